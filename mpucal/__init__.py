@@ -1,0 +1,41 @@
+"""mpucal: guided accelerometer calibration for the MPU-6050 and MPU-6500, with the gyroscope's help.
+
+    recording = mpucal.load("capture.mcap")
+    calibration = mpucal.calibrate(recording)
+    a = calibration.apply(acc)
+
+The names load on first use, so that `import mpucal` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .calibration import calibrate
+    from .capture import load
+    from .data import Recording
+    from .errors import MpucalError
+    from .result import Calibration
+
+__all__ = ["Calibration", "MpucalError", "Recording", "calibrate", "load"]
+__version__ = "0.1.0"
+
+_HOME = {
+    "Calibration": ".result",
+    "MpucalError": ".errors",
+    "Recording": ".data",
+    "calibrate": ".calibration",
+    "load": ".capture",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'mpucal' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name], __name__), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

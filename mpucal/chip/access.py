@@ -1,0 +1,60 @@
+"""What the chip's driver needs from a bus. Knows no bus."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Protocol
+
+
+class Reply(NamedTuple):
+    """Bytes read, and when."""
+
+    data: bytes
+    t_ns: int
+
+
+class Bus(Protocol):
+    """Moves register reads and writes, and carries the time (ns, in the bus's own clock).
+
+    Linux I2C, the replay and the simulated chip are buses; so is a tap that records one of them.
+    Every method raises BusError where the transfer fails; a replay raises EndOfCapture at its end.
+    """
+
+    def read(self, register: int, count: int) -> Reply:
+        """`count` bytes from `register` on; FIFO_R_W does not auto-increment. Time: when the read began."""
+        ...
+
+    def write(self, register: int, data: bytes) -> int:
+        """Write `data` from `register` on, and return the time."""
+        ...
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Wait until the bus's clock shows `t_ns` (a replay and a fast simulation return at once)."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the device."""
+        ...
+
+
+@dataclass(frozen=True)
+class Transaction:
+    """One register access as it happened.
+
+    Attributes
+    ----------
+    op : read or write. register : address. data : bytes moved. t_ns : the bus's clock.
+    error : None, or the sentence with which the transfer failed (then data holds what was to be written).
+    count : bytes asked for (reads) or given (writes).
+    """
+
+    op: Literal["read", "write"]
+    register: int
+    count: int
+    data: bytes
+    t_ns: int
+    error: str | None = None
+
+
+class EndOfCapture(Exception):  # noqa: N818 - not an error: the source has ended
+    """The source holds no more transactions."""

@@ -1,0 +1,195 @@
+"""The measured values that travel through mpucal. Knows no file, bus or estimate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import RecordingError
+
+Vector = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+STANDARD_GRAVITY_MPS2 = 9.80665
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """What is known of the sensor behind a recording; None where nobody said."""
+
+    chip: str | None = None
+    who_am_i: int | None = None
+    accel_range_g: float | None = None
+    gyro_range_dps: float | None = None
+    rate_hz: float | None = None
+    temperature_c: float | None = None
+
+
+@dataclass(frozen=True)
+class Samples:
+    """A run of samples, one row an instant.
+
+    Attributes
+    ----------
+    t : (n,) s, increasing.
+    acc : (n, 3) m/s^2 at the chip's nominal scale, the paper's y_t.
+    gyr : (n, 3) rad/s at the chip's nominal scale, the paper's omega-bar_t.
+    temperature_c : (n,) degrees Celsius, NaN where unknown.
+    gap : (n,) True where samples are missing just before this one.
+    acc_clipped, gyr_clipped : (n,) True where an axis stood at the end of its range.
+    """
+
+    t: Vector
+    acc: Vector
+    gyr: Vector
+    temperature_c: Vector
+    gap: Mask
+    acc_clipped: Mask
+    gyr_clipped: Mask
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @classmethod
+    def joined(cls, parts: list[Samples]) -> Samples:
+        """All parts, one after the other; no parts give no samples."""
+        if not parts:
+            return Samples.empty()
+        return Samples(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Samples)))
+
+    @classmethod
+    def empty(cls) -> Samples:
+        """No samples at all."""
+        none, three, no = np.zeros(0), np.zeros((0, 3)), np.zeros(0, bool)
+        return Samples(none, three, three.copy(), none.copy(), no, no.copy(), no.copy())
+
+
+@dataclass(frozen=True)
+class Recording(Samples):
+    """Samples of one session with one sensor.
+
+    Attributes
+    ----------
+    flat : (first, last + 1) samples known to lie flat and still; None: to be found.
+    sensor : what is known of the sensor.
+    name : what to call the recording in a message.
+    """
+
+    flat: tuple[int, int] | None = None
+    sensor: Sensor = Sensor()
+    name: str = "recording"
+
+    @classmethod
+    def from_arrays(
+        cls,
+        t: ArrayLike,
+        acc: ArrayLike,
+        gyr: ArrayLike,
+        flat: tuple[int, int] | None = None,
+        *,
+        temperature_c: ArrayLike | None = None,
+        gap: ArrayLike | None = None,
+        acc_clipped: ArrayLike | None = None,
+        gyr_clipped: ArrayLike | None = None,
+        sensor: Sensor | None = None,
+        name: str = "recording",
+    ) -> Recording:
+        """A recording of plain arrays, checked.
+
+        Parameters
+        ----------
+        t : (n,) s, strictly increasing. acc : (n, 3) m/s^2. gyr : (n, 3) rad/s.
+        flat : (first, last + 1) samples that lie flat, if known.
+        temperature_c : (n,); gap, acc_clipped, gyr_clipped : (n,) bool, see Samples.
+
+        Raises
+        ------
+        RecordingError : wrong shapes, values that are no numbers, or time that does not increase.
+        """
+        t = _numbers(t, "t", name)
+        if t.ndim != 1 or len(t) < 2:
+            raise RecordingError(
+                f"{name}: t has shape {t.shape}, not (n,) with n >= 2", "give one time in seconds a sample"
+            )
+        acc, gyr = _rows(acc, "acc", len(t), name), _rows(gyr, "gyr", len(t), name)
+        _check_time(t, name)
+        if flat is not None:
+            first, last = int(flat[0]), int(flat[1])
+            if not 0 <= first < last <= len(t):
+                raise RecordingError(
+                    f"{name}: flat = ({first}, {last}) does not lie within its {len(t)} samples",
+                    "give (first, last + 1) of the samples that lie flat, or leave it out",
+                )
+            flat = (first, last)
+        n = len(t)
+        return cls(
+            t,
+            acc,
+            gyr,
+            np.full(n, np.nan) if temperature_c is None else _column(temperature_c, "temperature_c", n, name),
+            *(
+                np.zeros(n, bool) if mask is None else _column(mask, key, n, name).astype(bool)
+                for key, mask in (("gap", gap), ("acc_clipped", acc_clipped), ("gyr_clipped", gyr_clipped))
+            ),
+            flat=flat,
+            sensor=sensor or Sensor(),
+            name=name,
+        )
+
+    @property
+    def rate_hz(self) -> float:
+        """Median sample rate [Hz]."""
+        return float(1.0 / np.median(np.diff(self.t)))
+
+    def part(self, first: int, last: int) -> Self:
+        """Samples first..last-1; `flat` is cut with it, or forgotten where it lies outside."""
+        flat = None
+        if self.flat is not None:
+            a, b = max(self.flat[0], first) - first, min(self.flat[1], last) - first
+            flat = (a, b) if b > a else None
+        arrays = {f.name: getattr(self, f.name)[first:last] for f in fields(Samples)}
+        return replace(self, flat=flat, **arrays)
+
+
+def _numbers(values: ArrayLike, key: str, name: str) -> Vector:
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise RecordingError(f"{name}: {key} holds values that are no numbers ({error})", "give numbers") from error
+
+
+def _column(values: ArrayLike, key: str, n: int, name: str) -> Vector:
+    array = _numbers(values, key, name)
+    if array.shape != (n,):
+        raise RecordingError(f"{name}: {key} has shape {array.shape}, not ({n},)", "give one value a sample")
+    return array
+
+
+def _rows(values: ArrayLike, key: str, n: int, name: str) -> Vector:
+    array = _numbers(values, key, name)
+    if array.shape != (n, 3):
+        raise RecordingError(
+            f"{name}: {key} has shape {array.shape}, not ({n}, 3)", "give one row of x, y, z a sample"
+        )
+    bad = ~np.isfinite(array).all(axis=1)
+    if bad.any():
+        raise RecordingError(
+            f"{name}: {key} is not a finite number in {int(bad.sum())} of {n} samples, first in sample {int(bad.argmax())}",
+            "leave those samples out, and keep the times of the others",
+        )
+    return array
+
+
+def _check_time(t: Vector, name: str) -> None:
+    if not np.isfinite(t).all():
+        raise RecordingError(f"{name}: t is not a finite number everywhere", "give times in seconds")
+    back = np.diff(t) <= 0
+    if back.any():
+        i = int(back.argmax()) + 1
+        raise RecordingError(
+            f"{name}: time does not increase at sample {i} ({t[i - 1]:.6f} s, then {t[i]:.6f} s)",
+            "sort the samples by time and drop repeated ones",
+        )

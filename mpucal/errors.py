@@ -1,0 +1,93 @@
+"""Everything mpucal raises on purpose, each with the exit code of the command line.
+
+    MpucalError
+    ├── UsageError            2  the call's words do not fit together
+    ├── SourceError           3  a device, bus or file cannot be read
+    │   ├── RecordingError       a file or arrays that are no recording
+    │   ├── CaptureError         a capture that is damaged, or does not hold what was asked of it
+    │   ├── BusError             a transfer failed
+    │   │   └── NoAnswer         nothing acknowledged the address
+    │   └── ChipError            the chip answers, but not as its register map says
+    ├── OutputError           3  a result cannot be written where it was asked to go
+    ├── Abandoned             4  the session ended before there was anything to calibrate
+    ├── RefusedError          5  the calibration was refused, or failed its verification
+    └── WriteBackError        6  the write-back was refused or failed; the old state holds
+"""
+
+from __future__ import annotations
+
+
+class MpucalError(Exception):
+    """Root of the tree: what happened, on what, and what to do next.
+
+    Parameters
+    ----------
+    what : one clause, no full stop: what happened, on what.
+    remedy : one clause, no full stop: what the person can do next.
+    """
+
+    exit_code = 1
+
+    def __init__(self, what: str, remedy: str) -> None:
+        super().__init__(what, remedy)
+        self.what = what
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.remedy}."
+
+
+class UsageError(MpucalError):
+    """The call's words do not fit together."""
+
+    exit_code = 2
+
+
+class SourceError(MpucalError):
+    """A device, bus or file cannot be read."""
+
+    exit_code = 3
+
+
+class RecordingError(SourceError):
+    """A file or arrays that are no recording."""
+
+
+class CaptureError(SourceError):
+    """A capture that is damaged, or does not hold what was asked of it."""
+
+
+class BusError(SourceError):
+    """A transfer failed."""
+
+
+class NoAnswer(BusError):  # noqa: N818 - reads as the sentence it is
+    """Nothing acknowledged the address."""
+
+
+class ChipError(SourceError):
+    """The chip answers, but not as its register map says."""
+
+
+class OutputError(MpucalError):
+    """A result cannot be written where it was asked to go."""
+
+    exit_code = 3
+
+
+class Abandoned(MpucalError):  # noqa: N818
+    """The session ended before there was anything to calibrate."""
+
+    exit_code = 4
+
+
+class RefusedError(MpucalError):
+    """The calibration was refused, or failed its verification."""
+
+    exit_code = 5
+
+
+class WriteBackError(MpucalError):
+    """The write-back was refused or failed; the old state holds."""
+
+    exit_code = 6
