@@ -158,7 +158,9 @@ def _numbers(values: ArrayLike, key: str, name: str) -> Vector:
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise RecordingError(f"{name}: {key} holds values that are no numbers ({error})", "give numbers") from error
+        raise RecordingError(
+            f"{name}: {key} holds values that are no numbers ({error})", "give numbers"
+        ) from error
 
 
 def _column(values: ArrayLike, key: str, n: int, name: str) -> Vector:

@@ -1,17 +1,17 @@
 """Everything mpucal raises on purpose, each with the exit code of the command line.
 
-    MpucalError
-    ├── UsageError            2  the call's words do not fit together
-    ├── SourceError           3  a device, bus or file cannot be read
-    │   ├── RecordingError       a file or arrays that are no recording
-    │   ├── CaptureError         a capture that is damaged, or does not hold what was asked of it
-    │   ├── BusError             a transfer failed
-    │   │   └── NoAnswer         nothing acknowledged the address
-    │   └── ChipError            the chip answers, but not as its register map says
-    ├── OutputError           3  a result cannot be written where it was asked to go
-    ├── Abandoned             4  the session ended before there was anything to calibrate
-    ├── RefusedError          5  the calibration was refused, or failed its verification
-    └── WriteBackError        6  the write-back was refused or failed; the old state holds
+MpucalError
+├── UsageError            2  the call's words do not fit together
+├── SourceError           3  a device, bus or file cannot be read
+│   ├── RecordingError       a file or arrays that are no recording
+│   ├── CaptureError         a capture that is damaged, or does not hold what was asked of it
+│   ├── BusError             a transfer failed
+│   │   └── NoAnswer         nothing acknowledged the address
+│   └── ChipError            the chip answers, but not as its register map says
+├── OutputError           3  a result cannot be written where it was asked to go
+├── Abandoned             4  the session ended before there was anything to calibrate
+├── RefusedError          5  the calibration was refused, or failed its verification
+└── WriteBackError        6  the write-back was refused or failed; the old state holds
 """
 
 from __future__ import annotations

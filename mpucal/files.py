@@ -31,7 +31,8 @@ def write_atomically(path: Path, data: bytes) -> None:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
         raise OutputError(
-            f"cannot write {path} ({error.strerror or error})", "choose a folder that you may write to with -o"
+            f"cannot write {path} ({error.strerror or error})",
+            "choose a folder that you may write to with -o",
         ) from error
 
 

@@ -1,0 +1,98 @@
+"""What the estimators share: the stationary segment's statistics and what a fit returns. Knows no algorithm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data import Vector
+
+
+@dataclass(frozen=True)
+class Flat:
+    """Line 1 of Algorithm 1: what the stationary segment says.
+
+    Attributes
+    ----------
+    first, last : samples first..last-1 are the segment.
+    y : (3,) m/s^2, mean of the accelerometer. b_omega : (3,) rad/s, mean of the gyroscope.
+    Sigma_a : (3,) (m/s^2)^2 and Sigma_omega : (3,) (rad/s)^2, the diagonals of the covariances.
+    """
+
+    first: int
+    last: int
+    y: Vector
+    b_omega: Vector
+    Sigma_a: Vector
+    Sigma_omega: Vector
+
+    @property
+    def n(self) -> int:
+        """Number of samples."""
+        return self.last - self.first
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Estimated parameters, whatever the method.
+
+    Attributes
+    ----------
+    D : (3, 3). b_a : (3,) m/s^2. b_omega : (3,) rad/s. K : (3, 3).
+    names : p names of the parameters, D row-major first, then b_a.
+    covariance : (p, p), in the order of `names`.
+    iterations : of the minimiser. converged : whether it met its stopping rule.
+    nis : mean of ||e_t||^2 weighted by the inverse of S_t, over all samples; 3 where the model holds.
+    V : the cost function (8) at the estimate.
+    """
+
+    D: Vector
+    b_a: Vector
+    b_omega: Vector
+    K: Vector
+    names: tuple[str, ...]
+    covariance: Vector
+    iterations: int
+    converged: bool
+    nis: float
+    V: float
+
+    def std(self, *names: str) -> Vector:
+        """Standard deviations of the named parameters, NaN for those that were not estimated."""
+        variance = dict(zip(self.names, np.diag(self.covariance), strict=True))
+        return np.sqrt([max(variance.get(name, np.nan), 0.0) for name in names])
+
+
+D_NAMES = tuple(f"D_{i}{j}" for i in "xyz" for j in "xyz")
+B_A_NAMES = tuple(f"b_a_{i}" for i in "xyz")
+B_OMEGA_NAMES = tuple(f"b_omega_{i}" for i in "xyz")
+
+
+def cross(v: Vector) -> NDArray[np.float64]:
+    """[v]x, the matrix of the cross product: (..., 3) -> (..., 3, 3)."""
+    matrix = np.zeros((*v.shape[:-1], 3, 3))
+    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    return matrix - np.swapaxes(matrix, -1, -2)
+
+
+def rotation(phi: Vector) -> NDArray[np.float64]:
+    """exp([phi]x), the rotation by the vector phi [rad]: (..., 3) -> (..., 3, 3)."""
+    angle2 = np.sum(phi * phi, axis=-1)[..., None, None]
+    angle = np.sqrt(angle2)
+    X = cross(phi)
+    # sinc and its companion, finite at zero
+    a = np.sinc(angle / np.pi)
+    b = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+    turn: NDArray[np.float64] = np.eye(3) + a * X + b * (X @ X)
+    return turn
+
+
+def tangents(u: Vector) -> tuple[Vector, Vector]:
+    """Two unit vectors (3,) that span the plane across the unit vector u."""
+    axis = np.zeros(3)
+    axis[int(np.argmin(np.abs(u)))] = 1.0
+    first = np.cross(u, axis)
+    first /= np.linalg.norm(first)
+    return first, np.cross(u, first)

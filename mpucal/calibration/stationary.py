@@ -1,0 +1,113 @@
+"""Where the board lies still, and what that says (line 1 of Algorithm 1). Knows no motion model."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..data import Recording, Vector
+from .model import Flat
+
+WINDOW_S = 0.5
+SHORTEST_FLAT_S = 1.0
+ENOUGH_FLAT_S = 5.0
+
+# Above these a window is not still, however noisy the quietest part of a recording is ...
+GYRO_SD_MAX_RAD_S, ACC_SD_MAX_MPS2 = 0.15, 0.5
+# ... and below these it may be, however quiet: a table that hums, a hand that is braced.
+GYRO_SD_MIN_RAD_S, ACC_SD_MIN_MPS2 = 0.03, 0.15
+# Neighbouring windows of a still board agree this well beyond their noise.
+GYRO_STEP_RAD_S, ACC_STEP_MPS2 = 0.01, 0.03
+
+VARIANCE_FLOOR_OF_RANGE = 1e-12
+
+
+def find_flat(recording: Recording) -> tuple[int, int] | None:
+    """(first, last + 1) of the segment that lies flat, or None where the board never lies still.
+
+    It is the earliest still run of five seconds, or else of half the length of the longest. A run is still where the windows'
+    spread is small and their means agree: a turn at a constant rate has no variance, only a mean that moves.
+    """
+    n = max(int(round(WINDOW_S * recording.rate_hz)), 4)
+    acc, gyr = _windows(recording.acc, n), _windows(recording.gyr, n)
+    if len(acc) < 2:
+        return None
+    acc_mean, gyr_mean = acc.mean(1), gyr.mean(1)
+    acc_sd, gyr_sd = acc.std(1), gyr.std(1)
+    quiet = (acc_sd <= _limit(acc_sd, ACC_SD_MIN_MPS2, ACC_SD_MAX_MPS2)).all(1)
+    quiet &= (gyr_sd <= _limit(gyr_sd, GYRO_SD_MIN_RAD_S, GYRO_SD_MAX_RAD_S)).all(1)
+    whole = ~(_windows(recording.gap[:, None], n)[:, 1:, 0].any(1))
+    quiet &= whole
+    runs = []
+    start = 0
+    for k in range(1, len(acc) + 1):
+        if k < len(acc) and quiet[k - 1] and quiet[k] and not recording.gap[k * n]:
+            here = slice(start, k)
+            size = 4.5 * np.sqrt(1.0 / n + 1.0 / (n * (k - start)))
+            near_acc = np.abs(acc_mean[k] - acc_mean[here].mean(0)) <= ACC_STEP_MPS2 + size * acc_sd[
+                here
+            ].mean(0)
+            near_gyr = np.abs(gyr_mean[k] - gyr_mean[here].mean(0)) <= GYRO_STEP_RAD_S + size * gyr_sd[
+                here
+            ].mean(0)
+            if near_acc.all() and near_gyr.all():
+                continue
+        if quiet[k - 1] and k - start >= 2:
+            runs.append((start * n, k * n))
+        start = k
+    shortest = SHORTEST_FLAT_S * recording.rate_hz
+    runs = [run for run in runs if run[1] - run[0] >= shortest]
+    if not runs:
+        return None
+    longest = max(last - first for first, last in runs)
+    enough = min(longest / 2, ENOUGH_FLAT_S * recording.rate_hz)
+    first, last = next(run for run in runs if run[1] - run[0] >= enough)
+    # the outermost windows may hold the first and last of a movement
+    trim = n if last - first >= 6 * n else 0
+    return first + trim, last - trim
+
+
+def flat_statistics(recording: Recording, flat: tuple[int, int]) -> Flat:
+    """Sigma_a, Sigma_omega, b_omega and the mean acceleration of samples flat[0]..flat[1]-1 (Algorithm 1, line 1).
+
+    A variance is never zero: a stream of coarse steps may read exactly constant, but its noise is then somewhere
+    below a step, not absent.
+    """
+    first, last = flat
+    acc, gyr = recording.acc[first:last], recording.gyr[first:last]
+    return Flat(
+        first,
+        last,
+        y=acc.mean(0),
+        b_omega=gyr.mean(0),
+        Sigma_a=_variance(acc, recording.acc),
+        Sigma_omega=_variance(gyr, recording.gyr),
+    )
+
+
+def _windows(values: Vector, n: int) -> Vector:
+    """(m, n, 3) consecutive windows of n samples; the remainder is left out."""
+    m = len(values) // n
+    return values[: m * n].reshape(m, n, values.shape[1])
+
+
+def _limit(sd: Vector, least: float, most: float) -> Vector:
+    """(3,) the largest standard deviation that still counts as quiet."""
+    return np.clip(2.5 * np.quantile(sd, 0.05, axis=0), least, most)
+
+
+def _variance(part: Vector, whole: Vector) -> Vector:
+    variance = part.var(0, ddof=1)
+    step = np.array([_step(whole[:, i]) for i in range(3)])
+    span = np.ptp(whole, axis=0)
+    return np.maximum(variance, np.maximum(step**2 / 12.0, VARIANCE_FLOOR_OF_RANGE * span**2))
+
+
+def _step(column: Vector) -> float:
+    """The stream's resolution: its smallest difference between two values, 0 where it is as fine as noise.
+
+    A thousand samples tell: where nearly all values differ there are no steps to see.
+    """
+    values = np.unique(column[:: max(len(column) // 1000, 1)])
+    if len(values) < 2:
+        return 0.0
+    return float(np.min(np.diff(values))) if len(values) < 700 else 0.0
