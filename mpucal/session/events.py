@@ -1,0 +1,154 @@
+"""What happens to a session and what it answers, as plain values. Knows no rule of what follows what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from ..data import Samples, Sensor
+
+Direction = tuple[float, float, float]
+
+
+class Key(StrEnum):
+    """What the person can say."""
+
+    ENOUGH = "enough"
+    ABORT = "abort"
+
+
+# What happens to a session.
+
+
+@dataclass(frozen=True)
+class Connected:
+    """The sensor answered and measures."""
+
+    sensor: Sensor
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Samples arrived; they carry the session's time."""
+
+    samples: Samples
+
+
+@dataclass(frozen=True)
+class Tick:
+    """The source was asked and the time is `t_s`, on the clock of the samples' times."""
+
+    t_s: float
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """The person pressed a key."""
+
+    key: Key
+
+
+@dataclass(frozen=True)
+class SourceEnded:
+    """No more samples will come; `why` is None where a recording came to its end, else what failed."""
+
+    why: str | None = None
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The calibration is there, with its verdict: good, usable or refused."""
+
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Written:
+    """The results are in their files."""
+
+    names: tuple[str, ...]
+
+
+# What the session itself finds in the above; they drive its table like the rest.
+
+
+@dataclass(frozen=True)
+class Rested:
+    """The board lay still for long enough."""
+
+    still_s: float
+
+
+@dataclass(frozen=True)
+class Turned:
+    """The board was turned enough, or as much as it will be."""
+
+    orientations: int
+    why: str
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """The session cannot go on or shall not; `why` says what happened, `remedy` what to do next."""
+
+    why: str
+    remedy: str
+
+
+Event = Connected | Measured | Tick | Pressed | SourceEnded | Fitted | Written | Rested | Turned | Stopped
+
+
+# What the session answers.
+
+
+class PromptKind(StrEnum):
+    """What the person (or the hand that stands in for one) is to do now."""
+
+    LAY_FLAT = "lay_flat"
+    HOLD_STILL = "hold_still"
+    ROTATE = "rotate"
+    REST = "rest"
+
+
+@dataclass(frozen=True)
+class Prompt:
+    """An instruction to the person.
+
+    Attributes
+    ----------
+    kind : what to do. text : the same in words.
+    down : unit vector in the board's axes that is to point down, where one orientation is wanted.
+    """
+
+    kind: PromptKind
+    text: str
+    down: Direction | None = None
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far the present step is: `done` of `of`, in words."""
+
+    done: float
+    of: float
+    text: str
+
+
+class Action(StrEnum):
+    """What the machine's owner is to do next."""
+
+    MEASURE = "measure"
+    CALIBRATE = "calibrate"
+    WRITE = "write"
+    FINISH = "finish"
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The session goes on with `action`; `why` in words."""
+
+    action: Action
+    why: str
+
+
+Output = Prompt | Progress | Decision
