@@ -37,6 +37,17 @@ class Bus(Protocol):
         ...
 
 
+class Failure(NamedTuple):
+    """The error with which a transfer failed, as plain words; `str` is its sentence."""
+
+    name: str
+    what: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.remedy}."
+
+
 @dataclass(frozen=True)
 class Transaction:
     """One register access as it happened.
@@ -44,7 +55,7 @@ class Transaction:
     Attributes
     ----------
     op : read or write. register : address. data : bytes moved. t_ns : the bus's clock.
-    error : None, or the sentence with which the transfer failed (then data holds what was to be written).
+    error : None, or how the transfer failed (then data holds what was to be written).
     count : bytes asked for (reads) or given (writes).
     """
 
@@ -53,7 +64,7 @@ class Transaction:
     count: int
     data: bytes
     t_ns: int
-    error: str | None = None
+    error: Failure | None = None
 
 
 class EndOfCapture(Exception):  # noqa: N818 - not an error: the source has ended
