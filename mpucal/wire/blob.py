@@ -1,0 +1,161 @@
+"""The config blob of firmware_protocol.md: a calibration as firmware reads it. Knows no file or chip."""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+MAGIC = b"MPUC"
+MAJOR, MINOR = 1, 0
+MAX_LENGTH = 256
+FORMULA = "a = inv(D) @ (y - b_a + applied_b_a)"
+
+# firmware_protocol.md, "Layout", down to the last field of this version; then the checksum
+FIELDS = struct.Struct("<4s B B H 40s B 3x f f 9f 3f f Q f 3f 9f 3f")
+CHECKSUM = struct.Struct("<I")
+LENGTH = FIELDS.size + CHECKSUM.size
+HEADER_LENGTH = 8
+
+MAJOR_AT = 4
+LENGTH_AT = 6
+
+
+class BlobError(ValueError):
+    """Bytes that are no config blob, or values that none can hold."""
+
+
+@dataclass(frozen=True)
+class Blob:
+    """What a config blob holds.
+
+    Attributes
+    ----------
+    who_am_i : the chip's WHO_AM_I; 0 unknown.
+    accel_range_g, gyro_range_dps : full scale; 0 unknown.
+    D : 9 numbers, row-major. b_a : 3, m/s^2: a = inv(D) (y - b_a + applied_b_a).
+    gravity : m/s^2, with which D was scaled; NaN unknown.
+    temperature_c : at which it was measured; NaN unknown.
+    created : ISO 8601, without an offset read as UTC; kept in whole seconds; empty: unknown.
+    applied_b_a : m/s^2 that the chip's offset registers subtract already.
+    K : 9 numbers, row-major. b_omega : 3, rad/s: w = K (y - b_omega); NaN where not estimated.
+    """
+
+    who_am_i: int
+    accel_range_g: float
+    gyro_range_dps: float
+    D: tuple[float, ...]
+    b_a: tuple[float, ...]
+    gravity: float
+    temperature_c: float
+    created: str
+    applied_b_a: tuple[float, ...]
+    K: tuple[float, ...]
+    b_omega: tuple[float, ...]
+
+    def encode(self) -> bytes:
+        """The blob's bytes.
+
+        Raises
+        ------
+        BlobError : D, b_a or applied_b_a is not finite, or a value does not fit its field.
+        """
+        _check_usable(self)
+        try:
+            body = FIELDS.pack(
+                MAGIC,
+                MAJOR,
+                MINOR,
+                LENGTH,
+                FORMULA.encode(),
+                self.who_am_i,
+                self.accel_range_g,
+                self.gyro_range_dps,
+                *self.D,
+                *self.b_a,
+                self.gravity,
+                _unix_seconds(self.created),
+                self.temperature_c,
+                *self.applied_b_a,
+                *self.K,
+                *self.b_omega,
+            )
+        except (struct.error, OverflowError) as error:
+            raise BlobError(f"a value does not fit its field ({error})") from error
+        return body + CHECKSUM.pack(zlib.crc32(body))
+
+    @classmethod
+    def decode(cls, data: bytes) -> Blob:
+        """The values of one whole blob; fields that a newer minor version appended are skipped.
+
+        Raises
+        ------
+        BlobError : too short, another magic, major version or length, damaged, or not usable.
+        """
+        _check_whole(data)
+        values = FIELDS.unpack_from(data)[5:]
+        blob = cls(
+            who_am_i=values[0],
+            accel_range_g=values[1],
+            gyro_range_dps=values[2],
+            D=values[3:12],
+            b_a=values[12:15],
+            gravity=values[15],
+            created=_iso_8601(values[16]),
+            temperature_c=values[17],
+            applied_b_a=values[18:21],
+            K=values[21:30],
+            b_omega=values[30:33],
+        )
+        _check_usable(blob)
+        return blob
+
+
+def _check_whole(data: bytes) -> None:
+    """The checks of firmware_protocol.md, "Reading", in its order."""
+    if len(data) < HEADER_LENGTH:
+        raise BlobError(f"{len(data)} bytes are too short for a blob")
+    if not data.startswith(MAGIC):
+        raise BlobError(f"it begins with {data[: len(MAGIC)]!r}, not {MAGIC!r}")
+    if data[MAJOR_AT] != MAJOR:
+        raise BlobError(f"its layout has major version {data[MAJOR_AT]}, and only {MAJOR} is known here")
+    length = int.from_bytes(data[LENGTH_AT : LENGTH_AT + 2], "little")
+    if not LENGTH <= length <= MAX_LENGTH:
+        raise BlobError(f"it says that it is {length} bytes long, where {LENGTH} to {MAX_LENGTH} are allowed")
+    if length != len(data):
+        raise BlobError(f"it says that it is {length} bytes long and is {len(data)}")
+    (checksum,) = CHECKSUM.unpack_from(data, length - CHECKSUM.size)
+    if checksum != zlib.crc32(data[: length - CHECKSUM.size]):
+        raise BlobError("its checksum does not match: it is damaged")
+
+
+def _check_usable(blob: Blob) -> None:
+    for name, count in (("D", 9), ("b_a", 3), ("applied_b_a", 3), ("K", 9), ("b_omega", 3)):
+        values = getattr(blob, name)
+        if len(values) != count:
+            raise BlobError(f"{name} has {len(values)} numbers, not {count}")
+        if name in ("D", "b_a", "applied_b_a") and not all(map(math.isfinite, values)):
+            raise BlobError(f"{name} holds a number that is not finite")
+
+
+def _unix_seconds(created: str) -> int:
+    if not created:
+        return 0
+    try:
+        time = datetime.fromisoformat(created)
+    except ValueError as error:
+        raise BlobError(f"created is no ISO 8601 time ({error})") from error
+    if time.tzinfo is None:
+        time = time.replace(tzinfo=UTC)
+    return math.floor(time.timestamp())
+
+
+def _iso_8601(seconds: int) -> str:
+    if not seconds:
+        return ""
+    try:
+        return datetime.fromtimestamp(seconds, UTC).isoformat()
+    except (ValueError, OverflowError, OSError) as error:
+        raise BlobError(f"its time, {seconds} s since 1970, is out of range") from error
