@@ -42,10 +42,13 @@ class Tick:
 
 
 @dataclass(frozen=True)
-class Pressed:
-    """The person pressed a key."""
+class Enough:
+    """The person says to go on now."""
 
-    key: Key
+
+@dataclass(frozen=True)
+class Abort:
+    """The person wants to stop."""
 
 
 @dataclass(frozen=True)
@@ -74,16 +77,16 @@ class Written:
 
 @dataclass(frozen=True)
 class Rested:
-    """The board lay still for long enough."""
+    """The board lay still for long enough; `acc` is the mean acceleration meanwhile [m/s^2]."""
 
     still_s: float
+    acc: Direction
 
 
 @dataclass(frozen=True)
 class Turned:
     """The board was turned enough, or as much as it will be."""
 
-    orientations: int
     why: str
 
 
@@ -95,7 +98,9 @@ class Stopped:
     remedy: str
 
 
-Event = Connected | Measured | Tick | Pressed | SourceEnded | Fitted | Written | Rested | Turned | Stopped
+Event = (
+    Connected | Measured | Tick | Enough | Abort | SourceEnded | Fitted | Written | Rested | Turned | Stopped
+)
 
 
 # What the session answers.
@@ -127,28 +132,20 @@ class Prompt:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far the present step is: `done` of `of`, in words."""
+    """How far the present step is: `done` of `of`, in words; `t_s` is the session's time."""
 
+    t_s: float
     done: float
     of: float
     text: str
 
 
-class Action(StrEnum):
-    """What the machine's owner is to do next."""
-
-    MEASURE = "measure"
-    CALIBRATE = "calibrate"
-    WRITE = "write"
-    FINISH = "finish"
-
-
 @dataclass(frozen=True)
 class Decision:
-    """The session goes on with `action`; `why` in words."""
+    """The session went on to its next state, or ended: `why`, and where it ended early, what to do next."""
 
-    action: Action
     why: str
+    remedy: str = ""
 
 
 Output = Prompt | Progress | Decision

@@ -1,0 +1,130 @@
+"""Whether the board lies still, for how long, and what moved it. Knows no prompt and no state."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import Vector
+from .windows import Window
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What still counts as still; the accelerometer's in m/s^2, the gyro's in rad/s.
+
+    Attributes
+    ----------
+    acc_sd, gyr_sd : a window's standard deviations may reach this, however quiet the sensor was before.
+    acc_step, gyr_step : its means may be this far, beyond its spread, from those of the stillness before it:
+        a turn at a constant rate has no spread, only a mean that moves.
+    """
+
+    acc_sd: float
+    gyr_sd: float
+    acc_step: float
+    gyr_step: float
+
+
+# A table may hum; a hand trembles by 0.1 m/s^2 and 1 deg/s at 2 to 10 Hz.
+ON_A_TABLE = Limits(acc_sd=0.15, gyr_sd=0.03, acc_step=0.08, gyr_step=0.02)
+IN_THE_HAND = Limits(acc_sd=0.3, gyr_sd=0.06, acc_step=0.3, gyr_step=0.06)
+
+# A noisier sensor may exceed these by what its quietest window shows, up to this factor ...
+OF_QUIETEST = 2.5
+# ... but never beyond this, however noisy it is.
+ACC_SD_MAX_MPS2, GYRO_SD_MAX_RAD_S = 0.5, 0.15
+
+# The MPU-6050's gyro may be off by 20 deg/s at rest; a board that seems to turn faster than this turns.
+GYRO_BIAS_MAX_RAD_S = math.radians(30.0)
+
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Still:
+    """It has been still for `seconds`; `acc` [m/s^2] and `gyr` [rad/s] are the means over that time, (3,)."""
+
+    seconds: float
+    acc: Vector
+    gyr: Vector
+
+
+@dataclass(frozen=True)
+class Moved:
+    """It moved after `after_s` of stillness; `what`: which sensor saw it, how much and about which axis."""
+
+    after_s: float
+    what: str
+
+
+class Stillness:
+    """Follows one still run after another, a window at a time."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._acc_quiet = np.full(3, np.inf)
+        self._gyr_quiet = np.full(3, np.inf)
+        self._run: list[Window] = []
+
+    @property
+    def seconds(self) -> float:
+        """How long it has been still [s]."""
+        return self._run[-1].end_s - self._run[0].start_s if self._run else 0.0
+
+    def add(self, window: Window) -> Still | Moved:
+        """What `window` shows."""
+        self._acc_quiet = np.minimum(self._acc_quiet, window.acc_sd)
+        self._gyr_quiet = np.minimum(self._gyr_quiet, window.gyr_sd)
+        what = self._shaken(window) or self._stepped(window)
+        if not what:
+            self._run.append(window)
+            return Still(self.seconds, *self._means())
+        moved = Moved(self.seconds, what)
+        # a window that is quiet in itself, only elsewhere, is where the next stillness begins
+        self._run = [] if self._shaken(window) else [window]
+        return moved
+
+    def _means(self) -> tuple[Vector, Vector]:
+        return np.mean([w.acc for w in self._run], 0), np.mean([w.gyr for w in self._run], 0)
+
+    def _shaken(self, window: Window) -> str:
+        """What within the window says that it is not still, or nothing."""
+        if not window.whole:
+            return "samples were lost"
+        acc = window.acc_sd / np.clip(OF_QUIETEST * self._acc_quiet, self._limits.acc_sd, ACC_SD_MAX_MPS2)
+        gyr = window.gyr_sd / np.clip(OF_QUIETEST * self._gyr_quiet, self._limits.gyr_sd, GYRO_SD_MAX_RAD_S)
+        turning = np.abs(window.gyr) / GYRO_BIAS_MAX_RAD_S
+        if turning.max() > 1.0:
+            return _turned(window.gyr)
+        if gyr.max() > max(acc.max(), 1.0):
+            return _turned(window.gyr_sd * np.where(gyr == gyr.max(), 1.0, 0.0))
+        return _shook(window.acc_sd, acc) if acc.max() > 1.0 else ""
+
+    def _stepped(self, window: Window) -> str:
+        """What between the window and the stillness before it says that it moved, or nothing."""
+        if not self._run:
+            return ""
+        acc, gyr = self._means()
+        acc_step, gyr_step = window.acc - acc, window.gyr - gyr
+        # a mean over a window with slow tremor in it is off by a part of that tremor
+        acc_ratio = np.abs(acc_step) / (self._limits.acc_step + window.acc_sd)
+        gyr_ratio = np.abs(gyr_step) / (self._limits.gyr_step + window.gyr_sd)
+        if max(acc_ratio.max(), gyr_ratio.max()) <= 1.0:
+            return ""
+        if gyr_ratio.max() > acc_ratio.max():
+            return _turned(gyr_step)
+        axis = int(acc_ratio.argmax())
+        return f"it tilted: the accelerometer changed by {abs(acc_step[axis]):.2f} m/s² along {AXES[axis]}"
+
+
+def _turned(gyr: Vector) -> str:
+    axis = int(np.abs(gyr).argmax())
+    return f"it turned at {math.degrees(abs(gyr[axis])):.0f} deg/s about {AXES[axis]}"
+
+
+def _shook(acc_sd: Vector, ratio: Vector) -> str:
+    axis = int(ratio.argmax())
+    return f"it shook: the accelerometer moved by {acc_sd[axis]:.2f} m/s² along {AXES[axis]}"

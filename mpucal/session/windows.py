@@ -1,0 +1,76 @@
+"""Half a second at a time: what each short run of samples looks like. Judges nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import Samples, Vector
+
+
+@dataclass(frozen=True)
+class Window:
+    """A short run of consecutive samples.
+
+    Attributes
+    ----------
+    start_s, end_s : times of its first sample and of the one after its last [s].
+    acc, gyr : (3,) means [m/s^2], [rad/s]. acc_sd, gyr_sd : (3,) standard deviations.
+    whole : no sample is missing within it or just before it.
+    """
+
+    start_s: float
+    end_s: float
+    acc: Vector
+    gyr: Vector
+    acc_sd: Vector
+    gyr_sd: Vector
+    whole: bool
+
+
+class Windows:
+    """Cuts samples, however they arrive, into windows of `length_s` by their own time."""
+
+    def __init__(self, length_s: float) -> None:
+        self._length_s = length_s
+        self._pending = Samples.empty()
+
+    def add(self, samples: Samples) -> list[Window]:
+        """The windows that `samples` complete."""
+        pending = Samples.joined([self._pending, samples]) if len(self._pending) else samples
+        windows: list[Window] = []
+        first = 0
+        while first < len(pending):
+            last = int(np.searchsorted(pending.t, pending.t[first] + self._length_s - 1e-9))
+            if last >= len(pending):
+                break
+            windows.append(_window(pending, first, last))
+            first = last
+        self._pending = _tail(pending, first)
+        return windows
+
+
+def _window(samples: Samples, first: int, last: int) -> Window:
+    acc, gyr = samples.acc[first:last], samples.gyr[first:last]
+    return Window(
+        float(samples.t[first]),
+        float(samples.t[last]),
+        acc.mean(0),
+        gyr.mean(0),
+        acc.std(0),
+        gyr.std(0),
+        not bool(samples.gap[first:last].any()),
+    )
+
+
+def _tail(samples: Samples, first: int) -> Samples:
+    return Samples(
+        samples.t[first:],
+        samples.acc[first:],
+        samples.gyr[first:],
+        samples.temperature_c[first:],
+        samples.gap[first:],
+        samples.acc_clipped[first:],
+        samples.gyr_clipped[first:],
+    )
