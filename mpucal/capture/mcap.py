@@ -1,0 +1,248 @@
+"""Captures as MCAP files: every register access and session event as it happened. Knows no chip."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Self
+
+from mcap.exceptions import McapError
+from mcap.records import Channel, Message, Metadata
+from mcap.stream_reader import CRCValidationError, StreamReader
+from mcap.well_known import MessageEncoding, SchemaEncoding
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
+from zstandard import ZstdError
+
+from ..bus.records import Record, SessionEvent
+from ..chip.access import Failure, Transaction
+from ..errors import CaptureError, OutputError
+
+FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 1
+BUS, SESSION = "/bus", "/session"
+
+# half of the second that a killed program may lose: the other half is for the wait between two records
+CHUNK_NS = 500_000_000
+
+_DAMAGE = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, EOFError)
+
+_BUS_SCHEMA = {
+    "title": "mpucal.Transaction",
+    "description": "A register access; the message's time is the bus's clock.",
+    "type": "object",
+    "properties": {
+        "op": {"enum": ["read", "write"]},
+        "register": {"type": "integer", "minimum": 0, "maximum": 255},
+        "count": {"type": "integer", "description": "bytes asked for or given"},
+        "data": {"type": "string", "description": "bytes moved, hexadecimal"},
+        "error": {
+            "type": "object",
+            "description": "how the transfer failed",
+            "properties": {key: {"type": "string"} for key in Failure._fields},
+        },
+    },
+}
+_SESSION_SCHEMA = {
+    "title": "mpucal.SessionEvent",
+    "description": "A key press, an option, the end; the message's time is the bus's clock.",
+    "type": "object",
+    "properties": {"name": {"type": "string"}, "data": {"type": "object"}},
+}
+
+
+class CaptureWriter:
+    """Writes a capture as it happens; a program that is killed loses the last second at most.
+
+    Raises
+    ------
+    OutputError : the file cannot be created or written.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._path = Path(path)
+        try:
+            self._file = self._path.open("wb")
+        except OSError as error:
+            raise self._cannot_write(error) from error
+        self._writer = Writer(self._file, compression=CompressionType.ZSTD, enable_data_crcs=True)
+        self._channels: dict[str, int] = {}
+        self._chunk_began_ns: int | None = None
+
+    def start(self, meta: Mapping[str, Any]) -> None:
+        """Write the head of the file: what is captured, by what and how; values of JSON's own types."""
+        try:
+            self._writer.start(profile="", library=FORMAT)
+            texts = {key: json.dumps(value) for key, value in {**meta, VERSION_KEY: VERSION}.items()}
+            self._writer.add_metadata(FORMAT, texts)
+            for topic, schema in ((BUS, _BUS_SCHEMA), (SESSION, _SESSION_SCHEMA)):
+                id_ = self._writer.register_schema(
+                    str(schema["title"]), SchemaEncoding.JSONSchema, json.dumps(schema).encode()
+                )
+                self._channels[topic] = self._writer.register_channel(topic, MessageEncoding.JSON, id_)
+            self._writer.flush()
+        except OSError as error:
+            raise self._cannot_write(error) from error
+
+    def transaction(self, transaction: Transaction) -> None:
+        """Keep a register access."""
+        content: dict[str, Any] = {
+            "op": transaction.op,
+            "register": transaction.register,
+            "count": transaction.count,
+            "data": transaction.data.hex(),
+        }
+        if transaction.error is not None:
+            content["error"] = transaction.error._asdict()
+        self._add(BUS, transaction.t_ns, content)
+
+    def event(self, name: str, t_ns: int, data: Mapping[str, Any] | None = None) -> None:
+        """Keep a session event; `data` of JSON's own types."""
+        self._add(SESSION, t_ns, {"name": name, "data": dict(data or {})})
+
+    def close(self) -> None:
+        """Write the index and close the file."""
+        try:
+            with self._file:
+                if self._channels:
+                    self._writer.finish()
+        except OSError as error:
+            raise self._cannot_write(error) from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _add(self, topic: str, t_ns: int, content: dict[str, Any]) -> None:
+        data = json.dumps(content, separators=(",", ":")).encode()
+        try:
+            self._writer.add_message(self._channels[topic], t_ns, data, publish_time=t_ns)
+            if self._chunk_began_ns is None:
+                self._chunk_began_ns = t_ns
+            elif t_ns - self._chunk_began_ns >= CHUNK_NS:
+                self._writer.flush()
+                self._chunk_began_ns = None
+        except OSError as error:
+            raise self._cannot_write(error) from error
+
+    def _cannot_write(self, error: OSError) -> OutputError:
+        return OutputError(
+            f"cannot write the capture {self._path} ({error.strerror or error})",
+            "choose a place that you may write to, with room on it, with -o",
+        )
+
+
+@dataclass(frozen=True)
+class Capture:
+    """What a capture file holds.
+
+    Attributes
+    ----------
+    meta : what `CaptureWriter.start` was given. records : in the order in which they happened.
+    recovered : None, or the sentence that says how much of a damaged file this is.
+    name : what to call the file in a message.
+    """
+
+    meta: Mapping[str, Any]
+    records: tuple[Record, ...]
+    recovered: str | None = None
+    name: str = "the capture"
+
+
+def read_capture(path: str | Path) -> Capture:
+    """Read a capture; of a file that was cut short, all that is whole.
+
+    Raises
+    ------
+    CaptureError : the file cannot be read, or is no capture of mpucal.
+    """
+    path = Path(path)
+    data = _bytes_of(path)
+    stream = BytesIO(data)
+    meta: dict[str, Any] | None = None
+    records: list[Record] = []
+    whole, finished = 0, False
+    try:
+        channels: dict[int, str] = {}
+        for item in StreamReader(stream, validate_crcs=True, record_size_limit=len(data)).records:
+            if isinstance(item, Metadata) and item.name == FORMAT:
+                meta = _meta(item, path)
+            elif isinstance(item, Channel):
+                channels[item.id] = item.topic
+            elif isinstance(item, Message):
+                record = _record(channels.get(item.channel_id, ""), item, path)
+                records += [] if record is None else [record]
+            whole = stream.tell()
+        finished = True
+    except _DAMAGE:
+        pass  # what was read until here is whole, and `_recovered` says what is not
+    if meta is None:
+        raise CaptureError(
+            f"{path} does not hold the head of a capture of mpucal", "give a capture that mpucal recorded"
+        )
+    recovered = None if finished else _recovered(path.name, records, len(data) - whole)
+    return Capture(meta, tuple(records), recovered, path.name)
+
+
+def _bytes_of(path: Path) -> bytes:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise CaptureError(
+            f"cannot read {path} ({error.strerror})", "check the path and its permissions"
+        ) from error
+    if not data:
+        raise CaptureError(f"{path} is empty", "record it again")
+    if not data.startswith(MCAP0_MAGIC):
+        raise CaptureError(f"{path} is no MCAP file", "give a capture that mpucal recorded")
+    return data
+
+
+def _meta(item: Metadata, path: Path) -> dict[str, Any]:
+    try:
+        meta = {key: json.loads(value) for key, value in item.metadata.items()}
+        version = int(meta.pop(VERSION_KEY))
+    except (ValueError, KeyError, TypeError) as error:
+        raise CaptureError(f"the head of {path} is damaged ({error})", "record it again") from error
+    if version > VERSION:
+        raise CaptureError(
+            f"{path} is a capture of version {version}, and this mpucal reads up to {VERSION}",
+            "update mpucal",
+        )
+    return meta
+
+
+def _record(topic: str, message: Message, path: Path) -> Record | None:
+    """The record of a message; None for a topic that a newer mpucal added."""
+    try:
+        content = json.loads(message.data)
+        if topic == SESSION:
+            return SessionEvent(content["name"], message.log_time, content["data"])
+        if topic != BUS:
+            return None
+        error = content.get("error")
+        return Transaction(
+            content["op"],
+            content["register"],
+            content["count"],
+            bytes.fromhex(content["data"]),
+            message.log_time,
+            None if error is None else Failure(**error),
+        )
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise CaptureError(
+            f"{path} holds a message on {topic} that is none of mpucal's ({error})",
+            "give a capture that mpucal recorded",
+        ) from error
+
+
+def _recovered(name: str, records: list[Record], lost: int) -> str:
+    seconds = (records[-1].t_ns - records[0].t_ns) / 1e9 if records else 0.0
+    held = f"{len(records)} records over {seconds:.1f} s are whole"
+    if lost:
+        return f"{name} is cut short or damaged: {held}, the {lost} bytes after them are lost."
+    return f"{name} was never closed: its {held}, what may have followed is lost."
