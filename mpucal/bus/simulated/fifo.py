@@ -1,0 +1,44 @@
+"""The chip's FIFO: bytes in, bytes out, and what happens when it is full. Knows no frame."""
+
+from __future__ import annotations
+
+
+class Fifo:
+    """A byte queue that overflows as the chip's does: by bytes, not by frames.
+
+    Parameters
+    ----------
+    size : bytes that fit.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self._bytes = bytearray()
+        self._last = 0
+
+    def __len__(self) -> int:
+        return len(self._bytes)
+
+    def push(self, data: bytes, stop_when_full: bool) -> bool:
+        """Append `data`; True where it did not fit, so that the oldest (or the newest) bytes are gone."""
+        self._bytes += data
+        excess = len(self._bytes) - self.size
+        if excess <= 0:
+            return False
+        if stop_when_full:
+            del self._bytes[-excess:]
+        else:
+            del self._bytes[:excess]
+        return True
+
+    def pop(self, count: int) -> bytes:
+        """The `count` oldest bytes; once it is empty, the last byte again and again."""
+        data = bytes(self._bytes[:count])
+        del self._bytes[:count]
+        if data:
+            self._last = data[-1]
+        return data + bytes([self._last]) * (count - len(data))
+
+    def clear(self) -> None:
+        """Forget all bytes."""
+        self._bytes.clear()
