@@ -1,0 +1,113 @@
+"""When each sample was taken: the sample index regressed on the bus's clock. Knows no bus and no frame.
+
+The chip samples with a clock of its own, up to 1 % off. All that is seen of it is how many samples it had
+taken by the time of each look. A look at `taken` samples finds the newest half an interval old on average, so
+
+    taken_j - 1/2 = rate (t_j - t_0),        t_i = t_0 + i / rate,
+
+with one rate for the whole recording and one t_0 for each run of samples without a gap: least squares of
+`taken` on t. The data sheet's tolerance is the prior of the rate: it holds the first second's times in
+place, and weighs less than 1e-6 after half a minute.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data import Vector
+
+NS = 1e-9
+
+# PS-MPU-6000A r3.4, section 6.6: the PLL on a gyroscope is within 1 %.
+RATE_TOLERANCE = 0.01
+# A look falls anywhere between two samples: a uniform distribution's standard deviation.
+LOOK_STD_SAMPLES = 12**-0.5
+
+
+@dataclass
+class _Segment:
+    """Sums over the looks at one run of samples; integers, so that they are exact."""
+
+    origin_ns: int = 0
+    n: int = 0
+    t: int = 0
+    taken: int = 0
+    tt: int = 0
+    t_taken: int = 0
+
+    def look(self, t_ns: int, taken: int) -> None:
+        if self.n == 0:
+            self.origin_ns = t_ns
+        t = t_ns - self.origin_ns
+        self.n += 1
+        self.t += t
+        self.taken += taken
+        self.tt += t * t
+        self.t_taken += t * taken
+
+    @property
+    def spread_s2(self) -> float:
+        """Sum of (t - mean t)^2."""
+        return (self.n * self.tt - self.t * self.t) / self.n * NS * NS if self.n else 0.0
+
+    @property
+    def product_s(self) -> float:
+        """Sum of (t - mean t)(taken - mean taken)."""
+        return (self.n * self.t_taken - self.t * self.taken) / self.n * NS if self.n else 0.0
+
+
+class SampleClock:
+    """Times of samples, in seconds of the bus's clock, better with every look.
+
+    Parameters
+    ----------
+    nominal_hz : the rate that the chip was set to.
+    """
+
+    def __init__(self, nominal_hz: float) -> None:
+        self._nominal_hz = nominal_hz
+        self._segments: list[_Segment] = []
+        self._past_spread_s2 = 0.0
+        self._past_product_s = 0.0
+
+    @property
+    def segment(self) -> int:
+        """Which run of samples without a gap is going on."""
+        return len(self._segments) - 1
+
+    def begin_segment(self) -> None:
+        """What follows has an offset of its own: it is the first, or samples were lost before it."""
+        if self._segments:
+            self._past_spread_s2 += self._segments[-1].spread_s2
+            self._past_product_s += self._segments[-1].product_s
+        self._segments.append(_Segment())
+
+    def look(self, t_ns: int, taken: int) -> None:
+        """At `t_ns` the chip had taken `taken` samples of this segment."""
+        self._segments[-1].look(t_ns, taken)
+
+    @property
+    def rate_hz(self) -> float:
+        """The sample rate, as far as it is known; once a segment has begun."""
+        prior = (LOOK_STD_SAMPLES / (RATE_TOLERANCE * self._nominal_hz)) ** 2
+        spread = self._past_spread_s2 + self._segments[-1].spread_s2
+        product = self._past_product_s + self._segments[-1].product_s
+        return (product + prior * self._nominal_hz) / (spread + prior)
+
+    def times_s(self, segment: int, index: NDArray[np.int64]) -> Vector:
+        """Times (n,) of samples number `index` (n,), counted from 0 in their segment, which was looked at."""
+        s = self._segments[segment]
+        taken_mean = s.taken / s.n
+        t_mean_s = s.origin_ns * NS + s.t / s.n * NS
+        return np.asarray(t_mean_s + (index + 0.5 - taken_mean) / self.rate_hz, np.float64)
+
+
+def increasing(t_s: Vector, step_s: float) -> Vector:
+    """`t_s` (n,), moved on by as little as makes each at least `step_s` later than the one before."""
+    if not (np.diff(t_s) < step_s).any():
+        return t_s
+    ramp = step_s * np.arange(len(t_s))
+    return np.asarray(np.maximum.accumulate(t_s - ramp) + ramp, np.float64)

@@ -1,0 +1,67 @@
+"""What a person may choose of how a chip measures, checked. Knows no register's address."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..errors import UsageError
+from . import registers as reg
+from .families import Part
+from .settings import Settings
+
+# Beyond 24 to 32 queued frames chips are known to corrupt some.
+MAX_FRAMES_A_POLL = 24
+MIN_POLL_S = 0.001
+
+
+@dataclass(frozen=True)
+class Config:
+    """How the chip is to measure.
+
+    Attributes
+    ----------
+    accel_range_g : 2, 4, 8 or 16. gyro_range_dps : 250, 500, 1000 or 2000 deg/s.
+    rate_hz : samples a second, nominally. dlpf : code of the low-pass filter, 0 (widest) to 6.
+    poll_s : time between two looks into the FIFO.
+
+    Raises
+    ------
+    UsageError : a value that the chip does not have; the sentence names those that it has.
+    """
+
+    accel_range_g: int = 4
+    gyro_range_dps: int = 500
+    rate_hz: float = 200
+    dlpf: int = 3
+    poll_s: float = 0.020
+
+    def __post_init__(self) -> None:
+        _check("accelerometer range", self.accel_range_g, "g", reg.ACCEL_RANGES_G)
+        _check("gyroscope range", self.gyro_range_dps, "deg/s", reg.GYRO_RANGES_DPS)
+        _check("low-pass filter", self.dlpf, "", reg.DLPF_CODES)
+        reg.sample_rate_divider(self.rate_hz, self.dlpf)
+        longest_s = MAX_FRAMES_A_POLL / self.rate_hz
+        if not MIN_POLL_S <= self.poll_s <= longest_s:
+            raise UsageError(
+                f"the FIFO cannot be polled every {self.poll_s:g} s at {self.rate_hz:g} Hz",
+                f"poll every {MIN_POLL_S:g} to {longest_s:g} s",
+            )
+
+    def settings(self, part: Part) -> Settings:
+        """The same for one part."""
+        return Settings(
+            part=part,
+            smplrt_div=reg.sample_rate_divider(self.rate_hz, self.dlpf),
+            dlpf_cfg=self.dlpf,
+            fs_sel=reg.GYRO_RANGES_DPS.index(self.gyro_range_dps),
+            afs_sel=reg.ACCEL_RANGES_G.index(self.accel_range_g),
+        )
+
+
+def _check(what: str, value: float, unit: str, allowed: Sequence[int]) -> None:
+    if value not in allowed:
+        choices = ", ".join(str(choice) for choice in allowed)
+        raise UsageError(
+            f"the chip has no {what} of {value:g} {unit}".rstrip(), f"take one of {choices} {unit}".rstrip()
+        )

@@ -1,0 +1,102 @@
+"""Register accesses to samples, as they happen or from a capture. Knows no bus and makes no access itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ..data import Recording, Samples
+from ..errors import RecordingError
+from . import registers as reg
+from .access import Transaction
+from .fifo import Fault, FifoDecoder
+from .settings import Settings
+
+
+class Decoder:
+    """Follows every access that succeeded, and knows from those alone what the FIFO's bytes mean.
+
+    The driver feeds it what it does and a capture what was done, so that both give the same samples.
+
+    Attributes
+    ----------
+    fault : what the last poll's INT_STATUS said against what the poll read.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._held: dict[int, int] = {}
+        self._settings: Settings | None = None
+        self._fifo: FifoDecoder | None = None
+        self.fault: Fault | None = None
+
+    def saw_read(self, register: int, data: bytes, t_ns: int) -> None:
+        """`data` was read from `register` on, at `t_ns`."""
+        if self._fifo is None:
+            self._hold(register, data)
+        elif register == reg.FIFO_COUNT_H:
+            self._fifo.counted(t_ns, int.from_bytes(data, "big"))
+        elif register == reg.FIFO_R_W:
+            self._fifo.data(data)
+        elif register == reg.INT_STATUS:
+            self.fault = self._fifo.judged(bool(data[0] & reg.INT_FIFO_OFLOW))
+        elif register == reg.TEMP_OUT_H:
+            self._fifo.temperature(int.from_bytes(data, "big", signed=True))
+        else:
+            self._hold(register, data)
+
+    def saw_write(self, register: int, data: bytes) -> None:
+        """`data` was written from `register` on.
+
+        Raises
+        ------
+        RecordingError : the FIFO starts with settings that nobody told, or that changed.
+        """
+        self._hold(register, data)
+        if register == reg.USER_CTRL and data[0] & reg.USER_CTRL_FIFO_RESET:
+            self._fifo_was_reset()
+
+    def take(self) -> Samples:
+        """The samples since the last `take`, with the times that are known now."""
+        return self._fifo.take() if self._fifo is not None else Samples.empty()
+
+    def recording(self) -> Recording:
+        """All samples so far, with the best times there are."""
+        if self._fifo is None:
+            empty = Samples.empty()
+            return Recording(**vars(empty), name=self._name)
+        return self._fifo.recording(self._name)
+
+    def _hold(self, register: int, data: bytes) -> None:
+        self._held.update(enumerate(data, register))
+
+    def _fifo_was_reset(self) -> None:
+        settings = Settings.from_registers(self._held, self._name)
+        if self._fifo is None:
+            self._settings, self._fifo = settings, FifoDecoder(settings)
+        elif settings != self._settings:
+            raise RecordingError(
+                f"{self._name} holds samples of two ranges or rates", "record each of them on its own"
+            )
+        self._fifo.reset()
+
+
+def decode(transactions: Iterable[Transaction], name: str = "recording") -> Recording:
+    """The samples that `transactions` carried; what was cut off at their end does no harm.
+
+    Raises
+    ------
+    RecordingError : the FIFO starts with settings that nobody told, or there are no two samples.
+    ChipError : a chip that is not known.
+    """
+    decoder = Decoder(name)
+    for transaction in transactions:
+        if transaction.error is not None:
+            continue
+        if transaction.op == "read":
+            decoder.saw_read(transaction.register, transaction.data, transaction.t_ns)
+        else:
+            decoder.saw_write(transaction.register, transaction.data)
+    recording = decoder.recording()
+    if len(recording) < 2:
+        raise RecordingError(f"{name} holds {len(recording)} samples", "record for longer")
+    return recording

@@ -1,0 +1,172 @@
+"""FIFO bytes to samples: aligned or not, clipped or not, and when. Knows no bus and no register.
+
+A frame is 14 bytes, big-endian int16 in register order: accelerometer x, y, z, temperature, gyroscope x, y, z
+(RM-MPU-6000A r4.2, registers 59 to 72 and 116).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data import Mask, Recording, Samples, Vector
+from . import registers as reg
+from .clock import SampleClock, increasing
+from .settings import Settings
+
+Counts = NDArray[np.int16]
+
+ACCEL, TEMPERATURE, GYRO = slice(0, 3), 3, slice(4, 7)
+FULL_SCALE_COUNT = 32767
+
+# The die does not change by 1.2 C from one sample to the next; a misaligned frame shows another word here.
+MAX_TEMPERATURE_STEP = 400
+# The first frame after a reset may have been cut by it, and the filters are not settled.
+DROPPED_FRAMES = 2
+# Between two times that the regression would put in the wrong order, in sample intervals.
+LEAST_STEP = 0.1
+
+
+class Fault(StrEnum):
+    """Why what lay in the FIFO is worth nothing."""
+
+    OVERFLOW = "overflow"
+    MISALIGNED = "misaligned"
+
+
+@dataclass(frozen=True)
+class _Run:
+    """Frames (n, 7) that follow each other, the first of them number `first` of `segment`."""
+
+    segment: int
+    first: int
+    frames: Counts
+    gap: bool
+
+
+class FifoDecoder:
+    """Turns what was read from the FIFO into samples; live and from a capture alike.
+
+    A poll is `counted`, then `data` if there was any, then `judged` by the overflow flag: what was read is
+    believed only then, since the FIFO may have overflowed while it was read. `reset` whenever the FIFO was.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._clock = SampleClock(settings.nominal_rate_hz)
+        self._runs: list[_Run] = []
+        self._taken = 0
+        self._temperature: int | None = None
+        self._read = 0
+        self._look: tuple[int, int] | None = None
+        self._pending = bytearray()
+        self._last_t_s: float | None = None
+
+    def temperature(self, count: int) -> None:
+        """The temperature register shows `count`: what an aligned frame will show too."""
+        self._temperature = count
+
+    def counted(self, t_ns: int, count_bytes: int) -> None:
+        """The FIFO held `count_bytes` at `t_ns`."""
+        self._pending.clear()
+        self._look = (t_ns, self._read + count_bytes // reg.FRAME_BYTES)
+
+    def data(self, data: bytes) -> None:
+        """`data` was read from the FIFO."""
+        self._pending += data
+
+    def judged(self, overflow: bool) -> Fault | None:
+        """Believe what the poll read, or say why not; then only a reset helps."""
+        data, look = bytes(self._pending), self._look
+        self._pending.clear()
+        self._look = None
+        if overflow:
+            return Fault.OVERFLOW
+        if len(data) % reg.FRAME_BYTES:
+            return Fault.MISALIGNED
+        frames = np.frombuffer(data, ">i2").reshape(-1, reg.FRAME_WORDS).astype(np.int16)
+        first = max(self._read, DROPPED_FRAMES)
+        kept = frames[first - self._read :]
+        if not self._aligned(kept):
+            return Fault.MISALIGNED
+        if look is not None:
+            self._clock.look(*look)
+        if len(kept):
+            self._runs.append(_Run(self._clock.segment, first, kept, gap=self._gap_before(first)))
+        self._read += len(frames)
+        return None
+
+    def reset(self) -> None:
+        """The FIFO was emptied: what was in it is lost, and a frame begins at the next byte."""
+        self._pending.clear()
+        self._look = None
+        self._clock.begin_segment()
+        self._read = 0
+
+    def take(self) -> Samples:
+        """The samples since the last `take`; their times are what is known now, and increase."""
+        runs, self._taken = self._runs[self._taken :], len(self._runs)
+        if not runs:
+            return Samples.empty()
+        samples = self._samples(runs)
+        t = samples.t
+        if self._last_t_s is not None:
+            t = increasing(np.insert(t, 0, self._last_t_s), LEAST_STEP / self._clock.rate_hz)[1:]
+        self._last_t_s = float(t[-1])
+        return replace(samples, t=t)
+
+    def recording(self, name: str) -> Recording:
+        """All samples so far with the best times there are, and the sensor with its measured rate."""
+        samples = self._samples(self._runs)
+        sensor = self._settings.sensor
+        if len(samples):
+            mean_c = float(samples.temperature_c.mean())
+            sensor = replace(sensor, rate_hz=self._clock.rate_hz, temperature_c=mean_c)
+        arrays = {f.name: getattr(samples, f.name) for f in fields(Samples)}
+        return Recording(**arrays, sensor=sensor, name=name)
+
+    def _aligned(self, frames: Counts) -> bool:
+        if not len(frames):
+            return True
+        temperature = frames[:, TEMPERATURE].astype(np.int64)
+        before = temperature[0] if self._temperature is None else self._temperature
+        if (np.abs(np.diff(temperature, prepend=before)) > MAX_TEMPERATURE_STEP).any():
+            return False
+        self._temperature = int(temperature[-1])
+        return True
+
+    def _gap_before(self, first: int) -> bool:
+        return first == DROPPED_FRAMES and bool(self._runs)
+
+    def _samples(self, runs: list[_Run]) -> Samples:
+        if not runs:
+            return Samples.empty()
+        frames = np.concatenate([run.frames for run in runs])
+        family, settings = self._settings.part.family, self._settings
+        gap = np.zeros(len(frames), bool)
+        gap[np.cumsum([0] + [len(run.frames) for run in runs[:-1]])] = [run.gap for run in runs]
+        return Samples(
+            t=self._times_s(runs),
+            acc=frames[:, ACCEL] * reg.mps2_per_lsb(settings.afs_sel),
+            gyr=frames[:, GYRO] * reg.rad_s_per_lsb(settings.fs_sel),
+            temperature_c=frames[:, TEMPERATURE] / family.lsb_per_c + family.zero_c,
+            gap=gap,
+            acc_clipped=_clipped(frames[:, ACCEL]),
+            gyr_clipped=_clipped(frames[:, GYRO]),
+        )
+
+    def _times_s(self, runs: list[_Run]) -> Vector:
+        times = [
+            self._clock.times_s(run.segment, run.first + np.arange(len(run.frames), dtype=np.int64))
+            for run in runs
+        ]
+        return increasing(np.concatenate(times), LEAST_STEP / self._clock.rate_hz)
+
+
+def _clipped(counts: Counts) -> Mask:
+    """(n,) True where one of (n, 3) stands at either end of int16."""
+    at_end = np.abs(counts.astype(np.int32)) >= FULL_SCALE_COUNT
+    return np.asarray(at_end.any(axis=1))

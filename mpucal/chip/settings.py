@@ -1,0 +1,83 @@
+"""How a chip is configured to measure: to its registers and back. Knows no bus and no order of writing.
+
+Source: RM-MPU-6000A r4.2 registers 25 to 28, RM-MPU-9250A r1.4 register 29.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Self
+
+from ..data import Sensor
+from ..errors import RecordingError
+from . import registers as reg
+from .families import Part, part_of
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What decides on the meaning of a FIFO frame.
+
+    Attributes
+    ----------
+    part : the chip. smplrt_div, dlpf_cfg : sample rate and low-pass filter, as registers hold them.
+    fs_sel, afs_sel : full scale of gyroscope and accelerometer, 0..3.
+    """
+
+    part: Part
+    smplrt_div: int
+    dlpf_cfg: int
+    fs_sel: int
+    afs_sel: int
+
+    @property
+    def nominal_rate_hz(self) -> float:
+        """The sample rate of a chip whose clock is right; none is."""
+        return reg.sample_rate_hz(self.smplrt_div, self.dlpf_cfg)
+
+    @property
+    def sensor(self) -> Sensor:
+        """What is known of the sensor before it has measured."""
+        return Sensor(
+            chip=self.part.chip,
+            who_am_i=self.part.who_am_i,
+            accel_range_g=float(reg.ACCEL_RANGES_G[self.afs_sel]),
+            gyro_range_dps=float(reg.GYRO_RANGES_DPS[self.fs_sel]),
+            rate_hz=self.nominal_rate_hz,
+        )
+
+    def registers(self) -> dict[int, int]:
+        """What each register is to hold, in the order of writing."""
+        values = {
+            reg.SMPLRT_DIV: self.smplrt_div,
+            reg.CONFIG: self.dlpf_cfg,
+            reg.GYRO_CONFIG: self.fs_sel << reg.FULL_SCALE_SHIFT,
+            reg.ACCEL_CONFIG: self.afs_sel << reg.FULL_SCALE_SHIFT,
+        }
+        if self.part.family.has_accel_config2:
+            values[reg.ACCEL_CONFIG2] = self.dlpf_cfg
+        return values
+
+    @classmethod
+    def from_registers(cls, held: Mapping[int, int], name: str = "the capture") -> Self:
+        """The settings that `held`, value by register address, means.
+
+        Raises
+        ------
+        RecordingError : a register that matters is missing. ChipError : no known part.
+        """
+        needed = (reg.WHO_AM_I, reg.SMPLRT_DIV, reg.CONFIG, reg.GYRO_CONFIG, reg.ACCEL_CONFIG)
+        missing = [f"0x{register:02x}" for register in needed if register not in held]
+        if missing:
+            raise RecordingError(
+                f"{name} does not say what register {', '.join(missing)} held as the FIFO started",
+                "record again from the start of the chip",
+            )
+        return cls(
+            part=part_of(held[reg.WHO_AM_I]),
+            smplrt_div=held[reg.SMPLRT_DIV],
+            dlpf_cfg=held[reg.CONFIG] & reg.CONFIG_DLPF_CFG,
+            fs_sel=(held[reg.GYRO_CONFIG] & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT,
+            afs_sel=(held[reg.ACCEL_CONFIG] & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT,
+        )
