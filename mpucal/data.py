@@ -76,11 +76,13 @@ class Recording(Samples):
     flat : (first, last + 1) samples known to lie flat and still; None: to be found.
     sensor : what is known of the sensor.
     name : what to call the recording in a message.
+    recovered : None, or the sentence that says how much of a damaged file this is.
     """
 
     flat: tuple[int, int] | None = None
     sensor: Sensor = Sensor()
     name: str = "recording"
+    recovered: str | None = None
 
     @classmethod
     def from_arrays(
