@@ -59,7 +59,6 @@ class Driver:
         self._next_poll_ns = 0
         self._last_sample_ns = 0
 
-    @property
     def now_ns(self) -> int:
         """The bus's clock as last seen."""
         return self._now_ns

@@ -1,0 +1,80 @@
+"""What the kernel's error numbers mean on an I2C bus, as sentences. Knows no transfer.
+
+Source: Linux Documentation/i2c/fault-codes.rst.
+"""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
+from ..errors import BusError, NoAnswer
+
+DEVICES = Path("/dev")
+
+WIRES = (
+    "check VCC, GND, SDA and SCL, and that AD0 is tied to GND (0x68) or to VCC (0x69);"
+    " `i2cdetect -y BUS` shows who answers"
+)
+
+_TRANSFER = {
+    errno.ETIMEDOUT: (
+        "the I2C bus does not come free",
+        "a wire holds SDA or SCL low: take the chip's supply away for a moment, and check for shorts",
+    ),
+    errno.EIO: (
+        "a transfer broke off",
+        "check the connectors, shorten the wires, or slow the bus down",
+    ),
+    errno.EAGAIN: ("another master took the I2C bus", "let no other master use this bus"),
+    errno.EBUSY: (
+        "a driver of the kernel holds the chip",
+        "remove its overlay or unbind it: /sys/bus/i2c/devices/N-00{address:02x}/driver names it",
+    ),
+    errno.EOPNOTSUPP: (
+        "the adapter cannot move this transfer",
+        "connect the chip to another adapter",
+    ),
+    errno.ENODEV: ("the adapter is gone", "plug it in again, and start again"),
+}
+
+
+def opening_error(error: OSError, path: str) -> BusError:
+    """Why the adapter at `path` could not be opened."""
+    if error.errno == errno.ENOENT:
+        return BusError(f"there is no I2C bus {path}", _others())
+    if error.errno in (errno.EACCES, errno.EPERM):
+        return BusError(
+            f"no permission to use {path}",
+            "join the group that may: `sudo usermod -aG i2c $USER`, then log in again",
+        )
+    if error.errno in (errno.ENOTTY, errno.EISDIR, errno.EINVAL):
+        return BusError(f"{path} is no I2C bus", _others())
+    if error.errno in (errno.ENXIO, errno.ENODEV):
+        return BusError(f"no adapter is behind {path}", "plug it in or load its driver, and start again")
+    return BusError(f"cannot open {path} ({error.strerror})", "check the adapter and its driver")
+
+
+def transfer_error(error: OSError, path: str, address: int) -> BusError:
+    """Why a transfer with the chip at `address` failed."""
+    if error.errno in (errno.EREMOTEIO, errno.ENXIO):
+        return nobody(path, (address,))
+    what, remedy = _TRANSFER.get(
+        error.errno or 0,
+        (f"a transfer failed ({error.strerror})", "check the wires, and start again"),
+    )
+    return BusError(f"{what} (0x{address:02x} on {path})", remedy.format(address=address))
+
+
+def nobody(path: str, addresses: tuple[int, ...]) -> NoAnswer:
+    """Nothing acknowledges any of `addresses`."""
+    places = " or ".join(f"0x{address:02x}" for address in addresses)
+    return NoAnswer(f"nothing answers at {places} on {path}", WIRES.replace("BUS", path.rpartition("-")[2]))
+
+
+def _others() -> str:
+    """What to open instead."""
+    buses = sorted(str(path) for path in DEVICES.glob("i2c-*"))
+    if buses:
+        return f"take one of {', '.join(buses)}"
+    return "enable I2C (on a Raspberry Pi: `sudo raspi-config nonint do_i2c 0`) and load `i2c-dev`"
