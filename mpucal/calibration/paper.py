@@ -127,7 +127,7 @@ def _line_search(ekf: Ekf, here: Expansion, direction: Vector) -> float:
 def _wolfe(here: Expansion, direction: Vector, step: float, V: float, slope: float) -> bool:
     """Both Wolfe conditions for a step that ends at V with a slope along the direction."""
     descent = here.gradient @ direction
-    return bool(V <= here.V + WOLFE_1 * step * descent and slope >= WOLFE_2 * descent)
+    return bool(here.V + WOLFE_1 * step * descent >= V and slope >= WOLFE_2 * descent)
 
 
 def _costs(ekf: Ekf, thetas: Vector) -> Vector:

@@ -1,2 +1,179 @@
+// The Python face of the kernel: NumPy arrays to plain pointers, without the GIL while it runs.
 #include <nanobind/nanobind.h>
-NB_MODULE(_kernel, m) { m.doc() = "placeholder"; }
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "filter.hpp"
+
+namespace nb = nanobind;
+using namespace mpucal;
+
+namespace {
+
+using Array = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
+using Out = nb::ndarray<nb::numpy, double>;
+
+Evaluate choose() {
+#ifdef MPUCAL_AVX2
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return evaluate_avx2;
+#endif
+  return evaluate_portable;
+}
+
+Evaluate evaluate = choose();
+
+const double* pointer(const Array& array, std::size_t size, const char* name) {
+  if (array.size() != size)
+    throw std::invalid_argument(std::string(name) + " holds " + std::to_string(array.size()) + " numbers, not " +
+                                std::to_string(size));
+  return array.data();
+}
+
+const double* pointer(const std::optional<Array>& array, std::size_t size, const char* name) {
+  return array ? pointer(*array, size, name) : nullptr;
+}
+
+Out give(std::vector<double> values, std::initializer_list<std::size_t> shape) {
+  auto* owner = new std::vector<double>(std::move(values));
+  nb::capsule capsule(owner, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
+  return Out(owner->data(), shape, capsule);
+}
+
+Series make_series(const Array& y, const Array& omega, const Array& dt, const std::optional<Array>& r_scale,
+                   const std::optional<Array>& q_scale, const std::optional<Array>& q_extra,
+                   const std::optional<Array>& motion, const std::optional<Array>& rate,
+                   const std::optional<Array>& alpha) {
+  Series series;
+  const std::size_t n = series.n = dt.size();
+  series.dt = dt.data();
+  series.y = pointer(y, 3 * n, "y");
+  series.omega = pointer(omega, 3 * n, "omega");
+  series.r_scale = pointer(r_scale, n, "r_scale");
+  series.q_scale = pointer(q_scale, n, "q_scale");
+  series.q_extra = pointer(q_extra, n, "q_extra");
+  series.motion = pointer(motion, n, "motion");
+  series.rate = pointer(rate, 3 * n, "rate");
+  series.alpha = pointer(alpha, 3 * n, "alpha");
+  if (!series.rate != !series.alpha) throw std::invalid_argument("rate and alpha come together");
+  return series;
+}
+
+// theta: D 9, b_a 3, b_omega 3, K 9, sigma_h, r 3, u 3, du 6
+Parameters make_parameters(const Array& theta) {
+  const double* p = pointer(theta, 37, "theta");
+  Parameters parameters;
+  static_assert(sizeof parameters == 37 * sizeof(double));
+  std::memcpy(&parameters, p, sizeof parameters);
+  return parameters;
+}
+
+// constants: gravity, Sigma_a 3, Sigma_omega 3, flat_y 3, flat_n, huber
+Constants make_constants(const Array& values) {
+  const double* p = pointer(values, 12, "constants");
+  Constants constants;
+  static_assert(sizeof constants == 12 * sizeof(double));
+  std::memcpy(&constants, p, sizeof constants);
+  return constants;
+}
+
+int lanes_of(int groups) {
+  if (groups != 0 && (groups < 5 || groups > 7)) throw std::invalid_argument("groups is 0, 5, 6 or 7");
+  return 4 * groups;
+}
+
+}  // namespace
+
+NB_MODULE(_kernel, m) {
+  m.doc() = "The gravity filter: value, gradient and Fisher matrix of V(theta).";
+
+  m.def(
+      "evaluate",
+      [](const Array& theta, const Array& constants, int groups, const Array& y, const Array& omega, const Array& dt,
+         const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
+         const std::optional<Array>& q_extra, const std::optional<Array>& motion, const std::optional<Array>& rate,
+         const std::optional<Array>& alpha) {
+        const Series series = make_series(y, omega, dt, r_scale, q_scale, q_extra, motion, rate, alpha);
+        const Parameters parameters = make_parameters(theta);
+        const Constants values = make_constants(constants);
+        const std::size_t p = lanes_of(groups);
+        std::vector<double> gradient(p), fisher(p * p);
+        Result result{};
+        result.gradient = gradient.data();
+        result.fisher = fisher.data();
+        {
+          nb::gil_scoped_release release;
+          evaluate(parameters, series, values, groups, result);
+        }
+        return nb::make_tuple(result.V, result.squares, give(std::move(gradient), {p}), give(std::move(fisher), {p, p}));
+      },
+      nb::arg("theta"), nb::arg("constants"), nb::arg("groups"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
+      nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
+      nb::arg("q_extra").none() = nb::none(), nb::arg("motion").none() = nb::none(),
+      nb::arg("rate").none() = nb::none(), nb::arg("alpha").none() = nb::none(),
+      "V, sum of squared whitened innovations, gradient and Fisher matrix (in lane order; empty for groups = 0).");
+
+  m.def(
+      "trace",
+      [](const Array& theta, const Array& constants, const Array& y, const Array& omega, const Array& dt,
+         const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
+         const std::optional<Array>& q_extra, const std::optional<Array>& motion, const std::optional<Array>& rate,
+         const std::optional<Array>& alpha) {
+        const Series series = make_series(y, omega, dt, r_scale, q_scale, q_extra, motion, rate, alpha);
+        const Parameters parameters = make_parameters(theta);
+        const Constants values = make_constants(constants);
+        std::vector<double> innovation(3 * series.n), gravity(3 * series.n);
+        Result result{};
+        result.innovation = innovation.data();
+        result.gravity = gravity.data();
+        {
+          nb::gil_scoped_release release;
+          evaluate(parameters, series, values, 0, result);
+        }
+        return nb::make_tuple(give(std::move(innovation), {series.n, 3}), give(std::move(gravity), {series.n, 3}));
+      },
+      nb::arg("theta"), nb::arg("constants"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
+      nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
+      nb::arg("q_extra").none() = nb::none(), nb::arg("motion").none() = nb::none(),
+      nb::arg("rate").none() = nb::none(), nb::arg("alpha").none() = nb::none(),
+      "Whitened innovations (n, 3) and the predicted gravity (n, 3) of every sample.");
+
+  m.def(
+      "moments",
+      [](const Array& b_omega, const Array& y, const Array& omega, const Array& dt,
+         const std::optional<Array>& r_scale) {
+        const Series series = make_series(y, omega, dt, r_scale, {}, {}, {}, {}, {});
+        const double* bias = pointer(b_omega, 3, "b_omega");
+        Moments sums;
+        {
+          nb::gil_scoped_release release;
+          moments(series, bias, sums);
+        }
+        auto copy = [](const double* p, std::size_t n) { return std::vector<double>(p, p + n); };
+        return nb::make_tuple(give(copy(&sums.CC[0][0], 81), {9, 9}), give(copy(&sums.yC[0][0], 27), {3, 9}),
+                              give(copy(sums.C, 9), {9}), give(copy(sums.y, 3), {3}), sums.yy, sums.n);
+      },
+      nb::arg("b_omega"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"), nb::arg("r_scale").none() = nb::none(),
+      "Sums of C C', y C', C, y, y y and the count, C_t the turn since the start.");
+
+  m.def("instruction_set", []() -> std::string { return evaluate == evaluate_portable ? "portable" : "avx2"; },
+        "Which build of the filter runs.");
+  m.def(
+      "use_instruction_set",
+      [](const std::string& name) {
+        if (name == "portable")
+          evaluate = evaluate_portable;
+        else if (name == "best")
+          evaluate = choose();
+        else
+          throw std::invalid_argument("the instruction set is portable or best");
+      },
+      nb::arg("name"), "Choose the build of the filter, portable or best; for comparing them.");
+}

@@ -1,0 +1,39 @@
+"""The kernel's Python face; see filter.hpp for what each array means."""
+
+from numpy import float64
+from numpy.typing import NDArray
+
+_Array = NDArray[float64]
+
+def evaluate(
+    theta: _Array,
+    constants: _Array,
+    groups: int,
+    y: _Array,
+    omega: _Array,
+    dt: _Array,
+    r_scale: _Array | None = None,
+    q_scale: _Array | None = None,
+    q_extra: _Array | None = None,
+    motion: _Array | None = None,
+    rate: _Array | None = None,
+    alpha: _Array | None = None,
+) -> tuple[float, float, _Array, _Array]: ...
+def trace(
+    theta: _Array,
+    constants: _Array,
+    y: _Array,
+    omega: _Array,
+    dt: _Array,
+    r_scale: _Array | None = None,
+    q_scale: _Array | None = None,
+    q_extra: _Array | None = None,
+    motion: _Array | None = None,
+    rate: _Array | None = None,
+    alpha: _Array | None = None,
+) -> tuple[_Array, _Array]: ...
+def moments(
+    b_omega: _Array, y: _Array, omega: _Array, dt: _Array, r_scale: _Array | None = None
+) -> tuple[_Array, _Array, _Array, _Array, float, float]: ...
+def instruction_set() -> str: ...
+def use_instruction_set(name: str) -> None: ...

@@ -1,0 +1,79 @@
+// The gravity filter and its exact derivatives: plain arrays in, plain numbers out, nothing known of Python.
+//
+// One step, with s the gravity vector in the body frame (m/s^2), P its covariance:
+//   e = y - D (s + L r) - b_a,  S = D P D' + R,  R = diag(r_scale Sigma_a) + sigma_h^2 m I,  L = [alpha]x + [omega]x^2
+//   s <- g (s + K e) / |s + K e|,  P <- P - K D P,  K = P D' S^-1
+//   s <- F s,  P <- F P F' + [s]x diag(c) [s]x',  F = exp(-dt [Gyro (omega_bar - b_omega)]x)
+// and V = sum of rho(e' S^-1 e) + 1/2 log det S, the paper's equation (8) with a Huber rho.
+//
+// Derivatives run forward, four parameters to a vector lane. A parameter's lane is given by `Lanes` below: row j of D and
+// b_a[j] share lane group j, so that their partial derivatives are products of one vector with scalars.
+#pragma once
+#include <cstddef>
+
+namespace mpucal {
+
+// Places of the parameters among the lanes (lane group = place / 4).
+struct Lanes {
+  static constexpr int D = 0;         // D[j][k] at 4 j + k, b_a[j] at 4 j + 3
+  static constexpr int b_omega = 12;  // 3
+  static constexpr int tilt0 = 15;
+  static constexpr int tilt1 = 16;
+  static constexpr int K = 17;        // 6: xx, xy, xz, yy, yz, zz
+  static constexpr int sigma_h = 23;
+  static constexpr int r = 24;        // 3
+  static constexpr int most = 28;
+};
+
+struct Parameters {
+  double D[3][3], b_a[3], b_omega[3], K[3][3], sigma_h, r[3];
+  double u[3];           // gravity's direction at the start, unit
+  double du[2][3];       // its derivatives by the two tilts
+};
+
+// What the filter runs over, (n,) or (n, 3) row by row; a null pointer means the value in brackets.
+struct Series {
+  std::size_t n;
+  const double* y;        // m/s^2
+  const double* omega;    // rad/s, mean rate over the step that leads to the sample
+  const double* dt;       // s, length of that step
+  const double* r_scale;  // factor of Sigma_a [1]
+  const double* q_scale;  // factor of Sigma_omega [1]
+  const double* q_extra;  // rad^2 added to the step's angle variance on each axis [0]
+  const double* motion;   // m, factor of sigma_h^2 [0]
+  const double* rate;     // rad/s at the sample, bias removed, for the lever arm [no lever arm]
+  const double* alpha;    // rad/s^2 at the sample
+};
+
+struct Constants {
+  double gravity;
+  double Sigma_a[3], Sigma_omega[3];
+  double flat_y[3], flat_n;  // the first measurement: the flat segment's mean, with covariance Sigma_a / flat_n
+  double huber;              // threshold on |L^-1 e|; infinity for the plain square
+};
+
+// What comes out. Null pointers are not written.
+struct Result {
+  double V;
+  double squares;         // sum of e' S^-1 e over the n samples
+  double* gradient;       // (groups * 4,)
+  double* fisher;         // (groups * 4, groups * 4)
+  double* innovation;     // (n, 3) whitened, L^-1 e
+  double* gravity;        // (n, 3) s before the update
+};
+
+// groups: 0 (value only), 5 (D, b_a, b_omega, tilts), 6 (and K), 7 (and sigma_h, r).
+using Evaluate = void (*)(const Parameters&, const Series&, const Constants&, int groups, Result&);
+
+void evaluate_portable(const Parameters&, const Series&, const Constants&, int groups, Result&);
+#ifdef MPUCAL_AVX2
+void evaluate_avx2(const Parameters&, const Series&, const Constants&, int groups, Result&);
+#endif
+
+// Sums of the linear initialiser: C_t turns the first body frame into the frame at t (b_omega removed, no K).
+struct Moments {
+  double CC[9][9], yC[3][9], C[9], y[3], yy, n;
+};
+void moments(const Series&, const double b_omega[3], Moments&);
+
+}  // namespace mpucal
