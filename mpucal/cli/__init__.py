@@ -1,1 +1,47 @@
-"""TODO."""
+"""The commands by name; each one's file loads when it is called, so that help needs nothing heavy."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import click
+
+from .. import __version__
+
+# name: what --help says of it; the command stands in the module of that name
+COMMANDS = {
+    "session": "Guide a person through a calibration, and write the result.",
+    "record": "Record a sensor into a capture, without calibrating.",
+    "calibrate": "Calibrate from a capture or another recording.",
+    "show": "Say what is in a calibration, a config blob or a recording.",
+}
+
+
+class Commands(click.Group):
+    """A group that imports a command when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """All names."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of that name."""
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = import_module(f".{cmd_name}", __name__).command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The names with what they do."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.command(
+    cls=Commands,
+    epilog="Example: `mpucal session --bus sim` runs a whole session on the simulated chip.",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.version_option(__version__, prog_name="mpucal")
+def commands() -> None:
+    """Calibrate the accelerometer of an MPU-6050 or MPU-6500, with the gyroscope's help."""

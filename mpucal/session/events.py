@@ -110,7 +110,6 @@ class PromptKind(StrEnum):
     """What the person (or the hand that stands in for one) is to do now."""
 
     LAY_FLAT = "lay_flat"
-    HOLD_STILL = "hold_still"
     ROTATE = "rotate"
     REST = "rest"
 

@@ -24,9 +24,10 @@ PROMPT = Prompt(
 
 
 class LayFlat:
-    """Waits for stillness, and says what disturbs it."""
+    """Waits for stillness, and says what disturbs it; `patient`: for ever."""
 
-    def __init__(self) -> None:
+    def __init__(self, patient: bool = False) -> None:
+        self._patient = patient
         self._windows = Windows(WINDOW_S)
         self._stillness = Stillness(ON_A_TABLE)
         self._still: Still | None = None
@@ -48,7 +49,7 @@ class LayFlat:
                 continue
             self._still = None
             found.append(self._moved(sight, window.end_s))
-            if window.end_s - self._begun_s >= PATIENCE_S:
+            if not self._patient and window.end_s - self._begun_s >= PATIENCE_S:
                 return [*found, _never_still(sight)]
         return found
 
@@ -66,7 +67,7 @@ class LayFlat:
         if moved.after_s >= WORTH_SAYING_S or t_s - self._spoke_s >= SAY_AGAIN_S:
             self._spoke_s = t_s
             return Prompt(
-                PromptKind.HOLD_STILL, f"Not still: {moved.what}. Let go of it; the count starts again."
+                PromptKind.LAY_FLAT, f"Not still: {moved.what}. Let go of it; the count starts again."
             )
         return self._progress(t_s, "waiting until it is still")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from . import lay_flat, rotate
 from .events import (
@@ -34,20 +33,18 @@ ABORTED = "the session was interrupted"
 START_AGAIN = "start again when you are ready"
 
 
-@dataclass(frozen=True)
-class Options:
-    """How a session runs. until_end : turn until the source ends, however many orientations there are."""
-
-    until_end: bool = False
-
-
 class Machine:
-    """Leads through the states of the table, and says what the person is to do."""
+    """Leads through the states of the table, and says what the person is to do.
 
-    def __init__(self, options: Options = Options()) -> None:
+    Parameters
+    ----------
+    until_end : each step takes its time, and turning ends with the source.
+    """
+
+    def __init__(self, until_end: bool = False) -> None:
         self.state = State.CONNECT
-        self._options = options
-        self._lay_flat = lay_flat.LayFlat()
+        self._until_end = until_end
+        self._lay_flat = lay_flat.LayFlat(patient=until_end)
         self._rotate: rotate.Rotate | None = None
         self._sampled_s: float | None = None
 
@@ -68,8 +65,8 @@ class Machine:
             case Connected():
                 return [lay_flat.PROMPT]
             case Rested(still_s, acc):
-                self._rotate = rotate.Rotate(acc, self._options.until_end)
-                return [Decision(f"still for {still_s:.0f} s"), rotate.PROMPT]
+                self._rotate = rotate.Rotate(acc, self._until_end)
+                return [Decision(f"flat and still for {still_s:.0f} s: that will do"), rotate.PROMPT]
             case Turned(why):
                 return [Decision(why), REST]
             case Enough():

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Where a calibration is written to."""

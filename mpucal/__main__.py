@@ -1,0 +1,46 @@
+"""`python -m mpucal` and the `mpucal` command: an exit code for each class of error, and one sentence."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Sequence
+
+import click
+
+from .cli import commands
+from .errors import Abandoned, MpucalError
+
+BUG = 1
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run a command, and leave with its exit code."""
+    sys.exit(run(arguments))
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run a command, and return its exit code."""
+    try:
+        return int(commands.main(args=arguments, prog_name="mpucal", standalone_mode=False) or 0)
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("mpucal: interrupted; what was recorded until then is kept.", err=True)
+        return Abandoned.exit_code
+    except MpucalError as error:
+        click.echo(f"mpucal: {error}", err=True)
+        return error.exit_code
+    except BrokenPipeError:
+        # who read the results has left; Python would complain again while it flushes
+        sys.stdout = None
+        return 0
+    except Exception:
+        traceback.print_exc()
+        click.echo("mpucal: this is a bug in mpucal: please report it with the lines above.", err=True)
+        return BUG
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,48 @@
+"""`mpucal calibrate`: fit a recording that is there already."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..calibration import calibrate
+from ..capture import load
+from ..errors import RefusedError
+from ..result import REFUSED
+from ..sinks.file import BLOB, make_folder, result_files, save
+from .options import fit_options
+from .summary import summary, written
+
+EXAMPLE = "Example: `mpucal calibrate capture.mcap -o results` or `mpucal calibrate walk.npz --json`"
+
+
+@click.command("calibrate", epilog=EXAMPLE)
+@click.argument("recording", metavar="FILE|DIR", type=click.Path(path_type=Path))
+@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Write the results there.")
+@click.option("--json", "as_json", is_flag=True, help="Print calibration.json, and nothing else.")
+@fit_options
+def command(recording: Path, folder: Path | None, as_json: bool, gravity: float, model: str) -> int:
+    """Calibrate from a capture (.mcap), an archive (.npz) or a table (.csv).
+
+    Of a folder, the capture in it is meant. Exit code 5: the calibration was refused, with reasons.
+    """
+    samples = load(recording)
+    if samples.recovered is not None:
+        click.echo(f"mpucal: {samples.recovered}", err=True)
+    calibration = calibrate(samples, model=model, gravity=gravity)
+    paths = []
+    if folder is not None:
+        make_folder(folder)
+        paths = [save(folder, name, data) for name, data in result_files(calibration, samples)]
+    if as_json:
+        click.echo(calibration.json(), nl=False)
+    else:
+        click.echo(summary(calibration))
+        if paths:
+            click.echo("\n" + written(paths))
+    if calibration.verdict != REFUSED:
+        return 0
+    if folder is not None and (folder / BLOB).exists():
+        click.echo(f"mpucal: {folder / BLOB} is of an earlier calibration, and was left as it is.", err=True)
+    return RefusedError.exit_code

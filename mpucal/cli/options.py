@@ -1,0 +1,98 @@
+"""Options that several commands share, and where their values fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+from click.core import ParameterSource
+
+from ..errors import UsageError
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+MODELS = ("auto", "accel", "paper")
+ACCEL_RANGES_G, GYRO_RANGES_DPS = ("2", "4", "8", "16"), ("250", "500", "1000", "2000")
+
+# what a capture fixes: none of it may be given beside --replay
+FIXED_BY_CAPTURE = ("address", "rate", "accel_range", "gyro_range", "seed", "gravity", "model")
+
+
+class Integer(click.ParamType[int]):
+    """A whole number, decimal or 0x hexadecimal."""
+
+    name = "integer"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """The number of its text."""
+        try:
+            return int(str(value), 0)
+        except ValueError:
+            self.fail(f"{value!r} is no whole number.", param, ctx)
+
+
+def source_options(command: F) -> F:
+    """--bus or --replay, and how the chip is set."""
+    for option in reversed(
+        (
+            click.option(
+                "--bus", metavar="BUS", help="/dev/i2c-N, or sim[:key=value,...] for the simulated chip."
+            ),
+            click.option(
+                "--replay", metavar="FILE", type=click.Path(path_type=Path), help="Run a capture again."
+            ),
+            click.option("--address", type=Integer(), help="I2C address; by default 0x68, then 0x69."),
+            click.option(
+                "--rate", metavar="HZ", type=float, default=200.0, show_default=True, help="Samples a second."
+            ),
+            click.option(
+                "--accel-range", type=click.Choice(ACCEL_RANGES_G), default="4", show_default=True, help="±g."
+            ),
+            click.option(
+                "--gyro-range",
+                type=click.Choice(GYRO_RANGES_DPS),
+                default="500",
+                show_default=True,
+                help="±deg/s.",
+            ),
+            click.option("--seed", type=int, help="Which simulated sensor and hand."),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+def fit_options(command: F) -> F:
+    """--gravity and --model."""
+    for option in (
+        click.option(
+            "--model", type=click.Choice(MODELS), default="auto", show_default=True, help="What to estimate."
+        ),
+        click.option(
+            "--gravity", type=float, default=9.80665, show_default=True, help="Local gravity [m/s²]."
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def check_source(context: click.Context) -> None:
+    """One source, and beside --replay nothing that the capture fixes.
+
+    Raises
+    ------
+    UsageError : none, several, or options that contradict the capture.
+    """
+    given = [name for name in ("bus", "replay") if context.params.get(name) is not None]
+    if len(given) != 1:
+        what = "--bus and --replay were given together" if given else "no source was given"
+        raise UsageError(what, "give exactly one of --bus BUS and --replay FILE")
+    if given == ["replay"]:
+        for name in FIXED_BY_CAPTURE:
+            if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+                raise UsageError(
+                    f"--{name.replace('_', '-')} was given beside --replay, and the capture fixes it",
+                    "leave it out, or use `mpucal calibrate` to fit the capture differently",
+                )

@@ -1,0 +1,36 @@
+"""`mpucal record`: keep what a sensor says, for later."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..console import console
+from ..errors import OutputError
+from .options import check_source, fit_options, source_options
+from .running import running, stamp
+from .source import opened
+
+EXAMPLE = "Example: `mpucal record --bus /dev/i2c-1 -o capture.mcap --seconds 60`"
+
+
+@click.command("record", epilog=EXAMPLE)
+@source_options
+@fit_options
+@click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Where the capture goes.")
+@click.option("--seconds", type=click.FloatRange(min=0.0, min_open=True), help="End after so long.")
+def command(file: Path | None, seconds: float | None, **options: Any) -> None:
+    """Record into a capture until Enter, Ctrl-C or --seconds end it; `mpucal calibrate` reads it.
+
+    The prompts are those of a session. --gravity and --model are kept for a session that replays it.
+    """
+    check_source(click.get_current_context())
+    source = opened(options, until_end=True)
+    file = file or Path(f"record-{stamp()}.mcap")
+    if file.exists():
+        raise OutputError(f"{file} is there already", "choose another file with -o")
+    with running(source, file, console(quiet=False)) as runner:
+        samples = runner.record(seconds)
+    click.echo(f"{file}: {samples} samples.")

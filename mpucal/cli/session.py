@@ -1,0 +1,74 @@
+"""`mpucal session`: guide a person, calibrate, and leave the results in a folder."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..calibration import calibrate
+from ..console import console
+from ..data import Recording
+from ..errors import RefusedError
+from ..result import REFUSED, Calibration
+from ..runner import Runner
+from .options import check_source, fit_options, source_options
+from .place import Place
+from .running import running
+from .source import Opened, opened
+from .summary import summary, written
+
+EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board, `mpucal session --bus sim`"
+
+
+@click.command("session", epilog=EXAMPLE)
+@source_options
+@fit_options
+@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Where the results go.")
+@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.option("--json", "as_json", is_flag=True, help="Print calibration.json, and nothing else.")
+@click.option("--json-events", is_flag=True, help="Say each event as a line of JSON, on stderr.")
+def command(folder: Path | None, yes: bool, as_json: bool, json_events: bool, **options: Any) -> int:
+    """Lay flat, rotate, calibrate: leaves capture.mcap, calibration.json, calibration.bin and report.html.
+
+    Exit code 4: it was stopped before there was anything to calibrate; 5: the calibration was refused.
+    """
+    check_source(click.get_current_context())
+    source = opened(options)
+    person = console(quiet=yes, as_json=json_events)
+    place = Place(folder)
+    finished = False
+    try:
+        with running(source, place.capture, person) as runner:
+            try:
+                recording = runner.measure()
+            finally:
+                _settle(place, runner)
+            calibration, paths = _finish(runner, source, place, recording)
+        finished = True
+    finally:
+        if not finished and place.capture.exists():
+            person.say(f"  What was recorded is kept in {place.capture}.")
+    if as_json:
+        click.echo(calibration.json(), nl=False)
+    else:
+        click.echo(f"{summary(calibration)}\n\n{written([place.capture, *paths])}")
+    return RefusedError.exit_code if calibration.verdict == REFUSED else 0
+
+
+def _settle(place: Place, runner: Runner) -> None:
+    """Name the folder by the chip, or take it away where no chip answered."""
+    if runner.sensor is None:
+        place.discard()
+    elif runner.sensor.chip:
+        place.name_by(runner.sensor.chip)
+
+
+def _finish(
+    runner: Runner, source: Opened, place: Place, recording: Recording
+) -> tuple[Calibration, tuple[Path, ...]]:
+    fit = partial(calibrate, model=source.plan.model, gravity=source.plan.gravity)
+    calibration = runner.calibrate(recording, fit)
+    return calibration, runner.write(place.folder, calibration, recording, source.truth)

@@ -1,0 +1,90 @@
+"""`mpucal show`: what is in a file, as a person would ask first."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from ..calibration.stationary import find_flat
+from ..capture import load
+from ..data import Recording, Sensor
+from ..result import Calibration
+from .summary import formula, summary
+
+EXAMPLE = "Example: `mpucal show calibration.json` or `mpucal show capture.mcap --json`"
+CALIBRATIONS = (".json", ".bin")
+
+
+@click.command("show", epilog=EXAMPLE)
+@click.argument("file", metavar="FILE|DIR", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print it as JSON.")
+def command(file: Path, as_json: bool) -> None:
+    """Say what is in a calibration (.json), a config blob (.bin) or a recording (.mcap, .npz, .csv)."""
+    if file.suffix in CALIBRATIONS:
+        calibration = Calibration.load(file)
+        click.echo(calibration.json() if as_json else _calibration(file, calibration), nl=not as_json)
+        return
+    recording = load(file)
+    if recording.recovered is not None:
+        click.echo(f"mpucal: {recording.recovered}", err=True)
+    facts = _facts(recording)
+    click.echo(json.dumps(facts, indent=2) if as_json else _recording(file, facts))
+
+
+def _calibration(file: Path, calibration: Calibration) -> str:
+    made = f", made {calibration.created}" if calibration.created else ""
+    head = f"{file}: a calibration of {_chip(calibration.sensor)}{made}."
+    return "\n".join([head, "", summary(calibration), "", formula(calibration)])
+
+
+def _facts(recording: Recording) -> dict[str, Any]:
+    """What a recording holds, in JSON's own types."""
+    flat = recording.flat or find_flat(recording)
+    temperature = recording.temperature_c[np.isfinite(recording.temperature_c)]
+    return {
+        "chip": _chip(recording.sensor),
+        "accel_range_g": recording.sensor.accel_range_g,
+        "gyro_range_dps": recording.sensor.gyro_range_dps,
+        "samples": len(recording),
+        "seconds": float(recording.t[-1] - recording.t[0]),
+        "rate_hz": recording.rate_hz,
+        "gaps": int(recording.gap.sum()),
+        "acc_clipped": int(recording.acc_clipped.sum()),
+        "gyr_clipped": int(recording.gyr_clipped.sum()),
+        "flat_s": None
+        if flat is None
+        else [float(recording.t[i] - recording.t[0]) for i in (flat[0], flat[1] - 1)],
+        "magnitude_mps2": float(np.median(np.linalg.norm(recording.acc, axis=1))),
+        "fastest_dps": float(np.degrees(np.abs(recording.gyr).max())),
+        "temperature_c": [float(temperature.min()), float(temperature.max())] if len(temperature) else None,
+    }
+
+
+def _recording(file: Path, facts: dict[str, Any]) -> str:
+    flat, warm = facts["flat_s"], facts["temperature_c"]
+    ranges = [
+        f"±{facts[key]:g} {unit}"
+        for key, unit in (("accel_range_g", "g"), ("gyro_range_dps", "deg/s"))
+        if facts[key] is not None
+    ]
+    rows = {
+        "sensor": ", ".join([facts["chip"], *ranges]),
+        "samples": f"{facts['samples']} in {facts['seconds']:.1f} s, at {facts['rate_hz']:.2f} Hz",
+        "lost": f"{facts['gaps']} gaps" if facts["gaps"] else "none",
+        "clipped": f"{facts['acc_clipped']} accelerometer, {facts['gyr_clipped']} gyroscope samples",
+        "lies flat": "nowhere" if flat is None else f"from {flat[0]:.1f} to {flat[1]:.1f} s",
+        "median |a|": f"{facts['magnitude_mps2']:.3f} m/s²",
+        "fastest turn": f"{facts['fastest_dps']:.0f} deg/s",
+        "temperature": "unknown" if warm is None else f"{warm[0]:.1f} to {warm[1]:.1f} °C",
+    }
+    return "\n".join([f"{file}: a recording.", "", *(f"  {key:<14}{value}" for key, value in rows.items())])
+
+
+def _chip(sensor: Sensor) -> str:
+    if sensor.chip:
+        return sensor.chip
+    return "an unnamed sensor" if sensor.who_am_i is None else f"a sensor of WHO_AM_I 0x{sensor.who_am_i:02x}"

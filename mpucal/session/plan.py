@@ -1,0 +1,56 @@
+"""What a session is to do, and how its capture says so. Knows no source and no option's spelling."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Self
+
+from ..chip.config import Config
+from ..chip.driver import DRIVER_VERSION
+from ..data import STANDARD_GRAVITY_MPS2
+from ..errors import CaptureError
+
+DRIVER, PLAN = "driver", "plan"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What decides, with the bytes and the keys, on all that a session does.
+
+    Attributes
+    ----------
+    config : how the chip measures. gravity : local gravity [m/s^2]. model : what to estimate.
+    until_end : each step takes its time, and turning ends with the source.
+    """
+
+    config: Config = field(default_factory=Config)
+    gravity: float = STANDARD_GRAVITY_MPS2
+    model: str = "auto"
+    until_end: bool = False
+
+    def meta(self) -> dict[str, Any]:
+        """For the head of a capture; values of JSON's own types."""
+        return {DRIVER: DRIVER_VERSION, PLAN: asdict(self)}
+
+    @classmethod
+    def of_capture(cls, meta: Mapping[str, Any], name: str) -> Self:
+        """The plan by which the capture `name` was made.
+
+        Raises
+        ------
+        CaptureError : another driver made it, or its head does not say how.
+        """
+        version = meta.get(DRIVER)
+        if version != DRIVER_VERSION:
+            raise CaptureError(
+                f"{name} was recorded by version {version} of the driver, and this is {DRIVER_VERSION}",
+                "use `mpucal calibrate` on it, which reads captures of every version",
+            )
+        try:
+            plan = dict(meta[PLAN])
+            return cls(**{**plan, "config": Config(**plan["config"])})
+        except (KeyError, TypeError, ValueError) as error:
+            raise CaptureError(
+                f"the head of {name} does not say how it was made ({error})", "use `mpucal calibrate` on it"
+            ) from error
