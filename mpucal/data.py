@@ -132,10 +132,9 @@ class Recording(Samples):
             acc,
             gyr,
             np.full(n, np.nan) if temperature_c is None else _column(temperature_c, "temperature_c", n, name),
-            *(
-                np.zeros(n, bool) if mask is None else _column(mask, key, n, name).astype(bool)
-                for key, mask in (("gap", gap), ("acc_clipped", acc_clipped), ("gyr_clipped", gyr_clipped))
-            ),
+            _mask(gap, "gap", n, name),
+            _mask(acc_clipped, "acc_clipped", n, name),
+            _mask(gyr_clipped, "gyr_clipped", n, name),
             flat=flat,
             sensor=sensor or Sensor(),
             name=name,
@@ -160,9 +159,7 @@ def _numbers(values: ArrayLike, key: str, name: str) -> Vector:
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise RecordingError(
-            f"{name}: {key} holds values that are no numbers ({error})", "give numbers"
-        ) from error
+        raise RecordingError(f"{name}: {key} holds values that are no numbers ({error})", "give numbers") from error
 
 
 def _column(values: ArrayLike, key: str, n: int, name: str) -> Vector:
@@ -172,12 +169,14 @@ def _column(values: ArrayLike, key: str, n: int, name: str) -> Vector:
     return array
 
 
+def _mask(values: ArrayLike | None, key: str, n: int, name: str) -> Mask:
+    return np.zeros(n, bool) if values is None else _column(values, key, n, name).astype(bool)
+
+
 def _rows(values: ArrayLike, key: str, n: int, name: str) -> Vector:
     array = _numbers(values, key, name)
     if array.shape != (n, 3):
-        raise RecordingError(
-            f"{name}: {key} has shape {array.shape}, not ({n}, 3)", "give one row of x, y, z a sample"
-        )
+        raise RecordingError(f"{name}: {key} has shape {array.shape}, not ({n}, 3)", "give one row of x, y, z a sample")
     bad = ~np.isfinite(array).all(axis=1)
     if bad.any():
         raise RecordingError(

@@ -34,9 +34,7 @@ def load_csv(path: str | Path) -> Recording:
         places = _places(header, path)
         values = [_numbers(row, places, len(header), rows.line_num, path) for row in rows if any(row)]
     except csv.Error as error:
-        raise RecordingError(
-            f"{path}: line {rows.line_num} is no line of a table ({error})", _REMEDY
-        ) from error
+        raise RecordingError(f"{path}: line {rows.line_num} is no line of a table ({error})", _REMEDY) from error
     if not values:
         raise RecordingError(f"{path} holds no samples", "record it again")
     table = np.array(values)
@@ -74,9 +72,7 @@ def _text(path: Path) -> str:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise RecordingError(
-            f"cannot read {path} ({error.strerror})", "check the path and its permissions"
-        ) from error
+        raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path and its permissions") from error
     except UnicodeDecodeError as error:
         raise RecordingError(f"{path} is no text", _REMEDY) from error
     if not text.strip():

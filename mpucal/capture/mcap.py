@@ -192,9 +192,7 @@ def _bytes_of(path: Path) -> bytes:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise CaptureError(
-            f"cannot read {path} ({error.strerror})", "check the path and its permissions"
-        ) from error
+        raise CaptureError(f"cannot read {path} ({error.strerror})", "check the path and its permissions") from error
     if not data:
         raise CaptureError(f"{path} is empty", "record it again")
     if not data.startswith(MCAP0_MAGIC):

@@ -35,9 +35,7 @@ def load_npz(path: str | Path) -> Recording:
     arrays = _arrays(path)
     missing = [key for key in ("t", "acc", "gyr") if key not in arrays]
     if missing:
-        raise RecordingError(
-            f"{path} has no {', '.join(missing)}; it has {', '.join(arrays) or 'nothing'}", _REMEDY
-        )
+        raise RecordingError(f"{path} has no {', '.join(missing)}; it has {', '.join(arrays) or 'nothing'}", _REMEDY)
     return Recording.from_arrays(
         arrays["t"],
         arrays["acc"],
@@ -80,9 +78,7 @@ def _arrays(path: Path) -> dict[str, Any]:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise RecordingError(
-            f"cannot read {path} ({error.strerror})", "check the path and its permissions"
-        ) from error
+        raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path and its permissions") from error
     try:
         # no pickles: a recording must not run code
         with np.load(BytesIO(data), allow_pickle=False) as archive:

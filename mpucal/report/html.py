@@ -25,12 +25,10 @@ _AXES = "xyz"
 def render(calibration: Calibration, recording: Recording | None = None) -> str:
     """The page of a calibration; with its recording, also the picture of |a| before and after."""
     sections = (
-        _verdict(calibration),
+        _verdict(calibration, recording),
         _section("Accelerometer", _parameters(calibration)),
         _section("Use", _formula(calibration)),
-        _section(
-            "Magnitude of the acceleration", _magnitudes(calibration) + _picture(calibration, recording)
-        ),
+        _section("Magnitude of the acceleration", _magnitudes(calibration) + _picture(calibration, recording)),
         _section("Sensor and settings", _settings(calibration, recording)),
     )
     title = f"Calibration of {calibration.sensor.chip or 'an accelerometer'}"
@@ -42,21 +40,20 @@ def render(calibration: Calibration, recording: Recording | None = None) -> str:
     )
 
 
-def _verdict(calibration: Calibration) -> str:
+def _verdict(calibration: Calibration, recording: Recording | None) -> str:
     verdict = calibration.verdict
     sentence = VERDICTS.get(verdict, f"The verdict is {verdict}.")
     reasons = "".join(
-        f"<li><code>{escape(str(reason['code']))}</code> {escape(str(reason['message']))}</li>\n"
+        f"<li><code>{escape(str(reason['code']))}</code>: {escape(str(reason['message']))}</li>\n"
         for reason in calibration.quality.get("reasons", ())
     )
     listed = f'<ul id="reasons">\n{reasons}</ul>\n' if reasons else ""
-    return f'<p class="verdict {escape(verdict)}" id="verdict">{escape(sentence)}</p>\n{listed}'
+    recovered = f"<p>{escape(recording.recovered)}</p>\n" if recording and recording.recovered else ""
+    return f'<p class="verdict {escape(verdict)}" id="verdict">{escape(sentence)}</p>\n{listed}{recovered}'
 
 
 def _parameters(calibration: Calibration) -> str:
-    rows = [
-        [f"D {axis}", *map(_with_std, calibration.D[i], calibration.D_std[i])] for i, axis in enumerate(_AXES)
-    ]
+    rows = [[f"D {axis}", *map(_with_std, calibration.D[i], calibration.D_std[i])] for i, axis in enumerate(_AXES)]
     rows.append(["b_a, m/s²", *map(_with_std, calibration.b_a, calibration.b_a_std)])
     rows.append(["noise, m/s²", *(_number(value) for value in calibration.noise_std)])
     return _table("parameters", "value ± standard deviation", ["", *_AXES], rows)
@@ -70,8 +67,7 @@ def _formula(calibration: Calibration) -> str:
     lines = [
         f"a_{axis} = "
         + " ".join(
-            f"{factor:+.6f} * (y_{of} {-offset:+.6f})"
-            for factor, of, offset in zip(gain[i], _AXES, bias, strict=True)
+            f"{factor:+.6f} * (y_{of} {-offset:+.6f})" for factor, of, offset in zip(gain[i], _AXES, bias, strict=True)
         )
         for i, axis in enumerate(_AXES)
     ]
@@ -139,9 +135,7 @@ def _section(title: str, content: str) -> str:
     return f"<section>\n<h2>{escape(title)}</h2>\n{content}</section>\n"
 
 
-def _table(
-    id_: str, caption: str, head: Iterable[str], rows: Iterable[Iterable[str]], words: bool = False
-) -> str:
+def _table(id_: str, caption: str, head: Iterable[str], rows: Iterable[Iterable[str]], words: bool = False) -> str:
     """A table whose rows begin with their names; every cell is escaped here."""
     cell = '<td class="words">' if words else "<td>"
     lines = [f'<div class="wide"><table id="{id_}">']

@@ -51,7 +51,7 @@ def magnitude_svg(t: Vector, before: Vector, after: Vector, gravity: float) -> s
             axes.axhline(gravity, color=_FAINT, linewidth=0.8, linestyle="--", label="gravity")
         axes.set(xlabel="time [s]", ylabel="|a| [m/s²]", xmargin=0)
         axes.spines[["top", "right"]].set_visible(False)
-        axes.legend(frameon=False, ncols=3, loc="upper right")
+        figure.legend(frameon=False, ncols=3, loc="outside upper right")
         text = StringIO()
         figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
     return _for_the_page(text.getvalue())

@@ -23,5 +23,5 @@ caption { text-align: left; padding-bottom: .3rem; }
 th, td { padding: .25rem 1.2rem .25rem 0; border-bottom: 1px solid var(--line); text-align: right; }
 th { font-weight: normal; } th[scope=row], td.words { text-align: left; }
 pre { background: var(--raised); padding: .8rem 1rem; overflow-x: auto; font-size: .9rem; }
-svg { width: 100%; height: auto; }
+svg { width: 100%; height: auto; margin-top: 1.2rem; }
 """

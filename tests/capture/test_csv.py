@@ -20,9 +20,7 @@ def path(tmp_path):
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30, deadline=None)
 @given(arrays(float, (4, 6), elements=finite), st.none() | arrays(float, 4, elements=finite))
 def test_reads_the_same_numbers_that_were_saved(path, values, temperature_c):
-    recording = Recording.from_arrays(
-        [0.0, 0.1, 0.2, 1 / 3], values[:, :3], values[:, 3:], temperature_c=temperature_c
-    )
+    recording = Recording.from_arrays([0.0, 0.1, 0.2, 1 / 3], values[:, :3], values[:, 3:], temperature_c=temperature_c)
     save_csv(recording, path)
     read = load_csv(path)
     for name in ("t", "acc", "gyr", "temperature_c"):
@@ -34,15 +32,9 @@ def test_reads_the_same_numbers_that_were_saved(path, values, temperature_c):
     "text",
     [
         pytest.param("t,ax,ay,az,gx,gy,gz\n0,1,2,3,4,5,6\n1,1,2,3,4,5,6\n", id="as documented"),
-        pytest.param(
-            "gz,t,gx,note,ay,ax,az,gy\n6,0,4,a,2,1,3,5\n6,1,4,b,2,1,3,5\n", id="another order, one more"
-        ),
-        pytest.param(
-            "\ufeffT, Ax, AY ,az,gx,gy,gz\r\n0,1,2,3,4,5,6\r\n\r\n1, 1,2,3,4,5,6", id="a spreadsheet's"
-        ),
-        pytest.param(
-            '"t","ax","ay","az","gx","gy","gz"\n"0",1,2,3,4,5,6\n"1",1,2,3,4,5,6\n,,,,,,\n', id="quoted"
-        ),
+        pytest.param("gz,t,gx,note,ay,ax,az,gy\n6,0,4,a,2,1,3,5\n6,1,4,b,2,1,3,5\n", id="another order, one more"),
+        pytest.param("\ufeffT, Ax, AY ,az,gx,gy,gz\r\n0,1,2,3,4,5,6\r\n\r\n1, 1,2,3,4,5,6", id="a spreadsheet's"),
+        pytest.param('"t","ax","ay","az","gx","gy","gz"\n"0",1,2,3,4,5,6\n"1",1,2,3,4,5,6\n,,,,,,\n', id="quoted"),
     ],
 )
 def test_columns_go_by_their_names(path, text):
@@ -69,9 +61,7 @@ def test_columns_go_by_their_names(path, text):
         pytest.param(HEADER + "0,1,2,3,4,5,6\n1,1,2,x,4,5,6\n", "line 3: az is 'x'", id="a word"),
         pytest.param(HEADER + "0,1,2,,4,5,6\n", "line 2: az is ''", id="nothing"),
         pytest.param(HEADER + "0,1,2,3,4,5,6\n1,1,nan,3,4,5,6\n", "acc is not a finite", id="NaN"),
-        pytest.param(
-            HEADER + "1,1,2,3,4,5,6\n0,1,2,3,4,5,6\n", "time does not increase", id="time runs back"
-        ),
+        pytest.param(HEADER + "1,1,2,3,4,5,6\n0,1,2,3,4,5,6\n", "time does not increase", id="time runs back"),
         pytest.param(HEADER + "0,1,2,3,4,5,6\n", r"shape \(1,\)", id="one sample"),
         pytest.param(HEADER + '0,"' + "1" * 200_000, "line 2 is no line", id="a field without end"),
     ],
@@ -90,6 +80,4 @@ def test_files_that_are_no_table(path, tmp_path):
     with pytest.raises(RecordingError, match="No such file"):
         load_csv(tmp_path / "none.csv")
     with pytest.raises(OutputError):
-        save_csv(
-            Recording.from_arrays([0, 1], np.zeros((2, 3)), np.zeros((2, 3))), tmp_path / "none" / "made.csv"
-        )
+        save_csv(Recording.from_arrays([0, 1], np.zeros((2, 3)), np.zeros((2, 3))), tmp_path / "none" / "made.csv")

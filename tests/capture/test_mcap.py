@@ -21,12 +21,8 @@ words = st.text(max_size=30)
 registers = st.integers(0, 255)
 data = st.binary(max_size=40)
 failures = st.none() | st.builds(Failure, words, words, words)
-reads = st.builds(
-    lambda r, d, t, f: Transaction("read", r, len(d), d, t, f), registers, data, times, failures
-)
-writes = st.builds(
-    lambda r, d, t, f: Transaction("write", r, len(d), d, t, f), registers, data, times, failures
-)
+reads = st.builds(lambda r, d, t, f: Transaction("read", r, len(d), d, t, f), registers, data, times, failures)
+writes = st.builds(lambda r, d, t, f: Transaction("write", r, len(d), d, t, f), registers, data, times, failures)
 plain = st.none() | st.booleans() | st.integers(-(2**53), 2**53) | st.floats(allow_nan=False) | words
 events = st.builds(SessionEvent, words, times, st.dictionaries(words, plain, max_size=3))
 
@@ -76,9 +72,7 @@ def test_other_programs_read_it(path):
         for schema in summary.schemas.values():
             assert schema.encoding == "jsonschema"
             assert json.loads(schema.data)["type"] == "object"
-        messages = [
-            (c.topic, json.loads(m.data)) for _, c, m in reader.iter_messages(starting_at=3_900_000_000)
-        ]
+        messages = [(c.topic, json.loads(m.data)) for _, c, m in reader.iter_messages(starting_at=3_900_000_000)]
         assert messages[0] == ("/bus", {"op": "read", "register": 0x74, "count": 4, "data": "000000c3"})
         assert messages[-1] == ("/session", {"name": "key", "data": {"key": "enough"}})
         (metadata,) = reader.iter_metadata()
@@ -161,9 +155,7 @@ def test_a_changed_bit_is_noticed_and_what_precedes_it_is_kept(path, data):
         pytest.param(b"", "is empty", id="empty"),
         pytest.param(b"t,ax,ay,az\n0,0,0,9.8\n", "no MCAP file", id="text"),
         pytest.param(b"\x89MCAP0\r\n", "does not hold the head", id="magic alone"),
-        pytest.param(
-            b"\x89MCAP0\r\n" + bytes(range(256)), "does not hold the head", id="junk after the magic"
-        ),
+        pytest.param(b"\x89MCAP0\r\n" + bytes(range(256)), "does not hold the head", id="junk after the magic"),
     ],
 )
 def test_what_is_no_capture_is_refused(path, content, says):

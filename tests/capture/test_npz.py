@@ -37,9 +37,7 @@ def test_reads_what_was_saved(arrays, path):
     read = load_npz(path)
     for field in fields(Recording):
         if field.name != "name":
-            np.testing.assert_array_equal(
-                getattr(read, field.name), getattr(recording, field.name), field.name
-            )
+            np.testing.assert_array_equal(getattr(read, field.name), getattr(recording, field.name), field.name)
     assert read.name == "made.npz"
 
 

@@ -117,9 +117,7 @@ def test_shows_the_magnitudes_of_the_document(calibration):
         np.testing.assert_allclose([float(cell) for cell in row[1:]], expected, atol=DIGITS)
 
 
-@pytest.mark.parametrize(
-    "applied", [[0, 0, 0], [0.25, -0.1, 1.0]], ids=["nothing applied", "applied in hardware"]
-)
+@pytest.mark.parametrize("applied", [[0, 0, 0], [0.25, -0.1, 1.0]], ids=["nothing applied", "applied in hardware"])
 def test_the_formula_computes_what_the_calibration_does(calibration, applied):
     calibration = replace(calibration, applied_in_hardware=np.array(applied, float))
     text = Page(render(calibration)).texts["formula"]
@@ -154,6 +152,11 @@ def test_what_is_unknown_is_called_so():
     assert page.tables["magnitudes"][1][1] == "unknown"
     assert page.tables["settings"] == []
     assert "cannot be inverted" in page.texts["formula"]
+
+
+def test_says_that_the_recording_was_cut_short(calibration, recording):
+    sentence = "capture.mcap was never closed: its 7 records are whole."
+    assert sentence in render(calibration, replace(recording, recovered=sentence))
 
 
 def test_there_is_no_picture_of_a_gain_that_cannot_be_inverted(calibration, recording):
