@@ -22,9 +22,7 @@ from .sensor import Truth, in_symmetric_frame
 __all__ = ["Chip", "Feed", "RecordedFeed", "SimulatedBus", "Truth", "open_recorded", "open_simulated"]
 
 
-def open_simulated(
-    text: str = "sim", gravity: float = STANDARD_GRAVITY_MPS2, seed: int | None = None
-) -> SimulatedBus:
+def open_simulated(text: str = "sim", gravity: float = STANDARD_GRAVITY_MPS2, seed: int | None = None) -> SimulatedBus:
     """The simulated chip that `sim:key=value,...` describes.
 
     Parameters

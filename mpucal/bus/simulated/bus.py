@@ -23,9 +23,7 @@ class SimulatedBus:
     motion, truth : what moves the chip's sensor and what is true of it; None for a recording's counts.
     """
 
-    def __init__(
-        self, chip: Chip, clock: Clock, motion: Motion | None = None, truth: Truth | None = None
-    ) -> None:
+    def __init__(self, chip: Chip, clock: Clock, motion: Motion | None = None, truth: Truth | None = None) -> None:
         self._chip, self._clock, self._motion, self._truth = chip, clock, motion, truth
 
     def read(self, register: int, count: int) -> Reply:

@@ -29,9 +29,7 @@ class Chip:
     accel_trim : (x, y, z) the factory's words in the accelerometer's offset registers.
     """
 
-    def __init__(
-        self, model: Model, feed: Feed, rate_error_ppm: float, accel_trim: tuple[int, int, int]
-    ) -> None:
+    def __init__(self, model: Model, feed: Feed, rate_error_ppm: float, accel_trim: tuple[int, int, int]) -> None:
         self._model, self._feed, self._trim = model, feed, accel_trim
         self._speed = 1 + rate_error_ppm * 1e-6
         self._writable = model.writable()
@@ -184,9 +182,7 @@ def _setting(registers: bytearray, rate_hz: float, model: Model, trim: tuple[int
         ((_word(registers, address) & ~1) - (factory & ~1)) / reg.ACCEL_OFFSET_LSB_PER_G
         for address, factory in zip(model.family.accel_offset_h, trim, strict=True)
     )
-    gx, gy, gz = (
-        _word(registers, reg.XG_OFFSET_H + 2 * axis) / reg.GYRO_OFFSET_LSB_PER_DPS for axis in range(3)
-    )
+    gx, gy, gz = (_word(registers, reg.XG_OFFSET_H + 2 * axis) / reg.GYRO_OFFSET_LSB_PER_DPS for axis in range(3))
     return Setting(
         rate_hz=rate_hz,
         accel_range_g=reg.ACCEL_RANGES_G[accel >> reg.FULL_SCALE_SHIFT],

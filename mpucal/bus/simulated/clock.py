@@ -50,7 +50,7 @@ class RealClock:
 
     def now(self) -> int:
         """What the clock shows; while a transfer lasts, its end."""
-        return max(self._busy_until, time.monotonic_ns() - self._opened)
+        return max(self._busy_until, self._passed())
 
     def spend(self, ns: int) -> None:
         """The bus is busy for `ns`."""
@@ -58,7 +58,10 @@ class RealClock:
 
     def sleep_until(self, t_ns: int) -> None:
         """Sleep until it shows `t_ns`."""
-        time.sleep(max(0, t_ns - self.now()) * 1e-9)
+        time.sleep(max(0, t_ns - self._passed()) * 1e-9)
+
+    def _passed(self) -> int:
+        return time.monotonic_ns() - self._opened
 
 
 CLOCKS: dict[str, type[FastClock] | type[RealClock]] = {"fast": FastClock, "real": RealClock}

@@ -90,10 +90,10 @@ class Hand:
         return self._leg
 
     def _obey(self, step: int) -> None:
-        # a board that is being laid flat is still once it is let go of: nothing else to do
         while self._heard and self._heard[0][0] <= step:
             prompt = self._heard.popleft()[1]
             kind, down = str(prompt.kind), prompt.down
+            # who is told to be still while laying the board flat goes on laying it flat
             calm_on = kind == "hold_still" and down is None and self._wish in ("lay_flat", "rest")
             if kind in ("lay_flat", "hold_still", "rotate", "rest") and not calm_on:
                 self._wish, self._moved = kind, False

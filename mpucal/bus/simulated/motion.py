@@ -121,9 +121,12 @@ class Motion:
         return means[:, :3], means[:, 3:]
 
     def attitude(self, t_s: float) -> Vector:
-        """The quaternion (4,) at the step before `t_s`, not before what `means` was last asked for."""
+        """The quaternion (4,) at `t_s`, which is not before what `means` was last asked for."""
         self._extend(t_s)
-        return np.asarray(self._attitudes[int(t_s * STEP_HZ) - self._first])
+        place = t_s * STEP_HZ - self._first
+        node = min(int(place), len(self._attitudes) - 2)
+        near = self._attitudes[node : node + 2]
+        return rotation.product(near[0], rotation.exp((place - node) * rotation.between(near)[0]))
 
     def _extend(self, t_s: float) -> None:
         while self._stance.step <= t_s * STEP_HZ:
@@ -155,9 +158,7 @@ class Motion:
         """The attitudes (n, 4) as the hand meant them, with its tremor in it."""
         if not grip.any():
             return planned
-        return rotation.product(
-            planned, rotation.exp(self._quiver.integral(first, len(grip)) * grip[:, None])
-        )
+        return rotation.product(planned, rotation.exp(self._quiver.integral(first, len(grip)) * grip[:, None]))
 
     def _swing(self, rates: Vector) -> Vector:
         """What a sensor on the lever r feels of (n, 3) rad/s: alpha x r + w x (w x r)."""

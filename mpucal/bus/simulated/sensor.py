@@ -155,16 +155,14 @@ class Truth:
 
     def document(self) -> dict[str, Any]:
         """The truth in plain JSON types, in m/s^2, rad/s and the symmetric frame."""
-        return {
-            key: value.tolist() if isinstance(value, np.ndarray) else value
-            for key, value in self.__dict__.items()
-        }
+        return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in self.__dict__.items()}
 
 
 def in_symmetric_frame(D: Vector, K: NDArray[np.floating[Any]]) -> tuple[Vector, Vector]:
     """The same sensor in the frame that makes K symmetric: K = U S V^T, Q = V U^T, then D Q^T and Q K."""
     U, S, Vt = np.linalg.svd(K)
-    return D @ U @ Vt, Vt.T @ np.diag(S) @ Vt
+    symmetric = Vt.T @ np.diag(S) @ Vt
+    return D @ U @ Vt, (symmetric + symmetric.T) / 2
 
 
 def rotation_matrix(angles_rad: Vector) -> Vector:
