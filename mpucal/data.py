@@ -180,7 +180,8 @@ def _rows(values: ArrayLike, key: str, n: int, name: str) -> Vector:
     bad = ~np.isfinite(array).all(axis=1)
     if bad.any():
         raise RecordingError(
-            f"{name}: {key} is not a finite number in {int(bad.sum())} of {n} samples, first in sample {int(bad.argmax())}",
+            f"{name}: {key} is not a finite number in {int(bad.sum())} of {n} samples,"
+            f" first in sample {int(bad.argmax())}",
             "leave those samples out, and keep the times of the others",
         )
     return array

@@ -70,8 +70,7 @@ class ReplayBus:
         recorded = self._accesses[self._next]
         if _words(asked) != _words(recorded):
             raise CaptureError(
-                f"the program asked for {_words(asked)}, but access {self._next} of {self._name} is"
-                f" {_words(recorded)}",
+                f"the program asked for {_words(asked)}, but access {self._next} of {self._name} is {_words(recorded)}",
                 "replay it with the mpucal and options that recorded it, or calibrate it without replaying",
             )
         self._next += 1

@@ -23,9 +23,7 @@ class Tap:
         try:
             reply = self._bus.read(register, count)
         except BusError as error:
-            self._recorder.transaction(
-                Transaction("read", register, count, b"", self._latest_ns, _failure(error))
-            )
+            self._recorder.transaction(Transaction("read", register, count, b"", self._latest_ns, _failure(error)))
             raise
         self._latest_ns = max(self._latest_ns, reply.t_ns)
         self._recorder.transaction(Transaction("read", register, count, reply.data, reply.t_ns))

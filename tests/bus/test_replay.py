@@ -45,27 +45,21 @@ def test_ends_after_the_last_access(records):
             ["read of 1 bytes from 0x74", "read of 1 bytes from 0x75"],
             id="another register",
         ),
-        pytest.param(
-            READ, lambda bus: bus.read(0x75, 2), ["2 bytes from 0x75", "1 bytes from"], id="another count"
-        ),
+        pytest.param(READ, lambda bus: bus.read(0x75, 2), ["2 bytes from 0x75", "1 bytes from"], id="another count"),
         pytest.param(
             READ,
             lambda bus: bus.write(0x75, b"\x68"),
             ["write of 68 to 0x75", "read of 1"],
             id="a write for a read",
         ),
-        pytest.param(
-            WRITE, lambda bus: bus.read(0x6B, 1), ["read of 1", "write of 80"], id="a read for a write"
-        ),
+        pytest.param(WRITE, lambda bus: bus.read(0x6B, 1), ["read of 1", "write of 80"], id="a read for a write"),
         pytest.param(
             WRITE,
             lambda bus: bus.write(0x6B, b"\x01"),
             ["write of 01", "write of 80 to 0x6b"],
             id="other bytes",
         ),
-        pytest.param(
-            WRITE, lambda bus: bus.write(0x6C, b"\x80"), ["to 0x6c", "to 0x6b"], id="written elsewhere"
-        ),
+        pytest.param(WRITE, lambda bus: bus.write(0x6C, b"\x80"), ["to 0x6c", "to 0x6b"], id="written elsewhere"),
     ],
 )
 def test_refuses_an_access_that_the_capture_does_not_hold(recorded, access, words):

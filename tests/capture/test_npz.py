@@ -1,4 +1,5 @@
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -115,3 +116,15 @@ def test_places_that_cannot_be_read_or_written(arrays, tmp_path):
         load_npz(tmp_path / "none.npz")
     with pytest.raises(OutputError):
         save_npz(Recording.from_arrays(**arrays), tmp_path / "none" / "made.npz")
+
+
+def test_real_and_simulated_recordings_of_others_are_read():
+    shared = Path(__file__).parents[2].parent / "shared"
+    paths = sorted([*shared.glob("recordings/*.npz"), *shared.glob("simulated/*.npz")])
+    if not paths:
+        pytest.skip("the folder shared with recordings of others is not beside the project")
+    for path in paths:
+        with np.load(path) as archive:
+            recording = load_npz(path)
+            np.testing.assert_array_equal(recording.acc, archive["acc"])
+            assert recording.flat == ((0, archive["flat_samples"]) if "flat_samples" in archive else None)

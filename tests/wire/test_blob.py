@@ -202,9 +202,7 @@ def test_the_tool_writes_the_vectors_that_are_there(tmp_path, monkeypatch):
     runpy.run_path(str(tool), run_name="__main__")
     made = {path.name: path.read_bytes() for path in tmp_path.glob("*.bin")}
     assert made == {path.name: path.read_bytes() for path in VECTORS.glob("blob_*.bin")}
-    assert {path.name for path in tmp_path.glob("*.json")} == {
-        path.name for path in VECTORS.glob("blob_*.json")
-    }
+    assert {path.name for path in tmp_path.glob("*.json")} == {path.name for path in VECTORS.glob("blob_*.json")}
 
 
 def test_the_documents_table_is_the_codecs_format():
