@@ -37,12 +37,8 @@ def source_options(command: F) -> F:
     """--bus or --replay, and how the chip is set."""
     for option in reversed(
         (
-            click.option(
-                "--bus", metavar="BUS", help="/dev/i2c-N, or sim[:key=value,...] for the simulated chip."
-            ),
-            click.option(
-                "--replay", metavar="FILE", type=click.Path(path_type=Path), help="Run a capture again."
-            ),
+            click.option("--bus", metavar="BUS", help="/dev/i2c-N, or sim[:key=value,...] for the simulated chip."),
+            click.option("--replay", metavar="FILE", type=click.Path(path_type=Path), help="Run a capture again."),
             click.option("--address", type=Integer(), help="I2C address; by default 0x68, then 0x69."),
             click.option(
                 "--rate", metavar="HZ", type=float, default=200.0, show_default=True, help="Samples a second."
@@ -67,12 +63,8 @@ def source_options(command: F) -> F:
 def fit_options(command: F) -> F:
     """--gravity and --model."""
     for option in (
-        click.option(
-            "--model", type=click.Choice(MODELS), default="auto", show_default=True, help="What to estimate."
-        ),
-        click.option(
-            "--gravity", type=float, default=9.80665, show_default=True, help="Local gravity [m/s²]."
-        ),
+        click.option("--model", type=click.Choice(MODELS), default="auto", show_default=True, help="What to estimate."),
+        click.option("--gravity", type=float, default=9.80665, show_default=True, help="Local gravity [m/s²]."),
     ):
         command = option(command)
     return command

@@ -66,9 +66,7 @@ def _settle(place: Place, runner: Runner) -> None:
         place.name_by(runner.sensor.chip)
 
 
-def _finish(
-    runner: Runner, source: Opened, place: Place, recording: Recording
-) -> tuple[Calibration, tuple[Path, ...]]:
+def _finish(runner: Runner, source: Opened, place: Place, recording: Recording) -> tuple[Calibration, tuple[Path, ...]]:
     fit = partial(calibrate, model=source.plan.model, gravity=source.plan.gravity)
     calibration = runner.calibrate(recording, fit)
     return calibration, runner.write(place.folder, calibration, recording, source.truth)

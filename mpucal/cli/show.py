@@ -55,9 +55,7 @@ def _facts(recording: Recording) -> dict[str, Any]:
         "gaps": int(recording.gap.sum()),
         "acc_clipped": int(recording.acc_clipped.sum()),
         "gyr_clipped": int(recording.gyr_clipped.sum()),
-        "flat_s": None
-        if flat is None
-        else [float(recording.t[i] - recording.t[0]) for i in (flat[0], flat[1] - 1)],
+        "flat_s": None if flat is None else [float(recording.t[i] - recording.t[0]) for i in (flat[0], flat[1] - 1)],
         "magnitude_mps2": float(np.median(np.linalg.norm(recording.acc, axis=1))),
         "fastest_dps": float(np.degrees(np.abs(recording.gyr).max())),
         "temperature_c": [float(temperature.min()), float(temperature.max())] if len(temperature) else None,

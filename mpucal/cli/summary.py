@@ -34,13 +34,14 @@ def written(paths: Sequence[Path]) -> str:
     folder = paths[0].parent
     lines = [f"Written to {folder}:", "  " + ", ".join(path.name for path in paths)]
     if any(path.name == BLOB for path in paths):
-        load = f'mpucal.Calibration.load("{folder / DOCUMENT}").apply(acc)'
-        lines += ["", f"Next: look at {folder / REPORT}; in a program, {load};", f"  on the board, {BLOB}."]
-    else:
         lines += [
-            "",
-            f"Next: look at {folder / REPORT}, mend what is named above, and run the session again.",
+            "Next:",
+            f"  look at      {folder / REPORT}",
+            f'  in Python    a = mpucal.Calibration.load("{folder / DOCUMENT}").apply(acc)',
+            f"  in firmware  {folder / BLOB}, as firmware_protocol.md describes it",
         ]
+    else:
+        lines += [f"Next: look at {folder / REPORT}, mend what is named above, and run the session again."]
     return "\n".join(lines)
 
 

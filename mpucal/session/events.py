@@ -98,9 +98,7 @@ class Stopped:
     remedy: str
 
 
-Event = (
-    Connected | Measured | Tick | Enough | Abort | SourceEnded | Fitted | Written | Rested | Turned | Stopped
-)
+Event = Connected | Measured | Tick | Enough | Abort | SourceEnded | Fitted | Written | Rested | Turned | Stopped
 
 
 # What the session answers.

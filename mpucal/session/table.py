@@ -90,4 +90,4 @@ def next_state(state: State, event: Event) -> State:
     try:
         return TRANSITIONS[state][type(event)]
     except KeyError:
-        raise IllegalEvent(f"{type(event).__name__} in state {state!r}") from None
+        raise IllegalEvent(f"{type(event).__name__} in state {state}") from None
