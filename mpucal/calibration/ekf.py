@@ -141,9 +141,7 @@ class Ekf:
                 x, P = self.predict(x, P, t)
             yield Innovations(np.array(e_s), np.array(S_s), np.array(x_s))
 
-    def correct(
-        self, x: Vector, P: Vector, y_less_b: Vector, g_D: Vector
-    ) -> tuple[Vector, Vector, Vector, Vector]:
+    def correct(self, x: Vector, P: Vector, y_less_b: Vector, g_D: Vector) -> tuple[Vector, Vector, Vector, Vector]:
         """x, P of t|t and e, S of (6): (b, 4), (b, 4, 4), (b, 3), (b, 3, 3), from y - b_a and |g| D."""
         H = g_D @ gravity_jacobian(x)
         e = y_less_b - 0.5 * (H @ x[..., None])[..., 0]

@@ -68,8 +68,7 @@ class Theta:
     def packed(self) -> Vector:
         """The kernel's layout: D, b_a, b_omega, K, sigma_h, r, u, and u's derivatives by the tilts."""
         return np.concatenate(
-            [self.D.ravel(), self.b_a, self.b_omega, self.K.ravel(), [self.sigma_h], self.r, self.u]
-            + list(tangents(self.u))
+            [self.D.ravel(), self.b_a, self.b_omega, self.K.ravel(), [self.sigma_h], self.r, self.u, *tangents(self.u)]
         )
 
 
@@ -111,10 +110,7 @@ class Series:
 
     def arrays(self) -> dict[str, Vector | None]:
         """Keyword arguments of the kernel."""
-        return {
-            name: None if value is None else np.ascontiguousarray(value)
-            for name, value in self.__dict__.items()
-        }
+        return {name: None if value is None else np.ascontiguousarray(value) for name, value in self.__dict__.items()}
 
 
 @dataclass(frozen=True)

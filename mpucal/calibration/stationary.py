@@ -24,10 +24,10 @@ VARIANCE_FLOOR_OF_RANGE = 1e-12
 def find_flat(recording: Recording) -> tuple[int, int] | None:
     """(first, last + 1) of the segment that lies flat, or None where the board never lies still.
 
-    It is the earliest still run of five seconds, or else of half the length of the longest. A run is still where the windows'
-    spread is small and their means agree: a turn at a constant rate has no variance, only a mean that moves.
+    It is the earliest still run of five seconds, or else of half the length of the longest. A run is still where the
+    windows' spread is small and their means agree: a turn at a constant rate has no variance, only a mean that moves.
     """
-    n = max(int(round(WINDOW_S * recording.rate_hz)), 4)
+    n = max(round(WINDOW_S * recording.rate_hz), 4)
     acc, gyr = _windows(recording.acc, n), _windows(recording.gyr, n)
     if len(acc) < 2:
         return None
@@ -43,12 +43,8 @@ def find_flat(recording: Recording) -> tuple[int, int] | None:
         if k < len(acc) and quiet[k - 1] and quiet[k] and not recording.gap[k * n]:
             here = slice(start, k)
             size = 4.5 * np.sqrt(1.0 / n + 1.0 / (n * (k - start)))
-            near_acc = np.abs(acc_mean[k] - acc_mean[here].mean(0)) <= ACC_STEP_MPS2 + size * acc_sd[
-                here
-            ].mean(0)
-            near_gyr = np.abs(gyr_mean[k] - gyr_mean[here].mean(0)) <= GYRO_STEP_RAD_S + size * gyr_sd[
-                here
-            ].mean(0)
+            near_acc = np.abs(acc_mean[k] - acc_mean[here].mean(0)) <= ACC_STEP_MPS2 + size * acc_sd[here].mean(0)
+            near_gyr = np.abs(gyr_mean[k] - gyr_mean[here].mean(0)) <= GYRO_STEP_RAD_S + size * gyr_sd[here].mean(0)
             if near_acc.all() and near_gyr.all():
                 continue
         if quiet[k - 1] and k - start >= 2:

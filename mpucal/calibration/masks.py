@@ -1,0 +1,67 @@
+"""Samples that must not be believed as they stand: clipped ones, and steps across a gap."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..data import STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
+from .likelihood import Series
+from .model import Flat
+
+ACC_RANGES = STANDARD_GRAVITY_MPS2 * np.array([2.0, 4.0, 8.0, 16.0])
+GYRO_RANGES = np.deg2rad([125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0])
+RANGE_TOLERANCE = 2e-3
+FEWEST_AT_A_RANGE, FEWEST_ANYWHERE = 2, 8
+
+CLIPPED_R_SCALE = 1e4
+GAP_ANGLE_VARIANCE = 1.0  # rad^2 a second: nothing is known of how the board turned
+CLIPPED_RATE_SD = 0.1  # of |omega|: what lies beyond the range
+
+GAP_INTERVALS = 2.5  # a longer time between samples than so many intervals is a gap
+
+
+def with_masks(recording: Recording) -> Recording:
+    """The recording with its gaps and clipped samples marked, where its source did not already."""
+    dt = np.diff(recording.t, prepend=recording.t[0])
+    return replace(
+        recording,
+        gap=recording.gap | (dt > GAP_INTERVALS * np.median(dt[1:])),
+        acc_clipped=recording.acc_clipped | _at_the_rail(recording.acc, ACC_RANGES),
+        gyr_clipped=recording.gyr_clipped | _at_the_rail(recording.gyr, GYRO_RANGES),
+    )
+
+
+def mask(series: Series, recording: Recording, flat: Flat) -> Series:
+    """The series with what its masks demand: R of clipped accelerations, extra Q of gaps and clipped rates."""
+    last = flat.last
+    gap, acc, gyr = recording.gap[last:], recording.acc_clipped[last:], recording.gyr_clipped[last - 1 :]
+    if not (gap.any() or acc.any() or gyr.any()):
+        return series
+    clipped = gyr[:-1] | gyr[1:]
+    rate2 = np.sum((series.omega - flat.b_omega) ** 2, axis=1)
+    q_extra = np.where(gap, GAP_ANGLE_VARIANCE * np.minimum(series.dt, 1e3), 0.0)
+    q_extra += np.where(clipped, (CLIPPED_RATE_SD * series.dt) ** 2 * rate2, 0.0)
+    # the measured rates on both sides of a gap say nothing of what lies between
+    omega = np.where(gap[:, None], flat.b_omega, series.omega)
+    return replace(series, omega=omega, r_scale=np.where(acc, CLIPPED_R_SCALE, 1.0), q_extra=q_extra)
+
+
+def _at_the_rail(values: Vector, ranges: Vector) -> Mask:
+    """(n,) True where an axis repeats its largest magnitude exactly: few times at a chip's range, often elsewhere."""
+    clipped = np.zeros(len(values), bool)
+    for column in values.T:
+        for rail in (column.max(), column.min()):
+            at = column == rail
+            known = np.any(np.abs(np.abs(rail) / ranges - 1.0) < RANGE_TOLERANCE)
+            runs = int(np.count_nonzero(at[1:] & at[:-1]))
+            if (known and at.sum() >= FEWEST_AT_A_RANGE) or (runs >= FEWEST_ANYWHERE and _beyond(column, rail)):
+                clipped |= at
+    return clipped
+
+
+def _beyond(column: Vector, rail: float) -> bool:
+    """Whether a value stands so far from the middle of its column that only motion can have brought it there."""
+    middle = np.median(column)
+    return bool(abs(rail - middle) > 20.0 * np.median(np.abs(column - middle)) + 1e-9)

@@ -1,0 +1,121 @@
+"""Levenberg-Marquardt on V(theta) plus a quadratic prior. Knows no sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import Vector
+from .likelihood import NAMES, Evaluation, Problem, Theta, evaluate
+
+DECREMENT = 1e-3  # g' H^-1 g / 2: 0.04 standard deviations from the optimum, whatever the units
+MOST_ITERATIONS = 60
+DAMPING, EASIER, HARDER, HOPELESS = 1e-3, 0.1, 8.0, 1e12
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known beforehand: sum of precision (x - mean)^2 / 2, (27,) in the order of NAMES; precision 0: nothing.
+
+    The tilts have no prior.
+    """
+
+    mean: Vector
+    precision: Vector
+
+    @classmethod
+    def of(cls, **known: tuple[Vector | float, Vector | float]) -> Prior:
+        """Of keywords b_omega, K (its six), sigma_h, r, each (mean, standard deviation)."""
+        mean, precision = np.zeros(len(NAMES)), np.zeros(len(NAMES))
+        for name, (centre, sd) in known.items():
+            place = slice(*PLACES[name])
+            mean[place], precision[place] = centre, 1.0 / np.square(sd)
+        return cls(mean, precision)
+
+
+PLACES = {"D": (0, 9), "b_a": (9, 12), "b_omega": (14, 17), "K": (17, 23), "sigma_h": (23, 24), "r": (24, 27)}
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where the minimiser stopped.
+
+    Attributes
+    ----------
+    theta : the estimate. V : its cost with the prior. squares : sum of e' S^-1 e.
+    H : (p, p) Fisher matrix with the prior's, over all p parameters, those held fixed as well.
+    free : (p,) True where a parameter was estimated.
+    """
+
+    theta: Theta
+    V: float
+    squares: float
+    H: Vector
+    free: Vector
+    iterations: int
+    converged: bool
+
+    def covariance(self) -> Vector:
+        """(p, p) inverse of H over the free parameters; zero for those held fixed."""
+        covariance = np.zeros_like(self.H)
+        free = np.ix_(self.free, self.free)
+        covariance[free] = np.linalg.pinv(self.H[free], hermitian=True)
+        return covariance
+
+
+def minimise(problem: Problem, theta: Theta, parameters: int, prior: Prior, fixed: tuple[str, ...] = ()) -> Minimum:
+    """Minimise V + prior over the first `parameters` of NAMES, those of `fixed` (keys of PLACES) excepted.
+
+    Stops where the Newton decrement g' H^-1 g / 2 falls below DECREMENT, or after MOST_ITERATIONS.
+    """
+    free = np.ones(parameters, bool)
+    for name in fixed:
+        free[slice(*PLACES[name])] = False
+    at, damping, iterations, converged = _At(problem, theta, parameters, prior), DAMPING, 0, False
+    while iterations < MOST_ITERATIONS and damping < HOPELESS:
+        gradient, H = at.gradient[free], at.H[np.ix_(free, free)]
+        if gradient @ _solve(H, gradient) / 2.0 < DECREMENT:
+            converged = True
+            break
+        step = np.zeros(parameters)
+        step[free] = -_solve(H + damping * np.diag(np.diag(H)), gradient)
+        trial = _At(problem, at.theta.moved(step), parameters, prior)
+        if trial.V < at.V:
+            at, damping, iterations = trial, damping * EASIER, iterations + 1
+        else:
+            damping *= HARDER
+    return Minimum(at.theta, at.V, at.data.squares, at.H, free, iterations, converged)
+
+
+class _At:
+    """V, gradient and H with the prior's share, at theta."""
+
+    def __init__(self, problem: Problem, theta: Theta, parameters: int, prior: Prior) -> None:
+        self.theta = theta
+        self.data: Evaluation = evaluate(problem, theta, parameters)
+        away = (_values(theta) - prior.mean)[:parameters]
+        precision = prior.precision[:parameters]
+        self.V = self.data.V + 0.5 * float(precision @ (away * away))
+        if not np.isfinite(self.V):
+            self.V = np.inf
+        self.gradient = self.data.gradient + precision * away
+        self.H = self.data.fisher + np.diag(precision)
+
+
+def _values(theta: Theta) -> Vector:
+    """(27,) in the order of NAMES; the tilts are zero by definition."""
+    K = theta.K
+    six = [K[0, 0], K[0, 1], K[0, 2], K[1, 1], K[1, 2], K[2, 2]]
+    return np.concatenate([theta.D.ravel(), theta.b_a, [0.0, 0.0], theta.b_omega, six, [theta.sigma_h], theta.r])
+
+
+def _solve(H: Vector, g: Vector) -> Vector:
+    """H^-1 g with H scaled to a unit diagonal; directions that nothing is known of stay put."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+    scaled = H * np.outer(scale, scale)
+    try:
+        x = np.linalg.solve(scaled, g * scale)
+    except np.linalg.LinAlgError:
+        x = np.linalg.lstsq(scaled, g * scale, rcond=1e-12)[0]
+    return np.asarray(x * scale)
