@@ -26,6 +26,18 @@ RATE_TOLERANCE = 0.01
 # A look falls anywhere between two samples: a uniform distribution's standard deviation.
 LOOK_STD_SAMPLES = 12**-0.5
 
+# The fractions of n times the golden ratio lie evenly between 0 and 1.
+GOLDEN = (5**0.5 - 1) / 2
+
+
+def look_phase(n: int) -> float:
+    """Where look number `n` should fall, -1/2..1/2 of a sample interval about its due time.
+
+    A regular look would fall at the same phase again and again where its period is a whole number of
+    intervals, and then a rate that is off by 100 ppm is not seen for a minute.
+    """
+    return n * GOLDEN % 1 - 0.5
+
 
 @dataclass
 class _Segment:

@@ -74,9 +74,7 @@ class Decoder:
         if self._fifo is None:
             self._settings, self._fifo = settings, FifoDecoder(settings)
         elif settings != self._settings:
-            raise RecordingError(
-                f"{self._name} holds samples of two ranges or rates", "record each of them on its own"
-            )
+            raise RecordingError(f"{self._name} holds samples of two ranges or rates", "record each of them on its own")
         self._fifo.reset()
 
 

@@ -14,6 +14,7 @@ from ..data import Recording, Samples, Sensor
 from ..errors import BusError, ChipError
 from . import registers as reg
 from .access import Bus, EndOfCapture
+from .clock import look_phase
 from .config import Config
 from .decode import Decoder
 from .families import Family, Part, part_of
@@ -30,13 +31,10 @@ WAKE_TRIES = 5
 
 TRIES = 3
 RETRY_NS = MS
-DEAD_NS = 2_000 * MS
+DEAD_S = 2.0
 
 # An overflow drops the oldest bytes, so a FIFO this full may have lost its frames' alignment.
 SPARE_BYTES = 3 * reg.FRAME_BYTES
-
-# The fractions of n times the golden ratio lie evenly between 0 and 1.
-GOLDEN = (5**0.5 - 1) / 2
 
 T = TypeVar("T")
 
@@ -57,7 +55,7 @@ class Driver:
         self._now_ns = 0
         self._polls = 0
         self._next_poll_ns = 0
-        self._last_sample_ns = 0
+        self._fruitless_polls = 0
 
     def now_ns(self) -> int:
         """The bus's clock as last seen."""
@@ -77,7 +75,6 @@ class Driver:
         self._settings = self._config.settings(part)
         self._configure(self._settings)
         self._restart_fifo()
-        self._last_sample_ns = self._now_ns
         return self._settings.sensor
 
     def poll(self) -> Samples:
@@ -92,9 +89,9 @@ class Driver:
         self._sleep_until(self._next_poll_ns)
         healthy = self._drain()
         samples = self._decoder.take()
-        if len(samples):
-            self._last_sample_ns = self._now_ns
-        elif self._now_ns - self._last_sample_ns > DEAD_NS:
+        # counted in polls: a host that slept for a while says nothing about the chip
+        self._fruitless_polls = 0 if len(samples) else self._fruitless_polls + 1
+        if self._fruitless_polls * self._config.poll_s > DEAD_S:
             raise self._why_dead()
         if not healthy:
             self._restart_fifo()
@@ -177,10 +174,10 @@ class Driver:
         return self._decoder.fault is None
 
     def _plan_next_poll(self) -> None:
-        # looks that fall at every phase of the chip's clock measure it best
-        phase = self._polls * GOLDEN % 1 - 0.5
+        period_s = self._config.poll_s
+        in_s = period_s + look_phase(self._polls) * min(period_s, 1 / self._config.rate_hz)
         self._polls += 1
-        self._next_poll_ns = self._now_ns + round((self._config.poll_s + phase / self._config.rate_hz) * 1e9)
+        self._next_poll_ns = self._now_ns + round(in_s * 1e9)
 
     def _why_dead(self) -> ChipError:
         """What two seconds without a sample come from."""
@@ -193,7 +190,7 @@ class Driver:
                 "its supply broke down: check the wires and connectors, then start again",
             )
         return ChipError(
-            f"the {chip} gave no sample that can be believed for {DEAD_NS // 10**9} s",
+            f"the {chip} gave no sample that can be believed for {DEAD_S:g} s",
             "take its supply away for a moment, slow the bus down or the rate, and start again",
         )
 

@@ -160,8 +160,7 @@ class FifoDecoder:
 
     def _times_s(self, runs: list[_Run]) -> Vector:
         times = [
-            self._clock.times_s(run.segment, run.first + np.arange(len(run.frames), dtype=np.int64))
-            for run in runs
+            self._clock.times_s(run.segment, run.first + np.arange(len(run.frames), dtype=np.int64)) for run in runs
         ]
         return increasing(np.concatenate(times), LEAST_STEP / self._clock.rate_hz)
 

@@ -1,0 +1,124 @@
+"""A simulated chip whose samples are numbered, on a bus that can be made to fail."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from mpucal.bus.simulated.bus import SimulatedBus
+from mpucal.bus.simulated.chip import Chip
+from mpucal.bus.simulated.clock import FastClock
+from mpucal.bus.simulated.models import MODELS
+from mpucal.bus.tap import Tap
+from mpucal.chip.access import Reply
+from mpucal.chip.driver import Driver
+from mpucal.data import Samples
+from mpucal.errors import BusError
+
+
+class NumberedFeed:
+    """Samples 0, 1, 2, ... in accelerometer x; every other word is the same in all."""
+
+    def __init__(self):
+        self.next = 0
+
+    def samples(self, edges_s, setting):
+        n = len(edges_s) - 1
+        rows = np.tile(np.array([0, -700, 8192, -2000, 1500, -1600, 1700], np.int16), (n, 1))
+        rows[:, 0] = np.arange(self.next, self.next + n) % 30000
+        self.next += n
+        return rows
+
+
+class WorkBench:
+    """A chip, its bus with faults, and everything that went over the bus.
+
+    `before` and `after` hold, by (op, register), what to call instead of or after an access.
+    """
+
+    def __init__(self, model="mpu6050", rate_error_ppm=3000.0):
+        self.clock, self.transactions = FastClock(), []
+        self.chip = Chip(MODELS[model], NumberedFeed(), rate_error_ppm, (-1500, 2001, 700))
+        self.inner = SimulatedBus(self.chip, self.clock)
+        self.before: dict[tuple[str, int], Callable] = {}
+        self.bus = Tap(self, self)
+
+    def transaction(self, transaction):
+        self.transactions.append(transaction)
+
+    def read(self, register, count):
+        self.before.get(("read", register), _nothing)()
+        reply = self.inner.read(register, count)
+        answer = self.before.get(("answer", register))
+        return reply if answer is None else Reply(answer(reply.data), reply.t_ns)
+
+    def write(self, register, data):
+        self.before.get(("write", register), _nothing)()
+        return self.inner.write(register, data)
+
+    def sleep_until(self, t_ns):
+        self.inner.sleep_until(t_ns)
+
+    def close(self):
+        self.inner.close()
+
+    def driver(self, config=None):
+        return Driver(self.bus, config)
+
+    def fail(self, op, register, times):
+        """The next `times` accesses to `register` fail."""
+        left = iter(range(times))
+
+        def broken():
+            if next(left, None) is not None:
+                raise BusError("a transfer broke off", "check the wires")
+
+        self.before[op, register] = broken
+
+    def stall(self, seconds):
+        """The host does nothing for a while."""
+        self.clock.spend(round(seconds * 1e9))
+
+    def accesses(self, op):
+        return [(t.register, t.data) if op == "write" else t.register for t in self.transactions if t.op == op]
+
+
+def _nothing():
+    pass
+
+
+@pytest.fixture
+def bench():
+    """Makes a work bench with a chip of the given model."""
+    return WorkBench
+
+
+@pytest.fixture
+def stream():
+    """Polls a started driver for so many seconds after the first poll, and gives its samples, joined."""
+
+    def run(driver, seconds):
+        parts = [driver.poll()]
+        end_ns = driver.now_ns() + seconds * 1e9
+        while driver.now_ns() < end_ns:
+            parts.append(driver.poll())
+        return Samples.joined(parts)
+
+    return run
+
+
+@pytest.fixture
+def numbers():
+    """Which of the feed's samples a recording holds."""
+    return lambda samples: np.rint(samples.acc[:, 0] / 9.80665 * 8192).astype(int)
+
+
+@pytest.fixture
+def same():
+    """Whether two recordings are equal to the last bit."""
+
+    def compare(a, b):
+        names = ("t", "acc", "gyr", "temperature_c", "gap", "acc_clipped", "gyr_clipped")
+        return a.sensor == b.sensor and all(np.array_equal(getattr(a, n), getattr(b, n)) for n in names)
+
+    return compare

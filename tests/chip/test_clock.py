@@ -1,0 +1,92 @@
+"""The sample clock against a chip whose clock is known, looked at with jitter."""
+
+import numpy as np
+import pytest
+
+from mpucal.chip.clock import SampleClock, increasing, look_phase
+
+POLL_S = 0.020
+
+
+def looks(rng, rate_hz, seconds, start_s=1.0, late_s=0.001):
+    """Times [ns] and counts of polls, each latched up to `late_s` after its time, and when sample 0 was taken.
+
+    Each poll is due 20 ms after the last, off by its phase, and comes up to 1 ms late.
+    """
+    first_s = start_s + rng.uniform(0, 1 / rate_hz)
+    phases = np.array([look_phase(n) for n in range(int(seconds / POLL_S))])
+    t_s = start_s + np.cumsum(POLL_S + phases / rate_hz + rng.uniform(0, 0.001, len(phases)))
+    latched_s = t_s + rng.uniform(0, late_s, len(t_s))
+    taken = np.maximum(0, np.floor((latched_s - first_s) * rate_hz).astype(int) + 1)
+    return np.rint(t_s * 1e9).astype(int).tolist(), taken.tolist(), first_s
+
+
+def watched(nominal_hz, t_ns, taken):
+    clock = SampleClock(nominal_hz)
+    clock.begin_segment()
+    for t, n in zip(t_ns, taken, strict=True):
+        clock.look(t, n)
+    return clock
+
+
+@pytest.mark.parametrize(
+    ("nominal_hz", "seconds", "rms_ppm"),
+    [(1000, 10, 8), (200, 10, 30), (1000, 30, 2), (200, 30, 6)],
+)
+def test_the_rate_is_measured_to_parts_per_million(nominal_hz, seconds, rms_ppm):
+    error_ppm = []
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        rate_hz = nominal_hz * (1 + rng.uniform(-0.01, 0.01))
+        t_ns, taken, _ = looks(rng, rate_hz, seconds)
+        error_ppm.append((watched(nominal_hz, t_ns, taken).rate_hz / rate_hz - 1) * 1e6)
+    assert np.sqrt(np.mean(np.square(error_ppm))) < rms_ppm
+
+
+def test_times_are_those_at_which_the_samples_were_taken():
+    rng = np.random.default_rng(5)
+    t_ns, taken, first_s = looks(rng, 198.7, 30, late_s=0.0)
+    clock = watched(200, t_ns, taken)
+    index = np.arange(taken[-1])
+    errors_s = clock.times_s(clock.segment, index) - (first_s + index / 198.7)
+    assert np.abs(errors_s).max() < 0.03 / 198.7
+
+
+def test_runs_apart_share_one_rate_and_keep_their_own_offset():
+    """Ten runs of two seconds say as much as one of a few; their offsets differ by what was lost."""
+    rng = np.random.default_rng(6)
+    clock, firsts = SampleClock(200), []
+    for run in range(10):
+        t_ns, taken, first_s = looks(rng, 201.3, 2, start_s=3.0 * run, late_s=0.0)
+        firsts.append(first_s)
+        clock.begin_segment()
+        for t, n in zip(t_ns, taken, strict=True):
+            clock.look(t, n)
+    assert clock.rate_hz == pytest.approx(201.3, rel=200e-6)
+    zeros = [clock.times_s(run, np.zeros(1, np.int64))[0] for run in range(10)]
+    assert np.allclose(zeros, firsts, atol=0.1 / 200)
+
+
+def test_before_anything_is_known_the_rate_is_nominal_and_soon_within_its_tolerance():
+    rng = np.random.default_rng(7)
+    t_ns, taken, _ = looks(rng, 202.0, 1)
+    rates = [watched(200, t_ns[:n], taken[:n]).rate_hz for n in range(0, len(t_ns), 5)]
+    assert rates[0] == pytest.approx(200)
+    assert all(197 < rate < 204 for rate in rates)
+    assert rates[-1] == pytest.approx(202, rel=2e-3)
+
+
+def test_the_prior_is_forgotten():
+    """A clone 5 % off, which no data sheet allows."""
+    t_ns, taken, _ = looks(np.random.default_rng(8), 210.0, 30)
+    assert watched(200, t_ns, taken).rate_hz == pytest.approx(210, rel=20e-6)
+
+
+def test_times_out_of_order_are_moved_as_little_as_it_takes():
+    t_s = np.array([1.0, 2.0, 1.5, 1.6, 3.0])
+    assert increasing(t_s, 0.1).tolist() == pytest.approx([1.0, 2.0, 2.1, 2.2, 3.0])
+
+
+def test_times_in_order_are_not_touched():
+    t_s = np.random.default_rng(9).uniform(0.11, 0.3, 1000).cumsum()
+    assert increasing(t_s, 0.1) is t_s

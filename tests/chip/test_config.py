@@ -1,0 +1,32 @@
+"""What may be chosen, and what is said of the rest."""
+
+import pytest
+
+from mpucal.chip.config import Config
+from mpucal.chip.families import part_of
+from mpucal.errors import UsageError
+
+
+def test_the_default_is_200_hz_at_4_g_and_500_deg_per_s():
+    settings = Config().settings(part_of(0x68))
+    assert (settings.smplrt_div, settings.dlpf_cfg, settings.fs_sel, settings.afs_sel) == (4, 3, 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("chosen", "allowed"),
+    [
+        pytest.param({"accel_range_g": 3}, "2, 4, 8, 16 g", id="accelerometer range"),
+        pytest.param({"gyro_range_dps": 300}, "250, 500, 1000, 2000 deg/s", id="gyroscope range"),
+        pytest.param({"dlpf": 7}, "0, 1, 2, 3, 4, 5, 6", id="filter"),
+        pytest.param({"rate_hz": 300}, "333.333 Hz", id="rate"),
+        pytest.param({"rate_hz": 1000, "poll_s": 0.05}, "0.001 to 0.024 s", id="polled too seldom"),
+        pytest.param({"poll_s": 0}, "0.001 to 0.12 s", id="polled all the time"),
+    ],
+)
+def test_what_the_chip_does_not_have_is_answered_with_what_it_has(chosen, allowed):
+    with pytest.raises(UsageError, match=allowed):
+        Config(**chosen)
+
+
+def test_one_kilohertz_is_polled_in_time_by_default():
+    assert Config(rate_hz=1000).settings(part_of(0x70)).nominal_rate_hz == 1000

@@ -1,0 +1,298 @@
+"""The driver on the simulated chip, undisturbed and disturbed."""
+
+import numpy as np
+import pytest
+
+from mpucal.bus.replay import ReplayBus
+from mpucal.chip import registers as reg
+from mpucal.chip.access import EndOfCapture
+from mpucal.chip.config import Config
+from mpucal.chip.driver import TRIES, Driver
+from mpucal.errors import BusError, ChipError, NoAnswer
+
+CHIPS = ["mpu6050", "mpu6500", "clone98"]
+# accesses of stop()
+STOPPING = 2
+
+
+def test_starting_follows_the_register_map(bench):
+    desk = bench("mpu6050")
+    sensor = desk.driver().start()
+    assert desk.accesses("write") == [
+        (register, bytes([value]))
+        for register, value in [
+            (reg.PWR_MGMT_1, 0x80),
+            (reg.SIGNAL_PATH_RESET, 0x07),
+            (reg.PWR_MGMT_1, 0x01),
+            (reg.PWR_MGMT_2, 0x00),
+            (reg.INT_ENABLE, 0x10),
+            (reg.SMPLRT_DIV, 4),
+            (reg.CONFIG, 3),
+            (reg.GYRO_CONFIG, 0x08),
+            (reg.ACCEL_CONFIG, 0x08),
+            (reg.FIFO_EN, 0x00),
+            (reg.USER_CTRL, 0x00),
+            (reg.USER_CTRL, 0x04),
+            (reg.USER_CTRL, 0x40),
+            (reg.FIFO_EN, 0xF8),
+        ]
+    ]
+    assert (sensor.chip, sensor.who_am_i) == ("MPU-6050", 0x68)
+    assert (sensor.accel_range_g, sensor.gyro_range_dps, sensor.rate_hz) == (4, 500, 200)
+
+
+def test_the_reset_and_the_wake_up_get_their_time(bench):
+    desk = bench()
+    desk.driver().start()
+    power = [t.t_ns for t in desk.transactions if t.register in (reg.PWR_MGMT_1, reg.SIGNAL_PATH_RESET)]
+    assert (np.diff(power[1:]) >= 100e6).all()
+
+
+def test_what_stood_in_the_offset_registers_is_read_before_the_reset(bench):
+    desk = bench("mpu6500")
+    desk.driver().start()
+    assert desk.accesses("read")[:4] == [reg.WHO_AM_I, 0x77, 0x7A, 0x7D]
+
+
+@pytest.mark.parametrize("model", CHIPS[1:])
+def test_a_6500_gets_its_accelerometer_filter(bench, model):
+    desk = bench(model)
+    desk.driver(Config(dlpf=2)).start()
+    assert (reg.ACCEL_CONFIG2, b"\x02") in desk.accesses("write")
+
+
+@pytest.mark.parametrize("rate_hz", [50, 200, 1000])
+@pytest.mark.parametrize("model", CHIPS)
+def test_every_sample_comes_once(bench, stream, numbers, model, rate_hz):
+    desk = bench(model)
+    driver = desk.driver(Config(rate_hz=rate_hz))
+    driver.start()
+    samples = stream(driver, 3)
+    assert len(samples) == pytest.approx(3 * rate_hz * 1.003, abs=0.05 * rate_hz)
+    assert (np.diff(numbers(samples)) == 1).all()
+    assert (np.diff(samples.t) > 0).all()
+    assert not samples.gap.any()
+
+
+def test_the_recording_has_the_chips_own_rate_and_temperature(bench, stream):
+    driver = bench("mpu6050", rate_error_ppm=-6000.0).driver()
+    driver.start()
+    stream(driver, 20)
+    recording = driver.recording()
+    assert recording.sensor.rate_hz == pytest.approx(200 * (1 - 6000e-6), rel=30e-6)
+    assert recording.sensor.temperature_c == pytest.approx(-2000 / 340 + 36.53)
+    assert np.ptp(np.diff(recording.t)) < 1e-9
+
+
+@pytest.mark.parametrize("model", CHIPS)
+@pytest.mark.parametrize("stall_s", [0.15, 0.5, 10.0])
+def test_an_overflow_is_a_gap_and_nothing_worse(bench, stream, numbers, model, stall_s):
+    desk = bench(model)
+    driver = desk.driver()
+    driver.start()
+    stream(driver, 0.5)
+    desk.stall(stall_s)
+    stream(driver, 0.5)
+    recording = driver.recording()
+    lost = np.diff(numbers(recording)) != 1
+    assert recording.gap[1:].tolist() == lost.tolist()
+    assert lost.sum() == (stall_s > 0.2)
+    assert np.unique(recording.gyr, axis=0).shape == (1, 3)
+
+
+def test_times_across_a_gap_are_those_of_the_chip(bench, stream, numbers):
+    desk = bench("mpu6050", rate_error_ppm=4000.0)
+    driver = desk.driver()
+    driver.start()
+    stream(driver, 5)
+    desk.stall(1.0)
+    stream(driver, 5)
+    recording = driver.recording()
+    line = np.polyfit(numbers(recording), recording.t, 1)
+    off_s = recording.t - np.polyval(line, numbers(recording))
+    assert np.abs(off_s).max() < 0.2 / 200
+
+
+def test_an_overflow_while_the_fifo_is_read_is_noticed(bench, stream, numbers):
+    desk = bench()
+    driver = desk.driver()
+    driver.start()
+    stream(driver, 0.5)
+    desk.before["read", reg.FIFO_R_W] = lambda: (desk.before.clear(), desk.stall(1.0))
+    stream(driver, 0.5)
+    recording = driver.recording()
+    assert recording.gap.sum() == 1
+    assert np.unique(recording.gyr, axis=0).shape == (1, 3)
+    assert (np.diff(numbers(recording))[~recording.gap[1:]] == 1).all()
+
+
+def test_misaligned_frames_never_arrive(bench, stream, numbers):
+    desk = bench()
+    driver = desk.driver()
+    driver.start()
+    stream(driver, 0.5)
+    desk.stall(0.01)
+    desk.inner.read(reg.FIFO_R_W, 3)
+    stream(driver, 0.5)
+    recording = driver.recording()
+    assert recording.gap.sum() == 1
+    assert np.unique(recording.gyr, axis=0).shape == (1, 3)
+
+
+def test_a_failed_fifo_read_is_not_repeated(bench, stream, numbers):
+    desk = bench()
+    driver = desk.driver()
+    driver.start()
+    stream(driver, 0.5)
+    desk.fail("read", reg.FIFO_R_W, 1)
+    before = len(desk.transactions)
+    driver.poll()
+    after = [t.register for t in desk.transactions[before:]]
+    assert after.count(reg.FIFO_R_W) == 1
+    assert after[-1] == reg.FIFO_EN
+    stream(driver, 0.5)
+    assert driver.recording().gap.sum() == 1
+
+
+@pytest.mark.parametrize("register", [reg.FIFO_COUNT_H, reg.INT_STATUS], ids=["count", "status"])
+def test_a_register_read_is_tried_three_times(bench, stream, register):
+    desk = bench()
+    driver = desk.driver()
+    driver.start()
+    desk.fail("read", register, TRIES - 1)
+    stream(driver, 0.5)
+    assert not driver.recording().gap.any()
+    desk.fail("read", register, TRIES)
+    with pytest.raises(BusError, match="broke off"):
+        stream(driver, 0.5)
+
+
+def test_nobody_there_is_said_at_once(bench):
+    desk = bench()
+
+    def nobody():
+        raise NoAnswer("nothing answers at 0x68", "check the wires")
+
+    desk.before["read", reg.WHO_AM_I] = nobody
+    with pytest.raises(NoAnswer):
+        desk.driver().start()
+    assert len(desk.transactions) == TRIES
+
+
+def test_another_chip_is_refused_before_anything_is_written(bench):
+    desk = bench()
+    desk.before["answer", reg.WHO_AM_I] = lambda data: b"\x13"
+    with pytest.raises(ChipError, match="0x13"):
+        desk.driver().start()
+    assert not desk.accesses("write")
+
+
+def test_a_chip_that_stays_asleep(bench):
+    desk = bench()
+    desk.before["answer", reg.PWR_MGMT_1] = lambda data: b"\x40" + data[1:]
+    with pytest.raises(ChipError, match="does not wake up"):
+        desk.driver().start()
+    assert desk.accesses("write").count((reg.PWR_MGMT_1, b"\x01")) == 5
+
+
+def test_a_setting_that_is_not_kept(bench):
+    desk = bench()
+    desk.before["answer", reg.GYRO_CONFIG] = lambda data: b"\x00"
+    with pytest.raises(ChipError, match="0x1b of the MPU-6050 reads 0x00 after 0x08"):
+        desk.driver().start()
+
+
+@pytest.mark.parametrize("model", CHIPS)
+def test_a_chip_that_was_reset_meanwhile(bench, stream, model):
+    desk = bench(model)
+    driver = desk.driver()
+    driver.start()
+    stream(driver, 0.5)
+    desk.inner.write(reg.PWR_MGMT_1, b"\x80")
+    begun_ns = driver.now_ns()
+    with pytest.raises(ChipError, match="lost its settings"):
+        stream(driver, 10)
+    assert driver.now_ns() - begun_ns < 2.5e9
+    assert len(driver.recording()) > 90
+
+
+@pytest.mark.parametrize(
+    "dead",
+    [
+        pytest.param((reg.FIFO_COUNT_H, lambda data: b"\0\0"), id="the FIFO stays empty"),
+        pytest.param((reg.FIFO_COUNT_H, lambda data: b"\xff\xff"), id="the FIFO stays full"),
+        pytest.param((reg.INT_STATUS, lambda data: b"\x11"), id="always overflowing"),
+        pytest.param((reg.TEMP_OUT_H, lambda data: b"\x7f\xff"), id="never aligned"),
+    ],
+)
+def test_two_seconds_without_a_sample(bench, stream, dead):
+    desk = bench()
+    register, answer = dead
+    desk.before["answer", register] = answer
+    driver = desk.driver()
+    driver.start()
+    with pytest.raises(ChipError, match="no sample that can be believed for 2 s"):
+        stream(driver, 10)
+
+
+def test_stopping_quiets_the_fifo_and_leaves_the_chip_awake(bench, stream):
+    desk = bench()
+    driver = desk.driver()
+    driver.start()
+    driver.stop()
+    assert desk.accesses("write")[-2:] == [(reg.FIFO_EN, b"\0"), (reg.USER_CTRL, b"\0")]
+    assert desk.inner.read(reg.PWR_MGMT_1, 1).data == b"\x01"
+
+
+def test_stopping_a_bus_that_is_gone_is_no_failure(bench):
+    desk = bench()
+    driver = desk.driver()
+    driver.start()
+    desk.fail("write", reg.FIFO_EN, 100)
+    driver.stop()
+    assert desk.transactions[-1].error is not None
+
+
+def test_polling_before_starting_is_a_mistake_of_the_program(bench):
+    with pytest.raises(RuntimeError, match="before it was started"):
+        bench().driver().poll()
+
+
+def test_a_replay_asks_for_the_same_and_gets_the_same(bench, stream, same):
+    """Whatever happens meanwhile: a stall, a failed FIFO read, a failed register read, slipped bytes."""
+    desk = bench("mpu6500")
+    live = desk.driver()
+    live.start()
+    stream(live, 0.3)
+    desk.stall(0.4)
+    stream(live, 0.3)
+    desk.fail("read", reg.FIFO_R_W, 1)
+    stream(live, 0.3)
+    desk.fail("read", reg.FIFO_COUNT_H, 2)
+    stream(live, 0.3)
+    desk.stall(0.01)
+    desk.inner.read(reg.FIFO_R_W, 5)
+    stream(live, 0.3)
+    live.stop()
+    bus = ReplayBus(desk.transactions)
+    replayed = Driver(bus)
+    assert replayed.start().chip == "MPU-6500"
+    while bus.unread() > STOPPING:
+        replayed.poll()
+    replayed.stop()
+    assert bus.unread() == 0
+    assert same(replayed.recording(), live.recording())
+    assert live.recording().gap.sum() == 3
+
+
+def test_the_end_of_a_capture_leaves_what_was_read(bench, stream, same):
+    desk = bench()
+    live = desk.driver()
+    live.start()
+    stream(live, 0.5)
+    replayed = Driver(ReplayBus(desk.transactions))
+    replayed.start()
+    with pytest.raises(EndOfCapture):
+        stream(replayed, 10)
+    replayed.stop()
+    assert same(replayed.recording(), live.recording())

@@ -1,0 +1,150 @@
+"""FIFO bytes to samples, against frames packed one by one."""
+
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mpucal.chip.families import part_of
+from mpucal.chip.fifo import DROPPED_FRAMES, Fault, FifoDecoder
+from mpucal.chip.settings import Settings
+
+SETTINGS = Settings(part_of(0x68), smplrt_div=4, dlpf_cfg=3, fs_sel=1, afs_sel=1)
+PERIOD_NS = 5_000_000
+QUIET = (100, -200, 8192, -2000, 5, -6, 7)
+
+int16 = st.integers(-32768, 32767)
+
+
+def packed(*frames):
+    return b"".join(struct.pack(">7h", *frame) for frame in frames)
+
+
+def fresh(frames_before=DROPPED_FRAMES):
+    """A decoder whose FIFO was reset at time 0, and that has read as many frames as it drops."""
+    decoder = FifoDecoder(SETTINGS)
+    decoder.temperature(QUIET[3])
+    decoder.reset()
+    if frames_before:
+        poll(decoder, packed(*[QUIET] * frames_before), 0)
+    return decoder
+
+
+def poll(decoder, data, n, overflow=False):
+    decoder.counted(n * 4 * PERIOD_NS, len(data))
+    decoder.data(data)
+    return decoder.judged(overflow)
+
+
+@given(st.lists(st.tuples(int16, int16, int16, st.integers(-2100, -1900), int16, int16, int16), min_size=1))
+def test_values_are_counts_times_nominal_scale(frames):
+    decoder = fresh()
+    assert poll(decoder, packed(*frames), 1) is None
+    samples = decoder.take()
+    for i, (ax, ay, az, temperature, gx, gy, gz) in enumerate(frames):
+        assert samples.acc[i] == pytest.approx(np.array([ax, ay, az]) / 8192 * 9.80665)
+        assert samples.gyr[i] == pytest.approx(np.radians(np.array([gx, gy, gz]) / 65.5))
+        assert samples.temperature_c[i] == pytest.approx(temperature / 340 + 36.53)
+        assert samples.acc_clipped[i] == any(abs(count) >= 32767 for count in (ax, ay, az))
+        assert samples.gyr_clipped[i] == any(abs(count) >= 32767 for count in (gx, gy, gz))
+
+
+@pytest.mark.parametrize("count", [32767, -32767, -32768])
+def test_a_count_at_either_end_is_clipped(count):
+    decoder = fresh()
+    poll(decoder, packed((count, 0, 0, *QUIET[3:]), (*QUIET[:6], count), QUIET), 1)
+    samples = decoder.take()
+    assert samples.acc_clipped.tolist() == [True, False, False]
+    assert samples.gyr_clipped.tolist() == [False, True, False]
+
+
+@given(st.lists(st.integers(0, 6), min_size=1, max_size=20))
+def test_samples_do_not_depend_on_how_polls_cut_them(sizes):
+    frames = [(i, -i, 8192, -2000, i, 0, -i) for i in range(sum(sizes))]
+    decoder, at = fresh(frames_before=0), 0
+    for n, size in enumerate(sizes):
+        assert poll(decoder, packed(*frames[at : at + size]), n) is None
+        at += size
+    taken = np.rint(decoder.recording("x").acc[:, 0] / 9.80665 * 8192).tolist()
+    assert taken == list(range(DROPPED_FRAMES, len(frames)))
+
+
+def test_the_first_frames_are_dropped_whatever_they_hold():
+    decoder = fresh(frames_before=0)
+    junk = (1, 2, 3, 32000, 4, 5, 6)
+    assert poll(decoder, packed(*[junk] * DROPPED_FRAMES, QUIET), 0) is None
+    assert len(decoder.take()) == 1
+
+
+@pytest.mark.parametrize("shift", range(1, 14))
+def test_misaligned_frames_are_noticed_at_the_first(shift):
+    decoder = fresh()
+    stream = packed(*[(100, -200, 8192, -2000, 950, -900, 700)] * 6)
+    assert poll(decoder, stream[shift : shift + 5 * 14], 1) is Fault.MISALIGNED
+    assert len(decoder.take()) == 0
+
+
+@pytest.mark.parametrize(
+    ("data", "overflow", "fault"),
+    [
+        pytest.param(packed(QUIET), True, Fault.OVERFLOW, id="overflow while reading"),
+        pytest.param(b"", True, Fault.OVERFLOW, id="overflow before"),
+        pytest.param(packed(QUIET)[:-1], False, Fault.MISALIGNED, id="a part of a frame"),
+        pytest.param(packed(QUIET, (*QUIET[:3], -1500, *QUIET[4:])), False, Fault.MISALIGNED, id="jump"),
+    ],
+)
+def test_what_cannot_be_believed_is_left_out_and_leaves_a_gap(data, overflow, fault):
+    decoder = fresh()
+    poll(decoder, packed(QUIET, QUIET), 1)
+    assert poll(decoder, data, 2, overflow) is fault
+    decoder.reset()
+    poll(decoder, packed(*[QUIET] * (DROPPED_FRAMES + 2)), 3)
+    poll(decoder, packed(QUIET), 4)
+    assert decoder.recording("x").gap.tolist() == [False, False, True, False, False]
+
+
+def test_a_reset_before_any_sample_leaves_no_gap():
+    decoder = fresh(frames_before=0)
+    poll(decoder, b"", 1, overflow=True)
+    decoder.reset()
+    poll(decoder, packed(*[QUIET] * 4), 2)
+    assert not decoder.recording("x").gap.any()
+
+
+def test_what_was_not_judged_is_not_there():
+    decoder = fresh()
+    decoder.counted(0, 28)
+    decoder.data(packed(QUIET, QUIET))
+    assert len(decoder.take()) == len(decoder.recording("x")) == 0
+
+
+def test_the_warming_die_is_no_misalignment():
+    decoder = fresh()
+    for n in range(1, 50):
+        assert poll(decoder, packed((*QUIET[:3], QUIET[3] + 100 * n, *QUIET[4:])), n) is None
+
+
+def test_provisional_times_increase_and_final_times_are_regular():
+    decoder, rng, t = fresh(frames_before=0), np.random.default_rng(1), []
+    taken = 0
+    for n in range(1, 400):
+        look_ns = n * 20_000_000 + int(rng.integers(0, 4_000_000))
+        size = look_ns // 4_966_000 - taken
+        decoder.counted(look_ns, size * 14)
+        decoder.data(packed(*[QUIET] * size))
+        assert decoder.judged(False) is None
+        taken += size
+        t.extend(decoder.take().t)
+    assert (np.diff(t) > 0).all()
+    recording = decoder.recording("x")
+    assert np.ptp(np.diff(recording.t)) < 1e-9
+    assert np.abs(recording.t - t).max() < 0.005
+    assert recording.sensor.rate_hz == pytest.approx(1e9 / 4_966_000, rel=100e-6)
+    assert recording.sensor.temperature_c == pytest.approx(-2000 / 340 + 36.53)
+
+
+def test_no_samples_are_a_recording_with_the_nominal_rate():
+    recording = fresh(frames_before=0).recording("nothing yet")
+    assert (len(recording), recording.sensor.rate_hz, recording.name) == (0, 200, "nothing yet")

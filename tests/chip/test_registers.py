@@ -1,0 +1,54 @@
+"""The register map's arithmetic against the data sheets' figures."""
+
+import math
+
+import pytest
+
+from mpucal.chip import registers as reg
+from mpucal.errors import UsageError
+
+
+@pytest.mark.parametrize(("afs_sel", "lsb_per_g"), [(0, 16384), (1, 8192), (2, 4096), (3, 2048)])
+def test_accelerometer_scale(afs_sel, lsb_per_g):
+    assert lsb_per_g * reg.mps2_per_lsb(afs_sel) == pytest.approx(9.80665)
+
+
+@pytest.mark.parametrize(("fs_sel", "lsb_per_dps"), [(0, 131), (1, 65.5), (2, 32.8), (3, 16.4)])
+def test_gyroscope_scale(fs_sel, lsb_per_dps):
+    assert lsb_per_dps * reg.rad_s_per_lsb(fs_sel) == pytest.approx(math.radians(1), rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "dlpf_cfg", "divider"),
+    [
+        pytest.param(200, 3, 4, id="the default"),
+        pytest.param(1000, 1, 0, id="the fastest"),
+        pytest.param(1000, 0, 7, id="from 8 kHz"),
+        pytest.param(1000 / 256, 6, 255, id="the slowest"),
+        pytest.param(333.33333, 3, 2, id="a third"),
+    ],
+)
+def test_divider_of_a_rate_and_back(rate_hz, dlpf_cfg, divider):
+    assert reg.sample_rate_divider(rate_hz, dlpf_cfg) == divider
+    assert reg.sample_rate_hz(divider, dlpf_cfg) == pytest.approx(rate_hz)
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "dlpf_cfg", "nearest"),
+    [
+        pytest.param(210, 3, "200 Hz", id="between two"),
+        pytest.param(2000, 3, "1000 Hz", id="too fast"),
+        pytest.param(8000, 0, "1000 Hz", id="too fast from 8 kHz"),
+        pytest.param(1, 3, "3.90625 Hz", id="too slow"),
+        pytest.param(0, 3, "3.90625 Hz", id="none"),
+        pytest.param(-5, 3, "3.90625 Hz", id="negative"),
+    ],
+)
+def test_a_rate_that_is_none_names_the_nearest(rate_hz, dlpf_cfg, nearest):
+    with pytest.raises(UsageError, match=nearest):
+        reg.sample_rate_divider(rate_hz, dlpf_cfg)
+
+
+def test_a_rate_that_is_no_number_is_refused():
+    with pytest.raises(UsageError):
+        reg.sample_rate_divider(math.nan, 3)

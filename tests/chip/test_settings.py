@@ -1,0 +1,56 @@
+"""Settings to registers and back."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mpucal.chip import registers as reg
+from mpucal.chip.families import PARTS, part_of
+from mpucal.chip.settings import Settings
+from mpucal.errors import ChipError, RecordingError
+
+settings = st.builds(
+    Settings,
+    part=st.sampled_from(sorted(PARTS)).map(part_of),
+    smplrt_div=st.integers(0, 255),
+    dlpf_cfg=st.integers(0, 6),
+    fs_sel=st.integers(0, 3),
+    afs_sel=st.integers(0, 3),
+)
+
+
+@given(settings)
+def test_registers_and_back(chosen):
+    held = chosen.registers() | {reg.WHO_AM_I: chosen.part.who_am_i}
+    assert Settings.from_registers(held) == chosen
+
+
+@given(settings, st.integers(0, 255))
+def test_other_bits_of_the_registers_do_not_matter(chosen, noise):
+    held = chosen.registers() | {reg.WHO_AM_I: chosen.part.who_am_i}
+    held[reg.CONFIG] |= noise & 0x78
+    held[reg.GYRO_CONFIG] |= noise & 0xE7
+    held[reg.ACCEL_CONFIG] |= noise & 0xE7
+    assert Settings.from_registers(held) == chosen
+
+
+def test_register_values_of_the_map():
+    chosen = Settings(part_of(0x70), smplrt_div=4, dlpf_cfg=3, fs_sel=1, afs_sel=2)
+    assert chosen.registers() == {0x19: 4, 0x1A: 3, 0x1B: 0x08, 0x1C: 0x10, 0x1D: 3}
+    assert chosen.nominal_rate_hz == 200
+    assert (chosen.sensor.gyro_range_dps, chosen.sensor.accel_range_g) == (500, 8)
+
+
+def test_a_6050_has_no_second_accelerometer_register():
+    assert reg.ACCEL_CONFIG2 not in Settings(part_of(0x68), 4, 3, 1, 1).registers()
+
+
+def test_missing_registers_are_named():
+    with pytest.raises(RecordingError, match=r"cut\.mcap.*0x75, 0x1b"):
+        Settings.from_registers({reg.SMPLRT_DIV: 4, reg.CONFIG: 3, reg.ACCEL_CONFIG: 0}, "cut.mcap")
+
+
+def test_an_unknown_chip_is_refused():
+    held = Settings(part_of(0x68), 4, 3, 1, 1).registers() | {reg.WHO_AM_I: 0x33}
+    with pytest.raises(ChipError, match="0x33"):
+        Settings.from_registers(held)
