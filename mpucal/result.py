@@ -60,7 +60,7 @@ class Calibration:
     gyro_noise_std: Vector = field(default_factory=lambda: unknown(3))
     fit: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     quality: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
-    sensor: Sensor = Sensor()
+    sensor: Sensor = field(default_factory=Sensor)
     created: str = ""
     applied_in_hardware: Vector = field(default_factory=lambda: np.zeros(3))
     extra: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,7 +108,7 @@ class Series:
             dt=np.diff(recording.t[last - 1 :]),
         )
 
-    def arrays(self) -> dict[str, Vector | None]:
+    def arrays(self) -> dict[str, Any]:
         """Keyword arguments of the kernel."""
         return {name: None if value is None else np.ascontiguousarray(value) for name, value in self.__dict__.items()}
 

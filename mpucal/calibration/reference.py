@@ -144,4 +144,4 @@ def _left_jacobian(phi: Vector) -> Vector:
     X = cross(phi)
     if angle < 1e-3:
         return np.eye(3) + X / 2 + X @ X / 6
-    return np.eye(3) + (1 - np.cos(angle)) / angle**2 * X + (angle - np.sin(angle)) / angle**3 * (X @ X)
+    return np.asarray(np.eye(3) + (1 - np.cos(angle)) / angle**2 * X + (angle - np.sin(angle)) / angle**3 * (X @ X))

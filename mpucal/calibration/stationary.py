@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ..data import Recording, Vector
 from .model import Flat
@@ -80,7 +83,7 @@ def flat_statistics(recording: Recording, flat: tuple[int, int]) -> Flat:
     )
 
 
-def _windows(values: Vector, n: int) -> Vector:
+def _windows(values: NDArray[Any], n: int) -> NDArray[Any]:
     """(m, n, 3) consecutive windows of n samples; the remainder is left out."""
     m = len(values) // n
     return values[: m * n].reshape(m, n, values.shape[1])
@@ -95,7 +98,7 @@ def _variance(part: Vector, whole: Vector) -> Vector:
     variance = part.var(0, ddof=1)
     step = np.array([_step(whole[:, i]) for i in range(3)])
     span = np.ptp(whole, axis=0)
-    return np.maximum(variance, np.maximum(step**2 / 12.0, VARIANCE_FLOOR_OF_RANGE * span**2))
+    return np.asarray(np.maximum(variance, np.maximum(step**2 / 12.0, VARIANCE_FLOOR_OF_RANGE * span**2)))
 
 
 def _step(column: Vector) -> float:
