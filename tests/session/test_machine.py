@@ -21,13 +21,13 @@ from mpucal.session.table import State
 
 
 class Session:
-    """A machine, fed with samples in polls of 20 ms, and all that it said."""
+    """A machine, fed with samples in polls of 50 ms, and all that it said."""
 
     def __init__(self, **options):
         self.machine = Machine(**options)
         self.said = self.machine.handle(Connected(Sensor()))
 
-    def feed(self, samples, poll=2):
+    def feed(self, samples, poll=5):
         for first in range(0, len(samples), poll):
             if self.state not in (State.LAY_FLAT, State.ROTATE):
                 break
