@@ -33,6 +33,9 @@ TRIES = 3
 RETRY_NS = MS
 DEAD_S = 2.0
 
+# Long after a frame is written, and no whole number of sample intervals.
+FRAME_WRITTEN_NS = 300_000
+
 # An overflow drops the oldest bytes, so a FIFO this full may have lost its frames' alignment.
 SPARE_BYTES = 3 * reg.FRAME_BYTES
 
@@ -159,7 +162,7 @@ class Driver:
 
     def _drain(self) -> bool:
         """Read all whole frames; False where they cannot be believed."""
-        count = int.from_bytes(self._read(reg.FIFO_COUNT_H, 2), "big")
+        count = self._fifo_count()
         self._plan_next_poll()
         if count >= self._running.part.family.fifo_bytes - SPARE_BYTES:
             return False
@@ -172,6 +175,14 @@ class Driver:
                 return False
         self._read(reg.INT_STATUS, 1)
         return self._decoder.fault is None
+
+    def _fifo_count(self) -> int:
+        count = int.from_bytes(self._read(reg.FIFO_COUNT_H, 2), "big")
+        if count % reg.FRAME_BYTES:
+            # the chip is writing a frame, or has slipped
+            self._sleep_until(self._now_ns + FRAME_WRITTEN_NS)
+            count = int.from_bytes(self._read(reg.FIFO_COUNT_H, 2), "big")
+        return count
 
     def _plan_next_poll(self) -> None:
         period_s = self._config.poll_s

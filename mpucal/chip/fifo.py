@@ -62,6 +62,7 @@ class FifoDecoder:
         self._temperature: int | None = None
         self._read = 0
         self._look: tuple[int, int] | None = None
+        self._odd_bytes = 0
         self._pending = bytearray()
         self._last_t_s: float | None = None
 
@@ -71,8 +72,9 @@ class FifoDecoder:
 
     def counted(self, t_ns: int, count_bytes: int) -> None:
         """The FIFO held `count_bytes` at `t_ns`."""
+        frames, self._odd_bytes = divmod(count_bytes, reg.FRAME_BYTES)
         self._pending.clear()
-        self._look = (t_ns, self._read + count_bytes // reg.FRAME_BYTES)
+        self._look = (t_ns, self._read + frames)
 
     def data(self, data: bytes) -> None:
         """`data` was read from the FIFO."""
@@ -85,7 +87,7 @@ class FifoDecoder:
         self._look = None
         if overflow:
             return Fault.OVERFLOW
-        if len(data) % reg.FRAME_BYTES:
+        if self._odd_bytes or len(data) % reg.FRAME_BYTES:
             return Fault.MISALIGNED
         frames = np.frombuffer(data, ">i2").reshape(-1, reg.FRAME_WORDS).astype(np.int16)
         first = max(self._read, DROPPED_FRAMES)
@@ -104,7 +106,7 @@ class FifoDecoder:
         self._pending.clear()
         self._look = None
         self._clock.begin_segment()
-        self._read = 0
+        self._read = self._odd_bytes = 0
 
     def take(self) -> Samples:
         """The samples since the last `take`; their times are what is known now, and increase."""

@@ -87,13 +87,13 @@ def _nothing():
     pass
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def bench():
     """Makes a work bench with a chip of the given model."""
     return WorkBench
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def stream():
     """Polls a started driver for so many seconds after the first poll, and gives its samples, joined."""
 
@@ -107,13 +107,13 @@ def stream():
     return run
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def numbers():
     """Which of the feed's samples a recording holds."""
     return lambda samples: np.rint(samples.acc[:, 0] / 9.80665 * 8192).astype(int)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def same():
     """Whether two recordings are equal to the last bit."""
 

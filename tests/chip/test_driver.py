@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mpucal.bus.replay import ReplayBus
 from mpucal.chip import registers as reg
 from mpucal.chip.access import EndOfCapture
 from mpucal.chip.config import Config
+from mpucal.chip.decode import decode
 from mpucal.chip.driver import TRIES, Driver
 from mpucal.errors import BusError, ChipError, NoAnswer
 
@@ -137,6 +140,16 @@ def test_misaligned_frames_never_arrive(bench, stream, numbers):
     recording = driver.recording()
     assert recording.gap.sum() == 1
     assert np.unique(recording.gyr, axis=0).shape == (1, 3)
+
+
+def test_a_count_caught_while_the_chip_writes_is_read_again(bench, stream):
+    desk = bench()
+    driver = desk.driver()
+    driver.start()
+    odd = iter([5])
+    desk.before["answer", reg.FIFO_COUNT_H] = lambda data: bytes([data[0], data[1] + next(odd, 0)])
+    stream(driver, 0.5)
+    assert not driver.recording().gap.any()
 
 
 def test_a_failed_fifo_read_is_not_repeated(bench, stream, numbers):
@@ -296,3 +309,52 @@ def test_the_end_of_a_capture_leaves_what_was_read(bench, stream, same):
         stream(replayed, 10)
     replayed.stop()
     assert same(replayed.recording(), live.recording())
+
+
+@pytest.mark.parametrize(("rate_hz", "share"), [(200, 0.08), (1000, 0.35)])
+def test_share_of_a_400_khz_bus(bench, stream, rate_hz, share):
+    """Addresses, register, start, repeated start and stop: 30 bits an access, then 9 a byte."""
+    desk = bench()
+    driver = desk.driver(Config(rate_hz=rate_hz))
+    driver.start()
+    desk.transactions.clear()
+    stream(driver, 5)
+    bits = sum(30 + 9 * t.count for t in desk.transactions)
+    seconds = (desk.transactions[-1].t_ns - desk.transactions[0].t_ns) * 1e-9
+    assert bits / 400_000 / seconds <= share
+
+
+@settings(max_examples=60)
+@given(
+    model=st.sampled_from(CHIPS),
+    rate_hz=st.sampled_from([100, 200, 1000]),
+    faults=st.lists(
+        st.tuples(st.sampled_from(["stall", "slip", "data", "count", "status"]), st.integers(1, 700)),
+        max_size=4,
+    ),
+)
+def test_whatever_happens_samples_are_true_in_order_and_gaps_are_marked(
+    bench, stream, numbers, same, model, rate_hz, faults
+):
+    desk = bench(model)
+    driver = desk.driver(Config(rate_hz=rate_hz))
+    driver.start()
+    for fault, amount in faults:
+        stream(driver, 0.1)
+        if fault == "stall":
+            desk.stall(amount * 1e-3)
+        elif fault == "slip":
+            desk.stall(0.01)
+            desk.inner.read(reg.FIFO_R_W, 1 + amount % 13)
+        elif fault == "data":
+            desk.fail("read", reg.FIFO_R_W, 1)
+        else:
+            desk.fail("read", {"count": reg.FIFO_COUNT_H, "status": reg.INT_STATUS}[fault], 1 + amount % 2)
+    stream(driver, 0.5)
+    recording = driver.recording()
+    assert (recording.gyr == recording.gyr[0]).all()
+    assert (recording.acc[:, 1:] == recording.acc[0, 1:]).all()
+    assert recording.gap[1:].tolist() == (np.diff(numbers(recording)) != 1).tolist()
+    assert (np.diff(numbers(recording)) >= 1).all()
+    assert (np.diff(recording.t) > 0).all()
+    assert same(decode(desk.transactions), recording)

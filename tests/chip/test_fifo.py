@@ -105,6 +105,13 @@ def test_what_cannot_be_believed_is_left_out_and_leaves_a_gap(data, overflow, fa
     assert decoder.recording("x").gap.tolist() == [False, False, True, False, False]
 
 
+def test_a_count_of_no_whole_number_of_frames_is_misaligned_even_where_the_values_fit():
+    decoder = fresh()
+    decoder.counted(1, 2 * 14 + 4)
+    decoder.data(packed(QUIET, QUIET))
+    assert decoder.judged(False) is Fault.MISALIGNED
+
+
 def test_a_reset_before_any_sample_leaves_no_gap():
     decoder = fresh(frames_before=0)
     poll(decoder, b"", 1, overflow=True)

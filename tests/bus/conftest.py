@@ -1,0 +1,118 @@
+"""The kernel's side of an I2C adapter: the ioctls of the real smbus2, answered in this process."""
+
+import ctypes
+import errno
+import os
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from smbus2 import smbus2
+
+import mpucal.bus.i2c
+from mpucal.bus.simulated import SimulatedBus
+from mpucal.bus.simulated.chip import Chip
+from mpucal.bus.simulated.clock import FastClock
+from mpucal.bus.simulated.models import MODELS
+
+I2C_M_RD = 0x0001
+
+
+class StillFeed:
+    """A board at rest, flat, at 30.65 C."""
+
+    def samples(self, edges_s, setting):
+        return np.tile(np.array([12, -34, 8192, -2000, 56, -78, 90], np.int16), (len(edges_s) - 1, 1))
+
+
+class Adapter:
+    """Passes what smbus2 asks the kernel for to `bus`, if it is for `address`.
+
+    Attributes
+    ----------
+    failures : errno by ioctl request, raised instead. transfers : [(flags, bytes)] of each I2C_RDWR.
+    """
+
+    def __init__(self, bus, address=0x68):
+        self.bus, self.address = bus, address
+        self.functions = int(smbus2.I2cFunc.I2C | smbus2.I2cFunc.SMBUS_EMUL)
+        self.failures, self.transfers, self.requests = {}, [], []
+        self._chosen = None
+
+    def ioctl(self, fd, request, argument):
+        os.fstat(fd)
+        self.requests.append(request)
+        if request in self.failures:
+            raise _os_error(self.failures[request])
+        answer = {
+            smbus2.I2C_FUNCS: self._functions,
+            smbus2.I2C_SLAVE: self._choose,
+            smbus2.I2C_SMBUS: self._smbus,
+            smbus2.I2C_RDWR: self._rdwr,
+        }[request]
+        answer(argument)
+        return 0
+
+    def _functions(self, argument):
+        assert isinstance(argument, ctypes.c_ulong)
+        argument.value = self.functions
+
+    def _choose(self, address):
+        self._chosen = address
+
+    def _smbus(self, argument):
+        assert (argument.read_write, argument.size) == (smbus2.I2C_SMBUS_READ, smbus2.I2C_SMBUS_BYTE_DATA)
+        self._acknowledge(self._chosen)
+        argument.data.contents.byte = self.bus.read(argument.command, 1).data[0]
+
+    def _rdwr(self, argument):
+        messages = [argument.msgs[i] for i in range(argument.nmsgs)]
+        for message in messages:
+            self._acknowledge(message.addr)
+            if message.len > 8192:
+                raise _os_error(errno.EINVAL)
+        self.transfers.append([(m.flags, m.len) for m in messages])
+        if any(m.flags & I2C_M_RD for m in messages[:-1]):
+            raise _os_error(errno.EOPNOTSUPP)
+        register, *data = bytes(messages[0])
+        if messages[-1].flags & I2C_M_RD:
+            reply = self.bus.read(register, messages[-1].len)
+            ctypes.memmove(messages[-1].buf, reply.data, messages[-1].len)
+        else:
+            self.bus.write(register, bytes(data))
+
+    def _acknowledge(self, address):
+        if address != self.address:
+            raise _os_error(errno.EREMOTEIO)
+
+
+def _os_error(number):
+    return OSError(number, os.strerror(number))
+
+
+@pytest.fixture
+def still_chip():
+    """A simulated chip at rest, and its bus, with a clock that runs only while someone waits."""
+
+    def make(model="mpu6050", rate_error_ppm=2500.0):
+        clock = FastClock()
+        return SimulatedBus(Chip(MODELS[model], StillFeed(), rate_error_ppm, (0, 0, 0)), clock), clock
+
+    return make
+
+
+@pytest.fixture
+def adapter(monkeypatch, tmp_path, still_chip):
+    """Puts a bus behind a path that smbus2 can open; its clock becomes the host's."""
+
+    def make(model="mpu6050", address=0x68):
+        bus, clock = still_chip(model)
+        kernel = Adapter(bus, address)
+        kernel.path = tmp_path / "i2c-1"
+        kernel.path.touch()
+        monkeypatch.setattr(smbus2, "ioctl", kernel.ioctl)
+        time = SimpleNamespace(monotonic_ns=clock.now, sleep=lambda s: clock.sleep_until(clock.now() + round(s * 1e9)))
+        monkeypatch.setattr(mpucal.bus.i2c, "time", time)
+        return kernel
+
+    return make
