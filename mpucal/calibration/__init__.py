@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from types import MappingProxyType
@@ -46,7 +45,6 @@ def calibrate(recording: Recording, model: str = "auto", gravity: float = STANDA
         raise UsageError(f"there is no model {model!r}", f"choose one of {', '.join(MODELS)}")
     if not (np.isfinite(gravity) and gravity > 0):
         raise UsageError(f"gravity is {gravity}", "give the local gravity in m/s^2, about 9.81")
-    began = time.perf_counter()
     recording = with_masks(recording)
     chosen, why = ("accel", "the estimator for a trusted gyroscope") if model == "auto" else (model, "asked for")
     segment = recording.flat or find_flat(recording)
@@ -54,9 +52,9 @@ def calibrate(recording: Recording, model: str = "auto", gravity: float = STANDA
     fit = None
     if flat is not None and len(recording) - flat.last >= FEWEST_SAMPLES:
         fit = _METHODS[chosen](recording, flat, gravity)
-    about = {"model": chosen, "why": why, "gravity": gravity, "samples": len(recording)}
-    quality = judge(recording, flat, fit, gravity)
-    return _calibration(recording, flat, fit, {**about, "seconds": time.perf_counter() - began}, quality)
+    seconds = float(recording.t[-1] - recording.t[0])
+    about = {"model": chosen, "why": why, "gravity": gravity, "samples": len(recording), "seconds": seconds}
+    return _calibration(recording, flat, fit, about, judge(recording, flat, fit, gravity))
 
 
 def _calibration(
