@@ -55,7 +55,7 @@ def orientation_of(y: Vector) -> Vector:
     if u[2] < -1.0 + 1e-12:
         return np.array([0.0, 1.0, 0.0, 0.0])
     x = np.array([1.0 + u[2], u[1], -u[0], 0.0])
-    return x / np.linalg.norm(x)
+    return _unit(x)
 
 
 def inverse(S: Vector) -> tuple[Vector, Vector]:
@@ -160,7 +160,8 @@ class Ekf:
 
 
 def _unit(x: Vector) -> Vector:
-    return x / np.sqrt((x * x).sum(-1, keepdims=True))
+    unit: Vector = x / np.sqrt((x * x).sum(-1, keepdims=True))
+    return unit
 
 
 def _transposed(matrices: Vector) -> Vector:
@@ -168,10 +169,9 @@ def _transposed(matrices: Vector) -> Vector:
     return np.ascontiguousarray(np.swapaxes(matrices, -1, -2))
 
 
-# S[i, k] is element 3 i + k of a row; the four factors of each cofactor's a b - c d
+# S[i, k] is element 3 i + k of a row; cofactor (i, k) is a b - c d of the rows and columns after it
 _I, _K = np.divmod(np.arange(9), 3)
-_I, _K = ((_I + 1) % 3, (_I + 2) % 3), ((_K + 1) % 3, (_K + 2) % 3)
-_MINORS = np.array([3 * _I[i] + _K[k] for i, k in ((0, 0), (1, 1), (0, 1), (1, 0))])
+_MINORS = np.array([3 * ((_I + i) % 3) + (_K + k) % 3 for i, k in ((1, 1), (2, 2), (1, 2), (2, 1))])
 
 
 def _linear(matrix: Callable[..., list[list[float]]]) -> Vector:

@@ -65,15 +65,15 @@ class Expansion:
 
     def direction(self) -> Vector:
         """The Gauss-Newton step; of least norm where the data leave a direction of theta open."""
-        step: Vector = np.linalg.lstsq(self.H, -self.gradient, rcond=None)[0]
-        return step
+        return np.asarray(np.linalg.lstsq(self.H, -self.gradient, rcond=None)[0], np.float64)
 
 
 def expand(ekf: Ekf, theta: Vector) -> Expansion:
     """V (8) at theta, and around it by central differences: theta and its 24 neighbours in one pass of the EKF.
 
-    Read literally, the paper's Hessian (dV/dtheta)^T (dV/dtheta) has rank 1 and leads nowhere. Gauss-Newton on the whitened
-    innovations is the reading that works: H = sum de^T S^-1 de + tr(S^-1 d_iS S^-1 d_jS) / 2, the Fisher information.
+    Read literally, the paper's Hessian (dV/dtheta)^T (dV/dtheta) has rank 1 and leads nowhere. Gauss-Newton on the
+    whitened innovations is the reading that works: the Fisher information
+    H = sum de^T S^-1 de + tr(S^-1 d_iS S^-1 d_jS) / 2.
     """
     p, h = len(theta), H_DIFFERENCE
     around = theta + h * np.concatenate([np.zeros((1, p)), np.eye(p), -np.eye(p)])
@@ -103,7 +103,7 @@ def _minimise(ekf: Ekf, here: Expansion) -> tuple[Expansion, int, bool]:
         if i == MAX_ITERATIONS:
             break
         following = expand(ekf, here.theta + direction)  # 4:, 5:
-        if not _wolfe(here, direction, 1.0, following.V, following.gradient @ direction):
+        if not _wolfe(here, direction, 1.0, following.V, float(following.gradient @ direction)):
             step = _line_search(ekf, here, direction)
             if step < EPSILON_2:
                 return here, i, False
@@ -113,7 +113,7 @@ def _minimise(ekf: Ekf, here: Expansion) -> tuple[Expansion, int, bool]:
 
 
 def _line_search(ekf: Ekf, here: Expansion, direction: Vector) -> float:
-    """The longest of STEPS with the Wolfe conditions; else that of least V among those that decrease it enough; else 0."""
+    """The longest of STEPS that meets both Wolfe conditions; else that of least V that decreases it enough; else 0."""
     h = H_DIFFERENCE
     V = _costs(ekf, here.theta + np.concatenate([STEPS, STEPS + h])[:, None] * direction).reshape(2, -1)
     slopes = (V[1] - V[0]) / h
@@ -155,6 +155,6 @@ def _inner(a: Vector, b: Vector) -> Vector:
 def _covariance(H: Vector) -> Vector:
     """The inverse of H; not a number where H has none."""
     try:
-        return np.linalg.inv(H)
+        return np.asarray(np.linalg.inv(H), np.float64)
     except np.linalg.LinAlgError:
         return np.full_like(H, np.nan)
