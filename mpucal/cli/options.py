@@ -9,11 +9,12 @@ from typing import Any, TypeVar
 import click
 from click.core import ParameterSource
 
+from ..calibration import MODELS
+from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import UsageError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-MODELS = ("auto", "accel", "paper")
 ACCEL_RANGES_G, GYRO_RANGES_DPS = ("2", "4", "8", "16"), ("250", "500", "1000", "2000")
 
 # what a capture fixes: none of it may be given beside --replay
@@ -64,7 +65,9 @@ def fit_options(command: F) -> F:
     """--gravity and --model."""
     for option in (
         click.option("--model", type=click.Choice(MODELS), default="auto", show_default=True, help="What to estimate."),
-        click.option("--gravity", type=float, default=9.80665, show_default=True, help="Local gravity [m/s²]."),
+        click.option(
+            "--gravity", type=float, default=STANDARD_GRAVITY_MPS2, show_default=True, help="Local gravity [m/s²]."
+        ),
     ):
         command = option(command)
     return command

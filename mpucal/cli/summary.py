@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from ..result import ACCELEROMETER_FORMULA, GOOD, REFUSED, USABLE, Calibration
 from ..sinks.file import BLOB, DOCUMENT, REPORT
 
 AXES = "xyz"
+WIDTH = 100
 SENTENCES = {
     GOOD: "The calibration is good.",
     USABLE: "The calibration is usable, with reservations:",
@@ -25,7 +27,7 @@ def summary(calibration: Calibration) -> str:
     lines = []
     if "verdict" in calibration.quality:
         reasons = calibration.quality.get("reasons", [])
-        lines = [SENTENCES[calibration.verdict], *(f"  - {reason['message']}" for reason in reasons), ""]
+        lines = [SENTENCES[calibration.verdict], *(_reason(reason["message"]) for reason in reasons), ""]
     return "\n".join([*lines, *_parameters(calibration), *_magnitudes(calibration), *_fit(calibration)])
 
 
@@ -48,10 +50,14 @@ def written(paths: Sequence[Path]) -> str:
 def formula(calibration: Calibration) -> str:
     """The calibrated acceleration, with its numbers."""
     rows = [
-        f"  [{' '.join(f'{value:+.6f}' for value in row)}]   y{axis} {-bias:+.5f}"
+        f"  [{' '.join(f'{value:+.6f}' for value in row)}]   y_{axis} {-bias:+.5f}"
         for axis, row, bias in zip(AXES, np.linalg.inv(calibration.D), calibration.b_a, strict=True)
     ]
     return "\n".join([f"{ACCELEROMETER_FORMULA} [m/s²]", *rows])
+
+
+def _reason(message: str) -> str:
+    return textwrap.fill(f"  - {message}.", WIDTH, subsequent_indent="    ")
 
 
 def _parameters(c: Calibration) -> list[str]:
@@ -97,7 +103,7 @@ def _fit(calibration: Calibration) -> list[str]:
         return []
     return [
         "",
-        f"Model {fit.get('model')}: {fit['samples']} samples in {_number(fit.get('seconds')):.0f} s,"
+        f"Model {fit.get('model')}: {fit['samples']} samples, fitted in {_number(fit.get('seconds')):.2f} s,"
         f" gravity {_number(fit.get('gravity')):.5f} m/s².",
     ]
 

@@ -1,0 +1,150 @@
+import json
+
+import numpy as np
+import pytest
+
+from mpucal.result import Calibration
+
+RATE_HZ, FLAT_S, TURN_S = 100.0, 10.0, 10.0
+
+
+def turning(n_turns=3, noise=0.05):
+    """Ten seconds flat, then a turn about each axis: t, acc, gyr of a perfect sensor but for noise."""
+    rng = np.random.default_rng(1)
+    up, acc, gyr = np.array([0.0, 0.0, 1.0]), [], []
+    for axis, seconds in [(None, FLAT_S), *((k % 3, TURN_S) for k in range(n_turns))]:
+        rate = np.zeros(3)
+        if axis is not None:
+            rate[axis] = 2 * np.pi / seconds
+        for _ in range(int(seconds * RATE_HZ)):
+            acc.append(9.80665 * up)
+            gyr.append(rate)
+            up = up + np.cross(up, rate) / RATE_HZ
+            up = up / np.linalg.norm(up)
+    acc, gyr = np.array(acc), np.array(gyr)
+    t = np.arange(len(acc)) / RATE_HZ
+    return {
+        "t": t,
+        "acc": acc + noise * rng.normal(size=acc.shape),
+        "gyr": gyr + 0.02 * noise * rng.normal(size=gyr.shape),
+    }
+
+
+def with_(**changes):
+    return lambda arrays: {**arrays, **{key: change(arrays[key].copy()) for key, change in changes.items()}}
+
+
+def nan(array):
+    array[17] = np.nan
+    return array
+
+
+def backwards(t):
+    t[100] = t[99]
+    return t
+
+
+UNREADABLE = {
+    "NaN": (with_(acc=nan), "acc is not a finite number in 1 of 4000 samples, first in sample 17"),
+    "time stands still": (with_(t=backwards), "time does not increase at sample 100"),
+    "one row too few": (with_(gyr=lambda gyr: gyr[1:]), "gyr has shape (3999, 3), not (4000, 3)"),
+    "two columns": (with_(acc=lambda acc: acc[:, :2]), "acc has shape (4000, 2)"),
+    "no gyr": (lambda arrays: {key: arrays[key] for key in ("t", "acc")}, "gyr"),
+}
+
+
+@pytest.mark.parametrize(("change", "sentence"), UNREADABLE.values(), ids=UNREADABLE.keys())
+def test_what_is_no_recording_is_3(mpucal, tmp_path, change, sentence):
+    np.savez(tmp_path / "walk.npz", **change(turning()))
+    result = mpucal("calibrate", "walk.npz")
+    assert result.code == 3
+    assert sentence in result.err
+    assert result.out == ""
+    assert len(result.err.strip().splitlines()) == 1
+
+
+REFUSED = {
+    "never still": (
+        with_(acc=lambda a: a[1200:2900], gyr=lambda g: g[1200:2900], t=lambda t: t[1200:2900]),
+        "never_still",
+    ),
+    "never turned": (with_(acc=lambda a: a[:900], gyr=lambda g: g[:900], t=lambda t: t[:900]), "few_orientations"),
+}
+
+
+@pytest.mark.parametrize(("change", "code"), REFUSED.values(), ids=REFUSED.keys())
+def test_what_cannot_be_calibrated_is_refused_with_its_reason(mpucal, tmp_path, change, code):
+    np.savez(tmp_path / "walk.npz", **change(turning()))
+    result = mpucal("calibrate", "walk.npz", "--json", "-o", "out")
+    assert result.code == 5
+    assert code in [reason["code"] for reason in json.loads(result.out)["quality"]["reasons"]]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["calibration.json", "report.html"]
+    assert mpucal("calibrate", "walk.npz").out.startswith("The calibration is refused:")
+
+
+def test_degrees_are_suspected(mpucal, tmp_path):
+    np.savez(tmp_path / "walk.npz", **with_(gyr=np.degrees)(turning()))
+    result = mpucal("calibrate", "walk.npz", "--json")
+    assert "units_suspect" in [reason["code"] for reason in json.loads(result.out)["quality"]["reasons"]]
+
+
+@pytest.mark.parametrize(
+    ("file", "sentence"),
+    [
+        ("missing.npz", "missing.npz"),
+        ("text.mcap", "text.mcap is no MCAP file"),
+        ("text.npz", "text.npz"),
+        ("text.docx", "text.docx"),
+        (".", "capture.mcap"),
+    ],
+)
+@pytest.mark.parametrize("command", ["calibrate", "show"])
+def test_what_cannot_be_read_is_3(mpucal, tmp_path, command, file, sentence):
+    for name in ("text.mcap", "text.npz", "text.docx"):
+        (tmp_path / name).write_text("hello")
+    result = mpucal(command, file)
+    assert result.code == 3
+    assert sentence in result.err
+    assert "Traceback" not in result.err
+
+
+def test_writes_only_where_it_is_told_to(mpucal, tmp_path):
+    np.savez(tmp_path / "walk.npz", **turning())
+    result = mpucal("calibrate", "walk.npz", "-o", "out/deep")
+    assert result.code == 0, result.out
+    assert "Written to out/deep" in result.out
+    loaded = Calibration.load(tmp_path / "out" / "deep" / "calibration.bin")
+    assert np.abs(loaded.D - np.eye(3)).max() < 0.01
+    assert {path.name for path in tmp_path.iterdir()} == {"walk.npz", "out"}
+
+
+def test_a_folder_that_cannot_be_made_is_3(mpucal, tmp_path):
+    np.savez(tmp_path / "walk.npz", **turning())
+    result = mpucal("calibrate", "walk.npz", "-o", "walk.npz/out")
+    assert result.code == 3
+    assert "cannot make the folder" in result.err
+
+
+def test_a_session_s_folder_is_its_capture(mpucal, session):
+    result = mpucal("calibrate", session.folder, "--json")
+    assert result.code == 0
+    offline, online = json.loads(result.out), json.loads((session.folder / "calibration.json").read_text())
+    assert offline["accelerometer"]["D"] == online["accelerometer"]["D"]
+
+
+def test_a_capture_cut_short_says_how_much_it_holds(mpucal, session, tmp_path):
+    data = (session.folder / "capture.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: int(0.8 * len(data))])
+    result = mpucal("calibrate", "cut.mcap")
+    assert result.code in (0, 5)
+    assert "cut.mcap" in result.err
+
+
+def test_a_refusal_leaves_an_earlier_blob_and_says_so(mpucal, tmp_path):
+    np.savez(tmp_path / "good.npz", **turning())
+    np.savez(tmp_path / "flat.npz", **REFUSED["never turned"][0](turning()))
+    mpucal("calibrate", "good.npz", "-o", "out")
+    blob = (tmp_path / "out" / "calibration.bin").read_bytes()
+    result = mpucal("calibrate", "flat.npz", "-o", "out")
+    assert "of an earlier calibration" in result.err
+    assert (tmp_path / "out" / "calibration.bin").read_bytes() == blob

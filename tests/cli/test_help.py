@@ -1,0 +1,51 @@
+import subprocess
+import sys
+
+import pytest
+
+from mpucal.cli import COMMANDS
+
+HEAVY = ("numpy", "mcap", "smbus2", "rich", "scipy", "matplotlib")
+
+
+def test_help_loads_nothing_heavy():
+    program = (
+        "import sys; from mpucal.__main__ import run; code = run(['--help']);"
+        f"print(code, [name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "0 []"
+    assert all(name in done.stdout for name in COMMANDS)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_each_command_has_an_example(mpucal, name):
+    result = mpucal(name, "--help")
+    assert result.code == 0
+    assert f"Example: `mpucal {name}" in " ".join(result.out.split())
+
+
+def test_no_command_shows_the_help(mpucal):
+    result = mpucal()
+    assert result.code == 2
+    assert "Commands:" in result.out + result.err
+
+
+@pytest.mark.parametrize("words", [["--nonsense"], ["nonsense"], ["calibrate"], ["session", "--rate", "fast"]])
+def test_wrong_usage_is_2(mpucal, words):
+    result = mpucal(*words)
+    assert result.code == 2
+    assert "Error" in result.err
+    assert "Traceback" not in result.err
+
+
+def test_says_its_version(mpucal):
+    assert mpucal("--version").out.startswith("mpucal, version ")
+
+
+def test_the_unexpected_is_a_bug_with_a_trace(mpucal, monkeypatch):
+    monkeypatch.setattr("mpucal.cli.show.load", lambda _: 1 / 0)
+    result = mpucal("show", "some.npz")
+    assert result.code == 1
+    assert "ZeroDivisionError" in result.err
+    assert "this is a bug in mpucal" in result.err

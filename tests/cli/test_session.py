@@ -1,0 +1,206 @@
+import json
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.bus.records import SessionEvent
+from mpucal.capture.mcap import CaptureWriter, read_capture
+from mpucal.result import Calibration
+
+
+def rewritten(capture, path, records=None, **meta):
+    """The same capture with another head or other records."""
+    with CaptureWriter(path) as writer:
+        writer.start({**capture.meta, **meta})
+        for record in capture.records if records is None else records:
+            if isinstance(record, SessionEvent):
+                writer.event(record.name, record.t_ns, record.data)
+            else:
+                writer.transaction(record)
+    return path
+
+
+def test_a_session_leaves_its_files_and_says_what_it_found(session):
+    assert session.result.code == 0, session.result.err
+    names = {path.name for path in session.folder.iterdir()}
+    assert names == {"capture.mcap", "calibration.json", "calibration.bin", "report.html", "truth.json"}
+    out = session.result.out
+    assert out.startswith("The calibration is ")
+    assert "bias [mg]" in out
+    assert "±" in out
+    assert "firmware" in out
+    for heading in ("LAY FLAT", "ROTATE", "REST"):
+        assert heading in session.result.err
+        assert heading not in out
+
+
+def test_the_truth_lies_within_what_the_result_claims(session):
+    truth = json.loads((session.folder / "truth.json").read_text())
+    calibration = Calibration.load(session.folder / "calibration.json")
+    true_b_a = np.array(truth.get("b_a") or truth["accelerometer"]["b_a"])
+    assert np.abs(calibration.b_a - true_b_a).max() < 0.5 * np.abs(true_b_a).max()
+
+
+def test_a_replay_says_the_same_and_finds_the_same_bits(mpucal, session, tmp_path):
+    again = mpucal("session", "--replay", session.folder / "capture.mcap", "-o", "again")
+    assert again.code == 0, again.err
+
+    def prompts(text):
+        return [line for line in text.splitlines() if not line.startswith("  wrote")]
+
+    assert prompts(again.err) == prompts(session.result.err)
+    first, second = (Calibration.load(folder / "calibration.json") for folder in (session.folder, tmp_path / "again"))
+    assert np.array_equal(first.D, second.D)
+    assert np.array_equal(first.b_a, second.b_a)
+    one, other = (read_capture(folder / "capture.mcap") for folder in (session.folder, tmp_path / "again"))
+    assert one.records == other.records
+
+
+def test_json_prints_the_document_alone(mpucal, session):
+    result = mpucal("session", "--replay", session.folder / "capture.mcap", "--json", "--yes")
+    document = json.loads(result.out)
+    assert document["format"] == "mpucal.calibration"
+
+
+def test_json_events_are_lines_of_json(mpucal, session):
+    result = mpucal("session", "--replay", session.folder / "capture.mcap", "--json-events")
+    events = [json.loads(line) for line in result.err.splitlines()]
+    assert [event["kind"] for event in events if event["event"] == "prompt"][-2:] == ["rotate", "rest"]
+
+
+def test_a_folder_of_its_own_is_named_by_the_chip(mpucal, session, tmp_path):
+    mpucal("session", "--replay", session.folder / "capture.mcap")
+    (folder,) = tmp_path.iterdir()
+    assert folder.name.startswith("mpu-6050-")
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "sentence"),
+    [
+        ([], 2, "no source was given"),
+        (["--bus", "sim", "--replay", "x.mcap"], 2, "--bus and --replay were given together"),
+        (["--replay", "x.mcap", "--rate", "100"], 2, "--rate was given beside --replay"),
+        (["--bus", "/dev/i2c-99", "--seed", "1"], 2, "--seed chooses a simulated sensor"),
+        (["--bus", "sim", "--rate", "0"], 2, "rate"),
+        (["--bus", "sim:colour=red"], 2, "colour"),
+        (["--bus", "/dev/i2c-99"], 3, "/dev/i2c-99"),
+        (["--replay", "missing.mcap"], 3, "missing.mcap"),
+        (["--replay", "text.mcap"], 3, "text.mcap is no MCAP file"),
+        (["--bus", "sim", "-o", "text.mcap/results"], 3, "cannot make the folder"),
+        (["--bus", "sim:hand=restless", "--rate", "50"], 4, "not still for 10 s within 60 s"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_what_cannot_work_says_so(mpucal, tmp_path, words, code, sentence):
+    (tmp_path / "text.mcap").write_text("not a capture")
+    result = mpucal("session", *words)
+    assert result.code == code, result.err
+    assert sentence in result.err
+    assert "Traceback" not in result.err
+
+
+def test_no_folder_is_left_where_nothing_answered(mpucal, tmp_path):
+    mpucal("session", "--bus", "/dev/i2c-99")
+    mpucal("session", "--bus", "sim:who_am_i=0x42")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_refused_session_has_reasons_and_no_blob(mpucal, tmp_path):
+    result = mpucal("session", "--bus", "sim:hand=still", "--rate", "50", "-o", "board")
+    assert result.code == 5
+    assert result.out.startswith("The calibration is refused:\n  - ")
+    assert not (tmp_path / "board" / "calibration.bin").exists()
+    assert json.loads((tmp_path / "board" / "calibration.json").read_text())["quality"]["verdict"] == "refused"
+
+
+def test_no_capture_is_written_over(mpucal, session):
+    before = (session.folder / "capture.mcap").read_bytes()
+    result = mpucal("session", "--bus", "sim", "-o", session.folder)
+    assert result.code == 3
+    assert "holds a capture already" in result.err
+    assert (session.folder / "capture.mcap").read_bytes() == before
+
+
+def test_a_capture_of_another_driver_stops(mpucal, session, tmp_path):
+    capture = read_capture(session.folder / "capture.mcap")
+    result = mpucal("session", "--replay", rewritten(capture, tmp_path / "old.mcap", driver=0))
+    assert result.code == 3
+    assert "version 0 of the driver" in result.err
+    assert "mpucal calibrate" in result.err
+
+
+def test_a_head_without_a_plan_stops(mpucal, session, tmp_path):
+    capture = read_capture(session.folder / "capture.mcap")
+    result = mpucal("session", "--replay", rewritten(capture, tmp_path / "odd.mcap", plan={"config": 3}))
+    assert result.code == 3
+    assert "does not say how it was made" in result.err
+
+
+def test_unread_accesses_stop(mpucal, session, tmp_path):
+    capture = read_capture(session.folder / "capture.mcap")
+    longer = rewritten(capture, tmp_path / "long.mcap", [*capture.records, capture.records[-1]])
+    result = mpucal("session", "--replay", longer)
+    assert result.code == 3
+    assert "1 accesses of its capture unread" in result.err
+
+
+def test_a_changed_access_stops(mpucal, session, tmp_path):
+    capture = read_capture(session.folder / "capture.mcap")
+    records = list(capture.records)
+    k = len(records) // 2
+    records[k] = replace(records[k], register=records[k].register + 1)
+    result = mpucal("session", "--replay", rewritten(capture, tmp_path / "odd.mcap", records))
+    assert result.code == 3
+    assert f"access {k}" in result.err
+
+
+def test_a_capture_cut_short_while_rotating_runs_and_says_how_much_it_holds(mpucal, session, tmp_path):
+    data = (session.folder / "capture.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: int(0.8 * len(data))])
+    result = mpucal("session", "--replay", "cut.mcap")
+    assert result.code in (0, 5)
+    assert "cut.mcap" in result.err
+    assert "the source ended" in result.err
+
+
+def test_a_capture_cut_short_while_flat_is_abandoned(mpucal, session, tmp_path):
+    data = (session.folder / "capture.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: int(0.08 * len(data))])
+    result = mpucal("session", "--replay", "cut.mcap")
+    assert result.code == 4
+    assert "ended before the board was turned" in result.err
+
+
+@pytest.mark.parametrize(
+    ("bus", "wait_for"), [("sim:pace=real", "LAY FLAT"), ("sim:hand=still", "ROTATE")], ids=["lay flat", "rotate"]
+)
+def test_ctrl_c_leaves_a_whole_capture_that_replays(mpucal, tmp_path, bus, wait_for):
+    words = [sys.executable, "-m", "mpucal", "session", "--bus", bus, "-o", "board"]
+    with subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as program:
+        lines = []
+        for line in program.stderr:
+            lines.append(line)
+            if wait_for in line:
+                program.send_signal(signal.SIGINT)
+                break
+        lines += program.stderr.readlines()
+    assert program.returncode == 4, "".join(lines)
+    assert "the session was interrupted" in lines[-1]
+    capture = tmp_path / "board" / "capture.mcap"
+    assert read_capture(capture).recovered is None
+    again = mpucal("session", "--replay", capture, "-o", "again")
+    assert again.code == 4
+    assert "the session was interrupted" in again.err
+
+
+def test_a_recording_is_calibrated_and_replayed_later(mpucal, tmp_path):
+    recorded = mpucal("record", "--bus", "sim", "--rate", "50", "--seconds", "60", "-o", "walk.mcap")
+    assert recorded.code == 0, recorded.err
+    assert "walk.mcap" in recorded.out
+    assert mpucal("calibrate", "walk.mcap").code == 0
+    assert mpucal("session", "--replay", "walk.mcap").code == 0
+    assert mpucal("record", "--bus", "sim", "--seconds", "1", "-o", "walk.mcap").code == 3
