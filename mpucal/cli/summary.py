@@ -103,7 +103,7 @@ def _fit(calibration: Calibration) -> list[str]:
         return []
     return [
         "",
-        f"Model {fit.get('model')}: {fit['samples']} samples, fitted in {_number(fit.get('seconds')):.2f} s,"
+        f"Model {fit.get('model')}: {fit['samples']} samples in {_number(fit.get('seconds')):.1f} s,"
         f" gravity {_number(fit.get('gravity')):.5f} m/s².",
     ]
 
