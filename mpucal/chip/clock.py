@@ -12,6 +12,7 @@ place, and weighs less than 1e-6 after half a minute.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,6 +60,16 @@ class _Segment:
         self.taken += taken
         self.tt += t * t
         self.t_taken += t * taken
+
+    @property
+    def t_mean_s(self) -> float:
+        """When it was looked at, on average; NaN if never."""
+        return self.origin_ns * NS + self.t / self.n * NS if self.n else math.nan
+
+    @property
+    def taken_mean(self) -> float:
+        """How many samples were found, on average; NaN if never."""
+        return self.taken / self.n if self.n else math.nan
 
     @property
     def spread_s2(self) -> float:
@@ -109,12 +120,11 @@ class SampleClock:
         product = self._past_product_s + self._segments[-1].product_s
         return (product + prior * self._nominal_hz) / (spread + prior)
 
-    def times_s(self, segment: int, index: NDArray[np.int64]) -> Vector:
-        """Times (n,) of samples number `index` (n,), counted from 0 in their segment, which was looked at."""
-        s = self._segments[segment]
-        taken_mean = s.taken / s.n
-        t_mean_s = s.origin_ns * NS + s.t / s.n * NS
-        return np.asarray(t_mean_s + (index + 0.5 - taken_mean) / self.rate_hz, np.float64)
+    def times_s(self, segment: NDArray[np.int64], index: NDArray[np.int64]) -> Vector:
+        """Times (n,) of the samples number `index` (n,), from 0 in their `segment` (n,); each was looked at."""
+        t_mean_s = np.array([s.t_mean_s for s in self._segments])
+        taken_mean = np.array([s.taken_mean for s in self._segments])
+        return np.asarray(t_mean_s[segment] + (index + 0.5 - taken_mean[segment]) / self.rate_hz, np.float64)
 
 
 def increasing(t_s: Vector, step_s: float) -> Vector:

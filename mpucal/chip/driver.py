@@ -90,7 +90,7 @@ class Driver:
         BusError : a transfer failed three times. ChipError : no samples for two seconds.
         """
         self._sleep_until(self._next_poll_ns)
-        healthy = self._drain()
+        healthy = self._drain(self._running.part.family.fifo_bytes)
         samples = self._decoder.take()
         # counted in polls: a host that slept for a while says nothing about the chip
         self._fruitless_polls = 0 if len(samples) else self._fruitless_polls + 1
@@ -160,11 +160,11 @@ class Driver:
         self._write(reg.FIFO_EN, reg.FIFO_EN_FRAME)
         self._plan_next_poll()
 
-    def _drain(self) -> bool:
+    def _drain(self, fifo_bytes: int) -> bool:
         """Read all whole frames; False where they cannot be believed."""
         count = self._fifo_count()
         self._plan_next_poll()
-        if count >= self._running.part.family.fifo_bytes - SPARE_BYTES:
+        if count >= fifo_bytes - SPARE_BYTES:
             return False
         frames = count // reg.FRAME_BYTES
         if frames:

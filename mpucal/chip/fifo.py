@@ -161,10 +161,11 @@ class FifoDecoder:
         )
 
     def _times_s(self, runs: list[_Run]) -> Vector:
-        times = [
-            self._clock.times_s(run.segment, run.first + np.arange(len(run.frames), dtype=np.int64)) for run in runs
-        ]
-        return increasing(np.concatenate(times), LEAST_STEP / self._clock.rate_hz)
+        lengths = [len(run.frames) for run in runs]
+        starts = np.cumsum([0, *lengths[:-1]])
+        segment = np.repeat([run.segment for run in runs], lengths)
+        index = np.arange(sum(lengths)) + np.repeat([run.first for run in runs] - starts, lengths)
+        return increasing(self._clock.times_s(segment, index), LEAST_STEP / self._clock.rate_hz)
 
 
 def _clipped(counts: Counts) -> Mask:
