@@ -16,7 +16,7 @@ from .session.events import Decision, Key, Output, Progress, Prompt, PromptKind
 
 PROGRESS_EVERY_S = 1.0
 HEADINGS = {PromptKind.LAY_FLAT: "LAY FLAT", PromptKind.ROTATE: "ROTATE", PromptKind.REST: "REST"}
-KEYS = "[Enter: that is enough; q Enter or Ctrl-C: stop]"
+KEYS = "(Enter: go on now; q and Enter, or Ctrl-C: stop.)"
 
 
 class Console:
@@ -31,6 +31,7 @@ class Console:
     def __init__(self, out: TextIO, keyboard: TextIO | None = None, as_json: bool = False) -> None:
         self._out, self._keyboard, self._as_json = out, keyboard, as_json
         self._interrupted = False
+        self._explained = False
         self._progress_s = float("-inf")
         self._line = ""
 
@@ -45,7 +46,7 @@ class Console:
             return
         match output:
             case Prompt(kind, text):
-                self.say(f"\n{HEADINGS[kind]}\n  {text}{self._keys(kind)}\n")
+                self.say(f"\n{HEADINGS[kind]}\n  {text}{self._keys()}\n")
             case Progress(t_s, _, _, text) if t_s - self._progress_s >= PROGRESS_EVERY_S - 1e-6:
                 self._progress_s = t_s
                 self._show(f"  {text}")
@@ -86,8 +87,12 @@ class Console:
             raise KeyboardInterrupt
         self._interrupted = True
 
-    def _keys(self, kind: PromptKind) -> str:
-        return f"\n  {KEYS}" if self._keyboard is not None and kind is not PromptKind.REST else ""
+    def _keys(self) -> str:
+        """How to answer, said once."""
+        if self._keyboard is None or self._explained:
+            return ""
+        self._explained = True
+        return f"\n  {KEYS}"
 
     def _show(self, text: str) -> None:
         """A line that the next one replaces; where there is no terminal, a line of its own if it is new."""

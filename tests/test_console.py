@@ -70,10 +70,13 @@ def test_a_keyboard_that_went_away_says_nothing(keyboard):
     assert console.pressed() == []
 
 
-def test_keys_are_explained_only_where_there_is_a_keyboard(keyboard):
-    out = io.StringIO()
-    Console(out, keyboard[1]).hear(Prompt(PromptKind.LAY_FLAT, "Lay it down."))
-    assert "Enter" in out.getvalue()
+def test_keys_are_explained_once_where_there_is_a_keyboard(keyboard):
+    for lines, times in ((None, 0), (keyboard[1], 1)):
+        out = io.StringIO()
+        console = Console(out, lines)
+        for _ in range(2):
+            console.hear(Prompt(PromptKind.LAY_FLAT, "Lay it down."))
+        assert out.getvalue().count("Enter: go on") == times
 
 
 def test_the_first_ctrl_c_is_a_key_and_the_second_interrupts():

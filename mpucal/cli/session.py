@@ -54,6 +54,7 @@ def command(folder: Path | None, yes: bool, as_json: bool, json_events: bool, **
     if as_json:
         click.echo(calibration.json(), nl=False)
     else:
+        click.echo(err=True)
         click.echo(f"{summary(calibration)}\n\n{written([place.capture, *paths])}")
     return RefusedError.exit_code if calibration.verdict == REFUSED else 0
 

@@ -66,7 +66,7 @@ class LayFlat:
     def _moved(self, moved: Moved, t_s: float) -> Output:
         if moved.after_s >= WORTH_SAYING_S or t_s - self._spoke_s >= SAY_AGAIN_S:
             self._spoke_s = t_s
-            return Prompt(PromptKind.LAY_FLAT, f"Not still: {moved.what}. Let go of it; the count starts again.")
+            return Prompt(PromptKind.LAY_FLAT, f"Not still: {moved.what}. Let go of it; the ten seconds start again.")
         return self._progress(t_s, "waiting until it is still")
 
     def _progress(self, t_s: float, text: str) -> Progress:
