@@ -1,31 +1,30 @@
-# Two commands do all the set-up: `make session` and `make test`.
-PYTHON ?= python3
+# Two commands are all that a newcomer types: `make session` and `make test`. Each sets up what it needs.
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+export PYTHON
 
 .PHONY: session test lint bench clean
 
 session: $(READY)
-	$(BIN)/mpucal session --bus sim
+	@$(BIN)/mpucal session --bus sim
 
 test: lint
 	$(BIN)/pytest
 
 lint: $(READY)
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
+	$(BIN)/ruff check --quiet .
+	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
-	$(BIN)/lint-imports
+	$(BIN)/lint-imports --no-logo
 
 bench: $(READY)
-	$(BIN)/python tools/bench.py
+	@$(BIN)/python tools/bench.py
 
 # the kernel is compiled here, so its sources are what a rebuild hangs on
-$(READY): pyproject.toml CMakeLists.txt $(wildcard mpucal/kernel/*.cpp mpucal/kernel/*.hpp)
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[plot,dev]'
-	touch $@
+$(READY): tools/set_up pyproject.toml CMakeLists.txt $(wildcard mpucal/kernel/*.cpp mpucal/kernel/*.hpp)
+	@tools/set_up $(VENV)
+	@touch $@
 
 clean:
-	rm -rf $(VENV) build dist
+	rm -rf $(VENV) build
