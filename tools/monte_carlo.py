@@ -180,8 +180,8 @@ def accuracy_table(document: dict[str, Any], options: argparse.Namespace) -> Tab
     iterations = document["iterations"]
     table.caption = (
         f"failed {document['failed_percent']:.1f} % {document['failures'] or ''}; "
-        f"iterations {iterations['mean'] or 0:.2f} (max {iterations['max']}; the paper {PAPER['iterations']}); {document['seconds_each']:.3f} s a calibration; "
-        f"models {document['models']}"
+        f"iterations {iterations['mean'] or 0:.2f} (max {iterations['max']}; the paper {PAPER['iterations']}); "
+        f"{document['seconds_each']:.3f} s a calibration; models {document['models']}"
     )
     return table
 

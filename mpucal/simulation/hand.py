@@ -35,7 +35,7 @@ class Hand:
         moving, holding : (n,) how much the hand moves or holds a pose, 0 to 1.
         """
         n = len(omega)
-        a = self._lever(omega, step_s, rng)
+        a = lever_acceleration(omega, self._lever(moving, step_s, rng), step_s)
         a += self.sway_mps2 * moving[:, None] * band_noise(n, step_s, 0.5, 4.0, rng)
         a += self._jerks(moving, step_s, rng)
         a += self.tremor_mps2 * holding[:, None] * band_noise(n, step_s, 2.0, 10.0, rng)
@@ -45,21 +45,13 @@ class Hand:
         """The rates (n, 3) [rad/s] of the tremor."""
         return self.tremor_rad_s * holding[:, None] * band_noise(len(holding), step_s, 2.0, 10.0, rng)
 
-    def _lever(self, omega: Vector, step_s: float, rng: np.random.Generator) -> Vector:
+    def _lever(self, moving: Vector, step_s: float, rng: np.random.Generator) -> Vector:
+        """Where the sensor is from the pivot (n, 3) [m], in the body."""
         direction = rng.standard_normal(3)
         length = rng.uniform(*self.lever_m)
-        r_0 = length * direction / np.linalg.norm(direction)
-        travel = band_noise(len(omega), step_s, 0.05, 0.4, rng)
-        alpha = np.gradient(omega, step_s, axis=0)
-        r = np.broadcast_to(r_0, omega.shape)
-        a = np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
-        if self.wobble:
-            # an rms of wobble * length over three axes
-            moved = self.wobble * length / np.sqrt(3.0) * travel
-            v = np.gradient(moved, step_s, axis=0)
-            a += np.cross(alpha, moved) + np.cross(omega, np.cross(omega, moved) + 2.0 * v)
-            a += np.gradient(v, step_s, axis=0)
-        return np.asarray(a, np.float64)
+        # an rms of wobble * length over three axes
+        travel = self.wobble * length / np.sqrt(3.0) * moving[:, None] * band_noise(len(moving), step_s, 0.05, 0.4, rng)
+        return np.asarray(length * direction / np.linalg.norm(direction) + travel)
 
     def _jerks(self, moving: Vector, step_s: float, rng: np.random.Generator) -> Vector:
         """Half sines of 2 to 6 m/s^2 and 60 to 120 ms that begin while the hand moves."""
@@ -71,6 +63,13 @@ class Hand:
             direction *= rng.uniform(2.0, 6.0) / np.linalg.norm(direction)
             a[start : start + length] += np.sin(np.pi * (np.arange(length) + 0.5) / length)[:, None] * direction
         return a
+
+
+def lever_acceleration(omega: Vector, r: Vector, step_s: float) -> Vector:
+    """The acceleration (n, 3) [m/s^2] in the body of a point r (n, 3) [m] of it, itself moving or not."""
+    alpha, v = np.gradient(omega, step_s, axis=0), np.gradient(r, step_s, axis=0)
+    a: Vector = np.cross(alpha, r) + np.cross(omega, np.cross(omega, r) + 2.0 * v) + np.gradient(v, step_s, axis=0)
+    return a
 
 
 def band_noise(n: int, step_s: float, low_hz: float, high_hz: float, rng: np.random.Generator) -> Vector:

@@ -27,9 +27,10 @@ def roll_pitch(s: Vector) -> tuple[Vector, Vector]:
 def tilt_errors_deg(s_true: Vector, s: Vector) -> tuple[float, float]:
     """Mean absolute errors of roll and pitch [deg] of estimated specific forces s (n, 3) against the true ones (n, 3).
 
-    Roll is compared where the true pitch is within 80 deg: beyond, a small tilt turns it by any angle.
+    Roll is compared where the cosine of the true pitch is above 0.2: below, near ±90 deg, a small tilt turns it by any
+    angle.
     """
     (roll_true, pitch_true), (roll, pitch) = roll_pitch(s_true), roll_pitch(s)
-    seen = np.abs(pitch_true) < np.radians(80.0)
+    seen = np.cos(pitch_true) > 0.2
     d_roll = np.abs(np.remainder(roll - roll_true + np.pi, 2.0 * np.pi) - np.pi)[seen]
     return float(np.degrees(d_roll.mean())), float(np.degrees(np.abs(pitch - pitch_true).mean()))
