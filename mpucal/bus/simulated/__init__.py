@@ -52,16 +52,19 @@ def open_recorded(
     accel_range_g: float,
     gyro_range_dps: float,
     *,
+    rate_error_ppm: float = 0.0,
     chip: str = "mpu6050",
 ) -> SimulatedBus:
     """A simulated chip that serves the int16 counts (n, 3) of a recording, and then ends with EndOfCapture.
+
+    Its sample clock is `rate_error_ppm` faster than `rate_hz`, to which the chip is to be set.
 
     Raises
     ------
     RecordingError : counts that are no int16, or not as many of both.
     """
     feed = RecordedFeed(acc_counts, gyr_counts, rate_hz, accel_range_g, gyro_range_dps)
-    return SimulatedBus(Chip(MODELS[chip], feed, 0.0, (0, 0, 0)), FastClock())
+    return SimulatedBus(Chip(MODELS[chip], feed, rate_error_ppm, (0, 0, 0)), FastClock())
 
 
 def _truth(options: Options, gravity: float) -> Truth:
