@@ -189,8 +189,9 @@ def accuracy_table(document: dict[str, Any], options: argparse.Namespace) -> Tab
 def efficiency(fits: list[tuple[Fit, Vector] | None]) -> dict[str, Any]:
     """RMSE against the Cramér-Rao bound of the mean Fisher information, of the 12 parameters."""
     good = [pair for pair in fits if pair is not None]
-    fisher = np.mean([np.linalg.inv(fit.covariance) for fit, _ in good], axis=0)
-    bound = np.sqrt(np.diag(np.linalg.inv(fisher))[:12])
+    # of D and b_a alone: the other parameters' meaning may change with the run (tilts about an estimated axis)
+    fisher = np.mean([np.linalg.inv(fit.covariance[:12, :12]) for fit, _ in good], axis=0)
+    bound = np.sqrt(np.diag(np.linalg.inv(fisher)))
     rmse = np.sqrt(np.mean([error**2 for _, error in good], axis=0))
     names = (*D_NAMES, *B_A_NAMES)
     return {
