@@ -64,24 +64,35 @@ class Minimum:
         return covariance
 
 
-def minimise(problem: Problem, theta: Theta, parameters: int, prior: Prior, fixed: tuple[str, ...] = ()) -> Minimum:
+def minimise(
+    problem: Problem,
+    theta: Theta,
+    parameters: int,
+    prior: Prior,
+    fixed: tuple[str, ...] = (),
+    *,
+    until: float = DECREMENT,
+    most: int = MOST_ITERATIONS,
+    slack: float = 0.0,
+) -> Minimum:
     """Minimise V + prior over the first `parameters` of NAMES, those of `fixed` (keys of PLACES) excepted.
 
-    Stops where the Newton decrement g' H^-1 g / 2 falls below DECREMENT, or after MOST_ITERATIONS.
+    Stops where the Newton decrement g' H^-1 g / 2 falls below `until`, or after `most` iterations. A step is accepted
+    where V rises by less than `slack`: the hand filter's gradient, its gains held, is not exactly that of V.
     """
     free = np.ones(parameters, bool)
     for name in fixed:
         free[slice(*PLACES[name])] = False
     at, damping, iterations, converged = _At(problem, theta, parameters, prior), DAMPING, 0, False
-    while iterations < MOST_ITERATIONS and damping < HOPELESS:
+    while iterations < most and damping < HOPELESS:
         gradient, H = at.gradient[free], at.H[np.ix_(free, free)]
-        if gradient @ _solve(H, gradient) / 2.0 < DECREMENT:
+        if gradient @ _solve(H, gradient) / 2.0 < until:
             converged = True
             break
         step = np.zeros(parameters)
         step[free] = -_solve(H + damping * np.diag(np.diag(H)), gradient)
         trial = _At(problem, at.theta.moved(step), parameters, prior)
-        if trial.V < at.V:
+        if at.V + slack > trial.V:
             at, damping, iterations = trial, damping * EASIER, iterations + 1
         else:
             damping *= HARDER

@@ -41,11 +41,12 @@ class Fit:
     Attributes
     ----------
     D : (3, 3). b_a : (3,) m/s^2. b_omega : (3,) rad/s. K : (3, 3).
-    names : p names of the parameters, D row-major first, then b_a.
+    names : p names of the parameters that were estimated, D row-major first, then b_a.
     covariance : (p, p), in the order of `names`.
     iterations : of the minimiser. converged : whether it met its stopping rule.
     nis : mean of ||e_t||^2 weighted by the inverse of S_t, over all samples; 3 where the model holds.
     V : the cost function (8) at the estimate.
+    at_prior : names of those parameters of which the data say little: they are what was known beforehand.
     """
 
     D: Vector
@@ -58,6 +59,7 @@ class Fit:
     converged: bool
     nis: float
     V: float
+    at_prior: tuple[str, ...] = ()
 
     def std(self, *names: str) -> Vector:
         """Standard deviations of the named parameters, NaN for those that were not estimated."""
