@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from ..data import STANDARD_GRAVITY_MPS2, Recording
+from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import UsageError
 from ..result import Calibration, unknown
-from .estimate import fit_accel
+from .estimate import METHODS, Choice, choose
+from .evidence import Evidence
+from .likelihood import K_NAMES
 from .masks import with_masks
-from .model import B_A_NAMES, B_OMEGA_NAMES, D_NAMES, Fit, Flat
-from .paper import fit_paper
+from .model import B_A_NAMES, B_OMEGA_NAMES, D_NAMES, Flat
 from .quality import judge
+from .reasons import BLOCKERS
 from .stationary import find_flat, flat_statistics
 
 __all__ = ["MODELS", "calibrate"]
 
-_METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {"accel": fit_accel, "paper": fit_paper}
-MODELS = ("auto", *_METHODS)
+MODELS = ("auto", *METHODS)
 
 FEWEST_SAMPLES = 50
 
@@ -46,22 +47,32 @@ def calibrate(recording: Recording, model: str = "auto", gravity: float = STANDA
     if not (np.isfinite(gravity) and gravity > 0):
         raise UsageError(f"gravity is {gravity}", "give the local gravity in m/s^2, about 9.81")
     recording = with_masks(recording)
-    chosen, why = ("accel", "the estimator for a trusted gyroscope") if model == "auto" else (model, "asked for")
     segment = recording.flat or find_flat(recording)
     flat = None if segment is None or segment[1] - segment[0] < 2 else flat_statistics(recording, segment)
-    fit = None
-    if flat is not None and len(recording) - flat.last >= FEWEST_SAMPLES:
-        fit = _METHODS[chosen](recording, flat, gravity)
-    seconds = float(recording.t[-1] - recording.t[0])
-    about = {"model": chosen, "why": why, "gravity": gravity, "samples": len(recording), "seconds": seconds}
-    return _calibration(recording, flat, fit, about, judge(recording, flat, fit, gravity))
+    before = Evidence(recording, gravity, flat, None, model)
+    if flat is None or len(recording) - flat.last < FEWEST_SAMPLES or any(check(before) for check in BLOCKERS):
+        return _calibration(before, {"model": model, "why": "nothing could be estimated"})
+    choice = _fit(recording, flat, gravity, model)
+    evidence = Evidence(recording, gravity, flat, choice.fit, choice.model)
+    return _calibration(evidence, {"model": choice.model, "why": choice.why})
 
 
-def _calibration(
-    recording: Recording, flat: Flat | None, fit: Fit | None, about: Mapping[str, Any], quality: Mapping[str, Any]
-) -> Calibration:
+def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> Choice:
+    if model == "auto":
+        return choose(recording, flat, gravity)
+    return Choice(METHODS[model](recording, flat, gravity), model, "asked for")
+
+
+def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
+    recording, flat, fit = evidence.recording, evidence.flat, evidence.fit
+    about: dict[str, Any] = {
+        **chosen,
+        "gravity": evidence.gravity,
+        "samples": len(recording),
+        "seconds": float(recording.t[-1] - recording.t[0]),
+    }
     common: dict[str, Any] = {
-        "quality": quality,
+        "quality": judge(evidence),
         "sensor": recording.sensor,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "noise_std": unknown(3) if flat is None else np.sqrt(flat.Sigma_a),
@@ -70,15 +81,28 @@ def _calibration(
     if fit is None:
         nothing = {"parameters": 0, "iterations": 0, "converged": False, "nis": np.nan}
         return Calibration(D=unknown(3, 3), b_a=unknown(3), fit=MappingProxyType({**about, **nothing}), **common)
-    numbers = {"parameters": len(fit.names), "iterations": fit.iterations, "converged": fit.converged, "nis": fit.nis}
+    numbers = {
+        "parameters": len(fit.names),
+        "iterations": fit.iterations,
+        "converged": fit.converged,
+        "nis": fit.nis,
+        "at_prior": list(fit.at_prior),
+    }
     return Calibration(
         D=fit.D,
         b_a=fit.b_a,
         D_std=fit.std(*D_NAMES).reshape(3, 3),
         b_a_std=fit.std(*B_A_NAMES),
         K=fit.K,
+        K_std=_symmetric([np.nan if name in fit.at_prior else fit.std(name)[0] for name in K_NAMES]),
         b_omega=fit.b_omega,
         b_omega_std=fit.std(*B_OMEGA_NAMES),
         fit=MappingProxyType({**about, **numbers}),
         **common,
     )
+
+
+def _symmetric(six: list[float]) -> Vector:
+    """(3, 3) of its upper triangle xx, xy, xz, yy, yz, zz."""
+    xx, xy, xz, yy, yz, zz = six
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

@@ -98,3 +98,14 @@ def tangents(u: Vector) -> tuple[Vector, Vector]:
     first = np.cross(u, axis)
     first /= np.linalg.norm(first)
     return first, np.cross(u, first)
+
+
+def product(F: Vector) -> Vector:
+    """F[n-1] ... F[1] F[0] of matrices (n, 3, 3), by halves; the identity of none."""
+    if len(F) == 0:
+        return np.eye(3)
+    while len(F) > 1:
+        odd = F[-1:] if len(F) % 2 else F[:0]
+        pairs = F[: len(F) - len(odd)]
+        F = np.concatenate([pairs[1::2] @ pairs[::2], odd])
+    return np.asarray(F[0])

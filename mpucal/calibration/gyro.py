@@ -1,0 +1,30 @@
+"""What is known of a gyroscope before it is measured, and whether a measurement adds to it. Knows no filter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..data import Vector
+from .likelihood import K_NAMES
+from .minimise import PLACES, Minimum
+
+# What a data sheet promises: +-3 % of scale, +-2 % across axes, taken as uniform; K is the symmetric part.
+K_MEAN = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
+K_SD = np.array([0.02, 0.01, 0.01, 0.02, 0.01, 0.02])
+# chi^2 of six degrees of freedom at 99 %: below it, K is not told from the identity
+WALD_99 = 16.8
+# a parameter is known where the data halve what was open before
+KNOWN = 0.5
+
+
+def wald(minimum: Minimum) -> float:
+    """k' C_k^-1 k of k = K - I: chi^2 of six degrees of freedom where the gyroscope is perfect."""
+    place = slice(*PLACES["K"])
+    k = minimum.theta.K[np.triu_indices(3)] - K_MEAN
+    return float(k @ np.linalg.solve(minimum.covariance()[place, place], k))
+
+
+def at_prior(covariance: Vector) -> tuple[str, ...]:
+    """Names of K's elements of which the data say little, by the (p, p) covariance of an estimate that has K."""
+    sd = np.sqrt(np.diag(covariance))[slice(*PLACES["K"])]
+    return tuple(name for name, now, before in zip(K_NAMES, sd, K_SD, strict=True) if now > KNOWN * before)

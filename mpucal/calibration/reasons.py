@@ -1,0 +1,280 @@
+"""What can speak against an estimate: one check a reason code, in sentences with a remedy. Knows no estimator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import permutations
+from itertools import product as choices
+
+import numpy as np
+
+from ..data import Mask, Recording
+from .evidence import Evidence
+
+GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.1, 0.4
+CONSISTENT_NIS = 5.0
+LEAST_TURN_RAD = np.deg2rad(20.0)
+FASTEST_GYRO_RAD_S = np.deg2rad(4100.0)
+WORST_AXES_RAD = np.deg2rad(60.0)
+GYRO_SCALE_OFF, GYRO_CROSS_OFF = 0.06, 0.04
+WARMER_C = 5.0
+RESTS_MPS2, RESTS_RAD = 0.08, np.deg2rad(1.5)
+HONEST_FACTOR = 5.0
+MOST_CLIPPED = 0.2
+
+
+@dataclass(frozen=True)
+class Reason:
+    """One thing that speaks against the estimate; `refuse` where nobody should use it."""
+
+    code: str
+    message: str
+    refuse: bool
+
+
+Check = Callable[[Evidence], Reason | None]
+
+
+def units_suspect(e: Evidence) -> Reason | None:
+    """Accelerations in g or counts; rates in deg/s."""
+    acc = float(np.median(np.linalg.norm(e.recording.acc, axis=1)))
+    if not 0.2 * e.gravity < acc < 5.0 * e.gravity:
+        guess = "g" if acc < 5.0 else "mg" if 200.0 < acc < 5000.0 else "raw counts"
+        return Reason(
+            "units_suspect",
+            f"the accelerometer's median magnitude is {acc:.4g}, not near {e.gravity:.4g} m/s^2: it seems to be in "
+            f"{guess}; convert it to m/s^2",
+            True,
+        )
+    rate = float(np.abs(e.recording.gyr).max())
+    if rate > FASTEST_GYRO_RAD_S or e.gyro_turned > 20.0 * e.gravity_turned or e.still_in_degrees:
+        return Reason(
+            "units_suspect",
+            f"the gyroscope reads up to {rate:.4g}, which as rad/s is {np.rad2deg(rate):.0f} deg/s and does not fit "
+            "how gravity turned: it seems to be in deg/s; convert it to rad/s",
+            True,
+        )
+    return None
+
+
+def never_still(e: Evidence) -> Reason | None:
+    """No flat segment."""
+    if e.flat is not None:
+        return None
+    return Reason(
+        "never_still",
+        "the board never lay still for a second, so the gyroscope's bias and the noise are not known; lay it on a "
+        "table for ten seconds before you turn it",
+        True,
+    )
+
+
+def moved_while_still(e: Evidence) -> Reason | None:
+    """A flat segment, given by its caller, in which the board moved."""
+    if e.flat is None or e.flat.n < 4:
+        return None
+    half = e.flat.n // 2
+    acc = e.recording.acc[e.flat.first : e.flat.first + 2 * half].reshape(2, half, 3)
+    moved = np.abs(acc[1].mean(0) - acc[0].mean(0))
+    if (moved <= 0.1 + 6.0 * np.sqrt(2.0 * acc.var(1).min(0) / half)).all():
+        return None
+    axis = int(np.argmax(moved))
+    return Reason(
+        "moved_while_still",
+        f"the board moved while it should have lain flat ({'xyz'[axis]} changed by {moved[axis]:.2g} m/s^2); lay it "
+        "down, take the hands off, and wait for ten seconds",
+        True,
+    )
+
+
+def hardly_turned(e: Evidence) -> Reason | None:
+    """A board that was not rotated."""
+    if e.flat is None or e.gravity_moved >= LEAST_TURN_RAD:
+        return None
+    return Reason(
+        "few_orientations",
+        f"the board was hardly turned (gravity moved {np.rad2deg(e.gravity_moved):.0f} deg in all); turn it so that "
+        "each of its sides, edges and corners points down once",
+        True,
+    )
+
+
+def few_orientations(e: Evidence) -> Reason | None:
+    """A direction that the data leave open."""
+    if e.sure is None or e.sure.rms_mps2 <= GOOD_RMS_MPS2:
+        return None
+    worst = e.sure.worst
+    side = "".join(f" {'+' if w > 0 else '-'}{axis}" for axis, w in zip("xyz", worst, strict=True) if abs(w) > 0.4)
+    return Reason(
+        "few_orientations",
+        f"a calibrated direction is known to {e.sure.rms_mps2:.2g} m/s^2 only, worst with{side} up; rest it in more "
+        f"orientations, above all with{side} up, down and aslant",
+        e.sure.rms_mps2 > USABLE_RMS_MPS2,
+    )
+
+
+def clipped(code: str, sensor: str, remedy: str, mask: Callable[[Recording], Mask]) -> Check:
+    """Samples at the end of the range."""
+
+    def check(e: Evidence) -> Reason | None:
+        count = int(mask(e.recording).sum())
+        if count == 0:
+            return None
+        share = count / len(e.recording)
+        sentence = f"the {sensor} stood at the end of its range in {count} samples ({share:.1%}); {remedy}"
+        return Reason(code, sentence, share > MOST_CLIPPED)
+
+    return check
+
+
+def data_lost(e: Evidence) -> Reason | None:
+    """Gaps."""
+    gaps = e.recording.gap
+    if not gaps.any():
+        return None
+    lost = float(np.diff(e.recording.t, prepend=e.recording.t[0])[gaps].sum())
+    return Reason(
+        "data_lost",
+        f"samples are missing in {int(gaps.sum())} places ({lost:.2f} s in all); use a faster bus or a lower rate",
+        lost > 0.5 * float(e.recording.t[-1] - e.recording.t[0]),
+    )
+
+
+def wrong_range(e: Evidence) -> Reason | None:
+    """All three gains near one power of two."""
+    if e.fit is None or e.sure is None:
+        return None
+    gains = np.linalg.norm(e.fit.D, axis=0)
+    power = np.round(np.log2(gains)).astype(int)
+    if power[0] == 0 or not (power == power[0]).all() or not (np.abs(gains / 2.0 ** power[0] - 1.0) < 0.05).all():
+        return None
+    return Reason(
+        "wrong_range",
+        f"all three gains are near {2.0 ** power[0]:g}: the accelerometer's range is not the one assumed (or it is an "
+        "early revision with half the sensitivity); give the true range",
+        True,
+    )
+
+
+def axes(e: Evidence) -> Reason | None:
+    """Axes that are mirrored or swapped against the gyroscope's."""
+    if e.fit is None or e.sure is None:
+        return None
+    U, _, Vt = np.linalg.svd(e.fit.D)
+    Q = U @ Vt
+    if np.arccos(np.clip((np.trace(Q) - 1.0) / 2.0, -1.0, 1.0)) <= WORST_AXES_RAD:
+        return None
+    # (D, u) and (-D, -u) fit equally, and D was made right-handed: a left-handed sensor shows as its mirror
+    M = max(_SIGNED_PERMUTATIONS, key=lambda M: max(np.sum(M * Q), np.sum(M * -Q)) + 0.01 * np.trace(M))
+    if (np.abs(M) == np.eye(3)).all():
+        flipped = [axis for axis, sign in zip("xyz", np.diag(M), strict=True) if sign < 0]
+        return Reason(
+            "left_handed",
+            "the accelerometer's axes are left-handed against the gyroscope's: change the sign of its "
+            f"{' and '.join(flipped)} axis",
+            True,
+        )
+    order = ", ".join(("-" if row.sum() < 0 else "") + "xyz"[int(np.argmax(np.abs(row)))] for row in M)
+    return Reason(
+        "swapped_axes",
+        f"the accelerometer's axes x, y, z lie along the gyroscope's {order}: name them so that both agree",
+        True,
+    )
+
+
+_SIGNED_PERMUTATIONS = [
+    np.eye(3)[list(order)] * np.array(signs)[:, None]
+    for order in permutations(range(3))
+    for signs in choices((1.0, -1.0), repeat=3)
+]
+
+
+def gyro_off(e: Evidence) -> Reason | None:
+    """A gyroscope beyond what its data sheet allows."""
+    if e.fit is None:
+        return None
+    off = e.fit.K - np.eye(3)
+    scale, cross = np.abs(np.diag(off)), np.abs(off - np.diag(np.diag(off)))
+    if scale.max() <= GYRO_SCALE_OFF and cross.max() <= GYRO_CROSS_OFF:
+        return None
+    axis = int(np.argmax(scale))
+    return Reason(
+        "gyro_off",
+        f"the gyroscope is off by {scale[axis]:.1%} on {'xyz'[axis]} and {cross.max():.1%} across axes, more than its "
+        "data sheet allows; check its range and the sample rate",
+        False,
+    )
+
+
+def temperature_moved(e: Evidence) -> Reason | None:
+    """A sensor that warmed or cooled while it was measured."""
+    known = e.recording.temperature_c[np.isfinite(e.recording.temperature_c)]
+    if len(known) < 10:
+        return None
+    low, high = np.quantile(known, [0.02, 0.98])
+    if high - low <= WARMER_C:
+        return None
+    return Reason(
+        "temperature_moved",
+        f"the temperature moved from {low:.1f} to {high:.1f} C, and the biases with it; let the board warm up first",
+        False,
+    )
+
+
+def not_converged(e: Evidence) -> Reason | None:
+    """A minimiser that did not settle."""
+    if e.fit is None or e.fit.converged:
+        return None
+    return Reason(
+        "not_converged",
+        f"the estimate had not settled after {e.fit.iterations} iterations; record again, with slower turns and pauses",
+        True,
+    )
+
+
+def inconsistent(e: Evidence) -> Reason | None:
+    """Data that the model does not explain: innovations beyond white noise, rests that contradict the estimate."""
+    if e.fit is None or e.sure is None:
+        return None
+    # a robust model leaves outliers in its innovations: only the others are judged by them
+    if e.model != "hand" and e.fit.nis > CONSISTENT_NIS:
+        after = float(np.median(np.linalg.norm(e.calibrated, axis=1))) if e.calibrated is not None else np.nan
+        return Reason(
+            "inconsistent",
+            f"the model does not explain the data (normalised innovations {e.fit.nis:.0f}, expected 3): a hand's own "
+            "acceleration or the gyroscope's scale; use --model hand, turn slowly, and rest the board often",
+            not abs(after / e.gravity - 1.0) < 0.05,
+        )
+    if e.rests is None:
+        return None
+    rests = e.rests
+    magnitude = rests.magnitude_rms > max(RESTS_MPS2, HONEST_FACTOR * e.sure.magnitude_mps2)
+    direction = rests.miss_median > max(RESTS_RAD, HONEST_FACTOR * e.sure.direction_rad)
+    if not (magnitude or direction):
+        return None
+    return Reason(
+        "inconsistent",
+        f"the rests contradict each other: |a| differs from gravity by {rests.magnitude_rms:.2g} m/s^2, and gravity "
+        f"carried by the gyroscope misses by {np.rad2deg(rests.miss_median):.1f} deg; is the sensor fast on its board? "
+        "Rest the board when you pause, and turn more slowly",
+        rests.magnitude_rms > 5.0 * RESTS_MPS2 or rests.miss_median > 5.0 * RESTS_RAD,
+    )
+
+
+# with one of these there is nothing to estimate
+BLOCKERS: tuple[Check, ...] = (units_suspect, never_still, hardly_turned)
+CHECKS: tuple[Check, ...] = (
+    *BLOCKERS,
+    moved_while_still,
+    few_orientations,
+    clipped("gyro_clipped", "gyroscope", "turn more slowly, or choose a larger range", lambda r: r.gyr_clipped),
+    clipped("accel_clipped", "accelerometer", "move more gently, or choose a larger range", lambda r: r.acc_clipped),
+    data_lost,
+    wrong_range,
+    axes,
+    gyro_off,
+    temperature_moved,
+    not_converged,
+    inconsistent,
+)

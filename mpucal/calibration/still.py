@@ -1,0 +1,106 @@
+"""Where the board rests between moves, and what the gyroscope's bias does meanwhile. Knows no accelerometer model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data import Mask, Recording, Vector
+from .model import Flat
+
+WINDOW_S, SHORTEST_S, TRIM_S = 0.5, 0.3, 0.1
+TIMES_QUIET = 2.5
+GYRO_SD_RAD_S, ACC_SD_MPS2 = 0.03, 0.15
+GYRO_MEAN_RAD_S = 0.05
+
+LONG_ENOUGH_FOR_BIAS_S = 0.5
+TREMOR_S = 0.05  # correlation time of a hand's tremor
+RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # (rad/s)^2 a second
+
+Runs = NDArray[np.intp]
+
+
+def still_runs(recording: Recording, flat: Flat) -> Runs:
+    """(k, 2) first and last + 1 of the runs of samples in which the board rests, the flat segment's among them.
+
+    A half-second window is still where its spread is near the flat segment's, or below what a braced hand gives, and
+    its mean rate is the bias; a sample is still where a still window covers it; runs are trimmed at both ends.
+    """
+    n = max(round(WINDOW_S * recording.rate_hz), 4)
+    if len(recording) < n:
+        return np.zeros((0, 2), np.intp)
+    gyr_mean, gyr_sd = _moving(recording.gyr, n)
+    _, acc_sd = _moving(recording.acc, n)
+    windows = (
+        (gyr_sd < np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_omega), GYRO_SD_RAD_S)).all(1)
+        & (acc_sd < np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_a), ACC_SD_MPS2)).all(1)
+        & (np.abs(gyr_mean - flat.b_omega) < GYRO_MEAN_RAD_S).all(1)
+    )
+    covered = np.zeros(len(recording) + 1, np.intp)
+    at = np.flatnonzero(windows)
+    np.add.at(covered, at, 1)
+    np.add.at(covered, at + n, -1)
+    still = (np.cumsum(covered)[:-1] > 0) & ~recording.gap
+    trim, shortest = round(TRIM_S * recording.rate_hz), SHORTEST_S * recording.rate_hz
+    runs = _runs(still) + np.array([trim, -trim])
+    return np.asarray(runs[runs[:, 1] - runs[:, 0] >= shortest])
+
+
+def without_drift(recording: Recording, flat: Flat, runs: Runs) -> Recording:
+    """The recording with its gyroscope's drift removed: in every run, the mean rate is the flat segment's.
+
+    The bias is a random walk seen through the runs' means, smoothed (Rauch, Tung, Striebel), its density chosen by
+    likelihood; between runs it is drawn straight.
+    """
+    runs = runs[runs[:, 1] - runs[:, 0] >= LONG_ENOUGH_FOR_BIAS_S * recording.rate_hz]
+    if len(runs) < 2:
+        return recording
+    t = np.array([0.5 * (recording.t[a] + recording.t[b - 1]) for a, b in runs])
+    bias = np.empty_like(recording.gyr)
+    for i in range(3):
+        parts = [recording.gyr[a:b, i] for a, b in runs]
+        n = np.array([len(part) for part in parts])
+        tremor = np.maximum([part.var() for part in parts] - 1.2 * flat.Sigma_omega[i], 0.0)
+        variance = flat.Sigma_omega[i] / n + tremor * np.minimum(1.0, 2.0 * TREMOR_S * recording.rate_hz / n)
+        bias[:, i] = np.interp(recording.t, t, _smoothed(t, np.array([part.mean() for part in parts]), variance))
+    return replace(recording, gyr=recording.gyr - bias + flat.b_omega)
+
+
+def _moving(values: Vector, n: int) -> tuple[Vector, Vector]:
+    """Means and standard deviations (len - n + 1, 3) of all windows of n samples."""
+    centred = values - values.mean(0)
+    sums = np.cumsum(np.vstack([np.zeros((1, 3)), centred]), axis=0)
+    squares = np.cumsum(np.vstack([np.zeros((1, 3)), centred**2]), axis=0)
+    mean = (sums[n:] - sums[:-n]) / n
+    variance = (squares[n:] - squares[:-n]) / n - mean**2
+    return mean + values.mean(0), np.sqrt(np.maximum(variance, 0.0))
+
+
+def _runs(mask: Mask) -> Runs:
+    """(k, 2) first and last + 1 of the runs of True."""
+    edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))
+    return np.asarray(np.stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)], axis=1))
+
+
+def _smoothed(t: Vector, mean: Vector, variance: Vector) -> Vector:
+    """(k,) the random walk behind measurements of given variance, of the likeliest density."""
+    return min((_random_walk(t, mean, variance, q) for q in RANDOM_WALKS), key=lambda result: result[0])[1]
+
+
+def _random_walk(t: Vector, mean: Vector, variance: Vector, q: float) -> tuple[float, Vector]:
+    """Minus twice the log-likelihood, and the smoothed states (k,)."""
+    k = len(t)
+    m, P, m_before, P_before = (np.empty(k) for _ in range(4))
+    cost = 0.0
+    m[0], P[0] = mean[0], variance[0]
+    for i in range(1, k):
+        m_before[i], P_before[i] = m[i - 1], P[i - 1] + q * (t[i] - t[i - 1])
+        S = P_before[i] + variance[i]
+        gain, e = P_before[i] / S, mean[i] - m_before[i]
+        cost += float(np.log(S) + e * e / S)
+        m[i], P[i] = m_before[i] + gain * e, (1.0 - gain) * P_before[i]
+    for i in range(k - 2, -1, -1):
+        m[i] += P[i] / P_before[i + 1] * (m[i + 1] - m_before[i + 1])
+    return cost, m
