@@ -23,6 +23,8 @@ struct Lanes {
   static constexpr int sigma_h = 23;
   static constexpr int r = 24;        // 3
   static constexpr int most = 28;
+  // lanes of the first so many groups that hold parameters estimated together
+  static constexpr int used(int groups) { return groups == 5 ? tilt1 + 1 : groups == 6 ? K + 6 : r + 3; }
 };
 
 struct Parameters {

@@ -10,9 +10,10 @@ void moments(const Series& series, const double b_omega[3], Moments& out) {
   std::memset(&out, 0, sizeof out);
   double C[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   for (std::size_t i = 0; i < series.n; ++i) {
-    double phi[3], next[3][3];
-    for (int a = 0; a < 3; ++a) phi[a] = -series.dt[i] * (series.omega[3 * i + a] - b_omega[a]);
-    const Turn turn(phi);
+    Turn<double> turn;
+    double next[3][3];
+    for (int a = 0; a < 3; ++a) turn.phi[a] = -series.dt[i] * (series.omega[3 * i + a] - b_omega[a]);
+    turn.compute();
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b)
         next[a][b] = turn.F[a][0] * C[0][b] + turn.F[a][1] * C[1][b] + turn.F[a][2] * C[2][b];

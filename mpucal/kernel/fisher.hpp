@@ -1,0 +1,70 @@
+// The Fisher matrix, a sum of outer products of rows: gathered over some steps, then added a tile at a time, so that
+// the tile stays in registers.
+#pragma once
+#include <type_traits>
+#include <utility>
+
+#include "filter.hpp"
+#include "lane.hpp"
+
+namespace mpucal {
+namespace {  // each build of the filter keeps its own
+
+// function(0), function(1) ... as constants
+template <typename Function, int... g>
+MPUCAL_INLINE void for_each(Function function, std::integer_sequence<int, g...>) {
+  (function(std::integral_constant<int, g>{}), ...);
+}
+template <int count, typename Function>
+MPUCAL_INLINE void for_each(Function function) {
+  for_each(function, std::make_integer_sequence<int, count>{});
+}
+
+// Lower triangle of the matrix over G lane groups
+template <int G>
+class Fisher {
+  static constexpr int used = Lanes::used(G);
+
+ public:
+  Fisher() {
+    for (auto& row : H_)
+      for (Lane& lane : row) lane = all(0.0);
+  }
+
+  // H += the sum of x' x over the rows x
+  void add(const Lane (*rows)[G], int count) {
+    for_each<G>([&](auto i) {
+      constexpr int height = used - 4 * i < 4 ? used - 4 * i : 4, widest = height == 1 ? 8 : kLanesInATile;
+      constexpr int tiles = i / widest + 1;
+      for_each<tiles>([&](auto k) {
+        constexpr int begin = (i + 1) * k / tiles, end = (i + 1) * (k + 1) / tiles;
+        tile<height, end - begin>(rows, count, i, begin);
+      });
+    });
+  }
+
+  void write(double* out) const {
+    for (int i = 0; i < 4 * G; ++i)
+      for (int j = 0; j <= i; ++j) out[i * 4 * G + j] = out[j * 4 * G + i] = at(H_[i][j / 4], j % 4);
+  }
+
+ private:
+  template <int height, int width>
+  MPUCAL_INLINE void tile(const Lane (*rows)[G], int count, int i, int j) {
+    Lane sum[height][width];
+    for (int a = 0; a < height; ++a)
+      for (int b = 0; b < width; ++b) sum[a][b] = H_[4 * i + a][j + b];
+    for (int k = 0; k < count; ++k)
+      for (int a = 0; a < height; ++a)
+        for (int b = 0; b < width; ++b) sum[a][b] = madd(at(rows[k][i], a), rows[k][j + b], sum[a][b]);
+    for (int a = 0; a < height; ++a)
+      for (int b = 0; b < width; ++b) H_[4 * i + a][j + b] = sum[a][b];
+  }
+
+  Lane H_[4 * G][G];
+};
+template <>
+class Fisher<0> {};
+
+}  // namespace
+}  // namespace mpucal
