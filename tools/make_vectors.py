@@ -95,9 +95,8 @@ def vectors() -> dict[str, tuple[bytes, dict[str, Any]]]:
     }
 
 
-def main() -> None:
+def write(folder: Path) -> None:
     """Write all vectors into the folder."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
     folder.mkdir(parents=True, exist_ok=True)
     for name, (data, content) in vectors().items():
         (folder / f"blob_{name}.bin").write_bytes(data)
@@ -105,4 +104,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    write(Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER)

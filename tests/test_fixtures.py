@@ -1,0 +1,53 @@
+"""What lies in fixtures/: complete, small, and what the tool makes."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mpucal.bus.records import SessionEvent
+from mpucal.capture.mcap import read_capture
+from mpucal.chip.driver import DRIVER_VERSION
+
+PROJECT = Path(__file__).parents[1]
+FIXTURES = PROJECT / "fixtures"
+CAPTURES = sorted(FIXTURES.glob("sessions/*.mcap"))
+
+
+def test_each_capture_lies_beside_what_it_gave():
+    assert [path.stem for path in CAPTURES] == sorted(path.stem for path in FIXTURES.glob("sessions/*.json"))
+
+
+@pytest.mark.parametrize("capture", CAPTURES, ids=lambda path: path.stem)
+def test_a_capture_is_small_whole_and_of_this_driver(capture):
+    assert capture.stat().st_size < 300_000
+    read = read_capture(capture)
+    assert read.recovered is None
+    assert read.meta["driver"] == DRIVER_VERSION
+
+
+def test_a_key_press_is_among_them():
+    presses = [
+        record
+        for capture in CAPTURES
+        for record in read_capture(capture).records
+        if isinstance(record, SessionEvent) and record.name == "key"
+    ]
+    assert len(presses) == 2
+
+
+def test_the_tool_makes_them(tmp_path):
+    subprocess.run([sys.executable, PROJECT / "tools" / "make_fixtures.py", tmp_path], check=True)
+    files = sorted(path.relative_to(FIXTURES) for path in FIXTURES.glob("*/*"))
+    assert files == sorted(path.relative_to(tmp_path) for path in tmp_path.glob("*/*"))
+    for path in files:
+        if path.suffix == ".mcap":
+            # the container's compression is a library's own; what it holds is not
+            assert read_capture(tmp_path / path) == read_capture(FIXTURES / path)
+        elif path.parent.name == "sessions":
+            made, stored = (json.loads((folder / path).read_text()) for folder in (tmp_path, FIXTURES))
+            assert made["said"] == stored["said"]
+        else:
+            assert (tmp_path / path).read_bytes() == (FIXTURES / path).read_bytes()

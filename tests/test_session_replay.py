@@ -1,0 +1,68 @@
+"""A session and its replay: the same words, the same bits."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpucal.__main__ import run
+from mpucal.capture.mcap import read_capture
+
+SESSIONS = Path(__file__).parents[1] / "fixtures" / "sessions"
+NAMES = sorted(path.stem for path in SESSIONS.glob("*.mcap"))
+
+
+class Outcome:
+    """What a session said, found and recorded."""
+
+    def __init__(self, folder, out, err):
+        events = [json.loads(line) for line in err.splitlines()]
+        self.said = [event for event in events if event["event"] in ("prompt", "decision")]
+        document = json.loads(out)
+        self.verdict = document["quality"]["verdict"]
+        self.D = np.array(document["accelerometer"]["D"])
+        self.b_a = np.array(document["accelerometer"]["b_a"])
+        self.samples = document["fit"]["samples"]
+        self.records = read_capture(folder / "capture.mcap").records
+
+
+@pytest.fixture
+def session(capsys, tmp_path):
+    def call(name, *words):
+        run(["session", *map(str, words), "-o", str(tmp_path / name), "--yes", "--json", "--json-events"])
+        captured = capsys.readouterr()
+        return Outcome(tmp_path / name, captured.out, captured.err)
+
+    return call
+
+
+def without_writing(said):
+    """All but the last decision, which names the files: a simulated session leaves its truth besides."""
+    assert said[-1]["why"].startswith("wrote ")
+    return said[:-1]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_stored_session_replays(session, name):
+    stored = json.loads((SESSIONS / f"{name}.json").read_text())
+    replayed = session("once", "--replay", SESSIONS / f"{name}.mcap")
+    assert without_writing(replayed.said) == stored["said"]
+    assert (replayed.verdict, replayed.samples) == (stored["verdict"], stored["samples"])
+    np.testing.assert_allclose(replayed.D, stored["D"], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(replayed.b_a, stored["b_a"], rtol=0, atol=1e-9)
+
+    again = session("twice", "--replay", SESSIONS / f"{name}.mcap")
+    assert again.said == replayed.said
+    assert np.array_equal(again.D, replayed.D)
+    assert np.array_equal(again.b_a, replayed.b_a)
+
+
+@pytest.mark.parametrize(("chip", "model"), [("mpu6050", "auto"), ("mpu6500", "accel"), ("clone98", "accel")])
+def test_a_replay_equals_its_session_to_the_last_bit(session, tmp_path, chip, model):
+    live = session("live", "--bus", f"sim:chip={chip}", "--seed", 5, "--rate", 50, "--model", model)
+    replayed = session("replayed", "--replay", tmp_path / "live" / "capture.mcap")
+    assert without_writing(replayed.said) == without_writing(live.said)
+    assert replayed.records == live.records
+    assert np.array_equal(replayed.D, live.D)
+    assert np.array_equal(replayed.b_a, live.b_a)
