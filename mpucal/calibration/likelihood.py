@@ -1,4 +1,8 @@
-"""V(theta), its gradient and its Fisher matrix over a recording, by the kernel. Knows no minimiser."""
+"""V(theta), its gradient and its Fisher matrix over a recording, by the kernel. Knows no minimiser.
+
+Two filters: the exact one for a sensor that turns in place, and the hand's, whose state holds the hand's travel as well
+(kernel/filter.hpp and kernel/hand.hpp).
+"""
 
 from __future__ import annotations
 
@@ -16,11 +20,11 @@ TILT_NAMES = ("tilt_0", "tilt_1")
 K_NAMES = ("K_xx", "K_xy", "K_xz", "K_yy", "K_yz", "K_zz")
 R_NAMES = ("r_x", "r_y", "r_z")
 
-NAMES = (*D_NAMES, *B_A_NAMES, *TILT_NAMES, *B_OMEGA_NAMES, *K_NAMES, "sigma_h", *R_NAMES)
+NAMES = (*D_NAMES, *B_A_NAMES, *TILT_NAMES, *B_OMEGA_NAMES, *K_NAMES, "tau", *R_NAMES)
 # where the kernel keeps each of them (Lanes in kernel/filter.hpp)
 LANES = np.array([0, 1, 2, 4, 5, 6, 8, 9, 10, 3, 7, 11, 15, 16, 12, 13, 14, *range(17, 27)])
-# lane groups that hold the first so many parameters
-GROUPS = {17: 5, 23: 6, 27: 7}
+# lane groups of the exact filter that hold the first so many parameters
+GROUPS = {17: 5, 23: 6}
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,7 @@ class Theta:
     Attributes
     ----------
     D : (3, 3). b_a : (3,) m/s^2. b_omega : (3,) rad/s. K : (3, 3) symmetric.
-    sigma_h : m/s^2, the hand's acceleration. r : (3,) m, the lever arm.
+    tau : s, by which the accelerometer lags behind the gyroscope. r : (3,) m, the lever arm.
     u : (3,) unit, gravity's direction in the body frame at the start (two parameters: tilts about it).
     """
 
@@ -39,7 +43,7 @@ class Theta:
     b_omega: Vector
     u: Vector
     K: Vector
-    sigma_h: float
+    tau: float
     r: Vector
 
     @classmethod
@@ -61,14 +65,14 @@ class Theta:
             u=u / np.linalg.norm(u),
             b_omega=self.b_omega + d[14:17],
             K=self.K + np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]),
-            sigma_h=self.sigma_h + d[23],
+            tau=self.tau + d[23],
             r=self.r + d[24:27],
         )
 
     def packed(self) -> Vector:
-        """The kernel's layout: D, b_a, b_omega, K, sigma_h, r, u, and u's derivatives by the tilts."""
+        """The kernel's layout: D, b_a, b_omega, K, tau, r, u, and u's derivatives by the tilts."""
         return np.concatenate(
-            [self.D.ravel(), self.b_a, self.b_omega, self.K.ravel(), [self.sigma_h], self.r, self.u, *tangents(self.u)]
+            [self.D.ravel(), self.b_a, self.b_omega, self.K.ravel(), [self.tau], self.r, self.u, *tangents(self.u)]
         )
 
 
@@ -80,8 +84,15 @@ class Series:
     ----------
     y : (n, 3) m/s^2. omega : (n, 3) rad/s, the mean measured rate over the step that leads to the sample.
     dt : (n,) s, that step. r_scale, q_scale : (n,) factors of Sigma_a and Sigma_omega [1].
-    q_extra : (n,) rad^2 added to the step's angle variance [0]. motion : (n,) factor of sigma_h^2 [0].
-    rate, alpha : (n, 3) rad/s, rad/s^2 at the sample, for the lever arm [no lever arm].
+    q_extra : (n,) rad^2 added to the step's angle variance [0].
+
+    What follows is for the hand's filter alone.
+
+    rate, alpha : (n, 3) rad/s, rad/s^2 at the sample, for lever arm and delay [neither].
+    r_extra : (n,) (m/s^2)^2 added to the noise of every axis [0].
+    jerk : (n,) (m/s^3)^2/Hz, spectral density of the hand's jerk over the step that leads to the sample [0].
+    reset : (n,) m/s^2, not below zero where the hand comes to rest or leaves it: its travel begins anew from rest, with
+        this standard deviation of its acceleration [nowhere].
     """
 
     y: Vector
@@ -90,9 +101,11 @@ class Series:
     r_scale: Vector | None = None
     q_scale: Vector | None = None
     q_extra: Vector | None = None
-    motion: Vector | None = None
     rate: Vector | None = None
     alpha: Vector | None = None
+    r_extra: Vector | None = None
+    jerk: Vector | None = None
+    reset: Vector | None = None
 
     def __len__(self) -> int:
         return len(self.dt)
@@ -108,24 +121,40 @@ class Series:
             dt=np.diff(recording.t[last - 1 :]),
         )
 
-    def arrays(self) -> dict[str, Any]:
-        """Keyword arguments of the kernel."""
-        return {name: None if value is None else np.ascontiguousarray(value) for name, value in self.__dict__.items()}
+    def arrays(self, names: tuple[str, ...]) -> dict[str, Any]:
+        """The named fields as the kernel's keyword arguments."""
+        values = {name: getattr(self, name) for name in names}
+        return {name: None if value is None else np.ascontiguousarray(value) for name, value in values.items()}
+
+
+COMMON = ("y", "omega", "dt", "r_scale", "q_scale", "q_extra")
+HAND = ("rate", "alpha", "r_extra", "jerk", "reset")
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A series with what is constant over it."""
+    """A series with what is constant over it; huber, tail and lam are the hand's filter's alone.
+
+    Attributes
+    ----------
+    gravity : m/s^2. huber : threshold on |L^-1 e| beyond which a sample weighs less.
+    tail : beyond it, rho grows as the distance (0, Huber) or as its logarithm (1, redescending).
+    lam : 1/s, the three poles that bring the hand's travel back.
+    """
 
     series: Series
     flat: Flat
     gravity: float
     huber: float = np.inf
+    tail: float = 1.0
+    lam: float = 5.0
 
     def constants(self) -> Vector:
-        """The kernel's layout: gravity, Sigma_a, Sigma_omega, the flat mean, its count, Huber's threshold."""
+        """The kernel's layout: gravity, Sigma_a, Sigma_omega, the flat mean, its count, then huber, tail and lam."""
         flat = self.flat
-        return np.array([self.gravity, *flat.Sigma_a, *flat.Sigma_omega, *flat.y, flat.n, self.huber])
+        return np.array(
+            [self.gravity, *flat.Sigma_a, *flat.Sigma_omega, *flat.y, flat.n, self.huber, self.tail, self.lam]
+        )
 
 
 class Evaluation(NamedTuple):
@@ -138,16 +167,58 @@ class Evaluation(NamedTuple):
 
 
 def evaluate(problem: Problem, theta: Theta, parameters: int) -> Evaluation:
-    """V(theta) of equation (8) with its derivatives by the first `parameters` (17, 23 or 27) of NAMES; 0: V alone."""
-    groups = GROUPS[parameters] if parameters else 0
-    V, squares, gradient, fisher = _kernel.evaluate(
-        theta.packed(), problem.constants(), groups, **problem.series.arrays()
-    )
+    """V(theta) with its derivatives by the first `parameters` of NAMES.
+
+    17, 23 (or 0: V alone): equation (8) by the exact filter. 27: by the hand's filter, whose derivatives hold gains and
+    weights: the gradient is zero where the estimate should be, not where V is least.
+
+    Raises
+    ------
+    ValueError : the exact filter was asked of a problem that only the hand's filter can solve.
+    """
+    if parameters == len(NAMES):
+        V, squares, gradient, fisher = _hand(problem, theta, derivatives=True)
+    else:
+        _refuse_a_hand(problem)
+        V, squares, gradient, fisher = _kernel.evaluate(
+            theta.packed(),
+            problem.constants()[:-2],
+            GROUPS[parameters] if parameters else 0,
+            **problem.series.arrays(COMMON),
+        )
     lanes = LANES[:parameters]
     return Evaluation(V, squares, gradient[lanes], fisher[np.ix_(lanes, lanes)])
 
 
-def trace(problem: Problem, theta: Theta) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Whitened innovations (n, 3) and predicted gravity (n, 3) m/s^2 of every sample."""
-    innovation, gravity = _kernel.trace(theta.packed(), problem.constants(), **problem.series.arrays())
-    return innovation, gravity
+def value(problem: Problem, theta: Theta) -> float:
+    """V(theta) of the hand's filter."""
+    return _hand(problem, theta, derivatives=False)[0]
+
+
+class Trace(NamedTuple):
+    """What the hand's filter made of every sample, (n, 3) each.
+
+    innovation : whitened, L^-1 e. s, a : m/s^2, gravity and the hand's acceleration in the body frame, as predicted.
+    """
+
+    innovation: NDArray[np.float64]
+    s: NDArray[np.float64]
+    a: NDArray[np.float64]
+
+
+def trace(problem: Problem, theta: Theta) -> Trace:
+    """The hand's filter, sample by sample."""
+    series = problem.series.arrays(COMMON + HAND)
+    return Trace(*_kernel.trace_hand(theta.packed(), problem.constants(), **series))
+
+
+def _hand(problem: Problem, theta: Theta, derivatives: bool) -> tuple[float, float, Vector, Vector]:
+    series = problem.series.arrays(COMMON + HAND)
+    return _kernel.evaluate_hand(theta.packed(), problem.constants(), derivatives, **series)
+
+
+def _refuse_a_hand(problem: Problem) -> None:
+    given = [name for name in HAND if getattr(problem.series, name) is not None]
+    given += ["huber"] if np.isfinite(problem.huber) else []
+    if given:
+        raise ValueError(f"the exact filter knows no {', '.join(given)}: ask for all {len(NAMES)} parameters")

@@ -26,7 +26,7 @@ class Prior:
 
     @classmethod
     def of(cls, **known: tuple[Vector | float, Vector | float]) -> Prior:
-        """Of keywords b_omega, K (its six), sigma_h, r, each (mean, standard deviation)."""
+        """Of keywords b_omega, K (its six), tau, r, each (mean, standard deviation)."""
         mean, precision = np.zeros(len(NAMES)), np.zeros(len(NAMES))
         for name, (centre, sd) in known.items():
             place = slice(*PLACES[name])
@@ -34,7 +34,7 @@ class Prior:
         return cls(mean, precision)
 
 
-PLACES = {"D": (0, 9), "b_a": (9, 12), "b_omega": (14, 17), "K": (17, 23), "sigma_h": (23, 24), "r": (24, 27)}
+PLACES = {"D": (0, 9), "b_a": (9, 12), "b_omega": (14, 17), "K": (17, 23), "tau": (23, 24), "r": (24, 27)}
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def _values(theta: Theta) -> Vector:
     """(27,) in the order of NAMES; the tilts are zero by definition."""
     K = theta.K
     six = [K[0, 0], K[0, 1], K[0, 2], K[1, 1], K[1, 2], K[2, 2]]
-    return np.concatenate([theta.D.ravel(), theta.b_a, [0.0, 0.0], theta.b_omega, six, [theta.sigma_h], theta.r])
+    return np.concatenate([theta.D.ravel(), theta.b_a, [0.0, 0.0], theta.b_omega, six, [theta.tau], theta.r])
 
 
 def _solve(H: Vector, g: Vector) -> Vector:

@@ -1,4 +1,4 @@
-"""The kernel's plain NumPy twin, a step at a time: slow, short, and the oracle of its tests."""
+"""The exact filter's plain NumPy twin, a step at a time: slow, short, and the oracle of its tests."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Vector
-from .likelihood import NAMES, Evaluation, Problem, Theta
+from .likelihood import Evaluation, Problem, Theta
 from .model import cross, rotation, tangents
 
-_K_BASIS = np.zeros((6, 3, 3))
+K_BASIS = np.zeros((6, 3, 3))
 for _m, (_i, _j) in enumerate([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]):
-    _K_BASIS[_m, _i, _j] = _K_BASIS[_m, _j, _i] = 1.0
+    K_BASIS[_m, _i, _j] = K_BASIS[_m, _j, _i] = 1.0
 
 
 class _State(NamedTuple):
@@ -40,70 +40,44 @@ def evaluate_reference(problem: Problem, theta: Theta, parameters: int) -> Evalu
     if p:
         ds[12], ds[13] = (g * t for t in tangents(theta.u))
     state = _State(g * theta.u, np.zeros((3, 3)), ds, np.zeros((p, 3, 3)))
-    state = _measure(state, flat.y, flat.Sigma_a / flat.n, 0.0, np.zeros((3, 3)), np.inf, theta, g, sums)
+    state = _measure(state, flat.y, flat.Sigma_a / flat.n, theta, g, sums)
     sums.squares = 0.0
     for i in range(len(series)):
         state = _propagate(state, problem, theta, i)
         scale = 1.0 if series.r_scale is None else series.r_scale[i]
-        motion = 0.0 if series.motion is None else series.motion[i]
-        L = np.zeros((3, 3))
-        if series.rate is not None and series.alpha is not None:
-            L = cross(series.alpha[i]) + cross(series.rate[i]) @ cross(series.rate[i])
-        state = _measure(state, series.y[i], scale * flat.Sigma_a, motion, L, problem.huber, theta, g, sums)
+        state = _measure(state, series.y[i], scale * flat.Sigma_a, theta, g, sums)
     return Evaluation(sums.V, sums.squares, sums.gradient, sums.fisher)
 
 
-def _directions(p: int) -> tuple[Vector, Vector, Vector, Vector]:
-    """Derivatives of D (p, 3, 3), b_a (p, 3), sigma_h (p,) and r (p, 3) by the parameters."""
-    dD, db, dh, dr = np.zeros((p, 3, 3)), np.zeros((p, 3)), np.zeros(p), np.zeros((p, 3))
+def _directions(p: int) -> tuple[Vector, Vector]:
+    """Derivatives of D (p, 3, 3) and b_a (p, 3) by the parameters."""
+    dD, db = np.zeros((p, 3, 3)), np.zeros((p, 3))
     dD[:9] = np.eye(9).reshape(9, 3, 3)[:p]
     if p:
         db[9:12] = np.eye(3)
-    if p == len(NAMES):
-        dh[23], dr[24:27] = 1.0, np.eye(3)
-    return dD, db, dh, dr
+    return dD, db
 
 
-def _measure(
-    state: _State,
-    y: Vector,
-    R0: Vector,
-    motion: float,
-    L: Vector,
-    huber: float,
-    theta: Theta,
-    g: float,
-    sums: _Sums,
-) -> _State:
-    """Innovation, cost and update; R0 (3,) is Sigma_a of this sample, L the lever arm's matrix."""
+def _measure(state: _State, y: Vector, R: Vector, theta: Theta, g: float, sums: _Sums) -> _State:
+    """Innovation, cost and update; R (3,) is Sigma_a of this sample."""
     s, P, ds, dP = state
     D, p = theta.D, len(ds)
-    dD, db, dh, dr = _directions(p)
-    R = np.diag(R0 + theta.sigma_h**2 * motion)
-    dR = (2.0 * theta.sigma_h * motion * dh)[:, None, None] * np.eye(3)
-    q, dq = s + L @ theta.r, ds + dr @ L.T
-    e = y - D @ q - theta.b_a
-    de = -(dD @ q) - dq @ D.T - db
-    S0 = D @ P @ D.T
-    dS0 = dD @ P @ D.T + D @ dP @ D.T + D @ P @ np.swapaxes(dD, 1, 2)
-    S, dS = S0 + R, dS0 + dR
+    dD, db = _directions(p)
+    e = y - D @ s - theta.b_a
+    de = -(dD @ s) - ds @ D.T - db
+    S = D @ P @ D.T + np.diag(R)
+    dS = dD @ P @ D.T + D @ dP @ D.T + D @ P @ np.swapaxes(dD, 1, 2)
     Si = np.linalg.inv(S)
     square = float(e @ Si @ e)
     dsquare = 2.0 * de @ Si @ e - np.einsum("a,pab,b->p", Si @ e, dS, Si @ e)
     SidS = Si @ dS
-    w = min(1.0, huber / np.sqrt(square)) if square > 0 else 1.0
     sums.squares += square
-    sums.V += 0.5 * square if w == 1.0 else huber * np.sqrt(square) - 0.5 * huber**2
-    sums.V += 0.5 * float(np.log(np.linalg.det(S)))
-    sums.gradient += 0.5 * w * dsquare + 0.5 * np.trace(SidS, axis1=1, axis2=2)
-    sums.fisher += w * de @ Si @ de.T
+    sums.V += 0.5 * square + 0.5 * float(np.log(np.linalg.det(S)))
+    sums.gradient += 0.5 * dsquare + 0.5 * np.trace(SidS, axis1=1, axis2=2)
+    sums.fisher += de @ Si @ de.T
     if sums.measurements % 4 == 0:  # small and slow: every fourth stands for four
         sums.fisher += 4 * 0.5 * np.einsum("pab,qba->pq", SidS, SidS)
     sums.measurements += 1
-    if w < 1.0:
-        dw = -0.5 * w * dsquare / square
-        S, dS = S0 + R / w, dS0 + dR / w - R * (dw / w**2)[:, None, None]
-        Si = np.linalg.inv(S)
     A = P @ D.T
     dA = dP @ D.T + P @ np.swapaxes(dD, 1, 2)
     gain, dgain = A @ Si, dA @ Si - A @ Si @ dS @ Si
@@ -125,8 +99,8 @@ def _propagate(state: _State, problem: Problem, theta: Theta, i: int) -> _State:
     if p:
         dphi[14:17] = dt * theta.K.T
     if p > 17:
-        dphi[17:23] = -dt * _K_BASIS @ rate
-    eta = dphi @ _left_jacobian(phi).T
+        dphi[17:23] = -dt * K_BASIS @ rate
+    eta = dphi @ left_jacobian(phi).T
     dF = cross(eta) @ F
     turned, dturned = F @ s, ds @ F.T + dF @ s
     Fp = F @ P @ F.T
@@ -139,7 +113,8 @@ def _propagate(state: _State, problem: Problem, theta: Theta, i: int) -> _State:
     return _State(turned, Fp + X @ c @ X.T, dturned, dFp + half + np.swapaxes(half, 1, 2))
 
 
-def _left_jacobian(phi: Vector) -> Vector:
+def left_jacobian(phi: Vector) -> Vector:
+    """J_l of d exp([phi]x) = [J_l dphi]x exp([phi]x)."""
     angle = float(np.linalg.norm(phi))
     X = cross(phi)
     if angle < 1e-3:

@@ -15,11 +15,24 @@ def evaluate(
     r_scale: _Array | None = None,
     q_scale: _Array | None = None,
     q_extra: _Array | None = None,
-    motion: _Array | None = None,
+) -> tuple[float, float, _Array, _Array]: ...
+def evaluate_hand(
+    theta: _Array,
+    constants: _Array,
+    derivatives: bool,
+    y: _Array,
+    omega: _Array,
+    dt: _Array,
+    r_scale: _Array | None = None,
+    q_scale: _Array | None = None,
+    q_extra: _Array | None = None,
     rate: _Array | None = None,
     alpha: _Array | None = None,
+    r_extra: _Array | None = None,
+    jerk: _Array | None = None,
+    reset: _Array | None = None,
 ) -> tuple[float, float, _Array, _Array]: ...
-def trace(
+def trace_hand(
     theta: _Array,
     constants: _Array,
     y: _Array,
@@ -28,10 +41,12 @@ def trace(
     r_scale: _Array | None = None,
     q_scale: _Array | None = None,
     q_extra: _Array | None = None,
-    motion: _Array | None = None,
     rate: _Array | None = None,
     alpha: _Array | None = None,
-) -> tuple[_Array, _Array]: ...
+    r_extra: _Array | None = None,
+    jerk: _Array | None = None,
+    reset: _Array | None = None,
+) -> tuple[_Array, _Array, _Array]: ...
 def moments(
     b_omega: _Array, y: _Array, omega: _Array, dt: _Array, r_scale: _Array | None = None
 ) -> tuple[_Array, _Array, _Array, _Array, float, float]: ...

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "filter.hpp"
+#include "hand.hpp"
 
 namespace nb = nanobind;
 using namespace mpucal;
@@ -28,7 +29,15 @@ Evaluate choose() {
   return evaluate_portable;
 }
 
+EvaluateHand choose_hand() {
+#ifdef MPUCAL_AVX2
+  if (choose() == evaluate_avx2) return evaluate_hand_avx2;
+#endif
+  return evaluate_hand_portable;
+}
+
 Evaluate evaluate = choose();
+EvaluateHand evaluate_hand = choose_hand();
 
 const double* pointer(const Array& array, std::size_t size, const char* name) {
   if (array.size() != size)
@@ -66,6 +75,15 @@ Series make_series(const Array& y, const Array& omega, const Array& dt, const st
   return series;
 }
 
+HandSeries make_hand_series(const Series& common, const std::optional<Array>& r_extra, const std::optional<Array>& jerk,
+                            const std::optional<Array>& reset) {
+  HandSeries series{common, nullptr, nullptr, nullptr};
+  series.r_extra = pointer(r_extra, series.n, "r_extra");
+  series.jerk = pointer(jerk, series.n, "jerk");
+  series.reset = pointer(reset, series.n, "reset");
+  return series;
+}
+
 // theta: D 9, b_a 3, b_omega 3, K 9, sigma_h, r 3, u 3, du 6
 Parameters make_parameters(const Array& theta) {
   const double* p = pointer(theta, 37, "theta");
@@ -81,6 +99,17 @@ Constants make_constants(const Array& values) {
   Constants constants;
   static_assert(sizeof constants == 12 * sizeof(double));
   std::memcpy(&constants, p, sizeof constants);
+  return constants;
+}
+
+// the same, then tail and lam
+HandConstants make_hand_constants(const Array& values) {
+  const double* p = pointer(values, 14, "constants");
+  HandConstants constants;
+  static_assert(sizeof constants == 14 * sizeof(double));
+  std::memcpy(static_cast<void*>(&constants), p, sizeof constants);
+  if (!(constants.lam > 0.0)) throw std::invalid_argument("lam is not positive");
+  if (constants.tail != 0.0 && constants.tail != 1.0) throw std::invalid_argument("tail is neither 0 nor 1");
   return constants;
 }
 
@@ -146,6 +175,66 @@ NB_MODULE(_kernel, m) {
       "Whitened innovations (n, 3) and the predicted gravity (n, 3) of every sample.");
 
   m.def(
+      "evaluate_hand",
+      [](const Array& theta, const Array& constants, bool derivatives, const Array& y, const Array& omega,
+         const Array& dt, const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
+         const std::optional<Array>& q_extra, const std::optional<Array>& rate, const std::optional<Array>& alpha,
+         const std::optional<Array>& r_extra, const std::optional<Array>& jerk, const std::optional<Array>& reset) {
+        const HandSeries series = make_hand_series(
+            make_series(y, omega, dt, r_scale, q_scale, q_extra, {}, rate, alpha), r_extra, jerk, reset);
+        const Parameters parameters = make_parameters(theta);
+        const HandConstants values = make_hand_constants(constants);
+        const std::size_t p = derivatives ? Lanes::most : 0;
+        std::vector<double> gradient(p), fisher(p * p);
+        HandResult result{};
+        if (derivatives) {
+          result.gradient = gradient.data();
+          result.fisher = fisher.data();
+        }
+        {
+          nb::gil_scoped_release release;
+          evaluate_hand(parameters, series, values, result);
+        }
+        return nb::make_tuple(result.V, result.squares, give(std::move(gradient), {p}), give(std::move(fisher), {p, p}));
+      },
+      nb::arg("theta"), nb::arg("constants"), nb::arg("derivatives"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
+      nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
+      nb::arg("q_extra").none() = nb::none(), nb::arg("rate").none() = nb::none(),
+      nb::arg("alpha").none() = nb::none(), nb::arg("r_extra").none() = nb::none(),
+      nb::arg("jerk").none() = nb::none(), nb::arg("reset").none() = nb::none(),
+      "V, sum of squared whitened innovations, gradient and Fisher matrix of the hand's filter (in lane order).");
+
+  m.def(
+      "trace_hand",
+      [](const Array& theta, const Array& constants, const Array& y, const Array& omega, const Array& dt,
+         const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
+         const std::optional<Array>& q_extra, const std::optional<Array>& rate, const std::optional<Array>& alpha,
+         const std::optional<Array>& r_extra, const std::optional<Array>& jerk, const std::optional<Array>& reset) {
+        const HandSeries series = make_hand_series(
+            make_series(y, omega, dt, r_scale, q_scale, q_extra, {}, rate, alpha), r_extra, jerk, reset);
+        const Parameters parameters = make_parameters(theta);
+        const HandConstants values = make_hand_constants(constants);
+        std::vector<double> innovation(3 * series.n), gravity(3 * series.n), motion(3 * series.n);
+        HandResult result{};
+        result.innovation = innovation.data();
+        result.gravity = gravity.data();
+        result.motion = motion.data();
+        {
+          nb::gil_scoped_release release;
+          evaluate_hand(parameters, series, values, result);
+        }
+        const std::size_t n = series.n;
+        return nb::make_tuple(give(std::move(innovation), {n, 3}), give(std::move(gravity), {n, 3}),
+                              give(std::move(motion), {n, 3}));
+      },
+      nb::arg("theta"), nb::arg("constants"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
+      nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
+      nb::arg("q_extra").none() = nb::none(), nb::arg("rate").none() = nb::none(),
+      nb::arg("alpha").none() = nb::none(), nb::arg("r_extra").none() = nb::none(),
+      nb::arg("jerk").none() = nb::none(), nb::arg("reset").none() = nb::none(),
+      "Whitened innovations, predicted gravity and predicted acceleration, (n, 3) each, of the hand's filter.");
+
+  m.def(
       "moments",
       [](const Array& b_omega, const Array& y, const Array& omega, const Array& dt,
          const std::optional<Array>& r_scale) {
@@ -169,9 +258,9 @@ NB_MODULE(_kernel, m) {
       "use_instruction_set",
       [](const std::string& name) {
         if (name == "portable")
-          evaluate = evaluate_portable;
+          evaluate = evaluate_portable, evaluate_hand = evaluate_hand_portable;
         else if (name == "best")
-          evaluate = choose();
+          evaluate = choose(), evaluate_hand = choose_hand();
         else
           throw std::invalid_argument("the instruction set is portable or best");
       },

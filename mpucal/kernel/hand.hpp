@@ -1,0 +1,46 @@
+// The filter of a sensor that a hand moves: gravity, and the hand's bounded travel beside it. Nothing known of Python.
+//
+// The state is four vectors that turn with the body, s gravity (|s| = g), p, v, a the hand's travel, speed and
+// acceleration; x = (s, p, v, a), P its covariance:
+//   e = y - D (E s + a + L r) - b_a,  E = I + tau [omega]x,  L = [alpha]x + [omega]x^2,  S = H P H' + R
+//   x <- x + K e,  s <- g s / |s|,  P <- P - K H P,  K = P H' (H P H' + R / w)^-1
+//   x <- F x,  F = exp(-dt [Gyro (omega_bar - b_omega)]x),  then (p, v, a) by the chain of chain.hpp
+// and V = sum of rho(e' S^-1 e) + 1/2 log det S; rho is Huber's, or redescends, and w is its weight.
+//
+// The derivatives hold the gains and weights: gradient = sum of w de' S^-1 e, Fisher matrix = sum of w de' S^-1 de. The
+// gradient's expectation is zero at the truth, since de depends on the past alone, but it is not that of V.
+#pragma once
+#include "filter.hpp"
+
+namespace mpucal {
+
+struct HandSeries : Series {
+  const double* r_extra;  // (m/s^2)^2 added to R on each axis [0]
+  const double* jerk;     // (m/s^3)^2/Hz, the chain's noise [0]
+  const double* reset;    // m/s^2: here p = v = a = 0 anew, with this standard deviation of a; below zero: not [none]
+};
+
+struct HandConstants : Constants {
+  double tail;  // beyond the threshold: 0 Huber's rho, 1 redescending
+  double lam;   // 1/s, the chain's poles
+};
+
+// What comes out. Null pointers are not written.
+struct HandResult {
+  double V;
+  double squares;      // sum of e' S^-1 e over the n samples
+  double* gradient;    // (28,) in the order of Lanes; with it, the derivatives are computed
+  double* fisher;      // (28, 28)
+  double* innovation;  // (n, 3) whitened, L^-1 e
+  double* gravity;     // (n, 3) s before the update
+  double* motion;      // (n, 3) a before the update
+};
+
+using EvaluateHand = void (*)(const Parameters&, const HandSeries&, const HandConstants&, HandResult&);
+
+void evaluate_hand_portable(const Parameters&, const HandSeries&, const HandConstants&, HandResult&);
+#ifdef MPUCAL_AVX2
+void evaluate_hand_avx2(const Parameters&, const HandSeries&, const HandConstants&, HandResult&);
+#endif
+
+}  // namespace mpucal
