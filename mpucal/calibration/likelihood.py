@@ -70,10 +70,12 @@ class Theta:
         )
 
     def packed(self) -> Vector:
-        """The kernel's layout: D, b_a, b_omega, K, tau, r, u, and u's derivatives by the tilts."""
-        return np.concatenate(
-            [self.D.ravel(), self.b_a, self.b_omega, self.K.ravel(), [self.tau], self.r, self.u, *tangents(self.u)]
-        )
+        """The exact filter's layout: D, b_a, b_omega, K, u, and u's derivatives by the tilts."""
+        return np.concatenate([self.D.ravel(), self.b_a, self.b_omega, self.K.ravel(), self.u, *tangents(self.u)])
+
+    def packed_with_hand(self) -> Vector:
+        """The hand's filter's layout: the exact filter's, tau, r."""
+        return np.concatenate([self.packed(), [self.tau], self.r])
 
 
 @dataclass(frozen=True)
@@ -182,7 +184,7 @@ def evaluate(problem: Problem, theta: Theta, parameters: int) -> Evaluation:
         _refuse_a_hand(problem)
         V, squares, gradient, fisher = _kernel.evaluate(
             theta.packed(),
-            problem.constants()[:-2],
+            problem.constants()[:-3],
             GROUPS[parameters] if parameters else 0,
             **problem.series.arrays(COMMON),
         )
@@ -209,12 +211,12 @@ class Trace(NamedTuple):
 def trace(problem: Problem, theta: Theta) -> Trace:
     """The hand's filter, sample by sample."""
     series = problem.series.arrays(COMMON + HAND)
-    return Trace(*_kernel.trace_hand(theta.packed(), problem.constants(), **series))
+    return Trace(*_kernel.trace_hand(theta.packed_with_hand(), problem.constants(), **series))
 
 
 def _hand(problem: Problem, theta: Theta, derivatives: bool) -> tuple[float, float, Vector, Vector]:
     series = problem.series.arrays(COMMON + HAND)
-    return _kernel.evaluate_hand(theta.packed(), problem.constants(), derivatives, **series)
+    return _kernel.evaluate_hand(theta.packed_with_hand(), problem.constants(), derivatives, **series)
 
 
 def _refuse_a_hand(problem: Problem) -> None:

@@ -17,8 +17,6 @@ constexpr int kRowsOfFour = 6 + 4 * 3;  // of the Fisher matrix, for four steps
 
 template <int G>
 class Derivatives {
-  static constexpr bool kHand = G > Lanes::r / 4;
-
  public:
   Derivatives(const Parameters& p, const Constants& c) {
     for (int g = 0; g < G; ++g) {
@@ -64,7 +62,7 @@ class Derivatives {
                                           Lane (*rows)[G]) {
     Lane e[3], new_s[3], new_P[6], x[3], WP[3][3];
     direct<g>(c, t, e, new_s, new_P);
-    // sqrt(w) L^-1 de, and V
+    // L^-1 de, and V
     for (int a = 0; a < 3; ++a) {
       for (int b = 0; b < 3; ++b) e[a] = nmadd(at(c.T[a][b], t), s[b], e[a]);
       rows[a][g] = e[a];
@@ -73,7 +71,6 @@ class Derivatives {
     for (int m = 1; m < 6; ++m) by_P = madd(at(c.dV[m], t), P[m], by_P);
     for (int a = 1; a < 3; ++a) by_e = madd(at(c.residual[a], t), e[a], by_e);
     if constexpr (g < 3) by_P = by_P + c.dV_dD[t][g];
-    if constexpr (kHand && g == Lanes::sigma_h / 4) by_P = madd(at(c.dV_dnoise, t), kSigmaH, by_P);
     gradient = gradient + (by_P + by_e);
 
     for (int a = 0; a < 3; ++a) {
@@ -88,17 +85,12 @@ class Derivatives {
                         madd(at(c.FW[a][1], t), P[kSym[1][b]], at(c.FW[a][0], t) * P[kSym[0][b]]));
     for (int m = 0; m < 6; ++m)
       for (int k = 0; k < 3; ++k) new_P[m] = madd(at(c.FW[kCol[m]][k], t), WP[kRow[m]][k], new_P[m]);
-    if (at(c.w, t) < 1.0) {
-      const Lane square = robust_square<g>(c, t, e, P);
-      for (int a = 0; a < 3; ++a) new_s[a] = nmadd(at(c.robust[a], t), square, new_s[a]);
-      for (int m = 0; m < 6; ++m) new_P[m] = madd(at(c.robust_P[m], t), square, new_P[m]);
-    }
     add_process_noise(c, t, new_s, new_P);
     for (int a = 0; a < 3; ++a) s[a] = new_s[a];
     for (int m = 0; m < 6; ++m) P[m] = new_P[m];
   }
 
-  // What the parameters do of themselves to sqrt(w) L^-1 e, s and P
+  // What the parameters do of themselves to L^-1 e, s and P
   template <int g>
   MPUCAL_INLINE static void direct(const Coefficients& c, int t, Lane (&e)[3], Lane (&s)[3], Lane (&P)[6]) {
     for (int a = 0; a < 3; ++a) e[a] = s[a] = all(0.0);
@@ -115,38 +107,6 @@ class Derivatives {
     if constexpr (g == Lanes::b_omega / 4) add_turn(c.eta_b[t], c, t, s, P);
     if constexpr (G > 5 && g == Lanes::K / 4) add_turn(c.eta_K[t], c, t, s, P);
     if constexpr (G > 5 && g == Lanes::K / 4 + 1) add_turn(c.eta_K2[t], c, t, s, P);
-    if constexpr (g == Lanes::r / 4)
-      for (int a = 0; a < 3; ++a) {
-        e[a] = e[a] - c.TL[t][a];
-        s[a] = s[a] - c.FNKDL[t][a];
-      }
-    if constexpr (kHand && g == Lanes::sigma_h / 4) {
-      const Lane noise = at(c.noise_w, t) * kSigmaH;
-      for (int a = 0; a < 3; ++a) s[a] = nmadd(at(c.FNK_v[a], t), kSigmaH, s[a]);
-      for (int m = 0; m < 6; ++m) {
-        const int a = kRow[m], b = kCol[m];
-        const double KK = madd(at(c.FK[a][2], t), at(c.FK[b][2], t),
-                               madd(at(c.FK[a][1], t), at(c.FK[b][1], t), at(c.FK[a][0], t) * at(c.FK[b][0], t)));
-        P[m] = madd(KK, noise, P[m]);
-      }
-    }
-  }
-
-  // d(e' S^-1 e) / 2
-  template <int g>
-  MPUCAL_INLINE static Lane robust_square(const Coefficients& c, int t, const Lane (&e)[3], const Lane (&P)[6]) {
-    Lane de = all(0.0), square = all(0.0);
-    for (int a = 0; a < 3; ++a) {
-      de = madd(at(c.residual[a], t), e[a], de);
-      Lane Pz = at(c.z_nominal[0], t) * P[kSym[a][0]];
-      Pz = madd(at(c.z_nominal[1], t), P[kSym[a][1]], Pz);
-      Pz = madd(at(c.z_nominal[2], t), P[kSym[a][2]], Pz);
-      square = nmadd(0.5 * at(c.z_nominal[a], t), Pz, square);
-    }
-    square = madd(1.0 / at(c.w, t), de, square);
-    if constexpr (g < 3) square = nmadd(at(c.v_nominal[g], t), c.A_v[t], square);
-    if constexpr (kHand && g == Lanes::sigma_h / 4) square = nmadd(at(c.v2, t), kSigmaH, square);
-    return square;
   }
 
   // eta x s, and [eta]x PF with its transpose
@@ -178,7 +138,6 @@ class Derivatives {
   // and changes slowly, so the first of four steps stands for four.
   template <int g>
   MPUCAL_INLINE static void information_in_S(const Coefficients& c, const Lane (&P)[6], Lane (*rows)[G]) {
-    const double scale = 2.0 / at(c.w, 0);
     Lane TP[3][3];
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b)
@@ -191,17 +150,10 @@ class Derivatives {
         if (a >= g) M = madd(at(c.white[a][g], 0), c.B[b], M);
         if (b >= g) M = madd(at(c.white[b][g], 0), c.B[a], M);
       }
-      if constexpr (kHand && g == Lanes::sigma_h / 4) {
-        double VV = 0.0;
-        for (int k = 0; k <= a; ++k) VV = madd(at(c.white[a][k], 0), at(c.white[b][k], 0), VV);
-        M = madd(VV * at(c.noise, 0), kSigmaH, M);
-      }
-      rows[m][g] = (a == b ? scale * std::sqrt(0.5) : scale) * M;
+      rows[m][g] = (a == b ? 1.4142135623730951 : 2.0) * M;
     }
   }
 
-  static constexpr int kSigmaHLane = Lanes::sigma_h % 4;
-  inline static const Lane kSigmaH{kSigmaHLane == 0, kSigmaHLane == 1, kSigmaHLane == 2, kSigmaHLane == 3};
   Lane ds_[G][3], dP_[G][6], gradient_[G];
 };
 template <>

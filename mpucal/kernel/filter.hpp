@@ -1,13 +1,13 @@
 // The gravity filter and its exact derivatives: plain arrays in, plain numbers out, nothing known of Python.
 //
 // One step, with s the gravity vector in the body frame (m/s^2), P its covariance:
-//   e = y - D (s + L r) - b_a,  S = D P D' + R,  R = diag(r_scale Sigma_a) + sigma_h^2 m I,  L = [alpha]x + [omega]x^2
+//   e = y - D s - b_a,  S = D P D' + R,  R = diag(r_scale Sigma_a)
 //   s <- g (s + K e) / |s + K e|,  P <- P - K D P,  K = P D' S^-1
 //   s <- F s,  P <- F P F' + [s]x diag(c) [s]x',  F = exp(-dt [Gyro (omega_bar - b_omega)]x)
-// and V = sum of rho(e' S^-1 e) + 1/2 log det S, the paper's equation (8) with a Huber rho.
+// and V = sum of 1/2 (e' S^-1 e + log det S), the paper's equation (8).
 //
-// Derivatives run forward, four parameters to a vector lane. A parameter's lane is given by `Lanes` below: row j of D and
-// b_a[j] share lane group j, so that their partial derivatives are products of one vector with scalars.
+// Derivatives run forward, four parameters to a lane group. A parameter's lane is given by `Lanes` below: row j of D
+// and b_a[j] share lane group j, so that their partial derivatives are products of one vector with scalars.
 #pragma once
 #include <cstddef>
 
@@ -20,7 +20,7 @@ struct Lanes {
   static constexpr int tilt0 = 15;
   static constexpr int tilt1 = 16;
   static constexpr int K = 17;        // 6: xx, xy, xz, yy, yz, zz
-  static constexpr int sigma_h = 23;
+  static constexpr int tau = 23;      // this and r in the hand's filter alone
   static constexpr int r = 24;        // 3
   static constexpr int most = 28;
   // lanes of the first so many groups that hold parameters estimated together
@@ -28,7 +28,7 @@ struct Lanes {
 };
 
 struct Parameters {
-  double D[3][3], b_a[3], b_omega[3], K[3][3], sigma_h, r[3];
+  double D[3][3], b_a[3], b_omega[3], K[3][3];
   double u[3];           // gravity's direction at the start, unit
   double du[2][3];       // its derivatives by the two tilts
 };
@@ -42,29 +42,23 @@ struct Series {
   const double* r_scale;  // factor of Sigma_a [1]
   const double* q_scale;  // factor of Sigma_omega [1]
   const double* q_extra;  // rad^2 added to the step's angle variance on each axis [0]
-  const double* motion;   // m, factor of sigma_h^2 [0]
-  const double* rate;     // rad/s at the sample, bias removed, for the lever arm [no lever arm]
-  const double* alpha;    // rad/s^2 at the sample
 };
 
 struct Constants {
   double gravity;
   double Sigma_a[3], Sigma_omega[3];
   double flat_y[3], flat_n;  // the first measurement: the flat segment's mean, with covariance Sigma_a / flat_n
-  double huber;              // threshold on |L^-1 e|; infinity for the plain square
 };
 
-// What comes out. Null pointers are not written.
+// What comes out; gradient and fisher are not written for the value alone.
 struct Result {
   double V;
   double squares;         // sum of e' S^-1 e over the n samples
   double* gradient;       // (groups * 4,)
   double* fisher;         // (groups * 4, groups * 4)
-  double* innovation;     // (n, 3) whitened, L^-1 e
-  double* gravity;        // (n, 3) s before the update
 };
 
-// groups: 0 (value only), 5 (D, b_a, b_omega, tilts), 6 (and K), 7 (and sigma_h, r).
+// groups: 0 (value only), 5 (D, b_a, b_omega, tilts), 6 (and K).
 using Evaluate = void (*)(const Parameters&, const Series&, const Constants&, int groups, Result&);
 
 void evaluate_portable(const Parameters&, const Series&, const Constants&, int groups, Result&);

@@ -14,13 +14,21 @@
 
 namespace mpucal {
 
+struct HandParameters : Parameters {
+  double tau;   // s, by which the accelerometer lags behind the gyroscope
+  double r[3];  // m, the lever arm
+};
+
 struct HandSeries : Series {
+  const double* rate;     // rad/s at the sample, bias removed, for lever arm and delay [neither]
+  const double* alpha;    // rad/s^2 at the sample
   const double* r_extra;  // (m/s^2)^2 added to R on each axis [0]
   const double* jerk;     // (m/s^3)^2/Hz, the chain's noise [0]
   const double* reset;    // m/s^2: here p = v = a = 0 anew, with this standard deviation of a; below zero: not [none]
 };
 
 struct HandConstants : Constants {
+  double huber;  // threshold on |L^-1 e|
   double tail;  // beyond the threshold: 0 Huber's rho, 1 redescending
   double lam;   // 1/s, the chain's poles
 };
@@ -36,11 +44,11 @@ struct HandResult {
   double* motion;      // (n, 3) a before the update
 };
 
-using EvaluateHand = void (*)(const Parameters&, const HandSeries&, const HandConstants&, HandResult&);
+using EvaluateHand = void (*)(const HandParameters&, const HandSeries&, const HandConstants&, HandResult&);
 
-void evaluate_hand_portable(const Parameters&, const HandSeries&, const HandConstants&, HandResult&);
+void evaluate_hand_portable(const HandParameters&, const HandSeries&, const HandConstants&, HandResult&);
 #ifdef MPUCAL_AVX2
-void evaluate_hand_avx2(const Parameters&, const HandSeries&, const HandConstants&, HandResult&);
+void evaluate_hand_avx2(const HandParameters&, const HandSeries&, const HandConstants&, HandResult&);
 #endif
 
 }  // namespace mpucal

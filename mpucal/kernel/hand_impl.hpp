@@ -57,7 +57,7 @@ MPUCAL_INLINE void solve(Adjugate<double>& inverse, const double (&e)[3], double
 template <bool kDerive>
 class HandFilter {
  public:
-  HandFilter(const Parameters& p, const HandConstants& c) : p_(p), c_(c) {
+  HandFilter(const HandParameters& p, const HandConstants& c) : p_(p), c_(c) {
     for (int a = 0; a < 3; ++a) x_[a] = Lane{c.gravity * p.u[a], 0.0, 0.0, 0.0};
     std::memset(static_cast<void*>(P_), 0, sizeof P_);
     if constexpr (kDerive) {
@@ -80,7 +80,7 @@ class HandFilter {
     for (std::size_t i = 0; i < series.n; ++i) {
       propagate(series, i);
       if (series.reset && series.reset[i] >= 0.0) reset(series.reset[i]);
-      observe(series.rate ? series.rate + 3 * i : still, series.alpha ? series.alpha + 3 * i : still, p_.sigma_h);
+      observe(series.rate ? series.rate + 3 * i : still, series.alpha ? series.alpha + 3 * i : still, p_.tau);
       for (int a = 0; a < 3; ++a)
         R[a] = (series.r_scale ? series.r_scale[i] : 1.0) * c_.Sigma_a[a] + (series.r_extra ? series.r_extra[i] : 0.0);
       record_state(result, i);
@@ -325,7 +325,7 @@ class HandFilter {
       de[j] = madd(-k.Hs[j][1], dx[kS][1], de[j]);
       de[j] = madd(-k.Hs[j][2], dx[kS][2], de[j]);
       for (int b = 0; b < 3; ++b) de[j] = madd(-k.Ha[j][b], dx[kA][b], de[j]);
-      if constexpr (g == Lanes::sigma_h / 4) de[j] = de[j] + Lane{0.0, 0.0, 0.0, -k.delay[j]};
+      if constexpr (g == Lanes::tau / 4) de[j] = de[j] + Lane{0.0, 0.0, 0.0, -k.delay[j]};
       if constexpr (g == Lanes::r / 4) de[j] = de[j] + Lane{-k.lever[j][0], -k.lever[j][1], -k.lever[j][2], 0.0};
       if constexpr (g < 3)
         if (j == g) de[j] = de[j] + Lane{-k.q[0], -k.q[1], -k.q[2], -1.0};
@@ -354,7 +354,7 @@ class HandFilter {
       const Lane p = dx[1][a], v = dx[2][a], m = dx[kA][a];
       for (int i = 0; i < 3; ++i) dx[i + 1][a] = madd(Phi[i][2], m, madd(Phi[i][1], v, all(Phi[i][0]) * p));
     }
-    if constexpr (g >= Lanes::b_omega / 4 && g <= Lanes::sigma_h / 4) {
+    if constexpr (g >= Lanes::b_omega / 4 && g <= Lanes::tau / 4) {
       for (int i = 0; i < kState; ++i) {
         Lane turned[3];
         cross_product(k.eta[g - Lanes::b_omega / 4], k.x[0][i], k.x[1][i], k.x[2][i], turned);
@@ -386,7 +386,7 @@ class HandFilter {
     }
   }
 
-  const Parameters& p_;
+  const HandParameters& p_;
   const HandConstants& c_;
   double C_[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};  // the turn from the first body frame to this one
   Lane x_[3];          // (s, p, v, a) along each axis
@@ -404,7 +404,7 @@ class HandFilter {
 
 }  // namespace
 
-void MPUCAL_EVALUATE_HAND(const Parameters& p, const HandSeries& series, const HandConstants& c, HandResult& result) {
+void MPUCAL_EVALUATE_HAND(const HandParameters& p, const HandSeries& series, const HandConstants& c, HandResult& result) {
   if (result.gradient)
     HandFilter<true>(p, c).run(series, result);
   else

@@ -57,9 +57,7 @@ Out give(std::vector<double> values, std::initializer_list<std::size_t> shape) {
 }
 
 Series make_series(const Array& y, const Array& omega, const Array& dt, const std::optional<Array>& r_scale,
-                   const std::optional<Array>& q_scale, const std::optional<Array>& q_extra,
-                   const std::optional<Array>& motion, const std::optional<Array>& rate,
-                   const std::optional<Array>& alpha) {
+                   const std::optional<Array>& q_scale, const std::optional<Array>& q_extra) {
   Series series;
   const std::size_t n = series.n = dt.size();
   series.dt = dt.data();
@@ -68,53 +66,41 @@ Series make_series(const Array& y, const Array& omega, const Array& dt, const st
   series.r_scale = pointer(r_scale, n, "r_scale");
   series.q_scale = pointer(q_scale, n, "q_scale");
   series.q_extra = pointer(q_extra, n, "q_extra");
-  series.motion = pointer(motion, n, "motion");
-  series.rate = pointer(rate, 3 * n, "rate");
-  series.alpha = pointer(alpha, 3 * n, "alpha");
-  if (!series.rate != !series.alpha) throw std::invalid_argument("rate and alpha come together");
   return series;
 }
 
-HandSeries make_hand_series(const Series& common, const std::optional<Array>& r_extra, const std::optional<Array>& jerk,
+HandSeries make_hand_series(const Series& common, const std::optional<Array>& rate, const std::optional<Array>& alpha,
+                            const std::optional<Array>& r_extra, const std::optional<Array>& jerk,
                             const std::optional<Array>& reset) {
-  HandSeries series{common, nullptr, nullptr, nullptr};
+  HandSeries series{common, nullptr, nullptr, nullptr, nullptr, nullptr};
+  series.rate = pointer(rate, 3 * series.n, "rate");
+  series.alpha = pointer(alpha, 3 * series.n, "alpha");
+  if (!series.rate != !series.alpha) throw std::invalid_argument("rate and alpha come together");
   series.r_extra = pointer(r_extra, series.n, "r_extra");
   series.jerk = pointer(jerk, series.n, "jerk");
   series.reset = pointer(reset, series.n, "reset");
   return series;
 }
 
-// theta: D 9, b_a 3, b_omega 3, K 9, sigma_h, r 3, u 3, du 6
-Parameters make_parameters(const Array& theta) {
-  const double* p = pointer(theta, 37, "theta");
-  Parameters parameters;
-  static_assert(sizeof parameters == 37 * sizeof(double));
-  std::memcpy(&parameters, p, sizeof parameters);
-  return parameters;
+// A structure of doubles from an array of as many
+template <typename Values>
+Values make(const Array& array, const char* name) {
+  constexpr std::size_t count = sizeof(Values) / sizeof(double);
+  const double* p = pointer(array, count, name);
+  Values values;
+  std::memcpy(static_cast<void*>(&values), p, sizeof values);
+  return values;
 }
 
-// constants: gravity, Sigma_a 3, Sigma_omega 3, flat_y 3, flat_n, huber
-Constants make_constants(const Array& values) {
-  const double* p = pointer(values, 12, "constants");
-  Constants constants;
-  static_assert(sizeof constants == 12 * sizeof(double));
-  std::memcpy(&constants, p, sizeof constants);
-  return constants;
-}
-
-// the same, then tail and lam
-HandConstants make_hand_constants(const Array& values) {
-  const double* p = pointer(values, 14, "constants");
-  HandConstants constants;
-  static_assert(sizeof constants == 14 * sizeof(double));
-  std::memcpy(static_cast<void*>(&constants), p, sizeof constants);
+HandConstants make_hand_constants(const Array& array) {
+  const auto constants = make<HandConstants>(array, "constants");
   if (!(constants.lam > 0.0)) throw std::invalid_argument("lam is not positive");
   if (constants.tail != 0.0 && constants.tail != 1.0) throw std::invalid_argument("tail is neither 0 nor 1");
   return constants;
 }
 
 int lanes_of(int groups) {
-  if (groups != 0 && (groups < 5 || groups > 7)) throw std::invalid_argument("groups is 0, 5, 6 or 7");
+  if (groups != 0 && (groups < 5 || groups > 6)) throw std::invalid_argument("groups is 0, 5 or 6");
   return 4 * groups;
 }
 
@@ -127,11 +113,10 @@ NB_MODULE(_kernel, m) {
       "evaluate",
       [](const Array& theta, const Array& constants, int groups, const Array& y, const Array& omega, const Array& dt,
          const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
-         const std::optional<Array>& q_extra, const std::optional<Array>& motion, const std::optional<Array>& rate,
-         const std::optional<Array>& alpha) {
-        const Series series = make_series(y, omega, dt, r_scale, q_scale, q_extra, motion, rate, alpha);
-        const Parameters parameters = make_parameters(theta);
-        const Constants values = make_constants(constants);
+         const std::optional<Array>& q_extra) {
+        const Series series = make_series(y, omega, dt, r_scale, q_scale, q_extra);
+        const auto parameters = make<Parameters>(theta, "theta");
+        const auto values = make<Constants>(constants, "constants");
         const std::size_t p = lanes_of(groups);
         std::vector<double> gradient(p), fisher(p * p);
         Result result{};
@@ -145,34 +130,8 @@ NB_MODULE(_kernel, m) {
       },
       nb::arg("theta"), nb::arg("constants"), nb::arg("groups"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
       nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
-      nb::arg("q_extra").none() = nb::none(), nb::arg("motion").none() = nb::none(),
-      nb::arg("rate").none() = nb::none(), nb::arg("alpha").none() = nb::none(),
-      "V, sum of squared whitened innovations, gradient and Fisher matrix (in lane order; empty for groups = 0).");
-
-  m.def(
-      "trace",
-      [](const Array& theta, const Array& constants, const Array& y, const Array& omega, const Array& dt,
-         const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
-         const std::optional<Array>& q_extra, const std::optional<Array>& motion, const std::optional<Array>& rate,
-         const std::optional<Array>& alpha) {
-        const Series series = make_series(y, omega, dt, r_scale, q_scale, q_extra, motion, rate, alpha);
-        const Parameters parameters = make_parameters(theta);
-        const Constants values = make_constants(constants);
-        std::vector<double> innovation(3 * series.n), gravity(3 * series.n);
-        Result result{};
-        result.innovation = innovation.data();
-        result.gravity = gravity.data();
-        {
-          nb::gil_scoped_release release;
-          evaluate(parameters, series, values, 0, result);
-        }
-        return nb::make_tuple(give(std::move(innovation), {series.n, 3}), give(std::move(gravity), {series.n, 3}));
-      },
-      nb::arg("theta"), nb::arg("constants"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
-      nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
-      nb::arg("q_extra").none() = nb::none(), nb::arg("motion").none() = nb::none(),
-      nb::arg("rate").none() = nb::none(), nb::arg("alpha").none() = nb::none(),
-      "Whitened innovations (n, 3) and the predicted gravity (n, 3) of every sample.");
+      nb::arg("q_extra").none() = nb::none(),
+      "V, sum of e' S^-1 e over the samples, gradient and Fisher matrix (in lane order; empty for groups = 0).");
 
   m.def(
       "evaluate_hand",
@@ -181,8 +140,8 @@ NB_MODULE(_kernel, m) {
          const std::optional<Array>& q_extra, const std::optional<Array>& rate, const std::optional<Array>& alpha,
          const std::optional<Array>& r_extra, const std::optional<Array>& jerk, const std::optional<Array>& reset) {
         const HandSeries series = make_hand_series(
-            make_series(y, omega, dt, r_scale, q_scale, q_extra, {}, rate, alpha), r_extra, jerk, reset);
-        const Parameters parameters = make_parameters(theta);
+            make_series(y, omega, dt, r_scale, q_scale, q_extra), rate, alpha, r_extra, jerk, reset);
+        const auto parameters = make<HandParameters>(theta, "theta");
         const HandConstants values = make_hand_constants(constants);
         const std::size_t p = derivatives ? Lanes::most : 0;
         std::vector<double> gradient(p), fisher(p * p);
@@ -211,8 +170,8 @@ NB_MODULE(_kernel, m) {
          const std::optional<Array>& q_extra, const std::optional<Array>& rate, const std::optional<Array>& alpha,
          const std::optional<Array>& r_extra, const std::optional<Array>& jerk, const std::optional<Array>& reset) {
         const HandSeries series = make_hand_series(
-            make_series(y, omega, dt, r_scale, q_scale, q_extra, {}, rate, alpha), r_extra, jerk, reset);
-        const Parameters parameters = make_parameters(theta);
+            make_series(y, omega, dt, r_scale, q_scale, q_extra), rate, alpha, r_extra, jerk, reset);
+        const auto parameters = make<HandParameters>(theta, "theta");
         const HandConstants values = make_hand_constants(constants);
         std::vector<double> innovation(3 * series.n), gravity(3 * series.n), motion(3 * series.n);
         HandResult result{};
@@ -238,7 +197,7 @@ NB_MODULE(_kernel, m) {
       "moments",
       [](const Array& b_omega, const Array& y, const Array& omega, const Array& dt,
          const std::optional<Array>& r_scale) {
-        const Series series = make_series(y, omega, dt, r_scale, {}, {}, {}, {}, {});
+        const Series series = make_series(y, omega, dt, r_scale, {}, {});
         const double* bias = pointer(b_omega, 3, "b_omega");
         Moments sums;
         {

@@ -27,57 +27,53 @@ class FourSamples {
   long at_[4];
 };
 
+// What is constant over the steps; the inverse of D takes the recursion to the accelerometer's axes.
+struct Model {
+  const Parameters& p;
+  const Constants& constants;
+  double D_inverse[3][3];
+
+  Model(const Parameters& parameters, const Constants& given) : p(parameters), constants(given) {
+    const double (&D)[3][3] = p.D;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const int a = (j + 1) % 3, b = (j + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
+        D_inverse[i][j] = D[a][c] * D[b][d] - D[a][d] * D[b][c];
+      }
+    const double determinant = D[0][0] * D_inverse[0][0] + D[0][1] * D_inverse[1][0] + D[0][2] * D_inverse[2][0];
+    for (auto& row : D_inverse)
+      for (double& x : row) x /= determinant;
+  }
+};
+
 struct Steps {
-  Lane y[3];     // y - D L r - b_a: what D s is to explain
+  Lane y[3];     // y - b_a: what D s is to explain
   Lane R[3];     // diagonal of R
-  Lane noise;    // its derivative by sigma_h
-  Lane L[3][3];  // the lever arm's matrix
-  Lane L_r[3];   // L r
   Turn<Lane> turn;
   Lane rate[3], dt;  // turn.phi = -dt Gyro rate
   Lane c[3];         // variance of the angle turned through
+  // H = F D^-1 and G = D F D^-1, with what is known of the measurement
+  Lane H_y[3], H_R[3][3], G_R[3][3], G_R_G[6];
 
-  MPUCAL_APART void read(const Parameters& p, const Series& series, const Constants& constants, long k) {
-    read_measurements(p, series, constants, k);
-    read_turns(p, series, constants, k);
+  MPUCAL_APART void read(const Model& model, const Series& series, long k) {
+    read_measurements(model.p, series, model.constants, k);
+    read_turns(model.p, series, model.constants, k);
+    combine(model);
   }
 
  private:
   MPUCAL_INLINE void read_measurements(const Parameters& p, const Series& series, const Constants& constants, long k) {
     const FourSamples samples(k - 1, static_cast<long>(series.n));
     samples.read(series.y, y);
-    Lane r_scale = samples.read(series.r_scale, 1.0), motion = samples.read(series.motion, 0.0);
-    for (int a = 0; a < 3; ++a) {
-      L[a][0] = L[a][1] = L[a][2] = all(0.0);
-    }
-    if (series.rate) {
-      Lane omega[3], alpha[3];
-      samples.read(series.rate, omega);
-      samples.read(series.alpha, alpha);
-      lever(omega, alpha);
-    }
+    Lane r_scale = samples.read(series.r_scale, 1.0);
     if (k == 0) {
-      for (int a = 0; a < 3; ++a) {
-        put(y[a], 0, constants.flat_y[a]);
-        for (int b = 0; b < 3; ++b) put(L[a][b], 0, 0.0);
-      }
+      for (int a = 0; a < 3; ++a) put(y[a], 0, constants.flat_y[a]);
       put(r_scale, 0, 1.0 / constants.flat_n);
-      put(motion, 0, 0.0);
     }
-    noise = 2.0 * p.sigma_h * motion;
-    multiply(L, p.r, L_r);
     for (int a = 0; a < 3; ++a) {
-      y[a] = y[a] - dot(p.D[a], L_r) - all(p.b_a[a]);
-      R[a] = madd(r_scale, constants.Sigma_a[a], p.sigma_h * p.sigma_h * motion);
+      y[a] = y[a] - all(p.b_a[a]);
+      R[a] = constants.Sigma_a[a] * r_scale;
     }
-  }
-
-  // [alpha]x + [omega]x^2
-  MPUCAL_INLINE void lever(const Lane (&omega)[3], const Lane (&alpha)[3]) {
-    const Lane omega2 = dot(omega, omega);
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) L[i][j] = i == j ? omega[i] * omega[j] - omega2 : omega[i] * omega[j];
-    add_cross(L, all(1.0), alpha);
   }
 
   MPUCAL_INLINE void read_turns(const Parameters& p, const Series& series, const Constants& constants, long k) {
@@ -89,6 +85,19 @@ struct Steps {
     turn.compute();
     const Lane q_scale = dt * dt * samples.read(series.q_scale, 1.0), q_extra = samples.read(series.q_extra, 0.0);
     for (int a = 0; a < 3; ++a) c[a] = madd(q_scale, constants.Sigma_omega[a], q_extra);
+  }
+
+  MPUCAL_INLINE void combine(const Model& model) {
+    Lane H[3][3], G[3][3];
+    multiply(turn.F, model.D_inverse, H);
+    multiply(model.p.D, H, G);
+    multiply(H, y, H_y);
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b) {
+        H_R[a][b] = H[a][b] * R[b];
+        G_R[a][b] = G[a][b] * R[b];
+      }
+    multiply_to_symmetric(G_R, G, G_R_G);
   }
 };
 
