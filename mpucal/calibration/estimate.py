@@ -9,6 +9,7 @@ import numpy as np
 
 from ..data import Recording
 from .gyro import K_MEAN, K_SD, WALD_99, at_prior, wald
+from .hand import fit_hand
 from .initialise import initialise
 from .likelihood import NAMES, Problem, Series
 from .masks import mask
@@ -41,6 +42,7 @@ def fit_imu(recording: Recording, flat: Flat, gravity: float) -> Fit:
 
 
 METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
+    "hand": fit_hand,
     "imu": fit_imu,
     "accel": fit_accel,
     "paper": fit_paper,
@@ -62,8 +64,10 @@ def choose(recording: Recording, flat: Flat, gravity: float) -> Choice:
             return Choice(_as_fit(imu, recording, flat), "imu", why)
         why = f"white noise and a perfect gyroscope explain the data (innovations {nis:.1f}, expected 3)"
         return Choice(_as_fit(accel, recording, flat), "accel", why)
-    why = f"white noise does not explain the data (innovations {nis:.0f}, expected 3)"
-    return Choice(_as_fit(accel, recording, flat), "accel", why)
+    hand = fit_hand(recording, flat, gravity)
+    kept = "K" if "K_xx" in hand.names else "no K (it is not told from the identity)"
+    why = f"white noise does not explain the data (innovations {nis:.0f}, expected 3): a hand's model, with {kept}"
+    return Choice(hand, "hand", why)
 
 
 def _minimum(recording: Recording, flat: Flat, gravity: float, parameters: int) -> Minimum:

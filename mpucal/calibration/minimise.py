@@ -11,6 +11,7 @@ from .likelihood import NAMES, Evaluation, Problem, Theta, evaluate
 
 DECREMENT = 1e-3  # g' H^-1 g / 2: 0.04 standard deviations from the optimum, whatever the units
 MOST_ITERATIONS = 60
+FROZEN_SLACK = 1.0  # by how much V may rise in such a step
 DAMPING, EASIER, HARDER, HOPELESS = 1e-3, 0.1, 8.0, 1e12
 
 
@@ -73,12 +74,12 @@ def minimise(
     *,
     until: float = DECREMENT,
     most: int = MOST_ITERATIONS,
-    slack: float = 0.0,
+    frozen: bool = False,
 ) -> Minimum:
     """Minimise V + prior over the first `parameters` of NAMES, those of `fixed` (keys of PLACES) excepted.
 
-    Stops where the Newton decrement g' H^-1 g / 2 falls below `until`, or after `most` iterations. A step is accepted
-    where V rises by less than `slack`: the hand filter's gradient, its gains held, is not exactly that of V.
+    Stops where the Newton decrement g' H^-1 g / 2 falls below `until`, or after `most` iterations. With `frozen` gains
+    the gradient is not exactly that of V, and a step that brings it nearer to zero is accepted too.
     """
     free = np.ones(parameters, bool)
     for name in fixed:
@@ -86,13 +87,14 @@ def minimise(
     at, damping, iterations, converged = _At(problem, theta, parameters, prior), DAMPING, 0, False
     while iterations < most and damping < HOPELESS:
         gradient, H = at.gradient[free], at.H[np.ix_(free, free)]
-        if gradient @ _solve(H, gradient) / 2.0 < until:
+        decrement = at.decrement(free)
+        if decrement < until:
             converged = True
             break
         step = np.zeros(parameters)
         step[free] = -_solve(H + damping * np.diag(np.diag(H)), gradient)
         trial = _At(problem, at.theta.moved(step), parameters, prior)
-        if at.V + slack > trial.V:
+        if trial.V < at.V or (frozen and trial.decrement(free) < decrement and trial.V < at.V + FROZEN_SLACK):
             at, damping, iterations = trial, damping * EASIER, iterations + 1
         else:
             damping *= HARDER
@@ -112,6 +114,11 @@ class _At:
             self.V = np.inf
         self.gradient = self.data.gradient + precision * away
         self.H = self.data.fisher + np.diag(precision)
+
+    def decrement(self, free: Vector) -> float:
+        """Newton decrement g' H^-1 g / 2 over the free parameters: how much V would still fall."""
+        gradient = self.gradient[free]
+        return float(gradient @ _solve(self.H[np.ix_(free, free)], gradient)) / 2.0
 
 
 def _values(theta: Theta) -> Vector:

@@ -1,0 +1,144 @@
+"""The estimator for a sensor in a hand: gyro matrix, lever arm, the hand's own acceleration, jerks, drift.
+
+The noise of the hand is found first, on means over blocks. While it moves, its acceleration is white; a recording that
+needs none (a bench, or a hand that only jerks) ends there. Else it is coloured: where the board rests often, white of a
+correlation time; where it hardly rests, the second derivative of a position that stays bounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from ..data import Recording
+from .gyro import K_MEAN, K_SD, WALD_99, at_prior, wald
+from .initialise import initialise
+from .likelihood import NAMES, Problem, Theta, evaluate, value
+from .minimise import Minimum, Prior, minimise
+from .model import Fit, Flat
+from .moves import q_scale_of_moves
+from .scene import CORRELATION_S, FLOOR_MPS2, Scene, prepare
+from .thin import thinned
+
+LEVER_SD_M = 0.3
+DELAY_SD_S = 0.002
+SEARCH_HZ = 50.0
+ROUGHLY, MOST_ROUGHLY = 0.05, 20
+
+FIRST_MPS2 = 0.3
+WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
+PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
+# the pivot travels farther than a bounded position of one lambda does: for the estimate, and for its covariance
+FARTHER, HONEST = 1.5, 3.5
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The hand's acceleration while it moves: none, white (correlated), or a pivot's, of sigma m/s^2."""
+
+    kind: Literal["none", "white", "pivot"]
+    sigma: float
+
+    def problem(self, scene: Scene, doubt: float = 1.0) -> Problem:
+        """The scene with this noise; a pivot's sigma times `doubt`."""
+        if self.kind == "pivot":
+            return scene.pivot(doubt * self.sigma, FLOOR_MPS2)
+        return scene.white(self.sigma, CORRELATION_S if self.kind == "white" else 0.0)
+
+
+def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
+    """D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves."""
+    fine = prepare(recording, (flat.first, flat.last), gravity)
+    search = _Search(prepare(*thinned(recording, flat, SEARCH_HZ), gravity))
+    theta, noise = search.run()
+    if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
+        noise = Noise("white", _likeliest(fine.white, _near(noise.sigma), theta))
+    problem, doubt = noise.problem(fine), noise.problem(fine, HONEST)
+    factor = q_scale_of_moves(fine.recording, fine.flat, problem.series, theta, fine.runs, gravity)
+    if factor is not None:
+        problem, doubt = (replace(p, series=replace(p.series, q_scale=factor)) for p in (problem, doubt))
+    prior = _prior(fine.flat)
+    minimum = minimise(problem, theta, len(NAMES), prior, frozen=True)
+    iterations = search.iterations + minimum.iterations
+    if wald(minimum) < WALD_99:
+        perfect = replace(minimum.theta, K=np.eye(3))
+        minimum = minimise(problem, perfect, len(NAMES), prior, fixed=("K",), frozen=True)
+        iterations += minimum.iterations
+    if noise.kind == "pivot":
+        fisher = evaluate(doubt, minimum.theta, len(NAMES)).fisher
+        minimum = replace(minimum, H=fisher + np.diag(prior.precision))
+    return _as_fit(minimum, iterations, len(problem.series))
+
+
+def _prior(flat: Flat) -> Prior:
+    return Prior.of(
+        b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)),
+        K=(K_MEAN, K_SD),
+        tau=(0.0, DELAY_SD_S),
+        r=(0.0, LEVER_SD_M),
+    )
+
+
+class _Search:
+    """The minimiser's way to a theta and a noise, each step rough."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.prior = _prior(scene.flat)
+        self.iterations = 0
+
+    def run(self) -> tuple[Theta, Noise]:
+        """First Huber's loss, which finds the way from afar; then the redescending one, and the likeliest sigma."""
+        scene = self.scene
+        theta = initialise(scene.problem, scene.flat.b_omega)
+        theta = self._roughly(replace(scene.white(FIRST_MPS2), tail=0.0), theta)
+        sigma = 0.0
+        for _ in range(2):
+            sigma = _likeliest(scene.white, WHITE_MPS2, theta)
+            theta = self._roughly(scene.white(sigma), theta)
+        if sigma == 0.0:
+            return theta, Noise("none", 0.0)
+        if scene.rests_often:
+            return theta, Noise("white", sigma)
+        sigma = _likeliest(scene.pivot, PIVOT_MPS2, theta)
+        theta = self._roughly(scene.pivot(sigma), theta)
+        sigma = _likeliest(scene.pivot, PIVOT_MPS2, theta)
+        return theta, Noise("pivot", (FARTHER + 0.5 * sigma) * sigma)
+
+    def _roughly(self, problem: Problem, theta: Theta) -> Theta:
+        minimum = minimise(problem, theta, len(NAMES), self.prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True)
+        self.iterations += minimum.iterations
+        return minimum.theta
+
+
+def _likeliest(problem_of: Callable[[float], Problem], sigmas: tuple[float, ...], theta: Theta) -> float:
+    """The sigma of least V at theta."""
+    return min(sigmas, key=lambda sigma: value(problem_of(sigma), theta))
+
+
+def _near(sigma: float) -> tuple[float, ...]:
+    """The neighbours of a sigma on the grid, itself among them, zero excepted."""
+    at = WHITE_MPS2.index(sigma)
+    return WHITE_MPS2[max(at - 1, 1) : at + 3]
+
+
+def _as_fit(minimum: Minimum, iterations: int, samples: int) -> Fit:
+    theta, free = minimum.theta, minimum.free
+    covariance = minimum.covariance()
+    names = tuple(name for name, kept in zip(NAMES, free, strict=True) if kept)
+    return Fit(
+        D=theta.D,
+        b_a=theta.b_a,
+        b_omega=theta.b_omega,
+        K=theta.K,
+        names=names,
+        covariance=covariance[np.ix_(free, free)],
+        iterations=iterations,
+        converged=minimum.converged,
+        nis=minimum.squares / max(samples, 1),
+        V=minimum.V,
+        at_prior=at_prior(covariance) if free.all() else (),
+    )

@@ -1,0 +1,124 @@
+"""A recording prepared for the hand's model: rests, rates for the lever arm, noise of the hand. Knows no minimiser."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..data import Recording, Vector
+from .likelihood import Problem, Series
+from .masks import mask
+from .model import Flat
+from .stationary import flat_statistics
+from .still import Runs, still_runs, without_drift
+
+HUBER = 2.0
+MOVING_RAD_S = 0.3  # the rate at which a hand's acceleration is half of what it grows to
+SMOOTH_S = 0.02  # of the rates whose derivative is the angular acceleration
+TREMOR_PER_S, MOTION_PER_S = 20.0, 5.0  # lambda: 4.5 Hz of a tremor at rest, 1.1 Hz of a pivot
+TREMOR_OF_NOISE = 0.2  # a tremor below this share of the sensor's noise is none
+POSE_MPS2 = 0.001  # no pose is known better than its mounting is stiff
+CORRELATION_S = 0.05  # of a hand's acceleration
+FLOOR_MPS2 = 0.12  # white acceleration that jerks leave beside the pivot's own
+MANY_RESTS = 6
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A recording after its flat segment, and the parts that its noise is made of.
+
+    Attributes
+    ----------
+    recording, flat : with the gyroscope's drift removed.
+    problem : the series with the tremor of the rests, and no noise of moving yet.
+    runs : (k, 2) rests in samples of the recording. rests : how many end after the flat segment.
+    motion : (n,) 0 at rest to 1. pose : (n,) (m/s^2)^2, r_extra of the rests.
+    """
+
+    recording: Recording
+    flat: Flat
+    problem: Problem
+    runs: Runs
+    rests: int
+    motion: Vector
+    pose: Vector
+
+    @property
+    def rests_often(self) -> bool:
+        """Whether there are rests enough to lean on them alone."""
+        return self.rests >= MANY_RESTS
+
+    def white(self, sigma: float, correlation_s: float = 0.0) -> Problem:
+        """White acceleration of sigma m/s^2 while moving; a correlation time tau makes it (1 + 2 tau / dt) of that."""
+        longer = 1.0 + 2.0 * correlation_s / self._dt
+        return self._with(r_extra=self.pose + longer * sigma**2 * self.motion)
+
+    def pivot(self, sigma: float, floor: float = 0.0) -> Problem:
+        """A pivot whose bounded travel accelerates the board by sigma m/s^2 while moving, over a white floor."""
+        jerk = jerk_density(sigma, self.problem.lam) * self.motion
+        if self.problem.series.jerk is not None:
+            jerk = jerk + self.problem.series.jerk
+        white = 2.0 * CORRELATION_S / self._dt * floor**2 * self.motion
+        return self._with(jerk=jerk, r_extra=self.pose + white)
+
+    @property
+    def _dt(self) -> float:
+        return float(np.median(self.problem.series.dt))
+
+    def _with(self, **series: Vector) -> Problem:
+        return replace(self.problem, series=replace(self.problem.series, **series))
+
+
+def prepare(recording: Recording, at: tuple[int, int], gravity: float) -> Scene:
+    """The scene of a recording whose flat segment is at[0]..at[1]-1."""
+    flat = flat_statistics(recording, at)
+    recording = without_drift(recording, flat, still_runs(recording, flat))
+    flat = flat_statistics(recording, at)
+    runs = still_runs(recording, flat)
+    series = mask(Series.after(recording, flat), recording, flat)
+    after = [(max(a - flat.last, 0), b - flat.last) for a, b in runs.tolist() if b > flat.last]
+    rest = np.zeros(len(series), bool)
+    for a, b in after:
+        rest[a:b] = True
+    rate, alpha = _rates(recording, flat, rest)
+    speed2 = np.sum(rate * rate, axis=1)
+    lam = TREMOR_PER_S if len(after) >= MANY_RESTS else MOTION_PER_S
+    reset, jerk, pose = np.full(len(series), -1.0), np.zeros(len(series)), np.zeros(len(series))
+    for a, b in after:
+        tremor = _tremor(series.y[a:b], flat)
+        reset[a], jerk[a:b], pose[a:b] = tremor, jerk_density(tremor, lam), POSE_MPS2**2 * (b - a)
+        if b < len(series):
+            reset[b] = 0.0
+    series = replace(series, rate=rate, alpha=alpha, reset=reset, jerk=jerk, r_extra=pose)
+    problem = Problem(series, flat, gravity, huber=HUBER, tail=1.0, lam=lam)
+    motion = speed2 / (speed2 + MOVING_RAD_S**2)
+    return Scene(recording, flat, problem, runs, len(after), motion, pose)
+
+
+def jerk_density(sigma: float, lam: float) -> float:
+    """Spectral density of the jerk [(m/s^3)^2/Hz] that gives an acceleration of sigma m/s^2 rms.
+
+    The position's three poles at lam leave the acceleration a variance of 3 q / (16 lam).
+    """
+    return 16.0 * lam / 3.0 * sigma**2
+
+
+def _rates(recording: Recording, flat: Flat, rest: Vector) -> tuple[Vector, Vector]:
+    """Rate and angular acceleration (n, 3) after the flat segment; zero at rest, where they are noise alone.
+
+    Noise in a regressor pulls the lever arm to zero.
+    """
+    n, k = len(recording), int(SMOOTH_S * recording.rate_hz)
+    sums = np.cumsum(np.vstack([np.zeros((1, 3)), recording.gyr - flat.b_omega]), axis=0)
+    low, high = np.maximum(np.arange(n) - k, 0), np.minimum(np.arange(n) + k + 1, n)
+    rate = (sums[high] - sums[low]) / (high - low)[:, None]
+    alpha = np.gradient(rate, recording.t, axis=0)
+    moving = np.where(rest, 0.0, 1.0)[:, None]
+    return rate[flat.last :] * moving, alpha[flat.last :] * moving
+
+
+def _tremor(y: Vector, flat: Flat) -> float:
+    """m/s^2 by which a rest trembles beyond the sensor's own noise; 0 for a board that lies on something."""
+    tremor = float(np.sqrt(max(np.mean(y.var(0) - 1.05 * flat.Sigma_a), 0.0)))
+    return tremor if tremor > TREMOR_OF_NOISE * np.sqrt(flat.Sigma_a.mean()) else 0.0

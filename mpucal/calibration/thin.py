@@ -1,0 +1,43 @@
+"""Fewer, better samples: means over blocks. Knows no estimator."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..data import Mask, Recording, Vector
+from .model import Flat
+
+
+def thinned(recording: Recording, flat: Flat, rate_hz: float) -> tuple[Recording, tuple[int, int]]:
+    """The recording at about `rate_hz` or a little more, by means over blocks, and where the flat segment lies then.
+
+    Blocks are aligned to the end of the flat segment; what does not fill a block at either end is left out. A block
+    with a gap or a clipped sample carries the mark.
+    """
+    size = int(recording.rate_hz / rate_hz * (1.0 + 1e-6))
+    if size < 2:
+        return recording, (flat.first, flat.last)
+    start = flat.last % size
+    m = (len(recording) - start) // size
+    used = slice(start, start + m * size)
+
+    def mean(x: Vector) -> Vector:
+        return np.asarray(x[used].reshape(m, size, *x.shape[1:]).mean(1))
+
+    def marked(x: Mask) -> Mask:
+        return np.asarray(x[used].reshape(m, size).any(1))
+
+    thin = replace(
+        recording,
+        t=mean(recording.t),
+        acc=mean(recording.acc),
+        gyr=mean(recording.gyr),
+        temperature_c=mean(recording.temperature_c),
+        gap=marked(recording.gap),
+        acc_clipped=marked(recording.acc_clipped),
+        gyr_clipped=marked(recording.gyr_clipped),
+        flat=None,
+    )
+    return thin, (-((start - flat.first) // size), (flat.last - start) // size)
