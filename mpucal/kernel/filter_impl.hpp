@@ -1,6 +1,5 @@
 // The filter, compiled once for each instruction set: the including file names the function.
 #include <algorithm>
-#include <cmath>
 
 #include "derivatives.hpp"
 

@@ -35,16 +35,6 @@ MPUCAL_INLINE void multiply_to_symmetric(const A (&a)[3][3], const B (&b)[3][3],
   for (int m = 0; m < 6; ++m) c[m] = dot(a[kRow[m]], b[kCol[m]]);
 }
 
-// c = a b' + diag(d), known to be symmetric
-template <typename A, typename B, typename C>
-MPUCAL_INLINE void multiply_to_symmetric(const A (&a)[3][3], const B (&b)[3][3], const C (&d)[3], C (&c)[6]) {
-  for (int m = 0; m < 6; ++m) {
-    const int i = kRow[m], j = kCol[m];
-    const C first = i == j ? madd(a[i][0], b[j][0], d[i]) : a[i][0] * b[j][0];
-    c[m] = madd(a[i][2], b[j][2], madd(a[i][1], b[j][1], first));
-  }
-}
-
 // c = a x
 template <typename A, typename B, typename C>
 MPUCAL_INLINE void multiply(const A (&a)[3][3], const B (&x)[3], C (&c)[3]) {

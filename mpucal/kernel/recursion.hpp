@@ -5,6 +5,8 @@
 //   S = M + R,  e = y - m,  m <- m + M S^-1 e = y - R S^-1 e,  M <- M - M S^-1 M = R - R S^-1 R
 // and where the turn is D F D^-1. The division of S^-1 = adjugate / determinant comes last, beside the turn.
 #pragma once
+#include <cmath>
+
 #include "steps.hpp"
 
 namespace mpucal {
