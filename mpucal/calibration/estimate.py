@@ -56,7 +56,7 @@ def choose(recording: Recording, flat: Flat, gravity: float) -> Choice:
     Data that neither explains were measured in a hand.
     """
     accel = _minimum(recording, flat, gravity, ACCEL)
-    nis = accel.squares / len(recording.t[flat.last :])
+    nis = accel.squares / (len(recording) - flat.last)
     if nis < EXPLAINED_NIS:
         imu = _minimum(recording, flat, gravity, IMU)
         if imu.converged and wald(imu) > WALD_99:

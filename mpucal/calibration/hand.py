@@ -53,7 +53,7 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     """D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves."""
     fine = prepare(recording, (flat.first, flat.last), gravity)
     search = _Search(prepare(*thinned(recording, flat, SEARCH_HZ), gravity))
-    theta, noise = search.run()
+    theta, noise = search.run(initialise(fine.problem, fine.flat.b_omega))
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
         noise = Noise("white", _likeliest(fine.white, _near(noise.sigma), theta))
     problem, doubt = noise.problem(fine), noise.problem(fine, HONEST)
@@ -90,10 +90,9 @@ class _Search:
         self.prior = _prior(scene.flat)
         self.iterations = 0
 
-    def run(self) -> tuple[Theta, Noise]:
+    def run(self, theta: Theta) -> tuple[Theta, Noise]:
         """First Huber's loss, which finds the way from afar; then the redescending one, and the likeliest sigma."""
         scene = self.scene
-        theta = initialise(scene.problem, scene.flat.b_omega)
         theta = self._roughly(replace(scene.white(FIRST_MPS2), tail=0.0), theta)
         sigma = 0.0
         for _ in range(2):
@@ -101,12 +100,13 @@ class _Search:
             theta = self._roughly(scene.white(sigma), theta)
         if sigma == 0.0:
             return theta, Noise("none", 0.0)
-        if scene.rests_often:
-            return theta, Noise("white", sigma)
-        sigma = _likeliest(scene.pivot, PIVOT_MPS2, theta)
-        theta = self._roughly(scene.pivot(sigma), theta)
-        sigma = _likeliest(scene.pivot, PIVOT_MPS2, theta)
-        return theta, Noise("pivot", (FARTHER + 0.5 * sigma) * sigma)
+        noise = Noise("white", sigma)
+        if not scene.rests_often:
+            sigma = _likeliest(scene.pivot, PIVOT_MPS2, theta)
+            theta = self._roughly(scene.pivot(sigma), theta)
+            sigma = _likeliest(scene.pivot, PIVOT_MPS2, theta)
+            noise = Noise("pivot", (FARTHER + 0.5 * sigma) * sigma)
+        return self._roughly(noise.problem(scene), theta), noise
 
     def _roughly(self, problem: Problem, theta: Theta) -> Theta:
         minimum = minimise(problem, theta, len(NAMES), self.prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True)

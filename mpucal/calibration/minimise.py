@@ -61,7 +61,7 @@ class Minimum:
         """(p, p) inverse of H over the free parameters; zero for those held fixed."""
         covariance = np.zeros_like(self.H)
         free = np.ix_(self.free, self.free)
-        covariance[free] = np.linalg.pinv(self.H[free], hermitian=True)
+        covariance[free] = _inverse(self.H[free])
         return covariance
 
 
@@ -126,6 +126,17 @@ def _values(theta: Theta) -> Vector:
     K = theta.K
     six = [K[0, 0], K[0, 1], K[0, 2], K[1, 1], K[1, 2], K[2, 2]]
     return np.concatenate([theta.D.ravel(), theta.b_a, [0.0, 0.0], theta.b_omega, six, [theta.tau], theta.r])
+
+
+def _inverse(H: Vector) -> Vector:
+    """H^-1 with H scaled to a unit diagonal; of what nothing is known, the variance is infinite in all but name."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+    scaled = H * np.outer(scale, scale)
+    try:
+        inverse = np.linalg.inv(scaled)
+    except np.linalg.LinAlgError:
+        inverse = np.linalg.pinv(scaled, hermitian=True)
+    return np.asarray(inverse * np.outer(scale, scale))
 
 
 def _solve(H: Vector, g: Vector) -> Vector:

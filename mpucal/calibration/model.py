@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,11 +94,13 @@ def rotation(phi: Vector) -> NDArray[np.float64]:
 
 def tangents(u: Vector) -> tuple[Vector, Vector]:
     """Two unit vectors (3,) that span the plane across the unit vector u."""
-    axis = np.zeros(3)
-    axis[int(np.argmin(np.abs(u)))] = 1.0
-    first = np.cross(u, axis)
-    first /= np.linalg.norm(first)
-    return first, np.cross(u, first)
+    x, y, z = u.tolist()
+    # across the axis that u is farthest from; plain floats, as this runs in every step of a minimiser
+    least = min(abs(x), abs(y), abs(z))
+    first = (0.0, z, -y) if abs(x) == least else (-z, 0.0, x) if abs(y) == least else (y, -x, 0.0)
+    size = math.hypot(*first)
+    a, b, c = (value / size for value in first)
+    return np.array([a, b, c]), np.array([y * c - z * b, z * a - x * c, x * b - y * a])
 
 
 def product(F: Vector) -> Vector:

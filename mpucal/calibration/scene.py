@@ -73,9 +73,9 @@ class Scene:
 def prepare(recording: Recording, at: tuple[int, int], gravity: float) -> Scene:
     """The scene of a recording whose flat segment is at[0]..at[1]-1."""
     flat = flat_statistics(recording, at)
-    recording = without_drift(recording, flat, still_runs(recording, flat))
-    flat = flat_statistics(recording, at)
     runs = still_runs(recording, flat)
+    recording = without_drift(recording, flat, runs)
+    flat = flat_statistics(recording, at)
     series = mask(Series.after(recording, flat), recording, flat)
     after = [(max(a - flat.last, 0), b - flat.last) for a, b in runs.tolist() if b > flat.last]
     rest = np.zeros(len(series), bool)
