@@ -171,9 +171,7 @@ class Calibration:
             try:
                 return cls.from_blob(Blob.decode(data))
             except BlobError as error:
-                raise RecordingError(
-                    f"{path} is no config blob: {error}", "give an undamaged blob"
-                ) from error
+                raise RecordingError(f"{path} is no config blob: {error}", "give an undamaged blob") from error
         try:
             return cls.from_document(json.loads(data))
         except (ValueError, KeyError, TypeError, AttributeError) as error:
@@ -207,9 +205,7 @@ class Calibration:
             sensor=Sensor(**{key: value for key, value in sensor.items() if key in known}),
             created=str(document.get("created", "")),
             applied_in_hardware=_array(document.get("applied_in_hardware", {}).get("b_a", [0, 0, 0]), 3),
-            extra=MappingProxyType(
-                {key: document[key] for key in ("autopilot", "others") if key in document}
-            ),
+            extra=MappingProxyType({key: document[key] for key in ("autopilot", "others") if key in document}),
         )
 
     @classmethod

@@ -77,7 +77,7 @@ class _Pass:
         Q: Vector = np.zeros((4, 4))
         Phi[1:, 1:] = both[3:, 3:].T
         Q[1:, 1:] = _at(self.problem.series.jerk, i, 0.0) * Phi[1:, 1:] @ both[:3, 3:]
-        Phi, Q = np.kron(Phi, np.eye(3)), np.kron(Q, np.eye(3))
+        Phi, Q = (np.asarray(np.kron(M, np.eye(3)), float) for M in (Phi, Q))
         self.x, self.dx, self.P = Phi @ self.x, self.dx @ Phi.T, Phi @ self.P @ Phi.T + Q
 
     def _reset(self, sigma: float) -> None:
