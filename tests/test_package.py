@@ -1,0 +1,61 @@
+"""The package as a whole: its names, its version, and that the README says what is so."""
+
+import re
+import shlex
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+import mpucal
+from mpucal.bus.simulated.options import PARSERS
+from mpucal.calibration import MODELS
+from mpucal.cli import commands
+
+PROJECT = Path(__file__).parents[1]
+README = (PROJECT / "README.md").read_text()
+CALLS = sorted(set(re.findall(r"^ {4}mpucal (.*?)(?: +#.*)?$", README, re.MULTILINE)))
+
+
+def test_every_public_name_is_there():
+    assert all(getattr(mpucal, name) for name in mpucal.__all__)
+    assert set(mpucal.__all__) <= set(dir(mpucal))
+
+
+def test_no_other_name_is_there():
+    with pytest.raises(AttributeError, match="nonsense"):
+        mpucal.nonsense  # noqa: B018
+
+
+def test_importing_it_loads_nothing_heavy():
+    program = "import sys, mpucal; print([name for name in ('numpy', 'mcap', 'click') if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_the_version_is_that_of_the_installed_package():
+    assert mpucal.__version__ == version("mpucal")
+
+
+def test_the_readme_shows_calls():
+    assert len(CALLS) >= 5
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_the_calls_of_the_readme_are_understood(call):
+    name, *words = shlex.split(call)
+    command = commands.get_command(None, name)
+    assert command.make_context(name, words).command.name == name
+
+
+@pytest.mark.parametrize("text", ["README.md", "fixtures/README.md", "docs/session.md", "firmware_protocol.md"])
+def test_links_lead_somewhere(text):
+    page = PROJECT / text
+    links = re.findall(r"\]\(([^):#]+)(?:#[^)]*)?\)", page.read_text())
+    assert [link for link in links if not (page.parent / link).exists()] == []
+
+
+def test_the_readme_names_every_model_and_every_key_of_the_simulated_chip():
+    assert [name for name in (*MODELS, *PARSERS) if f"`{name}`" not in README] == []
