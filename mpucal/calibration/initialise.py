@@ -10,7 +10,7 @@ from .likelihood import Problem, Theta
 from .model import tangents
 
 POINTS = 300
-REFINEMENTS = 8
+REFINEMENTS = 5
 # keeps the equations solvable for a board that hardly turned; nothing beside a second of data
 RIDGE = 1e-9
 
@@ -30,7 +30,7 @@ def initialise(problem: Problem, b_omega: Vector) -> Theta:
     CC, yC, C, y, _, n = _kernel.moments(
         np.ascontiguousarray(b_omega), series.y, series.omega, series.dt, series.r_scale
     )
-    sums = _Sums(CC.reshape(3, 3, 3, 3), yC.reshape(3, 3, 3), C.reshape(3, 3), y, n, problem)
+    sums = _Sums(CC, yC, C.reshape(3, 3), y, n, problem)
     points = fibonacci_sphere(POINTS)
     u = points[int(np.argmin(sums.cost(points)))]
     u = _refine(u, sums, step=2.0 / np.sqrt(POINTS))
@@ -51,17 +51,20 @@ class _Sums:
     """The normal equations of (D, b_a) for any u, from sums over the recording."""
 
     def __init__(self, CC: Vector, yC: Vector, C: Vector, y: Vector, n: float, problem: Problem) -> None:
-        self.CC, self.yC, self.C, self.y, self.n = CC, yC, C, y, n
+        # ordered so that a product with u, or with all products of u's elements, gives the sums for that u
+        self.CC = CC.reshape(3, 3, 3, 3).transpose(1, 3, 0, 2).reshape(9, 9)
+        self.yC = yC.reshape(3, 3, 3).transpose(2, 1, 0).reshape(3, 9)
+        self.C, self.y, self.n = C, y, n
         self.g, self.Sigma_a = problem.gravity, problem.flat.Sigma_a
 
     def _equations(self, u: Vector) -> tuple[Vector, Vector]:
         """(m, 4, 4) and (m, 4, 3): sums of z z' and z y', z = (g C_t u, 1), for u (m, 3)."""
         m, g = len(u), self.g
         zz, zy = np.empty((m, 4, 4)), np.empty((m, 4, 3))
-        zz[:, :3, :3] = g * g * np.einsum("abcd,mb,md->mac", self.CC, u, u, optimize=True)
-        zz[:, :3, 3] = zz[:, 3, :3] = g * np.einsum("ab,mb->ma", self.C, u)
+        zz[:, :3, :3] = g * g * ((u[:, :, None] * u[:, None, :]).reshape(m, 9) @ self.CC).reshape(m, 3, 3)
+        zz[:, :3, 3] = zz[:, 3, :3] = g * u @ self.C.T
         zz[:, 3, 3] = self.n
-        zy[:, :3] = g * np.einsum("jab,mb->maj", self.yC, u)
+        zy[:, :3] = g * (u @ self.yC).reshape(m, 3, 3)
         zy[:, 3] = self.y
         zz += RIDGE * np.trace(zz, axis1=1, axis2=2)[:, None, None] * np.eye(4)
         return zz, zy
@@ -74,7 +77,7 @@ class _Sums:
     def cost(self, u: Vector) -> Vector:
         """(m,) residual sum of squares in units of Sigma_a, up to a constant."""
         zz, zy = self._equations(u)
-        return np.asarray(-np.einsum("mij,mij,j->m", zy, np.linalg.solve(zz, zy), 1.0 / self.Sigma_a))
+        return np.asarray(-(zy * np.linalg.solve(zz, zy)).sum(1) @ (1.0 / self.Sigma_a))
 
 
 def _refine(u: Vector, sums: _Sums, step: float) -> Vector:
