@@ -12,20 +12,18 @@ import numpy as np
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import UsageError
 from ..result import Calibration, unknown
+from .blockers import BLOCKERS
 from .estimate import METHODS, Choice, choose
 from .evidence import Evidence
 from .likelihood import K_NAMES
 from .masks import with_masks
 from .model import B_A_NAMES, B_OMEGA_NAMES, D_NAMES, Flat
 from .quality import judge
-from .reasons import BLOCKERS
 from .stationary import find_flat, flat_statistics
 
 __all__ = ["MODELS", "calibrate"]
 
 MODELS = ("auto", *METHODS)
-
-FEWEST_SAMPLES = 50
 
 
 def calibrate(recording: Recording, model: str = "auto", gravity: float = STANDARD_GRAVITY_MPS2) -> Calibration:
@@ -50,7 +48,7 @@ def calibrate(recording: Recording, model: str = "auto", gravity: float = STANDA
     segment = recording.flat or find_flat(recording)
     flat = None if segment is None or segment[1] - segment[0] < 2 else flat_statistics(recording, segment)
     before = Evidence(recording, gravity, flat, None, model)
-    if flat is None or len(recording) - flat.last < FEWEST_SAMPLES or any(check(before) for check in BLOCKERS):
+    if flat is None or any(check(before) for check in BLOCKERS):
         return _calibration(before, {"model": model, "why": "nothing could be estimated"})
     choice = _fit(recording, flat, gravity, model)
     evidence = Evidence(recording, gravity, flat, choice.fit, choice.model)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -11,10 +11,12 @@ import numpy as np
 from ..data import Recording, Vector
 from .information import Uncertainty, uncertainty
 from .model import Fit, Flat, product, rotation
-from .stationary import find_flat
+from .stationary import find_flat, flat_statistics
 from .still import still_runs
 
 HALF_SECOND = 0.5
+LEAST_MOVE_RAD = np.deg2rad(2.0)  # of gravity in half a second, above noise
+FAR_TOO_FAR = 20.0  # times as far as gravity: no rates in rad/s, but for turns about the vertical
 LONGEST_MOVE_S = 20.0  # over which a gyroscope still says where gravity went
 
 
@@ -59,43 +61,50 @@ class Evidence:
         return np.asarray((self.recording.acc - self.fit.b_a) @ np.linalg.inv(self.fit.D).T)
 
     @cached_property
-    def means(self) -> Vector:
-        """(m, 3) m/s^2, means of the half seconds after the flat segment (of all, where there is none)."""
-        first = 0 if self.flat is None else self.flat.last
-        n = max(round(HALF_SECOND * self.recording.rate_hz), 1)
-        acc = self.recording.acc[first:]
-        m = len(acc) // n
-        return np.asarray(acc[: m * n].reshape(m, n, 3).mean(1))
-
-    @cached_property
     def gravity_moved(self) -> float:
         """rad, the largest angle between the flat mean and a half-second mean after it."""
-        if self.flat is None or len(self.means) == 0:
+        return 0.0 if self.flat is None else self._moved(self.recording.acc[self.flat.last :])
+
+    @cached_property
+    def gravity_moved_before(self) -> float:
+        """Likewise before it."""
+        return 0.0 if self.flat is None else self._moved(self.recording.acc[: self.flat.first])
+
+    def _moved(self, acc: Vector) -> float:
+        means = _means(acc, self._half_second)
+        if self.flat is None or len(means) == 0:
             return 0.0
-        u = _units(self.means)
-        return float(np.arccos(np.clip((u @ _units(self.flat.y[None])[0]).min(), -1.0, 1.0)))
+        return float(_angles(_units(means), _units(self.flat.y[None])).max())
+
+    @property
+    def _half_second(self) -> int:
+        return max(round(HALF_SECOND * self.recording.rate_hz), 1)
 
     @cached_property
-    def gyro_turned(self) -> float:
-        """What the gyroscope has turned in all after the flat segment, in its unit of angle."""
-        if self.flat is None:
-            return 0.0
-        rate = np.linalg.norm(self.recording.gyr[self.flat.last :] - self.flat.b_omega, axis=1)
-        return float(np.sum(rate[1:] * np.diff(self.recording.t[self.flat.last :])))
-
-    @cached_property
-    def gravity_turned(self) -> float:
-        """rad that gravity's direction has turned in all, from half second to half second; at least a tenth."""
-        u = _units(self.means)
-        angles = np.arccos(np.clip(np.sum(u[1:] * u[:-1], axis=1), -1.0, 1.0))
-        return max(float(angles[angles > np.deg2rad(2.0)].sum()), 0.1)
-
-    @cached_property
-    def still_in_degrees(self) -> bool:
-        """Whether a recording that never lies still would, were its rates in deg/s."""
-        r = self.recording
-        small = Recording.from_arrays(r.t, r.acc, np.deg2rad(r.gyr))
-        return self.flat is None and find_flat(small) is not None
+    def turned_in_degrees(self) -> bool:
+        """Whether gravity turns from half second to half second as the rates say in deg/s, and not as in rad/s."""
+        r, n, flat = self.recording, self._half_second, self.flat
+        if flat is None:
+            small = replace(r, gyr=np.deg2rad(r.gyr))
+            segment = find_flat(small)
+            if segment is None:
+                return False
+            flat = flat_statistics(r, segment)
+        u = _units(_means(r.acc[flat.last :], n))
+        moving = _angles(u[1:], u[:-1]) > LEAST_MOVE_RAD
+        if not moving.any():
+            return False
+        # between the middles of half seconds
+        part = slice(flat.last + n // 2, flat.last + n // 2 + len(moving) * n)
+        turns = np.diff(r.t[part.start - 1 : part.stop])[:, None] * (r.gyr[part] - flat.b_omega)
+        if np.linalg.norm(turns, axis=1).sum() < FAR_TOO_FAR * _angles(u[1:], u[:-1])[moving].sum():
+            return False
+        steps = turns.reshape(len(moving), n, 3).swapaxes(0, 1)
+        miss, miss_in_degrees = (
+            np.median(_angles((product(rotation(-unit * steps)) @ u[:-1, :, None])[..., 0], u[1:])[moving])
+            for unit in (1.0, np.deg2rad(1.0))
+        )
+        return bool(miss > 3.0 * miss_in_degrees)
 
     @cached_property
     def rests(self) -> Rests | None:
@@ -123,6 +132,17 @@ class Evidence:
 
 def _median_and_max(values: list[float]) -> tuple[float, float]:
     return (float(np.median(values)), max(values)) if values else (np.nan, np.nan)
+
+
+def _means(values: Vector, n: int) -> Vector:
+    """(m, 3) means of consecutive windows of n samples; the remainder is left out."""
+    m = len(values) // n
+    return np.asarray(values[: m * n].reshape(m, n, 3).mean(1))
+
+
+def _angles(u: Vector, v: Vector) -> Vector:
+    """(m,) rad between unit vectors (m, 3)."""
+    return np.asarray(np.arccos(np.clip(np.sum(u * v, axis=1), -1.0, 1.0)))
 
 
 def _units(v: Vector) -> Vector:

@@ -26,5 +26,7 @@ def wald(minimum: Minimum) -> float:
 
 def at_prior(covariance: Vector) -> tuple[str, ...]:
     """Names of K's elements of which the data say little, by the (p, p) covariance of an estimate that has K."""
-    sd = np.sqrt(np.diag(covariance))[slice(*PLACES["K"])]
-    return tuple(name for name, now, before in zip(K_NAMES, sd, K_SD, strict=True) if now > KNOWN * before)
+    variance = np.diag(covariance)[slice(*PLACES["K"])]
+    # a singular covariance may hold a variance that is none
+    known = (variance > 0.0) & (variance <= (KNOWN * K_SD) ** 2)
+    return tuple(name for name, is_known in zip(K_NAMES, known, strict=True) if not is_known)

@@ -3,71 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import permutations
 from itertools import product as choices
 
 import numpy as np
 
 from ..data import Mask, Recording
+from .blockers import BLOCKERS, Check, Reason
 from .evidence import Evidence
 
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.1, 0.4
 CONSISTENT_NIS = 5.0
-LEAST_TURN_RAD = np.deg2rad(20.0)
-FASTEST_GYRO_RAD_S = np.deg2rad(4100.0)
 WORST_AXES_RAD = np.deg2rad(60.0)
 GYRO_SCALE_OFF, GYRO_CROSS_OFF = 0.06, 0.04
 WARMER_C = 5.0
 RESTS_MPS2, RESTS_RAD = 0.08, np.deg2rad(1.5)
 HONEST_FACTOR = 5.0
 MOST_CLIPPED = 0.2
-
-
-@dataclass(frozen=True)
-class Reason:
-    """One thing that speaks against the estimate; `refuse` where nobody should use it."""
-
-    code: str
-    message: str
-    refuse: bool
-
-
-Check = Callable[[Evidence], Reason | None]
-
-
-def units_suspect(e: Evidence) -> Reason | None:
-    """Accelerations in g or counts; rates in deg/s."""
-    acc = float(np.median(np.linalg.norm(e.recording.acc, axis=1)))
-    if not 0.2 * e.gravity < acc < 5.0 * e.gravity:
-        guess = "g" if acc < 5.0 else "mg" if 200.0 < acc < 5000.0 else "raw counts"
-        return Reason(
-            "units_suspect",
-            f"the accelerometer's median magnitude is {acc:.4g}, not near {e.gravity:.4g} m/s^2: it seems to be in "
-            f"{guess}; convert it to m/s^2",
-            True,
-        )
-    rate = float(np.abs(e.recording.gyr).max())
-    if rate > FASTEST_GYRO_RAD_S or e.gyro_turned > 20.0 * e.gravity_turned or e.still_in_degrees:
-        return Reason(
-            "units_suspect",
-            f"the gyroscope reads up to {rate:.4g}, which as rad/s is {np.rad2deg(rate):.0f} deg/s and does not fit "
-            "how gravity turned: it seems to be in deg/s; convert it to rad/s",
-            True,
-        )
-    return None
-
-
-def never_still(e: Evidence) -> Reason | None:
-    """No flat segment."""
-    if e.flat is not None:
-        return None
-    return Reason(
-        "never_still",
-        "the board never lay still for a second, so the gyroscope's bias and the noise are not known; lay it on a "
-        "table for ten seconds before you turn it",
-        True,
-    )
 
 
 def moved_while_still(e: Evidence) -> Reason | None:
@@ -88,29 +40,18 @@ def moved_while_still(e: Evidence) -> Reason | None:
     )
 
 
-def hardly_turned(e: Evidence) -> Reason | None:
-    """A board that was not rotated."""
-    if e.flat is None or e.gravity_moved >= LEAST_TURN_RAD:
-        return None
-    return Reason(
-        "few_orientations",
-        f"the board was hardly turned (gravity moved {np.rad2deg(e.gravity_moved):.0f} deg in all); turn it so that "
-        "each of its sides, edges and corners points down once",
-        True,
-    )
-
-
 def few_orientations(e: Evidence) -> Reason | None:
     """A direction that the data leave open."""
     if e.sure is None or e.sure.rms_mps2 <= GOOD_RMS_MPS2:
         return None
-    worst = e.sure.worst
+    worst, rms = e.sure.worst, e.sure.rms_mps2
+    known = f"known to {rms:.2g} m/s^2 only" if rms < e.gravity else "not known at all"
     side = "".join(f" {'+' if w > 0 else '-'}{axis}" for axis, w in zip("xyz", worst, strict=True) if abs(w) > 0.4)
     return Reason(
         "few_orientations",
-        f"a calibrated direction is known to {e.sure.rms_mps2:.2g} m/s^2 only, worst with{side} up; rest it in more "
-        f"orientations, above all with{side} up, down and aslant",
-        e.sure.rms_mps2 > USABLE_RMS_MPS2,
+        f"a calibrated direction is {known}, worst with{side} up; rest it in more orientations, above all with{side} "
+        "up, down and aslant",
+        rms > USABLE_RMS_MPS2,
     )
 
 
@@ -141,9 +82,17 @@ def data_lost(e: Evidence) -> Reason | None:
     )
 
 
+def _trustworthy(e: Evidence) -> bool:
+    """Whether D and K are known well enough to conclude from them what is wrong with the sensor."""
+    if e.fit is None or e.sure is None or not e.fit.converged or e.sure.rms_mps2 > USABLE_RMS_MPS2:
+        return False
+    contradiction = inconsistent(e)
+    return contradiction is None or not contradiction.refuse
+
+
 def wrong_range(e: Evidence) -> Reason | None:
     """All three gains near one power of two."""
-    if e.fit is None or e.sure is None:
+    if e.fit is None or not _trustworthy(e):
         return None
     gains = np.linalg.norm(e.fit.D, axis=0)
     power = np.round(np.log2(gains)).astype(int)
@@ -159,7 +108,7 @@ def wrong_range(e: Evidence) -> Reason | None:
 
 def axes(e: Evidence) -> Reason | None:
     """Axes that are mirrored or swapped against the gyroscope's."""
-    if e.fit is None or e.sure is None:
+    if e.fit is None or not _trustworthy(e):
         return None
     U, _, Vt = np.linalg.svd(e.fit.D)
     Q = U @ Vt
@@ -192,7 +141,7 @@ _SIGNED_PERMUTATIONS = [
 
 def gyro_off(e: Evidence) -> Reason | None:
     """A gyroscope beyond what its data sheet allows."""
-    if e.fit is None:
+    if e.fit is None or not _trustworthy(e):
         return None
     off = e.fit.K - np.eye(3)
     scale, cross = np.abs(np.diag(off)), np.abs(off - np.diag(np.diag(off)))
@@ -262,8 +211,6 @@ def inconsistent(e: Evidence) -> Reason | None:
     )
 
 
-# with one of these there is nothing to estimate
-BLOCKERS: tuple[Check, ...] = (units_suspect, never_still, hardly_turned)
 CHECKS: tuple[Check, ...] = (
     *BLOCKERS,
     moved_while_still,

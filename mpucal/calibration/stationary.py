@@ -21,7 +21,8 @@ GYRO_SD_MIN_RAD_S, ACC_SD_MIN_MPS2 = 0.03, 0.15
 # Neighbouring windows of a still board agree this well beyond their noise.
 GYRO_STEP_RAD_S, ACC_STEP_MPS2 = 0.01, 0.03
 
-VARIANCE_FLOOR_OF_RANGE = 1e-12
+# No sensor of this kind is quieter; data without noise are simulated, or stuck.
+QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S = 1e-4, 1e-5
 
 
 def find_flat(recording: Recording) -> tuple[int, int] | None:
@@ -78,8 +79,8 @@ def flat_statistics(recording: Recording, flat: tuple[int, int]) -> Flat:
         last,
         y=acc.mean(0),
         b_omega=gyr.mean(0),
-        Sigma_a=_variance(acc, recording.acc),
-        Sigma_omega=_variance(gyr, recording.gyr),
+        Sigma_a=_variance(acc, recording.acc, QUIETEST_ACC_MPS2),
+        Sigma_omega=_variance(gyr, recording.gyr, QUIETEST_GYRO_RAD_S),
     )
 
 
@@ -94,11 +95,9 @@ def _limit(sd: Vector, least: float, most: float) -> Vector:
     return np.clip(2.5 * np.quantile(sd, 0.05, axis=0), least, most)
 
 
-def _variance(part: Vector, whole: Vector) -> Vector:
-    variance = part.var(0, ddof=1)
-    step = np.array([_step(whole[:, i]) for i in range(3)])
-    span = np.ptp(whole, axis=0)
-    return np.asarray(np.maximum(variance, np.maximum(step**2 / 12.0, VARIANCE_FLOOR_OF_RANGE * span**2)))
+def _variance(part: Vector, whole: Vector, quietest: float) -> Vector:
+    step = np.array([_step(column) for column in whole.T])
+    return np.asarray(np.maximum(part.var(0, ddof=1), np.maximum(step**2 / 12.0, quietest**2)))
 
 
 def _step(column: Vector) -> float:
