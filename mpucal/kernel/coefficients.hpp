@@ -8,13 +8,6 @@
 namespace mpucal {
 namespace {  // each build of the filter keeps its own
 
-MPUCAL_INLINE void turn_round(const Lane (&x)[3], double last, Lane (&out)[4]) {
-  transpose(x[0], x[1], x[2], all(last), out[0], out[1], out[2], out[3]);
-}
-MPUCAL_INLINE void turn_round(const Lane (&x)[3][3], Lane (&out)[4][3]) {
-  for (int a = 0; a < 3; ++a) transpose(x[a][0], x[a][1], x[a][2], all(0.0), out[0][a], out[1][a], out[2][a], out[3][a]);
-}
-
 struct Coefficients {
   // the measurement, whitened by L^-1 =: V
   Lane white[3][3], T[3][3], residual[3];  // V, V D, V e

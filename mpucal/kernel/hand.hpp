@@ -28,16 +28,16 @@ struct HandSeries : Series {
 };
 
 struct HandConstants : Constants {
-  double huber;  // threshold on |L^-1 e|
-  double tail;  // beyond the threshold: 0 Huber's rho, 1 redescending
-  double lam;   // 1/s, the chain's poles
+  double huber;  // threshold on |L^-1 e|; infinity for the plain square
+  double tail;   // beyond it: 0 Huber's rho, 1 redescending
+  double lam;    // 1/s, the chain's poles
 };
 
-// What comes out. Null pointers are not written.
+// What comes out: V and squares, and either the next two or the last three where their pointers are not null.
 struct HandResult {
   double V;
   double squares;      // sum of e' S^-1 e over the n samples
-  double* gradient;    // (28,) in the order of Lanes; with it, the derivatives are computed
+  double* gradient;    // (28,) in the order of Lanes
   double* fisher;      // (28, 28)
   double* innovation;  // (n, 3) whitened, L^-1 e
   double* gravity;     // (n, 3) s before the update

@@ -46,19 +46,17 @@ struct Model {
   }
 };
 
-struct Steps {
-  Lane y[3];     // y - b_a: what D s is to explain
-  Lane R[3];     // diagonal of R
+// What the series give, whatever the filter
+struct Given {
+  Lane y[3];  // y - b_a
+  Lane R[3];  // diagonal of R
   Turn<Lane> turn;
   Lane rate[3], dt;  // turn.phi = -dt Gyro rate
   Lane c[3];         // variance of the angle turned through
-  // H = F D^-1 and G = D F D^-1, with what is known of the measurement
-  Lane H_y[3], H_R[3][3], G_R[3][3], G_R_G[6];
 
-  MPUCAL_APART void read(const Model& model, const Series& series, long k) {
-    read_measurements(model.p, series, model.constants, k);
-    read_turns(model.p, series, model.constants, k);
-    combine(model);
+  MPUCAL_INLINE void read(const Parameters& p, const Series& series, const Constants& constants, long k) {
+    read_measurements(p, series, constants, k);
+    read_turns(p, series, constants, k);
   }
 
  private:
@@ -86,7 +84,18 @@ struct Steps {
     const Lane q_scale = dt * dt * samples.read(series.q_scale, 1.0), q_extra = samples.read(series.q_extra, 0.0);
     for (int a = 0; a < 3; ++a) c[a] = madd(q_scale, constants.Sigma_omega[a], q_extra);
   }
+};
 
+struct Steps : Given {
+  // H = F D^-1 and G = D F D^-1, with what is known of the measurement
+  Lane H_y[3], H_R[3][3], G_R[3][3], G_R_G[6];
+
+  MPUCAL_APART void read(const Model& model, const Series& series, long k) {
+    Given::read(model.p, series, model.constants, k);
+    combine(model);
+  }
+
+ private:
   MPUCAL_INLINE void combine(const Model& model) {
     Lane H[3][3], G[3][3];
     multiply(turn.F, model.D_inverse, H);

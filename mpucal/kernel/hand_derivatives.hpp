@@ -1,0 +1,187 @@
+// dx by the parameters with the gains held, four parameters at a time, carried through the steps beside the recursion.
+#pragma once
+#include "fisher.hpp"
+#include "hand_recursion.hpp"
+
+namespace mpucal {
+namespace {  // each build of the filters keeps its own
+
+constexpr int kHandGroups = Lanes::most / 4;
+
+// What the derivatives of four steps share
+struct HandCoefficients {
+  Lane white[3][3], residual[3];                // sqrt(w) L^-1, and it times e
+  Lane q[4];                                    // E s + a + L r in the body, and 1
+  Lane delay[3], lever[4][3];                   // D [omega]x s, D L
+  Lane direction[3], stretch;                   // of s after the update
+  Lane eta_b[4][3], eta_K[4][3], eta_K2[4][3];  // of d(F x) = eta x (F x), in the first frame
+
+  MPUCAL_APART void compute(const HandParameters& p, double gravity, const HandSteps& steps, const HandPredicted& met) {
+    whiten(met);
+    measurement(p, steps, met);
+    const Lane inverse_length = 1.0 / root(dot(met.plus, met.plus));
+    stretch = gravity * inverse_length;
+    for (int a = 0; a < 3; ++a) direction[a] = inverse_length * met.plus[a];
+    turning(p, steps);
+  }
+
+ private:
+  MPUCAL_INLINE void whiten(const HandPredicted& met) {
+    whitener(met.S, Adjugate<Lane>(met.S), white);
+    const Lane root_w = root(met.w);
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b <= a; ++b) white[a][b] = root_w * white[a][b];
+    multiply_lower(white, met.e, residual);
+  }
+
+  MPUCAL_INLINE void measurement(const HandParameters& p, const HandSteps& steps, const HandPredicted& met) {
+    Lane s[3], a[3], swept[3], sum[3], DL[3][3];
+    multiply(steps.C, met.s, s);
+    multiply(steps.C, met.a, a);
+    const Lane(&w)[3] = steps.omega;
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, k = (i + 2) % 3;
+      swept[i] = nmadd(w[k], s[j], w[j] * s[k]);
+      sum[i] = madd(p.tau, swept[i], s[i] + a[i] + steps.L_r[i]);
+    }
+    turn_round(sum, 1.0, q);
+    multiply(p.D, swept, delay);
+    multiply(p.D, steps.L, DL);
+    turn_round(DL, lever);
+  }
+
+  MPUCAL_INLINE void turning(const HandParameters& p, const HandSteps& steps) {
+    Lane J[3][3], CJ[3][3], CJK[3][3];
+    steps.turn.left_jacobian(J);
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b) {
+        const auto& C = steps.C_next;
+        CJ[a][b] = steps.dt * madd(C[2][a], J[2][b], madd(C[1][a], J[1][b], C[0][a] * J[0][b]));
+      }
+    multiply(CJ, p.K, CJK);
+    turn_round(CJK, eta_b);
+    const Lane(&rate)[3] = steps.rate, zero = all(0.0);
+    for (int a = 0; a < 3; ++a) {
+      const Lane xx = CJ[a][0] * rate[0], yy = CJ[a][1] * rate[1], zz = CJ[a][2] * rate[2];
+      const Lane xy = madd(CJ[a][0], rate[1], CJ[a][1] * rate[0]);
+      const Lane xz = madd(CJ[a][0], rate[2], CJ[a][2] * rate[0]);
+      const Lane yz = madd(CJ[a][1], rate[2], CJ[a][2] * rate[1]);
+      transpose(zero, zero - xx, zero - xy, zero - xz, eta_K[0][a], eta_K[1][a], eta_K[2][a], eta_K[3][a]);
+      transpose(zero - yy, zero - yz, zero - zz, zero, eta_K2[0][a], eta_K2[1][a], eta_K2[2][a], eta_K2[3][a]);
+    }
+  }
+};
+
+class HandDerivatives {
+ public:
+  HandDerivatives(const HandParameters& p, double gravity) {
+    for (int g = 0; g < kHandGroups; ++g) {
+      gradient_[g] = all(0.0);
+      for (auto& axis : dx_[g])
+        for (Lane& lane : axis) lane = all(0.0);
+    }
+    for (int a = 0; a < 3; ++a) {
+      put(dx_[Lanes::tilt0 / 4][a][kS], Lanes::tilt0 % 4, gravity * p.du[0][a]);
+      put(dx_[Lanes::tilt1 / 4][a][kS], Lanes::tilt1 % 4, gravity * p.du[1][a]);
+    }
+  }
+
+  // The next `count` steps; three rows of the Fisher matrix each
+  void run(const HandSteps* steps, const HandPredicted* met, const HandCoefficients* coefficients, int count,
+           Lane (*rows)[kHandGroups]) {
+    for_each<kHandGroups>([&](auto g) { run_group<g>(steps, met, coefficients, count, rows); });
+  }
+
+  void write(double* gradient) const {
+    for (int i = 0; i < Lanes::most; ++i) gradient[i] = at(gradient_[i / 4], i % 4);
+  }
+
+ private:
+  using State = Lane[3][kState];  // [axis][place]
+
+  template <int g>
+  MPUCAL_APART void run_group(const HandSteps* steps, const HandPredicted* met, const HandCoefficients* coefficients,
+                              int count, Lane (*rows)[kHandGroups]) {
+    Lane gradient = gradient_[g];
+    State x;
+    for (int a = 0; a < 3; ++a)
+      for (int k = 0; k < kState; ++k) x[a][k] = dx_[g][a][k];
+    for (int i = 0; i < count; ++i) {
+      const HandSteps& four = steps[i / 4];
+      const HandCoefficients& c = coefficients[i / 4];
+      const int t = i % 4;
+      Lane e[3];
+      innovate<g>(four, c, t, x, e);
+      for (int a = 0; a < 3; ++a) {
+        Lane row = at(c.white[a][0], t) * e[0];
+        for (int b = 1; b <= a; ++b) row = madd(at(c.white[a][b], t), e[b], row);
+        rows[3 * i + a][g] = row;
+        gradient = madd(at(c.residual[a], t), row, gradient);
+      }
+      update(met[i / 4].K[t], c, t, e, x);
+      follow<g>(four, c, t, met[i / 4].x_next[t], x);
+    }
+    for (int a = 0; a < 3; ++a)
+      for (int k = 0; k < kState; ++k) dx_[g][a][k] = x[a][k];
+    gradient_[g] = gradient;
+  }
+
+  template <int g>
+  MPUCAL_INLINE static void innovate(const HandSteps& four, const HandCoefficients& c, int t, const State& x,
+                                     Lane (&e)[3]) {
+    for (int j = 0; j < 3; ++j) {
+      e[j] = all(0.0);
+      if constexpr (g < 3)
+        if (j == g) e[j] = e[j] - c.q[t];
+      if constexpr (g == Lanes::tau / 4) e[j] = nmadd(at(c.delay[j], t), kTau, e[j]);
+      if constexpr (g == Lanes::r / 4) e[j] = e[j] - c.lever[t][j];
+      for (int b = 0; b < 3; ++b)
+        e[j] = nmadd(at(four.Ha[j][b], t), x[b][kA], nmadd(at(four.Hs[j][b], t), x[b][kS], e[j]));
+    }
+  }
+
+  // x + K e, and s keeps its length
+  MPUCAL_INLINE static void update(const Lane (&K)[3][3], const HandCoefficients& c, int t, const Lane (&e)[3],
+                                   State& x) {
+    for (int a = 0; a < 3; ++a)
+      for (int j = 0; j < 3; ++j)
+        for (int k = 0; k < kState; ++k) x[a][k] = madd(at(K[a][j], k), e[j], x[a][k]);
+    Lane along = at(c.direction[0], t) * x[0][kS];
+    for (int a = 1; a < 3; ++a) along = madd(at(c.direction[a], t), x[a][kS], along);
+    for (int a = 0; a < 3; ++a) x[a][kS] = at(c.stretch, t) * nmadd(at(c.direction[a], t), along, x[a][kS]);
+  }
+
+  // Phi x + eta x (Phi x); a new beginning forgets p, v and a
+  template <int g>
+  MPUCAL_INLINE static void follow(const HandSteps& four, const HandCoefficients& c, int t, const Lane (&next)[3],
+                                   State& x) {
+    if (at(four.reset, t) >= 0.0) {
+      for (int a = 0; a < 3; ++a) x[a][1] = x[a][2] = x[a][3] = all(0.0);
+    } else {
+      const auto& Phi = four.chain.Phi;
+      for (int a = 0; a < 3; ++a) {
+        const Lane p = x[a][1], v = x[a][2], m = x[a][3];
+        for (int k = 0; k < 3; ++k)
+          x[a][k + 1] = madd(at(Phi[k][2], t), m, madd(at(Phi[k][1], t), v, at(Phi[k][0], t) * p));
+      }
+    }
+    if constexpr (g == Lanes::b_omega / 4) add_turn(c.eta_b[t], next, x);
+    if constexpr (g == Lanes::K / 4) add_turn(c.eta_K[t], next, x);
+    if constexpr (g == Lanes::K / 4 + 1) add_turn(c.eta_K2[t], next, x);
+  }
+
+  // x += n x next
+  MPUCAL_INLINE static void add_turn(const Lane (&n)[3], const Lane (&next)[3], State& x) {
+    for (int a = 0; a < 3; ++a) {
+      const int b = (a + 1) % 3, c = (a + 2) % 3;
+      for (int k = 0; k < kState; ++k) x[a][k] = nmadd(at(next[b], k), n[c], madd(at(next[c], k), n[b], x[a][k]));
+    }
+  }
+
+  static constexpr int kTauLane = Lanes::tau % 4;
+  inline static const Lane kTau{kTauLane == 0, kTauLane == 1, kTauLane == 2, kTauLane == 3};
+  Lane dx_[kHandGroups][3][kState], gradient_[kHandGroups];
+};
+
+}  // namespace
+}  // namespace mpucal

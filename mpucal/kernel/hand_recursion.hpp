@@ -1,0 +1,228 @@
+// The recursion of the hand's x and P, a step at a time, and V along it.
+//
+// The four vectors of x are the four places of a Lane, so that the chain is one 4 x 4 matrix for all axes.
+#pragma once
+#include "hand_steps.hpp"
+
+namespace mpucal {
+namespace {  // each build of the filters keeps its own
+
+constexpr double kSpeedOfReset = 0.04;     // s: a rest that trembles by a moves at this times a
+constexpr int kState = 4, kS = 0, kA = 3;  // places of s and a in (s, p, v, a)
+
+// What four measurements met and did, one to a lane or [step]
+struct HandPredicted {
+  Lane s[3], a[3];             // of x before the measurement
+  Lane e[3], S[6], w;          // w: the robust weight
+  Lane plus[3];                // s + K e
+  Lane K[4][3][3];             // [step][axis][measurement], of (s, p, v, a)
+  Lane x_next[4][3];           // [step][axis], before the next measurement
+};
+
+class HandRecursion {
+ public:
+  HandRecursion(const HandParameters& p, const HandConstants& c) : c_(c), threshold_(c.huber * c.huber) {
+    for (int a = 0; a < 3; ++a) x_[a] = Lane{c.gravity * p.u[a], 0.0, 0.0, 0.0};
+    for (auto& block : P_)
+      for (auto& rows : block)
+        for (Lane& row : rows) row = all(0.0);
+  }
+
+  double V() const { return V_; }
+  double squares() const { return squares_; }
+
+  // The next `count` steps; the flat mean, which begins them, is no sample: nothing robust, not among the squares
+  template <bool kept>
+  MPUCAL_APART void run(const HandSteps* steps, int count, bool flat, HandPredicted* predicted) {
+    double determinants = 1.0, outliers = 1.0;
+    for (int i = 0; i < count; ++i, flat = false) {
+      const HandSteps& four = steps[i / 4];
+      const int t = i % 4;
+      double e[3], S[6], v[3], R[3];
+      Lane A[3][3], K[3][3];
+      cross_covariance(four, t, A);
+      innovate(four, t, A, e, S, R);
+      const Adjugate<double> adjugate(S);
+      multiply(adjugate.m, e, v);
+      double reciprocal = 1.0 / adjugate.determinant;
+      const double square = dot(e, v) * reciprocal;
+      determinants *= adjugate.determinant;
+      if constexpr (kept) keep(e, S, t, predicted[i / 4]);
+      const double w = flat ? plain(square) : weigh(square, outliers);
+      if (!flat) squares_ += square;
+      if (w < 1.0) {
+        for (int a = 0; a < 3; ++a) S[kSym[a][a]] = madd(R[a], 1.0 / w - 1.0, S[kSym[a][a]]);
+        const Adjugate<double> inflated(S);
+        reciprocal = 1.0 / inflated.determinant;
+        update(A, inflated, reciprocal, e, K);
+      } else {
+        update(A, adjugate, reciprocal, e, K);
+      }
+      if constexpr (kept) {
+        HandPredicted& kept_four = predicted[i / 4];
+        put(kept_four.w, t, w);
+        for (int a = 0; a < 3; ++a) {
+          put(kept_four.plus[a], t, at(x_[a], kS));
+          for (int j = 0; j < 3; ++j) kept_four.K[t][a][j] = K[a][j];
+        }
+      }
+      follow(four, t);
+      if (at(four.reset, t) >= 0.0) reset(at(four.reset, t));
+      if constexpr (kept)
+        for (int a = 0; a < 3; ++a) predicted[i / 4].x_next[t][a] = x_[a];
+    }
+    V_ += 0.5 * std::log(determinants);
+    if (outliers > 1.0) V_ += 0.5 * threshold_ * std::log(outliers);
+  }
+
+ private:
+  // Covariance of x along an axis with a measurement
+  MPUCAL_INLINE void cross_covariance(const HandSteps& four, int t, Lane (&A)[3][3]) const {
+    for (int a = 0; a < 3; ++a)
+      for (int j = 0; j < 3; ++j) {
+        A[a][j] = at(four.Hs[j][0], t) * P_[0][a][kS];
+        A[a][j] = madd(at(four.Ha[j][0], t), P_[0][a][kA], A[a][j]);
+        for (int b = 1; b < 3; ++b)
+          A[a][j] = madd(at(four.Ha[j][b], t), P_[b][a][kA], madd(at(four.Hs[j][b], t), P_[b][a][kS], A[a][j]));
+      }
+  }
+
+  MPUCAL_INLINE void innovate(const HandSteps& four, int t, const Lane (&A)[3][3], double (&e)[3], double (&S)[6],
+                              double (&R)[3]) const {
+    for (int j = 0; j < 3; ++j) {
+      R[j] = at(four.R[j], t);
+      e[j] = at(four.y[j], t);
+      for (int a = 0; a < 3; ++a)
+        e[j] = nmadd(at(four.Ha[j][a], t), at(x_[a], kA), nmadd(at(four.Hs[j][a], t), at(x_[a], kS), e[j]));
+    }
+    for (int m = 0; m < 6; ++m) {
+      const int i = kRow[m], j = kCol[m];
+      double by_s = i == j ? R[i] : 0.0, by_a = 0.0;
+      for (int a = 0; a < 3; ++a) {
+        by_s = madd(at(four.Hs[i][a], t), at(A[a][j], kS), by_s);
+        by_a = madd(at(four.Ha[i][a], t), at(A[a][j], kA), by_a);
+      }
+      S[m] = by_s + by_a;
+    }
+  }
+
+  MPUCAL_INLINE void keep(const double (&e)[3], const double (&S)[6], int t, HandPredicted& kept) const {
+    for (int a = 0; a < 3; ++a) {
+      put(kept.s[a], t, at(x_[a], kS));
+      put(kept.a[a], t, at(x_[a], kA));
+      put(kept.e[a], t, e[a]);
+    }
+    for (int m = 0; m < 6; ++m) put(kept.S[m], t, S[m]);
+  }
+
+  // The weight, and rho added to V; the redescending one's logarithm is left to `outliers`
+  MPUCAL_INLINE double weigh(double square, double& outliers) {
+    if (!(square > threshold_)) return plain(square);
+    if (c_.tail != 0.0) {
+      V_ += 0.5 * threshold_;
+      outliers *= square / threshold_;
+      return threshold_ / square;
+    }
+    const double norm = std::sqrt(square);
+    V_ += c_.huber * (norm - 0.5 * c_.huber);
+    return c_.huber / norm;
+  }
+  MPUCAL_INLINE double plain(double square) {
+    V_ += 0.5 * square;
+    return 1.0;
+  }
+
+  // K = A S^-1; x + K e and P - K A'
+  MPUCAL_INLINE void update(const Lane (&A)[3][3], const Adjugate<double>& adjugate, double reciprocal,
+                            const double (&e)[3], Lane (&K)[3][3]) {
+    double inverse[6];
+    for (int m = 0; m < 6; ++m) inverse[m] = reciprocal * adjugate.m[m];
+    for (int a = 0; a < 3; ++a)
+      for (int j = 0; j < 3; ++j) {
+        K[a][j] = madd(inverse[kSym[2][j]], A[a][2],
+                       madd(inverse[kSym[1][j]], A[a][1], inverse[kSym[0][j]] * A[a][0]));
+        x_[a] = madd(e[j], K[a][j], x_[a]);
+      }
+    for (int m = 0; m < 6; ++m)
+      for (int i = 0; i < kState; ++i)
+        for (int j = 0; j < 3; ++j)
+          P_[kRow[m]][kCol[m]][i] = nmadd(at(K[kRow[m]][j], i), A[kCol[m]][j], P_[kRow[m]][kCol[m]][i]);
+  }
+
+  // s its length again; x <- Phi x, P <- Phi P Phi' + the noise of the jerk and of the gyro
+  MPUCAL_INLINE void follow(const HandSteps& four, int t) {
+    double s[3] = {at(x_[0], kS), at(x_[1], kS), at(x_[2], kS)};
+    const double stretch = c_.gravity / std::sqrt(dot(s, s));
+    for (int a = 0; a < 3; ++a) {
+      s[a] *= stretch;
+      Lane x = Lane{s[a], 0.0, 0.0, 0.0};
+      for (int k = 0; k < 3; ++k) x = madd(at(x_[a], k + 1), four.column[t][k], x);
+      x_[a] = x;
+    }
+    double Phi[3][3], N[6];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) Phi[i][j] = at(four.chain.Phi[i][j], t);
+    process_noise(four, t, s, N);
+    for (int m = 0; m < 6; ++m) {
+      const int a = kRow[m], b = kCol[m];
+      Lane(&P)[kState] = P_[a][b], (&PT)[kState] = P_[b][a];
+      Lane X[kState];
+      chained(Phi, P);
+      transpose(P[0], P[1], P[2], P[3], X[0], X[1], X[2], X[3]);
+      chained(Phi, X);
+      X[kS] = X[kS] + Lane{N[m], 0.0, 0.0, 0.0};
+      if (a == b)
+        for (int k = 0; k < 3; ++k) X[k + 1] = X[k + 1] + four.noise[t][k];
+      else
+        transpose(X[0], X[1], X[2], X[3], P[0], P[1], P[2], P[3]);
+      for (int i = 0; i < kState; ++i) PT[i] = X[i];
+    }
+  }
+
+  // rows of (p, v, a) by Phi
+  MPUCAL_INLINE static void chained(const double (&Phi)[3][3], Lane (&rows)[kState]) {
+    const Lane p = rows[1], v = rows[2], a = rows[3];
+    for (int k = 0; k < 3; ++k) rows[k + 1] = madd(Phi[k][2], a, madd(Phi[k][1], v, Phi[k][0] * p));
+  }
+
+  // [s]x c [s]x'
+  MPUCAL_INLINE static void process_noise(const HandSteps& four, int t, const double (&s)[3], double (&N)[6]) {
+    double c[6], X[3][3];
+    for (int m = 0; m < 6; ++m) c[m] = at(four.c_first[m], t);
+    for (int b = 0; b < 3; ++b) {
+      X[0][b] = nmadd(s[2], c[kSym[1][b]], s[1] * c[kSym[2][b]]);
+      X[1][b] = nmadd(s[0], c[kSym[2][b]], s[2] * c[kSym[0][b]]);
+      X[2][b] = nmadd(s[1], c[kSym[0][b]], s[0] * c[kSym[1][b]]);
+    }
+    N[0] = nmadd(s[2], X[0][1], s[1] * X[0][2]);
+    N[1] = nmadd(s[0], X[0][2], s[2] * X[0][0]);
+    N[2] = nmadd(s[1], X[0][0], s[0] * X[0][1]);
+    N[3] = nmadd(s[0], X[1][2], s[2] * X[1][0]);
+    N[4] = nmadd(s[1], X[1][0], s[0] * X[1][1]);
+    N[5] = nmadd(s[1], X[2][0], s[0] * X[2][1]);
+  }
+
+  // p = v = a = 0, uncorrelated with all
+  void reset(double sigma) {
+    const Lane s_alone{1.0, 0.0, 0.0, 0.0};
+    const double speed = kSpeedOfReset * sigma;
+    for (int a = 0; a < 3; ++a) {
+      x_[a] = x_[a] * s_alone;
+      for (auto& block : P_[a]) {
+        block[kS] = block[kS] * s_alone;
+        for (int k = 1; k < kState; ++k) block[k] = all(0.0);
+      }
+      P_[a][a][2] = Lane{0.0, 0.0, speed * speed, 0.0};
+      P_[a][a][kA] = Lane{0.0, 0.0, 0.0, sigma * sigma};
+    }
+  }
+
+  const HandConstants& c_;
+  const double threshold_;
+  Lane x_[3];             // (s, p, v, a) along each axis
+  Lane P_[3][3][kState];  // [a][b]: rows of (s, p, v, a) along a, lanes along b
+  double V_ = 0.0, squares_ = 0.0;
+};
+
+}  // namespace
+}  // namespace mpucal
