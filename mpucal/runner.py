@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from .bus.records import SessionEvent
 from .chip.access import EndOfCapture
 from .data import Recording, Samples, Sensor
-from .errors import Abandoned, BusError, ChipError
+from .errors import Abandoned, BusError, CaptureError, ChipError
 from .result import Calibration
 from .session.events import (
     Abort,
@@ -142,7 +142,9 @@ class Runner:
                 if self._machine.state in MEASURING:
                     self._poll()
         except Abandoned:
-            self._rest()
+            # a replay that is stopped by who watches it went on when it was recorded
+            with suppress(CaptureError):
+                self._rest()
             raise
         self._rest()
         return self._source.recording()

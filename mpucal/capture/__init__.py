@@ -26,11 +26,11 @@ def load(path: str | Path) -> Recording:
     path = Path(path)
     if path.is_dir():
         path = _capture_in(path)
+    if not path.exists():
+        raise RecordingError(f"there is no file {path}", "check the path")
     kind = path.suffix.lower()
     if kind not in KINDS:
         raise RecordingError(f"{path} is no kind of recording that mpucal knows", _REMEDY)
-    if not path.exists():
-        raise RecordingError(f"there is no file {path}", "check the path")
     # a kind's library is loaded only when a file of that kind is
     if kind == ".mcap":
         return _load_capture(path)

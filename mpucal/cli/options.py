@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -34,6 +35,22 @@ class Integer(click.ParamType[int]):
             self.fail(f"{value!r} is no whole number.", param, ctx)
 
 
+class Gravity(click.ParamType[float]):
+    """A local gravity in m/s²."""
+
+    name = "float"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number of its text."""
+        try:
+            gravity = float(value)
+        except ValueError:
+            gravity = math.nan
+        if not 0.0 < gravity < math.inf:
+            self.fail(f"{value!r} is no local gravity: give it in m/s², about 9.81.", param, ctx)
+        return gravity
+
+
 def source_options(command: F) -> F:
     """--bus or --replay, and how the chip is set."""
     for option in reversed(
@@ -54,7 +71,7 @@ def source_options(command: F) -> F:
                 show_default=True,
                 help="±deg/s.",
             ),
-            click.option("--seed", type=int, help="Which simulated sensor and hand."),
+            click.option("--seed", type=click.IntRange(min=0), help="Which simulated sensor and hand."),
         )
     ):
         command = option(command)
@@ -66,7 +83,7 @@ def fit_options(command: F) -> F:
     for option in (
         click.option("--model", type=click.Choice(MODELS), default="auto", show_default=True, help="What to estimate."),
         click.option(
-            "--gravity", type=float, default=STANDARD_GRAVITY_MPS2, show_default=True, help="Local gravity [m/s²]."
+            "--gravity", type=Gravity(), default=STANDARD_GRAVITY_MPS2, show_default=True, help="Local gravity [m/s²]."
         ),
     ):
         command = option(command)

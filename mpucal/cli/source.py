@@ -52,6 +52,8 @@ def open_bus(text: str, plan: Plan, address: int | None, seed: int | None) -> Op
     UsageError : words that fit no bus. BusError : no such bus, or no permission.
     """
     if text == SIMULATED or text.startswith(SIMULATED + ":"):
+        if address is not None:
+            raise UsageError("--address is where a real chip answers, and --bus names a simulated one", "leave it out")
         bus = open_simulated(text, plan.gravity, seed)
         return Opened(bus, plan, (bus.hear,), bus.truth_document())
     if seed is not None:

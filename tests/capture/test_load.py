@@ -88,12 +88,14 @@ def test_the_ending_says_how_to_read(measured, tmp_path):
         ("none.npz", "there is no file"),
         ("none.mcap", "there is no file"),
         ("notes.txt", r"give a \.mcap, \.npz, \.csv file or the folder"),
+        ("none", "there is no file"),
         ("no_ending", "no kind of recording"),
         ("folder", r"holds no capture\.mcap"),
     ],
 )
 def test_what_is_no_recording(tmp_path, name, says):
     (tmp_path / "notes.txt").write_text("hello")
+    (tmp_path / "no_ending").write_text("hello")
     (tmp_path / "folder").mkdir()
     with pytest.raises(RecordingError, match=says) as raised:
         mpucal.load(tmp_path / name)

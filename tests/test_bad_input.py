@@ -1,0 +1,157 @@
+"""Bad input through the installed command: an exit code, one sentence, and nothing that was measured is lost."""
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import smbus2
+
+from mpucal.__main__ import run
+from mpucal.capture.mcap import read_capture
+from mpucal.chip.driver import Driver
+from mpucal.cli import session as command
+from mpucal.session.lay_flat import LayFlat
+from mpucal.session.rotate import Rotate
+from mpucal.sinks import file as sink
+
+FIXTURE = Path(__file__).parents[1] / "fixtures" / "sessions" / "mpu6500.mcap"
+INSTALLED = Path(sys.executable).parent / "mpucal"
+
+
+@pytest.fixture
+def mpucal(capsys, tmp_path, monkeypatch):
+    """Call it here, in an empty folder: exit code and what it said."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words):
+        code = run([str(word) for word in words])
+        said = capsys.readouterr().err
+        assert "Traceback" not in said
+        return code, said
+
+    return call
+
+
+def failing(number):
+    def fail(*_):
+        raise OSError(number, os.strerror(number))
+
+    return fail
+
+
+# what the kernel says where somebody opens a bus, or asks for a chip on it, and what a person is told
+OPENING = {
+    "no such bus": (errno.ENOENT, "there is no I2C bus /dev/i2c-1: "),
+    "no permission": (errno.EACCES, "no permission to use /dev/i2c-1: join the group that may"),
+    "no adapter": (errno.ENXIO, "no adapter is behind /dev/i2c-1: plug it in"),
+}
+ASKING = {
+    "nothing answers": (errno.EREMOTEIO, "nothing answers at 0x68 or 0x69 on /dev/i2c-1: check VCC, GND, SDA and SCL"),
+    "a wire held low": (errno.ETIMEDOUT, "the I2C bus does not come free (0x68 on /dev/i2c-1): a wire holds SDA"),
+    "a driver of the kernel": (errno.EBUSY, "a driver of the kernel holds the chip (0x68 on /dev/i2c-1): remove its"),
+}
+
+
+@pytest.mark.parametrize(
+    ("opens", "number", "sentence"),
+    [
+        *(pytest.param(False, *case, id=name) for name, case in OPENING.items()),
+        *(pytest.param(True, *case, id=name) for name, case in ASKING.items()),
+    ],
+)
+def test_a_bus_that_fails_says_why_and_leaves_nothing(mpucal, tmp_path, monkeypatch, opens, number, sentence):
+    def open_(smbus, _):
+        if not opens:
+            failing(number)()
+        smbus.fd, smbus.funcs = os.open(os.devnull, os.O_RDWR), smbus2.I2cFunc.I2C
+
+    monkeypatch.setattr(smbus2.SMBus, "open", open_)
+    monkeypatch.setattr(smbus2.SMBus, "read_byte_data", failing(number))
+    code, said = mpucal("session", "--bus", "/dev/i2c-1")
+    assert code == 3
+    assert said.startswith(f"mpucal: {sentence}")
+    assert len(said.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["session", "--bus", "sim", "--gravity", "-9.81"], "'-9.81' is no local gravity"),
+        (["session", "--bus", "sim", "--gravity", "nan"], "'nan' is no local gravity"),
+        (["calibrate", "walk.npz", "--gravity", "much"], "'much' is no local gravity"),
+        (["session", "--bus", "sim", "--address", "0x68"], "--address is where a real chip answers"),
+        (["session", "--bus", "sim", "--rate", "3"], "take 3.90625 Hz"),
+        (["record", "--bus", "sim", "--seconds", "0"], "--seconds"),
+        (["record"], "no source was given"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_words_that_cannot_be_meant_are_2_before_anything_is_measured(mpucal, tmp_path, words, sentence):
+    code, said = mpucal(*words)
+    assert code == 2
+    assert sentence in said
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["nothing", "nothing.npz", "nothing.mcap", "nothing/there.csv"])
+@pytest.mark.parametrize("verb", ["calibrate", "show"])
+def test_a_file_that_is_not_there_is_called_that(mpucal, verb, name):
+    assert mpucal(verb, name) == (3, f"mpucal: there is no file {name}: check the path.\n")
+
+
+def interrupted(times, function):
+    """`function`, during which somebody presses Ctrl-C so many times."""
+
+    def call(*words, **options):
+        for _ in range(times):
+            signal.raise_signal(signal.SIGINT)
+        return function(*words, **options)
+
+    return call
+
+
+STATES = {
+    "connect": (Driver, "start"),
+    "lay flat": (LayFlat, "add"),
+    "rotate": (Rotate, "add"),
+    "calibrate": (command, "calibrate"),
+    "write": (sink, "write_atomically"),
+}
+
+
+@pytest.mark.parametrize(("owner", "name"), STATES.values(), ids=STATES.keys())
+@pytest.mark.parametrize("times", [1, 2], ids=["once", "twice"])
+def test_ctrl_c_is_4_and_the_capture_stays_whole(mpucal, tmp_path, monkeypatch, owner, name, times):
+    monkeypatch.setattr(owner, name, interrupted(times, getattr(owner, name)))
+    code, said = mpucal("session", "--replay", FIXTURE, "-o", "board")
+    assert code == 4
+    assert said.splitlines()[-1].startswith(("mpucal: the session was interrupted", "mpucal: interrupted"))
+    capture = tmp_path / "board" / "capture.mcap"
+    if capture.exists():
+        assert read_capture(capture).recovered is None
+    assert capture.exists() == (name != "start" or times == 1)
+
+
+def test_a_full_disk_is_3_and_keeps_what_was_recorded(mpucal, tmp_path, monkeypatch):
+    def full(path, data):
+        raise sink.OutputError(f"cannot write {path} (No space left on device)", "make room")
+
+    monkeypatch.setattr(sink, "write_atomically", full)
+    code, said = mpucal("session", "--replay", FIXTURE, "-o", "board")
+    assert code == 3
+    assert "What was recorded is kept in board/capture.mcap." in said
+    assert "No space left on device" in said.splitlines()[-1]
+    assert read_capture(tmp_path / "board" / "capture.mcap").recovered is None
+
+
+def test_the_installed_command_gives_the_same_exit_codes(tmp_path):
+    (tmp_path / "text.mcap").write_text("hello")
+    for words, code in ((["session"], 2), (["session", "--replay", "text.mcap"], 3), (["--version"], 0)):
+        done = subprocess.run([INSTALLED, *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == code
+        assert len((done.stdout + done.stderr).splitlines()) == 1
