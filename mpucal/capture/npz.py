@@ -79,6 +79,8 @@ def _arrays(path: Path) -> dict[str, Any]:
         data = path.read_bytes()
     except OSError as error:
         raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path and its permissions") from error
+    if not zipfile.is_zipfile(BytesIO(data)):
+        raise RecordingError(f"{path} is no whole NumPy archive", _REMEDY)
     try:
         # no pickles: a recording must not run code
         with np.load(BytesIO(data), allow_pickle=False) as archive:
