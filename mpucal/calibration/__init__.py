@@ -51,7 +51,7 @@ def calibrate(recording: Recording, model: str = "auto", gravity: float = STANDA
     if flat is None or any(check(before) for check in BLOCKERS):
         return _calibration(before, {"model": model, "why": "nothing could be estimated"})
     choice = _fit(recording, flat, gravity, model)
-    evidence = Evidence(recording, gravity, flat, choice.fit, choice.model)
+    evidence = Evidence(recording, gravity, flat, choice.fit.right_handed(), choice.model)
     return _calibration(evidence, {"model": choice.model, "why": choice.why})
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,13 @@ class Fit:
         """Standard deviations of the named parameters, NaN for those that were not estimated."""
         variance = dict(zip(self.names, np.diag(self.covariance), strict=True))
         return np.sqrt([max(variance.get(name, np.nan), 0.0) for name in names])
+
+    def right_handed(self) -> Fit:
+        """Of (D, u) and (-D, -u), which fit equally well, the one with det D > 0."""
+        if not np.linalg.det(self.D) < 0.0:
+            return self
+        sign = np.array([-1.0 if name in D_NAMES else 1.0 for name in self.names])
+        return replace(self, D=-self.D, covariance=self.covariance * np.outer(sign, sign))
 
 
 D_NAMES = tuple(f"D_{i}{j}" for i in "xyz" for j in "xyz")
