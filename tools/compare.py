@@ -161,7 +161,7 @@ def simulated_table(scenario: str, runs: list[list[Grade]]) -> Table:
             method,
             number(known.mean() if len(known) else None),
             number(known.max() if len(known) else None),
-            "" if method == RAW else str(int(np.sum(errors > without))),
+            "" if method == RAW or len(known) == 0 else str(int(np.sum(errors > without))),
             str(len(failed) or ""),
             _milliseconds([g.seconds for g in of]),
             max(set(failed), key=failed.count) if failed else "",
