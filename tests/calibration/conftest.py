@@ -1,0 +1,104 @@
+"""Recordings whose truth is known: a sensor that is nearly ideal, the other simulator's, and those of the paper."""
+
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpucal.data import Recording, Samples
+from mpucal.simulation.scenarios import Truth, hand_scenario, paper_scenario
+from mpucal.simulation.sensors import SensorTruth
+
+SHARED = Path(__file__).parents[2].parent / "shared"
+G = 9.82
+
+
+@dataclass(frozen=True)
+class Other:
+    """A recording of a simulator that is not the project's, and its truth."""
+
+    recording: Recording
+    truth: Truth
+
+
+def near_ideal(seed=0, D=None, G_gyro=None, **scenario):
+    """The paper's turns of a sensor whose axes, gains and biases are nearly right, unless told otherwise."""
+    sensor = SensorTruth(
+        D=np.eye(3) if D is None else np.asarray(D, float),
+        b_a=np.array([0.1, -0.2, 0.15]),
+        G=np.eye(3) if G_gyro is None else G_gyro,
+        b_omega=np.array([0.02, -0.03, 0.01]),
+        sigma_a=np.full(3, 0.1),
+        sigma_omega=np.full(3, 0.03),
+    )
+    return paper_scenario(seed, sensor=sensor, **{"rate_hz": 50, **scenario})
+
+
+def samples_of(recording, kept):
+    """The recording with only those of its samples (n,) bool; what was flat is then to be found."""
+    arrays = {f.name: getattr(recording, f.name)[kept] for f in fields(Samples)}
+    return replace(recording, flat=None, **arrays)
+
+
+@pytest.fixture(scope="session")
+def ideal():
+    """A factory of near-ideal simulated recordings."""
+    return near_ideal
+
+
+@pytest.fixture(scope="session")
+def pick():
+    """A function that keeps some of a recording's samples."""
+    return samples_of
+
+
+@cache
+def by_hand(seed, motion, **how):
+    """An MPU-6050 in a hand at 100 Hz, simulated once."""
+    return hand_scenario(seed, motion, rate_hz=100, **how)
+
+
+@pytest.fixture(scope="session")
+def hand():
+    """A factory of hand-held simulated recordings."""
+    return by_hand
+
+
+@pytest.fixture(scope="session")
+def in_hand():
+    """An MPU-6050 that a hand turned through twelve poses."""
+    return by_hand(1, "pose12")
+
+
+@pytest.fixture(scope="session")
+def other_simulator():
+    """A function that loads a recording of another simulator by its name."""
+
+    def load(name):
+        path = SHARED / "simulated" / f"{name}.npz"
+        if not path.exists():
+            pytest.skip("the other simulator's recordings are not beside this checkout")
+        with np.load(path) as file:
+            recording = Recording.from_arrays(
+                file["t"], file["acc"], file["gyr"], flat=(0, int(file["flat_samples"])), name=name
+            )
+            truth = Truth(*(file[f"true_{key}"] for key in ("D", "b_a", "K", "b_omega")), float(file["gravity"]))
+        return Other(recording, truth)
+
+    return load
+
+
+@pytest.fixture(scope="session")
+def real():
+    """A function that loads what a real sensor measured, by its name, as a recording without a known flat part."""
+
+    def load(name):
+        path = SHARED / "recordings" / f"{name}.npz"
+        if not path.exists():
+            pytest.skip("the recordings of others are not beside this checkout")
+        with np.load(path) as file:
+            return Recording.from_arrays(file["t"], file["acc"], file["gyr"], name=name)
+
+    return load

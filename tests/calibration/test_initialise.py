@@ -1,0 +1,83 @@
+import numpy as np
+import pytest
+
+from mpucal.calibration.estimate import fit_accel
+from mpucal.calibration.initialise import fibonacci_sphere, initialise
+from mpucal.calibration.likelihood import Problem, Series
+from mpucal.calibration.model import rotation
+from mpucal.calibration.stationary import flat_statistics
+from mpucal.data import Recording
+from mpucal.simulation.metrics import sph_rms
+from mpucal.simulation.scenarios import paper_scenario
+
+
+def problem_of(simulated):
+    recording = simulated.recording
+    flat = flat_statistics(recording, recording.flat)
+    return Problem(Series.after(recording, flat), flat, simulated.truth.gravity)
+
+
+def exact(D, b_a, u, n=400, seed=0):
+    """The problem of a sensor without noise, turned at random about all axes from u on."""
+    rng = np.random.default_rng(seed)
+    t = 0.01 * np.arange(n + 100)
+    rates = np.zeros((n + 100, 3))
+    rates[100:] = np.repeat(rng.uniform(-4, 4, (n // 50, 3)), 50, axis=0)
+    s, force = 9.82 * u, []
+    for omega, following in zip(rates, np.append(rates[1:], rates[-1:], axis=0), strict=True):
+        force.append(s)
+        s = rotation(-0.01 * 0.5 * (omega + following)) @ s
+    recording = Recording.from_arrays(t, np.array(force) @ D.T + b_a, rates, flat=(0, 99))
+    flat = flat_statistics(recording, recording.flat)
+    return Problem(Series.after(recording, flat), flat, 9.82)
+
+
+@pytest.mark.parametrize("u", [(0, 0, 1), (0, 0, -1), (0.6, 0.8, 0), (-0.5, 0.5, np.sqrt(0.5))], ids=str)
+def test_without_noise_it_is_exact_whatever_lay_down(u):
+    D = np.array([[1.3, 0.1, -0.2], [0.3, 0.6, 0.1], [0.0, -0.2, 0.9]])
+    b_a = np.array([1.0, -0.5, 0.3])
+    theta = initialise(exact(D, b_a, np.array(u)), np.zeros(3))
+    np.testing.assert_allclose(theta.D, D, atol=2e-3)
+    np.testing.assert_allclose(theta.b_a, b_a, atol=2e-2)
+    np.testing.assert_allclose(theta.u, u, atol=2e-3)
+
+
+def test_of_a_mirrored_sensor_it_finds_the_right_handed_equal():
+    D, u = np.diag([1.0, 1.0, -1.0]), np.array([0.1, 0.2, np.sqrt(0.95)])
+    theta = initialise(exact(D, np.zeros(3), u), np.zeros(3))
+    np.testing.assert_allclose(theta.D, -D, atol=2e-3)
+    np.testing.assert_allclose(theta.u, -u, atol=2e-3)
+
+
+def test_from_it_the_minimiser_finds_every_sensor_of_the_paper():
+    for seed in range(30):
+        simulated = paper_scenario(seed, rate_hz=50)
+        problem = problem_of(simulated)
+        theta = initialise(problem, problem.flat.b_omega)
+        assert np.linalg.det(theta.D) > 0
+        assert np.linalg.norm(theta.u) == pytest.approx(1.0)
+        # the gyroscope's noise, integrated over half a minute, is what is left
+        assert sph_rms(simulated.truth, theta.D, theta.b_a) < 2.0
+        # and little enough for the minimiser to find the right optimum, soon
+        fit = fit_accel(simulated.recording, problem.flat, simulated.truth.gravity)
+        assert fit.iterations <= 4
+        assert fit.nis < 3.6
+
+
+def test_a_board_that_never_turned_gives_finite_numbers():
+    simulated = paper_scenario(0, rate_hz=50)
+    recording = simulated.recording.part(0, 500)
+    flat = flat_statistics(recording, (0, 200))
+    theta = initialise(Problem(Series.after(recording, flat), flat, 9.82), flat.b_omega)
+    assert np.isfinite(theta.D).all()
+    assert np.isfinite(theta.b_a).all()
+
+
+def test_the_sphere_is_covered_evenly():
+    points = fibonacci_sphere(400)
+    np.testing.assert_allclose(np.linalg.norm(points, axis=1), 1.0)
+    np.testing.assert_allclose(points.mean(0), 0.0, atol=2e-3)
+    np.testing.assert_allclose(points.T @ points / 400, np.eye(3) / 3, atol=2e-3)
+    nearest = np.sort(points @ points.T, axis=1)[:, -2]
+    angles = np.arccos(nearest)
+    assert angles.max() < 1.5 * angles.min()

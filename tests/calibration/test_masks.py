@@ -1,0 +1,135 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.calibration import calibrate
+from mpucal.calibration.likelihood import Series
+from mpucal.calibration.masks import ACC_RANGES, CLIPPED_R_SCALE, GYRO_RANGES, mask, with_masks
+from mpucal.calibration.stationary import flat_statistics
+from mpucal.data import Recording
+from mpucal.simulation.metrics import sph_rms
+
+
+def noise(n=1000, seed=0, **changes):
+    """A recording of nothing but noise about gravity."""
+    rng = np.random.default_rng(seed)
+    acc = [0.0, 0.0, 9.8] + 3.0 * rng.standard_normal((n, 3))
+    return replace(Recording.from_arrays(0.01 * np.arange(n), acc, rng.standard_normal((n, 3))), **changes)
+
+
+def test_white_noise_is_neither_clipped_nor_broken():
+    for seed in range(20):
+        marked = with_masks(noise(seed=seed))
+        assert not marked.gap.any()
+        assert not marked.acc_clipped.any()
+        assert not marked.gyr_clipped.any()
+
+
+def test_what_the_source_marked_stays_marked():
+    marks = np.zeros(1000, bool)
+    marks[[3, 500]] = True
+    marked = with_masks(noise(gap=marks, acc_clipped=marks, gyr_clipped=marks))
+    for name in ("gap", "acc_clipped", "gyr_clipped"):
+        np.testing.assert_array_equal(getattr(marked, name), marks)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.4], ids=["even", "jittered"])
+def test_a_gap_is_where_time_jumps(pick, jitter):
+    recording = noise()
+    rng = np.random.default_rng(1)
+    recording = replace(recording, t=recording.t + 0.01 * jitter * rng.uniform(-1, 1, 1000))
+    kept = np.ones(1000, bool)
+    kept[300:304] = kept[700:800] = False
+    assert np.flatnonzero(with_masks(pick(recording, kept)).gap).tolist() == [300, 696]
+
+
+@pytest.mark.parametrize("full_scale", GYRO_RANGES, ids=lambda x: f"{np.rad2deg(x):.0f} deg/s")
+def test_few_samples_at_a_chips_range_are_clipped(full_scale):
+    recording = noise()
+    gyr = np.clip(0.4 * full_scale * recording.gyr, -full_scale, full_scale * 32767 / 32768)
+    at_the_end = (np.abs(gyr) >= full_scale * 32767 / 32768).any(1)
+    assert 2 < at_the_end.sum() < 100
+    np.testing.assert_array_equal(with_masks(replace(recording, gyr=gyr)).gyr_clipped, at_the_end)
+
+
+@pytest.mark.parametrize("full_scale", ACC_RANGES, ids=lambda x: f"{x / 9.80665:.0f} g")
+def test_an_accelerometers_range_likewise(full_scale):
+    recording = noise()
+    acc = np.clip(0.35 * full_scale * (recording.acc - [0, 0, 9.8]), -full_scale, full_scale)
+    at_the_end = (np.abs(acc) == full_scale).any(1)
+    np.testing.assert_array_equal(with_masks(replace(recording, acc=acc)).acc_clipped, at_the_end)
+
+
+def test_any_other_end_of_range_must_hold_long_and_far_out():
+    recording = noise()
+    t = recording.t
+    gyr = recording.gyr * 0.001
+    gyr[400:500, 1] = np.minimum(5.0 * np.sin(np.pi * (t[400:500] - 4.0)), 3.3)
+    marked = with_masks(replace(recording, gyr=gyr))
+    np.testing.assert_array_equal(marked.gyr_clipped, gyr[:, 1] == 3.3)
+
+
+def test_a_constant_axis_is_not_clipped():
+    recording = noise()
+    acc = recording.acc.copy()
+    acc[:, 0] = 0.0
+    assert not with_masks(replace(recording, acc=acc)).acc_clipped.any()
+
+
+def test_coarse_counts_that_repeat_are_not_clipped():
+    recording = noise()
+    acc = np.rint(recording.acc / 2.0) * 2.0
+    assert not with_masks(replace(recording, acc=acc)).acc_clipped.any()
+
+
+def masked(recording):
+    flat = flat_statistics(recording, (0, 100))
+    plain = Series.after(recording, flat)
+    return plain, mask(plain, recording, flat), flat
+
+
+def test_without_marks_nothing_changes():
+    plain, series, _ = masked(noise())
+    assert series is plain
+
+
+def test_a_clipped_acceleration_hardly_counts():
+    marks = np.zeros(1000, bool)
+    marks[[50, 300]] = True
+    _, series, _ = masked(noise(acc_clipped=marks))
+    assert np.flatnonzero(series.r_scale == CLIPPED_R_SCALE).tolist() == [200]
+    assert (np.delete(series.r_scale, 200) == 1.0).all()
+    assert not series.q_extra.any()
+
+
+def test_both_steps_beside_a_clipped_rate_are_doubted():
+    marks = np.zeros(1000, bool)
+    marks[300] = True
+    plain, series, flat = masked(noise(gyr_clipped=marks))
+    assert np.flatnonzero(series.q_extra).tolist() == [200, 201]
+    omega = np.linalg.norm(plain.omega[[200, 201]] - flat.b_omega, axis=1)
+    np.testing.assert_allclose(np.sqrt(series.q_extra[[200, 201]]), 0.1 * omega * 0.01, rtol=1e-6)
+
+
+def test_across_a_gap_nothing_is_integrated_and_nothing_known(pick):
+    kept = np.ones(1000, bool)
+    kept[400:600] = False
+    recording = with_masks(pick(noise(), kept))
+    plain, series, flat = masked(recording)
+    np.testing.assert_array_equal(series.omega[300], flat.b_omega)
+    assert series.q_extra[300] == pytest.approx(2.01)
+    assert np.count_nonzero(series.q_extra) == 1
+    np.testing.assert_array_equal(np.delete(series.omega, 300, 0), np.delete(plain.omega, 300, 0))
+
+
+def test_a_mask_saves_what_a_clipped_gyroscope_would_spoil(hand, monkeypatch):
+    simulated = hand(3, "pose12")
+    recording, truth = simulated.recording, simulated.truth
+    limit = np.deg2rad(125.0)
+    clipped = replace(recording, gyr=np.clip(recording.gyr, -limit, limit))
+    assert 20 < (np.abs(clipped.gyr) == limit).any(1).sum() < 400
+    saved = calibrate(clipped, "hand", truth.gravity)
+    monkeypatch.setattr("mpucal.calibration.with_masks", lambda recording: recording)
+    blind = calibrate(clipped, "hand", truth.gravity)
+    assert sph_rms(truth, saved.D, saved.b_a) < 0.5 * sph_rms(truth, blind.D, blind.b_a)

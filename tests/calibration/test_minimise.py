@@ -1,0 +1,120 @@
+"""The minimiser on problems whose answer is known otherwise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.calibration.initialise import initialise
+from mpucal.calibration.likelihood import Problem, Series, evaluate
+from mpucal.calibration.minimise import DECREMENT, PLACES, Prior, minimise
+from mpucal.calibration.stationary import flat_statistics
+from mpucal.simulation.scenarios import paper_scenario
+
+ACCEL, IMU = 17, 23
+NOTHING = Prior.of()
+
+
+@pytest.fixture(scope="module")
+def problem():
+    recording = paper_scenario(2, rate_hz=50).recording
+    flat = flat_statistics(recording, recording.flat)
+    return Problem(Series.after(recording, flat), flat, 9.82)
+
+
+@pytest.fixture(scope="module")
+def start(problem):
+    return initialise(problem, problem.flat.b_omega)
+
+
+def decrement(problem, minimum, prior=NOTHING):
+    at = evaluate(problem, minimum.theta, ACCEL)
+    gradient = at.gradient + prior.precision[:ACCEL] * (values(minimum.theta) - prior.mean[:ACCEL])
+    free = minimum.free
+    return 0.5 * gradient[free] @ np.linalg.solve(minimum.H[np.ix_(free, free)], gradient[free])
+
+
+def values(theta):
+    return np.concatenate([theta.D.ravel(), theta.b_a, [0.0, 0.0], theta.b_omega])
+
+
+def test_it_ends_where_the_gradient_vanishes_and_nowhere_near_is_lower(problem, start):
+    minimum = minimise(problem, start, ACCEL, NOTHING)
+    assert minimum.converged
+    assert decrement(problem, minimum) < DECREMENT
+    rng = np.random.default_rng(0)
+    L = np.linalg.cholesky(minimum.covariance())
+    for _ in range(20):
+        direction = rng.standard_normal(ACCEL)
+        away = evaluate(problem, minimum.theta.moved(L @ direction / np.linalg.norm(direction)), 0).V
+        # one standard deviation away, V is higher by about a half
+        assert minimum.V + 0.3 < away < minimum.V + 0.8
+
+
+def test_it_finds_the_same_from_afar(problem, start):
+    near = minimise(problem, start, ACCEL, NOTHING)
+    far = replace(start, D=start.D + 0.2, b_a=start.b_a + 1.0)
+    from_afar = minimise(problem, far, ACCEL, NOTHING)
+    sd = np.sqrt(np.diag(near.covariance()))
+    assert (np.abs(values(from_afar.theta) - values(near.theta)) < 0.1 * np.where(sd > 0, sd, 1.0)).all()
+    assert from_afar.iterations > near.iterations
+
+
+def test_a_lower_bar_is_met_sooner(problem, start):
+    far = replace(start, D=start.D + 0.2)
+    rough, fine = (minimise(problem, far, ACCEL, NOTHING, until=until) for until in (10.0, 1e-8))
+    assert rough.iterations < fine.iterations
+    assert decrement(problem, fine) < 1e-8 < decrement(problem, rough)
+
+
+def test_too_few_iterations_do_not_converge(problem, start):
+    minimum = minimise(problem, replace(start, D=start.D + 0.2), ACCEL, NOTHING, most=1)
+    assert not minimum.converged
+    assert minimum.iterations == 1
+
+
+@pytest.mark.parametrize("name", ["D", "b_a", "b_omega"])
+def test_what_is_fixed_stays(problem, start, name):
+    minimum = minimise(problem, start, ACCEL, NOTHING, fixed=(name,))
+    np.testing.assert_array_equal(getattr(minimum.theta, name), getattr(start, name))
+    place = slice(*PLACES[name])
+    assert not minimum.free[place].any()
+    assert (minimum.covariance()[place] == 0.0).all()
+    assert (np.diag(minimum.covariance())[minimum.free] > 0).all()
+
+
+def test_a_tight_prior_wins_and_a_loose_one_is_forgotten(problem, start):
+    free = minimise(problem, start, ACCEL, NOTHING)
+    elsewhere = free.theta.b_a + 0.5
+    tight = minimise(problem, start, ACCEL, Prior.of(b_a=(elsewhere, 1e-5)))
+    loose = minimise(problem, start, ACCEL, Prior.of(b_a=(elsewhere, 1e3)))
+    sd = np.sqrt(np.diag(free.covariance()))[slice(*PLACES["b_a"])]
+    np.testing.assert_allclose(tight.theta.b_a, elsewhere, atol=1e-6)
+    assert (np.abs(loose.theta.b_a - free.theta.b_a) < 0.1 * sd).all()
+    assert tight.V > free.V + 1.0
+
+
+def test_a_prior_and_the_data_meet_where_their_information_says(problem, start):
+    free = minimise(problem, start, ACCEL, NOTHING, until=1e-8)
+    sd = np.sqrt(np.diag(free.covariance()))[9]
+    prior = Prior.of(b_a=(free.theta.b_a + sd * np.eye(3)[0], [sd, 1e6, 1e6]))
+    both = minimise(problem, start, ACCEL, prior, until=1e-8)
+    assert both.theta.b_a[0] - free.theta.b_a[0] == pytest.approx(0.5 * sd, rel=0.1)
+    assert np.sqrt(both.covariance()[9, 9]) == pytest.approx(sd / np.sqrt(2.0), rel=0.05)
+
+
+def test_without_turning_it_ends_and_claims_nothing():
+    recording = paper_scenario(0, rate_hz=50).recording.part(0, 500)
+    flat = flat_statistics(recording, (0, 200))
+    problem = Problem(Series.after(recording, flat), flat, 9.82)
+    prior = Prior.of(b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)))
+    minimum = minimise(problem, initialise(problem, flat.b_omega), ACCEL, prior)
+    assert np.isfinite(minimum.theta.D).all()
+    assert np.isfinite(minimum.covariance()).all()
+
+
+def test_a_cost_that_overflows_is_turned_away_from(problem, start):
+    absurd = replace(problem, series=replace(problem.series, y=1e160 * problem.series.y))
+    minimum = minimise(absurd, start, ACCEL, NOTHING)
+    assert not minimum.converged
+    assert np.isfinite(minimum.theta.D).all()

@@ -1,0 +1,122 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.calibration.stationary import QUIETEST_ACC_MPS2, find_flat, flat_statistics
+from mpucal.data import Recording
+from mpucal.simulation.scenarios import hand_scenario, paper_scenario
+
+
+def record(acc, gyr, rate_hz=100.0):
+    """A recording of rows (n, 3)."""
+    return Recording.from_arrays(np.arange(len(acc)) / rate_hz, acc, gyr)
+
+
+def parts(*spans, rate_hz=100.0, noise=(0.02, 0.002), seed=0):
+    """Consecutive spans of (seconds, mean acceleration, mean rate), with white noise."""
+    rng = np.random.default_rng(seed)
+    acc, gyr = [], []
+    for seconds, a, w in spans:
+        n = round(seconds * rate_hz)
+        acc.append(a + noise[0] * rng.standard_normal((n, 3)))
+        gyr.append(w + noise[1] * rng.standard_normal((n, 3)))
+    return record(np.concatenate(acc), np.concatenate(gyr), rate_hz)
+
+
+UP, ASIDE, REST, TURNING = np.array([0, 0, 9.8]), np.array([9.8, 0, 0]), np.zeros(3), np.array([0.6, 0, 0])
+
+
+@pytest.mark.parametrize("rate_hz", [20.0, 100.0, 1000.0])
+@pytest.mark.parametrize("make", [paper_scenario, lambda seed, rate_hz: hand_scenario(seed, "pose9", rate_hz=rate_hz)])
+def test_it_finds_the_ten_seconds_at_the_start(make, rate_hz):
+    for seed in range(3):
+        recording = make(seed, rate_hz=rate_hz).recording
+        first, last = find_flat(replace(recording, flat=None))
+        assert first <= 1.0 * rate_hz
+        # within, and most of it: what is turned slowly looks still for a moment
+        assert 8.0 * rate_hz <= last <= 10.3 * rate_hz
+
+
+def test_a_turn_at_constant_rate_has_no_variance_and_is_no_rest():
+    rate_hz, omega = 100.0, 0.3
+    t = np.arange(3000) / rate_hz
+    turning = 9.8 * np.stack([0 * t, np.sin(omega * t), np.cos(omega * t)], axis=1)
+    recording = record(turning, np.tile([omega, 0, 0], (3000, 1)))
+    assert find_flat(recording) is None
+
+
+def test_two_rests_side_by_side_are_two():
+    recording = parts((6, UP, REST), (6, ASIDE, REST))
+    first, last = find_flat(recording)
+    assert first < 100
+    assert 500 <= last <= 600
+
+
+def test_a_step_of_the_rate_ends_a_rest():
+    recording = parts((6, UP, REST), (6, UP, TURNING))
+    assert find_flat(recording)[1] <= 600
+
+
+@pytest.mark.parametrize("bias", [0.0, 1.0], ids=["no bias", "large bias"])
+def test_a_gyroscopes_bias_is_no_turn(bias):
+    assert find_flat(parts((10, UP, REST + bias)))[1] >= 900
+
+
+def test_the_earliest_rest_that_is_long_enough_is_flat_not_the_longest():
+    recording = parts((6, UP, REST), (2, UP, TURNING), (20, ASIDE, REST))
+    assert find_flat(recording)[1] <= 600
+
+
+def test_a_second_among_much_longer_rests_is_not_flat():
+    recording = parts((1, ASIDE, REST), (2, UP, TURNING), (20, UP, REST))
+    first, _ = find_flat(recording)
+    assert first >= 300
+
+
+@pytest.mark.parametrize("seconds", [0.1, 0.4])
+def test_too_short_to_tell(seconds):
+    assert find_flat(parts((seconds, UP, REST))) is None
+
+
+def test_shaking_is_not_still():
+    recording = parts((10, UP, REST), noise=(2.0, 0.5))
+    assert find_flat(recording) is None
+
+
+def test_a_noisy_sensor_may_lie_still():
+    assert find_flat(parts((10, UP, REST), (10, ASIDE, TURNING), noise=(0.3, 0.1)))[1] >= 800
+
+
+def test_a_gap_ends_a_rest():
+    recording = parts((12, UP, REST))
+    gap = np.zeros(len(recording), bool)
+    gap[600] = True
+    first, last = find_flat(replace(recording, gap=gap))
+    assert not first <= 600 < last
+
+
+def test_statistics_are_those_of_the_segment():
+    rng = np.random.default_rng(3)
+    sd_a, sd_omega = np.array([0.1, 0.2, 0.3]), np.array([0.01, 0.02, 0.03])
+    acc = [1.0, 2.0, 9.0] + sd_a * rng.standard_normal((20000, 3))
+    gyr = [0.1, 0.2, 0.3] + sd_omega * rng.standard_normal((20000, 3))
+    flat = flat_statistics(record(acc, gyr), (0, 10000))
+    assert flat.n == 10000
+    np.testing.assert_allclose(flat.y, [1.0, 2.0, 9.0], atol=0.01)
+    np.testing.assert_allclose(flat.b_omega, [0.1, 0.2, 0.3], atol=0.001)
+    np.testing.assert_allclose(np.sqrt(flat.Sigma_a), sd_a, rtol=0.03)
+    np.testing.assert_allclose(np.sqrt(flat.Sigma_omega), sd_omega, rtol=0.03)
+
+
+def test_coarse_steps_hide_noise_but_do_not_abolish_it():
+    acc = np.tile([0.0, 0.0, 9.8], (1000, 1))
+    acc[500:] += 0.06 * np.arange(500)[:, None]
+    flat = flat_statistics(record(0.06 * np.rint(acc / 0.06), np.zeros((1000, 3))), (0, 400))
+    np.testing.assert_allclose(np.sqrt(flat.Sigma_a), 0.06 / np.sqrt(12.0), rtol=1e-6)
+
+
+def test_data_without_noise_still_have_a_variance():
+    flat = flat_statistics(record(np.tile(UP, (100, 1)), np.zeros((100, 3))), (0, 50))
+    np.testing.assert_allclose(flat.Sigma_a, QUIETEST_ACC_MPS2**2)
+    assert (flat.Sigma_omega > 0).all()

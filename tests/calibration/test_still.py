@@ -1,0 +1,103 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.calibration.stationary import flat_statistics
+from mpucal.calibration.still import still_runs, without_drift
+from mpucal.data import Recording
+
+
+def found(simulated):
+    recording = simulated.recording
+    flat = flat_statistics(recording, recording.flat)
+    return recording, flat, still_runs(recording, flat)
+
+
+@pytest.mark.parametrize("motion", ["pose6", "pose9", "pose12"])
+@pytest.mark.parametrize("tremble", [False, True], ids=["set down", "trembling"])
+def test_it_finds_every_pose_and_nothing_else(hand, motion, tremble):
+    for seed in range(2):
+        simulated = hand(seed, motion, tremble=tremble)
+        recording, _, runs = found(simulated)
+        number = int(motion[4:])
+        assert number - (2 if tremble else 0) <= len(runs) <= number + (4 if tremble else 0)
+        s = simulated.specific_force
+        for a, b in runs:
+            assert b - a >= 0.3 * recording.rate_hz
+            # trembling by a degree a second at 2 Hz, a pose still is one
+            assert np.ptp(s[a:b], axis=0).max() < (0.2 if tremble else 0.01)
+
+
+def test_poses_that_follow_one_another_differ(hand):
+    simulated = hand(0, "pose12", tremble=False)
+    _, _, runs = found(simulated)
+    means = np.array([simulated.specific_force[a:b].mean(0) for a, b in runs])
+    assert (np.linalg.norm(np.diff(means, axis=0), axis=1) > 1.0).sum() >= 10
+
+
+@pytest.mark.parametrize("motion", ["continuous", "wobble100"])
+def test_a_hand_that_never_rests_has_only_the_flat_run(hand, motion):
+    _, flat, runs = found(hand(0, motion))
+    assert (runs[:, 0] < flat.last).all()
+
+
+def test_a_turn_at_constant_rate_is_no_rest():
+    rng = np.random.default_rng(0)
+    gyr = 0.001 * rng.standard_normal((2000, 3))
+    gyr[1000:, 2] += 0.5
+    acc = [0.0, 0.0, 9.8] + 0.01 * rng.standard_normal((2000, 3))
+    recording = Recording.from_arrays(0.01 * np.arange(2000), acc, gyr)
+    runs = still_runs(recording, flat_statistics(recording, (0, 900)))
+    assert runs[:, 1].max() <= 1010
+
+
+def test_a_gap_parts_a_rest(in_hand):
+    recording = in_hand.recording
+    gap = np.zeros(len(recording), bool)
+    gap[500] = True
+    flat = flat_statistics(recording, recording.flat)
+    runs = still_runs(replace(recording, gap=gap), flat)
+    assert not any(a <= 500 < b for a, b in runs)
+    assert len(runs) == len(still_runs(recording, flat)) + 1
+
+
+def test_shorter_than_a_window_has_no_runs():
+    recording = Recording.from_arrays(0.01 * np.arange(20), np.ones((20, 3)), np.zeros((20, 3)))
+    assert still_runs(recording, flat_statistics(recording, (0, 20))).shape == (0, 2)
+
+
+def drifting(in_hand, drift):
+    recording = in_hand.recording
+    return replace(recording, gyr=recording.gyr + drift(recording.t)[:, None] * [1.0, -0.5, 0.2])
+
+
+@pytest.mark.parametrize(
+    "drift",
+    [lambda t: 1e-3 * t, lambda t: 0.02 * np.sin(t / 15.0), lambda t: 0.02 * (1 - np.exp(-t / 20.0))],
+    ids=["a line", "a wave", "warming up"],
+)
+def test_drift_is_removed(in_hand, drift):
+    recording = drifting(in_hand, drift)
+    flat = flat_statistics(recording, recording.flat)
+    runs = still_runs(recording, flat)
+    mended = without_drift(recording, flat, runs)
+    for a, b in runs[1:]:
+        np.testing.assert_allclose(mended.gyr[a:b].mean(0), flat.b_omega, atol=5e-4)
+    bias = flat.b_omega - flat_statistics(in_hand.recording, recording.flat).b_omega
+    before, after = (np.abs(r.gyr - in_hand.recording.gyr - bias)[1000:] for r in (recording, mended))
+    assert np.sqrt((after**2).mean()) < 0.15 * np.sqrt((before**2).mean())
+
+
+def test_a_bias_that_stays_is_left_nearly_alone(in_hand):
+    recording = in_hand.recording
+    flat = flat_statistics(recording, recording.flat)
+    mended = without_drift(recording, flat, still_runs(recording, flat))
+    one_rest = np.sqrt(flat.Sigma_omega / 150).max()
+    assert np.abs(mended.gyr - recording.gyr).max() < 2.0 * one_rest
+
+
+def test_of_one_rest_no_drift_is_known(in_hand):
+    recording = in_hand.recording
+    flat = flat_statistics(recording, recording.flat)
+    assert without_drift(recording, flat, np.array([[0, 900]])) is recording
