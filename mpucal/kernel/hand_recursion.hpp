@@ -42,7 +42,7 @@ class HandRecursion {
       Lane A[3][3], K[3][3];
       cross_covariance(four, t, A);
       innovate(four, t, A, e, S, R);
-      const Adjugate<double> adjugate(S);
+      Adjugate<double> adjugate(S);
       multiply(adjugate.m, e, v);
       double reciprocal = 1.0 / adjugate.determinant;
       const double square = dot(e, v) * reciprocal;
@@ -52,12 +52,10 @@ class HandRecursion {
       if (!flat) squares_ += square;
       if (w < 1.0) {
         for (int a = 0; a < 3; ++a) S[kSym[a][a]] = madd(R[a], 1.0 / w - 1.0, S[kSym[a][a]]);
-        const Adjugate<double> inflated(S);
-        reciprocal = 1.0 / inflated.determinant;
-        update(A, inflated, reciprocal, e, K);
-      } else {
-        update(A, adjugate, reciprocal, e, K);
+        adjugate = Adjugate<double>(S);
+        reciprocal = 1.0 / adjugate.determinant;
       }
+      update(A, adjugate, reciprocal, e, K);
       if constexpr (kept) {
         HandPredicted& kept_four = predicted[i / 4];
         put(kept_four.w, t, w);
