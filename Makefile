@@ -10,7 +10,7 @@ session: $(READY)
 	@$(BIN)/mpucal session --bus sim
 
 test: lint
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses auto --dist loadfile
 
 lint: $(READY)
 	$(BIN)/ruff check --quiet .
