@@ -13,6 +13,7 @@ from .stationary import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
 FEWEST_SAMPLES = 50
 LEAST_TURN_RAD = np.deg2rad(20.0)
 SLOWEST_HZ = 5.0
+LONGEST_TO_LAY_DOWN_S = 10.0
 # from this many seconds between samples on, times are rather in microseconds, and in nanoseconds
 STEP_OF_MICROSECONDS, STEP_OF_NANOSECONDS = 60.0, 1e5
 FASTEST_GYRO_DPS = 4100.0
@@ -83,12 +84,11 @@ def never_still(e: Evidence) -> Reason | None:
             "table for ten seconds before you turn it",
             True,
         )
-    seconds = float(e.recording.t[e.flat.first] - e.recording.t[0])
-    if e.gravity_moved >= LEAST_TURN_RAD or e.gravity_moved_before < LEAST_TURN_RAD:
+    if not _rested_late(e):
         return None
     return Reason(
         "never_still",
-        f"the board lay still only after {seconds:.0f} s, when its turns were over; lay it on a table for ten seconds "
+        f"the board lay still only after {_seconds_before(e):.0f} s, when its turns were over; lay it on a table for ten seconds "
         "before you turn it",
         True,
     )
@@ -96,7 +96,7 @@ def never_still(e: Evidence) -> Reason | None:
 
 def hardly_turned(e: Evidence) -> Reason | None:
     """A board that was not rotated after it lay flat."""
-    if e.flat is None or e.gravity_moved_before >= LEAST_TURN_RAD > e.gravity_moved:
+    if e.flat is None or _rested_late(e):
         return None
     after = len(e.recording) - e.flat.last
     if e.gravity_moved >= LEAST_TURN_RAD and after >= FEWEST_SAMPLES:
@@ -108,6 +108,17 @@ def hardly_turned(e: Evidence) -> Reason | None:
         "turn it so that each of its sides, edges and corners points down once",
         True,
     )
+
+
+def _seconds_before(e: Evidence) -> float:
+    """s that passed before the flat segment."""
+    return 0.0 if e.flat is None else float(e.recording.t[e.flat.first] - e.recording.t[0])
+
+
+def _rested_late(e: Evidence) -> bool:
+    """Whether the turns came before the rest; a board that is laid down at the start moves gravity too, but soon."""
+    turned_before = e.gravity_moved_before >= LEAST_TURN_RAD > e.gravity_moved
+    return turned_before and _seconds_before(e) >= LONGEST_TO_LAY_DOWN_S
 
 
 def dead(code: str, sensor: str, name: str, quietest: float) -> Check:
