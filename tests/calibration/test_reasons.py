@@ -1,0 +1,417 @@
+"""One constructed recording per thing that can go wrong: verdict, code, and what the sentence tells a person."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from mpucal.calibration import calibrate
+from mpucal.calibration.quality import judge
+from mpucal.calibration.reasons import CHECKS
+from mpucal.data import Recording
+from mpucal.simulation.scenarios import paper_scenario
+
+G = 9.82
+CODES = {
+    "never_still", "few_orientations", "gyro_clipped", "accel_clipped", "data_lost", "left_handed", "swapped_axes",
+    "wrong_range", "moved_while_still", "gyro_off", "temperature_moved", "not_converged", "inconsistent",
+    "units_suspect",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A verdict and its reasons, {code: sentence} in their order."""
+
+    verdict: str
+    reasons: dict
+
+
+def judged(recording, model="auto"):
+    quality = calibrate(recording, model, G).quality
+    reasons = {reason["code"]: reason["message"] for reason in quality["reasons"]}
+    assert len(reasons) == len(quality["reasons"]), "a code came twice"
+    assert reasons.keys() <= CODES
+    for sentence in reasons.values():
+        what, _, remedy = sentence.rpartition(";")
+        assert what or "?" in remedy or ":" in remedy, f"no remedy: {sentence}"
+        assert "nan" not in sentence.split()
+        assert not sentence.endswith(".")
+    return Judged(quality["verdict"], reasons)
+
+
+def refused_for(code, recording, *words, model="auto"):
+    """Asserts the verdict, that this code is the only one, and the words of its sentence."""
+    result = judged(recording, model)
+    assert result.verdict == "refused"
+    assert list(result.reasons) == [code]
+    for word in words:
+        assert word in result.reasons[code]
+
+
+@pytest.fixture(scope="module")
+def good(ideal):
+    """A recording with nothing wrong."""
+    return ideal(0).recording
+
+
+def test_nothing_wrong_is_good(good, in_hand):
+    assert judged(good) == Judged("good", {})
+    assert judged(in_hand.recording) == Judged("good", {})
+
+
+def test_found_or_given_a_flat_part_makes_no_difference(good):
+    assert judged(replace(good, flat=None)) == Judged("good", {})
+
+
+# ---- what leaves nothing to estimate
+
+
+def test_a_board_that_was_shaken_all_along_never_lay_still(good):
+    rng = np.random.default_rng(0)
+    shaken = replace(good, gyr=good.gyr + rng.normal(0, 0.5, good.gyr.shape), flat=None)
+    refused_for("never_still", shaken, "never lay still", "table for ten seconds")
+
+
+def test_a_board_that_was_turned_from_the_first_sample_never_lay_still(good):
+    refused_for("never_still", replace(good.part(500, 1500), flat=None), "never lay still")
+
+
+def test_a_rest_that_comes_last_is_said_to_come_last(good):
+    last = Recording.from_arrays(good.t, np.roll(good.acc, -500, axis=0), np.roll(good.gyr, -500, axis=0))
+    # the turn about the vertical just before looks like a rest with another bias
+    refused_for("never_still", last, "only after 20 s", "before you turn it")
+
+
+def test_lying_still_is_not_turning(good):
+    refused_for("few_orientations", good.part(0, 520), "hardly turned", "each of its sides")
+
+
+def test_spinning_on_a_table_is_not_turning(in_hand):
+    recording = in_hand.recording
+    rng = np.random.default_rng(0)
+    spinning = recording.gyr * [0.0, 0.0, 1.0] + rng.normal(0, 0.01, recording.gyr.shape)
+    on_the_table = np.tile(recording.acc[:1000], (5, 1))
+    refused_for("few_orientations", replace(recording, acc=on_the_table, gyr=spinning), "hardly turned")
+
+
+def test_two_seconds_of_turning_are_too_few_samples(ideal):
+    fast = ideal(0, turn_s=2.0, rate_hz=20).recording
+    refused_for("few_orientations", fast.part(0, 230), "in 30 samples")
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("g", 1.0), ("mg", 1e3), ("raw counts", 16384.0), ("raw counts", 2048.0)], ids=str
+)
+def test_accelerations_in_another_unit(good, unit, factor):
+    other = replace(good, acc=good.acc / 9.80665 * factor)
+    refused_for("units_suspect", other, f"in {unit};", "convert it to m/s^2", "accelerometer")
+
+
+@pytest.mark.parametrize("flat", ["given", "found"])
+@pytest.mark.parametrize("noise_rad_s", [0.0, 0.05, 0.1], ids=["quiet", "noisy", "very noisy"])
+def test_rates_in_degrees(good, in_hand, flat, noise_rad_s):
+    rng = np.random.default_rng(0)
+    for recording in (good, in_hand.recording):
+        rates = np.rad2deg(recording.gyr + noise_rad_s * rng.standard_normal(recording.gyr.shape))
+        other = replace(recording, gyr=rates, flat=recording.flat if flat == "given" else None)
+        refused_for("units_suspect", other, "in deg/s;", "convert it to rad/s", "gyroscope")
+
+
+def test_slow_rates_in_degrees(ideal):
+    slow = ideal(0, turn_s=40.0, rate_hz=20).recording
+    assert np.rad2deg(np.abs(slow.gyr).max()) < 30
+    refused_for("units_suspect", replace(slow, gyr=np.rad2deg(slow.gyr)), "in deg/s;")
+
+
+def test_rates_in_counts(in_hand):
+    recording = in_hand.recording
+    refused_for("units_suspect", replace(recording, gyr=np.rad2deg(recording.gyr) * 131.0), "in raw counts;")
+
+
+@pytest.mark.parametrize("unit", [("milli", 1e3), ("micro", 1e6), ("nano", 1e9)], ids=lambda unit: unit[0])
+def test_times_that_are_no_seconds(good, unit):
+    name, factor = unit
+    refused_for("units_suspect", replace(good, t=good.t * factor), f"in {name}seconds", "convert them to seconds")
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
+def test_an_axis_that_is_stuck(good, axis):
+    for code, sensor, name in (("inconsistent", "accelerometer", "acc"), ("gyro_off", "gyroscope", "gyr")):
+        values = getattr(good, name).copy()
+        values[:, axis] = values[0, axis]
+        refused_for(code, replace(good, **{name: values}), f"the {sensor} reads the same on {'xyz'[axis]} in every")
+
+
+def test_a_gyroscope_that_was_not_recorded(good):
+    refused_for("gyro_off", replace(good, gyr=np.zeros_like(good.gyr)), "x and y and z", "wiring")
+
+
+def test_the_blockers_leave_unknown_what_nobody_estimated(good):
+    calibration = calibrate(good.part(0, 520), "auto", G)
+    assert np.isnan(calibration.D).all()
+    assert np.isnan(calibration.b_a).all()
+    assert calibration.fit["converged"] is False
+
+
+# ---- what an estimate shows
+
+
+@pytest.mark.parametrize(("axis", "turn"), [("x", (500, 1000)), ("y", (1000, 1500))], ids=["about x", "about y"])
+def test_of_one_turn_the_axis_turned_about_is_missing(good, pick, axis, turn):
+    k = np.arange(len(good))
+    one = pick(good, (k < 500) | ((k >= turn[0]) & (k < turn[1])))
+    one = replace(one, t=0.02 * np.arange(len(one)), flat=(0, 500))
+    result = judged(one)
+    assert result.verdict == "refused"
+    assert f"{axis} up" in result.reasons["few_orientations"]
+    assert "rest it in more orientations" in result.reasons["few_orientations"]
+    # what is not known says nothing of the sensor
+    assert result.reasons.keys() <= {"few_orientations", "not_converged"}
+
+
+def test_six_faces_by_hand_are_usable(hand):
+    result = judged(hand(0, "pose6").recording)
+    assert result.verdict == "usable"
+    assert "few_orientations" in result.reasons
+
+
+@pytest.mark.parametrize("degrees_a_second", [125, 250])
+def test_a_clipped_gyroscope_is_named(hand, degrees_a_second):
+    recording = hand(3, "pose12").recording
+    limit = np.deg2rad(degrees_a_second)
+    factor = degrees_a_second / 125  # as fast a hand as the range is wide
+    faster = replace(recording, t=recording.t / factor, gyr=recording.gyr * factor)
+    clipped = replace(faster, gyr=np.clip(faster.gyr, -limit, limit))
+    count = int((np.abs(clipped.gyr) == limit).any(1).sum())
+    result = judged(clipped)
+    assert result.verdict != "good"
+    assert f"{count} samples" in result.reasons["gyro_clipped"]
+    assert "turn more slowly" in result.reasons["gyro_clipped"]
+
+
+def test_a_clipped_accelerometer_is_named(good):
+    acc = good.acc.copy()
+    acc[[700, 901, 1102], 0] = 2 * 9.80665  # knocks
+    result = judged(replace(good, acc=acc))
+    assert result.verdict == "usable"
+    assert list(result.reasons) == ["accel_clipped"]
+    assert "in 3 samples" in result.reasons["accel_clipped"]
+    assert "move more gently" in result.reasons["accel_clipped"]
+
+
+def test_a_range_that_is_too_small_for_gravity_is_refused(ideal):
+    recording = ideal(0, D=2.1 * np.eye(3)).recording
+    limit = 2 * 9.80665
+    result = judged(replace(recording, acc=np.clip(recording.acc, -limit, limit)))
+    assert result.verdict == "refused"
+    assert "choose a larger range" in result.reasons["accel_clipped"]
+
+
+def test_lost_samples_are_counted_and_mended(ideal, pick):
+    simulated = ideal(0)
+    kept = np.ones(len(simulated.recording), bool)
+    kept[700:710] = kept[1100:1130] = False
+    result = judged(pick(simulated.recording, kept))
+    assert result.verdict == "usable"
+    assert "in 2 places (0.84 s in all)" in result.reasons["data_lost"]
+    assert "faster bus or a lower rate" in result.reasons["data_lost"]
+
+
+def test_a_recording_that_is_mostly_lost_is_refused(good, pick):
+    kept = np.ones(len(good), bool)
+    kept[600:1900] = False
+    assert judged(pick(good, kept)).verdict == "refused"
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
+def test_a_mirrored_axis_is_named(ideal, axis):
+    signs = np.ones(3)
+    signs[axis] = -1.0
+    recording = ideal(0, D=np.diag(signs)).recording
+    refused_for("left_handed", recording, f"change the sign of its {'xyz'[axis]} axis")
+    assert judged(replace(recording, acc=recording.acc * signs)).verdict == "good", "the remedy helps"
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
+def test_a_mirrored_axis_is_named_in_a_hand(in_hand, axis):
+    signs = np.ones(3)
+    signs[axis] = -1.0
+    mirrored = replace(in_hand.recording, acc=in_hand.recording.acc * signs)
+    refused_for("left_handed", mirrored, f"sign of its {'xyz'[axis]} axis")
+
+
+@pytest.mark.parametrize(
+    ("order", "named"),
+    [
+        ((1, 0, 2), "y, x, z"),
+        ((2, 1, 0), "z, y, x"),
+        ((0, 2, 1), "x, z, y"),
+        ((1, 2, 0), "y, z, x"),
+        ((2, 0, 1), "z, x, y"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_swapped_axes_are_named(ideal, order, named):
+    recording = ideal(0, D=np.eye(3)[list(order)]).recording
+    refused_for("swapped_axes", recording, f"along the gyroscope's {named}:")
+    put_right = recording.acc[:, np.argsort(order)]
+    assert judged(replace(recording, acc=put_right)).verdict == "good", "the remedy helps"
+
+
+def test_axes_turned_by_a_right_angle_are_swapped_with_a_sign(ideal):
+    about_z = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    refused_for("swapped_axes", ideal(0, D=about_z).recording, "y, -x, z")
+
+
+def test_axes_askew_by_30_degrees_are_legitimate():
+    for seed in range(10):
+        assert (
+            judged(paper_scenario(seed, rate_hz=50).recording)
+            .reasons.keys()
+            .isdisjoint({"left_handed", "swapped_axes", "wrong_range"})
+        )
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_wrong_range_is_named(ideal, factor):
+    recording = ideal(0, D=factor * np.diag([0.98, 1.01, 1.03])).recording
+    refused_for("wrong_range", recording, f"near {factor:g}", "give the true range")
+    assert judged(replace(recording, acc=recording.acc / factor)).verdict == "good", "the remedy helps"
+
+
+@pytest.mark.parametrize(
+    "gains", [(0.5, 1.0, 1.5), (0.5, 0.5, 0.6), (1.5, 1.5, 1.5), (0.54, 0.54, 0.54), (1.05, 0.95, 1.0)], ids=str
+)
+def test_gains_that_are_no_power_of_two_are_legitimate(ideal, gains):
+    assert judged(ideal(0, D=np.diag(gains)).recording) == Judged("good", {})
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
+def test_a_board_that_moved_while_it_should_lie(good, axis):
+    acc = good.acc.copy()
+    acc[250:500, axis] += 2.0
+    result = judged(replace(good, acc=acc))
+    assert result.verdict == "refused"
+    assert f"({'xyz'[axis]} changed by 2 m/s^2" in result.reasons["moved_while_still"]
+    assert "take the hands off" in result.reasons["moved_while_still"]
+
+
+def test_a_flat_part_that_is_found_leaves_out_where_it_moved(good):
+    acc = good.acc.copy()
+    acc[:50, 1] += 0.8
+    assert "moved_while_still" not in judged(replace(good, acc=acc, flat=None)).reasons
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
+def test_a_gyroscope_beyond_its_data_sheet_is_named(hand, axis):
+    recording = hand(3, "pose12").recording
+    scale = np.ones(3)
+    scale[axis] = 1 / 1.2
+    result = judged(replace(recording, gyr=recording.gyr * scale))
+    assert result.verdict == "usable"
+    assert list(result.reasons) == ["gyro_off"]
+    assert f"% on {'xyz'[axis]} " in result.reasons["gyro_off"]
+    off = float(result.reasons["gyro_off"].split("off by ")[1].split("%")[0])
+    assert off == pytest.approx(20.0, abs=4.0)
+    assert "check its range and the sample rate" in result.reasons["gyro_off"]
+
+
+@pytest.mark.parametrize(("to", "verdict"), [(23.0, "good"), (32.0, "usable")])
+def test_warming_up_is_named(good, to, verdict):
+    warming = replace(good, temperature_c=np.linspace(20.0, to, len(good)))
+    result = judged(warming)
+    assert result.verdict == verdict
+    assert ("temperature_moved" in result.reasons) == (verdict == "usable")
+    if verdict == "usable":
+        assert "from 20.2 to 31.8 C" in result.reasons["temperature_moved"]
+        assert "warm up first" in result.reasons["temperature_moved"]
+
+
+def test_one_glitch_of_the_thermometer_is_no_warming(good):
+    temperature = np.full(len(good), 25.0)
+    temperature[7] = 90.0
+    assert judged(replace(good, temperature_c=temperature)).verdict == "good"
+
+
+def test_algorithm_1_on_slow_turns_does_not_settle():
+    recording = paper_scenario(5, rate_hz=10, turn_s=40).recording
+    result = judged(recording, "paper")
+    assert result.verdict == "refused"
+    assert "iterations" in result.reasons["not_converged"]
+    assert "record again" in result.reasons["not_converged"]
+    assert "not_converged" not in judged(recording, "accel").reasons
+
+
+@pytest.mark.parametrize("model", ["accel", "imu"])
+def test_a_hand_is_inconsistent_with_a_model_that_knows_none(in_hand, model):
+    result = judged(in_hand.recording, model)
+    assert result.verdict == "usable"
+    assert list(result.reasons) == ["inconsistent"]
+    assert "expected 3" in result.reasons["inconsistent"]
+    assert "--model hand" in result.reasons["inconsistent"]
+
+
+def test_rests_that_contradict_each_other_are_inconsistent(in_hand):
+    recording = in_hand.recording
+    # the sensor slips on its board: what the gyroscope measured belongs to other moves
+    gyr = np.concatenate([recording.gyr[:1000], recording.gyr[1000:][::-1]])
+    result = judged(replace(recording, gyr=gyr))
+    assert result.verdict == "refused"
+    assert "the rests contradict each other" in result.reasons["inconsistent"]
+    assert result.reasons.keys().isdisjoint({"swapped_axes", "left_handed", "gyro_off", "wrong_range"})
+
+
+def test_every_check_is_silent_before_there_is_anything_to_judge(good, monkeypatch):
+    from mpucal.calibration.evidence import Evidence
+
+    nothing = Evidence(good, G, None, None, "auto")
+    assert [reason.code for check in CHECKS if (reason := check(nothing))] == ["never_still"]
+    assert judge(nothing)["verdict"] == "refused"
+
+
+# ---- the traps of real recordings
+
+
+def test_a_real_gyroscope_that_clipped_is_named(real):
+    result = judged(real("mpu6050_session"))
+    assert result.verdict == "usable"
+    assert "18 samples" in result.reasons["gyro_clipped"]
+
+
+def test_a_real_board_that_lay_still_is_not_calibrated(real):
+    refused_for("few_orientations", real("mpu6050_static"), "hardly turned")
+
+
+def test_a_real_single_turn_is_not_enough(real):
+    result = judged(real("mpu6050_turn90"))
+    assert result.verdict == "refused"
+    assert "x up" in result.reasons["few_orientations"]
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
+def test_a_real_sensors_flipped_axis_is_named(real, axis):
+    recording = real("mpu9150_a").part(0, 9000)
+    signs = np.ones(3)
+    signs[axis] = -1.0
+    result = judged(replace(recording, acc=recording.acc * signs))
+    assert result.verdict == "refused"
+    assert f"sign of its {'xyz'[axis]} axis" in result.reasons["left_handed"]
+
+
+def test_real_rates_in_degrees(real):
+    recording = real("mpu9150_b")
+    refused_for("units_suspect", replace(recording, gyr=np.rad2deg(recording.gyr)), "in deg/s;")
+
+
+def test_missing_rates_drawn_as_a_line_do_not_pass_for_good(real):
+    recording = real("mpu9150_a")
+    gyr = recording.gyr.copy()
+    first = 5000
+    lost = slice(first, first + 1200)
+    share = np.linspace(0.0, 1.0, 1200)[:, None]
+    gyr[lost] = (1.0 - share) * gyr[first] + share * gyr[first + 1200]
+    plain, spoilt = calibrate(recording, "auto", 9.81), calibrate(replace(recording, gyr=gyr), "auto", 9.81)
+    if spoilt.verdict == "good":
+        np.testing.assert_allclose(spoilt.D, plain.D, atol=0.01)
+        np.testing.assert_allclose(spoilt.b_a, plain.b_a, atol=0.05)
