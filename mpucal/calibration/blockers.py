@@ -88,8 +88,8 @@ def never_still(e: Evidence) -> Reason | None:
         return None
     return Reason(
         "never_still",
-        f"the board lay still only after {_seconds_before(e):.0f} s, when its turns were over; lay it on a table for ten seconds "
-        "before you turn it",
+        f"the board lay still only after {_seconds_before(e):.0f} s, when its turns were over; lay it on a table for "
+        "ten seconds before you turn it",
         True,
     )
 
