@@ -1,0 +1,115 @@
+"""The facts that a verdict rests on, against what the recordings were made from."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.calibration.evidence import Evidence
+from mpucal.calibration.model import B_A_NAMES, D_NAMES, Fit
+from mpucal.calibration.stationary import flat_statistics
+
+G = 9.82
+
+
+def exact_fit(truth, sd=1e-3):
+    """A fit that found the truth."""
+    return Fit(
+        truth.D,
+        truth.b_a,
+        truth.b_omega,
+        truth.K,
+        names=D_NAMES + B_A_NAMES,
+        covariance=sd**2 * np.eye(12),
+        iterations=1,
+        converged=True,
+        nis=3.0,
+        V=0.0,
+    )
+
+
+def evidence(recording, fit=None, flat=True):
+    statistics = flat_statistics(recording, recording.flat) if flat else None
+    return Evidence(recording, G, statistics, fit, "auto")
+
+
+def test_calibrated_at_the_truth_the_recording_is_gravity_and_noise(ideal):
+    simulated = ideal(0)
+    seen = evidence(simulated.recording, exact_fit(simulated.truth))
+    off = seen.calibrated - simulated.specific_force
+    assert np.abs(off.mean(0)).max() < 0.01
+    np.testing.assert_allclose(off.std(0), 0.1, rtol=0.1)
+
+
+def test_the_rests_of_a_hand_agree_at_the_truth(in_hand):
+    rests = evidence(in_hand.recording, exact_fit(in_hand.truth)).rests
+    assert rests.number >= 12
+    assert rests.magnitude_rms < 0.01
+    assert rests.miss_median < np.deg2rad(0.2)
+    assert rests.miss_max < np.deg2rad(1.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "grows"),
+    [
+        (lambda truth: {"D": truth.D * 1.02}, "magnitude_rms"),
+        (lambda truth: {"b_a": truth.b_a + 0.3}, "magnitude_rms"),
+        (lambda truth: {"K": truth.K * 1.05}, "miss_median"),
+    ],
+    ids=["a wrong gain", "a wrong bias", "a wrong gyroscope"],
+)
+def test_away_from_the_truth_they_disagree(in_hand, change, grows):
+    truth = in_hand.truth
+    right = evidence(in_hand.recording, exact_fit(truth)).rests
+    wrong = evidence(in_hand.recording, exact_fit(replace(truth, **change(truth)))).rests
+    assert getattr(wrong, grows) > 5.0 * getattr(right, grows)
+
+
+def test_a_wrong_gain_of_two_percent_is_measured_as_such(in_hand):
+    truth = in_hand.truth
+    rests = evidence(in_hand.recording, exact_fit(replace(truth, D=truth.D * 1.02))).rests
+    assert rests.magnitude_rms == pytest.approx(G * 0.02 / 1.02, rel=0.1)
+
+
+def test_without_rests_there_is_nothing_to_compare(hand):
+    simulated = hand(0, "continuous")
+    assert evidence(simulated.recording, exact_fit(simulated.truth)).rests is None
+
+
+@pytest.mark.parametrize("broken", [{"D": np.zeros((3, 3))}, {"D": np.full((3, 3), np.nan)}], ids=["singular", "nan"])
+def test_a_fit_without_a_usable_matrix_is_sure_of_nothing(in_hand, broken):
+    fit = replace(exact_fit(in_hand.truth), **broken)
+    seen = evidence(in_hand.recording, fit)
+    assert seen.sure is None
+    assert seen.calibrated is None
+    assert seen.rests is None
+
+
+def test_how_far_gravity_moved(ideal):
+    simulated = ideal(0)
+    recording = simulated.recording
+    assert np.rad2deg(evidence(recording.part(0, 600)).gravity_moved) == pytest.approx(72.0, abs=12.0)
+    assert np.rad2deg(evidence(recording).gravity_moved) > 160.0
+    assert evidence(recording).gravity_moved_before == 0.0
+    later = replace(recording, flat=(1800, 2000))
+    assert np.rad2deg(evidence(later).gravity_moved_before) > 160.0
+    assert evidence(later).gravity_moved == 0.0
+
+
+@pytest.mark.parametrize("flat", [True, False], ids=["flat known", "flat not found"])
+@pytest.mark.parametrize("motion", ["paper", "pose12", "continuous", "turns"])
+def test_rates_in_degrees_are_told_from_rates_in_radians(ideal, hand, motion, flat):
+    recording = ideal(0).recording if motion == "paper" else hand(0, motion).recording
+    in_degrees = replace(recording, gyr=np.rad2deg(recording.gyr))
+    assert not evidence(recording, flat=flat).turned_in_degrees
+    assert evidence(in_degrees, flat=flat).turned_in_degrees
+
+
+def test_turns_about_the_vertical_and_noise_are_no_degrees(in_hand):
+    recording = in_hand.recording
+    rng = np.random.default_rng(0)
+    upright = np.tile(recording.acc[:1000], (5, 1))
+    spinning = np.where(np.arange(5000)[:, None] < 1000, 0.0, [0.0, 0.0, 5.0])
+    assert not evidence(replace(recording, acc=upright, gyr=recording.gyr * 0 + spinning)).turned_in_degrees
+    noisy = recording.gyr + 2.0 * rng.standard_normal(recording.gyr.shape)
+    assert not evidence(replace(recording, gyr=noisy)).turned_in_degrees

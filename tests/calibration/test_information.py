@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+
+from mpucal.calibration.information import uncertainty
+
+G = 9.82
+D = np.array([[1.1, 0.05, -0.1], [0.2, 0.8, 0.0], [-0.05, 0.1, 0.9]])
+
+
+def covariance(seed=0, size=0.01):
+    A = size * np.random.default_rng(seed).standard_normal((12, 12))
+    return A @ A.T / 12
+
+
+def test_it_is_the_spread_of_calibrated_measurements():
+    C = covariance()
+    rng = np.random.default_rng(1)
+    s = rng.standard_normal((4000, 3))
+    s *= G / np.linalg.norm(s, axis=1, keepdims=True)
+    drawn = rng.multivariate_normal(np.concatenate([D.ravel(), np.zeros(3)]), C, 4000)
+    y = s @ D.T
+    calibrated = np.linalg.solve(drawn[:, :9].reshape(-1, 3, 3), (y - drawn[:, 9:])[..., None])[..., 0]
+    error = calibrated - s
+    sure = uncertainty(D, C, G)
+    assert sure.rms_mps2 == pytest.approx(np.sqrt((error**2).sum(1).mean()), rel=0.03)
+    along = np.linalg.norm(calibrated, axis=1) - G
+    assert sure.magnitude_mps2 == pytest.approx(np.sqrt((along**2).mean()), rel=0.03)
+    cosine = (calibrated * s).sum(1) / np.linalg.norm(calibrated, axis=1) / G
+    assert sure.direction_rad == pytest.approx(np.sqrt((np.arccos(cosine) ** 2).mean()), rel=0.03)
+
+
+def test_a_bias_alone_is_equally_bad_everywhere():
+    C = np.zeros((12, 12))
+    C[9:, 9:] = 0.04 * np.eye(3)
+    sure = uncertainty(np.eye(3), C, G)
+    assert sure.rms_mps2 == pytest.approx(0.2 * np.sqrt(3.0))
+    assert sure.worst_mps2 == pytest.approx(0.2 * np.sqrt(3.0))
+    assert sure.magnitude_mps2 == pytest.approx(0.2)
+    assert sure.direction_rad == pytest.approx(0.2 * np.sqrt(2.0) / G)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
+def test_a_gain_that_is_not_known_is_worst_along_its_axis(axis):
+    C = 1e-8 * np.eye(12)
+    C[4 * axis, 4 * axis] = 0.01**2
+    sure = uncertainty(np.eye(3), C, G)
+    assert abs(sure.worst[axis]) > 0.95
+    assert sure.worst_mps2 == pytest.approx(0.01 * G, rel=0.05)
+    assert np.linalg.norm(sure.worst) == pytest.approx(1.0)
+
+
+def test_twice_the_standard_deviation_is_twice_the_error():
+    one, two = uncertainty(D, covariance(), G), uncertainty(D, 4.0 * covariance(), G)
+    for name in ("rms_mps2", "magnitude_mps2", "direction_rad", "worst_mps2"):
+        assert getattr(two, name) == pytest.approx(2.0 * getattr(one, name))
+
+
+def test_a_rotation_of_the_sensor_is_an_error_of_direction_alone():
+    # D exp([phi]x) with an unknown turn phi about z
+    d_D = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]).ravel()
+    C = np.zeros((12, 12))
+    C[:9, :9] = 1e-4 * np.outer(d_D, d_D)
+    sure = uncertainty(np.eye(3), C, G)
+    assert sure.magnitude_mps2 < 1e-9
+    assert sure.direction_rad == pytest.approx(0.01 * np.sqrt(2.0 / 3.0), rel=0.01)
+    assert abs(sure.worst[2]) < 0.1
