@@ -1,0 +1,188 @@
+"""The one function that everything calls: what it promises whatever it is given."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from mpucal.calibration import MODELS, calibrate
+from mpucal.data import Recording, Sensor
+from mpucal.errors import MpucalError, UsageError
+from mpucal.simulation.metrics import sph_rms
+from mpucal.simulation.scenarios import hand_scenario, paper_scenario
+
+G = 9.82
+
+
+def numbers(calibration):
+    """Everything of the document but the time it was made."""
+    return {key: value for key, value in calibration.document().items() if key != "created"}
+
+
+@pytest.mark.parametrize("model", ["accel", "imu", "hand", "auto"])
+@pytest.mark.parametrize("scene", ["paper", "pose12", "continuous"])
+def test_the_same_recording_twice_gives_the_same_bits(hand, model, scene):
+    recording = (paper_scenario(0, rate_hz=50) if scene == "paper" else hand(1, scene)).recording
+    first, second = calibrate(recording, model, G), calibrate(recording, model, G)
+    for name in ("D", "b_a", "K", "b_omega", "D_std", "b_a_std", "K_std"):
+        assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
+    assert numbers(first) == numbers(second)
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_the_other_simulators_sensors_are_found_and_their_flat_part_too(other_simulator, number):
+    other = other_simulator(f"paper_{number}")
+    given_flat = calibrate(other.recording, "auto", G)
+    found = calibrate(replace(other.recording, flat=None), "auto", G)
+    for calibration in (given_flat, found):
+        assert calibration.verdict == "good"
+        assert calibration.fit["model"] == "accel"
+        assert sph_rms(other.truth, calibration.D, calibration.b_a) < 0.2
+    # nearly the same: ten seconds of rest are not always found whole
+    assert (np.abs(found.D - given_flat.D) < 1.0 * given_flat.D_std).all()
+    assert (np.abs(found.b_a - given_flat.b_a) < 1.0 * given_flat.b_a_std).all()
+
+
+def test_when_it_began_makes_no_difference(ideal):
+    recording = ideal(0).recording
+    late = replace(recording, t=recording.t + 86400.0)
+    np.testing.assert_allclose(calibrate(late, "auto", G).D, calibrate(recording, "auto", G).D, atol=1e-7)
+
+
+@pytest.mark.parametrize("scene", ["paper", "pose12"])
+def test_jittered_times_are_measured_times(scene):
+    """A jitter of the clock that is written down does no harm: the motion is sampled where the times say."""
+    simulated = paper_scenario(0, rate_hz=200) if scene == "paper" else hand_scenario(1, scene, rate_hz=200)
+    recording, truth = simulated.recording, simulated.truth
+    rng = np.random.default_rng(0)
+    # one of each two samples: 5, 10 or 15 ms apart
+    kept = np.arange(0, len(recording), 2) + rng.integers(0, 2, len(recording) // 2)
+    thin = Recording.from_arrays(recording.t[kept], recording.acc[kept], recording.gyr[kept], flat=(0, 1000))
+    plain, jittered = calibrate(recording, "auto", G), calibrate(thin, "auto", G)
+    limit = 3.0 * sph_rms(truth, plain.D, plain.b_a) + 0.01
+    assert sph_rms(truth, jittered.D, jittered.b_a) < limit
+
+
+def test_the_document_says_what_was_done(ideal):
+    simulated = ideal(0)
+    recording = replace(simulated.recording, sensor=Sensor(chip="mpu6050", rate_hz=50.0))
+    calibration = calibrate(recording, "auto", G)
+    fit, document = calibration.fit, json.loads(calibration.json())
+    assert (fit["model"], fit["parameters"], fit["converged"], fit["gravity"]) == ("accel", 17, True, G)
+    assert (fit["samples"], fit["seconds"]) == (2000, pytest.approx(39.98))
+    assert 2.7 < fit["nis"] < 3.3
+    assert document["sensor"]["chip"] == "mpu6050"
+    np.testing.assert_allclose(calibration.noise_std, 0.1, rtol=0.1)
+    np.testing.assert_allclose(calibration.gyro_noise_std, 0.03, rtol=0.1)
+    assert document["gyroscope"]["K"] == np.eye(3).tolist()
+    assert document["gyroscope"]["K_std"] == [[None] * 3] * 3  # not estimated
+    after, before = document["quality"]["magnitude_after"], document["quality"]["magnitude_before"]
+    assert after["median"] == pytest.approx(G, abs=0.02)
+    assert after["std"] < before["std"]
+    claimed = document["quality"]["error_std"]["rms"]
+    assert sph_rms(simulated.truth, calibration.D, calibration.b_a) < 3.0 * claimed
+    calibrated = calibration.apply(recording.acc)
+    assert np.median(np.linalg.norm(calibrated, axis=1)) == pytest.approx(after["median"])
+
+
+@pytest.mark.parametrize("model", ["accel", "imu", "hand"])
+def test_a_model_that_was_asked_for_is_used(ideal, model):
+    calibration = calibrate(ideal(0).recording, model, G)
+    assert calibration.fit["model"] == model
+    assert calibration.fit["why"] == "asked for"
+
+
+def test_no_such_model(ideal):
+    with pytest.raises(UsageError, match="choose one of auto, hand, imu, accel, paper"):
+        calibrate(ideal(0).recording, "magic", G)
+
+
+@pytest.mark.parametrize("gravity", [0.0, -9.81, np.nan, np.inf])
+def test_no_such_gravity(ideal, gravity):
+    with pytest.raises(UsageError, match="give the local gravity"):
+        calibrate(ideal(0).recording, "auto", gravity)
+
+
+# ---- whatever it is given
+
+SCENES = {
+    "paper": lambda: paper_scenario(1, rate_hz=25).recording,
+    "pose6": lambda: hand_scenario(1, "pose6", rate_hz=25).recording,
+    "continuous": lambda: hand_scenario(1, "continuous", rate_hz=25).recording,
+}
+MADE: dict[str, Recording] = {}
+
+# units that are wrong, and numbers no sensor reads
+FACTORS = (1.0, 1.0, 1.0, 1e-300, 1e-30, 1e-3, 1 / 9.80665, 57.3, 1e3, 1e11, 1e150)
+ends = st.floats(0.0, 1.0)
+
+
+@st.composite
+def recordings(draw):
+    """Recordings of simulated sensors, ill-treated."""
+    name = draw(st.sampled_from(sorted(SCENES)))
+    base = MADE.setdefault(name, SCENES[name]())
+    n, rng = len(base), np.random.default_rng(draw(st.integers(0, 2**16)))
+    faster = draw(st.sampled_from((1.0, 1.0, 0.8, 4.0, 160.0)))  # 20 Hz to 4 kHz
+    jitter = draw(st.sampled_from((0.0, 0.0, 0.3, 0.99)))
+    t = (base.t + jitter * 0.04 * rng.uniform(-0.5, 0.5, n)) / faster
+    acc = (base.acc + draw(st.sampled_from((0.0, 1e-3, 1e-1, 1e1))) * rng.standard_normal((n, 3))) * draw(
+        st.sampled_from(FACTORS)
+    )
+    gyr = (base.gyr * faster + draw(st.sampled_from((0.0, 1e-4, 1e-2, 1.0))) * rng.standard_normal((n, 3))) * draw(
+        st.sampled_from((*FACTORS, 0.0))
+    )
+    for values in (acc, gyr):
+        if draw(st.integers(0, 5)) == 0:
+            axis = draw(st.integers(0, 2))
+            values[:, axis] = draw(st.sampled_from((0.0, 5.0, values[0, axis])))
+    kept = np.ones(n, bool)
+    for _ in range(draw(st.sampled_from((0, 0, 1, 4)))):
+        first = int(draw(ends) * n)
+        kept[first : first + draw(st.integers(1, n // 3))] = False
+    if draw(st.integers(0, 3)) == 0:
+        first, last = sorted((int(draw(ends) * n), int(draw(ends) * n)))
+        kept[:first] = kept[last + 2 :] = False
+    if draw(st.integers(0, 5)) == 0:
+        kept[np.flatnonzero(kept)[draw(st.integers(2, 60)) :]] = False
+    kept[:2] |= kept.sum() < 2
+    m = int(kept.sum())
+    flat = draw(st.sampled_from((None, "start", "any")))
+    if flat == "any":
+        first = draw(st.integers(0, m - 1))
+        flat = (first, draw(st.integers(first + 1, m)))
+    elif flat == "start":
+        flat = (0, max(int(kept[: n // 4].sum()), 1))
+    if draw(st.integers(0, 9)) == 0:
+        t = t * draw(st.sampled_from((1e-9, 1e-3, 1e3, 1e9)))
+    return t[kept], acc[kept], gyr[kept], flat
+
+
+@settings(
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    database=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+)
+@given(recordings(), st.sampled_from([model for model in MODELS if model != "paper"]))
+def test_whatever_is_recorded_there_is_a_verdict(arrays, model):
+    try:
+        recording = Recording.from_arrays(*arrays)
+    except MpucalError as error:
+        assert str(error).endswith(".")
+        return
+    calibration = calibrate(recording, model, G)
+    document = json.loads(calibration.json(), parse_constant=pytest.fail)
+    assert document["quality"]["verdict"] in ("good", "usable", "refused")
+    if calibration.verdict == "refused":
+        assert document["quality"]["reasons"]
+    else:
+        for name in ("D", "b_a", "D_std", "b_a_std", "b_omega", "K"):
+            assert np.isfinite(getattr(calibration, name)).all(), name
+        assert np.linalg.det(calibration.D) > 0
+    for reason in document["quality"]["reasons"]:
+        assert not {"nan", "inf", "-inf"} & set(reason["message"].replace("(", " ").split())
