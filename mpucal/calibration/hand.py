@@ -31,9 +31,9 @@ ROUGHLY, MOST_ROUGHLY = 0.05, 20
 FIRST_MPS2 = 0.3
 WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
 PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
-# A pivot travels farther than a bounded position of one lambda, the more the wilder it is: factors of sigma and its
-# square for the estimate, and for what its covariance admits.
-FARTHER, HONEST = (1.5, 0.5), (5.0, 0.0)
+# A pivot travels farther than a bounded position of one lambda, the more the wilder it is: sigma (1.5 + 0.5 sigma) for
+# the estimate, and five times that for what its covariance admits.
+FARTHER, FARTHER_STILL, HONEST = 1.5, 0.5, 5.0
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,6 @@ class Noise:
             return scene.pivot(self.sigma, FLOOR_MPS2)
         return scene.white(self.sigma, CORRELATION_S if self.kind == "white" else 0.0)
 
-    def farther(self, factors: tuple[float, float]) -> Noise:
-        """The same kind of noise, larger by factors of sigma and its square."""
-        return replace(self, sigma=(factors[0] + factors[1] * self.sigma) * self.sigma)
-
 
 def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     """D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves."""
@@ -61,7 +57,7 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     theta, noise = search.run(initialise(fine.problem, fine.flat.b_omega))
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
         noise = Noise("white", _likeliest(fine.white, _near(noise.sigma), theta))
-    problem, doubt = noise.problem(fine), noise.farther(HONEST).problem(fine)
+    problem, doubt = noise.problem(fine), replace(noise, sigma=HONEST * noise.sigma).problem(fine)
     factor = q_scale_of_moves(fine.recording, fine.flat, problem.series, theta, fine.runs, gravity)
     if factor is not None:
         problem, doubt = (replace(p, series=replace(p.series, q_scale=factor)) for p in (problem, doubt))
@@ -110,7 +106,7 @@ class _Search:
             sigma = _likeliest(scene.pivot, PIVOT_MPS2, theta)
             theta = self._roughly(scene.pivot(sigma), theta)
             sigma = _likeliest(scene.pivot, PIVOT_MPS2, theta)
-            noise = Noise("pivot", sigma).farther(FARTHER)
+            noise = Noise("pivot", (FARTHER + FARTHER_STILL * sigma) * sigma)
         return self._roughly(noise.problem(scene), theta), noise
 
     def _roughly(self, problem: Problem, theta: Theta) -> Theta:
