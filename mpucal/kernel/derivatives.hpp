@@ -50,68 +50,84 @@ class Derivatives {
       const int t = i % 4;
       Lane(*const of_four)[G] = rows + i / 4 * kRowsOfFour;
       if (t == 0) information_in_S<g>(c, P, of_four);
-      differentiate<g>(c, t, s, P, gradient, of_four + 6 + 3 * t);
+      measure<g>(c, t, s, P, gradient, of_four + 6 + 3 * t);
+      Lane next_s[3], next_P[6];
+      carry_s<g>(c, t, s, P, next_s);
+      carry_P<g>(c, t, P, next_P);
+      add_process_noise(c, t, next_s, next_P);
+      for (int a = 0; a < 3; ++a) s[a] = next_s[a];
+      for (int m = 0; m < 6; ++m) P[m] = next_P[m];
     }
     for (int a = 0; a < 3; ++a) ds_[g][a] = s[a];
     for (int m = 0; m < 6; ++m) dP_[g][m] = P[m];
     gradient_[g] = gradient;
   }
 
+  // -L^-1 de, a row of the Fisher matrix for each component, and V
   template <int g>
-  MPUCAL_INLINE static void differentiate(const Coefficients& c, int t, Lane (&s)[3], Lane (&P)[6], Lane& gradient,
-                                          Lane (*rows)[G]) {
-    Lane e[3], new_s[3], new_P[6], x[3], WP[3][3];
-    direct<g>(c, t, e, new_s, new_P);
-    // L^-1 de, and V
+  MPUCAL_INLINE static void measure(const Coefficients& c, int t, const Lane (&s)[3], const Lane (&P)[6],
+                                    Lane& gradient, Lane (*rows)[G]) {
+    Lane e[3];
     for (int a = 0; a < 3; ++a) {
-      for (int b = 0; b < 3; ++b) e[a] = nmadd(at(c.T[a][b], t), s[b], e[a]);
+      e[a] = madd(at(c.T[a][2], t), s[2], madd(at(c.T[a][1], t), s[1], at(c.T[a][0], t) * s[0]));
+      if constexpr (g < 3)
+        if (a >= g) e[a] = madd(at(c.white[a][g], t), c.q[t], e[a]);
       rows[a][g] = e[a];
     }
     Lane by_P = at(c.dV[0], t) * P[0], by_e = at(c.residual[0], t) * e[0];
     for (int m = 1; m < 6; ++m) by_P = madd(at(c.dV[m], t), P[m], by_P);
     for (int a = 1; a < 3; ++a) by_e = madd(at(c.residual[a], t), e[a], by_e);
     if constexpr (g < 3) by_P = by_P + c.dV_dD[t][g];
-    gradient = gradient + (by_P + by_e);
+    gradient = gradient + (by_P - by_e);
+  }
 
+  // F N W (ds + dP z), what the parameters do of themselves in D and b_a, and eta x s
+  template <int g>
+  MPUCAL_INLINE static void carry_s(const Coefficients& c, int t, const Lane (&s)[3], const Lane (&P)[6],
+                                    Lane (&out)[3]) {
+    Lane x[3];
     for (int a = 0; a < 3; ++a) {
       x[a] = s[a];
       for (int b = 0; b < 3; ++b) x[a] = madd(at(c.z[b], t), P[kSym[a][b]], x[a]);
     }
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) new_s[a] = madd(at(c.FNW[a][b], t), x[b], new_s[a]);
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b)
-        WP[a][b] = madd(at(c.FW[a][2], t), P[kSym[2][b]],
-                        madd(at(c.FW[a][1], t), P[kSym[1][b]], at(c.FW[a][0], t) * P[kSym[0][b]]));
-    for (int m = 0; m < 6; ++m)
-      for (int k = 0; k < 3; ++k) new_P[m] = madd(at(c.FW[kCol[m]][k], t), WP[kRow[m]][k], new_P[m]);
-    add_process_noise(c, t, new_s, new_P);
-    for (int a = 0; a < 3; ++a) s[a] = new_s[a];
-    for (int m = 0; m < 6; ++m) P[m] = new_P[m];
+    for (int a = 0; a < 3; ++a) {
+      out[a] = madd(at(c.FNW[a][2], t), x[2], madd(at(c.FNW[a][1], t), x[1], at(c.FNW[a][0], t) * x[0]));
+      if constexpr (g < 3)
+        out[a] = nmadd(at(c.FNK[a][g], t), c.q_plus[t], madd(at(c.v[g], t), c.FNP[t][a], out[a]));
+    }
+    if constexpr (turns(g)) add_cross(eta<g>(c, t), at(c.s[0], t), at(c.s[1], t), at(c.s[2], t), out);
   }
 
-  // What the parameters do of themselves to L^-1 e, s and P
+  // F W dP (F W)' and the same for P; a row of F W dP serves its row of the product, and is done with
   template <int g>
-  MPUCAL_INLINE static void direct(const Coefficients& c, int t, Lane (&e)[3], Lane (&s)[3], Lane (&P)[6]) {
-    for (int a = 0; a < 3; ++a) e[a] = s[a] = all(0.0);
-    for (int m = 0; m < 6; ++m) P[m] = all(0.0);
-    if constexpr (g < 3) {
-      for (int a = g; a < 3; ++a) e[a] = nmadd(at(c.white[a][g], t), c.q[t], e[a]);
-      for (int a = 0; a < 3; ++a)
-        s[a] = nmadd(at(c.FNK[a][g], t), c.q_plus[t], madd(at(c.v[g], t), c.FNP[t][a], s[a]));
-      for (int m = 0; m < 6; ++m) {
-        const int a = kRow[m], b = kCol[m];
-        P[m] = nmadd(at(c.FK[b][g], t), c.FP[t][a], nmadd(at(c.FK[a][g], t), c.FP[t][b], P[m]));
+  MPUCAL_INLINE static void carry_P(const Coefficients& c, int t, const Lane (&P)[6], Lane (&out)[6]) {
+    for (int a = 0; a < 3; ++a) {
+      Lane row[3];
+      for (int b = 0; b < 3; ++b)
+        row[b] = madd(at(c.FW[a][2], t), P[kSym[2][b]],
+                      madd(at(c.FW[a][1], t), P[kSym[1][b]], at(c.FW[a][0], t) * P[kSym[0][b]]));
+      for (int b = a; b < 3; ++b) {
+        Lane& x = out[kSym[a][b]];
+        x = madd(at(c.FW[b][2], t), row[2], madd(at(c.FW[b][1], t), row[1], at(c.FW[b][0], t) * row[0]));
+        if constexpr (g < 3) x = nmadd(at(c.FK[b][g], t), c.FP[t][a], nmadd(at(c.FK[a][g], t), c.FP[t][b], x));
       }
     }
-    if constexpr (g == Lanes::b_omega / 4) add_turn(c.eta_b[t], c, t, s, P);
-    if constexpr (G > 5 && g == Lanes::K / 4) add_turn(c.eta_K[t], c, t, s, P);
-    if constexpr (G > 5 && g == Lanes::K / 4 + 1) add_turn(c.eta_K2[t], c, t, s, P);
+    if constexpr (turns(g)) add_turn(eta<g>(c, t), c, t, out);
   }
 
-  // eta x s, and [eta]x PF with its transpose
-  MPUCAL_INLINE static void add_turn(const Lane (&n)[3], const Coefficients& c, int t, Lane (&s)[3], Lane (&P)[6]) {
-    add_cross(n, at(c.s[0], t), at(c.s[1], t), at(c.s[2], t), s);
+  // d(F x) = eta x (F x), for the groups that hold the gyro's parameters
+  static constexpr bool turns(int g) {
+    return g == Lanes::b_omega / 4 || (G > 5 && (g == Lanes::K / 4 || g == Lanes::K / 4 + 1));
+  }
+  template <int g>
+  MPUCAL_INLINE static const Lane (&eta(const Coefficients& c, int t))[3] {
+    if constexpr (g == Lanes::b_omega / 4) return c.eta_b[t];
+    else if constexpr (g == Lanes::K / 4) return c.eta_K[t];
+    else return c.eta_K2[t];
+  }
+
+  // [eta]x PF with its transpose
+  MPUCAL_INLINE static void add_turn(const Lane (&n)[3], const Coefficients& c, int t, Lane (&P)[6]) {
     const double xx = at(c.PF[0], t), xy = at(c.PF[1], t), xz = at(c.PF[2], t);
     const double yy = at(c.PF[3], t), yz = at(c.PF[4], t), zz = at(c.PF[5], t);
     const Lane n2[3] = {n[0] + n[0], n[1] + n[1], n[2] + n[2]};
@@ -138,19 +154,19 @@ class Derivatives {
   // and changes slowly, so the first of four steps stands for four.
   template <int g>
   MPUCAL_INLINE static void information_in_S(const Coefficients& c, const Lane (&P)[6], Lane (*rows)[G]) {
-    Lane TP[3][3];
-    for (int a = 0; a < 3; ++a)
+    for (int a = 0; a < 3; ++a) {
+      Lane row[3];
       for (int b = 0; b < 3; ++b)
-        TP[a][b] = madd(at(c.T[a][2], 0), P[kSym[2][b]],
-                        madd(at(c.T[a][1], 0), P[kSym[1][b]], at(c.T[a][0], 0) * P[kSym[0][b]]));
-    for (int m = 0; m < 6; ++m) {
-      const int a = kRow[m], b = kCol[m];
-      Lane M = madd(at(c.T[b][2], 0), TP[a][2], madd(at(c.T[b][1], 0), TP[a][1], at(c.T[b][0], 0) * TP[a][0]));
-      if constexpr (g < 3) {
-        if (a >= g) M = madd(at(c.white[a][g], 0), c.B[b], M);
-        if (b >= g) M = madd(at(c.white[b][g], 0), c.B[a], M);
+        row[b] = madd(at(c.T[a][2], 0), P[kSym[2][b]],
+                      madd(at(c.T[a][1], 0), P[kSym[1][b]], at(c.T[a][0], 0) * P[kSym[0][b]]));
+      for (int b = a; b < 3; ++b) {
+        Lane x = madd(at(c.T[b][2], 0), row[2], madd(at(c.T[b][1], 0), row[1], at(c.T[b][0], 0) * row[0]));
+        if constexpr (g < 3) {
+          if (a >= g) x = madd(at(c.white[a][g], 0), c.B[b], x);
+          if (b >= g) x = madd(at(c.white[b][g], 0), c.B[a], x);
+        }
+        rows[kSym[a][b]][g] = (a == b ? 1.4142135623730951 : 2.0) * x;
       }
-      rows[m][g] = (a == b ? 1.4142135623730951 : 2.0) * M;
     }
   }
 
