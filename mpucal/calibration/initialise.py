@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..data import Vector
 from ..kernel import _kernel
-from .likelihood import Problem, Theta
+from .likelihood import Problem, Series, Theta, evaluate
+from .masks import GAP_ANGLE_VARIANCE, LOST_RAD
 from .model import tangents
 
 POINTS = 300
 REFINEMENTS = 5
 # keeps the equations solvable for a board that hardly turned; nothing beside a second of data
 RIDGE = 1e-9
+# of the parts between gaps, the longest so many are tried
+STRETCHES, FEWEST_OF_A_STRETCH = 4, 50
+ROUGH_MPS2 = 0.5
 
 
 def initialise(problem: Problem, b_omega: Vector) -> Theta:
@@ -22,13 +28,27 @@ def initialise(problem: Problem, b_omega: Vector) -> Theta:
     through sums of C_t's products, so a search over the whole sphere costs as much as one sample.
     (u, D) and (-u, -D) fit equally well: det D > 0 decides.
 
+    A gap in which the board turned breaks C_t: where there are gaps, stretches between them are tried as well, and the
+    filter, which knows how little is known across a gap, says which estimate is best.
+
     Parameters
     ----------
     b_omega : (3,) rad/s, the gyroscope's bias of the flat segment.
     """
+    whole = _between_gaps(problem, slice(0, len(problem.series)), b_omega)
+    stretches = _stretches(problem.series)
+    if not stretches:
+        return whole
+    tried = [whole, *(_from_the_flat_mean(problem, _between_gaps(problem, part, b_omega)) for part in stretches)]
+    return min(tried, key=lambda theta: _misfit(problem, theta))
+
+
+def _between_gaps(problem: Problem, part: slice, b_omega: Vector) -> Theta:
+    """The estimate from a part of the series alone; u is gravity's direction before its first step."""
     series = problem.series
+    r_scale = None if series.r_scale is None else series.r_scale[part]
     CC, yC, C, y, _, n = _kernel.moments(
-        np.ascontiguousarray(b_omega), series.y, series.omega, series.dt, series.r_scale
+        np.ascontiguousarray(b_omega), series.y[part], series.omega[part], series.dt[part], r_scale
     )
     sums = _Sums(CC, yC, C.reshape(3, 3), y, n, problem)
     points = fibonacci_sphere(POINTS)
@@ -37,6 +57,35 @@ def initialise(problem: Problem, b_omega: Vector) -> Theta:
     D, b_a = sums.solve(u[None])
     sign = 1.0 if np.linalg.det(D[0]) > 0 else -1.0
     return Theta.start(sign * D[0], b_a[0], b_omega, sign * u)
+
+
+def _stretches(series: Series) -> list[slice]:
+    """The longest parts of the series between gaps that leave unknown how the board turned; none without gaps."""
+    if series.q_extra is None:
+        return []
+    lost = series.q_extra >= 0.9 * GAP_ANGLE_VARIANCE * series.dt
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], lost, [False]]))).reshape(-1, 2)
+    gaps = [(a, b) for a, b in edges.tolist() if series.q_extra[a:b].sum() > LOST_RAD**2]
+    if not gaps:
+        return []
+    starts, ends = [0, *(b for _, b in gaps)], [*(a for a, _ in gaps), len(series)]
+    longest = sorted(zip(starts, ends, strict=True), key=lambda part: part[0] - part[1])[:STRETCHES]
+    return [slice(a, b) for a, b in longest if b - a >= FEWEST_OF_A_STRETCH]
+
+
+def _from_the_flat_mean(problem: Problem, theta: Theta) -> Theta:
+    """The same D and b_a, with the u that the flat mean then says."""
+    s = np.linalg.lstsq(theta.D, problem.flat.y - theta.b_a, rcond=None)[0]
+    return replace(theta, u=np.asarray(s / max(float(np.linalg.norm(s)), 1e-9)))
+
+
+def _misfit(problem: Problem, theta: Theta) -> float:
+    """V of the exact filter, with noise enough for a hand and the gyroscope's scale."""
+    of = problem.series
+    series = Series(of.y, of.omega, of.dt, of.r_scale, of.q_scale, of.q_extra)
+    flat = replace(problem.flat, Sigma_a=problem.flat.Sigma_a + ROUGH_MPS2**2)
+    V = evaluate(Problem(series, flat, problem.gravity), theta, 0).V
+    return V if np.isfinite(V) else np.inf
 
 
 def fibonacci_sphere(n: int) -> Vector:

@@ -1,4 +1,4 @@
-"""Samples that must not be believed as they stand: clipped ones, and steps across a gap."""
+"""Samples that must not be believed as they stand: clipped ones, and steps across a gap, drawn through or not."""
 
 from __future__ import annotations
 
@@ -19,6 +19,11 @@ CLIPPED_R_SCALE = 1e4
 GAP_ANGLE_VARIANCE = 1.0  # rad^2 a second: nothing is known of how the board turned
 CLIPPED_RATE_SD = 0.1  # of |omega|: what lies beyond the range
 
+# After a gap that long a correction, linear in the turn, falls short of it: the samples that follow correct it again.
+LOST_RAD, SETTLING = 0.2, 5
+
+LINE_TOLERANCE, SHORTEST_LINE = 1e-6, 8
+
 GAP_INTERVALS = 2.5  # a longer time between samples than so many intervals is a gap
 
 
@@ -27,7 +32,7 @@ def with_masks(recording: Recording) -> Recording:
     dt = np.diff(recording.t, prepend=recording.t[0])
     return replace(
         recording,
-        gap=recording.gap | (dt > GAP_INTERVALS * np.median(dt[1:])),
+        gap=recording.gap | (dt > GAP_INTERVALS * np.median(dt[1:])) | _on_a_line(recording.gyr, recording.t),
         acc_clipped=recording.acc_clipped | _at_the_rail(recording.acc, ACC_RANGES),
         gyr_clipped=recording.gyr_clipped | _at_the_rail(recording.gyr, GYRO_RANGES),
     )
@@ -42,10 +47,28 @@ def mask(series: Series, recording: Recording, flat: Flat) -> Series:
     clipped = gyr[:-1] | gyr[1:]
     rate2 = np.sum((series.omega - flat.b_omega) ** 2, axis=1)
     q_extra = np.where(gap, GAP_ANGLE_VARIANCE * np.minimum(series.dt, 1e3), 0.0)
+    for i in np.flatnonzero(q_extra > LOST_RAD**2):
+        q_extra[i + 1 : i + 1 + SETTLING] += LOST_RAD**2
     q_extra += np.where(clipped, (CLIPPED_RATE_SD * series.dt) ** 2 * rate2, 0.0)
     # the measured rates on both sides of a gap say nothing of what lies between
     omega = np.where(gap[:, None], flat.b_omega, series.omega)
     return replace(series, omega=omega, r_scale=np.where(acc, CLIPPED_R_SCALE, 1.0), q_extra=q_extra)
+
+
+def _on_a_line(values: Vector, t: Vector) -> Mask:
+    """(n,) True within straight lines that all axes follow exactly, and not at rest: somebody drew them."""
+    slope = np.diff(values, axis=0) / np.diff(t)[:, None]
+    bend, steep = np.abs(np.diff(slope, axis=0)), np.abs(slope[1:])
+    straight: Mask = np.all(bend <= LINE_TOLERANCE * steep, axis=1)
+    if 2 * np.count_nonzero(straight) > len(straight):  # computed data: nothing in them has noise
+        return np.zeros(len(values), bool)
+    straight &= (steep > 0).any(1)
+    edges = np.diff(np.concatenate([[False], straight, [False]]).astype(np.int8))
+    drawn = np.zeros(len(values), bool)
+    for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+        if last - first >= SHORTEST_LINE:
+            drawn[first + 1 : last + 2] = True
+    return drawn
 
 
 def _at_the_rail(values: Vector, ranges: Vector) -> Mask:

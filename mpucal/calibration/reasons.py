@@ -74,10 +74,12 @@ def data_lost(e: Evidence) -> Reason | None:
     gaps = e.recording.gap
     if not gaps.any():
         return None
+    places = int(np.count_nonzero(gaps & ~np.append(False, gaps[:-1])))
     lost = float(np.diff(e.recording.t, prepend=e.recording.t[0])[gaps].sum())
     return Reason(
         "data_lost",
-        f"samples are missing in {int(gaps.sum())} places ({lost:.2f} s in all); use a faster bus or a lower rate",
+        f"samples are missing in {places} place{'s' if places > 1 else ''} ({lost:.2f} s in all); use a faster bus or "
+        "a lower rate",
         lost > 0.5 * float(e.recording.t[-1] - e.recording.t[0]),
     )
 

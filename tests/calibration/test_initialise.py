@@ -4,6 +4,7 @@ import pytest
 from mpucal.calibration.estimate import fit_accel
 from mpucal.calibration.initialise import fibonacci_sphere, initialise
 from mpucal.calibration.likelihood import Problem, Series
+from mpucal.calibration.masks import mask, with_masks
 from mpucal.calibration.model import rotation
 from mpucal.calibration.stationary import flat_statistics
 from mpucal.data import Recording
@@ -17,8 +18,8 @@ def problem_of(simulated):
     return Problem(Series.after(recording, flat), flat, simulated.truth.gravity)
 
 
-def exact(D, b_a, u, n=400, seed=0):
-    """The problem of a sensor without noise, turned at random about all axes from u on."""
+def exact(D, b_a, u, n=400, seed=0, lost=()):
+    """The problem of a sensor without noise, turned at random about all axes from u on; `lost` samples left out."""
     rng = np.random.default_rng(seed)
     t = 0.01 * np.arange(n + 100)
     rates = np.zeros((n + 100, 3))
@@ -27,9 +28,11 @@ def exact(D, b_a, u, n=400, seed=0):
     for omega, following in zip(rates, np.append(rates[1:], rates[-1:], axis=0), strict=True):
         force.append(s)
         s = rotation(-0.01 * 0.5 * (omega + following)) @ s
-    recording = Recording.from_arrays(t, np.array(force) @ D.T + b_a, rates, flat=(0, 99))
+    kept = np.delete(np.arange(n + 100), lost)
+    acc = np.array(force) @ D.T + b_a
+    recording = with_masks(Recording.from_arrays(t[kept], acc[kept], rates[kept], flat=(0, 99)))
     flat = flat_statistics(recording, recording.flat)
-    return Problem(Series.after(recording, flat), flat, 9.82)
+    return Problem(mask(Series.after(recording, flat), recording, flat), flat, 9.82)
 
 
 @pytest.mark.parametrize("u", [(0, 0, 1), (0, 0, -1), (0.6, 0.8, 0), (-0.5, 0.5, np.sqrt(0.5))], ids=str)
@@ -71,6 +74,16 @@ def test_a_board_that_never_turned_gives_finite_numbers():
     theta = initialise(Problem(Series.after(recording, flat), flat, 9.82), flat.b_omega)
     assert np.isfinite(theta.D).all()
     assert np.isfinite(theta.b_a).all()
+
+
+@pytest.mark.parametrize("first", [150, 250, 350])
+def test_a_gap_in_which_the_board_turned_does_no_harm(first):
+    D, b_a = np.array([[1.3, 0.1, -0.2], [0.3, 0.6, 0.1], [0.0, -0.2, 0.9]]), np.array([1.0, -0.5, 0.3])
+    problem = exact(D, b_a, np.array([0.0, 0.0, 1.0]), lost=np.arange(100 + first, 150 + first))
+    theta = initialise(problem, np.zeros(3))
+    np.testing.assert_allclose(theta.D, D, atol=0.02)
+    np.testing.assert_allclose(theta.b_a, b_a, atol=0.1)
+    np.testing.assert_allclose(theta.u, [0, 0, 1], atol=0.02)
 
 
 def test_the_sphere_is_covered_evenly():

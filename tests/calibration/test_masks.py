@@ -119,8 +119,49 @@ def test_across_a_gap_nothing_is_integrated_and_nothing_known(pick):
     plain, series, flat = masked(recording)
     np.testing.assert_array_equal(series.omega[300], flat.b_omega)
     assert series.q_extra[300] == pytest.approx(2.01)
-    assert np.count_nonzero(series.q_extra) == 1
+    # so long a gap is corrected for by more than one sample
+    after = np.flatnonzero(series.q_extra)[1:]
+    assert after.tolist() == [301, 302, 303, 304, 305]
+    assert (series.q_extra[after] < 0.1 * series.q_extra[300]).all()
     np.testing.assert_array_equal(np.delete(series.omega, 300, 0), np.delete(plain.omega, 300, 0))
+
+
+def test_a_short_gap_is_corrected_for_at_once(pick):
+    kept = np.ones(1000, bool)
+    kept[400:402] = False
+    _, series, _ = masked(with_masks(pick(noise(), kept)))
+    assert np.flatnonzero(series.q_extra).tolist() == [300]
+
+
+def drawn(recording, first, last, at=slice(None)):
+    """The recording with a line through samples first..last-1 of its gyroscope."""
+    gyr = recording.gyr.copy()
+    share = np.linspace(0.0, 1.0, last - first + 2)[1:-1, None]
+    gyr[first:last, at] = ((1.0 - share) * gyr[first - 1] + share * gyr[last])[:, at]
+    return replace(recording, gyr=gyr)
+
+
+def test_a_line_drawn_through_lost_rates_is_a_gap():
+    gap = with_masks(drawn(noise(), 300, 420)).gap
+    assert gap[302:418].all()
+    assert not gap[:299].any()
+    assert not gap[421:].any()
+
+
+def test_one_axis_alone_on_a_line_is_chance():
+    assert not with_masks(drawn(noise(), 300, 420, at=[0])).gap.any()
+
+
+def test_a_constant_rate_is_no_line():
+    gyr = noise().gyr.copy()
+    gyr[:400] = 0.01  # a sensor of coarse steps at rest
+    assert not with_masks(replace(noise(), gyr=gyr)).gap.any()
+
+
+def test_computed_rates_may_follow_lines():
+    t = 0.01 * np.arange(1000)
+    ramps = np.abs((t[:, None] % 4.0) - 2.0) * [1.0, -0.5, 0.2]
+    assert not with_masks(replace(noise(), gyr=ramps)).gap.any()
 
 
 def test_a_mask_saves_what_a_clipped_gyroscope_would_spoil(hand, monkeypatch):

@@ -404,14 +404,16 @@ def test_real_rates_in_degrees(real):
     refused_for("units_suspect", replace(recording, gyr=np.rad2deg(recording.gyr)), "in deg/s;")
 
 
-def test_missing_rates_drawn_as_a_line_do_not_pass_for_good(real):
+def test_missing_rates_drawn_as_a_line_are_lost_data(real):
     recording = real("mpu9150_a")
     gyr = recording.gyr.copy()
     first = 5000
-    lost = slice(first, first + 1200)
     share = np.linspace(0.0, 1.0, 1200)[:, None]
-    gyr[lost] = (1.0 - share) * gyr[first] + share * gyr[first + 1200]
+    gyr[first : first + 1200] = (1.0 - share) * gyr[first] + share * gyr[first + 1200]
     plain, spoilt = calibrate(recording, "auto", 9.81), calibrate(replace(recording, gyr=gyr), "auto", 9.81)
-    if spoilt.verdict == "good":
-        np.testing.assert_allclose(spoilt.D, plain.D, atol=0.01)
-        np.testing.assert_allclose(spoilt.b_a, plain.b_a, atol=0.05)
+    assert plain.verdict == "good"
+    assert spoilt.verdict == "usable"
+    assert [reason["code"] for reason in spoilt.quality["reasons"]] == ["data_lost"]
+    assert "1 place (11.9" in spoilt.quality["reasons"][0]["message"]
+    np.testing.assert_allclose(spoilt.D, plain.D, atol=0.003)
+    np.testing.assert_allclose(spoilt.b_a, plain.b_a, atol=0.02)
