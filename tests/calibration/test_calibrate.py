@@ -162,7 +162,7 @@ def recordings(draw):
 
 
 @settings(
-    max_examples=60,
+    max_examples=50,
     deadline=None,
     derandomize=True,
     database=None,

@@ -334,8 +334,8 @@ def test_one_glitch_of_the_thermometer_is_no_warming(good):
     assert judged(replace(good, temperature_c=temperature)).verdict == "good"
 
 
-def test_algorithm_1_on_slow_turns_does_not_settle():
-    recording = paper_scenario(5, rate_hz=10, turn_s=40).recording
+def test_algorithm_1_does_not_always_settle():
+    recording = paper_scenario(17, rate_hz=10).recording
     result = judged(recording, "paper")
     assert result.verdict == "refused"
     assert "iterations" in result.reasons["not_converged"]
