@@ -10,6 +10,7 @@ import numpy as np
 
 from ..data import Vector
 from ..result import GOOD, REFUSED, USABLE
+from .blockers import BLOCKERS
 from .evidence import Evidence
 from .reasons import CHECKS
 
@@ -21,7 +22,9 @@ def judge(evidence: Evidence) -> Mapping[str, Any]:
     direction [deg].
     """
     sure = evidence.sure
-    reasons = [reason for check in CHECKS if (reason := check(evidence)) is not None]
+    # a fit there is only where nothing blocked it
+    checks = CHECKS if evidence.fit is not None else (*BLOCKERS, *CHECKS)
+    reasons = [reason for check in checks if (reason := check(evidence)) is not None]
     return MappingProxyType(
         {
             "verdict": REFUSED if any(r.refuse for r in reasons) else USABLE if reasons else GOOD,

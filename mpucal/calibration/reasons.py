@@ -9,7 +9,7 @@ from itertools import product as choices
 import numpy as np
 
 from ..data import Mask, Recording
-from .blockers import BLOCKERS, Check, Reason
+from .blockers import Check, Reason
 from .evidence import Evidence
 
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.1, 0.4
@@ -214,7 +214,6 @@ def inconsistent(e: Evidence) -> Reason | None:
 
 
 CHECKS: tuple[Check, ...] = (
-    *BLOCKERS,
     moved_while_still,
     few_orientations,
     clipped("gyro_clipped", "gyroscope", "turn more slowly, or choose a larger range", lambda r: r.gyr_clipped),
