@@ -25,7 +25,8 @@ def q_scale_of_moves(
     """
     F = rotation(-series.dt[:, None] * ((series.omega - theta.b_omega) @ theta.K.T))
     spans, v, z, noise = [], [], [], []
-    poses = [np.linalg.solve(theta.D, recording.acc[a:b].mean(0) - theta.b_a) for a, b in runs]
+    inverse = np.linalg.pinv(theta.D)  # a search may pass through a singular D: that is no reason to stop it
+    poses = [inverse @ (recording.acc[a:b].mean(0) - theta.b_a) for a, b in runs]
     for k in range(len(runs) - 1):
         first, last = max(runs[k][1] - flat.last, 0), runs[k + 1][0] - flat.last + 1
         if last <= 0:
