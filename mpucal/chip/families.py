@@ -20,6 +20,9 @@ class Family:
     fifo_bytes : size of the FIFO as this driver configures it.
     lsb_per_c, zero_c : temperature is counts / lsb_per_c + zero_c.
     accel_offset_h : addresses of the high bytes of the accelerometer offsets x, y, z; the low byte follows.
+    accel_offset_lsb_per_g : what one count of such a 16-bit word is nominally; bit 0 is reserved.
+    packed_self_test : the factory's self-test codes are 5 bits each in SELF_TEST_ACCEL and the three registers
+        after it; otherwise 8 bits each, from SELF_TEST_GYRO and from SELF_TEST_ACCEL on.
     has_accel_config2 : the accelerometer's filter has a register of its own, ACCEL_CONFIG2.
     accel_delay_ms, gyro_delay_ms : group delay of the low-pass filter by DLPF_CFG = 0..6.
     """
@@ -29,6 +32,8 @@ class Family:
     lsb_per_c: float
     zero_c: float
     accel_offset_h: tuple[int, int, int]
+    accel_offset_lsb_per_g: float
+    packed_self_test: bool
     has_accel_config2: bool
     accel_delay_ms: tuple[float, ...]
     gyro_delay_ms: tuple[float, ...]
@@ -54,6 +59,8 @@ MPU6050 = Family(
     lsb_per_c=340.0,
     zero_c=36.53,
     accel_offset_h=(0x06, 0x08, 0x0A),
+    accel_offset_lsb_per_g=2048.0,
+    packed_self_test=True,
     has_accel_config2=False,
     accel_delay_ms=(0.0, 2.0, 3.0, 4.9, 8.5, 13.8, 19.0),
     gyro_delay_ms=(0.98, 1.9, 2.8, 4.8, 8.3, 13.4, 18.6),
@@ -65,6 +72,8 @@ MPU6500 = Family(
     lsb_per_c=333.87,
     zero_c=21.0,
     accel_offset_h=(0x77, 0x7A, 0x7D),
+    accel_offset_lsb_per_g=2048.0,
+    packed_self_test=False,
     has_accel_config2=True,
     accel_delay_ms=(1.88, 1.88, 2.88, 4.88, 8.87, 16.83, 32.48),
     gyro_delay_ms=(0.97, 2.9, 3.9, 5.9, 9.9, 17.85, 33.48),
@@ -77,6 +86,8 @@ CLONE98 = Family(
     lsb_per_c=326.8,
     zero_c=25.0,
     accel_offset_h=MPU6500.accel_offset_h,
+    accel_offset_lsb_per_g=MPU6500.accel_offset_lsb_per_g,
+    packed_self_test=False,
     has_accel_config2=True,
     accel_delay_ms=MPU6500.accel_delay_ms,
     gyro_delay_ms=MPU6500.gyro_delay_ms,

@@ -12,6 +12,9 @@ from typing import Final
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import UsageError
 
+# the factory's self test: three bytes of each on a 6500, four packed ones on a 6050
+SELF_TEST_GYRO: Final = 0x00
+SELF_TEST_ACCEL: Final = 0x0D
 XG_OFFSET_H: Final = 0x13
 SMPLRT_DIV: Final = 0x19
 CONFIG: Final = 0x1A

@@ -13,6 +13,7 @@ import mpucal.bus.i2c
 from mpucal.bus.simulated import SimulatedBus
 from mpucal.bus.simulated.chip import Chip
 from mpucal.bus.simulated.clock import FastClock
+from mpucal.bus.simulated.factory import Factory
 from mpucal.bus.simulated.models import MODELS
 
 I2C_M_RD = 0x0001
@@ -96,7 +97,7 @@ def still_chip():
 
     def make(model="mpu6050", rate_error_ppm=2500.0):
         clock = FastClock()
-        return SimulatedBus(Chip(MODELS[model], StillFeed(), rate_error_ppm, (0, 0, 0)), clock), clock
+        return SimulatedBus(Chip(MODELS[model], StillFeed(), rate_error_ppm, Factory()), clock), clock
 
     return make
 

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from mpucal.bus.simulated.chip import Chip
-from mpucal.bus.simulated.models import MODELS
+from mpucal.bus.simulated.factory import Factory
+from mpucal.bus.simulated.models import MODELS, OFFSETS
 from mpucal.chip import registers as reg
 from mpucal.chip.access import EndOfCapture
 
 MS = 1_000_000
 TRIM = (-1500, 2001, 700)
+PIECE = Factory(TRIM, (13, 22, 31), (9, 1, 30), (0.4, 0.5, 0.6), (30.0, -40.0, 50.0))
 
 
 class Counter:
@@ -32,7 +34,7 @@ class Counter:
 
 
 def chip(model="mpu6050", feed=None, ppm=0.0):
-    return Chip(MODELS[model], feed or Counter(), ppm, TRIM)
+    return Chip(MODELS[model], feed or Counter(), ppm, PIECE)
 
 
 def collecting(device, divider=4, sources=0xF8, config=1):
@@ -303,6 +305,67 @@ def test_the_sensor_registers_end_with_the_feed():
 
 
 def test_another_identity_is_still_the_same_chip():
-    device = Chip(replace(MODELS["mpu6500"], who_am_i=0x71), Counter(), 0.0, TRIM)
+    device = Chip(replace(MODELS["mpu6500"], who_am_i=0x71), Counter(), 0.0, PIECE)
     assert device.read(reg.WHO_AM_I, 1, 0) == b"\x71"
     assert device.read(0x77, 2, 0) == TRIM[0].to_bytes(2, "big", signed=True)
+
+
+@pytest.mark.parametrize(
+    ("model", "held"),
+    [
+        # x: 0b01101 and 9, y: 0b10110 and 1, z: 0b11111 and 30
+        pytest.param(
+            "mpu6050", {0x0D: 0b011_01001, 0x0E: 0b101_00001, 0x0F: 0b111_11110, 0x10: 0b01_10_11}, id="packed"
+        ),
+        pytest.param("mpu6500", {0x00: 9, 0x01: 1, 0x02: 30, 0x0D: 13, 0x0E: 22, 0x0F: 31}, id="a byte each"),
+    ],
+)
+def test_the_factorys_self_test_codes(model, held):
+    device = chip(model)
+    assert {register: device.read(register, 1, 0)[0] for register in held} == held
+
+
+@pytest.mark.parametrize("model", ["mpu6050", "mpu6500", "clone98"])
+def test_self_test_adds_what_the_piece_answers_on_the_axes_asked_for(model):
+    feed = Counter()
+    device = chip(model, feed)
+    device.write(reg.GYRO_CONFIG, b"\x80\x68", 0)
+    collecting(device).read(reg.FIFO_R_W, 1, 5 * MS)
+    assert feed.settings[-1].gyro_offset_dps == (30.0, 0.0, 0.0)
+    assert feed.settings[-1].accel_offset_g == (0.0, 0.5, 0.6)
+    assert feed.settings[-1].accel_range_g == 4
+
+
+@pytest.mark.parametrize("model", ["mpu6050", "mpu6500"])
+def test_a_drawn_piece_answers_its_self_test_as_its_codes_say(model):
+    family = MODELS[model].family
+    for seed in range(20):
+        piece = Factory.draw(np.random.default_rng(seed), family)
+        for axis in range(3):
+            accel, gyro = piece.accel_codes[axis], piece.gyro_codes[axis]
+            if family.packed_self_test:
+                expected = 0.34 * (0.92 / 0.34) ** ((accel - 1) / 30), (25, -25, 25)[axis] * 1.046 ** (gyro - 1)
+            else:
+                expected = 2620 * 1.01 ** (accel - 1) / 16384, 2620 * 1.01 ** (gyro - 1) / 131
+            answered = piece.accel_self_test_g[axis], piece.gyro_self_test_dps[axis]
+            assert np.divide(answered, expected) == pytest.approx([1, 1], abs=0.05)
+            assert 0.2 < answered[0] < 1.0
+
+
+def test_revision_c_has_half_the_sensitivity():
+    feed = Counter()
+    device = collecting(chip("mpu6050c", feed))
+    device.write(reg.ACCEL_CONFIG, b"\x08", 0)
+    device.read(reg.FIFO_R_W, 1, 5 * MS)
+    assert feed.settings[-1].accel_range_g == 8
+
+
+@pytest.mark.parametrize(
+    ("offsets", "offset_g"), [("2048", 0.125), ("4096", 0.0625), ("readonly", 0.0)], ids=["2048", "4096", "readonly"]
+)
+def test_what_an_offset_does_can_be_chosen(offsets, offset_g):
+    feed = Counter()
+    device = Chip(replace(MODELS["mpu6050"], **OFFSETS[offsets]), feed, 0.0, PIECE)
+    device.write(0x06, (TRIM[0] + 256).to_bytes(2, "big", signed=True), 0)
+    collecting(device).read(reg.FIFO_R_W, 1, 5 * MS)
+    assert feed.settings[-1].accel_offset_g == (offset_g, 0.0, 0.0)

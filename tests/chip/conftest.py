@@ -8,6 +8,7 @@ import pytest
 from mpucal.bus.simulated.bus import SimulatedBus
 from mpucal.bus.simulated.chip import Chip
 from mpucal.bus.simulated.clock import FastClock
+from mpucal.bus.simulated.factory import Factory
 from mpucal.bus.simulated.models import MODELS
 from mpucal.bus.tap import Tap
 from mpucal.chip.access import Reply
@@ -38,7 +39,7 @@ class WorkBench:
 
     def __init__(self, model="mpu6050", rate_error_ppm=3000.0):
         self.clock, self.transactions = FastClock(), []
-        self.chip = Chip(MODELS[model], NumberedFeed(), rate_error_ppm, (-1500, 2001, 700))
+        self.chip = Chip(MODELS[model], NumberedFeed(), rate_error_ppm, Factory((-1500, 2001, 700)))
         self.inner = SimulatedBus(self.chip, self.clock)
         self.before: dict[tuple[str, int], Callable] = {}
         self.bus = Tap(self, self)

@@ -12,9 +12,10 @@ from ...data import STANDARD_GRAVITY_MPS2
 from .bus import SimulatedBus
 from .chip import Chip
 from .clock import CLOCKS, FastClock
+from .factory import Factory
 from .feed import Feed, RecordedFeed, SensorFeed
 from .hand import KINDS
-from .models import MODELS, draw_accel_trim
+from .models import MODELS, OFFSETS
 from .motion import Motion
 from .options import Options
 from .sensor import Truth, in_symmetric_frame
@@ -27,7 +28,7 @@ def open_simulated(text: str = "sim", gravity: float = STANDARD_GRAVITY_MPS2, se
 
     Parameters
     ----------
-    text : `sim`, or with keys: chip, who_am_i, seed, hand, pace, rate_error_ppm, D, b_a, K, b_omega, noise,
+    text : `sim`, or with keys: chip, who_am_i, offsets, seed, hand, pace, rate_error_ppm, D, b_a, K, b_omega, noise,
         temperature_c. gravity : m/s^2, where the board is. seed : beside the text.
 
     Raises
@@ -38,10 +39,11 @@ def open_simulated(text: str = "sim", gravity: float = STANDARD_GRAVITY_MPS2, se
     truth = _truth(options, gravity)
     of_hand, of_motion, of_noise, of_trim = np.random.default_rng([options.seed, 2]).spawn(4)
     motion = Motion(KINDS[options.hand](of_hand), of_motion, gravity)
-    model = MODELS[options.chip]
+    model = replace(MODELS[options.chip], **OFFSETS[options.offsets])
     if options.who_am_i is not None:
         model = replace(model, who_am_i=options.who_am_i)
-    chip = Chip(model, SensorFeed(truth, motion, of_noise), truth.rate_error_ppm, draw_accel_trim(of_trim))
+    factory = Factory.draw(of_trim, model.family)
+    chip = Chip(model, SensorFeed(truth, motion, of_noise), truth.rate_error_ppm, factory)
     return SimulatedBus(chip, CLOCKS[options.pace](), motion, truth)
 
 
@@ -64,7 +66,7 @@ def open_recorded(
     RecordingError : counts that are no int16, or not as many of both.
     """
     feed = RecordedFeed(acc_counts, gyr_counts, rate_hz, accel_range_g, gyro_range_dps)
-    return SimulatedBus(Chip(MODELS[chip], feed, rate_error_ppm, (0, 0, 0)), FastClock())
+    return SimulatedBus(Chip(MODELS[chip], feed, rate_error_ppm, Factory()), FastClock())
 
 
 def _truth(options: Options, gravity: float) -> Truth:

@@ -10,6 +10,7 @@ import numpy as np
 from ...chip import registers as reg
 from ...chip.access import EndOfCapture
 from ...data import Vector
+from .factory import Factory, Three
 from .feed import Feed
 from .fifo import Fifo
 from .models import Model
@@ -26,11 +27,11 @@ class Chip:
     ----------
     model : which chip. feed : where its samples come from.
     rate_error_ppm : how much faster than nominal its sample clock runs.
-    accel_trim : (x, y, z) the factory's words in the accelerometer's offset registers.
+    factory : what this piece brings along.
     """
 
-    def __init__(self, model: Model, feed: Feed, rate_error_ppm: float, accel_trim: tuple[int, int, int]) -> None:
-        self._model, self._feed, self._trim = model, feed, accel_trim
+    def __init__(self, model: Model, feed: Feed, rate_error_ppm: float, factory: Factory) -> None:
+        self._model, self._feed, self._factory = model, feed, factory
         self._speed = 1 + rate_error_ppm * 1e-6
         self._writable = model.writable()
         self._fifo = Fifo(model.family.fifo_bytes)
@@ -103,7 +104,7 @@ class Chip:
         self._registers[reg.FIFO_COUNT_H : reg.FIFO_COUNT_L + 1] = count
 
     def _reset(self, t_ns: int) -> None:
-        self._registers = self._model.reset_values(self._trim)
+        self._registers = self._model.reset_values(self._factory)
         self._fifo.size = self._model.family.fifo_bytes
         self._fifo.clear()
         self._latest, self._unread = bytes(reg.FRAME_BYTES), None
@@ -163,7 +164,7 @@ class Chip:
 
     def _how(self) -> Setting:
         if self._setting is None:
-            self._setting = _setting(self._registers, self._rate_hz, self._model, self._trim)
+            self._setting = _setting(self._registers, self._rate_hz, self._model, self._factory)
         return self._setting
 
 
@@ -174,24 +175,34 @@ def _columns(sources: int) -> list[int]:
     return accel + [3 + i for i, bit in enumerate(others) if sources & bit]
 
 
-def _setting(registers: bytearray, rate_hz: float, model: Model, trim: tuple[int, int, int]) -> Setting:
+def _setting(registers: bytearray, rate_hz: float, model: Model, factory: Factory) -> Setting:
     """What the registers say about how to measure."""
-    accel = registers[reg.ACCEL_CONFIG] & reg.FULL_SCALE
-    gyro = registers[reg.GYRO_CONFIG] & reg.FULL_SCALE
+    accel, gyro = registers[reg.ACCEL_CONFIG], registers[reg.GYRO_CONFIG]
     ax, ay, az = (
-        ((_word(registers, address) & ~1) - (factory & ~1)) / reg.ACCEL_OFFSET_LSB_PER_G
-        for address, factory in zip(model.family.accel_offset_h, trim, strict=True)
+        ((_word(registers, address) & ~1) - (trim & ~1)) / model.offset_lsb_per_g + more
+        for address, trim, more in zip(
+            model.family.accel_offset_h, factory.accel_trim, _tested(accel, factory.accel_self_test_g), strict=True
+        )
     )
-    gx, gy, gz = (_word(registers, reg.XG_OFFSET_H + 2 * axis) / reg.GYRO_OFFSET_LSB_PER_DPS for axis in range(3))
+    gx, gy, gz = (
+        _word(registers, reg.XG_OFFSET_H + 2 * axis) / reg.GYRO_OFFSET_LSB_PER_DPS + more
+        for axis, more in enumerate(_tested(gyro, factory.gyro_self_test_dps))
+    )
     return Setting(
         rate_hz=rate_hz,
-        accel_range_g=reg.ACCEL_RANGES_G[accel >> reg.FULL_SCALE_SHIFT],
-        gyro_range_dps=reg.GYRO_RANGES_DPS[gyro >> reg.FULL_SCALE_SHIFT],
+        accel_range_g=reg.ACCEL_RANGES_G[(accel & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT] / model.accel_sensitivity,
+        gyro_range_dps=reg.GYRO_RANGES_DPS[(gyro & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT],
         lsb_per_c=model.family.lsb_per_c,
         zero_c=model.family.zero_c,
         accel_offset_g=(ax, ay, az),
         gyro_offset_dps=(gx, gy, gz),
     )
+
+
+def _tested(config: int, responses: Three) -> Three:
+    """What the self test adds to x, y, z, as bits 7, 6 and 5 ask for it."""
+    x, y, z = (response if config & 0x80 >> axis else 0.0 for axis, response in enumerate(responses))
+    return x, y, z
 
 
 def _word(registers: bytearray, address: int) -> int:

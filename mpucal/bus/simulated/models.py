@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
+from dataclasses import dataclass, replace
+from typing import Any
 
 from ...chip import registers as reg
 from ...chip.families import CLONE98, MPU6050, MPU6500, Family
+from .factory import Factory
 
 AWAKE = 0x01
 
@@ -20,6 +20,9 @@ class Model:
     ----------
     name : as in an option. family : its register map.
     who_am_i : its identity. power_on : PWR_MGMT_1 after a reset.
+    accel_sensitivity : counts a g, over the nominal; revision C of the 6050 has half.
+    offset_lsb_per_g : what one count of an accelerometer offset really does.
+    offsets_kept : its accelerometer offsets can be written.
     reset_needs_fifo_off : FIFO_RST works only while FIFO_EN is 0 (RM-MPU-6000A, register 106).
     fifo_size_bits : ACCEL_CONFIG2 [7:6] doubles the FIFO that many times.
     """
@@ -28,29 +31,26 @@ class Model:
     family: Family
     who_am_i: int
     power_on: int
+    accel_sensitivity: float = 1.0
+    offset_lsb_per_g: float = 2048.0
+    offsets_kept: bool = True
     reset_needs_fifo_off: bool = False
     fifo_size_bits: bool = False
 
     def writable(self) -> frozenset[int]:
         """The addresses that keep what is written to them."""
-        offsets = {address + i for address in self.family.accel_offset_h for i in (0, 1)}
+        offsets = {address + i for address in self.family.accel_offset_h for i in (0, 1) if self.offsets_kept}
         own = {reg.ACCEL_CONFIG2} if self.family.has_accel_config2 else set()
         return frozenset(WRITABLE | offsets | own)
 
-    def reset_values(self, accel_trim: tuple[int, int, int]) -> bytearray:
-        """All 128 registers after a reset, with the factory's `accel_trim` (16-bit words x, y, z)."""
+    def reset_values(self, factory: Factory) -> bytearray:
+        """All 128 registers after a reset, with what the factory left in this piece."""
         values = bytearray(128)
         values[reg.PWR_MGMT_1] = self.power_on
         values[reg.WHO_AM_I] = self.who_am_i
-        for address, word in zip(self.family.accel_offset_h, accel_trim, strict=True):
-            values[address : address + 2] = word.to_bytes(2, "big", signed=True)
+        for address, value in factory.registers(self.family).items():
+            values[address] = value
         return values
-
-
-def draw_accel_trim(rng: np.random.Generator) -> tuple[int, int, int]:
-    """A factory trim: within +-1.5 g at 2048 LSB/g, with any reserved bit 0."""
-    x, y, z = (int(word) for word in rng.integers(-3000, 3000, 3))
-    return x, y, z
 
 
 WRITABLE = frozenset(
@@ -70,11 +70,20 @@ WRITABLE = frozenset(
     )
 )
 
+# How the accelerometer's offset registers of a simulated chip answer, by the word of an option.
+OFFSETS: dict[str, dict[str, Any]] = {
+    "2048": {},
+    "4096": {"offset_lsb_per_g": 4096.0},
+    "readonly": {"offsets_kept": False},
+}
+
 MODELS = {
     model.name: model
     for model in (
         Model("mpu6050", MPU6050, 0x68, reg.PWR_MGMT_1_SLEEP, reset_needs_fifo_off=True),
+        Model("mpu6050c", MPU6050, 0x68, reg.PWR_MGMT_1_SLEEP, accel_sensitivity=0.5, reset_needs_fifo_off=True),
         Model("mpu6500", MPU6500, 0x70, AWAKE),
+        Model("mpu6880", replace(MPU6500, fifo_bytes=4096), 0x78, AWAKE),
         Model("clone98", CLONE98, 0x98, reg.PWR_MGMT_1_SLEEP, fifo_size_bits=True),
     )
 }

@@ -12,7 +12,7 @@ from ...data import Vector
 from ...errors import UsageError
 from .clock import CLOCKS
 from .hand import KINDS
-from .models import MODELS
+from .models import MODELS, OFFSETS
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,7 @@ class Options:
     Attributes
     ----------
     chip, hand, pace : a name each. who_am_i : another identity than the chip's own.
+    offsets : what a count of its accelerometer offsets is, in LSB/g, or readonly.
     seed : of the sensor, its noise and the hand. rate_error_ppm : how fast the sample clock runs.
     D, K : (3, 3). b_a [m/s^2], b_omega [rad/s] : (3,).
     noise : times the data sheet's densities. temperature_c : of the die.
@@ -29,6 +30,7 @@ class Options:
 
     chip: str = "mpu6050"
     who_am_i: int | None = None
+    offsets: str = "2048"
     seed: int = 0
     hand: str = "guided"
     pace: str = "fast"
@@ -121,6 +123,7 @@ def _one_of(names: Mapping[str, object]) -> tuple[Callable[[str], str], str]:
 PARSERS: dict[str, tuple[Callable[[str], Any], str]] = {
     "chip": _one_of(MODELS),
     "who_am_i": (_identity, "a byte such as 0x68"),
+    "offsets": _one_of(OFFSETS),
     "seed": (_seed, "a whole number from 0 on"),
     "hand": _one_of(KINDS),
     "pace": _one_of(CLOCKS),

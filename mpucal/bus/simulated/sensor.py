@@ -15,8 +15,8 @@ Counts = NDArray[np.int16]
 FULL_SCALE = 32768
 TEMPERATURE_NOISE_C = 0.02
 
-# The data sheets' noise densities, by family: ug/sqrt(Hz), deg/s/sqrt(Hz).
-NOISE_DENSITY = {"mpu6050": (400.0, 0.005), "mpu6500": (300.0, 0.01), "clone98": (300.0, 0.01)}
+# The data sheets' noise densities: ug/sqrt(Hz), deg/s/sqrt(Hz).
+NOISE_OF_6050, NOISE_OF_6500 = (400.0, 0.005), (300.0, 0.01)
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Setting:
     Attributes
     ----------
     rate_hz : nominal sample rate. accel_range_g, gyro_range_dps : full scales.
-    accel_offset_g, gyro_offset_dps : (3,) what the offset registers add.
+    accel_offset_g, gyro_offset_dps : (3,) what offset registers and self test add.
     lsb_per_c, zero_c : temperature is counts / lsb_per_c + zero_c.
     """
 
@@ -120,7 +120,7 @@ class Truth:
         gyro = rng.uniform(-0.02, 0.02, (3, 3))
         np.fill_diagonal(gyro, rng.uniform(0.97, 1.03, 3))
         D, K = in_symmetric_frame(D, np.linalg.inv(gyro))
-        accel_noise, gyro_noise = NOISE_DENSITY[chip]
+        accel_noise, gyro_noise = NOISE_OF_6050 if chip.startswith("mpu6050") else NOISE_OF_6500
         return cls(
             D=D,
             b_a=rng.uniform(-0.08, 0.08, 3) * STANDARD_GRAVITY_MPS2,
