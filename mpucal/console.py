@@ -15,7 +15,12 @@ from typing import TextIO
 from .session.events import Decision, Key, Output, Progress, Prompt, PromptKind
 
 PROGRESS_EVERY_S = 1.0
-HEADINGS = {PromptKind.LAY_FLAT: "LAY FLAT", PromptKind.ROTATE: "ROTATE", PromptKind.REST: "REST"}
+HEADINGS = {
+    PromptKind.LAY_FLAT: "LAY FLAT",
+    PromptKind.ROTATE: "ROTATE",
+    PromptKind.VERIFY: "VERIFY",
+    PromptKind.REST: "REST",
+}
 KEYS = "(Enter: go on now; q and Enter, or Ctrl-C: stop.)"
 
 

@@ -14,6 +14,7 @@ class Key(StrEnum):
     """What the person can say."""
 
     ENOUGH = "enough"
+    REDO = "redo"
     ABORT = "abort"
 
 
@@ -109,12 +110,13 @@ class PromptKind(StrEnum):
 
     LAY_FLAT = "lay_flat"
     ROTATE = "rotate"
+    VERIFY = "verify"
     REST = "rest"
 
 
 @dataclass(frozen=True)
 class Prompt:
-    """An instruction to the person.
+    """An instruction to the person: the one that holds until the next.
 
     Attributes
     ----------
@@ -138,6 +140,133 @@ class Progress:
 
 
 @dataclass(frozen=True)
+class Meter:
+    """What the board does this moment, four times a second: for a needle and a picture, not for words.
+
+    Attributes
+    ----------
+    level : 0 perfectly still, 1 at the limit of what counts as still, beyond it moving. still : below that limit.
+    what : what moves it most, in words; empty where it is still.
+    down : unit vector in the board's axes that points down now. turning_dps : how fast it turns [deg/s].
+    rate_hz : samples a second as they come. temperature_c : of the chip; None where it says none.
+    """
+
+    t_s: float
+    level: float
+    still: bool
+    what: str
+    down: Direction
+    turning_dps: float
+    rate_hz: float
+    temperature_c: float | None
+
+
+@dataclass(frozen=True)
+class Countdown:
+    """How long the board must stay still yet, while something waits for that; `paused` by a bump.
+
+    It starts over (`remaining_s` is `of_s` again) only where the board was moved.
+    """
+
+    t_s: float
+    remaining_s: float
+    of_s: float
+    paused: bool
+
+
+@dataclass(frozen=True)
+class Caution:
+    """Something is not as it should be: `what` in one line, and what to `do` about it now.
+
+    `code` names its kind for those who count them: too_fast, clipped, data_lost, trembling, not_turned, elsewhere,
+    unplugged, slow_fit.
+    """
+
+    t_s: float
+    code: str
+    what: str
+    do: str
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The board has shown one more orientation: number `number` (the flat one is the first).
+
+    Attributes
+    ----------
+    down : unit vector in the board's axes that pointed down. paused : it was held; else only passed in turning.
+    """
+
+    t_s: float
+    number: int
+    down: Direction
+    paused: bool
+
+
+@dataclass(frozen=True)
+class Target:
+    """Standard deviations at which a session is content."""
+
+    gain_pct: float
+    misalignment_deg: float
+    bias_mg: float
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """How well the accelerometer is known by now, about once a second while the board is turned.
+
+    Attributes
+    ----------
+    gain_pct, misalignment_deg, bias_mg : (x, y, z) standard deviations [%], [deg], [mg]; of an axis' two leans the
+        worse. 1e3 or so means: nothing is known yet.
+    target : what is wanted of each.
+    gain, misalignment, bias : (x, y, z) progress toward it, 0..1. overall : the least of all nine.
+    down : unit vector in the board's axes: the still orientation that would help most if it pointed down now.
+        None where every one is known well enough.
+    words : that orientation in words ("corner +x -y down"), or what the knowledge amounts to.
+    doubt : one line where the data contradict each other already (a flipped axis, a wrong range), else empty.
+    """
+
+    t_s: float
+    gain_pct: Direction
+    misalignment_deg: Direction
+    bias_mg: Direction
+    target: Target
+    gain: Direction
+    misalignment: Direction
+    bias: Direction
+    overall: float
+    down: Direction | None
+    words: str
+    doubt: str = ""
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What one orientation that the fit had not seen says of it.
+
+    Attributes
+    ----------
+    number, of : which one of how many. down : unit vector in the board's axes that pointed down.
+    magnitude_mps2, magnitude_std_mps2 : |a| - g there, and what the covariance promises of it.
+    direction_deg, direction_std_deg : angle between gravity as the gyroscope carried it and as measured, and its promise.
+    agrees : both are within the promise. text : the same in words.
+    """
+
+    t_s: float
+    number: int
+    of: int
+    down: Direction
+    magnitude_mps2: float
+    magnitude_std_mps2: float
+    direction_deg: float
+    direction_std_deg: float
+    agrees: bool
+    text: str
+
+
+@dataclass(frozen=True)
 class Decision:
     """The session went on to its next state, or ended: `why`, and where it ended early, what to do next."""
 
@@ -145,4 +274,4 @@ class Decision:
     remedy: str = ""
 
 
-Output = Prompt | Progress | Decision
+Output = Prompt | Progress | Meter | Countdown | Caution | Seen | Knowledge | Verification | Decision

@@ -14,7 +14,6 @@ from .events import (
     Fitted,
     Measured,
     Output,
-    Progress,
     Prompt,
     PromptKind,
     Rested,
@@ -89,10 +88,10 @@ class Machine:
     def _follow(self, found: Sequence[Output | Rested | Turned | Stopped]) -> list[Output]:
         outputs: list[Output] = []
         for item in found:
-            if isinstance(item, Prompt | Progress | Decision):
-                outputs.append(item)
-            else:
+            if isinstance(item, Rested | Turned | Stopped):
                 outputs += self.handle(item)
+            else:
+                outputs.append(item)
         return outputs
 
     def _tick(self, t_s: float) -> list[Output]:
