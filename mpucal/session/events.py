@@ -250,7 +250,7 @@ class Verification:
     ----------
     number, of : which one of how many. down : unit vector in the board's axes that pointed down.
     magnitude_mps2, magnitude_std_mps2 : |a| - g there, and what the covariance promises of it.
-    direction_deg, direction_std_deg : angle between gravity as the gyroscope carried it and as measured, and its promise.
+    direction_deg, direction_std_deg : angle from gravity as the gyroscope carried it to it as measured, and its promise.
     agrees : both are within the promise. text : the same in words.
     """
 
