@@ -6,7 +6,8 @@ MpucalError
 │   ├── RecordingError       a file or arrays that are no recording
 │   ├── CaptureError         a capture that is damaged, or does not hold what was asked of it
 │   ├── BusError             a transfer failed
-│   │   └── NoAnswer         nothing acknowledged the address
+│   │   ├── NoAnswer         nothing acknowledged the address, or sent a heartbeat
+│   │   └── LinkError        the link to a vehicle broke, or cannot be used
 │   └── ChipError            the chip answers, but not as its register map says
 ├── OutputError           3  a result cannot be written where it was asked to go
 ├── Abandoned             4  the session ended before there was anything to calibrate
@@ -62,7 +63,11 @@ class BusError(SourceError):
 
 
 class NoAnswer(BusError):  # noqa: N818 - reads as the sentence it is
-    """Nothing acknowledged the address."""
+    """Nothing acknowledged the address, or sent a heartbeat."""
+
+
+class LinkError(BusError):
+    """The link to a vehicle broke, or cannot be used."""
 
 
 class ChipError(SourceError):

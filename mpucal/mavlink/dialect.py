@@ -1,0 +1,91 @@
+"""pymavlink's messages, loaded when asked for, and bytes made into them. Knows no address and no clock."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from typing import Any, NamedTuple
+
+# pymavlink has no types: a message is any object with get_type() and the fields of its definition
+Message = Any
+
+V1, V2 = 0xFE, 0xFD
+HEADER = {V1: 6, V2: 10}
+CHECKSUM, SIGNATURE = 2, 13
+SIGNED = 0x01
+FLAGS_AT = 2
+LONGEST = 10 + 255 + CHECKSUM + SIGNATURE
+
+
+@cache
+def dialect() -> Any:
+    """The module of all messages that ArduPilot and PX4 send (MAVLink 2)."""
+    return import_module("pymavlink.dialects.v20.ardupilotmega")
+
+
+class Packet(NamedTuple):
+    """The bytes of one message, and the message."""
+
+    data: bytes
+    message: Message
+
+
+def packet_length(data: bytes | bytearray) -> int | None:
+    """How long the packet is that begins at data[0]; None where too few bytes say so.
+
+    MAVLink serialisation: magic, payload length, (incompatibility flags), ...
+    """
+    if len(data) <= FLAGS_AT:
+        return None
+    signature = SIGNATURE if data[0] == V2 and data[FLAGS_AT] & SIGNED else 0
+    return HEADER[data[0]] + data[1] + CHECKSUM + signature
+
+
+class Parser:
+    """Bytes in, whole packets out; what is damaged is left out, and the next packet found.
+
+    Parameters
+    ----------
+    mav : pymavlink's MAVLink, which checks sums and signatures.
+    """
+
+    def __init__(self, mav: Any) -> None:
+        self._mav = mav
+        self._buffer = bytearray()
+        self.refused = 0
+
+    def datagram(self, data: bytes) -> list[Packet]:
+        """The packets of a datagram, which holds whole packets or is damaged."""
+        self._buffer = bytearray()
+        packets = self.stream(data)
+        self._buffer = bytearray()
+        return packets
+
+    def stream(self, data: bytes) -> list[Packet]:
+        """The packets that `data`, the next bytes of a stream, complete."""
+        self._buffer += data
+        packets: list[Packet] = []
+        at = 0
+        while at < len(self._buffer):
+            if self._buffer[at] not in HEADER:
+                at += 1
+                continue
+            length = packet_length(self._buffer[at : at + HEADER[V2]])
+            if length is None or at + length > len(self._buffer):
+                break
+            packet = self._decoded(self._buffer[at : at + length])
+            # a byte that only looks like a beginning: the packet may begin within what it claimed
+            at += length if packet else 1
+            packets += [packet] if packet else []
+        del self._buffer[:at]
+        return packets
+
+    def _decoded(self, data: bytearray) -> Packet | None:
+        if data[0] == V2 and data[FLAGS_AT] & ~SIGNED:
+            return None
+        try:
+            message = self._mav.decode(data)
+        except dialect().MAVError as error:
+            self.refused += "signature" in str(error)
+            return None
+        return Packet(bytes(data), message)

@@ -1,0 +1,321 @@
+"""The link to one vehicle: listen, lock to it, then hear and answer it alone. Knows no stream and no parameter.
+
+One thread: nothing arrives but in `messages`, and every message of the vehicle goes to all who subscribed, whoever
+called `messages`. The time is that of the transport, as of the last message or deadline: a replay repeats it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeVar
+
+from ..errors import LinkError, NoAnswer
+from .dialect import Message, Packet, Parser, dialect
+from .transport import Bytes, Transport
+
+T = TypeVar("T")
+
+# of us: a ground station beside the usual 255, as a component that autopilots expect of one
+OWN_SYSTEM, OWN_COMPONENT = 254, 190
+
+S = 1_000_000_000
+LISTEN_NS, PATIENCE_NS = 2 * S, 6 * S
+HEARTBEAT_NS = S
+SEQUENCE = 256
+# signatures count 10 us since 2015-01-01
+SIGNING_EPOCH_NS, SIGNING_UNIT_NS = 1_420_070_400 * S, 10_000
+
+Recorder = Callable[[int, bytes], None]
+Listener = Callable[[Message], None]
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """Who sent an autopilot's HEARTBEAT.
+
+    Attributes
+    ----------
+    address : from where. system, component : MAVLink ids. autopilot : MAV_AUTOPILOT. type : MAV_TYPE.
+    """
+
+    address: str
+    system: int
+    component: int
+    autopilot: int
+    type: int
+
+    @property
+    def is_px4(self) -> bool:
+        """Whether it does as PX4 does, rather than as ArduPilot."""
+        return bool(self.autopilot == dialect().MAV_AUTOPILOT_PX4)
+
+    @property
+    def firmware(self) -> str:
+        """The autopilot's name."""
+        names = {dialect().MAV_AUTOPILOT_PX4: "PX4", dialect().MAV_AUTOPILOT_ARDUPILOTMEGA: "ArduPilot"}
+        return names.get(self.autopilot, f"autopilot {self.autopilot}")
+
+    def __str__(self) -> str:
+        return f"system {self.system} ({self.firmware}) at {self.address}"
+
+
+class _Arrived(NamedTuple):
+    t_ns: int
+    address: str
+    packet: Packet
+
+
+class Link:
+    """A link over an open transport.
+
+    Parameters
+    ----------
+    transport : where the packets come from; `close` closes it.
+    record : keeps each packet of the vehicle and of us, with its time [ns since 1970].
+    key : 32 bytes with which both sides sign, or None.
+    """
+
+    def __init__(self, transport: Transport, record: Recorder, key: bytes | None = None) -> None:
+        self._transport = transport
+        self._record = record
+        self._mav = dialect().MAVLink(None, OWN_SYSTEM, OWN_COMPONENT)
+        self._now_ns = transport.now_ns()
+        if key is not None:
+            self._sign(key)
+        self._parsers: dict[str, Parser] = {}
+        self._queue: deque[_Arrived] = deque()
+        # until it is locked: time, from where (None: from us), bytes
+        self._heard: list[tuple[int, str | None, bytes]] = []
+        self._listeners: list[Listener] = []
+        self._vehicle: Vehicle | None = None
+        self._next_heartbeat_ns = self._now_ns
+        self._sequence: dict[int, int] = {}
+        self.lost = 0
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """Whom it is locked to.
+
+        Raises
+        ------
+        RuntimeError : it is not locked yet.
+        """
+        if self._vehicle is None:
+            raise RuntimeError("the link is not locked to a vehicle yet")
+        return self._vehicle
+
+    @property
+    def mav(self) -> Any:
+        """pymavlink's MAVLink, whose *_encode methods make messages."""
+        return self._mav
+
+    def now_ns(self) -> int:
+        """ns since 1970: of the last message delivered, or of the deadline that passed since."""
+        return self._now_ns
+
+    def subscribe(self, listener: Listener) -> None:
+        """Have `listener` called with every message of the vehicle from now on."""
+        self._listeners.append(listener)
+
+    def listen(self) -> tuple[Vehicle, ...]:
+        """Who sends an autopilot's HEARTBEAT within two seconds (the first one may take six).
+
+        Raises
+        ------
+        NoAnswer : nobody does, or none whose signature holds.
+        """
+        begun_ns = self._now_ns
+        found: dict[tuple[str, int], Vehicle] = {}
+        for patience_ns in (LISTEN_NS, PATIENCE_NS):
+            for arrived in self._arrivals(begun_ns + patience_ns):
+                self._heard.append((arrived.t_ns, arrived.address, arrived.packet.data))
+                vehicle = _vehicle(arrived)
+                if vehicle is not None:
+                    found.setdefault((vehicle.address, vehicle.system), vehicle)
+                    if patience_ns != LISTEN_NS:
+                        break
+            if found:
+                return tuple(found.values())
+        raise self._nobody()
+
+    def lock(self, vehicle: Vehicle) -> None:
+        """Hear `vehicle` alone from now on, and send to it."""
+        self._vehicle = vehicle
+        for t_ns, address, data in self._heard:
+            if address in (vehicle.address, None):
+                self._record(t_ns, data)
+        self._heard = []
+
+    def send(self, message: Message) -> None:
+        """Send to the vehicle, and nobody else.
+
+        Raises
+        ------
+        RuntimeError : the link is not locked. LinkError : it broke.
+        """
+        self._transmit(message, self.vehicle.address)
+
+    def messages(self, until_ns: int) -> Iterator[Message]:
+        """The vehicle's messages until `until_ns`; who leaves early loses none.
+
+        Raises
+        ------
+        EndOfCapture : a replay holds no more. LinkError : the link broke.
+        """
+        vehicle = self.vehicle
+        for arrived in self._arrivals(until_ns):
+            if arrived.address != vehicle.address:
+                continue
+            self._record(arrived.t_ns, arrived.packet.data)
+            message = arrived.packet.message
+            if (message.get_srcSystem(), message.get_srcComponent()) != (vehicle.system, vehicle.component):
+                continue
+            self._count(message.get_seq())
+            for listener in self._listeners:
+                listener(message)
+            yield message
+
+    def note(self, message: Message) -> None:
+        """Keep a message of ours in the record, and send it to nobody."""
+        self._keep(self._packed(message))
+
+    def close(self) -> None:
+        """Close the transport."""
+        self._transport.close()
+
+    def _arrivals(self, until_ns: int) -> Iterator[_Arrived]:
+        while True:
+            while self._queue and self._queue[0].t_ns < until_ns:
+                arrived = self._queue.popleft()
+                self._now_ns = max(self._now_ns, arrived.t_ns)
+                yield arrived
+            if self._queue:
+                break
+            self._beat()
+            received = self._transport.receive(min(until_ns, self._next_heartbeat_ns))
+            if received is not None:
+                self._queue.extend(self._parsed(received))
+            elif self._transport.now_ns() >= until_ns:
+                break
+        self._now_ns = max(self._now_ns, until_ns)
+
+    def _parsed(self, received: Bytes) -> list[_Arrived]:
+        # before its bytes are looked at: a stranger shall not touch what signatures are compared with
+        if self._vehicle is not None and received.address != self._vehicle.address:
+            return []
+        parser = self._parsers.setdefault(received.address, Parser(self._mav))
+        parse = parser.datagram if self._transport.datagrams else parser.stream
+        return [_Arrived(received.t_ns, received.address, packet) for packet in parse(received.data)]
+
+    def _beat(self) -> None:
+        """A ground station's HEARTBEAT each second, to whom we may speak."""
+        now_ns = self._transport.now_ns()
+        if now_ns < self._next_heartbeat_ns:
+            return
+        self._next_heartbeat_ns = now_ns + HEARTBEAT_NS
+        if self._vehicle is None and not self._transport.outward:
+            return
+        m = dialect()
+        heartbeat = self._mav.heartbeat_encode(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE)
+        self._transmit(heartbeat, None if self._vehicle is None else self._vehicle.address)
+
+    def _transmit(self, message: Message, address: str | None) -> None:
+        data = self._packed(message)
+        self._keep(data)
+        self._transport.send(data, None if self._transport.outward else address)
+
+    def _keep(self, data: bytes) -> None:
+        if self._vehicle is None:
+            self._heard.append((self._now_ns, None, data))
+        else:
+            self._record(self._now_ns, data)
+
+    def _packed(self, message: Message) -> bytes:
+        data = bytes(message.pack(self._mav))
+        self._mav.seq = (self._mav.seq + 1) % SEQUENCE
+        return data
+
+    def _count(self, sequence: int) -> None:
+        """Packets that are missing by their numbers; one that comes late was counted as missing before."""
+        component = self.vehicle.component
+        step = (sequence - self._sequence.get(component, sequence - 1)) % SEQUENCE
+        if 0 < step < SEQUENCE // 2:
+            self._sequence[component] = sequence
+            self.lost += step - 1
+        elif step:
+            self.lost = max(self.lost - 1, 0)
+
+    def _sign(self, key: bytes) -> None:
+        signing = self._mav.signing
+        signing.secret_key, signing.sign_outgoing, signing.link_id = key, True, OWN_COMPONENT
+        signing.timestamp = (self._now_ns - SIGNING_EPOCH_NS) // SIGNING_UNIT_NS
+
+    def _nobody(self) -> LinkError:
+        where = self._transport.name
+        if self._mav.signing.secret_key is not None and any(parser.refused for parser in self._parsers.values()):
+            return LinkError(
+                f"packets arrive on {where}, and none is signed with the key of --signing-key",
+                "give the vehicle's key, or leave it out where the vehicle does not sign",
+            )
+        return NoAnswer(
+            f"no autopilot's heartbeat came over {where} within {PATIENCE_NS // S} s",
+            "power the vehicle, and have its telemetry sent here",
+        )
+
+
+def ask(
+    link: Link,
+    message: Message,
+    reply: Callable[[Message], T | None],
+    timeout_s: float = 1.0,
+    tries: int = 3,
+) -> T | None:
+    """Send `message` until one of the vehicle's messages is an answer.
+
+    Parameters
+    ----------
+    reply : what a message answers, None where it is no answer. timeout_s : after which it is sent again.
+
+    Returns
+    -------
+    The answer, or None where none came.
+
+    Raises
+    ------
+    EndOfCapture, LinkError : see Link.messages.
+    """
+    for _ in range(tries):
+        link.send(message)
+        for received in link.messages(link.now_ns() + round(timeout_s * S)):
+            answer = reply(received)
+            if answer is not None:
+                return answer
+    return None
+
+
+def command(link: Link, number: int, *params: float, timeout_s: float = 1.0, tries: int = 3) -> int | None:
+    """Send MAV_CMD `number` as COMMAND_LONG; the MAV_RESULT of its COMMAND_ACK, None where none came."""
+    seven = [*params, *[0.0] * (7 - len(params))]
+    vehicle = link.vehicle
+    message = link.mav.command_long_encode(vehicle.system, vehicle.component, number, 0, *seven)
+
+    def reply(received: Message) -> int | None:
+        if received.get_type() != "COMMAND_ACK" or received.command != number:
+            return None
+        return None if received.result == dialect().MAV_RESULT_IN_PROGRESS else int(received.result)
+
+    return ask(link, message, reply, timeout_s, tries)
+
+
+def _vehicle(arrived: _Arrived) -> Vehicle | None:
+    """Whose HEARTBEAT it is, where it is an autopilot's."""
+    message = arrived.packet.message
+    m = dialect()
+    if message.get_type() != "HEARTBEAT" or message.autopilot == m.MAV_AUTOPILOT_INVALID:
+        return None
+    if message.type == m.MAV_TYPE_GCS:
+        return None
+    system, component = message.get_srcSystem(), message.get_srcComponent()
+    return Vehicle(arrived.address, system, component, message.autopilot, message.type)
