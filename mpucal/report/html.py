@@ -3,109 +3,125 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from html import escape
+from pathlib import PurePath
+from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
-from ..data import Recording, Vector
-from ..result import ACCELEROMETER_FORMULA, Calibration
-from .picture import magnitude_svg
+from .. import __version__
+from ..data import STANDARD_GRAVITY_MPS2, Recording
+from ..result import GOOD, REFUSED, USABLE, Calibration
+from .elements import as_float, code, heading, number, paragraph, quantity, section, table
+from .found import accelerometer_section, formula_section, gyroscope_table, is_regular, matrices_section
+from .gallery import gallery
 from .style import CSS
+from .track import Track
+from .use import in_c, in_python, in_ros
 
 VERDICTS = {
-    "good": "Good: the calibration explains what the sensor measured, and each parameter is well known.",
-    "usable": "Usable, with the reservations below.",
-    "refused": "Refused: do not use these numbers.",
+    GOOD: "Good: the calibration explains what the sensor measured, and each parameter is well known.",
+    USABLE: "Usable, with the reservations below.",
+    REFUSED: "Refused: do not use these numbers.",
 }
-_AXES = "xyz"
+INSTALL = "pip install 'mpucal[plot]'"
+_NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
 def render(calibration: Calibration, recording: Recording | None = None) -> str:
-    """The page of a calibration; with its recording, also the picture of |a| before and after."""
-    sections = (
+    """The page of a calibration; with its recording, also the pictures of that."""
+    drawn, why_not = _pictures(calibration, recording)
+    body = (
         _verdict(calibration, recording),
-        _section("Accelerometer", _parameters(calibration)),
-        _section("Use", _formula(calibration)),
-        _section("Magnitude of the acceleration", _magnitudes(calibration) + _picture(calibration, recording)),
-        _section("Sensor and settings", _settings(calibration, recording)),
+        accelerometer_section(calibration),
+        formula_section(calibration),
+        section("|a| before and after", _magnitudes(calibration), why_not, *_those(drawn, "magnitude", "sphere")),
+        section("How well it fits", *_those(drawn, "innovations")),
+        section("Where it was turned", *_those(drawn, "coverage")),
+        section("The gyroscope", gyroscope_table(calibration), *_those(drawn, "rates")),
+        section("Temperature", *_those(drawn, "temperature")),
+        _application(calibration),
+        _settings(calibration, recording),
+        matrices_section(calibration),
+        _reproduction(calibration, recording),
     )
-    title = f"Calibration of {calibration.sensor.chip or 'an accelerometer'}"
+    title = f"Calibration of {_article(calibration.sensor.chip)}"
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n"
-        f"<h1>{escape(title)}</h1>\n{''.join(sections)}</body>\n</html>\n"
+        f"<h1>{escape(title)}</h1>\n{''.join(body)}</body>\n</html>\n"
     )
+
+
+def _article(chip: str | None) -> str:
+    return f"an {chip}" if chip and chip[0] in "AEIMO" else f"a {chip}" if chip else "an accelerometer"
 
 
 def _verdict(calibration: Calibration, recording: Recording | None) -> str:
     verdict = calibration.verdict
-    sentence = VERDICTS.get(verdict, f"The verdict is {verdict}.")
+    sentence = " ".join([VERDICTS.get(verdict, f"The verdict is {verdict}."), *_how_sure(calibration)])
     reasons = "".join(
         f"<li><code>{escape(str(reason['code']))}</code>: {escape(str(reason['message']))}</li>\n"
         for reason in calibration.quality.get("reasons", ())
     )
     listed = f'<ul id="reasons">\n{reasons}</ul>\n' if reasons else ""
-    recovered = f"<p>{escape(recording.recovered)}</p>\n" if recording and recording.recovered else ""
+    recovered = paragraph(recording.recovered, note=True) if recording and recording.recovered else ""
     return f'<p class="verdict {escape(verdict)}" id="verdict">{escape(sentence)}</p>\n{listed}{recovered}'
 
 
-def _parameters(calibration: Calibration) -> str:
-    rows = [[f"D {axis}", *map(_with_std, calibration.D[i], calibration.D_std[i])] for i, axis in enumerate(_AXES)]
-    rows.append(["b_a, m/s²", *map(_with_std, calibration.b_a, calibration.b_a_std)])
-    rows.append(["noise, m/s²", *(_number(value) for value in calibration.noise_std)])
-    return _table("parameters", "value ± standard deviation", ["", *_AXES], rows)
-
-
-def _formula(calibration: Calibration) -> str:
-    if not _is_regular(calibration.D):
-        return '<p class="note" id="formula">D cannot be inverted: these numbers correct nothing.</p>\n'
-    gain = np.linalg.inv(calibration.D)
-    bias = calibration.b_a - calibration.applied_in_hardware
-    lines = [
-        f"a_{axis} = "
-        + " ".join(
-            f"{factor:+.6f} * (y_{of} {-offset:+.6f})" for factor, of, offset in zip(gain[i], _AXES, bias, strict=True)
-        )
-        for i, axis in enumerate(_AXES)
+def _how_sure(calibration: Calibration) -> list[str]:
+    """What an error of a calibrated reading amounts to; nothing where it is not known or the result is refused."""
+    error = calibration.quality.get("error_std") or {}
+    rms, direction = as_float(error.get("rms")), as_float(error.get("direction_deg"))
+    if calibration.verdict == REFUSED or not (math.isfinite(rms) and math.isfinite(direction)):
+        return []
+    mg = 1000.0 * rms / STANDARD_GRAVITY_MPS2
+    return [
+        f"What is left of its errors is {rms:.2g} m/s² ({mg:.2g} mg) rms over all orientations, and a direction is"
+        f" right to {direction:.2g} deg."
     ]
-    note = ""
-    if np.any(calibration.applied_in_hardware):
-        note = (
-            '<p class="note">The chip\'s offset registers subtract a part of b_a already; the numbers above'
-            " are what is left to subtract.</p>\n"
-        )
-    return (
-        f"<p><code>{escape(ACCELEROMETER_FORMULA)}</code>, in m/s², y being what the sensor delivers:</p>\n"
-        f'<pre id="formula">{escape(chr(10).join(lines))}</pre>\n{note}'
-    )
 
 
 def _magnitudes(calibration: Calibration) -> str:
     rows = []
     for name in ("before", "after"):
         values: Mapping[str, Any] = calibration.quality.get(f"magnitude_{name}") or {}
-        rows.append([name, *(_number(values.get(key)) for key in ("median", "mean", "std"))])
-    return _table("magnitudes", "|a|, m/s²", ["", "median", "mean", "std"], rows)
+        rows.append([name, *(number(values.get(key)) for key in ("median", "mean", "std"))])
+    return table("magnitudes", "|a|, m/s²", ["", "median", "mean", "std"], rows)
 
 
-def _picture(calibration: Calibration, recording: Recording | None) -> str:
+def _pictures(calibration: Calibration, recording: Recording | None) -> tuple[Mapping[str, str], str]:
+    """The pictures by name, and why there are none."""
     if recording is None:
-        return ""
-    if not _is_regular(calibration.D):
-        return '<p class="note">D cannot be inverted: there is no picture.</p>\n'
-    before = np.linalg.norm(recording.acc, axis=1)
-    after = np.linalg.norm(calibration.apply(recording.acc), axis=1)
+        return _NOTHING, ""
+    if not is_regular(calibration):
+        return _NOTHING, paragraph("D cannot be inverted: there are no pictures.", note=True)
     try:
-        gravity = _float(calibration.fit.get("gravity"))
-        return f'<div class="wide">{magnitude_svg(recording.t, before, after, gravity)}</div>\n'
+        return gallery(Track(recording, calibration)), ""
     except ImportError:
-        return (
-            '<p class="note" id="no-picture">For a picture of |a| over time install matplotlib:'
-            " <code>pip install 'mpucal[plot]'</code>.</p>\n"
-        )
+        said = f"For pictures install matplotlib ({INSTALL}), then run mpucal calibrate on the recording."
+        return _NOTHING, paragraph(said, "no-picture", note=True)
+
+
+def _those(drawn: Mapping[str, str], *names: str) -> list[str]:
+    return [drawn[name] for name in names if name in drawn]
+
+
+def _application(calibration: Calibration) -> str:
+    if not is_regular(calibration) or calibration.verdict == REFUSED:
+        return ""
+    return section(
+        "How to apply it",
+        heading("C"),
+        code(in_c(calibration), "c"),
+        paragraph("Or read calibration.bin, whose layout firmware_protocol.md describes.", note=True),
+        heading("Python"),
+        code(in_python(calibration), "python"),
+        paragraph('Or, with mpucal: a = mpucal.Calibration.load("calibration.json").apply(y).', note=True),
+        heading("ROS 2"),
+        code(in_ros(calibration), "ros"),
+    )
 
 
 def _settings(calibration: Calibration, recording: Recording | None) -> str:
@@ -113,64 +129,38 @@ def _settings(calibration: Calibration, recording: Recording | None) -> str:
     rows = [
         ("chip", sensor.chip),
         ("WHO_AM_I", None if sensor.who_am_i is None else f"0x{sensor.who_am_i:02x}"),
-        ("accelerometer range", _quantity(sensor.accel_range_g, "g", "±")),
-        ("gyroscope range", _quantity(sensor.gyro_range_dps, "deg/s", "±")),
-        ("sample rate", _quantity(sensor.rate_hz, "Hz")),
-        ("temperature", _quantity(sensor.temperature_c, "°C")),
-        ("gravity", _quantity(fit.get("gravity"), "m/s²")),
+        ("accelerometer range", quantity(sensor.accel_range_g, "g", "±")),
+        ("gyroscope range", quantity(sensor.gyro_range_dps, "deg/s", "±")),
+        ("sample rate", quantity(sensor.rate_hz, "Hz")),
+        ("temperature", quantity(sensor.temperature_c, "°C")),
+        ("gravity", quantity(fit.get("gravity"), "m/s²")),
         ("model", fit.get("model")),
         ("why this model", fit.get("why")),
         ("samples", fit.get("samples")),
-        ("duration", _quantity(fit.get("seconds"), "s")),
+        ("duration", quantity(fit.get("seconds"), "s")),
         ("iterations", fit.get("iterations")),
-        ("NIS a sample (3 expected)", _quantity(fit.get("nis"), "")),
+        ("NIS a sample (3 expected)", quantity(fit.get("nis"), "")),
         ("recording", None if recording is None else recording.name),
         ("made", calibration.created or None),
     ]
     known = [[name, str(value)] for name, value in rows if value is not None]
-    return _table("settings", "", [], known, words=True)
+    return section("Sensor and settings", table("settings", "", [], known, words=True))
 
 
-def _section(title: str, content: str) -> str:
-    return f"<section>\n<h2>{escape(title)}</h2>\n{content}</section>\n"
-
-
-def _table(id_: str, caption: str, head: Iterable[str], rows: Iterable[Iterable[str]], words: bool = False) -> str:
-    """A table whose rows begin with their names; every cell is escaped here."""
-    cell = '<td class="words">' if words else "<td>"
-    lines = [f'<div class="wide"><table id="{id_}">']
-    if caption:
-        lines.append(f"<caption>{escape(caption)}</caption>")
-    columns = "".join(f'<th scope="col">{escape(name)}</th>' for name in head)
-    if columns:
-        lines.append(f"<tr>{columns}</tr>")
-    for name, *values in rows:
-        cells = "".join(f"{cell}{escape(value)}</td>" for value in values)
-        lines.append(f'<tr><th scope="row">{escape(name)}</th>{cells}</tr>')
-    return "\n".join([*lines, "</table></div>\n"])
-
-
-def _with_std(value: float, std: float) -> str:
-    """A value to the second digit of its standard deviation."""
-    if not (math.isfinite(std) and std > 0):
-        return f"{_number(value)} ± {_number(std)}"
-    digits = min(max(1 - math.floor(math.log10(std)), 0), 9)
-    return f"{value:.{digits}f} ± {std:.{digits}f}"
-
-
-def _number(value: Any) -> str:
-    number = _float(value)
-    return f"{number:.6f}" if math.isfinite(number) else "unknown"
-
-
-def _quantity(value: Any, unit: str, sign: str = "") -> str | None:
-    number = _float(value)
-    return f"{sign}{number:.6g} {unit}".rstrip() if math.isfinite(number) else None
-
-
-def _float(value: Any) -> float:
-    return math.nan if value is None else float(value)
-
-
-def _is_regular(D: Vector) -> bool:
-    return bool(np.isfinite(D).all() and np.linalg.matrix_rank(D) == 3)
+def _reproduction(calibration: Calibration, recording: Recording | None) -> str:
+    """The commands that give these numbers again; none where nobody says from what."""
+    gravity, model = as_float(calibration.fit.get("gravity")), calibration.fit.get("model")
+    if recording is None or model is None or not math.isfinite(gravity):
+        return ""
+    name = PurePath(recording.name)
+    lines = [f"mpucal calibrate {name} --model {model} --gravity {gravity:.9g} -o again"]
+    if name.suffix == ".mcap":
+        lines.append(f"mpucal session --replay {name} -o replayed")
+    said = paragraph(
+        "In the folder of this page. The first fits the recording again; the second runs the whole session again, "
+        "prompt by prompt, where a session made it."
+        if len(lines) > 1
+        else "In the folder of the recording:"
+    )
+    made = paragraph(f"Made by mpucal {__version__}.", note=True)
+    return section("How to reproduce it", said, code("\n".join(lines), "reproduce"), made)

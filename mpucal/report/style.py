@@ -1,27 +1,37 @@
-"""How the report looks, by daylight and at night. Knows no content."""
+"""How the report looks, by daylight and at night, on a desk and on a phone. Knows no content."""
 
 CSS = """
 :root { color-scheme: light dark;
   --paper: #ffffff; --ink: #1c2024; --faint: #60646c; --line: #d9d9e0; --raised: #f5f5f8;
-  --before: #b4531f; --after: #1b66b3; --good: #18794e; --usable: #8f5f00; --refused: #b3261e; }
+  --before: #b4531f; --after: #1b66b3; --x: #c3352b; --y: #18794e; --z: #1b66b3;
+  --good: #18794e; --usable: #8f5f00; --refused: #b3261e; }
 @media (prefers-color-scheme: dark) { :root {
   --paper: #111315; --ink: #edeef0; --faint: #a5abb3; --line: #363a3f; --raised: #1a1d20;
-  --before: #f0a070; --after: #70b8ff; --good: #4cc38a; --usable: #e2b447; --refused: #ff8f86; } }
+  --before: #f0a070; --after: #70b8ff; --x: #ff8f86; --y: #4cc38a; --z: #70b8ff;
+  --good: #4cc38a; --usable: #e2b447; --refused: #ff8f86; } }
 * { box-sizing: border-box; }
-body { margin: 0 auto; padding: 2rem 1rem 4rem; max-width: 52rem; background: var(--paper);
-  color: var(--ink); font: 16px/1.5 system-ui, sans-serif; }
-h1 { font-size: 1.4rem; margin: 0 0 1rem; }
-h2 { font-size: 1.05rem; margin: 2.2rem 0 .6rem; }
+html { -webkit-text-size-adjust: 100%; }
+body { margin: 0 auto; padding: 1.5rem 1rem 4rem; max-width: 52rem; background: var(--paper);
+  color: var(--ink); font: 16px/1.5 system-ui, sans-serif; overflow-wrap: break-word; }
+h1 { font-size: 1.4rem; line-height: 1.25; margin: 0 0 1rem; }
+h2 { font-size: 1.1rem; margin: 2.4rem 0 .6rem; }
+h3 { font-size: 1rem; margin: 1.4rem 0 .3rem; }
 p, ul { margin: .5rem 0; }
 .verdict { border-left: .35rem solid; padding: .6rem 1rem; background: var(--raised); font-size: 1.1rem; }
 .good { border-color: var(--good); } .usable { border-color: var(--usable); }
 .refused { border-color: var(--refused); }
-.remedy, .note, caption, th { color: var(--faint); }
+.note, caption, th, figcaption { color: var(--faint); }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 caption { text-align: left; padding-bottom: .3rem; }
-th, td { padding: .25rem 1.2rem .25rem 0; border-bottom: 1px solid var(--line); text-align: right; }
+th, td { padding: .25rem 1.2rem .25rem 0; border-bottom: 1px solid var(--line); text-align: right;
+  white-space: nowrap; }
 th { font-weight: normal; } th[scope=row], td.words { text-align: left; }
-pre { background: var(--raised); padding: .8rem 1rem; overflow-x: auto; font-size: .9rem; }
-svg { width: 100%; height: auto; margin-top: 1.2rem; }
+td.words { white-space: normal; }
+pre { background: var(--raised); padding: .8rem 1rem; overflow-x: auto; font-size: .85rem; }
+figure { margin: 1.2rem 0 0; max-width: 40rem; }
+figcaption { font-size: .9rem; }
+svg { display: block; width: 100%; height: auto; }
+@media (max-width: 30rem) { th, td { padding-right: .8rem; font-size: .9rem; } pre { font-size: .75rem; } }
+@media print { body { max-width: none; } pre { white-space: pre-wrap; } figure { break-inside: avoid; } }
 """

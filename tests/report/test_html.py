@@ -148,7 +148,7 @@ def test_shows_the_sensor_and_the_settings(calibration, recording):
 def test_what_is_unknown_is_called_so():
     page = Page(render(Calibration(np.full((3, 3), np.nan), np.full(3, np.nan))))
     assert page.texts["verdict"].startswith("Refused")
-    assert page.tables["parameters"][1][1] == "unknown ± unknown"
+    assert page.tables["parameters"][1][1] == "unknown"
     assert page.tables["magnitudes"][1][1] == "unknown"
     assert page.tables["settings"] == []
     assert "cannot be inverted" in page.texts["formula"]

@@ -1,0 +1,60 @@
+"""All pictures of a page, each with what is to be seen in it. Knows no verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from . import pictures, spheres
+from .elements import figure
+from .track import Track
+
+MAGNITUDE = "|a| over time. At rest it should be gravity in every orientation; while the board is moved it is not."
+SPHERE = (
+    "Each dot is the mean of a rest. Calibrated, they lie on the sphere of gravity; hollow ones are on its far side. "
+    "Uncalibrated, they lie on an ellipsoid beside it."
+)
+COVERAGE = (
+    "Which way was up, in the board's axes: the upper and the lower half of a sphere, seen from above. Dots are rests, "
+    "specks are turns; what is empty was not shown to the sensor."
+)
+
+
+def gallery(track: Track) -> Mapping[str, str]:
+    """The figures by name, empty where the recording does not have what they show.
+
+    Raises
+    ------
+    ImportError : matplotlib is not installed.
+    """
+    return {
+        "magnitude": figure(pictures.magnitude(track), MAGNITUDE),
+        "sphere": figure(spheres.sphere(track), SPHERE),
+        "innovations": figure(pictures.innovations(track), _about_innovations(track)),
+        "coverage": figure(spheres.coverage(track), COVERAGE),
+        "rates": figure(pictures.rates(track), _about_rates(track)),
+        "temperature": figure(pictures.temperature(track), ""),
+    }
+
+
+def _about_innovations(track: Track) -> str:
+    e = track.innovations
+    if e is None:
+        return ""
+    resting = track.resting[-len(e) :]
+    said = [
+        f"{float(np.sqrt(np.mean(e[part] ** 2))):.2g} m/s² rms {where}"
+        for part, where in ((resting, "at rest"), (~resting, "while it moves"))
+        if part.any()
+    ]
+    return (
+        "What the calibrated accelerometer measured minus gravity as the gyroscope had carried it there: "
+        f"{' and '.join(said)} for each axis. At rest it should be noise about zero; while the board moves it is "
+        "mostly the hand's own acceleration."
+    )
+
+
+def _about_rates(track: Track) -> str:
+    fastest = float(np.degrees(np.abs(track.recording.gyr).max()))
+    return f"Fastest: {fastest:.0f} deg/s. Turns that leave the range are lost to the gyroscope."

@@ -1,0 +1,90 @@
+"""A recording as its calibration sees it: rests, calibrated samples, innovations. Knows no picture and no page."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..calibration.likelihood import Theta, trace
+from ..calibration.scene import Scene, prepare
+from ..calibration.stationary import find_flat, flat_statistics
+from ..calibration.still import Runs, still_runs
+from ..data import STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
+from ..result import Calibration
+
+# The hand's acceleration while it moves, as the filter that makes the innovations is told: what hands do.
+HAND_MPS2 = 0.5
+
+
+@dataclass(frozen=True)
+class Track:
+    """Both together, and what follows from both; D must be regular."""
+
+    recording: Recording
+    calibration: Calibration
+
+    @cached_property
+    def t(self) -> Vector:
+        """(n,) s since the first sample."""
+        return np.asarray(self.recording.t - self.recording.t[0])
+
+    @cached_property
+    def gravity(self) -> float:
+        """m/s^2, as the calibration assumed it."""
+        gravity = self.calibration.fit.get("gravity")
+        return STANDARD_GRAVITY_MPS2 if gravity is None or not math.isfinite(gravity) else float(gravity)
+
+    @cached_property
+    def calibrated(self) -> Vector:
+        """(n, 3) m/s^2, equation (4)."""
+        return np.asarray(self.calibration.apply(self.recording.acc))
+
+    @cached_property
+    def flat(self) -> tuple[int, int] | None:
+        """(first, last + 1) of the segment that lies flat; None: it lies nowhere, or there is nothing after it."""
+        flat = self.recording.flat or find_flat(self.recording)
+        if flat is None or flat[1] - flat[0] < 2 or flat[1] >= len(self.recording) - 1:
+            return None
+        return flat
+
+    @cached_property
+    def runs(self) -> Runs:
+        """(k, 2) first and last + 1 of the samples of each rest."""
+        if self.flat is None:
+            return np.zeros((0, 2), np.intp)
+        return still_runs(self.recording, flat_statistics(self.recording, self.flat))
+
+    @cached_property
+    def resting(self) -> Mask:
+        """(n,) whether the board rests."""
+        mask = np.zeros(len(self.recording), bool)
+        for first, last in self.runs:
+            mask[first:last] = True
+        return mask
+
+    def at_rest(self, acc: Vector) -> Vector:
+        """(k, 3) means of `acc` (n, 3) over each rest."""
+        return np.array([acc[first:last].mean(0) for first, last in self.runs]).reshape(-1, 3)
+
+    @cached_property
+    def innovations(self) -> Vector | None:
+        """(m, 3) m/s^2, the last m samples' calibrated measurement minus gravity as the gyroscope carried it there.
+
+        It is inv(D) e of equation (8), by the hand's filter. None where the filter cannot run.
+        """
+        c = self.calibration
+        known = (c.D, c.b_a, c.K, c.b_omega)
+        if self.flat is None or not all(np.isfinite(values).all() for values in known):
+            return None
+        scene = prepare(self.recording, self.flat, self.gravity)
+        predicted = trace(scene.white(HAND_MPS2), self._theta(scene)).s
+        return np.asarray(self.calibrated[-len(predicted) :] - predicted)
+
+    def _theta(self, scene: Scene) -> Theta:
+        c = self.calibration
+        s = np.linalg.solve(c.D, scene.flat.y - (c.b_a - c.applied_in_hardware))
+        D, b_a = c.D, c.b_a - c.applied_in_hardware
+        return Theta(D, b_a, c.b_omega, s / np.linalg.norm(s), c.K, 0.0, np.zeros(3))

@@ -1,0 +1,110 @@
+"""How a calibration is applied: functions in C, Python and ROS with its numbers in them. Knows no page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..result import Calibration
+
+COUNTS = 32768  # full scale of a 16-bit reading
+
+
+def left_to_subtract(c: Calibration) -> Vector:
+    """(3,) m/s^2, b_a without what the chip's offset registers subtract already."""
+    return np.asarray(c.b_a - c.applied_in_hardware)
+
+
+def formula(c: Calibration) -> str:
+    """a = inv(D) (y - b_a), one line an axis."""
+    gain, bias = np.linalg.inv(c.D), left_to_subtract(c)
+    rows = (
+        " ".join(
+            f"{factor:+.6f} * (y_{of} {-offset:+.6f})" for factor, of, offset in zip(row, "xyz", bias, strict=True)
+        )
+        for row in gain
+    )
+    return "\n".join(f"a_{axis} = {row}" for axis, row in zip("xyz", rows, strict=True))
+
+
+def in_c(c: Calibration) -> str:
+    """A function for firmware."""
+    gain = ",\n".join(f"        {{{_joined(f'{v:.8e}f' for v in row)}}}" for row in np.linalg.inv(c.D))
+    bias = _joined(f"{v:.8e}f" for v in left_to_subtract(c))
+    return f"""{_about_counts(c, "/* ", " */")}
+static void mpucal_apply(const float y[3], float a[3])
+{{
+    static const float gain[3][3] = {{  /* inv(D) */
+{gain},
+    }};
+    static const float bias[3] = {{{bias}}};  /* b_a, m/s^2 */
+
+    for (int i = 0; i < 3; i++) {{
+        a[i] = 0.0f;
+        for (int j = 0; j < 3; j++)
+            a[i] += gain[i][j] * (y[j] - bias[j]);
+    }}
+}}
+"""
+
+
+def in_python(c: Calibration) -> str:
+    """A function for NumPy."""
+    return f"""import numpy as np
+
+{_matrices(c)}
+
+def apply(y):
+    \"\"\"Calibrated accelerations (..., 3) [m/s^2] of measured ones.\"\"\"
+    return (np.asarray(y) - BIAS) @ GAIN.T
+"""
+
+
+def in_ros(c: Calibration) -> str:
+    """A node for ROS 2 that listens to imu/data_raw and publishes imu/data."""
+    noise = np.diag(c.noise_std**2)
+    known = f"COVARIANCE = {[float(f'{v:.6g}') for v in noise.ravel()]}\n" if np.isfinite(noise).all() else ""
+    told = "        imu.linear_acceleration_covariance = COVARIANCE\n" if known else ""
+    return f"""import numpy as np
+import rclpy
+from rclpy.node import Node
+from sensor_msgs.msg import Imu
+
+{_matrices(c)}{known}
+
+class Calibrated(Node):
+    def __init__(self):
+        super().__init__("calibrated_imu")
+        self.out = self.create_publisher(Imu, "imu/data", 10)
+        self.create_subscription(Imu, "imu/data_raw", self.hear, 10)
+
+    def hear(self, imu):
+        y = imu.linear_acceleration
+        y.x, y.y, y.z = (GAIN @ (np.array([y.x, y.y, y.z]) - BIAS)).tolist()
+{told}        self.out.publish(imu)
+
+
+if __name__ == "__main__":
+    rclpy.init()
+    rclpy.spin(Calibrated())
+"""
+
+
+def _matrices(c: Calibration) -> str:
+    rows = ",\n".join(f"    [{_joined(f'{v:.8f}' for v in row)}]" for row in np.linalg.inv(c.D))
+    bias = _joined(f"{v:.8f}" for v in left_to_subtract(c))
+    return f"GAIN = np.array([  # inv(D)\n{rows},\n])\nBIAS = np.array([{bias}])  # b_a, m/s^2\n"
+
+
+def _about_counts(c: Calibration, begin: str, end: str) -> str:
+    line = f"{begin}y: as measured, a: calibrated, both in m/s^2.{end}"
+    if c.sensor.accel_range_g is None:
+        return line
+    scale = c.sensor.accel_range_g * STANDARD_GRAVITY_MPS2 / COUNTS
+    return f"{line}\n{begin}At +-{c.sensor.accel_range_g:g} g one count of the chip is {scale:.9g} m/s^2.{end}"
+
+
+def _joined(numbers: Iterable[str]) -> str:
+    return ", ".join(numbers)
