@@ -178,8 +178,8 @@ class Countdown:
 class Caution:
     """Something is not as it should be: `what` in one line, and what to `do` about it now.
 
-    `code` names its kind for those who count them: too_fast, clipped, data_lost, trembling, not_turned, elsewhere,
-    unplugged, slow_fit.
+    `code` names its kind for those who count them: moved, trembling, too_fast, clipped, data_lost, not_turned,
+    seen_already, doubtful.
     """
 
     t_s: float
@@ -250,7 +250,7 @@ class Verification:
     ----------
     number, of : which one of how many. down : unit vector in the board's axes that pointed down.
     magnitude_mps2, magnitude_std_mps2 : |a| - g there, and what the covariance promises of it.
-    direction_deg, direction_std_deg : angle from gravity as the gyroscope carried it to it as measured, and its promise.
+    direction_deg, direction_std_deg : angle of gravity as the gyroscope carried it to it as measured, and its promise.
     agrees : both are within the promise. text : the same in words.
     """
 
