@@ -50,10 +50,10 @@ def table(id_: str, caption: str, head: Iterable[str], rows: Iterable[Iterable[s
     return "\n".join([*lines, "</table></div>\n"])
 
 
-def number(value: Any) -> str:
-    """Six decimals, or that it is not known."""
+def number(value: Any, decimals: int = 6) -> str:
+    """A number, or that it is not known."""
     known = as_float(value)
-    return f"{known:.6f}" if math.isfinite(known) else "unknown"
+    return f"{known:.{decimals}f}" if math.isfinite(known) else "unknown"
 
 
 def quantity(value: Any, unit: str, sign: str = "") -> str | None:

@@ -78,8 +78,8 @@ def _how_sure(calibration: Calibration) -> list[str]:
         return []
     mg = 1000.0 * rms / STANDARD_GRAVITY_MPS2
     return [
-        f"What is left of its errors is {rms:.2g} m/s² ({mg:.2g} mg) rms over all orientations, and a direction is"
-        f" right to {direction:.2g} deg."
+        f"A calibrated reading is off by {rms:.2g} m/s² ({mg:.2g} mg) rms over all orientations, and its direction"
+        f" by {direction:.2g} deg."
     ]
 
 
@@ -87,7 +87,7 @@ def _magnitudes(calibration: Calibration) -> str:
     rows = []
     for name in ("before", "after"):
         values: Mapping[str, Any] = calibration.quality.get(f"magnitude_{name}") or {}
-        rows.append([name, *(number(values.get(key)) for key in ("median", "mean", "std"))])
+        rows.append([name, *(number(values.get(key), 4) for key in ("median", "mean", "std"))])
     return table("magnitudes", "|a|, m/s²", ["", "median", "mean", "std"], rows)
 
 

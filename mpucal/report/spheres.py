@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 # where the sphere is looked at from; deviations are enlarged as long as they stay below this share of it
 _FROM = (0.76, -0.54, 0.36)
 _TIMES, _SHOWN = (20, 10, 5, 2, 1), 0.5
-_FEWEST_RESTS = 3
+_FEWEST_RESTS, _MOST_LINES = 3, 60
 _POINTS, _SPECKS = 300, 500
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 121)
 
@@ -31,6 +31,7 @@ def sphere(track: Track) -> str:
     def draw(figure: Figure) -> None:
         axes = _round(figure.subplots(), 1.0 + min(times * farthest, _SHOWN) + 0.05)
         view = _view()
+        drawn: list[Vector] = []
         for k in range(3):
             circle = np.roll(np.column_stack([np.cos(_CIRCLE), np.sin(_CIRCLE), 0.0 * _CIRCLE]), k, axis=1) @ view.T
             axes.plot(*np.where(circle[:, 2:] >= 0.0, circle, np.nan)[:, :2].T, color=LINE, linewidth=0.8)
@@ -38,10 +39,13 @@ def sphere(track: Track) -> str:
         for points, colour, name in zip(both, (BEFORE, AFTER), ("before", "after"), strict=True):
             size = np.linalg.norm(points, axis=1, keepdims=True)
             seen = points / size * (1.0 + times * (size - 1.0)) @ view.T
+            drawn.append(seen)
             front = seen[:, 2] >= 0.0
             near, far = seen[front], seen[~front]
             axes.scatter(near[:, 0], near[:, 1], s=16, color=colour, linewidths=0, label=name)
             axes.scatter(far[:, 0], far[:, 1], s=12, facecolors="none", edgecolors=colour, linewidths=0.7)
+        for pair in np.stack(drawn, axis=1) if len(drawn[0]) <= _MOST_LINES else ():
+            axes.plot(*pair[:, :2].T, color=FAINT, linewidth=0.5, zorder=0)
         axes.plot([], [], color=INK, linewidth=0.8, label="gravity")
         legend(figure)
         if times > 1:

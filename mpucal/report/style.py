@@ -32,6 +32,7 @@ pre { background: var(--raised); padding: .8rem 1rem; overflow-x: auto; font-siz
 figure { margin: 1.2rem 0 0; max-width: 40rem; }
 figcaption { font-size: .9rem; }
 svg { display: block; width: 100%; height: auto; }
-@media (max-width: 30rem) { th, td { padding-right: .8rem; font-size: .9rem; } pre { font-size: .75rem; } }
+@media (max-width: 34rem) { pre { font-size: .78rem; } #formula, #reproduce { white-space: pre-wrap; }
+  th, td { padding-right: .7rem; font-size: .9rem; white-space: normal; } }
 @media print { body { max-width: none; } pre { white-space: pre-wrap; } figure { break-inside: avoid; } }
 """
