@@ -1,6 +1,7 @@
 """Write the golden vectors of firmware_protocol.md: python tools/make_vectors.py [FOLDER].
 
-Each blob_*.bin lies beside a blob_*.json that says what a reader must find in it, or why it must refuse it.
+Each blob_*.bin lies beside a blob_*.json that says what a reader must find in it, or why it must refuse it. Each
+line_*.bin is what goes over a serial line, and the line_*.json beside it says which frames a receiver must find.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from mpucal.wire import messages as wire
 from mpucal.wire.blob import Blob
+from mpucal.wire.frame import Frame, stuff
 
 FOLDER = Path(__file__).parent.parent / "fixtures" / "vectors"
 
@@ -95,12 +98,106 @@ def vectors() -> dict[str, tuple[bytes, dict[str, Any]]]:
     }
 
 
+# The messages of the document's example, in its order, and one of each other kind: (seq, message).
+
+FIFO_FRAME = bytes.fromhex("000c ffde 2000 f830 0038 ffb2 005a")
+EXAMPLE: dict[str, tuple[int, wire.Message]] = {
+    "hello": (0, wire.Hello()),
+    "hello_reply": (
+        0,
+        wire.HelloReply(0, 0x0000F1A2, wire.MAGIC, 1, 0, 0x68, 3, 4, 256, b"mpucal-avr 1"),
+    ),
+    "read": (1, wire.Read(0x75, 1)),
+    "read_reply": (1, wire.ReadReply(0, 0x0000F6B4, b"\x68")),
+    "write": (2, wire.Write(0x23, b"\xf8")),
+    "write_reply": (2, wire.WriteReply(0, 0x0000FBC8)),
+    "stream": (3, wire.Stream(14, 2)),
+    "stream_reply": (3, wire.StreamReply(0, 0x000100DC)),
+    "frames": (3, wire.Frames(0, 0x00012900, 0, 0, 0, FIFO_FRAME * 2)),
+    "frames_overflow": (3, wire.Frames(7, 0x00014E20, 2, 1, 0, b"")),
+    "blob_state": (4, wire.BlobState()),
+    "blob_state_none": (4, wire.BlobStateReply(8, 0x00015F00, 0, 0, 0)),
+}
+OTHERS: dict[str, tuple[int, wire.Message]] = {
+    "burst": (254, wire.Burst(0x74, 70)),
+    "burst_reply_first": (254, wire.BurstReply(0, 0xFFFFFF00, 0, FIFO_FRAME * 4)),
+    "burst_reply_last": (254, wire.BurstReply(0, 0x00000010, 56, FIFO_FRAME)),
+    "stream_stop": (255, wire.Stream(0, 0)),
+    "blob_state_reply": (5, wire.BlobStateReply(0, 70000, 3, 188, 0x5D9B9255)),
+    "blob_read": (6, wire.BlobRead(168, 20)),
+    "blob_read_reply": (6, wire.BlobReadReply(0, 70100, MEASURED.encode()[168:])),
+    "blob_begin": (7, wire.BlobBegin(188)),
+    "blob_begin_reply": (7, wire.BlobBeginReply(0, 70200)),
+    "blob_data": (8, wire.BlobData(0, MEASURED.encode()[:32])),
+    "blob_data_reply": (8, wire.BlobDataReply(0, 70300)),
+    "blob_commit": (9, wire.BlobCommit(188, 0x5D9B9255)),
+    "blob_commit_reply": (9, wire.BlobCommitReply(0, 70400, 4)),
+    "blob_erase": (10, wire.BlobErase()),
+    "blob_erase_reply": (10, wire.BlobEraseReply(0, 70500)),
+    "failed_early": (11, wire.Reply(1, 70600)),
+}
+
+
+BYTES = ("data", "frames")
+
+
+def one_message(seq: int, message: wire.Message, kind: int | None = None) -> tuple[bytes, dict[str, Any]]:
+    """The line's bytes of one message, and its content."""
+    frame = Frame(message.TYPE if kind is None else kind, seq, message.payload())
+    values = {
+        key: value.rstrip(b"\0").decode() if key in ("magic", "name") else value.hex() if key in BYTES else value
+        for key, value in asdict(message).items()
+    }
+    return frame.encode(), {"frames": [plain_frame(frame)], "message": type(message).__name__, "values": values}
+
+
+def plain_frame(frame: Frame) -> dict[str, Any]:
+    """A frame in JSON's own types."""
+    return {"type": frame.type, "seq": frame.seq, "payload": frame.payload.hex()}
+
+
+def several(data: bytes, *frames: Frame, rejected: str = "") -> tuple[bytes, dict[str, Any]]:
+    """Bytes in which a receiver must find `frames` and nothing else."""
+    why = {"rejected": rejected} if rejected else {}
+    return data, {"frames": [plain_frame(frame) for frame in frames], **why}
+
+
+def lines() -> dict[str, tuple[bytes, dict[str, Any]]]:
+    """Name -> (bytes on the line, content of the .json)."""
+    kinds = {"failed_early": wire.BlobStateReply.TYPE}
+    made = {name: one_message(seq, message, kinds.get(name)) for name, (seq, message) in {**EXAMPLE, **OTHERS}.items()}
+    read = Frame(2, 1, bytes([0x75, 1]))
+    zeros, ones, longest = Frame(0, 0, bytes(66)), Frame(0xFF, 0xFF, b"\xff" * 66), Frame(0x7E, 0x55, bytes(range(66)))
+    encoded = read.encode()
+    damaged = encoded[:1] + bytes([encoded[1] ^ 0x40]) + encoded[2:]
+    return {
+        **made,
+        "zeros": several(zeros.encode(), zeros),
+        "ones": several(ones.encode(), ones),
+        "longest": several(longest.encode(), longest),
+        "no_payload": several(Frame(0x10, 9).encode(), Frame(0x10, 9)),
+        "idle": several(b"\0\0" + encoded + b"\0\0\0" + encoded, read, read),
+        "begun_within": several(
+            longest.encode()[30:] + encoded, read, rejected="the first frame's beginning is missing"
+        ),
+        "text": several(b"Initializing I2C devices...\r\n\0" + encoded, read, rejected="text is no frame"),
+        "bad_crc": several(damaged + encoded, read, rejected="the CRC-16 does not match"),
+        "cut": several(encoded[:-3] + b"\0" + encoded, read, rejected="two bytes are missing"),
+        "beyond_the_end": several(b"\x09" + encoded[1:], rejected="a COBS length points beyond the end"),
+        "too_short": several(stuff(b"\x01\x00\xff") + b"\0" + encoded, read, rejected="three bytes"),
+        "too_long": several(b"\x01" * 72 + b"\0" + encoded, read, rejected="72 bytes without a zero"),
+        "far_too_long": several(b"\x55" * 300 + b"\0" + encoded, read, rejected="300 bytes without a zero"),
+        "unfinished": several(encoded[:-1], rejected="no delimiter yet"),
+    }
+
+
 def write(folder: Path) -> None:
     """Write all vectors into the folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, (data, content) in vectors().items():
-        (folder / f"blob_{name}.bin").write_bytes(data)
-        (folder / f"blob_{name}.json").write_text(json.dumps(content, indent=2) + "\n")
+    for prefix, made in (("blob", vectors()), ("line", lines())):
+        for name, (data, content) in made.items():
+            (folder / f"{prefix}_{name}.bin").write_bytes(data)
+            (folder / f"{prefix}_{name}.json").write_text(json.dumps(content, indent=2) + "\n")
 
 
 if __name__ == "__main__":

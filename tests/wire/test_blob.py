@@ -200,9 +200,8 @@ def test_the_tool_writes_the_vectors_that_are_there(tmp_path, monkeypatch):
     tool = PROJECT / "tools" / "make_vectors.py"
     monkeypatch.setattr("sys.argv", [str(tool), str(tmp_path)])
     runpy.run_path(str(tool), run_name="__main__")
-    made = {path.name: path.read_bytes() for path in tmp_path.glob("*.bin")}
-    assert made == {path.name: path.read_bytes() for path in VECTORS.glob("blob_*.bin")}
-    assert {path.name for path in tmp_path.glob("*.json")} == {path.name for path in VECTORS.glob("blob_*.json")}
+    made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert made == {path.name: path.read_bytes() for path in VECTORS.iterdir()}
 
 
 def test_the_documents_table_is_the_codecs_format():

@@ -1,0 +1,123 @@
+"""Frames of the serial bridge: COBS, CRC-16 and a zero between them. Knows no message and no port.
+
+See firmware_protocol.md, "Framing".
+"""
+
+from __future__ import annotations
+
+import binascii
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+DELIMITER = b"\0"
+MAX_PAYLOAD = 66
+MAX_CONTENT = 70
+MAX_ENCODED = 71
+
+HEADER = struct.Struct("<B B")
+CHECKSUM = struct.Struct("<H")
+CRC_INITIAL = 0xFFFF
+
+
+class FrameError(ValueError):
+    """Bytes that are no frame, or a payload that fits none."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame: message type and sequence number, 0..255, and at most MAX_PAYLOAD bytes of payload."""
+
+    type: int
+    seq: int
+    payload: bytes = b""
+
+    def encode(self) -> bytes:
+        """The bytes on the line, with the delimiter.
+
+        Raises
+        ------
+        FrameError : the payload is too long.
+        """
+        if len(self.payload) > MAX_PAYLOAD:
+            raise FrameError(f"a payload of {len(self.payload)} bytes is longer than {MAX_PAYLOAD}")
+        content = HEADER.pack(self.type, self.seq) + self.payload
+        return stuff(content + CHECKSUM.pack(crc16(content))) + DELIMITER
+
+    @classmethod
+    def decode(cls, encoded: bytes) -> Frame:
+        """The frame of the bytes between two delimiters.
+
+        Raises
+        ------
+        FrameError : too short or too long, no COBS, or damaged.
+        """
+        if len(encoded) > MAX_ENCODED:
+            raise FrameError(f"{len(encoded)} bytes without a zero are longer than a frame")
+        content = unstuff(encoded)
+        if len(content) < HEADER.size + CHECKSUM.size:
+            raise FrameError(f"{len(content)} bytes are too short for a frame")
+        body, (crc,) = content[: -CHECKSUM.size], CHECKSUM.unpack(content[-CHECKSUM.size :])
+        if crc16(body) != crc:
+            raise FrameError("the CRC does not match")
+        kind, seq = HEADER.unpack_from(body)
+        return cls(kind, seq, body[HEADER.size :])
+
+
+class Deframer:
+    """Takes bytes as they come, and gives the frames among them; what is none is counted and left out.
+
+    Attributes
+    ----------
+    rejected : how many pieces between two delimiters were no frame.
+    """
+
+    def __init__(self) -> None:
+        self._piece = bytearray()
+        self.rejected = 0
+
+    def feed(self, data: bytes) -> Iterator[Frame]:
+        """The frames that end within `data`; to be used up before the next call."""
+        *ends, rest = data.split(DELIMITER)
+        for end in ends:
+            self._take(end)
+            piece = bytes(self._piece)
+            self._piece.clear()
+            if not piece:
+                continue
+            try:
+                yield Frame.decode(piece)
+            except FrameError:
+                self.rejected += 1
+        self._take(rest)
+
+    def _take(self, data: bytes) -> None:
+        # one byte too many is enough to know that it is no frame
+        self._piece += data[: MAX_ENCODED + 1 - len(self._piece)]
+
+
+def crc16(data: bytes) -> int:
+    """CRC-16/CCITT-FALSE."""
+    return binascii.crc_hqx(data, CRC_INITIAL)
+
+
+def stuff(content: bytes) -> bytes:
+    """COBS of at most 253 bytes: no zero in it, and one byte longer."""
+    return b"".join(bytes([len(piece) + 1]) + piece for piece in content.split(DELIMITER))
+
+
+def unstuff(encoded: bytes) -> bytes:
+    """The inverse of `stuff`, of bytes without a zero.
+
+    Raises
+    ------
+    FrameError : a length byte points beyond the end.
+    """
+    pieces, at = [], 0
+    while at < len(encoded):
+        length = encoded[at]
+        if at + length > len(encoded):
+            raise FrameError("a COBS length points beyond the end")
+        pieces.append(encoded[at + 1 : at + length])
+        at += length
+    return DELIMITER.join(pieces)
