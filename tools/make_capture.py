@@ -24,8 +24,8 @@ from mpucal.capture import load
 from mpucal.capture.npz import load_npz
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
+from mpucal.cli.on_bus import OnBus
 from mpucal.cli.running import running
-from mpucal.cli.source import Opened
 from mpucal.console import console
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from mpucal.errors import Abandoned, MpucalError, OutputError, RecordingError
@@ -86,7 +86,7 @@ def make_capture(file: Path, capture: Path, gravity: float, model: str) -> str:
     )
     plan = Plan(config, gravity, model, until_end=True)
     try:
-        with running(Opened(bus, plan), capture, console(quiet=True)) as runner:
+        with running(OnBus(bus, plan), capture, console(quiet=True)) as runner:
             runner.measure()
         note = ""
     except Abandoned as error:

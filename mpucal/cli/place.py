@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import OutputError
-from ..sinks.file import CAPTURE, make_folder
+from ..sinks.file import make_folder
 from .running import stamp
 
 
@@ -14,16 +14,17 @@ class Place:
 
     Parameters
     ----------
-    asked : where the person wants it; None: here, under a name of its own.
+    asked : where the person wants it; None: here, under a name of its own. capture_name : the file to come in it.
 
     Raises
     ------
     OutputError : it cannot be made, or holds a capture.
     """
 
-    def __init__(self, asked: Path | None) -> None:
+    def __init__(self, asked: Path | None, capture_name: str) -> None:
         self._stamp = stamp()
         self._asked = asked is not None
+        self._capture_name = capture_name
         self.folder = asked or Path(f"session-{self._stamp}")
         if self.capture.exists():
             raise OutputError(
@@ -35,7 +36,7 @@ class Place:
     @property
     def capture(self) -> Path:
         """Where the capture goes."""
-        return self.folder / CAPTURE
+        return self.folder / self._capture_name
 
     def name_by(self, chip: str) -> None:
         """Give a folder that nobody named the name of the chip."""

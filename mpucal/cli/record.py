@@ -28,7 +28,7 @@ def command(file: Path | None, seconds: float | None, **options: Any) -> None:
     """
     check_source(click.get_current_context())
     source = opened(options, until_end=True)
-    file = file or Path(f"record-{stamp()}.mcap")
+    file = file or Path(f"record-{stamp()}").with_suffix(Path(source.capture_name).suffix)
     if file.exists():
         raise OutputError(f"{file} is there already", "choose another file with -o")
     with running(source, file, console(quiet=False)) as runner:

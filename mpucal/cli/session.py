@@ -14,10 +14,11 @@ from ..data import Recording
 from ..errors import RefusedError
 from ..result import REFUSED, Calibration
 from ..runner import Runner
+from .opened import Opened
 from .options import check_source, fit_options, source_options
 from .place import Place
 from .running import running
-from .source import Opened, opened
+from .source import opened
 from .summary import summary, written
 
 EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board, `mpucal session --bus sim`"
@@ -38,7 +39,7 @@ def command(folder: Path | None, yes: bool, as_json: bool, json_events: bool, **
     check_source(click.get_current_context())
     source = opened(options)
     person = console(quiet=yes, as_json=json_events)
-    place = Place(folder)
+    place = Place(folder, source.capture_name)
     finished = False
     try:
         with running(source, place.capture, person) as runner:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,40 +10,16 @@ from ..bus.i2c import I2cBus
 from ..bus.replay import ReplayBus
 from ..bus.simulated import open_simulated
 from ..capture.mcap import read_capture
-from ..chip.access import Bus
 from ..chip.config import Config
 from ..errors import UsageError
-from ..runner import Replayed, Talk
-from ..session.events import Prompt
 from ..session.plan import Plan
+from .on_bus import OnBus
+from .opened import Opened
 
 SIMULATED = "sim"
 
 
-@dataclass(frozen=True)
-class Opened:
-    """A bus, and what comes with its kind.
-
-    Attributes
-    ----------
-    bus : open. plan : what to do with it.
-    listeners : hear the prompts besides the person. truth : of a simulated sensor.
-    replay : the same bus where it is a replay. recovered : how much of a damaged capture it holds.
-    """
-
-    bus: Bus
-    plan: Plan
-    listeners: Sequence[Callable[[Prompt], None]] = ()
-    truth: Mapping[str, Any] | None = None
-    replay: ReplayBus | None = None
-    recovered: str | None = None
-
-    def talk(self, person: Talk) -> Talk:
-        """Who presses the keys: the person, or the person in the capture."""
-        return person if self.replay is None else Replayed(person, self.replay.pending_events)
-
-
-def open_bus(text: str, plan: Plan, address: int | None, seed: int | None) -> Opened:
+def open_bus(text: str, plan: Plan, address: int | None, seed: int | None) -> OnBus:
     """A Linux I2C bus, or the simulated chip.
 
     Raises
@@ -55,13 +30,13 @@ def open_bus(text: str, plan: Plan, address: int | None, seed: int | None) -> Op
         if address is not None:
             raise UsageError("--address is where a real chip answers, and --bus names a simulated one", "leave it out")
         bus = open_simulated(text, plan.gravity, seed)
-        return Opened(bus, plan, (bus.hear,), bus.truth_document())
+        return OnBus(bus, plan, (bus.hear,), bus.truth_document())
     if seed is not None:
         raise UsageError("--seed chooses a simulated sensor, and --bus names a real one", "leave it out")
-    return Opened(I2cBus(text, address), plan)
+    return OnBus(I2cBus(text, address), plan)
 
 
-def open_replay(file: Path) -> Opened:
+def open_replay(file: Path) -> OnBus:
     """A capture, to be run again.
 
     Raises
@@ -71,7 +46,7 @@ def open_replay(file: Path) -> Opened:
     capture = read_capture(file)
     bus = ReplayBus(capture.records, capture.name)
     plan = Plan.of_capture(capture.meta, capture.name)
-    return Opened(bus, plan, replay=bus, recovered=capture.recovered)
+    return OnBus(bus, plan, replay=bus, recovered=capture.recovered)
 
 
 def opened(options: Mapping[str, Any], until_end: bool = False) -> Opened:

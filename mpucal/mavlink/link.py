@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
-from ..errors import LinkError, NoAnswer
+from ..errors import BusError, LinkError, NoAnswer
 from .dialect import Message, Packet, Parser, dialect
 from .transport import Bytes, Transport
 
@@ -252,7 +252,7 @@ class Link:
         signing.secret_key, signing.sign_outgoing, signing.link_id = key, True, OWN_COMPONENT
         signing.timestamp = (self._now_ns - SIGNING_EPOCH_NS) // SIGNING_UNIT_NS
 
-    def _nobody(self) -> LinkError:
+    def _nobody(self) -> BusError:
         where = self._transport.name
         if self._mav.signing.secret_key is not None and any(parser.refused for parser in self._parsers.values()):
             return LinkError(

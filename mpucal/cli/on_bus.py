@@ -1,0 +1,56 @@
+"""A chip on a bus as a session's source: its driver, tapped into an MCAP capture. Knows no option."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..bus.replay import ReplayBus
+from ..bus.tap import Tap
+from ..capture.mcap import CaptureWriter
+from ..chip.access import Bus
+from ..chip.driver import Driver
+from ..errors import CaptureError
+from ..runner import Replayed, Talk
+from ..session.events import Prompt
+from ..session.plan import Plan
+from ..sinks.file import CAPTURE
+from .opened import Measuring, Say
+
+
+@dataclass(frozen=True)
+class OnBus:
+    """A bus, and what comes with its kind; see Opened.
+
+    Attributes
+    ----------
+    bus : open. replay : the same bus where it is a replay.
+    """
+
+    bus: Bus
+    plan: Plan
+    listeners: Sequence[Callable[[Prompt], None]] = ()
+    truth: Mapping[str, Any] | None = None
+    replay: ReplayBus | None = None
+    recovered: str | None = None
+    capture_name: str = CAPTURE
+
+    def talk(self, person: Talk) -> Talk:
+        """See Opened."""
+        return person if self.replay is None else Replayed(person, self.replay.pending_events)
+
+    @contextmanager
+    def measuring(self, capture: Path, _say: Say, recorded: str) -> Iterator[Measuring]:
+        """See Opened."""
+        with closing(self.bus), CaptureWriter(capture) as writer:
+            writer.start({"mpucal": __version__, "recorded": recorded, **self.plan.meta()})
+            yield Measuring(Driver(Tap(self.bus, writer), self.plan.config, capture.name), writer.event)
+        if self.replay is not None and self.replay.unread():
+            raise CaptureError(
+                f"the replay ended with {self.replay.unread()} accesses of its capture unread",
+                "replay it with the mpucal that recorded it, or use `mpucal calibrate`",
+            )

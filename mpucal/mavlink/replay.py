@@ -1,0 +1,90 @@
+"""A .tlog in place of a vehicle: the packets come again at their times, and what we send goes nowhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ..chip.access import EndOfCapture
+from .dialect import Packet, Parser, dialect
+from .notes import Note, Notes, is_own
+from .tlog import Tlog
+from .transport import Bytes
+
+
+class Noted(NamedTuple):
+    """A note, and when it was made [ns since 1970]."""
+
+    t_ns: int
+    note: Note
+
+
+class Replay:
+    """A transport of the recorded packets; the notes among them wait for `pending`.
+
+    What mpucal itself sent when it recorded is passed over.
+    """
+
+    datagrams, outward = True, False
+
+    def __init__(self, tlog: Tlog) -> None:
+        self.name = tlog.name
+        self._records = tlog.records
+        self._parser = Parser(dialect().MAVLink(None))
+        self._notes = Notes()
+        self._pending: list[Noted] = []
+        self._at = 0
+        self._now_ns = tlog.records[0].t_ns
+        self._pass_own()
+
+    def now_ns(self) -> int:
+        """See Transport."""
+        return self._now_ns
+
+    def receive(self, until_ns: int) -> Bytes | None:
+        """See Transport.
+
+        Raises
+        ------
+        EndOfCapture : there are no more packets.
+        """
+        if self._at == len(self._records):
+            raise EndOfCapture
+        record = self._records[self._at]
+        t_ns = max(record.t_ns, self._now_ns)
+        if t_ns >= until_ns:
+            self._now_ns = max(self._now_ns, until_ns)
+            return None
+        self._now_ns = t_ns
+        self._at += 1
+        self._pass_own()
+        return Bytes(record.data, self.name, t_ns)
+
+    def send(self, data: bytes, address: str | None) -> None:
+        """See Transport: nobody hears it."""
+
+    def close(self) -> None:
+        """See Transport."""
+
+    def pending(self, now_ns: int) -> Sequence[Noted]:
+        """The notes made until `now_ns` that stand before the next packet, each once."""
+        due = [noted for noted in self._pending if noted.t_ns <= now_ns]
+        self._pending = self._pending[len(due) :]
+        return due
+
+    def _pass_own(self) -> None:
+        """Go on to the next packet that is not of mpucal."""
+        while self._at < len(self._records):
+            record = self._records[self._at]
+            packets = self._parser.datagram(record.data)
+            if not _are_own(packets):
+                return
+            self._at += 1
+            for packet in packets:
+                note = self._notes.add(packet.message)
+                if note is not None:
+                    self._pending.append(Noted(record.t_ns, note))
+
+
+def _are_own(packets: Sequence[Packet]) -> bool:
+    return bool(packets) and all(is_own(packet.message) for packet in packets)
