@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 export PYTHON
 
-.PHONY: session test lint bench clean
+.PHONY: session test lint bench firmware clean
 
 session: $(READY)
 	@$(BIN)/mpucal session --bus sim
@@ -25,6 +25,10 @@ bench: $(READY)
 $(READY): tools/set_up pyproject.toml CMakeLists.txt $(wildcard mpucal/kernel/*.cpp mpucal/kernel/*.hpp)
 	@tools/set_up $(VENV)
 	@touch $@
+
+# needs avr-gcc and avr-libc; says how much flash and RAM the bridge takes
+firmware:
+	@$(MAKE) --no-print-directory -C tools/firmware
 
 clean:
 	rm -rf $(VENV) build

@@ -1,0 +1,139 @@
+"""An emulated Arduino Uno with the bridge's firmware and a simulated chip. Knows no protocol.
+
+As a program it stands for the board on a pseudo terminal, and prints that one's name:
+
+    python tests/firmware/emulator/board.py --elf tools/firmware/build/mpucal_bridge.elf --eeprom eeprom.bin
+
+Prompts to the hand that holds the simulated chip come in on its stdin, as `mpucal session --json-events` says them.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from mpucal.bus.simulated import Chip
+
+CPU_HZ = 16_000_000
+EEPROM_BYTES = 1024
+BUFFER_BYTES = 1 << 16
+
+CHIP_READ = ctypes.CFUNCTYPE(ctypes.c_uint8, ctypes.c_uint8, ctypes.c_uint64)
+CHIP_WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint8, ctypes.c_uint8, ctypes.c_uint64)
+
+
+def build_library(folder: Path) -> ctypes.CDLL:
+    """Compile board.c into `folder`, and load it."""
+    library = folder / "board.so"
+    source = Path(__file__).with_name("board.c")
+    flags = ["-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared", "-I/usr/include/simavr"]
+    subprocess.run(["gcc", *flags, str(source), "-o", str(library), "-lsimavr", "-lelf"], check=True)
+    loaded = ctypes.CDLL(str(library))
+    board, u8, u32, u64 = ctypes.c_void_p, ctypes.c_uint8, ctypes.c_uint32, ctypes.c_uint64
+    prototypes = {
+        "board_open": (board, [ctypes.c_char_p, ctypes.c_char_p, CHIP_READ, CHIP_WRITE]),
+        "board_run": (ctypes.c_int, [board, u64]),
+        "board_cycle": (u64, [board]),
+        "board_send": (u32, [board, ctypes.c_char_p, u32]),
+        "board_receive": (u32, [board, ctypes.c_char_p, u32]),
+        "board_reset": (None, [board]),
+        "board_fail_twi": (None, [board, ctypes.c_int]),
+        "board_overruns": (u32, [board]),
+        "board_eeprom_writes": (u32, [board]),
+        "board_close": (None, [board, u8]),
+    }
+    for name, (result, arguments) in prototypes.items():
+        getattr(loaded, name).restype, getattr(loaded, name).argtypes = result, arguments
+    return loaded
+
+
+class Board:
+    """A board that was just switched on; its time passes only while it runs.
+
+    Parameters
+    ----------
+    library : from build_library. elf : the firmware. eeprom : its file, made where it is missing.
+    chip : what is on its TWI; its clock is the board's.
+    """
+
+    def __init__(self, library: ctypes.CDLL, elf: Path, eeprom: Path, chip: Chip) -> None:
+        if not eeprom.exists():
+            eeprom.write_bytes(b"\xff" * EEPROM_BYTES)
+        self._library, self._chip = library, chip
+        # kept, or the library would call what is no more
+        self._callbacks = CHIP_READ(self._read), CHIP_WRITE(self._write)
+        self._board = library.board_open(str(elf).encode(), str(eeprom).encode(), *self._callbacks)
+        if not self._board:
+            raise OSError(f"cannot use {elf} or {eeprom}")
+        self._buffer = ctypes.create_string_buffer(BUFFER_BYTES)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None):
+        self.cut_power()
+
+    @property
+    def cycle(self) -> int:
+        """Of the processor, since it was switched on."""
+        return self._library.board_cycle(self._board)
+
+    @property
+    def now_s(self) -> float:
+        """Since it was switched on."""
+        return self.cycle / CPU_HZ
+
+    @property
+    def overruns(self) -> int:
+        """Bytes that were lost on the line because nobody took them in time."""
+        return self._library.board_overruns(self._board)
+
+    @property
+    def eeprom_writes(self) -> int:
+        """Bytes written to the EEPROM."""
+        return self._library.board_eeprom_writes(self._board)
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        self.run_cycles(round(seconds * CPU_HZ))
+
+    def run_cycles(self, cycles: int) -> None:
+        """Let that many cycles pass."""
+        if not self._library.board_run(self._board, self.cycle + cycles):
+            raise RuntimeError(f"the processor crashed at cycle {self.cycle}")
+
+    def send(self, data: bytes) -> int:
+        """Put bytes on the line to the board; how many of them there was room for."""
+        return self._library.board_send(self._board, data, len(data))
+
+    def receive(self) -> bytes:
+        """What the board has sent since."""
+        count = self._library.board_receive(self._board, self._buffer, BUFFER_BYTES)
+        return self._buffer.raw[:count]
+
+    def press_reset(self) -> None:
+        """As DTR does when the port is opened; there is no bootloader."""
+        self._library.board_reset(self._board)
+
+    def unplug_chip(self, unplugged: bool = True) -> None:
+        """The chip does not answer its address; or does again."""
+        self._library.board_fail_twi(self._board, unplugged)
+
+    def cut_power(self, torn: int = 0xFF) -> None:
+        """Now; a byte that is just being written to the EEPROM is left as `torn`."""
+        if self._board:
+            self._library.board_close(self._board, torn)
+            self._board = None
+
+    def _read(self, address: int, cycle: int) -> int:
+        return self._chip.read(address, 1, _ns(cycle))[0]
+
+    def _write(self, address: int, value: int, cycle: int) -> None:
+        self._chip.write(address, bytes([value]), _ns(cycle))
+
+
+def _ns(cycle: int) -> int:
+    return cycle * 1_000_000_000 // CPU_HZ

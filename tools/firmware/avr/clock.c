@@ -1,0 +1,45 @@
+#include "clock.h"
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/sleep.h>
+#include <util/atomic.h>
+
+#if F_CPU != 16000000UL
+#error "timer 0 counts half microseconds at 16 MHz"
+#endif
+
+#define OVERFLOW_US 128
+
+static volatile uint32_t overflows_us;
+
+ISR(TIMER0_OVF_vect) {
+    overflows_us += OVERFLOW_US;
+}
+
+void clock_begin(void) {
+    TCCR0A = 0;
+    TCCR0B = _BV(CS01); /* 16 MHz / 8 */
+    TIMSK0 = _BV(TOIE0);
+    set_sleep_mode(SLEEP_MODE_IDLE);
+}
+
+uint32_t clock_now_us(void) {
+    uint32_t us = 0;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+        uint8_t ticks = TCNT0;
+        us = overflows_us + ticks / 2;
+        /* it has overflowed since interrupts are off, and before it was read */
+        if (TIFR0 & _BV(TOV0) && ticks < 128) {
+            us += OVERFLOW_US;
+        }
+    }
+    return us;
+}
+
+void clock_nap(void) {
+    sleep_enable();
+    sei();
+    sleep_cpu(); /* the instruction behind sei() still runs before any interrupt */
+    sleep_disable();
+}

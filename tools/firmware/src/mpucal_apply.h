@@ -1,0 +1,224 @@
+/* Apply a config blob to a sample: a = inv(D) (y - b_a + applied_b_a), from counts, in float.
+ *
+ * One header in C99 (or C++11) for any microcontroller: no heap, no tables, no library to link. It knows the blob of
+ * firmware_protocol.md and nothing of where the blob or the counts come from. 48 bytes of RAM a sensor.
+ *
+ *     static struct mpucal sensor;
+ *     if (mpucal_load(&sensor, blob, sizeof blob, 0x68, 4.0f) == MPUCAL_OK) {
+ *         float a_mps2[3];
+ *         mpucal_apply(&sensor, counts, a_mps2);
+ *     }
+ */
+#ifndef MPUCAL_APPLY_H
+#define MPUCAL_APPLY_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* firmware_protocol.md, "Layout": offsets and sizes in bytes. */
+#define MPUCAL_MAGIC 0x4355504Du /* "MPUC" */
+#define MPUCAL_MAJOR 1
+#define MPUCAL_MIN_LENGTH 188
+#define MPUCAL_MAX_LENGTH 256
+#define MPUCAL_HEADER_LENGTH 8
+#define MPUCAL_MAJOR_AT 4
+#define MPUCAL_LENGTH_AT 6
+#define MPUCAL_WHO_AM_I_AT 48
+#define MPUCAL_ACCEL_RANGE_G_AT 52
+#define MPUCAL_D_AT 60
+#define MPUCAL_B_A_AT 96
+#define MPUCAL_APPLIED_B_A_AT 124
+
+#define MPUCAL_STANDARD_GRAVITY_MPS2 9.80665f
+#define MPUCAL_FULL_SCALE 32768.0f
+
+/* Why a blob is not used; the first five in the order in which firmware_protocol.md, "Reading", has them checked. */
+enum mpucal_status {
+    MPUCAL_OK = 0,
+    MPUCAL_NO_BLOB,       /* too short, or another magic: nothing was stored */
+    MPUCAL_OTHER_MAJOR,   /* a layout that this code does not know */
+    MPUCAL_BAD_LENGTH,    /* its length is out of range, or more than there is */
+    MPUCAL_BAD_CRC,       /* damaged */
+    MPUCAL_NOT_FINITE,    /* D, b_a or applied_b_a holds infinity or NaN */
+    MPUCAL_NOT_INVERTIBLE, /* no more than rounding is left of D's determinant */
+    MPUCAL_OTHER_CHIP,    /* it was measured on a chip of another WHO_AM_I */
+    MPUCAL_OTHER_RANGE    /* it was measured at another full scale, or nobody knows at which */
+};
+
+/* A calibration, ready to be applied: a = gain * counts - bias, in m/s^2. */
+struct mpucal {
+    float gain[3][3]; /* inv(D) * 9.80665 * accel_range_g / 32768 */
+    float bias[3];    /* inv(D) (b_a - applied_b_a) */
+};
+
+/* Where a blob is read from, byte by byte: plain memory, or what has to be asked, such as an EEPROM. */
+struct mpucal_source {
+    uint8_t (*read)(const void *where, uint16_t offset);
+    const void *where;
+    size_t size; /* bytes that there are, at least the blob's */
+};
+
+static inline uint8_t mpucal_read_memory(const void *where, uint16_t offset) {
+    return ((const uint8_t *)where)[offset];
+}
+
+static inline uint8_t mpucal_u8(const struct mpucal_source *blob, uint16_t offset) {
+    return blob->read(blob->where, offset);
+}
+
+static inline uint16_t mpucal_u16(const struct mpucal_source *blob, uint16_t offset) {
+    return (uint16_t)(mpucal_u8(blob, offset) | (uint16_t)mpucal_u8(blob, (uint16_t)(offset + 1)) << 8);
+}
+
+static inline uint32_t mpucal_u32(const struct mpucal_source *blob, uint16_t offset) {
+    return mpucal_u16(blob, offset) | (uint32_t)mpucal_u16(blob, (uint16_t)(offset + 2)) << 16;
+}
+
+/* From bits rather than by a cast: their order is the blob's, not the processor's. */
+static inline float mpucal_f32(const struct mpucal_source *blob, uint16_t offset) {
+    uint32_t bits = mpucal_u32(blob, offset);
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+/* Neither infinite nor NaN; by its bits, since -ffast-math would take a comparison for true. */
+static inline int mpucal_is_finite(float value) {
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return (bits & 0x7F800000u) != 0x7F800000u;
+}
+
+static inline int mpucal_all_finite(const struct mpucal_source *blob, uint16_t offset, uint8_t count) {
+    for (uint8_t i = 0; i < count; i++) {
+        if (!mpucal_is_finite(mpucal_f32(blob, (uint16_t)(offset + 4 * i)))) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* CRC-32 of zlib, PNG and Ethernet of the first `count` bytes. By bits: it runs seldom, and a table takes 1 KiB. */
+static inline uint32_t mpucal_crc32(const struct mpucal_source *blob, uint16_t count) {
+    uint32_t crc = 0xFFFFFFFFu;
+    for (uint16_t i = 0; i < count; i++) {
+        crc ^= mpucal_u8(blob, i);
+        for (uint8_t bit = 0; bit < 8; bit++) {
+            crc = crc & 1 ? crc >> 1 ^ 0xEDB88320u : crc >> 1;
+        }
+    }
+    return ~crc;
+}
+
+/* firmware_protocol.md, "Reading", of the blob at the beginning of a source. */
+static inline enum mpucal_status mpucal_check(const struct mpucal_source *blob) {
+    if (blob->size < MPUCAL_HEADER_LENGTH || mpucal_u32(blob, 0) != MPUCAL_MAGIC) {
+        return MPUCAL_NO_BLOB;
+    }
+    if (mpucal_u8(blob, MPUCAL_MAJOR_AT) != MPUCAL_MAJOR) {
+        return MPUCAL_OTHER_MAJOR;
+    }
+    uint16_t length = mpucal_u16(blob, MPUCAL_LENGTH_AT);
+    if (length < MPUCAL_MIN_LENGTH || length > MPUCAL_MAX_LENGTH || length > blob->size) {
+        return MPUCAL_BAD_LENGTH;
+    }
+    uint16_t crc_at = (uint16_t)(length - 4);
+    if (mpucal_crc32(blob, crc_at) != mpucal_u32(blob, crc_at)) {
+        return MPUCAL_BAD_CRC;
+    }
+    if (!mpucal_all_finite(blob, MPUCAL_D_AT, 9) || !mpucal_all_finite(blob, MPUCAL_B_A_AT, 3) ||
+        !mpucal_all_finite(blob, MPUCAL_APPLIED_B_A_AT, 3)) {
+        return MPUCAL_NOT_FINITE;
+    }
+    return MPUCAL_OK;
+}
+
+/* Element (i, j) of the adjugate of D, row-major: of inv(D) but for 1 / det(D). */
+static inline float mpucal_adjugate(const float D[9], uint8_t i, uint8_t j) {
+    uint8_t p = (uint8_t)((j + 1) % 3), q = (uint8_t)((j + 2) % 3);
+    uint8_t r = (uint8_t)((i + 1) % 3), s = (uint8_t)((i + 2) % 3);
+    return D[3 * p + r] * D[3 * q + s] - D[3 * p + s] * D[3 * q + r];
+}
+
+/* What a blob that was checked makes of counts at +-range_g. */
+static inline enum mpucal_status mpucal_prepare(struct mpucal *sensor, const struct mpucal_source *blob,
+                                                float range_g) {
+    float D[9], offset[3], det = 0.0f;
+    for (uint8_t i = 0; i < 9; i++) {
+        D[i] = mpucal_f32(blob, (uint16_t)(MPUCAL_D_AT + 4 * i));
+    }
+    for (uint8_t i = 0; i < 3; i++) {
+        offset[i] = mpucal_f32(blob, (uint16_t)(MPUCAL_B_A_AT + 4 * i)) -
+                    mpucal_f32(blob, (uint16_t)(MPUCAL_APPLIED_B_A_AT + 4 * i));
+        det += D[i] * mpucal_adjugate(D, i, 0);
+    }
+    if (det == 0.0f || !mpucal_is_finite(det)) {
+        return MPUCAL_NOT_INVERTIBLE;
+    }
+    float mps2_per_count = MPUCAL_STANDARD_GRAVITY_MPS2 * range_g / MPUCAL_FULL_SCALE;
+    struct mpucal made = {{{0.0f}}, {0.0f}};
+    int usable = 1;
+    for (uint8_t i = 0; i < 3; i++) {
+        for (uint8_t j = 0; j < 3; j++) {
+            float inverse = mpucal_adjugate(D, i, j) / det;
+            made.gain[i][j] = inverse * mps2_per_count;
+            made.bias[i] += inverse * offset[j];
+            usable = usable && mpucal_is_finite(made.gain[i][j]) && mpucal_is_finite(made.bias[i]);
+        }
+    }
+    if (!usable) {
+        return MPUCAL_NOT_INVERTIBLE;
+    }
+    *sensor = made;
+    return MPUCAL_OK;
+}
+
+/* Check a blob, and prepare to apply it; on any status but MPUCAL_OK, `sensor` is left as it was.
+ *
+ * who_am_i: the chip's register 0x75; 0: whichever it is.
+ * accel_range_g: the full scale that the chip is set to, g; 0: the blob's.
+ */
+static inline enum mpucal_status mpucal_load_from(struct mpucal *sensor, const struct mpucal_source *blob,
+                                                  uint8_t who_am_i, float accel_range_g) {
+    enum mpucal_status status = mpucal_check(blob);
+    if (status != MPUCAL_OK) {
+        return status;
+    }
+    uint8_t measured_on = mpucal_u8(blob, MPUCAL_WHO_AM_I_AT);
+    if (who_am_i && measured_on && measured_on != who_am_i) {
+        return MPUCAL_OTHER_CHIP;
+    }
+    float measured_at_g = mpucal_f32(blob, MPUCAL_ACCEL_RANGE_G_AT);
+    float range_g = accel_range_g > 0.0f ? accel_range_g : measured_at_g;
+    if (!(range_g > 0.0f) || (measured_at_g > 0.0f && measured_at_g != range_g)) {
+        return MPUCAL_OTHER_RANGE;
+    }
+    return mpucal_prepare(sensor, blob, range_g);
+}
+
+/* The same, of a blob that begins at `memory`, where there are `size` bytes. */
+static inline enum mpucal_status mpucal_load(struct mpucal *sensor, const void *memory, size_t size, uint8_t who_am_i,
+                                             float accel_range_g) {
+    struct mpucal_source blob = {mpucal_read_memory, memory, size};
+    return mpucal_load_from(sensor, &blob, who_am_i, accel_range_g);
+}
+
+/* The specific force a_mps2 (m/s^2; at rest, +gravity upward) of one sample's accelerometer `counts` (x, y, z). */
+static inline void mpucal_apply(const struct mpucal *sensor, const int16_t counts[3], float a_mps2[3]) {
+    float x = counts[0], y = counts[1], z = counts[2];
+    for (uint8_t i = 0; i < 3; i++) {
+        const float *gain = sensor->gain[i];
+        a_mps2[i] = gain[0] * x + gain[1] * y + gain[2] * z - sensor->bias[i];
+    }
+}
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
