@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
@@ -26,6 +27,22 @@ class Sensor:
     gyro_range_dps: float | None = None
     rate_hz: float | None = None
     temperature_c: float | None = None
+
+
+@dataclass(frozen=True)
+class Autopilot:
+    """What an autopilot says of an IMU whose stream it sends, corrected by its parameters.
+
+    Attributes
+    ----------
+    firmware : ArduPilot or PX4. imu : which of the vehicle's, from 1. message : the stream's MAVLink name.
+    parameters : by name, all that are known.
+    """
+
+    firmware: str
+    imu: int
+    message: str
+    parameters: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -77,12 +94,18 @@ class Recording(Samples):
     sensor : what is known of the sensor.
     name : what to call the recording in a message.
     recovered : None, or the sentence that says how much of a damaged file this is.
+    least_noise : m/s^2, rad/s: standard deviations that a sample has at least, however still it reads.
+    autopilot : of an IMU of a vehicle, what stands between the sensor and the samples.
+    others : further IMUs of that vehicle, turned with it.
     """
 
     flat: tuple[int, int] | None = None
     sensor: Sensor = Sensor()
     name: str = "recording"
     recovered: str | None = None
+    least_noise: tuple[float, float] = (0.0, 0.0)
+    autopilot: Autopilot | None = None
+    others: tuple[Recording, ...] = ()
 
     @classmethod
     def from_arrays(

@@ -70,17 +70,18 @@ def flat_statistics(recording: Recording, flat: tuple[int, int]) -> Flat:
     """Sigma_a, Sigma_omega, b_omega and the mean acceleration of samples flat[0]..flat[1]-1 (Algorithm 1, line 1).
 
     A variance is never zero: a stream of coarse steps may read exactly constant, but its noise is then somewhere
-    below a step, not absent.
+    below a step, not absent. Nor is it below what the recording's source knows to be least.
     """
     first, last = flat
+    least_acc, least_gyr = recording.least_noise
     acc, gyr = recording.acc[first:last], recording.gyr[first:last]
     return Flat(
         first,
         last,
         y=acc.mean(0),
         b_omega=gyr.mean(0),
-        Sigma_a=_variance(acc, recording.acc, QUIETEST_ACC_MPS2),
-        Sigma_omega=_variance(gyr, recording.gyr, QUIETEST_GYRO_RAD_S),
+        Sigma_a=_variance(acc, recording.acc, max(least_acc, QUIETEST_ACC_MPS2)),
+        Sigma_omega=_variance(gyr, recording.gyr, max(least_gyr, QUIETEST_GYRO_RAD_S)),
     )
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 from ..data import Recording
 from ..errors import RecordingError
 
-KINDS = (".mcap", ".npz", ".csv")
+KINDS = (".mcap", ".tlog", ".npz", ".csv")
 _REMEDY = f"give a {', '.join(KINDS)} file or the folder of a session"
 
 
 def load(path: str | Path) -> Recording:
-    """The recording in a file (.mcap, .npz, .csv), or in the capture of a session's folder.
+    """The recording in a file (.mcap, .tlog, .npz, .csv), or in the capture of a session's folder.
 
     A capture that was cut short gives what is whole of it, and says so in `recovered`.
 
@@ -34,6 +34,10 @@ def load(path: str | Path) -> Recording:
     # a kind's library is loaded only when a file of that kind is
     if kind == ".mcap":
         return _load_capture(path)
+    if kind == ".tlog":
+        from .tlog import load_tlog  # noqa: PLC0415
+
+        return load_tlog(path)
     if kind == ".npz":
         from .npz import load_npz  # noqa: PLC0415
 
@@ -54,7 +58,7 @@ def _load_capture(path: Path) -> Recording:
 
 
 def _capture_in(folder: Path) -> Path:
-    path = folder / "capture.mcap"
-    if not path.exists():
-        raise RecordingError(f"the folder {folder} holds no {path.name}", _REMEDY)
-    return path
+    for path in (folder / "capture.mcap", folder / "capture.tlog"):
+        if path.exists():
+            return path
+    raise RecordingError(f"the folder {folder} holds no capture.mcap and no capture.tlog", _REMEDY)

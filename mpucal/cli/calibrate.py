@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from ..calibration import calibrate
 from ..capture import load
 from ..errors import RefusedError
+from ..mavlink.calibrate import calibrate_vehicle
 from ..result import REFUSED
 from ..sinks.file import BLOB, make_folder, result_files, save
 from .options import fit_options
@@ -23,14 +23,14 @@ EXAMPLE = "Example: `mpucal calibrate capture.mcap -o results` or `mpucal calibr
 @click.option("--json", "as_json", is_flag=True, help="Print calibration.json, and nothing else.")
 @fit_options
 def command(recording: Path, folder: Path | None, as_json: bool, gravity: float, model: str) -> int:
-    """Calibrate from a capture (.mcap), an archive (.npz) or a table (.csv).
+    """Calibrate from a capture (.mcap, .tlog), an archive (.npz) or a table (.csv).
 
     Of a folder, the capture in it is meant. Exit code 5: the calibration was refused, with reasons.
     """
     samples = load(recording)
     if samples.recovered is not None:
         click.echo(f"mpucal: {samples.recovered}", err=True)
-    calibration = calibrate(samples, model=model, gravity=gravity)
+    calibration = calibrate_vehicle(samples, model=model, gravity=gravity)
     paths = []
     if folder is not None:
         make_folder(folder)

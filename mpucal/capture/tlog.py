@@ -1,0 +1,19 @@
+"""MAVLink .tlog files as recordings. Knows no estimate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..data import Recording
+from ..mavlink.log import read_log
+from ..mavlink.tlog import read_tlog
+
+
+def load_tlog(path: Path) -> Recording:
+    """The recording of the vehicle's first IMU in a .tlog, the others in its `others`.
+
+    Raises
+    ------
+    CaptureError : it cannot be read. RecordingError : it holds no vehicle, several, or no IMU that tells the truth.
+    """
+    return read_log(read_tlog(path))

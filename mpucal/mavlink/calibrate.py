@@ -1,0 +1,43 @@
+"""All IMUs of a vehicle calibrated from one rotation. Knows no link; the estimate is that of any recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+from ..calibration import calibrate
+from ..data import STANDARD_GRAVITY_MPS2, Recording
+from ..result import Calibration
+
+OTHERS, AUTOPILOT = "others", "autopilot"
+
+
+def calibrate_vehicle(recording: Recording, model: str = "auto", gravity: float = STANDARD_GRAVITY_MPS2) -> Calibration:
+    """As `calibrate`; of a vehicle, also its other IMUs and each one's parameters, in `extra`.
+
+    Raises
+    ------
+    UsageError : see calibrate.
+    """
+    calibration = _one(recording, model, gravity)
+    if not recording.others:
+        return calibration
+    others = [_one(other, model, gravity).document() for other in recording.others]
+    return replace(calibration, extra=MappingProxyType({**calibration.extra, OTHERS: others}))
+
+
+def _one(recording: Recording, model: str, gravity: float) -> Calibration:
+    calibration = calibrate(recording, model, gravity)
+    if recording.autopilot is None:
+        return calibration
+    extra: Mapping[str, Any] = {AUTOPILOT: _autopilot(recording)}
+    return replace(calibration, extra=MappingProxyType({**calibration.extra, **extra}))
+
+
+def _autopilot(recording: Recording) -> dict[str, Any]:
+    autopilot = recording.autopilot
+    if autopilot is None:
+        return {}
+    return {"firmware": autopilot.firmware, "imu": autopilot.imu, "message": autopilot.message}

@@ -1,0 +1,64 @@
+"""A vehicle's clock, unwrapped and followed through resets. Knows no message."""
+
+from __future__ import annotations
+
+from enum import Enum, auto
+
+WRAP = 1 << 32
+US = 1_000
+S_US = 1_000_000
+# a packet this late was overtaken by others; a clock further back was set back
+LATE_US = S_US
+# the clock may run ahead of the times of receipt by this much more than before: packets pile up on a link
+STRAY_US = 5 * S_US
+
+
+class Jump(Enum):
+    """What the clock did."""
+
+    NONE = auto()
+    REBOOT = auto()
+    SET = auto()
+
+
+class VehicleClock:
+    """Times of one message stream on a line that only grows but for late packets.
+
+    Parameters
+    ----------
+    unit_us : what the stream's times count: 1 (time_usec) or 1000 (time_boot_ms).
+    """
+
+    def __init__(self, unit_us: int) -> None:
+        self._unit_us = unit_us
+        self._raw: int | None = None
+        self._offset_us = 0
+        self._latest_us = 0
+        self._received_us = 0
+
+    def us(self, raw: int, received_ns: int) -> tuple[int, Jump]:
+        """The time of `raw` in us, and what the clock did before it.
+
+        Parameters
+        ----------
+        raw : as the message says it. received_ns : when it arrived, any clock that goes evenly.
+        """
+        received_us = received_ns // US
+        if self._raw is None:
+            self._raw, self._latest_us, self._received_us = raw, raw * self._unit_us, received_us
+            return self._latest_us, Jump.NONE
+        step_us = (raw - self._raw) * self._unit_us
+        wrapped_us = step_us + WRAP * self._unit_us
+        passed_us = received_us - self._received_us
+        if step_us < -LATE_US and abs(wrapped_us - passed_us) < STRAY_US:
+            self._offset_us += WRAP * self._unit_us
+            step_us = wrapped_us
+        jump = Jump.NONE
+        if step_us < -LATE_US or step_us > passed_us + STRAY_US:
+            jump = Jump.REBOOT if step_us < 0 else Jump.SET
+            self._offset_us += max(passed_us, 1) - step_us
+            step_us = max(passed_us, 1)
+        t_us = raw * self._unit_us + self._offset_us
+        if step_us > 0:
+            self._raw, self._latest_us, self._received_us = raw, t_us, received_us
+        return t_us, jump

@@ -1,0 +1,159 @@
+"""Readings of a vehicle's IMUs gathered, and made into one recording an IMU. Knows no link and no parameter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..data import Autopilot, Recording, Samples, Sensor, Vector
+from .clock import Jump, VehicleClock
+from .imu import ACC_LSB_MPS2, GYRO_LSB_RAD_S, SCALED, Reading, Stream
+
+US_PER_S = 1e6
+MS_US = 1000
+
+# Single lost packets are as good as a lower rate; a longer time without one is a gap.
+GAP_S, GAP_INTERVALS = 0.1, 6.0
+# a stream that is truer is taken where it has at least this share of the packets of the busiest
+SHARE = 0.5
+PAIRED = 0.9
+
+# Times are those of sending, up to a loop after the sample, and truncation is no white noise while the board turns
+# slowly: what that leaves on a replay of known truth.
+WHOLE_NOISE = (1.75 * ACC_LSB_MPS2 / math.sqrt(12.0), 3.5 * GYRO_LSB_RAD_S / math.sqrt(12.0))
+
+
+class Row(NamedTuple):
+    """One reading: t_us on the stream's line."""
+
+    t_us: int
+    reading: Reading
+
+
+class Gathered:
+    """What one stream delivered."""
+
+    def __init__(self, stream: Stream) -> None:
+        self.stream = stream
+        self._clock = VehicleClock(stream.unit_us)
+        self._rows: dict[int, Row] = {}
+        self._newest_us: int | None = None
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def add(self, reading: Reading, received_ns: int) -> tuple[Row | None, Jump]:
+        """Keep a reading; the row where it is newer than all before it, and what the clock did before it."""
+        t_us, jump = self._clock.us(reading.time, received_ns)
+        row = self._rows.setdefault(t_us, Row(t_us, reading))
+        if self._newest_us is not None and t_us <= self._newest_us:
+            return None, jump
+        self._newest_us = t_us
+        return row, jump
+
+    def times_us(self) -> Vector:
+        """(n,) us, increasing."""
+        return np.array(sorted(self._rows), dtype=np.float64)
+
+    def samples(self, t_us: Vector | None = None) -> Samples:
+        """All readings in the order of their times, or of those given instead."""
+        rows = [self._rows[key] for key in sorted(self._rows)]
+        return samples_of(rows, self.times_us() if t_us is None else t_us)
+
+
+def samples_of(rows: Sequence[Row], t_us: Vector, before_us: float | None = None) -> Samples:
+    """Rows as samples.
+
+    Parameters
+    ----------
+    t_us : (n,) increasing. before_us : the time of the sample before the first, where there was one.
+    """
+    n = len(rows)
+    if not n:
+        return Samples.empty()
+    steps = np.diff(t_us, prepend=t_us[0] if before_us is None else before_us) / US_PER_S
+    limit = GAP_S if n < 3 else max(GAP_S, GAP_INTERVALS * float(np.median(steps[1:])))
+    no = np.zeros(n, bool)
+    return Samples(
+        t=t_us / US_PER_S,
+        acc=np.array([row.reading.acc for row in rows]),
+        gyr=np.array([row.reading.gyr for row in rows]),
+        temperature_c=np.array([row.reading.temperature_c for row in rows]),
+        gap=steps > limit,
+        acc_clipped=no,
+        gyr_clipped=no.copy(),
+    )
+
+
+class Gatherer:
+    """All streams of a vehicle."""
+
+    def __init__(self) -> None:
+        self.streams: dict[Stream, Gathered] = {}
+
+    def add(self, reading: Reading, received_ns: int) -> tuple[Row | None, Jump]:
+        """See Gathered.add."""
+        gathered = self.streams.setdefault(reading.stream, Gathered(reading.stream))
+        return gathered.add(reading, received_ns)
+
+    def chosen(self, order: Sequence[str]) -> list[Gathered]:
+        """The stream of each IMU to believe, by IMU.
+
+        Parameters
+        ----------
+        order : the message names that tell the truth, the truest first.
+        """
+        found = []
+        for imu in sorted({stream.imu for stream in self.streams}):
+            known = [g for s, g in self.streams.items() if s.imu == imu and s.name in order]
+            most = max((len(g) for g in known), default=0)
+            enough = [g for g in known if len(g) >= max(SHARE * most, 2)]
+            found += [min(enough, key=lambda g: order.index(g.stream.name))] if enough else []
+        return found
+
+    def recordings(
+        self, order: Sequence[str], name: str, firmware: str, parameters: Mapping[str, float]
+    ) -> list[Recording]:
+        """One recording an IMU, the first IMU's first; see `chosen`."""
+        chosen = self.chosen(order)
+        fine = next((g for g in chosen if g.stream.name not in SCALED), None)
+        made = []
+        for gathered in chosen:
+            autopilot = Autopilot(firmware, gathered.stream.imu, gathered.stream.name, parameters)
+            made.append(_recording(gathered, fine, autopilot, name))
+        return made
+
+
+def _recording(gathered: Gathered, fine: Gathered | None, autopilot: Autopilot, name: str) -> Recording:
+    samples = gathered.samples(None if fine is None else _finer(gathered, fine))
+    known = samples.temperature_c[np.isfinite(samples.temperature_c)]
+    stream = gathered.stream
+    sensor = Sensor(
+        chip=chip(autopilot.firmware, stream.imu),
+        rate_hz=float((len(samples) - 1) / (samples.t[-1] - samples.t[0])),
+        temperature_c=float(known.mean()) if len(known) else None,
+    )
+    noise = WHOLE_NOISE if stream.is_whole else (0.0, 0.0)
+    columns = {key: getattr(samples, key) for key in Samples.__dataclass_fields__}
+    return Recording(**columns, sensor=sensor, name=name, least_noise=noise, autopilot=autopilot)
+
+
+def _finer(gathered: Gathered, fine: Gathered) -> Vector | None:
+    """(n,) us in place of whole ms, of the messages that were sent in the same millisecond; None where few were."""
+    if gathered.stream.name not in SCALED:
+        return None
+    times, exact = gathered.times_us(), fine.times_us()
+    at = np.minimum(np.searchsorted(exact, times), len(exact) - 1)
+    paired = (exact[at] >= times) & (exact[at] < times + MS_US)
+    if paired.mean() < PAIRED:
+        return None
+    finer = np.where(paired, exact[at], times + MS_US / 2)
+    return finer if (np.diff(finer) > 0).all() else None
+
+
+def chip(firmware: str, imu: int) -> str:
+    """What to call the sensor behind a vehicle's stream."""
+    return f"{firmware}-IMU{imu}"

@@ -1,0 +1,151 @@
+"""A whole .tlog of any ground station made into a recording of each IMU. Knows no session.
+
+What was measured before a reboot, and under other accelerometer parameters, belongs to another recording: the longest
+is taken.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from ..calibration.stationary import find_flat
+from ..data import Recording
+from ..errors import RecordingError
+from .clock import Jump
+from .collect import Gatherer
+from .dialect import Message, Parser, dialect
+from .imu import Reading, reading
+from .parameters.encoding import is_parameter, of_wire
+from .tlog import Tlog
+from .truth import ARDUPILOT, PX4, truthful
+
+# whose change alters the streams
+SHAPING = ("INS_ACC", "CAL_ACC", "INS_GYR", "CAL_GYRO", "AHRS_ORIENTATION", "SENS_BOARD", "EKF2_IMU_CTRL")
+
+
+@dataclass
+class Segment:
+    """A stretch under one set of parameters, between reboots."""
+
+    parameters: dict[str, float]
+    gatherer: Gatherer = field(default_factory=Gatherer)
+
+    def __len__(self) -> int:
+        return max((len(g) for g in self.gatherer.streams.values()), default=0)
+
+
+class Log:
+    """Segments from the messages of one vehicle, as they come."""
+
+    def __init__(self, firmware: str) -> None:
+        self.firmware = firmware
+        self.segments = [Segment({})]
+
+    def add(self, message: Message, received_ns: int) -> None:
+        """Take one message."""
+        if is_parameter(message):
+            parameter = of_wire(message, self.firmware == PX4)
+            self.parameter(parameter.name, float(parameter.value))
+            return
+        content = reading(message)
+        if content is not None:
+            self.reading(content, received_ns)
+
+    def parameter(self, name: str, value: float) -> None:
+        """A parameter as the vehicle holds it from now on."""
+        now = self.segments[-1]
+        if len(now) and name.startswith(SHAPING) and now.parameters.get(name, value) != value:
+            now = Segment(dict(now.parameters))
+            self.segments.append(now)
+        now.parameters[name] = value
+
+    def reading(self, content: Reading, received_ns: int) -> None:
+        """An IMU's reading."""
+        _, jump = self.segments[-1].gatherer.add(content, received_ns)
+        if jump is Jump.REBOOT:
+            self.segments.append(Segment(dict(self.segments[-1].parameters)))
+            self.segments[-1].gatherer.add(content, received_ns)
+
+    def recording(self, name: str) -> Recording:
+        """The first IMU's recording of the longest segment, with the others' in `others`.
+
+        Raises
+        ------
+        RecordingError : it holds no IMU messages that tell the truth.
+        """
+        longest = max(self.segments, key=len)
+        order = truthful(self.firmware, longest.parameters)
+        recordings = longest.gatherer.recordings(order, name, self.firmware, longest.parameters)
+        if not recordings:
+            raise _no_imu(name, self.firmware, longest.gatherer)
+        return with_others(recordings)
+
+
+def with_others(recordings: list[Recording]) -> Recording:
+    """The first of a vehicle's recordings, holding the others, each with its flat segment.
+
+    The flat segment is sought before single lost packets are taken for gaps, of which a radio has one a second.
+    """
+    first, *others = [replace(recording, flat=find_flat(recording)) for recording in recordings]
+    return replace(first, others=tuple(others))
+
+
+def read_log(tlog: Tlog, system: int | None = None) -> Recording:
+    """The recording in a .tlog.
+
+    Parameters
+    ----------
+    system : whose, where several vehicles are in it.
+
+    Raises
+    ------
+    RecordingError : it holds none, or several vehicles, or no IMU messages that tell the truth.
+    """
+    parser = Parser(dialect().MAVLink(None))
+    messages = [(record.t_ns, packet.message) for record in tlog.records for packet in parser.datagram(record.data)]
+    vehicles = _vehicles(messages)
+    if system is not None:
+        vehicles = {ids: firmware for ids, firmware in vehicles.items() if ids[0] == system}
+    if len(vehicles) != 1:
+        raise _not_one(tlog.name, vehicles)
+    ((ids, firmware),) = vehicles.items()
+    log = Log(firmware)
+    for t_ns, message in messages:
+        if (message.get_srcSystem(), message.get_srcComponent()) == ids:
+            log.add(message, t_ns)
+    return replace(log.recording(tlog.name), recovered=tlog.recovered)
+
+
+def _vehicles(messages: list[tuple[int, Message]]) -> dict[tuple[int, int], str]:
+    """(system, component) of those who sent an autopilot's HEARTBEAT and IMU messages, with their firmware."""
+    m = dialect()
+    firmware: dict[tuple[int, int], str] = {}
+    imu: Counter[tuple[int, int]] = Counter()
+    for _, message in messages:
+        ids = (message.get_srcSystem(), message.get_srcComponent())
+        if message.get_type() == "HEARTBEAT" and message.autopilot != m.MAV_AUTOPILOT_INVALID:
+            firmware[ids] = PX4 if message.autopilot == m.MAV_AUTOPILOT_PX4 else ARDUPILOT
+        elif reading(message) is not None:
+            imu[ids] += 1
+    return {ids: name for ids, name in firmware.items() if imu[ids]} or firmware
+
+
+def _not_one(name: str, vehicles: Mapping[tuple[int, int], str]) -> RecordingError:
+    if not vehicles:
+        return RecordingError(f"{name} holds no autopilot's heartbeat", "give a .tlog of a link to the vehicle")
+    listed = ", ".join(f"system {system} ({firmware})" for (system, _), firmware in sorted(vehicles.items()))
+    return RecordingError(f"{name} holds several vehicles: {listed}", "record the one to calibrate alone")
+
+
+def _no_imu(name: str, firmware: str, gatherer: Gatherer) -> RecordingError:
+    if firmware == PX4 and gatherer.streams:
+        return RecordingError(
+            f"{name} holds only PX4's HIGHRES_IMU, from which the estimator's bias is subtracted already",
+            "record SCALED_IMU, as `mpucal session --mavlink` does, or clear bit 1 of EKF2_IMU_CTRL before",
+        )
+    return RecordingError(
+        f"{name} holds no accelerations and rates",
+        "record RAW_IMU or HIGHRES_IMU at 50 Hz or more, or let `mpucal session --mavlink` do it",
+    )
