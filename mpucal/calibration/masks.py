@@ -30,11 +30,13 @@ GAP_INTERVALS = 2.5  # a longer time between samples than so many intervals is a
 def with_masks(recording: Recording) -> Recording:
     """The recording with its gaps and clipped samples marked, where its source did not already."""
     dt = np.diff(recording.t, prepend=recording.t[0])
+    # autopilots run their sensors at ranges that no hand reaches, and round: values repeat without a rail
+    rails = recording.autopilot is None
     return replace(
         recording,
         gap=recording.gap | (dt > GAP_INTERVALS * np.median(dt[1:])) | _on_a_line(recording.gyr, recording.t),
-        acc_clipped=recording.acc_clipped | _at_the_rail(recording.acc, ACC_RANGES),
-        gyr_clipped=recording.gyr_clipped | _at_the_rail(recording.gyr, GYRO_RANGES),
+        acc_clipped=recording.acc_clipped | (rails & _at_the_rail(recording.acc, ACC_RANGES)),
+        gyr_clipped=recording.gyr_clipped | (rails & _at_the_rail(recording.gyr, GYRO_RANGES)),
     )
 
 
