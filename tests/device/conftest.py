@@ -1,0 +1,133 @@
+"""/dev/i2c-1 with a simulated chip behind it, for the installed command and for the tools of Linux."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+HARNESS = Path(__file__).parent / "harness"
+PRELOAD = "LD_PRELOAD"
+
+
+@dataclass(frozen=True)
+class Result:
+    code: int
+    out: str
+    err: str
+
+    @property
+    def sentences(self) -> list[str]:
+        return [line for line in self.err.splitlines() if line.startswith("mpucal: ")]
+
+
+class Device:
+    """A simulated chip at /dev/i2c-1, for the programs that `run` starts.
+
+    Parameters
+    ----------
+    text : the chip, as --bus sim:... names it. clock : file and library of the time that only waiting takes.
+    """
+
+    def __init__(self, text: str, folder: Path, clock: Path) -> None:
+        self.folder, time = folder, folder / "clock"
+        # an uptime of a quarter of an hour: a monotonic clock does not begin at zero
+        time.write_bytes((900 * 10**9).to_bytes(8, "little"))
+        command = [sys.executable, HARNESS / "device.py", text, time]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        mocked = json.loads(self._process.stdout.readline())
+        self.root = Path(mocked["UMOCKDEV_DIR"])
+        mocked[PRELOAD] = f"{clock}:{mocked[PRELOAD]}"
+        self.environment = {**os.environ, **mocked, "MPUCAL_TEST_CLOCK": str(time)}
+
+    def tell(self, **what) -> None:
+        """Change the device, see harness/device.py."""
+        self._process.stdin.write(json.dumps(what) + "\n")
+        self._process.stdin.flush()
+        self._process.stdout.readline()
+
+    def run(self, *command, prefix: Sequence[str] = ()) -> Result:
+        """Any program."""
+        words = [*prefix, *(str(word) for word in command)]
+        done = subprocess.run(
+            words, env=self.environment, cwd=self.folder, capture_output=True, text=True, check=False, timeout=120
+        )
+        return Result(done.returncode, done.stdout, done.stderr)
+
+    def mpucal(self, *words, prefix: Sequence[str] = ()) -> Result:
+        """The installed command."""
+        return self.run(Path(sys.executable).parent / "mpucal", *words, prefix=prefix)
+
+    def session(self, *words) -> Result:
+        """The same, guiding the simulated hand through a session; it may fail before."""
+        command = [Path(sys.executable).parent / "mpucal", "session", "--bus", "/dev/i2c-1", "--json-events", *words]
+        with subprocess.Popen(
+            [str(word) for word in command],
+            env=self.environment,
+            cwd=self.folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process:
+            said = []
+            for line in process.stderr:
+                said.append(line)
+                event = json.loads(line) if line.startswith("{") else {}
+                if event.get("event") == "prompt":
+                    self.tell(prompt={"kind": event["kind"], "down": event.get("down")})
+            return Result(process.wait(), process.stdout.read(), "".join(said))
+
+    def close(self) -> None:
+        self._process.stdin.close()
+        self._process.wait(timeout=30)
+        self._process.stdout.close()
+        shutil.rmtree(self.root, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def clock(tmp_path_factory):
+    """The library of harness/clock.c, built now."""
+    for library in ("libumockdev.so.0", "libumockdev-preload.so.0"):
+        try:
+            # the second one is for other programs: found is enough
+            ctypes.CDLL(library) if "preload" not in library else _find(library)
+        except OSError:
+            pytest.skip(f"{library} is missing: install Debian's umockdev, as tools/ci_packages does")
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("there is no C compiler for the clock of harness/clock.c")
+    built = tmp_path_factory.mktemp("clock") / "clock.so"
+    subprocess.run([compiler, "-O2", "-shared", "-fPIC", "-o", built, HARNESS / "clock.c"], check=True)
+    return built
+
+
+def _find(library):
+    done = subprocess.run(["/bin/true"], env={PRELOAD: library}, capture_output=True, text=True, check=True)
+    if done.stderr:
+        raise OSError(done.stderr)
+
+
+@pytest.fixture
+def device(clock):
+    """Makes a device; all are gone afterwards."""
+    made = []
+
+    def make(text="sim"):
+        folder = Path(tempfile.mkdtemp(prefix="mpucal-device-"))
+        made.append(Device(text, folder, clock))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+        shutil.rmtree(each.folder, ignore_errors=True)

@@ -1,0 +1,100 @@
+"""A program that is /dev/i2c-1: a simulated chip behind a mocked I2C adapter, until its input ends.
+
+    python device.py sim:chip=mpu6500 CLOCK_FILE
+
+`still` in place of `sim` is the chip of the contract that all buses keep: the same counts again and again. On stdout, a line of JSON with the environment in which programs find it. On stdin, lines of JSON: {"prompt": ...}
+lets the hand hear it, {"adapter": {...}} changes the adapter, {"registers": {...}} writes to the chip; each is
+answered by an empty line. CLOCK_FILE holds the time, see clock.c.
+"""
+
+from __future__ import annotations
+
+import json
+import mmap
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+from adapter import Adapter
+from umockdev import Testbed
+
+from mpucal.bus.simulated import Chip, RecordedFeed, SimulatedBus, open_simulated
+from mpucal.bus.simulated.clock import CLOCKS, Clock
+from mpucal.bus.simulated.factory import Factory
+from mpucal.bus.simulated.models import MODELS
+
+NODE, STILL = "/dev/i2c-1", "still"
+DEVICES = """\
+P: /devices/platform/i2c-1
+E: SUBSYSTEM=i2c
+A: name=mocked adapter
+
+P: /devices/platform/i2c-1/i2c-dev/i2c-1
+N: i2c-1
+E: SUBSYSTEM=i2c-dev
+E: DEVNAME=/dev/i2c-1
+A: name=mocked adapter
+"""
+
+
+class SharedClock:
+    """The time in a file, which a program under test reads too."""
+
+    def __init__(self, path: Path) -> None:
+        with path.open("r+b") as file:
+            self._page = mmap.mmap(file.fileno(), 8)
+        self._opened = self._shown()
+
+    def now(self) -> int:
+        """Time since the device was there."""
+        return self._shown() - self._opened
+
+    def spend(self, ns: int) -> None:
+        """A transfer takes `ns`, for whoever asked for it as well."""
+        self._page[:] = (self._shown() + ns).to_bytes(8, "little")
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Nobody sleeps here: only the program under test does."""
+        raise RuntimeError("the device does not wait")
+
+    def _shown(self) -> int:
+        return int.from_bytes(self._page, "little")
+
+
+def open_bus(text: str, clock: Path) -> SimulatedBus:
+    """The bus that `text` names, in the time of `clock`."""
+    if text == STILL:
+        counts = [(12, -34, 4096)] * 10_000, [(56, -78, 90)] * 10_000
+        feed = RecordedFeed(*counts, rate_hz=200.0, accel_range_g=8.0, gyro_range_dps=500.0)
+        return SimulatedBus(Chip(MODELS["mpu6050"], feed, 2500.0, Factory()), SharedClock(clock))
+
+    def shared() -> Clock:
+        return SharedClock(clock)
+
+    CLOCKS["shared"] = shared  # type: ignore[assignment]
+    return open_simulated(text + ("," if ":" in text else ":") + "pace=shared")
+
+
+def main(text: str, clock: str) -> None:
+    """Serve until stdin ends."""
+    bus = open_bus(text, Path(clock))
+    adapter, testbed = Adapter(bus), Testbed()
+    testbed.add(DEVICES)
+    testbed.attach(NODE, adapter.answer)
+    environment = {"UMOCKDEV_DIR": testbed.folder, "LD_PRELOAD": "libumockdev-preload.so.0"}
+    print(json.dumps(environment), flush=True)
+    for line in sys.stdin:
+        for what, value in json.loads(line).items():
+            if what == "prompt":
+                bus.hear(SimpleNamespace(**value))
+            elif what == "adapter":
+                for name, setting in value.items():
+                    setattr(adapter, name, frozenset(setting) if name == "bound" else setting)
+            elif what == "registers":
+                for register, data in value.items():
+                    bus.write(int(register), bytes.fromhex(data))
+        print(flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,88 @@
+"""What every bus promises, asked of the real smbus2 on a character device."""
+
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mpucal.chip.access import Reply
+
+CONTRACT = Path(__file__).parents[1] / "bus" / "test_contract.py"
+PROMISES = (
+    "test_a_register_keeps_what_was_written",
+    "test_the_fifo_register_does_not_increment",
+    "test_time_never_goes_back_and_sleeping_takes_it",
+    "test_replies_are_bytes",
+    "test_closing_ends_it",
+    "test_only_a_replay_ends",
+)
+# one I2cBus in a process for which /dev/i2c-1 is there
+SERVER = """
+import json, sys
+from mpucal.bus.i2c import I2cBus
+bus = I2cBus("/dev/i2c-1")
+for line in sys.stdin:
+    name, *arguments = json.loads(line)
+    if name == "write":
+        arguments[1] = bytes.fromhex(arguments[1])
+    reply = getattr(bus, name)(*arguments)
+    print(json.dumps([reply[0].hex(), reply[1]] if name == "read" else reply), flush=True)
+"""
+
+
+class DistantBus:
+    """The I2cBus of that process."""
+
+    def __init__(self, device):
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", SERVER],
+            env=device.environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def read(self, register, count):
+        data, t_ns = self._ask("read", register, count)
+        return Reply(bytes.fromhex(data), t_ns)
+
+    def write(self, register, data):
+        return self._ask("write", register, data.hex())
+
+    def sleep_until(self, t_ns):
+        self._ask("sleep_until", t_ns)
+
+    def close(self):
+        self._ask("close")
+
+    def end(self):
+        self._process.stdin.close()
+        assert self._process.wait(timeout=30) == 0
+        self._process.stdout.close()
+
+    def _ask(self, *words):
+        self._process.stdin.write(json.dumps(words) + "\n")
+        self._process.stdin.flush()
+        return json.loads(self._process.stdout.readline())
+
+
+def _contract():
+    spec = importlib.util.spec_from_file_location("contract", CONTRACT)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def bus(device):
+    distant = DistantBus(device("still"))
+    yield distant
+    distant.end()
+
+
+@pytest.mark.parametrize("promise", PROMISES)
+def test_the_contract(bus, promise):
+    getattr(_contract(), promise)(bus)
