@@ -1,0 +1,51 @@
+"""A prompt as a STATUSTEXT to the vehicle: its log then says what was done to it, and a simulated hand obeys it.
+
+The text is `mpucal: KIND` with, where one orientation is wanted, the unit vector in the vehicle's axes that is to
+point down: `mpucal: rotate, down +0.58 -0.58 +0.58`.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple, Protocol
+
+from .dialect import Message, dialect
+
+_TEXT = re.compile(r"mpucal: ([a-z_]{1,16})(?:, down ([+-]\d\.\d{2}) ([+-]\d\.\d{2}) ([+-]\d\.\d{2}))?")
+
+Direction = tuple[float, float, float]
+
+
+class Prompt(Protocol):
+    """What a session tells the person; see session.events.Prompt."""
+
+    @property
+    def kind(self) -> str: ...  # noqa: D102
+
+    @property
+    def down(self) -> Direction | None: ...  # noqa: D102
+
+
+class Heard(NamedTuple):
+    """A prompt as it arrives: its kind, and the unit vector to point down, if one is wanted."""
+
+    kind: str
+    down: Direction | None
+
+
+def to_message(prompt: Prompt) -> Message:
+    """The STATUSTEXT that says it."""
+    m = dialect()
+    down = "" if prompt.down is None else ", down {:+.2f} {:+.2f} {:+.2f}".format(*prompt.down)
+    return m.MAVLink_statustext_message(m.MAV_SEVERITY_INFO, f"mpucal: {prompt.kind}{down}".encode())
+
+
+def of_message(message: Message) -> Heard | None:
+    """The prompt in it, if there is one."""
+    if message.get_type() != "STATUSTEXT":
+        return None
+    found = _TEXT.fullmatch(message.text)
+    if found is None:
+        return None
+    kind, *down = found.groups()
+    return Heard(kind, None if down[0] is None else (float(down[0]), float(down[1]), float(down[2])))

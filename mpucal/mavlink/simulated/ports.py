@@ -1,0 +1,146 @@
+"""Real ports that a simulated vehicle speaks over: UDP, TCP, a pseudo-terminal. Knows no packet's meaning."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import socket
+import tty
+from contextlib import suppress
+from typing import Protocol
+
+from ...errors import LinkError
+
+CHUNK = 65536
+
+
+class Port(Protocol):
+    """Where stations are.
+
+    Attributes
+    ----------
+    name : what a station gives to --mavlink.
+    """
+
+    name: str
+
+    def send(self, data: bytes) -> None:
+        """To every station that is there; lost where none is."""
+        ...
+
+    def receive(self, timeout_s: float) -> list[bytes]:
+        """What stations sent, waited for as long at most."""
+        ...
+
+    def close(self) -> None:
+        """Let go of it."""
+        ...
+
+
+class UdpPort:
+    """Sends to one station's UDP port, as a vehicle's telemetry does, and hears whoever answers.
+
+    Parameters
+    ----------
+    host, port : of the station.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        self._station = (host, port)
+        self.name = f"udp:{host}:{port}"
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+
+    def send(self, data: bytes) -> None:
+        """See Port."""
+        with suppress(OSError):
+            self._socket.sendto(data, self._station)
+
+    def receive(self, timeout_s: float) -> list[bytes]:
+        """See Port."""
+        received: list[bytes] = []
+        select.select([self._socket], [], [], timeout_s)
+        with suppress(OSError):
+            while True:
+                received.append(self._socket.recvfrom(CHUNK)[0])
+        return received
+
+    def close(self) -> None:
+        """See Port."""
+        self._socket.close()
+
+
+class TcpPort:
+    """Listens on a TCP port, as a SITL does; any number of stations.
+
+    Raises
+    ------
+    LinkError : the port is taken.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        try:
+            self._server = socket.create_server((host, port))
+        except OSError as error:
+            raise LinkError(f"TCP port {port} cannot be listened on ({error.strerror})", "take another") from error
+        self._server.setblocking(False)
+        self.name = "tcp:{}:{}".format(*self._server.getsockname()[:2])
+        self._stations: list[socket.socket] = []
+
+    def send(self, data: bytes) -> None:
+        """See Port."""
+        for station in self._stations:
+            with suppress(OSError):
+                station.sendall(data)
+
+    def receive(self, timeout_s: float) -> list[bytes]:
+        """See Port."""
+        received: list[bytes] = []
+        ready, _, _ = select.select([self._server, *self._stations], [], [], timeout_s)
+        for channel in ready:
+            if channel is self._server:
+                self._stations.append(self._server.accept()[0])
+                continue
+            data = b""
+            with suppress(OSError):
+                data = channel.recv(CHUNK)
+            if data:
+                received.append(data)
+            else:
+                channel.close()
+                self._stations.remove(channel)
+        return received
+
+    def close(self) -> None:
+        """See Port."""
+        for channel in (*self._stations, self._server):
+            channel.close()
+
+
+class PtyPort:
+    """A pseudo-terminal, which a station opens as its serial port."""
+
+    def __init__(self) -> None:
+        self._master, self._slave = pty.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.name = os.ttyname(self._slave)
+
+    def send(self, data: bytes) -> None:
+        """See Port; what nobody reads is lost."""
+        with suppress(OSError):
+            os.write(self._master, data)
+
+    def receive(self, timeout_s: float) -> list[bytes]:
+        """See Port."""
+        if not select.select([self._master], [], [], timeout_s)[0]:
+            return []
+        with suppress(OSError):
+            return [os.read(self._master, CHUNK)]
+        return []
+
+    def close(self) -> None:
+        """See Port."""
+        os.close(self._master)
+        os.close(self._slave)
