@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ...data import STANDARD_GRAVITY_MPS2
 from .bus import SimulatedBus
 from .chip import Chip
-from .clock import CLOCKS, FastClock
+from .clock import CLOCKS, Clock, FastClock
 from .factory import Factory
 from .feed import Feed, RecordedFeed, SensorFeed
 from .hand import KINDS
@@ -23,13 +23,19 @@ from .sensor import Truth, in_symmetric_frame
 __all__ = ["Chip", "Feed", "RecordedFeed", "SimulatedBus", "Truth", "open_recorded", "open_simulated"]
 
 
-def open_simulated(text: str = "sim", gravity: float = STANDARD_GRAVITY_MPS2, seed: int | None = None) -> SimulatedBus:
+def open_simulated(
+    text: str = "sim",
+    gravity: float = STANDARD_GRAVITY_MPS2,
+    seed: int | None = None,
+    clock: Clock | None = None,
+) -> SimulatedBus:
     """The simulated chip that `sim:key=value,...` describes.
 
     Parameters
     ----------
     text : `sim`, or with keys: chip, who_am_i, offsets, seed, hand, pace, rate_error_ppm, D, b_a, K, b_omega, noise,
         temperature_c. gravity : m/s^2, where the board is. seed : beside the text.
+    clock : time in place of `pace`'s, where something else moves the bus.
 
     Raises
     ------
@@ -44,7 +50,7 @@ def open_simulated(text: str = "sim", gravity: float = STANDARD_GRAVITY_MPS2, se
         model = replace(model, who_am_i=options.who_am_i)
     factory = Factory.draw(of_trim, model.family)
     chip = Chip(model, SensorFeed(truth, motion, of_noise), truth.rate_error_ppm, factory)
-    return SimulatedBus(chip, CLOCKS[options.pace](), motion, truth)
+    return SimulatedBus(chip, clock or CLOCKS[options.pace](), motion, truth)
 
 
 def open_recorded(

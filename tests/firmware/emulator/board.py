@@ -1,11 +1,4 @@
-"""An emulated Arduino Uno with the bridge's firmware and a simulated chip. Knows no protocol.
-
-As a program it stands for the board on a pseudo terminal, and prints that one's name:
-
-    python tests/firmware/emulator/board.py --elf tools/firmware/build/mpucal_bridge.elf --eeprom eeprom.bin
-
-Prompts to the hand that holds the simulated chip come in on its stdin, as `mpucal session --json-events` says them.
-"""
+"""An emulated Arduino Uno with a chip on its I2C bus. Knows no firmware, no protocol and no real time."""
 
 from __future__ import annotations
 
@@ -15,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from mpucal.bus.simulated import Chip
+from mpucal.chip.access import Bus
 
 CPU_HZ = 16_000_000
 EEPROM_BYTES = 1024
@@ -50,19 +43,36 @@ def build_library(folder: Path) -> ctypes.CDLL:
     return loaded
 
 
+class BoardClock:
+    """What the chip takes for the time: when the transfer that is going on began, on the board's clock."""
+
+    def __init__(self) -> None:
+        self.cycle = 0
+
+    def now(self) -> int:
+        """In ns since the board was switched on."""
+        return self.cycle * 1_000_000_000 // CPU_HZ
+
+    def spend(self, ns: int) -> None:
+        """The board has spent it already."""
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Nobody sleeps on the chip's side."""
+
+
 class Board:
     """A board that was just switched on; its time passes only while it runs.
 
     Parameters
     ----------
     library : from build_library. elf : the firmware. eeprom : its file, made where it is missing.
-    chip : what is on its TWI; its clock is the board's.
+    chip : what is on its TWI; its time is `clock`.
     """
 
-    def __init__(self, library: ctypes.CDLL, elf: Path, eeprom: Path, chip: Chip) -> None:
+    def __init__(self, library: ctypes.CDLL, elf: Path, eeprom: Path, chip: Bus, clock: BoardClock) -> None:
         if not eeprom.exists():
             eeprom.write_bytes(b"\xff" * EEPROM_BYTES)
-        self._library, self._chip = library, chip
+        self._library, self._chip, self._clock = library, chip, clock
         # kept, or the library would call what is no more
         self._callbacks = CHIP_READ(self._read), CHIP_WRITE(self._write)
         self._board = library.board_open(str(elf).encode(), str(eeprom).encode(), *self._callbacks)
@@ -104,6 +114,7 @@ class Board:
         """Let that many cycles pass."""
         if not self._library.board_run(self._board, self.cycle + cycles):
             raise RuntimeError(f"the processor crashed at cycle {self.cycle}")
+        self._clock.cycle = self.cycle
 
     def send(self, data: bytes) -> int:
         """Put bytes on the line to the board; how many of them there was room for."""
@@ -129,11 +140,9 @@ class Board:
             self._board = None
 
     def _read(self, address: int, cycle: int) -> int:
-        return self._chip.read(address, 1, _ns(cycle))[0]
+        self._clock.cycle = cycle
+        return self._chip.read(address, 1).data[0]
 
     def _write(self, address: int, value: int, cycle: int) -> None:
-        self._chip.write(address, bytes([value]), _ns(cycle))
-
-
-def _ns(cycle: int) -> int:
-    return cycle * 1_000_000_000 // CPU_HZ
+        self._clock.cycle = cycle
+        self._chip.write(address, bytes([value]))
