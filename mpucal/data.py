@@ -177,6 +177,17 @@ class Recording(Samples):
         arrays = {f.name: getattr(self, f.name)[first:last] for f in fields(Samples)}
         return replace(self, flat=flat, **arrays)
 
+    def without(self, first: int, last: int) -> Self:
+        """All samples but first..last-1, and a gap where they were; `flat` is kept where it lies before them."""
+        if first >= last:
+            return self
+        kept = np.r_[0:first, last : len(self)]
+        arrays = {f.name: getattr(self, f.name)[kept] for f in fields(Samples)}
+        if first < len(kept):
+            arrays["gap"][first] = True
+        flat = self.flat if self.flat is not None and self.flat[1] <= first else None
+        return replace(self, flat=flat, **arrays)
+
 
 def _numbers(values: ArrayLike, key: str, name: str) -> Vector:
     try:

@@ -12,29 +12,36 @@ from .bus.records import SessionEvent
 from .chip.access import EndOfCapture
 from .data import Recording, Samples, Sensor
 from .errors import Abandoned, BusError, CaptureError, ChipError
+from .live.fits import Live
+from .live.verdict import verified
 from .result import Calibration
 from .session.events import (
     Abort,
+    Command,
     Connected,
     Decision,
     Enough,
     Event,
     Fitted,
+    Forget,
     Key,
     Measured,
     Output,
     Prompt,
+    Redo,
+    Resumed,
     SourceEnded,
     Tick,
     Written,
 )
 from .session.machine import Machine
+from .session.plan import Plan
 from .session.table import State
 from .sinks.file import result_files, save
 
-MEASURING = (State.LAY_FLAT, State.ROTATE)
-KEY = "key"
-_PRESSED: dict[Key, Event] = {Key.ENOUGH: Enough(), Key.ABORT: Abort()}
+MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
+KEY, FORGET = "key", "forget"
+_PRESSED: dict[Key, Event] = {Key.ENOUGH: Enough(), Key.REDO: Redo(), Key.ABORT: Abort()}
 
 
 class Source(Protocol):
@@ -105,8 +112,10 @@ class Runner:
     Parameters
     ----------
     talk : the person. note : keeps a session event in the capture (name, time [ns], data).
-    until_end : see Machine.
+    plan : what the session is to do.
     listeners : hear each prompt besides the person: the hand that turns a simulated board.
+    go_on : after the source has ended, lets it go on with the next part of what was recorded in parts: True where
+        there is one. The last part of a resumed session is the sensor itself.
     """
 
     def __init__(
@@ -114,20 +123,22 @@ class Runner:
         source: Source,
         talk: Talk,
         note: Note,
-        until_end: bool = False,
+        plan: Plan | None = None,
         listeners: Sequence[Callable[[Prompt], None]] = (),
+        go_on: Callable[[], bool] = lambda: False,
     ) -> None:
-        self._source = source
-        self._talk = talk
-        self._note = note
-        self._listeners = listeners
-        self._machine = Machine(until_end)
+        self._source, self._talk, self._note = source, talk, note
+        self._plan = plan or Plan()
+        self._listeners, self._go_on = listeners, go_on
+        self._machine = Machine(self._plan.until_end, self._plan.target, self._plan.tilt_only)
+        self._live: Live | None = None
+        self._forgotten: list[Forget] = []
         self._said = Decision("")
         self._ended = False
         self.sensor: Sensor | None = None
 
     def measure(self) -> Recording:
-        """Connect, lay flat, rotate.
+        """Connect, lay flat, rotate, verify.
 
         Raises
         ------
@@ -137,6 +148,8 @@ class Runner:
         try:
             self._ask()
             self._connect()
+            if self.sensor is not None:
+                self._live = Live(self._plan, self.sensor)
             while self._machine.state in MEASURING:
                 self._ask()
                 if self._machine.state in MEASURING:
@@ -146,8 +159,11 @@ class Runner:
             with suppress(CaptureError):
                 self._rest()
             raise
+        finally:
+            if self._live is not None:
+                self._live.close()
         self._rest()
-        return self._source.recording()
+        return self._recording()
 
     def record(self, seconds: float | None) -> int:
         """Measure for `seconds`, or until any key or the source's end; returns how many samples came.
@@ -170,8 +186,8 @@ class Runner:
         return len(self._source.recording())
 
     def calibrate(self, recording: Recording, fit: Callable[[Recording], Calibration]) -> Calibration:
-        """Fit; Abandoned where the person stopped it meanwhile."""
-        calibration = fit(recording)
+        """Fit, and join what the verification found; Abandoned where the person stopped it meanwhile."""
+        calibration = verified(fit(recording), self._machine.checked)
         self._ask()
         self._feed(Fitted(calibration.verdict))
         return calibration
@@ -201,8 +217,7 @@ class Runner:
         try:
             self.sensor = self._source.start()
         except EndOfCapture:
-            self._ended = True
-            self._feed(SourceEnded())
+            self._source_ended()
         else:
             self._feed(Connected(self.sensor))
 
@@ -210,18 +225,46 @@ class Runner:
         try:
             samples = self._source.poll()
         except EndOfCapture:
-            self._ended = True
-            self._feed(SourceEnded())
+            self._source_ended()
         except (BusError, ChipError) as error:
             self._ended = True
             # a CaptureError is none of these: what does not replay is not calibrated either
-            if self._machine.state is not State.ROTATE:
+            if self._machine.state not in (State.ROTATE, State.VERIFY):
                 raise
             self._feed(SourceEnded(error.what))
         else:
-            self._feed(Measured(samples))
+            self._measured(samples)
             if self._machine.state in MEASURING:
                 self._feed(Tick(self._source.now_ns() * 1e-9))
+
+    def _measured(self, samples: Samples) -> None:
+        if self._live is not None:
+            self._live.add(samples)
+        self._feed(Measured(samples))
+        for answer in self._live.answers() if self._live is not None else ():
+            if self._machine.state in MEASURING:
+                self._feed(answer)
+
+    def _source_ended(self) -> None:
+        """That was all, or all of one part."""
+        ended_ns = self._source.now_ns()
+        if not self._go_on():
+            self._ended = True
+            self._feed(SourceEnded())
+            return
+        sensor = self._source.start()
+        if self.sensor is None:
+            self.sensor = sensor
+            self._feed(Connected(sensor))
+        else:
+            self._feed(Resumed((self._source.now_ns() - ended_ns) * 1e-9))
+
+    def _recording(self) -> Recording:
+        """All samples but those that the person did not want."""
+        recording = self._source.recording()
+        for forget in sorted(self._forgotten, key=lambda f: f.first, reverse=True):
+            recording = recording.without(forget.first, forget.last)
+        return recording
 
     def _rest(self) -> None:
         if self._ended:
@@ -240,6 +283,9 @@ class Runner:
 
     def _feed(self, event: Event) -> None:
         for output in self._machine.handle(event):
+            if isinstance(output, Command):
+                self._do(output)
+                continue
             if isinstance(output, Decision):
                 self._said = output
             self._talk.hear(output)
@@ -248,3 +294,13 @@ class Runner:
                     listener(output)
         if self._machine.state is State.ABORTED:
             raise Abandoned(self._said.why, self._said.remedy)
+
+    def _do(self, command: Command) -> None:
+        """What the machine asks of its owner."""
+        if isinstance(command, Forget):
+            self._forgotten = [f for f in self._forgotten if f.first != command.first] + [command]
+            self._note(FORGET, self._source.now_ns(), {"first": command.first, "last": command.last})
+            if self._live is not None:
+                self._live.forget(command.first)
+        elif self._live is not None:
+            self._live.ask(command)

@@ -21,7 +21,7 @@ from .model import B_A_NAMES, B_OMEGA_NAMES, D_NAMES, Flat
 from .quality import judge
 from .stationary import find_flat, flat_statistics
 
-__all__ = ["MODELS", "calibrate"]
+__all__ = ["MODELS", "calibrate", "weigh"]
 
 MODELS = ("auto", *METHODS)
 
@@ -40,6 +40,18 @@ def calibrate(recording: Recording, model: str = "auto", gravity: float = STANDA
     ------
     UsageError : no such model, or a gravity that is none.
     """
+    return _calibration(*weigh(recording, model, gravity))
+
+
+def weigh(
+    recording: Recording, model: str = "auto", gravity: float = STANDARD_GRAVITY_MPS2
+) -> tuple[Evidence, Mapping[str, str]]:
+    """The same estimate as what it rests on: evidence, with the fit and its covariance, and the model and why.
+
+    Raises
+    ------
+    UsageError : no such model, or a gravity that is none.
+    """
     if model not in MODELS:
         raise UsageError(f"there is no model {model!r}", f"choose one of {', '.join(MODELS)}")
     if not (np.isfinite(gravity) and gravity > 0):
@@ -49,10 +61,10 @@ def calibrate(recording: Recording, model: str = "auto", gravity: float = STANDA
     flat = None if segment is None or segment[1] - segment[0] < 2 else flat_statistics(recording, segment)
     before = Evidence(recording, gravity, flat, None, model)
     if flat is None or any(check(before) for check in BLOCKERS):
-        return _calibration(before, {"model": model, "why": "nothing could be estimated"})
+        return before, {"model": model, "why": "nothing could be estimated"}
     choice = _fit(recording, flat, gravity, model)
     evidence = Evidence(recording, gravity, flat, choice.fit.right_handed(), choice.model)
-    return _calibration(evidence, {"model": choice.model, "why": choice.why})
+    return evidence, {"model": choice.model, "why": choice.why}
 
 
 def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> Choice:

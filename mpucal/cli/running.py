@@ -23,7 +23,7 @@ def running(source: Opened, capture: Path, person: Console) -> Iterator[Runner]:
     with source.measuring(capture, person.say, now().isoformat()) as (measured, note), person.listening():
         if source.recovered is not None:
             person.say(f"  {source.recovered}")
-        yield Runner(measured, source.talk(person), note, source.plan.until_end, source.listeners)
+        yield Runner(measured, source.talk(person), note, source.plan, source.listeners)
 
 
 def now() -> datetime:

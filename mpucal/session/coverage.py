@@ -1,4 +1,4 @@
-"""Which orientations the board has been in, whether they are enough, and which one would help most.
+"""Which orientations the board has been in, how many they are, and whether they are varied.
 
 Knows raw accelerometer directions only: a bias or a gain bends them by some degrees, which does no harm here.
 """
@@ -6,7 +6,6 @@ Knows raw accelerometer directions only: a bias or a gain bends them by some deg
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,11 +14,8 @@ from ..data import Vector
 # Orientations count as different from here on: far enough for 12 of them to be far from parallel,
 # near enough for a sphere to hold some seventy.
 DISTINCT_RAD = math.radians(20.0)
-# Ten to twelve pauses determine D to a few 1e-4; each further one adds little.
-PAUSES = 12
-# Without a pause a direction is seen only in passing, among the hand's accelerations:
-# most of the sphere (half a minute or more of turning about all axes) then makes up for the pauses.
-PASSES = 48
+# Without a pause a direction is seen only in passing, among the hand's accelerations: so many make up for a pause.
+PASSES_OF_A_PAUSE = 4
 
 # How evenly directions must be spread, against 1.0 for evenly over the whole sphere: what varied orientations
 # exceed several times, while the six faces or tilts about one axis stay below by orders of magnitude.
@@ -28,19 +24,19 @@ _UNIFORM = 2.0 / 15.0
 
 
 class Directions:
-    """Directions that differ from one another."""
+    """Directions that differ from one another: `units`, (n, 3)."""
 
     def __init__(self) -> None:
-        self._units = np.zeros((0, 3))
+        self.units = np.zeros((0, 3))
 
     def __len__(self) -> int:
-        return len(self._units)
+        return len(self.units)
 
     def add(self, unit: Vector) -> bool:
         """Keep a unit vector (3,) unless one near it is there already; True where it was new."""
-        if len(self) and float((self._units @ unit).max()) > math.cos(DISTINCT_RAD):
+        if len(self) and float((self.units @ unit).max()) > math.cos(DISTINCT_RAD):
             return False
-        self._units = np.vstack([self._units, unit])
+        self.units = np.vstack([self.units, unit])
         return True
 
     def spread(self) -> float:
@@ -52,26 +48,8 @@ class Directions:
         """
         if not len(self):
             return 0.0
-        p = _monomials(self._units)
+        p = _monomials(self.units)
         return float(np.linalg.eigvalsh(p.T @ p / len(p))[0]) / _UNIFORM
-
-    def most_wanted(self) -> Vector:
-        """(3,) the unit vector that would add most to what the directions determine."""
-        p = _monomials(self._units)
-        information = p.T @ p + 1e-3 * np.eye(9)
-        candidates = _monomials(_SPHERE)
-        gain = np.einsum("ki,ij,kj->k", candidates, np.linalg.inv(information), candidates)
-        return np.asarray(_SPHERE[int(gain.argmax())])
-
-
-@dataclass(frozen=True)
-class Count:
-    """How many orientations of how many, whether that is enough, and the direction (3,) that helps most."""
-
-    done: int
-    of: int
-    enough: bool
-    wanted: Vector
 
 
 class Coverage:
@@ -89,14 +67,20 @@ class Coverage:
         """The mean acceleration (3,) [m/s^2] of a pause; True where its direction is new."""
         return self.paused.add(_unit(acc))
 
-    def count(self) -> Count:
-        """How far it is, by pauses or by passes, whichever is further."""
-        by_pauses, by_passes = len(self.paused) / PAUSES, len(self.passed) / PASSES
-        directions = self.paused if by_pauses >= by_passes else self.passed
-        share = max(by_pauses, by_passes)
-        enough = share >= 1.0 and directions.spread() >= SPREAD
-        done = min(int(PAUSES * share + 1e-9), PAUSES)
-        return Count(done, PAUSES, enough, directions.most_wanted())
+    @property
+    def number(self) -> int:
+        """How many orientations there are, by pauses or by passes, whichever is more."""
+        return max(len(self.paused), len(self.passed) // PASSES_OF_A_PAUSE)
+
+    def farthest_down(self, candidates: Vector) -> Vector:
+        """(3,) that of the unit vectors (k, 3) which, pointing down, is least like any pause."""
+        ups = self.paused.units
+        return np.asarray(candidates[int((-candidates @ ups.T).max(1).argmin())])
+
+    @property
+    def varied(self) -> bool:
+        """Whether they are spread over the sphere."""
+        return max(self.paused.spread(), self.passed.spread()) >= SPREAD
 
 
 def _unit(acc: Vector) -> Vector:
@@ -108,15 +92,3 @@ def _monomials(u: Vector) -> Vector:
     x, y, z = u.T
     r = math.sqrt(2.0)
     return np.stack([x * x, y * y, z * z, r * x * y, r * x * z, r * y * z, x, y, z], axis=1)
-
-
-def _sphere(n: int) -> Vector:
-    """(n, 3) unit vectors, evenly over the sphere (a Fibonacci lattice)."""
-    k = np.arange(n) + 0.5
-    z = 1.0 - 2.0 * k / n
-    angle = math.pi * (1.0 + math.sqrt(5.0)) * k
-    radius = np.sqrt(1.0 - z * z)
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
-
-
-_SPHERE = _sphere(200)

@@ -60,8 +60,50 @@ class SourceEnded:
 
 
 @dataclass(frozen=True)
+class Redo:
+    """The person wants to turn the board again, without laying it flat again."""
+
+
+@dataclass(frozen=True)
+class Resumed:
+    """A source that had ended goes on, `gap_s` later; nobody knows what the board did meanwhile."""
+
+    gap_s: float
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """What is known by now, as it was asked for; with `advice` it says where to turn next."""
+
+    knowledge: Knowledge
+    advice: bool
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A first calibration from the turning alone, to be verified: its verdict, and why it is not good."""
+
+    verdict: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What the new orientations say of the first calibration; `why` and `remedy` where they disagree.
+
+    `code` is the reason's: verification_failed, or a truer one.
+    """
+
+    found: tuple[Verification, ...]
+    agrees: bool
+    code: str = ""
+    why: str = ""
+    remedy: str = ""
+
+
+@dataclass(frozen=True)
 class Fitted:
-    """The calibration is there, with its verdict: good, usable or refused."""
+    """The final calibration is there, with its verdict: good, usable or refused."""
 
     verdict: str
 
@@ -86,7 +128,14 @@ class Rested:
 
 @dataclass(frozen=True)
 class Turned:
-    """The board was turned enough, or as much as it will be."""
+    """The board was turned enough, or as much as it will be: what follows verifies it."""
+
+    why: str
+
+
+@dataclass(frozen=True)
+class Finished:
+    """No more is to be measured: verified, or as well as it will be."""
 
     why: str
 
@@ -99,7 +148,26 @@ class Stopped:
     remedy: str
 
 
-Event = Connected | Measured | Tick | Enough | Abort | SourceEnded | Fitted | Written | Rested | Turned | Stopped
+Event = (
+    Connected
+    | Measured
+    | Tick
+    | Enough
+    | Redo
+    | Abort
+    | SourceEnded
+    | Resumed
+    | Learnt
+    | Tried
+    | Checked
+    | Fitted
+    | Written
+    | Rested
+    | Turned
+    | Finished
+    | Stopped
+)
+Found = Rested | Turned | Finished | Stopped
 
 
 # What the session answers.
@@ -179,7 +247,7 @@ class Caution:
     """Something is not as it should be: `what` in one line, and what to `do` about it now.
 
     `code` names its kind for those who count them: moved, trembling, too_fast, clipped, data_lost, not_turned,
-    seen_already, doubtful.
+    doubtful, knocked.
     """
 
     t_s: float
@@ -274,4 +342,34 @@ class Decision:
     remedy: str = ""
 
 
-Output = Prompt | Progress | Meter | Countdown | Caution | Seen | Knowledge | Verification | Decision
+class Wish(StrEnum):
+    """What can be asked of whoever computes."""
+
+    KNOW = "know"
+    ADVISE = "advise"
+    TRY = "try"
+    CHECK = "check"
+
+
+@dataclass(frozen=True)
+class Ask:
+    """To the session's owner: compute this of all samples so far, and bring it after `wait_s` seconds of samples more.
+
+    Always after the same number of samples, waited for if need be: so a replay equals its session.
+    KNOW and ADVISE bring Learnt, TRY brings Tried, CHECK brings Checked of the samples after the TRY.
+    """
+
+    wish: Wish
+    wait_s: float
+
+
+@dataclass(frozen=True)
+class Forget:
+    """To the session's owner: samples number first..last-1 are not to be used; what follows them follows a gap."""
+
+    first: int
+    last: int
+
+
+Command = Ask | Forget
+Output = Prompt | Progress | Meter | Countdown | Caution | Seen | Knowledge | Verification | Decision | Command

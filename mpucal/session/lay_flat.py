@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..data import Samples
-from .events import Output, Progress, Prompt, PromptKind, Rested, Stopped
+from .events import Caution, Countdown, Output, Progress, Prompt, PromptKind, Rested, Stopped
 from .stillness import ON_A_TABLE, Moved, Still, Stillness
 from .windows import Windows
 
@@ -33,6 +33,7 @@ class LayFlat:
         self._still: Still | None = None
         self._begun_s: float | None = None
         self._spoke_s = 0.0
+        self._shaken = ""
 
     def add(self, samples: Samples) -> list[Output | Rested | Stopped]:
         """What `samples` show; Rested or Stopped comes last and ends the step."""
@@ -40,18 +41,22 @@ class LayFlat:
         for window in self._windows.add(samples):
             if self._begun_s is None:
                 self._begun_s = self._spoke_s = window.start_s
-            sight = self._stillness.add(window)
-            if isinstance(sight, Still):
-                self._still = sight
-                found.append(self._progress(window.end_s, f"still for {sight.seconds:.0f} of {FLAT_S:.0f} s"))
-                if sight.seconds >= FLAT_S - 1e-6:
-                    return [*found, self._rested(sight)]
+            t_s, sight = window.end_s, self._stillness.add(window)
+            if isinstance(sight, Moved):
+                found += self._moved(sight, t_s)
+                if not self._patient and t_s - self._begun_s >= PATIENCE_S:
+                    return [*found, _never_still(sight)]
                 continue
-            self._still = None
-            found.append(self._moved(sight, window.end_s))
-            if not self._patient and window.end_s - self._begun_s >= PATIENCE_S:
-                return [*found, _never_still(sight)]
+            found += self._rests(sight, t_s)
+            if sight.seconds >= FLAT_S - 1e-6:
+                return [*found, self._rested(sight)]
         return found
+
+    def resumed(self) -> list[Output]:
+        """The board may be anywhere now."""
+        self._stillness.forget()
+        self._still, self._begun_s = None, None
+        return [PROMPT]
 
     def enough(self) -> Rested | None:
         """The stillness so far, where there is enough of it to go on with."""
@@ -63,11 +68,30 @@ class LayFlat:
         x, y, z = still.acc.tolist()
         return Rested(still.seconds, (x, y, z))
 
-    def _moved(self, moved: Moved, t_s: float) -> Output:
+    def _rests(self, still: Still, t_s: float) -> list[Output]:
+        """Still, perhaps again, and perhaps elsewhere."""
+        found: list[Output] = []
+        before, self._still = self._still, still
+        if before is not None and still.run != before.run and before.seconds >= WORTH_SAYING_S:
+            self._spoke_s = t_s
+            found.append(Caution(t_s, "moved", f"it was moved: {self._shaken}", "let go of it; the time starts again"))
+        remaining = max(FLAT_S - still.seconds, 0.0)
+        return [
+            *found,
+            Countdown(t_s, remaining, FLAT_S, paused=False),
+            self._progress(t_s, f"still for {still.seconds:.0f} of {FLAT_S:.0f} s"),
+        ]
+
+    def _moved(self, moved: Moved, t_s: float) -> list[Output]:
+        self._shaken = moved.what
+        found: list[Output] = [
+            Countdown(t_s, max(FLAT_S - self._stillness.seconds, 0.0), FLAT_S, paused=True),
+            self._progress(t_s, "waiting until it is still"),
+        ]
         if moved.after_s >= WORTH_SAYING_S or t_s - self._spoke_s >= SAY_AGAIN_S:
             self._spoke_s = t_s
-            return Prompt(PromptKind.LAY_FLAT, f"Not still: {moved.what}. Let go of it; the ten seconds start again.")
-        return self._progress(t_s, "waiting until it is still")
+            found.append(Caution(t_s, "trembling", f"not still: {moved.what}", "let go of it, on something firm"))
+        return found
 
     def _progress(self, t_s: float, text: str) -> Progress:
         return Progress(t_s, min(self._stillness.seconds, FLAT_S), FLAT_S, text)

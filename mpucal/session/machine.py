@@ -1,35 +1,47 @@
-"""A guided session: events in, prompts, progress and decisions out. Knows no clock, device or screen."""
+"""A guided session: events in; prompts, progress, decisions and questions out. Knows no clock, device or screen."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from . import lay_flat, rotate
+from . import lay_flat
+from .aims import AIMS, NORMAL
 from .events import (
     Abort,
+    Checked,
     Connected,
     Decision,
     Enough,
     Event,
+    Finished,
     Fitted,
+    Forget,
+    Learnt,
     Measured,
     Output,
     Prompt,
     PromptKind,
+    Redo,
     Rested,
+    Resumed,
     SourceEnded,
     Stopped,
     Tick,
+    Tried,
     Turned,
     Written,
 )
+from .meter import Watch
+from .rotate import Rotate
 from .table import State, next_state
+from .verify import Verify
 
 SILENT_S = 5.0
 
 REST = Prompt(PromptKind.REST, "You can put the board down.")
 ABORTED = "the session was interrupted"
 START_AGAIN = "start again when you are ready"
+ENOUGH = "you said that is enough"
 
 
 class Machine:
@@ -38,14 +50,22 @@ class Machine:
     Parameters
     ----------
     until_end : each step takes its time, and turning ends with the source.
+    target : one of AIMS. tilt_only : ask for tilts alone, of a board that cannot be turned over.
+
+    Attributes
+    ----------
+    state : where the session is. checked : what the verification found; None where there was none.
     """
 
-    def __init__(self, until_end: bool = False) -> None:
+    def __init__(self, until_end: bool = False, target: str = NORMAL, tilt_only: bool = False) -> None:
         self.state = State.CONNECT
-        self._until_end = until_end
-        self._lay_flat = lay_flat.LayFlat(patient=until_end)
-        self._rotate: rotate.Rotate | None = None
+        self._until_end, self._aim, self._tilt_only = until_end, AIMS[target], tilt_only
+        self._step: lay_flat.LayFlat | Rotate | Verify = lay_flat.LayFlat(patient=until_end)
+        self._watch: Watch | None = None
+        self._flat: Rested | None = None
+        self._samples = self._flat_samples = 0
         self._sampled_s: float | None = None
+        self.checked: Checked | None = None
 
     def handle(self, event: Event) -> list[Output]:
         """Take one event, and answer it.
@@ -56,20 +76,28 @@ class Machine:
         """
         before, self.state = self.state, next_state(self.state, event)
         match event:
-            case Measured(samples) if len(samples):
-                self._sampled_s = float(samples.t[-1])
-                return self._follow(self._step().add(samples))
+            case Measured(samples):
+                return self._measured(event) if len(samples) else []
             case Tick(t_s):
                 return self._tick(t_s)
-            case Connected():
+            case Connected(sensor):
+                self._watch = Watch(sensor)
                 return [lay_flat.PROMPT]
-            case Rested(still_s, acc):
-                self._rotate = rotate.Rotate(acc, self._until_end)
-                return [Decision(f"flat and still for {still_s:.0f} s: that will do"), rotate.PROMPT]
+            case Rested(still_s):
+                self._flat, self._flat_samples = event, self._samples
+                return [Decision(f"flat and still for {still_s:.0f} s: that will do"), *self._turn(event)]
             case Turned(why):
+                return [Decision(why), *self._verify()]
+            case Finished(why):
                 return [Decision(why), REST]
             case Enough():
                 return self._enough(before)
+            case Redo():
+                return self._redo(before)
+            case Resumed():
+                return self._resumed()
+            case Learnt() | Tried() | Checked():
+                return self._answered(event)
             case Stopped(why, remedy):
                 return [Decision(why, remedy), REST]
             case Abort():
@@ -80,15 +108,42 @@ class Machine:
                 return [Decision(f"the calibration is {verdict}")]
             case Written(names):
                 return [Decision(f"wrote {', '.join(names)}")]
+
+    def _measured(self, event: Measured) -> list[Output]:
+        samples = event.samples
+        self._sampled_s = float(samples.t[-1])
+        self._samples += len(samples)
+        seen = self._watch.add(samples) if self._watch else []
+        return [*seen, *self._follow(self._step.add(samples))]
+
+    def _turn(self, flat: Rested) -> list[Output]:
+        rotate = Rotate(flat.acc, self._aim, self._until_end, self._tilt_only)
+        self._step = rotate
+        return [rotate.prompt]
+
+    def _verify(self) -> list[Output]:
+        if not isinstance(self._step, Rotate):
+            raise TypeError("the board is verified after it was turned")
+        verify = Verify(self._aim, self._step.coverage, self._step.directions, self._tilt_only)
+        self._step = verify
+        return verify.begin()
+
+    def _answered(self, event: Learnt | Tried | Checked) -> list[Output]:
+        """What was asked for has come; an answer to a step that is over is of no use any more."""
+        match event, self._step:
+            case Learnt(knowledge, advice), Rotate() as rotate:
+                return self._follow(rotate.learn(knowledge, advice))
+            case Tried(), Verify() as verify:
+                return self._follow(verify.tried(event))
+            case Checked(), Verify() as verify:
+                self.checked = event
+                return self._follow(verify.check(event))
         return []
 
-    def _step(self) -> lay_flat.LayFlat | rotate.Rotate:
-        return self._rotate or self._lay_flat
-
-    def _follow(self, found: Sequence[Output | Rested | Turned | Stopped]) -> list[Output]:
+    def _follow(self, found: Sequence[Output | Rested | Turned | Finished | Stopped]) -> list[Output]:
         outputs: list[Output] = []
         for item in found:
-            if isinstance(item, Rested | Turned | Stopped):
+            if isinstance(item, Rested | Turned | Finished | Stopped):
                 outputs += self.handle(item)
             else:
                 outputs.append(item)
@@ -100,18 +155,34 @@ class Machine:
         if t_s - self._sampled_s < SILENT_S:
             return []
         why = f"the sensor sent no samples for {SILENT_S:.0f} s"
-        if self._rotate:
-            return self.handle(Turned(why))
+        if self._flat:
+            return self.handle(Finished(why))
         return self.handle(Stopped(why, "check the wiring, then start again"))
 
     def _enough(self, state: State) -> list[Output]:
         if state is State.ROTATE:
-            return [Decision("you said that is enough"), REST]
-        rested = self._lay_flat.enough() if state is State.LAY_FLAT else None
-        return self.handle(rested) if rested else []
+            return self.handle(Finished(ENOUGH) if self._until_end else Turned(ENOUGH))
+        if state is State.VERIFY:
+            return self.handle(Finished(f"{ENOUGH}: not verified"))
+        if state is State.LAY_FLAT and isinstance(self._step, lay_flat.LayFlat):
+            rested = self._step.enough()
+            return self.handle(rested) if rested else []
+        return []
+
+    def _redo(self, state: State) -> list[Output]:
+        """Turn again; what was turned before is forgotten, the flat rest is not."""
+        if state not in (State.ROTATE, State.VERIFY) or self._flat is None:
+            return []
+        forget = Forget(self._flat_samples, self._samples)
+        self.checked = None
+        return [Decision("you want to turn it again: what was turned is forgotten"), forget, *self._turn(self._flat)]
+
+    def _resumed(self) -> list[Output]:
+        self._sampled_s = None
+        return [Decision("the session goes on where it was"), *self._step.resumed()]
 
     def _ended(self, state: State, why: str | None) -> list[Output]:
-        if state is State.ROTATE:
+        if state in (State.ROTATE, State.VERIFY):
             what = f"the source failed while you turned the board ({why})" if why else "the source ended"
             return [Decision(f"{what}; calibrating with what it gave"), REST]
         if why:

@@ -10,6 +10,7 @@ from ..chip.config import Config
 from ..chip.driver import DRIVER_VERSION
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import CaptureError
+from .aims import NORMAL
 
 DRIVER, PLAN = "driver", "plan"
 
@@ -22,12 +23,15 @@ class Plan:
     ----------
     config : how the chip measures. gravity : local gravity [m/s^2]. model : what to estimate.
     until_end : each step takes its time, and turning ends with the source.
+    target : how well it is to be known, one of AIMS. tilt_only : the board cannot be turned over.
     """
 
     config: Config = field(default_factory=Config)
     gravity: float = STANDARD_GRAVITY_MPS2
     model: str = "auto"
     until_end: bool = False
+    target: str = NORMAL
+    tilt_only: bool = False
 
     def meta(self) -> dict[str, Any]:
         """For the head of a capture; values of JSON's own types."""

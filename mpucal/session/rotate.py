@@ -1,90 +1,158 @@
-"""The second step of a session: the board is turned through enough orientations. Knows no other step."""
+"""The second step of a session: the board is turned until enough is known. Knows no other step."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..data import Samples, Vector
-from .coverage import PAUSES, Count, Coverage
-from .events import Direction, Output, Progress, Prompt, PromptKind, Turned
-from .stillness import AXES, IN_THE_HAND, Still, Stillness
+from .aims import Aim, directions
+from .coverage import Coverage
+from .events import (
+    Ask,
+    Caution,
+    Countdown,
+    Direction,
+    Knowledge,
+    Output,
+    Progress,
+    Prompt,
+    PromptKind,
+    Seen,
+    Turned,
+    Wish,
+)
+from .pauses import HOLD_S, Held, Pauses
 from .windows import Window, Windows
+from .words import side_down, tilt_down
 
-PAUSE_WINDOW_S = 0.25
 PASS_WINDOW_S = 0.1
 # So long in one orientation is a pause.
 PAUSE_S = 1.0
 PATIENCE_S = 60.0
+# Said again where nothing new was shown for so long.
+SAY_AGAIN_S = 8.0
 # Beyond these the hand's own acceleration hides where gravity is [m/s^2].
 LEAST_MPS2, MOST_MPS2 = 5.0, 15.0
-# An axis is worth naming in a hint where this much of gravity is to lie along it.
-WORTH_NAMING = 0.4
 
-PROMPT = Prompt(
-    PromptKind.ROTATE,
-    f"Now turn it through {PAUSES} different orientations, tilted ones too, and hold each for two seconds.",
-)
+# How often what is known is looked at, and how long a fit may take before the session waits for it.
+KNOW_EVERY_S = TELL_EVERY_S = 1.0
+WAIT_S = 0.5
 
 
 class Rotate:
-    """Counts orientations until there are enough, or until no new one comes.
+    """Asks for one orientation after the other, until enough is known.
 
     Parameters
     ----------
     flat : mean acceleration while the board lay flat [m/s^2]: the first orientation.
-    until_end : go on until the source ends, however many there are.
+    aim : what is wanted. until_end : go on until the source ends, and ask for nothing.
+    tilt_only : ask for small tilts from flat alone.
     """
 
-    def __init__(self, flat: Direction, until_end: bool = False) -> None:
-        self._until_end = until_end
-        self._pause_windows, self._pass_windows = Windows(PAUSE_WINDOW_S), Windows(PASS_WINDOW_S)
-        self._stillness = Stillness(IN_THE_HAND)
-        self._coverage = Coverage()
-        self._coverage.pauses(np.array(flat))
-        self._coverage.passes(np.array(flat))
-        self._count = self._coverage.count()
-        self._new_s: float | None = None
+    def __init__(self, flat: Direction, aim: Aim, until_end: bool = False, tilt_only: bool = False) -> None:
+        self._aim, self._until_end, self._tilt_only = aim, until_end, tilt_only
+        self._pauses, self._passes = Pauses(), Windows(PASS_WINDOW_S)
+        self.coverage = Coverage()
+        self.coverage.pauses(np.array(flat))
+        self.coverage.passes(np.array(flat))
+        x, y, z = (-np.array(flat) / np.linalg.norm(flat)).tolist()
+        self.directions = directions((x, y, z), tilt_only)
+        self._knowledge: Knowledge | None = None
+        self._asked = False
+        self._advised_run = 0
+        self._begun_s: float | None = None
+        self._new_s = self._known_s = self._told_s = self._said_s = 0.0
+        self.prompt = self._prompt_for(self.coverage.farthest_down(self.directions))
 
     def add(self, samples: Samples) -> list[Output | Turned]:
         """What `samples` show; Turned comes last and ends the step."""
-        for window in self._pass_windows.add(samples):
-            if window.whole and LEAST_MPS2 < np.linalg.norm(window.acc) < MOST_MPS2:
-                self._note(self._coverage.passes(window.acc), window.end_s)
+        if self._begun_s is None:
+            self._begun_s = self._new_s = self._known_s = self._told_s = self._said_s = float(samples.t[0])
+        for window in self._passes.add(samples):
+            self._pass(window)
         found: list[Output | Turned] = []
-        for window in self._pause_windows.add(samples):
-            self._pause(window)
-            self._count = self._coverage.count()
-            found.append(Progress(window.end_s, self._count.done, self._count.of, _words(self._count)))
-            turned = None if self._until_end else self._turned(window.end_s)
-            if turned:
-                return [*found, turned]
+        for sight in self._pauses.add(samples):
+            found += [sight] if isinstance(sight, Countdown) else self._hold(sight)
+        t_s = float(samples.t[-1])
+        found += self._at(t_s)
+        turned = None if self._until_end else self._turned(t_s)
+        return [*found, turned] if turned else found
+
+    def learn(self, knowledge: Knowledge, advice: bool) -> list[Output | Turned]:
+        """What is known by now; Turned comes last and ends the step."""
+        self._knowledge, self._asked = knowledge, False
+        found: list[Output | Turned] = [knowledge]
+        if self._until_end:
+            return found
+        if self._content():
+            return [*found, Turned(f"the target is reached: {knowledge.words}")]
+        if advice:
+            self._pauses.leave(self._advised_run)
+        if advice and knowledge.down is not None:
+            self._said_s = knowledge.t_s
+            self.prompt = self._prompt_for(np.array(knowledge.down))
+            found.append(self.prompt)
         return found
 
-    def _pause(self, window: Window) -> None:
-        sight = self._stillness.add(window)
-        if isinstance(sight, Still) and sight.seconds >= PAUSE_S - 1e-6:
-            self._note(self._coverage.pauses(sight.acc), window.end_s)
+    def resumed(self) -> list[Output]:
+        """The board may be anywhere now."""
+        self._asked, self._begun_s = False, None
+        self._pauses.forget()
+        return [] if self._until_end else [self.prompt]
 
-    def _note(self, is_new: bool, t_s: float) -> None:
-        if is_new or self._new_s is None:
-            self._new_s = t_s
+    def _pass(self, window: Window) -> None:
+        if window.whole and LEAST_MPS2 < np.linalg.norm(window.acc) < MOST_MPS2 and self.coverage.passes(window.acc):
+            self._new_s = window.end_s
+
+    def _hold(self, held: Held) -> list[Output | Turned]:
+        found: list[Output | Turned] = []
+        if held.seconds >= PAUSE_S - 1e-6 and self.coverage.pauses(held.acc):
+            self._new_s = held.t_s
+            found.append(Seen(held.t_s, len(self.coverage.paused), _down(held.acc), paused=True))
+        if self._until_end or self._asked or held.run <= self._advised_run:
+            return found
+        if held.seconds >= HOLD_S - WAIT_S - 1e-6:
+            self._asked, self._advised_run, self._known_s = True, held.run, held.t_s
+            found.append(Ask(Wish.ADVISE, WAIT_S))
+        return found
+
+    def _at(self, t_s: float) -> list[Output]:
+        found: list[Output] = []
+        if not self._asked and t_s - self._known_s >= KNOW_EVERY_S:
+            self._asked, self._known_s = True, t_s
+            found.append(Ask(Wish.KNOW, WAIT_S))
+        if t_s - self._told_s >= TELL_EVERY_S:
+            self._told_s = t_s
+            number = self.coverage.number
+            found.append(Progress(t_s, number, self._aim.least, f"orientation {number} of {self._aim.least}"))
+        if not self._until_end and t_s - max(self._new_s, self._said_s) >= SAY_AGAIN_S:
+            self._said_s = t_s
+            found.append(Caution(t_s, "not_turned", "nothing new was shown for a while", self.prompt.text))
+        return found
+
+    def _content(self) -> bool:
+        enough = self.coverage.number >= self._aim.least
+        if self._tilt_only:
+            return enough
+        return enough and self.coverage.varied and self._knowledge is not None and self._knowledge.overall >= 1.0
 
     def _turned(self, t_s: float) -> Turned | None:
-        if self._count.enough:
-            return Turned("the orientations are enough")
-        if self._new_s is not None and t_s - self._new_s >= PATIENCE_S:
-            return Turned(
-                f"no new orientation for {PATIENCE_S:.0f} s, {self._count.done} of {self._count.of} are there"
-            )
+        known = f": {self._knowledge.words}" if self._knowledge else ""
+        if t_s - self._new_s >= PATIENCE_S:
+            return Turned(f"no new orientation for {PATIENCE_S:.0f} s, {self.coverage.number} are there{known}")
+        if self._begun_s is not None and t_s - self._begun_s >= self._aim.longest_s:
+            return Turned(f"{self._aim.longest_s:.0f} s of turning are as good as it gets{known}")
         return None
 
+    def _prompt_for(self, down: Vector) -> Prompt:
+        x, y, z = down.tolist()
+        if self._until_end:
+            text = "Now turn it through different orientations, tilted ones too, and hold each for two seconds."
+            return Prompt(PromptKind.ROTATE, text)
+        side = tilt_down(down) if self._tilt_only else f"{side_down(down)} down"
+        return Prompt(PromptKind.ROTATE, f"Turn it: {side}, and hold it still.", (x, y, z))
 
-def _words(count: Count) -> str:
-    words = f"orientation {count.done} of {count.of}"
-    return words if count.enough else f"{words}; one that helps: {_attitude(count.wanted)}"
 
-
-def _attitude(up: Vector) -> str:
-    """How to hold the board so that `up` (3,) points up, in words about its axes."""
-    named = [i for i in np.argsort(-np.abs(up), kind="stable") if abs(up[i]) >= WORTH_NAMING]
-    return ", ".join(f"{AXES[i]} {'up' if up[i] > 0 else 'down'}" for i in named)
+def _down(acc: Vector) -> Direction:
+    x, y, z = (-acc / max(float(np.linalg.norm(acc)), 1e-9)).tolist()
+    return (x, y, z)

@@ -37,6 +37,10 @@ OF_QUIETEST = 2.5
 # ... but never beyond this, however noisy it is.
 ACC_SD_MAX_MPS2, GYRO_SD_MAX_RAD_S = 0.5, 0.15
 
+# A bump is over after so long, and has not turned the board by more than this.
+BUMP_S = 2.0
+BUMP_RAD = math.radians(3.0)
+
 # The MPU-6050's gyro may be off by 20 deg/s at rest; a board that seems to turn faster than this turns.
 GYRO_BIAS_MAX_RAD_S = math.radians(30.0)
 
@@ -45,58 +49,100 @@ AXES = "xyz"
 
 @dataclass(frozen=True)
 class Still:
-    """It has been still for `seconds`; `acc` [m/s^2] and `gyr` [rad/s] are the means over that time, (3,)."""
+    """It has been still for `seconds`; `acc` [m/s^2] and `gyr` [rad/s] are the means over that time, (3,).
+
+    `run` numbers the stillnesses: it counts up where the board was moved, and not where it was only bumped.
+    """
 
     seconds: float
     acc: Vector
     gyr: Vector
+    run: int
 
 
 @dataclass(frozen=True)
 class Moved:
-    """It moved after `after_s` of stillness; `what`: which sensor saw it, how much and about which axis."""
+    """It moves, after `after_s` of stillness; `what`: which sensor saw it, how much and about which axis."""
 
     after_s: float
     what: str
 
 
 class Stillness:
-    """Follows one still run after another, a window at a time."""
+    """Follows one still run after another, a window at a time.
+
+    A bump that leaves the board where it was pauses the run; any other movement ends it.
+
+    Attributes
+    ----------
+    level : how near the last window came to what counts as moving; 1 is there.
+    rest_rad_s : (3,) what the gyroscope read at the last stillness: its bias.
+    """
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self._acc_quiet = np.full(3, np.inf)
         self._gyr_quiet = np.full(3, np.inf)
         self._run: list[Window] = []
+        self._number = 0
+        self._bump_s = 0.0
+        self._bump_rad = np.zeros(3)
+        self.level = 0.0
+        self.rest_rad_s = np.zeros(3)
 
     @property
     def seconds(self) -> float:
-        """How long it has been still [s]."""
-        return self._run[-1].end_s - self._run[0].start_s if self._run else 0.0
+        """How long it has been still, a bump not counted [s]."""
+        return sum(window.end_s - window.start_s for window in self._run)
+
+    def forget(self) -> None:
+        """What comes next has nothing to do with what was."""
+        self._begin([])
 
     def add(self, window: Window) -> Still | Moved:
         """What `window` shows."""
         self._acc_quiet = np.minimum(self._acc_quiet, window.acc_sd)
         self._gyr_quiet = np.minimum(self._gyr_quiet, window.gyr_sd)
-        what = self._shaken(window) or self._stepped(window)
-        if not what:
-            self._run.append(window)
-            return Still(self.seconds, *self._means())
-        moved = Moved(self.seconds, what)
+        shaken = self._shaken(window)
+        if shaken:
+            return self._bumped(window, shaken)
         # a window that is quiet in itself, only elsewhere, is where the next stillness begins
-        self._run = [] if self._shaken(window) else [window]
+        stepped = self._stepped(window)
+        if stepped:
+            moved = Moved(self.seconds, stepped)
+            self._begin([window])
+            return moved
+        self._run.append(window)
+        self._bump_s, self._bump_rad = 0.0, np.zeros(3)
+        acc, self.rest_rad_s = self._means()
+        return Still(self.seconds, acc, self.rest_rad_s, self._number)
+
+    def _bumped(self, window: Window, what: str) -> Moved:
+        moved = Moved(self.seconds, what)
+        if self._run:
+            seconds = window.end_s - window.start_s
+            self._bump_s += seconds
+            self._bump_rad += (window.gyr - self._means()[1]) * seconds
+            if not window.whole or self._bump_s > BUMP_S or np.abs(self._bump_rad).max() > BUMP_RAD:
+                self._begin([])
         return moved
+
+    def _begin(self, run: list[Window]) -> None:
+        self._run = run
+        self._number += 1
+        self._bump_s, self._bump_rad = 0.0, np.zeros(3)
 
     def _means(self) -> tuple[Vector, Vector]:
         return np.mean([w.acc for w in self._run], 0), np.mean([w.gyr for w in self._run], 0)
 
     def _shaken(self, window: Window) -> str:
         """What within the window says that it is not still, or nothing."""
-        if not window.whole:
-            return "samples were lost"
         acc = window.acc_sd / np.clip(OF_QUIETEST * self._acc_quiet, self._limits.acc_sd, ACC_SD_MAX_MPS2)
         gyr = window.gyr_sd / np.clip(OF_QUIETEST * self._gyr_quiet, self._limits.gyr_sd, GYRO_SD_MAX_RAD_S)
         turning = np.abs(window.gyr) / GYRO_BIAS_MAX_RAD_S
+        self.level = float(max(acc.max(), gyr.max(), turning.max()))
+        if not window.whole:
+            return "samples were lost"
         if turning.max() > 1.0:
             return _turned(window.gyr)
         if gyr.max() > max(acc.max(), 1.0):
@@ -112,6 +158,7 @@ class Stillness:
         # a mean over a window with slow tremor in it is off by a part of that tremor
         acc_ratio = np.abs(acc_step) / (self._limits.acc_step + window.acc_sd)
         gyr_ratio = np.abs(gyr_step) / (self._limits.gyr_step + window.gyr_sd)
+        self.level = float(max(self.level, acc_ratio.max(), gyr_ratio.max()))
         if max(acc_ratio.max(), gyr_ratio.max()) <= 1.0:
             return ""
         if gyr_ratio.max() > acc_ratio.max():

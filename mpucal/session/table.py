@@ -8,15 +8,21 @@ from types import MappingProxyType
 
 from .events import (
     Abort,
+    Checked,
     Connected,
     Enough,
     Event,
+    Finished,
     Fitted,
+    Learnt,
     Measured,
+    Redo,
     Rested,
+    Resumed,
     SourceEnded,
     Stopped,
     Tick,
+    Tried,
     Turned,
     Written,
 )
@@ -28,6 +34,7 @@ class State(StrEnum):
     CONNECT = "connect"
     LAY_FLAT = "lay flat"
     ROTATE = "rotate"
+    VERIFY = "verify"
     CALIBRATE = "calibrate"
     WRITE = "write"
     DONE = "done"
@@ -40,13 +47,16 @@ TRANSITIONS: Mapping[State, Mapping[type[Event], State]] = MappingProxyType(
         State.CONNECT: {
             Connected: State.LAY_FLAT,
             Enough: State.CONNECT,
+            Redo: State.CONNECT,
             SourceEnded: State.ABORTED,
             Abort: State.ABORTED,
         },
         State.LAY_FLAT: {
             Measured: State.LAY_FLAT,
             Tick: State.LAY_FLAT,
+            Resumed: State.LAY_FLAT,
             Enough: State.LAY_FLAT,
+            Redo: State.LAY_FLAT,
             Rested: State.ROTATE,
             Stopped: State.ABORTED,
             SourceEnded: State.ABORTED,
@@ -55,19 +65,38 @@ TRANSITIONS: Mapping[State, Mapping[type[Event], State]] = MappingProxyType(
         State.ROTATE: {
             Measured: State.ROTATE,
             Tick: State.ROTATE,
-            Turned: State.CALIBRATE,
-            Enough: State.CALIBRATE,
+            Learnt: State.ROTATE,
+            Resumed: State.ROTATE,
+            Enough: State.ROTATE,
+            Redo: State.ROTATE,
+            Turned: State.VERIFY,
+            Finished: State.CALIBRATE,
+            SourceEnded: State.CALIBRATE,
+            Abort: State.ABORTED,
+        },
+        State.VERIFY: {
+            Measured: State.VERIFY,
+            Tick: State.VERIFY,
+            Learnt: State.VERIFY,
+            Tried: State.VERIFY,
+            Checked: State.VERIFY,
+            Resumed: State.VERIFY,
+            Enough: State.VERIFY,
+            Redo: State.ROTATE,
+            Finished: State.CALIBRATE,
             SourceEnded: State.CALIBRATE,
             Abort: State.ABORTED,
         },
         State.CALIBRATE: {
             Fitted: State.WRITE,
             Enough: State.CALIBRATE,
+            Redo: State.CALIBRATE,
             Abort: State.ABORTED,
         },
         State.WRITE: {
             Written: State.DONE,
             Enough: State.WRITE,
+            Redo: State.WRITE,
             Abort: State.ABORTED,
         },
         State.DONE: {},

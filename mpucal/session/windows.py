@@ -17,7 +17,7 @@ class Window:
     ----------
     start_s, end_s : times of its first sample and of the one after its last [s].
     acc, gyr : (3,) means [m/s^2], [rad/s]. acc_sd, gyr_sd : (3,) standard deviations.
-    whole : no sample is missing within it or just before it.
+    whole : no sample is missing within it or just before it. count : of its samples.
     """
 
     start_s: float
@@ -27,6 +27,7 @@ class Window:
     acc_sd: Vector
     gyr_sd: Vector
     whole: bool
+    count: int
 
 
 class Windows:
@@ -61,6 +62,7 @@ def _window(samples: Samples, first: int, last: int) -> Window:
         acc.std(0),
         gyr.std(0),
         not bool(samples.gap[first:last].any()),
+        last - first,
     )
 
 

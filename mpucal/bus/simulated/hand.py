@@ -29,7 +29,7 @@ class Prompt(Protocol):
 
     @property
     def kind(self) -> str:
-        """lay_flat, hold_still, rotate or rest; a hand goes on as before at any other."""
+        """lay_flat, hold_still, rotate, verify or rest; a hand goes on as before at any other."""
         ...
 
     @property
@@ -95,14 +95,14 @@ class Hand:
             kind, down = str(prompt.kind), prompt.down
             # who is told to be still while laying the board flat goes on laying it flat
             calm_on = kind == "hold_still" and down is None and self._wish in ("lay_flat", "rest")
-            if kind in ("lay_flat", "hold_still", "rotate", "rest") and not calm_on:
+            if kind in ("lay_flat", "hold_still", "rotate", "verify", "rest") and not calm_on:
                 self._wish, self._moved = kind, False
                 self._down = None if down is None else np.array(down)
 
     def _next(self, now: Stance) -> Leg:
         if self._wish in ("lay_flat", "rest"):
             return self.lay_flat(now)
-        return self.rotate(now) if self._wish == "rotate" else self.hold_still(now)
+        return self.rotate(now) if self._wish in ("rotate", "verify") else self.hold_still(now)
 
     def lay_flat(self, now: Stance) -> Leg:
         """Sets the board down, then leaves it alone."""
@@ -156,7 +156,7 @@ class Hand:
 
 
 class Guided(Hand):
-    """Goes where it is asked to; asked for nothing, or done with it, varies faces, edges and corners."""
+    """Goes where it is asked to and waits there; asked for nothing, varies faces, edges and corners."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         super().__init__(rng)
@@ -164,11 +164,16 @@ class Guided(Hand):
         self._places = corners / np.linalg.norm(corners, axis=1, keepdims=True)
         self._visited: list[Vector] = []
 
+    def rotate(self, now: Stance) -> Leg:
+        """To the asked direction, or on to another of its own."""
+        if self._down is None or not self._moved:
+            return super().rotate(now)
+        return self.pause(now, PAUSE_S)
+
     def aim(self, now: Stance) -> Vector:
         """To the asked direction, else to the one least like those visited."""
         if self._down is not None:
-            asked, self._down = self._down, None
-            return self.towards(now, self.missed(asked), self._rng.uniform(-0.5, 0.5))
+            return self.towards(now, self.missed(self._down), self._rng.uniform(-0.5, 0.5))
         down = -rotation.up_in_board(now.attitude)
         if not self._visited:
             self._visited.append(down)

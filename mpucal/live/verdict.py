@@ -1,0 +1,32 @@
+"""A final calibration together with what its verification found. Knows no estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from types import MappingProxyType
+from typing import Any
+
+from ..result import REFUSED, Calibration
+from ..session.events import Checked
+
+_FOUND = "agrees", "magnitude_mps2", "magnitude_std_mps2", "direction_deg", "direction_std_deg", "down"
+
+
+def verified(calibration: Calibration, checked: Checked | None) -> Calibration:
+    """The calibration with `quality.verification`; refused where the new orientations disagree with it.
+
+    Without a verification (the source ended, the person had enough) nothing is added.
+    """
+    if checked is None:
+        return calibration
+    found = [{key: value for key, value in asdict(rest).items() if key in _FOUND} for rest in checked.found]
+    quality: dict[str, Any] = {
+        **calibration.quality,
+        "verification": {"agrees": checked.agrees, "orientations": found},
+    }
+    if not checked.agrees:
+        reasons: list[Mapping[str, Any]] = [r for r in quality.get("reasons", []) if r["code"] != checked.code]
+        message = f"{checked.why}; {checked.remedy}"
+        quality |= {"verdict": REFUSED, "reasons": [{"code": checked.code, "message": message}, *reasons]}
+    return replace(calibration, quality=MappingProxyType(quality))

@@ -1,0 +1,63 @@
+"""Which orientations a session may ask for, and what it wants to know. Knows no board."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product as choices
+from types import MappingProxyType
+
+import numpy as np
+
+from ..data import Vector
+from .events import Direction, Target
+
+_corners = np.array([c for c in choices((-1.0, 0.0, 1.0), repeat=3) if any(c)])
+# (26, 3) unit vectors: the faces, edges and corners of a cube, which a person can name and find
+ALL_AROUND: Vector = _corners / np.linalg.norm(_corners, axis=1, keepdims=True)
+TILT_RAD = math.radians(30.0)
+
+
+@dataclass(frozen=True)
+class Aim:
+    """When a session is content.
+
+    Attributes
+    ----------
+    target : standard deviations. least : orientations that must have been seen, however sure the numbers seem.
+    longest_s : of turning, after which it is as good as it gets. verify : new orientations that verify it.
+    """
+
+    target: Target
+    least: int
+    longest_s: float
+    verify: int
+
+
+AIMS: Mapping[str, Aim] = MappingProxyType(
+    {
+        "quick": Aim(Target(0.3, 0.15, 3.0), least=8, longest_s=60.0, verify=2),
+        "normal": Aim(Target(0.1, 0.05, 1.0), least=10, longest_s=120.0, verify=3),
+        "best": Aim(Target(0.04, 0.02, 0.4), least=14, longest_s=240.0, verify=3),
+    }
+)
+NORMAL = "normal"
+
+
+def directions(flat_down: Direction, tilt_only: bool) -> Vector:
+    """(k, 3) unit vectors that may be asked to point down.
+
+    Parameters
+    ----------
+    flat_down : what points down while the board lies flat. tilt_only : no farther than a tilt from there.
+    """
+    if not tilt_only:
+        return ALL_AROUND
+    down = np.asarray(flat_down, float)
+    first = np.cross(down, np.eye(3)[int(np.argmin(np.abs(down)))])
+    first /= np.linalg.norm(first)
+    second = np.cross(down, first)
+    around = np.arange(8) * math.pi / 4.0
+    across = np.cos(around)[:, None] * first + np.sin(around)[:, None] * second
+    return np.vstack([down, math.cos(TILT_RAD) * down + math.sin(TILT_RAD) * across])

@@ -1,0 +1,87 @@
+"""What the board does this moment, and what is wrong with the way it is moved. Knows no step of a session."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..data import Samples, Sensor, Vector
+from .events import Caution, Direction, Meter, Output
+from .stillness import IN_THE_HAND, Limits, Moved, Stillness
+from .windows import Window, Windows
+
+WINDOW_S = 0.25
+# The same caution is not said more often than this.
+SAY_AGAIN_S = 5.0
+NEAR_RANGE = 0.8
+
+
+class Watch:
+    """Turns samples into Meter and Caution, whatever the step.
+
+    Parameters
+    ----------
+    sensor : whose ranges are known. limits : of what counts as still.
+    """
+
+    def __init__(self, sensor: Sensor, limits: Limits = IN_THE_HAND) -> None:
+        self._sensor = sensor
+        self._windows = Windows(WINDOW_S)
+        self._stillness = Stillness(limits)
+        self._said_s: dict[str, float] = {}
+        self._temperature_c: float | None = None
+
+    def add(self, samples: Samples) -> list[Output]:
+        """What `samples` show."""
+        t_s = float(samples.t[-1])
+        said = [caution for caution in self._cautions(samples, t_s) if self._news(caution)]
+        known = samples.temperature_c[np.isfinite(samples.temperature_c)]
+        if len(known):
+            self._temperature_c = float(known[-1])
+        return [*said, *(self._meter(window) for window in self._windows.add(samples))]
+
+    def _meter(self, window: Window) -> Meter:
+        sight = self._stillness.add(window)
+        moving = isinstance(sight, Moved)
+        # against the mean of the last stillness: a gyroscope at rest reads its bias
+        turning = float(np.linalg.norm(window.gyr - self._stillness.rest_rad_s))
+        return Meter(
+            window.end_s,
+            self._stillness.level,
+            not moving,
+            sight.what if isinstance(sight, Moved) else "",
+            _unit(-window.acc),
+            math.degrees(turning),
+            window.count / (window.end_s - window.start_s),
+            self._temperature_c,
+        )
+
+    def _cautions(self, samples: Samples, t_s: float) -> list[Caution]:
+        found = []
+        limit = self._sensor.gyro_range_dps
+        fastest = math.degrees(float(np.abs(samples.gyr).max()))
+        if samples.gyr_clipped.any():
+            what = f"you turn it faster than the {limit:.0f} deg/s that the gyroscope can measure" if limit else ""
+            found.append(Caution(t_s, "clipped", what or "the gyroscope is at its end", "turn it more slowly"))
+        elif limit and fastest > NEAR_RANGE * limit:
+            what = f"that was {fastest:.0f} deg/s, and the gyroscope ends at {limit:.0f}"
+            found.append(Caution(t_s, "too_fast", what, "turn it more slowly"))
+        if samples.acc_clipped.any():
+            what = "a knock went beyond what the accelerometer can measure"
+            found.append(Caution(t_s, "knocked", what, "handle it gently, and do not set it down hard"))
+        if samples.gap.any():
+            found.append(Caution(t_s, "data_lost", "samples were lost", "hold this orientation a moment longer"))
+        return found
+
+    def _news(self, caution: Caution) -> bool:
+        last = self._said_s.get(caution.code)
+        if last is not None and caution.t_s - last < SAY_AGAIN_S:
+            return False
+        self._said_s[caution.code] = caution.t_s
+        return True
+
+
+def _unit(v: Vector) -> Direction:
+    x, y, z = (v / max(float(np.linalg.norm(v)), 1e-9)).tolist()
+    return (x, y, z)

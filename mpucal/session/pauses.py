@@ -1,0 +1,60 @@
+"""The board held in one orientation after another: when one is complete. Knows no prompt and no purpose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import Samples, Vector
+from .events import Countdown
+from .stillness import IN_THE_HAND, Still, Stillness
+from .windows import Windows
+
+WINDOW_S = 0.25
+# From the prompt for the next orientation until a person moves there is another second of stillness.
+HOLD_S = 1.25
+
+
+@dataclass(frozen=True)
+class Held:
+    """The board has been still in one orientation for `seconds`; `run` numbers the stillnesses.
+
+    Attributes
+    ----------
+    acc : (3,) its mean acceleration [m/s^2].
+    """
+
+    t_s: float
+    seconds: float
+    acc: Vector
+    run: int
+
+
+class Pauses:
+    """Follows the stillnesses of a board in a hand; the one that it begins in is left out."""
+
+    def __init__(self) -> None:
+        self._windows = Windows(WINDOW_S)
+        self._stillness = Stillness(IN_THE_HAND)
+        self._left = 0
+
+    def leave(self, run: int) -> None:
+        """That stillness is done with: the next one counts."""
+        self._left = run
+
+    def forget(self) -> None:
+        """What comes next has nothing to do with what was."""
+        self._stillness.forget()
+
+    def add(self, samples: Samples) -> list[Held | Countdown]:
+        """What `samples` show, a window at a time."""
+        found: list[Held | Countdown] = []
+        for window in self._windows.add(samples):
+            sight = self._stillness.add(window)
+            if not isinstance(sight, Still) or sight.run <= self._left:
+                continue
+            remaining = max(HOLD_S - sight.seconds, 0.0)
+            found.append(Countdown(window.end_s, remaining, HOLD_S, paused=False))
+            found.append(Held(window.end_s, sight.seconds, np.asarray(sight.acc), sight.run))
+        return found

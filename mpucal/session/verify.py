@@ -1,0 +1,109 @@
+"""The third step of a session: orientations that the first calibration has not seen. Knows no other step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..data import Samples, Vector
+from .aims import Aim
+from .coverage import Coverage
+from .events import (
+    Ask,
+    Caution,
+    Checked,
+    Countdown,
+    Finished,
+    Output,
+    Progress,
+    Prompt,
+    PromptKind,
+    Tried,
+    Wish,
+)
+from .pauses import HOLD_S, Held, Pauses
+from .words import side_down, tilt_down
+
+PATIENCE_S = 40.0
+SAY_AGAIN_S = 8.0
+# A whole calibration is computed while the first orientations are asked for ...
+TRY_WAIT_S = 3.0
+# ... and what the last one says of it is soon told.
+CHECK_WAIT_S = 0.5
+REFUSED = "refused"
+
+
+class Verify:
+    """Asks for `aim.verify` new orientations, and for what they say.
+
+    Parameters
+    ----------
+    coverage : what the turning has shown. directions : (k, 3) that may be asked to point down.
+    """
+
+    def __init__(self, aim: Aim, coverage: Coverage, directions: Vector, tilt_only: bool = False) -> None:
+        self._aim, self._coverage, self._directions, self._tilt_only = aim, coverage, directions, tilt_only
+        self._pauses = Pauses()
+        self._number = 0
+        self._asked = False
+        self._begun_s: float | None = None
+        self._said_s = 0.0
+        self.checked: Checked | None = None
+        self.prompt = self._next()
+
+    def begin(self) -> list[Output]:
+        """The first words."""
+        return [Ask(Wish.TRY, TRY_WAIT_S), self.prompt]
+
+    def add(self, samples: Samples) -> list[Output | Finished]:
+        """What `samples` show; Finished comes last and ends the step."""
+        t_s = float(samples.t[-1])
+        if self._begun_s is None:
+            self._begun_s = self._said_s = t_s
+        found: list[Output | Finished] = []
+        for sight in self._pauses.add(samples):
+            found += [sight] if isinstance(sight, Countdown) else self._hold(sight)
+        if self._asked:
+            return found
+        if t_s - self._said_s >= SAY_AGAIN_S:
+            self._said_s = t_s
+            found.append(Caution(t_s, "not_turned", "that orientation is still to come", self.prompt.text))
+        if t_s - self._begun_s >= PATIENCE_S:
+            return [*found, Finished(f"no verification: {self._number} of {self._aim.verify} orientations were shown")]
+        return found
+
+    def tried(self, tried: Tried) -> list[Output | Finished]:
+        """The first calibration; a refused one is not worth verifying."""
+        return [Finished(f"not to be verified: {tried.why}")] if tried.verdict == REFUSED else []
+
+    def check(self, checked: Checked) -> list[Output | Finished]:
+        """What the orientations say."""
+        self.checked = checked
+        agree = "the new orientations agree with what was promised"
+        return [*checked.found, Finished(agree if checked.agrees else checked.why)]
+
+    def resumed(self) -> list[Output]:
+        """The board may be anywhere now."""
+        self._begun_s = None
+        self._pauses.forget()
+        return [self.prompt]
+
+    def _hold(self, held: Held) -> list[Output | Finished]:
+        if self._asked or held.seconds < HOLD_S - 1e-6:
+            return []
+        self._pauses.leave(held.run)
+        self._coverage.pauses(held.acc)
+        self._number += 1
+        self._said_s = held.t_s
+        progress = Progress(held.t_s, self._number, self._aim.verify, f"verified {self._number} of {self._aim.verify}")
+        if self._number == self._aim.verify:
+            self._asked = True
+            return [progress, Ask(Wish.CHECK, CHECK_WAIT_S)]
+        self.prompt = self._next()
+        return [progress, self.prompt]
+
+    def _next(self) -> Prompt:
+        down = self._coverage.farthest_down(self._directions)
+        x, y, z = np.asarray(down).tolist()
+        side = tilt_down(down) if self._tilt_only else f"{side_down(down)} down"
+        number = f"{self._number + 1} of {self._aim.verify}"
+        return Prompt(PromptKind.VERIFY, f"To verify, {number}: {side}, and hold it still.", (x, y, z))
