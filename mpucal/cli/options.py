@@ -14,12 +14,17 @@ from ..calibration import MODELS
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import UsageError
 
+TLOG = ".tlog"
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 ACCEL_RANGES_G, GYRO_RANGES_DPS = ("2", "4", "8", "16"), ("250", "500", "1000", "2000")
 
 # what a capture fixes: none of it may be given beside --replay
-FIXED_BY_CAPTURE = ("address", "rate", "accel_range", "gyro_range", "seed", "gravity", "model")
+FIXED_BY_CAPTURE = ("address", "rate", "accel_range", "gyro_range", "seed", "gravity", "model", "system", "signing_key")
+SOURCES = ("bus", "mavlink", "replay")
+# what only one kind of source has
+OF_A_BUS, OF_A_VEHICLE = ("address", "accel_range", "gyro_range", "seed"), ("system", "signing_key")
 
 
 class Integer(click.ParamType[int]):
@@ -52,10 +57,15 @@ class Gravity(click.ParamType[float]):
 
 
 def source_options(command: F) -> F:
-    """--bus or --replay, and how the chip is set."""
+    """--bus, --mavlink or --replay, and how the sensor is set."""
     for option in reversed(
         (
             click.option("--bus", metavar="BUS", help="/dev/i2c-N, or sim[:key=value,...] for the simulated chip."),
+            click.option(
+                "--mavlink",
+                metavar="URL",
+                help="udp:PORT, udp:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, or /dev/ttyX[:BAUD].",
+            ),
             click.option("--replay", metavar="FILE", type=click.Path(path_type=Path), help="Run a capture again."),
             click.option("--address", type=Integer(), help="I2C address; by default 0x68, then 0x69."),
             click.option(
@@ -72,6 +82,13 @@ def source_options(command: F) -> F:
                 help="±deg/s.",
             ),
             click.option("--seed", type=click.IntRange(min=0), help="Which simulated sensor and hand."),
+            click.option("--system", metavar="N", type=click.IntRange(1, 255), help="Which vehicle, if several."),
+            click.option(
+                "--signing-key",
+                metavar="FILE",
+                type=click.Path(path_type=Path),
+                help="MAVLink 2 key: 32 bytes, 64 hexadecimal digits, or a passphrase.",
+            ),
         )
     ):
         command = option(command)
@@ -91,20 +108,45 @@ def fit_options(command: F) -> F:
 
 
 def check_source(context: click.Context) -> None:
-    """One source, and beside --replay nothing that the capture fixes.
+    """One source, and beside it nothing that belongs to another, or that the capture fixes.
 
     Raises
     ------
-    UsageError : none, several, or options that contradict the capture.
+    UsageError : none, several, or options that do not fit the source.
     """
-    given = [name for name in ("bus", "replay") if context.params.get(name) is not None]
+    given = [name for name in SOURCES if context.params.get(name) is not None]
     if len(given) != 1:
-        what = "--bus and --replay were given together" if given else "no source was given"
-        raise UsageError(what, "give exactly one of --bus BUS and --replay FILE")
+        together = " and ".join(f"--{name}" for name in given)
+        what = f"{together} were given together" if given else "no source was given"
+        raise UsageError(what, "give exactly one of --bus BUS, --mavlink URL and --replay FILE")
     if given == ["replay"]:
-        for name in FIXED_BY_CAPTURE:
-            if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-                raise UsageError(
-                    f"--{name.replace('_', '-')} was given beside --replay, and the capture fixes it",
-                    "leave it out, or use `mpucal calibrate` to fit the capture differently",
-                )
+        # a .tlog of another ground station fixes nothing: its head is looked at where it is opened
+        if context.params["replay"].suffix.lower() != TLOG:
+            refuse_fixed(context)
+        return
+    for name in OF_A_VEHICLE if given == ["bus"] else OF_A_BUS:
+        if _was_given(context, name):
+            raise UsageError(f"{_spelled(name)} was given beside --{given[0]}, which has none", "leave it out")
+
+
+def refuse_fixed(context: click.Context) -> None:
+    """Beside --replay, nothing that the capture fixes.
+
+    Raises
+    ------
+    UsageError : it was given.
+    """
+    for name in FIXED_BY_CAPTURE:
+        if _was_given(context, name):
+            raise UsageError(
+                f"{_spelled(name)} was given beside --replay, and the capture fixes it",
+                "leave it out, or use `mpucal calibrate` to fit the capture differently",
+            )
+
+
+def _was_given(context: click.Context, name: str) -> bool:
+    return context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+
+
+def _spelled(name: str) -> str:
+    return f"--{name.replace('_', '-')}"

@@ -8,10 +8,10 @@ from typing import Any
 
 import click
 
-from ..calibration import calibrate
 from ..console import console
 from ..data import Recording
 from ..errors import RefusedError
+from ..mavlink.calibrate import calibrate_vehicle
 from ..result import REFUSED, Calibration
 from ..runner import Runner
 from .opened import Opened
@@ -69,6 +69,6 @@ def _settle(place: Place, runner: Runner) -> None:
 
 
 def _finish(runner: Runner, source: Opened, place: Place, recording: Recording) -> tuple[Calibration, tuple[Path, ...]]:
-    fit = partial(calibrate, model=source.plan.model, gravity=source.plan.gravity)
+    fit = partial(calibrate_vehicle, model=source.plan.model, gravity=source.plan.gravity)
     calibration = runner.calibrate(recording, fit)
     return calibration, runner.write(place.folder, calibration, recording, source.truth)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import click
 
 from ..bus.i2c import I2cBus
 from ..bus.replay import ReplayBus
@@ -15,6 +18,7 @@ from ..errors import UsageError
 from ..session.plan import Plan
 from .on_bus import OnBus
 from .opened import Opened
+from .options import TLOG, refuse_fixed
 
 SIMULATED = "sim"
 
@@ -49,10 +53,48 @@ def open_replay(file: Path) -> OnBus:
     return OnBus(bus, plan, replay=bus, recovered=capture.recovered)
 
 
+def open_vehicle(text: str, plan: Plan, system: int | None, key: Path | None) -> Opened:
+    """A vehicle over MAVLink.
+
+    Raises
+    ------
+    UsageError : words that are no URL, or no key. LinkError : it cannot be opened.
+    """
+    # pymavlink is slow to load, and of no use to a chip on a bus
+    from ..mavlink.signing import read_key  # noqa: PLC0415
+    from ..mavlink.transport import open_transport  # noqa: PLC0415
+    from ..mavlink.url import parse_url  # noqa: PLC0415
+    from .on_link import OnLink  # noqa: PLC0415
+
+    url = parse_url(text)
+    signing_key = None if key is None else read_key(key)
+    return OnLink(open_transport(url), plan, system, signing_key)
+
+
+def open_vehicle_replay(file: Path, plan: Plan, system: int | None) -> Opened:
+    """A .tlog, to be run again; `plan` and `system` are for one that another ground station recorded.
+
+    Raises
+    ------
+    CaptureError : no .tlog, or one of another version. RecordingError : no vehicle or no IMU in it.
+    UsageError : options that a .tlog of mpucal fixes.
+    """
+    from .on_link import OnLink, open_tlog  # noqa: PLC0415
+
+    source = open_tlog(file, plan, system)
+    if isinstance(source, OnLink):
+        refuse_fixed(click.get_current_context())
+    return source
+
+
 def opened(options: Mapping[str, Any], until_end: bool = False) -> Opened:
-    """What --bus or --replay of a command's `options` names, with the options beside it."""
-    if options["replay"] is not None:
-        return open_replay(options["replay"])
+    """What --bus, --mavlink or --replay of a command's `options` names, with the options beside it."""
     config = Config(int(options["accel_range"]), int(options["gyro_range"]), options["rate"])
     plan = Plan(config, options["gravity"], options["model"], until_end)
+    if options["mavlink"] is not None:
+        return open_vehicle(options["mavlink"], plan, options["system"], options["signing_key"])
+    if options["replay"] is not None:
+        if options["replay"].suffix.lower() == TLOG:
+            return open_vehicle_replay(options["replay"], replace(plan, until_end=True), options["system"])
+        return open_replay(options["replay"])
     return open_bus(options["bus"], plan, options["address"], options["seed"])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
 from ..errors import BusError, LinkError, NoAnswer
-from .dialect import Message, Packet, Parser, dialect
+from .dialect import SIGNED, Message, Packet, Parser, dialect
 from .transport import Bytes, Transport
 
 T = TypeVar("T")
@@ -91,8 +91,14 @@ class Link:
         self._listeners: list[Listener] = []
         self._vehicle: Vehicle | None = None
         self._next_heartbeat_ns = self._now_ns
-        self._sequence: dict[int, int] = {}
+        self._sequence: int | None = None
         self.lost = 0
+        self._signed = self._unsigned = 0
+
+    @property
+    def signed_only(self) -> bool:
+        """Whether the vehicle signs all that it sends, and we nothing."""
+        return self._mav.signing.secret_key is None and self._signed > 0 and not self._unsigned
 
     @property
     def vehicle(self) -> Vehicle:
@@ -172,7 +178,7 @@ class Link:
             message = arrived.packet.message
             if (message.get_srcSystem(), message.get_srcComponent()) != (vehicle.system, vehicle.component):
                 continue
-            self._count(message.get_seq())
+            self._count(message)
             for listener in self._listeners:
                 listener(message)
             yield message
@@ -237,12 +243,14 @@ class Link:
         self._mav.seq = (self._mav.seq + 1) % SEQUENCE
         return data
 
-    def _count(self, sequence: int) -> None:
+    def _count(self, message: Message) -> None:
         """Packets that are missing by their numbers; one that comes late was counted as missing before."""
-        component = self.vehicle.component
-        step = (sequence - self._sequence.get(component, sequence - 1)) % SEQUENCE
+        header = message.get_header()
+        self._signed += header.incompat_flags & SIGNED
+        self._unsigned += not header.incompat_flags & SIGNED
+        step = (header.seq - (header.seq - 1 if self._sequence is None else self._sequence)) % SEQUENCE
         if 0 < step < SEQUENCE // 2:
-            self._sequence[component] = sequence
+            self._sequence = header.seq
             self.lost += step - 1
         elif step:
             self.lost = max(self.lost - 1, 0)

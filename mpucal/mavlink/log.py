@@ -14,7 +14,7 @@ from ..calibration.stationary import find_flat
 from ..data import Recording
 from ..errors import RecordingError
 from .clock import Jump
-from .collect import Gatherer
+from .collect import Gatherer, Row
 from .dialect import Message, Parser, dialect
 from .imu import Reading, reading
 from .parameters.encoding import is_parameter, of_wire
@@ -44,14 +44,17 @@ class Log:
         self.segments = [Segment({})]
 
     def add(self, message: Message, received_ns: int) -> None:
-        """Take one message."""
-        if is_parameter(message):
-            parameter = of_wire(message, self.firmware == PX4)
-            self.parameter(parameter.name, float(parameter.value))
-            return
+        """Take one message: an IMU's, or a parameter's."""
+        self.add_other(message)
         content = reading(message)
         if content is not None:
             self.reading(content, received_ns)
+
+    def add_other(self, message: Message) -> None:
+        """Take a message that is no IMU's."""
+        if is_parameter(message):
+            parameter = of_wire(message, self.firmware == PX4)
+            self.parameter(parameter.name, float(parameter.value))
 
     def parameter(self, name: str, value: float) -> None:
         """A parameter as the vehicle holds it from now on."""
@@ -61,12 +64,13 @@ class Log:
             self.segments.append(now)
         now.parameters[name] = value
 
-    def reading(self, content: Reading, received_ns: int) -> None:
-        """An IMU's reading."""
-        _, jump = self.segments[-1].gatherer.add(content, received_ns)
+    def reading(self, content: Reading, received_ns: int) -> tuple[Row | None, Jump]:
+        """An IMU's reading; see Gathered.add."""
+        row, jump = self.segments[-1].gatherer.add(content, received_ns)
         if jump is Jump.REBOOT:
             self.segments.append(Segment(dict(self.segments[-1].parameters)))
             self.segments[-1].gatherer.add(content, received_ns)
+        return row, jump
 
     def recording(self, name: str) -> Recording:
         """The first IMU's recording of the longest segment, with the others' in `others`.

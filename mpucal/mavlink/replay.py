@@ -49,7 +49,7 @@ class Replay:
         EndOfCapture : there are no more packets.
         """
         if self._at == len(self._records):
-            raise EndOfCapture
+            raise EndOfCapture(f"{self.name} ends")
         record = self._records[self._at]
         t_ns = max(record.t_ns, self._now_ns)
         if t_ns >= until_ns:
@@ -66,9 +66,9 @@ class Replay:
     def close(self) -> None:
         """See Transport."""
 
-    def pending(self, now_ns: int) -> Sequence[Noted]:
-        """The notes made until `now_ns` that stand before the next packet, each once."""
-        due = [noted for noted in self._pending if noted.t_ns <= now_ns]
+    def pending(self) -> Sequence[Noted]:
+        """The notes made until now that stand before the next packet, each once."""
+        due = [noted for noted in self._pending if noted.t_ns <= self._now_ns]
         self._pending = self._pending[len(due) :]
         return due
 

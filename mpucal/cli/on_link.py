@@ -1,0 +1,148 @@
+"""A vehicle, or its .tlog, as a session's source, recorded into a .tlog. Knows no option."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..bus.records import SessionEvent
+from ..chip.config import Config
+from ..data import Recording
+from ..errors import CaptureError
+from ..mavlink.link import Link
+from ..mavlink.log import read_log
+from ..mavlink.notes import Note, to_messages
+from ..mavlink.recorded import RecordedSource
+from ..mavlink.replay import Replay
+from ..mavlink.source import VehicleSource
+from ..mavlink.tlog import Tlog, TlogWriter, read_tlog
+from ..mavlink.transport import Transport
+from ..runner import Replayed, Talk
+from ..session.events import Prompt
+from ..session.plan import Plan
+from .opened import Measuring, Say
+
+CAPTURE = "capture.tlog"
+SESSION, MPUCAL, RECORDED, SOURCE, PLAN, SYSTEM = "session", "mpucal", "recorded", "source", "plan", "system"
+# counts up with every change of what the source sends and believes
+SOURCE_VERSION = 1
+NOTE_IDS = 65535
+
+
+@dataclass(frozen=True)
+class OnLink:
+    """A transport to a vehicle, and what comes with its kind; see Opened.
+
+    Attributes
+    ----------
+    transport : open. plan : what to do; of its `config` the rate matters. system : whom to lock to.
+    key : to sign with, or None. replay : the same transport where it is a replay.
+    """
+
+    transport: Transport
+    plan: Plan
+    system: int | None = None
+    key: bytes | None = None
+    listeners: Sequence[Callable[[Prompt], None]] = ()
+    truth: Mapping[str, Any] | None = None
+    replay: Replay | None = None
+    recovered: str | None = None
+    capture_name: str = CAPTURE
+
+    def talk(self, person: Talk) -> Talk:
+        """See Opened."""
+        return person if self.replay is None else Replayed(person, self._pending)
+
+    @contextmanager
+    def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[Measuring]:
+        """See Opened."""
+        with closing(self.transport), TlogWriter(capture) as writer:
+            link = Link(self.transport, writer.packet, self.key)
+            notes = _Noting(link)
+            plan = {SOURCE: SOURCE_VERSION, PLAN: asdict(self.plan), SYSTEM: self.system}
+            notes.keep(SESSION, 0, {MPUCAL: __version__, RECORDED: recorded, **plan})
+            source = VehicleSource(link, self.plan.config.rate_hz, self.system, say, capture.name)
+            yield Measuring(source, notes.keep)
+
+    def _pending(self) -> Sequence[SessionEvent]:
+        if self.replay is None:
+            return []
+        return [SessionEvent(noted.note.name, noted.t_ns, noted.note.data) for noted in self.replay.pending()]
+
+
+@dataclass(frozen=True)
+class OnRecording:
+    """A .tlog of another ground station, and what comes with it; see Opened."""
+
+    tlog: Tlog
+    measured: Recording
+    plan: Plan
+    listeners: Sequence[Callable[[Prompt], None]] = ()
+    truth: Mapping[str, Any] | None = None
+    capture_name: str = CAPTURE
+
+    @property
+    def recovered(self) -> str | None:
+        """See Opened."""
+        return self.tlog.recovered
+
+    def talk(self, person: Talk) -> Talk:
+        """See Opened."""
+        return person
+
+    @contextmanager
+    def measuring(self, capture: Path, _say: Say, _recorded: str) -> Iterator[Measuring]:
+        """See Opened; the capture is a copy."""
+        with TlogWriter(capture) as writer:
+            for record in self.tlog.records:
+                writer.packet(record.t_ns, record.data)
+            yield Measuring(RecordedSource(self.measured), lambda _name, _t_ns, _data: None)
+
+
+class _Noting:
+    """Keeps session events among a link's packets."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._notes = 0
+
+    def keep(self, name: str, _t_ns: int, data: Mapping[str, Any]) -> None:
+        """Keep an event; its time is the link's."""
+        for message in to_messages(Note(name, data), 1 + self._notes % NOTE_IDS):
+            self._link.note(message)
+        self._notes += 1
+
+
+def open_tlog(file: Path, asked: Plan, system: int | None) -> OnLink | OnRecording:
+    """A .tlog to be run again: one of mpucal's sessions as it was, any other until its end.
+
+    Parameters
+    ----------
+    asked : the plan for one of another ground station.
+
+    Raises
+    ------
+    CaptureError : it cannot be read, or another version of mpucal made it. RecordingError : it holds no IMU.
+    """
+    tlog = read_tlog(file)
+    replay = Replay(tlog)
+    head = next((noted.note for noted in replay.pending() if noted.note.name == SESSION), None)
+    if head is None:
+        return OnRecording(tlog, read_log(tlog, system), asked)
+    if head.data.get(SOURCE) != SOURCE_VERSION:
+        raise CaptureError(
+            f"{tlog.name} was recorded by version {head.data.get(SOURCE)} of the source, and this is {SOURCE_VERSION}",
+            "use `mpucal calibrate` on it, which reads a .tlog of every version",
+        )
+    try:
+        plan = dict(head.data[PLAN])
+        made = Plan(**{**plan, "config": Config(**plan["config"])})
+        return OnLink(replay, made, head.data[SYSTEM], replay=replay, recovered=tlog.recovered)
+    except (KeyError, TypeError, ValueError) as error:
+        raise CaptureError(
+            f"the head of {tlog.name} does not say how it was made ({error})", "use `mpucal calibrate` on it"
+        ) from error

@@ -1,0 +1,70 @@
+"""The parameters that shape a vehicle's IMU streams, asked of it before it is turned. Writes none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .dialect import Message
+from .link import Link, S
+from .parameters.encoding import is_parameter, name_bytes, of_wire
+from .truth import EKF2_IMU_CTRL, PX4
+
+AXES = "XYZ"
+IMUS = 3
+SLOTS = 4
+# by name rather than as a list, which slows every stream: what one does not hold it does not answer (ArduPilot)
+ROUND_NS, ROUNDS = S, 4
+AT_ONCE = 12
+
+
+def shaping_names(firmware: str) -> tuple[str, ...]:
+    """Names of the parameters that stand between the sensors and the streams, and of the sensors' ids."""
+    if firmware == PX4:
+        kinds = ("ID", "PRIO", "ROT", *(f"{axis}{kind}" for kind in ("OFF", "SCALE") for axis in AXES))
+        slots = [f"CAL_ACC{slot}_{kind}" for slot in range(SLOTS) for kind in kinds]
+        board = [f"SENS_BOARD_{axis}_OFF" for axis in AXES]
+        return (EKF2_IMU_CTRL, "SENS_BOARD_ROT", *board, *slots)
+    accs = ["INS_ACC", *(f"INS_ACC{imu}" for imu in range(2, IMUS + 1))]
+    kinds = ("_ID", *(f"{kind}_{axis}" for kind in ("OFFS", "SCAL") for axis in AXES))
+    return ("AHRS_ORIENTATION", *(f"{acc}{kind}" for acc in accs for kind in kinds))
+
+
+def read_parameters(link: Link, names: Sequence[str], firmware: str) -> dict[str, float]:
+    """The values of those of `names` that the vehicle holds.
+
+    Raises
+    ------
+    EndOfCapture, LinkError : see Link.messages.
+    """
+    held: dict[str, float] = {}
+    for at in range(0, len(names), AT_ONCE):
+        held |= _some(link, names[at : at + AT_ONCE], firmware)
+    return held
+
+
+def _some(link: Link, names: Sequence[str], firmware: str) -> dict[str, float]:
+    held: dict[str, float] = {}
+    for _ in range(ROUNDS):
+        missing = [name for name in names if name not in held]
+        _request(link, missing)
+        before = len(held)
+        for message in link.messages(link.now_ns() + ROUND_NS):
+            _take(message, held, names, firmware)
+            if len(held) == len(names):
+                return held
+        if held and len(held) == before:
+            break
+    return held
+
+
+def _request(link: Link, names: Sequence[str]) -> None:
+    vehicle = link.vehicle
+    for name in names:
+        link.send(link.mav.param_request_read_encode(vehicle.system, vehicle.component, name_bytes(name), -1))
+
+
+def _take(message: Message, held: dict[str, float], names: Sequence[str], firmware: str) -> None:
+    if is_parameter(message):
+        parameter = of_wire(message, firmware == PX4)
+        if parameter.name in names:
+            held[parameter.name] = float(parameter.value)

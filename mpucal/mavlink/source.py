@@ -1,0 +1,147 @@
+"""A vehicle as a session's source: locked to, its parameters read, its IMUs streamed. Knows no person and no fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..data import Recording, Samples, Sensor
+from ..errors import LinkError, UsageError
+from .clock import Jump
+from .collect import Row, chip, samples_of
+from .dialect import Message
+from .imu import Stream, reading
+from .link import Link, S, Vehicle
+from .log import Log
+from .shaping import read_parameters, shaping_names
+from .stream import Streams
+from .truth import ARDUPILOT, PX4
+
+POLL_NS = S // 20
+SILENT_NS = 4 * S
+US_PER_S = 1e6
+
+
+class VehicleSource:
+    """The first IMU's samples as they come; all IMUs' recordings at the end.
+
+    What it does depends on the packets and their times alone, so that a replay repeats it.
+
+    Parameters
+    ----------
+    link : not locked yet. rate_hz : to ask for. system : whom to lock to, where there are several.
+    say : tells the person a sentence. name : what to call the recording.
+    """
+
+    def __init__(self, link: Link, rate_hz: float, system: int | None, say: Callable[[str], None], name: str) -> None:
+        self._link = link
+        self._rate_hz = rate_hz
+        self._system = system
+        self._say = say
+        self._name = name
+        self._log = Log(ARDUPILOT)
+        self._streams: Streams | None = None
+        self._stream: Stream | None = None
+        self._rows: list[Row] = []
+        self._last_us: float | None = None
+        self._heard_ns = self._sampled_ns = 0
+        self._rebooted = False
+
+    def start(self) -> Sensor:
+        """Listen, lock to one vehicle and say so, read its parameters, and have it stream.
+
+        Raises
+        ------
+        NoAnswer : no vehicle. UsageError : several. LinkError : it sends no accelerations, or the link broke.
+        """
+        vehicle = one_of(self._link.listen(), self._system)
+        # nothing is sent before the person has seen to whom
+        self._say(f"This is {vehicle}; what is asked and written goes there alone.")
+        self._link.lock(vehicle)
+        firmware = PX4 if vehicle.is_px4 else ARDUPILOT
+        self._log = Log(firmware)
+        self._link.subscribe(self._hear)
+        parameters = read_parameters(self._link, shaping_names(firmware), firmware)
+        self._streams = Streams(self._link, firmware, parameters, self._rate_hz, self._say)
+        self._stream = self._streams.start()
+        self._rows = []
+        self._heard_ns = self._sampled_ns = self._link.now_ns()
+        return Sensor(chip=chip(firmware, self._stream.imu), rate_hz=self._rate_hz)
+
+    def poll(self) -> Samples:
+        """Wait for a twentieth of a second, and give the first IMU's samples that came meanwhile.
+
+        Raises
+        ------
+        EndOfCapture : a replay holds no more. LinkError : the vehicle fell silent or rebooted, or the link broke.
+        """
+        for _ in self._link.messages(self._link.now_ns() + POLL_NS):
+            self._heard_ns = self._link.now_ns()
+        if self._streams is not None:
+            self._streams.watch()
+        self._check()
+        rows, self._rows = self._rows, []
+        t_us = np.array([row.t_us for row in rows], dtype=np.float64)
+        samples = samples_of(rows, t_us, self._last_us)
+        if rows:
+            self._last_us = float(t_us[-1])
+        return samples
+
+    def recording(self) -> Recording:
+        """All samples so far, late ones in their places; the other IMUs' in its `others`."""
+        return self._log.recording(self._name)
+
+    def now_ns(self) -> int:
+        """The vehicle's clock: that of the last sample, and what the link's clock counted since."""
+        if self._last_us is None:
+            return self._link.now_ns() - self._sampled_ns
+        return round(self._last_us * 1e3) + self._link.now_ns() - self._sampled_ns
+
+    def stop(self) -> None:
+        """Nothing: the vehicle's streams are left to its other ground stations, and to the write-back."""
+
+    def _hear(self, message: Message) -> None:
+        self._log.add_other(message)
+        content = reading(message)
+        if content is None:
+            return
+        row, jump = self._log.reading(content, self._link.now_ns())
+        self._rebooted |= jump is Jump.REBOOT
+        if row is not None and content.stream == self._stream:
+            self._rows.append(row)
+            self._sampled_ns = self._link.now_ns()
+
+    def _check(self) -> None:
+        now_ns = self._link.now_ns()
+        if self._rebooted:
+            raise LinkError(
+                f"{self._link.vehicle} rebooted: its clock started again", "check its power, then start again"
+            )
+        if now_ns - self._heard_ns >= SILENT_NS:
+            raise LinkError(
+                f"{self._link.vehicle} has sent nothing for {SILENT_NS // S} s",
+                "check its power and the link, then start again",
+            )
+        if now_ns - self._sampled_ns >= SILENT_NS:
+            raise LinkError(
+                f"{self._link.vehicle} has sent no IMU messages for {SILENT_NS // S} s",
+                "check that no other ground station stops them, then start again",
+            )
+
+
+def one_of(vehicles: tuple[Vehicle, ...], system: int | None) -> Vehicle:
+    """The only vehicle, or the only one of that system.
+
+    Raises
+    ------
+    UsageError : several, with their list, or none of that system.
+    """
+    asked = [vehicle for vehicle in vehicles if system in (None, vehicle.system)]
+    listed = ", ".join(str(vehicle) for vehicle in sorted(vehicles, key=lambda v: (v.system, v.address)))
+    if len(asked) == 1:
+        return asked[0]
+    if not asked:
+        raise UsageError(f"no vehicle is system {system}: there is {listed}", "give one of these to --system")
+    remedy = "choose one with --system N" if system is None else "stop the other, or listen on another port"
+    raise UsageError(f"there are several vehicles: {listed}", remedy)

@@ -1,0 +1,151 @@
+"""A vehicle's IMU streams: asked for, their rates watched, asked for again. Knows no sample's content."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
+
+from ..errors import LinkError
+from .dialect import Message, dialect
+from .imu import HIGHRES, MESSAGE_ID, RAW, Stream, reading
+from .link import Link, S, command
+from .truth import PX4, truthful
+
+US_PER_S = 1e6
+# what ArduPilot gives at a loop of 400 Hz: a rate that it denies is followed by the next lower one
+LADDER_HZ = (200.0, 100.0, 50.0, 25.0, 10.0)
+ARRIVE_NS, ENOUGH = S, 3
+ACK_S, ACK_TRIES = 0.7, 4
+
+WATCH_NS = 2 * S
+FALLEN = 0.6
+AGAIN_NS, SAY_AGAIN_NS = 2 * S, 15 * S
+
+
+class Streams:
+    """The streams of all IMUs of the vehicle that `link` is locked to.
+
+    Parameters
+    ----------
+    rate_hz : asked for; what comes is what the vehicle makes of it. say : tells the person a sentence.
+    """
+
+    def __init__(
+        self, link: Link, firmware: str, parameters: Mapping[str, float], rate_hz: float, say: Callable[[str], None]
+    ) -> None:
+        self._link = link
+        self._firmware = firmware
+        self._order = truthful(firmware, parameters)
+        self._rate_hz = rate_hz
+        self._say = say
+        self._counts: Counter[Stream] = Counter()
+        self._wanted: dict[str, float] = {}
+        self._windows: dict[Stream, deque[float]] = {}
+        self._best_hz: dict[Stream, float] = {}
+        self._window_ns = self._again_ns = self._said_ns = 0
+        link.subscribe(self._hear)
+
+    def start(self) -> Stream:
+        """Ask for all of them; the stream of the first IMU.
+
+        Raises
+        ------
+        LinkError : the vehicle sends no accelerations and rates, whatever it is asked.
+        """
+        first = self._first()
+        for name in ("SCALED_IMU2", "SCALED_IMU3"):
+            self._ask(name)
+        list(self._link.messages(self._link.now_ns() + ARRIVE_NS))
+        self._counts.clear()
+        self._window_ns = self._link.now_ns()
+        return first
+
+    def watch(self) -> None:
+        """Ask again for what comes slower than it did; call this often."""
+        now_ns = self._link.now_ns()
+        if now_ns - self._window_ns < WATCH_NS:
+            return
+        seconds = (now_ns - self._window_ns) / S
+        rates = {stream: count / seconds for stream, count in self._counts.items()}
+        self._counts.clear()
+        self._window_ns = now_ns
+        for stream, best_hz in list(self._best_hz.items()):
+            if stream.name in self._wanted and rates.get(stream, 0.0) < FALLEN * best_hz:
+                self._again(stream, rates.get(stream, 0.0))
+        for stream, rate_hz in rates.items():
+            self._best_hz[stream] = max(rate_hz, self._best_hz.get(stream, 0.0))
+
+    def _hear(self, message: Message) -> None:
+        content = reading(message)
+        if content is not None:
+            self._counts[content.stream] += 1
+
+    def _first(self) -> Stream:
+        for name in self._order:
+            stream = Stream(name, 1)
+            if name not in ("SCALED_IMU2", "SCALED_IMU3") and self._ask(name) and self._arrives(stream):
+                return stream
+        self._request_data_stream()
+        for name in self._order:
+            if self._arrives(Stream(name, 1)):
+                return Stream(name, 1)
+        raise self._nothing()
+
+    def _ask(self, name: str) -> bool:
+        """Ask for a message by SET_MESSAGE_INTERVAL, at lower rates where it is denied; whether it was not refused."""
+        m = dialect()
+        for rate_hz in (self._rate_hz, *(rate for rate in LADDER_HZ if rate < self._rate_hz)):
+            self._wanted[name] = rate_hz
+            result = command(
+                self._link,
+                m.MAV_CMD_SET_MESSAGE_INTERVAL,
+                MESSAGE_ID[name],
+                round(US_PER_S / rate_hz),
+                timeout_s=ACK_S,
+                tries=ACK_TRIES,
+            )
+            if result != m.MAV_RESULT_DENIED:
+                # no answer at all may be a lost one: what arrives tells
+                return result in (m.MAV_RESULT_ACCEPTED, None)
+        return False
+
+    def _arrives(self, stream: Stream) -> bool:
+        """Whether `stream` comes, waiting for it where it did not yet."""
+        self._counts.clear()
+        until_ns = self._link.now_ns() + ARRIVE_NS
+        return any(self._counts[stream] >= ENOUGH for _ in self._link.messages(until_ns))
+
+    def _request_data_stream(self) -> None:
+        """REQUEST_DATA_STREAM (66), which older firmwares know; PX4 ignores it."""
+        vehicle, raw_sensors = self._link.vehicle, dialect().MAV_DATA_STREAM_RAW_SENSORS
+        request = self._link.mav.request_data_stream_encode(
+            vehicle.system, vehicle.component, raw_sensors, round(self._rate_hz), 1
+        )
+        self._link.send(request)
+
+    def _again(self, stream: Stream, rate_hz: float) -> None:
+        m, now_ns = dialect(), self._link.now_ns()
+        vehicle = self._link.vehicle
+        interval_us = round(US_PER_S / self._wanted[stream.name])
+        params = (MESSAGE_ID[stream.name], interval_us, 0, 0, 0, 0, 0)
+        self._link.send(
+            self._link.mav.command_long_encode(
+                vehicle.system, vehicle.component, m.MAV_CMD_SET_MESSAGE_INTERVAL, 0, *params
+            )
+        )
+        if now_ns - self._said_ns < SAY_AGAIN_NS:
+            return
+        self._said_ns = now_ns
+        self._say(
+            f"{stream.name} fell from {self._best_hz[stream]:.0f} to {rate_hz:.0f} Hz, and was asked for again: "
+            "another ground station lowers it (start MAVProxy with --streamrate=-1)"
+        )
+
+    def _nothing(self) -> LinkError:
+        names = HIGHRES if self._firmware == PX4 else f"{HIGHRES} and {RAW}"
+        signed = self._link.signed_only
+        remedy = "give the vehicle's --signing-key: it signs, and hears nobody who does not"
+        return LinkError(
+            f"{self._link.vehicle} sends no IMU messages, though {names if not signed else 'they'} were asked for",
+            remedy if signed else "check that the link goes both ways, then start again",
+        )
