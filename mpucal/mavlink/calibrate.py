@@ -10,6 +10,7 @@ from typing import Any
 from ..calibration import calibrate
 from ..data import STANDARD_GRAVITY_MPS2, Recording
 from ..result import Calibration
+from .parameters.document import autopilot_document
 
 OTHERS, AUTOPILOT = "others", "autopilot"
 
@@ -32,12 +33,5 @@ def _one(recording: Recording, model: str, gravity: float) -> Calibration:
     calibration = calibrate(recording, model, gravity)
     if recording.autopilot is None:
         return calibration
-    extra: Mapping[str, Any] = {AUTOPILOT: _autopilot(recording)}
+    extra: Mapping[str, Any] = {AUTOPILOT: autopilot_document(recording.autopilot, calibration)}
     return replace(calibration, extra=MappingProxyType({**calibration.extra, **extra}))
-
-
-def _autopilot(recording: Recording) -> dict[str, Any]:
-    autopilot = recording.autopilot
-    if autopilot is None:
-        return {}
-    return {"firmware": autopilot.firmware, "imu": autopilot.imu, "message": autopilot.message}

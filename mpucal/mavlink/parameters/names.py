@@ -1,0 +1,122 @@
+"""Which parameters of which firmware correct which IMU, and how it is mounted. Knows no link and no estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...data import Vector
+from ..truth import PX4
+from .compose import Correction
+from .rotation import euler, orientation
+
+Values = Mapping[str, float]
+
+AXES = ("X", "Y", "Z")
+PX4_SLOTS = 4
+# AHRS_ORIENTATION -> the names of its angles in degrees
+CUSTOM_ANGLES = {100: "CUSTOM_", 101: "CUST_ROT1_", 102: "CUST_ROT2_"}
+ANGLES = ("ROLL", "PITCH", "YAW")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a firmware accepts of its own calibration: |offset| at most [m/s^2], scale from lowest to highest."""
+
+    offset_mps2: float
+    lowest: float
+    highest: float
+
+
+# ArduPilot: AccelCalibrator's; PX4: the parameters' own
+ARDUPILOT_LIMITS = Limits(9.8, 0.8, 1.2)
+PX4_LIMITS = Limits(np.inf, 0.1, 3.0)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a vehicle keeps one IMU's correction.
+
+    Attributes
+    ----------
+    imu : counted from 1. offset, scale : three names each, of x, y, z. sensor_id : the name of the sensor's id.
+    limits : what the firmware accepts there.
+    """
+
+    imu: int
+    offset: tuple[str, ...]
+    scale: tuple[str, ...]
+    sensor_id: str
+    limits: Limits
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All six of a correction."""
+        return (*self.offset, *self.scale)
+
+    def correction(self, values: Values) -> Correction | None:
+        """What is there; None where a value is missing."""
+        if not all(name in values for name in self.names):
+            return None
+        offset, scale = (np.array([values[name] for name in names]) for names in (self.offset, self.scale))
+        return Correction(offset, scale)
+
+    def values(self, correction: Correction) -> dict[str, float]:
+        """The same by name."""
+        return dict(zip(self.names, (*correction.offset.tolist(), *correction.scale.tolist()), strict=True))
+
+    def beyond(self, correction: Correction) -> str | None:
+        """Which value lies beyond what the firmware accepts, in words."""
+        limits = self.limits
+        for name, value in self.values(correction).items():
+            lowest, highest = -limits.offset_mps2, limits.offset_mps2
+            if name in self.scale:
+                lowest, highest = limits.lowest, limits.highest
+            if not lowest <= value <= highest:
+                return f"{name} would be {value:.4g}, beyond {lowest:g} to {highest:g}"
+        return None
+
+
+def place(firmware: str, imu: int, values: Values) -> Place | None:
+    """Where IMU `imu` (counted from 1) of a vehicle with these parameters has its correction.
+
+    PX4 keeps it in a slot that names its sensor by id; its streams are in the order of those slots. None where no
+    slot does.
+    """
+    if firmware != PX4:
+        stem = "INS_ACC" if imu == 1 else f"INS_ACC{imu}"
+        offset, scale = (tuple(f"{stem}{kind}_{axis}" for axis in AXES) for kind in ("OFFS", "SCAL"))
+        return Place(imu, offset, scale, f"{stem}_ID", ARDUPILOT_LIMITS)
+    slots = [slot for slot in range(PX4_SLOTS) if values.get(f"CAL_ACC{slot}_ID")]
+    return px4_place(imu, slots[imu - 1]) if imu <= len(slots) else None
+
+
+def px4_place(imu: int, slot: int) -> Place:
+    """The place in a slot of PX4's."""
+    stem = f"CAL_ACC{slot}_"
+    offset, scale = (tuple(f"{stem}{axis}{kind}" for axis in AXES) for kind in ("OFF", "SCALE"))
+    return Place(imu, offset, scale, f"{stem}ID", PX4_LIMITS)
+
+
+def mounting(firmware: str, where: Place, values: Values) -> Vector | None:
+    """R_b (3, 3) from the axes of the sensor at `where` to the vehicle's; None where it cannot be known."""
+    if firmware != PX4:
+        return _rotation("AHRS_ORIENTATION", values, CUSTOM_ANGLES)
+    own = where.sensor_id.replace("_ID", "_ROT")
+    # -1: inside the autopilot, which the board's rotation turns
+    turned = _rotation(own if values.get(own, -1) >= 0 else "SENS_BOARD_ROT", values, {})
+    level = np.radians([values.get(f"SENS_BOARD_{axis}_OFF", 0.0) for axis in AXES])
+    return None if turned is None else euler(*level.tolist()) @ turned
+
+
+def _rotation(name: str, values: Values, custom: Mapping[int, str]) -> Vector | None:
+    if name not in values:
+        return None
+    number = round(values[name])
+    if number in custom:
+        angles = [values.get(custom[number] + angle) for angle in ANGLES]
+        known = [angle for angle in angles if angle is not None]
+        return euler(*np.radians(known).tolist()) if len(known) == len(ANGLES) else None
+    return orientation(number)
