@@ -7,6 +7,7 @@ MpucalError
 │   ├── CaptureError         a capture that is damaged, or does not hold what was asked of it
 │   ├── BusError             a transfer failed
 │   │   ├── NoAnswer         nothing acknowledged the address, or sent a heartbeat
+│   │   ├── BusHeld          a wire is held low, so that every transfer takes its time-out
 │   │   └── LinkError        the link to a vehicle broke, or cannot be used
 │   └── ChipError            the chip answers, but not as its register map says
 ├── OutputError           3  a result cannot be written where it was asked to go
@@ -68,6 +69,10 @@ class NoAnswer(BusError):  # noqa: N818 - reads as the sentence it is
 
 class LinkError(BusError):
     """The link to a vehicle broke, or cannot be used."""
+
+
+class BusHeld(BusError):  # noqa: N818 - reads as the sentence it is
+    """A wire of the bus is held low, so that every transfer takes its time-out."""
 
 
 class ChipError(SourceError):

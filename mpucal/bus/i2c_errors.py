@@ -8,7 +8,7 @@ from __future__ import annotations
 import errno
 from pathlib import Path
 
-from ..errors import BusError, NoAnswer
+from ..errors import BusError, BusHeld, NoAnswer
 
 DEVICES = Path("/dev")
 
@@ -18,10 +18,6 @@ WIRES = (
 )
 
 _TRANSFER = {
-    errno.ETIMEDOUT: (
-        "the I2C bus does not come free",
-        "a wire holds SDA or SCL low: take the chip's supply away for a moment, and check for shorts",
-    ),
     errno.EIO: (
         "a transfer broke off",
         "check the connectors, shorten the wires, or slow the bus down",
@@ -59,6 +55,11 @@ def transfer_error(error: OSError, path: str, address: int) -> BusError:
     """Why a transfer with the chip at `address` failed."""
     if error.errno in (errno.EREMOTEIO, errno.ENXIO):
         return nobody(path, (address,))
+    if error.errno == errno.ETIMEDOUT:
+        return BusHeld(
+            f"the I2C bus does not come free (0x{address:02x} on {path})",
+            "a wire holds SDA or SCL low: take the chip's supply away for a moment, and check for shorts",
+        )
     what, remedy = _TRANSFER.get(
         error.errno or 0,
         (f"a transfer failed ({error.strerror})", "check the wires, and start again"),

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from ..chip.access import EndOfCapture, Reply, Transaction
-from ..errors import BusError, CaptureError, NoAnswer
+from ..errors import BusError, BusHeld, CaptureError, NoAnswer
 from .records import Record, SessionEvent
 
-_RAISES: dict[str, type[BusError]] = {"NoAnswer": NoAnswer}
+_RAISES: dict[str, type[BusError]] = {kind.__name__: kind for kind in (NoAnswer, BusHeld)}
 
 
 class ReplayBus:

@@ -13,6 +13,8 @@ from .settings import Settings
 # Beyond 24 to 32 queued frames chips are known to corrupt some.
 MAX_FRAMES_A_POLL = 24
 MIN_POLL_S = 0.001
+FAST_POLL_S, FAST_HZ = 0.020, 400
+SLOW_POLL_S = 0.040
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,7 @@ class Config:
     ----------
     accel_range_g : 2, 4, 8 or 16. gyro_range_dps : 250, 500, 1000 or 2000 deg/s.
     rate_hz : samples a second, nominally. dlpf : code of the low-pass filter, 0 (widest) to 6.
-    poll_s : time between two looks into the FIFO.
+    poll_s : time between two looks into the FIFO; None: `period_s` as suits the rate.
 
     Raises
     ------
@@ -34,7 +36,7 @@ class Config:
     gyro_range_dps: int = 500
     rate_hz: float = 200
     dlpf: int = 3
-    poll_s: float = 0.020
+    poll_s: float | None = None
 
     def __post_init__(self) -> None:
         _check("accelerometer range", self.accel_range_g, "g", reg.ACCEL_RANGES_G)
@@ -42,20 +44,26 @@ class Config:
         _check("low-pass filter", self.dlpf, "", reg.DLPF_CODES)
         reg.sample_rate_divider(self.rate_hz, self.dlpf)
         longest_s = MAX_FRAMES_A_POLL / self.rate_hz
-        if not MIN_POLL_S <= self.poll_s <= longest_s:
+        if not MIN_POLL_S <= self.period_s <= longest_s:
             raise UsageError(
-                f"the FIFO cannot be polled every {self.poll_s:g} s at {self.rate_hz:g} Hz",
+                f"the FIFO cannot be polled every {self.period_s:g} s at {self.rate_hz:g} Hz",
                 f"poll every {MIN_POLL_S:g} to {longest_s:g} s",
             )
 
+    @property
+    def period_s(self) -> float:
+        """Time between two looks into the FIFO: as seldom as a FIFO of 512 bytes and a host 10 ms late allow."""
+        return self.poll_s if self.poll_s is not None else FAST_POLL_S if self.rate_hz > FAST_HZ else SLOW_POLL_S
+
     def settings(self, part: Part) -> Settings:
-        """The same for one part."""
+        """The same for one part; one with less sensitivity takes the smallest range that is large enough."""
+        range_g = min(self.accel_range_g * part.accel_sensitivity, reg.ACCEL_RANGES_G[-1])
         return Settings(
             part=part,
             smplrt_div=reg.sample_rate_divider(self.rate_hz, self.dlpf),
             dlpf_cfg=self.dlpf,
             fs_sel=reg.GYRO_RANGES_DPS.index(self.gyro_range_dps),
-            afs_sel=reg.ACCEL_RANGES_G.index(self.accel_range_g),
+            afs_sel=next(i for i, nominal_g in enumerate(reg.ACCEL_RANGES_G) if nominal_g >= range_g),
         )
 
 

@@ -8,7 +8,9 @@ from ..data import Recording, Samples
 from ..errors import RecordingError
 from . import registers as reg
 from .access import Transaction
+from .families import Part
 from .fifo import Fault, FifoDecoder
+from .identity import Evidence
 from .settings import Settings
 
 
@@ -25,20 +27,39 @@ class Decoder:
     def __init__(self, name: str) -> None:
         self._name = name
         self._held: dict[int, int] = {}
+        self._evidence = Evidence()
         self._settings: Settings | None = None
         self._fifo: FifoDecoder | None = None
         self.fault: Fault | None = None
+
+    @property
+    def part(self) -> Part:
+        """Which part the chip is, as it answered and behaved.
+
+        Raises
+        ------
+        RecordingError : nobody asked for its identity. ChipError : no known part.
+        """
+        if reg.WHO_AM_I not in self._held:
+            raise RecordingError(
+                f"{self._name} does not say which chip it is (register 0x{reg.WHO_AM_I:02x})",
+                "record again from the start of the chip",
+            )
+        return self._evidence.part(self._held[reg.WHO_AM_I])
 
     def saw_read(self, register: int, data: bytes, t_ns: int) -> None:
         """`data` was read from `register` on, at `t_ns`."""
         if self._fifo is None:
             self._hold(register, data)
+            self._evidence.saw(register, data, self._held)
         elif register == reg.FIFO_COUNT_H:
             self._fifo.counted(t_ns, int.from_bytes(data, "big"))
         elif register == reg.FIFO_R_W:
             self._fifo.data(data)
-        elif register == reg.INT_STATUS:
-            self.fault = self._fifo.judged(bool(data[0] & reg.INT_FIFO_OFLOW))
+        elif register in (reg.INT_STATUS, reg.INT_ENABLE) and register + len(data) > reg.INT_STATUS:
+            lost = register == reg.INT_ENABLE and not data[0] & reg.INT_FIFO_OFLOW
+            overflow = bool(data[reg.INT_STATUS - register] & reg.INT_FIFO_OFLOW)
+            self.fault = self._fifo.judged(overflow, lost)
         elif register == reg.TEMP_OUT_H:
             self._fifo.temperature(int.from_bytes(data, "big", signed=True))
         else:
@@ -51,6 +72,9 @@ class Decoder:
         ------
         RecordingError : the FIFO starts with settings that nobody told, or that changed.
         """
+        if register == reg.PWR_MGMT_1 and data[0] & reg.PWR_MGMT_1_DEVICE_RESET:
+            self._held = {reg.WHO_AM_I: self._held[reg.WHO_AM_I]} if reg.WHO_AM_I in self._held else {}
+            return
         self._hold(register, data)
         if register == reg.USER_CTRL and data[0] & reg.USER_CTRL_FIFO_RESET:
             self._fifo_was_reset()
@@ -70,7 +94,7 @@ class Decoder:
         self._held.update(enumerate(data, register))
 
     def _fifo_was_reset(self) -> None:
-        settings = Settings.from_registers(self._held, self._name)
+        settings = Settings.from_registers(self._held, self.part, self._name)
         if self._fifo is None:
             self._settings, self._fifo = settings, FifoDecoder(settings)
         elif settings != self._settings:

@@ -5,7 +5,7 @@ Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4, PS-MPU-6000A r3.4, PS-MPU-9250A r1
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..errors import ChipError
 
@@ -46,11 +46,13 @@ class Part:
     Attributes
     ----------
     chip : its name. who_am_i : what it answers to WHO_AM_I. family : how to treat it.
+    accel_sensitivity : accelerometer counts a g, over the nominal; revision C of the 6050 has half.
     """
 
     chip: str
     who_am_i: int
     family: Family
+    accel_sensitivity: float = 1.0
 
 
 MPU6050 = Family(
@@ -79,6 +81,8 @@ MPU6500 = Family(
     gyro_delay_ms=(0.97, 2.9, 3.9, 5.9, 9.9, 17.85, 33.48),
 )
 
+MPU6880 = replace(MPU6500, name="MPU-6880", fifo_bytes=4096)
+
 # FIFO_SIZE in ACCEL_CONFIG2 could widen this FIFO to 4096 bytes; the driver leaves it at 0, 512 bytes.
 CLONE98 = Family(
     name="ICM-20689",
@@ -101,8 +105,14 @@ PARTS = {
         Part("MPU-9250", 0x71, MPU6500),
         Part("MPU-9255", 0x73, MPU6500),
         Part("MPU-6515", 0x74, MPU6500),
-        Part("MPU-6880", 0x78, MPU6500),
+        Part("MPU-6880", 0x78, MPU6880),
         Part("ICM-20689", 0x98, CLONE98),
+        Part("ICM-20600", 0x11, CLONE98),
+        Part("ICM-20602", 0x12, CLONE98),
+        Part("ICM-20690", 0x20, CLONE98),
+        Part("IAM-20680", 0xA9, CLONE98),
+        Part("ICM-20608D", 0xAE, CLONE98),
+        Part("ICM-20608", 0xAF, CLONE98),
     )
 }
 

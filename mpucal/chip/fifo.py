@@ -6,6 +6,7 @@ A frame is 14 bytes, big-endian int16 in register order: accelerometer x, y, z, 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 
@@ -26,6 +27,8 @@ FULL_SCALE_COUNT = 32767
 MAX_TEMPERATURE_STEP = 400
 # The first frame after a reset may have been cut by it, and the filters are not settled.
 DROPPED_FRAMES = 2
+# Noise moves some of a frame's seven words: as many frames alike, over so long, are one that is repeated.
+STUCK_FRAMES, STUCK_S = 10, 0.05
 # Between two times that the regression would put in the wrong order, in sample intervals.
 LEAST_STEP = 0.1
 
@@ -35,6 +38,8 @@ class Fault(StrEnum):
 
     OVERFLOW = "overflow"
     MISALIGNED = "misaligned"
+    STUCK = "stuck"
+    LOST = "lost its settings"
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,8 @@ class FifoDecoder:
         self._odd_bytes = 0
         self._pending = bytearray()
         self._last_t_s: float | None = None
+        self._stuck_frames = max(STUCK_FRAMES, math.ceil(STUCK_S * settings.nominal_rate_hz))
+        self._alike = np.zeros((0, reg.FRAME_WORDS), np.int16)
 
     def temperature(self, count: int) -> None:
         """The temperature register shows `count`: what an aligned frame will show too."""
@@ -80,31 +87,56 @@ class FifoDecoder:
         """`data` was read from the FIFO."""
         self._pending += data
 
-    def judged(self, overflow: bool) -> Fault | None:
-        """Believe what the poll read, or say why not; then only a reset helps."""
+    def judged(self, overflow: bool, lost: bool = False) -> Fault | None:
+        """Believe what the poll read, or say why not; then only a reset helps.
+
+        Frames at the end that are all alike wait until one that is not follows them.
+        """
         data, look = bytes(self._pending), self._look
         self._pending.clear()
         self._look = None
+        if lost:
+            return Fault.LOST
         if overflow:
             return Fault.OVERFLOW
         if self._odd_bytes or len(data) % reg.FRAME_BYTES:
             return Fault.MISALIGNED
         frames = np.frombuffer(data, ">i2").reshape(-1, reg.FRAME_WORDS).astype(np.int16)
-        first = max(self._read, DROPPED_FRAMES)
-        kept = frames[first - self._read :]
+        kept = frames[max(DROPPED_FRAMES - self._read, 0) :]
         if not self._aligned(kept):
             return Fault.MISALIGNED
+        self._read += len(frames)
+        kept = np.concatenate((self._alike, kept))
+        if self._stuck(kept):
+            return Fault.STUCK
         if look is not None:
             self._clock.look(*look)
-        if len(kept):
-            self._runs.append(_Run(self._clock.segment, first, kept, gap=self._gap_before(first)))
-        self._read += len(frames)
+        self._believe(kept)
         return None
+
+    def _believe(self, kept: Counts) -> None:
+        """Keep all but the run of frames alike at the end, which the next poll decides on."""
+        differ = np.flatnonzero((kept[1:] != kept[:-1]).any(axis=1))
+        alike = len(kept) - (int(differ[-1]) + 1 if len(differ) else 0)
+        believed = len(kept) - alike if alike > 1 else len(kept)
+        self._alike = kept[believed:]
+        if believed:
+            first = self._read - len(kept)
+            self._runs.append(_Run(self._clock.segment, first, kept[:believed], gap=self._gap_before(first)))
+
+    def _stuck(self, kept: Counts) -> bool:
+        """Whether a frame repeats itself for too long."""
+        n = self._stuck_frames
+        if len(kept) < n:
+            return False
+        same = (kept[1:] == kept[:-1]).all(axis=1)
+        return bool((np.convolve(same, np.ones(n - 1, int), "valid") == n - 1).any())
 
     def reset(self) -> None:
         """The FIFO was emptied: what was in it is lost, and a frame begins at the next byte."""
         self._pending.clear()
         self._look = None
+        self._alike = self._alike[:0]
         self._clock.begin_segment()
         self._read = self._odd_bytes = 0
 
@@ -152,7 +184,7 @@ class FifoDecoder:
         gap[np.cumsum([0] + [len(run.frames) for run in runs[:-1]])] = [run.gap for run in runs]
         return Samples(
             t=self._times_s(runs),
-            acc=frames[:, ACCEL] * reg.mps2_per_lsb(settings.afs_sel),
+            acc=frames[:, ACCEL] * settings.mps2_per_lsb,
             gyr=frames[:, GYRO] * reg.rad_s_per_lsb(settings.fs_sel),
             temperature_c=frames[:, TEMPERATURE] / family.lsb_per_c + family.zero_c,
             gap=gap,

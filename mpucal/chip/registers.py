@@ -50,6 +50,7 @@ GYRO_FCHOICE_B: Final = 0x03
 # ACCEL_CONFIG2 (6500 only)
 ACCEL_FCHOICE_B: Final = 0x08
 A_DLPF_CFG: Final = 0x07
+FIFO_SIZE: Final = 0xC0  # ICM-20689 and its like
 
 # FIFO_EN
 FIFO_EN_TEMP: Final = 0x80

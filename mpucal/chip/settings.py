@@ -12,7 +12,7 @@ from typing import Self
 from ..data import Sensor
 from ..errors import RecordingError
 from . import registers as reg
-from .families import Part, part_of
+from .families import Part
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,17 @@ class Settings:
         return reg.sample_rate_hz(self.smplrt_div, self.dlpf_cfg)
 
     @property
+    def mps2_per_lsb(self) -> float:
+        """m/s^2 of one count of the accelerometer."""
+        return reg.mps2_per_lsb(self.afs_sel) / self.part.accel_sensitivity
+
+    @property
     def sensor(self) -> Sensor:
         """What is known of the sensor before it has measured."""
         return Sensor(
             chip=self.part.chip,
             who_am_i=self.part.who_am_i,
-            accel_range_g=float(reg.ACCEL_RANGES_G[self.afs_sel]),
+            accel_range_g=reg.ACCEL_RANGES_G[self.afs_sel] / self.part.accel_sensitivity,
             gyro_range_dps=float(reg.GYRO_RANGES_DPS[self.fs_sel]),
             rate_hz=self.nominal_rate_hz,
         )
@@ -60,14 +65,14 @@ class Settings:
         return values
 
     @classmethod
-    def from_registers(cls, held: Mapping[int, int], name: str = "the capture") -> Self:
-        """The settings that `held`, value by register address, means.
+    def from_registers(cls, held: Mapping[int, int], part: Part, name: str = "the capture") -> Self:
+        """The settings that `held`, value by register address, means for `part`.
 
         Raises
         ------
-        RecordingError : a register that matters is missing. ChipError : no known part.
+        RecordingError : a register that matters is missing.
         """
-        needed = (reg.WHO_AM_I, reg.SMPLRT_DIV, reg.CONFIG, reg.GYRO_CONFIG, reg.ACCEL_CONFIG)
+        needed = (reg.SMPLRT_DIV, reg.CONFIG, reg.GYRO_CONFIG, reg.ACCEL_CONFIG)
         missing = [f"0x{register:02x}" for register in needed if register not in held]
         if missing:
             raise RecordingError(
@@ -75,7 +80,7 @@ class Settings:
                 "record again from the start of the chip",
             )
         return cls(
-            part=part_of(held[reg.WHO_AM_I]),
+            part=part,
             smplrt_div=held[reg.SMPLRT_DIV],
             dlpf_cfg=held[reg.CONFIG] & reg.CONFIG_DLPF_CFG,
             fs_sel=(held[reg.GYRO_CONFIG] & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT,

@@ -11,7 +11,7 @@ from mpucal.bus.i2c import I2cBus
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.errors import BusError, NoAnswer
+from mpucal.errors import BusError, BusHeld, NoAnswer
 
 
 def test_registers_are_read_in_one_burst(adapter):
@@ -56,7 +56,7 @@ def test_a_kernel_driver_is_noticed_by_a_plain_read_first(adapter):
     [
         (errno.EREMOTEIO, NoAnswer, "nothing answers at 0x68"),
         (errno.ENXIO, NoAnswer, "nothing answers at 0x68"),
-        (errno.ETIMEDOUT, BusError, "does not come free .*holds SDA or SCL low"),
+        (errno.ETIMEDOUT, BusHeld, "does not come free .*holds SDA or SCL low"),
         (errno.EIO, BusError, "broke off .*shorten the wires"),
         (errno.EAGAIN, BusError, "another master"),
         (errno.EBUSY, BusError, "driver of the kernel"),

@@ -4,7 +4,7 @@ from mpucal.bus.records import SessionEvent
 from mpucal.bus.replay import ReplayBus
 from mpucal.bus.tap import Tap
 from mpucal.chip.access import EndOfCapture, Failure, Reply, Transaction
-from mpucal.errors import BusError, CaptureError, NoAnswer
+from mpucal.errors import BusError, BusHeld, CaptureError, NoAnswer
 
 READ = Transaction("read", 0x75, 1, b"\x68", 1000)
 WRITE = Transaction("write", 0x6B, 1, b"\x80", 2000)
@@ -76,6 +76,7 @@ def test_refuses_an_access_that_the_capture_does_not_hold(recorded, access, word
     ("failure", "kind"),
     [
         (Failure("NoAnswer", "nothing at 0x68", "check the wires"), NoAnswer),
+        (Failure("BusHeld", "the bus does not come free", "look for a short"), BusHeld),
         (Failure("BusError", "the transfer failed", "try again"), BusError),
         (Failure("BusErrorOfTheFuture", "the transfer failed", "try again"), BusError),
     ],

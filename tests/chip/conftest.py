@@ -25,7 +25,8 @@ class NumberedFeed:
 
     def samples(self, edges_s, setting):
         n = len(edges_s) - 1
-        rows = np.tile(np.array([0, -700, 8192, -2000, 1500, -1600, 1700], np.int16), (n, 1))
+        one_g = round(32768 / setting.accel_range_g)
+        rows = np.tile(np.array([0, -700, one_g, -2000, 1500, -1600, 1700], np.int16), (n, 1))
         rows[:, 0] = np.arange(self.next, self.next + n) % 30000
         self.next += n
         return rows

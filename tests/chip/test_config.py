@@ -1,5 +1,7 @@
 """What may be chosen, and what is said of the rest."""
 
+from dataclasses import replace
+
 import pytest
 
 from mpucal.chip.config import Config
@@ -26,6 +28,14 @@ def test_the_default_is_200_hz_at_4_g_and_500_deg_per_s():
 def test_what_the_chip_does_not_have_is_answered_with_what_it_has(chosen, allowed):
     with pytest.raises(UsageError, match=allowed):
         Config(**chosen)
+
+
+@pytest.mark.parametrize(("asked_g", "afs_sel"), [(2, 0), (4, 0), (8, 1), (16, 2)])
+def test_half_the_sensitivity_takes_the_range_that_is_asked_for(asked_g, afs_sel):
+    half = replace(part_of(0x68), accel_sensitivity=0.5)
+    settings = Config(accel_range_g=asked_g).settings(half)
+    assert settings.afs_sel == afs_sel
+    assert settings.sensor.accel_range_g == max(asked_g, 4)
 
 
 def test_one_kilohertz_is_polled_in_time_by_default():

@@ -1,5 +1,6 @@
 """FIFO bytes to samples, against frames packed one by one."""
 
+import itertools
 import struct
 
 import numpy as np
@@ -14,6 +15,7 @@ from mpucal.chip.settings import Settings
 SETTINGS = Settings(part_of(0x68), smplrt_div=4, dlpf_cfg=3, fs_sel=1, afs_sel=1)
 PERIOD_NS = 5_000_000
 QUIET = (100, -200, 8192, -2000, 5, -6, 7)
+FLICKER = itertools.count()
 
 int16 = st.integers(-32768, 32767)
 
@@ -22,13 +24,18 @@ def packed(*frames):
     return b"".join(struct.pack(">7h", *frame) for frame in frames)
 
 
+def calm(n):
+    """`n` frames of a board at rest, each a little different from the one before."""
+    return [(*QUIET[:6], 7 + next(FLICKER) % 3) for _ in range(n)]
+
+
 def fresh(frames_before=DROPPED_FRAMES):
     """A decoder whose FIFO was reset at time 0, and that has read as many frames as it drops."""
     decoder = FifoDecoder(SETTINGS)
     decoder.temperature(QUIET[3])
     decoder.reset()
     if frames_before:
-        poll(decoder, packed(*[QUIET] * frames_before), 0)
+        poll(decoder, packed(*calm(frames_before)), 0)
     return decoder
 
 
@@ -41,6 +48,7 @@ def poll(decoder, data, n, overflow=False):
 @given(st.lists(st.tuples(int16, int16, int16, st.integers(-2100, -1900), int16, int16, int16), min_size=1))
 def test_values_are_counts_times_nominal_scale(frames):
     decoder = fresh()
+    frames = [frame for frame, _ in itertools.groupby(frames)]
     assert poll(decoder, packed(*frames), 1) is None
     samples = decoder.take()
     for i, (ax, ay, az, temperature, gx, gy, gz) in enumerate(frames):
@@ -74,7 +82,7 @@ def test_samples_do_not_depend_on_how_polls_cut_them(sizes):
 def test_the_first_frames_are_dropped_whatever_they_hold():
     decoder = fresh(frames_before=0)
     junk = (1, 2, 3, 32000, 4, 5, 6)
-    assert poll(decoder, packed(*[junk] * DROPPED_FRAMES, QUIET), 0) is None
+    assert poll(decoder, packed(*[junk] * DROPPED_FRAMES, *calm(1)), 0) is None
     assert len(decoder.take()) == 1
 
 
@@ -97,18 +105,18 @@ def test_misaligned_frames_are_noticed_at_the_first(shift):
 )
 def test_what_cannot_be_believed_is_left_out_and_leaves_a_gap(data, overflow, fault):
     decoder = fresh()
-    poll(decoder, packed(QUIET, QUIET), 1)
+    poll(decoder, packed(*calm(2)), 1)
     assert poll(decoder, data, 2, overflow) is fault
     decoder.reset()
-    poll(decoder, packed(*[QUIET] * (DROPPED_FRAMES + 2)), 3)
-    poll(decoder, packed(QUIET), 4)
+    poll(decoder, packed(*calm(DROPPED_FRAMES + 2)), 3)
+    poll(decoder, packed(*calm(1)), 4)
     assert decoder.recording("x").gap.tolist() == [False, False, True, False, False]
 
 
 def test_a_count_of_no_whole_number_of_frames_is_misaligned_even_where_the_values_fit():
     decoder = fresh()
     decoder.counted(1, 2 * 14 + 4)
-    decoder.data(packed(QUIET, QUIET))
+    decoder.data(packed(*calm(2)))
     assert decoder.judged(False) is Fault.MISALIGNED
 
 
@@ -116,14 +124,14 @@ def test_a_reset_before_any_sample_leaves_no_gap():
     decoder = fresh(frames_before=0)
     poll(decoder, b"", 1, overflow=True)
     decoder.reset()
-    poll(decoder, packed(*[QUIET] * 4), 2)
+    poll(decoder, packed(*calm(4)), 2)
     assert not decoder.recording("x").gap.any()
 
 
 def test_what_was_not_judged_is_not_there():
     decoder = fresh()
     decoder.counted(0, 28)
-    decoder.data(packed(QUIET, QUIET))
+    decoder.data(packed(*calm(2)))
     assert len(decoder.take()) == len(decoder.recording("x")) == 0
 
 
@@ -140,7 +148,7 @@ def test_provisional_times_increase_and_final_times_are_regular():
         look_ns = n * 20_000_000 + int(rng.integers(0, 4_000_000))
         size = look_ns // 4_966_000 - taken
         decoder.counted(look_ns, size * 14)
-        decoder.data(packed(*[QUIET] * size))
+        decoder.data(packed(*calm(size)))
         assert decoder.judged(False) is None
         taken += size
         t.extend(decoder.take().t)
@@ -155,3 +163,39 @@ def test_provisional_times_increase_and_final_times_are_regular():
 def test_no_samples_are_a_recording_with_the_nominal_rate():
     recording = fresh(frames_before=0).recording("nothing yet")
     assert (len(recording), recording.sensor.rate_hz, recording.name) == (0, 200, "nothing yet")
+
+
+@pytest.mark.parametrize("cut", range(1, 12))
+def test_a_frame_that_repeats_itself_is_not_delivered(cut):
+    """However polls cut the run; what came before it was delivered, and after a reset there is a gap."""
+    decoder = fresh()
+    before, stuck = calm(3), [(*QUIET[:6], -9)] * 12
+    faults = [poll(decoder, packed(*before, *stuck[:cut]), 1)]
+    if faults[0] is None:
+        faults.append(poll(decoder, packed(*stuck[cut:]), 2))
+    assert faults[-1] is Fault.STUCK
+    # the first of the run may be as true as those before it
+    assert len(decoder.take()) == (0 if len(faults) == 1 else 4 if cut == 1 else 3)
+    decoder.reset()
+    poll(decoder, packed(*calm(DROPPED_FRAMES + 2)), 3)
+    assert decoder.recording("x").gap.any() == (faults[0] is None)
+
+
+@given(st.lists(st.integers(1, 9), min_size=1, max_size=12), st.lists(st.integers(1, 20), min_size=1, max_size=12))
+def test_frames_that_are_alike_for_less_long_all_arrive(runs, sizes):
+    frames = [(*QUIET[:5], n % 2, n) for n, run in enumerate(runs) for _ in range(run)] + calm(1)
+    decoder, at = fresh(), 0
+    for n, size in enumerate([*sizes, len(frames)]):
+        assert poll(decoder, packed(*frames[at : at + size]), n) is None
+        at += size
+    recording = decoder.recording("x")
+    assert len(recording) == len(frames)
+    assert np.rint(np.degrees(recording.gyr[:-1, 2]) * 65.5).tolist() == [frame[6] for frame in frames[:-1]]
+
+
+def test_a_chip_that_was_reset_is_not_believed():
+    decoder = fresh()
+    decoder.counted(1, 28)
+    decoder.data(packed(*calm(2)))
+    assert decoder.judged(overflow=False, lost=True) is Fault.LOST
+    assert len(decoder.take()) == 0

@@ -97,7 +97,7 @@ def test_what_cannot_work_says_so(mpucal, tmp_path, words, code, sentence):
 
 def test_no_folder_is_left_where_nothing_answered(mpucal, tmp_path):
     mpucal("session", "--bus", "/dev/i2c-99")
-    mpucal("session", "--bus", "sim:who_am_i=0x42")
+    mpucal("session", "--bus", "sim:who_am_i=0xff")
     assert list(tmp_path.iterdir()) == []
 
 

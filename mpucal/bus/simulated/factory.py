@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...chip import registers as reg
 from ...chip.families import Family
 from ...data import Vector
 
+Whole = NDArray[np.int64]
 Three = tuple[float, float, float]
 Codes = tuple[int, int, int]
 
@@ -76,7 +78,7 @@ class Factory:
         return [*bytes_, x << 4 | y << 2 | z]
 
 
-def _responses(family: Family, accel_codes: Vector, gyro_codes: Vector) -> Vector:
+def _responses(family: Family, accel_codes: Whole, gyro_codes: Whole) -> Vector:
     """(2, 3) what the codes stand for: g, then deg/s."""
     if family.packed_self_test:
         accel_g = 0.34 * (0.92 / 0.34) ** ((accel_codes - 1) / 30)
@@ -85,7 +87,7 @@ def _responses(family: Family, accel_codes: Vector, gyro_codes: Vector) -> Vecto
     return np.asarray(counts / np.array([[reg.ACCEL_LSB_PER_G[0]], [reg.GYRO_LSB_PER_DPS[0]]]))
 
 
-def _whole(values: Vector) -> Codes:
+def _whole(values: Whole) -> Codes:
     x, y, z = (int(value) for value in values)
     return x, y, z
 

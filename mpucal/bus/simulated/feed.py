@@ -13,6 +13,8 @@ from .motion import Motion
 from .sensor import FULL_SCALE, Counts, Response, Setting, Truth
 
 RECORDED_C = 25.0
+# until a driver has found out which chip it is, it may be set otherwise
+UNSET_S = 1.0
 
 
 class Feed(Protocol):
@@ -65,30 +67,39 @@ class RecordedFeed:
             )
         self._acc, self._gyr = acc, gyr
         self._next = 0
+        self._unset_s: float | None = None
         self._recorded = {"Hz": rate_hz, "g": accel_range_g, "deg/s": gyro_range_dps}
 
     def samples(self, edges_s: Vector, setting: Setting) -> Counts:
         """The next samples, at 25 C; fewer than asked for at the end.
 
+        A chip that is set otherwise than the recording lies flat meanwhile.
+
         Raises
         ------
-        UsageError : the chip is set to another rate or range than the recording's.
+        UsageError : it stays set to another rate or range.
         """
-        self._check(setting)
+        temperature = round((RECORDED_C - setting.zero_c) * setting.lsb_per_c)
+        if other := self._set_otherwise(setting):
+            self._unset_s = float(edges_s[0]) if self._unset_s is None else self._unset_s
+            if self._next or edges_s[-1] > self._unset_s + UNSET_S:
+                raise other
+            flat = [0, 0, round(FULL_SCALE / setting.accel_range_g), temperature, 0, 0, 0]
+            return np.tile(np.array(flat, np.int16), (len(edges_s) - 1, 1))
         part = slice(self._next, self._next + len(edges_s) - 1)
         acc, gyr = self._acc[part], self._gyr[part]
         self._next += len(acc)
-        temperature = round((RECORDED_C - setting.zero_c) * setting.lsb_per_c)
         return np.hstack((acc, np.full((len(acc), 1), temperature, np.int16), gyr))
 
-    def _check(self, setting: Setting) -> None:
+    def _set_otherwise(self, setting: Setting) -> UsageError | None:
         chosen = {"Hz": setting.rate_hz, "g": setting.accel_range_g, "deg/s": setting.gyro_range_dps}
         for unit, recorded in self._recorded.items():
             if not np.isclose(chosen[unit], recorded, rtol=0.01):
-                raise UsageError(
+                return UsageError(
                     f"the chip is set to {chosen[unit]:g} {unit}, the recording to {recorded:g} {unit}",
                     "set the chip to the same",
                 )
+        return None
 
 
 def _counts(values: ArrayLike, of: str) -> Counts:

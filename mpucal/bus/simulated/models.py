@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from ...chip import registers as reg
-from ...chip.families import CLONE98, MPU6050, MPU6500, Family
+from ...chip.families import CLONE98, MPU6050, MPU6500, MPU6880, Family
 from .factory import Factory
 
 AWAKE = 0x01
@@ -83,7 +83,7 @@ MODELS = {
         Model("mpu6050", MPU6050, 0x68, reg.PWR_MGMT_1_SLEEP, reset_needs_fifo_off=True),
         Model("mpu6050c", MPU6050, 0x68, reg.PWR_MGMT_1_SLEEP, accel_sensitivity=0.5, reset_needs_fifo_off=True),
         Model("mpu6500", MPU6500, 0x70, AWAKE),
-        Model("mpu6880", replace(MPU6500, fifo_bytes=4096), 0x78, AWAKE),
+        Model("mpu6880", MPU6880, 0x78, AWAKE),
         Model("clone98", CLONE98, 0x98, reg.PWR_MGMT_1_SLEEP, fifo_size_bits=True),
     )
 }

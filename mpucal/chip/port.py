@@ -1,0 +1,70 @@
+"""One chip's registers over any bus: with retries of what may be repeated, and everything told to a decoder.
+
+Knows no sequence of accesses, and no clock but the bus's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from ..errors import BusError
+from .access import Bus
+from .decode import Decoder
+
+TRIES = 3
+RETRY_NS = 1_000_000
+
+T = TypeVar("T")
+
+
+class Port:
+    """Reads and writes, each of them followed by `decoder` where it succeeded.
+
+    Every method raises BusError where a transfer failed, EndOfCapture where a replay has ended.
+    """
+
+    def __init__(self, bus: Bus, decoder: Decoder) -> None:
+        self._bus = bus
+        self._decoder = decoder
+        self._now_ns = 0
+
+    @property
+    def now_ns(self) -> int:
+        """The bus's clock as last seen."""
+        return self._now_ns
+
+    def read(self, register: int, count: int) -> bytes:
+        """`count` bytes from `register` on; up to three tries."""
+        return self._retried(lambda: self.read_once(register, count))
+
+    def read_once(self, register: int, count: int) -> bytes:
+        """The same where reading takes something away from the chip, so that a second read gives something else."""
+        reply = self._bus.read(register, count)
+        self._now_ns = max(self._now_ns, reply.t_ns)
+        self._decoder.saw_read(register, reply.data, reply.t_ns)
+        return reply.data
+
+    def write(self, register: int, value: int) -> None:
+        """Write one byte; up to three tries."""
+        data = bytes([value])
+        t_ns = self._retried(lambda: self._bus.write(register, data))
+        self._now_ns = max(self._now_ns, t_ns)
+        self._decoder.saw_write(register, data)
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Wait until the bus's clock shows `t_ns`."""
+        self._bus.sleep_until(t_ns)
+        self._now_ns = max(self._now_ns, t_ns)
+
+    def sleep(self, ns: int) -> None:
+        """Wait for so long."""
+        self.sleep_until(self._now_ns + ns)
+
+    def _retried(self, access: Callable[[], T]) -> T:
+        for _ in range(TRIES - 1):
+            try:
+                return access()
+            except BusError:
+                self.sleep(RETRY_NS)
+        return access()

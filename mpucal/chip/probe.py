@@ -1,0 +1,98 @@
+"""Finds out which chip it is: refuses strangers by reading alone, then watches how it behaves. Knows no verdict.
+
+What the replies say is decided in identity.py, from a capture as well.
+"""
+
+from __future__ import annotations
+
+from ..errors import ChipError
+from . import registers as reg
+from .families import MPU6050, MPU6500, PARTS
+from .port import Port
+
+MS = 1_000_000
+
+# Awake after a reset a chip takes 8000 samples a second, and 293 frames fill the largest FIFO; clones may be slower.
+LOOK_NS = 15 * MS
+LOOKS = 45
+SIGHTS, SIGHT_NS = 8, 10 * MS
+
+# What every part knows of these two: unused bits are 0.
+POWER_UNUSED = reg.PWR_MGMT_1_DEVICE_RESET
+FIFO_COUNT_MAX = 4096
+
+
+def read_identity(port: Port) -> int:
+    """WHO_AM_I, and where no part answers so, a look at whether this may be one at all.
+
+    Raises
+    ------
+    ChipError : it is something else, which must not be written to.
+    """
+    who_am_i = port.read(reg.WHO_AM_I, 1)[0]
+    if who_am_i in PARTS:
+        return who_am_i
+    head = port.read(0, 7)
+    power = port.read(reg.PWR_MGMT_1, 1)[0]
+    count = int.from_bytes(port.read(reg.FIFO_COUNT_H, 2), "big")
+    if _shows_a_time(head):
+        raise ChipError(
+            "the chip at this address is a real-time clock (a DS1307 or DS3231), not an MPU",
+            "tie the MPU's AD0 to VCC and give --address 0x69",
+        )
+    if who_am_i in (0x00, 0xFF) or power & POWER_UNUSED or count > FIFO_COUNT_MAX:
+        known = ", ".join(f"0x{value:02x} {part.chip}" for value, part in sorted(PARTS.items()))
+        raise ChipError(
+            f"the chip answers 0x{who_am_i:02x} to WHO_AM_I and has no MPU's registers",
+            f"check which chip is at this address (known are {known})",
+        )
+    return who_am_i
+
+
+def probe(port: Port) -> None:
+    """Fill the FIFO of a chip that was reset and is awake, and see what it shows of gravity."""
+    port.write(reg.FIFO_EN, reg.FIFO_EN_FRAME)
+    port.write(reg.USER_CTRL, reg.USER_CTRL_FIFO_EN)
+    full = _filled(port)
+    if full <= MPU6500.fifo_bytes:
+        port.write(reg.ACCEL_CONFIG2, reg.FIFO_SIZE)
+        _filled(port)
+    port.write(reg.FIFO_EN, 0)
+    port.write(reg.USER_CTRL, 0)
+    if MPU6500.fifo_bytes < full <= MPU6050.fifo_bytes:
+        for _ in range(SIGHTS):
+            port.sleep(SIGHT_NS)
+            port.read(reg.ACCEL_XOUT_H, 6)
+
+
+def _filled(port: Port) -> int:
+    """How many bytes the FIFO holds once they do not get more.
+
+    Raises
+    ------
+    ChipError : they never do.
+    """
+    before = 0
+    for _ in range(LOOKS):
+        port.sleep(LOOK_NS)
+        count = int.from_bytes(port.read(reg.FIFO_COUNT_H, 2), "big")
+        if count and count == before:
+            return count
+        before = count
+    raise ChipError(
+        "the chip's FIFO does not fill as its register map says",
+        "take its supply away for a moment; if it stays so, the chip is broken or no MPU",
+    )
+
+
+def _shows_a_time(head: bytes) -> bool:
+    """Whether the first seven registers are seconds, minutes, hours, weekday, day, month, year, as decimal digits."""
+    low = (0, 0, 0, 1, 1, 1, 0)
+    high = (59, 59, 23, 7, 31, 12, 99)
+    # the clock's halt flag, 12 h mode and the century are flags in the upper bits
+    masks = (0x7F, 0x7F, 0x3F, 0x07, 0x3F, 0x1F, 0xFF)
+    for byte, mask, least, most in zip(head, masks, low, high, strict=True):
+        tens, ones = divmod(byte & mask, 16)
+        if ones > 9 or not least <= 10 * tens + ones <= most:
+            return False
+    return True

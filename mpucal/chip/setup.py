@@ -1,0 +1,103 @@
+"""Sets a chip up and starts its FIFO, in the order that its register map asks for. Knows no FIFO data.
+
+Source: RM-MPU-6000A r4.2 registers 104, 106 and 107; the start-up times of both product specifications are shorter.
+"""
+
+from __future__ import annotations
+
+from ..errors import ChipError
+from . import registers as reg
+from .port import Port
+from .settings import Settings
+
+MS = 1_000_000
+RESET_NS = 100 * MS
+WAKE_NS = 100 * MS
+SETTLE_NS = 100 * MS
+WAKE_TRIES = 5
+
+
+def reset(port: Port) -> None:
+    """All registers as after power-on, the accelerometer's factory trim too."""
+    port.write(reg.PWR_MGMT_1, reg.PWR_MGMT_1_DEVICE_RESET)
+    port.sleep(RESET_NS)
+    port.write(reg.SIGNAL_PATH_RESET, reg.SIGNAL_PATH_RESET_ALL)
+    port.sleep(RESET_NS)
+
+
+def wake(port: Port) -> None:
+    """Out of sleep, on the gyroscope's clock.
+
+    Raises
+    ------
+    ChipError : it does not wake up.
+    """
+    for _ in range(WAKE_TRIES):
+        port.write(reg.PWR_MGMT_1, reg.CLKSEL_PLL)
+        port.sleep(WAKE_NS)
+        held = port.read(reg.PWR_MGMT_1, 1)[0]
+        if held == reg.CLKSEL_PLL:
+            return
+    raise ChipError(
+        f"the chip does not wake up (its PWR_MGMT_1 stays at 0x{held:02x})",
+        "take its supply away for a moment, and check that it gets 3.3 V",
+    )
+
+
+def configure(port: Port, settings: Settings) -> None:
+    """Write what `settings` asks for, and read it back.
+
+    Raises
+    ------
+    ChipError : a register does not keep what was written.
+    """
+    wanted, chip = _wanted(settings), settings.part.chip
+    for register, value in wanted.items():
+        port.write(register, value)
+    for register, value in wanted.items():
+        held = port.read(register, 1)[0]
+        if held != value:
+            raise ChipError(
+                f"register 0x{register:02x} of the {chip} reads 0x{held:02x} after 0x{value:02x} was written",
+                "check its wiring and supply, and that no other program uses it",
+            )
+    port.sleep(SETTLE_NS)
+
+
+def configured(port: Port, settings: Settings) -> bool:
+    """Whether the chip still holds what `configure` wrote, and is awake."""
+    awake = port.read(reg.PWR_MGMT_1, 1)[0] == reg.CLKSEL_PLL
+    return awake and all(port.read(register, 1)[0] == value for register, value in _wanted(settings).items())
+
+
+def restart_fifo(port: Port) -> None:
+    """Empty the FIFO and fill it anew; it resets only while it is disabled (RM-MPU-6000A r4.2, register 106).
+
+    Raises
+    ------
+    ChipError : it does not start.
+    """
+    port.write(reg.FIFO_EN, 0)
+    port.write(reg.USER_CTRL, 0)
+    port.write(reg.USER_CTRL, reg.USER_CTRL_FIFO_RESET)
+    port.write(reg.USER_CTRL, reg.USER_CTRL_FIFO_EN)
+    port.read(reg.INT_STATUS, 1)
+    port.read(reg.TEMP_OUT_H, 2)
+    port.write(reg.FIFO_EN, reg.FIFO_EN_FRAME)
+    held = port.read(reg.FIFO_EN, 1) + port.read(reg.USER_CTRL, 1)
+    if held != bytes([reg.FIFO_EN_FRAME, reg.USER_CTRL_FIFO_EN]):
+        raise ChipError(
+            f"the chip's FIFO does not start (FIFO_EN and USER_CTRL read {held.hex(' ')})",
+            "check its wiring and supply, and that no other program uses it",
+        )
+
+
+def quiet(port: Port) -> None:
+    """The FIFO off; the chip stays awake."""
+    port.write(reg.FIFO_EN, 0)
+    port.write(reg.USER_CTRL, 0)
+
+
+def _wanted(settings: Settings) -> dict[int, int]:
+    """By register, in the order of writing. INT_ENABLE also tells a chip that was reset: it is 0 then."""
+    return {reg.PWR_MGMT_2: 0, reg.INT_ENABLE: reg.INT_FIFO_OFLOW, **settings.registers()}

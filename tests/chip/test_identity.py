@@ -1,0 +1,174 @@
+"""Which chip it is by its behaviour, told from the accesses alone; and what must not be written to."""
+
+import re
+
+import numpy as np
+import pytest
+
+from mpucal.bus.simulated import open_simulated
+from mpucal.bus.tap import Tap
+from mpucal.chip import registers as reg
+from mpucal.chip.access import Reply
+from mpucal.chip.config import Config
+from mpucal.chip.decode import decode
+from mpucal.chip.driver import Driver
+from mpucal.chip.families import CLONE98, MPU6050, MPU6500, PARTS
+from mpucal.chip.identity import Evidence, remark
+from mpucal.data import Sensor
+from mpucal.errors import ChipError
+
+FILLING = {reg.FIFO_EN: reg.FIFO_EN_FRAME}
+WIDENED = FILLING | {reg.ACCEL_CONFIG2: reg.FIFO_SIZE}
+
+
+def evidence(fifo_bytes, widened_bytes=None, magnitude_g=None):
+    seen = Evidence()
+    seen.saw(reg.FIFO_COUNT_H, (fifo_bytes // 2).to_bytes(2, "big"), FILLING)
+    seen.saw(reg.FIFO_COUNT_H, fifo_bytes.to_bytes(2, "big"), FILLING)
+    if widened_bytes is not None:
+        seen.saw(reg.FIFO_COUNT_H, widened_bytes.to_bytes(2, "big"), WIDENED)
+    for _ in range(0 if magnitude_g is None else 5):
+        axes = np.rint(np.array([0.6, 0.0, 0.8]) * magnitude_g * 16384).astype(">i2")
+        seen.saw(reg.ACCEL_XOUT_H, axes.tobytes(), {})
+    return seen
+
+
+@pytest.mark.parametrize(
+    ("who_am_i", "seen", "chip", "family"),
+    [
+        pytest.param(0x68, evidence(1024, magnitude_g=1.05), "MPU-6050", MPU6050, id="a 6050"),
+        pytest.param(0x68, evidence(1020), "MPU-6050", MPU6050, id="whose count stops early"),
+        pytest.param(0x68, evidence(1024, magnitude_g=0.55), "MPU-6050C", MPU6050, id="of revision C"),
+        pytest.param(0x70, evidence(512, 512), "MPU-6500", MPU6500, id="a 6500"),
+        pytest.param(0x71, evidence(512, 512), "MPU-9250", MPU6500, id="a 9250"),
+        pytest.param(0x98, evidence(512, 4096), "ICM-20689", CLONE98, id="the 0x98 clone"),
+        pytest.param(0x98, evidence(512, 512), "ICM-20689", CLONE98, id="whose FIFO does not grow"),
+        pytest.param(0xAF, evidence(512, 512), "ICM-20608", CLONE98, id="a 20608"),
+        pytest.param(0x68, evidence(512, 512), "MPU-6500", MPU6500, id="a 6500 that answers as a 6050"),
+        pytest.param(0x68, evidence(512, 4096), "ICM-20689", CLONE98, id="a 0x98 clone that answers as a 6050"),
+        pytest.param(0x70, evidence(512, 4096), "ICM-20689", CLONE98, id="or as a 6500"),
+        pytest.param(0x70, evidence(1024, magnitude_g=1), "MPU-6050", MPU6050, id="a 6050 that answers as a 6500"),
+        pytest.param(0x72, evidence(512, 512), "MPU-6500", MPU6500, id="an unknown clone of a 6500"),
+        pytest.param(0x19, evidence(1024, magnitude_g=1), "MPU-6050", MPU6050, id="an unknown clone of a 6050"),
+    ],
+)
+def test_behaviour_decides(who_am_i, seen, chip, family):
+    part = seen.part(who_am_i)
+    assert (part.chip, part.who_am_i) == (chip, who_am_i)
+    assert part.family == family
+    assert part.accel_sensitivity == (0.5 if chip.endswith("C") else 1.0)
+
+
+def test_the_size_of_a_fifo_is_the_one_it_showed():
+    assert evidence(4096).part(0x78).family.fifo_bytes == 4096
+    assert evidence(1008, 1008).part(0x12).family.fifo_bytes == 1008
+
+
+def test_an_unknown_chip_with_an_unknown_fifo_is_refused():
+    with pytest.raises(ChipError, match="answers 0x33 to WHO_AM_I and its FIFO holds 700 bytes"):
+        evidence(700).part(0x33)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "says"),
+    [
+        pytest.param(Sensor(), None, id="nobody said"),
+        pytest.param(Sensor("MPU-6050", 0x68), None, id="what it says it is"),
+        pytest.param(
+            Sensor("MPU-6500", 0x68), "0x68 to WHO_AM_I as an MPU-6050 does, but .* as an MPU-6500", id="else"
+        ),
+        pytest.param(Sensor("MPU-6500", 0x72), "0x72 to WHO_AM_I, which no part known .* as an MPU-6500", id="unknown"),
+        pytest.param(Sensor("MPU-6050C", 0x68), "revision C, with half the sensitivity", id="revision C"),
+    ],
+)
+def test_what_a_person_is_told(sensor, says):
+    told = remark(sensor)
+    assert told is None if says is None else re.search(says, told)
+
+
+class Kept(list):
+    def transaction(self, transaction):
+        self.append(transaction)
+
+
+@pytest.mark.parametrize(
+    ("chip", "behaves"),
+    [
+        ("mpu6050", "MPU-6050"),
+        ("mpu6050c", "MPU-6050C"),
+        ("mpu6500", "MPU-6500"),
+        ("mpu6880", "MPU-6880"),
+        ("clone98", "ICM-20689"),
+    ],
+)
+@pytest.mark.parametrize("who_am_i", [None, 0x68, 0x70, 0x72], ids=["own", "as a 6050", "as a 6500", "unknown"])
+def test_a_simulated_chip_is_recognised_whatever_it_answers(chip, behaves, who_am_i, same):
+    """And a capture of it tells the same; gravity, temperature and rate come out as they are."""
+    said = "" if who_am_i is None else f",who_am_i={who_am_i}"
+    bus, kept = open_simulated(f"sim:seed=4,chip={chip},noise=0,b_a=0/0/0,temperature_c=30{said}"), Kept()
+    driver = Driver(Tap(bus, kept), Config(accel_range_g=8))
+    sensor = driver.start()
+    for _ in range(20):
+        driver.poll()
+    recording = driver.recording()
+    assert sensor.chip == behaves
+    assert sensor.accel_range_g == 8
+    assert np.linalg.norm(recording.acc, axis=1).mean() == pytest.approx(9.8, abs=0.5)
+    assert recording.temperature_c.mean() == pytest.approx(30, abs=0.1)
+    assert same(decode(kept), recording)
+
+
+class Stranger:
+    """A chip that is none of ours: 128 registers, as given."""
+
+    def __init__(self, registers):
+        self.registers, self.writes = registers, 0
+
+    def read(self, register, count):
+        return Reply(bytes(self.registers.get((register + i) % 0x80, 0) for i in range(count)), 0)
+
+    def write(self, register, data):
+        self.writes += 1
+        return 0
+
+    def sleep_until(self, t_ns):
+        pass
+
+
+def clock_chip(wrap, identity=0x25):
+    """23:59:45 on Saturday the 31st of December, then memory, again and again after `wrap` registers."""
+    time = [0x45, 0x59, 0x23, 0x07, 0x31, 0x12, 0x99]
+    registers = {i: time[i % wrap] if i % wrap < 7 else identity for i in range(128)}
+    return registers | {reg.WHO_AM_I: identity, reg.FIFO_COUNT_H: 0, reg.PWR_MGMT_1: 0}
+
+
+@pytest.mark.parametrize(
+    ("registers", "says"),
+    [
+        pytest.param(
+            clock_chip(0x40), "is a real-time clock .*DS1307 or DS3231.*AD0 to VCC .* --address 0x69", id="RTC"
+        ),
+        pytest.param(clock_chip(0x13), "is a real-time clock", id="a DS3231"),
+        pytest.param(
+            {reg.WHO_AM_I: 0x61, reg.PWR_MGMT_1: 0xA5}, "0x61 to WHO_AM_I and has no MPU's", id="another chip"
+        ),
+        pytest.param({reg.WHO_AM_I: 0x61, reg.FIFO_COUNT_H: 0x80}, "0x61 to WHO_AM_I and has no MPU's", id="no FIFO"),
+        pytest.param({}, "0x00 to WHO_AM_I", id="nothing but zeros"),
+        pytest.param(dict.fromkeys(range(128), 0xFF), "0xff to WHO_AM_I", id="nothing but ones"),
+    ],
+)
+def test_a_stranger_is_refused_by_reading_alone(registers, says):
+    stranger = Stranger(registers)
+    with pytest.raises(ChipError, match=says):
+        Driver(stranger).start()
+    assert stranger.writes == 0
+
+
+def test_a_part_of_the_table_whose_fifo_never_fills_is_refused():
+    registers = {reg.WHO_AM_I: 0x68, reg.PWR_MGMT_1: 0x01}
+    with pytest.raises(ChipError, match="FIFO does not fill as its register map says"):
+        Driver(Stranger(registers)).start()
+
+
+def test_every_part_is_found_by_its_identity():
+    assert all(part.who_am_i == who_am_i for who_am_i, part in PARTS.items())
