@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,11 @@ from .. import __version__
 from ..bus.records import SessionEvent
 from ..chip.config import Config
 from ..data import Recording
-from ..errors import CaptureError
+from ..errors import CaptureError, LinkError
 from ..mavlink.link import Link
 from ..mavlink.log import read_log
 from ..mavlink.notes import Note, to_messages
+from ..mavlink.prompts import to_message
 from ..mavlink.recorded import RecordedSource
 from ..mavlink.replay import Replay
 from ..mavlink.source import VehicleSource
@@ -33,45 +34,70 @@ SOURCE_VERSION = 1
 NOTE_IDS = 65535
 
 
-@dataclass(frozen=True)
 class OnLink:
     """A transport to a vehicle, and what comes with its kind; see Opened.
 
-    Attributes
+    Parameters
     ----------
     transport : open. plan : what to do; of its `config` the rate matters. system : whom to lock to.
-    key : to sign with, or None. replay : the same transport where it is a replay.
+    key : to sign with, or None. listeners : hear the prompts, besides the vehicle.
+    truth : of a simulated vehicle. replay : the same transport where it is a replay.
+
+    Attributes
+    ----------
+    link : to the vehicle, while it measures.
     """
 
-    transport: Transport
-    plan: Plan
-    system: int | None = None
-    key: bytes | None = None
-    listeners: Sequence[Callable[[Prompt], None]] = ()
-    truth: Mapping[str, Any] | None = None
-    replay: Replay | None = None
-    recovered: str | None = None
-    capture_name: str = CAPTURE
+    capture_name = CAPTURE
+
+    def __init__(
+        self,
+        transport: Transport,
+        plan: Plan,
+        system: int | None = None,
+        key: bytes | None = None,
+        *,
+        listeners: Sequence[Callable[[Prompt], None]] = (),
+        truth: Mapping[str, Any] | None = None,
+        replay: Replay | None = None,
+        recovered: str | None = None,
+    ) -> None:
+        self.plan = plan
+        self.listeners = (self._prompt, *listeners)
+        self.truth = truth
+        self.recovered = recovered
+        self.link: Link | None = None
+        self._transport = transport
+        self._system = system
+        self._key = key
+        self._replay = replay
 
     def talk(self, person: Talk) -> Talk:
         """See Opened."""
-        return person if self.replay is None else Replayed(person, self._pending)
+        return person if self._replay is None else Replayed(person, self._pending)
 
     @contextmanager
     def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[Measuring]:
         """See Opened."""
-        with closing(self.transport), TlogWriter(capture) as writer:
-            link = Link(self.transport, writer.packet, self.key)
+        with closing(self._transport), TlogWriter(capture) as writer:
+            link = self.link = Link(self._transport, writer.packet, self._key)
             notes = _Noting(link)
-            plan = {SOURCE: SOURCE_VERSION, PLAN: asdict(self.plan), SYSTEM: self.system}
+            plan = {SOURCE: SOURCE_VERSION, PLAN: asdict(self.plan), SYSTEM: self._system}
             notes.keep(SESSION, 0, {MPUCAL: __version__, RECORDED: recorded, **plan})
-            source = VehicleSource(link, self.plan.config.rate_hz, self.system, say, capture.name)
+            source = VehicleSource(link, self.plan.config.rate_hz, self._system, say, capture.name)
             yield Measuring(source, notes.keep)
 
+    def _prompt(self, prompt: Prompt) -> None:
+        """Tell the vehicle, whose log then says what was done to it."""
+        if self.link is not None:
+            # a vehicle that is gone is no reason to keep a prompt from the person
+            with suppress(LinkError):
+                self.link.send(to_message(prompt))
+
     def _pending(self) -> Sequence[SessionEvent]:
-        if self.replay is None:
+        if self._replay is None:
             return []
-        return [SessionEvent(noted.note.name, noted.t_ns, noted.note.data) for noted in self.replay.pending()]
+        return [SessionEvent(noted.note.name, noted.t_ns, noted.note.data) for noted in self._replay.pending()]
 
 
 @dataclass(frozen=True)
