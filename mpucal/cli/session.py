@@ -31,14 +31,15 @@ EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board
 @click.option("--yes", is_flag=True, help="Ask nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print calibration.json, and nothing else.")
 @click.option("--json-events", is_flag=True, help="Say each event as a line of JSON, on stderr.")
-def command(folder: Path | None, yes: bool, as_json: bool, json_events: bool, **options: Any) -> int:
+@click.option("--beep/--no-beep", default=None, help="Ring at each change of prompt; by default on a terminal.")
+def command(folder: Path | None, yes: bool, as_json: bool, json_events: bool, beep: bool | None, **options: Any) -> int:
     """Lay flat, rotate, calibrate: leaves capture.mcap, calibration.json, calibration.bin and report.html.
 
     Exit code 4: it was stopped before there was anything to calibrate; 5: the calibration was refused.
     """
     check_source(click.get_current_context())
     source = opened(options)
-    person = console(quiet=yes, as_json=json_events)
+    person = console(quiet=yes, as_json=json_events, beep=beep)
     place = Place(folder, source.capture_name)
     finished = False
     try:

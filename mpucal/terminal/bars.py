@@ -1,0 +1,117 @@
+"""The rows below the pictures: stillness, what is known, the last warning, the keys. Knows no terminal."""
+
+from __future__ import annotations
+
+import textwrap
+
+from rich.text import Text
+
+from ..session.events import Direction, PromptKind
+from .glyphs import Glyphs
+from .view import View
+
+KNOWLEDGE_ROWS = 3
+_LABEL, _NEEDLE = 14, 24
+_WIDE = 110
+# words are wrapped no narrower, and cut instead
+NARROWEST = 12
+# standard deviations beyond this mean that nothing is known
+UNKNOWN = 100.0
+# a warning is loud for so long, and then remembered quietly
+LOUD_S = 6.0
+KEYS = "Enter: go on now    q or Ctrl-C: stop"
+KEYS_REDO = "Enter: go on now    r: turn it again from the start    q or Ctrl-C: stop"
+
+
+def bar(share: float, columns: int, glyphs: Glyphs) -> str:
+    """`columns` characters, the given share of them full."""
+    full = round(min(max(share, 0.0), 1.0) * columns)
+    return glyphs.full * full + glyphs.empty * (columns - full)
+
+
+def meter(view: View, glyphs: Glyphs) -> Text:
+    """The needle between still and moving, and what moves the board or what is waited for."""
+    m = view.meter
+    if m is None:
+        return Text("")
+    # the limit of stillness stands in the middle
+    at = min(int(0.5 * m.level * _NEEDLE), _NEEDLE - 1)
+    cells = [glyphs.full if k <= at else glyphs.empty for k in range(_NEEDLE)]
+    cells[_NEEDLE // 2] = glyphs.mark
+    style = "green" if m.still else "yellow"
+    waiting = view.waiting
+    said = "still" if m.still else f"moving: {m.what}" if m.what else "moving"
+    if waiting is not None:
+        said += f", {waiting.remaining_s:.0f} s to go" + (" (paused)" if waiting.paused else "")
+    return Text.assemble(f" {'stillness':<{_LABEL}}", ("".join(cells), style), f"  {said}")
+
+
+def knowledge_rows(view: View, columns: int, glyphs: Glyphs) -> list[Text]:
+    """KNOWLEDGE_ROWS rows: how well each group of parameters is known, or what there is to say instead."""
+    kind = view.prompt.kind if view.prompt is not None else None
+    if kind is PromptKind.VERIFY and view.verified:
+        rows = [_said(v.text, "green" if v.agrees else "bold yellow") for v in view.verified[-KNOWLEDGE_ROWS:]]
+    elif kind is PromptKind.REST or view.knowledge is None:
+        rows = [*_progress(view, glyphs), *(_said(note, "") for note in view.notes[-2:])]
+    else:
+        k = view.knowledge
+        rows = [
+            _group("gain", k.gain, k.gain_pct, k.target.gain_pct, "%", columns, glyphs),
+            _group(
+                "misalignment", k.misalignment, k.misalignment_deg, k.target.misalignment_deg, "deg", columns, glyphs
+            ),
+            _group("bias", k.bias, k.bias_mg, k.target.bias_mg, "mg", columns, glyphs),
+        ]
+    return [*rows, *[Text("")] * KNOWLEDGE_ROWS][:KNOWLEDGE_ROWS]
+
+
+def caution_rows(view: View, columns: int, glyphs: Glyphs) -> list[Text]:
+    """Two rows: the last warning, and what to do about it."""
+    c = view.caution
+    if c is None or view.now_s is None:
+        doubt = view.knowledge.doubt if view.knowledge is not None else ""
+        said, style = (f"! {doubt}" if doubt else "", ""), "bold yellow"
+    else:
+        age_s = view.now_s - c.t_s
+        loud = age_s <= LOUD_S
+        said = (f"! {c.what}{'' if loud else f' ({age_s:.0f} s ago)'}", f"{glyphs.arrow} {c.do}")
+        style = "bold yellow reverse" if loud else "dim"
+    return [
+        Text.assemble(" ", (textwrap.shorten(line, max(columns - 2, NARROWEST), placeholder=" ..."), style))
+        for line in said
+    ]
+
+
+def keys(view: View) -> Text:
+    """What can be pressed."""
+    kind = view.prompt.kind if view.prompt is not None else None
+    return Text(f" {KEYS_REDO if kind in (PromptKind.ROTATE, PromptKind.VERIFY) else KEYS}", style="dim")
+
+
+def _progress(view: View, glyphs: Glyphs) -> list[Text]:
+    p = view.progress
+    if p is None or p.of <= 0.0:
+        return []
+    return [Text.assemble(f" {'progress':<{_LABEL}}", (bar(p.done / p.of, _NEEDLE, glyphs), "cyan"), f"  {p.text}")]
+
+
+def _group(
+    name: str, progress: Direction, std: Direction, target: float, unit: str, columns: int, glyphs: Glyphs
+) -> Text:
+    """The least known axis of a group; all three where there is space."""
+    worst = min(range(3), key=lambda i: progress[i])
+    done = min(progress) >= 1.0
+    shown = range(3) if columns >= _WIDE else (worst,)
+    values = "  ".join(f"{'xyz'[i]} {_known(std[i], unit)}" for i in shown)
+    text = Text.assemble(
+        f" {name:<{_LABEL}}", (bar(min(progress), _NEEDLE, glyphs), "green" if done else "cyan"), f"  {values}"
+    )
+    return text.append(f"  (wanted {target:g})", style="dim")
+
+
+def _known(std: float, unit: str) -> str:
+    return f"±{std:.2g} {unit}" if std < UNKNOWN else "unknown"
+
+
+def _said(text: str, style: str) -> Text:
+    return Text(f" {text}", style=style)

@@ -1,0 +1,38 @@
+"""Which characters a terminal can show. Knows nothing of what is shown."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TextIO
+
+# the Linux console's fonts have no braille, whatever its encoding
+_NO_BRAILLE = ("linux",)
+_IN_ASCII = str.maketrans({"²": "2", "±": "+-", "°": " deg ", "−": "-", "·": "-", "→": "->", "…": "..."})
+
+
+@dataclass(frozen=True)
+class Glyphs:
+    """Blocks, bars and lines; `replacements` for the texts of others."""
+
+    unicode: bool
+    block: str
+    full: str
+    empty: str
+    mark: str
+    arrow: str
+    replacements: Mapping[int, str] = field(default_factory=dict)
+
+
+UNICODE = Glyphs(True, "█", "█", "░", "│", "→")
+ASCII = Glyphs(False, "#", "#", "-", "|", "->", _IN_ASCII)
+
+
+def glyphs_of(out: TextIO, term: str) -> Glyphs:
+    """What the terminal behind `out` can show; `term` is its TERM."""
+    try:
+        is_utf8 = codecs.lookup(out.encoding or "ascii").name == "utf-8"
+    except LookupError:
+        is_utf8 = False
+    return UNICODE if is_utf8 and term not in _NO_BRAILLE else ASCII

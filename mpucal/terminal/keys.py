@@ -1,0 +1,96 @@
+"""What the person presses: keys or lines of them, Ctrl-C, a signal to end. Knows nothing of what is shown."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from types import FrameType
+from typing import TextIO
+
+from ..session.events import Key
+
+_WORDS = {
+    "": Key.ENOUGH,
+    "r": Key.REDO,
+    "redo": Key.REDO,
+    "q": Key.ABORT,
+    "quit": Key.ABORT,
+}
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_AT_ONCE = 64
+
+
+class Keys:
+    """The keyboard, where there is one, and the signals.
+
+    Parameters
+    ----------
+    keyboard : where the person types; None: nobody types.
+    single : each key counts by itself, and none is echoed; else a line counts when Enter ends it.
+    """
+
+    def __init__(self, keyboard: TextIO | None = None, single: bool = False) -> None:
+        self._keyboard, self._single = keyboard, single
+        self._interrupted = False
+
+    @property
+    def asked(self) -> bool:
+        """Whether anybody can type."""
+        return self._keyboard is not None
+
+    def pressed(self) -> Sequence[Key]:
+        """What was pressed since the last call; never waits."""
+        keys = [Key.ABORT] if self._interrupted else []
+        self._interrupted = False
+        while self._keyboard is not None and select.select([self._keyboard], [], [], 0.0)[0]:
+            words = self._typed(self._keyboard)
+            if words is None:
+                self._keyboard = None
+            else:
+                keys += [_WORDS[word] for word in words if word in _WORDS]
+        return keys
+
+    @contextmanager
+    def listening(self) -> Iterator[None]:
+        """Meanwhile the first Ctrl-C is a key press, and the second one interrupts at once."""
+        with ExitStack() as stack:
+            for number in _SIGNALS:
+                stack.callback(signal.signal, number, signal.signal(number, self._interrupt))
+            if self._single and self._keyboard is not None:
+                stack.enter_context(_without_lines(self._keyboard))
+            yield
+
+    def _typed(self, keyboard: TextIO) -> list[str] | None:
+        """The words or keys that are there; None where there will never be any more."""
+        if not self._single:
+            line = keyboard.readline()
+            return [line.strip().lower()] if line else None
+        try:
+            data = os.read(keyboard.fileno(), _AT_ONCE)
+        except OSError:
+            return None
+        return [chr(key).strip().lower() for key in data if chr(key) in "\r\n" or chr(key).isalpha()] if data else None
+
+    def _interrupt(self, _number: int, _frame: FrameType | None) -> None:
+        if self._interrupted:
+            raise KeyboardInterrupt
+        self._interrupted = True
+
+
+@contextmanager
+def _without_lines(keyboard: TextIO) -> Iterator[None]:
+    """Keys come one by one and unseen; whatever happens, lines come again afterwards."""
+    import termios  # noqa: PLC0415 - not everywhere is there a terminal
+    import tty  # noqa: PLC0415
+
+    handle = keyboard.fileno()
+    before = termios.tcgetattr(handle)
+    tty.setcbreak(handle)
+    try:
+        yield
+    finally:
+        # what was typed for the session is not meant for the shell
+        termios.tcsetattr(handle, termios.TCSAFLUSH, before)

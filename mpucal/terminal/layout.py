@@ -1,0 +1,116 @@
+"""The one screen of a session: a view in, lines of text out. Knows no terminal, clock or thread."""
+
+from __future__ import annotations
+
+import textwrap
+
+from rich.text import Text
+
+from ..session.events import PromptKind
+from . import board, globe, letters
+from .bars import NARROWEST, caution_rows, keys, knowledge_rows, meter
+from .glyphs import Glyphs
+from .view import View
+
+# below these nothing is drawn but words
+LEAST_COLUMNS, LEAST_ROWS = 60, 20
+LARGE_COLUMNS, LARGE_ROWS, AIRY_ROWS = 120, 40, 30
+_PROMPT_ROWS = 2
+_BLANK = Text("")
+
+
+def lines(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
+    """Exactly `rows` lines of at most `columns` characters."""
+    roomy = columns >= LEAST_COLUMNS and rows >= LEAST_ROWS
+    air = [_BLANK] if rows >= AIRY_ROWS else []
+    above = [_status(view, columns), *air, *_headline(view, columns, rows, glyphs), *_prompt(view, columns)]
+    below = [
+        meter(view, glyphs),
+        *knowledge_rows(view, columns, glyphs),
+        *caution_rows(view, columns, glyphs),
+        keys(view),
+    ]
+    space = rows - len(above) - len(below)
+    between = _pictures(view, columns, space, glyphs) if roomy and space > 4 else []
+    between += [_BLANK] * max(space - len(between), 0)
+    drawn = [*above, *between, *below]
+    # too low a screen loses its upper bars first, and never what is to be done
+    if len(drawn) > rows:
+        drawn = [*drawn[: max(rows - 2, 1)], *drawn[-2:]][:rows]
+    return [_cut(line, columns, glyphs) for line in drawn]
+
+
+def _status(view: View, columns: int) -> Text:
+    minutes, seconds = divmod(int(view.elapsed_s), 60)
+    facts = [f"{minutes}:{seconds:02d}"]
+    if view.meter is not None:
+        facts.insert(0, f"{view.meter.rate_hz:.1f} Hz")
+        if view.meter.temperature_c is not None:
+            facts.insert(1, f"{view.meter.temperature_c:.1f} °C")
+    right = "   ".join(facts)
+    return Text(f" {view.title:<{max(columns - len(right) - 3, 1)}} {right} ", style="reverse")
+
+
+def _headline(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
+    text = view.headline
+    style = _headline_style(view)
+    large = columns >= LARGE_COLUMNS and rows >= LARGE_ROWS
+    for scale in (2, 1) if large else (1,):
+        if letters.width(text, scale) + 2 <= columns and rows >= LEAST_ROWS:
+            return [Text(f" {row}", style=style) for row in letters.large(text, glyphs.block, scale)]
+    return [Text(f" {text}", style=f"{style} reverse")]
+
+
+def _headline_style(view: View) -> str:
+    if view.prompt is None or view.prompt.kind is PromptKind.REST:
+        return "bold"
+    return "bold cyan" if view.waiting is None else "bold green"
+
+
+def _prompt(view: View, columns: int) -> list[Text]:
+    said = view.prompt.text if view.prompt is not None else "Looking for the sensor."
+    wrapped = textwrap.wrap(said, max(columns - 2, NARROWEST), max_lines=_PROMPT_ROWS, placeholder=" ...")
+    return [Text(f" {line}", style="bold") for line in [*wrapped, *[""] * (_PROMPT_ROWS - len(wrapped))]]
+
+
+def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
+    """The board as it is and as it is wanted, and the map of where it has been."""
+    height = rows - 1
+    wide, round_ = min(columns // 4 + 2, 4 * height), min(columns // 4 - 2, 2 * height)
+    parts: list[tuple[str, list[Text], int]] = []
+    if view.meter is not None:
+        parts.append(("now", board.picture(view.meter.down, wide, height).lines("", glyphs.unicode), wide))
+    if view.wanted is not None:
+        canvas = board.picture(view.wanted, wide, height)
+        parts.append(("turn it like this", canvas.lines("yellow", glyphs.unicode), wide))
+    marks = _marks(view)
+    if marks:
+        for upper, name in ((False, "+Z up"), (True, "-Z up")):
+            canvas = globe.half(upper, marks, round_, height, glyphs.unicode)
+            parts.append((name, canvas.lines("", glyphs.unicode), round_))
+    rows_ = [Text(" ").join(Text(name[:wide].center(wide), style="dim") for name, _, wide in parts)]
+    for k in range(height):
+        rows_.append(Text(" ").join(_filled(drawn[k], wide) for _, drawn, wide in parts))
+    return rows_
+
+
+def _marks(view: View) -> list[tuple[str, tuple[float, float, float]]]:
+    marks = [("passed", s.down) for s in view.seen if not s.paused]
+    marks += [("held", s.down) for s in view.seen if s.paused]
+    if view.wanted is not None:
+        marks.append(("wanted", view.wanted))
+    if marks and view.meter is not None:
+        marks.append(("now", view.meter.down))
+    return marks
+
+
+def _filled(text: Text, columns: int) -> Text:
+    text.pad_right(max(columns - len(text.plain), 0))
+    return text
+
+
+def _cut(line: Text, columns: int, glyphs: Glyphs) -> Text:
+    if not glyphs.unicode:
+        line.plain = line.plain.translate(glyphs.replacements)
+    line.truncate(columns)
+    return line

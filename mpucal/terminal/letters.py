@@ -1,0 +1,64 @@
+"""Letters that are read from across a table: five rows of blocks each. Knows no terminal."""
+
+from __future__ import annotations
+
+ROWS = 5
+WIDTH, GAP = 5, 1
+_UNKNOWN = " ### /#   #/  ## /     /  #  "
+_LETTERS = {
+    " ": "     /     /     /     /     ",
+    "A": " ### /#   #/#####/#   #/#   #",
+    "B": "#### /#   #/#### /#   #/#### ",
+    "C": " ####/#    /#    /#    / ####",
+    "D": "#### /#   #/#   #/#   #/#### ",
+    "E": "#####/#    /#### /#    /#####",
+    "F": "#####/#    /#### /#    /#    ",
+    "G": " ####/#    /#  ##/#   #/ ####",
+    "H": "#   #/#   #/#####/#   #/#   #",
+    "I": "#####/  #  /  #  /  #  /#####",
+    "J": "  ###/    #/    #/#   #/ ### ",
+    "K": "#  # /# #  /##   /# #  /#  # ",
+    "L": "#    /#    /#    /#    /#####",
+    "M": "#   #/## ##/# # #/#   #/#   #",
+    "N": "#   #/##  #/# # #/#  ##/#   #",
+    "O": " ### /#   #/#   #/#   #/ ### ",
+    "P": "#### /#   #/#### /#    /#    ",
+    "Q": " ### /#   #/# # #/#  # / ## #",
+    "R": "#### /#   #/#### /#  # /#   #",
+    "S": " ####/#    / ### /    #/#### ",
+    "T": "#####/  #  /  #  /  #  /  #  ",
+    "U": "#   #/#   #/#   #/#   #/ ### ",
+    "V": "#   #/#   #/#   #/ # # /  #  ",
+    "W": "#   #/#   #/# # #/## ##/#   #",
+    "X": "#   #/ # # /  #  / # # /#   #",
+    "Y": "#   #/ # # /  #  /  #  /  #  ",
+    "Z": "#####/   # /  #  / #   /#####",
+    "0": " ### /#  ##/# # #/##  #/ ### ",
+    "1": "  #  / ##  /  #  /  #  /#####",
+    "2": "#### /    #/ ### /#    /#####",
+    "3": "#### /    #/ ### /    #/#### ",
+    "4": "#  # /#  # /#####/   # /   # ",
+    "5": "#####/#    /#### /    #/#### ",
+    "6": " ### /#    /#### /#   #/ ### ",
+    "7": "#####/   # /  #  / #   /#    ",
+    "8": " ### /#   #/ ### /#   #/ ### ",
+    "9": " ### /#   #/ ####/    #/ ### ",
+    "+": "     /  #  /#####/  #  /     ",
+    "-": "     /     /#####/     /     ",
+}
+
+
+def width(text: str, scale: int = 1) -> int:
+    """How many columns `large` needs."""
+    return max(len(text) * (WIDTH + GAP) - GAP, 0) * scale
+
+
+def large(text: str, block: str, scale: int = 1) -> list[str]:
+    """ROWS * scale rows of `block` and spaces that show `text`."""
+    letters = [_LETTERS.get(letter, _UNKNOWN).split("/") for letter in text.upper()]
+    rows = []
+    for k in range(ROWS):
+        row = (" " * GAP).join(letter[k] for letter in letters)
+        wide = "".join((block if dot == "#" else " ") * scale for dot in row)
+        rows += [wide] * scale
+    return rows

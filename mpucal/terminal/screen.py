@@ -1,0 +1,95 @@
+"""A session on a terminal: one view that is kept up to date. Drawing has its own thread and delays nobody."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TextIO
+
+from ..session.events import Decision, Key, Output, Prompt, Verification
+from .glyphs import Glyphs
+from .keys import Keys
+from .layout import lines
+from .painter import Painter
+from .view import View
+
+# as often as an eye follows, and a slow line can carry
+LEAST_INTERVAL_S = 0.16
+# a terminal that takes no output any more is not waited for longer
+LAST_WORD_S = 1.0
+
+
+class Screen:
+    """Shows a session while `listening`; before and afterwards it says lines.
+
+    What is heard only changes the view, and a thread draws the latest one: a terminal that is slow or stopped
+    (Ctrl-S) costs the reading loop nothing.
+
+    Parameters
+    ----------
+    out : a terminal. keys : what is pressed. glyphs : what `out` can show. bell : rings at each change of prompt.
+    """
+
+    def __init__(self, out: TextIO, keys: Keys, glyphs: Glyphs, bell: bool = True) -> None:
+        self._out, self._keys, self._glyphs, self._bell = out, keys, glyphs, bell
+        self._view = View()
+        self._ring = False
+        self._changed = threading.Event()
+        self._closed = threading.Event()
+        self._open = False
+
+    def hear(self, output: Output) -> None:
+        """Change the view."""
+        if isinstance(output, Prompt) and output != self._view.prompt:
+            self._ring = self._bell
+        self._view = self._view.after(output)
+        if isinstance(output, Decision | Verification) and not self._open:
+            self.say(f"  {_line_of(output)}")
+        self._changed.set()
+
+    def say(self, text: str) -> None:
+        """A line of talk, kept for the end while the screen is shown."""
+        if self._open:
+            self._view = self._view.noted(text.strip())
+            self._changed.set()
+        else:
+            print(text, file=self._out, flush=True)
+
+    def pressed(self) -> Sequence[Key]:
+        """What was pressed since the last call."""
+        return self._keys.pressed()
+
+    @contextmanager
+    def listening(self) -> Iterator[None]:
+        """Meanwhile the screen is shown; whatever happens, the terminal is as it was afterwards."""
+        painter = Painter(self._out)
+        drawing = threading.Thread(target=self._draw, args=(painter,), name="screen", daemon=True)
+        with self._keys.listening():
+            try:
+                painter.show()
+                self._open = True
+                drawing.start()
+                yield
+            finally:
+                self._closed.set()
+                self._changed.set()
+                drawing.join(LAST_WORD_S)
+                painter.give_back()
+                self._open = False
+                for note in self._view.notes:
+                    self.say(f"  {note}")
+
+    def _draw(self, painter: Painter) -> None:
+        self._changed.set()
+        while not self._closed.is_set():
+            self._changed.wait()
+            self._changed.clear()
+            ring, self._ring = self._ring, False
+            size = painter.size()
+            painter.paint(lines(self._view, *size, self._glyphs), size, ring)
+            self._closed.wait(LEAST_INTERVAL_S)
+
+
+def _line_of(output: Decision | Verification) -> str:
+    return output.why if isinstance(output, Decision) else output.text

@@ -1,0 +1,139 @@
+"""What a screen knows of a session by now: outputs in, one frozen value out. Knows no terminal and no clock."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from ..session.events import (
+    Caution,
+    Countdown,
+    Decision,
+    Direction,
+    Knowledge,
+    Meter,
+    Output,
+    Progress,
+    Prompt,
+    PromptKind,
+    Seen,
+    Verification,
+)
+
+# a countdown that is not renewed for so long waits for nothing any more
+COUNTDOWN_HOLDS_S = 1.0
+# the part of gravity that an axis must carry to be named
+WORTH_NAMING = 0.4
+HEADLINES = {
+    PromptKind.LAY_FLAT: "LAY FLAT",
+    PromptKind.ROTATE: "TURN IT",
+    PromptKind.VERIFY: "CHECK",
+    PromptKind.REST: "PUT IT DOWN",
+}
+CONNECTING = "WAIT"
+
+
+@dataclass(frozen=True)
+class View:
+    """The latest of everything; times are the session's [s], None where nothing came yet.
+
+    Attributes
+    ----------
+    seen : the orientations that count, in the order in which they came. verified : since the last prompt to turn.
+    notes : decisions and other lines of talk, in order.
+    """
+
+    title: str = "mpucal"
+    prompt: Prompt | None = None
+    meter: Meter | None = None
+    countdown: Countdown | None = None
+    progress: Progress | None = None
+    knowledge: Knowledge | None = None
+    caution: Caution | None = None
+    seen: tuple[Seen, ...] = ()
+    verified: tuple[Verification, ...] = ()
+    notes: tuple[str, ...] = ()
+    begun_s: float | None = None
+    now_s: float | None = None
+
+    def after(self, output: Output) -> View:
+        """The view once `output` has come."""
+        match output:
+            case Prompt():
+                return self._prompted(output)
+            case Decision(why, _):
+                return self.noted(why)
+            case Meter():
+                view = replace(self, meter=output)
+            case Countdown():
+                view = replace(self, countdown=output)
+            case Progress():
+                view = replace(self, progress=output)
+            case Knowledge():
+                view = replace(self, knowledge=output)
+            case Caution():
+                view = replace(self, caution=output)
+            case Seen():
+                # turned anew, they are counted anew
+                kept = tuple(s for s in self.seen if s.paused != output.paused or s.number < output.number)
+                view = replace(self, seen=(*kept, output))
+            case Verification():
+                view = replace(self, verified=(*self.verified, output))
+            case _:  # what the session asks of others
+                return self
+        return view._at(output.t_s)
+
+    def noted(self, text: str) -> View:
+        """The view with a line of talk more."""
+        return replace(self, notes=(*self.notes, text))
+
+    @property
+    def elapsed_s(self) -> float:
+        """Since the first sample."""
+        return 0.0 if self.begun_s is None or self.now_s is None else self.now_s - self.begun_s
+
+    @property
+    def waiting(self) -> Countdown | None:
+        """The countdown, where one runs."""
+        if self.countdown is None or self.now_s is None or self.countdown.remaining_s <= 0.0:
+            return None
+        return self.countdown if self.now_s - self.countdown.t_s <= COUNTDOWN_HOLDS_S else None
+
+    @property
+    def wanted(self) -> Direction | None:
+        """What is to point down, where one orientation is wanted."""
+        if self.prompt is None or self.prompt.kind not in (PromptKind.ROTATE, PromptKind.VERIFY):
+            return None
+        if self.prompt.down is not None or self.prompt.kind is PromptKind.VERIFY or self.knowledge is None:
+            return self.prompt.down
+        return self.knowledge.down
+
+    @property
+    def headline(self) -> str:
+        """What to do this moment, in a word or two."""
+        if self.prompt is None:
+            return CONNECTING
+        waiting = self.waiting
+        if waiting is not None and self.prompt.kind is not PromptKind.REST and self._counts(waiting):
+            word = "STILL" if self.prompt.kind is PromptKind.LAY_FLAT else "HOLD"
+            return f"{word} {math.ceil(waiting.remaining_s)}"
+        return HEADLINES[self.prompt.kind] if self.wanted is None else f"{axes(self.wanted)} DOWN"
+
+    def _counts(self, waiting: Countdown) -> bool:
+        """Whether the countdown has begun; until then what it waits for is said."""
+        return waiting.remaining_s < waiting.of_s and not waiting.paused
+
+    def _prompted(self, prompt: Prompt) -> View:
+        goes_on = self.prompt is not None and self.prompt.kind is prompt.kind
+        if goes_on:
+            return replace(self, prompt=prompt)
+        return replace(self, prompt=prompt, countdown=None, progress=None, caution=None, verified=())
+
+    def _at(self, t_s: float) -> View:
+        return replace(self, now_s=t_s, begun_s=t_s if self.begun_s is None else self.begun_s)
+
+
+def axes(down: Direction) -> str:
+    """The axes that point down: "+X -Y"."""
+    named = [i for i in range(3) if abs(down[i]) >= WORTH_NAMING]
+    return " ".join(f"{'+' if down[i] > 0 else '-'}{'XYZ'[i]}" for i in named)

@@ -1,0 +1,108 @@
+"""A session's outputs as a machine sends them, and the view they add up to."""
+
+from __future__ import annotations
+
+import math
+import os
+
+import pytest
+
+from mpucal.session.events import (
+    Caution,
+    Countdown,
+    Decision,
+    Knowledge,
+    Meter,
+    Progress,
+    Prompt,
+    PromptKind,
+    Seen,
+    Target,
+    Verification,
+)
+from mpucal.terminal.view import View
+
+CORNER = (0.58, -0.57, 0.58)
+
+
+def meter(t_s, still=True, down=(0.0, 0.0, -1.0), what=""):
+    return Meter(t_s, 0.4 if still else 1.6, still, what, down, 2.0, 199.97, 31.25)
+
+
+def knowledge(t_s, down=CORNER, doubt=""):
+    return Knowledge(
+        t_s,
+        gain_pct=(0.2, 0.31, 0.1),
+        misalignment_deg=(0.5, 0.2, 1e3),
+        bias_mg=(3.0, 2.0, 5.0),
+        target=Target(0.1, 0.05, 1.0),
+        gain=(0.5, 0.3, 1.0),
+        misalignment=(0.1, 0.25, 0.0),
+        bias=(1.0, 1.0, 1.0),
+        overall=0.0,
+        down=down,
+        words="corner +x -y +z down",
+        doubt=doubt,
+    )
+
+
+LAY_FLAT = Prompt(PromptKind.LAY_FLAT, "Lay the board flat on something firm and let go of it.")
+TURN = Prompt(PromptKind.ROTATE, "Turn it: corner +X -Y +Z down, and hold it still.", CORNER)
+VERIFY = Prompt(PromptKind.VERIFY, "Now show it this side.", (0.0, 1.0, 0.0))
+REST = Prompt(PromptKind.REST, "You can put the board down.")
+
+LAID = [LAY_FLAT, meter(10.0), Progress(10.0, 3.0, 10.0, "still for 3 of 10 s"), Countdown(10.0, 6.6, 10.0, False)]
+TURNED = [
+    *LAID,
+    Decision("flat and still for 10 s: that will do"),
+    TURN,
+    *(Seen(20.0 + k, k + 1, (math.cos(k), math.sin(k), 0.5 * (-1) ** k), True) for k in range(4)),
+    Seen(24.5, 1, (0.0, 0.6, -0.8), False),
+    knowledge(25.0),
+    Caution(25.0, "too_fast", "it turned at 480 deg/s, near the gyroscope's range", "turn it more slowly"),
+    meter(25.25, still=False, down=(0.1, -0.2, 0.97), what="it turned at 30 deg/s about z"),
+]
+CHECKED = [
+    *TURNED,
+    VERIFY,
+    Verification(40.0, 1, 2, (0.0, 1.0, 0.0), 0.004, 0.003, 0.02, 0.03, True, "orientation 1 of 2 agrees"),
+    meter(40.25),
+]
+ENDED = [*CHECKED, REST, Decision("the calibration is good")]
+
+
+@pytest.fixture(
+    params=[[], LAID, TURNED, CHECKED, ENDED], ids=["connecting", "laid flat", "turned", "checked", "ended"]
+)
+def any_view(request):
+    return view_of(request.param)
+
+
+def view_of(outputs):
+    view = View()
+    for output in outputs:
+        view = view.after(output)
+    return view
+
+
+@pytest.fixture
+def views():
+    """The views by where the session is."""
+    return {
+        name: view_of(outputs)
+        for name, outputs in (("laid", LAID), ("turned", TURNED), ("checked", CHECKED), ("ended", ENDED))
+    }
+
+
+@pytest.fixture
+def session():
+    """A whole session's outputs."""
+    return ENDED
+
+
+@pytest.fixture
+def keyboard():
+    """What is typed, and where it is read."""
+    reader, writer = os.pipe()
+    with os.fdopen(reader) as lines, os.fdopen(writer, "w") as typed:
+        yield typed, lines

@@ -1,0 +1,85 @@
+import re
+
+import pytest
+
+from mpucal.session.events import Caution
+from mpucal.terminal.glyphs import ASCII, UNICODE
+from mpucal.terminal.layout import lines
+
+SIZES = [(80, 24), (160, 50), (60, 20), (100, 30), (40, 12), (20, 5), (1, 1)]
+BRAILLE = re.compile("[\u2801-\u28ff]")
+
+
+def text_of(view, columns=80, rows=24, glyphs=UNICODE):
+    return [line.plain for line in lines(view, columns, rows, glyphs)]
+
+
+@pytest.mark.parametrize("glyphs", [UNICODE, ASCII], ids=["unicode", "ascii"])
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_the_screen_is_filled_and_never_overflows(any_view, size, glyphs):
+    columns, rows = size
+    drawn = text_of(any_view, columns, rows, glyphs)
+    assert len(drawn) == rows
+    assert max(map(len, drawn)) <= columns
+
+
+def test_ascii_is_ascii(any_view):
+    assert "".join(text_of(any_view, glyphs=ASCII)).isascii()
+
+
+@pytest.mark.parametrize("size", [(80, 24), (160, 50)], ids=["80x24", "160x50"])
+def test_all_that_a_person_needs_is_there(views, size):
+    drawn = "\n".join(text_of(views["turned"], *size))
+    for words in (
+        "200.0 Hz",
+        "31.2 °C",
+        "0:15",
+        "Turn it: corner +X -Y +Z down, and hold it still.",
+        "now",
+        "turn it like this",
+        "+Z up",
+        "-Z up",
+        "moving: it turned at 30 deg/s about z",
+        "y ±0.31 %",
+        "z unknown",
+        "wanted 0.05",
+        "it turned at 480 deg/s, near the gyroscope's range",
+        "→ turn it more slowly",
+        "q or Ctrl-C: stop",
+        "█████",
+    ):
+        assert words in drawn
+    assert BRAILLE.search(drawn)
+
+
+def test_the_prompt_is_large_and_larger_on_a_large_screen(views):
+    small, large = (text_of(views["laid"], *size) for size in ((80, 24), (160, 50)))
+    assert sum("███" in line for line in small[1:6]) >= 3
+    assert sum("██████" in line for line in large[2:12]) >= 6
+
+
+def test_on_a_low_screen_the_words_are_left(views):
+    drawn = text_of(views["turned"], 40, 12)
+    assert not BRAILLE.search("".join(drawn))
+    assert "+X -Y +Z DOWN" in drawn[1]
+    assert "Turn it: corner" in drawn[2]
+
+
+def test_a_warning_grows_quiet(views):
+    view = views["turned"]
+    loud = [line for line in lines(view, 80, 24, UNICODE) if "480 deg/s" in line.plain]
+    assert "reverse" in str(loud[0].spans)
+    later = view.after(Caution(0.0, "too_fast", "it turned at 480 deg/s", "turn it more slowly"))
+    quiet = [line for line in lines(later.after(view.meter), 80, 24, UNICODE) if "480 deg/s" in line.plain]
+    assert "(25 s ago)" in quiet[0].plain
+    assert "reverse" not in str(quiet[0].spans)
+
+
+def test_results_of_the_check_stand_where_the_bars_were(views):
+    drawn = "\n".join(text_of(views["checked"]))
+    assert "orientation 1 of 2 agrees" in drawn
+    assert "wanted" not in drawn
+
+
+def test_at_the_end_the_decisions_are_there(views):
+    assert "the calibration is good" in "\n".join(text_of(views["ended"]))

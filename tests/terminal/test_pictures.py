@@ -1,0 +1,97 @@
+"""The drawn things: letters, the board, the map."""
+
+import numpy as np
+import pytest
+
+from mpucal.terminal import board, globe, letters
+from mpucal.terminal.canvas import Canvas
+from mpucal.terminal.view import HEADLINES
+
+DIRECTIONS = [
+    (0, 0, -1),
+    (0, 0, 1),
+    (1, 0, 0),
+    (-1, 0, 0),
+    (0, 1, 0),
+    (0, -1, 0),
+    (0.58, -0.57, 0.58),
+    (-0.7, 0.1, 0.7),
+]
+
+
+@pytest.mark.parametrize("text", [*HEADLINES.values(), "STILL 10", "HOLD 2", "+X -Y +Z DOWN", "0123456789"])
+def test_large_letters_are_as_wide_as_they_say(text):
+    for scale in (1, 2):
+        rows = letters.large(text, "#", scale)
+        assert len(rows) == letters.ROWS * scale
+        assert {len(row) for row in rows} == {letters.width(text, scale)}
+
+
+def test_large_letters_differ():
+    drawn = {"".join(letters.large(letter, "#")) for letter in "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789+- "}
+    assert len(drawn) == 39
+
+
+@pytest.mark.parametrize("down", DIRECTIONS, ids=str)
+def test_the_board_is_held_so_that_the_side_is_down(down):
+    rotation = np.array(board.held(down))
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)
+    np.testing.assert_allclose(np.linalg.det(rotation), 1.0)
+    np.testing.assert_allclose(rotation @ (np.array(down) / np.linalg.norm(down)), [0, 0, -1], atol=1e-6)
+
+
+def where(canvas, letter):
+    rows = [line.plain for line in canvas.lines("", unicode=True)]
+    return next((k, row.index(letter)) for k, row in enumerate(rows) if letter in row)
+
+
+@pytest.mark.parametrize(("axis", "letter"), [(0, "X"), (1, "Y"), (2, "Z")], ids="xyz")
+@pytest.mark.parametrize("size", [(22, 9), (44, 25)], ids=["small", "large"])
+def test_the_letter_of_the_axis_that_is_down_is_below_the_others(axis, letter, size):
+    for sign in (1.0, -1.0):
+        down = tuple(sign if i == axis else 0.0 for i in range(3))
+        canvas = board.picture(down, *size)
+        rows = {other: where(canvas, other)[0] for other in "XYZ"}
+        others = [row for other, row in rows.items() if other != letter]
+        assert (rows[letter] > max(others)) if sign > 0 else (rows[letter] < min(others))
+
+
+@pytest.mark.parametrize("down", DIRECTIONS, ids=str)
+def test_the_board_differs_from_any_other_way_to_hold_it(down):
+    drawn = [
+        "\n".join(line.plain for line in board.picture(other, 22, 9).lines("", unicode=unicode))
+        for unicode in (True, False)
+        for other in DIRECTIONS
+    ]
+    assert len(set(drawn)) == len(drawn)
+
+
+def test_the_map_shows_a_direction_on_its_own_half():
+    marks = [("held", (0.0, 0.0, 1.0)), ("wanted", (0.9, 0.0, -0.43))]
+    upper, lower = (
+        [line.plain for line in globe.half(part, marks, 20, 10, unicode=False).lines("", unicode=False)]
+        for part in (True, False)
+    )
+    assert any("o" in row for row in upper)
+    assert not any("X" in row for row in upper)
+    (row,) = (row for row in lower if "X" in row)
+    assert row.index("X") > 13  # x is to the right
+    assert not any("o" in row for row in lower)
+
+
+def test_what_lies_outside_is_not_drawn():
+    canvas = Canvas(4, 2)
+    canvas.line((-100.0, 3.0), (100.0, 3.0))
+    canvas.letter((50.0, 0.0), "X", "")
+    assert [line.plain for line in canvas.lines("", unicode=True)] == ["⣀" * 4, " " * 4]
+
+
+@pytest.mark.parametrize(
+    ("line", "drawn"),
+    [(((0, 0), (0, 3)), "|"), (((0, 0), (1, 3)), "\\"), (((1, 0), (0, 3)), "/"), (((0, 2), (1, 2)), "_")],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_ascii_strokes_lie_as_the_lines_do(line, drawn):
+    canvas = Canvas(1, 1)
+    canvas.line(*line)
+    assert canvas.lines("", unicode=False)[0].plain == drawn

@@ -1,0 +1,166 @@
+import io
+import os
+import pty
+import re
+import select
+import signal
+import threading
+
+import pytest
+from rich.text import Text
+
+from mpucal.session.events import Key, Prompt, PromptKind
+from mpucal.terminal.glyphs import ASCII, UNICODE, glyphs_of
+from mpucal.terminal.keys import Keys
+from mpucal.terminal.painter import Painter
+from mpucal.terminal.screen import Screen
+
+SHOWN, GIVEN_BACK = "\x1b[?1049h", "\x1b[?1049l"
+COLOUR = re.compile(r"\x1b\[(\d+;)*(3[0-8]|9[0-7])[;m]")
+
+
+class Terminal(io.StringIO):
+    encoding = "utf-8"
+
+    def isatty(self):
+        return True
+
+    def taken(self):
+        text = self.getvalue()
+        self.seek(0)
+        self.truncate()
+        return text
+
+
+@pytest.fixture
+def out(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    return Terminal()
+
+
+def test_only_rows_that_changed_are_sent(out):
+    painter = Painter(out)
+    painter.paint([Text("one"), Text("two"), Text("three")], (80, 24))
+    text = out.taken()
+    assert all(word in text for word in ("one", "two", "three"))
+    painter.paint([Text("one"), Text("TWO"), Text("three")], (80, 24))
+    assert out.taken() == "\x1b[2;1HTWO\x1b[0m\x1b[K"
+    assert painter.paint([Text("one"), Text("TWO"), Text("three")], (80, 24)) == 0
+
+
+def test_a_terminal_of_another_size_is_painted_anew(out):
+    painter = Painter(out)
+    painter.paint([Text("one"), Text("two")], (80, 24))
+    out.taken()
+    painter.paint([Text("one"), Text("two")], (100, 24))
+    assert "one" in out.getvalue()
+
+
+def test_colours_unless_nobody_wants_them(out, monkeypatch):
+    line = Text("green", style="bold green")
+    Painter(out).paint([line], (80, 24))
+    assert COLOUR.search(out.taken())
+    monkeypatch.setenv("NO_COLOR", "1")
+    Painter(out).paint([line], (80, 24))
+    text = out.taken()
+    assert not COLOUR.search(text)
+    assert "\x1b[1m" in text
+
+
+@pytest.mark.parametrize("error", [None, KeyboardInterrupt, ZeroDivisionError], ids=["ends", "Ctrl-C", "fails"])
+def test_the_terminal_is_given_back_and_what_was_decided_is_told(out, error, session):
+    screen = Screen(out, Keys(), UNICODE)
+    try:
+        with screen.listening():
+            for output in session:
+                screen.hear(output)
+            if error:
+                raise error
+    except (KeyboardInterrupt, ZeroDivisionError):
+        pass
+    text = out.getvalue()
+    assert text.count(SHOWN) == text.count(GIVEN_BACK) == 1
+    after = text[text.index(GIVEN_BACK) :]
+    assert "\x1b[?25h" in text
+    assert "flat and still for 10 s" in after
+    assert "the calibration is good" in after
+    assert threading.active_count() == 1
+
+
+def test_the_bell_rings_when_something_else_is_to_be_done(out):
+    for bell, times in ((True, 1), (False, 0)):
+        screen = Screen(out, Keys(), UNICODE, bell)
+        with screen.listening():
+            screen.hear(Prompt(PromptKind.ROTATE, "Turn it."))
+            drawn(screen, out, "Turn it.")
+        assert out.taken().count("\a") == times
+
+
+def drawn(screen, out, words):
+    """Until the drawing thread has painted `words`."""
+    painted = threading.Event()
+    for _ in range(200):
+        if words in out.getvalue():
+            return
+        painted.wait(0.05)
+    raise AssertionError(f"{words!r} was never drawn")
+
+
+def test_a_line_of_talk_is_kept_for_the_end(out):
+    screen = Screen(out, Keys(), UNICODE)
+    screen.say("before")
+    with screen.listening():
+        screen.say("  meanwhile")
+    screen.say("after")
+    text = out.getvalue()
+    assert text.startswith("before\n" + SHOWN)
+    assert text.endswith("  meanwhile\nafter\n")
+
+
+def test_a_terminal_that_takes_nothing_stops_nobody():
+    """Ctrl-S: the terminal's buffer is full, and hearing goes on all the same."""
+    person, program = pty.openpty()
+    os.set_blocking(person, False)
+    with os.fdopen(program, "w") as out:
+        screen = Screen(out, Keys(), UNICODE)
+        with screen.listening():
+            blocker = threading.Thread(target=fill, args=(program,), daemon=True)
+            blocker.start()
+            for k in range(2000):
+                screen.hear(Prompt(PromptKind.ROTATE, f"Turn it {k}."))
+            assert screen.pressed() == []
+            while blocker.is_alive():
+                if select.select([person], [], [], 0.1)[0]:
+                    os.read(person, 65536)
+        while select.select([person], [], [], 0.0)[0]:
+            os.read(person, 65536)
+    os.close(person)
+
+
+def fill(handle):
+    os.write(handle, b"x" * 200_000)
+
+
+def test_ctrl_c_is_a_key(out):
+    screen = Screen(out, Keys(), UNICODE)
+    with screen.listening():
+        signal.raise_signal(signal.SIGINT)
+        assert screen.pressed() == [Key.ABORT]
+
+
+@pytest.mark.parametrize(
+    ("encoding", "term", "glyphs"),
+    [
+        ("utf-8", "xterm", UNICODE),
+        ("UTF8", "tmux-256color", UNICODE),
+        ("utf-8", "linux", ASCII),
+        ("ascii", "xterm", ASCII),
+        ("latin-1", "xterm", ASCII),
+        ("nonsense", "xterm", ASCII),
+    ],
+)
+def test_glyphs_are_those_of_the_terminal(encoding, term, glyphs):
+    out = Terminal()
+    out.encoding = encoding
+    assert glyphs_of(out, term) is glyphs

@@ -1,0 +1,71 @@
+from dataclasses import replace
+
+import pytest
+
+from mpucal.session.events import Countdown, Prompt, PromptKind, Seen
+from mpucal.terminal.view import View, axes
+
+
+def test_nothing_is_known_at_first():
+    view = View()
+    assert (view.headline, view.wanted, view.waiting, view.elapsed_s) == ("WAIT", None, None, 0.0)
+
+
+def test_the_headline_says_what_to_do(views):
+    assert views["laid"].headline == "STILL 7"
+    assert views["turned"].headline == "+X -Y +Z DOWN"
+    assert views["checked"].headline == "+Y DOWN"
+    assert views["ended"].headline == "PUT IT DOWN"
+
+
+@pytest.mark.parametrize(
+    ("countdown", "headline"),
+    [
+        (Countdown(26.0, 2.0, 2.0, False), "+X -Y +Z DOWN"),
+        (Countdown(26.0, 1.3, 2.0, False), "HOLD 2"),
+        (Countdown(26.0, 1.3, 2.0, True), "+X -Y +Z DOWN"),
+        (Countdown(26.0, 0.0, 2.0, False), "+X -Y +Z DOWN"),
+        (Countdown(20.0, 1.3, 2.0, False), "+X -Y +Z DOWN"),
+    ],
+    ids=["not begun", "runs", "paused", "over", "forgotten"],
+)
+def test_a_countdown_that_runs_is_the_headline(views, countdown, headline):
+    view = replace(views["turned"], now_s=26.0, countdown=countdown)
+    assert view.headline == headline
+
+
+def test_what_would_help_most_is_wanted_where_the_prompt_names_nothing(views):
+    view = views["turned"].after(Prompt(PromptKind.ROTATE, "Turn it."))
+    assert view.wanted == view.knowledge.down
+    assert view.after(Prompt(PromptKind.VERIFY, "Check it.")).wanted is None
+
+
+def test_time_runs_from_the_first_sample(views):
+    assert views["laid"].elapsed_s == 0.0
+    assert views["turned"].elapsed_s == 15.25
+
+
+def test_orientations_are_counted_anew_when_the_board_is_turned_anew(views):
+    assert [s.number for s in views["turned"].seen if s.paused] == [1, 2, 3, 4]
+    again = views["turned"].after(Seen(50.0, 2, (1.0, 0.0, 0.0), True))
+    assert [s.number for s in again.seen if s.paused] == [1, 2]
+    assert [s.number for s in again.seen if not s.paused] == [1]
+
+
+def test_another_step_forgets_the_warnings_of_the_last(views):
+    assert views["turned"].caution is not None
+    assert views["checked"].caution is None
+
+
+@pytest.mark.parametrize(
+    ("down", "words"),
+    [
+        ((1.0, 0.0, 0.0), "+X"),
+        ((0.0, 0.0, -1.0), "-Z"),
+        ((0.6, -0.8, 0.0), "+X -Y"),
+        ((0.57, -0.58, 0.58), "+X -Y +Z"),
+        ((0.3, 0.9, 0.3), "+Y"),
+    ],
+)
+def test_axes_that_carry_much_of_gravity_are_named(down, words):
+    assert axes(down) == words
