@@ -1,0 +1,154 @@
+"""The two blob slots: one of them is whole at any moment, whatever the power does."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mpucal.wire.blob import Blob
+
+VECTORS = Path(__file__).parents[2] / "fixtures" / "vectors"
+SEAL_BYTES = 8
+SLOT_BYTES = 264
+MEASURED = Blob.decode((VECTORS / "blob_measured.bin").read_bytes())
+OLD, NEW, NEWER = (replace(MEASURED, b_a=(float(i), 0.0, 0.0)).encode() for i in range(3))
+
+
+@pytest.fixture(scope="module")
+def slots(core):
+    return Slots(core)
+
+
+class Slots:
+    """The calls of a blob write, as the bridge's messages make them."""
+
+    def __init__(self, core):
+        self._core = core
+
+    def stored(self, eeprom):
+        return self._core.mpucal_slots_stored(ctypes.byref(eeprom.memory))
+
+    def read(self, eeprom):
+        stored = self.stored(eeprom)
+        return bytes(eeprom.content[stored.at : stored.at + stored.length]) if stored.generation else None
+
+    def store(self, eeprom, blob):
+        memory = ctypes.byref(eeprom.memory)
+        at = self._core.mpucal_slots_open(memory)
+        for i, byte in enumerate(blob):
+            eeprom.memory.write(at + i, byte)
+        crc = int.from_bytes(blob[-4:], "little")
+        if not self._core.mpucal_slots_check(memory, at, len(blob), ctypes.c_uint32(crc)):
+            return 0
+        return self._core.mpucal_slots_seal(memory, at)
+
+    def erase(self, eeprom):
+        return self._core.mpucal_slots_erase(ctypes.byref(eeprom.memory))
+
+
+def holding(host, slots, *blobs):
+    eeprom = host.Eeprom()
+    for blob in blobs:
+        assert slots.store(eeprom, blob)
+    return bytes(eeprom.content)
+
+
+@pytest.mark.parametrize("content", [b"\xff" * 1024, bytes(1024), bytes(range(256)) * 4], ids=["new", "zeros", "other"])
+def test_nothing_is_stored_in_a_memory_that_never_held_a_blob(content, host, slots):
+    assert slots.read(host.Eeprom(content)) is None
+
+
+def test_generations_count_from_one_and_slots_take_turns(host, slots):
+    eeprom = host.Eeprom()
+    found = [(slots.store(eeprom, blob), slots.stored(eeprom).at, slots.read(eeprom)) for blob in (OLD, NEW, NEWER)]
+    assert found == [(1, SEAL_BYTES, OLD), (2, SLOT_BYTES + SEAL_BYTES, NEW), (3, SEAL_BYTES, NEWER)]
+
+
+def test_lies_in_memory_as_the_protocol_says(host, slots):
+    content = holding(host, slots, OLD, NEW)
+    second = content[SLOT_BYTES:]
+    assert content[:SEAL_BYTES] == bytes.fromhex("01000000feffffff")
+    assert second[:SEAL_BYTES] == bytes.fromhex("02000000fdffffff")
+    assert second[SEAL_BYTES : SEAL_BYTES + len(NEW)] == NEW
+
+
+def test_a_generation_wraps_around_to_one(host, slots):
+    content = bytearray(holding(host, slots, OLD))
+    content[:SEAL_BYTES] = bytes.fromhex("ffffffff00000000")
+    eeprom = host.Eeprom(content)
+    assert slots.stored(eeprom).generation == 0xFFFFFFFF
+    assert slots.store(eeprom, NEW) == 1
+    assert slots.read(eeprom) == NEW
+
+
+def writes_of(host, slots, content, change):
+    eeprom = host.Eeprom(content)
+    change(eeprom)
+    return eeprom.writes
+
+
+@pytest.mark.parametrize("before", [(), (OLD,), (NEWER, OLD)], ids=["none", "first slot", "both slots"])
+@pytest.mark.parametrize("torn", [0x00, 0xFF, 0x5A], ids=hex)
+def test_power_loss_at_any_write_leaves_the_old_blob_or_the_new_one(before, torn, host, slots):
+    content = holding(host, slots, *before)
+    old = before[-1] if before else None
+    seen = set()
+    for cut_at in range(writes_of(host, slots, content, lambda eeprom: slots.store(eeprom, NEW))):
+        eeprom = host.Eeprom(content, cut_at, torn)
+        slots.store(eeprom, NEW)
+        after = host.Eeprom(eeprom.content)
+        seen.add(slots.read(after))
+        assert seen <= {old, NEW}
+        # and whatever is left does not stand in the way of the next one
+        assert slots.store(after, NEWER)
+        assert slots.read(after) == NEWER
+    assert old in seen
+
+
+@settings(max_examples=200)
+@given(cuts=st.lists(st.tuples(st.integers(0, 210), st.integers(0, 255)), min_size=1, max_size=5))
+def test_power_loss_upon_power_loss_leaves_a_blob_that_was_once_whole(cuts, host, slots):
+    content, whole = holding(host, slots, OLD), OLD
+    for number, (cut_at, torn) in enumerate(cuts):
+        blob = replace(MEASURED, created="", b_a=(0.0, float(number), 1.0)).encode()
+        eeprom = host.Eeprom(content, cut_at, torn)
+        slots.store(eeprom, blob)
+        content = bytes(eeprom.content)
+        held = slots.read(host.Eeprom(content))
+        assert held in (whole, blob)
+        whole = held
+
+
+def test_a_byte_that_does_not_keep_its_value_leaves_the_old_blob(host, slots):
+    for stuck in range(SLOT_BYTES, SLOT_BYTES + SEAL_BYTES + len(NEW)):
+        eeprom = host.Eeprom(holding(host, slots, OLD))
+        eeprom.stuck.add(stuck)
+        stored = slots.store(eeprom, NEW)
+        # a byte that is stuck at what it was to be is no failure
+        assert slots.read(eeprom) == (NEW if stored else OLD)
+
+
+def test_a_blob_that_rotted_gives_way_to_the_one_before(host, slots):
+    content = bytearray(holding(host, slots, OLD, NEW))
+    content[SLOT_BYTES + SEAL_BYTES + 100] ^= 1
+    eeprom = host.Eeprom(content)
+    assert slots.read(eeprom) == OLD
+    assert slots.store(eeprom, NEWER)
+    assert (slots.read(eeprom), slots.stored(eeprom).at) == (NEWER, SLOT_BYTES + SEAL_BYTES)
+
+
+@pytest.mark.parametrize("before", [(), (OLD,), (OLD, NEW)], ids=["none", "one", "two"])
+def test_erased_is_erased_and_never_an_older_one(before, host, slots):
+    content = holding(host, slots, *before)
+    for cut_at in range(writes_of(host, slots, content, slots.erase)):
+        eeprom = host.Eeprom(content, cut_at, 0x5A)
+        slots.erase(eeprom)
+        assert slots.read(host.Eeprom(eeprom.content)) in (before[-1] if before else None, None)
+    eeprom = host.Eeprom(content)
+    assert slots.erase(eeprom)
+    assert slots.read(eeprom) is None
