@@ -1,0 +1,52 @@
+"""What register writes tell about the chip's FIFO: does it run, and will somebody drain it. Writes none itself.
+
+Source: RM-MPU-6000A r4.2, registers 35, 104, 106, 107 and 116.
+"""
+
+from __future__ import annotations
+
+from ...chip import registers as reg
+
+# What each bit of FIFO_EN adds to a frame; the lowest three are other chips', of unknown size.
+FRAME_PARTS = (
+    (reg.FIFO_EN_ACCEL, 6),
+    (reg.FIFO_EN_TEMP, 2),
+    (reg.FIFO_EN_XG, 2),
+    (reg.FIFO_EN_YG, 2),
+    (reg.FIFO_EN_ZG, 2),
+)
+OTHER_CHIPS = 0x07
+# A write to one of these may stop the FIFO or move what lies in it.
+CONTROLS = frozenset((reg.FIFO_EN, reg.USER_CTRL, reg.SIGNAL_PATH_RESET, reg.PWR_MGMT_1))
+
+
+class FifoWatch:
+    """Follows what somebody writes to a chip.
+
+    Who means to drain the FIFO resets it first, so that it begins with a frame (register 106); who starts it as
+    the chip's reset left it wants to see how much it holds.
+    """
+
+    def __init__(self) -> None:
+        self._held = dict.fromkeys(CONTROLS, 0)
+        self._begins_with_a_frame = False
+
+    def saw_write(self, register: int, data: bytes) -> None:
+        """`data` was written from `register` on."""
+        for at, value in enumerate(data, register):
+            if at == reg.PWR_MGMT_1 and value & reg.PWR_MGMT_1_DEVICE_RESET:
+                self._held = dict.fromkeys(CONTROLS, 0)
+                self._begins_with_a_frame = False
+            elif at in CONTROLS:
+                self._held[at] = value
+            if at == reg.USER_CTRL and value & reg.USER_CTRL_FIFO_RESET:
+                self._begins_with_a_frame = True
+
+    @property
+    def frame_bytes(self) -> int:
+        """Length of the frames to drain; 0 where the FIFO does not run, or none is known to begin there."""
+        sources = self._held[reg.FIFO_EN]
+        runs = self._held[reg.USER_CTRL] & reg.USER_CTRL_FIFO_EN and not sources & OTHER_CHIPS
+        if not (runs and self._begins_with_a_frame):
+            return 0
+        return sum(size for bit, size in FRAME_PARTS if sources & bit)
