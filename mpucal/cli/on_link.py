@@ -28,7 +28,8 @@ from ..session.plan import Plan
 from .opened import Measuring, Say
 
 CAPTURE = "capture.tlog"
-SESSION, MPUCAL, RECORDED, SOURCE, PLAN, SYSTEM = "session", "mpucal", "recorded", "source", "plan", "system"
+SESSION, END = "session", "end"
+MPUCAL, RECORDED, SOURCE, PLAN, SYSTEM = "mpucal", "recorded", "source", "plan", "system"
 # counts up with every change of what the source sends and believes
 SOURCE_VERSION = 1
 NOTE_IDS = 65535
@@ -85,7 +86,11 @@ class OnLink:
             plan = {SOURCE: SOURCE_VERSION, PLAN: asdict(self.plan), SYSTEM: self._system}
             notes.keep(SESSION, 0, {MPUCAL: __version__, RECORDED: recorded, **plan})
             source = VehicleSource(link, self.plan.config.rate_hz, self._system, say, capture.name)
-            yield Measuring(source, notes.keep)
+            try:
+                yield Measuring(source, notes.keep)
+            finally:
+                # until when nothing more came: a replay ends its last poll there
+                notes.keep(END, 0, {})
 
     def _prompt(self, prompt: Prompt) -> None:
         """Tell the vehicle, whose log then says what was done to it."""

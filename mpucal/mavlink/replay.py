@@ -35,6 +35,7 @@ class Replay:
         self._pending: list[Noted] = []
         self._at = 0
         self._now_ns = tlog.records[0].t_ns
+        self._end_ns = tlog.records[-1].t_ns
         self._pass_own()
 
     def now_ns(self) -> int:
@@ -48,13 +49,14 @@ class Replay:
         ------
         EndOfCapture : there are no more packets.
         """
-        if self._at == len(self._records):
+        ended = self._at == len(self._records)
+        if ended and until_ns > self._end_ns:
             raise EndOfCapture(f"{self.name} ends")
-        record = self._records[self._at]
-        t_ns = max(record.t_ns, self._now_ns)
-        if t_ns >= until_ns:
+        if ended or self._records[self._at].t_ns >= until_ns:
             self._now_ns = max(self._now_ns, until_ns)
             return None
+        record = self._records[self._at]
+        t_ns = max(record.t_ns, self._now_ns)
         self._now_ns = t_ns
         self._at += 1
         self._pass_own()
