@@ -9,12 +9,12 @@
 #error "timer 0 counts half microseconds at 16 MHz"
 #endif
 
-#define OVERFLOW_US 128
-
-static volatile uint32_t overflows_us;
+static volatile uint32_t steps_us;
+static volatile uint8_t steps;
 
 ISR(TIMER0_OVF_vect) {
-    overflows_us += OVERFLOW_US;
+    steps_us += CLOCK_STEP_US;
+    steps++;
 }
 
 void clock_begin(void) {
@@ -28,13 +28,17 @@ uint32_t clock_now_us(void) {
     uint32_t us = 0;
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
         uint8_t ticks = TCNT0;
-        us = overflows_us + ticks / 2;
+        us = steps_us + ticks / 2;
         /* it has overflowed since interrupts are off, and before it was read */
         if (TIFR0 & _BV(TOV0) && ticks < 128) {
-            us += OVERFLOW_US;
+            us += CLOCK_STEP_US;
         }
     }
     return us;
+}
+
+uint8_t clock_steps(void) {
+    return steps;
 }
 
 void clock_nap(void) {

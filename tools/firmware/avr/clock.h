@@ -9,7 +9,12 @@ void clock_begin(void);
 /* Wraps at 2^32; steps of 0.5 us, rounded down. */
 uint32_t clock_now_us(void);
 
-/* Sleep until any interrupt, at most 128 us; interrupts are off when it is called, and on when it returns. */
+/* The same in steps of 128 us, modulo 256: for short waits, without arithmetic in 32 bits. */
+uint8_t clock_steps(void);
+
+#define CLOCK_STEP_US 128
+
+/* Sleep until any interrupt, at most a step; interrupts are off when it is called, and on when it returns. */
 void clock_nap(void);
 
 #endif

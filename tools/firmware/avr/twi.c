@@ -9,7 +9,7 @@
 #include "mpucal_bridge.h"
 
 #define SCL_HZ 400000UL
-#define TIMEOUT_US 25000UL
+#define TIMEOUT_STEPS (25000 / CLOCK_STEP_US)
 #define HALF_BIT_US 2
 #define SDA PC4
 #define SCL PC5
@@ -111,11 +111,11 @@ static uint8_t give_up(void) {
 }
 
 static uint8_t transfer(uint8_t count) {
-    uint32_t began_us = clock_now_us();
+    uint8_t began = clock_steps();
     left = count;
     register_sent = 0;
     while (TWCR & _BV(TWSTO)) { /* the last transfer's */
-        if (clock_now_us() - began_us > TIMEOUT_US) {
+        if ((uint8_t)(clock_steps() - began) > TIMEOUT_STEPS) {
             return give_up();
         }
     }
@@ -125,7 +125,7 @@ static uint8_t transfer(uint8_t count) {
     while (code == RUNNING) {
         clock_nap();
         cli();
-        if (code == RUNNING && clock_now_us() - began_us > TIMEOUT_US) {
+        if (code == RUNNING && (uint8_t)(clock_steps() - began) > TIMEOUT_STEPS) {
             return give_up();
         }
     }

@@ -1,6 +1,6 @@
 /* The serial bridge of firmware_protocol.md: requests in, replies and pushed FIFO frames out.
  *
- * Knows the processor only through the functions of a port, keeps no more than struct mpucal_bridge (184 bytes on an
+ * Knows the processor only through the functions of a port, keeps no more than struct mpucal_bridge (176 bytes on an
  * AVR), and never allocates. The loop of a firmware gives it every byte that came in, and otherwise lets it look:
  *
  *     mpucal_bridge_begin(&bridge, &port);
