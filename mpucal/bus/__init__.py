@@ -12,6 +12,7 @@ from ..errors import UsageError
 
 # name -> module of this package, what opens the bus
 BUSES = {
+    "bridge": ("bridge", "open_bridge"),
     "i2c": ("i2c", "I2cBus"),
     "replay": ("replay", "ReplayBus"),
     "sim": ("simulated", "open_simulated"),

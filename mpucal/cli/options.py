@@ -22,7 +22,7 @@ ACCEL_RANGES_G, GYRO_RANGES_DPS = ("2", "4", "8", "16"), ("250", "500", "1000", 
 
 # what a capture fixes: none of it may be given beside --replay
 FIXED_BY_CAPTURE = ("address", "rate", "accel_range", "gyro_range", "seed", "gravity", "model", "system", "signing_key")
-SOURCES = ("bus", "mavlink", "replay")
+SOURCES = ("bus", "serial", "mavlink", "replay")
 # what only one kind of source has
 OF_A_BUS, OF_A_VEHICLE = ("address", "accel_range", "gyro_range", "seed"), ("system", "signing_key")
 
@@ -57,10 +57,17 @@ class Gravity(click.ParamType[float]):
 
 
 def source_options(command: F) -> F:
-    """--bus, --mavlink or --replay, and how the sensor is set."""
+    """--bus, --serial, --mavlink or --replay, and how the sensor is set."""
     for option in reversed(
         (
             click.option("--bus", metavar="BUS", help="/dev/i2c-N, or sim[:key=value,...] for the simulated chip."),
+            click.option(
+                "--serial",
+                metavar="PORT[:BAUD]",
+                is_flag=False,
+                flag_value="",
+                help="A board with the bridge's firmware: /dev/ttyX or COMn, or a URL such as socket://HOST:PORT.",
+            ),
             click.option(
                 "--mavlink",
                 metavar="URL",
@@ -118,13 +125,13 @@ def check_source(context: click.Context) -> None:
     if len(given) != 1:
         together = " and ".join(f"--{name}" for name in given)
         what = f"{together} were given together" if given else "no source was given"
-        raise UsageError(what, "give exactly one of --bus BUS, --mavlink URL and --replay FILE")
+        raise UsageError(what, "give exactly one of --bus BUS, --serial PORT, --mavlink URL and --replay FILE")
     if given == ["replay"]:
         # a .tlog of another ground station fixes nothing: its head is looked at where it is opened
         if context.params["replay"].suffix.lower() != TLOG:
             refuse_fixed(context)
         return
-    for name in OF_A_VEHICLE if given == ["bus"] else OF_A_BUS:
+    for name in OF_A_BUS if given == ["mavlink"] else OF_A_VEHICLE:
         if _was_given(context, name):
             raise UsageError(f"{_spelled(name)} was given beside --{given[0]}, which has none", "leave it out")
 

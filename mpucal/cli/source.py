@@ -40,6 +40,21 @@ def open_bus(text: str, plan: Plan, address: int | None, seed: int | None) -> On
     return OnBus(I2cBus(text, address), plan)
 
 
+def open_serial(text: str, plan: Plan, address: int | None, seed: int | None) -> OnBus:
+    """A chip behind a serial bridge.
+
+    Raises
+    ------
+    UsageError : no port was named. BusError : no such port, no permission, or no bridge on it.
+    """
+    # pyserial is of no use to a chip on another bus
+    from ..bus.bridge import open_bridge  # noqa: PLC0415
+
+    if seed is not None:
+        raise UsageError("--seed chooses a simulated sensor, and --serial names a real one", "leave it out")
+    return OnBus(open_bridge(text, address), plan)
+
+
 def open_replay(file: Path) -> OnBus:
     """A capture, to be run again.
 
@@ -88,9 +103,11 @@ def open_vehicle_replay(file: Path, plan: Plan, system: int | None) -> Opened:
 
 
 def opened(options: Mapping[str, Any], until_end: bool = False) -> Opened:
-    """What --bus, --mavlink or --replay of a command's `options` names, with the options beside it."""
+    """What --bus, --serial, --mavlink or --replay of a command's `options` names, with the options beside it."""
     config = Config(int(options["accel_range"]), int(options["gyro_range"]), options["rate"])
     plan = Plan(config, options["gravity"], options["model"], until_end)
+    if options["serial"] is not None:
+        return open_serial(options["serial"], plan, options["address"], options["seed"])
     if options["mavlink"] is not None:
         return open_vehicle(options["mavlink"], plan, options["system"], options["signing_key"])
     if options["replay"] is not None:

@@ -7,6 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from mpucal.bus import BUSES, opener
+from mpucal.bus.bridge import BridgeBus
+from mpucal.bus.bridge.emulated import EmulatedBridge, EmulatedLine
 from mpucal.bus.i2c import I2cBus
 from mpucal.bus.replay import ReplayBus
 from mpucal.bus.tap import Tap
@@ -40,12 +42,14 @@ def script(bus):
     return SimpleNamespace(times=times, replies=replies)
 
 
-@pytest.fixture(params=["i2c", "sim", "replay", "tap"])
+@pytest.fixture(params=["bridge", "i2c", "sim", "replay", "tap"])
 def bus(request, adapter, still_chip):
     recorder = _List()
     if request.param == "i2c":
         return I2cBus(str(adapter().path))
-    simulated, _ = still_chip()
+    simulated, clock = still_chip()
+    if request.param == "bridge":
+        return BridgeBus(EmulatedLine(EmulatedBridge(simulated, clock.now), clock))
     if request.param == "sim":
         return simulated
     if request.param == "tap":
@@ -106,11 +110,11 @@ def test_every_bus_of_the_list_can_be_asked_for(name):
 
 
 def test_an_unknown_bus_names_the_known():
-    with pytest.raises(UsageError, match="no bus called spi: take one of i2c, replay, sim"):
+    with pytest.raises(UsageError, match="no bus called spi: take one of bridge, i2c, replay, sim"):
         opener("spi")
 
 
 def test_no_library_of_a_bus_is_loaded_before_it_is_asked_for():
-    program = "import sys, mpucal.bus; print(sorted({'smbus2', 'numpy', 'mcap'} & set(sys.modules)))"
+    program = "import sys, mpucal.bus; print(sorted({'smbus2', 'serial', 'numpy', 'mcap'} & set(sys.modules)))"
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"

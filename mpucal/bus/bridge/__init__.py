@@ -13,6 +13,6 @@ def open_bridge(text: str, address: int | None = None) -> BridgeBus:
 
     Raises
     ------
-    BusError : no such port, or no bridge on it. NoAnswer : the bridge finds no chip.
+    UsageError : no port is named. BusError : no such port, or no bridge on it. NoAnswer : the bridge finds no chip.
     """
     return BridgeBus(SerialPort(text), address)

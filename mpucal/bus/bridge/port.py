@@ -12,8 +12,8 @@ from contextlib import suppress
 from threading import Event, Thread
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from ...errors import BusError
-from .port_errors import gone, opening_error
+from ...errors import BusError, UsageError
+from .port_errors import another, gone, opening_error
 
 if TYPE_CHECKING:
     from serial import Serial
@@ -77,10 +77,12 @@ class SerialPort:
 
     Raises
     ------
-    BusError : no such port, no permission, or taken.
+    UsageError : no port is named. BusError : no such port, no permission, or taken.
     """
 
     def __init__(self, text: str) -> None:
+        if not text:
+            raise UsageError("no serial port was named", another())
         self.name, self.bauds = split(text)
         self._chunks: queue.SimpleQueue[Chunk | BusError] = queue.SimpleQueue()
         self._closing = Event()

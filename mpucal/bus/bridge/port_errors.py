@@ -40,7 +40,7 @@ def another() -> str:
 
     ports = [f"{port.device} ({port.description})" for port in sorted(comports()) if port.hwid != "n/a"]
     if not ports:
-        return "plug the bridge in: no serial port was found on this machine"
+        return "plug the bridge in (this machine shows no serial port)"
     return f"take one of {', '.join(ports)}"
 
 
