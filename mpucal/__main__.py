@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+# next to nothing here: what takes a while to load does so where Ctrl-C finds its sentence
 import sys
-import traceback
 from collections.abc import Sequence
 
-import click
-
-from .cli import commands
 from .errors import Abandoned, MpucalError
 
 BUG = 1
+INTERRUPTED = "mpucal: interrupted; what was recorded until then is kept."
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -22,13 +20,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run a command, and return its exit code."""
     try:
+        return _run(arguments)
+    except KeyboardInterrupt:
+        print(INTERRUPTED, file=sys.stderr)
+        return Abandoned.exit_code
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    import click  # noqa: PLC0415
+
+    from .cli import commands  # noqa: PLC0415
+
+    try:
         return int(commands.main(args=arguments, prog_name="mpucal", standalone_mode=False) or 0)
     except click.ClickException as error:
         error.show()
         return error.exit_code
-    except (click.Abort, KeyboardInterrupt):
-        click.echo("mpucal: interrupted; what was recorded until then is kept.", err=True)
-        return Abandoned.exit_code
+    except click.Abort:
+        raise KeyboardInterrupt from None
     except MpucalError as error:
         click.echo(f"mpucal: {error}", err=True)
         return error.exit_code
@@ -37,6 +46,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         sys.stdout = None
         return 0
     except Exception:
+        import traceback  # noqa: PLC0415
+
         traceback.print_exc()
         click.echo("mpucal: this is a bug in mpucal: please report it with the lines above.", err=True)
         return BUG
