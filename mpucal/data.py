@@ -19,7 +19,12 @@ STANDARD_GRAVITY_MPS2 = 9.80665
 
 @dataclass(frozen=True)
 class Sensor:
-    """What is known of the sensor behind a recording; None where nobody said."""
+    """What is known of the sensor behind a recording; None where nobody said.
+
+    Attributes
+    ----------
+    accel_offsets : the words that its accelerometer's offset registers x, y, z held meanwhile.
+    """
 
     chip: str | None = None
     who_am_i: int | None = None
@@ -27,6 +32,7 @@ class Sensor:
     gyro_range_dps: float | None = None
     rate_hz: float | None = None
     temperature_c: float | None = None
+    accel_offsets: tuple[int, int, int] | None = None
 
 
 @dataclass(frozen=True)

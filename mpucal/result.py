@@ -202,7 +202,7 @@ class Calibration:
             gyro_noise_std=_array(gyr.get("noise_std"), 3),
             fit=MappingProxyType(dict(document.get("fit", {}))),
             quality=MappingProxyType(dict(document.get("quality", {}))),
-            sensor=Sensor(**{key: value for key, value in sensor.items() if key in known}),
+            sensor=Sensor(**{key: _hashable(value) for key, value in sensor.items() if key in known}),
             created=str(document.get("created", "")),
             applied_in_hardware=_array(document.get("applied_in_hardware", {}).get("b_a", [0, 0, 0]), 3),
             extra=MappingProxyType({key: document[key] for key in ("autopilot", "others") if key in document}),
@@ -235,6 +235,11 @@ def _array(values: Any, *shape: int) -> Vector:
     if array.shape != shape:
         raise ValueError(f"shape {array.shape} where {shape} belongs")
     return array
+
+
+def _hashable(value: Any) -> Any:
+    """JSON's lists as the tuples that they were."""
+    return tuple(value) if isinstance(value, list) else value
 
 
 def _plain(value: Any) -> Any:

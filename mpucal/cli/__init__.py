@@ -13,6 +13,7 @@ COMMANDS = {
     "session": "Guide a person through a calibration, and write the result.",
     "record": "Record a sensor into a capture, without calibrating.",
     "calibrate": "Calibrate from a capture or another recording.",
+    "write": "Write a calibration to the sensor's own memory, or what was there back.",
     "show": "Say what is in a calibration, a config blob or a recording.",
 }
 

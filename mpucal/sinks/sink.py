@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from ..result import Calibration
 
@@ -52,5 +52,19 @@ class Sink(Protocol):
         Raises
         ------
         WriteBackError : refused (nothing was written), or failed (the old state is restored); `what` says which.
+        """
+        ...
+
+
+@runtime_checkable
+class Restorable(Sink, Protocol):
+    """A sink that takes back what it kept."""
+
+    def put_back(self, kept: Path) -> str:
+        """Write back what `keep` saved to `kept`, and say in one sentence what holds now.
+
+        Raises
+        ------
+        RecordingError : `kept` is not what this sink keeps. WriteBackError : see Sink.
         """
         ...

@@ -1,0 +1,110 @@
+"""A chip made to measure for a moment and put back as it was, without the reset that would reload its trim.
+
+Knows no FIFO and no calibration: it looks at the data registers.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from ..data import Vector
+from ..errors import BusError, ChipError
+from . import registers as reg
+from .port import Port
+
+MS = 1_000_000
+WAKE_NS, SETTLE_NS = 100 * MS, 100 * MS
+LOOK_NS, LOOKS = 5 * MS, 100
+
+AFS_SEL, DLPF_CFG, SMPLRT_DIV = 1, 3, 4
+# in the order of writing: awake first
+SETTING = {
+    reg.PWR_MGMT_1: reg.CLKSEL_PLL,
+    reg.PWR_MGMT_2: 0,
+    reg.SMPLRT_DIV: SMPLRT_DIV,
+    reg.CONFIG: DLPF_CFG,
+    reg.ACCEL_CONFIG: AFS_SEL << reg.FULL_SCALE_SHIFT,
+}
+# a hand trembles by this much, a table does not; a person needs some time to put the board down
+STILL_STD_G, PATIENCE = 0.008, 40
+HALF_SENSITIVITY_G = 0.75
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What half a second showed.
+
+    Attributes
+    ----------
+    mean_g, std_g : (3,) of the accelerometer, at the nominal scale.
+    """
+
+    mean_g: Vector
+    std_g: Vector
+
+
+class Bench:
+    """For a `with` statement; what it changes is put back in the end, if the bus still works.
+
+    Parameters
+    ----------
+    port : the chip's.
+    """
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+        self._held: dict[int, int] = {}
+
+    def __enter__(self) -> Self:
+        self._held = {register: self._port.read(register, 1)[0] for register in SETTING}
+        try:
+            self._port.write(reg.PWR_MGMT_1, reg.CLKSEL_PLL)
+            self._port.sleep(WAKE_NS)
+            for register, value in SETTING.items():
+                self._port.write(register, value)
+            self._port.sleep(SETTLE_NS)
+        except BaseException:
+            self._put_back()
+            raise
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._put_back()
+
+    def rest(self) -> Rest:
+        """The accelerometer at rest, from a hundred looks; waits for a board that moves to be put down.
+
+        Raises
+        ------
+        BusError : a transfer failed three times. ChipError : the board moves on and on.
+        """
+        for _ in range(PATIENCE):
+            self._port.sleep(SETTLE_NS)
+            rest = self._look()
+            if (rest.std_g < STILL_STD_G).all():
+                return rest
+        raise ChipError(
+            f"the board moves (by {rest.std_g.max() * 1000:.0f} mg)", "lay it on something firm and let go of it"
+        )
+
+    def _look(self) -> Rest:
+        looks = np.empty((LOOKS, 3))
+        for look in looks:
+            self._port.sleep(LOOK_NS)
+            look[:] = np.frombuffer(self._port.read(reg.ACCEL_XOUT_H, 6), ">i2")
+        looks /= reg.ACCEL_LSB_PER_G[AFS_SEL]
+        # revision C of the 6050 shows half of gravity
+        if np.linalg.norm(looks.mean(0)) < HALF_SENSITIVITY_G:
+            looks *= 2
+        return Rest(looks.mean(0), looks.std(0))
+
+    def _put_back(self) -> None:
+        # in the other order: asleep last
+        for register, value in reversed(self._held.items()):
+            with suppress(BusError):
+                self._port.write(register, value)

@@ -1,0 +1,124 @@
+"""The accelerometer's offset registers: where they may be, what they hold, and how to write them whole.
+
+Knows no calibration, and nothing of what a count does: response.py measures that.
+
+Source: RM-MPU-6000A (0x06, two bytes an axis, one after the other); RM-MPU-9250A r1.4, registers 119 to 126 (0x77,
+with a reserved byte after each axis). 15 bits in [15:1]; bit 0 is reserved and kept. A factory trim is in them after
+power-on, and all that is written is gone with the supply.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Self
+
+from ..errors import BusError, ChipError
+from .families import MPU6050, MPU6500
+from .port import Port
+
+Place = tuple[int, int, int]
+Words = tuple[int, int, int]
+
+PLACES: tuple[Place, ...] = (MPU6500.accel_offset_h, MPU6050.accel_offset_h)
+
+RESERVED = 1
+LEAST, MOST = -32768, 32767
+
+# a wire that somebody touches is back within seconds
+RESTORE_WAITS_NS = tuple(1_000_000 * 4**i for i in range(7))
+
+
+@dataclass(frozen=True)
+class Block:
+    """All bytes from the first offset register to the last, so that one transfer writes the three axes.
+
+    Attributes
+    ----------
+    place : addresses of the high bytes x, y, z. data : what lies there, reserved bytes between included.
+    """
+
+    place: Place
+    data: bytes
+
+    @classmethod
+    def read(cls, port: Port, place: Place) -> Self:
+        """What the chip holds now; BusError where it cannot be read."""
+        return cls(place, port.read(place[0], place[2] + 2 - place[0]))
+
+    @property
+    def words(self) -> Words:
+        """The three axes as signed 16-bit words, reserved bit included."""
+        x, y, z = (int.from_bytes(self.data[high - self.place[0] :][:2], "big", signed=True) for high in self.place)
+        return x, y, z
+
+    def with_words(self, words: Sequence[int]) -> Block:
+        """The same with other words; what lies between them stays."""
+        data = bytearray(self.data)
+        for high, word in zip(self.place, words, strict=True):
+            data[high - self.place[0] : high - self.place[0] + 2] = word.to_bytes(2, "big", signed=True)
+        return Block(self.place, bytes(data))
+
+    def write(self, port: Port) -> bool:
+        """Write it in one transfer; True where the chip then holds it. BusError where that cannot be told."""
+        port.write_block(self.place[0], self.data)
+        return port.read(self.place[0], len(self.data)) == self.data
+
+
+def moved(words: Words, counts: Iterable[float]) -> Words:
+    """`words` moved by `counts`, rounded to what [15:1] can say; bit 0 stays as it is.
+
+    Raises
+    ------
+    ChipError : a register cannot hold that.
+    """
+    x, y, z = (
+        (old & ~RESERVED) + 2 * round(count / 2) | (old & RESERVED) for old, count in zip(words, counts, strict=True)
+    )
+    if not all(LEAST <= word <= MOST for word in (x, y, z)):
+        raise ChipError(
+            f"the offset registers cannot hold {x}, {y}, {z}",
+            "use the calibration's files: a bias this large does not fit beside the factory's trim",
+        )
+    return x, y, z
+
+
+def difference(new: Words, old: Words) -> tuple[int, int, int]:
+    """By how many counts `new` acts more than `old`: bit 0 does nothing."""
+    x, y, z = ((a & ~RESERVED) - (b & ~RESERVED) for a, b in zip(new, old, strict=True))
+    return x, y, z
+
+
+@contextmanager
+def restored(port: Port, old: Block) -> Iterator[None]:
+    """Meanwhile other words may be written there; `old` is there again afterwards, whatever happens.
+
+    Raises
+    ------
+    ChipError : it cannot be restored.
+    """
+    try:
+        yield
+    finally:
+        restore(port, old)
+
+
+def restore(port: Port, old: Block) -> None:
+    """Write `old` where it is not there, again and again for as long as a bad contact may last.
+
+    Raises
+    ------
+    ChipError : the chip does not take it.
+    """
+    for wait_ns in RESTORE_WAITS_NS:
+        try:
+            if Block.read(port, old.place) == old or old.write(port):
+                return
+        except BusError:
+            pass
+        port.sleep(wait_ns)
+    raise ChipError(
+        f"the accelerometer's offset registers could not be restored to {old.data.hex(' ')} at 0x{old.place[0]:02x}",
+        "take the chip's supply away for a moment: then its factory trim is back",
+    )

@@ -1,0 +1,85 @@
+"""Where a chip's offset registers really are and what a count of them does, by measuring. Knows no calibration.
+
+Clones move them, and even InvenSense's own drivers disagree on the scale: so a known step is written, half a second
+is averaged, and the step is taken away again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import Vector
+from ..errors import ChipError
+from .bench import Bench
+from .offsets import PLACES, Block, Place, difference, moved, restored
+from .port import Port
+
+# of different size on each axis, so that axes that are swapped show
+STEPS = (256, 320, 384)
+# a step goes towards zero where it would not fit
+ROOM = 30_000
+
+SCALES_LSB_PER_G = (2048.0, 4096.0)
+# the accelerometer's own scale is within 3 %
+TOLERANCE = 0.15
+# half of the smallest step, in g; and what a board that lay still may differ by
+NOTHING_G, MOVED_G = 0.03, 0.006
+
+
+@dataclass(frozen=True)
+class Response:
+    """What the offset registers do.
+
+    Attributes
+    ----------
+    place : where they are. lsb_per_g : counts that make 1 g. g_per_lsb : (3,) as measured, axis by axis.
+    """
+
+    place: Place
+    lsb_per_g: float
+    g_per_lsb: Vector
+
+
+def measured_response(port: Port, bench: Bench, likely: Place = PLACES[0]) -> Response:
+    """Try the `likely` place, then the others; the registers hold afterwards what they held before.
+
+    Raises
+    ------
+    BusError : a transfer failed. ChipError : no place answers, one answers as no register map says, the board moves,
+        or the old words could not be restored.
+    """
+    for place in sorted(PLACES, key=lambda place: place != likely):
+        old = Block.read(port, place)
+        steps = [step if word < ROOM else -step for step, word in zip(STEPS, old.words, strict=True)]
+        probe = old.with_words(moved(old.words, steps))
+        before = bench.rest().mean_g
+        with restored(port, old):
+            kept = probe.write(port)
+            during = bench.rest().mean_g if kept else before
+        if not kept:
+            continue
+        after = bench.rest().mean_g
+        if (np.abs(after - before) > MOVED_G).any():
+            raise ChipError(
+                "the board moved while its offset registers were tried", "lay it on something firm and let go of it"
+            )
+        shift = during - (before + after) / 2
+        if (np.abs(shift) > NOTHING_G).any():
+            return _understood(place, shift / np.array(difference(probe.words, old.words)))
+    raise ChipError(
+        "the accelerometer does not answer to its offset registers, neither at 0x77 nor at 0x06",
+        "use the calibration's files: this chip cannot hold a correction",
+    )
+
+
+def _understood(place: Place, g_per_lsb: Vector) -> Response:
+    for scale in SCALES_LSB_PER_G:
+        if (np.abs(g_per_lsb * scale - 1) < TOLERANCE).all():
+            return Response(place, scale, g_per_lsb)
+    per_256 = ", ".join(f"{256_000 * value:+.0f}" for value in g_per_lsb)
+    raise ChipError(
+        f"the offset registers at 0x{place[0]:02x} answer to 256 counts with {per_256} mg, where 125 or 62.5 are known",
+        "use the calibration's files: a correction would land in the wrong place",
+    )

@@ -1,0 +1,110 @@
+"""`mpucal write`: put a calibration where the sensor's user will use it, or back what was there before."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..data import STANDARD_GRAVITY_MPS2
+from ..errors import UsageError, WriteBackError
+from ..result import FORMAT, Calibration
+from ..session.events import Prompt, PromptKind
+from ..sinks.file import make_folder
+from ..sinks.sink import Restorable, Sink
+from .on_bus import OnBus
+from .options import check_source, source_options
+from .source import opened
+
+EXAMPLE = "Example: `mpucal write board7/calibration.json chip --bus /dev/i2c-1`"
+
+
+@contextmanager
+def on_chip(options: Mapping[str, Any]) -> Iterator[Sink]:
+    """The offset registers of the chip that the options name."""
+    source = opened(options)
+    if not isinstance(source, OnBus) or source.replay is not None:
+        raise UsageError("a chip's registers are written over its own bus", "give --bus BUS")
+    from ..sinks.chip import ChipSink  # noqa: PLC0415 - each target's own
+
+    with closing(source.bus):
+        put_down(source.listeners)
+        yield ChipSink(source.bus, f"the chip on {options['bus']}")
+
+
+def put_down(listeners: Sequence[Callable[[Prompt], None]]) -> None:
+    """Ask for a board at rest: what is written is seen in the samples."""
+    prompt = Prompt(PromptKind.LAY_FLAT, "Lay the board on something firm and let go of it.")
+    click.echo(f"mpucal: {prompt.text}", err=True)
+    for listener in listeners:
+        listener(prompt)
+
+
+# name: what opens it for the options of the command
+TARGETS: dict[str, Callable[[Mapping[str, Any]], Any]] = {"chip": on_chip}
+
+
+@click.command("write", epilog=EXAMPLE)
+@click.argument("calibration", metavar="CALIBRATION", type=click.Path(path_type=Path))
+@click.argument("target", metavar="|".join(TARGETS), type=click.Choice(list(TARGETS)))
+@source_options
+@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Where the old state is kept.")
+@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.option("--json", "as_json", is_flag=True, help="Print the calibration as it is applied now, and nothing else.")
+def command(calibration: Path, target: str, folder: Path | None, yes: bool, as_json: bool, **options: Any) -> None:
+    """Write a calibration (.json or .bin), read it back, and see its effect; whatever fails, the old state is restored.
+
+    Where CALIBRATION is the file in which an earlier write kept the old state, that is written back. Exit code 6:
+    refused or failed, and the place holds what it held.
+    """
+    check_source(click.get_current_context())
+    written = Calibration.load(calibration) if _is_calibration(calibration) else None
+    folder = folder or calibration.parent
+    make_folder(folder)
+    # a simulated chip lives in the gravity in which it was calibrated
+    gravity = STANDARD_GRAVITY_MPS2 if written is None else written.fit.get("gravity") or STANDARD_GRAVITY_MPS2
+    with TARGETS[target]({**options, "gravity": gravity, "model": "auto"}) as sink:
+        _ask(f"Write {calibration} to {sink.where}?", yes)
+        for path in sink.keep(folder):
+            click.echo(
+                f"mpucal: what it held is kept in {path}: `mpucal write {path} {target} ...` brings it back.", err=True
+            )
+        if written is None:
+            click.echo(f"Done: {_put_back(sink, calibration)}.")
+            return
+        applied = sink.write(written)
+    path = folder / f"{calibration.stem}-on-{target}.json"
+    applied.calibration.save(path)
+    applied.calibration.save(path.with_suffix(".bin"))
+    if as_json:
+        click.echo(applied.calibration.json(), nl=False)
+        return
+    click.echo(f"Done: {applied.what}.")
+    click.echo(f"Written to {path} (and .bin): the calibration of the sensor as it is now.")
+
+
+def _is_calibration(path: Path) -> bool:
+    """Whether it is one at all, or a file of another kind that a sink may have kept."""
+    if path.suffix != ".json":
+        return path.suffix == ".bin" or not path.exists()
+    try:
+        return bool(json.loads(path.read_bytes()).get("format") == FORMAT)
+    except (OSError, ValueError, AttributeError):
+        return True
+
+
+def _put_back(sink: Sink, kept: Path) -> str:
+    if not isinstance(sink, Restorable):
+        raise WriteBackError(f"nothing was written: {kept} is no calibration", "give a calibration.json")
+    return sink.put_back(kept)
+
+
+def _ask(question: str, yes: bool) -> None:
+    """Go on where the person agrees, or cannot be asked."""
+    if not yes and sys.stdin.isatty() and not click.confirm(question, err=True):
+        raise WriteBackError("nothing was written: you said no", "repeat it when you want it written")

@@ -1,0 +1,222 @@
+"""A chip's accelerometer offset registers as a place that keeps b_a. Knows no kind of bus.
+
+Only b_a fits there, in steps of 1 mg; D has no register. They are volatile: what is written is gone with the supply,
+and with the reset that a session begins with.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..chip import registers as reg
+from ..chip.access import Bus
+from ..chip.bench import Bench
+from ..chip.decode import Decoder
+from ..chip.families import PARTS
+from ..chip.offsets import PLACES, Block, Place, Words, difference, moved, restore
+from ..chip.port import Port
+from ..chip.response import Response, measured_response
+from ..chip.setup import reset
+from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..errors import ChipError, RecordingError, SourceError, WriteBackError
+from ..files import write_atomically
+from ..result import REFUSED, Calibration
+from .sink import Applied
+
+KEPT, FORMAT = "chip-offsets.json", "mpucal.chip_offsets"
+
+# a calibration that fits the chip brings gravity out within 20 mg, wherever the board lies
+GRAVITY_MPS2 = 0.2
+# a measured step: the board lay still, and the accelerometer's own scale is within 3 %
+SHIFT_G, SHIFT_SHARE = 0.006, 0.1
+
+VOLATILE = (
+    "the registers are volatile: without supply, or after a reset, the factory's trim is back,"
+    " and the calibration holds as it was before"
+)
+
+
+class ChipSink:
+    """The offset registers of the chip on `bus`; `where` says which one, in words."""
+
+    name = "chip"
+
+    def __init__(self, bus: Bus, where: str) -> None:
+        self._port = Port(bus, Decoder(where))
+        self.where = where
+
+    def keep(self, folder: Path) -> tuple[Path, ...]:
+        """Save what the registers hold to chip-offsets.json; see Sink."""
+        registers = {f"0x{block.place[0]:02x}": block.data.hex() for block in self._blocks()}
+        document = {"format": FORMAT, "version": 1, "where": self.where, "registers": registers}
+        # an earlier file holds an earlier state: it stays
+        names = (KEPT, *(f"{Path(KEPT).stem}-{n}.json" for n in range(2, 1000)))
+        path = next(folder / name for name in names if not (folder / name).exists())
+        write_atomically(path, (json.dumps(document, indent=2) + "\n").encode())
+        return (path,)
+
+    def put_back(self, kept: Path) -> str:
+        """Write what an earlier `keep` saved, and say so in a sentence.
+
+        Raises
+        ------
+        RecordingError : `kept` is no such file. WriteBackError : see Sink.
+        """
+        wanted = _kept(kept)
+        with _refusing():
+            olds = self._blocks()
+        with self._old_or_new(olds):
+            for block in wanted:
+                if Block.read(self._port, block.place) != block and not block.write(self._port):
+                    raise ChipError(f"the chip does not take {block.data.hex(' ')}", "check that it is the same chip")
+        return f"the offset registers of {self.where} hold again what {kept.name} says; {VOLATILE}"
+
+    def write(self, calibration: Calibration) -> Applied:
+        """Write b_a into the registers, and measure that it is gone from the samples; see Sink."""
+        with _refusing():
+            _check(calibration)
+            likely = self._identified(calibration)
+            olds = self._blocks()
+        with self._old_or_new(olds):
+            with Bench(self._port) as bench:
+                response = measured_response(self._port, bench, likely)
+            reference = self._reference(calibration, response)
+            with Bench(self._port) as bench:
+                applied = self._apply(calibration, response, reference, bench)
+        bias = ", ".join(f"{1000 * value:+.0f}" for value in applied / STANDARD_GRAVITY_MPS2)
+        return Applied(
+            replace(calibration, applied_in_hardware=applied),
+            f"the offset registers at 0x{response.place[0]:02x} of {self.where} now subtract ({bias}) mg,"
+            f" read back and seen in the samples; {VOLATILE}",
+        )
+
+    def _blocks(self) -> tuple[Block, ...]:
+        return tuple(Block.read(self._port, place) for place in PLACES)
+
+    @contextmanager
+    def _old_or_new(self, olds: Sequence[Block]) -> Iterator[None]:
+        """What fails within leaves the registers as they were."""
+        try:
+            yield
+        except BaseException as error:
+            try:
+                for old in olds:
+                    restore(self._port, old)
+            except SourceError as worse:
+                raise WriteBackError(f"{_what(error)}, and then {worse.what}", worse.remedy) from error
+            if isinstance(error, SourceError):
+                raise WriteBackError(f"{error.what}; the offset registers are as before", error.remedy) from error
+            raise
+
+    def _identified(self, calibration: Calibration) -> Place:
+        """Where the offset registers are by the chip's name; ChipError where it is another chip than was calibrated."""
+        who_am_i = self._port.read(reg.WHO_AM_I, 1)[0]
+        calibrated = calibration.sensor
+        if calibrated.who_am_i not in (None, who_am_i):
+            raise ChipError(
+                f"the chip answers 0x{who_am_i:02x} to WHO_AM_I, and the calibrated one 0x{calibrated.who_am_i:02x}",
+                "give the calibration of this chip",
+            )
+        named = {part.chip: part.family.accel_offset_h for part in PARTS.values()}
+        by_name = named.get((calibrated.chip or "").removesuffix("C"))
+        return by_name or (PARTS[who_am_i].family.accel_offset_h if who_am_i in PARTS else PLACES[0])
+
+    def _reference(self, calibration: Calibration, response: Response) -> Words:
+        """What the registers held while b_a was measured: what they hold now, or will after a reset.
+
+        Raises
+        ------
+        ChipError : they hold something else even then: it is another chip.
+        """
+        known = calibration.sensor.accel_offsets
+        held = Block.read(self._port, response.place).words
+        if known is not None and known == held:
+            return held
+        reset(self._port)
+        held = Block.read(self._port, response.place).words
+        if known is not None and known != held:
+            raise ChipError(
+                f"the factory's trim of this chip is {held}, and {known} in the one that was calibrated",
+                "give the calibration of this chip",
+            )
+        return held
+
+    def _apply(self, calibration: Calibration, response: Response, reference: Words, bench: Bench) -> Vector:
+        """Write, read back, measure; (3,) m/s^2 that the registers then subtract."""
+        old = Block.read(self._port, response.place)
+        counts = calibration.b_a / STANDARD_GRAVITY_MPS2 * response.lsb_per_g
+        new = old.with_words(moved(reference, -counts))
+        before = bench.rest().mean_g
+        _check_gravity(calibration, before, _subtracted(old.words, reference, response))
+        if not new.write(self._port):
+            raise ChipError("the offset registers read back other than written", "check the wires, and try again")
+        after = bench.rest().mean_g
+        expected = np.array(difference(new.words, old.words)) / response.lsb_per_g
+        if (np.abs(after - before - expected) > SHIFT_G + SHIFT_SHARE * np.abs(expected)).any():
+            raise ChipError(
+                f"the samples moved by ({_mg(after - before)}) mg where ({_mg(expected)}) were written",
+                "lay the board on something firm, and try again",
+            )
+        applied = _subtracted(new.words, reference, response)
+        _check_gravity(calibration, after, applied)
+        return applied
+
+
+def _check(calibration: Calibration) -> None:
+    if calibration.quality.get("verdict") == REFUSED or not np.isfinite(calibration.b_a).all():
+        raise ChipError("the calibration was refused", "repeat the session as its reasons say")
+    if "autopilot" in calibration.extra:
+        raise ChipError("the calibration is of an autopilot's stream, not of a chip", "write it to the autopilot")
+
+
+def _check_gravity(calibration: Calibration, mean_g: Vector, applied_mps2: Vector) -> None:
+    """The calibration, with what the registers subtract, makes gravity of what the chip shows at rest."""
+    gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
+    a = replace(calibration, applied_in_hardware=applied_mps2).apply(mean_g * STANDARD_GRAVITY_MPS2)
+    if not abs(np.linalg.norm(a) - gravity) < GRAVITY_MPS2:
+        raise ChipError(
+            f"with this calibration the chip at rest shows {np.linalg.norm(a):.2f} m/s², not {gravity:.2f}",
+            "lay the board still, and give the calibration of this very chip",
+        )
+
+
+def _subtracted(words: Words, reference: Words, response: Response) -> Vector:
+    """(3,) m/s^2 that `words` take from the samples, other than `reference`; more counts add."""
+    return -np.array(difference(words, reference)) / response.lsb_per_g * STANDARD_GRAVITY_MPS2
+
+
+def _kept(path: Path) -> list[Block]:
+    """What `keep` saved."""
+    try:
+        document = json.loads(path.read_bytes())
+        if document["format"] != FORMAT:
+            raise ValueError(f'"format" is {document["format"]!r}')
+        registers = {int(first, 0): bytes.fromhex(data) for first, data in document["registers"].items()}
+        blocks = [Block(place, registers[place[0]]) for place in PLACES if place[0] in registers]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise RecordingError(f"{path} holds no offset registers ({error})", f"give a {KEPT}") from error
+    if not blocks or any(len(block.data) != block.place[2] + 2 - block.place[0] for block in blocks):
+        raise RecordingError(f"{path} does not hold the offset registers of a chip", f"give a {KEPT}")
+    return blocks
+
+
+@contextmanager
+def _refusing() -> Iterator[None]:
+    try:
+        yield
+    except SourceError as error:
+        raise WriteBackError(f"nothing was written: {error.what}", error.remedy) from error
+
+
+def _what(error: BaseException) -> str:
+    return error.what if isinstance(error, SourceError) else "the write was interrupted"
+
+
+def _mg(values_g: Vector) -> str:
+    return ", ".join(f"{1000 * value:+.0f}" for value in values_g)
