@@ -18,6 +18,7 @@ import time
 
 from mpucal.errors import MpucalError, UsageError
 from mpucal.mavlink.simulated import Options, Vehicle
+from mpucal.mavlink.simulated.line import Line
 from mpucal.mavlink.simulated.ports import Port, PtyPort, TcpPort, UdpPort
 
 STEP_S = 0.002
@@ -58,12 +59,14 @@ def open_port(text: str) -> Port:
 
 def run(vehicle: Vehicle, port: Port, speed: float) -> None:
     """Let it live as time goes on, until Ctrl-C."""
+    line = Line(vehicle.options.faults, vehicle.options.seed)
     begun = time.monotonic()
     while True:
         for data in port.receive(STEP_S):
             vehicle.hear(data)
-        for sent in vehicle.go_on(round((time.monotonic() - begun) * speed * 1e6)):
-            port.send(sent.data)
+        sent = vehicle.go_on(round((time.monotonic() - begun) * speed * 1e6))
+        for data in line.carry([packet.data for packet in sent]):
+            port.send(data)
 
 
 if __name__ == "__main__":

@@ -71,7 +71,7 @@ def source_options(command: F) -> F:
             click.option(
                 "--mavlink",
                 metavar="URL",
-                help="udp:PORT, udp:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, or /dev/ttyX[:BAUD].",
+                help="udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, /dev/ttyX[:BAUD], or sim[:key=value,...].",
             ),
             click.option("--replay", metavar="FILE", type=click.Path(path_type=Path), help="Run a capture again."),
             click.option("--address", type=Integer(), help="I2C address; by default 0x68, then 0x69."),

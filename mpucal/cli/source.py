@@ -69,7 +69,7 @@ def open_replay(file: Path) -> OnBus:
 
 
 def open_vehicle(text: str, plan: Plan, system: int | None, key: Path | None) -> Opened:
-    """A vehicle over MAVLink.
+    """A vehicle over MAVLink, or the simulated one.
 
     Raises
     ------
@@ -81,9 +81,20 @@ def open_vehicle(text: str, plan: Plan, system: int | None, key: Path | None) ->
     from ..mavlink.url import parse_url  # noqa: PLC0415
     from .on_link import OnLink  # noqa: PLC0415
 
-    url = parse_url(text)
     signing_key = None if key is None else read_key(key)
+    if text == SIMULATED or text.startswith(SIMULATED + ":"):
+        return _simulated_vehicle(text, plan, system, signing_key)
+    url = parse_url(text)
     return OnLink(open_transport(url), plan, system, signing_key)
+
+
+def _simulated_vehicle(text: str, plan: Plan, system: int | None, key: bytes | None) -> Opened:
+    from ..mavlink.simulated import Options, Vehicle  # noqa: PLC0415
+    from ..mavlink.simulated.transport import SimulatedTransport  # noqa: PLC0415
+    from .on_link import OnLink  # noqa: PLC0415
+
+    vehicle = Vehicle(Options.parse(text), plan.gravity, key)
+    return OnLink(SimulatedTransport(vehicle), plan, system, key, truth=vehicle.truth_document())
 
 
 def open_vehicle_replay(file: Path, plan: Plan, system: int | None) -> Opened:
