@@ -6,6 +6,7 @@ the rest before it, as the gyroscope carries it there.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -14,13 +15,13 @@ import numpy as np
 from ..data import Recording, Vector
 from .likelihood import K_NAMES
 from .model import B_A_NAMES, D_NAMES, Fit, Flat, product, rotation
-from .still import TREMOR_S, still_runs
+from .still import still_runs, without_drift
 
 # What nobody promises: a mounting is not stiffer, and the gyroscope's bias wanders while the board is turned.
-FLOOR_MPS2, FLOOR_RAD = 0.01, np.deg2rad(0.1)
+FLOOR_MPS2, FLOOR_RAD, BIAS_RAD_S = 0.003, math.radians(0.05), math.radians(0.02)
 # Beyond so many standard deviations chance is no excuse.
 MOST_STD = 4.0
-LEAST_REST_S = 0.6
+LEAST_REST_S, BLOCK_S = 0.75, 0.25
 
 
 @dataclass(frozen=True)
@@ -57,55 +58,62 @@ class Rest:
 
 def unseen_rests(recording: Recording, flat: Flat, fit: Fit, gravity: float, since: int) -> list[Rest]:
     """What the rests that begin after sample `since` say of `fit`, one after the other."""
-    runs = [run for run in still_runs(recording, flat).tolist() if run[1] - run[0] >= LEAST_REST_S * recording.rate_hz]
-    first = next((k for k, (a, _) in enumerate(runs) if a >= since), len(runs))
-    return [_rest(recording, flat, fit, gravity, runs[k - 1], runs[k]) for k in range(max(first, 1), len(runs))]
+    runs = still_runs(recording, flat)
+    recording = without_drift(recording, flat, runs)
+    long = [(a, b) for a, b in runs.tolist() if b - a >= LEAST_REST_S * recording.rate_hz]
+    first = next((k for k, (a, _) in enumerate(long) if a >= since), len(long))
+    return [
+        _Move(recording, flat, long[k - 1], long[k]).judged_by(fit, gravity) for k in range(max(first, 1), len(long))
+    ]
 
 
-def _rest(recording: Recording, flat: Flat, fit: Fit, gravity: float, before: list[int], here: list[int]) -> Rest:
-    r = recording
-    (a, b), (c, d) = before, here
-    y, y_var = r.acc[c:d].mean(0), _mean_variance(r.acc[c:d], r.rate_hz)
-    z, z_var = r.acc[a:b].mean(0), _mean_variance(r.acc[a:b], r.rate_hz)
-    bias = 0.5 * (r.gyr[a:b].mean(0) + r.gyr[c:d].mean(0))
-    bias_var = 0.25 * (_mean_variance(r.gyr[a:b], r.rate_hz) + _mean_variance(r.gyr[c:d], r.rate_hz))
-    step = np.diff(r.t[b - 1 : c + 1])[:, None] * (0.5 * (r.gyr[b - 1 : c] + r.gyr[b : c + 1]) - bias)
+class _Move:
+    """From one rest to the next: their means, and the gyroscope's steps between them."""
 
-    def calibrated(theta: Vector, mean: Vector) -> Vector:
-        return np.asarray(np.linalg.solve(theta[:9].reshape(3, 3), mean - theta[9:12]))
+    def __init__(self, recording: Recording, flat: Flat, start: tuple[int, int], end: tuple[int, int]) -> None:
+        (a, b), (c, d) = start, end
+        r, between = recording, slice(b - 1, c + 1)
+        self.z, self.z_var = _mean(r.acc[a:b], r.rate_hz)
+        self.y, self.y_var = _mean(r.acc[c:d], r.rate_hz)
+        dt = np.diff(r.t[between])
+        self.steps = dt[:, None] * (0.5 * (r.gyr[b - 1 : c] + r.gyr[b : c + 1]) - flat.b_omega)
+        self.clipped = bool(r.gyr_clipped[between].any() or r.gap[b : c + 1].any())
+        noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
+        self.gyro_var = 2.0 * noise
 
-    def miss(theta: Vector) -> Vector:
-        K = _symmetric(theta[12:18])
-        carried = product(rotation(-(step @ K.T))) @ calibrated(theta, z)
-        return np.asarray(np.cross(_unit(carried), _unit(calibrated(theta, y))))
+    def judged_by(self, fit: Fit, gravity: float) -> Rest:
+        """What its end says of a fit."""
+        theta, covariance = _theta(fit)
+        s, miss = self._end(theta), self._miss(theta)
+        of_length = _slope(lambda x: np.array([np.linalg.norm(self._end(x))]), theta)
+        of_miss = _slope(self._miss, theta)
+        along = _unit(s) @ np.linalg.inv(fit.D)
+        length_var = float((of_length @ covariance @ of_length.T).item() + along**2 @ self.y_var)
+        miss_var = float(np.trace(of_miss @ covariance @ of_miss.T)) + self.gyro_var
+        miss_var += float(self.y_var.sum() + self.z_var.sum()) / gravity**2
+        return Rest(
+            down=-_unit(s),
+            magnitude=float(np.linalg.norm(s) - gravity),
+            magnitude_std=math.hypot(math.sqrt(length_var), FLOOR_MPS2),
+            direction=math.asin(min(float(np.linalg.norm(miss)), 1.0)),
+            direction_std=math.hypot(math.sqrt(miss_var), FLOOR_RAD),
+            turn=self.steps.sum(0) @ fit.K.T,
+            miss=miss,
+            clipped=self.clipped,
+        )
 
-    theta, covariance = _theta(fit)
-    s = calibrated(theta, y)
-    inverse = np.linalg.inv(fit.D)
-    by_theta = _slope(lambda x: np.array([np.linalg.norm(calibrated(x, y))]), theta)
-    along = _unit(s) @ inverse
-    magnitude_var = (by_theta @ covariance @ by_theta.T).item() + float(along**2 @ y_var) + FLOOR_MPS2**2
-    by_theta = _slope(miss, theta)
-    seconds = float(r.t[c] - r.t[b - 1])
-    gyro_var: float = float(np.sum(np.diff(r.t[b - 1 : c + 1]) ** 2)) * flat.Sigma_omega.mean() * 2.0
-    direction_var = (
-        float(np.trace(by_theta @ covariance @ by_theta.T))
-        + gyro_var
-        + bias_var.sum() * seconds**2
-        + (y_var.sum() + z_var.sum()) / gravity**2
-        + FLOOR_RAD**2
-    )
-    e = miss(theta)
-    return Rest(
-        down=-_unit(s),
-        magnitude=float(np.linalg.norm(s) - gravity),
-        magnitude_std=float(np.sqrt(magnitude_var)),
-        direction=float(np.arcsin(min(np.linalg.norm(e), 1.0))),
-        direction_std=float(np.sqrt(float(direction_var))),
-        turn=step.sum(0) @ fit.K.T,
-        miss=e,
-        clipped=bool(r.gyr_clipped[b - 1 : c + 1].any() or r.gap[b : c + 1].any()),
-    )
+    def _end(self, theta: Vector) -> Vector:
+        """(3,) m/s^2, the rest at its end by theta."""
+        return _calibrated(theta, self.y)
+
+    def _miss(self, theta: Vector) -> Vector:
+        """(3,) sine of the angle between gravity carried to its end and gravity there, along the axis of that angle."""
+        turns = rotation(-(self.steps @ _symmetric(theta[12:18]).T))
+        return np.cross(_unit(product(turns) @ _calibrated(theta, self.z)), _unit(self._end(theta)))
+
+
+def _calibrated(theta: Vector, y: Vector) -> Vector:
+    return np.asarray(np.linalg.solve(theta[:9].reshape(3, 3), y - theta[9:12]))
 
 
 def _theta(fit: Fit) -> tuple[Vector, Vector]:
@@ -126,10 +134,11 @@ def _slope(function: Callable[[Vector], Vector], theta: Vector) -> Vector:
     return np.stack([(function(theta + step) - function(theta - step)) / (2.0 * h) for step in steps], axis=1)
 
 
-def _mean_variance(part: Vector, rate_hz: float) -> Vector:
-    """(3,) variance of the mean of a rest, whose tremor is correlated."""
-    independent = max(len(part) / (1.0 + 2.0 * TREMOR_S * rate_hz), 1.0)
-    return np.asarray(part.var(0) / independent)
+def _mean(part: Vector, rate_hz: float) -> tuple[Vector, Vector]:
+    """(3,) mean of a rest, and its variance by the spread of shorter means: a tremor is not white."""
+    n = max(round(BLOCK_S * rate_hz), 1)
+    blocks = part[: len(part) // n * n].reshape(-1, n, 3).mean(1)
+    return part.mean(0), blocks.var(0, ddof=1) / len(blocks)
 
 
 def _symmetric(six: Vector) -> Vector:
