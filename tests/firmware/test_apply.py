@@ -1,0 +1,241 @@
+"""mpucal_apply.h against the Python codec and NumPy: golden vectors, a million random blobs, float32 rounding."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import shutil
+import struct
+import subprocess
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpucal.wire.blob import LENGTH, MAX_LENGTH, Blob, BlobError
+
+ROOT = Path(__file__).parents[2]
+SOURCES = ROOT / "tools" / "firmware" / "src"
+VECTORS = ROOT / "fixtures" / "vectors"
+MEASURED = Blob.decode((VECTORS / "blob_measured.bin").read_bytes())
+
+OK, NO_BLOB, OTHER_MAJOR, BAD_LENGTH, BAD_CRC, NOT_FINITE, NOT_INVERTIBLE, OTHER_CHIP, OTHER_RANGE = range(9)
+EPS = np.finfo(np.float32).eps
+STANDARD_GRAVITY_MPS2 = 9.80665
+BLOBS, CHUNK = 1_000_000, 100_000
+# the calendar ends in the year 9999
+LAST_SECOND = 253_402_300_799
+
+
+@pytest.fixture(scope="module")
+def apply(core):
+    def call(blob: bytes, counts, who_am_i=0, accel_range_g=0.0):
+        counts = np.ascontiguousarray(counts, np.int16).reshape(-1, 3)
+        a = np.full(counts.shape, np.nan, np.float32)
+        # of exactly this size, so that a sanitizer sees a byte too many
+        memory = (ctypes.c_uint8 * len(blob)).from_buffer_copy(blob)
+        status = core.host_apply(
+            memory,
+            ctypes.c_uint32(len(blob)),
+            ctypes.c_uint8(who_am_i),
+            ctypes.c_float(accel_range_g),
+            counts.ctypes.data_as(ctypes.c_void_p),
+            ctypes.c_uint32(len(counts)),
+            a.ctypes.data_as(ctypes.c_void_p),
+        )
+        return status, a
+
+    return call
+
+
+def reference(blob: Blob, counts, accel_range_g=None):
+    """inv(D) (y - b_a + applied_b_a) in float64, and how far float32 may be off it: (n, 3) each."""
+    D, b = np.array(blob.D).reshape(3, 3), np.array(blob.b_a) - np.array(blob.applied_b_a)
+    y = np.asarray(counts, float) * STANDARD_GRAVITY_MPS2 * (accel_range_g or blob.accel_range_g) / 32768
+    inverse = np.linalg.inv(D)
+    # some ten roundings, of numbers as large as the cofactors' and the sums' terms
+    size = (np.abs(y) + np.abs(blob.b_a) + np.abs(blob.applied_b_a)) @ np.abs(inverse).T
+    return (y - b) @ inverse.T, 16 * EPS * np.linalg.cond(D) ** 2 * size + np.finfo(np.float32).tiny
+
+
+@pytest.mark.parametrize("path", sorted(VECTORS.glob("blob_*.bin")), ids=lambda path: path.stem)
+def test_agrees_with_every_golden_vector(path, apply):
+    wanted = json.loads(path.with_suffix(".json").read_text())
+    status, _ = apply(path.read_bytes(), [0, 0, 0], accel_range_g=4.0)
+    if "rejected" in wanted:
+        assert status in range(NO_BLOB, NOT_INVERTIBLE)
+        return
+    assert status == OK
+    blob = Blob.decode(path.read_bytes())
+    counts = np.rint(np.array(wanted["y"]) * 32768 / (STANDARD_GRAVITY_MPS2 * 4))
+    _, a = apply(path.read_bytes(), counts, accel_range_g=4.0)
+    a64, bound = reference(blob, counts, 4.0)
+    assert (np.abs(a - a64) <= bound).all()
+    # half a count is what rounding y to counts may do
+    assert a[0] == pytest.approx(wanted["a"], abs=2 * STANDARD_GRAVITY_MPS2 * 4 / 32768)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_agrees_with_numpy_to_float32_rounding(seed, apply):
+    rng = np.random.default_rng(seed)
+    counts = rng.integers(-32768, 32768, (2000, 3))
+    D = np.eye(3) * rng.uniform(0.5, 1.5, 3) + rng.uniform(-0.3, 0.3, (3, 3)) * (seed % 4) / 3
+    blob = replace(
+        MEASURED,
+        accel_range_g=float(2 ** (1 + seed % 4)),
+        D=tuple(D.ravel().tolist()),
+        b_a=tuple(rng.uniform(-2, 2, 3).tolist()),
+        applied_b_a=tuple(rng.uniform(-2, 2, 3).tolist()),
+    ).encode()
+    status, a = apply(blob, counts)
+    a64, bound = reference(Blob.decode(blob), counts)
+    assert status == OK
+    assert (np.abs(a - a64) <= bound).all()
+
+
+def test_what_hardware_subtracts_is_not_subtracted_twice(apply):
+    counts = [100, -200, 8192]
+    b_a = (0.25, -0.5, 0.75)
+    y_offset = np.array(b_a) * 32768 / (STANDARD_GRAVITY_MPS2 * 4)
+    plain = replace(MEASURED, b_a=b_a, applied_b_a=(0.0, 0.0, 0.0)).encode()
+    applied = replace(MEASURED, b_a=b_a, applied_b_a=b_a).encode()
+    # the chip that subtracts b_a delivers less of it, and both give the same acceleration
+    _, of_plain = apply(plain, np.rint(counts + y_offset))
+    _, of_applied = apply(applied, counts)
+    assert of_applied == pytest.approx(of_plain, abs=1e-3)
+    exact, bound = reference(Blob.decode(applied), [counts])
+    assert np.array_equal(Blob.decode(applied).b_a, Blob.decode(applied).applied_b_a)
+    assert (np.abs(of_applied - exact) <= bound).all()
+
+
+@pytest.mark.parametrize(
+    ("measured", "used", "status"),
+    [
+        ((0x68, 4.0), (0x68, 4.0), OK),
+        ((0x68, 4.0), (0, 0.0), OK),
+        ((0, 0.0), (0x68, 4.0), OK),
+        ((0x68, 4.0), (0x70, 4.0), OTHER_CHIP),
+        ((0x68, 4.0), (0x68, 2.0), OTHER_RANGE),
+        ((0x68, 0.0), (0x68, 0.0), OTHER_RANGE),
+        ((0x68, float("nan")), (0x68, 0.0), OTHER_RANGE),
+    ],
+)
+def test_says_where_a_blob_does_not_belong(measured, used, status, apply):
+    blob = replace(MEASURED, who_am_i=measured[0], accel_range_g=measured[1]).encode()
+    assert apply(blob, [0, 0, 0], *used)[0] == status
+
+
+@pytest.mark.parametrize(
+    "D",
+    [np.zeros(9), np.ones(9), np.eye(3).ravel() * 1e-20, np.eye(3).ravel() * 1e20, [1, 2, 3, 2, 4, 6, 0, 0, 1]],
+    ids=["zero", "ones", "tiny", "huge", "two rows alike"],
+)
+def test_a_matrix_that_cannot_be_inverted_is_refused(D, apply):
+    status, a = apply(replace(MEASURED, D=tuple(map(float, D))).encode(), [1, 2, 3])
+    assert status == NOT_INVERTIBLE
+    assert np.isnan(a).all()
+
+
+def random_blobs(rng, count):
+    """(count, 256) bytes and (count,) sizes: blobs of all values, some appended to, some spoilt, some not finite."""
+    data = rng.integers(0, 256, (count, MAX_LENGTH), np.uint8)
+    data[:, :48] = np.frombuffer(MEASURED.encode()[:48], np.uint8)
+    data[:, 52:56] = rng.choice(np.float32([0, 2, 4, 8, 16, np.nan]), (count, 1)).view(np.uint8)
+    data[:, 112:120] = rng.integers(0, LAST_SECOND, (count, 1)).view(np.uint8)
+    for at, numbers in ((60, 9), (96, 3), (124, 3)):
+        values = rng.normal(size=(count, numbers)) * 10.0 ** rng.integers(-3, 3, (count, 1))
+        if at == 60:
+            values = values * 0.1 + np.eye(3).ravel()
+        data[:, at : at + 4 * numbers] = values.astype(np.float32).view(np.uint8)
+    wild = rng.random(count) < 0.1
+    data[wild, 60:108] = rng.integers(0, 256, (wild.sum(), 48), np.uint8)
+    sizes = np.where(rng.random(count) < 0.7, LENGTH, rng.integers(LENGTH, MAX_LENGTH + 1, count)).astype(np.uint16)
+    data[:, 6:8] = sizes[:, None].view(np.uint8)
+    for row, size in zip(data, sizes, strict=True):
+        row[size - 4 : size] = np.frombuffer(struct.pack("<I", zlib.crc32(row[: size - 4])), np.uint8)
+    spoilt = np.flatnonzero(rng.random(count) < 0.2)
+    # the first bytes are few, and each of them decides
+    at = np.where(rng.random(len(spoilt)) < 0.5, rng.integers(0, 8, len(spoilt)), rng.integers(0, LENGTH, len(spoilt)))
+    data[spoilt, at] ^= rng.integers(1, 256, len(spoilt)).astype(np.uint8)
+    cut = rng.random(count) < 0.02
+    sizes[cut] = rng.integers(0, sizes[cut])
+    return data, sizes
+
+
+def read_by_c(core, data, sizes, counts):
+    count = len(sizes)
+    checked, loaded = np.zeros(count, np.uint8), np.zeros(count, np.uint8)
+    fields, a = np.zeros((count, 16), np.float32), np.full((count, 3), np.nan, np.float32)
+    arrays = (data, sizes, counts, checked, loaded, fields, a)
+    data_p, sizes_p, *others = (array.ctypes.data_as(ctypes.c_void_p) for array in arrays)
+    core.host_read_blobs(data_p, ctypes.c_uint32(data.shape[1]), sizes_p, ctypes.c_uint32(count), *others)
+    return checked, loaded, fields, a
+
+
+def read_by_python(data, sizes):
+    """(n,) accepted, and of those (m, 16) fields as float32: D, b_a, applied_b_a, accel_range_g."""
+    accepted, fields = np.zeros(len(sizes), bool), []
+    for i, (row, size) in enumerate(zip(data, sizes.tolist(), strict=True)):
+        try:
+            blob = Blob.decode(row[:size].tobytes())
+        except BlobError:
+            continue
+        accepted[i] = True
+        fields.append((*blob.D, *blob.b_a, *blob.applied_b_a, blob.accel_range_g))
+    return accepted, np.array(fields, np.float32)
+
+
+@pytest.mark.skipif("MPUCAL_SANITIZE" in os.environ, reason="a million of them take a minute under the sanitizers")
+def test_reads_a_million_random_blobs_as_python_does(core):
+    rng = np.random.default_rng(6)
+    accepted_of_all = refused = computed = 0
+    for _ in range(BLOBS // CHUNK):
+        data, sizes = random_blobs(rng, CHUNK)
+        counts = rng.integers(-32768, 32768, (CHUNK, 3)).astype(np.int16)
+        checked, loaded, fields, a = read_by_c(core, data, sizes, counts)
+        accepted, wanted = read_by_python(data, sizes)
+        assert np.array_equal(checked == OK, accepted)
+        assert fields[accepted].tobytes() == wanted.tobytes()
+        accepted_of_all += accepted.sum()
+        refused += (~accepted).sum()
+        computed += check_computed(loaded[accepted] == OK, wanted, counts[accepted], a[accepted])
+    # the draw was no formality
+    assert min(accepted_of_all, refused, computed) > BLOBS / 10
+
+
+def check_computed(usable, fields, counts, a):
+    """How many were applied, each to float32 rounding."""
+    D, b, applied, range_g = np.split(fields.astype(float), [9, 12, 15], axis=1)
+    well = usable & (np.abs(D).max(axis=1) < 1e3) & (np.abs(np.linalg.det(D.reshape(-1, 3, 3))) > 1e-3)
+    D, b, applied, range_g = D[well].reshape(-1, 3, 3), b[well], applied[well], range_g[well]
+    y = counts[well] * (STANDARD_GRAVITY_MPS2 * range_g / 32768)
+    inverse = np.linalg.inv(D)
+    exact = np.einsum("nij,nj->ni", inverse, y - b + applied)
+    size = np.einsum("nij,nj->ni", np.abs(inverse), np.abs(y) + np.abs(b) + np.abs(applied))
+    bound = 16 * EPS * np.linalg.cond(D)[:, None] ** 2 * size
+    assert (np.abs(a[well] - exact) <= bound).all()
+    return well.sum()
+
+
+@pytest.mark.parametrize("size", range(MAX_LENGTH))
+def test_a_blob_cut_anywhere_is_refused_and_nothing_read_behind_it(size, apply):
+    whole = bytearray(MEASURED.encode()[:-4]) + bytes(MAX_LENGTH - LENGTH)
+    struct.pack_into("<H", whole, 6, MAX_LENGTH)
+    whole += struct.pack("<I", zlib.crc32(whole))
+    assert apply(bytes(whole[:size]), [0, 0, 0])[0] in (NO_BLOB, BAD_LENGTH)
+
+
+STANDARDS = [("gcc", "c99"), ("gcc", "c11"), ("g++", "c++11"), ("g++", "c++17")]
+
+
+@pytest.mark.parametrize(("compiler", "standard"), STANDARDS, ids=[standard for _, standard in STANDARDS])
+def test_compiles_without_a_warning(compiler, standard, tmp_path):
+    if shutil.which(compiler) is None:
+        pytest.skip(f"needs {compiler}")
+    source = tmp_path / ("main.c" if compiler == "gcc" else "main.cpp")
+    source.write_text('#include "mpucal_apply.h"\nint main(void) { return 0; }\n')
+    flags = [f"-std={standard}", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror"]
+    subprocess.run([compiler, *flags, f"-I{SOURCES}", "-c", str(source), "-o", str(tmp_path / "main.o")], check=True)
