@@ -37,20 +37,40 @@ class Correction:
 
 @dataclass(frozen=True)
 class Composed:
-    """What the parameters become, and what they cannot hold.
+    """What the parameters should become.
 
     Attributes
     ----------
     correction : the new parameters. M : (3, 3), of which they hold the diagonal.
-    residual_mps2 : by how much |a| is still wrong at worst, whatever the attitude.
-    turn_rad : (3,) in the vehicle's axes, small: how the whole calibrated sensor is turned against the gyroscope,
-        which level calibration removes and parameters do not.
+    mounting : R_b (3, 3).
     """
 
     correction: Correction
     M: Vector
-    residual_mps2: float
-    turn_rad: Vector
+    mounting: Vector
+
+    def residual_of(self, held: Correction) -> float:
+        """By how much |a| stays wrong at worst [m/s^2], whatever the attitude, with `held` as parameters.
+
+        a = R_b diag(scale) (inv(M) R_b^T f + o' - offset), so to first order |a| - g is g u^T S u and what the offsets
+        differ by, with u the direction of f and S the symmetric part of diag(scale) inv(M) - I.
+        """
+        left = self._left(held)
+        shape = STANDARD_GRAVITY_MPS2 * np.abs(np.linalg.eigvalsh((left + left.T) / 2)).max()
+        return float(shape + np.linalg.norm(held.scale * (self.correction.offset - held.offset)))
+
+    @property
+    def turn_rad(self) -> Vector:
+        """(3,) in the vehicle's axes: how the sensor is turned against the gyroscope, which parameters do not hold.
+
+        Level calibration takes it away (AHRS_TRIM); small, of the antisymmetric part of diag(scale) inv(M) - I.
+        """
+        left = self._left(self.correction)
+        skew = (left - left.T) / 2
+        return np.asarray(self.mounting @ np.array([skew[2, 1], skew[0, 2], skew[1, 0]]))
+
+    def _left(self, held: Correction) -> Vector:
+        return np.asarray(np.diag(held.scale) @ np.linalg.inv(self.M) - np.eye(3))
 
 
 def compose(D: Vector, b_a: Vector, old: Correction, R_b: Vector, gravity: float) -> Composed:
@@ -64,21 +84,4 @@ def compose(D: Vector, b_a: Vector, old: Correction, R_b: Vector, gravity: float
     """
     offset = old.offset + R_b.T @ b_a / old.scale
     M = R_b.T @ np.linalg.inv(D) @ R_b @ np.diag(old.scale) * (STANDARD_GRAVITY_MPS2 / gravity)
-    correction = Correction(offset, np.diag(M).copy())
-    return Composed(correction, M, residual_mps2(M, correction.scale), _turn(M, correction.scale, R_b))
-
-
-def residual_mps2(M: Vector, scale: Vector) -> float:
-    """By how much |a| is wrong at worst, in m/s^2, where `scale` (3,) stands for M (3, 3), to first order.
-
-    a = diag(scale) inv(M) f, so |a| - g = g u^T S u with S the symmetric part of diag(scale) inv(M) - I.
-    """
-    left = np.diag(scale) @ np.linalg.inv(M) - np.eye(3)
-    return float(STANDARD_GRAVITY_MPS2 * np.abs(np.linalg.eigvalsh((left + left.T) / 2)).max())
-
-
-def _turn(M: Vector, scale: Vector, R_b: Vector) -> Vector:
-    """The rotation vector (3,) of the antisymmetric part, to first order."""
-    left = np.diag(scale) @ np.linalg.inv(M) - np.eye(3)
-    skew = (left - left.T) / 2
-    return np.asarray(R_b @ np.array([skew[2, 1], skew[0, 2], skew[1, 0]]))
+    return Composed(Correction(offset, np.diag(M).copy()), M, R_b)

@@ -42,10 +42,11 @@ def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[s
     if not known or np.linalg.matrix_rank(calibration.D) < 3:
         return document | {"why": "the calibration was refused"}
     gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
-    composed = compose(calibration.D, calibration.b_a, old, R_b, gravity)
+    composed = compose(calibration.D, calibration.b_a, where.used(old), R_b, gravity)
+    new = where.used(composed.correction)
     return document | {
-        NEW: where.values(composed.correction),
-        RESIDUAL: composed.residual_mps2,
+        NEW: where.values(new),
+        RESIDUAL: composed.residual_of(new),
         "turn_deg": np.degrees(composed.turn_rad).tolist(),
         "mounting": R_b.tolist(),
     }

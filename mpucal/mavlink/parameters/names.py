@@ -23,16 +23,20 @@ ANGLES = ("ROLL", "PITCH", "YAW")
 
 @dataclass(frozen=True)
 class Limits:
-    """What a firmware accepts of its own calibration: |offset| at most [m/s^2], scale from lowest to highest."""
+    """What a firmware accepts of its own calibration: |offset| at most [m/s^2], scale from lowest to highest.
+
+    What differs from 0 (scale: from 1) by a norm of `unnoticed` or less, it stores and does not use.
+    """
 
     offset_mps2: float
     lowest: float
     highest: float
+    unnoticed: float
 
 
-# ArduPilot: AccelCalibrator's; PX4: the parameters' own
-ARDUPILOT_LIMITS = Limits(9.8, 0.8, 1.2)
-PX4_LIMITS = Limits(np.inf, 0.1, 3.0)
+# ArduPilot: AccelCalibrator's; PX4: the parameters' own, and sensor_calibration's Accelerometer
+ARDUPILOT_LIMITS = Limits(9.8, 0.8, 1.2, 0.0)
+PX4_LIMITS = Limits(np.inf, 0.1, 3.0, 0.01)
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,15 @@ class Place:
     def values(self, correction: Correction) -> dict[str, float]:
         """The same by name."""
         return dict(zip(self.names, (*correction.offset.tolist(), *correction.scale.tolist()), strict=True))
+
+    def used(self, correction: Correction) -> Correction:
+        """What the firmware makes of it when it starts."""
+        offset, scale = correction.offset, correction.scale
+        if np.linalg.norm(offset) <= self.limits.unnoticed:
+            offset = np.zeros(3)
+        if np.linalg.norm(scale - 1) <= self.limits.unnoticed:
+            scale = np.ones(3)
+        return Correction(offset, scale)
 
     def beyond(self, correction: Correction) -> str | None:
         """Which value lies beyond what the firmware accepts, in words."""

@@ -1,0 +1,84 @@
+"""A vehicle's parameters read and set over its link, each one confirmed. Knows no parameter's meaning."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from ...errors import LinkError
+from ..dialect import Message
+from ..link import Link, ask
+from .encoding import REAL32, Number, Parameter, as_float32, error_name, name_bytes, of_wire, to_wire
+
+# over a radio that loses a packet in five each way, ten tries fail once in 30,000
+TIMEOUT_S, TRIES = 0.5, 10
+
+
+@dataclass(frozen=True)
+class Refused:
+    """The vehicle said no; `why` in words."""
+
+    why: str
+
+
+class Parameters:
+    """The parameters of the vehicle that `link` is locked to."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._bytewise = link.vehicle.is_px4
+
+    def read(self, names: Sequence[str]) -> dict[str, Number]:
+        """The values of all of `names`.
+
+        Raises
+        ------
+        LinkError : one does not come. EndOfCapture : a replay holds no more.
+        """
+        return {name: self._read(name).value for name in names}
+
+    def set(self, name: str, value: float, kind: int = REAL32) -> None:
+        """Set one, and wait until the vehicle says that it has this value.
+
+        Raises
+        ------
+        LinkError : it refused, or said nothing, or something else. EndOfCapture : a replay holds no more.
+        """
+        wanted = as_float32(value) if kind == REAL32 else value
+        vehicle = self._link.vehicle
+        message = self._link.mav.param_set_encode(
+            vehicle.system, vehicle.component, name_bytes(name), to_wire(wanted, kind, self._bytewise), kind
+        )
+
+        def reply(received: Message) -> Parameter | Refused | None:
+            answer = self._answer(received, name)
+            # of a vector's other axes, ArduPilot echoes values from before
+            return None if isinstance(answer, Parameter) and answer.value != wanted else answer
+
+        answer = ask(self._link, message, reply, TIMEOUT_S, TRIES)
+        if isinstance(answer, Parameter):
+            return
+        why = answer.why if isinstance(answer, Refused) else "it did not confirm it"
+        raise LinkError(f"{vehicle} did not take {name} = {value:.6g}: {why}", "see whether it is read-only there")
+
+    def differing(self, values: Mapping[str, float]) -> dict[str, Number]:
+        """Those that the vehicle, read back, does not hold as given, with what it holds."""
+        held = self.read(tuple(values))
+        return {name: held[name] for name, value in values.items() if held[name] != as_float32(value)}
+
+    def _read(self, name: str) -> Parameter:
+        vehicle = self._link.vehicle
+        request = self._link.mav.param_request_read_encode(vehicle.system, vehicle.component, name_bytes(name), -1)
+        answer = ask(self._link, request, lambda received: self._answer(received, name), TIMEOUT_S, TRIES)
+        if isinstance(answer, Parameter):
+            return answer
+        why = answer.why if isinstance(answer, Refused) else "no answer"
+        raise LinkError(f"{vehicle} does not tell {name} ({why})", "check the link and the firmware's version")
+
+    def _answer(self, received: Message, name: str) -> Parameter | Refused | None:
+        kind = received.get_type()
+        if kind == "PARAM_VALUE" and received.param_id == name:
+            return of_wire(received, self._bytewise)
+        if kind == "PARAM_ERROR" and received.param_id == name:
+            return Refused(error_name(received.error))
+        return None

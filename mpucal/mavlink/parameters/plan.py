@@ -1,0 +1,100 @@
+"""What is to be written to a vehicle for a calibration, or why nothing is. Asks nobody."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...data import Vector
+from ...errors import WriteBackError
+from ...result import REFUSED, Calibration
+from ..imu import SCALED, Stream
+from .compose import Correction
+from .document import NEW, OLD, RESIDUAL
+from .names import Place, place
+
+NOTHING = "nothing was written"
+
+
+@dataclass(frozen=True)
+class Change:
+    """What becomes of one IMU's parameters.
+
+    Attributes
+    ----------
+    place : their names. new : the correction to write. mounting : R_b (3, 3). stream : where its effect shows.
+    sensor_id : of the sensor that was calibrated; None where the vehicle did not say.
+    residual_mps2 : what stays wrong.
+    """
+
+    place: Place
+    new: Correction
+    mounting: Vector
+    stream: Stream
+    sensor_id: float | None
+    residual_mps2: float
+
+    @property
+    def imu(self) -> int:
+        """Counted from 1."""
+        return self.place.imu
+
+
+def changes(calibration: Calibration, firmware: str) -> tuple[Change, ...]:
+    """A change for each IMU whose calibration holds.
+
+    Raises
+    ------
+    WriteBackError : the calibration is refused, of no vehicle, of another firmware, or beyond the firmware's limits.
+    """
+    if calibration.verdict == REFUSED:
+        raise WriteBackError(f"{NOTHING}: the calibration was refused", "repeat the session")
+    of_first = calibration.extra.get("autopilot")
+    if not of_first:
+        raise WriteBackError(f"{NOTHING}: the calibration is of no vehicle", "give one made with --mavlink")
+    others = [other for other in calibration.extra.get("others", []) if _holds(other)]
+    found = [_change(of, firmware) for of in (of_first, *(other["autopilot"] for other in others))]
+    return tuple(found)
+
+
+def left_out(calibration: Calibration) -> tuple[int, ...]:
+    """The IMUs, counted from 1, whose calibration was refused."""
+    others = calibration.extra.get("others", [])
+    return tuple(int(other["autopilot"]["imu"]) for other in others if not _holds(other) and other.get("autopilot"))
+
+
+def _holds(document: Mapping[str, Any]) -> bool:
+    verdict = document.get("quality", {}).get("verdict", REFUSED)
+    return verdict != REFUSED and bool(document.get("autopilot", {}).get(NEW))
+
+
+def _change(autopilot: Mapping[str, Any], firmware: str) -> Change:
+    imu = int(autopilot["imu"])
+    if autopilot["firmware"] != firmware:
+        raise WriteBackError(
+            f"{NOTHING}: the calibration is of an {autopilot['firmware']} vehicle, and this is {firmware}",
+            "connect the vehicle that was calibrated",
+        )
+    where = place(firmware, imu, autopilot[OLD])
+    new = None if where is None else where.correction(autopilot[NEW])
+    if where is None or new is None:
+        why = autopilot.get("why", "it holds no new parameters")
+        raise WriteBackError(f"{NOTHING}: the calibration does not fit the vehicle ({why})", "repeat the session")
+    beyond = where.beyond(new)
+    if beyond is not None:
+        raise WriteBackError(
+            f"{NOTHING}: {beyond}, which {firmware} accepts of its own calibration",
+            "check that the vehicle was turned to every side, and the sensor",
+        )
+    name = str(autopilot["message"])
+    return Change(
+        where,
+        new,
+        np.array(autopilot["mounting"]),
+        Stream(name, SCALED.get(name, imu)),
+        autopilot[OLD].get(where.sensor_id),
+        float(autopilot[RESIDUAL]),
+    )

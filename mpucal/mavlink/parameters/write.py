@@ -1,0 +1,121 @@
+"""New parameters written to a vehicle, all of them or none. Knows no calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from ...chip.access import EndOfCapture
+from ...errors import MpucalError, WriteBackError
+from ..link import Link, S
+from ..prearm import Watch
+from .client import Parameters
+from .encoding import as_float32
+from .names import Place
+
+# PX4 takes a vector over where it differs by more than 0.01 from the one in use: the last axis goes by a detour
+DETOUR = 0.05
+TAKEN_OVER_NS = S // 4
+
+FAILURES = (MpucalError, EndOfCapture, KeyboardInterrupt)
+
+
+class Step(NamedTuple):
+    """Set `name` to `value`, then wait for `wait_ns`."""
+
+    name: str
+    value: float
+    wait_ns: int = 0
+
+
+class Writer:
+    """Writes to the vehicle that `link` is locked to, while it is disarmed.
+
+    Parameters
+    ----------
+    watch : hears its heartbeats. places : whose parameters are written.
+    """
+
+    def __init__(self, link: Link, watch: Watch, places: Sequence[Place]) -> None:
+        self._link, self._watch, self._places = link, watch, tuple(places)
+        self._parameters = Parameters(link)
+
+    def held(self) -> dict[str, float]:
+        """What the vehicle holds there.
+
+        Raises
+        ------
+        LinkError : it does not say.
+        """
+        names = [name for where in self._places for name in where.names]
+        return {name: float(value) for name, value in self._parameters.read(names).items()}
+
+    def write(self, old: Mapping[str, float], new: Mapping[str, float], verify: Callable[[], None]) -> None:
+        """Set what of `new` is not in `old`, read all back, `verify`; on any failure put `old` back.
+
+        Raises
+        ------
+        WriteBackError : it failed; what it says ends with what the vehicle holds now.
+        """
+        if self._watch.armed:
+            raise WriteBackError("the vehicle is armed, so nothing was written", "disarm it, then write again")
+        try:
+            for where in self._places:
+                for step in _steps(where, old, new):
+                    self._disarmed()
+                    self._set(step)
+            self._compare(new)
+            verify()
+            self._disarmed()
+        except FAILURES as failure:
+            self._restore(old, failure)
+
+    def _set(self, step: Step) -> None:
+        self._parameters.set(step.name, step.value)
+        list(self._link.messages(self._link.now_ns() + step.wait_ns))
+
+    def _disarmed(self) -> None:
+        if self._watch.armed:
+            raise WriteBackError("the vehicle was armed meanwhile", "disarm it, then write again")
+
+    def _compare(self, values: Mapping[str, float]) -> None:
+        for name, held in self._parameters.differing(values).items():
+            raise WriteBackError(
+                f"{name} reads back as {held:.9g}, not {values[name]:.9g}", "see who else writes parameters"
+            )
+
+    def _restore(self, old: Mapping[str, float], failure: BaseException) -> None:
+        """Put `old` back, armed or not: half a correction is worse than either; then raise."""
+        what = failure.what if isinstance(failure, MpucalError) else "the write was interrupted"
+        remedy = failure.remedy if isinstance(failure, MpucalError) else "start again"
+        try:
+            for where in self._places:
+                for step in _steps(where, {}, old):
+                    self._set(step)
+            self._compare(old)
+        except FAILURES as second:
+            why = second.what if isinstance(second, MpucalError) else "interrupted"
+            raise WriteBackError(
+                f"{what}, and the old parameters could not be put back ({why})",
+                "load the file of old parameters with your ground station before the next flight",
+            ) from failure
+        raise WriteBackError(f"{what}; the old parameters are back, and read back as they were", remedy) from failure
+
+
+def _steps(where: Place, old: Mapping[str, float], new: Mapping[str, float]) -> Iterator[Step]:
+    """What to set there, in order: each vector of which not all of `new` is in `old`."""
+    for names in (where.offset, where.scale):
+        if all(old.get(name) == as_float32(new[name]) for name in names):
+            continue
+        yield from _with_detour(where, names, new) if where.limits.unnoticed else (Step(n, new[n]) for n in names)
+
+
+def _with_detour(where: Place, names: tuple[str, ...], values: Mapping[str, float]) -> Iterator[Step]:
+    """The steps after which PX4 uses what it would use of `values` after a start, and stores `values`."""
+    wanted = where.correction(values)
+    used = values if wanted is None else where.values(where.used(wanted))
+    *first, last = names
+    yield from (Step(name, used[name]) for name in first)
+    yield Step(last, used[last] + DETOUR, TAKEN_OVER_NS)
+    yield Step(last, used[last], TAKEN_OVER_NS)
+    yield from (Step(name, values[name]) for name in names if values[name] != used[name])

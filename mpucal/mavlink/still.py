@@ -1,0 +1,135 @@
+"""How a vehicle's IMUs read while it lies still, and how it was turned in between. Knows no parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import Vector
+from ..errors import LinkError
+from .dialect import Message, dialect
+from .imu import MESSAGE_ID, Reading, Stream, reading
+from .link import Link, S, command
+
+WINDOW_NS, PATIENCE_NS = 2 * S, 20 * S
+FEWEST = 20
+INTERVAL_US = 20_000
+# what a hand that means to be still does; a vehicle that stands on something is far below
+STILL_MPS2, STILL_RAD_S = 0.3, 0.1
+LONGEST_STEP_S = 1.0
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What the streams said while the vehicle lay still.
+
+    Attributes
+    ----------
+    mean : (3,) m/s^2, of each stream. error : (3,), how far the mean may be off (one standard deviation).
+    attitude : (3, 3) from the vehicle's axes then to those at the first rest, by the first stream's gyroscope.
+    """
+
+    mean: dict[Stream, Vector]
+    error: dict[Stream, Vector]
+    attitude: Vector
+
+
+class Stillness:
+    """Watches the streams of a locked link.
+
+    Parameters
+    ----------
+    streams : one of each IMU; they are asked for, and left on.
+    """
+
+    def __init__(self, link: Link, streams: Sequence[Stream]) -> None:
+        self._link = link
+        self._streams = tuple(streams)
+        self._attitude: Vector = np.eye(3)
+        self._gyro_bias: Vector | None = None
+        self._last: int | None = None
+        self._found: dict[Stream, list[Reading]] = {}
+        link.subscribe(self._hear)
+
+    def rest(self) -> Rest | None:
+        """Wait until all streams lay still for two seconds; None where they did not within twenty.
+
+        Raises
+        ------
+        LinkError : a stream does not come. EndOfCapture : a replay holds no more.
+        """
+        end_ns = self._link.now_ns() + PATIENCE_NS
+        self._ask()
+        while True:
+            middle = self._window()
+            missing = [stream for stream in self._streams if len(self._found[stream]) < FEWEST]
+            if not missing and all(is_still(readings) for readings in self._found.values()):
+                return self._rest(middle)
+            if self._link.now_ns() < end_ns:
+                if missing:
+                    self._ask()
+                continue
+            if not missing:
+                return None
+            raise LinkError(
+                f"{self._link.vehicle} does not send {missing[0].name} though it was asked for",
+                "check the link, and that no other ground station lowers its rates",
+            )
+
+    def _ask(self) -> None:
+        set_interval = dialect().MAV_CMD_SET_MESSAGE_INTERVAL
+        for stream in self._streams:
+            command(self._link, set_interval, MESSAGE_ID[stream.name], INTERVAL_US, tries=5)
+
+    def _window(self) -> Vector:
+        """Listen for a window; the attitude in its middle."""
+        self._found = {stream: [] for stream in self._streams}
+        begun_ns = self._link.now_ns()
+        list(self._link.messages(begun_ns + WINDOW_NS // 2))
+        middle = self._attitude
+        list(self._link.messages(begun_ns + WINDOW_NS))
+        return middle
+
+    def _hear(self, message: Message) -> None:
+        content = reading(message)
+        if content is None or content.stream not in self._streams:
+            return
+        self._found.setdefault(content.stream, []).append(content)
+        if content.stream != self._streams[0]:
+            return
+        step_s = 0.0 if self._last is None else (content.time - self._last) * content.stream.unit_us * 1e-6
+        self._last = content.time
+        if self._gyro_bias is not None and 0 < step_s < LONGEST_STEP_S:
+            self._attitude = self._attitude @ turn((np.array(content.gyr) - self._gyro_bias) * step_s)
+
+    def _rest(self, attitude: Vector) -> Rest:
+        mean, error = {}, {}
+        for stream, readings in self._found.items():
+            acc = np.array([r.acc for r in readings])
+            mean[stream] = acc.mean(axis=0)
+            # a hand trembles slowly: its samples are no independent ones
+            error[stream] = acc.std(axis=0) / 4
+        if self._gyro_bias is None:
+            self._gyro_bias = np.mean([r.gyr for r in self._found[self._streams[0]]], axis=0)
+        return Rest(mean, error, attitude)
+
+
+def is_still(readings: Sequence[Reading]) -> bool:
+    """Whether neither the acceleration nor the rate moved; a steady turn counts as moving."""
+    acc, gyr = np.array([r.acc for r in readings]), np.array([r.gyr for r in readings])
+    half = len(acc) // 2
+    drift = acc[:half].mean(axis=0) - acc[half:].mean(axis=0)
+    calm = acc.std(axis=0).max() < STILL_MPS2 and gyr.std(axis=0).max() < STILL_RAD_S
+    return bool(calm and np.abs(drift).max() < STILL_MPS2 / 2 and np.abs(gyr.mean(axis=0)).max() < STILL_RAD_S)
+
+
+def turn(angle_rad: Vector) -> Vector:
+    """The rotation matrix (3, 3) of a rotation vector (3,) [rad] (Rodrigues)."""
+    angle = float(np.linalg.norm(angle_rad))
+    x, y, z = angle_rad
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(
+        np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * cross @ cross
+    )
