@@ -12,22 +12,43 @@ import numpy as np
 from ..calibration.stationary import find_flat
 from ..capture import load
 from ..data import Recording, Sensor
+from ..errors import UsageError
 from ..result import Calibration
+from ..wire.blob import Blob
 from .summary import formula, summary
 
-EXAMPLE = "Example: `mpucal show calibration.json` or `mpucal show capture.mcap --json`"
+EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --json`, or `mpucal show --serial PORT`"
 CALIBRATIONS = (".json", ".bin")
 
 
 @click.command("show", epilog=EXAMPLE)
-@click.argument("file", metavar="FILE|DIR", type=click.Path(path_type=Path))
+@click.argument("file", metavar="FILE|DIR", type=click.Path(path_type=Path), required=False)
+@click.option(
+    "--serial",
+    metavar="PORT[:BAUD]",
+    is_flag=False,
+    flag_value="",
+    help="What a board with the bridge's firmware stores, instead of a file.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON.")
-def command(file: Path, as_json: bool) -> None:
-    """Say what is in a calibration (.json), a config blob (.bin) or a recording (.mcap, .npz, .csv)."""
-    if file.suffix in CALIBRATIONS:
+def command(file: Path | None, serial: str | None, as_json: bool) -> None:
+    """Say what is in a calibration (.json), a config blob (.bin), a recording (.mcap, .npz, .csv), or a bridge."""
+    if (file is None) == (serial is None):
+        raise UsageError(
+            "nothing to show was named" if file is None else "a file and --serial were given together",
+            "give either a file or --serial PORT",
+        )
+    if serial is not None:
+        where, stored = _stored(serial)
+        click.echo(stored.json() if as_json else _calibration(where, stored), nl=not as_json)
+    elif file is not None and file.suffix in CALIBRATIONS:
         calibration = Calibration.load(file)
-        click.echo(calibration.json() if as_json else _calibration(file, calibration), nl=not as_json)
-        return
+        click.echo(calibration.json() if as_json else _calibration(str(file), calibration), nl=not as_json)
+    elif file is not None:
+        _show_recording(file, as_json)
+
+
+def _show_recording(file: Path, as_json: bool) -> None:
     recording = load(file)
     if recording.recovered is not None:
         click.echo(f"mpucal: {recording.recovered}", err=True)
@@ -35,9 +56,18 @@ def command(file: Path, as_json: bool) -> None:
     click.echo(json.dumps(facts, indent=2) if as_json else _recording(file, facts))
 
 
-def _calibration(file: Path, calibration: Calibration) -> str:
+def _stored(port: str) -> tuple[str, Calibration]:
+    """What the bridge on `port` stores, and where that is, in words."""
+    from ..bus.bridge import open_store  # noqa: PLC0415 - a file needs no serial port
+
+    with open_store(port) as store:
+        number, blob = store.take()
+        return f"blob number {number} of the bridge on {store.name}", Calibration.from_blob(Blob.decode(blob))
+
+
+def _calibration(where: str, calibration: Calibration) -> str:
     made = f", made {calibration.created}" if calibration.created else ""
-    head = f"{file}: a calibration of {_chip(calibration.sensor)}{made}."
+    head = f"{where}: a calibration of {_chip(calibration.sensor)}{made}."
     return "\n".join([head, "", summary(calibration), "", formula(calibration)])
 
 

@@ -45,8 +45,20 @@ def put_down(listeners: Sequence[Callable[[Prompt], None]]) -> None:
         listener(prompt)
 
 
+@contextmanager
+def in_bridge(options: Mapping[str, Any]) -> Iterator[Sink]:
+    """The memory of the bridge that the options name."""
+    if options["serial"] is None:
+        raise UsageError("a bridge is written over its own port", "give --serial PORT")
+    from ..bus.bridge import open_store  # noqa: PLC0415
+    from ..sinks.bridge import BridgeSink  # noqa: PLC0415
+
+    with open_store(options["serial"]) as store:
+        yield BridgeSink(store)
+
+
 # name: what opens it for the options of the command
-TARGETS: dict[str, Callable[[Mapping[str, Any]], Any]] = {"chip": on_chip}
+TARGETS: dict[str, Callable[[Mapping[str, Any]], Any]] = {"chip": on_chip, "bridge": in_bridge}
 
 
 @click.command("write", epilog=EXAMPLE)

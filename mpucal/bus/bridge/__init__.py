@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from .bus import BridgeBus
-from .port import SerialPort
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 
-__all__ = ["BridgeBus", "open_bridge"]
+from ...wire.messages import Frames
+from .bus import BridgeBus
+from .link import Link
+from .port import SerialPort
+from .store import Store
+
+__all__ = ["BridgeBus", "Store", "open_bridge", "open_store"]
 
 
 def open_bridge(text: str, address: int | None = None) -> BridgeBus:
@@ -16,3 +22,21 @@ def open_bridge(text: str, address: int | None = None) -> BridgeBus:
     UsageError : no port is named. BusError : no such port, or no bridge on it. NoAnswer : the bridge finds no chip.
     """
     return BridgeBus(SerialPort(text), address)
+
+
+@contextmanager
+def open_store(text: str) -> Iterator[Store]:
+    """The memory of the bridge on the same, whether or not it finds a chip.
+
+    Raises
+    ------
+    UsageError : no port is named. BusError : no such port, or no bridge on it.
+    """
+    with closing(SerialPort(text)) as port:
+        link = Link(port, _unheard)
+        link.greet()
+        yield Store(link)
+
+
+def _unheard(seq: int, frames: Frames, t_ns: int) -> None:
+    """Nobody listens to what is pushed."""

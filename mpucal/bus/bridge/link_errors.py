@@ -55,6 +55,16 @@ def restarted(port: str) -> tuple[str, str]:
     return f"the bridge on {port} was reset", "check its cable and supply"
 
 
+def without_blob(port: str) -> tuple[str, str]:
+    """It has no memory for a blob."""
+    return f"the bridge on {port} keeps no calibration", "keep calibration.bin where its firmware reads it"
+
+
+def not_readable(port: str, why: str) -> tuple[str, str]:
+    """It takes a blob for valid that is not."""
+    return f"what the bridge on {port} stores is no calibration ({why})", "store one again"
+
+
 def other_version(port: str, reply: Reply) -> tuple[str, str]:
     """It speaks another major version."""
     theirs = reply.major if isinstance(reply, HelloReply) else 0
