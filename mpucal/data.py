@@ -24,6 +24,7 @@ class Sensor:
     Attributes
     ----------
     accel_offsets : the words that its accelerometer's offset registers x, y, z held meanwhile.
+    message : of an IMU of a vehicle, the MAVLink message that carried its samples, filtered and by radio.
     """
 
     chip: str | None = None
@@ -33,6 +34,7 @@ class Sensor:
     rate_hz: float | None = None
     temperature_c: float | None = None
     accel_offsets: tuple[int, int, int] | None = None
+    message: str | None = None
 
 
 @dataclass(frozen=True)

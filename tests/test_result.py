@@ -70,7 +70,7 @@ def test_the_document_has_the_keys_of_its_contract(calibration):
         "applied_in_hardware": {"b_a"},
     }
     for key, inner in expected.items():
-        assert set(document[key]) == inner
+        assert set(document[key]) >= inner  # keys are only added
     assert document["accelerometer"]["formula"] == "a = inv(D) @ (y - b_a)"
     assert document["gyroscope"]["formula"] == "w = K @ (y - b_omega)"
     assert {"fit", "quality", "created", "others"} <= set(document)

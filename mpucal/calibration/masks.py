@@ -30,13 +30,15 @@ GAP_INTERVALS = 2.5  # a longer time between samples than so many intervals is a
 def with_masks(recording: Recording) -> Recording:
     """The recording with its gaps and clipped samples marked, where its source did not already."""
     dt = np.diff(recording.t, prepend=recording.t[0])
-    # autopilots run their sensors at ranges that no hand reaches, and round: values repeat without a rail
-    rails = recording.autopilot is None
+    # An autopilot's stream comes by radio: its source says which pauses are more than packets lost here and there.
+    # It is rounded as well, of a range that no hand reaches: values repeat without a rail.
+    of_a_chip = recording.sensor.message is None
+    paused = of_a_chip & (dt > GAP_INTERVALS * np.median(dt[1:]))
     return replace(
         recording,
-        gap=recording.gap | (dt > GAP_INTERVALS * np.median(dt[1:])) | _on_a_line(recording.gyr, recording.t),
-        acc_clipped=recording.acc_clipped | (rails & _at_the_rail(recording.acc, ACC_RANGES)),
-        gyr_clipped=recording.gyr_clipped | (rails & _at_the_rail(recording.gyr, GYRO_RANGES)),
+        gap=recording.gap | paused | _on_a_line(recording.gyr, recording.t),
+        acc_clipped=recording.acc_clipped | (of_a_chip & _at_the_rail(recording.acc, ACC_RANGES)),
+        gyr_clipped=recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, GYRO_RANGES)),
     )
 
 

@@ -16,7 +16,7 @@ US_PER_S = 1e6
 MS_US = 1000
 
 # Single lost packets are as good as a lower rate; a longer time without one is a gap.
-GAP_S, GAP_INTERVALS = 0.1, 6.0
+GAP_S, GAP_INTERVALS = 0.05, 6.0
 # a stream that is truer is taken where it has at least this share of the packets of the busiest
 SHARE = 0.5
 PAIRED = 0.9
@@ -135,6 +135,7 @@ def _recording(gathered: Gathered, fine: Gathered | None, autopilot: Autopilot, 
         chip=chip(autopilot.firmware, stream.imu),
         rate_hz=float((len(samples) - 1) / (samples.t[-1] - samples.t[0])),
         temperature_c=float(known.mean()) if len(known) else None,
+        message=stream.name,
     )
     noise = WHOLE_NOISE if stream.is_whole else (0.0, 0.0)
     columns = {key: getattr(samples, key) for key in Samples.__dataclass_fields__}

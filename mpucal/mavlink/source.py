@@ -21,6 +21,8 @@ from .truth import ARDUPILOT, PX4
 POLL_NS = S // 20
 SILENT_NS = 4 * S
 US_PER_S = 1e6
+# packets after which their loss is weighed, and the share of it that a person should know of
+WEIGHED, WORTH_SAYING = 2000, 0.05
 
 
 class VehicleSource:
@@ -47,6 +49,8 @@ class VehicleSource:
         self._last_us: float | None = None
         self._heard_ns = self._sampled_ns = 0
         self._rebooted = False
+        self._received = 0
+        self._said_lost = False
 
     def start(self) -> Sensor:
         """Listen, lock to one vehicle and say so, read its parameters, and have it stream.
@@ -67,7 +71,7 @@ class VehicleSource:
         self._stream = self._streams.start()
         self._rows = []
         self._heard_ns = self._sampled_ns = self._link.now_ns()
-        return Sensor(chip=chip(firmware, self._stream.imu), rate_hz=self._rate_hz)
+        return Sensor(chip=chip(firmware, self._stream.imu), rate_hz=self._rate_hz, message=self._stream.name)
 
     def poll(self) -> Samples:
         """Wait for a twentieth of a second, and give the first IMU's samples that came meanwhile.
@@ -78,9 +82,11 @@ class VehicleSource:
         """
         for _ in self._link.messages(self._link.now_ns() + POLL_NS):
             self._heard_ns = self._link.now_ns()
+            self._received += 1
         if self._streams is not None:
             self._streams.watch()
         self._check()
+        self._weigh()
         rows, self._rows = self._rows, []
         t_us = np.array([row.t_us for row in rows], dtype=np.float64)
         samples = samples_of(rows, t_us, self._last_us)
@@ -111,6 +117,16 @@ class VehicleSource:
         if row is not None and content.stream == self._stream:
             self._rows.append(row)
             self._sampled_ns = self._link.now_ns()
+
+    def _weigh(self) -> None:
+        """Say once that the link loses packets."""
+        sent = self._received + self._link.lost
+        if self._said_lost or sent < WEIGHED or self._link.lost < WORTH_SAYING * sent:
+            return
+        self._said_lost = True
+        self._say(
+            f"The link loses {100 * self._link.lost / sent:.0f} % of the packets; a nearer or faster one is better."
+        )
 
     def _check(self) -> None:
         now_ns = self._link.now_ns()
