@@ -9,12 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import STANDARD_GRAVITY_MPS2
+from ..report.units import accelerometer, with_std
 from ..result import ACCELEROMETER_FORMULA, GOOD, REFUSED, USABLE, Calibration
 from ..sinks.file import BLOB, DOCUMENT, REPORT
 
 AXES = "xyz"
-WIDTH = 100
+# what fits a terminal of 80 columns
+WIDTH, LABEL, COLUMN = 79, 16, 20
 SENTENCES = {
     GOOD: "The calibration is good.",
     USABLE: "The calibration is usable, with reservations:",
@@ -61,27 +62,17 @@ def _reason(message: str) -> str:
 
 
 def _parameters(c: Calibration) -> list[str]:
-    """One row an axis: gain, bias, and how much the axis leans towards the other two."""
-    gain, gain_sd = 100.0 * (np.diag(c.D) - 1.0), 100.0 * np.diag(c.D_std)
-    bias, bias_sd = (1000.0 * v / STANDARD_GRAVITY_MPS2 for v in (c.b_a, c.b_a_std))
-    lean, lean_sd = (np.degrees(v / np.diag(c.D)[:, None]) for v in (c.D, c.D_std))
-    heads = ["gain error [%]", "bias [mg]", *(f"lean to {axis} [deg]" for axis in AXES)]
-    lines = ["axis" + "".join(f"{head:>19}" for head in heads)]
-    for i, axis in enumerate(AXES):
-        cells = [_cell(gain[i], gain_sd[i]), _cell(bias[i], bias_sd[i])]
-        cells += ["" if j == i else _cell(lean[i, j], lean_sd[i, j]) for j in range(3)]
-        lines.append((f"{axis:<4}" + "".join(f"{cell:>19}" for cell in cells)).rstrip())
+    """Gain, bias, and how much each axis leans towards the other two; one column an axis."""
+    lines = [f"{'':<{LABEL}}" + "".join(f"{axis:>{COLUMN}}" for axis in AXES)]
+    for row in accelerometer(c):
+        cells = [
+            "" if row.name == f"lean to {axis}" else with_std(float(row.value[i]), float(row.std[i]))
+            for i, axis in enumerate(AXES)
+        ]
+        lines.append(
+            (f"{f'{row.name}, {row.unit}':<{LABEL}}" + "".join(f"{cell:>{COLUMN}}" for cell in cells)).rstrip()
+        )
     return lines
-
-
-def _cell(value: float, sd: float) -> str:
-    """value ± sd, to two digits of sd."""
-    if not math.isfinite(value):
-        return "unknown"
-    if not math.isfinite(sd) or sd <= 0.0:
-        return f"{value:+.3f} ± ?"
-    digits = min(max(1 - math.floor(math.log10(sd)), 0), 5)
-    return f"{value:+.{digits}f} ± {sd:.{digits}f}"
 
 
 def _magnitudes(calibration: Calibration) -> list[str]:
@@ -93,8 +84,8 @@ def _magnitudes(calibration: Calibration) -> list[str]:
 
 
 def _statistics(row: Mapping[str, float | None]) -> str:
-    mean, std = (_number(row.get(key)) for key in ("mean", "std"))
-    return f"{mean:7.3f} m/s², spread {std:.3f}"
+    median, std = (_number(row.get(key)) for key in ("median", "std"))
+    return f"{median:7.3f} m/s² in the median, spread {std:.3f}"
 
 
 def _fit(calibration: Calibration) -> list[str]:

@@ -86,8 +86,13 @@ def _is_itself(row: Measured, i: int) -> bool:
 
 
 def _cell(row: Measured, i: int) -> str:
-    return with_std(float(row.value[i]), float(row.std[i]))
+    return _unbroken(with_std(float(row.value[i]), float(row.std[i])))
 
 
 def _pair(value: float, std: float) -> str:
-    return with_std(value, std, most_digits=9).removeprefix("+")
+    return _unbroken(with_std(value, std, most_digits=9).removeprefix("+"))
+
+
+def _unbroken(text: str) -> str:
+    """No line breaks after ±: where a column is narrow, the deviation goes below its value as a whole."""
+    return text.replace("± ", "±\u00a0")

@@ -10,9 +10,6 @@ import numpy as np
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..result import Calibration, unknown
 
-# with a space at which no line breaks: where a column is narrow, the deviation goes below its value as a whole
-PLUS_MINUS = "±\u00a0"
-
 
 @dataclass(frozen=True)
 class Measured:
@@ -60,6 +57,6 @@ def with_std(value: float, std: float, most_digits: int = 5) -> str:
     if not math.isfinite(value):
         return "unknown"
     if not math.isfinite(std) or std <= 0.0:
-        return f"{value:+.3f} {PLUS_MINUS}?"
+        return f"{value:+.3f} ± ?"
     digits = min(max(1 - math.floor(math.log10(std)), 0), most_digits)
-    return f"{value:+.{digits}f} {PLUS_MINUS}{std:.{digits}f}"
+    return f"{value:+.{digits}f} ± {std:.{digits}f}"

@@ -6,17 +6,16 @@ import textwrap
 
 from rich.text import Text
 
-from ..session.events import Direction, PromptKind
+from ..session.events import PromptKind
 from .glyphs import Glyphs
 from .view import View
+from .words import Group, groups, sentence
 
 KNOWLEDGE_ROWS = 3
 _LABEL, _NEEDLE = 14, 24
 _WIDE = 110
 # words are wrapped no narrower, and cut instead
 NARROWEST = 12
-# standard deviations beyond this mean that nothing is known
-UNKNOWN = 100.0
 # a warning is loud for so long, and then remembered quietly
 LOUD_S = 6.0
 KEYS = "Enter: go on now    q or Ctrl-C: stop"
@@ -54,14 +53,7 @@ def knowledge_rows(view: View, columns: int, glyphs: Glyphs) -> list[Text]:
     elif kind is PromptKind.REST or view.knowledge is None:
         rows = [*_progress(view, glyphs), *(_said(note, "") for note in view.notes[-2:])]
     else:
-        k = view.knowledge
-        rows = [
-            _group("gain", k.gain, k.gain_pct, k.target.gain_pct, "%", columns, glyphs),
-            _group(
-                "misalignment", k.misalignment, k.misalignment_deg, k.target.misalignment_deg, "deg", columns, glyphs
-            ),
-            _group("bias", k.bias, k.bias_mg, k.target.bias_mg, "mg", columns, glyphs),
-        ]
+        rows = [_group(group, columns, glyphs) for group in groups(view.knowledge)]
     return [*rows, *[Text("")] * KNOWLEDGE_ROWS][:KNOWLEDGE_ROWS]
 
 
@@ -70,11 +62,11 @@ def caution_rows(view: View, columns: int, glyphs: Glyphs) -> list[Text]:
     c = view.caution
     if c is None or view.now_s is None:
         doubt = view.knowledge.doubt if view.knowledge is not None else ""
-        said, style = (f"! {doubt}" if doubt else "", ""), "bold yellow"
+        said, style = (f"! {sentence(doubt)}" if doubt else "", ""), "bold yellow"
     else:
         age_s = view.now_s - c.t_s
         loud = age_s <= LOUD_S
-        said = (f"! {c.what}{'' if loud else f' ({age_s:.0f} s ago)'}", f"{glyphs.arrow} {c.do}")
+        said = (f"! {sentence(c.what)}{'' if loud else f' ({age_s:.0f} s ago)'}", f"{glyphs.arrow} {sentence(c.do)}")
         style = "bold yellow reverse" if loud else "dim"
     return [
         Text.assemble(" ", (textwrap.shorten(line, max(columns - 2, NARROWEST), placeholder=" ..."), style))
@@ -95,22 +87,14 @@ def _progress(view: View, glyphs: Glyphs) -> list[Text]:
     return [Text.assemble(f" {'progress':<{_LABEL}}", (bar(p.done / p.of, _NEEDLE, glyphs), "cyan"), f"  {p.text}")]
 
 
-def _group(
-    name: str, progress: Direction, std: Direction, target: float, unit: str, columns: int, glyphs: Glyphs
-) -> Text:
+def _group(group: Group, columns: int, glyphs: Glyphs) -> Text:
     """The least known axis of a group; all three where there is space."""
-    worst = min(range(3), key=lambda i: progress[i])
-    done = min(progress) >= 1.0
-    shown = range(3) if columns >= _WIDE else (worst,)
-    values = "  ".join(f"{'xyz'[i]} {_known(std[i], unit)}" for i in shown)
-    text = Text.assemble(
-        f" {name:<{_LABEL}}", (bar(min(progress), _NEEDLE, glyphs), "green" if done else "cyan"), f"  {values}"
-    )
-    return text.append(f"  (wanted {target:g})", style="dim")
-
-
-def _known(std: float, unit: str) -> str:
-    return f"±{std:.2g} {unit}" if std < UNKNOWN else "unknown"
+    least = group.progress[group.worst]
+    shown = range(3) if columns >= _WIDE else (group.worst,)
+    values = "  ".join(f"{'xyz'[i]} {group.said(i)}" for i in shown)
+    style = "green" if least >= 1.0 else "cyan"
+    text = Text.assemble(f" {group.name:<{_LABEL}}", (bar(least, _NEEDLE, glyphs), style), f"  {values}")
+    return text.append(f"  (wanted {group.target:g})", style="dim")
 
 
 def _said(text: str, style: str) -> Text:

@@ -19,7 +19,7 @@ _WORDS = {
     "q": Key.ABORT,
     "quit": Key.ABORT,
 }
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_ENDING = (signal.SIGINT, signal.SIGTERM)
 _AT_ONCE = 64
 
 
@@ -57,9 +57,11 @@ class Keys:
     def listening(self) -> Iterator[None]:
         """Meanwhile the first Ctrl-C is a key press, and the second one interrupts at once."""
         with ExitStack() as stack:
-            for number in _SIGNALS:
+            for number in _ENDING:
                 stack.callback(signal.signal, number, signal.signal(number, self._interrupt))
             if self._single and self._keyboard is not None:
+                # who is stopped by Ctrl-Z loses samples, and leaves a screen behind
+                stack.callback(signal.signal, signal.SIGTSTP, signal.signal(signal.SIGTSTP, signal.SIG_IGN))
                 stack.enter_context(_without_lines(self._keyboard))
             yield
 

@@ -11,6 +11,7 @@ from typing import Any, TextIO
 
 from ..session.events import Caution, Decision, Key, Knowledge, Output, Progress, Prompt, PromptKind, Verification
 from .keys import Keys
+from .words import known, sentence
 
 PROGRESS_EVERY_S = 1.0
 KNOWLEDGE_EVERY_S = 5.0
@@ -52,7 +53,7 @@ class Lines:
             case Knowledge() if self._is_due("knowledge", output.t_s, KNOWLEDGE_EVERY_S):
                 self.say(f"  {known(output)}")
             case Caution(t_s, code, what, do) if self._is_due(code, t_s, CAUTION_EVERY_S):
-                self.say(f"  ! {what}: {do}")
+                self.say(f"  ! {sentence(what)} {sentence(do)}")
             case Verification():
                 self.say(f"  {output.text}")
             case Decision(why):
@@ -97,17 +98,6 @@ class JsonLines(Lines):
     def hear(self, output: Output) -> None:
         """Say it."""
         self.say(json.dumps({"event": type(output).__name__.lower(), **_plain(asdict(output))}, allow_nan=False))
-
-
-def known(k: Knowledge) -> str:
-    """How well the worst of each group is known, and what is wanted."""
-    groups = (
-        ("gain", k.gain_pct, k.target.gain_pct, "%"),
-        ("misalignment", k.misalignment_deg, k.target.misalignment_deg, "deg"),
-        ("bias", k.bias_mg, k.target.bias_mg, "mg"),
-    )
-    said = ", ".join(f"{name} {max(std):.2g} {unit} (wanted {target:g})" for name, std, target, unit in groups)
-    return f"known to: {said}" + (f"; {k.doubt}" if k.doubt else "")
 
 
 def _plain(value: Any) -> Any:

@@ -31,7 +31,7 @@ def test_a_session_leaves_its_files_and_says_what_it_found(session):
     assert names == {"capture.mcap", "calibration.json", "calibration.bin", "report.html", "truth.json"}
     out = session.result.out
     assert out.startswith("The calibration is ")
-    assert "bias [mg]" in out
+    assert "bias, mg" in out
     assert "±" in out
     assert "firmware" in out
     for heading in ("LAY FLAT", "ROTATE", "REST"):

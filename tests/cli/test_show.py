@@ -28,18 +28,18 @@ def calibration(verdict="good", **changes):
     return Calibration(**{**values, **changes})
 
 
-def row(text, axis):
-    return next(line for line in text.splitlines() if line.startswith(f"{axis} "))
+def row(text, name):
+    return next(line for line in text.splitlines() if line.startswith(name))
 
 
-def test_a_summary_is_in_the_units_of_people():
+def test_a_summary_is_in_the_units_of_people_and_fits_80_columns():
     text = summary(calibration())
     assert text.startswith("The calibration is good.")
-    assert "+2.000 ± 0.020" in row(text, "x")
-    assert "+10.0 ± 1.0" in row(text, "x")
-    assert "-1.000 ± 0.020" in row(text, "y")
-    assert "+0.000 ± ?" in row(text, "z")
-    assert "+1.000 ± 0.011" in row(text, "z")
+    assert " ".join(row(text, "gain error, %").split()[3:]) == "+2.000 ± 0.020 -1.000 ± 0.020 +0.000 ± 0.020"
+    assert row(text, "bias, mg").split()[2:] == ["+10.0", "±", "1.0", "-51.0", "±", "2.0", "+0.000", "±", "?"]
+    assert row(text, "lean to y, deg").endswith("+1.000 ± 0.011")
+    assert "9.800 m/s² in the median" in row(text, "|a| after")
+    assert max(map(len, text.splitlines())) < 80
 
 
 @pytest.mark.parametrize("verdict", ["usable", "refused"])
@@ -51,12 +51,12 @@ def test_reservations_are_named(verdict):
 
 def test_nobody_judged_a_blob():
     text = summary(calibration(quality={}, fit={}))
-    assert text.startswith("axis")
+    assert text.splitlines()[0].split() == ["x", "y", "z"]
     assert "calibration is" not in text
 
 
 def test_unknown_numbers_are_called_unknown():
-    assert "unknown" in row(summary(calibration(b_a=np.full(3, np.nan))), "x")
+    assert "unknown" in row(summary(calibration(b_a=np.full(3, np.nan))), "bias")
 
 
 def test_the_formula_calibrates():
@@ -83,7 +83,7 @@ def test_shows_a_calibration(mpucal, session, name):
     result = mpucal("show", session.folder / name)
     assert result.code == 0
     assert "a calibration of" in result.out
-    assert "bias [mg]" in result.out
+    assert "bias, mg" in result.out
     assert "inv(D)" in result.out
     assert ("The calibration is" in result.out) == name.endswith("json")
 

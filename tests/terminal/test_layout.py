@@ -43,8 +43,8 @@ def test_all_that_a_person_needs_is_there(views, size):
         "y ±0.31 %",
         "z unknown",
         "wanted 0.05",
-        "it turned at 480 deg/s, near the gyroscope's range",
-        "→ turn it more slowly",
+        "! It turned at 480 deg/s, near the gyroscope's range",
+        "→ Turn it more slowly.",
         "q or Ctrl-C: stop",
         "█████",
     ):
