@@ -47,7 +47,10 @@ class Port:
 
     def write(self, register: int, value: int) -> None:
         """Write one byte; up to three tries."""
-        data = bytes([value])
+        self.write_block(register, bytes([value]))
+
+    def write_block(self, register: int, data: bytes) -> None:
+        """Write `data` from `register` on, in one transfer; up to three tries."""
         t_ns = self._retried(lambda: self._bus.write(register, data))
         self._now_ns = max(self._now_ns, t_ns)
         self._decoder.saw_write(register, data)

@@ -2,7 +2,9 @@
 
     python device.py sim:chip=mpu6500 CLOCK_FILE
 
-`still` in place of `sim` is the chip of the contract that all buses keep: the same counts again and again. On stdout, a line of JSON with the environment in which programs find it. On stdin, lines of JSON: {"prompt": ...}
+`still` in place of `sim` is the chip of the contract that all buses keep: the same counts again and again.
+
+On stdout, a line of JSON with the environment in which programs find it. On stdin, lines of JSON: {"prompt": ...}
 lets the hand hear it, {"adapter": {...}} changes the adapter, {"registers": {...}} writes to the chip; each is
 answered by an empty line. CLOCK_FILE holds the time, see clock.c.
 """
