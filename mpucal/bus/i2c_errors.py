@@ -12,10 +12,7 @@ from ..errors import BusError, BusHeld, NoAnswer
 
 DEVICES = Path("/dev")
 
-WIRES = (
-    "check VCC, GND, SDA and SCL, and that AD0 is tied to GND (0x68) or to VCC (0x69);"
-    " `i2cdetect -y BUS` shows who answers"
-)
+WIRES = "check VCC, GND, SDA and SCL, and that AD0 is tied to GND (0x68) or to VCC (0x69)"
 
 _TRANSFER = {
     errno.EIO: (
@@ -70,7 +67,9 @@ def transfer_error(error: OSError, path: str, address: int) -> BusError:
 def nobody(path: str, addresses: tuple[int, ...]) -> NoAnswer:
     """Nothing acknowledges any of `addresses`."""
     places = " or ".join(f"0x{address:02x}" for address in addresses)
-    return NoAnswer(f"nothing answers at {places} on {path}", WIRES.replace("BUS", path.rpartition("-")[2]))
+    number = path.rpartition("i2c-")[2]
+    who = f"; `i2cdetect -y {number}` shows who answers" if number.isdecimal() else ""
+    return NoAnswer(f"nothing answers at {places} on {path}", WIRES + who)
 
 
 def _others() -> str:

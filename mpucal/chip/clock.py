@@ -7,23 +7,27 @@ taken by the time of each look. A look at `taken` samples finds the newest half 
 
 with one rate for the whole recording and one t_0 for each run of samples without a gap: least squares of
 `taken` on t. The data sheet's tolerance is the prior of the rate: it holds the first second's times in
-place, and weighs less than 1e-6 after half a minute.
+place, and weighs less than 1e-6 after half a minute. A clock whose rate changed is one of several pieces, each
+with a rate of its own (pieces.py); that is found for the final times, not for those while samples come in.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..data import Vector
+from .pieces import lines, steady
 
 NS = 1e-9
 
 # PS-MPU-6000A r3.4, section 6.6: the PLL on a gyroscope is within 1 %.
 RATE_TOLERANCE = 0.01
+# More samples than any segment holds.
+FAR = 2.0**40
 # A look falls anywhere between two samples: a uniform distribution's standard deviation.
 LOOK_STD_SAMPLES = 12**-0.5
 
@@ -42,7 +46,7 @@ def look_phase(n: int) -> float:
 
 @dataclass
 class _Segment:
-    """Sums over the looks at one run of samples; integers, so that they are exact."""
+    """The looks at one run of samples, and sums over them; integers, so that they are exact."""
 
     origin_ns: int = 0
     n: int = 0
@@ -50,11 +54,13 @@ class _Segment:
     taken: int = 0
     tt: int = 0
     t_taken: int = 0
+    looks: list[tuple[int, int]] = field(default_factory=list)
 
     def look(self, t_ns: int, taken: int) -> None:
         if self.n == 0:
             self.origin_ns = t_ns
         t = t_ns - self.origin_ns
+        self.looks.append((t_ns, taken))
         self.n += 1
         self.t += t
         self.taken += taken
@@ -125,6 +131,20 @@ class SampleClock:
         t_mean_s = np.array([s.t_mean_s for s in self._segments])
         taken_mean = np.array([s.taken_mean for s in self._segments])
         return np.asarray(t_mean_s[segment] + (index + 0.5 - taken_mean[segment]) / self.rate_hz, np.float64)
+
+    def final_times_s(self, segment: NDArray[np.int64], index: NDArray[np.int64]) -> Vector:
+        """The same with all that is known: each piece of a clock whose rate changed keeps its own."""
+        pieces = [
+            (number, line)
+            for number, each in enumerate(self._segments)
+            if each.looks
+            for line in lines(*np.array(each.looks, np.float64).T * [[NS], [1.0]])
+        ]
+        rates_hz = steady([line for _, line in pieces], self._nominal_hz, RATE_TOLERANCE)
+        begins = np.array([number * FAR + line.first for number, line in pieces])
+        at = np.searchsorted(begins, segment * FAR + index, side="right") - 1
+        t_s, taken = np.array([(line.t_s, line.y) for _, line in pieces]).T
+        return np.asarray(t_s[at] + (index + 0.5 - taken[at]) / rates_hz[at], np.float64)
 
 
 def increasing(t_s: Vector, step_s: float) -> Vector:

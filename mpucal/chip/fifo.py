@@ -154,7 +154,7 @@ class FifoDecoder:
 
     def recording(self, name: str) -> Recording:
         """All samples so far with the best times there are, and the sensor with its measured rate."""
-        samples = self._samples(self._runs)
+        samples = self._samples(self._runs, final=True)
         sensor = self._settings.sensor
         if len(samples):
             mean_c = float(samples.temperature_c.mean())
@@ -175,7 +175,7 @@ class FifoDecoder:
     def _gap_before(self, first: int) -> bool:
         return first == DROPPED_FRAMES and bool(self._runs)
 
-    def _samples(self, runs: list[_Run]) -> Samples:
+    def _samples(self, runs: list[_Run], final: bool = False) -> Samples:
         if not runs:
             return Samples.empty()
         frames = np.concatenate([run.frames for run in runs])
@@ -183,7 +183,7 @@ class FifoDecoder:
         gap = np.zeros(len(frames), bool)
         gap[np.cumsum([0] + [len(run.frames) for run in runs[:-1]])] = [run.gap for run in runs]
         return Samples(
-            t=self._times_s(runs),
+            t=self._times_s(runs, final),
             acc=frames[:, ACCEL] * settings.mps2_per_lsb,
             gyr=frames[:, GYRO] * reg.rad_s_per_lsb(settings.fs_sel),
             temperature_c=frames[:, TEMPERATURE] / family.lsb_per_c + family.zero_c,
@@ -192,12 +192,13 @@ class FifoDecoder:
             gyr_clipped=_clipped(frames[:, GYRO]),
         )
 
-    def _times_s(self, runs: list[_Run]) -> Vector:
+    def _times_s(self, runs: list[_Run], final: bool) -> Vector:
         lengths = [len(run.frames) for run in runs]
         starts = np.cumsum([0, *lengths[:-1]])
         segment = np.repeat([run.segment for run in runs], lengths)
         index = np.arange(sum(lengths)) + np.repeat([run.first for run in runs] - starts, lengths)
-        return increasing(self._clock.times_s(segment, index), LEAST_STEP / self._clock.rate_hz)
+        times_s = self._clock.final_times_s if final else self._clock.times_s
+        return increasing(times_s(segment, index), LEAST_STEP / self._clock.rate_hz)
 
 
 def _clipped(counts: Counts) -> Mask:

@@ -15,6 +15,7 @@ MS = 1_000_000
 # Awake after a reset a chip takes 8000 samples a second, and 293 frames fill the largest FIFO; clones may be slower.
 LOOK_NS = 15 * MS
 LOOKS = 45
+IDENTITY_TRIES = 5
 SIGHTS, SIGHT_NS = 8, 10 * MS
 
 # What every part knows of these two: unused bits are 0.
@@ -29,7 +30,7 @@ def read_identity(port: Port) -> int:
     ------
     ChipError : it is something else, which must not be written to.
     """
-    who_am_i = port.read(reg.WHO_AM_I, 1)[0]
+    who_am_i = _settled(port)
     if who_am_i in PARTS:
         return who_am_i
     head = port.read(0, 7)
@@ -47,6 +48,20 @@ def read_identity(port: Port) -> int:
             f"check which chip is at this address (known are {known})",
         )
     return who_am_i
+
+
+def _settled(port: Port) -> int:
+    """What WHO_AM_I shows twice in a row: everything depends on it, and a bit may flip on the way."""
+    before = None
+    for _ in range(IDENTITY_TRIES):
+        who_am_i = port.read(reg.WHO_AM_I, 1)[0]
+        if who_am_i == before:
+            return who_am_i
+        before = who_am_i
+    raise ChipError(
+        "the chip answers something else to WHO_AM_I each time",
+        "shorten the wires, check the pull-ups, or slow the bus down",
+    )
 
 
 def probe(port: Port) -> None:

@@ -79,7 +79,7 @@ def test_an_older_capture_of_an_unknown_chip_says_so(bench, stream):
     _, transactions = disturbed(bench, stream)
     identity = Transaction("read", reg.WHO_AM_I, 1, b"\x13", 0)
     with pytest.raises(ChipError, match="0x13"):
-        decode([identity, *without_its_probe(transactions)[1:]])
+        decode([identity, identity, *without_its_probe(transactions)[2:]])
 
 
 @pytest.mark.parametrize("model", ["mpu6050", "mpu6500", "clone98"])

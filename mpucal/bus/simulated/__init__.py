@@ -13,6 +13,7 @@ from .bus import SimulatedBus
 from .chip import Chip
 from .clock import CLOCKS, Clock, FastClock
 from .factory import Factory
+from .faults import Faults
 from .feed import Feed, RecordedFeed, SensorFeed
 from .hand import KINDS
 from .models import MODELS, OFFSETS
@@ -33,8 +34,8 @@ def open_simulated(
 
     Parameters
     ----------
-    text : `sim`, or with keys: chip, who_am_i, offsets, seed, hand, pace, rate_error_ppm, D, b_a, K, b_omega, noise,
-        temperature_c. gravity : m/s^2, where the board is. seed : beside the text.
+    text : `sim`, or with keys: chip, who_am_i, offsets, seed, hand, pace, fault, rate_error_ppm, D, b_a, K,
+        b_omega, noise, temperature_c. gravity : m/s^2, where the board is. seed : beside the text.
     clock : time in place of `pace`'s, where something else moves the bus.
 
     Raises
@@ -43,14 +44,16 @@ def open_simulated(
     """
     options = Options.parse(text, seed)
     truth = _truth(options, gravity)
-    of_hand, of_motion, of_noise, of_trim = np.random.default_rng([options.seed, 2]).spawn(4)
+    of_hand, of_motion, of_noise, of_trim, of_faults = np.random.default_rng([options.seed, 2]).spawn(5)
     motion = Motion(KINDS[options.hand](of_hand), of_motion, gravity)
     model = replace(MODELS[options.chip], **OFFSETS[options.offsets])
     if options.who_am_i is not None:
         model = replace(model, who_am_i=options.who_am_i)
     factory = Factory.draw(of_trim, model.family)
     chip = Chip(model, SensorFeed(truth, motion, of_noise), truth.rate_error_ppm, factory)
-    return SimulatedBus(chip, clock or CLOCKS[options.pace](), motion, truth)
+    clock = clock or CLOCKS[options.pace]()
+    faults = Faults(options.fault, chip, clock, of_faults) if options.fault else None
+    return SimulatedBus(chip, clock, motion, truth, faults)
 
 
 def open_recorded(

@@ -1,17 +1,20 @@
-"""The bus to a simulated chip, with the time its transfers take. Knows no register."""
+"""The bus to a simulated chip, with the time its transfers take and the faults they meet. Knows no register."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from ...chip.access import Reply
+from ..i2c_errors import transfer_error
 from .chip import Chip
 from .clock import Clock
+from .faults import Faults
 from .hand import Prompt
 from .motion import Motion
 from .sensor import Truth
 
 BIT_NS = 2500  # at 400 kHz
+NAME, ADDRESS = "the simulated bus", 0x68
 
 
 class SimulatedBus:
@@ -21,28 +24,41 @@ class SimulatedBus:
     ----------
     chip : the only one on it. clock : its time.
     motion, truth : what moves the chip's sensor and what is true of it; None for a recording's counts.
+    faults : what goes wrong with chip and bus.
     """
 
-    def __init__(self, chip: Chip, clock: Clock, motion: Motion | None = None, truth: Truth | None = None) -> None:
-        self._chip, self._clock, self._motion, self._truth = chip, clock, motion, truth
+    def __init__(
+        self,
+        chip: Chip,
+        clock: Clock,
+        motion: Motion | None = None,
+        truth: Truth | None = None,
+        faults: Faults | None = None,
+    ) -> None:
+        self._chip, self._clock, self._motion, self._truth, self._faults = chip, clock, motion, truth, faults
 
     def read(self, register: int, count: int) -> Reply:
         """`count` bytes from `register` on, and when the read began.
 
         Raises
         ------
-        EndOfCapture : the recording behind the chip has ended.
+        EndOfCapture : the recording behind the chip has ended. BusError : a fault, as Linux would tell it.
         """
-        t_ns = self._clock.now()
-        data = self._chip.read(register, count, t_ns)
+        t_ns = self._begun()
+        data = self._arriving(self._chip.read(register, count, t_ns))
         # two addresses and the register, start, repeated start and stop, then the data
         self._clock.spend((27 + 3 + 9 * count) * BIT_NS)
         return Reply(data, t_ns)
 
     def write(self, register: int, data: bytes) -> int:
-        """Write `data` from `register` on, and return when that began."""
-        t_ns = self._clock.now()
-        self._chip.write(register, data, t_ns)
+        """Write `data` from `register` on, and return when that began.
+
+        Raises
+        ------
+        BusError : a fault, as Linux would tell it.
+        """
+        t_ns = self._begun()
+        self._chip.write(register, self._arriving(data), t_ns)
         self._clock.spend((18 + 2 + 9 * len(data)) * BIT_NS)
         return t_ns
 
@@ -59,5 +75,19 @@ class SimulatedBus:
             self._motion.hear(prompt, self._clock.now() * 1e-9)
 
     def truth_document(self) -> dict[str, Any] | None:
-        """What is true of the sensor, in plain JSON types; None for a recording."""
-        return None if self._truth is None else self._truth.document()
+        """What is true of the sensor, and what goes wrong with it, in plain JSON types; None for a recording."""
+        if self._truth is None:
+            return None
+        return self._truth.document() | ({} if self._faults is None else {"faults": self._faults.words()})
+
+    def _begun(self) -> int:
+        """When a transfer begins that may go on."""
+        if self._faults is not None:
+            try:
+                self._faults.before_transfer()
+            except OSError as error:
+                raise transfer_error(error, NAME, ADDRESS) from error
+        return self._clock.now()
+
+    def _arriving(self, data: bytes) -> bytes:
+        return data if self._faults is None else self._faults.arriving(data)

@@ -38,7 +38,9 @@ class Chip:
         self._ended = False
         self._setting: Setting | None = None
         self._unread: Vector | None = None
-        self._reset(0)
+        self._frozen_until_ns = 0
+        self._frozen: Counts | None = None
+        self.reset(0)
 
     def read(self, register: int, count: int, t_ns: int) -> bytes:
         """`count` bytes from `register` on; FIFO_R_W does not auto-increment.
@@ -61,6 +63,15 @@ class Chip:
             if register + i in self._writable:
                 self._write_byte(register + i, value, t_ns)
 
+    def reset(self, t_ns: int) -> None:
+        """All registers as after power-on, and the FIFO empty."""
+        self._registers = self._model.reset_values(self._factory)
+        self._fifo.size = self._model.family.fifo_bytes
+        self._fifo.clear()
+        self._latest, self._unread = bytes(reg.FRAME_BYTES), None
+        self._setting = None
+        self._start_clock(t_ns)
+
     def _read_byte(self, address: int) -> int:
         if reg.ACCEL_XOUT_H <= address < reg.ACCEL_XOUT_H + reg.FRAME_BYTES:
             return self._latest_sample()[address - reg.ACCEL_XOUT_H]
@@ -73,7 +84,7 @@ class Chip:
 
     def _write_byte(self, address: int, value: int, t_ns: int) -> None:
         if address == reg.PWR_MGMT_1 and value & reg.PWR_MGMT_1_DEVICE_RESET:
-            self._reset(t_ns)
+            self.reset(t_ns)
             return
         if address == reg.USER_CTRL:
             value = self._user_control(value)
@@ -103,13 +114,22 @@ class Chip:
         count = len(self._fifo).to_bytes(2, "big")
         self._registers[reg.FIFO_COUNT_H : reg.FIFO_COUNT_L + 1] = count
 
-    def _reset(self, t_ns: int) -> None:
-        self._registers = self._model.reset_values(self._factory)
-        self._fifo.size = self._model.family.fifo_bytes
-        self._fifo.clear()
-        self._latest, self._unread = bytes(reg.FRAME_BYTES), None
-        self._setting = None
+    # What goes wrong with it.
+
+    def hurry(self, factor: float, t_ns: int) -> None:
+        """Its sample clock runs `factor` times as fast from now on."""
+        self._advance(t_ns)
+        self._speed *= factor
         self._start_clock(t_ns)
+
+    def freeze(self, until_ns: int) -> None:
+        """It measures the same again and again, until then."""
+        self._frozen_until_ns, self._frozen = until_ns, None
+
+    def slip(self, t_ns: int) -> None:
+        """Its FIFO loses a byte."""
+        self._advance(t_ns)
+        self._fifo.pop(1)
 
     # The sample clock.
 
@@ -160,6 +180,9 @@ class Chip:
     def _measure(self, edges_s: Vector) -> Counts:
         counts = self._feed.samples(edges_s, self._how())
         self._ended = len(counts) < len(edges_s) - 1
+        if len(counts) and edges_s[0] * 1e9 < self._frozen_until_ns:
+            self._frozen = counts[:1] if self._frozen is None else self._frozen
+            return np.repeat(self._frozen, len(counts), axis=0)
         return counts
 
     def _how(self) -> Setting:

@@ -11,6 +11,8 @@ import numpy as np
 from ...data import Vector
 from ...errors import UsageError
 from .clock import CLOCKS
+from .faults import KINDS as FAULTS
+from .faults import Fault
 from .hand import KINDS
 from .models import MODELS, OFFSETS
 
@@ -25,7 +27,7 @@ class Options:
     offsets : what a count of its accelerometer offsets is, in LSB/g, or readonly.
     seed : of the sensor, its noise and the hand. rate_error_ppm : how fast the sample clock runs.
     D, K : (3, 3). b_a [m/s^2], b_omega [rad/s] : (3,).
-    noise : times the data sheet's densities. temperature_c : of the die.
+    fault : what goes wrong, and when. noise : times the data sheet's densities. temperature_c : of the die.
     """
 
     chip: str = "mpu6050"
@@ -39,6 +41,7 @@ class Options:
     b_a: Vector | None = None
     K: Vector | None = None
     b_omega: Vector | None = None
+    fault: tuple[Fault, ...] = ()
     noise: float = 1.0
     temperature_c: float | None = None
 
@@ -101,6 +104,10 @@ def _identity(text: str) -> int:
     return value
 
 
+def _faults(text: str) -> tuple[Fault, ...]:
+    return tuple(Fault.parse(part) for part in text.split("/"))
+
+
 def _vector(text: str) -> Vector:
     return np.array([_number(part) for part in text.split("/")]).reshape(3)
 
@@ -127,6 +134,7 @@ PARSERS: dict[str, tuple[Callable[[str], Any], str]] = {
     "seed": (_seed, "a whole number from 0 on"),
     "hand": _one_of(KINDS),
     "pace": _one_of(CLOCKS),
+    "fault": (_faults, "NAME@SECONDS, or several with / between them, of " + ", ".join(FAULTS)),
     "rate_error_ppm": (_number, "a number"),
     "D": (_matrix, "nine numbers with / between them, by row, that can be inverted"),
     "b_a": (_vector, "three numbers with / between them, in m/s^2"),
