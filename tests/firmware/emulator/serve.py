@@ -136,7 +136,10 @@ def main() -> None:
             began_s = time.monotonic()
             while listen():
                 served.step()
-                time.sleep(max(0.0, board.now_s / options.pace - (time.monotonic() - began_s)))
+                ahead_s = board.now_s / options.pace - (time.monotonic() - began_s)
+                # even a sleep of no time gives the processor away
+                if ahead_s > 0:
+                    time.sleep(ahead_s)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@
 
 #define FRAMES_BODY 5 /* index, drops, left; then the frames */
 #define MAX_BATCH 32
-#define LOOK_US 500 /* twice as often as it must be: a look may come late */
+#define LOOK_US 800 /* a millisecond is the most, and a port may nap for a while */
 #define BEAT_US (MPUCAL_BEAT_MS * 1000UL)
 
 uint8_t mpucal_on_stream(struct mpucal_bridge *bridge, struct mpucal_request request, struct mpucal_message *reply) {
