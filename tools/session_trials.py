@@ -142,7 +142,10 @@ def all_of(bus_words: str, plan: Plan, seeds: Sequence[int], jobs: int) -> list[
         return list(pool.imap(partial(run, bus_words, plan), seeds))
 
 
-HEAD = f"{'hand':<12}{'good':>9}{'rotated [s]':>18}{'finished [s]':>18}{'sph_rms [m/s2]':>20}{'z':>7}{'z verify':>10}{'asked':>7}"
+HEAD = (
+    "hand             good       rotated [s]      finished [s]      sph_rms [m/s2]      z  z verify  asked\n"
+    "                          median (worst)    median (worst)        mean (worst)    rms       rms  median"
+)
 
 
 def row(name: str, trials: Sequence[Trial]) -> str:
@@ -153,7 +156,8 @@ def row(name: str, trials: Sequence[Trial]) -> str:
     rotated, finished, sph = (np.array([getattr(t, k) for t in trials]) for k in ("rotated_s", "finished_s", "sph_rms"))
     return (
         f"{name:<12}{good:>4} of {len(trials):<3}"
-        f"{np.nanmedian(rotated):>8.1f} ({np.nanmax(rotated):>5.1f})  {np.nanmedian(finished):>8.1f} ({np.nanmax(finished):>5.1f})"
+        f"{np.nanmedian(rotated):>8.1f} ({np.nanmax(rotated):>5.1f})  "
+        f"{np.nanmedian(finished):>8.1f} ({np.nanmax(finished):>5.1f})"
         f"{np.nanmean(sph):>11.4f} ({np.nanmax(sph):.4f})"
         f"{_rms(z):>7.2f}{_rms(verified):>10.2f}{np.median([t.prompts for t in trials]):>7.0f}"
     )

@@ -12,11 +12,15 @@ AXES = "xyz"
 # Below this a turn is too short to blame a scale on it.
 LEAST_TURN_RAD = np.deg2rad(40.0)
 WARMER_C = 8.0
+MUCH_CLIPPED = 0.002
 CLIPPED = "turn the board more slowly, or choose a larger --gyro-range, and run the session again"
 
 
-def judged(rests: list[Rest], of: int, recording: Recording) -> Checked:
-    """All of them, and what is wrong, if anything is."""
+def judged(rests: list[Rest], of: int, recording: Recording, contradiction: str) -> Checked:
+    """All of them, and what is wrong, if anything is.
+
+    contradiction : what the rests of the turning say against each other; empty where they agree.
+    """
     found = tuple(_found(rest, i + 1, max(of, len(rests)), float(recording.t[-1])) for i, rest in enumerate(rests))
     warmer = _warmer_c(recording)
     if abs(warmer) > WARMER_C:
@@ -31,9 +35,15 @@ def judged(rests: list[Rest], of: int, recording: Recording) -> Checked:
     if rests and all(rest.clipped for rest in rests):
         what = "every turn went beyond what the gyroscope can measure, so nothing says where gravity went"
         return Checked(found, False, "gyro_clipped", what, CLIPPED)
+    if not all(result.agrees for result in found) and recording.gyr_clipped.mean() > MUCH_CLIPPED:
+        what = "the new orientations disagree, after turns beyond what the gyroscope can measure"
+        return Checked(found, False, "gyro_clipped", what, CLIPPED)
     if not rests:
         what = "the board was never still in a new orientation, so nothing verifies the calibration"
         return Checked(found, False, "verification_failed", what, "run the session again, and hold the board still")
+    if contradiction:
+        what, _, remedy = contradiction.partition("; ")
+        return Checked(found, False, "inconsistent", what, remedy)
     if all(result.agrees for result in found):
         return Checked(found, True)
     return Checked(found, False, "verification_failed", *_why(rests, recording))

@@ -130,4 +130,6 @@ class Live:
             return Checked((), False, "verification_failed", "there is nothing to verify", "turn the board again")
         recording = with_masks(recording)
         rests = unseen_rests(recording, evidence.flat, evidence.fit, self._plan.gravity, self._since)
-        return judged(rests[:of], of, recording)
+        reasons = judge(evidence)["reasons"]
+        contradiction = next((reason["message"] for reason in reasons if reason["code"] == "inconsistent"), "")
+        return judged(rests[:of], of, recording, contradiction)

@@ -34,8 +34,9 @@ SAY_AGAIN_S = 8.0
 # Beyond these the hand's own acceleration hides where gravity is [m/s^2].
 LEAST_MPS2, MOST_MPS2 = 5.0, 15.0
 
-# How often what is known is looked at, and how long a fit may take before the session waits for it.
+# How often what is known is looked at, seldom after a long time; how long a fit may take until the session waits for it.
 KNOW_EVERY_S = TELL_EVERY_S = 1.0
+SELDOM = 40.0
 WAIT_S = 0.5
 
 
@@ -118,7 +119,8 @@ class Rotate:
 
     def _at(self, t_s: float) -> list[Output]:
         found: list[Output] = []
-        if not self._asked and t_s - self._known_s >= KNOW_EVERY_S:
+        turning_s = t_s - (self._begun_s or t_s)
+        if not self._asked and t_s - self._known_s >= max(KNOW_EVERY_S, turning_s / SELDOM):
             self._asked, self._known_s = True, t_s
             found.append(Ask(Wish.KNOW, WAIT_S))
         if t_s - self._told_s >= TELL_EVERY_S:

@@ -13,6 +13,7 @@ from .motion import Motion
 from .sensor import FULL_SCALE, Counts, Response, Setting, Truth
 
 RECORDED_C = 25.0
+TEMPERATURE = 3
 # until a driver has found out which chip it is, it may be set otherwise
 UNSET_S = 1.0
 
@@ -36,7 +37,10 @@ class SensorFeed:
         """The samples between (n + 1,) times [s]; it never ends."""
         if self._set is None or self._set[0] is not setting:
             self._set = setting, self._truth.response(setting)
-        return self._set[1].counts(*self._motion.means(edges_s), self._rng)
+        counts = self._set[1].counts(*self._motion.means(edges_s), self._rng)
+        warmer = np.rint(self._motion.warmer_c(edges_s) * setting.lsb_per_c).astype(np.int16)
+        counts[:, TEMPERATURE] += warmer
+        return counts
 
 
 class RecordedFeed:

@@ -13,6 +13,7 @@ import numpy as np
 from ...data import Vector
 from . import rotation
 from .legs import STEP_HZ, Leg, Move, Pause, Tumble, steps
+from .mishaps import Knock, Mishap, Slip, Warmth
 
 # Faster than this no person reacts; so motion is settled this far ahead.
 REACTION_S = (0.5, 1.5)
@@ -22,6 +23,8 @@ PAUSE_S = 2.0
 FLAT_DOWN = (0.0, 0.0, -1.0)
 TURN_RAD = (math.radians(50.0), math.radians(130.0))
 ON_THE_TABLE, IN_THE_HAND = 0.0, 1.0
+# Halfway through the turning.
+MISHAP_AFTER_S = 18.0
 
 
 class Prompt(Protocol):
@@ -53,7 +56,15 @@ class Hand:
     Parameters
     ----------
     rng : makes it this person and no other.
+
+    Attributes
+    ----------
+    mishap : what befalls the sensor meanwhile.
     """
+
+    MISHAP: type[Mishap] = Mishap
+    HELD = IN_THE_HAND
+    HASTE = 1.0
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng, self._nerves = rng.spawn(2)
@@ -63,6 +74,7 @@ class Hand:
         self._wish = "hold_still"
         self._down: Vector | None = None
         self._moved = False
+        self.mishap = self.MISHAP()
 
     def first_stance(self) -> Stance:
         """The board as it is picked up: somehow tilted."""
@@ -75,6 +87,8 @@ class Hand:
         if said == self._last:
             return
         self._last = said
+        if prompt.kind == "rotate":
+            self.mishap.begin(t_s + MISHAP_AFTER_S)
         obeyed = math.ceil((t_s + self._nerves.uniform(*REACTION_S)) * STEP_HZ)
         if self._heard:
             obeyed = max(obeyed, self._heard[-1][0])
@@ -123,7 +137,7 @@ class Hand:
         """Moves and pauses by turns, to wherever `aim` says."""
         self._moved = not self._moved
         if self._moved:
-            return self.move(now, self.aim(now), IN_THE_HAND)
+            return self.move(now, self.aim(now), self.HELD)
         return self.pause(now, PAUSE_S)
 
     def aim(self, now: Stance) -> Vector:
@@ -137,7 +151,7 @@ class Hand:
     def move(self, now: Stance, turn_rad: Vector, held: float) -> Leg:
         """A turn about a fixed axis; beyond 130 deg it takes longer."""
         longer = max(1.0, float(np.linalg.norm(turn_rad)) / TURN_RAD[1])
-        seconds = MOVE_S * longer * self._rng.uniform(0.9, 1.1)
+        seconds = MOVE_S * longer / self.HASTE * self._rng.uniform(0.9, 1.1)
         return Move(now.step, now.step + steps(seconds), turn_rad, (now.held, held))
 
     def towards(self, now: Stance, down: Vector, twist_rad: float = 0.0) -> Vector:
@@ -195,6 +209,57 @@ class Guided(Hand):
         return turn
 
 
+class Placing(Guided):
+    """Sets the board down on something in each orientation, and lets go of it."""
+
+    HELD = ON_THE_TABLE
+
+
+class Wandering(Guided):
+    """Pauses as others do, but in any orientation, whatever it is asked for."""
+
+    def aim(self, now: Stance) -> Vector:
+        """Anywhere."""
+        axis = self._rng.normal(size=3)
+        return np.asarray(axis / np.linalg.norm(axis) * self._rng.uniform(*TURN_RAD))
+
+    def rotate(self, now: Stance) -> Leg:
+        """Moves and pauses by turns."""
+        return Hand.rotate(self, now)
+
+
+class OneAxis(Wandering):
+    """Turns the board about its x axis alone."""
+
+    def aim(self, now: Stance) -> Vector:
+        """On, by as much as others turn."""
+        return np.array([self._rng.uniform(*TURN_RAD), 0.0, 0.0])
+
+
+class Hasty(Guided):
+    """Follows as others do, four times as fast."""
+
+    HASTE = 4.0
+
+
+class Slipping(Guided):
+    """Holds the board by its sensor, whose accelerometer slips on its mount."""
+
+    MISHAP = Slip
+
+
+class Knocking(Guided):
+    """Knocks the board against something."""
+
+    MISHAP = Knock
+
+
+class Warming(Guided):
+    """Stands in the sun."""
+
+    MISHAP = Warmth
+
+
 class Random(Hand):
     """Turns the board all the time, about every axis at once, whatever direction it is asked for."""
 
@@ -234,4 +299,16 @@ class Restless(Guided):
         return Move(now.step, now.step + steps(self._rng.uniform(0.3, 0.7)), turn, (now.held, IN_THE_HAND))
 
 
-KINDS: dict[str, type[Hand]] = {"guided": Guided, "random": Random, "still": Still, "restless": Restless}
+KINDS: dict[str, type[Hand]] = {
+    "guided": Guided,
+    "placing": Placing,
+    "random": Random,
+    "wandering": Wandering,
+    "still": Still,
+    "restless": Restless,
+    "one_axis": OneAxis,
+    "hasty": Hasty,
+    "slipping": Slipping,
+    "knocking": Knocking,
+    "warming": Warming,
+}

@@ -118,7 +118,11 @@ class Motion:
         sums = (1 - part) * self._sums[node] + part * self._sums[node + 1]
         means = (sums[1:] - sums[:-1]) / (edges_s[1:] - edges_s[:-1])[:, None]
         self._forget(int(node[-1]))
-        return means[:, :3], means[:, 3:]
+        return self._hand.mishap.felt(means[:, :3], means[:, 3:], edges_s[1:])
+
+    def warmer_c(self, edges_s: Vector) -> Vector:
+        """(n,) by how much the chip is warmer than at first, between (n + 1,) times [s]."""
+        return self._hand.mishap.warmer_c(edges_s[1:])
 
     def attitude(self, t_s: float) -> Vector:
         """The quaternion (4,) at `t_s`, which is not before what `means` was last asked for."""
