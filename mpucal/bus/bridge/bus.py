@@ -98,7 +98,7 @@ class BridgeBus:
         self._watch.saw_write(register, data)
         if controls and self._can_read_ahead:
             return self._start(*requests)
-        return self._ask(*requests)[-1][-1].t_ns
+        return self._seen_from(self._ask(*requests)[-1][-1].t_ns)
 
     def sleep_until(self, t_ns: int) -> None:
         """Wait until the bridge's clock shows `t_ns`, as far as is known, and take what it pushes."""
@@ -124,25 +124,23 @@ class BridgeBus:
         if count > MAX_BURST:
             raise BusError(f"a bridge reads at most {MAX_BURST} bytes at once, not {count}", "read less at once")
         answers = [answer for several in self._ask(*_reads(register, count)) for answer in several]
-        return Reply(b"".join(_data(answers)), answers[0].t_ns)
+        return Reply(b"".join(_data(answers)), self._seen_from(answers[0].t_ns))
 
     def _judged(self, reply: Reply, at: int) -> Reply:
-        """What was read, with INT_STATUS at `at`: it tells what was lost on the way to the host, too.
-
-        It is a word on what was counted before, so its time is not later: a host that works off what was read ahead
-        would take itself to be up to date.
-        """
-        overflow, t_ns = bool(reply.data[at] & reg.INT_FIFO_OFLOW), reply.t_ns
+        """What was read, with INT_STATUS at `at`: it tells what was lost on the way to the host, too."""
         if self._ahead is not None:
-            if overflow:
+            if reply.data[at] & reg.INT_FIFO_OFLOW:
                 # the reading cleared it, and the bridge does not see it any more
-                self._ahead.lose(t_ns)
-            lost, t_ns = self._ahead.take_overflow(t_ns)
+                self._ahead.lose(reply.t_ns)
+            lost = self._ahead.take_overflow()
         else:
             lost, self._lost = self._lost, False
         data = bytearray(reply.data)
         data[at] |= reg.INT_FIFO_OFLOW * lost
-        return Reply(bytes(data), t_ns)
+        return Reply(bytes(data), reply.t_ns)
+
+    def _seen_from(self, t_ns: int) -> int:
+        return t_ns if self._ahead is None else self._ahead.seen_from(t_ns)
 
     @property
     def _can_read_ahead(self) -> bool:

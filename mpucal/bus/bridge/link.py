@@ -83,8 +83,13 @@ class _Asked:
 
     @property
     def repeatable(self) -> bool:
-        """Whether it does no harm when carried out twice."""
-        return not isinstance(self.request, Read | Burst) or self.request.register not in (FIFO_R_W, INT_STATUS)
+        """Whether it does no harm when carried out twice: reading these two takes something away."""
+        if isinstance(self.request, Burst):
+            return False
+        if not isinstance(self.request, Read):
+            return True
+        first = self.request.register
+        return not first <= INT_STATUS < first + self.request.count and first != FIFO_R_W
 
     def is_answered_by(self, frame: Frame, reply: Reply) -> bool:
         """Whether `reply` is what it waits for: of a BURST, a piece behind one that was lost is not."""

@@ -10,10 +10,7 @@ WIRES = "check the chip's supply, SDA, SCL and AD0"
 SENTENCES = {
     Status.UNKNOWN_TYPE: ("the bridge on {port} does not know this request", "put a newer firmware on it"),
     Status.BAD_PAYLOAD: ("the bridge on {port} refuses a request's values", "put a firmware of this version on it"),
-    Status.NO_ANSWER: (
-        "the bridge on {port} finds no chip on its I2C bus",
-        "check the chip's supply, SDA, SCL and AD0",
-    ),
+    Status.NO_ANSWER: ("the chip no longer answers the bridge on {port}", WIRES),
     Status.BUS_FAILED: (
         "a transfer on the I2C bus of the bridge on {port} broke off",
         "shorten the wires, or add pull-ups",

@@ -35,10 +35,11 @@ class ReadAhead:
         self._frame_bytes = frame_bytes
         self._looks: deque[Look] = deque()
         self._begun: list[Frames] = []
+        self._begun_t_ns = 0
         self._next_index = 0
         self._drops: int | None = None
         self._shown = bytearray()
-        self._shown_t_ns: int | None = None
+        self._shown_t_ns = 0
         self._last_byte = 0
         self._overflow = False
 
@@ -50,6 +51,7 @@ class ReadAhead:
         self._drops = frames.drops
         self._next_index = (frames.index + len(frames.frames) // self._frame_bytes) % INDEX_WRAP
         self._begun.append(frames)
+        self._begun_t_ns = t_ns
         if frames.left == 0:
             data = b"".join(part.frames for part in self._begun)
             self._looks.append(Look(t_ns, data, lost=False))
@@ -81,7 +83,7 @@ class ReadAhead:
             if look.lost:
                 self._overflow = True
                 break
-        return len(self._shown), self._shown_t_ns or 0
+        return len(self._shown), self._shown_t_ns
 
     def pop(self, count: int) -> tuple[bytes, int]:
         """FIFO_R_W: the oldest `count` bytes of what was counted; where it is empty, the last again."""
@@ -89,12 +91,21 @@ class ReadAhead:
         del self._shown[:count]
         if data:
             self._last_byte = data[-1]
-        return data + bytes([self._last_byte]) * (count - len(data)), self._shown_t_ns or 0
+        return data + bytes([self._last_byte]) * (count - len(data)), self._shown_t_ns
 
-    def take_overflow(self, t_ns: int) -> tuple[bool, int]:
-        """Whether something was lost before what was counted last, told once, and when that was; at `t_ns` if never."""
+    def take_overflow(self) -> bool:
+        """INT_STATUS: whether something was lost before what was counted last; told once."""
         overflow, self._overflow = self._overflow, False
-        return overflow, t_ns if self._shown_t_ns is None else self._shown_t_ns
+        return overflow
+
+    def seen_from(self, t_ns: int) -> int:
+        """When something that was done at `t_ns` was done for who still has looks of before to count.
+
+        Time would go back for him otherwise, and he would take himself to be up to date.
+        """
+        if self._looks:
+            return min(t_ns, self._looks[0].t_ns)
+        return min(t_ns, self._begun_t_ns) if self._begun else t_ns
 
     def _is_lost(self, frames: Frames) -> bool:
         if frames.status != Status.OK or len(frames.frames) % self._frame_bytes:

@@ -1,0 +1,90 @@
+"""A simulated chip behind an emulated bridge, on a line whose time runs only while the host waits."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mpucal.bus.bridge.bus import BridgeBus
+from mpucal.bus.bridge.emulated import EmulatedBridge, EmulatedLine
+from mpucal.bus.simulated import SimulatedBus
+from mpucal.bus.simulated.chip import Chip
+from mpucal.bus.simulated.clock import FastClock
+from mpucal.bus.simulated.factory import Factory
+from mpucal.bus.simulated.models import MODELS
+
+MS = 1_000_000
+
+
+class NumberedFeed:
+    """Samples 0, 1, 2, ... in accelerometer x; every other word is the same in all."""
+
+    def __init__(self):
+        self.next = 0
+
+    def samples(self, edges_s, setting):
+        n = len(edges_s) - 1
+        rows = np.tile(np.array([0, -34, 8192, -2000, 56, -78, 90], np.int16), (n, 1))
+        rows[:, 0] = np.arange(self.next, self.next + n) % 30000
+        self.next += n
+        return rows
+
+
+class Rig(SimpleNamespace):
+    """The parts by name: clock, chip, line, and `bus` on demand."""
+
+    def new_chip(self):
+        """One that has just got its supply."""
+        self.chip = SimulatedBus(Chip(MODELS[self.model], NumberedFeed(), 2500.0, Factory()), self.clock)
+
+    def new_bridge(self, boot_ns=0, **how):
+        """One that has just got its supply, with the chip there is."""
+        started_ns = self.clock.now()
+        bridge = EmulatedBridge(self.chip, lambda: self.clock.now() - started_ns, **{**self.how, **how})
+        return Booting(bridge, self.clock, started_ns + boot_ns)
+
+    def bus(self, address=None):
+        return BridgeBus(self.line, address)
+
+
+class Booting:
+    """A bridge whose boot loader eats what comes until `ready_ns`."""
+
+    def __init__(self, bridge, clock, ready_ns):
+        self.bridge, self.clock, self.ready_ns = bridge, clock, ready_ns
+
+    def receive(self, data):
+        if self.clock.now() >= self.ready_ns:
+            self.bridge.receive(data)
+
+    def work(self):
+        return self.bridge.work()
+
+
+@pytest.fixture(scope="session")
+def rig():
+    def make(model="mpu6050", latency_ns=MS, boot_ns=0, **how):
+        made = Rig(model=model, clock=FastClock(), how=how)
+        made.new_chip()
+        made.line = EmulatedLine(made.new_bridge(boot_ns), made.clock, latency_ns)
+        return made
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def numbers():
+    """Which of the feed's samples a recording holds."""
+    return lambda recording: np.rint(recording.acc[:, 0] / recording.acc[0, 2] * 8192).astype(int)
+
+
+@pytest.fixture(scope="session")
+def stream():
+    """Polls a started driver for so many seconds."""
+
+    def run(driver, seconds):
+        end_ns = driver.now_ns() + round(seconds * 1e9)
+        while driver.now_ns() < end_ns:
+            driver.poll()
+
+    return run
