@@ -1,0 +1,98 @@
+"""Every number on the page against calibration.json, converted here once more."""
+
+import html
+import math
+import re
+
+import numpy as np
+import pytest
+
+CELL = re.compile(r"([-+]?[\d.]+) ±\u00a0([\d.]+)")
+TABLE = r'<table id="{}">(.*?)</table>'
+MG = 9.80665e-3
+
+
+def table(page, name):
+    rows = {}
+    for row in re.findall(r"<tr>(.*?)</tr>", re.search(TABLE.format(name), page, re.DOTALL)[1], re.DOTALL):
+        cells = [html.unescape(cell) for cell in re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row)]
+        rows[cells[0]] = cells[1:]
+    return rows
+
+
+def agree(cells, values, stds):
+    """Each cell is its value and deviation, as far as their digits go."""
+    assert len(cells) == len(values)
+    for cell, value, std in zip(cells, values, stds, strict=True):
+        if math.isnan(value):
+            assert cell == ""
+            continue
+        shown, deviation = CELL.fullmatch(cell).groups()
+        digit = 10.0 ** -len(shown.partition(".")[2])
+        assert abs(float(shown) - value) <= 0.51 * digit
+        assert abs(float(deviation) - std) <= 0.51 * digit
+        assert digit <= 0.11 * std
+
+
+@pytest.fixture(scope="module")
+def accelerometer(result):
+    return {name: np.array(result.document["accelerometer"][name]) for name in ("D", "b_a", "D_std", "b_a_std")}
+
+
+def test_gains_and_biases(result, accelerometer):
+    rows = table(result.html, "accelerometer")
+    a = accelerometer
+    agree(rows["gain error, %"], 100 * (np.diag(a["D"]) - 1), 100 * np.diag(a["D_std"]))
+    agree(rows["bias, mg"], a["b_a"] / MG, a["b_a_std"] / MG)
+
+
+@pytest.mark.parametrize("axis", range(3), ids="xyz")
+def test_leans(result, accelerometer, axis):
+    D, D_std = accelerometer["D"], accelerometer["D_std"]
+    expected = [
+        [math.nan if i == axis else math.degrees(matrix[i, axis] / D[i, i]) for i in range(3)] for matrix in (D, D_std)
+    ]
+    agree(table(result.html, "accelerometer")[f"lean to {'xyz'[axis]}, deg"], *expected)
+
+
+def test_the_gyroscope(result):
+    gyro = {name: np.array(value) for name, value in result.document["gyroscope"].items() if name != "formula"}
+    rows = table(result.html, "gyroscope")
+    wrong = np.linalg.inv(gyro["K"])
+    agree(rows["gain error, %"], 100 * (np.diag(wrong) - 1), 100 * np.diag(gyro["K_std"]))
+    agree(rows["bias, deg/s"], np.degrees(gyro["b_omega"]), np.degrees(gyro["b_omega_std"]))
+
+
+def test_the_matrices(result, accelerometer):
+    rows = table(result.html, "parameters")
+    for i, axis in enumerate("xyz"):
+        agree(rows[f"D {axis}"], accelerometer["D"][i], accelerometer["D_std"][i])
+    agree(rows["b_a, m/s²"], accelerometer["b_a"], accelerometer["b_a_std"])
+    rows, gyro = table(result.html, "gyro-parameters"), result.document["gyroscope"]
+    for i, axis in enumerate("xyz"):
+        agree(rows[f"K {axis}"], gyro["K"][i], gyro["K_std"][i])
+    agree(rows["b_omega, rad/s"], gyro["b_omega"], gyro["b_omega_std"])
+
+
+def test_magnitudes(result):
+    rows = table(result.html, "magnitudes")
+    for when in ("before", "after"):
+        expected = result.document["quality"][f"magnitude_{when}"]
+        assert rows[when] == [f"{expected[key]:.4f}" for key in ("median", "mean", "std")]
+
+
+def test_the_sentence_says_how_sure(result):
+    error = result.document["quality"]["error_std"]
+    sentence = re.search(r'id="verdict">(.*?)</p>', result.html)[1]
+    assert sentence.lower().startswith(result.document["quality"]["verdict"])
+    rms, mg, direction = map(float, re.search(r"off by (\S+) m/s² \((\S+) mg\).*? by (\S+) deg", sentence).groups())
+    np.testing.assert_allclose(
+        [rms, mg * MG, direction], [error["rms"], error["rms"], error["direction_deg"]], rtol=0.06
+    )
+
+
+def test_it_says_how_to_fit_it_again(result):
+    commands = html.unescape(re.search(r'<pre id="reproduce">(.*?)</pre>', result.html, re.DOTALL)[1]).splitlines()
+    fit = result.document["fit"]
+    assert commands[0] == f"mpucal calibrate mpu6050.mcap --model {fit['model']} --gravity {fit['gravity']} -o again"
+    assert commands[1] == "mpucal session --replay mpu6050.mcap -o replayed"
