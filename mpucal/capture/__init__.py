@@ -8,12 +8,12 @@ from pathlib import Path
 from ..data import Recording
 from ..errors import RecordingError
 
-KINDS = (".mcap", ".tlog", ".npz", ".csv")
+KINDS = (".mcap", ".tlog", ".bin", ".npz", ".csv")
 _REMEDY = f"give a {', '.join(KINDS)} file or the folder of a session"
 
 
 def load(path: str | Path) -> Recording:
-    """The recording in a file (.mcap, .tlog, .npz, .csv), or in the capture of a session's folder.
+    """The recording in a file (.mcap, .tlog, .bin of ArduPilot, .npz, .csv), or in the capture of a session's folder.
 
     A capture that was cut short gives what is whole of it, and says so in `recovered`.
 
@@ -38,6 +38,10 @@ def load(path: str | Path) -> Recording:
         from .tlog import load_tlog  # noqa: PLC0415
 
         return load_tlog(path)
+    if kind == ".bin":
+        from .dataflash import load_dataflash  # noqa: PLC0415
+
+        return load_dataflash(path)
     if kind == ".npz":
         from .npz import load_npz  # noqa: PLC0415
 

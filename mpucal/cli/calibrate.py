@@ -23,7 +23,7 @@ EXAMPLE = "Example: `mpucal calibrate capture.mcap -o results` or `mpucal calibr
 @click.option("--json", "as_json", is_flag=True, help="Print calibration.json, and nothing else.")
 @fit_options
 def command(recording: Path, folder: Path | None, as_json: bool, gravity: float, model: str) -> int:
-    """Calibrate from a capture (.mcap, .tlog), an archive (.npz) or a table (.csv).
+    """Calibrate from a capture (.mcap, .tlog), a dataflash log (.bin), an archive (.npz) or a table (.csv).
 
     Of a folder, the capture in it is meant. Exit code 5: the calibration was refused, with reasons.
     """

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..calibration.stationary import find_flat
 from ..capture import load
+from ..capture.dataflash import is_dataflash
 from ..data import Recording, Sensor
 from ..errors import UsageError
 from ..result import Calibration
@@ -32,7 +33,7 @@ CALIBRATIONS = (".json", ".bin")
 )
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON.")
 def command(file: Path | None, serial: str | None, as_json: bool) -> None:
-    """Say what is in a calibration (.json), a config blob (.bin), a recording (.mcap, .npz, .csv), or a bridge."""
+    """Say what is in a calibration (.json), a config blob (.bin), a recording, or a bridge."""
     if (file is None) == (serial is None):
         raise UsageError(
             "nothing to show was named" if file is None else "a file and --serial were given together",
@@ -41,7 +42,7 @@ def command(file: Path | None, serial: str | None, as_json: bool) -> None:
     if serial is not None:
         where, stored = _stored(serial)
         click.echo(stored.json() if as_json else _calibration(where, stored), nl=not as_json)
-    elif file is not None and file.suffix in CALIBRATIONS:
+    elif file is not None and file.suffix in CALIBRATIONS and not is_dataflash(file):
         calibration = Calibration.load(file)
         click.echo(calibration.json() if as_json else _calibration(str(file), calibration), nl=not as_json)
     elif file is not None:

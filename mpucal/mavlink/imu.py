@@ -22,6 +22,8 @@ HIGHRES_UPDATED = 0b111111  # HIGHRES_IMU_UPDATED_FLAGS: accelerometer and gyros
 CENTIDEGREES = 100.0
 
 HIGHRES, RAW = "HIGHRES_IMU", "RAW_IMU"
+# of ArduPilot's dataflash logs: what HIGHRES_IMU is, of every IMU
+DATAFLASH = "IMU"
 SCALED = {"SCALED_IMU": 1, "SCALED_IMU2": 2, "SCALED_IMU3": 3}
 MESSAGE_ID = {HIGHRES: 105, RAW: 27, "SCALED_IMU": 26, "SCALED_IMU2": 116, "SCALED_IMU3": 129}
 
@@ -35,7 +37,7 @@ class Stream(NamedTuple):
     @property
     def is_whole(self) -> bool:
         """Whether its numbers are truncated to whole milli-g and mrad/s."""
-        return self.name != HIGHRES
+        return self.name not in (HIGHRES, DATAFLASH)
 
     @property
     def unit_us(self) -> int:

@@ -49,7 +49,7 @@ class VehicleSource:
         self._last_us: float | None = None
         self._heard_ns = self._sampled_ns = 0
         self._rebooted = False
-        self._received = 0
+        self._received = self._lost = 0
         self._said_lost = False
 
     def start(self) -> Sensor:
@@ -70,6 +70,7 @@ class VehicleSource:
         self._streams = Streams(self._link, firmware, parameters, self._rate_hz, self._say)
         self._stream = self._streams.start()
         self._rows = []
+        self._lost = self._link.lost
         self._heard_ns = self._sampled_ns = self._link.now_ns()
         return Sensor(chip=chip(firmware, self._stream.imu), rate_hz=self._rate_hz, message=self._stream.name)
 
@@ -120,8 +121,9 @@ class VehicleSource:
 
     def _weigh(self) -> None:
         """Say once that the link loses packets."""
-        sent = self._received + self._link.lost
-        if self._said_lost or sent < WEIGHED or self._link.lost < WORTH_SAYING * sent:
+        lost = self._link.lost - self._lost
+        sent = self._received + lost
+        if self._said_lost or sent < WEIGHED or lost < WORTH_SAYING * sent:
             return
         self._said_lost = True
         self._say(

@@ -35,7 +35,7 @@ class Streams:
     ) -> None:
         self._link = link
         self._firmware = firmware
-        self._order = truthful(firmware, parameters)
+        self._order = [name for name in truthful(firmware, parameters) if name in MESSAGE_ID]
         self._rate_hz = rate_hz
         self._say = say
         self._counts: Counter[Stream] = Counter()

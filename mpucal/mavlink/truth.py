@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from .imu import HIGHRES, RAW
+from .imu import DATAFLASH, HIGHRES, RAW
 
 ARDUPILOT, PX4 = "ArduPilot", "PX4"
 
@@ -20,7 +20,7 @@ def truthful(firmware: str, parameters: Mapping[str, float]) -> tuple[str, ...]:
     EKF2_IMU_CTRL's bit 1 is clear; and PX4 sends no RAW_IMU.
     """
     if firmware != PX4:
-        return (HIGHRES, RAW, *SCALED_ORDER)
+        return (DATAFLASH, HIGHRES, RAW, *SCALED_ORDER)
     control = parameters.get(EKF2_IMU_CTRL)
     unbiased = control is not None and not int(control) & ACCEL_BIAS
     return (HIGHRES, *SCALED_ORDER) if unbiased else SCALED_ORDER

@@ -1,0 +1,77 @@
+"""ArduPilot's dataflash logs (.bin) as recordings, by pymavlink's reader. Knows no estimate."""
+
+from __future__ import annotations
+
+import math
+import struct
+from contextlib import closing, redirect_stderr, redirect_stdout, suppress
+from importlib import import_module
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from ..data import Recording
+from ..errors import RecordingError
+from ..mavlink.imu import DATAFLASH, Reading, Stream
+from ..mavlink.log import Log
+from ..mavlink.truth import ARDUPILOT
+
+MAGIC = b"\xa3\x95"
+PARAMETER = "PARM"
+# before ArduPilot 4.0 each IMU had a message of its own; since then `I` counts them from 0
+IMUS = {"IMU": 1, "IMU2": 2, "IMU3": 3}
+US = 1_000
+
+_DAMAGE = (ValueError, TypeError, KeyError, IndexError, AttributeError, OSError, ZeroDivisionError, struct.error)
+
+
+def is_dataflash(path: Path) -> bool:
+    """Whether a file begins as a dataflash log."""
+    try:
+        with path.open("rb") as file:
+            return file.read(len(MAGIC)) == MAGIC
+    except OSError:
+        return False
+
+
+def load_dataflash(path: Path) -> Recording:
+    """The recording of the vehicle's first IMU in a dataflash log, the others in its `others`.
+
+    Raises
+    ------
+    RecordingError : it is none, or holds no IMU messages.
+    """
+    if not is_dataflash(path):
+        raise RecordingError(f"{path} is no dataflash log", "give a .bin that ArduPilot wrote")
+    log = Log(ARDUPILOT)
+    # the reader prints what it dislikes
+    with redirect_stderr(StringIO()), redirect_stdout(StringIO()):
+        _fill(log, path)
+    if not any(map(len, log.segments)):
+        raise RecordingError(
+            f"{path} holds no IMU messages",
+            "have LOG_BITMASK log the IMU (IMU or IMU_FAST) also while disarmed, and turn it again",
+        )
+    return log.recording(path.name)
+
+
+def _fill(log: Log, path: Path) -> None:
+    """Take the IMU and parameter messages, up to where the file is damaged."""
+    DFReader = import_module("pymavlink.DFReader")
+    with suppress(*_DAMAGE), closing(DFReader.DFReader_binary(str(path))) as reader:
+        while (message := reader.recv_match(type=[PARAMETER, *IMUS])) is not None:
+            if message.get_type() == PARAMETER:
+                log.parameter(str(message.Name), float(message.Value))
+                continue
+            content = _reading(message)
+            if content is not None:
+                log.reading(content, content.time * US)
+
+
+def _reading(message: Any) -> Reading | None:
+    imu = getattr(message, "I", IMUS[message.get_type()] - 1) + 1
+    acc, gyr = (message.AccX, message.AccY, message.AccZ), (message.GyrX, message.GyrY, message.GyrZ)
+    if not all(map(math.isfinite, acc + gyr)):
+        return None
+    warmth = getattr(message, "T", math.nan)
+    return Reading(Stream(DATAFLASH, imu), int(message.TimeUS), acc, gyr, float(warmth))
