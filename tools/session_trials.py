@@ -43,7 +43,7 @@ SABOTAGE: dict[str, tuple[str, dict[str, Any], str]] = {
     "wrong range": ("sim:D=2/0/0/0/2/0/0/0/2", {}, "wrong_range"),
     "gyro clipping": ("sim:hand=hasty", {"gyro_range_dps": 250}, "gyro_clipped"),
     "a knock": ("sim:hand=knocking", {}, "verification_failed"),
-    "a slip": ("sim:hand=slipping", {}, "verification_failed"),
+    "a slip": ("sim:hand=slipping", {}, "inconsistent"),
     "warming by 15 C": ("sim:hand=warming", {}, "temperature_moved"),
 }
 

@@ -21,13 +21,14 @@ from ..calibration.quality import judge
 from ..calibration.stationary import find_flat, flat_statistics
 from ..calibration.verification import unseen_rests
 from ..data import Recording, Samples, Sensor
-from ..result import GOOD
 from ..session.aims import AIMS, directions
 from ..session.events import Ask, Checked, Event, Learnt, Tried, Wish
 from ..session.plan import Plan
 from .disagreement import judged
 from .knowledge import knowledge, wanted
 from .store import Store
+
+CONTRADICTION = "inconsistent"
 
 
 @dataclass(frozen=True)
@@ -120,8 +121,10 @@ class Live:
         evidence, _ = weigh(recording, self._plan.model, self._plan.gravity)
         self._tried, self._since = evidence, len(recording)
         quality = judge(evidence)
-        why = "; ".join(reason["message"] for reason in quality["reasons"])
-        return Tried(quality["verdict"], "" if quality["verdict"] == GOOD else why)
+        # an estimate that contradicts itself does not settle either: that is the truer reason
+        reasons = sorted(quality["reasons"], key=lambda reason: reason["code"] != CONTRADICTION)
+        first = reasons[0] if reasons else {"code": "", "message": ""}
+        return Tried(quality["verdict"], first["message"], first["code"])
 
     def _check(self, recording: Recording) -> Event:
         of = AIMS[self._plan.target].verify
@@ -131,5 +134,5 @@ class Live:
         recording = with_masks(recording)
         rests = unseen_rests(recording, evidence.flat, evidence.fit, self._plan.gravity, self._since)
         reasons = judge(evidence)["reasons"]
-        contradiction = next((reason["message"] for reason in reasons if reason["code"] == "inconsistent"), "")
+        contradiction = next((reason["message"] for reason in reasons if reason["code"] == CONTRADICTION), "")
         return judged(rests[:of], of, recording, contradiction)

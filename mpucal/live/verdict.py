@@ -27,6 +27,6 @@ def verified(calibration: Calibration, checked: Checked | None) -> Calibration:
     }
     if not checked.agrees:
         reasons: list[Mapping[str, Any]] = [r for r in quality.get("reasons", []) if r["code"] != checked.code]
-        message = f"{checked.why}; {checked.remedy}"
+        message = "; ".join(text for text in (checked.why, checked.remedy) if text)
         quality |= {"verdict": REFUSED, "reasons": [{"code": checked.code, "message": message}, *reasons]}
     return replace(calibration, quality=MappingProxyType(quality))

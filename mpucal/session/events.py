@@ -81,10 +81,14 @@ class Learnt:
 
 @dataclass(frozen=True)
 class Tried:
-    """A first calibration from the turning alone, to be verified: its verdict, and why it is not good."""
+    """A first calibration from the turning alone, to be verified: its verdict, and why it is not good.
+
+    code : of the reason that weighs most.
+    """
 
     verdict: str
     why: str
+    code: str = ""
 
 
 @dataclass(frozen=True)

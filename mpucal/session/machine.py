@@ -134,7 +134,9 @@ class Machine:
             case Learnt(knowledge, advice), Rotate() as rotate:
                 return self._follow(rotate.learn(knowledge, advice))
             case Tried(), Verify() as verify:
-                return self._follow(verify.tried(event))
+                found = verify.tried(event)
+                self.checked = verify.checked
+                return self._follow(found)
             case Checked(), Verify() as verify:
                 self.checked = event
                 return self._follow(verify.check(event))

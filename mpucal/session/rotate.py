@@ -34,7 +34,7 @@ SAY_AGAIN_S = 8.0
 # Beyond these the hand's own acceleration hides where gravity is [m/s^2].
 LEAST_MPS2, MOST_MPS2 = 5.0, 15.0
 
-# How often what is known is looked at, seldom after a long time; how long a fit may take until the session waits for it.
+# How often what is known is looked at (after a long time, less), and how long the session lets a fit take.
 KNOW_EVERY_S = TELL_EVERY_S = 1.0
 SELDOM = 40.0
 WAIT_S = 0.5

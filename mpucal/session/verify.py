@@ -73,11 +73,13 @@ class Verify:
 
     def tried(self, tried: Tried) -> list[Output | Finished]:
         """The first calibration; a refused one is not worth verifying."""
-        return [Finished(f"not to be verified: {tried.why}")] if tried.verdict == REFUSED else []
+        if tried.verdict != REFUSED:
+            return []
+        self.checked = Checked((), False, tried.code, tried.why)
+        return [Finished(f"not to be verified: {tried.why}")]
 
     def check(self, checked: Checked) -> list[Output | Finished]:
         """What the orientations say."""
-        self.checked = checked
         agree = "the new orientations agree with what was promised"
         return [*checked.found, Finished(agree if checked.agrees else checked.why)]
 
