@@ -12,14 +12,14 @@ from .. import __version__
 from ..bus.records import SessionEvent
 from ..chip.config import Config
 from ..data import Recording
-from ..errors import CaptureError, LinkError
+from ..errors import CaptureError, LinkError, UsageError
 from ..mavlink.link import Link
 from ..mavlink.log import read_log
 from ..mavlink.notes import Note, to_messages
 from ..mavlink.prompts import to_message
 from ..mavlink.recorded import RecordedSource
 from ..mavlink.replay import Replay
-from ..mavlink.source import VehicleSource
+from ..mavlink.source import VehicleSource, one_of
 from ..mavlink.tlog import Tlog, TlogWriter, read_tlog
 from ..mavlink.transport import Transport
 from ..runner import Replayed, Talk
@@ -91,6 +91,23 @@ class OnLink:
             finally:
                 # until when nothing more came: a replay ends its last poll there
                 notes.keep(END, 0, {})
+
+    @contextmanager
+    def connected(self, say: Say) -> Iterator[Link]:
+        """A link that is locked to the vehicle, and recorded nowhere.
+
+        Raises
+        ------
+        UsageError : a .tlog, or several vehicles. NoAnswer, LinkError : see Link.
+        """
+        if self._replay is not None:
+            raise UsageError("a .tlog has no vehicle to write to", "give the vehicle's --mavlink URL")
+        with closing(self._transport):
+            link = self.link = Link(self._transport, lambda _t_ns, _packet: None, self._key)
+            vehicle = one_of(link.listen(), self._system)
+            say(f"This is {vehicle}; what is asked and written goes there alone.")
+            link.lock(vehicle)
+            yield link
 
     def _prompt(self, prompt: Prompt) -> None:
         """Tell the vehicle, whose log then says what was done to it."""

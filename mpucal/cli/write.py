@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,9 @@ import click
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import UsageError, WriteBackError
 from ..result import FORMAT, Calibration
-from ..session.events import Prompt, PromptKind
 from ..sinks.file import make_folder
 from ..sinks.sink import Restorable, Sink
+from .at_rest import put_down
 from .on_bus import OnBus
 from .options import check_source, source_options
 from .source import opened
@@ -37,14 +37,6 @@ def on_chip(options: Mapping[str, Any]) -> Iterator[Sink]:
         yield ChipSink(source.bus, f"the chip on {options['bus']}")
 
 
-def put_down(listeners: Sequence[Callable[[Prompt], None]]) -> None:
-    """Ask for a board at rest: what is written is seen in the samples."""
-    prompt = Prompt(PromptKind.LAY_FLAT, "Lay the board on something firm and let go of it.")
-    click.echo(f"mpucal: {prompt.text}", err=True)
-    for listener in listeners:
-        listener(prompt)
-
-
 @contextmanager
 def in_bridge(options: Mapping[str, Any]) -> Iterator[Sink]:
     """The memory of the bridge that the options name."""
@@ -57,8 +49,28 @@ def in_bridge(options: Mapping[str, Any]) -> Iterator[Sink]:
         yield BridgeSink(store)
 
 
+@contextmanager
+def on_autopilot(options: Mapping[str, Any]) -> Iterator[Sink]:
+    """The parameters of the vehicle that the options name."""
+    if options["mavlink"] is None:
+        raise UsageError("an autopilot is written over MAVLink", "give --mavlink URL")
+    from ..sinks.autopilot import AutopilotSink  # noqa: PLC0415
+    from .on_link import OnLink  # noqa: PLC0415
+
+    source = opened(options)
+    if not isinstance(source, OnLink):
+        raise UsageError("a .tlog has no vehicle to write to", "give the vehicle's --mavlink URL")
+    with source.connected(lambda text: click.echo(f"mpucal: {text}", err=True)) as link:
+        put_down(source.listeners)
+        yield AutopilotSink(link)
+
+
 # name: what opens it for the options of the command
-TARGETS: dict[str, Callable[[Mapping[str, Any]], Any]] = {"chip": on_chip, "bridge": in_bridge}
+TARGETS: dict[str, Callable[[Mapping[str, Any]], Any]] = {
+    "chip": on_chip,
+    "bridge": in_bridge,
+    "autopilot": on_autopilot,
+}
 
 
 @click.command("write", epilog=EXAMPLE)

@@ -13,7 +13,7 @@ from .dialect import Message, dialect
 from .imu import MESSAGE_ID, Reading, Stream, reading
 from .link import Link, S, command
 
-WINDOW_NS, PATIENCE_NS = 2 * S, 20 * S
+WINDOW_NS, PATIENCE_NS = 2 * S, 30 * S
 FEWEST = 20
 INTERVAL_US = 20_000
 # what a hand that means to be still does; a vehicle that stands on something is far below
@@ -54,7 +54,9 @@ class Stillness:
         link.subscribe(self._hear)
 
     def rest(self) -> Rest | None:
-        """Wait until all streams lay still for two seconds; None where they did not within twenty.
+        """Wait until all streams lay still for two windows, and return the second; None where they did not.
+
+        Two, because a person who is told to set it down takes a second to begin.
 
         Raises
         ------
@@ -62,11 +64,15 @@ class Stillness:
         """
         end_ns = self._link.now_ns() + PATIENCE_NS
         self._ask()
+        last: Rest | None = None
         while True:
             middle = self._window()
             missing = [stream for stream in self._streams if len(self._found[stream]) < FEWEST]
-            if not missing and all(is_still(readings) for readings in self._found.values()):
-                return self._rest(middle)
+            still = not missing and all(is_still(readings) for readings in self._found.values())
+            now = self._rest(middle) if still else None
+            if now is not None and last is not None and _agree(last, now):
+                return now
+            last = now
             if self._link.now_ns() < end_ns:
                 if missing:
                     self._ask()
@@ -111,9 +117,12 @@ class Stillness:
             mean[stream] = acc.mean(axis=0)
             # a hand trembles slowly: its samples are no independent ones
             error[stream] = acc.std(axis=0) / 4
-        if self._gyro_bias is None:
-            self._gyro_bias = np.mean([r.gyr for r in self._found[self._streams[0]]], axis=0)
+        self._gyro_bias = np.mean([r.gyr for r in self._found[self._streams[0]]], axis=0)
         return Rest(mean, error, attitude)
+
+
+def _agree(one: Rest, other: Rest) -> bool:
+    return all(np.abs(one.mean[stream] - other.mean[stream]).max() < STILL_MPS2 / 2 for stream in one.mean)
 
 
 def is_still(readings: Sequence[Reading]) -> bool:

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2
-from ..errors import LinkError, WriteBackError
+from ..errors import LinkError, RecordingError, WriteBackError
 from ..files import write_atomically
 from ..mavlink.dialect import dialect
 from ..mavlink.link import Link, command
+from ..mavlink.parameters.applied import applied
 from ..mavlink.parameters.client import Parameters
+from ..mavlink.parameters.names import all_places
 from ..mavlink.parameters.plan import NOTHING, Change, changes, left_out
-from ..mavlink.parameters.text import PARAM, PARAMS, param_text, params_text
+from ..mavlink.parameters.text import PARAM, PARAMS, param_text, params_text, read_parameters_file
 from ..mavlink.parameters.write import Writer
 from ..mavlink.prearm import Prearm, Watch, prearm
 from ..mavlink.shaping import read_parameters, shaping_names
@@ -32,6 +33,7 @@ SAVE_IDS = 76
 
 # a step of the stream, and what an attitude by the gyroscope is worse than one that did not change
 AGREE_MPS2, SIGMAS, PER_TURN = 0.03, 3.0, 0.05
+MOST_TURNED_RAD = 0.1
 
 
 class AutopilotSink:
@@ -64,12 +66,33 @@ class AutopilotSink:
         held = read_parameters(self._link, shaping_names(self._firmware), self._firmware)
         values = {name: value for name, value in held.items() if CORRECTION.search(name)}
         remarks = [f"Accelerometer parameters of {self.where} before mpucal wrote new ones"]
+        ending, text = PARAM, param_text(values, remarks)
         if self._firmware == PX4:
-            path, text = folder / (OLD_PARAMETERS + PARAMS), params_text(values, remarks, self._link.vehicle.system)
-        else:
-            path, text = folder / (OLD_PARAMETERS + PARAM), param_text(values, remarks)
+            ending, text = PARAMS, params_text(values, remarks, self._link.vehicle.system)
+        # an earlier file holds an earlier state: it stays
+        names = (OLD_PARAMETERS + ending, *(f"{OLD_PARAMETERS}-{n}{ending}" for n in range(2, 1000)))
+        path = next(folder / name for name in names if not (folder / name).exists())
         write_atomically(path, text.encode())
         return (path,)
+
+    def put_back(self, kept: Path) -> str:
+        """Write what an earlier `keep` saved, and say so in a sentence.
+
+        Raises
+        ------
+        RecordingError : `kept` is no such file. WriteBackError : see Sink.
+        """
+        wanted = read_parameters_file(kept)
+        places = [where for where in all_places(self._firmware) if set(where.names) <= set(wanted)]
+        if not places:
+            raise RecordingError(
+                f"{kept} holds no accelerometer parameters of {self._firmware}", "give a file that a write kept"
+            )
+        writer = Writer(self._link, self._watch, places)
+        with _nothing_written():
+            old = writer.held()
+        writer.write(old, {name: wanted[name] for where in places for name in where.names}, lambda: None)
+        return f"{self.where} holds again what {kept.name} says, read back"
 
     def write(self, calibration: Calibration) -> Applied:
         """Set each parameter, read all back, and see their effect in the streams; or put the old ones back.
@@ -81,19 +104,18 @@ class AutopilotSink:
         planned = changes(calibration, self._firmware)
         writer = Writer(self._link, self._watch, [change.place for change in planned])
         stillness = Stillness(self._link, [change.stream for change in planned])
-        try:
+        with _nothing_written():
             self._check(planned)
             before = prearm(self._link)
             old = writer.held()
             rest = stillness.rest()
-        except LinkError as error:
-            raise WriteBackError(f"{NOTHING}: {error.what}", error.remedy) from error
         if rest is None:
             raise WriteBackError(f"{NOTHING}: the vehicle did not lie still", "set it down, then write again")
         new = {name: value for change in planned for name, value in change.place.values(change.new).items()}
         writer.write(old, new, lambda: verify(planned, old, rest, stillness))
         after = self._settled(planned)
-        return Applied(written(calibration, old, new), self._said(planned, left_out(calibration), before, after))
+        now = applied(calibration, [change.imu for change in planned])
+        return Applied(now, self._said(planned, left_out(calibration), before, after))
 
     def _check(self, planned: Sequence[Change]) -> None:
         """Disarmed, and with the sensors that were calibrated."""
@@ -122,16 +144,25 @@ class AutopilotSink:
     def _said(self, planned: Sequence[Change], out: Sequence[int], before: Prearm, after: Prearm) -> str:
         imus = " and ".join(str(change.imu) for change in planned)
         residuals = ", ".join(f"{change.residual_mps2:.3f}" for change in planned)
-        sentences = [
-            f"The parameters of IMU {imus} are written to {self.where}, read back, and their effect is seen in the"
-            f" streams. Parameters hold no cross-axis terms: |a| stays wrong by up to {residuals} m/s^2.",
-            f"Before, it {before}; now it {after}.",
+        clauses = [
+            f"{self.where} has the new parameters of IMU {imus}, read back and seen in its streams; they hold no"
+            f" cross-axis terms, without which |a| stays wrong by up to {residuals} m/s^2",
+            f"before, it {before}; now it {after}",
         ]
         if out:
-            sentences.append(f"IMU {', '.join(map(str, out))} keeps its old ones: its calibration was refused.")
+            clauses.append(f"IMU {', '.join(map(str, out))} keeps its old ones, as its calibration was refused")
         if self._firmware == PX4:
-            sentences.append("Leave it powered for three seconds more: PX4 saves late.")
-        return " ".join(sentences)
+            clauses.append("leave it powered for three seconds more, as PX4 saves late")
+        return "; ".join(clauses)
+
+
+@contextmanager
+def _nothing_written() -> Iterator[None]:
+    """What fails on the link before anything is written."""
+    try:
+        yield
+    except LinkError as error:
+        raise WriteBackError(f"{NOTHING}: {error.what}", error.remedy) from error
 
 
 def verify(planned: Sequence[Change], old: Mapping[str, float], before: Rest, stillness: Stillness) -> None:
@@ -143,9 +174,14 @@ def verify(planned: Sequence[Change], old: Mapping[str, float], before: Rest, st
     """
     after = stillness.rest()
     if after is None:
-        raise WriteBackError("the vehicle did not lie still while the new parameters were verified", "set it down")
+        raise WriteBackError("the vehicle did not lie still while its new parameters were verified", "set it down")
     turned = before.attitude.T @ after.attitude
     angle = float(np.linalg.norm(turned - np.eye(3)) / np.sqrt(2))
+    if angle > MOST_TURNED_RAD:
+        raise WriteBackError(
+            f"the vehicle was turned by {np.degrees(angle):.0f} deg while its new parameters were verified",
+            "set it down, let go of it, and write again",
+        )
     for change in planned:
         held = change.place.correction(old)
         if held is None or not held.scale.all():
@@ -158,9 +194,3 @@ def verify(planned: Sequence[Change], old: Mapping[str, float], before: Rest, st
                 f"IMU {change.imu}'s stream does not show its new parameters: it is off by {apart.max():.3f} m/s^2",
                 "check that nobody else writes parameters, then calibrate again",
             )
-
-
-def written(calibration: Calibration, old: Mapping[str, float], new: Mapping[str, float]) -> Calibration:
-    """The calibration, which now says what the vehicle held and holds."""
-    autopilot = {**calibration.extra["autopilot"], "written": {"before": dict(old), "after": dict(new)}}
-    return replace(calibration, extra=MappingProxyType({**calibration.extra, "autopilot": autopilot}))

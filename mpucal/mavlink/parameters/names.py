@@ -15,7 +15,7 @@ from .rotation import euler, orientation
 Values = Mapping[str, float]
 
 AXES = ("X", "Y", "Z")
-PX4_SLOTS = 4
+PX4_SLOTS, ARDUPILOT_IMUS = 4, 3
 # AHRS_ORIENTATION -> the names of its angles in degrees
 CUSTOM_ANGLES = {100: "CUSTOM_", 101: "CUST_ROT1_", 102: "CUST_ROT2_"}
 ANGLES = ("ROLL", "PITCH", "YAW")
@@ -99,11 +99,16 @@ def place(firmware: str, imu: int, values: Values) -> Place | None:
     slot does.
     """
     if firmware != PX4:
-        stem = "INS_ACC" if imu == 1 else f"INS_ACC{imu}"
-        offset, scale = (tuple(f"{stem}{kind}_{axis}" for axis in AXES) for kind in ("OFFS", "SCAL"))
-        return Place(imu, offset, scale, f"{stem}_ID", ARDUPILOT_LIMITS)
+        return ardupilot_place(imu)
     slots = [slot for slot in range(PX4_SLOTS) if values.get(f"CAL_ACC{slot}_ID")]
     return px4_place(imu, slots[imu - 1]) if imu <= len(slots) else None
+
+
+def ardupilot_place(imu: int) -> Place:
+    """The place of an IMU of ArduPilot's."""
+    stem = "INS_ACC" if imu == 1 else f"INS_ACC{imu}"
+    offset, scale = (tuple(f"{stem}{kind}_{axis}" for axis in AXES) for kind in ("OFFS", "SCAL"))
+    return Place(imu, offset, scale, f"{stem}_ID", ARDUPILOT_LIMITS)
 
 
 def px4_place(imu: int, slot: int) -> Place:
@@ -111,6 +116,13 @@ def px4_place(imu: int, slot: int) -> Place:
     stem = f"CAL_ACC{slot}_"
     offset, scale = (tuple(f"{stem}{axis}{kind}" for axis in AXES) for kind in ("OFF", "SCALE"))
     return Place(imu, offset, scale, f"{stem}ID", PX4_LIMITS)
+
+
+def all_places(firmware: str) -> tuple[Place, ...]:
+    """Every one that the firmware has."""
+    if firmware == PX4:
+        return tuple(px4_place(slot + 1, slot) for slot in range(PX4_SLOTS))
+    return tuple(ardupilot_place(imu) for imu in range(1, ARDUPILOT_IMUS + 1))
 
 
 def mounting(firmware: str, where: Place, values: Values) -> Vector | None:

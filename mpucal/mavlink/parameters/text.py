@@ -6,11 +6,15 @@ component, name, value and MAV_PARAM_TYPE, with tabs between. Both take lines th
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 
+from ...errors import RecordingError
 from .encoding import REAL32, as_float32
 
 PARAM, PARAMS = ".param", ".params"
+PARAMS_COLUMNS = 5
 
 
 def param_text(values: Mapping[str, float], remarks: Iterable[str] = ()) -> str:
@@ -33,6 +37,25 @@ def params_text(
     for name, value in values.items():
         lines.append(f"{system}\t{component}\t{name}\t{_digits(value)}\t{kinds.get(name, REAL32)}")
     return "\n".join(lines) + "\n"
+
+
+def read_parameters_file(path: Path) -> dict[str, float]:
+    """The values in either kind of file, by name.
+
+    Raises
+    ------
+    RecordingError : it cannot be read, or is neither.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        rows = [re.split(r"[\s,]+", line.strip()) for line in lines if line.strip() and not line.startswith("#")]
+        # QGroundControl's rows begin with vehicle and component
+        pairs = [row[2:4] if len(row) == PARAMS_COLUMNS else row for row in rows]
+        return {name: as_float32(float(value)) for name, value in pairs}
+    except OSError as error:
+        raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path") from error
+    except ValueError as error:
+        raise RecordingError(f"{path} is no file of parameters ({error})", "give a .param or .params file") from error
 
 
 def _digits(value: float) -> str:
