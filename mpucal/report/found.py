@@ -57,6 +57,31 @@ def gyroscope_table(c: Calibration) -> str:
     return _in_peoples_units("gyroscope", rows) + paragraph(said, note=True)
 
 
+def verification_section(c: Calibration) -> str:
+    """What orientations say that the calibration had not seen; empty where nobody asked them."""
+    found = (c.quality.get("verification") or {}).get("orientations") or ()
+    rows = [
+        [
+            f"{_side(one['down'])} down",
+            f"{one['magnitude_mps2']:+.4f} (±\u00a0{one['magnitude_std_mps2']:.4f})",
+            f"{one['direction_deg']:.3f} (±\u00a0{one['direction_std_deg']:.3f})",
+        ]
+        for one in found
+    ]
+    if not rows:
+        return ""
+    said = paragraph(
+        "Orientations that the calibration had not seen when it was put to the test: how far it was off, and what its "
+        "own uncertainties promise (one standard deviation)."
+    )
+    return section("Verification", said, table("verification", "", ["", "|a| − gravity, m/s²", "direction, deg"], rows))
+
+
+def _side(down: Sequence[float]) -> str:
+    named = [f"{'+' if value > 0 else '−'}{axis}" for axis, value in zip(_AXES, down, strict=True) if abs(value) > 0.4]
+    return " ".join(named)
+
+
 def matrices_section(c: Calibration) -> str:
     """The numbers of calibration.json themselves."""
     rows = [[f"D {axis}", *map(_pair, c.D[i], c.D_std[i])] for i, axis in enumerate(_AXES)]

@@ -13,7 +13,14 @@ from .. import __version__
 from ..data import STANDARD_GRAVITY_MPS2, Recording
 from ..result import GOOD, REFUSED, USABLE, Calibration
 from .elements import as_float, code, heading, number, paragraph, quantity, section, table
-from .found import accelerometer_section, formula_section, gyroscope_table, is_regular, matrices_section
+from .found import (
+    accelerometer_section,
+    formula_section,
+    gyroscope_table,
+    is_regular,
+    matrices_section,
+    verification_section,
+)
 from .gallery import gallery
 from .style import CSS
 from .track import Track
@@ -36,6 +43,7 @@ def render(calibration: Calibration, recording: Recording | None = None) -> str:
         accelerometer_section(calibration),
         formula_section(calibration),
         section("|a| before and after", _magnitudes(calibration), why_not, *_those(drawn, "magnitude", "sphere")),
+        verification_section(calibration),
         section("How well it fits", *_those(drawn, "innovations")),
         section("Where it was turned", *_those(drawn, "coverage")),
         section("The gyroscope", gyroscope_table(calibration), *_those(drawn, "rates")),

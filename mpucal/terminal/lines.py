@@ -38,6 +38,7 @@ class Lines:
     def __init__(self, out: TextIO, keys: Keys, bell: bool = False) -> None:
         self._out, self._keys, self._bell = out, keys, bell
         self._explained = not keys.asked
+        self._heard = True
         self._prompt: Prompt | None = None
         self._last = ""
         self._due_s: dict[str, float] = {}
@@ -60,8 +61,12 @@ class Lines:
                 self.say(f"  {why}")
 
     def say(self, text: str) -> None:
-        """A line of talk."""
-        print(text, file=self._out, flush=True)
+        """A line of talk; nobody may be left to hear it, and the session goes on all the same."""
+        if self._heard:
+            try:
+                print(text, file=self._out, flush=True)
+            except BrokenPipeError:
+                self._heard = False
 
     def pressed(self) -> Sequence[Key]:
         """What was pressed since the last call."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import TextIO
 
 from rich.console import COLOR_SYSTEMS, Console
@@ -84,5 +85,7 @@ class Painter:
         return "".join(parts)
 
     def _send(self, text: str) -> None:
-        self._out.write(text)
-        self._out.flush()
+        # a terminal that is gone needs no painting, and nobody is there to be told
+        with suppress(OSError):
+            self._out.write(text)
+            self._out.flush()

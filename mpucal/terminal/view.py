@@ -78,7 +78,7 @@ class View:
                 kept = tuple(s for s in self.seen if s.paused != output.paused or s.number < output.number)
                 view = replace(self, seen=(*kept, output))
             case Verification():
-                view = replace(self, verified=(*self.verified, output))
+                view = replace(self, verified=(*self.verified, output)).noted(output.text)
             case _:  # what the session asks of others
                 return self
         return view._at(output.t_s)

@@ -7,6 +7,9 @@ import re
 import numpy as np
 import pytest
 
+from mpucal.report import render
+from mpucal.result import Calibration
+
 CELL = re.compile(r"([-+]?[\d.]+) ±\u00a0([\d.]+)")
 TABLE = r'<table id="{}">(.*?)</table>'
 MG = 9.80665e-3
@@ -96,3 +99,28 @@ def test_it_says_how_to_fit_it_again(result):
     fit = result.document["fit"]
     assert commands[0] == f"mpucal calibrate mpu6050.mcap --model {fit['model']} --gravity {fit['gravity']} -o again"
     assert commands[1] == "mpucal session --replay mpu6050.mcap -o replayed"
+
+
+def test_the_verification(result):
+    document = {
+        **result.document,
+        "quality": {
+            **result.document["quality"],
+            "verification": {
+                "agrees": True,
+                "orientations": [
+                    {
+                        "down": [0.64, 0.48, -0.59],
+                        "magnitude_mps2": -0.00097,
+                        "magnitude_std_mps2": 0.0087,
+                        "direction_deg": 0.0637,
+                        "direction_std_deg": 0.1307,
+                        "agrees": True,
+                    }
+                ],
+            },
+        },
+    }
+    page = render(Calibration.from_document(document))
+    assert table(page, "verification")["+x +y −z down"] == ["-0.0010 (±\u00a00.0087)", "0.064 (±\u00a00.131)"]
+    assert 'id="verification"' not in result.html

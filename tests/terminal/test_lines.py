@@ -1,6 +1,8 @@
+import contextlib
 import io
 import json
 import math
+import os
 from dataclasses import replace
 
 import pytest
@@ -115,3 +117,14 @@ def test_json_knows_no_infinity(out, session):
     told = next(output for output in session if type(output).__name__ == "Knowledge")
     JsonLines(out, Keys()).hear(replace(told, gain_pct=(math.inf, math.nan, 0.1)))
     assert json.loads(out.getvalue())["gain_pct"] == [None, None, 0.1]
+
+
+def test_a_session_whose_listener_left_goes_on():
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w", buffering=1) as pipe:
+        lines = Lines(pipe, Keys())
+        for k in range(3):
+            lines.say(f"line {k}")
+        with contextlib.suppress(BrokenPipeError):
+            pipe.close()

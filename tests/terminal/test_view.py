@@ -40,6 +40,10 @@ def test_what_would_help_most_is_wanted_where_the_prompt_names_nothing(views):
     assert view.after(Prompt(PromptKind.VERIFY, "Check it.")).wanted is None
 
 
+def test_what_was_verified_is_told_at_the_end(views):
+    assert views["ended"].notes[-2:] == ("orientation 1 of 2 agrees", "the calibration is good")
+
+
 def test_time_runs_from_the_first_sample(views):
     assert views["laid"].elapsed_s == 0.0
     assert views["turned"].elapsed_s == 15.25

@@ -1,0 +1,120 @@
+"""The screen in a real terminal of both sizes: what a person sees, and what is left behind."""
+
+import itertools
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+
+import pytest
+
+PATIENCE_S = 60.0
+_NUMBERS = itertools.count()
+BRAILLE = [chr(dots) for dots in range(0x2801, 0x2900)]
+
+
+class Tmux:
+    """One terminal of a given size, in a server of its own."""
+
+    def __init__(self, size, folder, environment):
+        self.columns, self.rows = size
+        self._socket, self._folder = f"mpucal-{os.getpid()}-{next(_NUMBERS)}", folder
+        told = [f"-e{name}={value}" for name, value in environment.items()]
+        self._tmux("-f/dev/null", "new-session", "-d", f"-x{self.columns}", f"-y{self.rows}", *told, "/bin/sh")
+
+    def type(self, *keys):
+        self._tmux("send-keys", *keys)
+
+    def run(self, *words):
+        modes = "stty -a | grep -o -- '-\\?icanon\\|-\\?echo '"
+        self.type(f"{shlex.join(map(str, words))}; echo left with $?; {modes}; printf 'that was %s\\n' all", "Enter")
+
+    def text(self, *options):
+        return self._tmux("capture-pane", "-p", *options)
+
+    def is_on_the_second_screen(self):
+        return self._tmux("display-message", "-p", "#{alternate_on} #{cursor_flag}").split() == ["1", "0"]
+
+    def wait_for(self, *words):
+        """The screen as soon as all of `words` are on it."""
+        until = time.monotonic() + PATIENCE_S
+        while time.monotonic() < until:
+            text = self.text()
+            if all(word in text for word in words):
+                return text
+            time.sleep(0.05)
+        raise AssertionError(f"never saw {words} but:\n{text}")
+
+    def close(self):
+        self._tmux("kill-server")
+
+    def _tmux(self, *words):
+        words = ["tmux", "-L", self._socket, *words]
+        return subprocess.run(words, cwd=self._folder, capture_output=True, text=True, check=True).stdout
+
+
+@pytest.fixture
+def terminal(tmp_path):
+    if shutil.which("tmux") is None:
+        pytest.skip("there is no tmux here")
+    opened = []
+
+    def open_(columns=80, rows=24, **environment):
+        opened.append(Tmux((columns, rows), tmp_path, {"PS1": "$ ", **environment}))
+        return opened[-1]
+
+    yield open_
+    for one in opened:
+        one.close()
+
+
+SESSION = [sys.executable, "-m", "mpucal", "session", "--bus", "sim:pace=real", "-o", "board"]
+
+
+@pytest.mark.parametrize("size", [(80, 24), (160, 50)], ids=["80x24", "160x50"])
+def test_a_session_is_shown_and_ctrl_c_leaves_the_terminal_as_it_was(terminal, size):
+    tmux = terminal(*size)
+    tmux.run(*SESSION)
+    text = tmux.wait_for("Lay the board flat", "Hz", "°C", "still", "now", "q or Ctrl-C: stop")
+    assert tmux.is_on_the_second_screen()
+    assert any(dots in text for dots in BRAILLE)
+    assert "██" in text
+    assert max(map(len, text.splitlines())) <= size[0]
+    tmux.type("C-c")
+    after = tmux.wait_for("left with 4", "that was all")
+    assert not tmux.is_on_the_second_screen()
+    assert "the session was interrupted" in after
+    assert "What was recorded is kept in board/capture.mcap." in after
+    assert "Traceback" not in after
+    assert after.split("left with 4")[1].split()[:2] == ["icanon", "echo"]
+
+
+def test_the_q_key_stops_too_and_is_not_left_for_the_shell(terminal):
+    tmux = terminal()
+    tmux.run(*SESSION)
+    tmux.wait_for("q or Ctrl-C: stop")
+    tmux.type("q")
+    after = tmux.wait_for("left with 4", "that was all")
+    assert not after.rstrip().endswith("q")
+
+
+def test_no_color_has_no_colour(terminal):
+    tmux = terminal(NO_COLOR="1")
+    tmux.run(*SESSION)
+    tmux.wait_for("Lay the board flat", "Hz")
+    coloured = tmux.text("-e")
+    assert "\x1b[1m" in coloured
+    assert "\x1b[3" not in coloured.replace("\x1b[39m", "")
+    tmux.type("C-c")
+    tmux.wait_for("left with 4")
+
+
+def test_a_dumb_terminal_gets_lines(terminal):
+    tmux = terminal(TERM="dumb")
+    tmux.run("env", "TERM=dumb", *SESSION)
+    tmux.wait_for("LAY FLAT", "Lay the board flat")
+    assert not tmux.is_on_the_second_screen()
+    tmux.type("C-c")
+    tmux.wait_for("left with 4")
