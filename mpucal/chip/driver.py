@@ -16,7 +16,7 @@ from .access import Bus, EndOfCapture
 from .clock import look_phase
 from .config import Config
 from .decode import Decoder
-from .families import MPU6050, MPU6500
+from .families import MPU6050, MPU6500, Part
 from .fifo import Fault
 from .port import Port
 from .probe import probe, read_identity
@@ -74,6 +74,11 @@ class Driver:
     def now_ns(self) -> int:
         """The bus's clock as last seen."""
         return self._port.now_ns
+
+    @property
+    def part(self) -> Part:
+        """Which part it turned out to be; once it was started."""
+        return self._running.part
 
     def start(self) -> Sensor:
         """Identify, reset, wake and configure the chip, and start its FIFO.

@@ -54,13 +54,13 @@ def measured_response(port: Port, bench: Bench, likely: Place = PLACES[0]) -> Re
         old = Block.read(port, place)
         steps = [step if word < ROOM else -step for step, word in zip(STEPS, old.words, strict=True)]
         probe = old.with_words(moved(old.words, steps))
-        before = bench.rest().mean_g
+        before = bench.rest()
         with restored(port, old):
             kept = probe.write(port)
-            during = bench.rest().mean_g if kept else before
+            during = bench.rest() if kept else before
         if not kept:
             continue
-        after = bench.rest().mean_g
+        after = bench.rest()
         if (np.abs(after - before) > MOVED_G).any():
             raise ChipError(
                 "the board moved while its offset registers were tried", "lay it on something firm and let go of it"

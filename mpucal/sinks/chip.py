@@ -152,11 +152,11 @@ class ChipSink:
         old = Block.read(self._port, response.place)
         counts = calibration.b_a / STANDARD_GRAVITY_MPS2 * response.lsb_per_g
         new = old.with_words(moved(reference, -counts))
-        before = bench.rest().mean_g
+        before = bench.rest()
         _check_gravity(calibration, before, _subtracted(old.words, reference, response))
         if not new.write(self._port):
             raise ChipError("the offset registers read back other than written", "check the wires, and try again")
-        after = bench.rest().mean_g
+        after = bench.rest()
         expected = np.array(difference(new.words, old.words)) / response.lsb_per_g
         if (np.abs(after - before - expected) > SHIFT_G + SHIFT_SHARE * np.abs(expected)).any():
             raise ChipError(

@@ -1,0 +1,95 @@
+"""The factory's self test: each axis is pushed by a built-in force, and its answer compared with the factory's code.
+
+Knows no verdict on the whole chip, and which family it is only by what it is given.
+
+Source: RM-MPU-6000A r4.2, registers 13 to 16, 27 and 28, and PS-MPU-6000A r3.4, sections 6.1 and 6.2 (within 14 %);
+for the 6500 RM-MPU-9250A r1.4, registers 0 to 15, with the limits of Linux' drivers/iio/imu/inv_mpu6050.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import Vector
+from . import registers as reg
+from .families import Part
+from .port import Port
+
+SETTLE_NS, LOOK_NS, LOOKS = 250_000_000, 5_000_000, 100
+
+# 6050: +-8 g and +-250 deg/s; 6500: +-2 g and +-250 deg/s
+PACKED_AFS_SEL, AFS_SEL, FS_SEL = 2, 0, 0
+PACKED_SHARES, ACCEL_SHARES, GYRO_SHARES = (0.86, 1.14), (0.5, 1.5), (0.5, np.inf)
+
+
+@dataclass(frozen=True)
+class SelfTest:
+    """What the axes x, y, z answered.
+
+    Attributes
+    ----------
+    accel_shares, gyro_shares : (3,) of what the factory's codes promise; NaN where it left no code.
+    passed : whether all lie within what the register map allows; False without codes.
+    """
+
+    accel_shares: Vector
+    gyro_shares: Vector
+    passed: bool
+
+    @property
+    def has_codes(self) -> bool:
+        """Whether the factory left its codes, as it does in every genuine part."""
+        return bool(np.isfinite([self.accel_shares, self.gyro_shares]).all())
+
+
+def run_self_test(port: Port, part: Part) -> SelfTest:
+    """Test a chip that is awake and at rest; its ranges are afterwards as before.
+
+    Raises
+    ------
+    BusError : a transfer failed three times.
+    """
+    held, family = port.read(reg.GYRO_CONFIG, 2), part.family
+    afs_sel = PACKED_AFS_SEL if family.packed_self_test else AFS_SEL
+    try:
+        off = _answer(port, 0, afs_sel)
+        on = _answer(port, reg.SELF_TEST, afs_sel)
+    finally:
+        port.write_block(reg.GYRO_CONFIG, held)
+        port.sleep(SETTLE_NS)
+    accel = (on - off)[:3] / (reg.ACCEL_LSB_PER_G[afs_sel] * part.accel_sensitivity)
+    gyro = (on - off)[4:] / reg.GYRO_LSB_PER_DPS[FS_SEL]
+    accel_g, gyro_dps = _promised(port, family.packed_self_test)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.where(accel_g == 0, np.nan, accel / accel_g), np.where(gyro_dps == 0, np.nan, gyro / gyro_dps)
+    limits = (PACKED_SHARES, PACKED_SHARES) if family.packed_self_test else (ACCEL_SHARES, GYRO_SHARES)
+    passed = all(((low < share) & (share < high)).all() for share, (low, high) in zip(shares, limits, strict=True))
+    return SelfTest(*shares, passed=passed)
+
+
+def _answer(port: Port, test: int, afs_sel: int) -> Vector:
+    """(7,) mean counts of a sample, so set."""
+    gyro, accel = FS_SEL << reg.FULL_SCALE_SHIFT, afs_sel << reg.FULL_SCALE_SHIFT
+    port.write_block(reg.GYRO_CONFIG, bytes([gyro | test, accel | test]))
+    port.sleep(SETTLE_NS)
+    looks = np.empty((LOOKS, reg.FRAME_WORDS))
+    for look in looks:
+        port.sleep(LOOK_NS)
+        look[:] = np.frombuffer(port.read(reg.ACCEL_XOUT_H, reg.FRAME_BYTES), ">i2")
+    return np.asarray(looks.mean(0))
+
+
+def _promised(port: Port, packed: bool) -> tuple[Vector, Vector]:
+    """(3,) g and (3,) deg/s that the factory measured; 0 where it left no code."""
+    if not packed:
+        gyro, accel = (np.array(list(port.read(start, 3))) for start in (reg.SELF_TEST_GYRO, reg.SELF_TEST_ACCEL))
+        counts = [np.where(codes == 0, 0.0, 2620.0 * 1.01 ** (codes - 1.0)) for codes in (accel, gyro)]
+        return counts[0] / reg.ACCEL_LSB_PER_G[AFS_SEL], counts[1] / reg.GYRO_LSB_PER_DPS[FS_SEL]
+    *axes, low = port.read(reg.SELF_TEST_ACCEL, 4)
+    accel = np.array([(axis >> 5) << 2 | low >> shift & 3 for axis, shift in zip(axes, (4, 2, 0), strict=True)])
+    gyro = np.array([axis & 0x1F for axis in axes])
+    accel_g = np.where(accel == 0, 0.0, 0.34 * (0.92 / 0.34) ** ((accel - 1) / 30))
+    gyro_dps = np.where(gyro == 0, 0.0, 25 * 1.046 ** (gyro - 1.0)) * np.array([1, -1, 1])
+    return accel_g, gyro_dps

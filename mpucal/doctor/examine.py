@@ -1,0 +1,180 @@
+"""The examination of a chip on any bus, step by step. Knows no kind of bus and no page.
+
+The offset registers hold afterwards what they held before: the reset that identifying takes reloads the factory's
+trim, and whoever had corrected it would miss that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+
+import numpy as np
+
+from ..chip import registers as reg
+from ..chip.access import Bus
+from ..chip.bench import Bench
+from ..chip.config import Config
+from ..chip.decode import Decoder
+from ..chip.driver import Driver
+from ..chip.families import PARTS, Family, Part
+from ..chip.identity import remark
+from ..chip.offsets import PLACES, Block, restore
+from ..chip.port import Port
+from ..chip.response import measured_response
+from ..chip.self_test import run_self_test
+from ..data import Sensor
+from ..errors import BusError, ChipError, SourceError
+from .finding import Finding, Mark, failed
+from .measure import examine_stream
+
+LONG_BYTES, SHORT_BYTES, READS = 55, 2, 25
+SLOW_HZ = 300_000
+SLOW = "at 1 kHz 100 kHz do not suffice: `dtparam=i2c_arm_baudrate=400000` on a Raspberry Pi"
+
+
+def examine(bus: Bus, config: Config, seconds: float) -> Iterator[Finding]:
+    """Everything that asking the chip tells; ends early where it does not answer.
+
+    Parameters
+    ----------
+    seconds : how long to watch its stream; the board is to lie still.
+    """
+    port = Port(bus, Decoder("doctor"))
+    try:
+        olds = [Block.read(port, place) for place in PLACES]
+        yield _speed(bus)
+        with suppress(ChipError), Bench(port) as bench:
+            # until the board is put down; one that is not is told of later
+            bench.rest()
+    except SourceError as error:
+        yield failed("chip", error)
+        return
+    driver = Driver(bus, config, "doctor")
+    try:
+        yield from _awake(port, driver, config, seconds, olds)
+    except SourceError as error:
+        yield failed("chip", error)
+    finally:
+        driver.stop()
+        with suppress(SourceError):
+            for old in olds:
+                restore(port, old)
+
+
+def _awake(port: Port, driver: Driver, config: Config, seconds: float, olds: list[Block]) -> Iterator[Finding]:
+    sensor = driver.start()
+    part, family = driver.part, driver.part.family
+    yield _identity(sensor)
+    yield _held(port, family, olds)
+    end_ns = driver.now_ns() + round(seconds * 1e9)
+    while driver.now_ns() < end_ns:
+        driver.poll()
+    recording = driver.recording()
+    if len(recording) > config.rate_hz:
+        yield from examine_stream(recording, config.rate_hz, family)
+    else:
+        yield Finding(
+            "stream", Mark.BAD, f"{len(recording)} samples in {seconds:g} s", "check the wires and the supply"
+        )
+    driver.stop()
+    named = PARTS.get(sensor.who_am_i or 0)
+    answers_as_it_is = named is not None and named.family.name == family.name
+    doubts = [] if answers_as_it_is else ["it behaves otherwise than it answers"]
+    for step in (_self_test, _offsets):
+        finding, doubt = step(port, part)
+        doubts += doubt
+        yield finding
+    yield _verdict(sensor, doubts)
+
+
+def _speed(bus: Bus) -> Finding:
+    """From what 53 bytes more take: nine bits each."""
+    took = [_median_ns(bus, count) for count in (SHORT_BYTES, LONG_BYTES)]
+    hz = 9e9 * (LONG_BYTES - SHORT_BYTES) / max(1.0, took[1] - took[0])
+    slow = hz < SLOW_HZ
+    return Finding(
+        "bus speed",
+        Mark.NOTE if slow else Mark.OK,
+        f"{hz / 1000:.0f} kHz achieved; a read of 14 bytes takes {(took[0] + 12 * 9e9 / hz) / 1e6:.2f} ms",
+        SLOW if slow else "",
+        {"achieved_hz": hz, "read_2_bytes_ms": took[0] / 1e6, "read_55_bytes_ms": took[1] / 1e6},
+    )
+
+
+def _median_ns(bus: Bus, count: int) -> float:
+    times = [bus.read(reg.ACCEL_XOUT_H, count).t_ns for _ in range(READS + 1)]
+    return float(np.median(np.diff(times)))
+
+
+def _identity(sensor: Sensor) -> Finding:
+    other = remark(sensor)
+    data = {"chip": sensor.chip, "who_am_i": sensor.who_am_i, "accel_range_g": sensor.accel_range_g}
+    if other is None:
+        return Finding("chip", Mark.OK, f"{sensor.chip}, WHO_AM_I 0x{sensor.who_am_i or 0:02x}", "", data)
+    return Finding("chip", Mark.NOTE, other, "", data)
+
+
+def _held(port: Port, family: Family, olds: list[Block]) -> Finding:
+    old = next(block for block in olds if block.place == family.accel_offset_h)
+    trim = Block.read(port, old.place).words
+    data = {"held": list(old.words), "trim": list(trim), "place": old.place[0]}
+    if old.words == trim:
+        return Finding("factory trim", Mark.OK, f"{', '.join(map(str, trim))} at 0x{old.place[0]:02x}", "", data)
+    return Finding(
+        "factory trim",
+        Mark.NOTE,
+        f"{', '.join(map(str, trim))} at 0x{old.place[0]:02x}; somebody had written {', '.join(map(str, old.words))}",
+        "put back after this examination; a session resets the chip, and measures without it",
+        data,
+    )
+
+
+def _self_test(port: Port, part: Part) -> tuple[Finding, list[str]]:
+    try:
+        test = run_self_test(port, part)
+    except SourceError as error:
+        return failed("self test", error), []
+    data = {"accel_shares": _listed(test.accel_shares), "gyro_shares": _listed(test.gyro_shares)}
+    if not test.has_codes:
+        what = "the factory left no codes to compare with"
+        return Finding("self test", Mark.NOTE, what, "", data), ["it has no self-test codes"]
+    accel, gyro = (", ".join(f"{100 * share:.0f}" for share in each) for each in (test.accel_shares, test.gyro_shares))
+    what = f"accelerometer {accel} %, gyroscope {gyro} % of what the factory measured"
+    if test.passed:
+        return Finding("self test", Mark.OK, what, "", data), []
+    remedy = "lay the board still and repeat; if it stays so, the chip is damaged or no genuine part"
+    return Finding("self test", Mark.BAD, what, remedy, data), ["its self test fails"]
+
+
+def _offsets(port: Port, part: Part) -> tuple[Finding, list[str]]:
+    try:
+        with Bench(port) as bench:
+            response = measured_response(port, bench, part.family.accel_offset_h)
+    except ChipError as error:
+        return Finding("offset registers", Mark.NOTE, error.what, error.remedy), []
+    except BusError as error:
+        return failed("offset registers", error), []
+    where = f"0x{response.place[0]:02x}"
+    data = {"place": response.place[0], "lsb_per_g": response.lsb_per_g, "g_per_lsb": response.g_per_lsb.tolist()}
+    mg = ", ".join(f"{256_000 * value:.1f}" for value in response.g_per_lsb)
+    what = f"at {where}, {response.lsb_per_g:.0f} LSB/g (256 counts moved x, y, z by {mg} mg)"
+    if response.place == part.family.accel_offset_h:
+        return Finding("offset registers", Mark.OK, what, "", data), []
+    return Finding("offset registers", Mark.NOTE, what, "", data), [f"its offset registers are at {where}"]
+
+
+def _verdict(sensor: Sensor, doubts: list[str]) -> Finding:
+    if not doubts:
+        return Finding("genuine?", Mark.OK, f"nothing speaks against a genuine {sensor.chip}", "", {"doubts": []})
+    return Finding(
+        "genuine?",
+        Mark.NOTE,
+        f"hardly a genuine part: {', '.join(doubts)}",
+        "it can be used: mpucal goes by behaviour, other software may not",
+        {"doubts": doubts},
+    )
+
+
+def _listed(shares: np.ndarray) -> list[float | None]:
+    return [float(share) if np.isfinite(share) else None for share in shares]

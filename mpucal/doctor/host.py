@@ -1,0 +1,160 @@
+"""The Linux side of an I2C bus: its device file, adapter, kernel drivers and who answers. Knows no chip's registers.
+
+Source: Linux Documentation/i2c/dev-interface.rst and sysfs; i2c-tools' i2cdetect for how to ask politely.
+"""
+
+from __future__ import annotations
+
+import errno
+import grp
+import os
+import pwd
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+from .finding import Finding, Mark
+
+SYS = Path("/sys")
+FAST_HZ = 400_000
+FIRST, LAST = 0x08, 0x77
+# a quick write could upset these, which are EEPROMs; a read could upset the others
+READ_ONLY = (*range(0x30, 0x38), *range(0x50, 0x60))
+OURS = (0x68, 0x69)
+
+GUESSES = {
+    0x0C: "an AK8963 magnetometer (behind an MPU-9250's bypass)",
+    0x0D: "a QMC5883L magnetometer",
+    0x1E: "an HMC5883L magnetometer",
+    0x3C: "an OLED display",
+    0x50: "an EEPROM",
+    0x57: "an EEPROM (of a DS3231 board)",
+    0x68: "an MPU with AD0 low, or a DS1307 or DS3231 clock",
+    0x69: "an MPU with AD0 high",
+    0x76: "a BMP280 or MS5611",
+    0x77: "a BMP180, BMP280 or MS5611",
+}
+DTPARAM = "on a Raspberry Pi: `dtparam=i2c_arm=on,i2c_arm_baudrate=400000` in /boot/firmware/config.txt, then reboot"
+
+
+def examine_host(path: str) -> Iterator[Finding]:
+    """What can be said of `path`, an adapter's device file, before any chip on it was asked anything."""
+    number = path.rpartition("-")[2]
+    yield _device_file(Path(path))
+    yield from _adapter(number)
+    yield from _kernel_drivers(number)
+    yield from _who_answers(path)
+
+
+def _device_file(path: Path) -> Finding:
+    try:
+        about = path.stat()
+    except OSError as error:
+        others = ", ".join(sorted(str(other) for other in path.parent.glob("i2c-*"))) or "none"
+        return Finding(
+            "device file", Mark.BAD, f"{path}: {error.strerror}", f"enable I2C (buses there are: {others}); {DTPARAM}"
+        )
+    owner, group = _name(pwd.getpwuid, about.st_uid), _name(grp.getgrgid, about.st_gid)
+    what = f"{path}, {stat.filemode(about.st_mode)} {owner}:{group}"
+    data = {"path": str(path), "mode": stat.filemode(about.st_mode), "owner": owner, "group": group}
+    if not stat.S_ISCHR(about.st_mode):
+        return Finding("device file", Mark.BAD, f"{what}: no device", "give /dev/i2c-N", data)
+    if not os.access(path, os.R_OK | os.W_OK):
+        remedy = "join the group: `sudo usermod -aG i2c $USER`, then log in again"
+        return Finding("device file", Mark.BAD, f"{what}: you may not use it", remedy, data)
+    return Finding("device file", Mark.OK, what, "", data)
+
+
+def _name(look_up: object, number: int) -> str:
+    try:
+        return str(look_up(number)[0])  # type: ignore[operator]
+    except KeyError:
+        return str(number)
+
+
+def _adapter(number: str) -> Iterator[Finding]:
+    folder = SYS / "class" / "i2c-dev" / f"i2c-{number}"
+    name = _text(folder / "name") or "unnamed"
+    speed = _bytes(folder / "device" / "of_node" / "clock-frequency")
+    hz = int.from_bytes(speed, "big") if len(speed) == 4 else None
+    if hz is None:
+        yield Finding("adapter", Mark.OK, f"{name}; its configured speed is not told", "", {"name": name})
+    elif hz < FAST_HZ:
+        yield Finding("adapter", Mark.NOTE, f"{name}, configured for {hz / 1000:g} kHz", DTPARAM, _of(name, hz))
+    else:
+        yield Finding("adapter", Mark.OK, f"{name}, configured for {hz / 1000:g} kHz", "", _of(name, hz))
+
+
+def _of(name: str, hz: int) -> dict[str, object]:
+    return {"name": name, "configured_hz": hz}
+
+
+def _kernel_drivers(number: str) -> Iterator[Finding]:
+    for address in OURS:
+        link = SYS / "bus" / "i2c" / "devices" / f"{number}-{address:04x}" / "driver"
+        try:
+            driver = link.readlink().name
+        except OSError:
+            continue
+        yield Finding(
+            "kernel driver",
+            Mark.BAD,
+            f"{driver} holds 0x{address:02x}",
+            f"remove its overlay, or: echo {number}-{address:04x} | sudo tee {link}/unbind",
+            {"driver": driver, "address": address},
+        )
+
+
+def _who_answers(path: str) -> Iterator[Finding]:
+    import smbus2  # noqa: PLC0415 - only where there is an I2C bus
+
+    bus = smbus2.SMBus()
+    try:
+        bus.open(path)
+    except OSError:
+        # the device file has its own finding
+        return
+    try:
+        can_i2c = bool(bus.funcs & smbus2.I2cFunc.I2C)
+        found = {address: answer for address in range(FIRST, LAST + 1) if (answer := _answer(bus, address))}
+    finally:
+        bus.close()
+    if not can_i2c:
+        yield Finding("adapter", Mark.NOTE, "it speaks SMBus only: 32 bytes at once", "keep to 200 Hz or less")
+    words = [f"0x{address:02x}{_guess(address, answer)}" for address, answer in found.items()]
+    ours = any(address in OURS for address in found)
+    yield Finding(
+        "on the bus",
+        Mark.OK if ours else Mark.BAD,
+        "; ".join(words) or "nothing answers",
+        "" if ours else "check VCC, GND, SDA, SCL and AD0",
+        {"addresses": sorted(found), "smbus_only": not can_i2c},
+    )
+
+
+def _answer(bus: object, address: int) -> str:
+    """Empty where nothing answers."""
+    try:
+        if address in READ_ONLY:
+            bus.read_byte(address)  # type: ignore[attr-defined]
+        else:
+            bus.write_quick(address)  # type: ignore[attr-defined]
+    except OSError as error:
+        return "busy" if error.errno == errno.EBUSY else ""
+    return "there"
+
+
+def _guess(address: int, answer: str) -> str:
+    held = " (held by a driver of the kernel)" if answer == "busy" else ""
+    return held or (f", {GUESSES[address]}" if address in GUESSES else "")
+
+
+def _text(path: Path) -> str:
+    return _bytes(path).decode(errors="replace").strip()
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""

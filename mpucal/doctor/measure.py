@@ -1,0 +1,89 @@
+"""What the stream of a board at rest says about its chip. Knows no bus, and asks nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..chip.families import Family
+from ..data import STANDARD_GRAVITY_MPS2, Recording
+from .datasheet import RATE_TOLERANCE, data_sheet
+from .finding import Finding, Mark
+from .noise import density, trembles
+
+# times the data sheet's typical density
+NOISY, BROKEN = 1.5, 3.0
+# +-3 % of scale and 80 mg of zero
+FAR_FROM_G = 0.11
+USUAL_C = (-10.0, 70.0)
+
+
+def examine_stream(recording: Recording, nominal_hz: float, family: Family) -> Iterator[Finding]:
+    """Rate, losses, noise and what rest shows, of seconds of samples."""
+    yield _rate(recording, nominal_hz)
+    yield _losses(recording)
+    acc, gyr = recording.acc, np.degrees(recording.gyr)
+    hz, sheet = float(recording.sensor.rate_hz or nominal_hz), data_sheet(family)
+    if trembles(acc, hz):
+        yield Finding("noise", Mark.UNKNOWN, "the board moved", "lay it on something firm, and ask again")
+        return
+    ug = density(acc, hz) / STANDARD_GRAVITY_MPS2 * 1e6
+    yield _noise("accelerometer noise", ug, sheet.accel_noise_ug, "ug_rthz", "µg/√Hz")
+    yield _noise("gyroscope noise", density(gyr, hz), sheet.gyro_noise_dps, "dps_rthz", "deg/s/√Hz")
+    yield _gravity(recording)
+    yield _zero_rate(gyr.mean(0).tolist(), sheet.zero_rate_dps)
+    yield _temperature(float(recording.temperature_c.mean()))
+
+
+def _rate(recording: Recording, nominal_hz: float) -> Finding:
+    hz = float(recording.sensor.rate_hz or np.nan)
+    off = hz / nominal_hz - 1
+    ok = abs(off) <= RATE_TOLERANCE
+    return Finding(
+        "sample rate",
+        Mark.OK if ok else Mark.BAD,
+        f"{hz:.3f} Hz where {nominal_hz:g} were asked for, {100 * off:+.2f} % (data sheet: within 1 %)",
+        "" if ok else "a chip whose clock is this far off is not as specified: measure its rate, never trust it",
+        {"rate_hz": hz, "nominal_hz": nominal_hz},
+    )
+
+
+def _losses(recording: Recording) -> Finding:
+    gaps, seconds = int(recording.gap.sum()), float(recording.t[-1] - recording.t[0])
+    data = {"samples": len(recording), "seconds": seconds, "gaps": gaps}
+    if not gaps:
+        return Finding("losses", Mark.OK, f"none of {len(recording)} samples in {seconds:.1f} s", "", data)
+    remedy = "shorten the wires, check connectors and supply, or slow the bus down"
+    return Finding("losses", Mark.BAD, f"{gaps} gaps in {seconds:.1f} s", remedy, data)
+
+
+def _noise(topic: str, measured: np.ndarray, typical: float, key: str, unit: str) -> Finding:
+    share = float(measured.max()) / typical
+    what = f"{', '.join(f'{value:.3g}' for value in measured)} {unit} (data sheet: {typical:g})"
+    data = {key: measured.tolist(), f"typical_{key}": typical}
+    if share <= NOISY:
+        return Finding(topic, Mark.OK, what, "", data)
+    remedy = "let nothing shake the board, and give it a clean supply; if that is so, the chip is noisy"
+    return Finding(topic, Mark.NOTE if share <= BROKEN else Mark.BAD, what, remedy, data)
+
+
+def _gravity(recording: Recording) -> Finding:
+    g = float(np.linalg.norm(recording.acc.mean(0))) / STANDARD_GRAVITY_MPS2
+    near = abs(g - 1) <= FAR_FROM_G
+    remedy = "" if near else "beyond the data sheet's scale and zero: a calibration mends it, if it stays so"
+    return Finding("at rest", Mark.OK if near else Mark.NOTE, f"the accelerometer shows {g:.3f} g", remedy, {"g": g})
+
+
+def _zero_rate(dps: list[float], limit_dps: float) -> Finding:
+    inside = max(map(abs, dps)) <= limit_dps
+    what = f"the gyroscope shows {', '.join(f'{value:+.2f}' for value in dps)} deg/s (data sheet: within {limit_dps:g})"
+    remedy = "" if inside else "a calibration mends it, if it stays so"
+    return Finding("zero rate", Mark.OK if inside else Mark.NOTE, what, remedy, {"dps": dps})
+
+
+def _temperature(celsius: float) -> Finding:
+    usual = USUAL_C[0] < celsius < USUAL_C[1]
+    what = f"{celsius:.1f} °C by the formula of this family"
+    remedy = "" if usual else "the chip is no such part, or too hot"
+    return Finding("temperature", Mark.OK if usual else Mark.NOTE, what, remedy, {"temperature_c": celsius})
