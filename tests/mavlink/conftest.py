@@ -103,7 +103,7 @@ def decoded():
 def turned():
     """turned(n, hz): t [s], acc, gyr of a sensor with known D and b_a, flat first and then turned about varied axes."""
 
-    def make(D, b_a, seconds=70.0, hz=100.0):
+    def make(D, b_a, seconds=60.0, hz=50.0):
         t = np.arange(round(seconds * hz)) / hz
         moving = np.clip((t - 12.0) / 1.0, 0.0, 1.0)
         w = moving[:, None] * np.stack(

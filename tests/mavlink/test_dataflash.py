@@ -36,7 +36,7 @@ def test_every_imu_of_a_flight_is_calibrated(flight):
     recording = mpucal.load(flight)
     assert recording.autopilot.parameters["INS_ACCOFFS_X"] == pytest.approx(0.05)
     assert recording.sensor.temperature_c == pytest.approx(31.5)
-    assert len(recording) == len(recording.others[0]) == 7000
+    assert len(recording) == len(recording.others[0]) == 3000
     calibration = calibrate_vehicle(recording)
     np.testing.assert_allclose(calibration.D, D, atol=1e-3)
     np.testing.assert_allclose(calibration.b_a, B_A, atol=5e-3)
@@ -50,7 +50,7 @@ def test_the_commands_take_a_log_for_what_it_is(flight, tmp_path, name):
     path = flight.rename(tmp_path / name)
     shown = CliRunner().invoke(commands, ["show", str(path)])
     assert shown.exit_code == 0
-    assert "7000 in 70.0 s" in shown.output
+    assert "3000 in 60.0 s" in shown.output
 
 
 def test_a_log_with_a_message_for_each_imu_is_read(dataflash, tmp_path):

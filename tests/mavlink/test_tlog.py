@@ -1,0 +1,154 @@
+import struct
+import subprocess
+import sys
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import mpucal
+from mpucal.errors import CaptureError, OutputError, RecordingError
+from mpucal.mavlink.log import read_log
+from mpucal.mavlink.tlog import Record, TlogWriter, read_tlog
+
+START_NS = 1_700_000_000_000_000_000
+
+
+@pytest.fixture
+def written(station, tmp_path):
+    """A .tlog of two seconds, and its records."""
+    vehicle = station()
+    records = [Record(START_NS, vehicle.heartbeat())]
+    records += [Record(START_NS + 10_000_000 * k, vehicle.raw(10_000 * k)) for k in range(1, 200)]
+    path = tmp_path / "capture.tlog"
+    with TlogWriter(path) as writer:
+        for record in records:
+            writer.packet(*record)
+    return path, records
+
+
+def test_what_is_written_is_read(written):
+    path, records = written
+    tlog = read_tlog(path)
+    assert tlog.records == tuple(records)
+    assert tlog.recovered is None
+
+
+def test_pymavlink_reads_it(written, monkeypatch):
+    path, records = written
+    monkeypatch.setenv("MAVLINK20", "1")
+    mavutil = pytest.importorskip("pymavlink.mavutil")
+    mavutil.set_dialect("ardupilotmega")
+    mavlogfile = mavutil.mavlogfile(str(path), robust_parsing=True)
+    try:
+        read = []
+        while (message := mavlogfile.recv_msg()) is not None:
+            read.append((message.get_type(), round(message._timestamp * 1e6)))
+    finally:
+        mavlogfile.close()
+    assert read == [("HEARTBEAT" if k == 0 else "RAW_IMU", record.t_ns // 1000) for k, record in enumerate(records)]
+
+
+def test_mavlogdump_reads_it(written):
+    path, records = written
+    command = [sys.executable, "-W", "ignore", "-m", "pymavlink.tools.mavlogdump", "--types", "RAW_IMU", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    if "No module named" in done.stderr:
+        pytest.skip("mavlogdump is not installed")
+    assert done.stdout.count("RAW_IMU {") == len(records) - 1
+
+
+@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(cut=st.integers(1, 400), junk=st.binary(max_size=100))
+def test_a_damaged_log_gives_what_is_whole(written, cut, junk):
+    path, records = written
+    whole = b"".join((record.t_ns // 1000).to_bytes(8, "big") + record.data for record in records)
+    path.write_bytes(whole[:-cut] + junk)
+    tlog = read_tlog(path)
+    least = next(
+        k for k in range(len(records), -1, -1) if sum(8 + len(r.data) for r in records[:k]) <= len(whole) - cut
+    )
+    assert tlog.records[:least] == tuple(records[:least])
+    if len(whole) - cut + len(junk) != sum(8 + len(r.data) for r in tlog.records):
+        assert "are no packets" in tlog.recovered
+
+
+def test_no_packets_at_all(tmp_path):
+    (tmp_path / "x.tlog").write_bytes(b"hello, this is no log of packets")
+    with pytest.raises(CaptureError, match="holds no MAVLink packet"):
+        read_tlog(tmp_path / "x.tlog")
+
+
+def test_a_place_that_cannot_be_written_to(tmp_path):
+    with pytest.raises(OutputError, match="cannot write the capture"):
+        TlogWriter(tmp_path / "missing" / "capture.tlog")
+
+
+def log_of(tmp_path, records):
+    path = tmp_path / "made.tlog"
+    with TlogWriter(path) as writer:
+        for t_s, data in records:
+            writer.packet(START_NS + round(t_s * 1e9), data)
+    return path
+
+
+def test_a_reboot_splits_a_log_and_the_longest_part_is_taken(station, tmp_path):
+    vehicle = station()
+    before = [(0.01 * k, vehicle.raw(50_000_000 + 10_000 * k)) for k in range(100)]
+    after = [(1.0 + 0.01 * k, vehicle.raw(2_000_000 + 10_000 * k)) for k in range(300)]
+    recording = mpucal.load(log_of(tmp_path, [(0.0, vehicle.heartbeat()), *before, *after]))
+    assert len(recording) == 300
+    assert recording.t[0] == pytest.approx(2.0)
+
+
+def test_a_parameter_that_changes_splits_a_log(station, tmp_path):
+    vehicle = station()
+
+    def offset(value):
+        return vehicle.message("param_value", b"INS_ACCOFFS_X", value, 9, 1, 0)
+
+    turned = [(0.01 * k, vehicle.raw(1_000_000 + 10_000 * k)) for k in range(300)]
+    checked = [(3.0 + 0.01 * k, vehicle.raw(4_000_000 + 10_000 * k)) for k in range(100)]
+    packets = [(0.0, vehicle.heartbeat()), (0.0, offset(0.25)), *turned, (3.0, offset(0.5)), *checked]
+    recording = mpucal.load(log_of(tmp_path, packets))
+    assert len(recording) == 300
+    assert recording.autopilot.parameters["INS_ACCOFFS_X"] == 0.25
+
+
+def test_several_vehicles_are_listed_and_one_can_be_chosen(station, tmp_path):
+    packets = []
+    for system in (1, 7):
+        vehicle = station(system)
+        packets += [(0.0, vehicle.heartbeat()), *((0.01 * k, vehicle.raw(10_000 * k)) for k in range(1, 50))]
+    path = log_of(tmp_path, sorted(packets, key=lambda packet: packet[0]))
+    with pytest.raises(RecordingError, match=r"several vehicles: system 1 \(ArduPilot\), system 7"):
+        mpucal.load(path)
+    assert len(read_log(read_tlog(path), system=7)) == 49
+
+
+def test_px4_highres_is_believed_only_without_the_estimators_bias(station, tmp_path):
+    px4 = station(autopilot=12)
+
+    def highres(k):
+        return px4.message("highres_imu", 10_000 * k, 0.1, 0.2, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 20.0, 0xFFFF, 0)
+
+    def control(bits):
+        as_float = struct.unpack("<f", bits.to_bytes(4, "little"))[0]
+        return px4.message("param_value", b"EKF2_IMU_CTRL", as_float, 6, 1, 0)
+
+    stream = [(0.01 * k, highres(k)) for k in range(1, 50)]
+    biased = [(0.0, px4.heartbeat()), (0.0, control(7)), *stream]
+    with pytest.raises(RecordingError, match="estimator's bias is subtracted"):
+        mpucal.load(log_of(tmp_path, biased))
+    unbiased = [(0.0, px4.heartbeat()), (0.0, control(5)), *stream]
+    assert mpucal.load(log_of(tmp_path, unbiased)).sensor.message == "HIGHRES_IMU"
+
+
+def test_a_log_without_imu_messages(station, tmp_path):
+    with pytest.raises(RecordingError, match="holds no accelerations"):
+        mpucal.load(log_of(tmp_path, [(0.0, station().heartbeat())]))
+
+
+def test_a_log_without_a_vehicle(station, tmp_path):
+    with pytest.raises(RecordingError, match="no autopilot's heartbeat"):
+        mpucal.load(log_of(tmp_path, [(0.0, station().raw(1000))]))
