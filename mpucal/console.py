@@ -33,13 +33,13 @@ class Console(Protocol):
         ...
 
 
-def console(quiet: bool, as_json: bool = False, beep: bool | None = None) -> Console:
+def console(quiet: bool, as_json: bool = False, beep: bool | None = None, title: str = "") -> Console:
     """The console on stderr and stdin.
 
     Parameters
     ----------
     quiet : nobody is asked anything. as_json : one JSON object a line in place of words.
-    beep : ring at each change of prompt; None: where there is a screen.
+    beep : ring at each change of prompt; None: where there is a screen. title : what is measured.
     """
     term = os.environ.get("TERM", "dumb")
     drawn = sys.stderr.isatty() and term not in ("", "dumb") and not as_json
@@ -51,4 +51,4 @@ def console(quiet: bool, as_json: bool = False, beep: bool | None = None) -> Con
     from .terminal.glyphs import glyphs_of  # noqa: PLC0415 - draws with rich, which takes a while to load
     from .terminal.screen import Screen  # noqa: PLC0415
 
-    return Screen(sys.stderr, keys, glyphs_of(sys.stderr, term), bell=beep is not False)
+    return Screen(sys.stderr, keys, glyphs_of(sys.stderr, term), bell=beep is not False, title=title)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,6 +23,7 @@ ACCEL_RANGES_G, GYRO_RANGES_DPS = ("2", "4", "8", "16"), ("250", "500", "1000", 
 # what a capture fixes: none of it may be given beside --replay
 FIXED_BY_CAPTURE = ("address", "rate", "accel_range", "gyro_range", "seed", "gravity", "model", "system", "signing_key")
 SOURCES = ("bus", "serial", "mavlink", "replay")
+SIMULATED = "sim"
 # what only one kind of source has
 OF_A_BUS, OF_A_VEHICLE = ("address", "accel_range", "gyro_range", "seed"), ("system", "signing_key")
 
@@ -112,6 +113,19 @@ def fit_options(command: F) -> F:
     ):
         command = option(command)
     return command
+
+
+def source_name(options: Mapping[str, Any]) -> str:
+    """The source as a person would name it; empty where none is given."""
+    kind = next((name for name in SOURCES if options.get(name) is not None), None)
+    if kind is None:
+        return ""
+    what = str(options[kind])
+    if kind == "replay":
+        return f"replay of {what}"
+    if what.partition(":")[0] == SIMULATED:
+        return "simulated vehicle" if kind == "mavlink" else "simulated chip"
+    return what
 
 
 def check_source(context: click.Context) -> None:

@@ -15,7 +15,7 @@ from ..mavlink.calibrate import calibrate_vehicle
 from ..result import REFUSED, Calibration
 from ..runner import Runner
 from .opened import Opened
-from .options import check_source, fit_options, source_options
+from .options import check_source, fit_options, source_name, source_options
 from .place import Place
 from .running import running
 from .source import opened
@@ -39,7 +39,7 @@ def command(folder: Path | None, yes: bool, as_json: bool, json_events: bool, be
     """
     check_source(click.get_current_context())
     source = opened(options)
-    person = console(quiet=yes, as_json=json_events, beep=beep)
+    person = console(quiet=yes, as_json=json_events, beep=beep, title=source_name(options))
     place = Place(folder, source.capture_name)
     finished = False
     try:

@@ -18,9 +18,7 @@ from ..errors import UsageError
 from ..session.plan import Plan
 from .on_bus import OnBus
 from .opened import Opened
-from .options import TLOG, refuse_fixed
-
-SIMULATED = "sim"
+from .options import SIMULATED, TLOG, refuse_fixed
 
 
 def open_bus(text: str, plan: Plan, address: int | None, seed: int | None) -> OnBus:

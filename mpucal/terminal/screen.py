@@ -29,11 +29,12 @@ class Screen:
     Parameters
     ----------
     out : a terminal. keys : what is pressed. glyphs : what `out` can show. bell : rings at each change of prompt.
+    title : what is measured.
     """
 
-    def __init__(self, out: TextIO, keys: Keys, glyphs: Glyphs, bell: bool = True) -> None:
+    def __init__(self, out: TextIO, keys: Keys, glyphs: Glyphs, bell: bool = True, title: str = "") -> None:
         self._out, self._keys, self._glyphs, self._bell = out, keys, glyphs, bell
-        self._view = View()
+        self._view = View(f"mpucal: {title}" if title else "mpucal")
         self._ring = False
         self._changed = threading.Event()
         self._closed = threading.Event()
