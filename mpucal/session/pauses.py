@@ -37,7 +37,7 @@ class Pauses:
     def __init__(self) -> None:
         self._windows = Windows(WINDOW_S)
         self._stillness = Stillness(IN_THE_HAND)
-        self._left = 0
+        self._left: int | None = None
 
     def leave(self, run: int) -> None:
         """That stillness is done with: the next one counts."""
@@ -52,9 +52,12 @@ class Pauses:
         found: list[Held | Countdown] = []
         for window in self._windows.add(samples):
             sight = self._stillness.add(window)
+            if self._left is None:
+                self._left = sight.run if isinstance(sight, Still) else -1
             if not isinstance(sight, Still) or sight.run <= self._left:
                 continue
-            remaining = max(HOLD_S - sight.seconds, 0.0)
-            found.append(Countdown(window.end_s, remaining, HOLD_S, paused=False))
+            if sight.seconds < HOLD_S + WINDOW_S - 1e-6:
+                remaining = max(HOLD_S - sight.seconds, 0.0)
+                found.append(Countdown(window.end_s, remaining, HOLD_S, paused=False))
             found.append(Held(window.end_s, sight.seconds, np.asarray(sight.acc), sight.run))
         return found

@@ -60,7 +60,7 @@ class Rotate:
         self.directions = directions((x, y, z), tilt_only)
         self._knowledge: Knowledge | None = None
         self._asked = False
-        self._advised_run = 0
+        self._advised_run = -1
         self._begun_s: float | None = None
         self._new_s = self._known_s = self._told_s = self._said_s = 0.0
         self.prompt = self._prompt_for(self.coverage.farthest_down(self.directions))
@@ -87,8 +87,6 @@ class Rotate:
             return found
         if self._content():
             return [*found, Turned(f"the target is reached: {knowledge.words}")]
-        if advice:
-            self._pauses.leave(self._advised_run)
         if advice and knowledge.down is not None:
             self._said_s = knowledge.t_s
             self.prompt = self._prompt_for(np.array(knowledge.down))

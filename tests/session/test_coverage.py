@@ -3,7 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mpucal.session.coverage import DISTINCT_RAD, Directions
+from mpucal.session.aims import ALL_AROUND, TILT_RAD, directions
+from mpucal.session.coverage import DISTINCT_RAD, SPREAD, Coverage, Directions
 
 FACES = np.vstack([np.eye(3), -np.eye(3)])
 DEGENERATE = {
@@ -29,11 +30,38 @@ def test_degenerate_directions_have_no_spread(units):
 
 
 @pytest.mark.parametrize("units", DEGENERATE.values(), ids=DEGENERATE.keys())
-def test_the_wanted_direction_mends_them(units):
-    directions = directions_of(units)
+def test_the_farthest_directions_mend_them(units):
+    coverage = Coverage()
+    for unit in units:
+        coverage.pauses(np.array(unit, float))
+    assert not coverage.varied
     for _ in range(8):
-        directions.add(directions.most_wanted())
-    assert directions.spread() > 0.05
+        coverage.pauses(-coverage.farthest_down(ALL_AROUND))
+    assert coverage.varied
+    assert coverage.paused.spread() > SPREAD
+
+
+def test_four_passes_count_as_a_pause():
+    coverage = Coverage()
+    coverage.pauses(np.array([0.0, 0.0, 9.8]))
+    assert coverage.number == 1
+    for unit in ALL_AROUND[:12]:
+        coverage.passes(9.8 * unit)
+    assert coverage.number == 3
+
+
+@pytest.mark.parametrize(
+    "flat", [(0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.6, 0.0, -0.8)], ids=["level", "upright", "tilted"]
+)
+def test_tilts_alone_stay_near_level_and_differ(flat):
+    asked = directions(flat, tilt_only=True)
+    assert (asked @ np.array(flat) >= np.cos(TILT_RAD) - 1e-9).all()
+    between = np.arccos(np.clip(asked @ asked.T, -1.0, 1.0))[np.triu_indices(len(asked), 1)]
+    assert (between > DISTINCT_RAD).all()
+
+
+def test_the_whole_cube_is_asked_for_otherwise():
+    assert len(directions((0.0, 0.0, -1.0), tilt_only=False)) == 26
 
 
 def test_all_over_the_sphere_spread_is_one():

@@ -4,40 +4,84 @@ import pytest
 from mpucal.data import Samples, Sensor
 from mpucal.session.events import (
     Abort,
+    Ask,
+    Caution,
+    Checked,
     Connected,
+    Countdown,
     Decision,
     Enough,
     Fitted,
+    Forget,
+    Knowledge,
+    Learnt,
     Measured,
+    Meter,
     Progress,
     Prompt,
     PromptKind,
+    Redo,
+    Resumed,
+    Seen,
     SourceEnded,
+    Target,
     Tick,
+    Tried,
+    Wish,
     Written,
 )
 from mpucal.session.machine import Machine
 from mpucal.session.table import State
 
+MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
+DOWN = (0.0, 0.6, -0.8)
+
+
+def learnt(overall=0.1, advice=True, down=DOWN):
+    three = (overall, overall, overall)
+    wanted = Target(0.1, 0.05, 1.0)
+    words = "bias to 3 mg"
+    return Learnt(
+        Knowledge(0.0, three, three, three, wanted, three, three, three, overall, down if advice else None, words),
+        advice,
+    )
+
 
 class Session:
-    """A machine, fed with samples in polls of 50 ms, and all that it said."""
+    """A machine, fed with samples in polls of 50 ms, and all that it said.
+
+    What it asks for is answered at once: with `overall` as far as is known (None: not at all), `tried` and `checked`.
+    """
 
     def __init__(self, **options):
+        self.overall, self.tried, self.checked = None, Tried("good", ""), Checked((), agrees=True)
         self.machine = Machine(**options)
-        self.said = self.machine.handle(Connected(Sensor()))
+        self.said = self.machine.handle(Connected(Sensor(accel_range_g=4.0, gyro_range_dps=500.0)))
 
     def feed(self, samples, poll=5):
         for first in range(0, len(samples), poll):
-            if self.state not in (State.LAY_FLAT, State.ROTATE):
+            if self.state not in MEASURING:
                 break
             part = slice(first, first + poll)
             self.give(Measured(Samples(*(array[part] for array in vars(samples).values()))))
         return self
 
     def give(self, event):
-        self.said += self.machine.handle(event)
+        outputs = self.machine.handle(event)
+        self.said += outputs
+        for ask in (output for output in outputs if isinstance(output, Ask)):
+            answer = self.answer(ask.wish)
+            if answer is not None and self.state in MEASURING:
+                self.give(answer)
         return self
+
+    def answer(self, wish):
+        if wish in (Wish.KNOW, Wish.ADVISE):
+            return None if self.overall is None else learnt(self.overall, wish is Wish.ADVISE)
+        return self.tried if wish is Wish.TRY else self.checked
+
+    def of(self, kind):
+        return [output for output in self.said if isinstance(output, kind)]
 
     @property
     def state(self):
@@ -47,7 +91,8 @@ class Session:
         return [output.kind for output in self.said if isinstance(output, Prompt)]
 
     def words(self):
-        return " | ".join(getattr(output, "text", "") or getattr(output, "why", "") for output in self.said)
+        names = ("text", "why", "what")
+        return " | ".join(getattr(output, name) for output in self.said for name in names if hasattr(output, name))
 
     def count(self):
         return [output.done for output in self.said if isinstance(output, Progress)][-1]
@@ -73,16 +118,31 @@ def test_tells_to_lay_flat_then_to_rotate_after_ten_seconds_of_stillness(board):
     [
         (lambda board: board.turn((0, 1, 0), 0.5, 1.0), "m/s² along x"),
         (lambda board: board.turn((0, 0, 1), 2.0, 1.0), "deg/s about z"),
-        (lambda board: board.shaken(1.0, 2.0), "m/s² along x"),
     ],
-    ids=["tilted", "turned about the vertical", "shaken"],
+    ids=["tilted", "turned about the vertical"],
 )
-def test_a_bump_starts_the_count_again_and_says_what_moved(board, disturb, what):
+def test_a_board_that_was_moved_starts_the_count_again_and_says_what_moved(board, disturb, what):
     session = Session().feed(board.still(8.0)).feed(disturb(board)).feed(board.still(8.0))
     assert session.state is State.LAY_FLAT
     assert what in session.words()
-    assert session.prompts() == [PromptKind.LAY_FLAT, PromptKind.LAY_FLAT]
+    assert [caution.code for caution in session.of(Caution)][-1] == "moved"
+    assert max(countdown.remaining_s for countdown in session.of(Countdown)[-16:]) == pytest.approx(9.5, abs=0.6)
     assert session.feed(board.still(3.0)).state is State.ROTATE
+
+
+def test_a_bump_only_pauses_the_count(board):
+    session = Session().feed(board.still(8.0)).feed(board.shaken(1.0, 2.0))
+    assert session.of(Countdown)[-1].paused
+    assert session.of(Countdown)[-1].remaining_s == pytest.approx(2.0, abs=0.6)
+    assert "m/s² along x" in session.words()
+    assert session.feed(board.still(3.6)).state is State.ROTATE
+
+
+def test_lost_samples_start_the_count_again(board):
+    session = Session().feed(board.still(8.0))
+    later = board.still(8.0)
+    later.gap[0] = True
+    assert session.feed(later).state is State.LAY_FLAT
 
 
 def test_a_slow_turn_at_a_constant_rate_is_not_stillness(board):
@@ -102,11 +162,11 @@ def test_a_large_gyro_bias_is_no_turn(make_board):
 def test_never_still_for_a_minute_is_abandoned_with_a_reason(board):
     session = Session()
     for _ in range(15):
-        session.feed(board.still(3.0)).feed(board.shaken(1.2, 3.0))
+        session.feed(board.still(3.0)).feed(board.turn((1, 0, 0), 0.3, 1.2))
     assert session.state is State.ABORTED
     last = [output for output in session.said if isinstance(output, Decision)][-1]
     assert "not still for 10 s within 60 s" in last.why
-    assert "m/s² along x" in last.why
+    assert "deg/s about x" in last.why
     assert "firm" in last.remedy
 
 
@@ -116,53 +176,164 @@ def test_until_end_waits_for_stillness_for_ever(board):
     assert session.feed(board.still(11.5)).state is State.ROTATE
 
 
-def test_twelve_varied_pauses_are_enough_within_fifty_seconds(board, rotating, varied):
-    begun_s = board.t_s
-    for up in varied:
-        rotating.feed(board.turn_to(up)).feed(board.still(2.0))
-    assert rotating.state is State.CALIBRATE
-    assert 35.0 < rotating_end_s(rotating) - begun_s < 50.0
-    assert "orientation 5 of 12" in rotating.words()
-    assert rotating.prompts()[-1] is PromptKind.REST
+def show(session, board, ups):
+    """Turn to one orientation after the other, and hold each."""
+    for up in ups:
+        session.feed(board.turn_to(up)).feed(board.still(2.0))
+    return session
 
 
-def rotating_end_s(session):
-    return [output.t_s for output in session.said if isinstance(output, Progress)][-1]
+def test_asks_for_the_orientation_that_helps_most_as_soon_as_one_was_held(board, rotating):
+    rotating.overall = 0.1
+    rotating.feed(board.turn_to((1, 0, 0))).feed(board.still(0.6))
+    assert rotating.prompts().count(PromptKind.ROTATE) == 1
+    rotating.feed(board.still(0.6))
+    asked = rotating.of(Prompt)[-1]
+    assert (asked.kind, asked.down) == (PromptKind.ROTATE, DOWN)
+    assert "edge +Y −Z down" in asked.text
+    assert rotating.prompts().count(PromptKind.ROTATE) == 2
+    assert rotating.feed(board.still(3.0)).prompts().count(PromptKind.ROTATE) == 2
 
 
-def test_six_faces_are_not_enough_and_a_corner_is_wanted(board, rotating):
-    faces = [(1, 0, 0), (0, 1, 0), (0, 0, -1), (0, -1, 0), (-1, 0, 0), (0, 0, 1)]
-    for up in [*faces, *faces]:
-        rotating.feed(board.turn_to(up)).feed(board.still(2.0))
+def test_what_is_known_is_asked_every_second(board, rotating):
+    rotating.overall = 0.1
+    rotating.feed(board.turn((1, 0, 0), 3.0, 6.0))
+    assert [ask.wish for ask in rotating.of(Ask)] in ([Wish.KNOW] * 5, [Wish.KNOW] * 6)
+
+
+def test_enough_orientations_and_the_target_lead_on_to_verify(board, rotating, varied):
+    rotating.overall = 1.0
+    show(rotating, board, varied[:8])
     assert rotating.state is State.ROTATE
-    assert rotating.count() == 6
-    hint = [output.text for output in rotating.said if isinstance(output, Progress)][-1].split("helps: ")[1]
-    assert len(hint.split(", ")) >= 2
+    assert [seen.number for seen in rotating.of(Seen)] == [2, 3, 4, 5, 6, 7, 8, 9]
+    show(rotating, board, varied[8:9])
+    assert rotating.state is State.VERIFY
+    assert "the target is reached: bias to 3 mg" in rotating.words()
+    assert "orientation 5 of 10" in rotating.words()
+
+
+def test_the_target_alone_is_not_enough(board, rotating):
+    """The numbers may claim what they like: faces alone never tilt two axes together."""
+    rotating.overall = 1.0
+    faces = [(1, 0, 0), (0, 1, 0), (0, 0, -1), (0, -1, 0), (-1, 0, 0), (0, 0, 1)]
+    assert show(rotating, board, [*faces, *faces]).state is State.ROTATE
 
 
 def test_tilts_about_one_axis_are_never_enough(board, rotating):
-    for angle in np.radians(np.arange(25.0, 360.0, 25.0)):
-        rotating.feed(board.turn_to((0, np.sin(angle), np.cos(angle)))).feed(board.still(2.0))
-    assert rotating.count() == 12
-    assert rotating.state is State.ROTATE
+    rotating.overall = 1.0
+    ups = [(0, np.sin(angle), np.cos(angle)) for angle in np.radians(np.arange(25.0, 360.0, 25.0))]
+    assert show(rotating, board, ups).state is State.ROTATE
 
 
-def test_turning_without_a_pause_is_enough_in_the_end(board, rotating):
+def test_without_the_target_turning_goes_on_for_two_minutes(board, rotating):
+    rotating.overall = 0.3
     rng = np.random.default_rng(5)
-    for _ in range(60):
+    begun_s = board.t_s
+    while rotating.state is State.ROTATE:
         rotating.feed(board.turn(rng.normal(size=3), rng.uniform(1.5, 2.5), 1.5))
-        if rotating.state is not State.ROTATE:
-            break
-    assert rotating.state is State.CALIBRATE
-    assert board.t_s - 10.6 > 30.0
+    assert rotating.state is State.VERIFY
+    assert 119.0 < board.t_s - begun_s < 123.0
+    assert "as good as it gets: bias to 3 mg" in rotating.words()
 
 
 def test_no_new_orientation_for_a_minute_ends_the_turning(board, rotating):
     rotating.feed(board.turn_to((1, 0, 0))).feed(board.still(59.0))
     assert rotating.state is State.ROTATE
+    assert "nothing new was shown for a while" in rotating.words()
     rotating.feed(board.still(3.0))
+    assert rotating.state is State.VERIFY
+    assert "no new orientation for 60 s, 2 are there" in rotating.words()
+
+
+@pytest.fixture
+def verifying(board, rotating, varied):
+    rotating.overall = 1.0
+    show(rotating, board, varied[:9])
+    assert rotating.state is State.VERIFY
+    return rotating
+
+
+def test_verifies_in_three_orientations_that_were_not_seen(board, verifying, varied):
+    seen = -np.array([seen.down for seen in verifying.of(Seen)])
+    for number in (1, 2, 3):
+        asked = verifying.of(Prompt)[-1]
+        assert asked.kind is PromptKind.VERIFY
+        assert f"{number} of 3" in asked.text
+        assert (-seen @ np.array(asked.down)).max() < np.cos(np.radians(25.0))
+        verifying.feed(board.turn_to([-v for v in asked.down])).feed(board.still(2.0))
+    assert [ask.wish for ask in verifying.of(Ask) if ask.wish in (Wish.TRY, Wish.CHECK)] == [Wish.TRY, Wish.CHECK]
+    assert verifying.state is State.CALIBRATE
+    assert "agree with what was promised" in verifying.words()
+    assert verifying.machine.checked.agrees
+
+
+def test_a_disagreement_is_told_and_kept(board, verifying, varied):
+    verifying.checked = Checked((), False, "verification_failed", "the sensor moved on its mount", "fasten it")
+    show(verifying, board, varied[9:12])
+    assert verifying.state is State.CALIBRATE
+    assert "the sensor moved on its mount" in verifying.words()
+    assert verifying.machine.checked.code == "verification_failed"
+
+
+def test_a_refused_first_calibration_is_not_verified(board, rotating, varied):
+    rotating.overall, rotating.tried = 1.0, Tried("refused", "an axis is flipped", "left_handed")
+    show(rotating, board, varied[:9])
     assert rotating.state is State.CALIBRATE
-    assert "no new orientation for 60 s, 2 of 12 are there" in rotating.words()
+    assert "not to be verified: an axis is flipped" in rotating.words()
+    assert rotating.machine.checked.code == "left_handed"
+
+
+def test_who_does_not_verify_is_not_waited_for_for_ever(board, verifying):
+    verifying.feed(board.still(41.0))
+    assert verifying.state is State.CALIBRATE
+    assert "no verification: 0 of 3" in verifying.words()
+    assert verifying.machine.checked is None
+
+
+def test_redo_turns_again_without_laying_flat_again(board, verifying):
+    samples = verifying.machine._samples
+    verifying.give(Redo())
+    assert verifying.state is State.ROTATE
+    (forget,) = verifying.of(Forget)
+    assert forget.last == samples
+    assert 1000 <= forget.first <= 1060
+    assert verifying.prompts()[-1] is PromptKind.ROTATE
+
+
+def test_a_resumed_session_asks_again_for_what_it_wanted(board, rotating):
+    rotating.overall = 0.1
+    rotating.feed(board.turn_to((1, 0, 0))).feed(board.still(2.0))
+    wanted = rotating.of(Prompt)[-1]
+    rotating.give(Resumed(20.0))
+    assert rotating.state is State.ROTATE
+    assert rotating.of(Prompt)[-1] == wanted
+    board.silence(20.0)
+    assert rotating.feed(board.still(3.0)).give(Tick(board.t_s)).state is State.ROTATE
+
+
+def test_a_resumed_rest_begins_anew(board):
+    session = Session().feed(board.still(6.0)).give(Resumed(1.0)).feed(board.still(6.0))
+    assert session.state is State.LAY_FLAT
+    assert session.feed(board.still(5.0)).state is State.ROTATE
+
+
+def test_what_is_wrong_with_the_turning_is_said_once_in_a_while(board, rotating):
+    fast = board.turn((0, 0, 1), 14.0, 2.0)
+    fast.gyr_clipped[40:60] = True
+    rotating.feed(fast)
+    codes = [caution.code for caution in rotating.of(Caution)]
+    assert codes == ["too_fast", "clipped"]
+
+
+def test_the_meter_follows_the_board(board, rotating):
+    rotating.feed(board.turn((1, 0, 0), np.radians(90.0), 1.0)).feed(board.still(1.5))
+    meters = rotating.of(Meter)
+    assert max(meter.turning_dps for meter in meters) == pytest.approx(90.0, abs=5.0)
+    assert meters[-1].still
+    assert meters[-1].level < 1.0 < max(meter.level for meter in meters)
+    np.testing.assert_allclose(meters[-1].down, -board.up, atol=0.02)
+    assert meters[-1].rate_hz == pytest.approx(100.0, rel=0.05)
+    assert meters[-1].temperature_c == 25.0
 
 
 def test_until_end_turns_until_the_source_ends(board, varied):
@@ -195,7 +366,8 @@ def test_enter_cuts_the_stillness_short_once_there_is_some(board):
     assert session.feed(board.still(2.0)).give(Enough()).state is State.ROTATE
 
 
-def test_enter_ends_the_turning(rotating):
+def test_enter_ends_the_turning_and_once_more_the_verification(rotating):
+    assert rotating.give(Enough()).state is State.VERIFY
     assert rotating.give(Enough()).state is State.CALIBRATE
 
 
@@ -211,12 +383,16 @@ def test_silence_while_turning_ends_it(board, rotating):
 
 
 def test_runs_to_the_end_even_if_refused(rotating):
-    rotating.give(Enough()).give(Fitted("refused")).give(Written(("calibration.json",)))
+    rotating.give(Enough()).give(Enough()).give(Fitted("refused")).give(Written(("calibration.json",)))
     assert rotating.state is State.DONE
     assert "refused" in rotating.words()
 
 
-@pytest.mark.parametrize("events", [[], [Enough()], [Enough(), Fitted("good")]], ids=["rotate", "fit", "write"])
+@pytest.mark.parametrize(
+    "events",
+    [[], [Enough()], [Enough(), Enough()], [Enough(), Enough(), Fitted("good")]],
+    ids=["rotate", "verify", "fit", "write"],
+)
 def test_can_be_aborted(rotating, events):
     for event in events:
         rotating.give(event)
@@ -230,6 +406,6 @@ def test_decides_the_same_however_the_samples_arrive(make_board, varied):
         for up in varied:
             parts += [board.turn_to(up), board.still(2.0)]
         session.feed(Samples.joined(parts), poll)
-        return [output for output in session.said if not isinstance(output, Progress)]
+        return [output for output in session.said if isinstance(output, Prompt | Decision)], len(session.of(Seen))
 
     assert decided(3) == decided(7) == decided(50)

@@ -7,48 +7,69 @@ import pytest
 from mpucal.data import Samples, Sensor
 from mpucal.session.events import (
     Abort,
+    Checked,
     Connected,
     Enough,
+    Finished,
     Fitted,
+    Knowledge,
+    Learnt,
     Measured,
+    Redo,
     Rested,
+    Resumed,
     SourceEnded,
     Stopped,
+    Target,
     Tick,
+    Tried,
     Turned,
     Written,
 )
 from mpucal.session.machine import Machine
 from mpucal.session.table import TRANSITIONS, IllegalEvent, State, next_state
 
+ONE = (1.0, 1.0, 1.0)
 EVENTS = {
     "Connected": Connected(Sensor()),
     "Measured": Measured(Samples.empty()),
     "Tick": Tick(0.0),
     "Enough": Enough(),
+    "Redo": Redo(),
     "Abort": Abort(),
+    "Resumed": Resumed(3.0),
+    "Learnt": Learnt(Knowledge(0.0, ONE, ONE, ONE, Target(0.1, 0.05, 1.0), ONE, ONE, ONE, 1.0, None, ""), advice=True),
+    "Tried": Tried("good", ""),
+    "Checked": Checked((), agrees=True),
     "SourceEnded": SourceEnded(),
     "Fitted": Fitted("good"),
     "Written": Written(()),
     "Rested": Rested(10.0, (0.0, 0.0, 9.8)),
     "Turned": Turned("enough"),
+    "Finished": Finished("verified"),
     "Stopped": Stopped("it moved", "start again"),
 }
 
 # written out by hand: where each event leads, "" where it may not happen
 EXPECTED = {
-    #              connect     lay flat    rotate       calibrate    write
-    "Connected": ("lay flat", "", "", "", ""),
-    "Measured": ("", "lay flat", "rotate", "", ""),
-    "Tick": ("", "lay flat", "rotate", "", ""),
-    "Enough": ("connect", "lay flat", "calibrate", "calibrate", "write"),
-    "Abort": ("aborted", "aborted", "aborted", "aborted", "aborted"),
-    "SourceEnded": ("aborted", "aborted", "calibrate", "", ""),
-    "Fitted": ("", "", "", "write", ""),
-    "Written": ("", "", "", "", "done"),
-    "Rested": ("", "rotate", "", "", ""),
-    "Turned": ("", "", "calibrate", "", ""),
-    "Stopped": ("", "aborted", "", "", ""),
+    #              connect     lay flat    rotate       verify       calibrate    write
+    "Connected": ("lay flat", "", "", "", "", ""),
+    "Measured": ("", "lay flat", "rotate", "verify", "", ""),
+    "Tick": ("", "lay flat", "rotate", "verify", "", ""),
+    "Enough": ("connect", "lay flat", "rotate", "verify", "calibrate", "write"),
+    "Redo": ("connect", "lay flat", "rotate", "rotate", "calibrate", "write"),
+    "Abort": ("aborted", "aborted", "aborted", "aborted", "aborted", "aborted"),
+    "Resumed": ("", "lay flat", "rotate", "verify", "", ""),
+    "Learnt": ("", "", "rotate", "verify", "", ""),
+    "Tried": ("", "", "", "verify", "", ""),
+    "Checked": ("", "", "", "verify", "", ""),
+    "SourceEnded": ("aborted", "aborted", "calibrate", "calibrate", "", ""),
+    "Fitted": ("", "", "", "", "write", ""),
+    "Written": ("", "", "", "", "", "done"),
+    "Rested": ("", "rotate", "", "", "", ""),
+    "Turned": ("", "", "verify", "", "", ""),
+    "Finished": ("", "", "calibrate", "calibrate", "", ""),
+    "Stopped": ("", "aborted", "", "", "", ""),
 }
 CASES = [
     pytest.param(state, EVENTS[name], following, id=f"{state}-{name}")
