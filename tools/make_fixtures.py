@@ -24,13 +24,16 @@ from mpucal.capture.mcap import CaptureWriter, read_capture
 from mpucal.chip.config import Config
 from mpucal.cli.running import running
 from mpucal.cli.source import open_bus
-from mpucal.console import Console
 from mpucal.session.events import Key, Output, Progress
 from mpucal.session.plan import Plan
+from mpucal.terminal.keys import Keys
+from mpucal.terminal.lines import JsonLines
 
 FOLDER = Path(__file__).parent.parent / "fixtures"
 # named, so that what `auto` chooses is free to change without them
 MODEL = "accel"
+# what a person is asked and told, without the dials between
+SAID = ("prompt", "decision")
 
 
 @dataclass(frozen=True)
@@ -50,16 +53,16 @@ class Script:
 SESSIONS = {
     "mpu6050": Script("sim:seed=1", Config(rate_hz=100, poll_s=0.05)),
     "mpu6500": Script("sim:seed=2,chip=mpu6500,rate_error_ppm=9000", Config(8, 1000, rate_hz=100, poll_s=0.1)),
-    "enter": Script("sim:seed=3", Config(2, 250, rate_hz=50), ("still for 5 of", "orientation 10 of")),
+    "enter": Script("sim:seed=3", Config(2, 250, rate_hz=50), ("still for 5 of", "orientation 8 of")),
 }
 
 
-class Typist(Console):
+class Typist(JsonLines):
     """Presses Enter the first time that the progress begins with one of `enter`."""
 
     def __init__(self, enter: Sequence[str]) -> None:
         self.said = StringIO()
-        super().__init__(self.said, as_json=True)
+        super().__init__(self.said, Keys(None, single=False))
         self._enter = list(enter)
         self._pressed: list[Key] = []
 
@@ -89,7 +92,7 @@ def make_session(script: Script, capture: Path) -> dict[str, Any]:
     said = [json.loads(line) for line in person.said.getvalue().splitlines()]
     return {
         "bus": script.bus,
-        "said": [output for output in said if output["event"] != "progress"],
+        "said": [output for output in said if output["event"] in SAID],
         "samples": len(recording),
         "verdict": calibration.verdict,
         "D": calibration.D.tolist(),
