@@ -1,0 +1,174 @@
+import pytest
+
+from mpucal.errors import LinkError, NoAnswer, UsageError
+from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM, Link, S, ask, command
+from mpucal.mavlink.source import one_of
+
+KEY = b"k" * 32
+HOME, STRANGER = "10.0.0.2:14555", "10.0.0.66:999"
+
+
+def heartbeats(vehicle, address, seconds=10):
+    return [(0.5 + k, address, vehicle.heartbeat()) for k in range(seconds)]
+
+
+def in_order(*arriving):
+    return sorted([packet for packets in arriving for packet in packets], key=lambda packet: packet[0])
+
+
+def locked(transport, key=None):
+    """A link locked to the only vehicle, and what it records."""
+    record = []
+    link = Link(transport, lambda t_ns, data: record.append((t_ns, data)), key)
+    link.lock(one_of(link.listen(), None))
+    return link, record
+
+
+def test_it_only_reads_until_it_is_locked_and_then_beats_once_a_second(script, station, decoded):
+    transport = script(heartbeats(station(), HOME))
+    link = Link(transport, lambda t_ns, data: None)
+    (vehicle,) = link.listen()
+    assert (vehicle.address, vehicle.system, link.now_ns()) == (HOME, 1, 2 * S)
+    assert transport.sent == []
+    link.lock(vehicle)
+    assert len(list(link.messages(8 * S))) == 6
+    assert [address for _, address, _ in transport.sent] == [HOME] * 6
+    beat = decoded(transport.sent[0][2])
+    assert (beat.get_type(), beat.type, beat.get_srcSystem()) == ("HEARTBEAT", 6, OWN_SYSTEM)
+
+
+def test_a_partner_that_was_named_is_spoken_to_at_once(script, station):
+    transport = script(heartbeats(station(), HOME), outward=True)
+    Link(transport, lambda t_ns, data: None).listen()
+    assert [(t, address) for t, address, _ in transport.sent] == [(0.0, None), (1.0, None)]
+
+
+def test_several_vehicles_end_with_their_list(script, station):
+    transport = script(in_order(heartbeats(station(1), HOME), heartbeats(station(7, autopilot=12), STRANGER)))
+    vehicles = Link(transport, lambda t_ns, data: None).listen()
+    with pytest.raises(UsageError) as raised:
+        one_of(vehicles, None)
+    assert str(raised.value) == (
+        f"there are several vehicles: system 1 (ArduPilot) at {HOME}, system 7 (PX4) at {STRANGER}: "
+        "choose one with --system N."
+    )
+    assert one_of(vehicles, 7).address == STRANGER
+    with pytest.raises(UsageError, match="no vehicle is system 9"):
+        one_of(vehicles, 9)
+
+
+def test_one_system_at_two_addresses_is_not_guessed_at(script, station):
+    transport = script(in_order(heartbeats(station(), HOME), heartbeats(station(), STRANGER)))
+    with pytest.raises(UsageError, match="stop the other"):
+        one_of(Link(transport, lambda t_ns, data: None).listen(), 1)
+
+
+@pytest.mark.parametrize("key", [None, KEY], ids=["unsigned", "signed"])
+def test_a_stranger_changes_nothing(script, station, key):
+    vehicle, forger = station(key=key), station(key=key)
+    forger.mav.signing.timestamp = 1 << 47
+    own = heartbeats(vehicle, HOME, 2) + [(2 + 0.02 * k, HOME, vehicle.raw(20_000 * k)) for k in range(100)]
+    forged = [(2 + 0.02 * k, STRANGER, forger.raw(20_000 * k, acc=(9, 9, 9))) for k in range(100)]
+    cut = [(2.01 + 0.02 * k, STRANGER, forger.raw(k)[:-4]) for k in range(100)]
+    heard = []
+    for arriving in (own, in_order(own, forged, cut)):
+        link, record = locked(script(arriving), key)
+        heard.append(([m.to_dict() for m in link.messages(5 * S)], [data for _, data in record if data[5] == 1]))
+    assert len(heard[0][0]) == 100
+    assert heard[0] == heard[1]
+
+
+def test_others_at_the_vehicles_address_are_kept_but_not_heard(script, station):
+    vehicle, gimbal, other = station(), station(1, component=154), station(3)
+    arriving = in_order(heartbeats(vehicle, HOME, 4), [(3.1, HOME, gimbal.raw(1)), (3.2, HOME, other.raw(1))])
+    link, record = locked(script(arriving))
+    assert {message.get_type() for message in link.messages(5 * S)} == {"HEARTBEAT"}
+    assert {(data[5], data[6]) for _, data in record} == {(1, 1), (1, 154), (3, 1), (OWN_SYSTEM, OWN_COMPONENT)}
+    assert [t_ns for t_ns, _ in record] == sorted(t_ns for t_ns, _ in record)
+
+
+def test_nobody_there_is_one_sentence(script):
+    with pytest.raises(NoAnswer, match="no autopilot's heartbeat came over a script within 6 s: power the vehicle"):
+        Link(script([]), lambda t_ns, data: None).listen()
+
+
+def test_ground_stations_are_no_vehicles(script, station):
+    station_ = station(255, 190)
+    beats = [(0.5 + k, HOME, station_.message("heartbeat", 6, 8, 0, 0, 4)) for k in range(9)]
+    with pytest.raises(NoAnswer):
+        Link(script(beats), lambda t_ns, data: None).listen()
+
+
+def test_a_first_heartbeat_may_take_six_seconds(script, station):
+    transport = script([(5.5, HOME, station().heartbeat())])
+    assert len(Link(transport, lambda t_ns, data: None).listen()) == 1
+
+
+def test_a_wrong_signing_key_is_named(script, station):
+    transport = script(heartbeats(station(key=KEY), HOME))
+    with pytest.raises(LinkError, match="none is signed with the key of --signing-key"):
+        Link(transport, lambda t_ns, data: None, b"x" * 32).listen()
+
+
+def test_with_the_key_both_sides_sign(script, station, decoded):
+    transport = script(heartbeats(station(key=KEY), HOME))
+    link, _ = locked(transport, KEY)
+    list(link.messages(5 * S))
+    assert all(decoded(data).get_header().incompat_flags & 1 for _, _, data in transport.sent)
+
+
+def test_a_vehicle_that_signs_is_noticed_where_we_do_not(script, station):
+    link, _ = locked(script(heartbeats(station(key=KEY), HOME)))
+    list(link.messages(5 * S))
+    assert link.signed_only
+
+
+def test_who_leaves_early_loses_nothing(script, station):
+    vehicle = station()
+    burst = b"".join(vehicle.raw(10_000 * k) for k in range(20))
+    link, _ = locked(script([*heartbeats(vehicle, HOME, 2), (3.0, HOME, burst)], datagrams=False))
+    times, heard = [], []
+    link.subscribe(lambda message: heard.append(message.get_type()))
+    while len(times) < 20:
+        for message in link.messages(4 * S):
+            times.append(message.time_usec)
+            break
+    assert times == [10_000 * k for k in range(20)]
+    assert len(heard) == 20
+
+
+def test_lost_packets_are_counted_late_ones_are_not(script, station):
+    vehicle = station()
+    heartbeat, packets = vehicle.heartbeat(), [vehicle.raw(k) for k in range(10)]
+    come = [0, 1, 4, 3, 5, 5, 9]
+    arriving = [(3.0 + 0.1 * i, HOME, packets[k]) for i, k in enumerate(come)]
+    link, _ = locked(script([(0.5, HOME, heartbeat), *arriving]))
+    list(link.messages(9 * S))
+    assert link.lost == 4  # 2, 6, 7 and 8
+
+
+def test_a_request_is_repeated_until_its_own_answer(script, station, decoded):
+    vehicle, asked = station(), []
+    transport = script(heartbeats(vehicle, HOME, 20))
+
+    def answer(data):
+        if decoded(data).get_type() != "COMMAND_LONG":
+            return []
+        asked.append(data)
+        # to the first only another command's answer, then nothing, then the right one after a "wait"
+        ack = {1: [(400, 0)], 2: [], 3: [(511, 5), (511, 4)]}[len(asked)]
+        return [vehicle.message("command_ack", *fields) for fields in ack]
+
+    transport.answer = answer
+    link, _ = locked(transport)
+    assert command(link, 511, 27, 10_000) == 4
+    assert len(asked) == 3
+
+
+def test_a_request_that_nobody_answers_gives_none(script, station):
+    transport = script(heartbeats(station(), HOME, 20))
+    link, _ = locked(transport)
+    before_ns = link.now_ns()
+    request = link.mav.param_request_read_encode(1, 1, b"NO_SUCH", -1)
+    assert ask(link, request, lambda message: None, timeout_s=0.5, tries=4) is None
+    assert link.now_ns() - before_ns == 2 * S
