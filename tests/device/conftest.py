@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -87,6 +88,20 @@ class Device:
                     self.tell(prompt={"kind": event["kind"], "down": event.get("down")})
             return Result(process.wait(), process.stdout.read(), "".join(said))
 
+    def chmod(self, mode: int) -> None:
+        """Whose the device file is; everybody may look for it."""
+        for folder in (self.root, self.folder):
+            for path in (folder, *(each for each in folder.rglob("*") if each.is_dir())):
+                path.chmod(0o755)
+        (self.root / "dev" / "i2c-1").chmod(mode)
+        self.folder.chmod(0o777)
+
+    def configure(self, hz: int) -> None:
+        """The speed that the device tree asks of the adapter."""
+        node = self.root / "sys" / "devices" / "platform" / "i2c-1" / "of_node"
+        node.mkdir(parents=True)
+        (node / "clock-frequency").write_bytes(hz.to_bytes(4, "big"))
+
     def close(self) -> None:
         self._process.stdin.close()
         self._process.wait(timeout=30)
@@ -117,12 +132,11 @@ def _find(library):
         raise OSError(done.stderr)
 
 
-@pytest.fixture
-def device(clock):
-    """Makes a device; all are gone afterwards."""
+@contextmanager
+def _devices(clock: Path):
     made = []
 
-    def make(text="sim"):
+    def make(text: str = "sim") -> Device:
         folder = Path(tempfile.mkdtemp(prefix="mpucal-device-"))
         made.append(Device(text, folder, clock))
         return made[-1]
@@ -131,3 +145,30 @@ def device(clock):
     for each in made:
         each.close()
         shutil.rmtree(each.folder, ignore_errors=True)
+
+
+@pytest.fixture
+def device(clock):
+    """Makes a device; all are gone afterwards."""
+    with _devices(clock) as make:
+        yield make
+
+
+@pytest.fixture(scope="module")
+def device_of_module(clock):
+    """The same for a device that several tests share."""
+    with _devices(clock) as make:
+        yield make
+
+
+@pytest.fixture
+def as_nobody():
+    """What makes a program run as somebody who may do nothing, where this is root."""
+    if os.geteuid() != 0:
+        return ()
+    if shutil.which("setpriv") is None:
+        pytest.skip("setpriv is missing, and root may use every device")
+    nobody = ("setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", "--")
+    if subprocess.run([*nobody, sys.executable, "-c", "import mpucal"], capture_output=True, check=False).returncode:
+        pytest.skip("this checkout is closed to other users, and root may use every device")
+    return nobody

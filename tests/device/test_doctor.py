@@ -1,0 +1,77 @@
+"""`mpucal doctor` on /dev/i2c-1: what a person would paste into a bug report."""
+
+import errno
+import json
+
+import pytest
+
+NODE = "/dev/i2c-1"
+
+
+def examined(mocked, *words, prefix=()):
+    mocked.tell(prompt={"kind": "lay_flat", "down": None})
+    result = mocked.mpucal("doctor", "--bus", NODE, "--seconds", "2", *words, prefix=prefix)
+    return result, {finding["topic"]: finding for finding in json.loads(result.out)["findings"]} if words else {}
+
+
+def test_a_sound_chip_is_told_on_a_page(device):
+    result, _ = examined(device("sim:seed=3"))
+    assert result.code == 0
+    lines = result.out.splitlines()
+    assert len(lines) < 40
+    assert max(map(len, lines)) <= 100
+    for words in ("0x68, an MPU", "400 kHz achieved", "MPU-6050", "self test", "at 0x06, 2048 LSB/g", "no faults"):
+        assert words in result.out
+
+
+@pytest.mark.parametrize("chip", ["mpu6500", "clone98"])
+def test_a_chip_under_another_name_is_recognised(device, chip):
+    result, findings = examined(device(f"sim:chip={chip},who_am_i=0x68"), "--json")
+    assert result.code == 0
+    assert "behaves as an" in findings["chip"]["what"]
+    assert findings["offset registers"]["data"]["place"] == 0x77
+    assert findings["genuine?"]["mark"] == "note"
+
+
+@pytest.mark.parametrize(
+    ("adapter", "topic", "words"),
+    [
+        ({"address": 0x50}, "on the bus", "0x50, an EEPROM"),
+        ({"bound": [0x68]}, "on the bus", "held by a driver of the kernel"),
+        ({"fails": errno.ETIMEDOUT}, "bus", "does not come free"),
+    ],
+    ids=["nobody", "bound", "stuck"],
+)
+def test_what_stands_in_the_way_is_told(device, adapter, topic, words):
+    mocked = device()
+    mocked.tell(adapter=adapter)
+    result, findings = examined(mocked, "--json")
+    assert result.code == 3
+    assert words in findings[topic]["what"]
+    assert findings["bus"]["mark"] == "bad"
+    assert findings["bus"]["remedy"]
+
+
+def test_no_permission_comes_with_what_to_do(device, as_nobody):
+    mocked = device()
+    mocked.chmod(0o600)
+    result, findings = examined(mocked, "--json", prefix=as_nobody)
+    assert result.code == 3
+    assert "usermod -aG i2c" in findings["device file"]["remedy"]
+
+
+def test_a_slow_bus_comes_with_the_setting_that_helps(device):
+    mocked = device()
+    mocked.configure(100_000)
+    _, findings = examined(mocked, "--json")
+    assert "100 kHz" in findings["adapter"]["what"]
+    assert "i2c_arm_baudrate=400000" in findings["adapter"]["remedy"]
+
+
+def test_a_correction_that_somebody_wrote_is_noticed_and_stays(device):
+    mocked = device()
+    mocked.tell(registers={"6": "1234"})
+    _, findings = examined(mocked, "--json")
+    assert findings["factory trim"]["mark"] == "note"
+    assert findings["factory trim"]["data"]["held"][0] == 0x1234
+    assert mocked.run("i2cget", "-y", "1", "0x68", "0x06").out.strip() == "0x12"

@@ -1,0 +1,130 @@
+"""The installed command on /dev/i2c-1: a session from start to blob, its write-back, and every fault in one sentence."""
+
+import errno
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from mpucal import Calibration
+
+NODE = "/dev/i2c-1"
+
+
+@pytest.fixture(scope="module")
+def guided(device_of_module):
+    """One whole session, and the device on which it ran."""
+    mocked = device_of_module("sim:chip=mpu6500,who_am_i=0x68,seed=7")
+    return mocked, mocked.session("--rate", "100", "--yes", "-o", "board")
+
+
+def test_a_session_ends_with_a_good_calibration_and_its_files(guided):
+    mocked, result = guided
+    assert result.code == 0, result.err
+    left = {path.name for path in (mocked.folder / "board").iterdir()}
+    assert {"capture.mcap", "calibration.json", "calibration.bin", "report.html"} <= left
+    document = json.loads((mocked.folder / "board" / "calibration.json").read_text())
+    assert document["quality"]["verdict"] == "good"
+    assert document["sensor"]["chip"] == "MPU-6500"
+
+
+def test_its_capture_replays_to_the_same_bits(guided):
+    mocked, _ = guided
+    replayed = mocked.mpucal("session", "--replay", "board/capture.mcap", "-o", "again", "--yes")
+    assert replayed.code == 0, replayed.err
+    first, second = (Calibration.load(mocked.folder / name / "calibration.json") for name in ("board", "again"))
+    assert np.array_equal(first.D, second.D)
+    assert np.array_equal(first.b_a, second.b_a)
+
+
+def test_its_bias_goes_into_the_chip_and_out_again(guided):
+    mocked, _ = guided
+    mocked.tell(prompt={"kind": "lay_flat", "down": None})
+    before = mocked.run("i2cget", "-y", "1", "0x68", "0x77", "w").out
+    written = mocked.mpucal("write", "board/calibration.json", "chip", "--bus", NODE, "--json")
+    assert written.code == 0, written.err
+    applied = np.array(json.loads(written.out)["applied_in_hardware"]["b_a"])
+    b_a = Calibration.load(mocked.folder / "board" / "calibration.json").b_a
+    assert applied == pytest.approx(b_a, abs=0.006)
+    if shutil.which("i2cget"):
+        assert mocked.run("i2cget", "-y", "1", "0x68", "0x77", "w").out != before
+    back = mocked.mpucal("write", "board/chip-offsets.json", "chip", "--bus", NODE)
+    assert back.code == 0, back.err
+    assert mocked.run("i2cget", "-y", "1", "0x68", "0x77", "w").out == before
+
+
+@pytest.mark.parametrize("command", [("session", "-o", "x"), ("record", "-o", "x.mcap")], ids=["session", "record"])
+@pytest.mark.parametrize(
+    ("adapter", "words"),
+    [
+        ({"address": 0x50}, "nothing answers at 0x68 or 0x69 on /dev/i2c-1: check VCC"),
+        ({"fails": errno.ETIMEDOUT}, "a wire holds SDA or SCL low"),
+        ({"fails": errno.EIO}, "a transfer broke off"),
+        ({"bound": [0x68, 0x69]}, "a driver of the kernel holds the chip"),
+        ({"fails": errno.ENODEV}, "the adapter is gone"),
+    ],
+    ids=["nobody", "stuck", "broken", "bound", "gone"],
+)
+def test_a_chip_that_cannot_be_reached_is_one_sentence(device, command, adapter, words):
+    mocked = device()
+    mocked.tell(adapter=adapter)
+    result = mocked.mpucal(*command, "--bus", NODE)
+    assert result.code == 3
+    (sentence,) = result.sentences
+    assert words in sentence
+    assert result.err.strip() == sentence
+
+
+def test_no_permission_is_one_sentence(device, as_nobody):
+    mocked = device()
+    mocked.chmod(0o600)
+    result = mocked.mpucal("session", "--bus", NODE, "-o", "x", prefix=as_nobody)
+    assert result.code == 3
+    assert result.err.strip() == (
+        f"mpucal: no permission to use {NODE}: join the group that may: `sudo usermod -aG i2c $USER`,"
+        " then log in again."
+    )
+
+
+def test_another_bus_is_one_sentence(device):
+    result = device().mpucal("session", "--bus", "/dev/i2c-7", "-o", "x")
+    assert result.code == 3
+    assert result.err.startswith("mpucal: there is no I2C bus /dev/i2c-7: ")
+
+
+def test_an_smbus_only_adapter_measures_too(device):
+    mocked = device()
+    mocked.tell(adapter={"functions": 0x0EFF0008})
+    result = mocked.mpucal("record", "--bus", NODE, "-o", "x.mcap", "--seconds", "3", "--rate", "100")
+    assert result.code == 0, result.err
+    assert "samples" in result.out
+
+
+# when it happens, the board lies flat: a session of a few seconds more has not begun to turn
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("unplugged@4", "nothing answers at 0x68"),
+        ("stuck@4", "a wire holds SDA or SCL low"),
+    ],
+)
+def test_a_fault_that_stays_ends_a_session_with_one_sentence(device, fault, words):
+    mocked = device(f"sim:fault={fault}")
+    result = mocked.session("-o", "x", "--rate", "100")
+    assert result.code == 3
+    (sentence,) = result.sentences
+    assert words in sentence
+    assert (mocked.folder / "x" / "capture.mcap").exists()
+
+
+@pytest.mark.parametrize(
+    "fault", ["nack@4", "timeout@4", "brownout@4", "overflow@4", "bitflips@4", "frozen@4", "slip@4"]
+)
+def test_a_fault_that_passes_is_a_gap(device, fault):
+    mocked = device(f"sim:fault={fault}")
+    result = mocked.mpucal("record", "--bus", NODE, "-o", "x.mcap", "--seconds", "8", "--rate", "100")
+    assert result.code == 0, result.err
+    facts = json.loads(mocked.mpucal("show", "x.mcap", "--json").out)
+    assert facts["gaps"] >= 1
+    assert facts["samples"] > 400
