@@ -28,7 +28,7 @@ class Rest:
     Attributes
     ----------
     mean : (3,) m/s^2, of each stream. error : (3,), how far the mean may be off (one standard deviation).
-    attitude : (3, 3) from the vehicle's axes then to those at the first rest, by the first stream's gyroscope.
+    attitude : (3, 3) as it ended, from the vehicle's axes to those at the start, by the first stream's gyroscope.
     """
 
     mean: dict[Stream, Vector]
@@ -66,10 +66,10 @@ class Stillness:
         self._ask()
         last: Rest | None = None
         while True:
-            middle = self._window()
+            self._window()
             missing = [stream for stream in self._streams if len(self._found[stream]) < FEWEST]
             still = not missing and all(is_still(readings) for readings in self._found.values())
-            now = self._rest(middle) if still else None
+            now = self._rest() if still else None
             if now is not None and last is not None and _agree(last, now):
                 return now
             last = now
@@ -89,14 +89,9 @@ class Stillness:
         for stream in self._streams:
             command(self._link, set_interval, MESSAGE_ID[stream.name], INTERVAL_US, tries=5)
 
-    def _window(self) -> Vector:
-        """Listen for a window; the attitude in its middle."""
+    def _window(self) -> None:
         self._found = {stream: [] for stream in self._streams}
-        begun_ns = self._link.now_ns()
-        list(self._link.messages(begun_ns + WINDOW_NS // 2))
-        middle = self._attitude
-        list(self._link.messages(begun_ns + WINDOW_NS))
-        return middle
+        list(self._link.messages(self._link.now_ns() + WINDOW_NS))
 
     def _hear(self, message: Message) -> None:
         content = reading(message)
@@ -110,7 +105,7 @@ class Stillness:
         if self._gyro_bias is not None and 0 < step_s < LONGEST_STEP_S:
             self._attitude = self._attitude @ turn((np.array(content.gyr) - self._gyro_bias) * step_s)
 
-    def _rest(self, attitude: Vector) -> Rest:
+    def _rest(self) -> Rest:
         mean, error = {}, {}
         for stream, readings in self._found.items():
             acc = np.array([r.acc for r in readings])
@@ -118,7 +113,7 @@ class Stillness:
             # a hand trembles slowly: its samples are no independent ones
             error[stream] = acc.std(axis=0) / 4
         self._gyro_bias = np.mean([r.gyr for r in self._found[self._streams[0]]], axis=0)
-        return Rest(mean, error, attitude)
+        return Rest(mean, error, self._attitude)
 
 
 def _agree(one: Rest, other: Rest) -> bool:
