@@ -164,7 +164,7 @@ class Stillness:
         if gyr_ratio.max() > acc_ratio.max():
             return _turned(gyr_step)
         axis = int(acc_ratio.argmax())
-        return f"it tilted: the accelerometer changed by {abs(acc_step[axis]):.2f} m/s² along {AXES[axis]}"
+        return f"it tilted by {abs(acc_step[axis]):.2f} m/s² along {AXES[axis]}"
 
 
 def _turned(gyr: Vector) -> str:
@@ -174,4 +174,4 @@ def _turned(gyr: Vector) -> str:
 
 def _shook(acc_sd: Vector, ratio: Vector) -> str:
     axis = int(ratio.argmax())
-    return f"it shook: the accelerometer moved by {acc_sd[axis]:.2f} m/s² along {AXES[axis]}"
+    return f"it shook by {acc_sd[axis]:.2f} m/s² along {AXES[axis]}"
