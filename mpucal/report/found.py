@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..result import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA, Calibration
+from ..session.words import side_down
 from .elements import code, number, paragraph, section, table
 from .units import Measured, accelerometer, gyroscope, with_std
 from .use import formula
@@ -62,7 +63,7 @@ def verification_section(c: Calibration) -> str:
     found = (c.quality.get("verification") or {}).get("orientations") or ()
     rows = [
         [
-            f"{_side(one['down'])} down",
+            f"{side_down(one['down'])} down",
             f"{one['magnitude_mps2']:+.4f} (±\u00a0{one['magnitude_std_mps2']:.4f})",
             f"{one['direction_deg']:.3f} (±\u00a0{one['direction_std_deg']:.3f})",
         ]
@@ -75,11 +76,6 @@ def verification_section(c: Calibration) -> str:
         "own uncertainties promise (one standard deviation)."
     )
     return section("Verification", said, table("verification", "", ["", "|a| − gravity, m/s²", "direction, deg"], rows))
-
-
-def _side(down: Sequence[float]) -> str:
-    named = [f"{'+' if value > 0 else '−'}{axis}" for axis, value in zip(_AXES, down, strict=True) if abs(value) > 0.4]
-    return " ".join(named)
 
 
 def matrices_section(c: Calibration) -> str:

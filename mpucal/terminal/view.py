@@ -22,8 +22,8 @@ from ..session.events import (
 
 # a countdown that is not renewed for so long waits for nothing any more
 COUNTDOWN_HOLDS_S = 1.0
-# the part of gravity that an axis must carry to be named
-WORTH_NAMING = 0.4
+# the part of gravity that an axis must carry to be named: a tilt by 30 degrees towards a corner is named by both axes
+WORTH_NAMING = 0.3
 HEADLINES = {
     PromptKind.LAY_FLAT: "LAY FLAT",
     PromptKind.ROTATE: "TURN IT",

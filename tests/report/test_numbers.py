@@ -122,5 +122,5 @@ def test_the_verification(result):
         },
     }
     page = render(Calibration.from_document(document))
-    assert table(page, "verification")["+x +y −z down"] == ["-0.0010 (±\u00a00.0087)", "0.064 (±\u00a00.131)"]
+    assert table(page, "verification")["corner +X +Y −Z down"] == ["-0.0010 (±\u00a00.0087)", "0.064 (±\u00a00.131)"]
     assert 'id="verification"' not in result.html

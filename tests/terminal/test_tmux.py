@@ -77,7 +77,9 @@ SESSION = [sys.executable, "-m", "mpucal", "session", "--bus", "sim:pace=real", 
 def test_a_session_is_shown_and_ctrl_c_leaves_the_terminal_as_it_was(terminal, size):
     tmux = terminal(*size)
     tmux.run(*SESSION)
-    text = tmux.wait_for("Lay the board flat", "Hz", "°C", "still", "now", "q or Ctrl-C: stop", "mpucal: simulated chip")
+    text = tmux.wait_for(
+        "Lay the board flat", "Hz", "°C", "still", "now", "q or Ctrl-C: stop", "mpucal: simulated chip"
+    )
     assert tmux.is_on_the_second_screen()
     assert any(dots in text for dots in BRAILLE)
     assert "██" in text

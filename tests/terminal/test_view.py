@@ -68,7 +68,8 @@ def test_another_step_forgets_the_warnings_of_the_last(views):
         ((0.0, 0.0, -1.0), "-Z"),
         ((0.6, -0.8, 0.0), "+X -Y"),
         ((0.57, -0.58, 0.58), "+X -Y +Z"),
-        ((0.3, 0.9, 0.3), "+Y"),
+        ((0.2, 0.95, 0.2), "+Y"),
+        ((0.35, -0.35, -0.87), "+X -Y -Z"),
     ],
 )
 def test_axes_that_carry_much_of_gravity_are_named(down, words):
