@@ -39,6 +39,7 @@ class Writer:
     def __init__(self, link: Link, watch: Watch, places: Sequence[Place]) -> None:
         self._link, self._watch, self._places = link, watch, tuple(places)
         self._parameters = Parameters(link)
+        self._touched: set[str] = set()
 
     def held(self) -> dict[str, float]:
         """What the vehicle holds there.
@@ -60,18 +61,25 @@ class Writer:
         if self._watch.armed:
             raise WriteBackError("the vehicle is armed, so nothing was written", "disarm it, then write again")
         try:
-            for where in self._places:
-                for step in _steps(where, old, new):
-                    self._disarmed()
-                    self._set(step)
+            for where, names in self._vectors():
+                if any(as_float32(new[name]) != old[name] for name in names):
+                    for step in _steps(where, names, new):
+                        self._disarmed()
+                        self._set(step)
             self._compare(new)
             verify()
             self._disarmed()
         except FAILURES as failure:
             self._restore(old, failure)
 
+    def _vectors(self) -> Iterator[tuple[Place, tuple[str, ...]]]:
+        for where in self._places:
+            yield where, where.offset
+            yield where, where.scale
+
     def _set(self, step: Step) -> None:
         self._parameters.set(step.name, step.value)
+        self._touched.add(step.name)
         list(self._link.messages(self._link.now_ns() + step.wait_ns))
 
     def _disarmed(self) -> None:
@@ -89,8 +97,11 @@ class Writer:
         what = failure.what if isinstance(failure, MpucalError) else "the write was interrupted"
         remedy = failure.remedy if isinstance(failure, MpucalError) else "start again"
         try:
-            for where in self._places:
-                for step in _steps(where, {}, old):
+            for where, names in self._vectors():
+                held = self._parameters.read(names)
+                # one that was refused holds its old value, and would be refused again
+                changed = [name for name in names if name in self._touched or held[name] != old[name]]
+                for step in _steps(where, changed, old):
                     self._set(step)
             self._compare(old)
         except FAILURES as second:
@@ -102,18 +113,16 @@ class Writer:
         raise WriteBackError(f"{what}; the old parameters are back, and read back as they were", remedy) from failure
 
 
-def _steps(where: Place, old: Mapping[str, float], new: Mapping[str, float]) -> Iterator[Step]:
-    """What to set there, in order: each vector of which not all of `new` is in `old`."""
-    for names in (where.offset, where.scale):
-        if all(old.get(name) == as_float32(new[name]) for name in names):
-            continue
-        yield from _with_detour(where, names, new) if where.limits.unnoticed else (Step(n, new[n]) for n in names)
+def _steps(where: Place, names: Sequence[str], values: Mapping[str, float]) -> Iterator[Step]:
+    """How `names` of one vector come to `values`, which holds all of it.
 
-
-def _with_detour(where: Place, names: tuple[str, ...], values: Mapping[str, float]) -> Iterator[Step]:
-    """The steps after which PX4 uses what it would use of `values` after a start, and stores `values`."""
+    Where the firmware does not notice small changes, it then uses what it would use after a start.
+    """
     wanted = where.correction(values)
-    used = values if wanted is None else where.values(where.used(wanted))
+    if not where.limits.unnoticed or wanted is None or not names:
+        yield from (Step(name, values[name]) for name in names)
+        return
+    used = where.values(where.used(wanted))
     *first, last = names
     yield from (Step(name, used[name]) for name in first)
     yield Step(last, used[last] + DETOUR, TAKEN_OVER_NS)

@@ -17,7 +17,7 @@ FAULTS = {
     "arm": True,
     "reboot": True,
     "silence": True,
-    "second_station": False,
+    "second_station": True,
     "loss": False,
     "reorder": False,
     "duplicate": False,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple
@@ -14,6 +15,7 @@ from ..prompts import Heard, of_message
 from .ardupilot import ArduPilot
 from .firmware import Firmware
 from .imus import Imus
+from .mishaps import Mishaps
 from .options import Options
 from .px4 import Px4
 from .streams import Streams
@@ -28,6 +30,8 @@ SEQUENCE = 256
 QUADROTOR = 2
 ARMED = 128
 FORCE_SAVE = 76
+REBOOT_US = 2 * S_US
+SECOND_STATION_HZ = 4
 
 
 class Sent(NamedTuple):
@@ -56,6 +60,8 @@ class Vehicle:
             self._mav.signing.secret_key, self._mav.signing.sign_outgoing = key, True
         self._parser = Parser(self._mav)
         self._now_us = 0
+        self._silent_until_us: float = 0
+        self._mishaps = Mishaps(options.faults)
         self._out: deque[Sent] = deque()
         self._boot()
         if options.rotate_at is not None:
@@ -68,6 +74,8 @@ class Vehicle:
 
     def hear(self, data: bytes) -> None:
         """A datagram arrives now."""
+        if self._now_us < self._silent_until_us:
+            return
         for packet in self._parser.datagram(data):
             answer = self._HANDLERS.get(packet.message.get_type())
             if answer is not None and getattr(packet.message, "target_system", 0) in (0, self.options.system):
@@ -98,7 +106,11 @@ class Vehicle:
         self.firmware.temperature_c = self.imus.temperature_c
 
     def _tick(self) -> None:
+        for mishap in self._mishaps.due(self._now_us):
+            self._MISHAPS[mishap](self)
         self.firmware.sense(self.imus.next())
+        if self._now_us < self._silent_until_us:
+            return
         for message_id in self._streams.due(self._now_us, SLOWER_WHILE_BUSY if self._list else 1):
             message = self._heartbeat() if message_id == HEARTBEAT else self._message(message_id)
             if message is not None:
@@ -197,6 +209,27 @@ class Vehicle:
         if prompt is not None:
             self.imus.hear(prompt, self._now_us / S_US)
 
+    def _arm(self) -> None:
+        self.firmware.armed = True
+
+    def _reboot(self) -> None:
+        self._silent_until_us = self._now_us + REBOOT_US
+        self._boot()
+
+    def _fall_silent(self) -> None:
+        self._silent_until_us = math.inf
+
+    def _obey_second_station(self) -> None:
+        """A ground station at its default rate."""
+        for message_id, interval_us in self.firmware.group(SECOND_STATION_HZ):
+            self._streams.set(message_id, interval_us, self._now_us)
+
+    _MISHAPS: ClassVar[Mapping[str, Callable[[Vehicle], None]]] = {
+        "arm": _arm,
+        "reboot": _reboot,
+        "silence": _fall_silent,
+        "second_station": _obey_second_station,
+    }
     _HANDLERS: ClassVar[Mapping[str, Callable[[Vehicle, Message], None]]] = {
         "PARAM_REQUEST_READ": _param_request_read,
         "PARAM_REQUEST_LIST": _param_request_list,
