@@ -96,7 +96,7 @@ class Verify:
         self._coverage.pauses(held.acc)
         self._number += 1
         self._said_s = held.t_s
-        progress = Progress(held.t_s, self._number, self._aim.verify, f"verified {self._number} of {self._aim.verify}")
+        progress = Progress(held.t_s, self._number, self._aim.verify, f"shown {self._number} of {self._aim.verify}")
         if self._number == self._aim.verify:
             self._asked = True
             return [progress, Ask(Wish.CHECK, CHECK_WAIT_S)]
