@@ -7,8 +7,8 @@ US = 1000
 
 # A ceramic resonator is within 0.5 %; twice that, so that an estimate can fall behind and come back.
 DRIFT = 0.01
-# Beyond this a clock that went on cannot differ from what was expected of it: it was reset.
-LEAP_NS = 1_000_000_000
+# A clock that is this far from what was expected of it is taken to have been reset; nothing is lost where it was not.
+LEAP_NS = 50_000_000
 
 
 class BridgeClock:

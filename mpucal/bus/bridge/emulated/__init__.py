@@ -13,11 +13,11 @@ from ....wire import messages as wire
 from ....wire.blob import MAX_LENGTH
 from ....wire.frame import Deframer, Frame
 from ....wire.messages import Frames, Message, Reply, Status
+from ..clock import US, WRAP_US
 from .keeper import Keeper
 from .line import EmulatedLine
 from .pusher import Pusher
 from .storage import Memory
-from .time import t_us
 
 __all__ = ["EmulatedBridge", "EmulatedLine", "Memory"]
 
@@ -64,7 +64,7 @@ class EmulatedBridge:
         self._inbox.clear()
         pusher = self._pusher
         if pusher is not None:
-            out += [_encoded(Frames.TYPE, pusher.seq, frames) for frames in pusher.look(self._now_ns())]
+            out += [_encoded(Frames.TYPE, pusher.seq, frames) for frames in pusher.look()]
         return b"".join(out)
 
     def _handle(self, frame: Frame) -> bytes:
@@ -101,11 +101,14 @@ class EmulatedBridge:
             case wire.Message() if wire.Feature.BLOB in self._features:
                 if isinstance(request, wire.BlobBegin):
                     self._stop()
-                return [self._keeper.answer(request, t_us(self._now_ns()))]
+                return [self._keeper.answer(request, self._time())]
         return [self._said(Status.UNKNOWN_TYPE)]
 
+    def _time(self) -> int:
+        return self._now_ns() // US % WRAP_US
+
     def _said(self, status: Status) -> Reply:
-        return Reply(status, t_us(self._now_ns()))
+        return Reply(status, self._time())
 
     def _hello(self, request: wire.Hello) -> Reply:
         if request.magic != wire.MAGIC:
@@ -119,7 +122,7 @@ class EmulatedBridge:
         room = MAX_LENGTH if wire.Feature.BLOB in self._features else 0
         identity = (wire.MAGIC, wire.MAJOR, wire.MINOR, self._chosen)
         return wire.HelloReply(
-            status, t_us(self._now_ns()), *identity, self._features, self._window, room, NAME.ljust(16, b"\0")
+            status, self._time(), *identity, self._features, self._window, room, NAME.ljust(16, b"\0")
         )
 
     def _bus(self) -> Bus:
@@ -130,30 +133,32 @@ class EmulatedBridge:
     def _read(self, request: wire.Read) -> Reply:
         if not 1 <= request.count <= wire.MAX_READ:
             return self._said(Status.BAD_PAYLOAD)
-        data, t_ns = self._bus().read(request.register, request.count)
-        return wire.ReadReply(Status.OK, t_us(t_ns), data)
+        began = self._time()
+        return wire.ReadReply(Status.OK, began, self._bus().read(request.register, request.count).data)
 
     def _burst(self, request: wire.Burst) -> list[Reply]:
         if not 1 <= request.count <= wire.MAX_BURST:
             return [self._said(Status.BAD_PAYLOAD)]
         replies: list[Reply] = []
         for offset in range(0, request.count, wire.MAX_READ):
-            data, t_ns = self._bus().read(request.register, min(wire.MAX_READ, request.count - offset))
-            replies.append(wire.BurstReply(Status.OK, t_us(t_ns), offset, data))
+            began, count = self._time(), min(wire.MAX_READ, request.count - offset)
+            replies.append(wire.BurstReply(Status.OK, began, offset, self._bus().read(request.register, count).data))
         return replies
 
     def _write(self, request: wire.Write) -> Reply:
         if not 1 <= len(request.data) <= wire.MAX_WRITE:
             return self._said(Status.BAD_PAYLOAD)
-        return wire.WriteReply(Status.OK, t_us(self._bus().write(request.register, request.data)))
+        began = self._time()
+        self._bus().write(request.register, request.data)
+        return wire.WriteReply(Status.OK, began)
 
     def _stream(self, request: wire.Stream, seq: int) -> Reply:
         if request.frame_bytes > wire.MAX_READ or (request.frame_bytes and not 1 <= request.batch <= wire.MAX_LOOK):
             return self._said(Status.BAD_PAYLOAD)
         self._stop()
         if request.frame_bytes:
-            self._pusher = Pusher(self._bus(), seq, request, self._drops, self._now_ns())
-        return wire.StreamReply(Status.OK, t_us(self._now_ns()))
+            self._pusher = Pusher(self._bus(), seq, request, self._drops, self._now_ns)
+        return wire.StreamReply(Status.OK, self._time())
 
     def _stop(self) -> None:
         if self._pusher is not None:

@@ -9,7 +9,7 @@ from typing import Protocol
 from ..port import BAUDS, Chunk
 from ..port_errors import gone
 
-STEP_NS = 250_000
+STEP_NS = 500_000
 BITS_A_BYTE = 10
 # the host's clock and the bridge's begin at different times
 HOST_AHEAD_NS = 7_000_000_000

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from ....chip import registers as reg
 from ....chip.access import Bus
 from ....errors import BusError, NoAnswer
 from ....wire.messages import MAX_LOOK, MAX_READ, Frames, Status, Stream
-from .time import t_us
+from ..clock import US, WRAP_US
 
 BEAT_NS = 100_000_000
 INDEX_WRAP = 2**16
@@ -19,18 +19,21 @@ class Pusher:
 
     Parameters
     ----------
-    bus : with the chip. seq, request : of the STREAM that started it, at `now_ns`. drops : counted before.
+    bus : with the chip. seq, request : of the STREAM that starts it now. drops : counted before.
+    now_ns : the bridge's clock.
     """
 
-    def __init__(self, bus: Bus, seq: int, request: Stream, drops: int, now_ns: int) -> None:
+    def __init__(self, bus: Bus, seq: int, request: Stream, drops: int, now_ns: Callable[[], int]) -> None:
         self._bus, self.seq, self.drops = bus, seq, drops
         self._frame_bytes, self._batch = request.frame_bytes, request.batch
         self._index = 0
         self._status = Status.OK
-        self._pushed_ns = now_ns
+        self._now_ns = now_ns
+        self._pushed_ns = now_ns()
 
-    def look(self, now_ns: int) -> list[Frames]:
-        """What there is to push at `now_ns`."""
+    def look(self) -> list[Frames]:
+        """What there is to push."""
+        now_ns = self._now_ns()
         late = now_ns - self._pushed_ns >= BEAT_NS
         if self._status == Status.OK:
             try:
@@ -44,8 +47,8 @@ class Pusher:
         return made
 
     def _look(self, late: bool) -> Iterator[Frames]:
-        count, t_ns = self._bus.read(reg.FIFO_COUNT_H, 2)
-        n = int.from_bytes(count, "big") // self._frame_bytes
+        t_ns = self._now_ns()
+        n = int.from_bytes(self._bus.read(reg.FIFO_COUNT_H, 2).data, "big") // self._frame_bytes
         if n > MAX_LOOK:
             yield self._stand(Status.OVERFLOW, t_ns)
             return
@@ -66,7 +69,7 @@ class Pusher:
         return self._bus.read(reg.FIFO_R_W, frames * self._frame_bytes).data if frames else b""
 
     def _frames(self, t_ns: int, data: bytes = b"", left: int = 0) -> Frames:
-        made = Frames(self._status, t_us(t_ns), self._index, self.drops % INDEX_WRAP, left, data)
+        made = Frames(self._status, t_ns // US % WRAP_US, self._index, self.drops % INDEX_WRAP, left, data)
         self._index = (self._index + len(data) // self._frame_bytes) % INDEX_WRAP
         return made
 
