@@ -1,0 +1,88 @@
+"""Real logs of simulated autopilots, whose sensors' truth is known."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import mpucal
+from mpucal.cli import commands
+from mpucal.result import REFUSED, Calibration
+
+AXES = "XYZ"
+
+
+@pytest.fixture(scope="module")
+def replayed(tmp_path_factory):
+    """replayed(path): what `mpucal session --replay` leaves, run once a path."""
+    done = {}
+
+    def run(path):
+        if path not in done:
+            folder = tmp_path_factory.mktemp("replayed")
+            result = CliRunner().invoke(commands, ["session", "--replay", str(path), "-o", str(folder), "--yes"])
+            done[path] = (result, folder)
+        return done[path]
+
+    return run
+
+
+def of_imu(folder, imu):
+    document = json.loads((folder / "calibration.json").read_text())
+    return document if imu == 1 else {"format": document["format"], **document["others"][imu - 2]}
+
+
+@pytest.mark.parametrize("imu", [1, 2])
+def test_both_imus_meet_their_truth(captures, replayed, imu):
+    result, folder = replayed(captures / "ardupilot_two_imus.tlog")
+    assert result.exception is None, result.output
+    truth = json.loads((captures / "ardupilot_two_imus.json").read_text())["params"]
+    document = of_imu(folder, imu)
+    new, prefix = document["autopilot"]["params_new"], "INS_ACC" if imu == 1 else f"INS_ACC{imu}"
+    for axis in AXES:
+        assert new[f"{prefix}OFFS_{axis}"] == pytest.approx(truth[f"SIM_ACC{imu}_BIAS_{axis}"], abs=2e-3)
+        assert new[f"{prefix}SCAL_{axis}"] == pytest.approx(truth[f"SIM_ACC{imu}_SCAL_{axis}"], abs=2e-4)
+    D = Calibration.from_document(document).D
+    assert np.abs(D - np.diag(np.diag(D))).max() < 1.5e-3
+
+
+def test_the_parameters_of_the_log_are_the_old_ones(captures, replayed):
+    _, folder = replayed(captures / "ardupilot_two_imus.tlog")
+    truth = json.loads((captures / "ardupilot_two_imus.json").read_text())["params"]
+    for imu, prefix in ((1, "INS_ACC"), (2, "INS_ACC2")):
+        old = of_imu(folder, imu)["autopilot"]["params_old"]
+        names = [f"{prefix}{kind}_{axis}" for kind in ("OFFS", "SCAL") for axis in AXES]
+        assert {name: old[name] for name in names} == pytest.approx({name: truth[name] for name in names})
+
+
+def test_the_replayed_capture_is_the_log_itself(captures, replayed):
+    _, folder = replayed(captures / "ardupilot_two_imus.tlog")
+    assert (folder / "capture.tlog").read_bytes() == (captures / "ardupilot_two_imus.tlog").read_bytes()
+
+
+def test_calibrate_gives_what_the_replay_gave(captures, replayed):
+    _, folder = replayed(captures / "ardupilot_two_imus.tlog")
+    result = CliRunner().invoke(commands, ["calibrate", str(captures / "ardupilot_two_imus.tlog"), "--json"])
+    offline, live = json.loads(result.stdout), of_imu(folder, 1)
+    assert offline["accelerometer"]["D"] == live["accelerometer"]["D"]
+    assert len(offline["others"]) == 1
+
+
+def test_a_stream_that_another_station_slowed_gives_way_to_one_it_did_not(captures):
+    recording = mpucal.load(captures / "mavproxy_streamrate4.tlog")
+    assert recording.sensor.message == "HIGHRES_IMU"
+    assert recording.rate_hz == pytest.approx(100, abs=1)
+
+
+def test_px4_is_calibrated_from_what_its_estimator_did_not_touch(captures):
+    recording = mpucal.load(captures / "px4_sih_static.tlog")
+    assert recording.sensor.message == "SCALED_IMU"
+    assert recording.acc[:, 0].mean() == pytest.approx(-0.50, abs=0.02)
+
+
+def test_a_vehicle_that_only_lay_still_is_refused_with_a_reason(captures, replayed):
+    _, folder = replayed(captures / "px4_sih_static.tlog")
+    quality = of_imu(folder, 1)["quality"]
+    assert quality["verdict"] == REFUSED
+    assert quality["reasons"][0]["code"] == "few_orientations"

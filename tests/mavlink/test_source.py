@@ -1,0 +1,132 @@
+from itertools import chain
+
+import numpy as np
+import pytest
+
+from mpucal.chip.access import EndOfCapture
+from mpucal.errors import LinkError, UsageError
+from mpucal.mavlink.link import Link
+from mpucal.mavlink.replay import Replay
+from mpucal.mavlink.simulated import Options, Vehicle
+from mpucal.mavlink.simulated.transport import SimulatedTransport
+from mpucal.mavlink.source import VehicleSource
+from mpucal.mavlink.tlog import Record, Tlog
+
+
+class Disturbed(SimulatedTransport):
+    """A simulated vehicle of which nothing comes, or to which something happens, from a time on [s]."""
+
+    def __init__(self, vehicle, silent_from=np.inf):
+        super().__init__(vehicle)
+        self._vehicle_, self._silent_from = vehicle, silent_from
+
+    def receive(self, until_ns):
+        received = super().receive(until_ns)
+        return None if self._vehicle_.now_us * 1e-6 > self._silent_from else received
+
+
+def opened(words="", transport=SimulatedTransport, system=None, **how):
+    """A source on a simulated vehicle, what it records, and what it says."""
+    vehicle = Vehicle(Options.parse(f"sim:{words}" if words else "sim"))
+    record, said = [], []
+    link = Link(transport(vehicle, **how), lambda t_ns, data: record.append(Record(t_ns, data)))
+    return VehicleSource(link, 100.0, system, said.append, "test"), record, said
+
+
+def polled(source, seconds):
+    return list(chain.from_iterable(source.poll().t for _ in range(round(20 * seconds))))
+
+
+@pytest.mark.parametrize(
+    ("words", "messages"),
+    [
+        ("", ["HIGHRES_IMU", "SCALED_IMU2"]),
+        ("highres=no,imus=3", ["RAW_IMU", "SCALED_IMU2", "SCALED_IMU3"]),
+        ("firmware=px4", ["SCALED_IMU", "SCALED_IMU2"]),
+    ],
+    ids=["new ArduPilot", "old ArduPilot", "PX4"],
+)
+def test_all_imus_are_recorded_by_their_truest_streams(words, messages):
+    source, _, said = opened(words)
+    sensor = source.start()
+    assert sensor.message == messages[0]
+    assert "system 1" in said[0]
+    t = polled(source, 3)
+    assert np.diff(t) == pytest.approx(0.01, abs=3e-3)
+    recording = source.recording()
+    recordings = [recording, *recording.others]
+    assert [r.autopilot.message for r in recordings] == messages
+    assert [r.autopilot.imu for r in recordings] == list(range(1, len(messages) + 1))
+    assert [r.t[-1] for r in recordings] == pytest.approx([t[-1]] * len(messages), abs=0.02)
+    assert set(t) <= set(recording.t)
+
+
+def test_the_parameters_that_shape_the_stream_are_read_first():
+    source, _, _ = opened("INS_ACCOFFS_X=0.25")
+    source.start()
+    polled(source, 1)
+    parameters = source.recording().autopilot.parameters
+    assert parameters["INS_ACCOFFS_X"] == 0.25
+    assert {"AHRS_ORIENTATION", "INS_ACC2SCAL_Z"} <= set(parameters)
+
+
+def test_a_still_quantised_gyro_is_not_believed_to_be_without_noise():
+    source, _, _ = opened("highres=no")
+    source.start()
+    polled(source, 3)
+    recording = source.recording()
+    assert min(recording.least_noise) > 0.0
+    assert recording.flat is not None
+
+
+@pytest.mark.parametrize("fault", ["loss", "reorder", "duplicate"])
+def test_faults_of_the_line_leave_samples_in_order(fault):
+    source, _, said = opened(f"fault={fault}")
+    source.start()
+    t = polled(source, 12)
+    assert (np.diff(t) > 0).all()
+    recording = source.recording()
+    assert (np.diff(recording.t) > 0).all()
+    assert not recording.gap.any()
+    # late samples are missing while it measures, and in their places at the end
+    lost = 0.2 if fault == "loss" else 0.0
+    assert len(recording) == pytest.approx((1.0 - lost) * 1200, abs=150)
+    assert [text for text in said if "loses" in text] == ([f for f in said if "% of the packets" in f] if lost else [])
+
+
+def test_a_replay_gives_the_same_samples_poll_by_poll():
+    source, record, _ = opened("highres=no,fault=loss,fault=reorder")
+    first = [source.start(), *(source.poll().t.tolist() for _ in range(60))]
+    link = Link(Replay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)
+    again = VehicleSource(link, 100.0, None, lambda text: None, "test")
+    assert [again.start(), *(again.poll().t.tolist() for _ in range(59))] == first[:-1]
+    with pytest.raises(EndOfCapture):
+        for _ in range(3):
+            again.poll()
+    np.testing.assert_array_equal(again.recording().acc, source.recording().acc)
+
+
+def test_a_vehicle_that_falls_silent_is_one_sentence():
+    source, _, _ = opened(transport=Disturbed, silent_from=12.0)
+    source.start()
+    with pytest.raises(LinkError, match=r"system 1 \(ArduPilot\) at the simulated vehicle has sent nothing for 4 s"):
+        polled(source, 30)
+
+
+def test_a_reboot_is_noticed(script, station):
+    vehicle, home = station(), "10.0.0.2:14555"
+    packets = [(0.5, home, vehicle.heartbeat())]
+    packets += [(1 + 0.01 * k, home, vehicle.raw(900_000_000 + 10_000 * k)) for k in range(4000)]
+    packets += [(42 + 0.01 * k, home, vehicle.raw(3_000_000 + 10_000 * k)) for k in range(100)]
+    link = Link(script(packets), lambda t_ns, data: None)
+    source = VehicleSource(link, 100.0, None, lambda text: None, "test")
+    source.start()
+    with pytest.raises(LinkError, match="rebooted: its clock started again"):
+        polled(source, 60)
+    assert len(source.recording()) > 1000
+
+
+def test_another_system_is_not_locked_to():
+    source, _, _ = opened(system=9)
+    with pytest.raises(UsageError, match="no vehicle is system 9"):
+        source.start()

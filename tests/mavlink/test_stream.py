@@ -1,0 +1,135 @@
+import pytest
+
+from mpucal.errors import LinkError
+from mpucal.mavlink.dialect import dialect
+from mpucal.mavlink.imu import Stream
+from mpucal.mavlink.link import Link, S
+from mpucal.mavlink.stream import Streams
+from mpucal.mavlink.truth import ARDUPILOT
+
+HOME = "10.0.0.2:14555"
+RAW, HIGHRES, SCALED2 = 27, 105, 116
+
+
+@pytest.fixture
+def vehicle(script, station, decoded):
+    """vehicle(...): a transport to one that streams what it is asked for, as ArduPilot does."""
+
+    class Streaming(script):
+        outward = False
+
+        def __init__(self, streams=(RAW,), fastest_hz=333, commands=True, groups=False):
+            super().__init__([(0.5 + k, HOME, maker.heartbeat()) for k in range(60)])
+            self.streams, self.fastest_hz, self.commands, self.groups = streams, fastest_hz, commands, groups
+            self.interval_ns = {}
+            self.due_ns = {}
+            self.asked = []
+            self.answer = self.answered
+
+        def set(self, message_id, hz):
+            self.interval_ns[message_id] = round(S / hz)
+            self.due_ns[message_id] = self.now_ns()
+
+        def answered(self, data):
+            message = decoded(data)
+            if message.get_type() == "REQUEST_DATA_STREAM" and self.groups:
+                self.set(RAW, message.req_message_rate)
+            if message.get_type() != "COMMAND_LONG" or not self.commands:
+                return []
+            message_id, hz = int(message.param1), 1e6 / message.param2
+            self.asked.append((message_id, round(hz)))
+            result = 3 if message_id not in self.streams else 2 if hz > self.fastest_hz else 0
+            if not result:
+                self.set(message_id, hz)
+            return [maker.message("command_ack", message.command, result)]
+
+        def receive(self, until_ns):
+            due = [(t_ns, message_id) for message_id, t_ns in self.due_ns.items()]
+            t_ns, message_id = min(due, default=(until_ns, 0))
+            if t_ns < until_ns and not (self.arriving and self.arriving[0].t_ns <= t_ns):
+                data = MAKE[message_id](t_ns // 1000)
+                self.due_ns[message_id] += self.interval_ns[message_id]
+                self.arriving = [*script([(t_ns / S, HOME, data)]).arriving, *self.arriving]
+            return super().receive(until_ns)
+
+    maker = station()
+    MAKE = {
+        RAW: maker.raw,
+        SCALED2: lambda t_us: maker.message("scaled_imu2", t_us // 1000, 0, 0, -1000, 0, 0, 0, 0, 0, 0),
+        HIGHRES: lambda t_us: maker.message(
+            "highres_imu", t_us, 0, 0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 25.0, 0xFFFF, 0
+        ),
+    }
+    return Streaming
+
+
+def streams(transport, said=None, rate_hz=200.0):
+    link = Link(transport, lambda t_ns, data: None)
+    link.lock(link.listen()[0])
+    return link, Streams(link, ARDUPILOT, {}, rate_hz, (said if said is not None else []).append)
+
+
+@pytest.mark.parametrize(
+    ("what", "first"),
+    [
+        ({"streams": (HIGHRES, RAW)}, "HIGHRES_IMU"),
+        ({"streams": (RAW, SCALED2)}, "RAW_IMU"),
+        ({"streams": (), "groups": True}, "RAW_IMU"),
+        ({"commands": False, "groups": True}, "RAW_IMU"),
+    ],
+    ids=["highres", "raw", "REQUEST_DATA_STREAM", "an autopilot that acknowledges nothing"],
+)
+def test_the_truest_stream_there_is(vehicle, what, first):
+    _, asked = streams(vehicle(**what))
+    assert asked.start() == Stream(first, 1)
+
+
+def test_a_denied_rate_is_followed_by_lower_ones(vehicle):
+    transport = vehicle(fastest_hz=120)
+    _, asked = streams(transport, rate_hz=400.0)
+    asked.start()
+    assert [hz for message_id, hz in transport.asked if message_id == RAW] == [400, 200, 100]
+
+
+def watched(transport, lowered_hz, said):
+    """How many RAW_IMU come in the 20 s after another station set its rate."""
+    link, asked = streams(transport, said)
+    asked.start()
+    counted = []
+    link.subscribe(lambda message: counted.append(message) if message.get_type() == "RAW_IMU" else None)
+    for second in range(30):
+        if second == 10:
+            counted.clear()
+            transport.set(RAW, lowered_hz)
+        for _ in range(20):
+            list(link.messages(link.now_ns() + S // 20))
+            asked.watch()
+    return len(counted) / 20.0
+
+
+@pytest.mark.parametrize("lowered_hz", [4, 60])
+def test_a_lowered_rate_is_asked_for_again_and_told(vehicle, lowered_hz):
+    said = []
+    assert watched(vehicle(), lowered_hz, said) > 140
+    assert len(said) == 1
+    assert "RAW_IMU fell from 200" in said[0]
+    assert "--streamrate=-1" in said[0]
+
+
+def test_a_slightly_lower_rate_is_let_be(vehicle):
+    said = []
+    assert watched(vehicle(), 160, said) < 170
+    assert said == []
+
+
+def test_a_vehicle_that_streams_nothing_is_one_sentence(vehicle):
+    _, asked = streams(vehicle(streams=()))
+    with pytest.raises(LinkError, match="sends no IMU messages, though HIGHRES_IMU and RAW_IMU were asked for: check"):
+        asked.start()
+
+
+def test_the_messages_asked_for_are_those_of_the_dialect():
+    from mpucal.mavlink.imu import MESSAGE_ID
+
+    ids = {name: getattr(dialect(), f"MAVLINK_MSG_ID_{name}") for name in MESSAGE_ID}
+    assert ids == MESSAGE_ID
