@@ -6,8 +6,16 @@
     python tools/sim_vehicle.py tcp:127.0.0.1:5760     # listens; mpucal session --mavlink tcp:127.0.0.1:5760
     python tools/sim_vehicle.py pty                    # says which device
 
-It prints the station's --mavlink on its first line, then runs until it is stopped, or its standard input ends.
-Everything else is KEY=VALUE: the vehicle's keys (an unknown one lists them) and its parameters' first values.
+It prints the station's --mavlink on its first line, then runs until it is stopped. Everything else is KEY=VALUE: the
+vehicle's keys (an unknown one lists them) and its parameters' first values. What a station has to live with:
+
+    fault=loss fault=reorder fault=duplicate           # one packet in five lost, one in ten late, one in ten twice
+    fault=second_station@20                            # another station's REQUEST_DATA_STREAM at 4 Hz, every 15 s
+    fault=arm@30 fault=reboot@30 fault=silence@30      # s after the start
+    refuse=INS_ACCSCAL_Y                               # a parameter that it will not set
+    --vehicles 2                                       # the others are systems of their own, at ports of their own
+    --stranger                                         # 50 forged RAW_IMU and 50 truncated packets a second
+    --signing-key FILE                                 # it signs, and hears nobody who does not
 """
 
 from __future__ import annotations
@@ -15,13 +23,20 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NoReturn
 
 from mpucal.errors import MpucalError, UsageError
+from mpucal.mavlink.dialect import dialect
+from mpucal.mavlink.signing import read_key
 from mpucal.mavlink.simulated import Options, Vehicle
 from mpucal.mavlink.simulated.line import Line
 from mpucal.mavlink.simulated.ports import Port, PtyPort, TcpPort, UdpPort
 
 STEP_S = 0.002
+STRANGER_US = 20_000
 
 
 def main() -> int:
@@ -29,21 +44,33 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("port", metavar="udp:HOST:PORT|tcp:HOST:PORT|pty")
     parser.add_argument("words", metavar="KEY=VALUE", nargs="*")
+    parser.add_argument("--vehicles", type=int, default=1, help="how many (udp)")
+    parser.add_argument("--stranger", action="store_true", help="send forged and truncated packets (udp)")
+    parser.add_argument("--signing-key", metavar="FILE", type=Path, help="32 bytes to sign with")
     parser.add_argument("--speed", type=float, default=1.0, help="how much faster than real its time runs")
     arguments = parser.parse_args()
+    ports: list[Port] = []
     try:
-        vehicle = Vehicle(Options.parse(":".join(["sim", ",".join(arguments.words)]).rstrip(":")))
-        port = open_port(arguments.port)
+        options = Options.parse(":".join(["sim", ",".join(arguments.words)]).rstrip(":"))
+        key = None if arguments.signing_key is None else read_key(arguments.signing_key)
+        riders: list[Ride | Stranger] = []
+        for number in range(arguments.vehicles):
+            vehicle = Vehicle(replace(options, system=options.system + number, seed=options.seed + number), key=key)
+            ports.append(open_port(arguments.port))
+            riders.append(Ride(vehicle, ports[-1]))
+        if arguments.stranger:
+            ports.append(open_port(arguments.port))
+            riders.append(Stranger(ports[-1], options.system))
+        print(ports[0].name, flush=True)
+        run(riders, arguments.speed)
     except MpucalError as error:
         print(f"sim_vehicle: {error}", file=sys.stderr)
         return error.exit_code
-    print(port.name, flush=True)
-    try:
-        run(vehicle, port, arguments.speed)
     except KeyboardInterrupt:
         return 0
     finally:
-        port.close()
+        for port in ports:
+            port.close()
 
 
 def open_port(text: str) -> Port:
@@ -57,16 +84,47 @@ def open_port(text: str) -> Port:
     raise UsageError(f"{text} is no port", "give udp:HOST:PORT, tcp:HOST:PORT or pty")
 
 
-def run(vehicle: Vehicle, port: Port, speed: float) -> None:
-    """Let it live as time goes on, until Ctrl-C."""
-    line = Line(vehicle.options.faults, vehicle.options.seed)
+class Ride:
+    """A vehicle on a port."""
+
+    def __init__(self, vehicle: Vehicle, port: Port) -> None:
+        self._vehicle, self._port = vehicle, port
+        self._line = Line(vehicle.options.faults, vehicle.options.seed)
+
+    def go_on(self, until_us: int) -> None:
+        """Hear what came, and live until `until_us`."""
+        for data in self._port.receive():
+            self._vehicle.hear(data, self._port.datagrams)
+        for data in self._line.carry([packet.data for packet in self._vehicle.go_on(until_us)]):
+            self._port.send(data)
+
+
+class Stranger:
+    """Somebody else on the network, who sends what the vehicle's `system` would, and parts of it."""
+
+    def __init__(self, port: Port, system: int) -> None:
+        self._port = port
+        self._mav = dialect().MAVLink(None, system, 1)
+        self._sent = 0
+
+    def go_on(self, until_us: int) -> None:
+        """A forged RAW_IMU and a truncated one, each 20 ms."""
+        while self._sent * STRANGER_US < until_us:
+            forged = (
+                dialect().MAVLink_raw_imu_message(until_us, 999, -999, 999, 999, -999, 999, 0, 0, 0).pack(self._mav)
+            )
+            self._port.send(forged)
+            self._port.send(forged[:17])
+            self._sent += 1
+
+
+def run(riders: Sequence[Ride | Stranger], speed: float) -> NoReturn:
+    """Let them live as time goes on, until Ctrl-C."""
     begun = time.monotonic()
     while True:
-        for data in port.receive(STEP_S):
-            vehicle.hear(data)
-        sent = vehicle.go_on(round((time.monotonic() - begun) * speed * 1e6))
-        for data in line.carry([packet.data for packet in sent]):
-            port.send(data)
+        time.sleep(STEP_S)
+        for rider in riders:
+            rider.go_on(round((time.monotonic() - begun) * speed * 1e6))
 
 
 if __name__ == "__main__":

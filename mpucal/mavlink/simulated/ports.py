@@ -20,17 +20,18 @@ class Port(Protocol):
 
     Attributes
     ----------
-    name : what a station gives to --mavlink.
+    name : what a station gives to --mavlink. datagrams : what it receives comes in whole packets.
     """
 
     name: str
+    datagrams: bool
 
     def send(self, data: bytes) -> None:
         """To every station that is there; lost where none is."""
         ...
 
-    def receive(self, timeout_s: float) -> list[bytes]:
-        """What stations sent, waited for as long at most."""
+    def receive(self) -> list[bytes]:
+        """What stations sent meanwhile."""
         ...
 
     def close(self) -> None:
@@ -46,6 +47,8 @@ class UdpPort:
     host, port : of the station.
     """
 
+    datagrams = True
+
     def __init__(self, host: str, port: int) -> None:
         self._station = (host, port)
         self.name = f"udp:{host}:{port}"
@@ -57,10 +60,9 @@ class UdpPort:
         with suppress(OSError):
             self._socket.sendto(data, self._station)
 
-    def receive(self, timeout_s: float) -> list[bytes]:
+    def receive(self) -> list[bytes]:
         """See Port."""
         received: list[bytes] = []
-        select.select([self._socket], [], [], timeout_s)
         with suppress(OSError):
             while True:
                 received.append(self._socket.recvfrom(CHUNK)[0])
@@ -79,6 +81,8 @@ class TcpPort:
     LinkError : the port is taken.
     """
 
+    datagrams = False
+
     def __init__(self, host: str, port: int) -> None:
         try:
             self._server = socket.create_server((host, port))
@@ -94,10 +98,10 @@ class TcpPort:
             with suppress(OSError):
                 station.sendall(data)
 
-    def receive(self, timeout_s: float) -> list[bytes]:
+    def receive(self) -> list[bytes]:
         """See Port."""
         received: list[bytes] = []
-        ready, _, _ = select.select([self._server, *self._stations], [], [], timeout_s)
+        ready, _, _ = select.select([self._server, *self._stations], [], [], 0)
         for channel in ready:
             if channel is self._server:
                 self._stations.append(self._server.accept()[0])
@@ -121,6 +125,8 @@ class TcpPort:
 class PtyPort:
     """A pseudo-terminal, which a station opens as its serial port."""
 
+    datagrams = False
+
     def __init__(self) -> None:
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
@@ -132,9 +138,9 @@ class PtyPort:
         with suppress(OSError):
             os.write(self._master, data)
 
-    def receive(self, timeout_s: float) -> list[bytes]:
+    def receive(self) -> list[bytes]:
         """See Port."""
-        if not select.select([self._master], [], [], timeout_s)[0]:
+        if not select.select([self._master], [], [], 0)[0]:
             return []
         with suppress(OSError):
             return [os.read(self._master, CHUNK)]

@@ -72,11 +72,11 @@ class Vehicle:
         """How far it has gone on."""
         return self._now_us
 
-    def hear(self, data: bytes) -> None:
-        """A datagram arrives now."""
+    def hear(self, data: bytes, datagram: bool = True) -> None:
+        """Bytes arrive now: a datagram of whole packets, or a piece of a stream."""
         if self._now_us < self._silent_until_us:
             return
-        for packet in self._parser.datagram(data):
+        for packet in self._parser.datagram(data) if datagram else self._parser.stream(data):
             answer = self._HANDLERS.get(packet.message.get_type())
             if answer is not None and getattr(packet.message, "target_system", 0) in (0, self.options.system):
                 answer(self, packet.message)
