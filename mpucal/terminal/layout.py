@@ -76,7 +76,8 @@ def _prompt(view: View, columns: int) -> list[Text]:
 def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
     """The board as it is and as it is wanted, and the map of where it has been."""
     height = rows - 1
-    wide, round_ = min(columns // 4 + 2, 4 * height), min(columns // 4 - 2, 2 * height)
+    quarter = (columns - 4) // 4
+    wide, round_ = min(quarter + 2, 4 * height), min(quarter - 2, 2 * height)
     parts: list[tuple[str, list[Text], int]] = []
     if view.meter is not None:
         parts.append(("now", board.picture(view.meter.down, wide, height).lines("", glyphs.unicode), wide))

@@ -83,3 +83,10 @@ def test_results_of_the_check_stand_where_the_bars_were(views):
 
 def test_at_the_end_the_decisions_are_there(views):
     assert "the calibration is good" in "\n".join(text_of(views["ended"]))
+
+
+@pytest.mark.parametrize("size", [(60, 20), (80, 24), (80, 30), (100, 30), (119, 45), (160, 50), (161, 60)], ids=str)
+def test_no_picture_is_cut_off(views, size):
+    drawn = text_of(views["turned"], *size)
+    pictures = [line for line in drawn if BRAILLE.search(line)]
+    assert max(len(line.rstrip()) for line in pictures) < size[0]
