@@ -52,9 +52,10 @@ def avr_build(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def emulator(tmp_path_factory):
-    """The module of the emulated board, and its library."""
+    """The modules of the emulated board and of a line to it, and the board's library between them."""
     _need("gcc")
     if not SIMAVR.exists():
         pytest.skip("needs libsimavr-dev, of the packages in tools/ci_packages.txt")
     module = _module(HERE / "emulator" / "board.py")
-    return module, module.build_library(tmp_path_factory.mktemp("board"))
+    library = module.build_library(tmp_path_factory.mktemp("board"))
+    return module, library, _module(HERE / "emulator" / "port.py")

@@ -1,0 +1,195 @@
+"""The real firmware on an emulated ATmega328P, in that one's own time: registers, a minute at 1 kHz, blobs, power."""
+
+from __future__ import annotations
+
+import re
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpucal.bus.bridge.bus import BridgeBus
+from mpucal.bus.bridge.link import Link
+from mpucal.bus.bridge.store import Store
+from mpucal.bus.simulated import open_simulated
+from mpucal.chip import registers as reg
+from mpucal.chip.access import Reply
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.errors import BusError, NoAnswer
+from mpucal.wire.blob import Blob
+
+ROOT = Path(__file__).parents[2]
+OLD = (ROOT / "fixtures" / "vectors" / "blob_measured.bin").read_bytes()
+NEW = replace(Blob.decode(OLD), b_a=(1.0, 2.0, 3.0)).encode()
+
+FLASH_LIMIT, RAM_LIMIT = 8192, 1024
+RATE_HZ, SECONDS = 1000, 60
+
+
+class NumberingChip:
+    """An MPU-6050 as far as the driver sees, whose samples are numbered: accelerometer x and y hold the number."""
+
+    DROPPED = 2  # which the driver does not believe, right after a reset
+
+    def __init__(self, clock):
+        self._chip, self._clock = open_simulated("sim", clock=clock), clock
+        self._started_ns, self._made, self._fifo = None, 0, bytearray()
+
+    def read(self, register, count):
+        self._advance()
+        if register == reg.FIFO_COUNT_H:
+            self._count = len(self._fifo).to_bytes(2, "big")
+        if register in (reg.FIFO_COUNT_H, reg.FIFO_COUNT_L):
+            return Reply(self._count[register - reg.FIFO_COUNT_H :][:1], 0)
+        if register in (reg.TEMP_OUT_H, reg.TEMP_OUT_H + 1):
+            return Reply(b"\0", 0)
+        if register != reg.FIFO_R_W or not self._fifo:
+            return self._chip.read(register, count)
+        return Reply(bytes([self._fifo.pop(0)]), 0)
+
+    def write(self, register, data):
+        self._advance()
+        if register == reg.FIFO_EN:
+            self._started_ns, self._made = (self._clock.now(), 0) if data[0] else (None, 0)
+            self._fifo.clear()
+            return 0
+        return self._chip.write(register, data)
+
+    def _advance(self):
+        if self._started_ns is None:
+            return
+        while self._started_ns + (self._made + 1) * 1_000_000 <= self._clock.now():
+            words = np.array([*divmod(self._made, 1000), 0, 0, 0, 0, 0], ">i2")
+            self._fifo += words.tobytes()
+            self._made += 1
+
+
+@pytest.fixture
+def switch_on(emulator, avr_build, tmp_path):
+    """Switches a board on, with an EEPROM that outlives it; gives the board and a port to it."""
+    module, library, port = emulator
+    boards = []
+
+    def power(chip=None, eeprom=tmp_path / "eeprom.bin"):
+        clock = module.BoardClock()
+        board = module.Board(library, avr_build[0] / "mpucal_bridge.elf", eeprom, (chip or _simulated)(clock), clock)
+        boards.append(board)
+        board.run(0.001)
+        return board, port.BoardPort(board)
+
+    yield power
+    for board in boards:
+        board.cut_power()
+
+
+def _simulated(clock):
+    return open_simulated("sim:seed=1", clock=clock)
+
+
+def open_store(port):
+    link = Link(port, lambda *_: None)
+    link.greet()
+    return Store(link)
+
+
+def test_flash_and_ram_leave_room(avr_build):
+    flash, ram = map(int, re.search(r"(\d+) bytes of flash .* (\d+) bytes of RAM", avr_build[1]).groups())
+    assert (flash < FLASH_LIMIT, ram < RAM_LIMIT) == (True, True)
+
+
+def test_reads_and_writes_registers_in_the_bridges_time(switch_on):
+    board, port = switch_on()
+    bus = BridgeBus(port)
+    first, second = bus.read(reg.WHO_AM_I, 1), bus.read(reg.WHO_AM_I, 1)
+    assert (first.data, bus.link.bridge.address) == (b"\x68", 0x68)
+    assert 0 < second.t_ns - first.t_ns < 10_000_000
+    bus.write(reg.PWR_MGMT_1, b"\x01\x00")
+    assert bus.read(reg.PWR_MGMT_1, 2).data == b"\x01\x00"
+    assert board.overruns == 0
+
+
+def test_says_that_no_chip_answers(switch_on):
+    board, port = switch_on()
+    board.unplug_chip()
+    with pytest.raises(NoAnswer):
+        BridgeBus(port)
+
+
+def test_a_chip_unplugged_under_way_is_told(switch_on):
+    board, port = switch_on()
+    bus = BridgeBus(port)
+    board.unplug_chip()
+    with pytest.raises(NoAnswer):
+        bus.read(reg.WHO_AM_I, 1)
+    board.unplug_chip(False)
+    assert bus.read(reg.WHO_AM_I, 1).data == b"\x68"
+
+
+def test_a_minute_at_1_khz_and_500_kbaud_loses_nothing(switch_on):
+    board, port = switch_on(NumberingChip)
+    driver = Driver(BridgeBus(port), Config(rate_hz=RATE_HZ))
+    driver.start()
+    while board.now_s < SECONDS + 1:
+        driver.poll()
+    recording = driver.recording()
+    words = np.rint(recording.acc * 8192 / 9.80665).astype(int)
+    numbers = words[:, 0] * 1000 + words[:, 1]
+    assert len(numbers) >= SECONDS * RATE_HZ
+    assert np.array_equal(numbers, np.arange(len(numbers)) + NumberingChip.DROPPED)
+    assert (recording.gap.sum(), board.overruns) == (0, 0)
+    assert recording.rate_hz == pytest.approx(RATE_HZ, rel=1e-4)
+    assert np.diff(recording.t) == pytest.approx(1 / RATE_HZ, rel=1e-3)
+
+
+def test_a_blob_outlives_the_power(switch_on):
+    board, port = switch_on()
+    open_store(port).write(OLD)
+    board.cut_power()
+    _, port = switch_on()
+    store = open_store(port)
+    assert (store.read(), store.state().generation) == (OLD, 1)
+
+
+@pytest.mark.parametrize("torn", [0x00, 0xFF, 0xA5], ids=hex)
+def test_power_loss_at_any_cycle_of_a_blob_write_leaves_the_old_blob_or_the_new(torn, switch_on, tmp_path):
+    eeprom = tmp_path / "eeprom.bin"
+    board, port = switch_on()
+    open_store(port).write(OLD)
+    holds_old, began = eeprom.read_bytes(), board.cycle
+    open_store(port).write(NEW)
+    cycles = board.cycle - began
+    board.cut_power()
+    rng = np.random.default_rng(torn)
+    found = [held_after(cut, torn, holds_old, switch_on, eeprom) for cut in rng.integers(0, cycles, 10)]
+    assert set(found) <= {OLD, NEW}
+    # the last bytes that are written make the difference
+    assert held_after(2 * cycles, torn, holds_old, switch_on, eeprom) == NEW
+    assert held_after(cycles // 2, torn, holds_old, switch_on, eeprom) == OLD
+
+
+class Gone(Exception):  # noqa: N818 - stands for a plug that was pulled
+    """The power failed."""
+
+
+def held_after(cycles, torn, before, switch_on, eeprom):
+    """What the next start finds where the power fails `cycles` after the host began to write NEW."""
+    eeprom.write_bytes(before)
+    board, port = switch_on()
+    store = open_store(port)
+    end = board.cycle + int(cycles)
+    run_cycles = board.run_cycles
+
+    def run_until_power_fails(count):
+        run_cycles(min(count, end - board.cycle))
+        if board.cycle >= end:
+            raise Gone
+
+    board.run_cycles = run_until_power_fails
+    with suppress(Gone, BusError):
+        store.write(NEW)
+    board.cut_power(torn)
+    _, port = switch_on()
+    return open_store(port).read()
