@@ -27,7 +27,12 @@ def accelerometer_section(c: Calibration) -> str:
     explained = paragraph(
         "An axis that leans to another one feels a part of that one's acceleration; 1 mg is 0.0098 m/s².", note=True
     )
-    return section("The accelerometer", _in_peoples_units("accelerometer", accelerometer(c)), explained)
+    return section("The accelerometer", accelerometer_table(c, "accelerometer"), explained)
+
+
+def accelerometer_table(c: Calibration, id_: str) -> str:
+    """Its gains, biases and leans."""
+    return _in_peoples_units(id_, accelerometer(c))
 
 
 def formula_section(c: Calibration) -> str:

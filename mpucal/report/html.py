@@ -25,6 +25,7 @@ from .gallery import gallery
 from .style import CSS
 from .track import Track
 from .use import in_c, in_python, in_ros
+from .vehicle import vehicle_section
 
 VERDICTS = {
     GOOD: "Good: the calibration explains what the sensor measured, and each parameter is well known.",
@@ -32,6 +33,7 @@ VERDICTS = {
     REFUSED: "Refused: do not use these numbers.",
 }
 INSTALL = "pip install 'mpucal[plot]'"
+CAPTURES = (".mcap", ".tlog")
 _NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
@@ -48,6 +50,7 @@ def render(calibration: Calibration, recording: Recording | None = None) -> str:
         section("Where it was turned", *_those(drawn, "coverage")),
         section("The gyroscope", gyroscope_table(calibration), *_those(drawn, "rates")),
         section("Temperature", *_those(drawn, "temperature")),
+        vehicle_section(calibration),
         _application(calibration),
         _settings(calibration, recording),
         matrices_section(calibration),
@@ -162,7 +165,7 @@ def _reproduction(calibration: Calibration, recording: Recording | None) -> str:
         return ""
     name = PurePath(recording.name)
     lines = [f"mpucal calibrate {name} --model {model} --gravity {gravity:.9g} -o again"]
-    if name.suffix == ".mcap":
+    if name.suffix in CAPTURES:
         lines.append(f"mpucal session --replay {name} -o replayed")
     said = paragraph(
         "In the folder of this page. The first fits the recording again; the second runs the whole session again, "
