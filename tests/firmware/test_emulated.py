@@ -13,9 +13,10 @@ import pytest
 from mpucal.bus.bridge.bus import BridgeBus
 from mpucal.bus.bridge.link import Link
 from mpucal.bus.bridge.store import Store
-from mpucal.bus.simulated import open_simulated
+from mpucal.bus.simulated import Chip, SimulatedBus, open_simulated
+from mpucal.bus.simulated.factory import Factory
+from mpucal.bus.simulated.models import MODELS
 from mpucal.chip import registers as reg
-from mpucal.chip.access import Reply
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, NoAnswer
@@ -29,42 +30,22 @@ FLASH_LIMIT, RAM_LIMIT = 8192, 1024
 RATE_HZ, SECONDS = 1000, 60
 
 
-class NumberingChip:
-    """An MPU-6050 as far as the driver sees, whose samples are numbered: accelerometer x and y hold the number."""
+class Numbers:
+    """A feed whose samples are numbered: accelerometer x and y hold the number, at a constant temperature."""
 
-    DROPPED = 2  # which the driver does not believe, right after a reset
+    def __init__(self):
+        self._next = 0
 
-    def __init__(self, clock):
-        self._chip, self._clock = open_simulated("sim", clock=clock), clock
-        self._started_ns, self._made, self._fifo = None, 0, bytearray()
+    def samples(self, edges_s, _setting):
+        numbers = np.arange(self._next, self._next + len(edges_s) - 1)
+        self._next += len(numbers)
+        words = np.zeros((len(numbers), 7), np.int16)
+        words[:, 0], words[:, 1] = np.divmod(numbers, 1000)
+        return words
 
-    def read(self, register, count):
-        self._advance()
-        if register == reg.FIFO_COUNT_H:
-            self._count = len(self._fifo).to_bytes(2, "big")
-        if register in (reg.FIFO_COUNT_H, reg.FIFO_COUNT_L):
-            return Reply(self._count[register - reg.FIFO_COUNT_H :][:1], 0)
-        if register in (reg.TEMP_OUT_H, reg.TEMP_OUT_H + 1):
-            return Reply(b"\0", 0)
-        if register != reg.FIFO_R_W or not self._fifo:
-            return self._chip.read(register, count)
-        return Reply(bytes([self._fifo.pop(0)]), 0)
 
-    def write(self, register, data):
-        self._advance()
-        if register == reg.FIFO_EN:
-            self._started_ns, self._made = (self._clock.now(), 0) if data[0] else (None, 0)
-            self._fifo.clear()
-            return 0
-        return self._chip.write(register, data)
-
-    def _advance(self):
-        if self._started_ns is None:
-            return
-        while self._started_ns + (self._made + 1) * 1_000_000 <= self._clock.now():
-            words = np.array([*divmod(self._made, 1000), 0, 0, 0, 0, 0], ">i2")
-            self._fifo += words.tobytes()
-            self._made += 1
+def _numbering(clock):
+    return SimulatedBus(Chip(MODELS["mpu6050"], Numbers(), 0.0, Factory()), clock)
 
 
 @pytest.fixture
@@ -129,7 +110,7 @@ def test_a_chip_unplugged_under_way_is_told(switch_on):
 
 
 def test_a_minute_at_1_khz_and_500_kbaud_loses_nothing(switch_on):
-    board, port = switch_on(NumberingChip)
+    board, port = switch_on(_numbering)
     driver = Driver(BridgeBus(port), Config(rate_hz=RATE_HZ))
     driver.start()
     while board.now_s < SECONDS + 1:
@@ -138,7 +119,7 @@ def test_a_minute_at_1_khz_and_500_kbaud_loses_nothing(switch_on):
     words = np.rint(recording.acc * 8192 / 9.80665).astype(int)
     numbers = words[:, 0] * 1000 + words[:, 1]
     assert len(numbers) >= SECONDS * RATE_HZ
-    assert np.array_equal(numbers, np.arange(len(numbers)) + NumberingChip.DROPPED)
+    assert np.array_equal(numbers, np.arange(len(numbers)) + numbers[0])
     assert (recording.gap.sum(), board.overruns) == (0, 0)
     assert recording.rate_hz == pytest.approx(RATE_HZ, rel=1e-4)
     assert np.diff(recording.t) == pytest.approx(1 / RATE_HZ, rel=1e-3)
