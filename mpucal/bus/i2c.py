@@ -1,28 +1,32 @@
-"""A Linux I2C bus on smbus2. Knows no chip but the address where one answers, and repeats nothing.
+"""A Linux I2C bus on smbus2. Knows no chip but the identity by which it finds one, and repeats nothing.
+
+What an adapter can do is found, not assumed: plain I2C where there is any, else SMBus blocks of 32 bytes; and where
+it refuses a message as too long, before anything has moved, shorter ones.
 
 Source: Linux Documentation/i2c/dev-interface.rst and fault-codes.rst.
 """
 
 from __future__ import annotations
 
+import errno
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 from ..chip.access import Reply
-from ..chip.registers import WHO_AM_I
+from ..chip.families import PARTS
+from ..chip.registers import FIFO_R_W, WHO_AM_I
 from ..errors import BusError, NoAnswer
 from .i2c_errors import nobody, opening_error, transfer_error
-
-if TYPE_CHECKING:
-    from smbus2 import i2c_msg
 
 # AD0 low, AD0 high
 ADDRESSES = (0x68, 0x69)
 
 # i2c-dev refuses longer messages
 MAX_MESSAGE_BYTES = 8192
+SMBUS_BLOCK_BYTES = 32
+# an adapter that refuses even this little cannot do what is asked of it at all
+SHORTEST_LIMIT = 4
 
 
 class I2cBus:
@@ -47,8 +51,10 @@ class I2cBus:
         try:
             with self._told(opening_error):
                 self._smbus.open(self._path)
-            if not self._smbus.funcs & smbus2.I2cFunc.I2C:
-                raise BusError(f"the adapter {self._path} speaks SMBus only, not I2C", "use another adapter")
+            self._blocks = not self._smbus.funcs & smbus2.I2cFunc.I2C
+            if self._blocks and not self._smbus.funcs & smbus2.I2cFunc.SMBUS_READ_I2C_BLOCK:
+                raise BusError(f"the adapter {self._path} moves single bytes only", "use another adapter")
+            self._longest = SMBUS_BLOCK_BYTES if self._blocks else MAX_MESSAGE_BYTES
             self._address = self._find(ADDRESSES if address is None else (address,))
         except BaseException:
             self._smbus.close()
@@ -60,19 +66,29 @@ class I2cBus:
         return self._address
 
     def read(self, register: int, count: int) -> Reply:
-        """`count` bytes from `register` on, in one message; the time is the one just before the transfer."""
+        """`count` bytes from `register` on, in one message if the adapter can; the time is the one just before."""
         if count > MAX_MESSAGE_BYTES:
             raise BusError(
                 f"{self._path} moves at most {MAX_MESSAGE_BYTES} bytes at once, not {count}",
                 "read less at once",
             )
-        message = self._message.read(self._address, count)
-        t_ns = self._transfer(self._message.write(self._address, [register]), message)
-        return Reply(bytes(message), t_ns)
+        t_ns, data = time.monotonic_ns(), b""
+        with self._told(transfer_error, self._address):
+            while len(data) < count:
+                # FIFO_R_W gives the next bytes again and again, any other register is followed by the next
+                place = register if register == FIFO_R_W else register + len(data)
+                data += self._part(place, count - len(data))
+        return Reply(data, t_ns)
 
     def write(self, register: int, data: bytes) -> int:
         """Write `data` from `register` on, and return the time just before the transfer."""
-        return self._transfer(self._message.write(self._address, [register, *data]))
+        t_ns = time.monotonic_ns()
+        with self._told(transfer_error, self._address):
+            if self._blocks:
+                self._smbus.write_i2c_block_data(self._address, register, list(data))
+            else:
+                self._smbus.i2c_rdwr(self._message.write(self._address, [register, *data]))
+        return t_ns
 
     def sleep_until(self, t_ns: int) -> None:
         """Sleep until the monotonic clock shows `t_ns`."""
@@ -83,29 +99,44 @@ class I2cBus:
         self._smbus.close()
 
     def _find(self, addresses: tuple[int, ...]) -> int:
-        """The first address that answers.
+        """The first address at which a known part answers, else the first that answers at all.
 
         By a plain SMBus read: I2C_RDWR would not notice that a driver of the kernel holds the address.
         """
         failures: list[BusError] = []
+        strangers: list[int] = []
         for address in addresses:
             try:
                 with self._told(transfer_error, address):
-                    self._smbus.read_byte_data(address, WHO_AM_I)
+                    answer = self._smbus.read_byte_data(address, WHO_AM_I)
             except BusError as error:
                 failures.append(error)
             else:
-                return address
+                if answer in PARTS:
+                    return address
+                strangers.append(address)
+        if strangers:
+            return strangers[0]
         for failure in failures:
             if not isinstance(failure, NoAnswer):
                 raise failure
         raise nobody(self._path, addresses)
 
-    def _transfer(self, *messages: i2c_msg) -> int:
-        t_ns = time.monotonic_ns()
-        with self._told(transfer_error, self._address):
-            self._smbus.i2c_rdwr(*messages)
-        return t_ns
+    def _part(self, register: int, count: int) -> bytes:
+        """Up to `count` bytes, as many as go into one message."""
+        count = min(count, self._longest)
+        if self._blocks:
+            return bytes(self._smbus.read_i2c_block_data(self._address, register, count))
+        message = self._message.read(self._address, count)
+        try:
+            self._smbus.i2c_rdwr(self._message.write(self._address, [register]), message)
+        except OSError as error:
+            if error.errno != errno.EOPNOTSUPP or count <= SHORTEST_LIMIT:
+                raise
+            # refused before anything has moved (the kernel's i2c_check_for_quirks): take half as much
+            self._longest = count // 2
+            return self._part(register, count)
+        return bytes(message)
 
     @contextmanager
     def _told(self, sentence: Callable[..., BusError], *where: int) -> Iterator[None]:

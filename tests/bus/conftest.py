@@ -39,12 +39,14 @@ class Adapter:
 
     Attributes
     ----------
-    failures : errno by ioctl request, raised instead. transfers : [(flags, bytes)] of each I2C_RDWR.
+    longest : message that it moves, in bytes. failures : errno by ioctl request, raised instead.
+    transfers : [(flags, bytes)] of each I2C_RDWR.
     """
 
     def __init__(self, bus, address=0x68):
         self.bus, self.address = bus, address
         self.functions = int(smbus2.I2cFunc.I2C | smbus2.I2cFunc.SMBUS_EMUL)
+        self.longest = 8192
         self.failures, self.transfers, self.requests = {}, [], []
         self._chosen = None
 
@@ -70,9 +72,18 @@ class Adapter:
         self._chosen = address
 
     def _smbus(self, argument):
-        assert (argument.read_write, argument.size) == (smbus2.I2C_SMBUS_READ, smbus2.I2C_SMBUS_BYTE_DATA)
         self._acknowledge(self._chosen)
-        argument.data.contents.byte = self.bus.read(argument.command, 1).data[0]
+        block = argument.data.contents.block
+        if argument.size == smbus2.I2C_SMBUS_BYTE_DATA:
+            assert argument.read_write == smbus2.I2C_SMBUS_READ
+            argument.data.contents.byte = self.bus.read(argument.command, 1).data[0]
+            return
+        assert argument.size == smbus2.I2C_SMBUS_I2C_BLOCK_DATA
+        self.transfers.append([(argument.read_write, block[0])])
+        if argument.read_write == smbus2.I2C_SMBUS_WRITE:
+            self.bus.write(argument.command, bytes(block[1 : 1 + block[0]]))
+        else:
+            block[1 : 1 + block[0]] = list(self.bus.read(argument.command, block[0]).data)
 
     def _rdwr(self, argument):
         messages = [argument.msgs[i] for i in range(argument.nmsgs)]
@@ -80,6 +91,8 @@ class Adapter:
             self._acknowledge(message.addr)
             if message.len > 8192:
                 raise _os_error(errno.EINVAL)
+            if message.len > self.longest:
+                raise _os_error(errno.EOPNOTSUPP)
         self.transfers.append([(m.flags, m.len) for m in messages])
         if any(m.flags & I2C_M_RD for m in messages[:-1]):
             raise _os_error(errno.EOPNOTSUPP)

@@ -73,7 +73,7 @@ def test_a_failed_transfer_is_a_sentence_and_not_repeated(adapter, op, number, k
     kernel.failures[smbus2.I2C_RDWR] = number
     kernel.requests.clear()
     with pytest.raises(BusError, match=words) as caught:
-        bus.read(reg.FIFO_R_W, 14) if op == "read" else bus.write(reg.USER_CTRL, b"\0")
+        bus.read(reg.FIFO_R_W, 4) if op == "read" else bus.write(reg.USER_CTRL, b"\0")
     assert type(caught.value) is kind
     assert isinstance(caught.value.__cause__, OSError)
     assert kernel.requests == [smbus2.I2C_RDWR]
@@ -131,11 +131,59 @@ def test_another_file_is_no_bus_and_is_closed_again(tmp_path):
     assert len(os.listdir("/proc/self/fd")) == handles  # noqa: PTH208
 
 
-def test_an_smbus_adapter_is_refused(adapter):
+def test_an_adapter_of_single_bytes_is_refused(adapter):
     kernel = adapter()
     kernel.functions = int(smbus2.I2cFunc.SMBUS_BYTE_DATA)
-    with pytest.raises(BusError, match="speaks SMBus only"):
+    with pytest.raises(BusError, match="moves single bytes only"):
         I2cBus(str(kernel.path))
+
+
+def test_an_smbus_adapter_moves_blocks_of_32_bytes(adapter):
+    kernel = adapter()
+    kernel.functions = int(smbus2.I2cFunc.SMBUS_BYTE_DATA | smbus2.I2cFunc.SMBUS_I2C_BLOCK)
+    driver = Driver(I2cBus(str(kernel.path)), Config(rate_hz=100))
+    driver.start()
+    while driver.now_ns() < 3e9:
+        driver.poll()
+    recording = driver.recording()
+    assert len(recording) > 200
+    assert not recording.gap.any()
+    assert smbus2.I2C_RDWR not in kernel.requests
+    assert max(length for transfer in kernel.transfers for _, length in transfer) == 32
+
+
+def test_registers_in_blocks_are_those_in_one_burst(adapter):
+    whole, parts = adapter(), adapter("mpu6050")
+    expected = I2cBus(str(whole.path)).read(0x00, 100).data
+    parts.functions = int(smbus2.I2cFunc.SMBUS_BYTE_DATA | smbus2.I2cFunc.SMBUS_I2C_BLOCK)
+    assert I2cBus(str(parts.path)).read(0x00, 100).data == expected
+
+
+def test_the_longest_message_of_an_adapter_is_found(adapter):
+    """As i2c-core refuses what an adapter's quirks do not allow; no byte of the FIFO is lost by it."""
+    kernel = adapter()
+    kernel.longest = 70
+    driver = Driver(I2cBus(str(kernel.path)))
+    driver.start()
+    while driver.now_ns() < 3e9:
+        driver.poll()
+    assert not driver.recording().gap.any()
+    assert len(driver.recording()) > 400
+
+
+def test_a_known_part_is_preferred_to_a_clock_at_the_other_address(adapter, monkeypatch):
+    kernel = adapter(address=0x69)
+    acknowledge = kernel._acknowledge
+    monkeypatch.setattr(kernel, "_acknowledge", lambda address: address == 0x68 or acknowledge(address))
+    read = kernel.bus.read
+
+    def both(register, count):
+        reply = read(register, count)
+        return reply._replace(data=b"\x13") if kernel._chosen == 0x68 else reply
+
+    monkeypatch.setattr(kernel.bus, "read", both)
+    assert I2cBus(str(kernel.path)).address == 0x69
+    assert I2cBus(str(kernel.path), 0x68).address == 0x68
 
 
 def test_more_than_the_kernel_moves_at_once(adapter):

@@ -1,0 +1,29 @@
+import pytest
+
+
+@pytest.fixture(scope="module")
+def budget(tool):
+    return tool("bus_budget")
+
+
+@pytest.mark.parametrize(("rate_hz", "share"), [(200, 0.08), (1000, 0.35)])
+@pytest.mark.parametrize(("model", "late_s"), [("mpu6050", 0.020), ("mpu6500", 0.010)])
+def test_the_bus_suffices_and_no_sample_is_lost(budget, model, late_s, rate_hz, share):
+    """The simulated chip's processor time is in it, so that is only printed."""
+    recording, of_bus, _ = budget.run(model, rate_hz, 20.0, late_s)
+    assert of_bus <= share
+    assert budget.lost(recording) == 0
+    assert not recording.gap.any()
+    assert len(recording) > 20 * rate_hz
+
+
+@pytest.mark.parametrize(("model", "late_s"), [("mpu6050", 0.020), ("mpu6500", 0.010)])
+def test_a_host_that_is_too_late_loses_samples_and_the_tool_sees_it(budget, model, late_s):
+    recording, _, _ = budget.run(model, 1000, 5.0, 5 * late_s)
+    assert budget.lost(recording) > 0
+    assert recording.gap.any()
+
+
+@pytest.mark.parametrize(("rate_hz", "rms_ppm"), [(1000, 20), (200, 60)])
+def test_the_rate_is_known_after_ten_seconds(budget, rate_hz, rms_ppm):
+    assert budget.rate_error_ppm(rate_hz, 10, 4) < rms_ppm

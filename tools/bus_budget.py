@@ -1,0 +1,130 @@
+"""How much of a 400 kHz bus the driver takes, whether it keeps up, and how well it knows the sample rate.
+
+    python tools/bus_budget.py [CAPTURE.mcap]
+
+The share is counted from the transactions, as the simulated chip's driver makes them or as a capture holds them: a
+transfer takes 27 bits of addresses and register, 3 of start, repeated start and stop, and 9 a byte. Samples are
+numbered, so that a lost one is seen.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from mpucal.bus.simulated.bus import SimulatedBus
+from mpucal.bus.simulated.chip import Chip
+from mpucal.bus.simulated.clock import FastClock
+from mpucal.bus.simulated.factory import Factory
+from mpucal.bus.simulated.models import MODELS
+from mpucal.bus.simulated.sensor import Counts, Setting
+from mpucal.bus.tap import Tap
+from mpucal.capture.mcap import read_capture
+from mpucal.chip.access import Transaction
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.data import Recording, Vector
+
+BUS_HZ = 400_000
+READ_BITS, WRITE_BITS, BYTE_BITS = 30, 20, 9
+FASTEST_PPM = 10_000.0
+
+
+class NumberedFeed:
+    """Samples 0, 1, 2, ... in accelerometer x, modulo 30000."""
+
+    def __init__(self) -> None:
+        self.next = 0
+
+    def samples(self, edges_s: Vector, setting: Setting) -> Counts:
+        """The next samples of a board at rest."""
+        n = len(edges_s) - 1
+        rows = np.tile(np.array([0, 0, round(32768 / setting.accel_range_g), -2000, 0, 0, 0], np.int16), (n, 1))
+        rows[:, 0] = np.arange(self.next, self.next + n) % 30000
+        self.next += n
+        return rows
+
+
+class JitterClock(FastClock):
+    """A host that wakes up to `late_s` too late, each time by chance."""
+
+    def __init__(self, late_s: float, seed: int = 0) -> None:
+        super().__init__()
+        self._late_ns, self._rng = late_s * 1e9, np.random.default_rng(seed)
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Go on to `t_ns`, and by chance further."""
+        super().sleep_until(t_ns + int(self._rng.uniform(0, self._late_ns)))
+
+
+class Kept(list[Transaction]):
+    """Keeps what crosses the bus."""
+
+    def transaction(self, transaction: Transaction) -> None:
+        """Keep one more."""
+        self.append(transaction)
+
+
+def share(transactions: Sequence[Transaction]) -> float:
+    """Of the bus, from the first of them to the last."""
+    bits = sum((READ_BITS if t.op == "read" else WRITE_BITS) + BYTE_BITS * t.count for t in transactions)
+    return bits / BUS_HZ / ((transactions[-1].t_ns - transactions[0].t_ns) * 1e-9)
+
+
+def run(
+    model: str, rate_hz: float, seconds: float, late_s: float, ppm: float = FASTEST_PPM, seed: int = 0
+) -> tuple[Recording, float, float]:
+    """What was recorded on a host that is late, the share of the bus, and processor seconds a second."""
+    kept = Kept()
+    bus = SimulatedBus(Chip(MODELS[model], NumberedFeed(), ppm, Factory()), JitterClock(late_s, seed))
+    driver = Driver(Tap(bus, kept), Config(rate_hz=rate_hz))
+    driver.start()
+    kept.clear()
+    begun_ns, begun = driver.now_ns(), time.process_time()
+    while driver.now_ns() < begun_ns + seconds * 1e9:
+        driver.poll()
+    return driver.recording(), share(kept), (time.process_time() - begun) / seconds
+
+
+def lost(recording: Recording) -> int:
+    """How many samples are missing between the first and the last."""
+    number = np.rint(recording.acc[:, 0] / 9.80665 * 8192).astype(int)
+    return int(((np.diff(number) % 30000) - 1).sum())
+
+
+def rate_error_ppm(rate_hz: float, seconds: float, seeds: int) -> float:
+    """The root mean square of the measured rate's error, on a host 1 ms late."""
+    errors = []
+    for seed in range(seeds):
+        ppm = float(np.random.default_rng(seed).uniform(-8000, 8000))
+        recording, _, _ = run("mpu6050", rate_hz, seconds, 0.001, ppm, seed)
+        assert recording.sensor.rate_hz is not None
+        errors.append((recording.sensor.rate_hz / rate_hz / (1 + ppm * 1e-6) - 1) * 1e6)
+    return float(np.sqrt(np.mean(np.square(errors))))
+
+
+def main() -> None:
+    """Print it all."""
+    if len(sys.argv) > 1:
+        records = read_capture(sys.argv[1]).records
+        print(f"{share([r for r in records if isinstance(r, Transaction)]):.1%} of a 400 kHz bus, with the start")
+        return
+    for model, late_s in (("mpu6050", 0.020), ("mpu6500", 0.010)):
+        for rate_hz in (200, 1000):
+            recording, of_bus, of_processor = run(model, rate_hz, 60.0, late_s)
+            print(
+                f"{model} at {rate_hz} Hz, host up to {late_s * 1e3:.0f} ms late: {of_bus:.1%} of the bus,"
+                f" {lost(recording)} of {len(recording)} samples lost, {of_processor:.1%} of a processor"
+            )
+    for model, late_s in (("mpu6050", 0.020), ("mpu6500", 0.010)):
+        recording, _, _ = run(model, 1000, 3600.0, late_s)
+        print(f"{model}, an hour at 1000 Hz: {lost(recording)} of {len(recording)} samples lost")
+    for rate_hz, seconds in ((1000, 10), (200, 10), (1000, 30)):
+        print(f"rate at {rate_hz} Hz after {seconds} s: {rate_error_ppm(rate_hz, seconds, 100):.1f} ppm rms, 100 seeds")
+
+
+if __name__ == "__main__":
+    main()

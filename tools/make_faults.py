@@ -1,0 +1,68 @@
+"""Make the captures of faulty runs anew, all from seeds: python tools/make_faults.py [FOLDER].
+
+faults/NAME.mcap is what crossed the bus while the driver measured a simulated chip, ten seconds at 50 Hz, that suffered
+the fault NAME at the fifth; NAME.json beside it is what the driver made of it: what a replay must make of it too.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from mpucal.bus.simulated import open_simulated
+from mpucal.bus.simulated.faults import KINDS
+from mpucal.bus.tap import Tap
+from mpucal.capture.mcap import CaptureWriter
+from mpucal.chip.access import Bus, EndOfCapture
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.data import Recording
+from mpucal.errors import SourceError
+from mpucal.session.plan import Plan
+
+FOLDER = Path(__file__).parent.parent / "fixtures" / "faults"
+PLAN = Plan(Config(rate_hz=50))
+FAULT_S, END_S = 5.0, 10.0
+
+
+def measured(bus: Bus) -> tuple[Recording, str | None]:
+    """What the driver measures on `bus` until ten seconds are over or it gives up, and why it gave up."""
+    driver = Driver(bus, PLAN.config)
+    try:
+        driver.start()
+        while driver.now_ns() < END_S * 1e9:
+            driver.poll()
+    except EndOfCapture:
+        return driver.recording(), None
+    except SourceError as error:
+        return driver.recording(), str(error)
+    driver.stop()
+    return driver.recording(), None
+
+
+def made_of_it(recording: Recording, why: str | None) -> dict[str, Any]:
+    """The same as JSON."""
+    return {
+        "samples": len(recording),
+        "gaps": int(recording.gap.sum()),
+        "rate_hz": recording.sensor.rate_hz,
+        "gave_up": why,
+    }
+
+
+def main() -> None:
+    """Make them all."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in KINDS:
+        simulated = open_simulated(f"sim:seed=8,chip=mpu6500,fault={name}@{FAULT_S:g}")
+        with CaptureWriter(folder / f"{name}.mcap") as writer:
+            writer.start(PLAN.meta())
+            found = made_of_it(*measured(Tap(simulated, writer)))
+        (folder / f"{name}.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
