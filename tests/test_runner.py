@@ -11,6 +11,7 @@ from mpucal.errors import Abandoned, BusError, CaptureError, ChipError, NoAnswer
 from mpucal.result import Calibration
 from mpucal.runner import Replayed, Runner
 from mpucal.session.events import Decision, Key, Prompt, PromptKind
+from mpucal.session.plan import Plan
 
 RATE_HZ, POLL = 100.0, 10
 FLAT_POLLS = 110
@@ -19,10 +20,10 @@ NOT_THERE = NoAnswer("nothing answers at 0x68 any more", "check the wires")
 
 
 class Source:
-    """Lies flat for eleven seconds, then in one more orientation after another; `fails` by number of poll."""
+    """Lies flat for eleven seconds, then in one more orientation after another, and ends; `fails` by number of poll."""
 
     def __init__(self, fails=None, start=None):
-        self.fails, self.start_fails = fails or {}, start
+        self.fails, self.start_fails = fails or {170: EndOfCapture()}, start
         self.polls, self.stops = 0, 0
         self.parts = []
 
@@ -93,8 +94,7 @@ def test_runs_through_and_writes_the_results(tmp_path):
     paths = runner.write(tmp_path, calibration, recording, {"D": 1})
     assert [path.name for path in paths] == ["calibration.json", "calibration.bin", "report.html", "truth.json"]
     assert json.loads((tmp_path / "calibration.json").read_text())["quality"]["verdict"] == "good"
-    assert source.stops == 1
-    assert len(recording) == source.polls * POLL
+    assert len(recording) == 169 * POLL
     assert runner.sensor.chip == "MPU-6050"
 
 
@@ -241,11 +241,11 @@ def test_who_watches_a_replay_may_stop_it_but_not_steer_it():
 )
 def test_recording_ends_when_asked_and_leaves_the_key_that_replays_it(person, seconds, polls, key):
     source, notes = Source(), Notes()
-    assert Runner(source, person, notes, until_end=True).record(seconds) == polls * POLL
+    assert Runner(source, person, notes, plan=Plan(until_end=True)).record(seconds) == polls * POLL
     assert [note.data for note in notes] == [{module.KEY: key}]
     assert source.stops == 1
 
 
 def test_recording_ends_with_the_source():
     source = Source({300: EndOfCapture()})
-    assert runner_of(source, until_end=True).record(None) == 299 * POLL
+    assert runner_of(source, plan=Plan(until_end=True)).record(None) == 299 * POLL
