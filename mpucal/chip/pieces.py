@@ -95,7 +95,18 @@ def breaks(t_s: Vector, y: Vector) -> list[int]:
         if at is not None:
             found.append(first + at)
             todo += [(first, first + at), (first + at, last)]
-    return sorted(found)
+    return _settled(t_s, y, sorted(found))
+
+
+def _settled(t_s: Vector, y: Vector, found: list[int]) -> list[int]:
+    """Each break anew between its neighbours: one that was found before they were may be off, or none."""
+    kept: list[int] = []
+    for following in [*found[1:], len(t_s)]:
+        first = kept[-1] if kept else 0
+        at = _break(t_s[first:following], y[first:following])
+        if at is not None:
+            kept.append(first + at)
+    return kept if found else []
 
 
 def _break(t_s: Vector, y: Vector) -> int | None:
