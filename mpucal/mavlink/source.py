@@ -134,7 +134,7 @@ class VehicleSource:
         now_ns = self._link.now_ns()
         if self._rebooted:
             raise LinkError(
-                f"{self._link.vehicle} rebooted: its clock started again", "check its power, then start again"
+                f"{self._link.vehicle} rebooted (its clock started again)", "check its power, then start again"
             )
         if now_ns - self._heard_ns >= SILENT_NS:
             raise LinkError(

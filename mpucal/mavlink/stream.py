@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Mapping
 
 from ..errors import LinkError
@@ -19,7 +19,7 @@ ACK_S, ACK_TRIES = 0.7, 4
 
 WATCH_NS = 2 * S
 FALLEN = 0.6
-AGAIN_NS, SAY_AGAIN_NS = 2 * S, 15 * S
+SAY_AGAIN_NS = 15 * S
 
 
 class Streams:
@@ -40,9 +40,9 @@ class Streams:
         self._say = say
         self._counts: Counter[Stream] = Counter()
         self._wanted: dict[str, float] = {}
-        self._windows: dict[Stream, deque[float]] = {}
         self._best_hz: dict[Stream, float] = {}
-        self._window_ns = self._again_ns = self._said_ns = 0
+        self._fallen: list[Stream] = []
+        self._window_ns = self._quiet_until_ns = 0
         link.subscribe(self._hear)
 
     def start(self) -> Stream:
@@ -69,9 +69,10 @@ class Streams:
         rates = {stream: count / seconds for stream, count in self._counts.items()}
         self._counts.clear()
         self._window_ns = now_ns
-        for stream, best_hz in list(self._best_hz.items()):
+        self._tell(rates)
+        for stream, best_hz in self._best_hz.items():
             if stream.name in self._wanted and rates.get(stream, 0.0) < FALLEN * best_hz:
-                self._again(stream, rates.get(stream, 0.0))
+                self._again(stream)
         for stream, rate_hz in rates.items():
             self._best_hz[stream] = max(rate_hz, self._best_hz.get(stream, 0.0))
 
@@ -123,22 +124,25 @@ class Streams:
         )
         self._link.send(request)
 
-    def _again(self, stream: Stream, rate_hz: float) -> None:
-        m, now_ns = dialect(), self._link.now_ns()
-        vehicle = self._link.vehicle
-        interval_us = round(US_PER_S / self._wanted[stream.name])
+    def _again(self, stream: Stream) -> None:
+        vehicle, interval_us = self._link.vehicle, round(US_PER_S / self._wanted[stream.name])
         params = (MESSAGE_ID[stream.name], interval_us, 0, 0, 0, 0, 0)
-        self._link.send(
-            self._link.mav.command_long_encode(
-                vehicle.system, vehicle.component, m.MAV_CMD_SET_MESSAGE_INTERVAL, 0, *params
-            )
-        )
-        if now_ns - self._said_ns < SAY_AGAIN_NS:
+        number = dialect().MAV_CMD_SET_MESSAGE_INTERVAL
+        # its answer is not waited for: whether the rate is back shows in the next window
+        self._link.send(self._link.mav.command_long_encode(vehicle.system, vehicle.component, number, 0, *params))
+        self._fallen.append(stream)
+
+    def _tell(self, rates: Mapping[Stream, float]) -> None:
+        """Say what had fallen, where it still comes: a vehicle that fell silent was slowed by nobody."""
+        alive = [stream for stream in self._fallen if rates.get(stream)]
+        self._fallen = []
+        now_ns = self._link.now_ns()
+        if not alive or now_ns < self._quiet_until_ns:
             return
-        self._said_ns = now_ns
+        self._quiet_until_ns = now_ns + SAY_AGAIN_NS
         self._say(
-            f"{stream.name} fell from {self._best_hz[stream]:.0f} to {rate_hz:.0f} Hz, and was asked for again: "
-            "another ground station lowers it (start MAVProxy with --streamrate=-1)"
+            f"{alive[0].name} was slowed down from {self._best_hz[alive[0]]:.0f} Hz, and has been asked for again: "
+            "another ground station lowers it (start MAVProxy with --streamrate=-1)."
         )
 
     def _nothing(self) -> LinkError:

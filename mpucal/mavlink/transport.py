@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import select
 import socket
 import time
@@ -240,9 +241,13 @@ def _cannot_open(url: Url, error: Exception) -> LinkError:
     remedy = "check that it is plugged in, that no other program uses it, and that you may open it"
     if url.kind is not Kind.SERIAL:
         remedy = "check host and port, and that no other ground station listens there"
-    return LinkError(f"{url} cannot be opened ({getattr(error, 'strerror', None) or error})", remedy)
+    return LinkError(f"{url} cannot be opened ({_why(error)})", remedy)
 
 
 def _broken(name: str, error: Exception) -> LinkError:
-    why = getattr(error, "strerror", None) or error
-    return LinkError(f"the link over {name} broke ({why})", "check cable and power, then start again")
+    return LinkError(f"the link over {name} broke ({_why(error)})", "check cable and power, then start again")
+
+
+def _why(error: Exception) -> str:
+    number = getattr(error, "errno", None)
+    return str(error) if number is None or number < 0 else os.strerror(number)

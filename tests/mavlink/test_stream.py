@@ -112,7 +112,7 @@ def test_a_lowered_rate_is_asked_for_again_and_told(vehicle, lowered_hz):
     said = []
     assert watched(vehicle(), lowered_hz, said) > 140
     assert len(said) == 1
-    assert "RAW_IMU fell from 200" in said[0]
+    assert "RAW_IMU was slowed down from 200 Hz" in said[0]
     assert "--streamrate=-1" in said[0]
 
 
