@@ -8,9 +8,9 @@ import pytest
 NODE = "/dev/i2c-1"
 
 
-def examined(mocked, *words, prefix=()):
+def examined(mocked, *words):
     mocked.tell(prompt={"kind": "lay_flat", "down": None})
-    result = mocked.mpucal("doctor", "--bus", NODE, "--seconds", "2", *words, prefix=prefix)
+    result = mocked.mpucal("doctor", "--bus", NODE, "--seconds", "2", *words)
     return result, {finding["topic"]: finding for finding in json.loads(result.out)["findings"]} if words else {}
 
 
@@ -52,10 +52,10 @@ def test_what_stands_in_the_way_is_told(device, adapter, topic, words):
     assert findings["bus"]["remedy"]
 
 
-def test_no_permission_comes_with_what_to_do(device, as_nobody):
+def test_no_permission_comes_with_what_to_do(device):
     mocked = device()
-    mocked.chmod(0o600)
-    result, findings = examined(mocked, "--json", prefix=as_nobody)
+    mocked.forbid()
+    result, findings = examined(mocked, "--json")
     assert result.code == 3
     assert "usermod -aG i2c" in findings["device file"]["remedy"]
 

@@ -6,7 +6,9 @@
  */
 #define _GNU_SOURCE
 #include <errno.h>
+#include <dlfcn.h>
 #include <fcntl.h>
+#include <pthread.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <sys/mman.h>
@@ -44,4 +46,13 @@ int clock_nanosleep(clockid_t clock, int flags, const struct timespec *wanted, s
     if (until > *now_ns)
         *now_ns = until;
     return 0;
+}
+
+/* Threads wait for each other in real time. Python would give the deadlines of its global lock in the time above,
+ * and spin once they are past; without a monotonic clock for its conditions it takes the time of day. */
+int pthread_condattr_setclock(pthread_condattr_t *attributes, clockid_t clock) {
+    if (now_ns && clock == CLOCK_MONOTONIC)
+        return EINVAL;
+    int (*real)(pthread_condattr_t *, clockid_t) = dlsym(RTLD_NEXT, "pthread_condattr_setclock");
+    return real(attributes, clock);
 }
