@@ -52,11 +52,12 @@ class Composed:
     def residual_of(self, held: Correction) -> float:
         """By how much |a| stays wrong at worst [m/s^2], whatever the attitude, with `held` as parameters.
 
-        a = R_b diag(scale) (inv(M) R_b^T f + o' - offset), so to first order |a| - g is g u^T S u and what the offsets
-        differ by, with u the direction of f and S the symmetric part of diag(scale) inv(M) - I.
+        a = R_b diag(scale) (inv(M) R_b^T f + o' - offset): |a| lies between the least and the largest singular value
+        of diag(scale) inv(M), times g, and what the offsets differ by. (To first order that is g times the largest
+        eigenvalue of the symmetric part of what is off the diagonal.)
         """
-        left = self._left(held)
-        shape = STANDARD_GRAVITY_MPS2 * np.abs(np.linalg.eigvalsh((left + left.T) / 2)).max()
+        singular = np.linalg.svd(self._left(held) + np.eye(3), compute_uv=False)
+        shape = STANDARD_GRAVITY_MPS2 * np.abs(singular - 1).max()
         return float(shape + np.linalg.norm(held.scale * (self.correction.offset - held.offset)))
 
     @property

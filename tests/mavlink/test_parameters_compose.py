@@ -1,0 +1,108 @@
+"""New parameters of a calibration, against the stream that they then make, computed the long way."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mpucal.data import STANDARD_GRAVITY_MPS2
+from mpucal.mavlink.parameters.compose import Correction, compose
+from mpucal.mavlink.parameters.rotation import orientation
+
+ORIENTATIONS = [number for number in range(41) if orientation(number) is not None]
+
+
+def sensor(rng, cross):
+    """raw = C f_sensor + bias, in the sensor's axes."""
+    C = np.diag(rng.uniform(0.9, 1.1, 3)) + cross * rng.uniform(-1, 1, (3, 3)) * (1 - np.eye(3))
+    return C, rng.uniform(-1, 1, 3)
+
+
+def stream(C, bias, correction, R, f):
+    """What an autopilot delivers of the specific force f (n, 3) in its own axes."""
+    raw = f @ R @ C.T + bias
+    return ((raw - correction.offset) * correction.scale) @ R.T
+
+
+def calibrated(C, bias, correction, R):
+    """D and b_a of that stream."""
+    b = stream(C, bias, correction, R, np.zeros((1, 3)))[0]
+    return (stream(C, bias, correction, R, np.eye(3)) - b).T, b
+
+
+def sphere(n, radius):
+    points = np.random.default_rng(0).normal(size=(n, 3))
+    return radius * points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(ORIENTATIONS))
+def test_a_sensor_without_cross_axis_terms_is_made_perfect(seed, number):
+    rng = np.random.default_rng(seed)
+    R = orientation(number)
+    C, bias = sensor(rng, cross=0.0)
+    old = Correction(rng.uniform(-0.5, 0.5, 3), rng.uniform(0.9, 1.1, 3))
+    composed = compose(*calibrated(C, bias, old, R), old, R, STANDARD_GRAVITY_MPS2)
+    f = sphere(20, STANDARD_GRAVITY_MPS2)
+    np.testing.assert_allclose(stream(C, bias, composed.correction, R, f), f, atol=1e-9)
+    assert composed.residual_of(composed.correction) < 1e-9
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(ORIENTATIONS))
+def test_the_offset_is_exact_and_the_residual_what_the_worst_attitude_shows(seed, number):
+    rng = np.random.default_rng(seed)
+    R = orientation(number)
+    C, bias = sensor(rng, cross=0.02)
+    old = Correction(rng.uniform(-0.5, 0.5, 3), rng.uniform(0.9, 1.1, 3))
+    composed = compose(*calibrated(C, bias, old, R), old, R, STANDARD_GRAVITY_MPS2)
+    new = composed.correction
+    np.testing.assert_allclose(new.offset, bias, atol=1e-12)
+    f = sphere(4000, STANDARD_GRAVITY_MPS2)
+    worst = np.abs(np.linalg.norm(stream(C, bias, new, R, f), axis=1) - STANDARD_GRAVITY_MPS2).max()
+    assert composed.residual_of(new) == pytest.approx(worst, rel=0.03, abs=1e-4)
+
+
+def test_an_autopilot_is_calibrated_to_standard_gravity_wherever_it_is():
+    C, bias = np.diag([1.02, 0.98, 1.01]), np.array([0.1, -0.2, 0.3])
+    old, R, local = Correction(np.zeros(3), np.ones(3)), np.eye(3), 9.78
+    # a fit that takes local gravity for `local` sees C in these units
+    composed = compose(*calibrated(C, bias, old, R), old, R, local)
+    a = stream(C, bias, composed.correction, R, sphere(50, local))
+    np.testing.assert_allclose(np.linalg.norm(a, axis=1), STANDARD_GRAVITY_MPS2, rtol=1e-12)
+
+
+def test_what_is_only_turned_is_said_and_not_written():
+    angle = np.radians(2.0)
+    D = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    composed = compose(D, np.zeros(3), Correction(np.zeros(3), np.ones(3)), np.eye(3), STANDARD_GRAVITY_MPS2)
+    np.testing.assert_allclose(np.degrees(composed.turn_rad), [0, 0, 2.0], atol=0.01)
+    assert composed.residual_of(composed.correction) < 0.01
+
+
+def test_the_stream_after_a_change_is_foretold():
+    rng = np.random.default_rng(5)
+    C, bias = sensor(rng, cross=0.02)
+    R = orientation(14)
+    old, new = (Correction(rng.uniform(-0.5, 0.5, 3), rng.uniform(0.9, 1.1, 3)) for _ in range(2))
+    f = sphere(10, STANDARD_GRAVITY_MPS2)
+    foretold = old.seen_through(new, R, stream(C, bias, old, R, f))
+    np.testing.assert_allclose(foretold, stream(C, bias, new, R, f), atol=1e-12)
+
+
+@pytest.mark.parametrize("number", ORIENTATIONS)
+def test_orientations_are_pymavlinks_euler_angles(number):
+    rotmat = pytest.importorskip("pymavlink.rotmat")
+    from mpucal.mavlink.dialect import dialect
+
+    words = dialect().enums["MAV_SENSOR_ORIENTATION"][number].name.removeprefix("MAV_SENSOR_ROTATION_").split("_")
+    angles = dict(zip(words[::2], map(float, words[1::2]), strict=False)) if len(words) > 1 else {}
+    expected = rotmat.Matrix3()
+    expected.from_euler(*(np.radians(angles.get(axis, 0.0)) for axis in ("ROLL", "PITCH", "YAW")))
+    rows = [[v.x, v.y, v.z] for v in (expected.a, expected.b, expected.c)]
+    np.testing.assert_allclose(orientation(number), rows, atol=1e-12)
+
+
+def test_an_orientation_without_angles_is_unknown():
+    assert orientation(100) is None
+    assert orientation(77) is None

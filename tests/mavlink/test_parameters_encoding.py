@@ -1,0 +1,126 @@
+"""Values on the wire, through pymavlink's own packing and back."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mpucal.errors import RecordingError
+from mpucal.mavlink.dialect import Parser, dialect
+from mpucal.mavlink.parameters.encoding import error_name, name_bytes, of_wire, to_wire
+from mpucal.mavlink.parameters.names import all_places, mounting, place
+from mpucal.mavlink.parameters.text import param_text, params_text, read_parameters_file
+
+INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
+RANGES = {INT8: 8, INT16: 16, INT32: 32}
+
+
+def sent(name, value, kind, bytewise):
+    mav = dialect().MAVLink(None, 1, 1)
+    message = mav.param_value_encode(name_bytes(name), to_wire(value, kind, bytewise), kind, 100, 7)
+    (packet,) = Parser(dialect().MAVLink(None)).datagram(bytes(message.pack(mav)))
+    return of_wire(packet.message, bytewise)
+
+
+@given(st.sampled_from(sorted(RANGES)), st.data())
+def test_integers_travel_by_their_bytes_to_px4(kind, data):
+    most = 1 << (RANGES[kind] - 1)
+    value = data.draw(st.integers(-most, most - 1))
+    # the bytes of a signalling NaN do not survive as a float
+    bits = value & 0xFFFFFFFF
+    if (bits & 0x7F800000) == 0x7F800000 and bits & 0x007FFFFF and not bits & 0x00400000:
+        return
+    parameter = sent("CAL_ACC0_ID", value, kind, True)
+    assert (parameter.value, parameter.index, parameter.count) == (value, 7, 100)
+
+
+@given(st.integers(-(1 << 24), 1 << 24))
+def test_integers_travel_by_their_value_to_ardupilot(value):
+    assert sent("INS_ACC_ID", value, INT32, False).value == value
+
+
+@given(st.floats(width=32, allow_nan=False, allow_infinity=False), st.booleans())
+def test_floats_travel_as_they_are(value, bytewise):
+    assert sent("X", value, REAL32, bytewise).value == value
+
+
+def test_a_name_of_sixteen_letters_has_no_end_mark():
+    assert name_bytes("CAL_ACC0_XSCALE_") == b"CAL_ACC0_XSCALE_"
+    assert sent("ABCDEFGHIJKLMNOP", 1.0, REAL32, False).name == "ABCDEFGHIJKLMNOP"
+
+
+def test_errors_beyond_pymavlinks_enumeration_have_words():
+    assert error_name(7) == "its type is another"
+    assert error_name(99) == "error 99"
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.dictionaries(st.text("ABCXYZ019_", min_size=2, max_size=16), st.floats(width=32, allow_nan=False), min_size=1))
+def test_both_files_give_back_each_float32(tmp_path_factory, values):
+    folder = tmp_path_factory.mktemp("parameters")
+    finite = {name: value for name, value in values.items() if math.isfinite(value)}
+    for name, text in (("a.param", param_text(finite, ["a remark"])), ("a.params", params_text(finite, ["a remark"]))):
+        (folder / name).write_text(text)
+        assert read_parameters_file(folder / name) == finite
+
+
+def test_mavproxy_and_mission_planner_load_the_param_file(tmp_path, capsys):
+    from pymavlink.mavparm import MAVParmDict
+
+    values = {"INS_ACCOFFS_X": 0.25, "INS_ACCSCAL_X": 1.0123456}
+    (tmp_path / "new.param").write_text(param_text(values, ["made by a test"]))
+    loaded = MAVParmDict()
+    assert loaded.load(str(tmp_path / "new.param"))
+    assert {name: np.float32(value) for name, value in dict(loaded).items()} == {
+        name: np.float32(value) for name, value in values.items()
+    }
+
+
+def test_the_params_file_has_qgroundcontrols_columns():
+    line = params_text({"CAL_ACC0_XOFF": 0.5}, system=3).splitlines()[-1]
+    assert line.split("\t") == ["3", "1", "CAL_ACC0_XOFF", "0.5", "9"]
+
+
+@pytest.mark.parametrize("text", ["NAME,VALUE,MORE\n", "NAME,word\n", "\xff"], ids=["columns", "word", "letters"])
+def test_another_file_is_refused(tmp_path, text):
+    (tmp_path / "x.param").write_text(text, encoding="latin-1")
+    with pytest.raises(RecordingError):
+        read_parameters_file(tmp_path / "x.param")
+
+
+def test_px4_keeps_a_sensor_in_the_slot_that_names_it():
+    ids = {"CAL_ACC0_ID": 0.0, "CAL_ACC1_ID": 1310988.0, "CAL_ACC2_ID": 1310996.0}
+    assert place("PX4", 1, ids).offset[0] == "CAL_ACC1_XOFF"
+    assert place("PX4", 2, ids).scale[2] == "CAL_ACC2_ZSCALE"
+    assert place("PX4", 3, ids) is None
+
+
+@pytest.mark.parametrize(
+    ("firmware", "imu", "name"),
+    [("ArduPilot", 1, "INS_ACCOFFS_X"), ("ArduPilot", 2, "INS_ACC2OFFS_X"), ("ArduPilot", 3, "INS_ACC3OFFS_X")],
+    ids=["first", "second", "third"],
+)
+def test_ardupilots_names_count_from_the_second(firmware, imu, name):
+    assert place(firmware, imu, {}).offset[0] == name
+    assert name in [where.offset[0] for where in all_places(firmware)]
+
+
+def test_the_mounting_is_that_of_the_board_unless_the_sensor_is_outside():
+    where = place("PX4", 1, {"CAL_ACC0_ID": 5.0})
+    board = {"SENS_BOARD_ROT": 2.0, "CAL_ACC0_ROT": -1.0}
+    np.testing.assert_allclose(mounting("PX4", where, board) @ [1, 0, 0], [0, 1, 0], atol=1e-12)
+    outside = board | {"CAL_ACC0_ROT": 4.0}
+    np.testing.assert_allclose(mounting("PX4", where, outside) @ [1, 0, 0], [-1, 0, 0], atol=1e-12)
+    level = board | {"SENS_BOARD_ROT": 0.0, "SENS_BOARD_Z_OFF": 90.0}
+    np.testing.assert_allclose(mounting("PX4", where, level) @ [1, 0, 0], [0, 1, 0], atol=1e-12)
+
+
+def test_a_custom_orientation_needs_its_angles():
+    where = place("ArduPilot", 1, {})
+    assert mounting("ArduPilot", where, {"AHRS_ORIENTATION": 101.0}) is None
+    assert mounting("ArduPilot", where, {}) is None
+    angles = {"CUST_ROT1_ROLL": 0.0, "CUST_ROT1_PITCH": 0.0, "CUST_ROT1_YAW": 90.0}
+    turned = mounting("ArduPilot", where, {"AHRS_ORIENTATION": 101.0, **angles})
+    np.testing.assert_allclose(turned @ [1, 0, 0], [0, 1, 0], atol=1e-12)
