@@ -7,6 +7,8 @@ US = 1000
 
 # A ceramic resonator is within 0.5 %; twice that, so that an estimate can fall behind and come back.
 DRIFT = 0.01
+# No message is under way for longer: it is the bridge that lags, as one that is emulated on a busy machine does.
+LATE_NS = 250_000_000
 # A clock that is this far from what was expected of it is taken to have been reset; nothing is lost where it was not.
 LEAP_NS = 50_000_000
 
@@ -15,7 +17,7 @@ class BridgeClock:
     """Bus time: what the bridge's clock shows, in ns without wraps; goes on where the bridge was reset.
 
     What the clock shows now is known from the message that took the shortest way to the host: `host - bus` is
-    least for that one. Between two messages the clocks may drift apart by DRIFT.
+    least for that one. Between two messages the clocks may drift apart by DRIFT; one that lags by LATE_NS is followed.
     """
 
     def __init__(self) -> None:
@@ -49,7 +51,8 @@ class BridgeClock:
     def _follow(self, t_ns: int, host_ns: int) -> None:
         ahead_ns = host_ns - t_ns
         if self._ahead_ns is not None:
-            ahead_ns = min(ahead_ns, self._ahead_ns + round(DRIFT * (host_ns - self._seen_at_ns)))
+            drifted_ns = self._ahead_ns + round(DRIFT * (host_ns - self._seen_at_ns))
+            ahead_ns = min(ahead_ns, max(drifted_ns, ahead_ns - LATE_NS))
         self._ahead_ns, self._seen_at_ns = ahead_ns, host_ns
         self._latest_ns = max(self._latest_ns, t_ns)
 

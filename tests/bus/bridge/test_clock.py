@@ -60,3 +60,18 @@ def test_a_clock_that_went_on_is_followed():
 
 def test_it_shows_nothing_before_it_was_seen():
     assert BridgeClock().now(5 * S) == 0
+
+
+def test_a_bridge_that_runs_at_half_speed_is_followed():
+    clock = BridgeClock()
+    for i in range(1000):
+        clock.seen(shown(i * 10 * MS), i * 20 * MS)
+        assert 0 <= clock.now(i * 20 * MS) - i * 10 * MS <= 250 * MS
+
+
+def test_a_clock_that_is_far_too_slow_is_followed_nevertheless():
+    """As an emulated board's is on a busy machine: whoever waits for its time would wait for ever otherwise."""
+    clock = BridgeClock()
+    for i in range(2000):
+        clock.seen(shown(i * 10 * MS), i * 20 * MS)
+    assert clock.now(2000 * 20 * MS) - 2000 * 10 * MS < 300 * MS
