@@ -13,6 +13,7 @@ from click.core import ParameterSource
 from ..calibration import MODELS
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import UsageError
+from ..session.aims import AIMS, NORMAL
 
 TLOG = ".tlog"
 
@@ -21,7 +22,19 @@ F = TypeVar("F", bound=Callable[..., Any])
 ACCEL_RANGES_G, GYRO_RANGES_DPS = ("2", "4", "8", "16"), ("250", "500", "1000", "2000")
 
 # what a capture fixes: none of it may be given beside --replay
-FIXED_BY_CAPTURE = ("address", "rate", "accel_range", "gyro_range", "seed", "gravity", "model", "system", "signing_key")
+FIXED_BY_CAPTURE = (
+    "address",
+    "rate",
+    "accel_range",
+    "gyro_range",
+    "seed",
+    "gravity",
+    "model",
+    "target",
+    "tilt_only",
+    "system",
+    "signing_key",
+)
 SOURCES = ("bus", "serial", "mavlink", "replay")
 SIMULATED = "sim"
 # what only one kind of source has
@@ -109,6 +122,24 @@ def fit_options(command: F) -> F:
         click.option("--model", type=click.Choice(MODELS), default="auto", show_default=True, help="What to estimate."),
         click.option(
             "--gravity", type=Gravity(), default=STANDARD_GRAVITY_MPS2, show_default=True, help="Local gravity [m/s²]."
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def aim_options(command: F) -> F:
+    """--target and --tilt-only."""
+    for option in (
+        click.option(
+            "--tilt-only", is_flag=True, help="Of what cannot be turned over: ask for tilts, claim what they show."
+        ),
+        click.option(
+            "--target",
+            type=click.Choice(tuple(AIMS)),
+            default=NORMAL,
+            show_default=True,
+            help="How well to know it: normal is 1 mg of bias, 0.1 % of gain, 0.05 deg.",
         ),
     ):
         command = option(command)

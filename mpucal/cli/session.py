@@ -15,7 +15,7 @@ from ..mavlink.calibrate import calibrate_vehicle
 from ..result import REFUSED, Calibration
 from ..runner import Runner
 from .opened import Opened
-from .options import check_source, fit_options, source_name, source_options
+from .options import aim_options, check_source, fit_options, source_name, source_options
 from .place import Place
 from .running import running
 from .source import opened
@@ -27,6 +27,7 @@ EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board
 @click.command("session", epilog=EXAMPLE)
 @source_options
 @fit_options
+@aim_options
 @click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Where the results go.")
 @click.option("--yes", is_flag=True, help="Ask nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print calibration.json, and nothing else.")
