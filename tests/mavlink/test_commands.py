@@ -1,0 +1,76 @@
+"""The words of the command line that name vehicles, and what contradicts them."""
+
+import hashlib
+
+import pytest
+from click.testing import CliRunner
+
+from mpucal.cli import commands
+from mpucal.errors import UsageError
+from mpucal.mavlink.signing import read_key
+
+
+def run(*words):
+    return CliRunner().invoke(commands, [str(word) for word in words])
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A few seconds of the simulated vehicle, recorded by mpucal."""
+    path = tmp_path_factory.mktemp("recorded") / "capture.tlog"
+    result = run("record", "--mavlink", "sim:imus=1", "--seconds", 6, "-o", path, "--gravity", 9.81)
+    assert result.exception is None, result.output
+    return path
+
+
+def test_a_recording_of_a_vehicle_is_shown(recorded):
+    result = run("show", recorded)
+    assert "ArduPilot-IMU1" in result.output
+    assert "200.00 Hz" in result.output
+
+
+@pytest.mark.parametrize(
+    ("words", "what"),
+    [
+        (["--bus", "sim", "--mavlink", "sim"], "--bus and --mavlink were given together"),
+        (["--bus", "sim", "--system", 1], "--system was given beside --bus"),
+        (["--mavlink", "sim", "--address", 0x68], "--address was given beside --mavlink"),
+        (["--mavlink", "sim", "--accel-range", 8], "--accel-range was given beside --mavlink"),
+        (["--mavlink", "nonsense"], "cannot be understood"),
+        (["--mavlink", "sim", "--signing-key", "/no/such/key"], "cannot be read"),
+    ],
+)
+def test_what_does_not_fit_is_refused(words, what, tmp_path):
+    result = run("session", *words, "-o", tmp_path / "out", "--yes")
+    assert isinstance(result.exception, UsageError)
+    assert what in str(result.exception)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_capture_of_mpucal_fixes_its_options(recorded, tmp_path):
+    result = run("session", "--replay", recorded, "--gravity", 9.8, "-o", tmp_path / "out", "--yes")
+    assert isinstance(result.exception, UsageError)
+    assert "the capture fixes it" in str(result.exception)
+
+
+KEY = bytes(range(32))
+
+
+@pytest.mark.parametrize(
+    ("content", "key"),
+    [
+        (KEY, KEY),
+        (KEY.hex().encode() + b"\n", KEY),
+        (b"correct horse\n", hashlib.sha256(b"correct horse").digest()),
+    ],
+    ids=["bytes", "hexadecimal", "passphrase"],
+)
+def test_the_forms_of_a_key(content, key, tmp_path):
+    (tmp_path / "key").write_bytes(content)
+    assert read_key(tmp_path / "key") == key
+
+
+def test_an_empty_key_is_refused(tmp_path):
+    (tmp_path / "key").write_bytes(b" \n")
+    with pytest.raises(UsageError, match="is empty"):
+        read_key(tmp_path / "key")
