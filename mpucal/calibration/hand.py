@@ -27,9 +27,11 @@ LEVER_SD_M = 0.3
 DELAY_SD_S = 0.002
 SEARCH_HZ = 50.0
 ROUGHLY, MOST_ROUGHLY = 0.05, 20
+PASSES = 3
 
 FIRST_MPS2 = 0.3
 WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
+HAND_MPS2 = WHITE_MPS2[4:]  # who goes from rest to rest, has a hand
 PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 # A pivot travels farther than a bounded position of one lambda, the more the wilder it is: sigma (1.5 + 0.5 sigma) for
 # the estimate, and five times that for what its covariance admits.
@@ -58,12 +60,14 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
         noise = Noise("white", _likeliest(fine.white, _near(noise.sigma), theta))
     problem, doubt = noise.problem(fine), replace(noise, sigma=HONEST * noise.sigma).problem(fine)
-    factor = q_scale_of_moves(fine.recording, fine.flat, problem.series, theta, fine.runs, gravity)
-    if factor is not None:
+    prior, iterations = _prior(fine.flat), search.iterations
+    for _ in range(PASSES):
+        factor = q_scale_of_moves(fine.recording, fine.flat, problem.series, theta, fine.runs, gravity)
         problem, doubt = (replace(p, series=replace(p.series, q_scale=factor)) for p in (problem, doubt))
-    prior = _prior(fine.flat)
-    minimum = minimise(problem, theta, len(NAMES), prior, frozen=True)
-    iterations = search.iterations + minimum.iterations
+        minimum = minimise(problem, theta, len(NAMES), prior, frozen=True)
+        theta, iterations = minimum.theta, iterations + minimum.iterations
+        if factor is None:
+            break
     if wald(minimum) < WALD_99:
         perfect = replace(minimum.theta, K=np.eye(3))
         minimum = minimise(problem, perfect, len(NAMES), prior, fixed=("K",), frozen=True)
@@ -96,8 +100,9 @@ class _Search:
         scene = self.scene
         theta = self._roughly(replace(scene.white(FIRST_MPS2), tail=0.0), theta)
         sigma = 0.0
+        sigmas = HAND_MPS2 if scene.rests_often else WHITE_MPS2
         for _ in range(2):
-            sigma = _likeliest(scene.white, WHITE_MPS2, theta)
+            sigma = _likeliest(scene.white, sigmas, theta)
             theta = self._roughly(scene.white(sigma), theta)
         if sigma == 0.0:
             return theta, Noise("none", 0.0)

@@ -17,7 +17,7 @@ FEWEST_AT_A_RANGE, FEWEST_ANYWHERE = 2, 8
 
 CLIPPED_R_SCALE = 1e4
 GAP_ANGLE_VARIANCE = 1.0  # rad^2 a second: nothing is known of how the board turned
-CLIPPED_RATE_SD = 0.1  # of |omega|: what lies beyond the range
+CLIPPED_RATE_SD = 0.003  # of |omega|, in a run of one: a longer one hides more of what lies beyond the range
 
 # After a gap that long a correction, linear in the turn, falls short of it: the samples that follow correct it again.
 LOST_RAD, SETTLING = 0.2, 5
@@ -53,10 +53,16 @@ def mask(series: Series, recording: Recording, flat: Flat) -> Series:
     q_extra = np.where(gap, GAP_ANGLE_VARIANCE * np.minimum(series.dt, 1e3), 0.0)
     for i in np.flatnonzero(q_extra > LOST_RAD**2):
         q_extra[i + 1 : i + 1 + SETTLING] += LOST_RAD**2
-    q_extra += np.where(clipped, (CLIPPED_RATE_SD * series.dt) ** 2 * rate2, 0.0)
+    q_extra += clipped * _run_lengths(clipped) * (CLIPPED_RATE_SD * series.dt) ** 2 * rate2
     # the measured rates on both sides of a gap say nothing of what lies between
     omega = np.where(gap[:, None], flat.b_omega, series.omega)
     return replace(series, omega=omega, r_scale=np.where(acc, CLIPPED_R_SCALE, 1.0), q_extra=q_extra)
+
+
+def _run_lengths(mask: Mask) -> Vector:
+    """(n,) how many neighbours in a row share each sample's value, itself among them."""
+    edges = np.flatnonzero(np.concatenate([[True], mask[1:] != mask[:-1], [True]]))
+    return np.repeat(np.diff(edges), np.diff(edges)).astype(np.float64)
 
 
 def _on_a_line(values: Vector, t: Vector) -> Mask:

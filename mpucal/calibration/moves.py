@@ -1,6 +1,13 @@
-"""Moves between rests whose gyroscope cannot be believed: a line drawn through lost samples, a slip of the mount."""
+"""How far the gyroscope is believed between two rests. Knows no minimiser.
+
+A real gyroscope errs by more than its noise: by its scale's non-linearity, by steps too long for a fast turn. The rests
+on both sides of a move show by how much.
+"""
 
 from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,47 +16,78 @@ from .likelihood import Series, Theta
 from .model import Flat, product, rotation
 from .still import Runs
 
-POSE_MPS2 = 0.003
+POSE_MPS2 = 0.0003  # no pose is known better than its mounting is stiff
+SPEED_OF_TREMOR_S = 0.04  # what a tremor's speed is to its acceleration
+FEWEST_MOVES = 3
 DEGREES_OF_FREEDOM = 4.0
-# a weight so small that a move says nothing beside the others
+# a move of less weight is weighed down by itself; the others differ by chance
 WORTHLESS = 0.02
+
+
+class Rest(NamedTuple):
+    """A rest as the moves see it.
+
+    first, last : samples of the recording. coming, leaving : (3,) m/s^2, its mean specific force in the body's axes at
+    the first and at the last sample. variance : rad^2 an axis, of its direction.
+    """
+
+    first: int
+    last: int
+    coming: Vector
+    leaving: Vector
+    variance: float
 
 
 def q_scale_of_moves(
     recording: Recording, flat: Flat, series: Series, theta: Theta, runs: Runs, gravity: float
 ) -> Vector | None:
-    """(n,) factor of Sigma_omega over the series, large on moves that disagree with the others; None where none does.
+    """(n,) factor of Sigma_omega over the series, with which noise explains all moves; None where they are too few.
 
     The gravity of one rest, carried to the next by the gyroscope, misses it by e; z = |e|^2 / (2 v) with v what noise
-    explains; Student's t gives each move its weight, against the common scale of all moves.
+    explains. All moves have a common scale c, the mean of z by Student's t; a lost one has a scale of its own.
     """
-    F = rotation(-series.dt[:, None] * ((series.omega - theta.b_omega) @ theta.K.T))
+    turns = -series.dt[:, None] * ((series.omega - theta.b_omega) @ theta.K.T)
+    rests = _rests(recording, flat, turns, theta, runs, gravity)
+    if len(rests) <= FEWEST_MOVES:
+        return None
+    F = rotation(turns)
     spans, v, z, noise = [], [], [], []
-    inverse = np.linalg.pinv(theta.D)  # a search may pass through a singular D: that is no reason to stop it
-    poses = [inverse @ (recording.acc[a:b].mean(0) - theta.b_a) for a, b in runs]
-    for k in range(len(runs) - 1):
-        first, last = max(runs[k][1] - flat.last, 0), runs[k + 1][0] - flat.last + 1
-        if last <= 0:
-            continue
-        e = _miss(product(F[first:last]) @ poses[k], poses[k + 1])
-        at_rest = sum(1.0 / (b - a) for a, b in runs[k : k + 2])
-        of_gyro = float(np.sum(series.dt[first:last] ** 2) * flat.Sigma_omega.mean())
-        known = of_gyro + (0.0 if series.q_extra is None else float(series.q_extra[first:last].sum()))
-        variance = known + (2.0 * POSE_MPS2**2 + flat.Sigma_a.mean() * at_rest) / gravity**2
-        spans.append(slice(first, last))
+    for one, other in pairwise(rests):
+        span = slice(one.last - flat.last, other.first + 1 - flat.last)
+        e = _miss(product(F[span]) @ one.leaving, other.coming)
+        of_gyro = float(np.sum(series.dt[span] ** 2) * flat.Sigma_omega.mean())
+        known = of_gyro + (0.0 if series.q_extra is None else float(series.q_extra[span].sum()))
+        variance = known + one.variance + other.variance
+        spans.append(span)
         v.append(variance)
         z.append(0.5 * float(e @ e) / variance)
         noise.append(of_gyro)
-    if len(z) < 3:
-        return None
     weight, scale = _weights(np.array(z))
-    if not (weight < WORTHLESS).any():
-        return None
     factor = np.ones(len(series))
     for span, w, variance, of_gyro in zip(spans, weight, v, noise, strict=True):
-        if w < WORTHLESS:
-            factor[span] = max(scale / w * variance / of_gyro, 1.0)
+        factor[span] += (scale / (w if w < WORTHLESS else 1.0) - 1.0) * variance / of_gyro
     return factor
+
+
+def _rests(recording: Recording, flat: Flat, turns: Vector, theta: Theta, runs: Runs, gravity: float) -> list[Rest]:
+    """The flat segment and the rests after it; `turns` (n, 3) rad are the steps of the series."""
+    inverse = np.linalg.pinv(theta.D)  # a search may pass through a singular D: that is no reason to stop it
+    dt = 1.0 / recording.rate_hz
+    turns = np.vstack([np.zeros((flat.last, 3)), turns])
+    rests = []
+    for first, last in runs.tolist():
+        if last <= flat.last + 1:
+            continue
+        s = (recording.acc[first:last] - theta.b_a) @ inverse.T
+        # a board in a hand turns a little as it rests: each sample counts in the axes of either end
+        turned = np.cumsum(turns[first:last], axis=0)
+        coming = s - np.cross(turned - turned[0], s)
+        leaving = s + np.cross(turned[-1] - turned, s)
+        tremor = max(float(np.mean(s.var(0) - flat.Sigma_a)), 0.0)
+        of_tremor = 2.0 * tremor * (SPEED_OF_TREMOR_S / ((last - first) * dt)) ** 2
+        variance = (POSE_MPS2**2 + flat.Sigma_a.mean() / (last - first) + of_tremor) / gravity**2
+        rests.append(Rest(first, last, coming.mean(0), leaving.mean(0), variance))
+    return rests
 
 
 def _miss(carried: Vector, seen: Vector) -> Vector:

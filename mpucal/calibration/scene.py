@@ -10,6 +10,7 @@ from ..data import Recording, Vector
 from .likelihood import Problem, Series
 from .masks import mask
 from .model import Flat
+from .moves import POSE_MPS2
 from .stationary import flat_statistics
 from .still import Runs, still_runs, without_drift
 
@@ -18,8 +19,8 @@ MOVING_RAD_S = 0.3  # the rate at which a hand's acceleration is half of what it
 SMOOTH_S = 0.02  # of the rates whose derivative is the angular acceleration
 TREMOR_PER_S, MOTION_PER_S = 20.0, 5.0  # lambda: 4.5 Hz of a tremor at rest, 1.1 Hz of a pivot
 TREMOR_OF_NOISE = 0.2  # a tremor below this share of the sensor's noise is none
-POSE_MPS2 = 0.001  # no pose is known better than its mounting is stiff
-CORRELATION_S = 0.05  # of a hand's acceleration
+CORRELATION_S = 0.25  # of the acceleration of a hand that goes from rest to rest
+FLOOR_CORRELATION_S = 0.05  # of jerks
 FLOOR_MPS2 = 0.12  # white acceleration that jerks leave beside the pivot's own
 MANY_RESTS = 6
 
@@ -59,7 +60,7 @@ class Scene:
         jerk = jerk_density(sigma, self.problem.lam) * self.motion
         if self.problem.series.jerk is not None:
             jerk = jerk + self.problem.series.jerk
-        white = 2.0 * CORRELATION_S / self._dt * floor**2 * self.motion
+        white = 2.0 * FLOOR_CORRELATION_S / self._dt * floor**2 * self.motion
         return self._with(jerk=jerk, r_extra=self.pose + white)
 
     @property
@@ -92,7 +93,8 @@ def prepare(recording: Recording, at: tuple[int, int], gravity: float) -> Scene:
             reset[b] = 0.0
     series = replace(series, rate=rate, alpha=alpha, reset=reset, jerk=jerk, r_extra=pose)
     problem = Problem(series, flat, gravity, huber=HUBER, tail=1.0, lam=lam)
-    motion = speed2 / (speed2 + MOVING_RAD_S**2)
+    # between rests nothing is trusted to be at rest: the ends of a move are slow, and yet the hand's
+    motion = np.where(rest, 0.0, 1.0) if len(after) >= MANY_RESTS else speed2 / (speed2 + MOVING_RAD_S**2)
     return Scene(recording, flat, problem, runs, len(after), motion, pose)
 
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ..data import Mask, Recording, Vector
 from .model import Flat
 
-WINDOW_S, SHORTEST_S, TRIM_S = 0.5, 0.3, 0.1
+WINDOW_S, SHORTEST_S = 0.5, 0.3
+TRIM, LEAST_TRIM_S, MOST_TRIM_S = 0.125, 0.1, 0.35  # of a rest at either end: a hand settles, and leaves early
 TIMES_QUIET = 2.5
 GYRO_SD_RAD_S, ACC_SD_MPS2 = 0.03, 0.15
 GYRO_MEAN_RAD_S = 0.05
@@ -43,9 +44,10 @@ def still_runs(recording: Recording, flat: Flat) -> Runs:
     np.add.at(covered, at, 1)
     np.add.at(covered, at + n, -1)
     still = (np.cumsum(covered)[:-1] > 0) & ~recording.gap
-    trim, shortest = round(TRIM_S * recording.rate_hz), SHORTEST_S * recording.rate_hz
-    runs = _runs(still) + np.array([trim, -trim])
-    return np.asarray(runs[runs[:, 1] - runs[:, 0] >= shortest])
+    runs, rate = _runs(still), recording.rate_hz
+    trim = np.clip(TRIM * (runs[:, 1] - runs[:, 0]), LEAST_TRIM_S * rate, MOST_TRIM_S * rate).astype(np.intp)
+    runs = runs + np.stack([trim, -trim], axis=1)
+    return np.asarray(runs[runs[:, 1] - runs[:, 0] >= SHORTEST_S * rate])
 
 
 def without_drift(recording: Recording, flat: Flat, runs: Runs) -> Recording:

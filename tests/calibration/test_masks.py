@@ -109,7 +109,15 @@ def test_both_steps_beside_a_clipped_rate_are_doubted():
     plain, series, flat = masked(noise(gyr_clipped=marks))
     assert np.flatnonzero(series.q_extra).tolist() == [200, 201]
     omega = np.linalg.norm(plain.omega[[200, 201]] - flat.b_omega, axis=1)
-    np.testing.assert_allclose(np.sqrt(series.q_extra[[200, 201]]), 0.1 * omega * 0.01, rtol=1e-6)
+    # two steps in a row: 0.3 % of the rate, times the root of two
+    np.testing.assert_allclose(np.sqrt(series.q_extra[[200, 201]]), 0.003 * np.sqrt(2.0) * omega * 0.01, rtol=1e-6)
+
+
+def test_the_longer_a_rate_is_clipped_the_less_its_range_says():
+    short, long = np.zeros(1000, bool), np.zeros(1000, bool)
+    short[300], long[300:307] = True, True
+    variance = [masked(noise(gyr_clipped=marks))[1].q_extra[201] for marks in (short, long)]
+    np.testing.assert_allclose(variance[1] / variance[0], 8.0 / 2.0)
 
 
 def test_across_a_gap_nothing_is_integrated_and_nothing_known(pick):

@@ -35,7 +35,7 @@ class Scene:
 
 def test_moves_that_agree_keep_their_noise(hand):
     for seed in range(3):
-        assert Scene(hand(seed, "pose12")).scale() is None
+        assert Scene(hand(seed, "pose12")).scale().max() < 2.0
 
 
 @pytest.mark.parametrize("k", [3, 6])
@@ -50,7 +50,7 @@ def test_the_move_that_lost_its_gyroscope_is_the_one_that_is_doubted(in_hand, k)
     for other in range(1, len(scene.runs) - 1):
         if other != k:
             middle = scene.move(other)
-            assert factor[(middle.start + middle.stop) // 2] == 1.0
+            assert factor[(middle.start + middle.stop) // 2] < 1e-3 * factor[scene.move(k)].min()
 
 
 def test_the_doubt_is_as_large_as_the_miss(in_hand):
