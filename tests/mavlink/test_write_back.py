@@ -1,0 +1,336 @@
+"""A calibration written into simulated vehicles: the new parameters or the old ones, and the exit code says which."""
+
+import re
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mpucal.data import Autopilot
+from mpucal.errors import RecordingError, WriteBackError
+from mpucal.mavlink.dialect import Parser, dialect
+from mpucal.mavlink.link import Link
+from mpucal.mavlink.parameters.document import autopilot_document
+from mpucal.mavlink.prompts import Heard, to_message
+from mpucal.mavlink.simulated import Options, Vehicle
+from mpucal.mavlink.simulated.transport import SimulatedTransport
+from mpucal.result import Calibration
+from mpucal.sinks.autopilot import AutopilotSink
+
+FIRMWARES = ("ardupilot", "px4")
+SCALED = ("SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
+REFUSED = {"verdict": "refused", "reasons": []}
+
+
+class Flying(SimulatedTransport):
+    """The simulated vehicle, where `befall` sees each PARAM_SET that is sent, and may swallow it."""
+
+    def __init__(self, vehicle):
+        super().__init__(vehicle)
+        self.vehicle, self.sets, self.befall = vehicle, 0, lambda number, message: True
+        self._parser = Parser(dialect().MAVLink(None))
+
+    def send(self, data, address):
+        for packet in self._parser.datagram(data):
+            if packet.message.get_type() == "PARAM_SET":
+                self.sets += 1
+                if not self.befall(self.sets, packet.message):
+                    return
+        super().send(data, address)
+
+
+def vehicle_of(firmware, words=""):
+    """A vehicle that was set down, behind a locked link."""
+    vehicle = Vehicle(Options.parse(f"sim:firmware={firmware}{words}"))
+    transport = Flying(vehicle)
+    link = Link(transport, lambda t_ns, packet: None)
+    link.lock(link.listen()[0])
+    link.send(to_message(Heard("lay_flat", None)))
+    list(link.messages(link.now_ns() + 4_000_000_000))
+    return vehicle, transport, link
+
+
+def calibration_of(vehicle):
+    """What a perfect fit says of its streams."""
+    firmware = vehicle.firmware
+    name = "PX4" if firmware.bytewise else "ArduPilot"
+    parameters = {key: float(firmware.store[key]) for key in firmware.store}
+    made = []
+    for imu in range(vehicle.options.imus):
+        truth = vehicle.imus.truth(imu, *firmware.correction(imu))
+        message = SCALED[imu] if firmware.bytewise or imu else "HIGHRES_IMU"
+        one = Calibration(
+            np.array(truth["D"]),
+            np.array(truth["b_a"]),
+            fit={"gravity": 9.80665},
+            quality={"verdict": "good", "reasons": []},
+        )
+        autopilot = autopilot_document(Autopilot(name, imu + 1, message, parameters), one)
+        made.append(replace(one, extra=MappingProxyType({"autopilot": autopilot})))
+    first, *others = made
+    extra = {**first.extra, "others": [other.document() for other in others]}
+    return replace(first, extra=MappingProxyType(extra))
+
+
+def stored(vehicle):
+    """Its accelerometers' corrections."""
+    pattern = re.compile(r"(OFFS|SCAL)_[XYZ]$|[XYZ](OFF|SCALE)$")
+    return {name: vehicle.firmware.store[name] for name in vehicle.firmware.store if pattern.search(name)}
+
+
+def error_mps2(vehicle, imu=0):
+    """By how much |a| of its stream is wrong at worst, over attitudes."""
+    truth = vehicle.imus.truth(imu, *vehicle.firmware.correction(imu))
+    points = np.random.default_rng(1).normal(size=(500, 3))
+    f = 9.80665 * points / np.linalg.norm(points, axis=1, keepdims=True)
+    return np.abs(np.linalg.norm(f @ np.array(truth["D"]).T + truth["b_a"], axis=1) - 9.80665).max()
+
+
+@pytest.mark.parametrize("words", ["", ",imus=3", ",rotation=1", ",highres=no,imus=1"], ids=str)
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_every_imu_reads_gravity_better_afterwards(firmware, words):
+    vehicle, _, link = vehicle_of(firmware, words)
+    if "highres=no" in words and firmware == "ardupilot":
+        calibration = calibration_of(vehicle)
+        calibration.extra["autopilot"]["message"] = "RAW_IMU"
+    else:
+        calibration = calibration_of(vehicle)
+    before = [error_mps2(vehicle, imu) for imu in range(vehicle.options.imus)]
+    applied = AutopilotSink(link).write(calibration)
+    said = [calibration.extra["autopilot"], *(other["autopilot"] for other in calibration.extra["others"])]
+    for imu, autopilot in enumerate(said):
+        assert error_mps2(vehicle, imu) < 0.5 * before[imu]
+        assert error_mps2(vehicle, imu) == pytest.approx(autopilot["residual_mps2"], rel=0.1, abs=0.01)
+    assert "would arm" in applied.what.rpartition("now it ")[2]
+    # what is returned is of the streams as they are now
+    truth = vehicle.truth_document()
+    np.testing.assert_allclose(applied.calibration.D, truth["D"], atol=1e-6)
+    np.testing.assert_allclose(applied.calibration.b_a, truth["b_a"], atol=1e-6)
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_a_second_write_changes_nothing(firmware):
+    vehicle, transport, link = vehicle_of(firmware, ",imus=1")
+    sink = AutopilotSink(link)
+    applied = sink.write(calibration_of(vehicle))
+    once, sets = stored(vehicle), transport.sets
+    sink.write(applied.calibration)
+    assert (stored(vehicle), transport.sets) == (once, sets)
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_what_was_kept_is_put_back(firmware, tmp_path):
+    vehicle, _, link = vehicle_of(firmware)
+    sink = AutopilotSink(link)
+    old = stored(vehicle)
+    (kept,) = sink.keep(tmp_path)
+    sink.write(calibration_of(vehicle))
+    (later,) = sink.keep(tmp_path)
+    assert stored(vehicle) != old
+    assert later != kept
+    sink.put_back(kept)
+    assert stored(vehicle) == old
+
+
+def test_another_file_is_not_put_back(tmp_path):
+    _, _, link = vehicle_of("ardupilot")
+    (tmp_path / "x.param").write_text("ATC_RAT_RLL_P,0.135\n")
+    with pytest.raises(RecordingError, match="no accelerometer parameters"):
+        AutopilotSink(link).put_back(tmp_path / "x.param")
+
+
+def refused(calibration):
+    return replace(calibration, quality=MappingProxyType(REFUSED))
+
+
+def of_a_chip(calibration):
+    return replace(calibration, extra=MappingProxyType({}))
+
+
+def beyond_limits(calibration):
+    new = calibration.extra["autopilot"]["params_new"]
+    new[next(name for name in new if "SCAL" in name)] = 7.5
+    return calibration
+
+
+def of_another_sensor(calibration):
+    old = calibration.extra["autopilot"]["params_old"]
+    old[next(name for name in old if name.endswith("_ID") and old[name] > 1000)] += 8
+    return calibration
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (refused, "refused"),
+        (of_a_chip, "of no vehicle"),
+        (beyond_limits, "beyond"),
+        (of_another_sensor, "of sensor"),
+    ],
+    ids=lambda value: getattr(value, "__name__", None),
+)
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_nothing_is_written_that_does_not_belong_there(firmware, change, why):
+    vehicle, transport, link = vehicle_of(firmware, ",imus=1")
+    with pytest.raises(WriteBackError, match=rf"nothing was written.*{why}"):
+        AutopilotSink(link).write(change(calibration_of(vehicle)))
+    assert transport.sets == 0
+
+
+def test_a_calibration_of_the_other_firmware_is_refused():
+    px4, *_ = vehicle_of("px4", ",imus=1")
+    _, transport, link = vehicle_of("ardupilot", ",imus=1")
+    with pytest.raises(WriteBackError, match=r"nothing was written.*PX4"):
+        AutopilotSink(link).write(calibration_of(px4))
+    assert transport.sets == 0
+
+
+def test_an_armed_vehicle_is_left_alone():
+    vehicle, transport, link = vehicle_of("ardupilot", ",fault=arm@3")
+    with pytest.raises(WriteBackError, match=r"nothing was written.*armed"):
+        AutopilotSink(link).write(calibration_of(vehicle))
+    assert transport.sets == 0
+
+
+def test_a_vehicle_in_a_restless_hand_is_left_alone():
+    vehicle, transport, link = vehicle_of("ardupilot", ",imus=1,hand=restless")
+    with pytest.raises(WriteBackError, match=r"nothing was written.*still"):
+        AutopilotSink(link).write(calibration_of(vehicle))
+    assert transport.sets == 0
+
+
+def test_an_imu_whose_fit_was_refused_keeps_its_parameters():
+    vehicle, _, link = vehicle_of("ardupilot")
+    calibration = calibration_of(vehicle)
+    calibration.extra["others"][0]["quality"] = REFUSED
+    old = stored(vehicle)
+    applied = AutopilotSink(link).write(calibration)
+    assert {name: value for name, value in stored(vehicle).items() if "ACC2" in name} == {
+        name: value for name, value in old.items() if "ACC2" in name
+    }
+    assert "IMU 2 keeps" in applied.what
+
+
+def test_sensors_without_ids_are_given_theirs():
+    vehicle, _, link = vehicle_of("ardupilot", ",INS_ACC_ID=0,INS_ACC2_ID=0")
+    AutopilotSink(link).write(calibration_of(vehicle))
+    assert vehicle.firmware.store["INS_ACC2_ID"] != 0
+    assert vehicle.firmware.complaints() == []
+
+
+def test_px4_uses_what_it_stores_though_the_change_is_small():
+    # 0.004 m/s^2 from what is in use: PX4 would store it and go on as before
+    vehicle, _, link = vehicle_of("px4", ",imus=1")
+    calibration = calibration_of(vehicle)
+    sink = AutopilotSink(link)
+    applied = sink.write(calibration)
+    new = applied.calibration.extra["autopilot"]["params_new"]
+    new["CAL_ACC0_XOFF"] += 0.004
+    sink.write(applied.calibration)
+    offset, _ = vehicle.firmware.correction(0)
+    assert offset[0] == pytest.approx(new["CAL_ACC0_XOFF"], abs=1e-6)
+    vehicle.firmware.start()
+    np.testing.assert_allclose(vehicle.firmware.correction(0)[0], offset)
+
+
+def test_px4_is_not_asked_to_hold_what_it_ignores_after_a_start():
+    words = ",imus=1,CAL_ACC0_XSCALE=1.004"
+    vehicle, _, _ = vehicle_of("px4", words)
+    # the stored 1.004 is not in use: the stream is uncorrected, and its calibration must not count it
+    calibration = calibration_of(vehicle)
+    np.testing.assert_allclose(
+        [calibration.extra["autopilot"]["params_new"][f"CAL_ACC0_{axis}SCALE"] for axis in "XYZ"],
+        np.diag(np.linalg.inv(vehicle.imus.truths[0].D)),
+        atol=1e-9,
+    )
+
+
+def lose(transport, number):
+    """The nth PARAM_SET and five more are lost."""
+    transport.befall = lambda count, message: not number <= count < number + 6
+
+
+def arm(transport, number):
+    """It is armed at the nth PARAM_SET."""
+
+    def befall(count, message):
+        transport.vehicle.firmware.armed |= count >= number
+        return True
+
+    transport.befall = befall
+
+
+def refuse(transport, number):
+    """It takes no value for the parameter of the nth PARAM_SET, from then on."""
+    names = []
+
+    def befall(count, message):
+        names.extend([message.param_id] if count == number else [])
+        return message.param_id not in names
+
+    transport.befall = befall
+
+
+def spoil(transport, number):
+    """Somebody else writes another value just before the nth PARAM_SET."""
+
+    def befall(count, message):
+        if count == number:
+            store = transport.vehicle.firmware.store
+            other = next(name for name in stored(transport.vehicle) if name[:8] == message.param_id[:8])
+            store[other] = float(store[other]) + 0.3
+        return True
+
+    transport.befall = befall
+
+
+def reboot(transport, number):
+    """It starts anew at the nth PARAM_SET."""
+
+    def befall(count, message):
+        if count == number:
+            transport.vehicle._reboot()
+        return True
+
+    transport.befall = befall
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    firmware=st.sampled_from(FIRMWARES),
+    fault=st.sampled_from([lose, arm, refuse, spoil, reboot]),
+    number=st.integers(1, 18),
+)
+def test_whatever_happens_at_whichever_step_it_holds_the_old_or_the_new(firmware, fault, number):
+    vehicle, transport, link = vehicle_of(firmware, ",imus=1")
+    calibration = calibration_of(vehicle)
+    old = stored(vehicle)
+    new = {name: np.float32(value) for name, value in calibration.extra["autopilot"]["params_new"].items()}
+    fault(transport, number)
+    try:
+        AutopilotSink(link).write(calibration)
+    except WriteBackError as error:
+        assert error.exit_code == 6
+        assert "old parameters are back" in error.what
+        assert stored(vehicle) == old
+    else:
+        held = stored(vehicle)
+        assert {name: held[name] for name in new} == new
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_a_vehicle_that_is_gone_cannot_be_put_back_and_that_is_said(firmware):
+    vehicle, transport, link = vehicle_of(firmware, ",imus=1")
+    calibration = calibration_of(vehicle)
+
+    def befall(count, message):
+        if count == 4:
+            vehicle._fall_silent()
+        return True
+
+    transport.befall = befall
+    with pytest.raises(WriteBackError, match="could not be put back"):
+        AutopilotSink(link).write(calibration)
