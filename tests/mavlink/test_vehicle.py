@@ -1,0 +1,243 @@
+"""The simulated vehicle does what ArduPilot and PX4 do, quirks included."""
+
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpucal.errors import UsageError
+from mpucal.mavlink.dialect import Parser, dialect
+from mpucal.mavlink.link import Link
+from mpucal.mavlink.parameters.encoding import name_bytes, of_wire, to_wire
+from mpucal.mavlink.prompts import Heard, to_message
+from mpucal.mavlink.simulated import Options, Vehicle
+from mpucal.mavlink.transport import open_transport
+from mpucal.mavlink.url import parse_url
+
+S_US = 1_000_000
+HIGHRES, RAW, SCALED, SCALED2 = 105, 27, 26, 116
+ACCEPTED, DENIED, FAILED = 0, 2, 4
+REAL32, INT32 = 9, 6
+FIRMWARES = ("ardupilot", "px4")
+
+
+class Station:
+    """Speaks with a vehicle, and reads what it sends."""
+
+    def __init__(self, words=""):
+        self.vehicle = Vehicle(Options.parse("sim" + (":" + words if words else "")))
+        self.mav = dialect().MAVLink(None, 254, 190)
+        self._parser = Parser(dialect().MAVLink(None))
+
+    def say(self, kind, *fields):
+        self.vehicle.hear(bytes(getattr(self.mav, f"{kind}_encode")(*fields).pack(self.mav)))
+
+    def command(self, number, *params):
+        self.say("command_long", 1, 1, number, 0, *params, *[0] * (7 - len(params)))
+        return next(m.result for m in self.hear(0.01) if m.get_type() == "COMMAND_ACK")
+
+    def interval(self, message_id, rate_hz):
+        return self.command(511, message_id, round(1e6 / rate_hz))
+
+    def set(self, name, value, kind=REAL32):
+        self.say("param_set", 1, 1, name_bytes(name), to_wire(value, kind, self.vehicle.firmware.bytewise), kind)
+        return self.hear(0.01)
+
+    def hear(self, seconds):
+        sent = self.vehicle.go_on(self.vehicle.now_us + round(seconds * S_US))
+        return [packet.message for one in sent for packet in self._parser.datagram(one.data)]
+
+    def rates(self, seconds=2.0):
+        counts = Counter(message.get_type() for message in self.hear(seconds))
+        return {name: count / seconds for name, count in counts.items()}
+
+    def rest(self):
+        """Set it down."""
+        self.vehicle.hear(bytes(to_message(Heard("lay_flat", None)).pack(self.mav)))
+        self.hear(5.0)
+
+
+@pytest.mark.parametrize(
+    ("asked_hz", "result", "got_hz"),
+    [(10, ACCEPTED, 10), (100, ACCEPTED, 100), (250, ACCEPTED, 250), (300, ACCEPTED, 333), (400, DENIED, 50)],
+)
+def test_ardupilot_cuts_intervals_to_whole_ms_and_keeps_the_last_where_it_denies(asked_hz, result, got_hz):
+    station = Station("imus=1")
+    station.interval(HIGHRES, 50)
+    assert station.interval(HIGHRES, asked_hz) == result
+    assert station.rates()["HIGHRES_IMU"] == pytest.approx(got_hz, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("words", "message_id", "result"),
+    [
+        ("firmware=px4", RAW, FAILED),
+        ("firmware=px4", HIGHRES, ACCEPTED),
+        ("highres=no", HIGHRES, DENIED),
+        ("highres=no", RAW, ACCEPTED),
+    ],
+    ids=["px4 raw", "px4 highres", "old ardupilot highres", "old ardupilot raw"],
+)
+def test_each_firmware_has_its_messages(words, message_id, result):
+    assert Station(words).interval(message_id, 100) == result
+
+
+def test_px4_acknowledges_two_hundred_and_sends_less():
+    station = Station("firmware=px4")
+    assert station.interval(SCALED, 200) == ACCEPTED
+    assert station.rates()["SCALED_IMU"] == pytest.approx(125, rel=0.02)
+
+
+def test_a_second_station_slows_raw_imu_and_not_highres_imu():
+    station = Station("fault=second_station@3")
+    station.interval(HIGHRES, 100)
+    station.interval(RAW, 100)
+    before = station.rates()
+    station.hear(1.5)
+    after = station.rates()
+    assert (before["RAW_IMU"], before["HIGHRES_IMU"]) == pytest.approx((100, 100), rel=0.03)
+    assert (after["RAW_IMU"], after["HIGHRES_IMU"]) == pytest.approx((4, 100), rel=0.15)
+
+
+def test_a_parameter_list_slows_the_streams():
+    station = Station("imus=1")
+    station.interval(HIGHRES, 100)
+    station.say("param_request_list", 1, 1)
+    messages = station.hear(0.05)
+    values = [m for m in messages if m.get_type() == "PARAM_VALUE"]
+    assert len(values) == 20
+    assert len(messages) - len(values) <= 3
+
+
+def test_whole_milli_g_are_truncated_toward_zero():
+    station = Station("imus=1,highres=yes")
+    station.rest()
+    station.interval(HIGHRES, 100)
+    station.interval(RAW, 100)
+    messages = station.hear(1.0)
+    exact = {m.time_usec: m for m in messages if m.get_type() == "HIGHRES_IMU"}
+    pairs = [(m, exact[m.time_usec]) for m in messages if m.get_type() == "RAW_IMU" and m.time_usec in exact]
+    assert len(pairs) > 90
+    for raw, float_ in pairs:
+        for axis in "xyz":
+            assert getattr(raw, f"{axis}acc") == int(getattr(float_, f"{axis}acc") / 9.80665e-3)
+            assert getattr(raw, f"{axis}gyro") == int(getattr(float_, f"{axis}gyro") * 1000)
+
+
+@pytest.mark.parametrize("words", ["", "firmware=px4", "rotation=1", "firmware=px4,rotation=12"], ids=str)
+def test_the_truth_it_tells_is_that_of_its_streams(words):
+    station = Station(words)
+    station.rest()
+    station.interval(SCALED, 100)
+    station.interval(SCALED2, 100)
+    found = station.hear(2.0)
+    first = station.vehicle.truth_document()
+    for name, truth in (("SCALED_IMU", first), ("SCALED_IMU2", first["others"][0])):
+        rows = [(m.xacc, m.yacc, m.zacc) for m in found if m.get_type() == name]
+        mean = np.mean(np.array(rows) + 0.5 * np.sign(rows), axis=0) * 9.80665e-3
+        # level, z down: gravity is felt upwards
+        expected = np.array(truth["D"]) @ [0, 0, -9.80665] + truth["b_a"]
+        np.testing.assert_allclose(mean, expected, atol=0.01)
+
+
+def test_px4s_highres_imu_hides_what_the_estimator_learns_unless_it_is_told_not_to():
+    shift = {}
+    for control in (7, 5):
+        station = Station(f"firmware=px4,imus=1,EKF2_IMU_CTRL={control}")
+        station.rest()
+        station.interval(SCALED, 50)
+        last = {m.get_type(): m.zacc for m in station.hear(30.0) if hasattr(m, "zacc")}
+        shift[control] = abs(last["HIGHRES_IMU"] - last["SCALED_IMU"] * 9.80665e-3)
+    assert shift[7] > 0.2
+    assert shift[5] < 0.05
+
+
+def test_ardupilot_echoes_a_vectors_other_axes_and_is_silent_on_unknown_names():
+    station = Station()
+    echoes = [m.param_id for m in station.set("INS_ACCOFFS_Y", 0.25) if m.get_type() == "PARAM_VALUE"]
+    assert echoes == ["INS_ACCOFFS_X", "INS_ACCOFFS_Y", "INS_ACCOFFS_Z"]
+    assert station.vehicle.firmware.store["INS_ACCOFFS_Y"] == 0.25
+    assert station.set("INS_NO_SUCH", 1.0) == []
+    assert station.set("INS_ACCOFFS_X", float("nan")) == []
+
+
+def test_ardupilots_scale_of_zero_is_a_stream_of_zero():
+    station = Station("imus=1,INS_ACCSCAL_X=0,INS_ACCSCAL_Y=0,INS_ACCSCAL_Z=0")
+    station.interval(HIGHRES, 50)
+    assert {m.zacc for m in station.hear(0.5) if m.get_type() == "HIGHRES_IMU"} == {0.0}
+    assert "calibration needed" in station.vehicle.firmware.complaints()[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "error"), [("CAL_NO_SUCH", REAL32, 1), ("CAL_ACC0_XOFF", INT32, 7)], ids=["unknown", "type"]
+)
+def test_px4_answers_with_an_error(name, kind, error):
+    (answer,) = [m for m in Station("firmware=px4").set(name, 1, kind) if m.get_type() == "PARAM_ERROR"]
+    assert (answer.param_id, answer.error) == (name, error)
+
+
+def test_px4s_integers_travel_by_their_bytes():
+    station = Station("firmware=px4,imus=1")
+    station.say("param_request_read", 1, 1, b"CAL_ACC1_PRIO", -1)
+    (value,) = [m for m in station.hear(0.01) if m.get_type() == "PARAM_VALUE"]
+    assert np.isnan(value.param_value)
+    assert of_wire(value, True).value == -1
+
+
+@pytest.mark.parametrize(("value", "used"), [(0.009, 0.0), (0.011, 0.011)], ids=["too little", "enough"])
+def test_px4_stores_and_ignores_a_small_change(value, used):
+    station = Station("firmware=px4,imus=1")
+    (echo,) = [m for m in station.set("CAL_ACC0_XOFF", value) if m.get_type() == "PARAM_VALUE"]
+    assert echo.param_value == pytest.approx(value)
+    for _ in range(2):
+        assert station.vehicle.firmware.correction(0)[0][0] == pytest.approx(used)
+        station.vehicle.firmware.start()
+
+
+def test_it_arms_reboots_and_falls_silent_when_told_to():
+    station = Station("fault=arm@2,fault=reboot@4,fault=silence@8")
+    assert [m.base_mode & 128 for m in station.hear(3.9) if m.get_type() == "HEARTBEAT"] == [0, 128, 128]
+    assert station.hear(2.0) == []
+    assert station.hear(2.0) != []
+    assert station.hear(5.0) == []
+
+
+def test_the_hand_obeys_prompts():
+    station = Station("imus=1")
+    station.rest()
+    station.interval(HIGHRES, 50)
+
+    def down():
+        last = [m for m in station.hear(4.0) if m.get_type() == "HIGHRES_IMU"][-1]
+        f = np.array([last.xacc, last.yacc, last.zacc])
+        return -f / np.linalg.norm(f)
+
+    assert down() @ [0, 0, 1] > 0.98
+    station.vehicle.hear(bytes(to_message(Heard("rotate", (1.0, 0.0, 0.0))).pack(station.mav)))
+    assert down() @ [1, 0, 0] > 0.9
+
+
+@pytest.mark.parametrize("words", ["imus=9", "firmware=betaflight", "fault=arm", "nonsense", "seed=1,seed=2"], ids=str)
+def test_unknown_words_are_refused(words):
+    with pytest.raises(UsageError):
+        Options.parse("sim:" + words)
+
+
+@pytest.mark.parametrize("port", ["tcp:127.0.0.1:0", "pty"])
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_the_tool_puts_it_on_a_real_port(port, firmware):
+    tool = Path(__file__).parents[2] / "tools" / "sim_vehicle.py"
+    command = [sys.executable, str(tool), port, f"firmware={firmware}", "--speed", "4"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
+        try:
+            url = running.stdout.readline().strip()
+            transport = open_transport(parse_url(url))
+            link = Link(transport, lambda t_ns, packet: None)
+            (vehicle,) = link.listen()
+            assert vehicle.is_px4 == (firmware == "px4")
+            link.close()
+        finally:
+            running.terminate()
