@@ -55,7 +55,8 @@ class BridgeSink:
         )
 
     def _blob(self, calibration: Calibration) -> bytes:
-        if calibration.verdict == REFUSED:
+        # a blob says nothing of its quality: what was refused has none
+        if calibration.quality.get("verdict") == REFUSED:
             raise WriteBackError(f"the calibration was refused; {UNTOUCHED}", "measure again, as its reasons say")
         try:
             return calibration.blob().encode()

@@ -46,6 +46,5 @@ def another() -> str:
 
 def _reason(error: Exception) -> str:
     """The system's own words, which pyserial wraps in its own."""
-    words = str(error)
-    found = re.search(r"\[Errno \d+\] ([^:']+)|\(\d+, '([^']+)'\)", words)
-    return next(filter(None, found.groups())) if found else words
+    found = re.findall(r"\[Errno \d+\] ([^:']+)|\(\d+, '([^']+)'\)", str(error))
+    return "".join(found[-1]) if found else str(error)

@@ -1,5 +1,11 @@
 """A simulated chip behind an emulated bridge, on a line whose time runs only while the host waits."""
 
+import contextlib
+import os
+import select
+import socket
+import threading
+import tty
 from types import SimpleNamespace
 
 import numpy as np
@@ -88,3 +94,105 @@ def stream():
             driver.poll()
 
     return run
+
+
+class Server:
+    """Serves an emulated bridge on a pty or a socket, from a thread of its own, in a time that runs as fast as it can.
+
+    Attributes
+    ----------
+    name : what the host opens. device : may be replaced: that is a reset. clock : the bridge's.
+    """
+
+    def __init__(self, device, clock, handle, name, step_ns):
+        self.device, self.clock, self.name = device, clock, name
+        self._handle, self._step_ns = handle, step_ns
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def stop(self):
+        if not self._stop.is_set():
+            self._stop.set()
+            self._thread.join()
+            self._handle.close()
+
+    def _serve(self):
+        with contextlib.suppress(OSError):
+            while not self._stop.is_set():
+                if select.select([self._handle], [], [], 0.0005)[0]:
+                    self.device.receive(self._handle.read())
+                self.clock.sleep_until(self.clock.now() + self._step_ns)
+                self._handle.write(self.device.work())
+
+
+class OnPty:
+    def __init__(self):
+        self._host, there = os.openpty()
+        tty.setraw(there)
+        self.name, self._there = os.ttyname(there), there
+
+    def fileno(self):
+        return self._host
+
+    def read(self):
+        return os.read(self._host, 4096)
+
+    def write(self, data):
+        while data:
+            if select.select([], [self._host], [], 0.1)[1]:
+                data = data[os.write(self._host, data) :]
+
+    def close(self):
+        os.close(self._host)
+        os.close(self._there)
+
+
+class OnSocket:
+    """One host after the other."""
+
+    def __init__(self):
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.name = f"socket://127.0.0.1:{self._listening.getsockname()[1]}"
+        self._host = None
+
+    def fileno(self):
+        return (self._host or self._listening).fileno()
+
+    def read(self):
+        if self._host is None:
+            self._host = self._listening.accept()[0]
+            return b""
+        try:
+            data = self._host.recv(4096)
+        except ConnectionError:
+            data = b""
+        if not data:
+            self._host.close()
+            self._host = None
+        return data
+
+    def write(self, data):
+        if self._host is not None and data:
+            with contextlib.suppress(ConnectionError):
+                self._host.sendall(data)
+
+    def close(self):
+        if self._host is not None:
+            self._host.close()
+        self._listening.close()
+
+
+@pytest.fixture
+def serve():
+    """Serves a device on a "pty" or "socket"."""
+    servers = []
+
+    def begin(device, clock, kind, step_ns=MS):
+        handle = {"pty": OnPty, "socket": OnSocket}[kind]()
+        servers.append(Server(device, clock, handle, handle.name, step_ns))
+        return servers[-1]
+
+    yield begin
+    for server in servers:
+        server.stop()

@@ -1,0 +1,121 @@
+"""A calibration into an emulated bridge's memory: kept, compared, or the old one is there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.bus.bridge.store import Held
+from mpucal.errors import BusError, WriteBackError
+from mpucal.result import Calibration
+from mpucal.sinks.bridge import BridgeSink
+
+OLD = b"an old blob"
+
+
+class FakeStore:
+    """A bridge's memory, whose `fails` names the calls that lose the bridge; `spoils` changes what is stored.
+
+    `stores_first` : a write that fails has stored its blob all the same.
+    """
+
+    name = "/dev/ttyUSB0"
+
+    def __init__(self, blob=OLD, fails=(), spoils=(), stores_first=False, chip=0x68):
+        self.blob, self.fails, self.spoils = blob, list(fails), list(spoils)
+        self.stores_first, self.chip, self.generation, self.written = stores_first, chip, 7, []
+
+    def _may_fail(self, call):
+        if call in self.fails:
+            self.fails.remove(call)
+            raise BusError("the bridge was reset", "check its cable")
+
+    def greet(self):
+        self._may_fail("greet")
+
+    def who_am_i(self):
+        self._may_fail("who_am_i")
+        return self.chip
+
+    def state(self):
+        return None if self.blob is None else Held(self.generation, len(self.blob), 0x1234ABCD)
+
+    def read(self):
+        return self.blob
+
+    def write(self, blob):
+        self.written.append(blob)
+        if self.stores_first:
+            self.blob = blob
+        self._may_fail("write")
+        self.blob = self.spoils.pop(0) if self.spoils else blob
+        self.generation += 1
+
+    def erase(self):
+        self.blob = None
+
+
+@pytest.fixture
+def calibration():
+    good = Calibration(D=np.eye(3), b_a=np.zeros(3), quality={"verdict": "good"}, created="2024-05-17T09:30:00+00:00")
+    return replace(good, sensor=replace(good.sensor, who_am_i=0x68))
+
+
+def test_it_is_stored_read_back_and_found_valid(calibration):
+    store = FakeStore()
+    applied = BridgeSink(store).write(calibration)
+    assert store.blob == calibration.blob().encode()
+    assert applied.calibration is calibration
+    assert "blob number 8 (188 bytes, CRC-32 1234abcd), read back the same, and found valid" in applied.what
+
+
+def test_the_old_one_is_kept_in_a_file_of_its_number(tmp_path):
+    (path,) = BridgeSink(FakeStore()).keep(tmp_path)
+    assert (path.name, path.read_bytes()) == ("bridge-blob-7.bin", OLD)
+    assert BridgeSink(FakeStore(None)).keep(tmp_path) == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "store", "words"),
+    [
+        ({"quality": {"verdict": "refused"}}, {}, "was refused; nothing was written: measure again"),
+        ({"D": np.full((3, 3), np.nan)}, {}, "does not fit a blob .*; nothing was written"),
+        ({}, {"chip": 0x70}, "answers 0x70 to WHO_AM_I, and the calibrated one 0x68; nothing was written"),
+        ({}, {"fails": ["who_am_i"]}, "the bridge was reset; nothing was written: check its cable"),
+    ],
+    ids=["refused", "not finite", "another chip", "lost"],
+)
+def test_what_is_refused_touches_nothing(calibration, changes, store, words):
+    held = FakeStore(**store)
+    with pytest.raises(WriteBackError, match=words):
+        BridgeSink(held).write(replace(calibration, **changes))
+    assert (held.blob, held.written) == (OLD, [])
+
+
+@pytest.mark.parametrize(
+    ("store", "words", "left"),
+    [
+        ({"fails": ["write"]}, "the bridge was reset; it keeps the old calibration: check", OLD),
+        ({"fails": ["write"], "blob": None}, "the bridge was reset; it keeps none, as before", None),
+        (
+            {"fails": ["write", "greet"]},
+            "the old calibration or the new one, never a part: plug it in again.*show",
+            OLD,
+        ),
+        ({"spoils": [b"x"]}, "gives back another calibration than was stored; the old calibration is there again", OLD),
+        ({"spoils": [b"x"], "blob": None}, "than was stored; it keeps none, as before", None),
+        ({"spoils": [b"x", b"y"]}, "does not take the old one: use another board", b"y"),
+    ],
+    ids=["reset", "reset, empty", "gone", "spoiled", "spoiled, empty", "worn out"],
+)
+def test_what_fails_leaves_the_old_one_and_says_so(calibration, store, words, left):
+    held = FakeStore(**store)
+    with pytest.raises(WriteBackError, match=words):
+        BridgeSink(held).write(calibration)
+    assert held.blob == left
+
+
+def test_a_reply_that_was_lost_behind_the_commit_is_no_failure(calibration):
+    held = FakeStore(fails=["write"], stores_first=True)
+    assert "read back the same" in BridgeSink(held).write(calibration).what
+    assert held.blob == calibration.blob().encode()
