@@ -18,10 +18,10 @@ import time
 from pathlib import Path
 
 from mpucal.mavlink.dialect import dialect
+from mpucal.mavlink.lines import Udp
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.source import VehicleSource
 from mpucal.mavlink.tlog import TlogWriter
-from mpucal.mavlink.transport import Udp
 from mpucal.mavlink.url import Kind, Url
 
 

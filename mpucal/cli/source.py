@@ -74,8 +74,8 @@ def open_vehicle(text: str, plan: Plan, system: int | None, key: Path | None) ->
     UsageError : words that are no URL, or no key. LinkError : it cannot be opened.
     """
     # pymavlink is slow to load, and of no use to a chip on a bus
+    from ..mavlink.lines import open_transport  # noqa: PLC0415
     from ..mavlink.signing import read_key  # noqa: PLC0415
-    from ..mavlink.transport import open_transport  # noqa: PLC0415
     from ..mavlink.url import parse_url  # noqa: PLC0415
     from .on_link import OnLink  # noqa: PLC0415
 

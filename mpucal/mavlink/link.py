@@ -8,14 +8,12 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from ..errors import BusError, LinkError, NoAnswer
 from .dialect import SIGNED, Message, Packet, Parser, dialect
 from .transport import Bytes, Transport
-
-T = TypeVar("T")
+from .vehicle import Vehicle, vehicle_of
 
 # of us: a ground station beside the usual 255, as a component that autopilots expect of one
 OWN_SYSTEM, OWN_COMPONENT = 254, 190
@@ -29,36 +27,6 @@ SIGNING_EPOCH_NS, SIGNING_UNIT_NS = 1_420_070_400 * S, 10_000
 
 Recorder = Callable[[int, bytes], None]
 Listener = Callable[[Message], None]
-
-
-@dataclass(frozen=True)
-class Vehicle:
-    """Who sent an autopilot's HEARTBEAT.
-
-    Attributes
-    ----------
-    address : from where. system, component : MAVLink ids. autopilot : MAV_AUTOPILOT. type : MAV_TYPE.
-    """
-
-    address: str
-    system: int
-    component: int
-    autopilot: int
-    type: int
-
-    @property
-    def is_px4(self) -> bool:
-        """Whether it does as PX4 does, rather than as ArduPilot."""
-        return bool(self.autopilot == dialect().MAV_AUTOPILOT_PX4)
-
-    @property
-    def firmware(self) -> str:
-        """The autopilot's name."""
-        names = {dialect().MAV_AUTOPILOT_PX4: "PX4", dialect().MAV_AUTOPILOT_ARDUPILOTMEGA: "ArduPilot"}
-        return names.get(self.autopilot, f"autopilot {self.autopilot}")
-
-    def __str__(self) -> str:
-        return f"system {self.system} ({self.firmware}) at {self.address}"
 
 
 class _Arrived(NamedTuple):
@@ -137,7 +105,7 @@ class Link:
         for patience_ns in (LISTEN_NS, PATIENCE_NS):
             for arrived in self._arrivals(begun_ns + patience_ns):
                 self._heard.append((arrived.t_ns, arrived.address, arrived.packet.data))
-                vehicle = _vehicle(arrived)
+                vehicle = vehicle_of(arrived.address, arrived.packet.message)
                 if vehicle is not None:
                     found.setdefault((vehicle.address, vehicle.system), vehicle)
                     if patience_ns != LISTEN_NS:
@@ -271,59 +239,3 @@ class Link:
             f"no autopilot's heartbeat came over {where} within {PATIENCE_NS // S} s",
             "power the vehicle, and have its telemetry sent here",
         )
-
-
-def ask(
-    link: Link,
-    message: Message,
-    reply: Callable[[Message], T | None],
-    timeout_s: float = 1.0,
-    tries: int = 3,
-) -> T | None:
-    """Send `message` until one of the vehicle's messages is an answer.
-
-    Parameters
-    ----------
-    reply : what a message answers, None where it is no answer. timeout_s : after which it is sent again.
-
-    Returns
-    -------
-    The answer, or None where none came.
-
-    Raises
-    ------
-    EndOfCapture, LinkError : see Link.messages.
-    """
-    for _ in range(tries):
-        link.send(message)
-        for received in link.messages(link.now_ns() + round(timeout_s * S)):
-            answer = reply(received)
-            if answer is not None:
-                return answer
-    return None
-
-
-def command(link: Link, number: int, *params: float, timeout_s: float = 1.0, tries: int = 3) -> int | None:
-    """Send MAV_CMD `number` as COMMAND_LONG; the MAV_RESULT of its COMMAND_ACK, None where none came."""
-    seven = [*params, *[0.0] * (7 - len(params))]
-    vehicle = link.vehicle
-    message = link.mav.command_long_encode(vehicle.system, vehicle.component, number, 0, *seven)
-
-    def reply(received: Message) -> int | None:
-        if received.get_type() != "COMMAND_ACK" or received.command != number:
-            return None
-        return None if received.result == dialect().MAV_RESULT_IN_PROGRESS else int(received.result)
-
-    return ask(link, message, reply, timeout_s, tries)
-
-
-def _vehicle(arrived: _Arrived) -> Vehicle | None:
-    """Whose HEARTBEAT it is, where it is an autopilot's."""
-    message = arrived.packet.message
-    m = dialect()
-    if message.get_type() != "HEARTBEAT" or message.autopilot == m.MAV_AUTOPILOT_INVALID:
-        return None
-    if message.type == m.MAV_TYPE_GCS:
-        return None
-    system, component = message.get_srcSystem(), message.get_srcComponent()
-    return Vehicle(arrived.address, system, component, message.autopilot, message.type)

@@ -12,11 +12,12 @@ from .clock import Jump
 from .collect import Row, chip, samples_of
 from .dialect import Message
 from .imu import Stream, reading
-from .link import Link, S, Vehicle
+from .link import Link, S
 from .log import Log
 from .shaping import read_parameters, shaping_names
 from .stream import Streams
 from .truth import ARDUPILOT, PX4
+from .vehicle import Vehicle
 
 POLL_NS = S // 20
 SILENT_NS = 4 * S

@@ -11,7 +11,8 @@ from ..data import Vector
 from ..errors import LinkError
 from .dialect import Message, dialect
 from .imu import MESSAGE_ID, Reading, Stream, reading
-from .link import Link, S, command
+from .link import Link, S
+from .request import command
 
 WINDOW_NS, PATIENCE_NS = 2 * S, 30 * S
 FEWEST = 20

@@ -8,7 +8,8 @@ from collections.abc import Callable, Mapping
 from ..errors import LinkError
 from .dialect import Message, dialect
 from .imu import HIGHRES, MESSAGE_ID, RAW, Stream, reading
-from .link import Link, S, command
+from .link import Link, S
+from .request import command
 from .truth import PX4, truthful
 
 US_PER_S = 1e6

@@ -13,7 +13,7 @@ from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import LinkError, RecordingError, WriteBackError
 from ..files import write_atomically
 from ..mavlink.dialect import dialect
-from ..mavlink.link import Link, command
+from ..mavlink.link import Link
 from ..mavlink.parameters.applied import applied
 from ..mavlink.parameters.client import Parameters
 from ..mavlink.parameters.names import all_places
@@ -21,6 +21,7 @@ from ..mavlink.parameters.plan import NOTHING, Change, changes, left_out
 from ..mavlink.parameters.text import PARAM, PARAMS, param_text, params_text, read_parameters_file
 from ..mavlink.parameters.write import Writer
 from ..mavlink.prearm import Prearm, Watch, prearm
+from ..mavlink.request import command
 from ..mavlink.shaping import read_parameters, shaping_names
 from ..mavlink.still import Rest, Stillness
 from ..mavlink.truth import ARDUPILOT, PX4

@@ -1,7 +1,8 @@
 import pytest
 
 from mpucal.errors import LinkError, NoAnswer, UsageError
-from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM, Link, S, ask, command
+from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM, Link, S
+from mpucal.mavlink.request import ask, command
 from mpucal.mavlink.source import one_of
 
 KEY = b"k" * 32

@@ -11,9 +11,9 @@ import pytest
 
 import mpucal
 from mpucal.errors import NoAnswer
+from mpucal.mavlink.lines import Udp
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.source import VehicleSource
-from mpucal.mavlink.transport import Udp
 from mpucal.mavlink.url import Kind, Url
 
 MAVPROXY = shutil.which("mavproxy.py")

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from ...errors import LinkError
 from ..dialect import Message
-from ..link import Link, ask
+from ..link import Link
+from ..request import ask
 from .encoding import REAL32, Number, Parameter, as_float32, error_name, name_bytes, of_wire, to_wire
 
 # over a radio that loses a packet in five each way, ten tries fail once in 30,000

@@ -1,0 +1,202 @@
+"""Bytes to and from a vehicle over UDP, TCP or a serial line, with the time. Knows no packet."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+from contextlib import suppress
+from typing import Any
+
+from ..errors import LinkError, NoAnswer
+from .transport import Bytes, Clock, Transport
+from .url import Kind, Url
+
+CHUNK = 65536
+CONNECT_S = 5.0
+# what a busy second of three IMUs may pile up while a fit runs
+RECEIVE_BUFFER = 4 << 20
+
+
+class Udp:
+    """A UDP socket: listening for whoever sends, or speaking to one partner.
+
+    Raises
+    ------
+    LinkError : the port is taken, or there is no such host.
+    """
+
+    datagrams = True
+
+    def __init__(self, url: Url) -> None:
+        self._clock = Clock()
+        self.name = str(url)
+        self.outward = url.kind is Kind.UDPOUT
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        try:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+            self._partner = (socket.gethostbyname(url.host), url.port)
+            self._socket.bind(("", 0) if self.outward else self._partner)
+        except OSError as error:
+            self._socket.close()
+            raise _cannot_open(url, error) from error
+
+    @property
+    def port(self) -> int:
+        """Our own port."""
+        return int(self._socket.getsockname()[1])
+
+    def now_ns(self) -> int:
+        """See Transport."""
+        return self._clock.now_ns()
+
+    def receive(self, until_ns: int) -> Bytes | None:
+        """See Transport; who refuses our datagrams is not there yet."""
+        if not _readable(self._socket, until_ns - self.now_ns()):
+            return None
+        try:
+            data, (host, port) = self._socket.recvfrom(CHUNK)
+        except (ConnectionError, BlockingIOError):
+            return None
+        return Bytes(data, f"{host}:{port}", self.now_ns())
+
+    def send(self, data: bytes, address: str | None) -> None:
+        """See Transport; a datagram that cannot go out is lost, as any may be."""
+        host, _, port = (address or "").rpartition(":")
+        with suppress(OSError):
+            self._socket.sendto(data, (host, int(port)) if address else self._partner)
+
+    def close(self) -> None:
+        """See Transport."""
+        self._socket.close()
+
+
+class Tcp:
+    """A TCP connection to a vehicle or a router.
+
+    Raises
+    ------
+    NoAnswer : nobody listens there. LinkError : there is no such host.
+    """
+
+    datagrams, outward = False, True
+
+    def __init__(self, url: Url) -> None:
+        self._clock = Clock()
+        self.name = str(url)
+        try:
+            self._socket = socket.create_connection((url.host, url.port), CONNECT_S)
+        except (ConnectionRefusedError, TimeoutError) as error:
+            raise NoAnswer(
+                f"nothing answers at {url}", "start the vehicle or its router, and check host and port"
+            ) from error
+        except OSError as error:
+            raise _cannot_open(url, error) from error
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def now_ns(self) -> int:
+        """See Transport."""
+        return self._clock.now_ns()
+
+    def receive(self, until_ns: int) -> Bytes | None:
+        """See Transport."""
+        if not _readable(self._socket, until_ns - self.now_ns()):
+            return None
+        try:
+            data = self._socket.recv(CHUNK)
+        except OSError as error:
+            raise _broken(self.name, error) from error
+        if not data:
+            raise LinkError(f"{self.name} closed the connection", "start it again, then the session")
+        return Bytes(data, self.name, self.now_ns())
+
+    def send(self, data: bytes, address: str | None) -> None:
+        """See Transport."""
+        try:
+            self._socket.sendall(data)
+        except OSError as error:
+            raise _broken(self.name, error) from error
+
+    def close(self) -> None:
+        """See Transport."""
+        self._socket.close()
+
+
+class Serial:
+    """A serial line: an autopilot's USB port, a telemetry radio.
+
+    Raises
+    ------
+    LinkError : no such device, or no permission.
+    """
+
+    datagrams, outward = False, True
+
+    def __init__(self, url: Url) -> None:
+        import serial  # noqa: PLC0415
+
+        self._clock = Clock()
+        self.name = str(url)
+        self._failure: Any = (OSError, serial.SerialException)
+        try:
+            self._port = serial.Serial(url.host, url.port, timeout=0, write_timeout=1.0, exclusive=True)
+        except (OSError, ValueError) as error:
+            raise _cannot_open(url, error) from error
+
+    def now_ns(self) -> int:
+        """See Transport."""
+        return self._clock.now_ns()
+
+    def receive(self, until_ns: int) -> Bytes | None:
+        """See Transport."""
+        try:
+            if not _readable(self._port, until_ns - self.now_ns()):
+                return None
+            data = self._port.read(CHUNK)
+        except self._failure as error:
+            raise _broken(self.name, error) from error
+        return Bytes(data, self.name, self.now_ns()) if data else None
+
+    def send(self, data: bytes, address: str | None) -> None:
+        """See Transport."""
+        try:
+            self._port.write(data)
+        except self._failure as error:
+            raise _broken(self.name, error) from error
+
+    def close(self) -> None:
+        """See Transport."""
+        self._port.close()
+
+
+def open_transport(url: Url) -> Transport:
+    """What a URL names, open.
+
+    Raises
+    ------
+    LinkError : it cannot be opened.
+    """
+    if url.kind is Kind.TCP:
+        return Tcp(url)
+    return Serial(url) if url.kind is Kind.SERIAL else Udp(url)
+
+
+def _readable(channel: Any, wait_ns: int) -> bool:
+    return bool(select.select([channel], [], [], max(wait_ns, 0) * 1e-9)[0])
+
+
+def _cannot_open(url: Url, error: Exception) -> LinkError:
+    remedy = "check that it is plugged in, that no other program uses it, and that you may open it"
+    if url.kind is not Kind.SERIAL:
+        remedy = "check host and port, and that no other ground station listens there"
+    return LinkError(f"{url} cannot be opened ({_why(error)})", remedy)
+
+
+def _broken(name: str, error: Exception) -> LinkError:
+    return LinkError(f"the link over {name} broke ({_why(error)})", "check cable and power, then start again")
+
+
+def _why(error: Exception) -> str:
+    number = getattr(error, "errno", None)
+    return str(error) if number is None or number < 0 else os.strerror(number)
