@@ -10,6 +10,7 @@ import pytest
 
 HERE = Path(__file__).parent
 FIRMWARE = HERE.parents[1] / "tools" / "firmware"
+ARDUINO = Path("/usr/share/arduino/hardware/arduino/avr")
 SIMAVR = Path("/usr/include/simavr/sim_avr.h")
 
 
@@ -41,13 +42,32 @@ def core(host, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def avr_build(tmp_path_factory):
-    """The folder with the firmware for the ATmega328P, and what its build said."""
+def make(tmp_path_factory):
+    """Makes targets of the firmware's Makefile in a folder of its own; gives that and what was said."""
     _need("avr-gcc", "make")
     folder = tmp_path_factory.mktemp("avr")
-    made = subprocess.run(["make", "-C", str(FIRMWARE), f"BUILD={folder}"], capture_output=True, text=True, check=False)
-    assert made.returncode == 0, made.stderr
-    return folder, made.stdout
+
+    def run(*targets):
+        words = ["make", "--no-print-directory", "-C", str(FIRMWARE), f"BUILD={folder}", *targets]
+        made = subprocess.run(words, capture_output=True, text=True, check=False)
+        assert made.returncode == 0, made.stderr
+        return folder, made.stdout
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def avr_build(make):
+    """The folder with the firmware for the ATmega328P, and what its build said."""
+    return make()
+
+
+@pytest.fixture(scope="session")
+def sketches(make):
+    """The folder with the Arduino sketches, built for an Uno."""
+    if not ARDUINO.exists():
+        pytest.skip("needs arduino-core-avr, of the packages in tools/ci_packages.txt")
+    return make("sketches")[0]
 
 
 @pytest.fixture(scope="session")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -54,9 +56,9 @@ def switch_on(emulator, avr_build, tmp_path):
     module, library, port = emulator
     boards = []
 
-    def power(chip=None, eeprom=tmp_path / "eeprom.bin"):
+    def power(chip=None, elf=avr_build[0] / "mpucal_bridge.elf", eeprom=tmp_path / "eeprom.bin"):
         clock = module.BoardClock()
-        board = module.Board(library, avr_build[0] / "mpucal_bridge.elf", eeprom, (chip or _simulated)(clock), clock)
+        board = module.Board(library, elf, eeprom, (chip or _simulated)(clock), clock)
         boards.append(board)
         board.run(0.001)
         return board, port.BoardPort(board)
@@ -79,6 +81,49 @@ def open_store(port):
 def test_flash_and_ram_leave_room(avr_build):
     flash, ram = map(int, re.search(r"(\d+) bytes of flash .* (\d+) bytes of RAM", avr_build[1]).groups())
     assert (flash < FLASH_LIMIT, ram < RAM_LIMIT) == (True, True)
+
+
+def test_the_bridges_ram_is_as_stated(avr_build):
+    header = (ROOT / "tools" / "firmware" / "src" / "mpucal_bridge.h").read_text()
+    (stated,) = re.findall(r"struct mpucal_bridge \((\d+) bytes", header)
+    symbols = subprocess.run(
+        ["avr-nm", "-S", avr_build[0] / "mpucal_bridge.elf"], capture_output=True, text=True, check=True
+    ).stdout
+    (size,) = re.findall(r"^\w+ (\w+) b bridge\b", symbols, re.MULTILINE)
+    assert int(size, 16) == int(stated)
+
+
+def test_the_readme_gives_the_cycles_that_are_counted(make):
+    if shutil.which("simavr") is None:
+        pytest.skip("needs simavr, of the packages in tools/ci_packages.txt")
+    counted = re.findall(r"\d+ cycles", make("cycles")[1])
+    readme = (ROOT / "tools" / "firmware" / "README.md").read_text()
+    # the compiler's version decides the last per cents
+    for cycles, stated in zip(counted, re.findall(r"\d+ cycles", readme), strict=True):
+        assert int(cycles.split()[0]) == pytest.approx(int(stated.split()[0]), rel=0.15)
+
+
+def test_the_sketch_is_the_same_bridge(switch_on, sketches):
+    board, port = switch_on(elf=sketches / "mpucal_bridge_sketch.elf")
+    driver = Driver(BridgeBus(port), Config(rate_hz=200))
+    assert driver.start().who_am_i == 0x68
+    while board.now_s < 3:
+        driver.poll()
+    recording = driver.recording()
+    assert (recording.gap.sum(), len(recording) > 300) == (0, True)
+    driver.stop()
+    store = open_store(port)
+    store.write(OLD)
+    assert (store.read(), store.state().generation) == (OLD, 1)
+
+
+def test_the_corrected_sketch_prints_what_is_stored(switch_on, sketches):
+    _, port = switch_on()
+    open_store(port).write(OLD)
+    board, _ = switch_on(elf=sketches / "mpucal_corrected_sketch.elf")
+    board.run(0.5)
+    *_, line, _ = board.receive().decode().splitlines()
+    assert 5 < np.linalg.norm([float(number) for number in line.split()]) < 15
 
 
 def test_reads_and_writes_registers_in_the_bridges_time(switch_on):
