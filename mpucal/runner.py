@@ -8,7 +8,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Protocol
 
+from .bus.parts import RESUMED
 from .bus.records import SessionEvent
+from .capture import FORGET
 from .chip.access import EndOfCapture
 from .data import Recording, Samples, Sensor
 from .errors import Abandoned, BusError, CaptureError, ChipError
@@ -40,7 +42,7 @@ from .session.table import State
 from .sinks.file import result_files, save
 
 MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
-KEY, FORGET = "key", "forget"
+KEY = "key"
 _PRESSED: dict[Key, Event] = {Key.ENOUGH: Enough(), Key.REDO: Redo(), Key.ABORT: Abort()}
 
 
@@ -227,6 +229,9 @@ class Runner:
         except EndOfCapture:
             self._source_ended()
         except (BusError, ChipError) as error:
+            # what ended one part of a session that was resumed does not end the session
+            if self._next_part():
+                return
             self._ended = True
             # a CaptureError is none of these: what does not replay is not calibrated either
             if self._machine.state not in (State.ROTATE, State.VERIFY):
@@ -247,17 +252,24 @@ class Runner:
 
     def _source_ended(self) -> None:
         """That was all, or all of one part."""
-        ended_ns = self._source.now_ns()
-        if not self._go_on():
+        if not self._next_part():
             self._ended = True
             self._feed(SourceEnded())
-            return
-        sensor = self._source.start()
-        if self.sensor is None:
+
+    def _next_part(self) -> bool:
+        """Go on with the next part of a resumed session; False where there is none."""
+        ended_ns = self._source.now_ns()
+        while self._go_on():
+            self._note(RESUMED, ended_ns, {})
+            try:
+                sensor = self._source.start()
+            except EndOfCapture:
+                continue
+            gap_s = (self._source.now_ns() - ended_ns) * 1e-9
+            self._feed(Connected(sensor) if self.sensor is None else Resumed(gap_s))
             self.sensor = sensor
-            self._feed(Connected(sensor))
-        else:
-            self._feed(Resumed((self._source.now_ns() - ended_ns) * 1e-9))
+            return True
+        return False
 
     def _recording(self) -> Recording:
         """All samples but those that the person did not want."""

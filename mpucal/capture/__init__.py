@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from ..data import Recording
 from ..errors import RecordingError
+from .parts import captures_in
 
+# a session event: samples first..last-1 are not to be used
+FORGET = "forget"
 KINDS = (".mcap", ".tlog", ".bin", ".npz", ".csv")
 _REMEDY = f"give a {', '.join(KINDS)} file or the folder of a session"
 
@@ -24,8 +28,10 @@ def load(path: str | Path) -> Recording:
     ChipError : the capture of a chip that is not known.
     """
     path = Path(path)
+    parts = [path]
     if path.is_dir():
-        path = _capture_in(path)
+        parts = _captures_of(path)
+        path = parts[0]
     if not path.exists():
         raise RecordingError(f"there is no file {path}", "check the path")
     kind = path.suffix.lower()
@@ -33,7 +39,7 @@ def load(path: str | Path) -> Recording:
         raise RecordingError(f"{path} is no kind of recording that mpucal knows", _REMEDY)
     # a kind's library is loaded only when a file of that kind is
     if kind == ".mcap":
-        return _load_capture(path)
+        return _load_captures(parts)
     if kind == ".tlog":
         from .tlog import load_tlog  # noqa: PLC0415
 
@@ -51,18 +57,31 @@ def load(path: str | Path) -> Recording:
     return load_csv(path)
 
 
-def _load_capture(path: Path) -> Recording:
+def _load_captures(paths: Sequence[Path]) -> Recording:
+    """The recording in the captures of one session, without what its person wanted to forget."""
     from ..bus.records import SessionEvent  # noqa: PLC0415
     from ..chip.decode import decode  # noqa: PLC0415
     from .mcap import read_capture  # noqa: PLC0415
 
-    capture = read_capture(path)
-    accesses = [record for record in capture.records if not isinstance(record, SessionEvent)]
-    return replace(decode(accesses, capture.name), recovered=capture.recovered)
+    captures = [read_capture(path) for path in paths]
+    records = [record for capture in captures for record in capture.records]
+    accesses = [record for record in records if not isinstance(record, SessionEvent)]
+    recording = decode(accesses, captures[0].name)
+    forgotten = {
+        int(record.data["first"]): int(record.data["last"])
+        for record in records
+        if isinstance(record, SessionEvent) and record.name == FORGET
+    }
+    for first, last in sorted(forgotten.items(), reverse=True):
+        recording = recording.without(first, last)
+    recovered = [capture.recovered for capture in captures if capture.recovered is not None]
+    return replace(recording, recovered=recovered[-1] if recovered else None)
 
 
-def _capture_in(folder: Path) -> Path:
-    for path in (folder / "capture.mcap", folder / "capture.tlog"):
-        if path.exists():
-            return path
+def _captures_of(folder: Path) -> list[Path]:
+    found = captures_in(folder)
+    if found:
+        return found
+    if (folder / "capture.tlog").exists():
+        return [folder / "capture.tlog"]
     raise RecordingError(f"the folder {folder} holds no capture.mcap and no capture.tlog", _REMEDY)

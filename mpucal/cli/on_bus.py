@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..bus.replay import ReplayBus
+from ..bus.parts import PartsBus
 from ..bus.tap import Tap
 from ..capture.mcap import CaptureWriter
 from ..chip.access import Bus
@@ -20,6 +20,10 @@ from ..session.events import Prompt
 from ..session.plan import Plan
 from ..sinks.file import CAPTURE
 from .opened import Measuring, Say
+from .opened import never_on as _never
+
+# of a capture's head: what to open to go on with the session
+SOURCE = "source"
 
 
 @dataclass(frozen=True)
@@ -29,26 +33,33 @@ class OnBus:
     Attributes
     ----------
     bus : open. replay : the same bus where it is a replay.
+    words : the options by which it was opened, for who resumes the session.
     """
 
     bus: Bus
     plan: Plan
     listeners: Sequence[Callable[[Prompt], None]] = ()
     truth: Mapping[str, Any] | None = None
-    replay: ReplayBus | None = None
+    replay: PartsBus | None = None
     recovered: str | None = None
     capture_name: str = CAPTURE
+    words: Mapping[str, Any] = field(default_factory=dict)
+
+    def source_meta(self) -> dict[str, Any]:
+        """For the head of a capture."""
+        return {SOURCE: dict(self.words)} if self.words else {}
 
     def talk(self, person: Talk) -> Talk:
         """See Opened."""
         return person if self.replay is None else Replayed(person, self.replay.pending_events)
 
     @contextmanager
-    def measuring(self, capture: Path, _say: Say, recorded: str) -> Iterator[Measuring]:
+    def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[Measuring]:
         """See Opened."""
         with closing(self.bus), CaptureWriter(capture) as writer:
-            writer.start({"mpucal": __version__, "recorded": recorded, **self.plan.meta()})
-            yield Measuring(Driver(Tap(self.bus, writer), self.plan.config, capture.name), writer.event)
+            writer.start({"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.source_meta()})
+            driver = Driver(Tap(self.bus, writer), self.plan.config, capture.name, lambda text: say(f"  {text}."))
+            yield Measuring(driver, writer.event, _never if self.replay is None else self.replay.go_on)
         if self.replay is not None and self.replay.unread():
             raise CaptureError(
                 f"the replay ended with {self.replay.unread()} accesses of its capture unread",

@@ -14,11 +14,17 @@ from ..session.plan import Plan
 Say = Callable[[str], None]
 
 
+def never_on() -> bool:
+    """A source in one part does not go on after its end."""
+    return False
+
+
 class Measuring(NamedTuple):
-    """A source that is being recorded, and what keeps session events beside it."""
+    """A source that is being recorded, what keeps session events beside it, and what begins its next part."""
 
     source: Source
     note: Note
+    go_on: Callable[[], bool] = never_on
 
 
 class Opened(Protocol):

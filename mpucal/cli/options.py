@@ -181,6 +181,21 @@ def check_source(context: click.Context) -> None:
             raise UsageError(f"{_spelled(name)} was given beside --{given[0]}, which has none", "leave it out")
 
 
+def check_resumed(context: click.Context) -> None:
+    """Beside --resume neither a source nor what its capture fixes.
+
+    Raises
+    ------
+    UsageError : it was given.
+    """
+    for name in (*SOURCES, *FIXED_BY_CAPTURE, "folder"):
+        if _was_given(context, name):
+            spelled = "-o" if name == "folder" else _spelled(name)
+            raise UsageError(
+                f"{spelled} was given beside --resume, and a session goes on as it began, in its folder", "leave it out"
+            )
+
+
 def refuse_fixed(context: click.Context) -> None:
     """Beside --replay, nothing that the capture fixes.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ..capture.parts import captures_in
 from ..errors import OutputError
 from ..sinks.file import make_folder
 from .running import stamp
@@ -15,18 +16,19 @@ class Place:
     Parameters
     ----------
     asked : where the person wants it; None: here, under a name of its own. capture_name : the file to come in it.
+    again : the folder holds earlier captures of the same session.
 
     Raises
     ------
     OutputError : it cannot be made, or holds a capture.
     """
 
-    def __init__(self, asked: Path | None, capture_name: str) -> None:
+    def __init__(self, asked: Path | None, capture_name: str, again: bool = False) -> None:
         self._stamp = stamp()
         self._asked = asked is not None
         self._capture_name = capture_name
         self.folder = asked or Path(f"session-{self._stamp}")
-        if self.capture.exists():
+        if self.capture.exists() or (not again and captures_in(self.folder)):
             raise OutputError(
                 f"{self.folder} holds a capture already, and no capture is written over",
                 "choose another folder with -o",

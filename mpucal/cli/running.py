@@ -20,10 +20,11 @@ def running(source: Opened, capture: Path, person: Console) -> Iterator[Runner]:
     ------
     CaptureError : a replay came to its end before its capture did.
     """
-    with source.measuring(capture, person.say, now().isoformat()) as (measured, note), person.listening():
+    with source.measuring(capture, person.say, now().isoformat()) as measuring, person.listening():
         if source.recovered is not None:
             person.say(f"  {source.recovered}")
-        yield Runner(measured, source.talk(person), note, source.plan, source.listeners)
+        talk = source.talk(person)
+        yield Runner(measuring.source, talk, measuring.note, source.plan, source.listeners, measuring.go_on)
 
 
 def now() -> datetime:

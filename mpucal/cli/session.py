@@ -14,11 +14,12 @@ from ..errors import RefusedError
 from ..mavlink.calibrate import calibrate_vehicle
 from ..result import REFUSED, Calibration
 from ..runner import Runner
+from .on_parts import open_resumed
 from .opened import Opened
-from .options import aim_options, check_source, fit_options, source_name, source_options
+from .options import aim_options, check_resumed, check_source, fit_options, source_name, source_options
 from .place import Place
 from .running import running
-from .source import opened
+from .source import open_again, opened
 from .summary import summary, written
 
 EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board, `mpucal session --bus sim`"
@@ -29,6 +30,9 @@ EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board
 @fit_options
 @aim_options
 @click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Where the results go.")
+@click.option(
+    "--resume", metavar="DIR", type=click.Path(path_type=Path), help="Go on with the interrupted session in DIR."
+)
 @click.option("--yes", is_flag=True, help="Ask nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print calibration.json, and nothing else.")
 @click.option("--json-events", is_flag=True, help="Say each event as a line of JSON, on stderr.")
@@ -38,10 +42,15 @@ def command(folder: Path | None, yes: bool, as_json: bool, json_events: bool, be
 
     Exit code 4: it was stopped before there was anything to calibrate; 5: the calibration was refused.
     """
-    check_source(click.get_current_context())
-    source = opened(options)
+    resume: Path | None = options.pop("resume")
+    if resume is None:
+        check_source(click.get_current_context())
+        source = opened(options)
+    else:
+        check_resumed(click.get_current_context())
+        source, folder = open_resumed(resume, open_again), resume
     person = console(quiet=yes, as_json=json_events, beep=beep, title=source_name(options))
-    place = Place(folder, source.capture_name)
+    place = Place(folder, source.capture_name, again=resume is not None)
     finished = False
     try:
         with running(source, place.capture, person) as runner:
@@ -53,7 +62,7 @@ def command(folder: Path | None, yes: bool, as_json: bool, json_events: bool, be
         finished = True
     finally:
         if not finished and place.capture.exists():
-            person.say(f"  What was recorded is kept in {place.capture}.")
+            person.say(f"  What was recorded is kept in {place.capture}; go on with --resume {place.folder}.")
     if as_json:
         click.echo(calibration.json(), nl=False)
     else:

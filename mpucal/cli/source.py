@@ -10,9 +10,11 @@ from typing import Any
 import click
 
 from ..bus.i2c import I2cBus
+from ..bus.parts import PartsBus, parts_of
 from ..bus.replay import ReplayBus
 from ..bus.simulated import open_simulated
 from ..capture.mcap import read_capture
+from ..capture.parts import captures_in
 from ..chip.config import Config
 from ..errors import UsageError
 from ..session.plan import Plan
@@ -32,10 +34,10 @@ def open_bus(text: str, plan: Plan, address: int | None, seed: int | None) -> On
         if address is not None:
             raise UsageError("--address is where a real chip answers, and --bus names a simulated one", "leave it out")
         bus = open_simulated(text, plan.gravity, seed)
-        return OnBus(bus, plan, (bus.hear,), bus.truth_document())
+        return OnBus(bus, plan, (bus.hear,), bus.truth_document(), words={"bus": text, "seed": seed})
     if seed is not None:
         raise UsageError("--seed chooses a simulated sensor, and --bus names a real one", "leave it out")
-    return OnBus(I2cBus(text, address), plan)
+    return OnBus(I2cBus(text, address), plan, words={"bus": text, "address": address})
 
 
 def open_serial(text: str, plan: Plan, address: int | None, seed: int | None) -> OnBus:
@@ -50,20 +52,30 @@ def open_serial(text: str, plan: Plan, address: int | None, seed: int | None) ->
 
     if seed is not None:
         raise UsageError("--seed chooses a simulated sensor, and --serial names a real one", "leave it out")
-    return OnBus(open_bridge(text, address), plan)
+    return OnBus(open_bridge(text, address), plan, words={"serial": text, "address": address})
 
 
 def open_replay(file: Path) -> OnBus:
-    """A capture, to be run again.
+    """A capture, or all those in the folder of a session that was resumed, to be run again.
 
     Raises
     ------
     CaptureError : no capture, or one of another driver.
     """
-    capture = read_capture(file)
-    bus = ReplayBus(capture.records, capture.name)
-    plan = Plan.of_capture(capture.meta, capture.name)
-    return OnBus(bus, plan, replay=bus, recovered=capture.recovered)
+    captures = [read_capture(path) for path in (captures_in(file) or [file])]
+    name = captures[0].name
+    bus = PartsBus([ReplayBus(part, name) for part in parts_of(capture.records for capture in captures)])
+    recovered = [capture.recovered for capture in captures if capture.recovered]
+    return OnBus(
+        bus, Plan.of_capture(captures[0].meta, name), replay=bus, recovered=recovered[-1] if recovered else None
+    )
+
+
+def open_again(words: Mapping[str, Any], plan: Plan) -> OnBus:
+    """The source of a session that is resumed, by the words in its capture's head."""
+    if words.get("serial") is not None:
+        return open_serial(words["serial"], plan, words.get("address"), None)
+    return open_bus(words["bus"], plan, words.get("address"), words.get("seed"))
 
 
 def open_vehicle(text: str, plan: Plan, system: int | None, key: Path | None) -> Opened:

@@ -62,7 +62,7 @@ def on_autopilot(options: Mapping[str, Any]) -> Iterator[Sink]:
         raise UsageError("a .tlog has no vehicle to write to", "give the vehicle's --mavlink URL")
     with source.connected(lambda text: click.echo(f"mpucal: {text}", err=True)) as link:
         put_down(source.listeners)
-        yield AutopilotSink(link)
+        yield AutopilotSink(link, options["store"])
 
 
 # name: what opens it for the options of the command
@@ -78,6 +78,7 @@ TARGETS: dict[str, Callable[[Mapping[str, Any]], Any]] = {
 @click.argument("target", metavar="|".join(TARGETS), type=click.Choice(list(TARGETS)))
 @source_options
 @click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Where the old state is kept.")
+@click.option("--store", is_flag=True, help="autopilot: keep D in the vehicle's storage too.")
 @click.option("--yes", is_flag=True, help="Ask nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the calibration as it is applied now, and nothing else.")
 def command(calibration: Path, target: str, folder: Path | None, yes: bool, as_json: bool, **options: Any) -> None:
