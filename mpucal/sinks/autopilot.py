@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +13,9 @@ from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import LinkError, RecordingError, WriteBackError
 from ..files import write_atomically
 from ..mavlink.dialect import dialect
+from ..mavlink.ftp import Storage
 from ..mavlink.link import Link
-from ..mavlink.parameters.applied import applied
+from ..mavlink.parameters.applied import applied, of_imu
 from ..mavlink.parameters.client import Parameters
 from ..mavlink.parameters.names import all_places
 from ..mavlink.parameters.plan import NOTHING, Change, changes, left_out
@@ -29,6 +30,7 @@ from ..result import Calibration
 from .sink import Applied
 
 OLD_PARAMETERS = "autopilot_old"
+FILE, FOLDERS = "{}mpucal-imu{}.bin", {ARDUPILOT: "/APM/", PX4: "/fs/microsd/"}
 CORRECTION = re.compile(r"(OFFS|SCAL)_[XYZ]$|[XYZ](OFF|SCALE)$")
 SAVE_IDS = 76
 
@@ -43,12 +45,14 @@ class AutopilotSink:
     Parameters
     ----------
     link : locked to the vehicle; the sink leaves it open.
+    store : keep D and b_a, which parameters do not hold in full, as files in the vehicle's storage too.
     """
 
     name = "autopilot"
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: Link, store: bool = False) -> None:
         self._link = link
+        self._store = store
         self._firmware = PX4 if link.vehicle.is_px4 else ARDUPILOT
         self._watch = Watch(link)
 
@@ -113,10 +117,30 @@ class AutopilotSink:
         if rest is None:
             raise WriteBackError(f"{NOTHING}: the vehicle did not lie still", "set it down, then write again")
         new = {name: value for change in planned for name, value in change.place.values(change.new).items()}
-        writer.write(old, new, lambda: verify(planned, old, rest, stillness))
-        after = self._settled(planned)
         now = applied(calibration, [change.imu for change in planned])
-        return Applied(now, self._said(planned, left_out(calibration), before, after))
+        with self._stored(now, planned) as paths:
+            writer.write(old, new, lambda: verify(planned, old, rest, stillness))
+        after = self._settled(planned)
+        return Applied(now, "; ".join([*self._said(planned, left_out(calibration), before, after), *paths]))
+
+    @contextmanager
+    def _stored(self, now: Calibration, planned: Sequence[Change]) -> Iterator[list[str]]:
+        """The files in its storage while the parameters are written: where that fails, they are removed again."""
+        if not self._store:
+            yield []
+            return
+        storage = Storage(self._link)
+        files = {FILE.format(FOLDERS[self._firmware], change.imu): of_imu(now, change.imu) for change in planned}
+        with _nothing_written():
+            for path, calibration in files.items():
+                storage.put(path, calibration.blob().encode())
+        try:
+            yield [f"{path} in its storage holds D and b_a, read back" for path in files]
+        except WriteBackError:
+            with suppress(LinkError):
+                for path in files:
+                    storage.remove(path)
+            raise
 
     def _check(self, planned: Sequence[Change]) -> None:
         """Disarmed, and with the sensors that were calibrated."""
@@ -142,7 +166,7 @@ class AutopilotSink:
         command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, SAVE_IDS)
         return prearm(self._link)
 
-    def _said(self, planned: Sequence[Change], out: Sequence[int], before: Prearm, after: Prearm) -> str:
+    def _said(self, planned: Sequence[Change], out: Sequence[int], before: Prearm, after: Prearm) -> list[str]:
         imus = " and ".join(str(change.imu) for change in planned)
         residuals = ", ".join(f"{change.residual_mps2:.3f}" for change in planned)
         clauses = [
@@ -154,7 +178,7 @@ class AutopilotSink:
             clauses.append(f"IMU {', '.join(map(str, out))} keeps its old ones, as its calibration was refused")
         if self._firmware == PX4:
             clauses.append("leave it powered for three seconds more, as PX4 saves late")
-        return "; ".join(clauses)
+        return clauses
 
 
 @contextmanager

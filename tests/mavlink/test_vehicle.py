@@ -10,11 +10,11 @@ import pytest
 
 from mpucal.errors import UsageError
 from mpucal.mavlink.dialect import Parser, dialect
+from mpucal.mavlink.lines import open_transport
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.encoding import name_bytes, of_wire, to_wire
 from mpucal.mavlink.prompts import Heard, to_message
 from mpucal.mavlink.simulated import Options, Vehicle
-from mpucal.mavlink.transport import open_transport
 from mpucal.mavlink.url import parse_url
 
 S_US = 1_000_000

@@ -19,6 +19,7 @@ from mpucal.mavlink.simulated import Options, Vehicle
 from mpucal.mavlink.simulated.transport import SimulatedTransport
 from mpucal.result import Calibration
 from mpucal.sinks.autopilot import AutopilotSink
+from mpucal.wire.blob import Blob
 
 FIRMWARES = ("ardupilot", "px4")
 SCALED = ("SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
@@ -334,3 +335,30 @@ def test_a_vehicle_that_is_gone_cannot_be_put_back_and_that_is_said(firmware):
     transport.befall = befall
     with pytest.raises(WriteBackError, match="could not be put back"):
         AutopilotSink(link).write(calibration)
+
+
+@pytest.mark.parametrize("words", ["", ",fault=loss"], ids=["", "one packet in five lost"])
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_the_whole_d_is_kept_in_the_vehicles_storage(firmware, words):
+    vehicle, _, link = vehicle_of(firmware, words)
+    applied = AutopilotSink(link, store=True).write(calibration_of(vehicle))
+    paths = re.findall(r"(\S+) in its storage", applied.what)
+    assert len(paths) == 2
+    truth = vehicle.truth_document()
+    for path, expected in zip(paths, (truth, truth["others"][0]), strict=True):
+        blob = Blob.decode(vehicle.card.files[path])
+        np.testing.assert_allclose(np.array(blob.D).reshape(3, 3), expected["D"], atol=1e-5)
+
+
+def test_nothing_is_written_where_there_is_no_card():
+    vehicle, transport, link = vehicle_of("ardupilot", ",fault=no_storage")
+    with pytest.raises(WriteBackError, match=r"nothing was written.*card"):
+        AutopilotSink(link, store=True).write(calibration_of(vehicle))
+    assert transport.sets == 0
+
+
+def test_a_failed_write_leaves_no_file_behind():
+    vehicle, _, link = vehicle_of("ardupilot", ",refuse=INS_ACCSCAL_Y")
+    with pytest.raises(WriteBackError, match="old parameters are back"):
+        AutopilotSink(link, store=True).write(calibration_of(vehicle))
+    assert vehicle.card.files == {}

@@ -26,6 +26,21 @@ def applied(calibration: Calibration, imus: Collection[int]) -> Calibration:
     return _one(replace(calibration, extra=MappingProxyType(extra)), imus)
 
 
+def of_imu(calibration: Calibration, imu: int) -> Calibration:
+    """The calibration of one IMU, counted from 1.
+
+    Raises
+    ------
+    KeyError : it holds none.
+    """
+    if calibration.extra.get("autopilot", {}).get("imu") == imu:
+        return calibration
+    for other in calibration.extra.get("others", []):
+        if other.get("autopilot", {}).get("imu") == imu:
+            return Calibration.from_document(other)
+    raise KeyError(imu)
+
+
 def _one(calibration: Calibration, imus: Collection[int]) -> Calibration:
     autopilot = calibration.extra.get("autopilot", {})
     if autopilot.get("imu") not in imus:

@@ -31,6 +31,7 @@ class ArduPilot(Firmware):
 
     autopilot = 3
     tick_us = 1_000_000 // LOOP_HZ
+    folder = "/APM/"
     bytewise = False
 
     def __init__(self, options: Options) -> None:

@@ -27,12 +27,14 @@ class Firmware(ABC):
     Attributes
     ----------
     autopilot : MAV_AUTOPILOT. tick_us : how often it runs. bytewise : how its integers travel.
-    store : its parameters. corrected : (imus, 2, 3) specific force [m/s^2] and rate [rad/s] in the vehicle's axes.
+    folder : of its card. store : its parameters.
+    corrected : (imus, 2, 3) specific force [m/s^2] and rate [rad/s] in the vehicle's axes.
     """
 
     autopilot: int
     tick_us: int
     bytewise: bool
+    folder: str
     streams: tuple[tuple[int, int], ...] = ()
 
     def __init__(self, options: Options) -> None:

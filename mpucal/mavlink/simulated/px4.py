@@ -28,6 +28,7 @@ class Px4(Firmware):
 
     autopilot = 12
     tick_us = 1_000_000 // LOOP_HZ
+    folder = "/fs/microsd/"
     bytewise = True
     streams = ((HIGHRES_IMU, 20_000), (SYS_STATUS, 1_000_000))
 

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from ...data import STANDARD_GRAVITY_MPS2
 from ..dialect import Message, Parser, dialect
+from ..ftp import Payload
 from ..parameters.encoding import Parameter, name_bytes, of_wire, to_wire
 from ..prompts import Heard, of_message
 from .ardupilot import ArduPilot
@@ -18,6 +19,7 @@ from .imus import Imus
 from .mishaps import Mishaps
 from .options import Options
 from .px4 import Px4
+from .storage import Card
 from .streams import Streams
 
 FIRMWARES: dict[str, type[Firmware]] = {"ardupilot": ArduPilot, "px4": Px4}
@@ -61,6 +63,7 @@ class Vehicle:
         self._parser = Parser(self._mav)
         self._now_us = 0
         self._silent_until_us: float = 0
+        self.card = Card(None if "no_storage" in options.faults else self.firmware.folder)
         self._mishaps = Mishaps(options.faults)
         self._out: deque[Sent] = deque()
         self._boot()
@@ -224,6 +227,10 @@ class Vehicle:
         for message_id, interval_us in self.firmware.group(SECOND_STATION_HZ):
             self._streams.set(message_id, interval_us, self._now_us)
 
+    def _file_transfer_protocol(self, message: Message) -> None:
+        reply = self.card.answer(Payload.decode(bytes(message.payload)))
+        self._send(dialect().MAVLink_file_transfer_protocol_message(0, 0, 0, bytearray(reply.encode())))
+
     _MISHAPS: ClassVar[Mapping[str, Callable[[Vehicle], None]]] = {
         "arm": _arm,
         "reboot": _reboot,
@@ -237,4 +244,5 @@ class Vehicle:
         "REQUEST_DATA_STREAM": _request_data_stream,
         "COMMAND_LONG": _command_long,
         "STATUSTEXT": _statustext,
+        "FILE_TRANSFER_PROTOCOL": _file_transfer_protocol,
     }
