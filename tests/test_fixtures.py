@@ -49,5 +49,10 @@ def test_the_tool_makes_them(tmp_path):
         elif path.suffix == ".json":
             # another machine's sines may move a count by one
             made, stored = (json.loads((folder / path).read_text()) for folder in (tmp_path, FIXTURES))
+            if path.parent.name == "faults":
+                rates = made.pop("rate_hz"), stored.pop("rate_hz")
+                assert made == stored
+                assert rates[0] == pytest.approx(rates[1], rel=1e-6)
+                continue
             assert made["said"] == stored["said"]
             np.testing.assert_allclose(made["D"], stored["D"], atol=1e-4)

@@ -52,9 +52,8 @@ def made_of_it(recording: Recording, why: str | None) -> dict[str, Any]:
     }
 
 
-def main() -> None:
+def write(folder: Path) -> None:
     """Make them all."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
     folder.mkdir(parents=True, exist_ok=True)
     for name in KINDS:
         simulated = open_simulated(f"sim:seed=8,chip=mpu6500,fault={name}@{FAULT_S:g}")
@@ -65,4 +64,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    write(Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER)

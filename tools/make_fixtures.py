@@ -1,7 +1,8 @@
 """Make every fixture anew, all from seeds: python tools/make_fixtures.py [FOLDER].
 
 sessions/NAME.mcap is the capture of a whole session on the simulated chip, and NAME.json beside it is what that session
-said and found: what a replay must say and find too. vectors/ are those of make_vectors.py.
+said and found: what a replay must say and find too. faults/ are those of make_faults.py, vectors/ those of
+make_vectors.py.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import make_faults
 import make_vectors
 
 from mpucal.bus.records import SessionEvent
@@ -120,6 +122,7 @@ def main() -> None:
     for name, script in SESSIONS.items():
         found = make_session(script, sessions / f"{name}.mcap")
         (sessions / f"{name}.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    make_faults.write(folder / "faults")
     make_vectors.write(folder / "vectors")
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 from ..data import Recording, Samples
 from ..errors import RecordingError
@@ -12,6 +13,8 @@ from .families import Part
 from .fifo import Fault, FifoDecoder
 from .identity import Evidence
 from .settings import Settings
+
+Words = tuple[int, int, int]
 
 
 class Decoder:
@@ -30,7 +33,15 @@ class Decoder:
         self._evidence = Evidence()
         self._settings: Settings | None = None
         self._fifo: FifoDecoder | None = None
+        self._before_reset: dict[int, int] = {}
+        self._accel_offsets: Words | None = None
         self.fault: Fault | None = None
+
+    @property
+    def corrected(self) -> tuple[Words, Words] | None:
+        """Offset words before and after the reset where they differ: somebody had corrected the accelerometer."""
+        before, after = (self._words(held) for held in (self._before_reset, self._held))
+        return None if before is None or after is None or before == after else (before, after)
 
     @property
     def part(self) -> Part:
@@ -73,6 +84,7 @@ class Decoder:
         RecordingError : the FIFO starts with settings that nobody told, or that changed.
         """
         if register == reg.PWR_MGMT_1 and data[0] & reg.PWR_MGMT_1_DEVICE_RESET:
+            self._before_reset = self._before_reset or dict(self._held)
             self._held = {reg.WHO_AM_I: self._held[reg.WHO_AM_I]} if reg.WHO_AM_I in self._held else {}
             return
         self._hold(register, data)
@@ -88,7 +100,8 @@ class Decoder:
         if self._fifo is None:
             empty = Samples.empty()
             return Recording(**vars(empty), name=self._name)
-        return self._fifo.recording(self._name)
+        recording = self._fifo.recording(self._name)
+        return replace(recording, sensor=replace(recording.sensor, accel_offsets=self._accel_offsets))
 
     def _hold(self, register: int, data: bytes) -> None:
         self._held.update(enumerate(data, register))
@@ -97,9 +110,18 @@ class Decoder:
         settings = Settings.from_registers(self._held, self.part, self._name)
         if self._fifo is None:
             self._settings, self._fifo = settings, FifoDecoder(settings)
+            self._accel_offsets = self._words(self._held)
         elif settings != self._settings:
             raise RecordingError(f"{self._name} holds samples of two ranges or rates", "record each of them on its own")
         self._fifo.reset()
+
+    def _words(self, held: Mapping[int, int]) -> Words | None:
+        """What the accelerometer's offset registers held, if that is known."""
+        place = self.part.family.accel_offset_h
+        if not all(high + i in held for high in place for i in (0, 1)):
+            return None
+        x, y, z = (int.from_bytes([held[high], held[high + 1]], "big", signed=True) for high in place)
+        return x, y, z
 
 
 def decode(transactions: Iterable[Transaction], name: str = "recording") -> Recording:

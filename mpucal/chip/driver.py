@@ -6,6 +6,7 @@ accesses. DRIVER_VERSION counts up with every change of them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from enum import Enum, auto
 
@@ -18,12 +19,13 @@ from .config import Config
 from .decode import Decoder
 from .families import MPU6050, MPU6500, Part
 from .fifo import Fault
+from .identity import remark
 from .port import Port
 from .probe import probe, read_identity
 from .settings import Settings
 from .setup import configure, configured, quiet, reset, restart_fifo, wake
 
-DRIVER_VERSION = 2
+DRIVER_VERSION = 3
 
 # so long without a sample that can be believed, and the driver gives up
 DEAD_NS = 2_000_000_000
@@ -59,9 +61,17 @@ class Driver:
     Parameters
     ----------
     bus : where the chip is. config : how it is to measure. name : what to call its recording.
+    say : is told, once it was started, what a person should know of this chip: one sentence, no full stop.
     """
 
-    def __init__(self, bus: Bus, config: Config | None = None, name: str = "recording") -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        config: Config | None = None,
+        name: str = "recording",
+        say: Callable[[str], None] = lambda _sentence: None,
+    ) -> None:
+        self._say = say
         self._decoder = Decoder(name)
         self._port = Port(bus, self._decoder)
         self._config = config or Config()
@@ -90,11 +100,14 @@ class Driver:
         read_identity(self._port)
         self._look_before_reset()
         reset(self._port)
+        self._look_at_offsets()
         wake(self._port)
         probe(self._port)
         self._settings = self._config.settings(self._decoder.part)
         configure(self._port, self._settings)
         self._restart()
+        for sentence in filter(None, (remark(self._settings.sensor), self._correction())):
+            self._say(sentence)
         return self._settings.sensor
 
     def poll(self) -> Samples:
@@ -136,12 +149,24 @@ class Driver:
 
     def _look_before_reset(self) -> None:
         # the reset reloads the factory's trim: what somebody wrote before is kept in the capture, wherever it is
-        for family in (MPU6050, MPU6500):
-            first, _, last = family.accel_offset_h
-            self._port.read(first, last + 2 - first)
+        self._look_at_offsets()
         self._port.read(reg.XG_OFFSET_H, 6)
         self._port.read(reg.SMPLRT_DIV, 5)
         self._port.read(reg.PWR_MGMT_1, 2)
+
+    def _look_at_offsets(self) -> None:
+        for family in (MPU6050, MPU6500):
+            first, _, last = family.accel_offset_h
+            self._port.read(first, last + 2 - first)
+
+    def _correction(self) -> str | None:
+        if self._decoder.corrected is None:
+            return None
+        before, trim = self._decoder.corrected
+        return (
+            f"the chip's offset registers held a correction, {before} in place of the factory's {trim}; the reset has"
+            " taken it away, and this calibration is of the chip without it"
+        )
 
     def _drain(self, fifo_bytes: int) -> Need:
         """Read all whole frames, and say what they need to be believed."""

@@ -75,6 +75,15 @@ def test_a_chip_that_cannot_be_reached_is_one_sentence(device, adapter, words):
     assert result.err.strip() == sentence
 
 
+def test_a_correction_in_the_chip_is_noticed_as_a_session_starts(device):
+    mocked = device()
+    mocked.tell(registers={"6": "1234"})
+    result = mocked.mpucal("record", "--bus", NODE, "-o", "x.mcap", "--seconds", "1")
+    assert result.code == 0, result.err
+    assert "offset registers held a correction, (4660, " in result.err
+    assert load(mocked.folder / "x.mcap").sensor.accel_offsets[0] != 0x1234
+
+
 def test_no_permission_is_one_sentence(device):
     mocked = device()
     mocked.forbid()

@@ -32,7 +32,12 @@ class AtRest:
 
     def samples(self, edges_s, setting):
         n = len(edges_s) - 1
-        g = np.array([0.0, 0.0, 1.0]) + BIAS_G + setting.accel_offset_g + self.shakes_g * np.sin(25.0 * edges_s[1:, None])
+        g = (
+            np.array([0.0, 0.0, 1.0])
+            + BIAS_G
+            + setting.accel_offset_g
+            + self.shakes_g * np.sin(25.0 * edges_s[1:, None])
+        )
         rows = np.zeros((n, 7))
         rows[:, :3] = g * 32768 / setting.accel_range_g
         return np.rint(rows + self.rng.normal(size=rows.shape)).astype(np.int16)
