@@ -24,7 +24,7 @@ from ..chip.port import Port
 from ..chip.response import measured_response
 from ..chip.self_test import run_self_test
 from ..data import Sensor
-from ..errors import BusError, ChipError, SourceError
+from ..errors import ChipError, SourceError
 from .finding import Finding, Mark, failed
 from .measure import examine_stream
 
@@ -54,7 +54,7 @@ def examine(bus: Bus, config: Config, seconds: float) -> Iterator[Finding]:
     try:
         yield from _awake(port, driver, config, seconds, olds)
     except SourceError as error:
-        yield failed("chip", error)
+        yield failed("broken off", error)
     finally:
         driver.stop()
         with suppress(SourceError):
@@ -72,7 +72,7 @@ def _awake(port: Port, driver: Driver, config: Config, seconds: float, olds: lis
         driver.poll()
     recording = driver.recording()
     if len(recording) > config.rate_hz:
-        yield from examine_stream(recording, config.rate_hz, family)
+        yield from examine_stream(recording, config.rate_hz, seconds, family)
     else:
         yield Finding(
             "stream", Mark.BAD, f"{len(recording)} samples in {seconds:g} s", "check the wires and the supply"
@@ -131,10 +131,7 @@ def _held(port: Port, family: Family, olds: list[Block]) -> Finding:
 
 
 def _self_test(port: Port, part: Part) -> tuple[Finding, list[str]]:
-    try:
-        test = run_self_test(port, part)
-    except SourceError as error:
-        return failed("self test", error), []
+    test = run_self_test(port, part)
     data = {"accel_shares": _listed(test.accel_shares), "gyro_shares": _listed(test.gyro_shares)}
     if not test.has_codes:
         what = "the factory left no codes to compare with"
@@ -153,8 +150,6 @@ def _offsets(port: Port, part: Part) -> tuple[Finding, list[str]]:
             response = measured_response(port, bench, part.family.accel_offset_h)
     except ChipError as error:
         return Finding("offset registers", Mark.NOTE, error.what, error.remedy), []
-    except BusError as error:
-        return failed("offset registers", error), []
     where = f"0x{response.place[0]:02x}"
     data = {"place": response.place[0], "lsb_per_g": response.lsb_per_g, "g_per_lsb": response.g_per_lsb.tolist()}
     mg = ", ".join(f"{256_000 * value:.1f}" for value in response.g_per_lsb)

@@ -16,13 +16,15 @@ from .noise import density, trembles
 NOISY, BROKEN = 1.5, 3.0
 # +-3 % of scale and 80 mg of zero
 FAR_FROM_G = 0.11
+# what the stream may be short of: its first and last poll
+ENDS_S = 0.1
 USUAL_C = (-10.0, 70.0)
 
 
-def examine_stream(recording: Recording, nominal_hz: float, family: Family) -> Iterator[Finding]:
-    """Rate, losses, noise and what rest shows, of seconds of samples."""
+def examine_stream(recording: Recording, nominal_hz: float, seconds: float, family: Family) -> Iterator[Finding]:
+    """Rate, losses, noise and what rest shows, of so many `seconds` of samples."""
     yield _rate(recording, nominal_hz)
-    yield _losses(recording)
+    yield _losses(recording, seconds)
     acc, gyr = recording.acc, np.degrees(recording.gyr)
     hz, sheet = float(recording.sensor.rate_hz or nominal_hz), data_sheet(family)
     if trembles(acc, hz):
@@ -49,13 +51,14 @@ def _rate(recording: Recording, nominal_hz: float) -> Finding:
     )
 
 
-def _losses(recording: Recording) -> Finding:
+def _losses(recording: Recording, asked_s: float) -> Finding:
     gaps, seconds = int(recording.gap.sum()), float(recording.t[-1] - recording.t[0])
     data = {"samples": len(recording), "seconds": seconds, "gaps": gaps}
-    if not gaps:
-        return Finding("losses", Mark.OK, f"none of {len(recording)} samples in {seconds:.1f} s", "", data)
+    what = f"{len(recording)} samples in {seconds:.1f} s"
+    if not gaps and seconds > asked_s - ENDS_S:
+        return Finding("losses", Mark.OK, f"none of {what}", "", data)
     remedy = "shorten the wires, check connectors and supply, or slow the bus down"
-    return Finding("losses", Mark.BAD, f"{gaps} gaps in {seconds:.1f} s", remedy, data)
+    return Finding("losses", Mark.BAD, f"{gaps} gaps within {what}, where {asked_s:g} s were asked for", remedy, data)
 
 
 def _noise(topic: str, measured: np.ndarray, typical: float, key: str, unit: str) -> Finding:

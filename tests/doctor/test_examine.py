@@ -1,0 +1,88 @@
+"""The examination on the simulated chip: what each kind of chip and fault is told to be."""
+
+import json
+
+import pytest
+
+from mpucal.bus.simulated import open_simulated
+from mpucal.chip.config import Config
+from mpucal.doctor.examine import examine
+from mpucal.doctor.finding import Finding, Mark
+from mpucal.doctor.page import document, text
+from mpucal.session.events import Prompt, PromptKind
+
+
+def findings(bus):
+    bus.hear(Prompt(PromptKind.LAY_FLAT, ""))
+    return {finding.topic: finding for finding in examine(bus, Config(), 3.0)}
+
+
+@pytest.mark.parametrize(
+    ("chip", "place", "genuine"),
+    [
+        ("mpu6050", 0x06, True),
+        ("mpu6050c", 0x06, True),
+        ("mpu6500", 0x77, True),
+        ("mpu6880", 0x77, True),
+        ("clone98", 0x77, True),
+        ("mpu6500,who_am_i=0x68", 0x77, False),
+        ("clone98,who_am_i=0x68", 0x77, False),
+    ],
+)
+def test_a_sound_chip_has_no_fault(chip, place, genuine):
+    told = findings(open_simulated(f"sim:seed=3,chip={chip}"))
+    assert [topic for topic, finding in told.items() if finding.mark is Mark.BAD] == []
+    assert told["offset registers"].data["place"] == place
+    assert (told["genuine?"].mark is Mark.OK) is genuine
+    assert told["bus speed"].data["achieved_hz"] == pytest.approx(400_000, rel=0.01)
+
+
+def test_the_true_rate_is_measured():
+    told = findings(open_simulated("sim:rate_error_ppm=-7000"))
+    assert told["sample rate"].data["rate_hz"] == pytest.approx(200 * 0.993, rel=1e-3)
+    assert told["sample rate"].mark is Mark.OK
+
+
+@pytest.mark.parametrize(
+    ("keys", "topic", "mark"),
+    [
+        ("rate_error_ppm=30000", "sample rate", Mark.BAD),
+        ("noise=6", "accelerometer noise", Mark.BAD),
+        ("noise=2", "gyroscope noise", Mark.NOTE),
+        ("offsets=readonly", "offset registers", Mark.NOTE),
+        ("b_omega=0.5/0/0", "zero rate", Mark.NOTE),
+        ("b_a=0/0/3", "at rest", Mark.NOTE),
+        ("temperature_c=90", "temperature", Mark.NOTE),
+        ("hand=restless", "noise", Mark.UNKNOWN),
+        ("fault=brownout@5", "losses", Mark.BAD),
+    ],
+)
+def test_what_is_amiss_is_found(keys, topic, mark):
+    told = findings(open_simulated(f"sim:{keys}"))
+    assert told[topic].mark is mark
+    assert told[topic].remedy
+
+
+@pytest.mark.parametrize("at_s", [0, 1, 3, 5, 6, 8])
+def test_a_wire_pulled_meanwhile_ends_it_with_a_sentence(at_s):
+    told = findings(open_simulated(f"sim:fault=unplugged@{at_s}"))
+    assert list(told.values())[-1].mark is Mark.BAD
+    assert "nothing answers" in list(told.values())[-1].what
+    assert "genuine?" not in told
+
+
+def test_a_correction_is_still_there_afterwards():
+    bus = open_simulated("sim:chip=mpu6500")
+    bus.write(0x77, b"\x12\x34")
+    assert findings(bus)["factory trim"].mark is Mark.NOTE
+    assert bus.read(0x77, 2).data == b"\x12\x34"
+
+
+def test_page_and_document_hold_every_finding():
+    all_of = [Finding("chip", Mark.OK, "a chip"), Finding("bus", Mark.BAD, "is slow", "mend it", {"hz": 1.0})]
+    page, content = text("sim", "1.0", all_of), json.loads(document("sim", "1.0", all_of))
+    assert "! bus" in page
+    assert "-> mend it" in page
+    assert page.endswith("1 fault (!), no notes (* or ?).")
+    assert [finding["topic"] for finding in content["findings"]] == ["chip", "bus"]
+    assert content["findings"][1]["data"] == {"hz": 1.0}
