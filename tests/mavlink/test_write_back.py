@@ -265,11 +265,13 @@ def arm(transport, number):
 
 
 def refuse(transport, number):
-    """It takes no value for the parameter of the nth PARAM_SET, from then on."""
-    names = []
+    """From the nth PARAM_SET on it takes no value for the next parameter that was not set before."""
+    seen, names = set(), []
 
     def befall(count, message):
-        names.extend([message.param_id] if count == number else [])
+        if count >= number and not names and message.param_id not in seen:
+            names.append(message.param_id)
+        seen.add(message.param_id)
         return message.param_id not in names
 
     transport.befall = befall
@@ -362,3 +364,18 @@ def test_a_failed_write_leaves_no_file_behind():
     with pytest.raises(WriteBackError, match="old parameters are back"):
         AutopilotSink(link, store=True).write(calibration_of(vehicle))
     assert vehicle.card.files == {}
+
+
+@pytest.mark.parametrize("words", ["", ",CAL_ACC0_XOFF=0.3,CAL_ACC1_ZSCALE=1.05"], ids=["new", "calibrated before"])
+def test_px4s_slots_in_another_order_are_found_by_their_effect(words):
+    ids = ",CAL_ACC0_ID=1310996,CAL_ACC1_ID=1310988"
+    vehicle, _, link = vehicle_of("px4", ids + words)
+    calibration = calibration_of(vehicle)
+    applied = AutopilotSink(link).write(calibration)
+    for imu in range(2):
+        offset, scale = vehicle.firmware.correction(imu)
+        np.testing.assert_allclose(offset, vehicle.imus.truths[imu].b_a, atol=1e-6)
+        np.testing.assert_allclose(scale, np.diag(np.linalg.inv(vehicle.imus.truths[imu].D)), atol=1e-6)
+    truth = vehicle.truth_document()
+    np.testing.assert_allclose(applied.calibration.D, truth["D"], atol=1e-6)
+    assert "CAL_ACC1_XOFF" in applied.calibration.extra["autopilot"]["params_new"]

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...result import Calibration
 from .document import NEW, OLD
-from .names import place
+from .names import place_of
 
 
 def applied(calibration: Calibration, imus: Collection[int]) -> Calibration:
@@ -45,7 +45,7 @@ def _one(calibration: Calibration, imus: Collection[int]) -> Calibration:
     autopilot = calibration.extra.get("autopilot", {})
     if autopilot.get("imu") not in imus:
         return calibration
-    where = place(autopilot["firmware"], autopilot["imu"], autopilot[OLD])
+    where = place_of(autopilot["firmware"], autopilot["imu"], autopilot[NEW])
     old = None if where is None else where.correction(autopilot[OLD])
     new = None if where is None else where.correction(autopilot[NEW])
     if where is None or old is None or new is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -123,6 +123,12 @@ def all_places(firmware: str) -> tuple[Place, ...]:
     if firmware == PX4:
         return tuple(px4_place(slot + 1, slot) for slot in range(PX4_SLOTS))
     return tuple(ardupilot_place(imu) for imu in range(1, ARDUPILOT_IMUS + 1))
+
+
+def place_of(firmware: str, imu: int, values: Values) -> Place | None:
+    """The place that `values`, the parameters of one IMU, belong to; None where that is none."""
+    found = (where for where in all_places(firmware) if set(where.names) <= set(values))
+    return next((replace(where, imu=imu) for where in found), None)
 
 
 def mounting(firmware: str, where: Place, values: Values) -> Vector | None:

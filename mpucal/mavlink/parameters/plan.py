@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from ...result import REFUSED, Calibration
 from ..imu import SCALED, Stream
 from .compose import Correction
 from .document import NEW, OLD, RESIDUAL
-from .names import Place, place
+from .names import Place, place_of
 
 NOTHING = "nothing was written"
 
@@ -25,12 +26,14 @@ class Change:
 
     Attributes
     ----------
-    place : their names. new : the correction to write. mounting : R_b (3, 3). stream : where its effect shows.
+    place : their names. old : what corrected the stream that was calibrated. new : what is to be written.
+    mounting : R_b (3, 3). stream : where its effect shows.
     sensor_id : of the sensor that was calibrated; None where the vehicle did not say.
     residual_mps2 : what stays wrong.
     """
 
     place: Place
+    old: Correction
     new: Correction
     mounting: Vector
     stream: Stream
@@ -66,6 +69,32 @@ def left_out(calibration: Calibration) -> tuple[int, ...]:
     return tuple(int(other["autopilot"]["imu"]) for other in others if not _holds(other) and other.get("autopilot"))
 
 
+def moved(calibration: Calibration, order: Sequence[int], firmware: str) -> Calibration:
+    """The same calibration, where the parameters of IMUs lie in one another's places.
+
+    With o, k what corrected the stream, o' and k' what shall, and o_p, k_p what lies in the other place: the stream was
+    corrected by o_p and k_p all the time, so that o_p + (k / k_p) (o' - o) and k' k_p / k belong there.
+
+    Parameters
+    ----------
+    order : for each of `changes`, the index of the one in whose place its parameters belong.
+    """
+    planned = changes(calibration, firmware)
+    documents: dict[int, dict[str, Any]] = {}
+    for change, index in zip(planned, order, strict=True):
+        at = planned[index]
+        offset = at.old.offset + change.old.scale / at.old.scale * (change.new.offset - change.old.offset)
+        new = at.place.used(Correction(offset, change.new.scale * at.old.scale / change.old.scale))
+        documents[change.imu] = {NEW: at.place.values(new)}
+    extra = dict(calibration.extra)
+    extra["autopilot"] = {**extra["autopilot"], **documents[planned[0].imu]}
+    extra["others"] = [
+        {**other, "autopilot": {**other["autopilot"], **documents.get(other["autopilot"]["imu"], {})}}
+        for other in extra.get("others", [])
+    ]
+    return replace(calibration, extra=MappingProxyType(extra))
+
+
 def _holds(document: Mapping[str, Any]) -> bool:
     verdict = document.get("quality", {}).get("verdict", REFUSED)
     return verdict != REFUSED and bool(document.get("autopilot", {}).get(NEW))
@@ -78,9 +107,10 @@ def _change(autopilot: Mapping[str, Any], firmware: str) -> Change:
             f"{NOTHING}: the calibration is of an {autopilot['firmware']} vehicle, and this is {firmware}",
             "connect the vehicle that was calibrated",
         )
-    where = place(firmware, imu, autopilot[OLD])
+    where = place_of(firmware, imu, autopilot[NEW])
     new = None if where is None else where.correction(autopilot[NEW])
-    if where is None or new is None:
+    old = None if where is None else where.correction(autopilot[OLD])
+    if where is None or new is None or old is None:
         why = autopilot.get("why", "it holds no new parameters")
         raise WriteBackError(f"{NOTHING}: the calibration does not fit the vehicle ({why})", "repeat the session")
     beyond = where.beyond(new)
@@ -92,6 +122,7 @@ def _change(autopilot: Mapping[str, Any], firmware: str) -> Change:
     name = str(autopilot["message"])
     return Change(
         where,
+        where.used(old),
         new,
         np.array(autopilot["mounting"]),
         Stream(name, SCALED.get(name, imu)),

@@ -34,12 +34,17 @@ class Writer:
     Parameters
     ----------
     watch : hears its heartbeats. places : whose parameters are written.
+
+    Attributes
+    ----------
+    restored : a write failed, and the old parameters are back.
     """
 
     def __init__(self, link: Link, watch: Watch, places: Sequence[Place]) -> None:
         self._link, self._watch, self._places = link, watch, tuple(places)
         self._parameters = Parameters(link)
         self._touched: set[str] = set()
+        self.restored = False
 
     def held(self) -> dict[str, float]:
         """What the vehicle holds there.
@@ -110,6 +115,7 @@ class Writer:
                 f"{what}, and the old parameters could not be put back ({why})",
                 "load the file of old parameters with your ground station before the next flight",
             ) from failure
+        self.restored = True
         raise WriteBackError(f"{what}; the old parameters are back, and read back as they were", remedy) from failure
 
 
