@@ -2,9 +2,9 @@
 
 python tools/kill_trials.py --trials 10
 
-Each session runs in a process of its own on the simulated chip, is killed (SIGKILL) as soon as it says that a random time
-has come, and is resumed into a second capture file. Then `mpucal calibrate` of its folder must give the D and b_a of the
-session, and those of one capture that holds the records of both; and no more than a second may be lost.
+Each session runs in a process of its own on the simulated chip, is killed (SIGKILL) as soon as it says that a random
+time has come, and is resumed into a second capture file. Then `mpucal calibrate` of its folder must give the D and b_a
+of the session, and those of one capture that holds the records of both; and no more than a second may be lost.
 """
 
 from __future__ import annotations

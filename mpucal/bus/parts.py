@@ -104,10 +104,10 @@ class LaterBus:
         return t_ns + self._later_ns
 
 
-def parts_of(captures: Iterable[Sequence[Record]]) -> list[list[Record]]:
-    """The records of one or several captures, cut where a session was resumed.
+def parts_of(captures: Iterable[Sequence[Record]], more: bool = False) -> list[list[Record]]:
+    """The records of one or several captures, cut where a session was resumed; `more`: another part will follow.
 
-    Of a part that somebody stopped, what came after is left out: nothing of it was measured.
+    Of a part that somebody stopped and another follows, what came after is left out: nothing of it was measured.
     """
     parts: list[list[Record]] = []
     for records in captures:
@@ -117,7 +117,8 @@ def parts_of(captures: Iterable[Sequence[Record]]) -> list[list[Record]]:
                 parts += [[]] if parts[-1] else []
             else:
                 parts[-1].append(record)
-    return [*(_until_stopped(part) for part in parts[:-1]), *parts[-1:]]
+    last = len(parts) if more else len(parts) - 1
+    return [*(_until_stopped(part) for part in parts[:last]), *parts[last:]]
 
 
 def _until_stopped(part: list[Record]) -> list[Record]:

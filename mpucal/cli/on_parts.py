@@ -118,7 +118,7 @@ def open_resumed(folder: Path, open_live: Callable[[Mapping[str, Any], Plan], On
             f"the capture in {folder} does not name a source to go on with", "use `mpucal calibrate` on the folder"
         )
     live = open_live(source, plan)
-    records = parts_of(capture.records for capture in captures)
+    records = parts_of((capture.records for capture in captures), more=True)
     last_ns = max((record.t_ns for part in records for record in part), default=0)
     replays = [ReplayBus(part, folder.name) for part in records]
     recovered = [capture.recovered for capture in captures if capture.recovered]

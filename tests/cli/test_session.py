@@ -65,7 +65,7 @@ def test_machines_read_json_alone_and_a_folder_of_its_own_is_named_by_the_chip(m
     result = mpucal("session", "--replay", session.folder / "capture.mcap", "--json", "--json-events", "--yes")
     assert json.loads(result.out)["format"] == "mpucal.calibration"
     events = [json.loads(line) for line in result.err.splitlines()]
-    assert [event["kind"] for event in events if event["event"] == "prompt"][-2:] == ["rotate", "rest"]
+    assert [event["kind"] for event in events if event["event"] == "prompt"][-2:] == ["verify", "rest"]
     (folder,) = tmp_path.iterdir()
     assert folder.name.startswith("mpu-6050-")
 
@@ -144,7 +144,7 @@ def test_a_changed_access_stops(mpucal, session, tmp_path):
 
 def test_a_capture_cut_short_while_rotating_is_refused_with_reasons_and_without_a_blob(mpucal, session, tmp_path):
     data = (session.folder / "capture.mcap").read_bytes()
-    (tmp_path / "cut.mcap").write_bytes(data[: int(0.3 * len(data))])
+    (tmp_path / "cut.mcap").write_bytes(data[: int(0.22 * len(data))])
     result = mpucal("session", "--replay", "cut.mcap", "-o", "board")
     assert result.code == 5
     assert "cut.mcap" in result.err

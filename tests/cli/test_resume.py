@@ -1,0 +1,109 @@
+"""A session that is interrupted and resumed: nothing lost, and the same bits as if it had never stopped."""
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpucal.bus.records import SessionEvent
+from mpucal.calibration import calibrate
+from mpucal.capture import load
+from mpucal.capture.mcap import CaptureWriter, read_capture
+from mpucal.result import Calibration
+
+STORED = Path(__file__).parents[2] / "fixtures" / "sessions" / "enter.mcap"
+WORDS = ("session", "--json-events", "--yes")
+
+
+def interrupted(folder, sign, after_s, *options):
+    """A session that gets the signal as soon as it says that `after_s` has come; when it stopped talking."""
+    words = [sys.executable, "-m", "mpucal", *WORDS, "--bus", "sim", "--rate", "50", "-o", str(folder), *options]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as program:
+        t_s, sent = 0.0, False
+        for line in program.stderr:
+            if not line.startswith("{"):
+                continue
+            t_s = max(t_s, json.loads(line).get("t_s", 0.0))
+            if t_s >= after_s and not sent:
+                program.send_signal(sign)
+                sent = True
+                if sign == signal.SIGKILL:
+                    break
+    return t_s
+
+
+def joined(folder):
+    """One capture with the records of both."""
+    captures = [read_capture(folder / name) for name in ("capture.mcap", "capture-2.mcap")]
+    path = folder.parent / "joined.mcap"
+    with CaptureWriter(path) as writer:
+        writer.start(captures[0].meta)
+        for record in (record for capture in captures for record in capture.records):
+            if isinstance(record, SessionEvent):
+                writer.event(record.name, record.t_ns, record.data)
+            else:
+                writer.transaction(record)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("sign", "after_s"),
+    [(signal.SIGKILL, 6.0), (signal.SIGINT, 34.0)],
+    ids=["killed while flat", "Ctrl-C while rotating"],
+)
+def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, tmp_path, sign, after_s):
+    folder = tmp_path / "board"
+    come_to_s = interrupted(folder, sign, after_s)
+    whole_s = read_capture(folder / "capture.mcap").records[-1].t_ns * 1e-9
+    assert come_to_s - whole_s < 1.0
+
+    resumed = mpucal(*WORDS, "--resume", folder)
+    assert resumed.code == 0, resumed.err
+    said = [json.loads(line) for line in resumed.err.splitlines() if line.startswith("{")]
+    assert said[0]["event"] in ("note", "decision")
+    assert "the session goes on where it was" in resumed.err
+    prompts = [event["kind"] for event in said if event["event"] == "prompt"]
+    assert prompts[0] == ("lay_flat" if after_s < 10 else "rotate")
+    assert prompts[-2:] == ["verify", "rest"]
+
+    found = Calibration.load(folder / "calibration.json")
+    unbroken = joined(folder)
+    for recording in (load(folder), load(unbroken)):
+        other = calibrate(recording)
+        assert np.array_equal(other.D, found.D)
+        assert np.array_equal(other.b_a, found.b_a)
+
+    again = mpucal(*WORDS, "--replay", folder, "-o", "again")
+    assert again.code == 0, again.err
+    replayed = Calibration.load(tmp_path / "again" / "calibration.json")
+    assert np.array_equal(replayed.D, found.D)
+    assert replayed.quality["verification"] == found.quality["verification"]
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--resume", "nowhere"], "nowhere holds no session that could be resumed"),
+        (["--resume", "x", "--bus", "sim"], "--bus was given beside --resume"),
+        (["--resume", "x", "-o", "y"], "-o was given beside --resume"),
+    ],
+    ids=["no session", "another source", "another folder"],
+)
+def test_what_cannot_be_resumed_says_so(mpucal, words, sentence):
+    result = mpucal("session", *words)
+    assert result.code == 2
+    assert sentence in result.err
+
+
+def test_a_capture_without_a_source_cannot_be_resumed(mpucal, tmp_path):
+    capture = read_capture(STORED)
+    (tmp_path / "old").mkdir()
+    with CaptureWriter(tmp_path / "old" / "capture.mcap") as writer:
+        writer.start({key: value for key, value in capture.meta.items() if key != "source"})
+    result = mpucal("session", "--resume", "old")
+    assert result.code == 2
+    assert "does not name a source to go on with" in result.err
