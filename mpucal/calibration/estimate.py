@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +17,16 @@ from .masks import mask
 from .minimise import Minimum, Prior, minimise
 from .model import Fit, Flat
 from .paper import fit_paper
+from .stationary import flat_statistics
+from .thin import thinned
 
 # The mean ||e||^2 of white noise is 3; a hand, or a gyroscope's scale, makes it tens to thousands.
 EXPLAINED_NIS = 4.0
+HOPELESS_NIS = 10.0  # of means over blocks, in which white noise is less and a hand's is not
 
 ACCEL, IMU = 17, 23
+
+SEARCH_HZ, ROUGHLY = 50.0, 0.05
 
 
 class Choice(NamedTuple):
@@ -33,12 +39,12 @@ class Choice(NamedTuple):
 
 def fit_accel(recording: Recording, flat: Flat, gravity: float) -> Fit:
     """D, b_a, b_omega and the first tilts, with the gyroscope's scale trusted: the paper's model, made efficient."""
-    return _as_fit(_minimum(recording, flat, gravity, ACCEL), recording, flat)
+    return _as_fit(_minimum(recording, flat, gravity, ACCEL, _rough(recording, flat, gravity, ACCEL)))
 
 
 def fit_imu(recording: Recording, flat: Flat, gravity: float) -> Fit:
     """As `accel`, with the gyroscope's matrix K."""
-    return _as_fit(_minimum(recording, flat, gravity, IMU), recording, flat)
+    return _as_fit(_minimum(recording, flat, gravity, IMU, _rough(recording, flat, gravity, IMU)))
 
 
 METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
@@ -55,28 +61,47 @@ def choose(recording: Recording, flat: Flat, gravity: float) -> Choice:
     White noise and a trusted gyroscope first, then its matrix K, kept where a Wald test tells it from the identity.
     Data that neither explains were measured in a hand.
     """
-    accel = _minimum(recording, flat, gravity, ACCEL)
-    nis = accel.squares / (len(recording) - flat.last)
+    rough = _rough(recording, flat, gravity, ACCEL)
+    nis = rough.nis
+    if nis < HOPELESS_NIS:
+        accel = _minimum(recording, flat, gravity, ACCEL, rough)
+        nis = accel.nis
     if nis < EXPLAINED_NIS:
-        imu = _minimum(recording, flat, gravity, IMU)
+        imu = _minimum(recording, flat, gravity, IMU, accel)
         if imu.converged and wald(imu) > WALD_99:
             why = f"white noise explains the data (innovations {nis:.1f}, expected 3), and the gyroscope is not perfect"
-            return Choice(_as_fit(imu, recording, flat), "imu", why)
+            return Choice(_as_fit(imu), "imu", why)
         why = f"white noise and a perfect gyroscope explain the data (innovations {nis:.1f}, expected 3)"
-        return Choice(_as_fit(accel, recording, flat), "accel", why)
+        return Choice(_as_fit(accel), "accel", why)
     hand = fit_hand(recording, flat, gravity)
     kept = "K" if "K_xx" in hand.names else "no K (it is not told from the identity)"
     why = f"white noise does not explain the data (innovations {nis:.0f}, expected 3): a hand's model, with {kept}"
     return Choice(hand, "hand", why)
 
 
-def _minimum(recording: Recording, flat: Flat, gravity: float, parameters: int) -> Minimum:
-    problem = Problem(mask(Series.after(recording, flat), recording, flat), flat, gravity)
-    known = {"b_omega": (flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)), "K": (K_MEAN, K_SD)}
-    return minimise(problem, initialise(problem, flat.b_omega), parameters, Prior.of(**known))
+def _rough(recording: Recording, flat: Flat, gravity: float, parameters: int) -> Minimum:
+    """On means over blocks: white noise leaves little in a block beside its mean."""
+    thin, at = thinned(recording, flat, SEARCH_HZ)
+    problem = _problem(thin, flat_statistics(thin, at), gravity)
+    theta = initialise(problem, flat.b_omega)
+    return minimise(problem, theta, parameters, _prior(flat), until=ROUGHLY)
 
 
-def _as_fit(minimum: Minimum, recording: Recording, flat: Flat) -> Fit:
+def _minimum(recording: Recording, flat: Flat, gravity: float, parameters: int, near: Minimum) -> Minimum:
+    """On all samples, from where another search ended."""
+    minimum = minimise(_problem(recording, flat, gravity), near.theta, parameters, _prior(flat))
+    return replace(minimum, iterations=near.iterations + minimum.iterations)
+
+
+def _problem(recording: Recording, flat: Flat, gravity: float) -> Problem:
+    return Problem(mask(Series.after(recording, flat), recording, flat), flat, gravity)
+
+
+def _prior(flat: Flat) -> Prior:
+    return Prior.of(b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)), K=(K_MEAN, K_SD))
+
+
+def _as_fit(minimum: Minimum) -> Fit:
     theta, parameters = minimum.theta, len(minimum.H)
     covariance = minimum.covariance()
     names = NAMES[:parameters]
@@ -89,7 +114,7 @@ def _as_fit(minimum: Minimum, recording: Recording, flat: Flat) -> Fit:
         covariance=covariance,
         iterations=minimum.iterations,
         converged=minimum.converged,
-        nis=minimum.squares / max(len(recording) - flat.last, 1),
+        nis=minimum.nis,
         V=minimum.V,
         at_prior=at_prior(covariance) if parameters > ACCEL else (),
     )

@@ -59,23 +59,26 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     theta, noise = search.run(initialise(fine.problem, fine.flat.b_omega))
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
         noise = Noise("white", _likeliest(fine.white, _near(noise.sigma), theta))
-    problem, doubt = noise.problem(fine), replace(noise, sigma=HONEST * noise.sigma).problem(fine)
-    prior, iterations = _prior(fine.flat), search.iterations
-    for _ in range(PASSES):
-        factor = q_scale_of_moves(fine.recording, fine.flat, problem.series, theta, fine.runs, gravity)
-        problem, doubt = (replace(p, series=replace(p.series, q_scale=factor)) for p in (problem, doubt))
-        minimum = minimise(problem, theta, len(NAMES), prior, frozen=True)
-        theta, iterations = minimum.theta, iterations + minimum.iterations
-        if factor is None:
-            break
+    problem = _with_doubted_moves(noise.problem(fine), fine, theta)
+    prior = _prior(fine.flat)
+    minimum = minimise(problem, theta, len(NAMES), prior, frozen=True)
+    iterations = search.iterations + minimum.iterations
     if wald(minimum) < WALD_99:
         perfect = replace(minimum.theta, K=np.eye(3))
         minimum = minimise(problem, perfect, len(NAMES), prior, fixed=("K",), frozen=True)
         iterations += minimum.iterations
     if noise.kind == "pivot":
+        doubt = replace(noise, sigma=HONEST * noise.sigma).problem(fine)
+        doubt = replace(doubt, series=replace(doubt.series, q_scale=problem.series.q_scale))
         fisher = evaluate(doubt, minimum.theta, len(NAMES)).fisher
         minimum = replace(minimum, H=fisher + np.diag(prior.precision))
-    return _as_fit(minimum, iterations, len(problem.series))
+    return _as_fit(minimum, iterations)
+
+
+def _with_doubted_moves(problem: Problem, scene: Scene, theta: Theta) -> Problem:
+    """The problem with as much noise of the gyroscope between rests as the rests show, under theta."""
+    factor = q_scale_of_moves(scene.recording, scene.flat, problem.series, theta, scene.runs, problem.gravity)
+    return replace(problem, series=replace(problem.series, q_scale=factor))
 
 
 def _prior(flat: Flat) -> Prior:
@@ -112,7 +115,9 @@ class _Search:
             theta = self._roughly(scene.pivot(sigma), theta)
             sigma = _likeliest(scene.pivot, PIVOT_MPS2, theta)
             noise = Noise("pivot", (FARTHER + FARTHER_STILL * sigma) * sigma)
-        return self._roughly(noise.problem(scene), theta), noise
+        for _ in range(PASSES):
+            theta = self._roughly(_with_doubted_moves(noise.problem(scene), scene, theta), theta)
+        return theta, noise
 
     def _roughly(self, problem: Problem, theta: Theta) -> Theta:
         minimum = minimise(problem, theta, len(NAMES), self.prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True)
@@ -131,7 +136,7 @@ def _near(sigma: float) -> tuple[float, ...]:
     return WHITE_MPS2[max(at - 1, 1) : at + 3]
 
 
-def _as_fit(minimum: Minimum, iterations: int, samples: int) -> Fit:
+def _as_fit(minimum: Minimum, iterations: int) -> Fit:
     theta, free = minimum.theta, minimum.free
     covariance = minimum.covariance()
     names = tuple(name for name, kept in zip(NAMES, free, strict=True) if kept)
@@ -144,7 +149,7 @@ def _as_fit(minimum: Minimum, iterations: int, samples: int) -> Fit:
         covariance=covariance[np.ix_(free, free)],
         iterations=iterations,
         converged=minimum.converged,
-        nis=minimum.squares / max(samples, 1),
+        nis=minimum.nis,
         V=minimum.V,
         at_prior=at_prior(covariance) if free.all() else (),
     )

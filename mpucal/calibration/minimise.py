@@ -10,6 +10,7 @@ from ..data import Vector
 from .likelihood import NAMES, Evaluation, Problem, Theta, evaluate
 
 DECREMENT = 1e-3  # g' H^-1 g / 2: 0.04 standard deviations from the optimum, whatever the units
+LAST = 30.0  # so near, a whole step leaves a thousandth of the decrement: nobody need look back
 MOST_ITERATIONS = 60
 FROZEN_SLACK = 1.0  # by how much V may rise in such a step
 DAMPING, EASIER, HARDER, HOPELESS = 1e-3, 0.1, 8.0, 1e12
@@ -44,14 +45,14 @@ class Minimum:
 
     Attributes
     ----------
-    theta : the estimate. V : its cost with the prior. squares : sum of e' S^-1 e.
+    theta : the estimate. V : its cost with the prior. nis : mean of e' S^-1 e over the samples.
     H : (p, p) Fisher matrix with the prior's, over all p parameters, those held fixed as well.
     free : (p,) True where a parameter was estimated.
     """
 
     theta: Theta
     V: float
-    squares: float
+    nis: float
     H: Vector
     free: Vector
     iterations: int
@@ -92,13 +93,18 @@ def minimise(
             converged = True
             break
         step = np.zeros(parameters)
+        if decrement < LAST * until and not frozen:
+            step[free] = -_solve(H, gradient)
+            at.step(step, decrement)
+            converged, iterations = True, iterations + 1
+            break
         step[free] = -_solve(H + damping * np.diag(np.diag(H)), gradient)
         trial = _At(problem, at.theta.moved(step), parameters, prior)
         if trial.V < at.V or (frozen and trial.decrement(free) < decrement and trial.V < at.V + FROZEN_SLACK):
             at, damping, iterations = trial, damping * EASIER, iterations + 1
         else:
             damping *= HARDER
-    return Minimum(at.theta, at.V, at.data.squares, at.H, free, iterations, converged)
+    return Minimum(at.theta, at.V, at.data.squares / max(len(problem.series), 1), at.H, free, iterations, converged)
 
 
 class _At:
@@ -114,6 +120,11 @@ class _At:
             self.V = np.inf
         self.gradient = self.data.gradient + precision * away
         self.H = self.data.fisher + np.diag(precision)
+
+    def step(self, step: Vector, decrement: float) -> None:
+        """Move theta by the last step, by which V falls by the decrement."""
+        self.theta = self.theta.moved(step)
+        self.V -= decrement
 
     def decrement(self, free: Vector) -> float:
         """Newton decrement g' H^-1 g / 2 over the free parameters: how much V would still fall."""

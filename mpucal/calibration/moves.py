@@ -78,16 +78,23 @@ def _rests(recording: Recording, flat: Flat, turns: Vector, theta: Theta, runs: 
     for first, last in runs.tolist():
         if last <= flat.last + 1:
             continue
-        s = (recording.acc[first:last] - theta.b_a) @ inverse.T
+        acc = recording.acc[first:last]
+        s = (acc.mean(0) - theta.b_a) @ inverse.T
         # a board in a hand turns a little as it rests: each sample counts in the axes of either end
         turned = np.cumsum(turns[first:last], axis=0)
-        coming = s - np.cross(turned - turned[0], s)
-        leaving = s + np.cross(turned[-1] - turned, s)
-        tremor = max(float(np.mean(s.var(0) - flat.Sigma_a)), 0.0)
+        across = _mean_cross(turned, (acc - theta.b_a) @ inverse.T)
+        coming, leaving = s - across + np.cross(turned[0], s), s + np.cross(turned[-1], s) - across
+        tremor = max(float(np.mean(acc.var(0) - flat.Sigma_a)), 0.0)
         of_tremor = 2.0 * tremor * (SPEED_OF_TREMOR_S / ((last - first) * dt)) ** 2
         variance = (POSE_MPS2**2 + flat.Sigma_a.mean() / (last - first) + of_tremor) / gravity**2
-        rests.append(Rest(first, last, coming.mean(0), leaving.mean(0), variance))
+        rests.append(Rest(first, last, coming, leaving, variance))
     return rests
+
+
+def _mean_cross(a: Vector, b: Vector) -> Vector:
+    """(3,) mean of the cross products of the rows of a and b (n, 3)."""
+    M = a.T @ b / len(a)
+    return np.array([M[1, 2] - M[2, 1], M[2, 0] - M[0, 2], M[0, 1] - M[1, 0]])
 
 
 def _miss(carried: Vector, seen: Vector) -> Vector:

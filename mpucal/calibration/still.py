@@ -35,9 +35,9 @@ def still_runs(recording: Recording, flat: Flat) -> Runs:
     gyr_mean, gyr_sd = _moving(recording.gyr, n)
     _, acc_sd = _moving(recording.acc, n)
     windows = (
-        (gyr_sd < np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_omega), GYRO_SD_RAD_S)).all(1)
-        & (acc_sd < np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_a), ACC_SD_MPS2)).all(1)
-        & (np.abs(gyr_mean - flat.b_omega) < GYRO_MEAN_RAD_S).all(1)
+        (gyr_sd < np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_omega), GYRO_SD_RAD_S)[:, None]).all(0)
+        & (acc_sd < np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_a), ACC_SD_MPS2)[:, None]).all(0)
+        & (np.abs(gyr_mean - flat.b_omega[:, None]) < GYRO_MEAN_RAD_S).all(0)
     )
     covered = np.zeros(len(recording) + 1, np.intp)
     at = np.flatnonzero(windows)
@@ -71,13 +71,14 @@ def without_drift(recording: Recording, flat: Flat, runs: Runs) -> Recording:
 
 
 def _moving(values: Vector, n: int) -> tuple[Vector, Vector]:
-    """Means and standard deviations (len - n + 1, 3) of all windows of n samples."""
-    centred = values - values.mean(0)
-    sums = np.cumsum(np.vstack([np.zeros((1, 3)), centred]), axis=0)
-    squares = np.cumsum(np.vstack([np.zeros((1, 3)), centred**2]), axis=0)
-    mean = (sums[n:] - sums[:-n]) / n
-    variance = (squares[n:] - squares[:-n]) / n - mean**2
-    return mean + values.mean(0), np.sqrt(np.maximum(variance, 0.0))
+    """Means and standard deviations (3, len - n + 1) of all windows of n samples."""
+    mean = values.mean(0)
+    x = np.zeros((3, len(values) + 1))  # an axis a row: sums along a row are the fast ones
+    x[:, 1:] = (values - mean).T
+    sums, squares = np.cumsum(x, axis=1), np.cumsum(x * x, axis=1)
+    of_window = (sums[:, n:] - sums[:, :-n]) / n
+    variance = (squares[:, n:] - squares[:, :-n]) / n - of_window**2
+    return of_window + mean[:, None], np.sqrt(np.maximum(variance, 0.0))
 
 
 def _runs(mask: Mask) -> Runs:
