@@ -24,9 +24,8 @@ def test_a_sound_chip_is_told_on_a_page(device):
         assert words in result.out
 
 
-@pytest.mark.parametrize("chip", ["mpu6500", "clone98"])
-def test_a_chip_under_another_name_is_recognised(device, chip):
-    result, findings = examined(device(f"sim:chip={chip},who_am_i=0x68"), "--json")
+def test_a_chip_under_another_name_is_recognised(device):
+    result, findings = examined(device("sim:chip=clone98,who_am_i=0x68"), "--json")
     assert result.code == 0
     assert "behaves as an" in findings["chip"]["what"]
     assert findings["offset registers"]["data"]["place"] == 0x77
@@ -63,6 +62,7 @@ def test_no_permission_comes_with_what_to_do(device):
 def test_a_slow_bus_comes_with_the_setting_that_helps(device):
     mocked = device()
     mocked.configure(100_000)
+    mocked.tell(adapter={"address": 0x50})
     _, findings = examined(mocked, "--json")
     assert "100 kHz" in findings["adapter"]["what"]
     assert "i2c_arm_baudrate=400000" in findings["adapter"]["remedy"]
