@@ -16,11 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 from .data import Sensor, Vector
 from .errors import RecordingError
 from .files import write_atomically
-from .wire.blob import Blob, BlobError
+from .wire.blob import NO_RANGE, Blob, BlobError
 
 FORMAT, VERSION = "mpucal.calibration", 1
 ACCELEROMETER_FORMULA = "a = inv(D) @ (y - b_a)"
 GYROSCOPE_FORMULA = "w = K @ (y - b_omega)"
+
+# top-level keys of the document that are kept as they are
+EXTRA = ("autopilot", "others", "written", "merged")
 
 GOOD, USABLE, REFUSED = "good", "usable", "refused"
 
@@ -43,7 +46,9 @@ class Calibration:
     sensor : what was calibrated.
     created : ISO 8601 time.
     applied_in_hardware : (3,) m/s^2 that offset registers subtract already; a consumer uses b_a minus this.
-    extra : further top-level keys of the document (autopilot, others).
+    b_a_slope : (3,) m/s^2 a degree Celsius, of which b_a grows away from sensor.temperature_c; zeros: not known to.
+    b_a_slope_std : (3,). temperature_range_c : (2,) degrees Celsius, within which that was seen.
+    extra : further top-level keys of the document (autopilot, others, written, merged).
 
     Unknown numbers are NaN (null in the file).
     """
@@ -64,25 +69,46 @@ class Calibration:
     created: str = ""
     applied_in_hardware: Vector = field(default_factory=lambda: np.zeros(3))
     extra: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    b_a_slope: Vector = field(default_factory=lambda: np.zeros(3))
+    b_a_slope_std: Vector = field(default_factory=lambda: unknown(3))
+    temperature_range_c: Vector = field(default_factory=lambda: unknown(2))
+
+    @property
+    def follows_temperature(self) -> bool:
+        """Whether b_a(T) is known, and not b_a alone."""
+        return bool(np.any(self.b_a_slope))
+
+    def b_a_at(self, temperature_c: ArrayLike | None = None) -> Vector:
+        """b_a(T) (..., 3) m/s^2 at (...) degrees Celsius; b_a where that is NaN, None, or b_a(T) is not known.
+
+        Beyond the range in which it was seen, b_a(T) stays as at its end.
+        """
+        if temperature_c is None or not self.follows_temperature:
+            return self.b_a
+        T_0 = self.sensor.temperature_c
+        T = np.clip(np.asarray(temperature_c, float), *self.temperature_range_c)
+        away = np.nan_to_num(T - (np.nan if T_0 is None else T_0))
+        return np.asarray(self.b_a + away[..., None] * self.b_a_slope)
 
     @property
     def verdict(self) -> str:
         """good, usable or refused; refused where nobody judged."""
         return str(self.quality.get("verdict", REFUSED))
 
-    def apply(self, acc: ArrayLike, gyr: ArrayLike | None = None) -> Any:
+    def apply(self, acc: ArrayLike, gyr: ArrayLike | None = None, temperature_c: ArrayLike | None = None) -> Any:
         """Calibrated measurements (the paper's equation 4).
 
         Parameters
         ----------
         acc : (..., 3) m/s^2 as measured. gyr : (..., 3) rad/s as measured, or None.
+        temperature_c : (...) degrees Celsius of the chip, for b_a(T); None: b_a.
 
         Returns
         -------
         (..., 3) m/s^2, inv(D) (y - b_a); with gyr the pair of it and K (y - b_omega), (..., 3) rad/s.
         """
         # b_a minus what the offset registers subtract: y comes from the chip with that already gone
-        y = np.asarray(acc, float) - (self.b_a - self.applied_in_hardware)
+        y = np.asarray(acc, float) - (self.b_a_at(temperature_c) - self.applied_in_hardware)
         a: NDArray[np.float64] = y @ np.linalg.inv(self.D).T
         if gyr is None:
             return a
@@ -101,6 +127,7 @@ class Calibration:
                 "b_a_std": _plain(self.b_a_std),
                 "noise_std": _plain(self.noise_std),
                 "formula": ACCELEROMETER_FORMULA,
+                **self._temperature_document(),
             },
             "gyroscope": {
                 "K": _plain(self.K),
@@ -115,6 +142,15 @@ class Calibration:
             "sensor": _plain(asdict(self.sensor)),
             "applied_in_hardware": {"b_a": _plain(self.applied_in_hardware)},
             **_plain(dict(self.extra)),
+        }
+
+    def _temperature_document(self) -> dict[str, Any]:
+        if not self.follows_temperature:
+            return {}
+        return {
+            "b_a_slope": _plain(self.b_a_slope),
+            "b_a_slope_std": _plain(self.b_a_slope_std),
+            "temperature_range_c": _plain(self.temperature_range_c),
         }
 
     def json(self) -> str:
@@ -136,6 +172,8 @@ class Calibration:
             applied_b_a=tuple(self.applied_in_hardware.tolist()),
             K=tuple(self.K.ravel().tolist()),
             b_omega=tuple(self.b_omega.tolist()),
+            b_a_slope=tuple(self.b_a_slope.tolist()),
+            temperature_range_c=tuple(self.temperature_range_c.tolist()) if self.follows_temperature else NO_RANGE,
         )
 
     def save(self, path: str | Path) -> None:
@@ -205,7 +243,10 @@ class Calibration:
             sensor=Sensor(**{key: _hashable(value) for key, value in sensor.items() if key in known}),
             created=str(document.get("created", "")),
             applied_in_hardware=_array(document.get("applied_in_hardware", {}).get("b_a", [0, 0, 0]), 3),
-            extra=MappingProxyType({key: document[key] for key in ("autopilot", "others") if key in document}),
+            b_a_slope=_array(acc.get("b_a_slope", [0, 0, 0]), 3),
+            b_a_slope_std=_array(acc.get("b_a_slope_std"), 3),
+            temperature_range_c=_array(acc.get("temperature_range_c"), 2),
+            extra=MappingProxyType({key: document[key] for key in EXTRA if key in document}),
         )
 
     @classmethod
@@ -225,6 +266,8 @@ class Calibration:
             ),
             created=blob.created,
             applied_in_hardware=np.array(blob.applied_b_a),
+            b_a_slope=np.array(blob.b_a_slope),
+            temperature_range_c=np.array(blob.temperature_range_c),
         )
 
 

@@ -49,6 +49,9 @@ UNKNOWN = replace(
     b_omega=(math.nan,) * 3,
 )
 APPLIED = replace(MEASURED, who_am_i=0x70, applied_b_a=(0.234375, -0.3671875, 0.8046875))
+SLOPED = replace(MEASURED, b_a_slope=(0.0078125, -0.001953125, 0.015625), temperature_range_c=(10.5, 52.25))
+# one degree each side of the ends, where b_a(T) stays as it is, and one between
+TEMPERATURES_C = (9.5, 40.0, 53.25)
 Y = (0.5, -1.25, 10.5)
 
 
@@ -64,7 +67,17 @@ def accepted(blob: Blob, data: bytes | None = None) -> tuple[bytes, dict[str, An
     values = {key: plain(value) for key, value in asdict(blob).items()}
     D = np.array(blob.D).reshape(3, 3)
     a = np.linalg.solve(D, np.array(Y) - blob.b_a + blob.applied_b_a)
-    return data or blob.encode(), {"blob": values, "y": list(Y), "a": a.tolist()}
+    content = {"blob": values, "y": list(Y), "a": a.tolist()}
+    return data or blob.encode(), content | (at_temperatures(blob, D) if any(blob.b_a_slope) else {})
+
+
+def at_temperatures(blob: Blob, D: Any) -> dict[str, Any]:
+    """What b_a(T) makes of Y."""
+    b_a = [
+        np.array(blob.b_a) + np.array(blob.b_a_slope) * (np.clip(T, *blob.temperature_range_c) - blob.temperature_c)
+        for T in TEMPERATURES_C
+    ]
+    return {"at_c": TEMPERATURES_C, "a_at": [np.linalg.solve(D, Y - b + blob.applied_b_a).tolist() for b in b_a]}
 
 
 def plain(value: Any) -> Any:
@@ -88,7 +101,12 @@ def vectors() -> dict[str, tuple[bytes, dict[str, Any]]]:
         "measured": accepted(MEASURED),
         "unknown": accepted(UNKNOWN),
         "applied": accepted(APPLIED),
-        "appended": accepted(MEASURED, sealed(with_byte(body, 5, 1) + struct.pack("<2f", 1.5, -2.5))),
+        "sloped": accepted(SLOPED),
+        "appended": accepted(SLOPED, sealed(with_byte(SLOPED.encode()[:-4], 5, 2) + struct.pack("<2f", 1.5, -2.5))),
+        "slope_cut": accepted(MEASURED, sealed(with_byte(body, 5, 1) + struct.pack("<2f", 1.5, -2.5))),
+        "slope_not_finite": accepted(
+            MEASURED, sealed(with_byte(body, 5, 1) + struct.pack("<5f", 1, math.nan, 1, 0, 50))
+        ),
         "bad_magic": (sealed(b"MPUX" + body[4:]), {"rejected": "another magic"}),
         "bad_major": (sealed(with_byte(body, 4, 2)), {"rejected": "a major version that is not known"}),
         "bad_length": (sealed(body, length=len(good) + 1), {"rejected": "length is not the number of bytes"}),

@@ -17,9 +17,14 @@ def left_to_subtract(c: Calibration) -> Vector:
     return np.asarray(c.b_a - c.applied_in_hardware)
 
 
+def inverse(c: Calibration) -> Vector:
+    """inv(D) (3, 3)."""
+    return np.asarray(np.linalg.inv(c.D))
+
+
 def formula(c: Calibration) -> str:
     """a = inv(D) (y - b_a), one line an axis."""
-    gain, bias = np.linalg.inv(c.D), left_to_subtract(c)
+    gain, bias = inverse(c), left_to_subtract(c)
     rows = (
         " ".join(
             f"{factor:+.6f} * (y_{of} {-offset:+.6f})" for factor, of, offset in zip(row, "xyz", bias, strict=True)
@@ -30,24 +35,33 @@ def formula(c: Calibration) -> str:
 
 
 def in_c(c: Calibration) -> str:
-    """A function for firmware."""
-    gain = ",\n".join(f"        {{{_joined(f'{v:.8e}f' for v in row)}}}" for row in np.linalg.inv(c.D))
+    """inv(D) and b_a as constants, and the function for firmware that applies them."""
     bias = _joined(f"{v:.8e}f" for v in left_to_subtract(c))
-    return f"""{_about_counts(c, "/* ", " */")}
-static void mpucal_apply(const float y[3], float a[3])
-{{
-    static const float gain[3][3] = {{  /* inv(D) */
-{gain},
-    }};
-    static const float bias[3] = {{{bias}}};  /* b_a, m/s^2 */
+    return f"""static const float MPUCAL_INV_D[3][3] = {{
+{c_matrix(inverse(c))}
+}};
+static const float MPUCAL_B_A[3] = {{{bias}}}; /* m/s^2 */
 
+{_about_counts(c, "/* ", " */")}
+static inline void mpucal_apply(const float y[3], float a[3])
+{{
     for (int i = 0; i < 3; i++) {{
         a[i] = 0.0f;
         for (int j = 0; j < 3; j++)
-            a[i] += gain[i][j] * (y[j] - bias[j]);
+            a[i] += MPUCAL_INV_D[i][j] * (y[j] - MPUCAL_B_A[j]);
     }}
 }}
 """
+
+
+def c_matrix(matrix: Vector) -> str:
+    """The rows of a C initialiser, in float."""
+    return ",\n".join(f"    {{{_joined(f'{v:.8e}f' for v in row)}}}" for row in matrix)
+
+
+def py_matrix(matrix: Vector) -> str:
+    """The rows of a Python list."""
+    return ",\n".join(f"    [{_joined(f'{v:.8f}' for v in row)}]" for row in matrix)
 
 
 def in_python(c: Calibration) -> str:
@@ -93,7 +107,7 @@ if __name__ == "__main__":
 
 
 def _matrices(c: Calibration) -> str:
-    rows = ",\n".join(f"    [{_joined(f'{v:.8f}' for v in row)}]" for row in np.linalg.inv(c.D))
+    rows = py_matrix(inverse(c))
     bias = _joined(f"{v:.8f}" for v in left_to_subtract(c))
     return f"GAIN = np.array([  # inv(D)\n{rows},\n])\nBIAS = np.array([{bias}])  # b_a, m/s^2\n"
 

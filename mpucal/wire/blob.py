@@ -9,15 +9,21 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 MAGIC = b"MPUC"
-MAJOR, MINOR = 1, 0
+# a blob without b_a(T) is written as minor version 0 has it
+MAJOR, MINOR, MINOR_WITHOUT_SLOPE = 1, 1, 0
 MAX_LENGTH = 256
 FORMULA = "a = inv(D) @ (y - b_a + applied_b_a)"
 
-# firmware_protocol.md, "Layout", down to the last field of this version; then the checksum
+# firmware_protocol.md, "Layout", down to the last field of minor version 0; what 1 appended; then the checksum
 FIELDS = struct.Struct("<4s B B H 40s B 3x f f 9f 3f f Q f 3f 9f 3f")
+SLOPE = struct.Struct("<3f 2f")
 CHECKSUM = struct.Struct("<I")
 LENGTH = FIELDS.size + CHECKSUM.size
+LENGTH_WITH_SLOPE = LENGTH + SLOPE.size
 HEADER_LENGTH = 8
+
+APPENDED = (("b_a_slope", 3), ("temperature_range_c", 2))
+NO_SLOPE, NO_RANGE = (0.0, 0.0, 0.0), (math.nan, math.nan)
 
 MAJOR_AT = 4
 LENGTH_AT = 6
@@ -41,6 +47,8 @@ class Blob:
     created : ISO 8601, without an offset read as UTC; kept in whole seconds; empty: unknown.
     applied_b_a : m/s^2 that the chip's offset registers subtract already.
     K : 9 numbers, row-major. b_omega : 3, rad/s: w = K (y - b_omega); NaN where not estimated.
+    b_a_slope : 3, m/s^2 a degree Celsius: b_a(T) = b_a + b_a_slope (T - temperature_c); zeros: not known.
+    temperature_range_c : 2, to which T is cut off; NaN without b_a_slope.
     """
 
     who_am_i: int
@@ -54,6 +62,8 @@ class Blob:
     applied_b_a: tuple[float, ...]
     K: tuple[float, ...]
     b_omega: tuple[float, ...]
+    b_a_slope: tuple[float, ...] = NO_SLOPE
+    temperature_range_c: tuple[float, ...] = NO_RANGE
 
     def encode(self) -> bytes:
         """The blob's bytes.
@@ -64,11 +74,12 @@ class Blob:
         """
         _check_usable(self)
         try:
+            appended = SLOPE.pack(*self.b_a_slope, *self.temperature_range_c) if any(self.b_a_slope) else b""
             body = FIELDS.pack(
                 MAGIC,
                 MAJOR,
-                MINOR,
-                LENGTH,
+                MINOR if appended else MINOR_WITHOUT_SLOPE,
+                LENGTH + len(appended),
                 FORMULA.encode(),
                 self.who_am_i,
                 self.accel_range_g,
@@ -84,6 +95,7 @@ class Blob:
             )
         except (struct.error, OverflowError) as error:
             raise BlobError(f"a value does not fit its field ({error})") from error
+        body += appended
         return body + CHECKSUM.pack(zlib.crc32(body))
 
     @classmethod
@@ -96,6 +108,7 @@ class Blob:
         """
         _check_whole(data)
         values = FIELDS.unpack_from(data)[5:]
+        slope, range_c = _slope(data, values[17])
         blob = cls(
             who_am_i=values[0],
             accel_range_g=values[1],
@@ -108,6 +121,8 @@ class Blob:
             applied_b_a=values[18:21],
             K=values[21:30],
             b_omega=values[30:33],
+            b_a_slope=slope,
+            temperature_range_c=range_c,
         )
         _check_usable(blob)
         return blob
@@ -131,8 +146,17 @@ def _check_whole(data: bytes) -> None:
         raise BlobError("its checksum does not match: it is damaged")
 
 
+def _slope(data: bytes, temperature_c: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """b_a(T) and its range, where they are there and can be used."""
+    if len(data) < LENGTH_WITH_SLOPE:
+        return NO_SLOPE, NO_RANGE
+    values = SLOPE.unpack_from(data, FIELDS.size)
+    usable = all(map(math.isfinite, (*values, temperature_c))) and values[3] <= temperature_c <= values[4]
+    return (values[:3], values[3:]) if usable else (NO_SLOPE, NO_RANGE)
+
+
 def _check_usable(blob: Blob) -> None:
-    for name, count in (("D", 9), ("b_a", 3), ("applied_b_a", 3), ("K", 9), ("b_omega", 3)):
+    for name, count in (("D", 9), ("b_a", 3), ("applied_b_a", 3), ("K", 9), ("b_omega", 3), *APPENDED):
         values = getattr(blob, name)
         if len(values) != count:
             raise BlobError(f"{name} has {len(values)} numbers, not {count}")

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpucal.wire.blob import FIELDS, FORMULA, LENGTH, MAX_LENGTH, Blob, BlobError
+from mpucal.wire.blob import FIELDS, FORMULA, LENGTH, LENGTH_WITH_SLOPE, MAX_LENGTH, SLOPE, Blob, BlobError
 
 PROJECT = Path(__file__).parents[2]
 VECTORS = PROJECT / "fixtures" / "vectors"
@@ -44,6 +44,14 @@ def blobs(draw):
     )
 
 
+@st.composite
+def sloped(draw):
+    """With b_a(T), which needs a temperature within its range."""
+    low, at, high = sorted(draw(several(3)))
+    slope = draw(several(3).filter(any))
+    return replace(draw(blobs()), temperature_c=at, b_a_slope=slope, temperature_range_c=(low, high))
+
+
 def plain(blob):
     """Values that compare equal where NaN stands for NaN."""
     return repr(asdict(blob))
@@ -54,6 +62,21 @@ def sealed(body, length=None):
     body = bytearray(body)
     struct.pack_into("<H", body, 6, len(body) + 4 if length is None else length)
     return bytes(body) + struct.pack("<I", zlib.crc32(body))
+
+
+@given(sloped())
+def test_decode_is_the_inverse_of_encode_with_a_slope(blob):
+    data = blob.encode()
+    assert (len(data), data[5]) == (LENGTH_WITH_SLOPE, 1)
+    assert plain(Blob.decode(data)) == plain(blob)
+
+
+@given(sloped(), st.sampled_from(["b_a_slope", "temperature_range_c", "temperature_c"]))
+def test_a_slope_that_cannot_be_used_is_none(blob, name):
+    spoilt = (math.nan,) * 3 if name == "b_a_slope" else (math.inf, 0.0) if name == "temperature_range_c" else math.nan
+    read = Blob.decode(replace(blob, **{name: spoilt}).encode())
+    assert not any(read.b_a_slope)
+    assert (read.D, read.b_a) == (blob.D, blob.b_a)
 
 
 @pytest.fixture
@@ -214,14 +237,14 @@ def test_the_documents_table_is_the_codecs_format():
         code = f"{count}x" if name == "reserved" else code
         assert struct.calcsize("<" + code) == int(last or first) - int(first) + 1, name
         expected, at = f"{expected} {code}", int(last or first) + 1
-    assert expected.replace("< ", "<") == FIELDS.format
-    assert at + 4 == LENGTH
+    assert expected.replace("< ", "<") == f"{FIELDS.format} {SLOPE.format[1:]}"
+    assert at + 4 == LENGTH_WITH_SLOPE
 
 
 def test_every_number_of_the_table_is_naturally_aligned():
     sizes = {"u8": 1, "u16": 2, "u64": 8, "f32": 4}
     rows = re.findall(r"^\| (\d+)(?:-\d+)? \| (\w+) \| (u8|u16|u64|f32)", PROTOCOL, re.M)
-    assert len(rows) == 15
+    assert len(rows) == 17
     assert [name for first, name, kind in rows if int(first) % sizes[kind]] == []
 
 

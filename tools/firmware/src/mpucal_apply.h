@@ -32,7 +32,11 @@ extern "C" {
 #define MPUCAL_ACCEL_RANGE_G_AT 52
 #define MPUCAL_D_AT 60
 #define MPUCAL_B_A_AT 96
+#define MPUCAL_TEMPERATURE_C_AT 120
 #define MPUCAL_APPLIED_B_A_AT 124
+#define MPUCAL_B_A_SLOPE_AT 184
+#define MPUCAL_RANGE_C_AT 196
+#define MPUCAL_LENGTH_WITH_SLOPE 208
 
 #define MPUCAL_STANDARD_GRAVITY_MPS2 9.80665f
 #define MPUCAL_FULL_SCALE 32768.0f
@@ -54,6 +58,12 @@ enum mpucal_status {
 struct mpucal {
     float gain[3][3]; /* inv(D) * 9.80665 * accel_range_g / 32768 */
     float bias[3];    /* inv(D) (b_a - applied_b_a) */
+};
+
+/* How that drifts with the chip's temperature: 24 bytes more, for firmware that reads it. */
+struct mpucal_drift {
+    float slope[3]; /* inv(D) b_a_slope, m/s^2 per degree Celsius; zeros where the blob has no b_a(T) */
+    float at_c, from_c, to_c;
 };
 
 /* Where a blob is read from, byte by byte: plain memory, or what has to be asked, such as an EEPROM. */
@@ -214,6 +224,53 @@ static inline void mpucal_apply(const struct mpucal *sensor, const int16_t count
     for (uint8_t i = 0; i < 3; i++) {
         const float *gain = sensor->gain[i];
         a_mps2[i] = gain[0] * x + gain[1] * y + gain[2] * z - sensor->bias[i];
+    }
+}
+
+/* b_a(T) of a blob, beside what mpucal_load makes of it; on any status but MPUCAL_OK, `drift` is left as it was. */
+static inline enum mpucal_status mpucal_load_drift(struct mpucal_drift *drift, const struct mpucal_source *blob) {
+    enum mpucal_status status = mpucal_check(blob);
+    if (status != MPUCAL_OK) {
+        return status;
+    }
+    struct mpucal_drift made = {{0.0f, 0.0f, 0.0f}, 0.0f, 0.0f, 0.0f};
+    float at_c = mpucal_f32(blob, MPUCAL_TEMPERATURE_C_AT), D[9], slope[3], det = 0.0f;
+    if (mpucal_u16(blob, MPUCAL_LENGTH_AT) < MPUCAL_LENGTH_WITH_SLOPE || !mpucal_is_finite(at_c) ||
+        !mpucal_all_finite(blob, MPUCAL_B_A_SLOPE_AT, 5) || mpucal_f32(blob, MPUCAL_RANGE_C_AT) > at_c ||
+        mpucal_f32(blob, MPUCAL_RANGE_C_AT + 4) < at_c) {
+        *drift = made;
+        return MPUCAL_OK;
+    }
+    for (uint8_t i = 0; i < 9; i++) {
+        D[i] = mpucal_f32(blob, (uint16_t)(MPUCAL_D_AT + 4 * i));
+    }
+    for (uint8_t i = 0; i < 3; i++) {
+        slope[i] = mpucal_f32(blob, (uint16_t)(MPUCAL_B_A_SLOPE_AT + 4 * i));
+        det += D[i] * mpucal_adjugate(D, i, 0);
+    }
+    if (det == 0.0f || !mpucal_is_finite(det)) {
+        return MPUCAL_NOT_INVERTIBLE;
+    }
+    for (uint8_t i = 0; i < 3; i++) {
+        for (uint8_t j = 0; j < 3; j++) {
+            made.slope[i] += mpucal_adjugate(D, i, j) / det * slope[j];
+        }
+    }
+    made.at_c = at_c;
+    made.from_c = mpucal_f32(blob, MPUCAL_RANGE_C_AT);
+    made.to_c = mpucal_f32(blob, MPUCAL_RANGE_C_AT + 4);
+    *drift = made;
+    return MPUCAL_OK;
+}
+
+/* The specific force with b_a(T) at the chip's temperature_c; beyond the temperatures that were seen, as at their end. */
+static inline void mpucal_apply_at(const struct mpucal *sensor, const struct mpucal_drift *drift,
+                                   const int16_t counts[3], float temperature_c, float a_mps2[3]) {
+    float within = temperature_c < drift->from_c ? drift->from_c : temperature_c;
+    float away = (within > drift->to_c ? drift->to_c : within) - drift->at_c;
+    mpucal_apply(sensor, counts, a_mps2);
+    for (uint8_t i = 0; i < 3; i++) {
+        a_mps2[i] -= drift->slope[i] * away;
     }
 }
 

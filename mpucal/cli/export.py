@@ -1,0 +1,39 @@
+"""`mpucal export`: a calibration in the form that somebody else's program reads."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from ..export import FORMS, form
+from ..files import write_atomically
+from ..result import Calibration
+
+EXAMPLE = "Example: `mpucal export board7/calibration.json --to c-header -o calibration.h`"
+
+
+@click.command("export", epilog=EXAMPLE)
+@click.argument("calibration", metavar="CALIBRATION", type=click.Path(path_type=Path))
+@click.option("--to", "name", type=click.Choice(list(FORMS)), required=True, help="Who is to read it.")
+@click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Where it goes; by default stdout.")
+@click.option("--json", "as_json", is_flag=True, help="Print form, text and what it cannot carry as JSON.")
+def command(calibration: Path, name: str, file: Path | None, as_json: bool) -> None:
+    """Write a calibration (.json or .bin) in another program's form, and say what that cannot carry.
+
+    Exit code 5: the calibration was refused; 6: the form cannot hold it.
+    """
+    chosen = form(name)
+    text, notes = chosen.export(Calibration.load(calibration))
+    if file is not None:
+        write_atomically(file, text.encode())
+    for note in notes:
+        click.echo(f"mpucal: {note}", err=True)
+    if as_json:
+        document = {"to": name, "ending": chosen.ENDING, "text": text, "cannot_carry": notes}
+        click.echo(json.dumps(document, indent=2))
+    elif file is not None:
+        click.echo(f"Written to {file}.")
+    else:
+        click.echo(text, nl=False)

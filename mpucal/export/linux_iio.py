@@ -1,0 +1,92 @@
+"""A calibration as sysfs commands for Linux's IIO: calibbias, calibscale and mount_matrix.
+
+A user of IIO sees M diag(calibscale) (y + what calibbias adds), M the mount matrix: M diag(calibscale) = inv(D), with
+columns of length 1 in M. The driver inv_mpu6050 passes calibbias on to the accelerometer's offset registers, has no
+calibscale, and takes its mount matrix from the device tree. Of a chip with the MPU-6500's registers it writes to wrong
+addresses (it takes them to lie as the MPU-6050's do), so that nothing may be written there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..chip.families import MPU6050, PARTS
+from ..chip.offsets import moved
+from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..errors import ChipError
+from ..report.use import inverse
+from ..result import Calibration
+from .losses import check_usable, head, mps2, without_gyroscope, without_temperature
+
+ENDING = ".sh"
+AXES = "xyz"
+LSB_PER_G = 2048.0
+STEP_G = 2 / LSB_PER_G
+
+
+def export(calibration: Calibration) -> tuple[str, tuple[str, ...]]:
+    """A script for /bin/sh, whose argument is the device's folder, and what it cannot carry.
+
+    Raises
+    ------
+    RefusedError : see losses.check_usable.
+    """
+    check_usable(calibration)
+    words, why = _words(calibration)
+    gain = inverse(calibration)
+    scale = np.linalg.norm(gain, axis=0)
+    notes = (*_losses(calibration, why), *without_gyroscope(calibration), *without_temperature(calibration))
+    remarks = [f"# {line}" for line in (f"{head(calibration)}.", "# usage: sh FILE /sys/bus/iio/devices/iio:deviceN")]
+    remarks += [f"# {note}" for note in notes]
+    lines = ["#!/bin/sh", *remarks, "set -e", _DEVICE, _PUT]
+    if words is not None:
+        lines += [f'put "$DEVICE/in_accel_{axis}_calibbias" {word}' for axis, word in zip(AXES, words, strict=True)]
+    calibscales = " && ".join(f'[ -w "$DEVICE/in_accel_{axis}_calibscale" ]' for axis in AXES)
+    lines += [f"if {calibscales}; then"]
+    lines += [f'    put "$DEVICE/in_accel_{a}_calibscale" {s:.9f}' for a, s in zip(AXES, scale, strict=True)]
+    lines += [f'    MATRIX="{_matrix(gain / scale)}"', "else", f'    MATRIX="{_matrix(gain)}"', "fi", _MATRIX]
+    return "\n".join(lines) + "\n", notes
+
+
+def _words(calibration: Calibration) -> tuple[tuple[int, int, int] | None, str]:
+    """What the offset registers should hold, or why nobody can say; absolute, so that running it twice does no harm."""
+    sensor = calibration.sensor
+    families = {part.family for part in PARTS.values() if part.chip == sensor.chip}
+    if families != {MPU6050}:
+        return None, "calibbias is left alone, as the driver writes to wrong registers of all but an MPU-6050"
+    if sensor.accel_offsets is None:
+        return None, "calibbias is left alone, as the calibration does not say what the factory's trim was"
+    try:
+        return moved(sensor.accel_offsets, -calibration.b_a / STANDARD_GRAVITY_MPS2 * LSB_PER_G), ""
+    except ChipError as error:
+        return None, f"calibbias is left alone: {error.what}"
+
+
+def _losses(calibration: Calibration, why: str) -> tuple[str, ...]:
+    if why:
+        return (f"It {why}: b_a, ({mps2(calibration.b_a)}) m/s^2, stays to be subtracted by who reads.", _SCALE)
+    step = STEP_G * STANDARD_GRAVITY_MPS2 / 2
+    return (
+        f"calibbias has steps of 1 mg: up to {step:.4f} m/s^2 of b_a stay; where an offset register counts 4096 to 1 g,"
+        " as in some MPU-6050, half of b_a stays (`mpucal write` measures which it is).",
+        "The offset registers are volatile: run it after each start.",
+        _SCALE,
+    )
+
+
+_SCALE = (
+    "Where the driver has no calibscale, or a mount_matrix that cannot be written (inv_mpu6050), the script prints the"
+    " line for the device tree and for udev; until that is there, D is not corrected."
+)
+_DEVICE = 'DEVICE="${1:?give the folder of the device}"'
+_PUT = """put() { printf '%s' "$2" > "$1"; [ "$(cat "$1")" = "$2" ] || { echo "$1 does not keep $2" >&2; exit 1; }; }"""
+_MATRIX = """if [ -w "$DEVICE/in_accel_mount_matrix" ]; then
+    put "$DEVICE/in_accel_mount_matrix" "$MATRIX"
+else
+    echo "udev: ACCEL_MOUNT_MATRIX=$MATRIX"
+    echo "device tree: mount-matrix = \\"$(echo "$MATRIX" | sed 's/[,;] */", "/g')\\";"
+fi"""
+
+
+def _matrix(values: Vector) -> str:
+    return "; ".join(", ".join(f"{value:.9f}" for value in row) for row in values)

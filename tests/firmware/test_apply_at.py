@@ -1,0 +1,71 @@
+"""mpucal_apply_at against the golden vectors: b_a(T), where a blob has one, between its ends and beyond them."""
+
+import ctypes
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpucal.wire.blob import Blob
+
+ROOT = Path(__file__).parents[2]
+VECTORS = ROOT / "fixtures" / "vectors"
+HOST = """
+#include "mpucal_apply.h"
+unsigned char host_apply_at(const void *blob, unsigned size, const int16_t *counts, float temperature_c, float *a) {
+    struct mpucal sensor;
+    struct mpucal_drift drift;
+    struct mpucal_source source = {mpucal_read_memory, blob, size};
+    enum mpucal_status status = mpucal_load_from(&sensor, &source, 0, 4.0f);
+    if (status == MPUCAL_OK) status = mpucal_load_drift(&drift, &source);
+    if (status == MPUCAL_OK) mpucal_apply_at(&sensor, &drift, counts, temperature_c, a);
+    return (unsigned char)status;
+}
+"""
+ACCEPTED = [
+    path for path in sorted(VECTORS.glob("blob_*.bin")) if "blob" in json.loads(path.with_suffix(".json").read_text())
+]
+
+
+@pytest.fixture(scope="module")
+def apply_at(tmp_path_factory):
+    if shutil.which("gcc") is None:
+        pytest.skip("needs gcc")
+    folder = tmp_path_factory.mktemp("apply_at")
+    (folder / "host.c").write_text(HOST)
+    flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-shared", "-fPIC"]
+    words = ["gcc", *flags, f"-I{ROOT / 'tools/firmware/src'}", "-o", "host.so", "host.c"]
+    subprocess.run(words, cwd=folder, check=True)
+    library = ctypes.CDLL(str(folder / "host.so"))
+
+    def call(data, counts, temperature_c):
+        a = np.full(3, np.nan, np.float32)
+        counts = np.asarray(counts, np.int16)
+        status = library.host_apply_at(
+            data,
+            len(data),
+            counts.ctypes.data_as(ctypes.c_void_p),
+            ctypes.c_float(temperature_c),
+            a.ctypes.data_as(ctypes.c_void_p),
+        )
+        assert status == 0
+        return a
+
+    return call
+
+
+@pytest.mark.parametrize("path", ACCEPTED, ids=lambda path: path.stem)
+def test_agrees_with_every_golden_vector(path, apply_at):
+    wanted = json.loads(path.with_suffix(".json").read_text())
+    data = path.read_bytes()
+    blob = Blob.decode(data)
+    mps2_per_count = 9.80665 * 4 / 32768
+    counts = np.rint(np.array(wanted["y"]) / mps2_per_count)
+    D = np.array(blob.D).reshape(3, 3)
+    rounded = np.linalg.solve(D, counts * mps2_per_count - wanted["y"])
+    temperatures = wanted.get("at_c", [-40.0, 25.0, 85.0])
+    for temperature_c, a in zip(temperatures, wanted.get("a_at", [wanted["a"]] * 3), strict=True):
+        assert apply_at(data, counts, temperature_c) == pytest.approx(np.array(a) + rounded, abs=1e-5)
