@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import ctypes
 import json
+import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.wire.frame import MAX_CONTENT, MAX_ENCODED, MAX_PAYLOAD, Deframer, Frame, stuff
 
 VECTORS = sorted((Path(__file__).parents[2] / "fixtures" / "vectors").glob("line_*.bin"))
-RANDOM_FRAMES = 10_000_000
+# a sanitizer has seen all of it long before
+RANDOM_FRAMES = 1_000_000 if "MPUCAL_SANITIZE" in os.environ else 10_000_000
 
 
 class Incoming(ctypes.Structure):
@@ -58,6 +60,7 @@ def test_finds_the_frames_of_every_golden_vector(path, found):
     ]
 
 
+@settings(deadline=None)
 @given(frame=frames)
 def test_encodes_as_python_does_and_decodes_what_it_encoded(frame, found, closed):
     assert closed(frame) == frame.encode()
@@ -76,6 +79,7 @@ pieces = st.one_of(
 )
 
 
+@settings(deadline=None)
 @given(data=st.lists(pieces, max_size=6).map(b"".join))
 def test_finds_the_same_frames_as_python_in_whatever_comes(data, found):
     assert found(data) == list(Deframer().feed(data))

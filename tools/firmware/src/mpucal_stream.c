@@ -65,7 +65,7 @@ static int look(struct mpucal_bridge *bridge, uint32_t now_us) {
         stand(bridge, code);
         return 0;
     }
-    uint16_t frames = (uint16_t)(count[0] << 8 | count[1]) / stream->frame_bytes;
+    uint16_t bytes = (uint16_t)(count[0] << 8 | count[1]), frames = (uint16_t)(bytes / stream->frame_bytes);
     if (frames > MPUCAL_MAX_LOOK) {
         stand(bridge, MPUCAL_CODE_OVERFLOW);
         return 0;

@@ -1,0 +1,48 @@
+"""The tests of the core once more, with AddressSanitizer and UBSan compiled into it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+TESTS = ["test_frame.py", "test_slots.py", "test_bridge.py", "test_stream.py", "test_apply.py"]
+
+
+@pytest.fixture(scope="module")
+def sanitized(core):
+    """An environment in which what gcc sanitizes runs within Python, each block of memory by itself."""
+    found = subprocess.run(["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
+    library = Path(found.stdout.strip())
+    if not library.is_absolute():
+        pytest.skip("needs gcc's libasan")
+    # Python keeps much until it ends; that is no leak of the core's
+    asan = {"LD_PRELOAD": str(library), "ASAN_OPTIONS": "detect_leaks=0", "PYTHONMALLOC": "malloc"}
+    return {**os.environ, **asan, "MPUCAL_SANITIZE": "1"}
+
+
+def run(sanitized, *words):
+    return subprocess.run([sys.executable, *words], env=sanitized, capture_output=True, text=True, check=False)
+
+
+def test_the_core_passes_its_tests_under_sanitizers(sanitized):
+    paths = [str(HERE / name) for name in TESTS]
+    done = run(sanitized, "-m", "pytest", "-p", "no:cacheprovider", "-p", "no:xdist", *paths)
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
+
+
+def test_and_the_sanitizers_are_awake(sanitized, tmp_path):
+    too_far = "ctypes.create_string_buffer(8), 200"
+    program = (
+        "import ctypes, importlib.util, pathlib, sys\n"
+        f"spec = importlib.util.spec_from_file_location('core', {str(HERE / 'host' / 'core.py')!r})\n"
+        "core = importlib.util.module_from_spec(spec); sys.modules['core'] = core; spec.loader.exec_module(core)\n"
+        f"core.build_core(pathlib.Path({str(tmp_path)!r})).mpucal_crc16({too_far})\n"
+    )
+    done = run(sanitized, "-c", program)
+    assert done.returncode != 0
+    assert "heap-buffer-overflow" in done.stderr
