@@ -52,19 +52,19 @@ class ArduPilot(Firmware):
 
     def start(self) -> None:
         """Filters begin anew."""
-        self._low_pass = (
-            LowPass(float(self.store["INS_ACCEL_FILTER"]), LOOP_HZ),
-            LowPass(float(self.store["INS_GYRO_FILTER"]), LOOP_HZ),
-        )
+        cutoffs = [[float(self.store["INS_ACCEL_FILTER"])], [float(self.store["INS_GYRO_FILTER"])]]
+        self._low_pass = LowPass(cutoffs, LOOP_HZ)
+        self._taken = -1
 
     def sense(self, raw: Vector) -> None:
         """(raw - OFFS) * SCAL in the sensor's axes, R_b, low pass."""
-        for imu in range(len(raw)):
-            offset, scale = self.correction(imu)
-            self.corrected[imu, 0] = self.rotation @ ((raw[imu, 0] - offset) * scale)
-            self.corrected[imu, 1] = self.rotation @ raw[imu, 1]
-        for part, low_pass in enumerate(self._low_pass):
-            self.corrected[:, part] = low_pass(self.corrected[:, part])
+        if self._taken != self.store.version:
+            self._taken = self.store.version
+            corrections = [self.correction(imu) for imu in range(len(raw))]
+            self._offsets, self._scales = (np.array(part) for part in zip(*corrections, strict=True))
+        in_sensor = raw.copy()
+        in_sensor[:, 0] = (raw[:, 0] - self._offsets) * self._scales
+        self.corrected = self._low_pass(in_sensor @ self.rotation.T)
 
     def message(self, message_id: int, t_us: int) -> Message | None:
         """RAW_IMU is IMU 1, corrected and filtered like the rest."""

@@ -17,7 +17,7 @@ from .options import Options
 FROM_HAND = np.diag([1.0, -1.0, -1.0])
 # what autopilots set their IMUs to
 ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 2000.0
-BLOCK = 20
+BLOCK = 40
 # autopilots take the gyroscope's bias at each start, but for what then warms up
 GYRO_BIAS_LEFT = 0.03
 

@@ -14,9 +14,15 @@ AXES = ("X", "Y", "Z")
 
 
 class Store:
-    """Names, values and types; floats are kept as float32."""
+    """Names, values and types; floats are kept as float32.
+
+    Attributes
+    ----------
+    version : counts up with every change.
+    """
 
     def __init__(self) -> None:
+        self.version = 0
         self._values: dict[str, Number] = {}
         self._types: dict[str, int] = {}
 
@@ -43,6 +49,7 @@ class Store:
         return self._values[name]
 
     def __setitem__(self, name: str, value: Number) -> None:
+        self.version += 1
         self._values[name] = as_float32(value) if self._types[name] == REAL32 else round(value)
 
     def type(self, name: str) -> int:
