@@ -129,10 +129,14 @@ def apart(trial: Trial, file: Path) -> str:
 
 
 def mpucal(*words: str) -> subprocess.CompletedProcess[str]:
-    """Run the installed command."""
-    return subprocess.run(
-        [str(MPUCAL), *words], capture_output=True, text=True, timeout=PATIENCE_S, check=False, stdin=subprocess.DEVNULL
-    )
+    """Run the installed command; one that does not end is ended, and has exit code -1."""
+    command = [str(MPUCAL), *words]
+    try:
+        return subprocess.run(
+            command, capture_output=True, text=True, timeout=PATIENCE_S, check=False, stdin=subprocess.DEVNULL
+        )
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(command, -1, "", f"it had not ended after {PATIENCE_S} s")
 
 
 def last_line(done: subprocess.CompletedProcess[str]) -> str:
