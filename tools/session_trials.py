@@ -188,7 +188,8 @@ def main() -> int:
     parser.add_argument("--json", type=Path)
     parser.add_argument("--verbose", action="store_true", help="a line a session")
     arguments = parser.parse_args()
-    plan = Plan(target=arguments.target, tilt_only=arguments.tilt_only)
+    model = "tilt" if arguments.tilt_only else "auto"
+    plan = Plan(model=model, target=arguments.target, tilt_only=arguments.tilt_only)
     if arguments.sabotage:
         wrong = 0
         for name, trial in sabotage(plan, arguments.first).items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from types import MappingProxyType
 from typing import Any
@@ -17,7 +17,7 @@ from .estimate import METHODS, Choice, choose
 from .evidence import Evidence
 from .likelihood import K_NAMES
 from .masks import with_masks
-from .model import B_A_NAMES, B_OMEGA_NAMES, D_NAMES, Flat
+from .model import B_A_NAMES, B_OMEGA_NAMES, D_NAMES, Fit, Flat
 from .quality import judge
 from .stationary import find_flat, flat_statistics
 
@@ -101,15 +101,20 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
     return Calibration(
         D=fit.D,
         b_a=fit.b_a,
-        D_std=fit.std(*D_NAMES).reshape(3, 3),
-        b_a_std=fit.std(*B_A_NAMES),
+        D_std=_claimed(fit, D_NAMES).reshape(3, 3),
+        b_a_std=_claimed(fit, B_A_NAMES),
         K=fit.K,
-        K_std=_symmetric([np.nan if name in fit.at_prior else fit.std(name)[0] for name in K_NAMES]),
+        K_std=_symmetric(_claimed(fit, K_NAMES).tolist()),
         b_omega=fit.b_omega,
         b_omega_std=fit.std(*B_OMEGA_NAMES),
         fit=MappingProxyType({**about, **numbers}),
         **common,
     )
+
+
+def _claimed(fit: Fit, names: Sequence[str]) -> Vector:
+    """Standard deviations; unknown of what the data say little."""
+    return np.where([name in fit.at_prior for name in names], np.nan, fit.std(*names))
 
 
 def _symmetric(six: list[float]) -> Vector:

@@ -19,6 +19,7 @@ from .model import Fit, Flat
 from .paper import fit_paper
 from .stationary import flat_statistics
 from .thin import thinned
+from .tilt import fit_tilt
 
 # The mean ||e||^2 of white noise is 3; a hand, or a gyroscope's scale, makes it tens to thousands.
 EXPLAINED_NIS = 4.0
@@ -52,6 +53,7 @@ METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
     "imu": fit_imu,
     "accel": fit_accel,
     "paper": fit_paper,
+    "tilt": fit_tilt,
 }
 
 

@@ -9,13 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Recording, Vector
-from .information import Uncertainty, uncertainty
+from .information import DIRECTIONS, Uncertainty, uncertainty
+from .initialise import fibonacci_sphere
 from .model import Fit, Flat, product, rotation
 from .stationary import find_flat, flat_statistics
 from .still import still_runs
+from .tilt import tilted_directions
 
 HALF_SECOND = 0.5
 LEAST_MOVE_RAD = np.deg2rad(2.0)  # of gravity in half a second, above noise
+ENOUGH_MOVES = 100
 FAR_TOO_FAR = 20.0  # times as far as gravity: no rates in rad/s, but for turns about the vertical
 LONGEST_MOVE_S = 20.0  # over which a gyroscope still says where gravity went
 
@@ -51,7 +54,14 @@ class Evidence:
             return None
         if abs(np.linalg.det(fit.D)) < 1e-6:
             return None
-        return uncertainty(fit.D, fit.covariance[:12, :12], self.gravity)
+        return uncertainty(fit.D, fit.covariance[:12, :12], self.gravity, self._shown)
+
+    @property
+    def _shown(self) -> Vector | None:
+        """(n, 3) the directions that the estimate is for; None: all."""
+        if self.model != "tilt" or self.flat is None:
+            return None
+        return tilted_directions(self.flat.y / np.linalg.norm(self.flat.y), fibonacci_sphere(DIRECTIONS))
 
     @cached_property
     def calibrated(self) -> Vector | None:
@@ -94,14 +104,14 @@ class Evidence:
         moving = _angles(u[1:], u[:-1]) > LEAST_MOVE_RAD
         if not moving.any():
             return False
-        # between the middles of half seconds
-        part = slice(flat.last + n // 2, flat.last + n // 2 + len(moving) * n)
-        turns = np.diff(r.t[part.start - 1 : part.stop])[:, None] * (r.gyr[part] - flat.b_omega)
-        if np.linalg.norm(turns, axis=1).sum() < FAR_TOO_FAR * _angles(u[1:], u[:-1])[moving].sum():
+        # between the middles of half seconds; as many of them tell as much as all
+        at = np.flatnonzero(moving)[:: max(np.count_nonzero(moving) // ENOUGH_MOVES, 1)]
+        steps = flat.last + n // 2 + np.arange(n)[:, None] + at * n
+        turns = (r.t[steps] - r.t[steps - 1])[:, :, None] * (r.gyr[steps] - flat.b_omega)
+        if np.linalg.norm(turns, axis=2).sum() < FAR_TOO_FAR * _angles(u[at + 1], u[at]).sum():
             return False
-        steps = turns.reshape(len(moving), n, 3).swapaxes(0, 1)
         miss, miss_in_degrees = (
-            np.median(_angles((product(rotation(-unit * steps)) @ u[:-1, :, None])[..., 0], u[1:])[moving])
+            np.median(_angles((product(rotation(-unit * turns)) @ u[at, :, None])[..., 0], u[at + 1]))
             for unit in (1.0, np.deg2rad(1.0))
         )
         return bool(miss > 3.0 * miss_in_degrees)

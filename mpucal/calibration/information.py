@@ -29,12 +29,15 @@ class Uncertainty:
     worst: Vector
 
 
-def uncertainty(D: Vector, covariance: Vector, gravity: float) -> Uncertainty:
-    """What the (12, 12) covariance of (D row-major, b_a) means for inv(D) (y - b_a) with |s| = gravity."""
-    s = gravity * fibonacci_sphere(DIRECTIONS)
-    unit = s / gravity
+def uncertainty(D: Vector, covariance: Vector, gravity: float, unit: Vector | None = None) -> Uncertainty:
+    """What the (12, 12) covariance of (D row-major, b_a) means for inv(D) (y - b_a) with |s| = gravity.
+
+    unit : (n, 3) directions of s; None: all over the sphere.
+    """
+    unit = fibonacci_sphere(DIRECTIONS) if unit is None else unit
+    s = gravity * unit
     # the error is -inv(D) (dD s + db): linear in the twelve parameters
-    J = np.zeros((DIRECTIONS, 3, 12))
+    J = np.zeros((len(unit), 3, 12))
     for i in range(3):
         J[:, i, 3 * i : 3 * i + 3] = s
         J[:, i, 9 + i] = 1.0

@@ -11,6 +11,7 @@ import numpy as np
 from ..data import Mask, Recording
 from .blockers import Check, Reason
 from .evidence import Evidence
+from .tilt import CONE_RAD
 
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.1, 0.4
 CONSISTENT_NIS = 5.0
@@ -213,8 +214,23 @@ def inconsistent(e: Evidence) -> Reason | None:
     )
 
 
+def tilted_only(e: Evidence) -> Reason | None:
+    """Parameters of which tilts say nothing."""
+    if e.model != "tilt" or e.fit is None:
+        return None
+    left = [name for name in e.fit.at_prior if name.startswith(("D_", "b_a_"))]
+    named = f"; {', '.join(left)} stay as assumed beforehand and are not claimed" if left else ""
+    return Reason(
+        "few_orientations",
+        f"the board was only tilted, and the calibration holds within {np.rad2deg(CONE_RAD):.0f} deg of how it lay"
+        f"{named}; turn it over to know the rest",
+        False,
+    )
+
+
 CHECKS: tuple[Check, ...] = (
     moved_while_still,
+    tilted_only,
     few_orientations,
     clipped("gyro_clipped", "gyroscope", "turn more slowly, or choose a larger range", lambda r: r.gyr_clipped),
     clipped("accel_clipped", "accelerometer", "move more gently, or choose a larger range", lambda r: r.acc_clipped),

@@ -127,7 +127,8 @@ def opened(options: Mapping[str, Any], until_end: bool = False) -> Opened:
     """What --bus, --serial, --mavlink or --replay of a command's `options` names, with the options beside it."""
     config = Config(int(options["accel_range"]), int(options["gyro_range"]), options["rate"])
     aim = {name: options[name] for name in ("target", "tilt_only") if name in options}
-    plan = Plan(config, options["gravity"], options["model"], until_end, **aim)
+    model = "tilt" if options["model"] == "auto" and options.get("tilt_only") else options["model"]
+    plan = Plan(config, options["gravity"], model, until_end, **aim)
     if options["serial"] is not None:
         return open_serial(options["serial"], plan, options["address"], options["seed"])
     if options["mavlink"] is not None:

@@ -29,6 +29,8 @@ PASS_WINDOW_S = 0.1
 # So long in one orientation is a pause.
 PAUSE_S = 1.0
 PATIENCE_S = 60.0
+# Of nine that may be asked for, a sloppy hand makes so many different ones.
+TILTS = 6
 # Said again where nothing new was shown for so long.
 SAY_AGAIN_S = 8.0
 # Beyond these the hand's own acceleration hides where gravity is [m/s^2].
@@ -89,7 +91,10 @@ class Rotate:
             return [*found, Turned(f"the target is reached: {knowledge.words}")]
         if advice and knowledge.down is not None:
             self._said_s = knowledge.t_s
-            self.prompt = self._prompt_for(np.array(knowledge.down))
+            # near level every tilt teaches: all of them are asked for
+            advised = np.array(knowledge.down)
+            down = self.coverage.farthest_down(self.directions) if self._tilt_only else advised
+            self.prompt = self._prompt_for(down)
             found.append(self.prompt)
         return found
 
@@ -131,9 +136,9 @@ class Rotate:
         return found
 
     def _content(self) -> bool:
-        enough = self.coverage.number >= self._aim.least
         if self._tilt_only:
-            return enough
+            return self.coverage.number >= TILTS
+        enough = self.coverage.number >= self._aim.least
         return enough and self.coverage.varied and self._knowledge is not None and self._knowledge.overall >= 1.0
 
     def _turned(self, t_s: float) -> Turned | None:

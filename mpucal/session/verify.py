@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..data import Samples, Vector
 from .aims import Aim
-from .coverage import Coverage
+from .coverage import DISTINCT_RAD, Coverage
 from .events import (
     Ask,
     Caution,
@@ -104,7 +106,10 @@ class Verify:
         return [progress, self.prompt]
 
     def _next(self) -> Prompt:
-        down = self._coverage.farthest_down(self._directions)
+        asked = self._directions
+        if self._number:
+            asked = asked[asked @ np.array(self.prompt.down) < math.cos(DISTINCT_RAD)]
+        down = self._coverage.farthest_down(asked)
         x, y, z = np.asarray(down).tolist()
         side = tilt_down(down) if self._tilt_only else f"{side_down(down)} down"
         number = f"{self._number + 1} of {self._aim.verify}"
