@@ -31,8 +31,8 @@ def load_csv(path: str | Path) -> Recording:
     rows = csv.reader(StringIO(_text(path), newline=""))
     try:
         header = [name.strip().lower() for name in next(rows, [])]
-        places = _places(header, path)
-        values = [_numbers(row, places, len(header), rows.line_num, path) for row in rows if any(row)]
+        places = places_of(header, path)
+        values = [numbers_of(row, places, len(header), rows.line_num, path) for row in rows if any(row)]
     except csv.Error as error:
         raise RecordingError(f"{path}: line {rows.line_num} is no line of a table ({error})", _REMEDY) from error
     if not values:
@@ -80,7 +80,7 @@ def _text(path: Path) -> str:
     return text
 
 
-def _places(header: list[str], path: Path) -> dict[str, int]:
+def places_of(header: list[str], path: Path) -> dict[str, int]:
     """Column name -> its place, for the columns that are read."""
     missing = [name for name in COLUMNS if name not in header]
     if missing:
@@ -92,7 +92,8 @@ def _places(header: list[str], path: Path) -> dict[str, int]:
     return {name: header.index(name) for name in wanted}
 
 
-def _numbers(row: list[str], places: dict[str, int], width: int, line: int, path: Path) -> list[float]:
+def numbers_of(row: list[str], places: dict[str, int], width: int, line: int, path: Path) -> list[float]:
+    """The numbers of a row in `places`' order; RecordingError names what is none by its line."""
     if len(row) != width:
         raise RecordingError(
             f"{path}: line {line} has {len(row)} values where the first line names {width}",

@@ -40,12 +40,12 @@ def load_npz(path: str | Path) -> Recording:
         arrays["t"],
         arrays["acc"],
         arrays["gyr"],
-        _flat(arrays, path),
+        flat_of(arrays, path),
         temperature_c=arrays.get("temperature_c", arrays.get("temperature")),
         gap=arrays.get("gap"),
         acc_clipped=arrays.get("acc_clipped"),
         gyr_clipped=arrays.get("gyr_clipped"),
-        sensor=_sensor(arrays, path),
+        sensor=sensor_of(arrays, path),
         name=path.name,
     )
 
@@ -97,7 +97,8 @@ def _arrays(path: Path) -> dict[str, Any]:
         raise RecordingError(f"{path} is no whole NumPy archive ({error})", _REMEDY) from error
 
 
-def _flat(arrays: Mapping[str, Any], path: Path) -> tuple[int, int] | None:
+def flat_of(arrays: Mapping[str, Any], path: Path) -> tuple[int, int] | None:
+    """(first, last + 1) samples that an archive says lie flat; RecordingError where that is nonsense."""
     key = "flat" if "flat" in arrays else "flat_samples"
     if key not in arrays:
         return None
@@ -112,7 +113,8 @@ def _flat(arrays: Mapping[str, Any], path: Path) -> tuple[int, int] | None:
     return first, last
 
 
-def _sensor(arrays: Mapping[str, Any], path: Path) -> Sensor:
+def sensor_of(arrays: Mapping[str, Any], path: Path) -> Sensor:
+    """What an archive says of its sensor; RecordingError where that is nonsense."""
     if "sensor" not in arrays:
         return Sensor()
     known = {f.name for f in fields(Sensor)}

@@ -14,6 +14,7 @@ COMMANDS = {
     "record": "Record a sensor into a capture, without calibrating.",
     "calibrate": "Calibrate from a capture or another recording.",
     "write": "Write a calibration to the sensor's own memory, or what was there back.",
+    "apply": "Calibrated data of recorded data.",
     "export": "Write a calibration in the form that another program reads.",
     "doctor": "Examine a chip and its bus, on one page.",
     "show": "Say what is in a calibration, a config blob or a recording.",

@@ -1,0 +1,105 @@
+"""Samples in runs, from a file to a file, so that neither has to fit the memory. Knows no calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ...data import Autopilot, Samples, Sensor
+from ...errors import OutputError, RecordingError
+
+# 64 Ki samples take 4 MB
+ROWS = 1 << 16
+
+
+@dataclass(frozen=True)
+class Rows:
+    """A recording, a run of samples at a time.
+
+    Attributes
+    ----------
+    runs : each of at most ROWS samples, to be gone through once.
+    sensor, flat, autopilot, recovered, name : as of a Recording. others : how many further IMUs it holds.
+    done : the sentence that says that the file is calibrated data already; empty where it is not.
+    """
+
+    runs: Iterator[Samples]
+    sensor: Sensor = field(default_factory=Sensor)
+    flat: tuple[int, int] | None = None
+    autopilot: Autopilot | None = None
+    recovered: str | None = None
+    name: str = "recording"
+    others: int = 0
+    done: str = ""
+
+
+Write = Callable[[Samples], None]
+
+
+def open_rows(path: Path) -> Rows:
+    """The samples of any recording that `load` reads.
+
+    A table and an archive are read as they are gone through. A capture is decoded whole, since the times of its first
+    samples are known only with its last.
+
+    Raises
+    ------
+    RecordingError, CaptureError, ChipError : see load; a table's bad line when it is come to.
+    """
+    if path.is_file() and path.suffix.lower() == ".csv":
+        from .csv import csv_rows  # noqa: PLC0415 - each kind's own
+
+        return csv_rows(path)
+    if path.is_file() and path.suffix.lower() == ".npz":
+        from .npz import npz_rows  # noqa: PLC0415
+
+        return npz_rows(path)
+    from .. import load  # noqa: PLC0415
+
+    recording = load(path)
+    return Rows(
+        (recording.part(first, first + ROWS) for first in range(0, len(recording), ROWS)),
+        recording.sensor,
+        recording.flat,
+        recording.autopilot,
+        recording.recovered,
+        recording.name,
+        len(recording.others),
+    )
+
+
+WRITERS = (".csv", ".npz", ".mcap")
+
+
+def open_writer(path: Path, rows: Rows, done: str) -> AbstractContextManager[Write]:
+    """A new file of the kind that its name ends with, there once its context ends, whole or not at all.
+
+    Parameters
+    ----------
+    rows : what else is known of the samples. done : what was done to them, which the file then says where it can.
+
+    Raises
+    ------
+    OutputError : another ending, or the file cannot be made.
+    """
+    kind = path.suffix.lower()
+    if kind == ".csv":
+        from .csv import csv_file  # noqa: PLC0415
+
+        return csv_file(path)
+    if kind == ".npz":
+        from .npz import npz_file  # noqa: PLC0415
+
+        return npz_file(path, rows, done)
+    if kind == ".mcap":
+        from .imu import imu_file  # noqa: PLC0415
+
+        return imu_file(path, done)
+    raise OutputError(f"{path} ends with no kind of file that is written", f"end it with {', '.join(WRITERS)}")
+
+
+def cannot_read(path: Path, error: OSError) -> RecordingError:
+    """What to say of a file that cannot be read."""
+    return RecordingError(f"cannot read {path} ({error.strerror or error})", "check the path and its permissions")

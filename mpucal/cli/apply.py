@@ -1,0 +1,81 @@
+"""`mpucal apply`: calibrated data of recorded data."""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from ..capture.rows import Rows, open_rows, open_writer
+from ..capture.rows.csv import CsvText
+from ..correction import correction
+from ..data import Samples
+from ..errors import UsageError
+from ..result import Calibration
+
+EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calibrated.mcap`"
+
+
+@click.command("apply", epilog=EXAMPLE)
+@click.argument("calibration", metavar="CALIBRATION", type=click.Path(path_type=Path))
+@click.argument("file", metavar="FILE|DIR", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "target",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="A .csv, .npz or .mcap (sensor_msgs/Imu, for ROS 2 and Foxglove); by default a table on stdout.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print what was done as JSON; needs -o.")
+def command(calibration: Path, file: Path, target: Path | None, as_json: bool) -> None:
+    """Apply a calibration (.json or .bin) to a recording of any kind, however long: m/s² and rad/s in its body frame.
+
+    A .csv or .npz passes through as it is read; a capture or log is decoded whole first.
+    """
+    if as_json and target is None:
+        raise UsageError("--json was given without -o, and the samples go to stdout", "name a file with -o")
+    if target is not None and target.exists() and target.samefile(file):
+        raise UsageError(f"{target} is the recording itself", "name another file with -o")
+    rows = open_rows(file)
+    if rows.done:
+        raise UsageError(f"{file} is calibrated already ({rows.done})", "give what was measured")
+    ready = correction(Calibration.load(calibration), rows.sensor, rows.autopilot)
+    for remark in (*ready.remarks, *_remarks(rows)):
+        click.echo(f"mpucal: {remark}", err=True)
+    done = f"calibrated with {calibration.name} of {ready.calibration.created or 'an unknown time'}"
+    seen = _Seen()
+    with nullcontext(CsvText(sys.stdout).write) if target is None else open_writer(target, rows, done) as write:
+        for samples in rows.runs:
+            after = ready.apply(samples)
+            seen.add(samples, after)
+            write(after)
+    if as_json:
+        click.echo(json.dumps({"file": str(target), "done": done, **seen.facts()}, indent=2))
+    elif target is not None:
+        click.echo(f"{target}: {seen.samples} samples, {done}.")
+
+
+def _remarks(rows: Rows) -> tuple[str, ...]:
+    others = f"Of {rows.name} this is the first IMU; {rows.others} more are in it." if rows.others else None
+    return tuple(filter(None, (rows.recovered, others)))
+
+
+class _Seen:
+    """How many samples there were, and their mean |a|."""
+
+    def __init__(self) -> None:
+        self.samples, self._before, self._after = 0, 0.0, 0.0
+
+    def add(self, before: Samples, after: Samples) -> None:
+        self.samples += len(before)
+        self._before += float(np.linalg.norm(before.acc, axis=1).sum())
+        self._after += float(np.linalg.norm(after.acc, axis=1).sum())
+
+    def facts(self) -> dict[str, Any]:
+        n = max(self.samples, 1)
+        return {"samples": self.samples, "mean_before_mps2": self._before / n, "mean_after_mps2": self._after / n}
