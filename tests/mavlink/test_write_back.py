@@ -301,7 +301,7 @@ def reboot(transport, number):
     transport.befall = befall
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     firmware=st.sampled_from(FIRMWARES),
     fault=st.sampled_from([lose, arm, refuse, spoil, reboot]),
