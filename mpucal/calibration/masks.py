@@ -17,7 +17,7 @@ FEWEST_AT_A_RANGE, FEWEST_ANYWHERE = 2, 8
 
 CLIPPED_R_SCALE = 1e4
 GAP_ANGLE_VARIANCE = 1.0  # rad^2 a second: nothing is known of how the board turned
-CLIPPED_RATE_SD = 0.003  # of |omega|, in a run of one: a longer one hides more of what lies beyond the range
+CLIPPED_RATE_SD = 0.0015  # of |omega|, in a run of one: a longer one hides more of what lies beyond the range
 
 # After a gap that long a correction, linear in the turn, falls short of it: the samples that follow correct it again.
 LOST_RAD, SETTLING = 0.2, 5

@@ -11,7 +11,7 @@ from ..data import Mask, Recording, Vector
 from .model import Flat
 
 WINDOW_S, SHORTEST_S = 0.5, 0.3
-TRIM, LEAST_TRIM_S, MOST_TRIM_S = 0.125, 0.1, 0.35  # of a rest at either end: a hand settles, and leaves early
+TRIM, LEAST_TRIM_S, MOST_TRIM_S = 0.125, 0.1, 0.25  # of a rest at either end: a hand settles, and leaves early
 TIMES_QUIET = 2.5
 GYRO_SD_RAD_S, ACC_SD_MPS2 = 0.03, 0.15
 GYRO_MEAN_RAD_S = 0.05
@@ -32,13 +32,13 @@ def still_runs(recording: Recording, flat: Flat) -> Runs:
     n = max(round(WINDOW_S * recording.rate_hz), 4)
     if len(recording) < n:
         return np.zeros((0, 2), np.intp)
-    gyr_mean, gyr_sd = _moving(recording.gyr, n)
-    _, acc_sd = _moving(recording.acc, n)
-    windows = (
-        (gyr_sd < np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_omega), GYRO_SD_RAD_S)[:, None]).all(0)
-        & (acc_sd < np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_a), ACC_SD_MPS2)[:, None]).all(0)
-        & (np.abs(gyr_mean - flat.b_omega[:, None]) < GYRO_MEAN_RAD_S).all(0)
-    )
+    gyr_limit = np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_omega), GYRO_SD_RAD_S)
+    acc_limit = np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_a), ACC_SD_MPS2)
+    windows = np.ones(len(recording) - n + 1, bool)
+    for i in range(3):  # an axis at a time: what it takes in between is several times the recording
+        mean, sd = _moving(recording.gyr[:, i], n)
+        windows &= (sd < gyr_limit[i]) & (np.abs(mean - flat.b_omega[i]) < GYRO_MEAN_RAD_S)
+        windows &= _moving(recording.acc[:, i], n)[1] < acc_limit[i]
     covered = np.zeros(len(recording) + 1, np.intp)
     at = np.flatnonzero(windows)
     np.add.at(covered, at, 1)
@@ -71,14 +71,13 @@ def without_drift(recording: Recording, flat: Flat, runs: Runs) -> Recording:
 
 
 def _moving(values: Vector, n: int) -> tuple[Vector, Vector]:
-    """Means and standard deviations (3, len - n + 1) of all windows of n samples."""
-    mean = values.mean(0)
-    x = np.zeros((3, len(values) + 1))  # an axis a row: sums along a row are the fast ones
-    x[:, 1:] = (values - mean).T
-    sums, squares = np.cumsum(x, axis=1), np.cumsum(x * x, axis=1)
-    of_window = (sums[:, n:] - sums[:, :-n]) / n
-    variance = (squares[:, n:] - squares[:, :-n]) / n - of_window**2
-    return of_window + mean[:, None], np.sqrt(np.maximum(variance, 0.0))
+    """Means and standard deviations (len - n + 1,) of all windows of n samples of an axis."""
+    middle = values.mean()
+    x = np.concatenate([[0.0], values - middle])
+    sums, squares = np.cumsum(x), np.cumsum(x * x)
+    mean = (sums[n:] - sums[:-n]) / n
+    variance = (squares[n:] - squares[:-n]) / n - mean**2
+    return mean + middle, np.sqrt(np.maximum(variance, 0.0))
 
 
 def _runs(mask: Mask) -> Runs:

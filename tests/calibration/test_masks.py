@@ -109,8 +109,8 @@ def test_both_steps_beside_a_clipped_rate_are_doubted():
     plain, series, flat = masked(noise(gyr_clipped=marks))
     assert np.flatnonzero(series.q_extra).tolist() == [200, 201]
     omega = np.linalg.norm(plain.omega[[200, 201]] - flat.b_omega, axis=1)
-    # two steps in a row: 0.3 % of the rate, times the root of two
-    np.testing.assert_allclose(np.sqrt(series.q_extra[[200, 201]]), 0.003 * np.sqrt(2.0) * omega * 0.01, rtol=1e-6)
+    # two steps in a row: 0.15 % of the rate, times the root of two
+    np.testing.assert_allclose(np.sqrt(series.q_extra[[200, 201]]), 0.0015 * np.sqrt(2.0) * omega * 0.01, rtol=1e-6)
 
 
 def test_the_longer_a_rate_is_clipped_the_less_its_range_says():
