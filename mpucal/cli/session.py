@@ -14,6 +14,7 @@ from ..errors import RefusedError
 from ..mavlink.calibrate import calibrate_vehicle
 from ..result import REFUSED, Calibration
 from ..runner import Runner
+from .destination import destinations, recorder, said, sink_options, written_back
 from .on_parts import open_resumed
 from .opened import Opened
 from .options import aim_options, check_resumed, check_source, fit_options, source_name, source_options
@@ -29,6 +30,7 @@ EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board
 @source_options
 @fit_options
 @aim_options
+@sink_options
 @click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Where the results go.")
 @click.option(
     "--resume", metavar="DIR", type=click.Path(path_type=Path), help="Go on with the interrupted session in DIR."
@@ -37,23 +39,37 @@ EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board
 @click.option("--json", "as_json", is_flag=True, help="Print calibration.json, and nothing else.")
 @click.option("--json-events", is_flag=True, help="Say each event as a line of JSON, on stderr.")
 @click.option("--beep/--no-beep", default=None, help="Ring at each change of prompt; by default on a terminal.")
-def command(folder: Path | None, yes: bool, as_json: bool, json_events: bool, beep: bool | None, **options: Any) -> int:
+def command(
+    folder: Path | None,
+    yes: bool,
+    as_json: bool,
+    json_events: bool,
+    beep: bool | None,
+    sinks: tuple[str, ...],
+    no_write: bool,
+    **options: Any,
+) -> int:
     """Lay flat, rotate, calibrate: leaves capture.mcap, calibration.json, calibration.bin and report.html.
 
-    Exit code 4: it was stopped before there was anything to calibrate; 5: the calibration was refused.
+    A bridge and an autopilot are then given the calibration to keep. Exit code 4: it was stopped before there was
+    anything to calibrate; 5: the calibration was refused; 6: the write-back was refused or failed.
     """
     resume: Path | None = options.pop("resume")
     if resume is None:
         check_source(click.get_current_context())
+        names = destinations(sinks, no_write, options)
         source = opened(options)
     else:
         check_resumed(click.get_current_context())
-        source, folder = open_resumed(resume, open_again), resume
+        resumed = open_resumed(resume, open_again)
+        source, folder, options = resumed, resume, {**options, **resumed.live.words}
+        names = destinations(sinks, no_write, options)
     person = console(quiet=yes, as_json=json_events, beep=beep, title=source_name(options))
     place = Place(folder, source.capture_name, again=resume is not None)
     finished = False
     try:
         with running(source, place.capture, person) as runner:
+            person.say(f"  {said(names, no_write)}")
             try:
                 recording = runner.measure()
             finally:
@@ -63,11 +79,19 @@ def command(folder: Path | None, yes: bool, as_json: bool, json_events: bool, be
     finally:
         if not finished and place.capture.exists():
             person.say(f"  What was recorded is kept in {place.capture}; go on with --resume {place.folder}.")
-    if as_json:
-        click.echo(calibration.json(), nl=False)
-    else:
+    if not as_json:
         click.echo(err=True)
         click.echo(f"{summary(calibration)}\n\n{written([place.capture, *paths])}")
+    record = recorder(place.folder, calibration, recording, source.truth)
+    words = {**options, "gravity": source.plan.gravity, "model": source.plan.model, "store": False}
+    try:
+        for applied in written_back(names, calibration, words, yes, place.folder, record):
+            calibration = applied.calibration
+            click.echo(f"Done: {applied.what}.", err=as_json)
+    finally:
+        # whatever becomes of the write-back, there is a result
+        if as_json:
+            click.echo(calibration.json(), nl=False)
     return RefusedError.exit_code if calibration.verdict == REFUSED else 0
 
 

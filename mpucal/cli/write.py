@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -20,6 +19,7 @@ from .at_rest import put_down
 from .on_bus import OnBus
 from .options import check_source, source_options
 from .source import opened
+from .write_back import ask, keep, write_to
 
 EXAMPLE = "Example: `mpucal write board7/calibration.json chip --bus /dev/i2c-1`"
 
@@ -94,18 +94,13 @@ def command(calibration: Path, target: str, folder: Path | None, yes: bool, as_j
     # a simulated chip lives in the gravity in which it was calibrated
     gravity = STANDARD_GRAVITY_MPS2 if written is None else written.fit.get("gravity") or STANDARD_GRAVITY_MPS2
     with TARGETS[target]({**options, "gravity": gravity, "model": "auto"}) as sink:
-        _ask(f"Write {calibration} to {sink.where}?", yes)
-        for path in sink.keep(folder):
-            click.echo(
-                f"mpucal: what it held is kept in {path}: `mpucal write {path} {target} ...` brings it back.", err=True
-            )
+        ask(f"Write {calibration} to {sink.where}?", yes)
         if written is None:
+            keep(sink, folder)
             click.echo(f"Done: {_put_back(sink, calibration)}.")
             return
-        applied = sink.write(written)
-    path = folder / f"{calibration.stem}-on-{target}.json"
-    applied.calibration.save(path)
-    applied.calibration.save(path.with_suffix(".bin"))
+        path = folder / f"{calibration.stem}-on-{target}.json"
+        applied = write_to(sink, written, folder, lambda now: _save(now, path))
     if as_json:
         click.echo(applied.calibration.json(), nl=False)
         return
@@ -123,13 +118,13 @@ def _is_calibration(path: Path) -> bool:
         return True
 
 
+def _save(now: Calibration, path: Path) -> Calibration:
+    now.save(path.with_suffix(".bin"))
+    now.save(path)
+    return now
+
+
 def _put_back(sink: Sink, kept: Path) -> str:
     if not isinstance(sink, Restorable):
         raise WriteBackError(f"nothing was written: {kept} is no calibration", "give a calibration.json")
     return sink.put_back(kept)
-
-
-def _ask(question: str, yes: bool) -> None:
-    """Go on where the person agrees, or cannot be asked."""
-    if not yes and sys.stdin.isatty() and not click.confirm(question, err=True):
-        raise WriteBackError("nothing was written: you said no", "repeat it when you want it written")
