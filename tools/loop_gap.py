@@ -1,0 +1,119 @@
+"""The reading loop's worst gap while fits run beside it, and what of a core a live session takes.
+
+python tools/loop_gap.py --rate 1000 --seconds 70
+python tools/loop_gap.py --rate 200 --seconds 70
+
+A session on the simulated chip at a person's pace: the gap is the time between two looks into the FIFO, which at 1 kHz
+overflows 36 ms after it was emptied. The simulation itself takes most of the time; its share is measured apart, by the
+same session without fits.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mpucal.bus.simulated import open_simulated
+from mpucal.chip import registers as reg
+from mpucal.chip.access import Bus, EndOfCapture, Reply
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.live.fits import Live
+from mpucal.runner import Runner
+from mpucal.session.events import Key, Output
+from mpucal.session.plan import Plan
+
+FIFO_FRAMES = 512 // reg.FRAME_BYTES
+
+
+class Timed:
+    """A bus that notes when the FIFO is looked at, and ends after some seconds."""
+
+    def __init__(self, bus: Bus, seconds: float) -> None:
+        self._bus, self._end_ns = bus, time.monotonic_ns() + round(seconds * 1e9)
+        self.looks_ns: list[int] = []
+
+    def read(self, register: int, count: int) -> Reply:
+        """See Bus."""
+        if register == reg.FIFO_COUNT_H:
+            self.looks_ns.append(time.monotonic_ns())
+        if time.monotonic_ns() > self._end_ns:
+            raise EndOfCapture
+        return self._bus.read(register, count)
+
+    def write(self, register: int, data: bytes) -> int:
+        """See Bus."""
+        return self._bus.write(register, data)
+
+    def sleep_until(self, t_ns: int) -> None:
+        """See Bus."""
+        self._bus.sleep_until(t_ns)
+
+    def close(self) -> None:
+        """See Bus."""
+        self._bus.close()
+
+
+class Nobody:
+    """Hears everything and says nothing."""
+
+    def hear(self, _output: Output) -> None:
+        """Nothing."""
+
+    def pressed(self) -> Sequence[Key]:
+        """Nothing."""
+        return ()
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Gaps (n,) between looks [ms], and what of a core was used."""
+
+    gaps_ms: np.ndarray
+    share: float
+
+
+def measure(rate_hz: float, seconds: float, fits: bool) -> Measured:
+    """One session of so long."""
+    chip = open_simulated("sim:pace=real", seed=1)
+    bus = Timed(chip, seconds)
+    plan = Plan(Config(rate_hz=rate_hz), target="best")
+    runner = Runner(Driver(bus, plan.config), Nobody(), lambda *_: None, plan, (chip.hear,))
+    restored: Callable[..., object] = Live.ask
+    if not fits:
+        Live.ask = lambda *_: None  # type: ignore[method-assign]
+    begun, cpu = time.monotonic(), time.process_time()
+    try:
+        runner.measure()
+    finally:
+        Live.ask = restored  # type: ignore[method-assign]
+    share = (time.process_time() - cpu) / (time.monotonic() - begun)
+    return Measured(np.diff(bus.looks_ns) * 1e-6, share)
+
+
+def main() -> int:
+    """Measure with and without fits."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--rate", type=float, default=1000.0)
+    parser.add_argument("--seconds", type=float, default=70.0)
+    arguments = parser.parse_args()
+    print(f"{arguments.rate:g} Hz, {arguments.seconds:g} s; a 512-byte FIFO holds", end=" ")
+    print(f"{1000.0 * FIFO_FRAMES / arguments.rate:.0f} ms")
+    for fits in (False, True):
+        found = measure(arguments.rate, arguments.seconds, fits)
+        gaps = found.gaps_ms
+        print(
+            f"{'with' if fits else 'without'} fits: gaps {np.median(gaps):.1f} ms in the median, "
+            f"{np.quantile(gaps, 0.99):.1f} at 99 %, {gaps.max():.1f} at worst; {found.share:.0%} of a core",
+            flush=True,
+        )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
