@@ -16,6 +16,7 @@ COMMANDS = {
     "write": "Write a calibration to the sensor's own memory, or what was there back.",
     "apply": "Calibrated data of recorded data.",
     "export": "Write a calibration in the form that another program reads.",
+    "diff": "How two calibrations differ, and whether that is more than chance.",
     "doctor": "Examine a chip and its bus, on one page.",
     "show": "Say what is in a calibration, a config blob or a recording.",
 }

@@ -1,0 +1,69 @@
+"""`mpucal diff`: how two calibrations differ, and whether that is more than they know."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..comparison import CONFIDENCE, Comparison, Difference, compare
+from ..report.units import with_std
+from ..result import Calibration
+
+EXAMPLE = "Example: `mpucal diff board7/calibration.json board7-today/calibration.json`"
+
+
+@click.command("diff", epilog=EXAMPLE)
+@click.argument("a", metavar="A", type=click.Path(path_type=Path))
+@click.argument("b", metavar="B", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print it as JSON.")
+def command(a: Path, b: Path, as_json: bool) -> None:
+    """Say how calibration B (.json or .bin) differs from A, in mg, % and deg, and whether that is more than chance.
+
+    Of one unchanged sensor, calibrated twice, 1 pair in 100 is called different.
+    """
+    found = compare(Calibration.load(a), Calibration.load(b))
+    click.echo(json.dumps(_document(found), indent=2) if as_json else _page(found))
+
+
+def _document(found: Comparison) -> dict[str, Any]:
+    return {
+        "same": found.same,
+        "confidence": CONFIDENCE,
+        "limit": found.limit,
+        "numbers": [_plain(d) for d in found.numbers],
+        "gyroscope": [_plain(d) for d in found.gyroscope],
+        "remarks": list(found.remarks),
+    }
+
+
+def _plain(d: Difference) -> dict[str, Any]:
+    # NaN, which equals nothing, is null
+    return {key: None if value != value else value for key, value in {**asdict(d), "z": d.z}.items()}  # noqa: PLR0124
+
+
+def _page(found: Comparison) -> str:
+    rows = [
+        f"  {f'{d.name}, {d.unit}':<26}{with_std(d.value, d.std):>22}{_stars(d, found.limit)}"
+        for d in (*found.numbers, *found.gyroscope)
+    ]
+    return "\n".join([_verdict(found), "", *rows, *(["", *found.remarks] if found.remarks else [])])
+
+
+def _stars(d: Difference, limit: float) -> str:
+    return f"   {abs(d.z):.1f} standard deviations" if abs(d.z) > limit else ""
+
+
+def _verdict(found: Comparison) -> str:
+    if found.same is None:
+        return "Whether they differ cannot be told: neither says how sure it is, as no config blob does."
+    if found.same:
+        return "The same: no number of the accelerometer differs by more than both calibrations' uncertainties."
+    first = found.changed[0]
+    return (
+        f"Different: {len(found.changed)} of the accelerometer's numbers changed by more than both calibrations'"
+        f" uncertainties,\nmost surely the {first.name}, by {first.value:+.3g} {first.unit}."
+    )
