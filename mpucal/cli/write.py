@@ -34,7 +34,7 @@ def on_chip(options: Mapping[str, Any]) -> Iterator[Sink]:
 
     with closing(source.bus):
         put_down(source.listeners)
-        yield ChipSink(source.bus, f"the chip on {options['bus']}")
+        yield ChipSink(source.bus, f"the chip on {options['bus'] or options['serial']}")
 
 
 @contextmanager

@@ -53,7 +53,8 @@ def changes(calibration: Calibration, firmware: str) -> tuple[Change, ...]:
     ------
     WriteBackError : the calibration is refused, of no vehicle, of another firmware, or beyond the firmware's limits.
     """
-    if calibration.verdict == REFUSED:
+    # a config blob says nothing of its quality: what was refused has none
+    if calibration.quality.get("verdict") == REFUSED:
         raise WriteBackError(f"{NOTHING}: the calibration was refused", "repeat the session")
     of_first = calibration.extra.get("autopilot")
     if not of_first:
