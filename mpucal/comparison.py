@@ -122,8 +122,8 @@ def _remarks(a: Calibration, b: Calibration) -> list[str]:
     held = [c.sensor.accel_offsets for c in (a, b)]
     if None not in held and held[0] != held[1]:
         said.append(
-            f"The offset registers held {held[0]} for A and {held[1]} for B: the biases differ by that, or it is another"
-            " chip."
+            f"The offset registers held {held[0]} for A and {held[1]} for B: the biases differ by that, or it is"
+            " another chip."
         )
     warm = [c.sensor.temperature_c for c in (a, b)]
     if warm[0] is not None and warm[1] is not None and abs(warm[1] - warm[0]) >= WARMER_C:

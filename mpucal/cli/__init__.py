@@ -15,8 +15,10 @@ COMMANDS = {
     "calibrate": "Calibrate from a capture or another recording.",
     "write": "Write a calibration to the sensor's own memory, or what was there back.",
     "apply": "Calibrated data of recorded data.",
+    "stream": "Calibrated samples as they come.",
     "export": "Write a calibration in the form that another program reads.",
     "diff": "How two calibrations differ, and whether that is more than chance.",
+    "merge": "One calibration of sessions at different temperatures.",
     "doctor": "Examine a chip and its bus, on one page.",
     "show": "Say what is in a calibration, a config blob or a recording.",
 }

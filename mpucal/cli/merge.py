@@ -1,0 +1,50 @@
+"""`mpucal merge`: sessions at different temperatures made into one calibration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..merge import merge
+from ..result import Calibration
+from ..sinks.file import BLOB, DOCUMENT, make_folder
+from .summary import summary
+
+EXAMPLE = "Example: `mpucal merge cold/calibration.json warm/calibration.json hot/calibration.json -o merged`"
+
+
+@click.command("merge", epilog=EXAMPLE)
+@click.argument("calibrations", metavar="A B ...", nargs=-1, type=click.Path(path_type=Path))
+@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Write the result there.")
+@click.option("--json", "as_json", is_flag=True, help="Print calibration.json, and nothing else.")
+def command(calibrations: tuple[Path, ...], folder: Path | None, as_json: bool) -> None:
+    """Combine calibrations of one chip at different temperatures into one with b_a(T), where they support it.
+
+    Where they do not, it says why, and b_a is their mean. `mpucal apply`, the blob and mpucal_apply.h use b_a(T).
+    """
+    made = merge([Calibration.load(path) for path in calibrations])
+    if folder is not None:
+        make_folder(folder)
+        for name in (BLOB, DOCUMENT):
+            made.calibration.save(folder / name)
+    for sentence in (made.why, *made.remarks):
+        click.echo(f"mpucal: {sentence}", err=True)
+    if as_json:
+        click.echo(made.calibration.json(), nl=False)
+        return
+    click.echo(f"{summary(made.calibration)}\n{slope(made.calibration)}")
+    if folder is not None:
+        click.echo(f"\nWritten to {folder}:\n  {BLOB}, {DOCUMENT}")
+
+
+def slope(calibration: Calibration) -> str:
+    """b_a(T) in a sentence."""
+    if not calibration.follows_temperature:
+        return "b_a is taken to hold at every temperature."
+    steps = ", ".join(f"{1000 * value / 9.80665:+.3f}" for value in calibration.b_a_slope)
+    low, high = calibration.temperature_range_c
+    return (
+        f"b_a grows by ({steps}) mg a degree from what it is at {calibration.sensor.temperature_c:.1f} °C, between"
+        f" {low:.1f} and {high:.1f} °C."
+    )

@@ -1,0 +1,89 @@
+"""`mpucal stream`: calibrated samples as they come, for another program to read."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..capture.rows.csv import CsvText
+from ..chip.access import EndOfCapture
+from ..correction import Correction, correction
+from ..data import STANDARD_GRAVITY_MPS2, Samples
+from ..errors import OutputError, UsageError
+from ..result import Calibration
+from ..runner import Source
+from .options import check_source, source_options
+from .running import now
+from .source import opened
+
+EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.json --seconds 10`"
+
+
+@click.command("stream", epilog=EXAMPLE)
+@source_options
+@click.option("--apply", "calibration", metavar="CALIBRATION", type=click.Path(path_type=Path), required=True)
+@click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Keep the capture, too.")
+@click.option("--seconds", type=click.FloatRange(min=0.0, min_open=True), help="End after so long.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a line, in place of a table.")
+def command(calibration: Path, file: Path | None, seconds: float | None, as_json: bool, **options: Any) -> None:
+    """Print calibrated samples, m/s² and rad/s, until Ctrl-C, --seconds or the source's end.
+
+    Times are as first known: a capture's decoding knows them better.
+    """
+    check_source(click.get_current_context())
+    if options["replay"] is not None:
+        raise UsageError("--replay was given, and a capture does not stream", "use `mpucal apply CALIBRATION FILE`")
+    applied = Calibration.load(calibration)
+    if file is not None and file.exists():
+        raise OutputError(f"{file} is there already", "choose another file with -o")
+    # a simulated chip lives in the gravity in which it was calibrated
+    gravity = applied.fit.get("gravity") or STANDARD_GRAVITY_MPS2
+    source = opened({**options, "gravity": gravity, "model": "auto"}, until_end=True)
+    write = _json_lines if as_json else CsvText(sys.stdout).write
+    with source.measuring(file or Path(os.devnull), _say, now().isoformat()) as measuring, suppress(KeyboardInterrupt):
+        ready: Correction | None = None
+        for samples in _polled(measuring.source, seconds):
+            if ready is None:
+                ready = _correction(applied, measuring.source)
+            write(ready.apply(samples))
+            sys.stdout.flush()
+
+
+def _polled(source: Source, seconds: float | None) -> Iterator[Samples]:
+    """Samples as they come, whatever ends them."""
+    with suppress(EndOfCapture):
+        source.start()
+        begun_ns = source.now_ns()
+        try:
+            while seconds is None or source.now_ns() - begun_ns < seconds * 1e9:
+                samples = source.poll()
+                if len(samples):
+                    yield samples
+        finally:
+            source.stop()
+
+
+def _correction(calibration: Calibration, source: Source) -> Correction:
+    recording = source.recording()
+    ready = correction(calibration, recording.sensor, recording.autopilot)
+    for remark in ready.remarks:
+        _say(remark)
+    return ready
+
+
+def _json_lines(samples: Samples) -> None:
+    columns: list[Callable[[], Any]] = [samples.t.tolist, samples.acc.tolist, samples.gyr.tolist]
+    for t, a, w, warm in zip(*(column() for column in columns), samples.temperature_c.tolist(), strict=True):
+        temperature_c = warm if warm == warm else None  # noqa: PLR0124 - NaN, which JSON has not
+        print(json.dumps({"t": t, "a": a, "w": w, "temperature_c": temperature_c}))
+
+
+def _say(text: str) -> None:
+    click.echo(f"mpucal: {text.strip()}", err=True)
