@@ -25,6 +25,7 @@ class Sensor:
     ----------
     accel_offsets : the words that its accelerometer's offset registers x, y, z held meanwhile.
     message : of an IMU of a vehicle, the MAVLink message that carried its samples, filtered and by radio.
+    least_noise : m/s^2, rad/s: standard deviations that a sample has at least, however still it reads.
     """
 
     chip: str | None = None
@@ -35,6 +36,7 @@ class Sensor:
     temperature_c: float | None = None
     accel_offsets: tuple[int, int, int] | None = None
     message: str | None = None
+    least_noise: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,6 @@ class Recording(Samples):
     sensor : what is known of the sensor.
     name : what to call the recording in a message.
     recovered : None, or the sentence that says how much of a damaged file this is.
-    least_noise : m/s^2, rad/s: standard deviations that a sample has at least, however still it reads.
     autopilot : of an IMU of a vehicle, what stands between the sensor and the samples.
     others : further IMUs of that vehicle, turned with it.
     """
@@ -111,7 +112,6 @@ class Recording(Samples):
     sensor: Sensor = Sensor()
     name: str = "recording"
     recovered: str | None = None
-    least_noise: tuple[float, float] = (0.0, 0.0)
     autopilot: Autopilot | None = None
     others: tuple[Recording, ...] = ()
 

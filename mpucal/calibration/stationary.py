@@ -73,7 +73,7 @@ def flat_statistics(recording: Recording, flat: tuple[int, int]) -> Flat:
     below a step, not absent. Nor is it below what the recording's source knows to be least.
     """
     first, last = flat
-    least_acc, least_gyr = recording.least_noise
+    least_acc, least_gyr = recording.sensor.least_noise
     acc, gyr = recording.acc[first:last], recording.gyr[first:last]
     return Flat(
         first,

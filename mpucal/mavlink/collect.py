@@ -136,10 +136,10 @@ def _recording(gathered: Gathered, fine: Gathered | None, autopilot: Autopilot, 
         rate_hz=float((len(samples) - 1) / (samples.t[-1] - samples.t[0])),
         temperature_c=float(known.mean()) if len(known) else None,
         message=stream.name,
+        least_noise=least_noise(stream),
     )
-    noise = WHOLE_NOISE if stream.is_whole else (0.0, 0.0)
     columns = {key: getattr(samples, key) for key in Samples.__dataclass_fields__}
-    return Recording(**columns, sensor=sensor, name=name, least_noise=noise, autopilot=autopilot)
+    return Recording(**columns, sensor=sensor, name=name, autopilot=autopilot)
 
 
 def _finer(gathered: Gathered, fine: Gathered) -> Vector | None:
@@ -153,6 +153,11 @@ def _finer(gathered: Gathered, fine: Gathered) -> Vector | None:
         return None
     finer = np.where(paired, exact[at], times + MS_US / 2)
     return finer if (np.diff(finer) > 0).all() else None
+
+
+def least_noise(stream: Stream) -> tuple[float, float]:
+    """m/s^2, rad/s that a sample of a stream has at least, however still it reads."""
+    return WHOLE_NOISE if stream.is_whole else (0.0, 0.0)
 
 
 def chip(firmware: str, imu: int) -> str:

@@ -9,11 +9,12 @@ import numpy as np
 from ..data import Recording, Samples, Sensor
 from ..errors import LinkError, UsageError
 from .clock import Jump
-from .collect import Row, chip, samples_of
+from .collect import Row, chip, least_noise, samples_of
 from .dialect import Message
 from .imu import Stream, reading
 from .link import Link, S
 from .log import Log
+from .prearm import ARMED
 from .shaping import read_parameters, shaping_names
 from .stream import Streams
 from .truth import ARDUPILOT, PX4
@@ -51,7 +52,7 @@ class VehicleSource:
         self._heard_ns = self._sampled_ns = 0
         self._rebooted = False
         self._received = self._lost = 0
-        self._said_lost = False
+        self._said_lost = self._said_armed = False
 
     def start(self) -> Sensor:
         """Listen, lock to one vehicle and say so, read its parameters, and have it stream.
@@ -73,7 +74,12 @@ class VehicleSource:
         self._rows = []
         self._lost = self._link.lost
         self._heard_ns = self._sampled_ns = self._link.now_ns()
-        return Sensor(chip=chip(firmware, self._stream.imu), rate_hz=self._rate_hz, message=self._stream.name)
+        return Sensor(
+            chip=chip(firmware, self._stream.imu),
+            rate_hz=self._rate_hz,
+            message=self._stream.name,
+            least_noise=least_noise(self._stream),
+        )
 
     def poll(self) -> Samples:
         """Wait for a twentieth of a second, and give the first IMU's samples that came meanwhile.
@@ -111,6 +117,8 @@ class VehicleSource:
 
     def _hear(self, message: Message) -> None:
         self._log.add_other(message)
+        if message.get_type() == "HEARTBEAT":
+            self._beware(bool(message.base_mode & ARMED))
         content = reading(message)
         if content is None:
             return
@@ -119,6 +127,15 @@ class VehicleSource:
         if row is not None and content.stream == self._stream:
             self._rows.append(row)
             self._sampled_ns = self._link.now_ns()
+
+    def _beware(self, armed: bool) -> None:
+        """Say each time it is armed: whoever turns it is near its propellers."""
+        if armed and not self._said_armed:
+            self._say(
+                f"{self._link.vehicle} was armed: keep clear of its propellers and disarm it;"
+                " nothing is written to an armed vehicle."
+            )
+        self._said_armed = armed
 
     def _weigh(self) -> None:
         """Say once that the link loses packets."""
