@@ -1,0 +1,284 @@
+"""Each form applied the way its reader does, against Calibration.apply, to the form's own rounding."""
+
+import ast
+import json
+import math
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.data import STANDARD_GRAVITY_MPS2
+from mpucal.errors import MpucalError, RefusedError
+from mpucal.export import FORMS, form
+from mpucal.result import Calibration
+
+# what the header says of itself
+FLOAT_MPS2 = 2e-4
+OWN = [name for name in FORMS if name not in ("ardupilot", "px4")]
+APPLIED = np.array([0.25, -0.2, 1.0])
+
+
+@pytest.fixture(params=[np.zeros(3), APPLIED], ids=["nothing applied", "applied in hardware"])
+def calibrated(request, calibration):
+    return replace(calibration, applied_in_hardware=request.param)
+
+
+def compiled(folder, name, source, *flags):
+    compiler = "g++" if name.endswith(".cpp") else "gcc"
+    if shutil.which(compiler) is None:
+        pytest.skip(f"needs {compiler}")
+    (folder / name).write_text(source)
+    words = [compiler, "-Wall", "-Wextra", "-Wpedantic", "-Werror", *flags, "-I.", "-o", "program", name]
+    subprocess.run(words, cwd=folder, check=True)
+
+    def run(text):
+        done = subprocess.run([folder / "program"], input=text, capture_output=True, text=True, check=True)
+        return np.array([line.split() for line in done.stdout.splitlines()], float)
+
+    return run
+
+
+def table(values):
+    return "".join(" ".join(f"{v:.9g}" for v in row) + "\n" for row in values)
+
+
+C = """
+#include <stdio.h>
+#include "calibration.h"
+int main(void) {
+    float y[3], a[3];
+    while (scanf("%f %f %f", &y[0], &y[1], &y[2]) == 3) {
+        mpucal_apply(y, a);
+        printf("%.9g %.9g %.9g %.9g\\n", (double)a[0], (double)a[1], (double)a[2], (double)MPUCAL_D[0][1]);
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("flags", [("-std=c99",), ("-x", "c++", "-std=c++11")], ids=["C99", "C++11"])
+def test_the_c_header_compiled_and_run(calibrated, samples, tmp_path, flags):
+    text, notes = form("c-header").export(calibrated)
+    (tmp_path / "calibration.h").write_text(text)
+    out = compiled(tmp_path, "main.c" if flags[0] == "-std=c99" else "main.cpp", C, *flags)(table(samples))
+    error = np.abs(out[:, :3] - calibrated.apply(samples)).max()
+    assert error < FLOAT_MPS2
+    stated = next(float(re.search(r"up to (\S+) m/s", note)[1]) for note in notes if "float32" in note)
+    assert error < 2 * stated < 1e-3
+    assert out[0, 3] == pytest.approx(calibrated.D[0, 1], rel=1e-6)
+
+
+# what a sketch needs of Arduino: a chip at 0x68 that answers with the counts on stdin, and a port that is stdout
+ARDUINO = """
+#pragma once
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+static int16_t counts[3];
+static uint8_t registers[128], at, sent[2], length, taken;
+struct Port {
+    void begin(long) {}
+    void print(float value, int digits) { printf("%.*f", digits, (double)value); }
+    void print(char c) { putchar(c); }
+};
+static Port Serial;
+static void delay(int) {}
+"""
+WIRE = """
+#pragma once
+#include "Arduino.h"
+struct Bus {
+    void begin() {}
+    void beginTransmission(uint8_t address) { if (address != 0x68) abort(); length = 0; }
+    void write(uint8_t value) { sent[length++] = value; }
+    int endTransmission(bool = true) { at = sent[0]; if (length == 2) registers[at] = sent[1]; return 0; }
+    int requestFrom(uint8_t, uint8_t count) { taken = 0; return count; }
+    int read() {
+        if (at != 0x3B || registers[0x6B] != 0x01 || registers[0x1C] != RANGE_BITS) abort();
+        uint16_t value = (uint16_t)counts[taken / 2];
+        return taken++ % 2 ? value & 0xFF : value >> 8;
+    }
+};
+static Bus Wire;
+"""
+HOST = """
+#include "Arduino.h"
+#include "sketch.ino"
+int main() {
+    setup();
+    while (scanf("%hd %hd %hd", &counts[0], &counts[1], &counts[2]) == 3) loop();
+}
+"""
+
+
+@pytest.mark.parametrize(("range_g", "bits"), [(2.0, 0x00), (4.0, 0x08), (8.0, 0x10), (16.0, 0x18)])
+def test_the_sketch_compiled_and_run_on_a_stand_in_for_arduino(calibrated, tmp_path, range_g, bits):
+    calibrated = replace(calibrated, sensor=replace(calibrated.sensor, accel_range_g=range_g))
+    (tmp_path / "sketch.ino").write_text(form("arduino").export(calibrated)[0])
+    (tmp_path / "Arduino.h").write_text(ARDUINO)
+    (tmp_path / "Wire.h").write_text(WIRE)
+    counts = np.random.default_rng(1).integers(-32768, 32768, (100, 3))
+    run = compiled(tmp_path, "host.cpp", HOST, "-std=c++11", f"-DRANGE_BITS={bits}")
+    a = run("".join(f"{x} {y} {z}\n" for x, y, z in counts))
+    y = counts * range_g * STANDARD_GRAVITY_MPS2 / 32768
+    # it prints four digits
+    assert np.abs(a - calibrated.apply(y)).max() < 6e-5 + range_g * 1e-5
+
+
+def test_the_python_module_needs_numpy_alone(calibrated, samples):
+    text, _ = form("python").export(calibrated)
+    imported = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import | ast.ImportFrom)]
+    assert [name.name for node in imported for name in node.names] == ["numpy"]
+    module = {}
+    exec(text, module)
+    a, w = calibrated.apply(samples, samples)
+    np.testing.assert_allclose(module["apply"](samples), a, atol=1e-6)
+    np.testing.assert_allclose(module["apply_gyro"](samples), w, atol=1e-6)
+
+
+def yaml_of(text):
+    """The little YAML that the file is made of: lists of numbers, read as YAML 1.1 reads them."""
+    found = {}
+    for line in text.splitlines():
+        if line.startswith("#"):
+            continue
+        key, rest = line.split(": ", 1)
+        words = re.fullmatch(r"\[(.*)\]", rest)[1].split(", ")
+        assert all(re.fullmatch(r"[-+]?[0-9]+\.[0-9]*", word) for word in words), line
+        found[key] = [float(word) for word in words]
+    return found
+
+
+def test_the_yaml_as_imu_calib_applies_it(calibrated, samples):
+    found = yaml_of(form("ros").export(calibrated)[0])
+    SM, bias = np.reshape(found["SM"], (3, 3)), np.array(found["bias"])
+    np.testing.assert_allclose(samples @ SM.T - bias, calibrated.apply(samples), atol=1e-9)
+    covariance = np.reshape(found["linear_acceleration_covariance"], (3, 3))
+    np.testing.assert_allclose(covariance, np.diag(calibrated.noise_std**2), atol=1e-6)
+
+
+def test_the_yaml_is_what_a_yaml_parser_reads(calibrated):
+    yaml = pytest.importorskip("yaml", reason="PyYAML is not installed; the test above reads the file by YAML's rules")
+    text, _ = form("ros").export(calibrated)
+    assert yaml.safe_load(text) == yaml_of(text)
+
+
+def device(folder, *writable, words=(-1501, 2000, 701)):
+    """An IIO device's folder; the mount matrix that of a driver that has none of its own."""
+    folder.mkdir(exist_ok=True)
+    for axis, word in zip("xyz", words, strict=True):
+        (folder / f"in_accel_{axis}_calibbias").write_text(f"{word}")
+        if "calibscale" in writable:
+            (folder / f"in_accel_{axis}_calibscale").write_text("1")
+    matrix = folder / "in_accel_mount_matrix"
+    matrix.write_text("1, 0, 0; 0, 1, 0; 0, 0, 1")
+    if "matrix" not in writable:
+        matrix.rename(folder / "in_accel_mount_matrix_of_the_device_tree")
+    return folder
+
+
+def seen_by_iio(folder, said, y, trim):
+    """M diag(calibscale) (y + what the registers add), as sysfs-bus-iio says; 2048 counts to 1 g, of even words."""
+    words = [int((folder / f"in_accel_{axis}_calibbias").read_text()) for axis in "xyz"]
+    assert [word & 1 for word in words] == [word & 1 for word in trim]
+    added = (np.array(words) - trim) / 2048 * STANDARD_GRAVITY_MPS2
+    scales = [folder / f"in_accel_{axis}_calibscale" for axis in "xyz"]
+    scale = np.array([float(path.read_text()) if path.exists() else 1.0 for path in scales])
+    matrix = folder / "in_accel_mount_matrix"
+    text = matrix.read_text() if matrix.exists() else re.search(r"ACCEL_MOUNT_MATRIX=(.*)", said)[1]
+    M = np.array([[float(word) for word in row.split(",")] for row in text.split(";")])
+    return ((y + added) * scale) @ M.T
+
+
+@pytest.mark.parametrize(
+    "writable", [(), ("calibscale",), ("calibscale", "matrix")], ids=["inv_mpu6050", "scale", "all"]
+)
+def test_the_sysfs_commands_as_iio_means_them(calibrated, samples, tmp_path, writable):
+    text, notes = form("linux-iio").export(calibrated)
+    (tmp_path / "calibrate.sh").write_text(text)
+    folder, trim = device(tmp_path / "iio", *writable), np.array(calibrated.sensor.accel_offsets)
+    words = ["sh", str(tmp_path / "calibrate.sh"), str(folder)]
+    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    left = float(re.search(r"up to (\S+) m/s\^2 of b_a", " ".join(notes))[1])
+    # what registers subtracted before is in their words: the whole of b_a is to be subtracted of what the chip trims
+    wanted = replace(calibrated, applied_in_hardware=np.zeros(3)).apply(samples)
+    a = seen_by_iio(folder, said, samples, trim)
+    assert np.abs(a - wanted).max() < 1.1 * np.sqrt(3) * left
+    # twice does what once does
+    before = {path.name: path.read_text() for path in folder.iterdir()}
+    subprocess.run(words, capture_output=True, check=True)
+    assert {path.name: path.read_text() for path in folder.iterdir()} == before
+
+
+def test_no_register_is_written_that_the_driver_misplaces(calibration, tmp_path):
+    of_6500 = replace(calibration, sensor=replace(calibration.sensor, chip="MPU-6500", who_am_i=0x70))
+    text, notes = form("linux-iio").export(of_6500)
+    assert 'calibbias"' not in text
+    assert "b_a, (+0.3100, -0.2200, +1.0800) m/s^2, stays" in notes[0]
+
+
+def test_a_device_that_does_not_keep_a_value_is_told(calibration, tmp_path):
+    (tmp_path / "calibrate.sh").write_text(form("linux-iio").export(calibration)[0])
+    words = ["sh", str(tmp_path / "calibrate.sh"), str(tmp_path / "nowhere")]
+    assert subprocess.run(words, capture_output=True, check=False).returncode != 0
+
+
+def test_json_and_blob_make_each_other(calibrated, tmp_path):
+    calibrated = replace(
+        calibrated, b_a_slope=np.array([0.001, -0.002, 0.003]), temperature_range_c=np.array([5.0, 40.0])
+    )
+    calibrated.save(tmp_path / "one.bin")
+    (tmp_path / "two.json").write_text(form("json").export(Calibration.load(tmp_path / "one.bin"))[0])
+    Calibration.load(tmp_path / "two.json").save(tmp_path / "three.bin")
+    assert (tmp_path / "three.bin").read_bytes() == (tmp_path / "one.bin").read_bytes()
+    document = json.loads((tmp_path / "two.json").read_text())
+    np.testing.assert_allclose(document["accelerometer"]["D"], calibrated.D, rtol=1e-7)
+
+
+@pytest.mark.parametrize("name", [name for name in OWN if name != "json"])
+@pytest.mark.parametrize(
+    "changes",
+    [{"quality": {"verdict": "refused"}}, {"b_a": np.full(3, math.nan)}, {"D": np.ones((3, 3))}],
+    ids=["refused", "unknown", "singular"],
+)
+def test_what_must_not_be_used_is_not_exported(calibration, name, changes):
+    with pytest.raises(RefusedError, match="nothing was exported"):
+        form(name).export(replace(calibration, **changes))
+
+
+@pytest.mark.parametrize("name", ["ardupilot", "px4"])
+def test_a_chips_calibration_is_none_of_a_vehicle(calibration, name):
+    with pytest.raises(MpucalError, match="of no vehicle"):
+        form(name).export(calibration)
+
+
+@pytest.mark.parametrize("name", [name for name in OWN if name != "json"])
+def test_each_says_what_temperature_and_registers_leave(calibration, name):
+    changed = replace(
+        calibration,
+        b_a_slope=np.array([0.001, -0.02, 0.003]),
+        temperature_range_c=np.array([5.0, 40.0]),
+        applied_in_hardware=APPLIED,
+    )
+    text, notes = form(name).export(changed)
+    said = " ".join(notes)
+    assert "each degree away from that leaves up to 0.02 m/s^2" in said
+    assert name == "linux-iio" or "after a reset" in said
+    assert all(note in text.replace("\n * ", " ") for note in notes)
+
+
+def test_every_form_has_an_ending():
+    assert {name: form(name).ENDING for name in FORMS} == {
+        "c-header": ".h",
+        "arduino": ".ino",
+        "python": ".py",
+        "ros": ".yaml",
+        "linux-iio": ".sh",
+        "ardupilot": ".param",
+        "px4": ".params",
+        "json": ".json",
+    }
