@@ -34,11 +34,15 @@ def with_masks(recording: Recording) -> Recording:
     # It is rounded as well, of a range that no hand reaches: values repeat without a rail.
     of_a_chip = recording.sensor.message is None
     paused = of_a_chip & (dt > GAP_INTERVALS * np.median(dt[1:]))
+    # a chip whose range is known does not clip at another one
+    acc_g, gyro_dps = recording.sensor.accel_range_g, recording.sensor.gyro_range_dps
+    acc_ranges = ACC_RANGES if acc_g is None else np.array([acc_g]) * STANDARD_GRAVITY_MPS2
+    gyro_ranges = GYRO_RANGES if gyro_dps is None else np.deg2rad([gyro_dps])
     return replace(
         recording,
         gap=recording.gap | paused | _on_a_line(recording.gyr, recording.t),
-        acc_clipped=recording.acc_clipped | (of_a_chip & _at_the_rail(recording.acc, ACC_RANGES)),
-        gyr_clipped=recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, GYRO_RANGES)),
+        acc_clipped=recording.acc_clipped | (of_a_chip & _at_the_rail(recording.acc, acc_ranges)),
+        gyr_clipped=recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, gyro_ranges)),
     )
 
 
