@@ -22,7 +22,17 @@ from .tlog import Tlog
 from .truth import ARDUPILOT, PX4, truthful
 
 # whose change alters the streams
-SHAPING = ("INS_ACC", "CAL_ACC", "INS_GYR", "CAL_GYRO", "AHRS_ORIENTATION", "SENS_BOARD", "EKF2_IMU_CTRL")
+SHAPING = (
+    "INS_ACC",
+    "CAL_ACC",
+    "INS_GYR",
+    "CAL_GYRO",
+    "AHRS_ORIENTATION",
+    "AHRS_CUSTOM",
+    "CUST_ROT",
+    "SENS_BOARD",
+    "EKF2_IMU_CTRL",
+)
 
 
 @dataclass

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from .dialect import Message
 from .link import Link, S
 from .parameters.encoding import is_parameter, name_bytes, of_wire
+from .parameters.names import CUSTOM_ANGLES
 from .truth import EKF2_IMU_CTRL, PX4
 
+ORIENTATION = "AHRS_ORIENTATION"
 AXES = "XYZ"
 IMUS = 3
 SLOTS = 4
@@ -26,7 +28,19 @@ def shaping_names(firmware: str) -> tuple[str, ...]:
         return (EKF2_IMU_CTRL, "SENS_BOARD_ROT", *board, *slots)
     accs = ["INS_ACC", *(f"INS_ACC{imu}" for imu in range(2, IMUS + 1))]
     kinds = ("_ID", *(f"{kind}_{axis}" for kind in ("OFFS", "SCAL") for axis in AXES))
-    return ("AHRS_ORIENTATION", *(f"{acc}{kind}" for acc in accs for kind in kinds))
+    return (ORIENTATION, *(f"{acc}{kind}" for acc in accs for kind in kinds))
+
+
+def read_shaping(link: Link, firmware: str) -> dict[str, float]:
+    """The values of `shaping_names` that the vehicle holds, and the angles of a board that is turned by its own.
+
+    Raises
+    ------
+    EndOfCapture, LinkError : see Link.messages.
+    """
+    held = read_parameters(link, shaping_names(firmware), firmware)
+    angles = CUSTOM_ANGLES.get(round(held.get(ORIENTATION, 0)), ())
+    return held | read_parameters(link, angles, firmware)
 
 
 def read_parameters(link: Link, names: Sequence[str], firmware: str) -> dict[str, float]:

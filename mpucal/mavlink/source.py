@@ -15,7 +15,7 @@ from .imu import Stream, reading
 from .link import Link, S
 from .log import Log
 from .prearm import ARMED
-from .shaping import read_parameters, shaping_names
+from .shaping import read_shaping
 from .stream import Streams
 from .truth import ARDUPILOT, PX4
 from .vehicle import Vehicle
@@ -68,7 +68,7 @@ class VehicleSource:
         firmware = PX4 if vehicle.is_px4 else ARDUPILOT
         self._log = Log(firmware)
         self._link.subscribe(self._hear)
-        parameters = read_parameters(self._link, shaping_names(firmware), firmware)
+        parameters = read_shaping(self._link, firmware)
         self._streams = Streams(self._link, firmware, parameters, self._rate_hz, self._say)
         self._stream = self._streams.start()
         self._rows = []

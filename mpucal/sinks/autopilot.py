@@ -21,7 +21,7 @@ from ..mavlink.parameters.verify import OtherPlacesError, verify
 from ..mavlink.parameters.write import Writer
 from ..mavlink.prearm import Prearm, Watch, prearm
 from ..mavlink.request import command
-from ..mavlink.shaping import read_parameters, shaping_names
+from ..mavlink.shaping import read_shaping
 from ..mavlink.still import Stillness
 from ..mavlink.truth import ARDUPILOT, PX4
 from ..result import Calibration
@@ -62,7 +62,7 @@ class AutopilotSink:
         ------
         LinkError : they cannot be read. OutputError : they cannot be saved.
         """
-        held = read_parameters(self._link, shaping_names(self._firmware), self._firmware)
+        held = read_shaping(self._link, self._firmware)
         values = {name: value for name, value in held.items() if CORRECTION.search(name)}
         remarks = [f"Accelerometer parameters of {self.where} before mpucal wrote new ones"]
         ending, text = PARAM, param_text(values, remarks)

@@ -6,11 +6,13 @@ import pytest
 from mpucal.chip.access import EndOfCapture
 from mpucal.errors import LinkError, UsageError
 from mpucal.mavlink.link import Link
+from mpucal.mavlink.parameters.names import ardupilot_place, mounting
 from mpucal.mavlink.replay import Replay
 from mpucal.mavlink.simulated import Options, Vehicle
 from mpucal.mavlink.simulated.transport import SimulatedTransport
 from mpucal.mavlink.source import VehicleSource
 from mpucal.mavlink.tlog import Record, Tlog
+from mpucal.mavlink.truth import ARDUPILOT
 
 
 class Disturbed(SimulatedTransport):
@@ -68,6 +70,15 @@ def test_the_parameters_that_shape_the_stream_are_read_first():
     parameters = source.recording().autopilot.parameters
     assert parameters["INS_ACCOFFS_X"] == 0.25
     assert {"AHRS_ORIENTATION", "INS_ACC2SCAL_Z"} <= set(parameters)
+
+
+def test_the_angles_of_a_board_that_is_turned_by_its_own_are_asked_for():
+    source, _, _ = opened("imus=1,rotation=101,CUST_ROT1_ROLL=180,CUST_ROT1_YAW=90")
+    source.start()
+    polled(source, 1)
+    R_b = mounting(ARDUPILOT, ardupilot_place(1), source.recording().autopilot.parameters)
+    # turned over its nose, then to the right: its x points to the vehicle's y, its y to x, its z up
+    np.testing.assert_allclose(R_b, [[0, 1, 0], [1, 0, 0], [0, 0, -1]], atol=1e-12)
 
 
 def test_a_still_quantised_gyro_is_not_believed_to_be_without_noise():

@@ -16,9 +16,12 @@ Values = Mapping[str, float]
 
 AXES = ("X", "Y", "Z")
 PX4_SLOTS, ARDUPILOT_IMUS = 4, 3
-# AHRS_ORIENTATION -> the names of its angles in degrees
-CUSTOM_ANGLES = {100: "CUSTOM_", 101: "CUST_ROT1_", 102: "CUST_ROT2_"}
-ANGLES = ("ROLL", "PITCH", "YAW")
+# AHRS_ORIENTATION -> the names of its roll, pitch and yaw in degrees; before ArduPilot 4.2 only the first
+CUSTOM_ANGLES = {
+    100: ("AHRS_CUSTOM_ROLL", "AHRS_CUSTOM_PIT", "AHRS_CUSTOM_YAW"),
+    101: ("CUST_ROT1_ROLL", "CUST_ROT1_PITCH", "CUST_ROT1_YAW"),
+    102: ("CUST_ROT2_ROLL", "CUST_ROT2_PITCH", "CUST_ROT2_YAW"),
+}
 
 
 @dataclass(frozen=True)
@@ -142,12 +145,12 @@ def mounting(firmware: str, where: Place, values: Values) -> Vector | None:
     return None if turned is None else euler(*level.tolist()) @ turned
 
 
-def _rotation(name: str, values: Values, custom: Mapping[int, str]) -> Vector | None:
+def _rotation(name: str, values: Values, custom: Mapping[int, tuple[str, ...]]) -> Vector | None:
     if name not in values:
         return None
     number = round(values[name])
     if number in custom:
-        angles = [values.get(custom[number] + angle) for angle in ANGLES]
-        known = [angle for angle in angles if angle is not None]
-        return euler(*np.radians(known).tolist()) if len(known) == len(ANGLES) else None
+        if not all(angle in values for angle in custom[number]):
+            return None
+        return euler(*np.radians([values[angle] for angle in custom[number]]).tolist())
     return orientation(number)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 
 from ...data import Vector
 from ..dialect import Message, dialect
 from ..parameters.encoding import REAL32, Parameter
+from ..parameters.names import CUSTOM_ANGLES
 from .filter import LowPass
 from .firmware import HIGHRES_IMU, RAW_IMU, SCALED_IMUS, SYS_STATUS, Firmware
 from .options import Options
@@ -39,6 +42,8 @@ class ArduPilot(Firmware):
         store = self.store
         store.add("SYSID_THISMAV", options.system, INT16)
         store.add("AHRS_ORIENTATION", options.rotation, INT8)
+        for name in chain(*CUSTOM_ANGLES.values()):
+            store.add(name, 0.0)
         for axis in AXES:
             store.add(f"AHRS_TRIM_{axis}", 0.0)
         store.add("INS_ACCEL_FILTER", 20, INT16)

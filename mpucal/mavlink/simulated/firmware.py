@@ -9,7 +9,8 @@ import numpy as np
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ..dialect import Message, dialect
 from ..parameters.encoding import Parameter
-from ..parameters.rotation import orientation
+from ..parameters.names import CUSTOM_ANGLES
+from ..parameters.rotation import euler, orientation
 from .options import Options
 from .store import Store
 
@@ -40,8 +41,7 @@ class Firmware(ABC):
     def __init__(self, options: Options) -> None:
         self.options = options
         self.store = Store()
-        rotation = orientation(options.rotation)
-        self.rotation: Vector = np.eye(3) if rotation is None else rotation
+        self.rotation = mounted(options)
         self.corrected = np.zeros((options.imus, 2, 3))
         self.temperature_c = 0.0
         self.armed = False
@@ -104,3 +104,12 @@ class Firmware(ABC):
         sensors = ACCELEROMETER | PREARM_CHECK
         health = ACCELEROMETER | (0 if self.complaints() else PREARM_CHECK)
         return dialect().MAVLink_sys_status_message(sensors, sensors, health, 100, 12000, -1, -1, 0, 0, 0, 0, 0, 0)
+
+
+def mounted(options: Options) -> Vector:
+    """R_b (3, 3) of a board that is turned by a known orientation, or by angles of its own."""
+    if options.rotation in CUSTOM_ANGLES:
+        degrees = [options.parameters.get(name, 0.0) for name in CUSTOM_ANGLES[options.rotation]]
+        return euler(*np.radians(degrees).tolist())
+    rotation = orientation(options.rotation)
+    return np.eye(3) if rotation is None else rotation

@@ -129,7 +129,7 @@ PARSERS: dict[str, tuple[Callable[[str], Any], str]] = {
     "firmware": _one_of(FIRMWARES),
     "imus": (_within(1, MOST_IMUS), f"a number from 1 to {MOST_IMUS}"),
     "system": (_within(1, 250), "a number from 1 to 250"),
-    "rotation": (_within(0, 40), "a MAV_SENSOR_ORIENTATION from 0 to 40"),
+    "rotation": (_within(0, 102), "a MAV_SENSOR_ORIENTATION: 0 to 40, 100 to 102"),
     "highres": (lambda text: {"yes": True, "no": False}[text], "yes or no"),
     "seed": (_within(0, 1 << 62), "a whole number from 0 on"),
     "hand": _one_of(tuple(KINDS)),

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 from ...data import STANDARD_GRAVITY_MPS2
+from ...errors import UsageError
 from ..dialect import Message, Parser, dialect
 from ..ftp import Payload
 from ..parameters.encoding import Parameter, name_bytes, of_wire, to_wire
@@ -55,6 +56,8 @@ class Vehicle:
         self.options = options
         self.firmware = FIRMWARES[options.firmware](options)
         for name, value in options.parameters.items():
+            if name not in self.firmware.store:
+                raise UsageError(f"the simulated vehicle has no parameter {name}", "leave it out, or spell it anew")
             self.firmware.store[name] = value
         self.imus = Imus(options, self.firmware.rotation, S_US / self.firmware.tick_us, gravity)
         self._mav: Any = dialect().MAVLink(None, options.system, COMPONENT)
