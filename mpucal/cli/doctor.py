@@ -10,10 +10,12 @@ import click
 
 from .. import __version__
 from ..data import STANDARD_GRAVITY_MPS2
+from ..doctor.bridge import examine_bridge
 from ..doctor.examine import examine
 from ..doctor.finding import Finding, Mark, failed
 from ..doctor.host import examine_host
 from ..doctor.page import document, text
+from ..doctor.speed import examine_speed
 from ..errors import SourceError, UsageError
 from .at_rest import put_down
 from .on_bus import OnBus
@@ -56,4 +58,5 @@ def _findings(options: Mapping[str, Any], seconds: float) -> Iterator[Finding]:
         raise UsageError("a doctor examines a chip on its own bus", "give --bus BUS or --serial PORT")
     with closing(source.bus):
         put_down(source.listeners)
-        yield from examine(source.bus, source.plan.config, seconds)
+        way = examine_speed if options["serial"] is None else examine_bridge
+        yield from examine(source.bus, source.plan.config, seconds, way)

@@ -6,12 +6,11 @@ trim, and whoever had corrected it would miss that.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 
 import numpy as np
 
-from ..chip import registers as reg
 from ..chip.access import Bus
 from ..chip.bench import Bench
 from ..chip.config import Config
@@ -27,23 +26,22 @@ from ..data import Sensor
 from ..errors import ChipError, SourceError
 from .finding import Finding, Mark, failed
 from .measure import examine_stream
+from .speed import examine_speed
 
-LONG_BYTES, SHORT_BYTES, READS = 55, 2, 25
-SLOW_HZ = 300_000
-SLOW = "at 1 kHz 100 kHz do not suffice: `dtparam=i2c_arm_baudrate=400000` on a Raspberry Pi"
+Look = Callable[[Bus], Iterable[Finding]]
 
 
-def examine(bus: Bus, config: Config, seconds: float) -> Iterator[Finding]:
+def examine(bus: Bus, config: Config, seconds: float, way: Look = examine_speed) -> Iterator[Finding]:
     """Everything that asking the chip tells; ends early where it does not answer.
 
     Parameters
     ----------
-    seconds : how long to watch its stream; the board is to lie still.
+    seconds : how long to watch its stream; the board is to lie still. way : examines what leads to the chip.
     """
     port = Port(bus, Decoder("doctor"))
     try:
         olds = [Block.read(port, place) for place in PLACES]
-        yield _speed(bus)
+        yield from way(bus)
         with suppress(ChipError), Bench(port) as bench:
             # until the board is put down; one that is not is told of later
             bench.rest()
@@ -86,25 +84,6 @@ def _awake(port: Port, driver: Driver, config: Config, seconds: float, olds: lis
         doubts += doubt
         yield finding
     yield _verdict(sensor, doubts)
-
-
-def _speed(bus: Bus) -> Finding:
-    """From what 53 bytes more take: nine bits each."""
-    took = [_median_ns(bus, count) for count in (SHORT_BYTES, LONG_BYTES)]
-    hz = 9e9 * (LONG_BYTES - SHORT_BYTES) / max(1.0, took[1] - took[0])
-    slow = hz < SLOW_HZ
-    return Finding(
-        "bus speed",
-        Mark.NOTE if slow else Mark.OK,
-        f"{hz / 1000:.0f} kHz achieved; a read of 14 bytes takes {(took[0] + 12 * 9e9 / hz) / 1e6:.2f} ms",
-        SLOW if slow else "",
-        {"achieved_hz": hz, "read_2_bytes_ms": took[0] / 1e6, "read_55_bytes_ms": took[1] / 1e6},
-    )
-
-
-def _median_ns(bus: Bus, count: int) -> float:
-    times = [bus.read(reg.ACCEL_XOUT_H, count).t_ns for _ in range(READS + 1)]
-    return float(np.median(np.diff(times)))
 
 
 def _identity(sensor: Sensor) -> Finding:

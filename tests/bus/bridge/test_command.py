@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from mpucal.__main__ import run
@@ -12,6 +13,7 @@ from mpucal.bus.simulated import open_simulated
 from mpucal.bus.simulated.clock import FastClock
 from mpucal.errors import BusError
 from mpucal.result import Calibration
+from mpucal.session.events import Prompt, PromptKind
 
 BLOB = Path(__file__).parents[3] / "fixtures" / "vectors" / "blob_measured.bin"
 
@@ -67,6 +69,34 @@ def test_into_the_memory_and_back(board, mpucal, tmp_path):
     anew = mpucal("write", "calibration.json", "bridge", "--serial", board.name, "-o", "kept")
     assert "bridge-blob-1.bin" in anew.err
     assert (tmp_path / "kept" / "bridge-blob-1.bin").read_bytes() == BLOB.read_bytes()
+
+
+def test_the_doctor_tells_bridge_and_chip(board, mpucal):
+    board.chip.hear(Prompt(PromptKind.LAY_FLAT, ""))
+    told = mpucal("doctor", "--serial", board.name, "--seconds", "2", "--json")
+    assert told.code == 0, told.out
+    found = {finding["topic"]: finding for finding in json.loads(told.out)["findings"]}
+    assert found["bridge"]["data"]["name"] == "emulated bridge"
+    assert found["bridge"]["data"]["pushes"]
+    assert found["offset registers"]["data"]["place"] == 0x06
+    # what passes through a serial line does not show the speed of the bus behind it
+    assert "serial line" in found
+    assert "bus speed" not in found
+
+
+def test_a_bias_goes_into_the_chip_behind_it_and_out_again(board, mpucal, tmp_path):
+    board.chip.hear(Prompt(PromptKind.LAY_FLAT, ""))
+    truth = board.chip.truth_document()
+    Calibration(np.array(truth["D"]), np.array(truth["b_a"])).save("calibration.json")
+    before = board.chip.read(0x06, 6).data
+    written = mpucal("write", "calibration.json", "chip", "--serial", board.name, "--yes", "--json")
+    assert written.code == 0, written.err
+    assert json.loads(written.out)["applied_in_hardware"]["b_a"] == pytest.approx(truth["b_a"], abs=0.006)
+    assert board.chip.read(0x06, 6).data != before
+    kept = json.loads((tmp_path / "chip-offsets.json").read_text())
+    assert kept["where"] == f"the chip on {board.name}"
+    assert mpucal("write", "chip-offsets.json", "chip", "--serial", board.name, "--yes").code == 0
+    assert board.chip.read(0x06, 6).data == before
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,40 @@
+"""How fast a bus moves bytes, by the times of its own replies. Knows no kind of bus."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..chip import registers as reg
+from ..chip.access import Bus
+from .finding import Finding, Mark
+
+LONG_BYTES, SHORT_BYTES, READS = 55, 2, 25
+SLOW_HZ = 300_000
+SLOW = "at 1 kHz 100 kHz do not suffice: `dtparam=i2c_arm_baudrate=400000` on a Raspberry Pi"
+
+
+def examine_speed(bus: Bus) -> Iterator[Finding]:
+    """The speed of an I2C bus, from what 53 bytes more take: nine bits each.
+
+    Raises
+    ------
+    BusError : a transfer failed.
+    """
+    short_ms, long_ms = (median_ms(bus, count) for count in (SHORT_BYTES, LONG_BYTES))
+    hz = 9e3 * (LONG_BYTES - SHORT_BYTES) / max(1e-6, long_ms - short_ms)
+    slow = hz < SLOW_HZ
+    yield Finding(
+        "bus speed",
+        Mark.NOTE if slow else Mark.OK,
+        f"{hz / 1000:.0f} kHz achieved; a read of 14 bytes takes {short_ms + 12 * 9e3 / hz:.2f} ms",
+        SLOW if slow else "",
+        {"achieved_hz": hz, "read_2_bytes_ms": short_ms, "read_55_bytes_ms": long_ms},
+    )
+
+
+def median_ms(bus: Bus, count: int) -> float:
+    """From one read of so many bytes to the next."""
+    times = [bus.read(reg.ACCEL_XOUT_H, count).t_ns for _ in range(READS + 1)]
+    return float(np.median(np.diff(times))) / 1e6
