@@ -13,6 +13,7 @@ from .information import DIRECTIONS, Uncertainty, uncertainty
 from .initialise import fibonacci_sphere
 from .model import Fit, Flat, product, rotation
 from .stationary import find_flat, flat_statistics
+from .steady import Change, likeliest_change
 from .still import still_runs
 from .tilt import tilted_directions
 
@@ -115,6 +116,13 @@ class Evidence:
             for unit in (1.0, np.deg2rad(1.0))
         )
         return bool(miss > 3.0 * miss_in_degrees)
+
+    @cached_property
+    def change(self) -> Change | None:
+        """The likeliest change of the sensor midway; None where nothing can tell."""
+        if self.fit is None or self.flat is None or self.sure is None:
+            return None
+        return likeliest_change(self.recording, self.flat, self.fit, self.gravity)
 
     @cached_property
     def rests(self) -> Rests | None:

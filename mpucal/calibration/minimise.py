@@ -113,7 +113,7 @@ class _At:
     def __init__(self, problem: Problem, theta: Theta, parameters: int, prior: Prior) -> None:
         self.theta = theta
         self.data: Evaluation = evaluate(problem, theta, parameters)
-        away = (_values(theta) - prior.mean)[:parameters]
+        away = (values(theta) - prior.mean)[:parameters]
         precision = prior.precision[:parameters]
         self.V = self.data.V + 0.5 * float(precision @ (away * away))
         if not np.isfinite(self.V):
@@ -132,7 +132,7 @@ class _At:
         return float(gradient @ _solve(self.H[np.ix_(free, free)], gradient)) / 2.0
 
 
-def _values(theta: Theta) -> Vector:
+def values(theta: Theta) -> Vector:
     """(27,) in the order of NAMES; the tilts are zero by definition."""
     K = theta.K
     six = [K[0, 0], K[0, 1], K[0, 2], K[1, 1], K[1, 2], K[2, 2]]

@@ -21,6 +21,10 @@ WARMER_C = 5.0
 RESTS_MPS2, RESTS_RAD = 0.08, np.deg2rad(1.5)
 HONEST_FACTOR = 5.0
 MOST_CLIPPED = 0.2
+# Of a change's significance. Hands whose pivot wobbles reach 4.5 without one. A gyroscope's non-linearity, which rests
+# show most, makes it 10 with a real sensor.
+STEADY, STEADY_BY_RESTS = 5.0, 12.0
+UNSTEADY_BY_FAR = 4.0
 
 
 def moved_while_still(e: Evidence) -> Reason | None:
@@ -214,6 +218,28 @@ def inconsistent(e: Evidence) -> Reason | None:
     )
 
 
+def changed_midway(e: Evidence) -> Reason | None:
+    """A mount that slipped or a bias that stepped, where nothing else speaks against the estimate.
+
+    Lost and clipped samples pull at an estimate too, and have reasons of their own.
+    """
+    if e.model == "tilt" or not _trustworthy(e) or inconsistent(e) is not None or few_orientations(e) is not None:
+        return None
+    r = e.recording
+    if r.gyr_clipped.any() or r.acc_clipped.any() or r.gap.any() or e.change is None:
+        return None
+    limit = STEADY_BY_RESTS if e.change.rests_often else STEADY
+    if e.change.significance <= limit:
+        return None
+    return Reason(
+        "inconsistent",
+        f"the sensor was not the same before and after about {e.change.t_s - r.t[0]:.0f} s: what each part of the "
+        "recording says of it differs by more than noise; did its mount slip, or something knock it? Fasten it and "
+        "record again",
+        e.change.significance > UNSTEADY_BY_FAR * limit,
+    )
+
+
 def tilted_only(e: Evidence) -> Reason | None:
     """Parameters of which tilts say nothing."""
     if e.model != "tilt" or e.fit is None:
@@ -241,4 +267,5 @@ CHECKS: tuple[Check, ...] = (
     temperature_moved,
     not_converged,
     inconsistent,
+    changed_midway,
 )

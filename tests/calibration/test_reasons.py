@@ -7,6 +7,7 @@ import pytest
 
 from mpucal.calibration import calibrate
 from mpucal.calibration.evidence import Evidence
+from mpucal.calibration.model import rotation
 from mpucal.calibration.quality import judge
 from mpucal.data import Recording
 from mpucal.simulation.scenarios import paper_scenario
@@ -360,6 +361,41 @@ def test_rests_that_contradict_each_other_are_inconsistent(in_hand):
     assert result.verdict == "refused"
     assert "the rests contradict each other" in result.reasons["inconsistent"]
     assert result.reasons.keys().isdisjoint({"swapped_axes", "left_handed", "gyro_off", "wrong_range"})
+
+
+CHANGES = {
+    "a mount that slips": lambda acc, gyr: (acc @ rotation(np.radians([2.0, -5.0, 2.0])).T, gyr),
+    "a bias that steps": lambda acc, gyr: (acc + np.array([0.3, -0.5, 0.3]), gyr),
+    "a gyroscope's bias that steps": lambda acc, gyr: (acc, gyr + np.radians([2.0, 1.0, -2.0])),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_a_sensor_that_changes_while_it_is_turned(hand, change):
+    recording = hand(2, "continuous").recording
+    assert "inconsistent" not in judged(recording).reasons
+    half = len(recording) * 6 // 10
+    after = change(recording.acc[half:], recording.gyr[half:])
+    acc, gyr = (np.concatenate([x[:half], y]) for x, y in zip((recording.acc, recording.gyr), after, strict=True))
+    result = judged(replace(recording, acc=acc, gyr=gyr))
+    assert result.verdict != "good"
+    assert "not the same before and after about" in result.reasons["inconsistent"]
+    assert "Fasten it" in result.reasons["inconsistent"]
+
+
+def test_a_mount_that_slips_between_rests(in_hand):
+    recording = in_hand.recording
+    slipped = np.concatenate([recording.acc[:3000], recording.acc[3000:] @ rotation(np.radians([0.0, 3.0, 0.0])).T])
+    assert "inconsistent" in judged(replace(recording, acc=slipped)).reasons
+
+
+def test_what_clipped_is_not_said_to_have_slipped(hand):
+    recording = hand(2, "continuous").recording
+    acc = recording.acc.copy()
+    acc[3000:] += [0.3, -0.5, 0.3]
+    clipped = np.zeros(len(acc), bool)
+    clipped[2000:2003] = True
+    assert list(judged(replace(recording, acc=acc, acc_clipped=clipped)).reasons) == ["accel_clipped"]
 
 
 def test_before_there_is_anything_to_judge_only_that_is_said(good):

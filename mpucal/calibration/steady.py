@@ -1,0 +1,116 @@
+"""Whether the sensor stayed the same from start to end, by a score test on means over blocks. Knows no verdict.
+
+A calibration averages over a mount that slipped or a bias that stepped, and nothing in its covariance shows it. But the
+parts of the recording then pull it to different sides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..data import Recording, Vector
+from .gyro import K_MEAN, K_SD
+from .hand import DELAY_SD_S, FARTHER, FARTHER_STILL, LEVER_SD_M, PIVOT_MPS2, WHITE_MPS2
+from .likelihood import NAMES, Problem, Series, Theta, evaluate, value
+from .minimise import Prior, minimise, values
+from .model import Fit, Flat
+from .scene import CORRELATION_S, FLOOR_MPS2, Scene, prepare
+from .thin import thinned
+
+TEST_HZ = 25.0
+SHARES = (0.25, 0.5, 0.75)  # of the recording, after which something may have changed
+ROUGHLY, MOST_ROUGHLY = 0.05, 3
+FEWEST_BLOCKS = 100
+# what no sensor changes by: without it, what one part says nothing of would be free
+CHANGE_SD = np.repeat([0.5, 5.0], [9, 3])
+# what an honest sensor changes by, as it warms
+DRIFT_SD = np.repeat([0.003, 0.03], [9, 3])
+
+
+class Change(NamedTuple):
+    """The likeliest change of D and b_a at one of a few times.
+
+    significance : its squared size a parameter, in units of its covariance and of what warming does; 1 by chance.
+    t_s : when, in the recording's time. rests_often : whether it was judged by rests, or else by moves.
+    """
+
+    significance: float
+    t_s: float
+    rests_often: bool
+
+
+def likeliest_change(recording: Recording, flat: Flat, fit: Fit, gravity: float) -> Change | None:
+    """The most significant change; None for a recording too short to tell.
+
+    Let D and b_a be theta's before a time and theirs + d after it. One Newton step from d = 0 needs nothing but the
+    gradient and the Fisher matrix of the whole and of the part before.
+    """
+    scene = prepare(*thinned(recording, flat, TEST_HZ), gravity)
+    n = len(scene.problem.series)
+    if n < FEWEST_BLOCKS:
+        return None
+    prior = _prior(scene.flat)
+    start = _start(fit, scene)
+    problem = _with_noise(scene, start)
+    theta = minimise(problem, start, len(NAMES), prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True).theta
+    whole = evaluate(problem, theta, len(NAMES))
+    gradient = whole.gradient + prior.precision * (values(theta) - prior.mean)
+    H = whole.fisher + np.diag(prior.precision)
+    changes = []
+    for share in SHARES:
+        cut = int(share * n)
+        before = evaluate(_first(problem, cut), theta, len(NAMES))
+        of_after, H_after = whole.gradient - before.gradient, whole.fisher - before.fisher
+        d, covariance = _newton(H, gradient, H_after[:, :12], of_after[:12])
+        changes.append(
+            Change(
+                float(d @ np.linalg.solve(covariance + np.diag(DRIFT_SD**2), d)) / len(d),
+                float(scene.recording.t[scene.flat.last + cut]),
+                scene.rests_often,
+            )
+        )
+    return max(changes)
+
+
+def _prior(flat: Flat) -> Prior:
+    return Prior.of(
+        b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)),
+        K=(K_MEAN, K_SD),
+        tau=(0.0, DELAY_SD_S),
+        r=(0.0, LEVER_SD_M),
+    )
+
+
+def _start(fit: Fit, scene: Scene) -> Theta:
+    """Of the fit, without a lever arm and a delay, which it does not tell."""
+    u = np.linalg.solve(fit.D, scene.flat.y - fit.b_a)
+    return replace(Theta.start(fit.D, fit.b_a, scene.flat.b_omega, u / np.linalg.norm(u)), K=fit.K)
+
+
+def _with_noise(scene: Scene, theta: Theta) -> Problem:
+    """The likeliest noise of the hand: white from rest to rest, else a pivot's, which a calm one does not need."""
+    if scene.rests_often:
+        sigma = min(WHITE_MPS2, key=lambda s: value(scene.white(s), theta))
+        return scene.white(sigma, CORRELATION_S)
+    sigma = min(PIVOT_MPS2, key=lambda s: value(scene.pivot(s, FLOOR_MPS2), theta))
+    return scene.pivot((FARTHER + FARTHER_STILL * sigma) * sigma, FLOOR_MPS2)
+
+
+def _first(problem: Problem, n: int) -> Problem:
+    """The problem of the first n samples."""
+    series = problem.series
+    cut = {f.name: x[:n] for f in fields(Series) if (x := getattr(series, f.name)) is not None}
+    return replace(problem, series=replace(series, **cut))
+
+
+def _newton(H: Vector, gradient: Vector, H_after: Vector, gradient_after: Vector) -> tuple[Vector, Vector]:
+    """d (12,) and its covariance, beside theta (p,): H (p, p), and what the part after says of d: (p, 12), (12,)."""
+    p = len(H)
+    joint = np.block([[H, H_after], [H_after.T, H_after[:12] + np.diag(CHANGE_SD**-2.0)]])
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(joint), 1e-300))
+    covariance = np.linalg.pinv(joint * np.outer(scale, scale), hermitian=True) * np.outer(scale, scale)
+    step = -covariance @ np.append(gradient, gradient_after)
+    return step[p:], covariance[p:, p:]
