@@ -22,17 +22,8 @@ from .tlog import Tlog
 from .truth import ARDUPILOT, PX4, truthful
 
 # whose change alters the streams
-SHAPING = (
-    "INS_ACC",
-    "CAL_ACC",
-    "INS_GYR",
-    "CAL_GYRO",
-    "AHRS_ORIENTATION",
-    "AHRS_CUSTOM",
-    "CUST_ROT",
-    "SENS_BOARD",
-    "EKF2_IMU_CTRL",
-)
+MOUNTED = ("AHRS_ORIENTATION", "AHRS_CUSTOM", "CUST_ROT", "SENS_BOARD")
+SHAPING = ("INS_ACC", "CAL_ACC", "INS_GYR", "CAL_GYRO", *MOUNTED, "EKF2_IMU_CTRL")
 
 
 @dataclass

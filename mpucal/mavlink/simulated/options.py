@@ -8,10 +8,12 @@ from typing import Any, Self
 
 from ...bus.simulated.hand import KINDS
 from ...errors import UsageError
+from ..parameters.names import CUSTOM_ANGLES
 
 FIRMWARES = ("ardupilot", "px4")
 PACES = ("fast", "real")
 MOST_IMUS = 3
+LAST_ORIENTATION = 40
 # name -> whether it begins at a time, as in fault=NAME@SECONDS
 FAULTS = {
     "arm": True,
@@ -110,6 +112,13 @@ def _within(lowest: int, highest: int) -> Callable[[str], int]:
     return parse
 
 
+def _orientation(text: str) -> int:
+    value = int(text)
+    if not (0 <= value <= LAST_ORIENTATION or value in CUSTOM_ANGLES):
+        raise ValueError(text)
+    return value
+
+
 def _one_of(names: tuple[str, ...]) -> tuple[Callable[[str], str], str]:
     def parse(text: str) -> str:
         if text not in names:
@@ -129,7 +138,7 @@ PARSERS: dict[str, tuple[Callable[[str], Any], str]] = {
     "firmware": _one_of(FIRMWARES),
     "imus": (_within(1, MOST_IMUS), f"a number from 1 to {MOST_IMUS}"),
     "system": (_within(1, 250), "a number from 1 to 250"),
-    "rotation": (_within(0, 102), "a MAV_SENSOR_ORIENTATION: 0 to 40, 100 to 102"),
+    "rotation": (_orientation, "a MAV_SENSOR_ORIENTATION: 0 to 40, 100 to 102"),
     "highres": (lambda text: {"yes": True, "no": False}[text], "yes or no"),
     "seed": (_within(0, 1 << 62), "a whole number from 0 on"),
     "hand": _one_of(tuple(KINDS)),
