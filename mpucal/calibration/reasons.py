@@ -83,8 +83,8 @@ def data_lost(e: Evidence) -> Reason | None:
     lost = float(np.diff(e.recording.t, prepend=e.recording.t[0])[gaps].sum())
     return Reason(
         "data_lost",
-        f"samples are missing in {places} place{'s' if places > 1 else ''} ({lost:.2f} s in all); use a faster bus or "
-        "a lower rate",
+        f"samples are missing in {places} place{'s' if places > 1 else ''} ({lost:.2f} s in all); use "
+        f"{'a faster bus' if e.recording.autopilot is None else 'a nearer or faster link'} or a lower rate",
         lost > 0.5 * float(e.recording.t[-1] - e.recording.t[0]),
     )
 
