@@ -1,9 +1,9 @@
 """A Linux I2C bus on smbus2. Knows no chip but the identity by which it finds one, and repeats nothing.
 
 What an adapter can do is found, not assumed: plain I2C where there is any, else SMBus blocks of 32 bytes; and where
-it refuses a message as too long, before anything has moved, shorter ones.
+it refuses a transfer before anything has moved, as one without a repeated start or of shorter messages.
 
-Source: Linux Documentation/i2c/dev-interface.rst and fault-codes.rst.
+Source: Linux Documentation/i2c/dev-interface.rst and fault-codes.rst; drivers/i2c/i2c-core-base.c for what it refuses.
 """
 
 from __future__ import annotations
@@ -55,6 +55,7 @@ class I2cBus:
             if self._blocks and not self._smbus.funcs & smbus2.I2cFunc.SMBUS_READ_I2C_BLOCK:
                 raise BusError(f"the adapter {self._path} moves single bytes only", "use another adapter")
             self._longest = SMBUS_BLOCK_BYTES if self._blocks else MAX_MESSAGE_BYTES
+            self._repeated_start = True
             self._address = self._find(ADDRESSES if address is None else (address,))
         except BaseException:
             self._smbus.close()
@@ -108,7 +109,7 @@ class I2cBus:
         for address in addresses:
             try:
                 with self._told(transfer_error, address):
-                    answer = self._smbus.read_byte_data(address, WHO_AM_I)
+                    answer = self._identity(address)
             except BusError as error:
                 failures.append(error)
             else:
@@ -122,19 +123,39 @@ class I2cBus:
                 raise failure
         raise nobody(self._path, addresses)
 
+    def _identity(self, address: int) -> int:
+        """What answers there; smbus2 asks for the address itself, which a driver of the kernel may hold."""
+        try:
+            return int(self._smbus.read_byte_data(address, WHO_AM_I))
+        except OSError as error:
+            if error.errno != errno.EOPNOTSUPP:
+                raise
+        # made of two messages, where the adapter moves one at a time
+        self._smbus.write_byte(address, WHO_AM_I)
+        return int(self._smbus.read_byte(address))
+
     def _part(self, register: int, count: int) -> bytes:
         """Up to `count` bytes, as many as go into one message."""
         count = min(count, self._longest)
         if self._blocks:
             return bytes(self._smbus.read_i2c_block_data(self._address, register, count))
-        message = self._message.read(self._address, count)
+        choose, message = self._message.write(self._address, [register]), self._message.read(self._address, count)
         try:
-            self._smbus.i2c_rdwr(self._message.write(self._address, [register]), message)
+            if self._repeated_start:
+                self._smbus.i2c_rdwr(choose, message)
+            else:
+                self._smbus.i2c_rdwr(choose)
+                self._smbus.i2c_rdwr(message)
         except OSError as error:
-            if error.errno != errno.EOPNOTSUPP or count <= SHORTEST_LIMIT:
+            if error.errno != errno.EOPNOTSUPP:
                 raise
-            # refused before anything has moved (the kernel's i2c_check_for_quirks): take half as much
-            self._longest = count // 2
+            # refused before anything has moved (the kernel's i2c_check_for_quirks)
+            if count > SHORTEST_LIMIT:
+                self._longest = count // 2
+            elif self._repeated_start:
+                self._repeated_start, self._longest = False, MAX_MESSAGE_BYTES
+            else:
+                raise
             return self._part(register, count)
         return bytes(message)
 

@@ -39,16 +39,17 @@ class Adapter:
 
     Attributes
     ----------
-    longest : message that it moves, in bytes. failures : errno by ioctl request, raised instead.
+    longest : message that it moves, in bytes. repeats_start : moves two messages in one transfer.
+    failures : errno by ioctl request, raised instead.
     transfers : [(flags, bytes)] of each I2C_RDWR.
     """
 
     def __init__(self, bus, address=0x68):
         self.bus, self.address = bus, address
         self.functions = int(smbus2.I2cFunc.I2C | smbus2.I2cFunc.SMBUS_EMUL)
-        self.longest = 8192
+        self.longest, self.repeats_start = 8192, True
         self.failures, self.transfers, self.requests = {}, [], []
-        self._chosen = None
+        self._chosen = self._register = None
 
     def ioctl(self, fd, request, argument):
         os.fstat(fd)
@@ -73,9 +74,17 @@ class Adapter:
 
     def _smbus(self, argument):
         self._acknowledge(self._chosen)
+        if argument.size == smbus2.I2C_SMBUS_BYTE:
+            if argument.read_write == smbus2.I2C_SMBUS_WRITE:
+                self._register = argument.command
+            else:
+                argument.data.contents.byte = self.bus.read(self._register, 1).data[0]
+            return
         block = argument.data.contents.block
         if argument.size == smbus2.I2C_SMBUS_BYTE_DATA:
             assert argument.read_write == smbus2.I2C_SMBUS_READ
+            if not self.repeats_start:
+                raise _os_error(errno.EOPNOTSUPP)
             argument.data.contents.byte = self.bus.read(argument.command, 1).data[0]
             return
         assert argument.size == smbus2.I2C_SMBUS_I2C_BLOCK_DATA
@@ -87,6 +96,8 @@ class Adapter:
 
     def _rdwr(self, argument):
         messages = [argument.msgs[i] for i in range(argument.nmsgs)]
+        if len(messages) > 1 and not self.repeats_start:
+            raise _os_error(errno.EOPNOTSUPP)
         for message in messages:
             self._acknowledge(message.addr)
             if message.len > 8192:
@@ -96,12 +107,13 @@ class Adapter:
         self.transfers.append([(m.flags, m.len) for m in messages])
         if any(m.flags & I2C_M_RD for m in messages[:-1]):
             raise _os_error(errno.EOPNOTSUPP)
-        register, *data = bytes(messages[0])
-        if messages[-1].flags & I2C_M_RD:
-            reply = self.bus.read(register, messages[-1].len)
-            ctypes.memmove(messages[-1].buf, reply.data, messages[-1].len)
-        else:
-            self.bus.write(register, bytes(data))
+        for message in messages:
+            if message.flags & I2C_M_RD:
+                ctypes.memmove(message.buf, self.bus.read(self._register, message.len).data, message.len)
+                continue
+            self._register, *data = bytes(message)
+            if data:
+                self.bus.write(self._register, bytes(data))
 
     def _acknowledge(self, address):
         if address != self.address:

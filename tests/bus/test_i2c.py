@@ -60,7 +60,6 @@ def test_a_kernel_driver_is_noticed_by_a_plain_read_first(adapter):
         (errno.EIO, BusError, "broke off .*shorten the wires"),
         (errno.EAGAIN, BusError, "another master"),
         (errno.EBUSY, BusError, "driver of the kernel"),
-        (errno.EOPNOTSUPP, BusError, "cannot move this transfer"),
         (errno.ENODEV, BusError, "adapter is gone"),
         (errno.EFAULT, BusError, "a transfer failed .Bad address"),
     ],
@@ -169,6 +168,36 @@ def test_the_longest_message_of_an_adapter_is_found(adapter):
         driver.poll()
     assert not driver.recording().gap.any()
     assert len(driver.recording()) > 400
+
+
+def test_an_adapter_without_repeated_start_writes_and_reads_apart(adapter):
+    kernel = adapter()
+    kernel.repeats_start = False
+    driver = Driver(I2cBus(str(kernel.path)))
+    assert driver.start().who_am_i == 0x68
+    while driver.now_ns() < 3e9:
+        driver.poll()
+    assert not driver.recording().gap.any()
+    assert len(driver.recording()) > 400
+    # whole bursts still
+    assert max(length for transfer in kernel.transfers for _, length in transfer) >= 4 * reg.FRAME_BYTES
+
+
+@pytest.mark.parametrize("op", ["read", "write"])
+def test_an_adapter_that_moves_nothing_is_a_sentence(adapter, op):
+    kernel = adapter()
+    bus = I2cBus(str(kernel.path))
+    kernel.failures[smbus2.I2C_RDWR] = errno.EOPNOTSUPP
+    with pytest.raises(BusError, match="cannot move this transfer"):
+        bus.read(reg.FIFO_R_W, 14) if op == "read" else bus.write(reg.USER_CTRL, b"\0")
+
+
+def test_a_kernel_driver_is_noticed_without_repeated_start_too(adapter):
+    kernel = adapter()
+    kernel.repeats_start = False
+    kernel.failures[smbus2.I2C_SLAVE] = errno.EBUSY
+    with pytest.raises(BusError, match="a driver of the kernel holds the chip"):
+        I2cBus(str(kernel.path), 0x68)
 
 
 def test_a_known_part_is_preferred_to_a_clock_at_the_other_address(adapter, monkeypatch):
