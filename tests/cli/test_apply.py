@@ -1,0 +1,164 @@
+"""`mpucal apply` and `mpucal stream`: the formula on every kind of file, and no bias that is removed twice."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpucal.capture import load
+from mpucal.capture.csv import save_csv
+from mpucal.capture.npz import save_npz
+from mpucal.result import Calibration
+
+ROOT = Path(__file__).parents[2]
+RECORDINGS = ROOT.parent / "shared" / "recordings"
+NAMES = (
+    "broad_01",
+    "imucal_session",
+    "mpu6050_session",
+    "mpu6050_static",
+    "mpu6050_turn90",
+    "mpu9150_a",
+    "mpu9150_b",
+)
+D = np.array([[1.021, 0.013, -0.007], [-0.009, 0.987, 0.021], [0.004, -0.016, 1.034]])
+B_A = np.array([0.31, -0.22, 1.08])
+K = np.array([[1.01, 0.002, 0.0], [0.002, 0.98, -0.004], [0.0, -0.004, 1.0]])
+B_OMEGA = np.array([0.02, -0.03, 0.01])
+
+
+@pytest.fixture
+def calibration(tmp_path):
+    made = Calibration(D, B_A, K=K, b_omega=B_OMEGA, quality={"verdict": "good", "reasons": []})
+    made.save(tmp_path / "c.json")
+    made.save(tmp_path / "c.bin")
+    return made
+
+
+def formula(recording):
+    """Equation 4 of the paper, as NumPy has it."""
+    return (recording.acc - B_A) @ np.linalg.inv(D).T, (recording.gyr - B_OMEGA) @ K.T
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_real_recording_comes_out_as_the_formula_says(mpucal, calibration, name):
+    path = RECORDINGS / f"{name}.npz"
+    if not path.exists():
+        pytest.skip("the real recordings are not beside the project")
+    assert mpucal("apply", "c.json", path, "-o", "out.npz").code == 0
+    recording, out = load(path), load("out.npz")
+    acc, gyr = formula(recording)
+    # runs of rows are multiplied in another order than all at once
+    np.testing.assert_allclose(out.acc, acc, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(out.gyr, gyr, rtol=1e-13, atol=1e-13)
+    np.testing.assert_array_equal(out.t, recording.t)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".npz"])
+@pytest.mark.parametrize("name", ["c.json", "c.bin"])
+def test_a_capture_goes_into_every_kind(mpucal, session, calibration, name, ending):
+    done = mpucal("apply", name, session.folder, "-o", f"out{ending}", "--json")
+    assert done.code == 0, done.err
+    recording, out = load(session.folder), load(f"out{ending}")
+    acc, gyr = formula(recording)
+    exact = 1e-12 if name == "c.json" else 1e-5
+    np.testing.assert_allclose(out.acc, acc, atol=exact)
+    np.testing.assert_allclose(out.gyr, gyr, atol=exact)
+    facts = json.loads(done.out)
+    assert facts["samples"] == len(recording)
+    assert facts["mean_after_mps2"] == pytest.approx(np.linalg.norm(acc, axis=1).mean(), abs=1e-5)
+
+
+def test_a_table_goes_to_stdout(mpucal, session, calibration, tmp_path):
+    recording = load(session.folder).part(0, 500)
+    save_csv(recording, "in.csv")
+    done = mpucal("apply", "c.json", "in.csv")
+    assert done.code == 0
+    (tmp_path / "out.csv").write_text(done.out)
+    np.testing.assert_allclose(load("out.csv").acc, formula(recording)[0], atol=1e-12)
+
+
+def test_b_a_follows_the_temperature(mpucal, session, calibration):
+    recording = load(session.folder)
+    slope, at = np.array([0.01, -0.02, 0.03]), float(recording.temperature_c.mean()) - 5.0
+    warm = replace(
+        calibration,
+        b_a_slope=slope,
+        temperature_range_c=np.array([at - 1.0, at + 9.0]),
+        sensor=replace(calibration.sensor, temperature_c=at),
+    )
+    warm.save("warm.json")
+    assert mpucal("apply", "warm.json", session.folder, "-o", "out.npz").code == 0
+    b_a = B_A + (recording.temperature_c - at)[:, None] * slope
+    np.testing.assert_allclose(load("out.npz").acc, (recording.acc - b_a) @ np.linalg.inv(D).T, atol=1e-12)
+
+
+def test_what_is_calibrated_already_is_refused(mpucal, session, calibration):
+    mpucal("apply", "c.json", session.folder, "-o", "out.npz")
+    again = mpucal("apply", "c.json", "out.npz", "-o", "twice.npz")
+    assert again.code == 2
+    assert "calibrated already" in again.err
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "says"),
+    [
+        ({"quality": {"verdict": "refused"}}, 2, "refused"),
+        ({"who_am_i": 0x70}, 2, "WHO_AM_I"),
+        ({"accel_offsets": (2, 4, 6)}, 2, "offset registers held"),
+        ({"accel_offsets": (2, 4, 6), "applied_in_hardware": B_A}, 0, ""),
+        ({"applied_in_hardware": B_A}, 0, "factory's trim again"),
+    ],
+    ids=["refused", "another chip", "other registers", "registers that it knows", "registers that a reset cleared"],
+)
+def test_a_calibration_that_does_not_belong(mpucal, session, calibration, changes, code, says):
+    recording = load(session.folder)
+    sensor = replace(recording.sensor, **{k: changes.pop(k) for k in ("who_am_i", "accel_offsets") if k in changes})
+    registers_differ = sensor.accel_offsets != recording.sensor.accel_offsets
+    replace(calibration, sensor=sensor, **changes).save("other.json")
+    done = mpucal("apply", "other.json", session.folder, "-o", "out.npz")
+    assert done.code == code, done.err
+    assert says in done.err
+    if code == 0:
+        # what the registers subtract is not subtracted again, and after a reset all of it is
+        left = B_A - (B_A if registers_differ else 0.0)
+        np.testing.assert_allclose(load("out.npz").acc, (recording.acc - left) @ np.linalg.inv(D).T, atol=1e-12)
+
+
+def test_nothing_is_written_over_the_recording(mpucal, session, calibration):
+    save_npz(load(session.folder), "in.npz")
+    before = Path("in.npz").read_bytes()
+    assert mpucal("apply", "c.json", "in.npz", "-o", "in.npz").code == 2
+    assert Path("in.npz").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("apply", "c.json", "walk.npz"), ("apply", "none.json", "walk.npz"), ("apply", "c.json", "x.txt", "-o", "y.csv")],
+)
+def test_what_is_not_there_is_3(mpucal, calibration, words):
+    assert mpucal(*words).code == 3
+
+
+def test_a_stream_is_calibrated(mpucal, session):
+    words = ("stream", "--bus", "sim:seed=3", "--seconds", "3", "--apply", session.folder / "calibration.json")
+    lines = mpucal(*words, "--json", "-o", "stream.mcap").out.splitlines()
+    made = Calibration.load(session.folder / "calibration.json")
+    recording = load("stream.mcap")
+    a, w = made.apply(recording.acc, recording.gyr)
+    rows = [json.loads(line) for line in lines]
+    assert len(rows) > 400
+    np.testing.assert_allclose([row["a"] for row in rows], a[: len(rows)], atol=1e-12)
+    np.testing.assert_allclose([row["w"] for row in rows], w[: len(rows)], atol=1e-12)
+    table = mpucal(*words).out.splitlines()
+    assert table[0] == "t,ax,ay,az,gx,gy,gz,temperature_c"
+    np.testing.assert_allclose([float(v) for v in table[1].split(",")[1:4]], rows[0]["a"], atol=1e-12)
+
+
+def test_a_capture_does_not_stream(mpucal, session):
+    words = ("--replay", session.folder / "capture.mcap", "--apply", session.folder / "calibration.json")
+    done = mpucal("stream", *words)
+    assert done.code == 2
+    assert "mpucal apply" in done.err

@@ -1,0 +1,58 @@
+"""The examples in each command's help, run as they stand there; only the devices are simulated ones."""
+
+import re
+import shlex
+import shutil
+from dataclasses import replace
+
+import click
+import pytest
+
+from mpucal.capture import load
+from mpucal.capture.npz import save_npz
+from mpucal.cli import COMMANDS, commands
+from mpucal.result import Calibration
+
+# what stands there for what a person has; a bridge's own tests show what it keeps
+DEVICES = {"/dev/i2c-1": "sim:seed=3", "sim": "sim:seed=3"}
+NEEDS_A_PORT = "--serial PORT"
+
+
+def examples():
+    context = click.Context(commands)
+    for name in COMMANDS:
+        said = commands.get_command(context, name).epilog
+        for number, example in enumerate(re.findall(r"`mpucal ([^`]+)`", said)):
+            if NEEDS_A_PORT not in example:
+                yield pytest.param(example, id=f"{name}-{number}")
+
+
+@pytest.fixture
+def belongings(session, tmp_path):
+    """What the examples name: results of sessions, recordings."""
+    made = Calibration.load(session.folder / "calibration.json")
+    for number, name in enumerate(("board7", "board7-today", "cold", "warm", "hot")):
+        folder = tmp_path / name
+        folder.mkdir()
+        sensor = replace(made.sensor, temperature_c=10.0 + 10.0 * number)
+        replace(made, sensor=sensor, b_a=made.b_a + 0.01 * number).save(folder / "calibration.json")
+    made.save(tmp_path / "calibration.json")
+    shutil.copy(session.folder / "capture.mcap", tmp_path)
+    save_npz(load(session.folder), tmp_path / "walk.npz")
+
+
+@pytest.mark.parametrize("example", list(examples()))
+def test_an_example_runs(mpucal, belongings, tmp_path, example):
+    words = [DEVICES.get(word, word) for word in shlex.split(example)]
+    if words[0] in ("session", "record"):
+        # these begin with no such folder or file
+        shutil.rmtree(tmp_path / "board7")
+        (tmp_path / "capture.mcap").unlink()
+    result = mpucal(*words)
+    assert result.code == 0, result.err
+    assert result.out
+
+
+def test_every_command_has_one():
+    context = click.Context(commands)
+    assert all("Example: `mpucal " in commands.get_command(context, name).epilog for name in COMMANDS)
