@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +37,13 @@ class Sensor:
     accel_offsets: tuple[int, int, int] | None = None
     message: str | None = None
     least_noise: tuple[float, float] = (0.0, 0.0)
+
+    @classmethod
+    def of(cls, document: Mapping[str, Any]) -> Self:
+        """Of a document's values, JSON's own types; what it holds besides is left out."""
+        known = {f.name for f in fields(cls)}
+        values: dict[str, Any] = {key: value for key, value in document.items() if key in known}
+        return cls(**{key: tuple(value) if isinstance(value, list) else value for key, value in values.items()})
 
 
 @dataclass(frozen=True)

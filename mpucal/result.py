@@ -225,8 +225,6 @@ class Calibration:
         if document.get("version", 0) > VERSION:
             raise ValueError(f"version {document['version']} is newer than {VERSION}")
         acc, gyr = document["accelerometer"], document.get("gyroscope", {})
-        sensor = document.get("sensor", {})
-        known = {f.name for f in fields(Sensor)}
         return cls(
             D=_array(acc["D"], 3, 3),
             b_a=_array(acc["b_a"], 3),
@@ -240,7 +238,7 @@ class Calibration:
             gyro_noise_std=_array(gyr.get("noise_std"), 3),
             fit=MappingProxyType(dict(document.get("fit", {}))),
             quality=MappingProxyType(dict(document.get("quality", {}))),
-            sensor=Sensor(**{key: _hashable(value) for key, value in sensor.items() if key in known}),
+            sensor=Sensor.of(document.get("sensor", {})),
             created=str(document.get("created", "")),
             applied_in_hardware=_array(document.get("applied_in_hardware", {}).get("b_a", [0, 0, 0]), 3),
             b_a_slope=_array(acc.get("b_a_slope", [0, 0, 0]), 3),
@@ -278,11 +276,6 @@ def _array(values: Any, *shape: int) -> Vector:
     if array.shape != shape:
         raise ValueError(f"shape {array.shape} where {shape} belongs")
     return array
-
-
-def _hashable(value: Any) -> Any:
-    """JSON's lists as the tuples that they were."""
-    return tuple(value) if isinstance(value, list) else value
 
 
 def _plain(value: Any) -> Any:

@@ -119,7 +119,7 @@ STATES = {
     "connect": (Driver, "start"),
     "lay flat": (LayFlat, "add"),
     "rotate": (Rotate, "add"),
-    "calibrate": (command, "calibrate"),
+    "calibrate": (command, "calibrate_vehicle"),
     "write": (sink, "write_atomically"),
 }
 
@@ -144,7 +144,7 @@ def test_a_full_disk_is_3_and_keeps_what_was_recorded(mpucal, tmp_path, monkeypa
     monkeypatch.setattr(sink, "write_atomically", full)
     code, said = mpucal("session", "--replay", FIXTURE, "-o", "board")
     assert code == 3
-    assert "What was recorded is kept in board/capture.mcap." in said
+    assert "What was recorded is kept in board/capture.mcap; go on with --resume board." in said
     assert "No space left on device" in said.splitlines()[-1]
     assert read_capture(tmp_path / "board" / "capture.mcap").recovered is None
 

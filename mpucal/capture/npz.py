@@ -6,7 +6,7 @@ import json
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -117,11 +117,9 @@ def sensor_of(arrays: Mapping[str, Any], path: Path) -> Sensor:
     """What an archive says of its sensor; RecordingError where that is nonsense."""
     if "sensor" not in arrays:
         return Sensor()
-    known = {f.name for f in fields(Sensor)}
     try:
-        items = json.loads(str(arrays["sensor"])).items()
+        return Sensor.of(json.loads(str(arrays["sensor"])))
     except (ValueError, AttributeError) as error:
         raise RecordingError(
             f"{path}: sensor is no JSON object ({error})", "leave sensor out, or write it with mpucal"
         ) from error
-    return Sensor(**{key: value for key, value in items if key in known})

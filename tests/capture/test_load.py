@@ -87,7 +87,7 @@ def test_the_ending_says_how_to_read(measured, tmp_path):
     [
         ("none.npz", "there is no file"),
         ("none.mcap", "there is no file"),
-        ("notes.txt", r"give a \.mcap, \.npz, \.csv file or the folder"),
+        ("notes.txt", r"give a \.mcap, \.tlog, \.bin, \.npz, \.csv file or the folder"),
         ("none", "there is no file"),
         ("no_ending", "no kind of recording"),
         ("folder", r"holds no capture\.mcap"),
