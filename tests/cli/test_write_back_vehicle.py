@@ -1,0 +1,72 @@
+"""A session over MAVLink writes to the autopilot it was measured on, or leaves it as it was and ends with 6."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mpucal.cli.destination import recorder, written_back
+from mpucal.errors import WriteBackError
+from mpucal.result import Calibration
+
+SOURCE = {
+    "bus": None,
+    "serial": None,
+    "replay": None,
+    "system": None,
+    "signing_key": None,
+    "address": None,
+    "seed": None,
+}
+WORDS = {
+    **SOURCE,
+    "rate": 200.0,
+    "accel_range": "4",
+    "gyro_range": "500",
+    "gravity": 9.80665,
+    "model": "auto",
+    "store": False,
+}
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory, process):
+    folder = tmp_path_factory.mktemp("vehicle")
+    result = process(folder, "session", "--mavlink", "sim:imus=1", "-o", "flown", "--json", "--yes")
+    return SimpleNamespace(folder=folder / "flown", result=result)
+
+
+def test_the_new_parameters_are_there_and_the_files_say_so(flown):
+    assert flown.result.code == 0, flown.result.err
+    document = json.loads(flown.result.out)
+    assert document == json.loads((flown.folder / "calibration.json").read_text())
+    (entry,) = document["written"]
+    assert entry["to"] == "autopilot"
+    assert "read back and seen in its streams" in entry["what"]
+    assert "The result goes to files and the autopilot" in flown.result.err
+    # of what was measured, as truth.json is; of the streams that come now, the other file
+    truth = json.loads((flown.folder / "truth.json").read_text())
+    measured = Calibration.load(flown.folder / "calibration.json")
+    now = Calibration.load(flown.folder / "calibration-on-autopilot.json")
+    np.testing.assert_allclose(measured.D, truth["D"], atol=0.005)
+    assert np.abs(now.b_a).max() < 0.02 < np.abs(measured.b_a).max()
+    assert now.extra["autopilot"]["params_old"].items() >= measured.extra["autopilot"]["params_new"].items()
+
+
+def test_its_own_recording_takes_the_calibration_of_what_was_measured(flown, mpucal):
+    assert mpucal("apply", flown.folder / "calibration.json", flown.folder, "-o", "a.npz").code == 0
+    other = mpucal("apply", flown.folder / "calibration-on-autopilot.json", flown.folder, "-o", "b.npz")
+    assert other.code == 2
+    assert "while these samples were taken" in other.err
+
+
+def test_a_vehicle_that_refuses_keeps_what_it_held(flown, tmp_path):
+    measured = Calibration.load(flown.folder / "calibration.json")
+    record = recorder(tmp_path, measured, None, None)
+    words = {**WORDS, "mavlink": "sim:imus=1,refuse=INS_ACCSCAL_Y"}
+    with pytest.raises(WriteBackError) as raised:
+        list(written_back(("autopilot",), measured, words, True, tmp_path, record))
+    assert raised.value.exit_code == 6
+    # nothing says that anything was written
+    assert not (tmp_path / "calibration.json").exists()
