@@ -42,8 +42,10 @@ class Sensor:
     def of(cls, document: Mapping[str, Any]) -> Self:
         """Of a document's values, JSON's own types; what it holds besides is left out."""
         known = {f.name for f in fields(cls)}
-        values: dict[str, Any] = {key: value for key, value in document.items() if key in known}
-        return cls(**{key: tuple(value) if isinstance(value, list) else value for key, value in values.items()})
+        values: dict[str, Any] = {
+            key: tuple(value) if isinstance(value, list) else value for key, value in document.items() if key in known
+        }
+        return cls(**values)
 
 
 @dataclass(frozen=True)
