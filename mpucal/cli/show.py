@@ -12,10 +12,12 @@ import numpy as np
 from ..calibration.stationary import find_flat
 from ..capture import load
 from ..capture.dataflash import is_dataflash
-from ..data import Recording, Sensor
+from ..data import STANDARD_GRAVITY_MPS2, Recording, Sensor
 from ..errors import UsageError
 from ..result import Calibration
 from ..wire.blob import Blob
+from .merge import slope
+from .options import Integer
 from .summary import formula, summary
 
 EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --json`, or `mpucal show --serial PORT`"
@@ -31,15 +33,34 @@ CALIBRATIONS = (".json", ".bin")
     flag_value="",
     help="What a board with the bridge's firmware stores, instead of a file.",
 )
+@click.option("--bus", metavar="BUS", help="What the chip on /dev/i2c-N, or sim, holds now; nothing is written.")
+@click.option("--mavlink", metavar="URL", help="What a vehicle's accelerometer parameters are; nothing is written.")
+@click.option("--address", type=Integer(), help="I2C address; by default 0x68, then 0x69.")
+@click.option("--system", metavar="N", type=click.IntRange(1, 255), help="Which vehicle, if several.")
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON.")
-def command(file: Path | None, serial: str | None, as_json: bool) -> None:
-    """Say what is in a calibration (.json), a config blob (.bin), a recording, or a bridge."""
-    if (file is None) == (serial is None):
+def command(
+    file: Path | None,
+    serial: str | None,
+    bus: str | None,
+    mavlink: str | None,
+    address: int | None,
+    system: int | None,
+    as_json: bool,
+) -> None:
+    """Say what is in a calibration (.json), a config blob (.bin), a recording, or a device."""
+    places = {"a file": file, "--serial": serial, "--bus": bus, "--mavlink": mavlink}
+    given = [name for name, what in places.items() if what is not None]
+    if len(given) != 1:
         raise UsageError(
-            "nothing to show was named" if file is None else "a file and --serial were given together",
-            "give either a file or --serial PORT",
+            f"{' and '.join(given)} were given together" if given else "nothing to show was named",
+            "give either a file or one of --serial PORT, --bus BUS and --mavlink URL",
         )
-    if serial is not None:
+    if bus is not None or mavlink is not None:
+        from .show_device import of_bus, of_vehicle, page  # noqa: PLC0415 - a file needs no driver
+
+        facts = of_vehicle(str(mavlink), system) if bus is None else of_bus(bus, address)
+        click.echo(json.dumps(facts, indent=2) if as_json else page(facts))
+    elif serial is not None:
         where, stored = _stored(serial)
         click.echo(stored.json() if as_json else _calibration(where, stored), nl=not as_json)
     elif file is not None and file.suffix in CALIBRATIONS and not is_dataflash(file):
@@ -69,7 +90,19 @@ def _stored(port: str) -> tuple[str, Calibration]:
 def _calibration(where: str, calibration: Calibration) -> str:
     made = f", made {calibration.created}" if calibration.created else ""
     head = f"{where}: a calibration of {_chip(calibration.sensor)}{made}."
-    return "\n".join([head, "", summary(calibration), "", formula(calibration)])
+    return "\n".join([head, "", summary(calibration), "", formula(calibration), *_applied(calibration)])
+
+
+def _applied(calibration: Calibration) -> list[str]:
+    """Where it is applied already, and how it goes with the temperature; nothing of what nobody said."""
+    said = []
+    if np.any(calibration.applied_in_hardware):
+        mg = ", ".join(f"{1000 * value / STANDARD_GRAVITY_MPS2:+.1f}" for value in calibration.applied_in_hardware)
+        said.append(f"The chip's offset registers subtract ({mg}) mg of b_a, until its supply goes or it is reset.")
+    said += [f"Written at {entry.get('at')}: {entry.get('what')}." for entry in calibration.extra.get("written", ())]
+    if calibration.follows_temperature:
+        said.append(slope(calibration))
+    return ["", *said] if said else []
 
 
 def _facts(recording: Recording) -> dict[str, Any]:
@@ -80,6 +113,7 @@ def _facts(recording: Recording) -> dict[str, Any]:
         "chip": _chip(recording.sensor),
         "accel_range_g": recording.sensor.accel_range_g,
         "gyro_range_dps": recording.sensor.gyro_range_dps,
+        "imus": 1 + len(recording.others),
         "samples": len(recording),
         "seconds": float(recording.t[-1] - recording.t[0]),
         "rate_hz": recording.rate_hz,
@@ -101,7 +135,9 @@ def _recording(file: Path, facts: dict[str, Any]) -> str:
         if facts[key] is not None
     ]
     rows = {
-        "sensor": ", ".join([facts["chip"], *ranges]),
+        "sensor": ", ".join(
+            [facts["chip"], *ranges, *([f"the first of {n} IMUs"] if (n := facts["imus"]) > 1 else [])]
+        ),
         "samples": f"{facts['samples']} in {facts['seconds']:.1f} s, at {facts['rate_hz']:.2f} Hz",
         "lost": f"{facts['gaps']} gaps" if facts["gaps"] else "none",
         "clipped": f"{facts['acc_clipped']} accelerometer, {facts['gyr_clipped']} gyroscope samples",

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..report.units import accelerometer, with_std
+from ..report.use import left_to_subtract
 from ..result import ACCELEROMETER_FORMULA, GOOD, REFUSED, USABLE, Calibration
 from ..sinks.file import BLOB, DOCUMENT, REPORT
 
@@ -52,7 +53,7 @@ def formula(calibration: Calibration) -> str:
     """The calibrated acceleration, with its numbers."""
     rows = [
         f"  [{' '.join(f'{value:+.6f}' for value in row)}]   y_{axis} {-bias:+.5f}"
-        for axis, row, bias in zip(AXES, np.linalg.inv(calibration.D), calibration.b_a, strict=True)
+        for axis, row, bias in zip(AXES, np.linalg.inv(calibration.D), left_to_subtract(calibration), strict=True)
     ]
     return "\n".join([f"{ACCELEROMETER_FORMULA} [m/s²]", *rows])
 
