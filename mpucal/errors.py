@@ -7,6 +7,7 @@ MpucalError
 │   ├── CaptureError         a capture that is damaged, or does not hold what was asked of it
 │   ├── BusError             a transfer failed
 │   │   ├── NoAnswer         nothing acknowledged the address, or sent a heartbeat
+│   │   ├── KeepsNothing     the bridge's firmware has no memory for a calibration
 │   │   ├── BusHeld          a wire is held low, so that every transfer takes its time-out
 │   │   └── LinkError        the link to a vehicle broke, or cannot be used
 │   └── ChipError            the chip answers, but not as its register map says
@@ -69,6 +70,10 @@ class NoAnswer(BusError):  # noqa: N818 - reads as the sentence it is
 
 class LinkError(BusError):
     """The link to a vehicle broke, or cannot be used."""
+
+
+class KeepsNothing(BusError):  # noqa: N818 - reads as the sentence it is
+    """The bridge's firmware has no memory for a calibration."""
 
 
 class BusHeld(BusError):  # noqa: N818 - reads as the sentence it is

@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from ..data import Recording
-from ..errors import SourceError, UsageError, WriteBackError
+from ..errors import KeepsNothing, SourceError, UsageError, WriteBackError
 from ..result import REFUSED, Calibration
 from ..sinks.file import DOCUMENT, result_files, save
 from ..sinks.sink import Applied
@@ -84,12 +84,14 @@ def written_back(
     yes: bool,
     folder: Path,
     record: Callable[[str, Calibration], Calibration],
+    asked: Sequence[str] = (),
 ) -> Iterator[Applied]:
     """Write to each sink in turn, and save what is applied then; nothing of a calibration that was refused.
 
     Parameters
     ----------
     words : the options that name the source, with gravity and model. record : see recorder.
+    asked : the sinks that --to named: a bridge whose firmware keeps nothing is no failure unless it was.
 
     Raises
     ------
@@ -101,6 +103,9 @@ def written_back(
                 ask(f"Write the calibration to {sink.where}?", yes)
                 applied = write_to(sink, calibration, folder, partial(record, name))
         except SourceError as error:
+            if isinstance(error, KeepsNothing) and name not in asked:
+                click.echo(f"mpucal: {error.what}: the result is in files alone.", err=True)
+                continue
             raise WriteBackError(f"nothing was written to the {name}: {error.what}", error.remedy) from error
         calibration = applied.calibration
         yield applied

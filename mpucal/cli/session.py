@@ -85,7 +85,7 @@ def command(
     record = recorder(place.folder, calibration, recording, source.truth)
     words = {**options, "gravity": source.plan.gravity, "model": source.plan.model, "store": False}
     try:
-        for applied in written_back(names, calibration, words, yes, place.folder, record):
+        for applied in written_back(names, calibration, words, yes, place.folder, record, sinks):
             calibration = applied.calibration
             click.echo(f"Done: {applied.what}.", err=as_json)
     finally:

@@ -13,7 +13,7 @@ from mpucal.capture import load
 from mpucal.cli import write_back
 from mpucal.cli.destination import destinations, recorder, said, written_back
 from mpucal.cli.write import TARGETS
-from mpucal.errors import BusError, OutputError, UsageError, WriteBackError
+from mpucal.errors import BusError, KeepsNothing, OutputError, UsageError, WriteBackError
 from mpucal.result import Calibration
 from mpucal.sinks.sink import Applied
 
@@ -164,6 +164,22 @@ def test_a_device_that_is_gone_is_a_write_back_that_failed(tmp_path, monkeypatch
     calibration = Calibration(np.eye(3), BIAS, quality=GOOD)
     with pytest.raises(WriteBackError, match="nothing was written to the bridge"):
         list(written_back(("bridge",), calibration, {}, True, tmp_path, lambda name, now: now))
+
+
+@pytest.mark.parametrize("asked", [(), ("bridge",)], ids=["by default", "asked for"])
+def test_a_bridge_that_keeps_nothing_is_a_failure_where_it_was_asked_for(tmp_path, monkeypatch, capsys, asked):
+    def keeps_nothing(words):
+        raise KeepsNothing("the firmware of the bridge on x keeps no calibration", "flash another")
+
+    monkeypatch.setitem(TARGETS, "bridge", keeps_nothing)
+    calibration = Calibration(np.eye(3), BIAS, quality=GOOD)
+    writing = written_back(("bridge",), calibration, {}, True, tmp_path, lambda name, now: now, asked)
+    if asked:
+        with pytest.raises(WriteBackError):
+            list(writing)
+    else:
+        assert list(writing) == []
+        assert "in files alone" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("answer", ["y\n", "n\n", None], ids=["yes", "no", "no terminal"])

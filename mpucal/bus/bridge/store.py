@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from ...chip.registers import WHO_AM_I
-from ...errors import BusError
+from ...errors import BusError, KeepsNothing
 from ...wire.blob import Blob, BlobError
 from ...wire.messages import (
     MAX_CHUNK,
@@ -122,7 +122,7 @@ class Store:
 
     def _check(self) -> None:
         if not self._link.bridge.features & Feature.BLOB:
-            raise BusError(*without_blob(self.name))
+            raise KeepsNothing(*without_blob(self.name))
 
     def _done(self, kind: type[R], *requests: Message) -> list[R]:
         return [self._expect(answers[-1].reply, kind) for answers in self._link.ask(*requests)]
