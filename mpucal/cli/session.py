@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from ..errors import RefusedError
 from ..mavlink.calibrate import calibrate_vehicle
 from ..result import REFUSED, Calibration
 from ..runner import Runner
+from ..sinks.sink import Applied
 from .destination import destinations, recorder, said, sink_options, written_back
 from .on_parts import open_resumed
 from .opened import Opened
@@ -55,15 +57,8 @@ def command(
     anything to calibrate; 5: the calibration was refused; 6: the write-back was refused or failed.
     """
     resume: Path | None = options.pop("resume")
-    if resume is None:
-        check_source(click.get_current_context())
-        names = destinations(sinks, no_write, options)
-        source = opened(options)
-    else:
-        check_resumed(click.get_current_context())
-        resumed = open_resumed(resume, open_again)
-        source, folder, options = resumed, resume, {**options, **resumed.live.words}
-        names = destinations(sinks, no_write, options)
+    source, names, options = _opened(resume, options, sinks, no_write)
+    folder = resume or folder
     person = console(quiet=yes, as_json=json_events, beep=beep, title=source_name(options))
     place = Place(folder, source.capture_name, again=resume is not None)
     finished = False
@@ -84,15 +79,33 @@ def command(
         click.echo(f"{summary(calibration)}\n\n{written([place.capture, *paths])}")
     record = recorder(place.folder, calibration, recording, source.truth)
     words = {**options, "gravity": source.plan.gravity, "model": source.plan.model, "store": False}
+    _report(calibration, written_back(names, calibration, words, yes, place.folder, record, sinks), as_json)
+    return RefusedError.exit_code if calibration.verdict == REFUSED else 0
+
+
+def _opened(
+    resume: Path | None, options: dict[str, Any], sinks: tuple[str, ...], no_write: bool
+) -> tuple[Opened, tuple[str, ...], dict[str, Any]]:
+    """The source, the sinks that the result goes to, and the options that name the source."""
+    if resume is None:
+        check_source(click.get_current_context())
+        names = destinations(sinks, no_write, options)
+        return opened(options), names, options
+    check_resumed(click.get_current_context())
+    source = open_resumed(resume, open_again)
+    options = {**options, **source.live.words}
+    return source, destinations(sinks, no_write, options), options
+
+
+def _report(calibration: Calibration, writing: Iterator[Applied], as_json: bool) -> None:
+    """Write to the sinks, and say what was done; whatever becomes of that, there is a result."""
     try:
-        for applied in written_back(names, calibration, words, yes, place.folder, record, sinks):
+        for applied in writing:
             calibration = applied.calibration
             click.echo(f"Done: {applied.what}.", err=as_json)
     finally:
-        # whatever becomes of the write-back, there is a result
         if as_json:
             click.echo(calibration.json(), nl=False)
-    return RefusedError.exit_code if calibration.verdict == REFUSED else 0
 
 
 def _settle(place: Place, runner: Runner) -> None:
