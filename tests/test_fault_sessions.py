@@ -20,7 +20,7 @@ def outcome():
     sys.path.remove(str(TOOLS))
 
 
-@settings(max_examples=3, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=2, deadline=None, suppress_health_check=list(HealthCheck))
 @given(
     faults=st.lists(
         st.builds(Fault, st.sampled_from(sorted(KINDS)), st.floats(0, 60).map(lambda t: round(t, 2))),

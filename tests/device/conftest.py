@@ -55,6 +55,15 @@ class Device:
         self._process.stdin.flush()
         self._process.stdout.readline()
 
+    @contextmanager
+    def but_for(self, adapter):
+        """Another adapter for as long as the context lasts; see harness/adapter.py."""
+        self.tell(adapter=adapter)
+        try:
+            yield
+        finally:
+            self.tell(adapter={"address": 0x68, "bound": [], "fails": 0})
+
     def run(self, *command) -> Result:
         """Any program."""
         words = [str(word) for word in command]

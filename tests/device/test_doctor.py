@@ -14,8 +14,14 @@ def examined(mocked, *words):
     return result, {finding["topic"]: finding for finding in json.loads(result.out)["findings"]} if words else {}
 
 
-def test_a_sound_chip_is_told_on_a_page(device):
-    result, _ = examined(device("sim:seed=3"))
+@pytest.fixture(scope="module")
+def sound(device_of_module):
+    """A device on which nothing is amiss; who changes it puts that right."""
+    return device_of_module("sim:seed=3")
+
+
+def test_a_sound_chip_is_told_on_a_page(sound):
+    result, _ = examined(sound)
     assert result.code == 0
     lines = result.out.splitlines()
     assert len(lines) < 40
@@ -41,10 +47,9 @@ def test_a_chip_under_another_name_is_recognised(device):
     ],
     ids=["nobody", "bound", "stuck"],
 )
-def test_what_stands_in_the_way_is_told(device, adapter, topic, words):
-    mocked = device()
-    mocked.tell(adapter=adapter)
-    result, findings = examined(mocked, "--json")
+def test_what_stands_in_the_way_is_told(sound, adapter, topic, words):
+    with sound.but_for(adapter):
+        result, findings = examined(sound, "--json")
     assert result.code == 3
     assert words in findings[topic]["what"]
     assert findings["bus"]["mark"] == "bad"
@@ -59,11 +64,10 @@ def test_no_permission_comes_with_what_to_do(device):
     assert "usermod -aG i2c" in findings["device file"]["remedy"]
 
 
-def test_a_slow_bus_comes_with_the_setting_that_helps(device):
-    mocked = device()
-    mocked.configure(100_000)
-    mocked.tell(adapter={"address": 0x50})
-    _, findings = examined(mocked, "--json")
+def test_a_slow_bus_comes_with_the_setting_that_helps(sound):
+    sound.configure(100_000)
+    with sound.but_for({"address": 0x50}):
+        _, findings = examined(sound, "--json")
     assert "100 kHz" in findings["adapter"]["what"]
     assert "i2c_arm_baudrate=400000" in findings["adapter"]["remedy"]
 
