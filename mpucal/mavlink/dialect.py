@@ -54,6 +54,11 @@ class Parser:
         self._buffer = bytearray()
         self.refused = 0
 
+    @property
+    def signed_at(self) -> int:
+        """When the newest packet was signed [10 us since 2015]; 0 where none was."""
+        return int(self._mav.signing.timestamp)
+
     def datagram(self, data: bytes) -> list[Packet]:
         """The packets of a datagram, which holds whole packets or is damaged."""
         self._buffer = bytearray()

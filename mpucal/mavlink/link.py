@@ -50,6 +50,7 @@ class Link:
         self._record = record
         self._mav = dialect().MAVLink(None, OWN_SYSTEM, OWN_COMPONENT)
         self._now_ns = transport.now_ns()
+        self._key = key
         if key is not None:
             self._sign(key)
         self._parsers: dict[str, Parser] = {}
@@ -176,10 +177,11 @@ class Link:
         self._now_ns = max(self._now_ns, until_ns)
 
     def _parsed(self, received: Bytes) -> list[_Arrived]:
-        # before its bytes are looked at: a stranger shall not touch what signatures are compared with
         if self._vehicle is not None and received.address != self._vehicle.address:
             return []
-        parser = self._parsers.setdefault(received.address, Parser(self._mav))
+        if received.address not in self._parsers:
+            self._parsers[received.address] = Parser(self._receiver())
+        parser = self._parsers[received.address]
         parse = parser.datagram if self._transport.datagrams else parser.stream
         return [_Arrived(received.t_ns, received.address, packet) for packet in parse(received.data)]
 
@@ -207,6 +209,10 @@ class Link:
             self._record(self._now_ns, data)
 
     def _packed(self, message: Message) -> bytes:
+        if self._vehicle is not None and self._vehicle.address in self._parsers:
+            # what is a minute older than its own signatures a vehicle refuses
+            newest = self._parsers[self._vehicle.address].signed_at
+            self._mav.signing.timestamp = max(self._mav.signing.timestamp, newest)
         data = bytes(message.pack(self._mav))
         self._mav.seq = (self._mav.seq + 1) % SEQUENCE
         return data
@@ -222,6 +228,15 @@ class Link:
             self.lost += step - 1
         elif step:
             self.lost = max(self.lost - 1, 0)
+
+    def _receiver(self) -> Any:
+        """A MAVLink for one address, as pymavlink remembers a signature's time before it has checked the signature.
+
+        From 1970 on: without a battery or a satellite, a vehicle's clock goes on where it once stopped.
+        """
+        mav = dialect().MAVLink(None, OWN_SYSTEM, OWN_COMPONENT)
+        mav.signing.secret_key = self._key
+        return mav
 
     def _sign(self, key: bytes) -> None:
         signing = self._mav.signing

@@ -118,6 +118,33 @@ def test_with_the_key_both_sides_sign(script, station, decoded):
     assert all(decoded(data).get_header().incompat_flags & 1 for _, _, data in transport.sent)
 
 
+def test_a_vehicle_whose_clock_stood_still_is_believed(script, station):
+    vehicle, now_s = station(key=KEY), 1_750_000_000
+    vehicle.mav.signing.timestamp = 7
+    transport = script([(now_s + 0.5, HOME, vehicle.heartbeat())])
+    transport._now_ns = now_s * S
+    assert len(Link(transport, lambda t_ns, data: None, KEY).listen()) == 1
+
+
+def test_our_signatures_are_not_older_than_the_vehicles(script, station):
+    vehicle = station(key=KEY)
+    vehicle.mav.signing.timestamp = ahead = 1 << 44
+    transport = script(heartbeats(vehicle, HOME))
+    link, _ = locked(transport, KEY)
+    list(link.messages(5 * S))
+    assert transport.sent
+    # MAVLink 2 signing: link id, 6 bytes of time, 6 of signature at the packet's end
+    assert all(int.from_bytes(data[-12:-6], "little") >= ahead for _, _, data in transport.sent)
+
+
+def test_who_forges_signatures_meanwhile_does_not_silence_the_vehicle(script, station):
+    vehicle, forger = station(key=KEY), station(key=b"x" * 32)
+    forger.mav.signing.timestamp = 1 << 47
+    transport = script(in_order(heartbeats(vehicle, HOME), heartbeats(forger, STRANGER, 4)))
+    found = Link(transport, lambda t_ns, data: None, KEY).listen()
+    assert [each.address for each in found] == [HOME]
+
+
 def test_a_vehicle_that_signs_is_noticed_where_we_do_not(script, station):
     link, _ = locked(script(heartbeats(station(key=KEY), HOME)))
     list(link.messages(5 * S))
