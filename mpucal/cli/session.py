@@ -64,7 +64,9 @@ def command(
     finished = False
     try:
         with running(source, place.capture, person) as runner:
-            person.say(f"  {said(names, no_write)}")
+            # a program that reads the events finds it in calibration.json
+            if not json_events:
+                person.say(f"  {said(names, no_write)}")
             try:
                 recording = runner.measure()
             finally:
