@@ -31,7 +31,7 @@ CAPTURE = "capture.tlog"
 SESSION, END = "session", "end"
 MPUCAL, RECORDED, SOURCE, PLAN, SYSTEM = "mpucal", "recorded", "source", "plan", "system"
 # counts up with every change of what the source sends and believes
-SOURCE_VERSION = 1
+SOURCE_VERSION = 2
 NOTE_IDS = 65535
 
 

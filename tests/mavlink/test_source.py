@@ -91,18 +91,19 @@ def test_a_still_quantised_gyro_is_not_believed_to_be_without_noise():
     assert recording.flat is not None
 
 
-@pytest.mark.parametrize("fault", ["loss", "reorder", "duplicate"])
-def test_faults_of_the_line_leave_samples_in_order(fault):
+# the loss is told once 2000 packets were sent: 10 s of two IMUs
+@pytest.mark.parametrize(("fault", "seconds"), [("loss", 12), ("reorder", 3), ("duplicate", 3)])
+def test_faults_of_the_line_leave_samples_in_order(fault, seconds):
     source, _, said = opened(f"fault={fault}")
     source.start()
-    t = polled(source, 12)
+    t = polled(source, seconds)
     assert (np.diff(t) > 0).all()
     recording = source.recording()
     assert (np.diff(recording.t) > 0).all()
     assert not recording.gap.any()
     # late samples are missing while it measures, and in their places at the end
     lost = 0.2 if fault == "loss" else 0.0
-    assert len(recording) == pytest.approx((1.0 - lost) * 1200, abs=150)
+    assert len(recording) == pytest.approx((1.0 - lost) * (seconds + 1) * 100, rel=0.1)
     assert [text for text in said if "loses" in text] == ([f for f in said if "% of the packets" in f] if lost else [])
 
 
@@ -123,6 +124,14 @@ def test_a_vehicle_that_falls_silent_is_one_sentence():
     source.start()
     with pytest.raises(LinkError, match=r"system 1 \(ArduPilot\) at the simulated vehicle has sent nothing for 4 s"):
         polled(source, 30)
+
+
+def test_arming_is_said_at_once_and_does_not_end_it():
+    source, _, said = opened("imus=1,fault=arm@8")
+    source.start()
+    polled(source, 8)
+    assert [text for text in said if "was armed: keep clear of its propellers" in text] == said[1:]
+    assert len(said) == 2
 
 
 def test_a_reboot_is_noticed(script, station):
