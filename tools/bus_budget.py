@@ -1,6 +1,6 @@
 """How much of a 400 kHz bus the driver takes, whether it keeps up, and how well it knows the sample rate.
 
-    python tools/bus_budget.py [CAPTURE.mcap]
+    python tools/bus_budget.py [CAPTURE.mcap] [--seconds 3600] [--seeds 100]
 
 The share is counted from the transactions, as the simulated chip's driver makes them or as a capture holds them: a
 transfer takes 27 bits of addresses and register, 3 of start, repeated start and stop, and 9 a byte. Samples are
@@ -9,9 +9,10 @@ numbered, so that a lost one is seen.
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -108,8 +109,13 @@ def rate_error_ppm(rate_hz: float, seconds: float, seeds: int) -> float:
 
 def main() -> None:
     """Print it all."""
-    if len(sys.argv) > 1:
-        records = read_capture(sys.argv[1]).records
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("capture", type=Path, nargs="?", help="count its transactions instead")
+    parser.add_argument("--seconds", type=float, default=3600.0, help="how long the long run takes, of simulated time")
+    parser.add_argument("--seeds", type=int, default=100, help="how often each rate is measured")
+    options = parser.parse_args()
+    if options.capture is not None:
+        records = read_capture(options.capture).records
         print(f"{share([r for r in records if isinstance(r, Transaction)]):.1%} of a 400 kHz bus, with the start")
         return
     for model, late_s in (("mpu6050", 0.020), ("mpu6500", 0.010)):
@@ -120,10 +126,12 @@ def main() -> None:
                 f" {lost(recording)} of {len(recording)} samples lost, {of_processor:.1%} of a processor"
             )
     for model, late_s in (("mpu6050", 0.020), ("mpu6500", 0.010)):
-        recording, _, _ = run(model, 1000, 3600.0, late_s)
-        print(f"{model}, an hour at 1000 Hz: {lost(recording)} of {len(recording)} samples lost")
+        recording, _, _ = run(model, 1000, options.seconds, late_s)
+        missing = f"{lost(recording)} of {len(recording)} samples lost"
+        print(f"{model}, {options.seconds:.0f} s at 1000 Hz: {missing}", flush=True)
     for rate_hz, seconds in ((1000, 10), (200, 10), (1000, 30)):
-        print(f"rate at {rate_hz} Hz after {seconds} s: {rate_error_ppm(rate_hz, seconds, 100):.1f} ppm rms, 100 seeds")
+        ppm = rate_error_ppm(rate_hz, seconds, options.seeds)
+        print(f"rate at {rate_hz} Hz after {seconds} s: {ppm:.1f} ppm rms, {options.seeds} seeds", flush=True)
 
 
 if __name__ == "__main__":

@@ -41,6 +41,8 @@ def examine_host(path: str) -> Iterator[Finding]:
     """What can be said of `path`, an adapter's device file, before any chip on it was asked anything."""
     number = path.rpartition("-")[2]
     yield _device_file(Path(path))
+    if not Path(path).exists():
+        return
     yield from _adapter(number)
     yield from _kernel_drivers(number)
     yield from _who_answers(path)
