@@ -35,6 +35,8 @@ from mpucal.mavlink.url import parse_url
 HERE = Path(__file__).parent
 MPUCAL = Path(sys.executable).parent / "mpucal"
 AT_ONCE = 2
+# of what mpucal said, where it is not as expected
+LINES = 12
 # a session takes little more than a minute, of a vehicle whose time stands still where the machine is busy
 PATIENCE_S = 600
 OFFSET_MPS2, SCALE = 0.01, 0.001
@@ -126,6 +128,8 @@ def run(trial: Trial, port: str, folder: Path) -> bool:
     elif trial.system is not None:
         lines.append("it holds its old parameters" if new == old else "IT HOLDS OTHER PARAMETERS THAN BEFORE")
         good &= new == old
+    if not good:
+        lines += done.stderr.splitlines()[-LINES:]
     print("\n  ".join([f"{'as expected' if good else 'NOT AS EXPECTED'}: {trial.name}", *lines]), flush=True)
     return good
 
