@@ -15,7 +15,8 @@ AXES = "XYZ"
 IMUS = 3
 SLOTS = 4
 # by name rather than as a list, which slows every stream: what one does not hold it does not answer (ArduPilot)
-ROUND_NS, ROUNDS = S, 4
+# a name is given up after so many rounds without any: over a radio that loses a packet in five each way, once in 10,000
+ROUND_NS, SILENT_ROUNDS = S // 2, 8
 AT_ONCE = 12
 
 
@@ -58,7 +59,8 @@ def read_parameters(link: Link, names: Sequence[str], firmware: str) -> dict[str
 
 def _some(link: Link, names: Sequence[str], firmware: str) -> dict[str, float]:
     held: dict[str, float] = {}
-    for _ in range(ROUNDS):
+    silent = 0
+    while silent < SILENT_ROUNDS:
         missing = [name for name in names if name not in held]
         _request(link, missing)
         before = len(held)
@@ -66,8 +68,7 @@ def _some(link: Link, names: Sequence[str], firmware: str) -> dict[str, float]:
             _take(message, held, names, firmware)
             if len(held) == len(names):
                 return held
-        if held and len(held) == before:
-            break
+        silent = silent + 1 if len(held) == before else 0
     return held
 
 

@@ -8,6 +8,7 @@ from mpucal.errors import LinkError, UsageError
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.names import ardupilot_place, mounting
 from mpucal.mavlink.replay import Replay
+from mpucal.mavlink.shaping import read_shaping, shaping_names
 from mpucal.mavlink.simulated import Options, Vehicle
 from mpucal.mavlink.simulated.transport import SimulatedTransport
 from mpucal.mavlink.source import VehicleSource
@@ -70,6 +71,14 @@ def test_the_parameters_that_shape_the_stream_are_read_first():
     parameters = source.recording().autopilot.parameters
     assert parameters["INS_ACCOFFS_X"] == 0.25
     assert {"AHRS_ORIENTATION", "INS_ACC2SCAL_Z"} <= set(parameters)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_parameter_is_given_up_where_one_packet_in_five_is_lost(seed):
+    vehicle = Vehicle(Options.parse(f"sim:imus=1,fault=loss,seed={seed}"))
+    link = Link(SimulatedTransport(vehicle), lambda t_ns, data: None)
+    link.lock(link.listen()[0])
+    assert set(read_shaping(link, ARDUPILOT)) == set(shaping_names(ARDUPILOT))
 
 
 def test_the_angles_of_a_board_that_is_turned_by_its_own_are_asked_for():
