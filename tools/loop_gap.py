@@ -60,10 +60,16 @@ class Timed:
 
 
 class Nobody:
-    """Hears everything and says nothing."""
+    """Says nothing; at the first prompt, when the chip is set up, the count of looks begins."""
+
+    def __init__(self, bus: Timed) -> None:
+        self._bus: Timed | None = bus
 
     def hear(self, _output: Output) -> None:
-        """Nothing."""
+        """Begin to count."""
+        if self._bus is not None:
+            self._bus.looks_ns.clear()
+        self._bus = None
 
     def pressed(self) -> Sequence[Key]:
         """Nothing."""
@@ -83,7 +89,7 @@ def measure(rate_hz: float, seconds: float, fits: bool) -> Measured:
     chip = open_simulated("sim:pace=real", seed=1)
     bus = Timed(chip, seconds)
     plan = Plan(Config(rate_hz=rate_hz), target="best")
-    runner = Runner(Driver(bus, plan.config), Nobody(), lambda *_: None, plan, (chip.hear,))
+    runner = Runner(Driver(bus, plan.config), Nobody(bus), lambda *_: None, plan, (chip.hear,))
     restored: Callable[..., object] = Live.ask
     if not fits:
         Live.ask = lambda *_: None  # type: ignore[method-assign]
