@@ -12,7 +12,7 @@ from ..data import Recording
 from .gyro import K_MEAN, K_SD, WALD_99, at_prior, wald
 from .hand import fit_hand
 from .initialise import initialise
-from .likelihood import NAMES, Problem, Series
+from .likelihood import Problem, Series
 from .masks import mask
 from .minimise import Minimum, Prior, minimise
 from .model import Fit, Flat
@@ -104,19 +104,4 @@ def _prior(flat: Flat) -> Prior:
 
 
 def _as_fit(minimum: Minimum) -> Fit:
-    theta, parameters = minimum.theta, len(minimum.H)
-    covariance = minimum.covariance()
-    names = NAMES[:parameters]
-    return Fit(
-        D=theta.D,
-        b_a=theta.b_a,
-        b_omega=theta.b_omega,
-        K=theta.K,
-        names=names,
-        covariance=covariance,
-        iterations=minimum.iterations,
-        converged=minimum.converged,
-        nis=minimum.nis,
-        V=minimum.V,
-        at_prior=at_prior(covariance) if parameters > ACCEL else (),
-    )
+    return minimum.as_fit(at_prior(minimum.covariance()) if len(minimum.H) > ACCEL else ())

@@ -17,7 +17,7 @@ from ..data import Recording
 from .gyro import K_MEAN, K_SD, WALD_99, at_prior, wald
 from .initialise import initialise
 from .likelihood import NAMES, Problem, Theta, evaluate, value
-from .minimise import Minimum, Prior, minimise
+from .minimise import Prior, minimise
 from .model import Fit, Flat
 from .moves import q_scale_of_moves
 from .scene import CORRELATION_S, FLOOR_MPS2, Scene, prepare
@@ -72,7 +72,8 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
         doubt = replace(doubt, series=replace(doubt.series, q_scale=problem.series.q_scale))
         fisher = evaluate(doubt, minimum.theta, len(NAMES)).fisher
         minimum = replace(minimum, H=fisher + np.diag(prior.precision))
-    return _as_fit(minimum, iterations)
+    known = at_prior(minimum.covariance()) if minimum.free.all() else ()
+    return replace(minimum, iterations=iterations).as_fit(known)
 
 
 def _with_doubted_moves(problem: Problem, scene: Scene, theta: Theta) -> Problem:
@@ -134,22 +135,3 @@ def _near(sigma: float) -> tuple[float, ...]:
     """The neighbours of a sigma on the grid, itself among them, zero excepted."""
     at = WHITE_MPS2.index(sigma)
     return WHITE_MPS2[max(at - 1, 1) : at + 3]
-
-
-def _as_fit(minimum: Minimum, iterations: int) -> Fit:
-    theta, free = minimum.theta, minimum.free
-    covariance = minimum.covariance()
-    names = tuple(name for name, kept in zip(NAMES, free, strict=True) if kept)
-    return Fit(
-        D=theta.D,
-        b_a=theta.b_a,
-        b_omega=theta.b_omega,
-        K=theta.K,
-        names=names,
-        covariance=covariance[np.ix_(free, free)],
-        iterations=iterations,
-        converged=minimum.converged,
-        nis=minimum.nis,
-        V=minimum.V,
-        at_prior=at_prior(covariance) if free.all() else (),
-    )

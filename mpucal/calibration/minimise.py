@@ -8,6 +8,7 @@ import numpy as np
 
 from ..data import Vector
 from .likelihood import NAMES, Evaluation, Problem, Theta, evaluate
+from .model import Fit
 
 DECREMENT = 1e-3  # g' H^-1 g / 2: 0.04 standard deviations from the optimum, whatever the units
 LAST = 30.0  # so near, a whole step leaves a thousandth of the decrement: nobody need look back
@@ -64,6 +65,23 @@ class Minimum:
         free = np.ix_(self.free, self.free)
         covariance[free] = _inverse(self.H[free])
         return covariance
+
+    def as_fit(self, at_prior: tuple[str, ...] = (), spread: float = 1.0) -> Fit:
+        """The estimate of the free parameters, with `spread` times the standard deviations of H [1]."""
+        theta, covariance = self.theta, spread**2 * self.covariance()
+        return Fit(
+            D=theta.D,
+            b_a=theta.b_a,
+            b_omega=theta.b_omega,
+            K=theta.K,
+            names=tuple(name for name, kept in zip(NAMES, self.free, strict=False) if kept),
+            covariance=covariance[np.ix_(self.free, self.free)],
+            iterations=self.iterations,
+            converged=self.converged,
+            nis=self.nis,
+            V=self.V,
+            at_prior=at_prior,
+        )
 
 
 def minimise(

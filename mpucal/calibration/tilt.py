@@ -63,20 +63,8 @@ def _prior(flat: Flat) -> Prior:
 
 
 def _as_fit(minimum: Minimum) -> Fit:
-    theta, covariance = minimum.theta, HONEST**2 * minimum.covariance()
+    covariance = HONEST**2 * minimum.covariance()
     before = np.concatenate([np.where(np.eye(3) > 0, GAIN_SD, LEAN_SD).ravel(), np.full(3, BIAS_SD_MPS2)])
     sd = np.sqrt(np.maximum(np.diag(covariance)[:12], 0.0))
     left = tuple(name for name, open_ in zip(D_NAMES + B_A_NAMES, sd > KNOWN * before, strict=True) if open_)
-    return Fit(
-        D=theta.D,
-        b_a=theta.b_a,
-        b_omega=theta.b_omega,
-        K=theta.K,
-        names=NAMES,
-        covariance=covariance,
-        iterations=minimum.iterations,
-        converged=minimum.converged,
-        nis=minimum.nis,
-        V=minimum.V,
-        at_prior=(*left, *at_prior(covariance)),
-    )
+    return minimum.as_fit((*left, *at_prior(covariance)), spread=HONEST)
