@@ -6,6 +6,7 @@ accesses. DRIVER_VERSION counts up with every change of them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import suppress
 from enum import Enum, auto
@@ -37,8 +38,10 @@ HELD_NS = 500_000_000
 # Long after a frame is written, and no whole number of sample intervals.
 FRAME_WRITTEN_NS = 300_000
 
-# An overflow drops the oldest bytes, so a FIFO this full may have lost its frames' alignment.
-SPARE_BYTES = 3 * reg.FRAME_BYTES
+# An overflow drops the oldest bytes, so a FIFO so many frames short of full may have lost its frames' alignment.
+SPARE_FRAMES = 3
+# a host that was late once or twice says nothing about the bus
+OVERFLOWS = 3
 
 # INT_ENABLE, the DMP's status and INT_STATUS in one read: INT_ENABLE is 0 in a chip that was reset meanwhile
 STATUS_BYTES = reg.INT_STATUS - reg.INT_ENABLE + 1
@@ -80,6 +83,8 @@ class Driver:
         self._next_poll_ns = 0
         self._need = Need.NOTHING
         self._fruitless_ns = 0
+        self._overflows = 0
+        self._frame_ns = math.inf
 
     def now_ns(self) -> int:
         """The bus's clock as last seen."""
@@ -118,7 +123,7 @@ class Driver:
 
         Raises
         ------
-        BusError, ChipError : what prevented samples for two seconds.
+        BusError, ChipError : what prevented samples for two seconds. BusError : a bus too slow for the rate.
         """
         begun_ns = self._port.now_ns
         running = self._running
@@ -126,12 +131,13 @@ class Driver:
         trouble: BusError | ChipError | None = None
         try:
             if self._need is Need.NOTHING:
-                self._need = self._drain(running.part.family.fifo_bytes)
+                self._need = self._drain(running)
             if self._need is not Need.NOTHING:
                 self._recover(running)
         except (BusError, ChipError) as error:
             trouble = error
             self._plan_next_poll()
+        self._check_pace(running)
         samples = self._decoder.take()
         self._fruitless_ns = 0 if len(samples) else self._fruitless_ns + self._spent_ns(begun_ns, trouble)
         if self._fruitless_ns > DEAD_NS:
@@ -168,21 +174,35 @@ class Driver:
             " taken it away, and this calibration is of the chip without it"
         )
 
-    def _drain(self, fifo_bytes: int) -> Need:
+    def _drain(self, settings: Settings) -> Need:
         """Read all whole frames, and say what they need to be believed."""
-        count = self._fifo_count()
+        count, begun_ns = self._fifo_count(settings.frame_bytes), self._port.now_ns
         self._plan_next_poll()
-        if count >= fifo_bytes - SPARE_BYTES:
+        if count >= settings.part.family.fifo_bytes - SPARE_FRAMES * settings.frame_bytes:
+            self._overflows += 1
             return Need.RESTART
-        frames = count // reg.FRAME_BYTES
+        frames = count // settings.frame_bytes
         try:
             if frames:
-                self._port.read_once(reg.FIFO_R_W, frames * reg.FRAME_BYTES)
+                self._port.read_once(reg.FIFO_R_W, frames * settings.frame_bytes)
             self._port.read_once(reg.INT_ENABLE, STATUS_BYTES)
         except BusError:
             # the bytes, or the flag, that went by are gone: a second read would begin within a frame
             return Need.RESTART
+        if frames:
+            self._frame_ns = min(self._frame_ns, (self._port.now_ns - begun_ns) / frames)
+        self._overflows += self._decoder.fault is Fault.OVERFLOW
         return _CURES.get(self._decoder.fault, Need.SET_UP)
+
+    def _check_pace(self, settings: Settings) -> None:
+        """Raise BusError where frames come faster than even the quickest look took them, and not by chance."""
+        rate_hz = settings.nominal_rate_hz
+        if self._overflows < OVERFLOWS or self._frame_ns * rate_hz < 1e9 or self._frame_ns == math.inf:
+            return
+        raise BusError(
+            f"the bus moves {1e9 / self._frame_ns:.0f} samples a second, where the chip takes {rate_hz:g}",
+            "run it at 400 kHz (`dtparam=i2c_arm_baudrate=400000` on a Raspberry Pi), or take a lower --rate",
+        )
 
     def _recover(self, settings: Settings) -> None:
         """Start the FIFO anew; before that, set up a chip that has lost its settings or repeats itself."""
@@ -204,13 +224,13 @@ class Driver:
         configure(self._port, settings)
 
     def _restart(self) -> None:
-        restart_fifo(self._port)
+        restart_fifo(self._port, self._running)
         self._need = Need.NOTHING
         self._plan_next_poll()
 
-    def _fifo_count(self) -> int:
+    def _fifo_count(self, frame_bytes: int) -> int:
         count = int.from_bytes(self._port.read(reg.FIFO_COUNT_H, 2), "big")
-        if count % reg.FRAME_BYTES:
+        if count % frame_bytes:
             # the chip is writing a frame, or has slipped
             self._port.sleep(FRAME_WRITTEN_NS)
             count = int.from_bytes(self._port.read(reg.FIFO_COUNT_H, 2), "big")

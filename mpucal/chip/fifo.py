@@ -1,7 +1,8 @@
 """FIFO bytes to samples: aligned or not, clipped or not, and when. Knows no bus and no register.
 
 A frame is 14 bytes, big-endian int16 in register order: accelerometer x, y, z, temperature, gyroscope x, y, z
-(RM-MPU-6000A r4.2, registers 59 to 72 and 116).
+(RM-MPU-6000A r4.2, registers 59 to 72 and 116); of the accelerometer alone it is the first six. Those have no
+temperature to be told by where they begin: there a part of a frame tells, since what slips is bytes.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +46,7 @@ class Fault(StrEnum):
 
 @dataclass(frozen=True)
 class _Run:
-    """Frames (n, 7) that follow each other, the first of them number `first` of `segment`."""
+    """Frames (n, 7 or 3) that follow each other, the first of them number `first` of `segment`."""
 
     segment: int
     first: int
@@ -71,7 +73,7 @@ class FifoDecoder:
         self._pending = bytearray()
         self._last_t_s: float | None = None
         self._stuck_frames = max(STUCK_FRAMES, math.ceil(STUCK_S * settings.nominal_rate_hz))
-        self._alike = np.zeros((0, reg.FRAME_WORDS), np.int16)
+        self._alike = np.zeros((0, settings.frame_words), np.int16)
 
     def temperature(self, count: int) -> None:
         """The temperature register shows `count`: what an aligned frame will show too."""
@@ -79,7 +81,7 @@ class FifoDecoder:
 
     def counted(self, t_ns: int, count_bytes: int) -> None:
         """The FIFO held `count_bytes` at `t_ns`."""
-        frames, self._odd_bytes = divmod(count_bytes, reg.FRAME_BYTES)
+        frames, self._odd_bytes = divmod(count_bytes, self._settings.frame_bytes)
         self._pending.clear()
         self._look = (t_ns, self._read + frames)
 
@@ -99,9 +101,9 @@ class FifoDecoder:
             return Fault.LOST
         if overflow:
             return Fault.OVERFLOW
-        if self._odd_bytes or len(data) % reg.FRAME_BYTES:
+        if self._odd_bytes or len(data) % self._settings.frame_bytes:
             return Fault.MISALIGNED
-        frames = np.frombuffer(data, ">i2").reshape(-1, reg.FRAME_WORDS).astype(np.int16)
+        frames = np.frombuffer(data, ">i2").reshape(-1, self._settings.frame_words).astype(np.int16)
         kept = frames[max(DROPPED_FRAMES - self._read, 0) :]
         if not self._aligned(kept):
             return Fault.MISALIGNED
@@ -157,13 +159,13 @@ class FifoDecoder:
         samples = self._samples(self._runs, final=True)
         sensor = self._settings.sensor
         if len(samples):
-            mean_c = float(samples.temperature_c.mean())
+            mean_c = self._last_c if self._settings.accel_alone else float(samples.temperature_c.mean())
             sensor = replace(sensor, rate_hz=self._clock.rate_hz, temperature_c=mean_c)
         arrays = {f.name: getattr(samples, f.name) for f in fields(Samples)}
         return Recording(**arrays, sensor=sensor, name=name)
 
     def _aligned(self, frames: Counts) -> bool:
-        if not len(frames):
+        if not len(frames) or self._settings.accel_alone:
             return True
         temperature = frames[:, TEMPERATURE].astype(np.int64)
         before = temperature[0] if self._temperature is None else self._temperature
@@ -179,18 +181,35 @@ class FifoDecoder:
         if not runs:
             return Samples.empty()
         frames = np.concatenate([run.frames for run in runs])
-        family, settings = self._settings.part.family, self._settings
+        settings = self._settings
         gap = np.zeros(len(frames), bool)
         gap[np.cumsum([0] + [len(run.frames) for run in runs[:-1]])] = [run.gap for run in runs]
-        return Samples(
+        alone = Samples(
             t=self._times_s(runs, final),
             acc=frames[:, ACCEL] * settings.mps2_per_lsb,
-            gyr=frames[:, GYRO] * reg.rad_s_per_lsb(settings.fs_sel),
-            temperature_c=frames[:, TEMPERATURE] / family.lsb_per_c + family.zero_c,
+            gyr=np.full((len(frames), 3), np.nan),
+            temperature_c=np.full(len(frames), np.nan),
             gap=gap,
             acc_clipped=_clipped(frames[:, ACCEL]),
+            gyr_clipped=np.zeros(len(frames), bool),
+        )
+        if settings.accel_alone:
+            return alone
+        return replace(
+            alone,
+            gyr=frames[:, GYRO] * reg.rad_s_per_lsb(settings.fs_sel),
+            temperature_c=self._celsius(frames[:, TEMPERATURE]),
             gyr_clipped=_clipped(frames[:, GYRO]),
         )
+
+    def _celsius(self, counts: Any) -> Any:
+        family = self._settings.part.family
+        return counts / family.lsb_per_c + family.zero_c
+
+    @property
+    def _last_c(self) -> float | None:
+        """What the temperature register showed last."""
+        return None if self._temperature is None else float(self._celsius(self._temperature))
 
     def _times_s(self, runs: list[_Run], final: bool) -> Vector:
         lengths = [len(run.frames) for run in runs]

@@ -78,7 +78,11 @@ PWR_MGMT_1_SLEEP: Final = 0x40
 PWR_MGMT_1_CLKSEL: Final = 0x07
 CLKSEL_PLL: Final = 0x01
 
+# PWR_MGMT_2
+STANDBY_GYRO: Final = 0x07
+
 # One FIFO frame, in register order: accelerometer x, y, z, temperature, gyroscope x, y, z, big-endian int16.
+ACCEL_WORDS: Final = 3
 FRAME_WORDS: Final = 7
 FRAME_BYTES: Final = 2 * FRAME_WORDS
 
@@ -95,6 +99,8 @@ GYRO_OFFSET_LSB_PER_DPS: Final = 32.75
 
 DLPF_CODES: Final = (0, 1, 2, 3, 4, 5, 6)
 MAX_RATE_HZ: Final = 1000.0
+# ACCEL_FCHOICE_B takes the accelerometer past its filter, and the gyroscope no longer sets the pace in standby
+ACCEL_ALONE_HZ: Final = 4000.0
 
 
 def mps2_per_lsb(afs_sel: int) -> float:
@@ -130,6 +136,7 @@ def sample_rate_divider(rate_hz: float, dlpf_cfg: int) -> int:
     if not math.isclose(nearest, rate_hz, rel_tol=1e-6):
         raise UsageError(
             f"the chip has no sample rate of {rate_hz:g} Hz with its low-pass filter at {dlpf_cfg}",
-            f"take {nearest:g} Hz, or another {base:g} Hz / n from {base / 256:.4g} to {MAX_RATE_HZ:g} Hz",
+            f"take {nearest:g} Hz, or another {base:g} Hz / n from {base / 256:.4g} to {MAX_RATE_HZ:g} Hz, or"
+            f" {ACCEL_ALONE_HZ:g} Hz of an MPU-6500's accelerometer alone",
         )
     return int(divider)

@@ -23,6 +23,7 @@ class Settings:
     ----------
     part : the chip. smplrt_div, dlpf_cfg : sample rate and low-pass filter, as registers hold them.
     fs_sel, afs_sel : full scale of gyroscope and accelerometer, 0..3.
+    accel_alone : the accelerometer at ACCEL_ALONE_HZ past its filter, the gyroscope in standby.
     """
 
     part: Part
@@ -30,11 +31,27 @@ class Settings:
     dlpf_cfg: int
     fs_sel: int
     afs_sel: int
+    accel_alone: bool = False
 
     @property
     def nominal_rate_hz(self) -> float:
         """The sample rate of a chip whose clock is right; none is."""
-        return reg.sample_rate_hz(self.smplrt_div, self.dlpf_cfg)
+        return reg.ACCEL_ALONE_HZ if self.accel_alone else reg.sample_rate_hz(self.smplrt_div, self.dlpf_cfg)
+
+    @property
+    def fifo_en(self) -> int:
+        """What goes into the FIFO."""
+        return reg.FIFO_EN_ACCEL if self.accel_alone else reg.FIFO_EN_FRAME
+
+    @property
+    def frame_words(self) -> int:
+        """How many words that makes a sample."""
+        return reg.ACCEL_WORDS if self.accel_alone else reg.FRAME_WORDS
+
+    @property
+    def frame_bytes(self) -> int:
+        """The same in bytes."""
+        return 2 * self.frame_words
 
     @property
     def mps2_per_lsb(self) -> float:
@@ -48,20 +65,23 @@ class Settings:
             chip=self.part.chip,
             who_am_i=self.part.who_am_i,
             accel_range_g=reg.ACCEL_RANGES_G[self.afs_sel] / self.part.accel_sensitivity,
-            gyro_range_dps=float(reg.GYRO_RANGES_DPS[self.fs_sel]),
+            gyro_range_dps=None if self.accel_alone else float(reg.GYRO_RANGES_DPS[self.fs_sel]),
             rate_hz=self.nominal_rate_hz,
         )
 
     def registers(self) -> dict[int, int]:
         """What each register is to hold, in the order of writing."""
         values = {
+            reg.PWR_MGMT_2: reg.STANDBY_GYRO if self.accel_alone else 0,
+            # a chip that was reset meanwhile is told by it, too: it is 0 then
+            reg.INT_ENABLE: reg.INT_FIFO_OFLOW,
             reg.SMPLRT_DIV: self.smplrt_div,
             reg.CONFIG: self.dlpf_cfg,
             reg.GYRO_CONFIG: self.fs_sel << reg.FULL_SCALE_SHIFT,
             reg.ACCEL_CONFIG: self.afs_sel << reg.FULL_SCALE_SHIFT,
         }
         if self.part.family.has_accel_config2:
-            values[reg.ACCEL_CONFIG2] = self.dlpf_cfg
+            values[reg.ACCEL_CONFIG2] = reg.ACCEL_FCHOICE_B if self.accel_alone else self.dlpf_cfg
         return values
 
     @classmethod
@@ -85,4 +105,5 @@ class Settings:
             dlpf_cfg=held[reg.CONFIG] & reg.CONFIG_DLPF_CFG,
             fs_sel=(held[reg.GYRO_CONFIG] & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT,
             afs_sel=(held[reg.ACCEL_CONFIG] & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT,
+            accel_alone=held.get(reg.PWR_MGMT_2, 0) & reg.STANDBY_GYRO == reg.STANDBY_GYRO,
         )

@@ -51,7 +51,7 @@ def configure(port: Port, settings: Settings) -> None:
     ------
     ChipError : a register does not keep what was written.
     """
-    wanted, chip = _wanted(settings), settings.part.chip
+    wanted, chip = settings.registers(), settings.part.chip
     for register, value in wanted.items():
         port.write(register, value)
     for register, value in wanted.items():
@@ -67,10 +67,10 @@ def configure(port: Port, settings: Settings) -> None:
 def configured(port: Port, settings: Settings) -> bool:
     """Whether the chip still holds what `configure` wrote, and is awake."""
     awake = port.read(reg.PWR_MGMT_1, 1)[0] == reg.CLKSEL_PLL
-    return awake and all(port.read(register, 1)[0] == value for register, value in _wanted(settings).items())
+    return awake and all(port.read(register, 1)[0] == value for register, value in settings.registers().items())
 
 
-def restart_fifo(port: Port) -> None:
+def restart_fifo(port: Port, settings: Settings) -> None:
     """Empty the FIFO and fill it anew; it resets only while it is disabled (RM-MPU-6000A r4.2, register 106).
 
     Raises
@@ -83,9 +83,9 @@ def restart_fifo(port: Port) -> None:
     port.write(reg.USER_CTRL, reg.USER_CTRL_FIFO_EN)
     port.read(reg.INT_STATUS, 1)
     port.read(reg.TEMP_OUT_H, 2)
-    port.write(reg.FIFO_EN, reg.FIFO_EN_FRAME)
+    port.write(reg.FIFO_EN, settings.fifo_en)
     held = port.read(reg.FIFO_EN, 1) + port.read(reg.USER_CTRL, 1)
-    if held != bytes([reg.FIFO_EN_FRAME, reg.USER_CTRL_FIFO_EN]):
+    if held != bytes([settings.fifo_en, reg.USER_CTRL_FIFO_EN]):
         raise ChipError(
             f"the chip's FIFO does not start (FIFO_EN and USER_CTRL read {held.hex(' ')})",
             "check its wiring and supply, and that no other program uses it",
@@ -96,8 +96,3 @@ def quiet(port: Port) -> None:
     """The FIFO off; the chip stays awake."""
     port.write(reg.FIFO_EN, 0)
     port.write(reg.USER_CTRL, 0)
-
-
-def _wanted(settings: Settings) -> dict[int, int]:
-    """By register, in the order of writing. INT_ENABLE also tells a chip that was reset: it is 0 then."""
-    return {reg.PWR_MGMT_2: 0, reg.INT_ENABLE: reg.INT_FIFO_OFLOW, **settings.registers()}

@@ -24,7 +24,7 @@ def disturbed(bench, stream, model="mpu6050", config=None):
 
 @pytest.mark.parametrize(
     "config",
-    [Config(), Config(accel_range_g=16, gyro_range_dps=2000, dlpf=0), Config(rate_hz=1000, poll_s=0.01)],
+    [Config(), Config(accel_range_g=16, gyro_range_dps=2000, dlpf=1), Config(rate_hz=1000, poll_s=0.01)],
     ids=["default", "wide", "fast"],
 )
 @pytest.mark.parametrize("model", ["mpu6050", "mpu6500", "clone98"])

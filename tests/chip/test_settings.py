@@ -18,6 +18,7 @@ settings = st.builds(
     dlpf_cfg=st.integers(0, 6),
     fs_sel=st.integers(0, 3),
     afs_sel=st.integers(0, 3),
+    accel_alone=st.booleans(),
 )
 
 
@@ -37,7 +38,7 @@ def test_other_bits_of_the_registers_do_not_matter(chosen, noise):
 
 def test_register_values_of_the_map():
     chosen = Settings(part_of(0x70), smplrt_div=4, dlpf_cfg=3, fs_sel=1, afs_sel=2)
-    assert chosen.registers() == {0x19: 4, 0x1A: 3, 0x1B: 0x08, 0x1C: 0x10, 0x1D: 3}
+    assert chosen.registers() == {0x6C: 0, 0x38: 0x10, 0x19: 4, 0x1A: 3, 0x1B: 0x08, 0x1C: 0x10, 0x1D: 3}
     assert chosen.nominal_rate_hz == 200
     assert (chosen.sensor.gyro_range_dps, chosen.sensor.accel_range_g) == (500, 8)
 

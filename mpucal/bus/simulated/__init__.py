@@ -35,7 +35,7 @@ def open_simulated(
     Parameters
     ----------
     text : `sim`, or with keys: chip, who_am_i, offsets, seed, hand, pace, fault, rate_error_ppm, D, b_a, K,
-        b_omega, noise, temperature_c. gravity : m/s^2, where the board is. seed : beside the text.
+        b_omega, noise, temperature_c, khz. gravity : m/s^2, where the board is. seed : beside the text.
     clock : time in place of `pace`'s, where something else moves the bus.
 
     Raises
@@ -53,7 +53,7 @@ def open_simulated(
     chip = Chip(model, SensorFeed(truth, motion, of_noise), truth.rate_error_ppm, factory)
     clock = clock or CLOCKS[options.pace]()
     faults = Faults(options.fault, chip, clock, of_faults) if options.fault else None
-    return SimulatedBus(chip, clock, motion, truth, faults)
+    return SimulatedBus(chip, clock, motion, truth, faults, options.khz)
 
 
 def open_recorded(

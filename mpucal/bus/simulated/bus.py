@@ -13,7 +13,7 @@ from .hand import Prompt
 from .motion import Motion
 from .sensor import Truth
 
-BIT_NS = 2500  # at 400 kHz
+KHZ = 400
 NAME, ADDRESS = "the simulated bus", 0x68
 
 
@@ -24,7 +24,7 @@ class SimulatedBus:
     ----------
     chip : the only one on it. clock : its time.
     motion, truth : what moves the chip's sensor and what is true of it; None for a recording's counts.
-    faults : what goes wrong with chip and bus.
+    faults : what goes wrong with chip and bus. khz : how fast it moves bits.
     """
 
     def __init__(
@@ -34,8 +34,10 @@ class SimulatedBus:
         motion: Motion | None = None,
         truth: Truth | None = None,
         faults: Faults | None = None,
+        khz: float = KHZ,
     ) -> None:
         self._chip, self._clock, self._motion, self._truth, self._faults = chip, clock, motion, truth, faults
+        self._bit_ns = round(1e6 / khz)
 
     def read(self, register: int, count: int) -> Reply:
         """`count` bytes from `register` on, and when the read began.
@@ -47,7 +49,7 @@ class SimulatedBus:
         t_ns = self._begun()
         data = self._arriving(self._chip.read(register, count, t_ns))
         # two addresses and the register, start, repeated start and stop, then the data
-        self._clock.spend((27 + 3 + 9 * count) * BIT_NS)
+        self._clock.spend((27 + 3 + 9 * count) * self._bit_ns)
         return Reply(data, t_ns)
 
     def write(self, register: int, data: bytes) -> int:
@@ -59,7 +61,7 @@ class SimulatedBus:
         """
         t_ns = self._begun()
         self._chip.write(register, self._arriving(data), t_ns)
-        self._clock.spend((18 + 2 + 9 * len(data)) * BIT_NS)
+        self._clock.spend((18 + 2 + 9 * len(data)) * self._bit_ns)
         return t_ns
 
     def sleep_until(self, t_ns: int) -> None:

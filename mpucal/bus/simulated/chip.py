@@ -9,6 +9,7 @@ import numpy as np
 
 from ...chip import registers as reg
 from ...chip.access import EndOfCapture
+from ...chip.fifo import GYRO
 from ...data import Vector
 from .factory import Factory, Three
 from .feed import Feed
@@ -16,8 +17,10 @@ from .fifo import Fifo
 from .models import Model
 from .sensor import Counts, Setting
 
-# A write to one of these starts the sample clock anew.
+# A write to one of these starts the sample clock anew,
 SAMPLING = frozenset((reg.SMPLRT_DIV, reg.CONFIG, reg.PWR_MGMT_1))
+# and to one of these where it changes the rate.
+PACING = frozenset((reg.PWR_MGMT_2, reg.ACCEL_CONFIG2))
 
 
 class Chip:
@@ -95,7 +98,7 @@ class Chip:
         self._setting = None
         if address == reg.ACCEL_CONFIG2 and self._model.fifo_size_bits:
             self._fifo.size = self._model.family.fifo_bytes << (value >> 6)
-        if address in SAMPLING and changed:
+        if (address in SAMPLING and changed) or (address in PACING and self._rate() != self._rate_hz):
             self._start_clock(t_ns)
 
     def _user_control(self, value: int) -> int:
@@ -135,8 +138,22 @@ class Chip:
 
     def _start_clock(self, t_ns: int) -> None:
         self._start_ns, self._taken = t_ns, 0
+        self._rate_hz = self._rate()
+
+    def _rate(self) -> float:
+        """Nominal samples a second."""
         divider, dlpf = self._registers[reg.SMPLRT_DIV], self._registers[reg.CONFIG] & reg.CONFIG_DLPF_CFG
-        self._rate_hz = reg.sample_rate_hz(divider, dlpf)
+        if not self._model.family.has_accel_config2:
+            return reg.sample_rate_hz(divider, dlpf)
+        if self._in_standby() and self._registers[reg.ACCEL_CONFIG2] & reg.ACCEL_FCHOICE_B:
+            return reg.ACCEL_ALONE_HZ
+        # RM-MPU-9250A, register 25: what comes from the filter at 8 kHz is not divided
+        base_hz = reg.base_rate_hz(dlpf)
+        return base_hz if base_hz > reg.MAX_RATE_HZ else reg.sample_rate_hz(divider, dlpf)
+
+    def _in_standby(self) -> bool:
+        """Whether the gyroscope is."""
+        return self._registers[reg.PWR_MGMT_2] & reg.STANDBY_GYRO == reg.STANDBY_GYRO
 
     def _advance(self, t_ns: int) -> None:
         """Take the samples that are due."""
@@ -179,6 +196,8 @@ class Chip:
 
     def _measure(self, edges_s: Vector) -> Counts:
         counts = self._feed.samples(edges_s, self._how())
+        if self._in_standby():
+            counts[:, GYRO] = 0
         self._ended = len(counts) < len(edges_s) - 1
         if len(counts) and edges_s[0] * 1e9 < self._frozen_until_ns:
             self._frozen = counts[:1] if self._frozen is None else self._frozen

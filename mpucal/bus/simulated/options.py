@@ -10,6 +10,7 @@ import numpy as np
 
 from ...data import Vector
 from ...errors import UsageError
+from .bus import KHZ
 from .clock import CLOCKS
 from .faults import KINDS as FAULTS
 from .faults import Fault
@@ -28,6 +29,7 @@ class Options:
     seed : of the sensor, its noise and the hand. rate_error_ppm : how fast the sample clock runs.
     D, K : (3, 3). b_a [m/s^2], b_omega [rad/s] : (3,).
     fault : what goes wrong, and when. noise : times the data sheet's densities. temperature_c : of the die.
+    khz : how fast the bus is.
     """
 
     chip: str = "mpu6050"
@@ -44,6 +46,7 @@ class Options:
     fault: tuple[Fault, ...] = ()
     noise: float = 1.0
     temperature_c: float | None = None
+    khz: float = KHZ
 
     @classmethod
     def parse(cls, text: str, seed: int | None = None) -> Self:
@@ -88,6 +91,12 @@ def _number(text: str) -> float:
 
 def _not_negative(text: str) -> float:
     if (value := _number(text)) < 0:
+        raise ValueError(text)
+    return value
+
+
+def _positive(text: str) -> float:
+    if (value := _number(text)) <= 0:
         raise ValueError(text)
     return value
 
@@ -142,4 +151,5 @@ PARSERS: dict[str, tuple[Callable[[str], Any], str]] = {
     "b_omega": (_vector, "three numbers with / between them, in rad/s"),
     "noise": (_not_negative, "a number from 0 on"),
     "temperature_c": (_number, "a number of degrees Celsius"),
+    "khz": (_positive, "a number above 0"),
 }
