@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -63,7 +64,7 @@ class Scene:
         white = 2.0 * FLOOR_CORRELATION_S / self._dt * floor**2 * self.motion
         return self._with(jerk=jerk, r_extra=self.pose + white)
 
-    @property
+    @cached_property
     def _dt(self) -> float:
         return float(np.median(self.problem.series.dt))
 

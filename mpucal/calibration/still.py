@@ -60,13 +60,12 @@ def without_drift(recording: Recording, flat: Flat, runs: Runs) -> Recording:
     if len(runs) < 2:
         return recording
     t = np.array([0.5 * (recording.t[a] + recording.t[b - 1]) for a, b in runs])
-    bias = np.empty_like(recording.gyr)
-    for i in range(3):
-        parts = [recording.gyr[a:b, i] for a, b in runs]
-        n = np.array([len(part) for part in parts])
-        tremor = np.maximum([part.var() for part in parts] - 1.2 * flat.Sigma_omega[i], 0.0)
-        variance = flat.Sigma_omega[i] / n + tremor * np.minimum(1.0, 2.0 * TREMOR_S * recording.rate_hz / n)
-        bias[:, i] = np.interp(recording.t, t, _smoothed(t, np.array([part.mean() for part in parts]), variance))
+    n = (runs[:, 1] - runs[:, 0])[:, None]
+    rests = [recording.gyr[a:b].T for a, b in runs]
+    tremor = np.maximum([[axis.var() for axis in rest] for rest in rests] - 1.2 * flat.Sigma_omega, 0.0)
+    variance = flat.Sigma_omega / n + tremor * np.minimum(1.0, 2.0 * TREMOR_S * recording.rate_hz / n)
+    walk = _smoothed(t, np.array([[axis.mean() for axis in rest] for rest in rests]), variance)
+    bias = np.stack([np.interp(recording.t, t, column) for column in walk.T], axis=1)
     return replace(recording, gyr=recording.gyr - bias + flat.b_omega)
 
 
@@ -87,22 +86,20 @@ def _runs(mask: Mask) -> Runs:
 
 
 def _smoothed(t: Vector, mean: Vector, variance: Vector) -> Vector:
-    """(k,) the random walk behind measurements of given variance, of the likeliest density."""
-    return min((_random_walk(t, mean, variance, q) for q in RANDOM_WALKS), key=lambda result: result[0])[1]
+    """(k, 3) the random walks behind the rows of measurements (k, 3) of given variance, each of the likeliest density.
 
-
-def _random_walk(t: Vector, mean: Vector, variance: Vector, q: float) -> tuple[float, Vector]:
-    """Minus twice the log-likelihood, and the smoothed states (k,)."""
-    k = len(t)
-    m, P, m_before, P_before = (np.empty(k) for _ in range(4))
-    cost = 0.0
-    m[0], P[0] = mean[0], variance[0]
+    All densities go side by side; (k, 3, q) in between.
+    """
+    k, q = len(t), RANDOM_WALKS
+    m, P, m_before, P_before = (np.empty((k, 3, len(q))) for _ in range(4))
+    cost = np.zeros((3, len(q)))
+    m[0], P[0] = mean[0, :, None], variance[0, :, None]
     for i in range(1, k):
         m_before[i], P_before[i] = m[i - 1], P[i - 1] + q * (t[i] - t[i - 1])
-        S = P_before[i] + variance[i]
-        gain, e = P_before[i] / S, mean[i] - m_before[i]
-        cost += float(np.log(S) + e * e / S)
+        S = P_before[i] + variance[i, :, None]
+        gain, e = P_before[i] / S, mean[i, :, None] - m_before[i]
+        cost += np.log(S) + e * e / S
         m[i], P[i] = m_before[i] + gain * e, (1.0 - gain) * P_before[i]
     for i in range(k - 2, -1, -1):
         m[i] += P[i] / P_before[i + 1] * (m[i + 1] - m_before[i + 1])
-    return cost, m
+    return np.asarray(m[:, np.arange(3), cost.argmin(1)])
