@@ -41,9 +41,8 @@ def _run(arguments: Sequence[str] | None) -> int:
     except MpucalError as error:
         click.echo(f"mpucal: {error}", err=True)
         return error.exit_code
-    except BrokenPipeError:
-        # who read the results has left; Python would complain again while it flushes
-        sys.stdout = None
+    except SystemExit:
+        # click's own end where who read the results has left: that is no error
         return 0
     except Exception:
         import traceback  # noqa: PLC0415

@@ -61,6 +61,10 @@ class Source(Protocol):
         """All samples so far, with their final times."""
         ...
 
+    def forget(self) -> None:
+        """Let go of all samples so far: `recording` holds what comes from now on, for hours if need be."""
+        ...
+
     def now_ns(self) -> int:
         """The source's clock, in which the samples' times are."""
         ...

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -67,7 +68,9 @@ class CaptureWriter:
             self._file = self._path.open("wb")
         except OSError as error:
             raise self._cannot_write(error) from error
-        self._writer = Writer(self._file, compression=CompressionType.ZSTD, enable_data_crcs=True)
+        # the chunks' index grows by 4 MB an hour: in vain where nothing is kept
+        chunked = self._path != Path(os.devnull)
+        self._writer = Writer(self._file, compression=CompressionType.ZSTD, enable_data_crcs=True, use_chunking=chunked)
         self._channels: dict[str, int] = {}
         self._chunk_began_ns: int | None = None
 

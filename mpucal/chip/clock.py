@@ -99,13 +99,14 @@ class SampleClock:
     def __init__(self, nominal_hz: float) -> None:
         self._nominal_hz = nominal_hz
         self._segments: list[_Segment] = []
+        self._forgotten = 0
         self._past_spread_s2 = 0.0
         self._past_product_s = 0.0
 
     @property
     def segment(self) -> int:
         """Which run of samples without a gap is going on."""
-        return len(self._segments) - 1
+        return self._forgotten + len(self._segments) - 1
 
     def begin_segment(self) -> None:
         """What follows has an offset of its own: it is the first, or samples were lost before it."""
@@ -113,6 +114,13 @@ class SampleClock:
             self._past_spread_s2 += self._segments[-1].spread_s2
             self._past_product_s += self._segments[-1].product_s
         self._segments.append(_Segment())
+
+    def forget(self) -> None:
+        """Let go of all segments but the one that is going on, and of its single looks."""
+        self._forgotten += len(self._segments[:-1])
+        self._segments = self._segments[-1:]
+        for each in self._segments:
+            each.looks.clear()
 
     def look(self, t_ns: int, taken: int) -> None:
         """At `t_ns` the chip had taken `taken` samples of this segment."""
@@ -128,6 +136,7 @@ class SampleClock:
 
     def times_s(self, segment: NDArray[np.int64], index: NDArray[np.int64]) -> Vector:
         """Times (n,) of the samples number `index` (n,), from 0 in their `segment` (n,); each was looked at."""
+        segment = segment - self._forgotten
         t_mean_s = np.array([s.t_mean_s for s in self._segments])
         taken_mean = np.array([s.taken_mean for s in self._segments])
         return np.asarray(t_mean_s[segment] + (index + 0.5 - taken_mean[segment]) / self.rate_hz, np.float64)
@@ -136,7 +145,7 @@ class SampleClock:
         """The same with all that is known: each piece of a clock whose rate changed keeps its own."""
         pieces = [
             (number, line)
-            for number, each in enumerate(self._segments)
+            for number, each in enumerate(self._segments, self._forgotten)
             if each.looks
             for line in lines(*np.array(each.looks, np.float64).T * [[NS], [1.0]])
         ]

@@ -95,6 +95,11 @@ class Decoder:
         """The samples since the last `take`, with the times that are known now."""
         return self._fifo.take() if self._fifo is not None else Samples.empty()
 
+    def forget(self) -> None:
+        """Let go of all that was taken: `recording` holds what comes from now on."""
+        if self._fifo is not None:
+            self._fifo.forget()
+
     def recording(self) -> Recording:
         """All samples so far, with the best times there are."""
         if self._fifo is None:

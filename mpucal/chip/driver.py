@@ -148,6 +148,10 @@ class Driver:
         """Everything so far, with the best times there are and the measured rate and temperature."""
         return self._decoder.recording()
 
+    def forget(self) -> None:
+        """Let go of all samples so far: `recording` holds what comes from now on."""
+        self._decoder.forget()
+
     def stop(self) -> None:
         """Quiet the FIFO, if the bus still works; the chip stays awake."""
         with suppress(BusError, EndOfCapture):

@@ -66,6 +66,7 @@ class FifoDecoder:
         self._clock = SampleClock(settings.nominal_rate_hz)
         self._runs: list[_Run] = []
         self._taken = 0
+        self._begun = False
         self._temperature: int | None = None
         self._read = 0
         self._look: tuple[int, int] | None = None
@@ -125,6 +126,7 @@ class FifoDecoder:
         if believed:
             first = self._read - len(kept)
             self._runs.append(_Run(self._clock.segment, first, kept[:believed], gap=self._gap_before(first)))
+            self._begun = True
 
     def _stuck(self, kept: Counts) -> bool:
         """Whether a frame repeats itself for too long."""
@@ -154,6 +156,12 @@ class FifoDecoder:
         self._last_t_s = float(t[-1])
         return replace(samples, t=t)
 
+    def forget(self) -> None:
+        """Let go of all that was taken: `recording` holds what comes from now on."""
+        self._runs, self._taken = self._runs[self._taken :], 0
+        if not self._runs:
+            self._clock.forget()
+
     def recording(self, name: str) -> Recording:
         """All samples so far with the best times there are, and the sensor with its measured rate."""
         samples = self._samples(self._runs, final=True)
@@ -175,7 +183,7 @@ class FifoDecoder:
         return True
 
     def _gap_before(self, first: int) -> bool:
-        return first == DROPPED_FRAMES and bool(self._runs)
+        return first == DROPPED_FRAMES and self._begun
 
     def _samples(self, runs: list[_Run], final: bool = False) -> Samples:
         if not runs:

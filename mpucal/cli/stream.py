@@ -35,7 +35,8 @@ EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.j
 def command(calibration: Path, file: Path | None, seconds: float | None, as_json: bool, **options: Any) -> None:
     """Print calibrated samples, m/s² and rad/s, until Ctrl-C, --seconds or the source's end.
 
-    Times are as first known: a capture's decoding knows them better.
+    Each sample is printed as it comes, and then forgotten: it may run for as long as it likes. Times are as first
+    known: a capture's decoding knows them better.
     """
     check_source(click.get_current_context())
     if options["replay"] is not None:
@@ -54,6 +55,7 @@ def command(calibration: Path, file: Path | None, seconds: float | None, as_json
                 ready = _correction(applied, measuring.source)
             write(ready.apply(samples))
             sys.stdout.flush()
+            measuring.source.forget()
 
 
 def _polled(source: Source, seconds: float | None) -> Iterator[Samples]:

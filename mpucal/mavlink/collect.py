@@ -54,6 +54,10 @@ class Gathered:
         self._newest_us = t_us
         return row, jump
 
+    def forget(self) -> None:
+        """Let go of all that was kept."""
+        self._rows.clear()
+
     def times_us(self) -> Vector:
         """(n,) us, increasing."""
         return np.array(sorted(self._rows), dtype=np.float64)
@@ -98,6 +102,11 @@ class Gatherer:
         """See Gathered.add."""
         gathered = self.streams.setdefault(reading.stream, Gathered(reading.stream))
         return gathered.add(reading, received_ns)
+
+    def forget(self) -> None:
+        """Let go of all that was kept."""
+        for gathered in self.streams.values():
+            gathered.forget()
 
     def chosen(self, order: Sequence[str]) -> list[Gathered]:
         """The stream of each IMU to believe, by IMU.

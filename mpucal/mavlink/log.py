@@ -73,6 +73,11 @@ class Log:
             self.segments[-1].gatherer.add(content, received_ns)
         return row, jump
 
+    def forget(self) -> None:
+        """Let go of all readings so far, and go on under the same parameters."""
+        self.segments = self.segments[-1:]
+        self.segments[0].gatherer.forget()
+
     def recording(self, name: str) -> Recording:
         """The first IMU's recording of the longest segment, with the others' in `others`.
 

@@ -39,6 +39,10 @@ class RecordedSource:
         """All of it."""
         return self._recording
 
+    def forget(self) -> None:
+        """Let go of what was polled."""
+        self._recording, self._at = self._recording.part(self._at, len(self._recording)), 0
+
     def now_ns(self) -> int:
         """The samples' clock."""
         return round(self._now_s * 1e9)

@@ -106,6 +106,10 @@ class VehicleSource:
         """All samples so far, late ones in their places; the other IMUs' in its `others`."""
         return self._log.recording(self._name)
 
+    def forget(self) -> None:
+        """Let go of all samples so far: `recording` holds what comes from now on."""
+        self._log.forget()
+
     def now_ns(self) -> int:
         """The vehicle's clock: that of the last sample, and what the link's clock counted since."""
         if self._last_us is None:

@@ -12,6 +12,7 @@ from mpucal.chip.config import Config
 from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
 from mpucal.chip.port import TRIES
+from mpucal.data import Samples
 from mpucal.errors import BusError, BusHeld, ChipError, NoAnswer
 
 CHIPS = ["mpu6050", "mpu6500", "clone98"]
@@ -456,3 +457,24 @@ def test_whatever_happens_samples_are_true_in_order_and_gaps_are_marked(
     assert (np.diff(numbers(recording)) >= 1).all()
     assert (np.diff(recording.t) > 0).all()
     assert same(decode(desk.transactions), recording)
+
+
+def test_samples_that_are_forgotten_are_the_same_samples(bench):
+    """With an overflow amid them, which begins a new segment of the clock's."""
+
+    def polled(forget):
+        desk = bench()
+        driver = desk.driver()
+        driver.start()
+        for number in range(40):
+            if number == 20:
+                desk.clock.spend(3_000_000_000)
+            yield driver.poll()
+            if forget:
+                driver.forget()
+                assert not len(driver.recording())
+
+    kept, forgotten = Samples.joined(list(polled(False))), Samples.joined(list(polled(True)))
+    assert kept.gap.sum() == 1
+    for name in Samples.__dataclass_fields__:
+        np.testing.assert_array_equal(getattr(kept, name), getattr(forgotten, name))

@@ -1,4 +1,4 @@
-"""`mpucal apply` and `mpucal stream`: the formula on every kind of file, and no bias that is removed twice."""
+"""`mpucal apply`: the formula on every kind of file, and no bias that is removed twice."""
 
 import json
 from dataclasses import replace
@@ -140,25 +140,3 @@ def test_nothing_is_written_over_the_recording(mpucal, session, calibration):
 )
 def test_what_is_not_there_is_3(mpucal, calibration, words):
     assert mpucal(*words).code == 3
-
-
-def test_a_stream_is_calibrated(mpucal, session):
-    words = ("stream", "--bus", "sim:seed=3", "--seconds", "3", "--apply", session.folder / "calibration.json")
-    lines = mpucal(*words, "--json", "-o", "stream.mcap").out.splitlines()
-    made = Calibration.load(session.folder / "calibration.json")
-    recording = load("stream.mcap")
-    a, w = made.apply(recording.acc, recording.gyr)
-    rows = [json.loads(line) for line in lines]
-    assert len(rows) > 400
-    np.testing.assert_allclose([row["a"] for row in rows], a[: len(rows)], atol=1e-12)
-    np.testing.assert_allclose([row["w"] for row in rows], w[: len(rows)], atol=1e-12)
-    table = mpucal(*words).out.splitlines()
-    assert table[0] == "t,ax,ay,az,gx,gy,gz,temperature_c"
-    np.testing.assert_allclose([float(v) for v in table[1].split(",")[1:4]], rows[0]["a"], atol=1e-12)
-
-
-def test_a_capture_does_not_stream(mpucal, session):
-    words = ("--replay", session.folder / "capture.mcap", "--apply", session.folder / "calibration.json")
-    done = mpucal("stream", *words)
-    assert done.code == 2
-    assert "mpucal apply" in done.err

@@ -1,0 +1,98 @@
+"""`mpucal stream`: calibrated samples as they come, for hours if need be, to whoever still listens."""
+
+import io
+import json
+import os
+import subprocess
+import sys
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from mpucal.__main__ import run
+from mpucal.capture import load
+from mpucal.result import Calibration
+
+D = np.array([[1.021, 0.013, -0.007], [-0.009, 0.987, 0.021], [0.004, -0.016, 1.034]])
+B_A = np.array([0.31, -0.22, 1.08])
+
+
+def test_a_stream_is_calibrated(mpucal, made):
+    words = ("stream", "--bus", "sim:seed=3", "--seconds", "3", "--apply", made)
+    lines = mpucal(*words, "--json", "-o", "stream.mcap").out.splitlines()
+    recording = load("stream.mcap")
+    a, w = Calibration.load(made).apply(recording.acc, recording.gyr)
+    rows = [json.loads(line) for line in lines]
+    assert len(rows) > 400
+    np.testing.assert_allclose([row["a"] for row in rows], a[: len(rows)], atol=1e-12)
+    np.testing.assert_allclose([row["w"] for row in rows], w[: len(rows)], atol=1e-12)
+    table = mpucal(*words).out.splitlines()
+    assert table[0] == "t,ax,ay,az,gx,gy,gz,temperature_c"
+    np.testing.assert_allclose([float(v) for v in table[1].split(",")[1:4]], rows[0]["a"], atol=1e-12)
+
+
+def test_a_capture_does_not_stream(mpucal, made):
+    words = ("--replay", "capture.mcap", "--apply", made)
+    done = mpucal("stream", *words)
+    assert done.code == 2
+    assert "mpucal apply" in done.err
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    path = tmp_path_factory.mktemp("made") / "calibration.json"
+    Calibration(D, B_A, quality={"verdict": "good", "reasons": []}).save(path)
+    return path
+
+
+class Weighing(io.StringIO):
+    """A reader that keeps nothing, and each time it is given something weighs what was kept since the first time."""
+
+    def __init__(self):
+        super().__init__()
+        self.weights = []
+
+    def write(self, text):
+        return len(text)
+
+    def flush(self):
+        if not tracemalloc.is_tracing():
+            tracemalloc.start()
+        self.weights.append(tracemalloc.get_traced_memory()[0])
+
+
+@pytest.mark.parametrize(
+    ("source", "seconds", "kept"),
+    [(("--bus", "sim:seed=3"), 20, 170_000), (("--mavlink", "sim"), 5, 500_000)],
+    ids=["chip", "vehicle"],
+)
+def test_memory_does_not_grow(made, monkeypatch, source, seconds, kept):
+    """Kept, the second half's samples would weigh as much as `kept`, a share of which is left to chance."""
+    listener = Weighing()
+    monkeypatch.setattr(sys, "stdout", listener)
+    words = ["stream", *source, "--apply", str(made), "--seconds", str(seconds)]
+    try:
+        assert run(words) == 0
+    finally:
+        tracemalloc.stop()
+    weights = listener.weights
+    assert len(weights) > 20
+    assert max(weights[len(weights) // 2 :]) - max(weights[: len(weights) // 2]) < kept / 4
+
+
+def test_a_line_comes_at_once_and_a_closed_pipe_is_no_error(made):
+    """At 10 samples a second a pipe's 8 KiB would fill in six seconds."""
+    words = ["stream", "--bus", "sim:seed=3,pace=real", "--rate", "10"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "mpucal", *words, "--apply", made],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as program:
+        first = os.read(program.stdout.fileno(), 1 << 16)
+        program.stdout.close()
+        said = program.stderr.read().decode()
+        assert program.wait(20) == 0, said
+    assert first.startswith(b"t,ax,ay,az,gx,gy,gz")
+    assert len(first) < 4096
+    assert not said
