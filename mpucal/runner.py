@@ -178,6 +178,8 @@ class Runner:
         ------
         SourceError : the source failed before the board was turned.
         """
+        if self._plan.config.accel_alone:
+            return self._collect(seconds)
         self._connect()
         begun_ns = self._source.now_ns()
         long_ns = math.inf if seconds is None else seconds * 1e9
@@ -218,6 +220,18 @@ class Runner:
         self._ask()
         self._feed(Written(tuple(path.name for path in written)))
         return tuple(written)
+
+    def _collect(self, seconds: float | None) -> int:
+        """The same without a prompt: of the accelerometer alone no session is made."""
+        with suppress(EndOfCapture):
+            self.sensor = self._source.start()
+            end_ns = math.inf if seconds is None else self._source.now_ns() + seconds * 1e9
+            while self._source.now_ns() < end_ns and not self._talk.pressed():
+                self._source.poll()
+            # a replay stops where this did
+            self._note(KEY, self._source.now_ns(), {KEY: Key.ENOUGH.value})
+            self._source.stop()
+        return len(self._source.recording())
 
     def _connect(self) -> None:
         try:

@@ -12,7 +12,7 @@ import numpy as np
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import UsageError
 from ..result import Calibration, unknown
-from .blockers import BLOCKERS
+from .blockers import BLOCKERS, no_gyroscope
 from .estimate import METHODS, Choice, choose
 from .evidence import Evidence
 from .likelihood import K_NAMES
@@ -56,6 +56,9 @@ def weigh(
         raise UsageError(f"there is no model {model!r}", f"choose one of {', '.join(MODELS)}")
     if not (np.isfinite(gravity) and gravity > 0):
         raise UsageError(f"gravity is {gravity}", "give the local gravity in m/s^2, about 9.81")
+    before = Evidence(recording, gravity, None, None, model)
+    if no_gyroscope(before) is not None:
+        return before, {"model": model, "why": "nothing could be estimated"}
     recording = with_masks(recording)
     segment = recording.flat or find_flat(recording)
     flat = None if segment is None or segment[1] - segment[0] < 2 else flat_statistics(recording, segment)

@@ -31,6 +31,18 @@ class Reason:
 Check = Callable[[Evidence], Reason | None]
 
 
+def no_gyroscope(e: Evidence) -> Reason | None:
+    """A recording of the accelerometer alone; nothing else can be said of it."""
+    if np.isfinite(e.recording.gyr).all():
+        return None
+    return Reason(
+        "gyro_off",
+        "the recording holds the accelerometer alone, as a chip measures at 4000 Hz, and nothing says how the board "
+        "was turned; record it at 1000 Hz or less",
+        True,
+    )
+
+
 def time_unit(e: Evidence) -> Reason | None:
     """Times that are no seconds."""
     step = 1.0 / e.recording.rate_hz

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Vector
 from ..result import GOOD, REFUSED, USABLE
-from .blockers import BLOCKERS
+from .blockers import BLOCKERS, no_gyroscope
 from .evidence import Evidence
 from .reasons import CHECKS
 
@@ -24,6 +24,8 @@ def judge(evidence: Evidence) -> Mapping[str, Any]:
     sure = evidence.sure
     # a fit there is only where nothing blocked it
     checks = CHECKS if evidence.fit is not None else (*BLOCKERS, *CHECKS)
+    if no_gyroscope(evidence) is not None:
+        checks = (no_gyroscope,)
     reasons = [reason for check in checks if (reason := check(evidence)) is not None]
     return MappingProxyType(
         {

@@ -88,7 +88,7 @@ class Config:
         if self.accel_alone and not filtered_apart:
             raise ChipError(
                 f"the accelerometer of the {part.chip} measures {reg.MAX_RATE_HZ:g} times a second at most",
-                f"take --rate {reg.MAX_RATE_HZ:g} or less: only the MPU-6500's family is faster",
+                f"take --rate {reg.MAX_RATE_HZ:g} or less; only the MPU-6500's family is faster",
             )
         # RM-MPU-9250A, register 25: SMPLRT_DIV divides what was filtered, and that is the case for 1 to 6
         if filtered_apart and not self.accel_alone and reg.base_rate_hz(self.dlpf) > reg.MAX_RATE_HZ:

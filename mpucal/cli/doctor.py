@@ -19,7 +19,7 @@ from ..doctor.speed import examine_speed
 from ..errors import SourceError, UsageError
 from .at_rest import put_down
 from .on_bus import OnBus
-from .options import check_source, source_options
+from .options import check_gyroscope, check_source, source_options
 from .source import opened
 
 EXAMPLE = "Example: `mpucal doctor --bus /dev/i2c-1`, or `mpucal doctor --bus sim:chip=clone98,who_am_i=0x68`"
@@ -56,6 +56,7 @@ def _findings(options: Mapping[str, Any], seconds: float) -> Iterator[Finding]:
         return
     if not isinstance(source, OnBus):
         raise UsageError("a doctor examines a chip on its own bus", "give --bus BUS or --serial PORT")
+    check_gyroscope(source.plan.config)
     with closing(source.bus):
         put_down(source.listeners)
         way = examine_speed if options["serial"] is None else examine_bridge

@@ -11,6 +11,8 @@ import click
 from click.core import ParameterSource
 
 from ..calibration import MODELS
+from ..chip.config import Config
+from ..chip.registers import DLPF_CODES
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import UsageError
 from ..session.aims import AIMS, NORMAL
@@ -25,6 +27,7 @@ ACCEL_RANGES_G, GYRO_RANGES_DPS = ("2", "4", "8", "16"), ("250", "500", "1000", 
 FIXED_BY_CAPTURE = (
     "address",
     "rate",
+    "dlpf",
     "accel_range",
     "gyro_range",
     "seed",
@@ -38,7 +41,7 @@ FIXED_BY_CAPTURE = (
 SOURCES = ("bus", "serial", "mavlink", "replay")
 SIMULATED = "sim"
 # what only one kind of source has
-OF_A_BUS, OF_A_VEHICLE = ("address", "accel_range", "gyro_range", "seed"), ("system", "signing_key")
+OF_A_BUS, OF_A_VEHICLE = ("address", "dlpf", "accel_range", "gyro_range", "seed"), ("system", "signing_key")
 
 
 class Integer(click.ParamType[int]):
@@ -90,7 +93,20 @@ def source_options(command: F) -> F:
             click.option("--replay", metavar="FILE", type=click.Path(path_type=Path), help="Run a capture again."),
             click.option("--address", type=Integer(), help="I2C address; by default 0x68, then 0x69."),
             click.option(
-                "--rate", metavar="HZ", type=float, default=200.0, show_default=True, help="Samples a second."
+                "--rate",
+                metavar="HZ",
+                type=float,
+                default=200.0,
+                show_default=True,
+                help="Samples a second, to 1000; 4000 records or streams an MPU-6500's accelerometer alone.",
+            ),
+            click.option(
+                "--dlpf",
+                metavar="CODE",
+                type=click.IntRange(DLPF_CODES[0], DLPF_CODES[-1]),
+                default=3,
+                show_default=True,
+                help="Low-pass filter: 1 (184 Hz) to 6 (5 Hz); 0 (260 Hz) of an MPU-6050 only.",
             ),
             click.option(
                 "--accel-range", type=click.Choice(ACCEL_RANGES_G), default="4", show_default=True, help="±g."
@@ -144,6 +160,20 @@ def aim_options(command: F) -> F:
     ):
         command = option(command)
     return command
+
+
+def check_gyroscope(config: Config) -> None:
+    """What is to be calibrated or examined is measured with the gyroscope, too.
+
+    Raises
+    ------
+    UsageError : it is left out.
+    """
+    if config.accel_alone:
+        raise UsageError(
+            f"at {config.rate_hz:g} Hz a chip measures with its accelerometer alone, and this needs the gyroscope",
+            f"take --rate 1000 or less; `mpucal record` and `mpucal stream` do with --rate {config.rate_hz:g}",
+        )
 
 
 def source_name(options: Mapping[str, Any]) -> str:

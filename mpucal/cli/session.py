@@ -19,7 +19,7 @@ from ..sinks.sink import Applied
 from .destination import destinations, recorder, said, sink_options, written_back
 from .on_parts import open_resumed
 from .opened import Opened
-from .options import aim_options, check_resumed, check_source, fit_options, source_name, source_options
+from .options import aim_options, check_gyroscope, check_resumed, check_source, fit_options, source_name, source_options
 from .place import Place
 from .running import running
 from .source import open_again, opened
@@ -58,6 +58,7 @@ def command(
     """
     resume: Path | None = options.pop("resume")
     source, names, options = _opened(resume, options, sinks, no_write)
+    check_gyroscope(source.plan.config)
     folder = resume or folder
     person = console(quiet=yes, as_json=json_events, beep=beep, title=source_name(options))
     place = Place(folder, source.capture_name, again=resume is not None)

@@ -122,7 +122,7 @@ def _facts(recording: Recording) -> dict[str, Any]:
         "gyr_clipped": int(recording.gyr_clipped.sum()),
         "flat_s": None if flat is None else [float(recording.t[i] - recording.t[0]) for i in (flat[0], flat[1] - 1)],
         "magnitude_mps2": float(np.median(np.linalg.norm(recording.acc, axis=1))),
-        "fastest_dps": float(np.degrees(np.abs(recording.gyr).max())),
+        "fastest_dps": float(np.degrees(np.abs(recording.gyr).max())) if np.isfinite(recording.gyr).all() else None,
         "temperature_c": [float(temperature.min()), float(temperature.max())] if len(temperature) else None,
     }
 
@@ -143,7 +143,7 @@ def _recording(file: Path, facts: dict[str, Any]) -> str:
         "clipped": f"{facts['acc_clipped']} accelerometer, {facts['gyr_clipped']} gyroscope samples",
         "lies flat": "nowhere" if flat is None else f"from {flat[0]:.1f} to {flat[1]:.1f} s",
         "median |a|": f"{facts['magnitude_mps2']:.3f} m/s²",
-        "fastest turn": f"{facts['fastest_dps']:.0f} deg/s",
+        "fastest turn": "not measured" if facts["fastest_dps"] is None else f"{facts['fastest_dps']:.0f} deg/s",
         "temperature": "unknown" if warm is None else f"{warm[0]:.1f} to {warm[1]:.1f} °C",
     }
     return "\n".join([f"{file}: a recording.", "", *(f"  {key:<14}{value}" for key, value in rows.items())])

@@ -52,6 +52,11 @@ def open_serial(text: str, plan: Plan, address: int | None, seed: int | None) ->
 
     if seed is not None:
         raise UsageError("--seed chooses a simulated sensor, and --serial names a real one", "leave it out")
+    if plan.config.accel_alone:
+        raise UsageError(
+            f"a bridge does not move {plan.config.rate_hz:g} samples a second",
+            "take --rate 1000 or less, or connect the chip to an I2C bus of this computer",
+        )
     return OnBus(open_bridge(text, address), plan, words={"serial": text, "address": address})
 
 
@@ -125,7 +130,7 @@ def open_vehicle_replay(file: Path, plan: Plan, system: int | None) -> Opened:
 
 def opened(options: Mapping[str, Any], until_end: bool = False) -> Opened:
     """What --bus, --serial, --mavlink or --replay of a command's `options` names, with the options beside it."""
-    config = Config(int(options["accel_range"]), int(options["gyro_range"]), options["rate"])
+    config = Config(int(options["accel_range"]), int(options["gyro_range"]), options["rate"], options["dlpf"])
     aim = {name: options[name] for name in ("target", "tilt_only") if name in options}
     model = "tilt" if options["model"] == "auto" and options.get("tilt_only") else options["model"]
     plan = Plan(config, options["gravity"], model, until_end, **aim)

@@ -84,7 +84,8 @@ def _json_lines(samples: Samples) -> None:
     columns: list[Callable[[], Any]] = [samples.t.tolist, samples.acc.tolist, samples.gyr.tolist]
     for t, a, w, warm in zip(*(column() for column in columns), samples.temperature_c.tolist(), strict=True):
         temperature_c = warm if warm == warm else None  # noqa: PLR0124 - NaN, which JSON has not
-        print(json.dumps({"t": t, "a": a, "w": w, "temperature_c": temperature_c}))
+        turning = w if w[0] == w[0] else None
+        print(json.dumps({"t": t, "a": a, "w": turning, "temperature_c": temperature_c}))
 
 
 def _say(text: str) -> None:

@@ -18,6 +18,8 @@ from ...files import whole_file
 from ..csv import COLUMNS, TEMPERATURE, numbers_of, places_of
 from . import ROWS, Rows, Write, cannot_read
 
+ALL = (*COLUMNS, TEMPERATURE)
+
 
 def csv_rows(path: Path) -> Rows:
     """The samples of a table, whose columns are those of load_csv.
@@ -73,21 +75,22 @@ def _samples(values: Vector) -> Samples:
 
 
 class CsvText:
-    """Samples as lines of text, under a first line that names the columns; the temperature where the first has one."""
+    """Samples as lines of text, under a first line that names the columns: of what the first samples know."""
 
     def __init__(self, file: IO[str]) -> None:
         self._file = file
-        self._warm: bool | None = None
+        self._columns: list[str] = []
 
     def write(self, samples: Samples) -> None:
         """Take a run of samples."""
         buffer = StringIO(newline="")
         writer = csv.writer(buffer, lineterminator="\n")
-        if self._warm is None:
-            self._warm = bool(np.isfinite(samples.temperature_c).any())
-            writer.writerow([*COLUMNS, TEMPERATURE] if self._warm else COLUMNS)
-        columns: list[Vector] = [samples.t, samples.acc, samples.gyr]
-        writer.writerows(np.column_stack([*columns, *([samples.temperature_c] if self._warm else [])]).tolist())
+        table: Vector = np.column_stack([samples.t, samples.acc, samples.gyr, samples.temperature_c])
+        if not self._columns:
+            known = np.flatnonzero(~np.isnan(table).all(axis=0))
+            self._columns = [ALL[i] for i in known]
+            writer.writerow(self._columns)
+        writer.writerows(table[:, [ALL.index(name) for name in self._columns]].tolist())
         self._file.write(buffer.getvalue())
 
 

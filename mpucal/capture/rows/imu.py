@@ -24,7 +24,7 @@ TOPIC, FRAME_ID = "/imu/data", "imu"
 LIBRARY = "mpucal.imu"
 S = 1_000_000_000
 # sensor_msgs/Imu: a first covariance of -1 says that there is no such measurement
-NO_ORIENTATION = -1.0
+NOT_MEASURED = -1.0
 
 MESSAGE = np.dtype(
     [
@@ -86,8 +86,11 @@ def messages(samples: Samples) -> tuple[list[int], list[bytes]]:
     rows["sec"], rows["nanosec"] = t_ns // S, t_ns % S
     rows["frame_id"], rows["frame_id_size"] = FRAME_ID.encode(), len(FRAME_ID) + 1
     rows["orientation"][:, 3] = 1.0
-    rows["orientation_covariance"][:, 0] = NO_ORIENTATION
-    rows["angular_velocity"], rows["linear_acceleration"] = samples.gyr, samples.acc
+    rows["orientation_covariance"][:, 0] = NOT_MEASURED
+    turned = np.asarray(np.isfinite(samples.gyr).all(axis=1))
+    rows["angular_velocity_covariance"][~turned, 0] = NOT_MEASURED
+    rows["angular_velocity"] = np.where(turned[:, None], samples.gyr, 0.0)
+    rows["linear_acceleration"] = samples.acc
     data, size = rows.tobytes(), MESSAGE.itemsize
     return t_ns.tolist(), [data[at : at + size] for at in range(0, len(data), size)]
 
