@@ -21,8 +21,8 @@ lint: $(READY)
 bench: $(READY)
 	@$(BIN)/python tools/bench.py
 
-# the kernel is compiled here, so its sources are what a rebuild hangs on
-$(READY): tools/set_up pyproject.toml CMakeLists.txt $(wildcard mpucal/kernel/*.cpp mpucal/kernel/*.hpp)
+# what is compiled here is what a rebuild hangs on
+$(READY): tools/set_up pyproject.toml CMakeLists.txt $(shell find mpucal -name '*.[ch]pp')
 	@tools/set_up $(VENV)
 	@touch $@
 

@@ -49,7 +49,11 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool) -
         click.echo(f"mpucal: {remark}", err=True)
     done = f"calibrated with {calibration.name} of {ready.calibration.created or 'an unknown time'}"
     seen = _Seen()
-    with nullcontext(CsvText(sys.stdout).write) if target is None else open_writer(target, rows, done) as write:
+    with (
+        nullcontext(CsvText(lambda text: sys.stdout.write(text.decode())).write)
+        if target is None
+        else open_writer(target, rows, done) as write
+    ):
         for samples in rows.runs:
             after = ready.apply(samples)
             seen.add(samples, after, magnitudes=as_json)

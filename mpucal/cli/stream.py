@@ -47,7 +47,7 @@ def command(calibration: Path, file: Path | None, seconds: float | None, as_json
     # a simulated chip lives in the gravity in which it was calibrated
     gravity = applied.fit.get("gravity") or STANDARD_GRAVITY_MPS2
     source = opened({**options, "gravity": gravity, "model": "auto"}, until_end=True)
-    write = _json_lines if as_json else CsvText(sys.stdout).write
+    write = _json_lines if as_json else CsvText(lambda text: sys.stdout.write(text.decode())).write
     with source.measuring(file or Path(os.devnull), _say, now().isoformat()) as measuring, suppress(KeyboardInterrupt):
         ready: Correction | None = None
         for samples in _polled(measuring.source, seconds):

@@ -3,13 +3,19 @@
 import csv
 import struct
 
+import hypothesis.extra.numpy as hnp
 import numpy as np
 import pytest
-from mcap.reader import make_reader
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.reader import NonSeekingReader, make_reader
 
 from mpucal.capture import load
 from mpucal.capture.npz import save_npz
 from mpucal.capture.rows import ROWS, open_rows, open_writer
+from mpucal.capture.rows import csv as rows_csv
+from mpucal.capture.rows._text import lines, numbers
+from mpucal.capture.rows.chunks import MESSAGES
 from mpucal.data import Recording, Samples, Sensor
 from mpucal.errors import OutputError, RecordingError
 
@@ -69,6 +75,46 @@ def test_a_table_comes_out_as_it_went_in(warm, tmp_path):
         np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
 
 
+@given(hnp.arrays(float, st.tuples(st.integers(1, 4), st.integers(1, 3)), elements=st.floats(allow_subnormal=True)))
+def test_text_gives_back_each_number_that_there_is(table):
+    text = lines(table)
+    assert [len(row) for row in csv.reader(text.decode().splitlines())] == [table.shape[1]] * len(table)
+    np.testing.assert_array_equal([[float(cell) for cell in row.split(b",")] for row in text.splitlines()], table)
+    np.testing.assert_array_equal(numbers(text, table.shape[1], range(table.shape[1])), table)
+
+
+def test_text_is_as_a_person_writes_it():
+    assert lines(np.array([[0.0, 1.0, -0.25, 100000.0], [1e-4, 1e-9, 1e20, np.nan]])) == (
+        b"0,1,-0.25,100000\n0.0001,1e-09,1e+20,nan\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (b"1,2,3", [[3.0, 1.0]]),
+        (b"1, 2 ,3\r\n\r\n  \n4,note,6\n", [[3.0, 1.0], [6.0, 4.0]]),
+        (b"", []),
+        (b"1,2\n", None),
+        (b"1,2,3,4\n", None),
+        (b"1,2,\n", None),
+        (b'1,"2",3\n', None),
+        (b"+1,2,3\n", None),
+        (b"1,2,3\n1,2,3x\n", None),
+        (b"1\r2,2,3\n", None),
+    ],
+)
+def test_what_is_no_plain_line_is_left_to_others(text, found):
+    values = numbers(text, 3, [2, 0])
+    assert values is None if found is None else values.tolist() == found
+
+
+def test_lines_may_end_as_on_an_old_macintosh(tmp_path):
+    (tmp_path / "old.csv").write_bytes(b"t,ax,ay,az,gx,gy,gz\r0,1,2,3,4,5,6\r1,7,8,9,10,11,12\r")
+    (samples,) = open_rows(tmp_path / "old.csv").runs
+    np.testing.assert_array_equal(samples.acc, load(tmp_path / "old.csv").acc)
+
+
 def test_a_table_with_everything_that_load_takes(tmp_path):
     text = '\ufeffGz,note,t,ax,ay,az,gx,gy\r\n6,"a, b",0,1,2,3,4,5\r\n\r\n12,,1,7,8,9,10,11\r\n'
     (tmp_path / "odd.csv").write_text(text, encoding="utf-8")
@@ -78,14 +124,16 @@ def test_a_table_with_everything_that_load_takes(tmp_path):
         np.testing.assert_array_equal(getattr(samples, name), getattr(whole, name))
 
 
-@pytest.mark.parametrize("line", [2, ROWS + 3])
-def test_a_bad_line_is_named(line, tmp_path):
-    rows = [[i, 1, 2, 3, 4, 5, 6] for i in range(ROWS + 10)]
+@pytest.mark.parametrize("line", [2, 250])
+def test_a_bad_line_is_named(line, tmp_path, monkeypatch):
+    monkeypatch.setattr(rows_csv, "BLOCK", 1000)
+    rows = [[i, 1, 2, 3, 4, 5, 6] for i in range(300)]
     rows[line - 2][3] = "nonsense"
     with (tmp_path / "bad.csv").open("w", newline="") as file:
         csv.writer(file).writerows([["t", "ax", "ay", "az", "gx", "gy", "gz"], *rows])
+    runs = open_rows(tmp_path / "bad.csv").runs
     with pytest.raises(RecordingError, match=f"line {line}: az is 'nonsense'"):
-        list(open_rows(tmp_path / "bad.csv").runs)
+        list(runs)
 
 
 def cdr(data):
@@ -129,6 +177,26 @@ def test_ros_reads_what_was_written(tmp_path):
         assert numbers[4] == -1.0
         assert numbers[13:16] == before.gyr[i].tolist()
         assert numbers[25:28] == before.acc[i].tolist()
+
+
+def test_the_index_of_an_mcap_leads_to_its_messages(tmp_path):
+    n = 2 * MESSAGES + 5
+    before = recording(n)
+    save_npz(before, tmp_path / "in.npz")
+    through(tmp_path / "in.npz", tmp_path / "out.mcap")
+    t_ns = np.rint(before.t * 1e9).astype(int).tolist()
+    with (tmp_path / "out.mcap").open("rb") as file:
+        indexed = make_reader(file, validate_crcs=True)
+        summary = indexed.get_summary()
+        assert summary.statistics.message_count == n
+        assert (summary.statistics.message_start_time, summary.statistics.message_end_time) == (t_ns[0], t_ns[-1])
+        assert len(summary.chunk_indexes) == 3
+        found = [m.log_time for _, _, m in indexed.iter_messages(starting_at=t_ns[MESSAGES], ending_before=t_ns[-2])]
+        assert found == t_ns[MESSAGES:-2]
+        assert [(m.name, m.metadata) for m in indexed.iter_metadata()] == [("mpucal.imu", {"done": "nothing was done"})]
+        file.seek(0)
+        sequence = [m.sequence for _, _, m in NonSeekingReader(file, validate_crcs=True).iter_messages()]
+        assert sequence == list(range(n))
 
 
 @pytest.mark.parametrize("ending", [".csv", ".npz", ".mcap"])

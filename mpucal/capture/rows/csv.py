@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from io import StringIO, TextIOWrapper
-from itertools import islice
+from io import StringIO
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 
@@ -16,9 +14,12 @@ from ...data import Samples, Vector
 from ...errors import RecordingError
 from ...files import whole_file
 from ..csv import COLUMNS, TEMPERATURE, numbers_of, places_of
-from . import ROWS, Rows, Write, cannot_read
+from . import Rows, Write, cannot_read
+from ._text import lines, numbers
 
 ALL = (*COLUMNS, TEMPERATURE)
+# some 16000 lines
+BLOCK = 1 << 21
 
 
 def csv_rows(path: Path) -> Rows:
@@ -29,42 +30,50 @@ def csv_rows(path: Path) -> Rows:
     RecordingError : it cannot be read, or its first line names no such columns.
     """
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            header = [name.strip().lower() for name in next(csv.reader([file.readline()]), [])]
+        with path.open("rb") as file:
+            begun = file.readline()
+        text = begun.decode("utf-8-sig")
+        # a line may end with a carriage return alone
+        first = StringIO(text, newline="").readline()
+        header = [name.strip().lower() for name in next(csv.reader([first]), [])]
     except OSError as error:
         raise cannot_read(path, error) from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise RecordingError(f"{path} is no table of text ({error})", "give one whose first line is text") from error
-    return Rows(_runs(path, header, places_of(header, path)), name=path.name)
+    begin = len(begun) - len(text.removeprefix(first).encode())
+    return Rows(_runs(path, begin, header, places_of(header, path)), name=path.name)
 
 
-def _runs(path: Path, header: list[str], places: dict[str, int]) -> Iterator[Samples]:
+def _runs(path: Path, begin: int, header: list[str], places: dict[str, int]) -> Iterator[Samples]:
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            line = 1 + len(list(islice(file, 1)))
-            while lines := list(islice(file, ROWS)):
-                values = _values(lines, header, places, line, path)
-                line += len(lines)
+        with path.open("rb") as file:
+            file.seek(begin)
+            line = 2
+            while block := file.read(BLOCK) + file.readline():
+                values = numbers(block, len(header), list(places.values()))
+                if values is None:
+                    values = _odd(block, header, places, line, path)
+                line += block.count(b"\n")
                 if len(values):
                     yield _samples(values)
-    except UnicodeDecodeError as error:
-        raise RecordingError(f"{path} is no text from line {line} on", "record it again") from error
     except OSError as error:
         raise cannot_read(path, error) from error
 
 
-def _values(lines: list[str], header: list[str], places: dict[str, int], line: int, path: Path) -> Vector:
-    """(n, 7 or 8) numbers of lines, the first of which is number `line`."""
-    full = [text for text in lines if not text.isspace()]
-    if not full:
-        return np.zeros((0, len(places)))
+def _odd(block: bytes, header: list[str], places: dict[str, int], line: int, path: Path) -> Vector:
+    """(n, 7 or 8) numbers of lines, the first of which is number `line`: slowly all that load_csv takes.
+
+    Raises
+    ------
+    RecordingError : what is no number is named by its line.
+    """
     try:
-        return np.loadtxt(full, delimiter=",", comments=None, usecols=list(places.values()), ndmin=2, quotechar='"')
-    except ValueError:
-        # the slow way, which skips what load_csv does, and names a bad line
-        rows = csv.reader(lines)
-        values = [numbers_of(row, places, len(header), line + rows.line_num - 1, path) for row in rows if any(row)]
-        return np.array(values).reshape(-1, len(places))
+        text = block.decode()
+    except UnicodeDecodeError as error:
+        raise RecordingError(f"{path} is no text from line {line} on", "record it again") from error
+    rows = csv.reader(StringIO(text, newline=""))
+    values = [numbers_of(row, places, len(header), line + rows.line_num - 1, path) for row in rows if any(row)]
+    return np.array(values).reshape(-1, len(places))
 
 
 def _samples(values: Vector) -> Samples:
@@ -75,32 +84,28 @@ def _samples(values: Vector) -> Samples:
 
 
 class CsvText:
-    """Samples as lines of text, under a first line that names the columns: of what the first samples know."""
+    """Samples as lines of text, under a first line that names the columns: of what the first samples know.
 
-    def __init__(self, file: IO[str]) -> None:
-        self._file = file
-        self._columns: list[str] = []
+    Parameters
+    ----------
+    put : takes the text, a run of samples at a time.
+    """
+
+    def __init__(self, put: Callable[[bytes], object]) -> None:
+        self._put = put
+        self._columns: list[int] = []
 
     def write(self, samples: Samples) -> None:
         """Take a run of samples."""
-        buffer = StringIO(newline="")
-        writer = csv.writer(buffer, lineterminator="\n")
         table: Vector = np.column_stack([samples.t, samples.acc, samples.gyr, samples.temperature_c])
         if not self._columns:
-            known = np.flatnonzero(~np.isnan(table).all(axis=0))
-            self._columns = [ALL[i] for i in known]
-            writer.writerow(self._columns)
-        writer.writerows(table[:, [ALL.index(name) for name in self._columns]].tolist())
-        self._file.write(buffer.getvalue())
+            self._columns = np.flatnonzero(~np.isnan(table).all(axis=0)).tolist()
+            self._put(",".join(ALL[column] for column in self._columns).encode() + b"\n")
+        self._put(lines(np.ascontiguousarray(table[:, self._columns])))
 
 
 @contextmanager
 def csv_file(path: Path) -> Iterator[Write]:
     """A table as a file; see open_writer."""
     with whole_file(path) as file:
-        text = TextIOWrapper(file, encoding="utf-8", newline="")
-        try:
-            yield CsvText(text).write
-        finally:
-            # the file is whole_file's to close
-            text.detach()
+        yield CsvText(file.write).write

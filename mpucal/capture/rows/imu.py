@@ -9,16 +9,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from mcap.records import Channel, Header, Metadata, Schema
 from mcap.well_known import MessageEncoding, SchemaEncoding
-from mcap.writer import CompressionType, Writer
+from numpy.typing import NDArray
 
 from ... import __version__
 from ...data import Samples
 from ...errors import RecordingError
 from ...files import whole_file
 from . import Write
+from .chunks import ChunkWriter
 
 TOPIC, FRAME_ID = "/imu/data", "imu"
 LIBRARY = "mpucal.imu"
@@ -71,8 +74,8 @@ float64 z
 """
 
 
-def messages(samples: Samples) -> tuple[list[int], list[bytes]]:
-    """Times [ns] and CDR bytes of a run of samples.
+def messages(samples: Samples) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    """Times (n,) [ns] and messages (n,), each the CDR bytes of a sample.
 
     Raises
     ------
@@ -91,26 +94,20 @@ def messages(samples: Samples) -> tuple[list[int], list[bytes]]:
     rows["angular_velocity_covariance"][~turned, 0] = NOT_MEASURED
     rows["angular_velocity"] = np.where(turned[:, None], samples.gyr, 0.0)
     rows["linear_acceleration"] = samples.acc
-    data, size = rows.tobytes(), MESSAGE.itemsize
-    return t_ns.tolist(), [data[at : at + size] for at in range(0, len(data), size)]
+    return t_ns, rows
 
 
 @contextmanager
 def imu_file(path: Path, done: str) -> Iterator[Write]:
     """An MCAP file of Imu messages on TOPIC; `done`, what was done to the samples, is its metadata. See open_writer."""
     with whole_file(path) as file:
-        writer = Writer(file, compression=CompressionType.ZSTD)
-        writer.start(profile="ros2", library=f"{LIBRARY} {__version__}")
-        writer.add_metadata(LIBRARY, {"done": done})
-        schema = writer.register_schema("sensor_msgs/msg/Imu", SchemaEncoding.ROS2, SCHEMA.encode())
-        channel = writer.register_channel(TOPIC, MessageEncoding.CDR, schema)
-        count = 0
-
-        def write(samples: Samples) -> None:
-            nonlocal count
-            for t_ns, data in zip(*messages(samples), strict=True):
-                writer.add_message(channel, t_ns, data, t_ns, count)
-                count += 1
-
-        yield write
+        writer = ChunkWriter(
+            file,
+            MESSAGE,
+            Header(profile="ros2", library=f"{LIBRARY} {__version__}"),
+            Schema(id=1, data=SCHEMA.encode(), encoding=SchemaEncoding.ROS2, name="sensor_msgs/msg/Imu"),
+            Channel(id=1, topic=TOPIC, message_encoding=MessageEncoding.CDR, metadata={}, schema_id=1),
+            Metadata(LIBRARY, {"done": done}),
+        )
+        yield lambda samples: writer.add(*messages(samples))
         writer.finish()
