@@ -1,35 +1,53 @@
-"""Whole sessions on a chip that suffers faults end in a true calibration or a true refusal, and never in a trace."""
+"""Sessions on a chip that suffers faults end in a true calibration or a true refusal, and never in a trace."""
 
 import sys
 from importlib import import_module
+from itertools import combinations_with_replacement
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from mpucal.bus.simulated.faults import KINDS, Fault
 
 TOOLS = Path(__file__).parents[1] / "tools"
+PAIRS = list(combinations_with_replacement(KINDS, 2))
+LONGEST_S = 60
+
+once = settings(max_examples=1, deadline=None, suppress_health_check=list(HealthCheck))
+kinds = st.sampled_from(sorted(KINDS))
 
 
 @pytest.fixture(scope="module")
-def outcome():
+def tool():
     sys.path.insert(0, str(TOOLS))
-    yield import_module("fault_sessions").outcome
+    yield import_module("fault_sessions")
     sys.path.remove(str(TOOLS))
 
 
-@settings(max_examples=2, deadline=None, suppress_health_check=list(HealthCheck))
-@given(
-    faults=st.lists(
-        st.builds(Fault, st.sampled_from(sorted(KINDS)), st.floats(0, 60).map(lambda t: round(t, 2))),
-        min_size=1,
-        max_size=2,
-    ),
-    seed=st.integers(0, 30),
-)
-def test_no_wrong_calibration_is_called_good(outcome, faults, seed):
-    ended = outcome(faults, seed, model="accel")
+def moments(end_s):
+    return st.integers(0, 100 * end_s).map(lambda t: t / 100)
+
+
+@once
+@given(names=st.tuples(kinds, kinds), at_s=st.tuples(moments(LONGEST_S), moments(LONGEST_S)), seed=st.integers(0, 30))
+def test_no_session_calls_a_wrong_calibration_good(tool, names, at_s, seed):
+    assume(any(at_s))  # what hypothesis begins with is the same every time
+    faults = tuple(map(Fault, names, at_s))
+    ended = tool.outcome(faults, seed, model="accel")
     assert not ended.wrong, ended
     assert ended.code == 0 or ended.said
+
+
+@pytest.mark.parametrize("names", PAIRS, ids=["-".join(pair) for pair in PAIRS])
+@once
+@given(data=st.data(), seed=st.integers(0, 1000))
+def test_no_pair_of_faults_makes_a_wrong_calibration_good(tool, names, data, seed):
+    """A recording calibrated afterwards: as a session, without the fits behind its advice."""
+    at_s = [data.draw(moments(tool.RECORDED_S), label) for label in names]
+    assume(any(at_s))
+    faults = tuple(map(Fault, names, at_s))
+    ended = tool.recorded(faults, seed)
+    assert not ended.wrong, (faults, seed, ended)
+    assert ended.code != 3 or ended.said
