@@ -30,7 +30,7 @@ def load(path: str | Path) -> Recording:
     path = Path(path)
     parts = [path]
     if path.is_dir():
-        parts = _captures_of(path)
+        parts = captures_of(path)
         path = parts[0]
     if not path.exists():
         raise RecordingError(f"there is no file {path}", "check the path")
@@ -78,7 +78,8 @@ def _load_captures(paths: Sequence[Path]) -> Recording:
     return replace(recording, recovered=recovered[-1] if recovered else None)
 
 
-def _captures_of(folder: Path) -> list[Path]:
+def captures_of(folder: Path) -> list[Path]:
+    """The captures in the folder of a session; RecordingError where there is none."""
     found = captures_in(folder)
     if found:
         return found

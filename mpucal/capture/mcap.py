@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 import os
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
-from typing import Any, Self
+from typing import IO, Any, Self, cast
 
 from mcap.exceptions import McapError
 from mcap.records import Channel, Message, Metadata
@@ -163,44 +162,107 @@ def read_capture(path: str | Path) -> Capture:
     ------
     CaptureError : the file cannot be read, or is no capture of mpucal.
     """
-    path = Path(path)
-    data = _bytes_of(path)
-    stream = BytesIO(data)
-    meta: dict[str, Any] | None = None
-    records: list[Record] = []
-    whole, finished = 0, False
-    try:
+    reader = CaptureReader(path)
+    records = tuple(reader)
+    return Capture(reader.meta, records, reader.recovered, reader.name)
+
+
+class CaptureReader:
+    """The records of a capture, one after the other, as they are read; of a file that was cut short, all that is whole.
+
+    To be gone through once.
+
+    Attributes
+    ----------
+    name : what to call the file in a message. meta, recovered : see Capture; once all records were read.
+
+    Raises
+    ------
+    CaptureError : the file cannot be read, or is no capture of mpucal; some of it only where the records come to it.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._path = Path(path)
+        self.name = self._path.name
+        self.meta: Mapping[str, Any] = {}
+        self.recovered: str | None = None
+        self._count = self._first_ns = self._last_ns = 0
+
+    def __iter__(self) -> Iterator[Record]:
+        try:
+            with self._path.open("rb") as file:
+                yield from self._records(file)
+        except OSError as error:
+            raise CaptureError(
+                f"cannot read {self._path} ({error.strerror})", "check the path and its permissions"
+            ) from error
+
+    def _records(self, file: IO[bytes]) -> Iterator[Record]:
+        size = os.fstat(file.fileno()).st_size
+        self._check(file.read(len(MCAP0_MAGIC)))
+        file.seek(0)
         channels: dict[int, str] = {}
-        for item in StreamReader(stream, validate_crcs=True, record_size_limit=len(data)).records:
+        meta: Mapping[str, Any] | None = None
+        whole, finished = 0, False
+        stream = _Bounded(file, size)
+        items = StreamReader(cast("IO[bytes]", stream), validate_crcs=True, record_size_limit=size).records
+        while not finished:
+            try:
+                item = next(items, None)
+            except _DAMAGE:
+                # what was read until here is whole, and `recovered` says what is not
+                break
+            whole, finished = stream.at, item is None
             if isinstance(item, Metadata) and item.name == FORMAT:
-                meta = _meta(item, path)
+                meta = _meta(item, self._path)
             elif isinstance(item, Channel):
                 channels[item.id] = item.topic
             elif isinstance(item, Message):
-                record = _record(channels.get(item.channel_id, ""), item, path)
-                records += [] if record is None else [record]
-            whole = stream.tell()
-        finished = True
-    except _DAMAGE:
-        pass  # what was read until here is whole, and `_recovered` says what is not
-    if meta is None:
-        raise CaptureError(
-            f"{path} does not hold the head of a capture of mpucal", "give a capture that mpucal recorded"
-        )
-    recovered = None if finished else _recovered(path.name, records, len(data) - whole)
-    return Capture(meta, tuple(records), recovered, path.name)
+                record = _record(channels.get(item.channel_id, ""), item, self._path)
+                if record is not None:
+                    self._counted(record)
+                    yield record
+        if meta is None:
+            raise CaptureError(
+                f"{self._path} does not hold the head of a capture of mpucal", "give a capture that mpucal recorded"
+            )
+        self.meta = meta
+        self.recovered = None if finished else self._why_recovered(size - whole)
+
+    def _check(self, magic: bytes) -> None:
+        if not magic:
+            raise CaptureError(f"{self._path} is empty", "record it again")
+        if magic != MCAP0_MAGIC:
+            raise CaptureError(f"{self._path} is no MCAP file", "give a capture that mpucal recorded")
+
+    def _counted(self, record: Record) -> None:
+        self._first_ns = self._first_ns if self._count else record.t_ns
+        self._last_ns = record.t_ns
+        self._count += 1
+
+    def _why_recovered(self, lost: int) -> str:
+        held = f"{self._count} records over {(self._last_ns - self._first_ns) / 1e9:.1f} s are whole"
+        if lost:
+            return f"{self.name} is cut short or damaged: {held}, the {lost} bytes after them are lost."
+        return f"{self.name} was never closed: its {held}, what may have followed is lost."
 
 
-def _bytes_of(path: Path) -> bytes:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise CaptureError(f"cannot read {path} ({error.strerror})", "check the path and its permissions") from error
-    if not data:
-        raise CaptureError(f"{path} is empty", "record it again")
-    if not data.startswith(MCAP0_MAGIC):
-        raise CaptureError(f"{path} is no MCAP file", "give a capture that mpucal recorded")
-    return data
+class _Bounded:
+    """A file of `size` bytes that is not asked for more of them: a damaged length would take all memory.
+
+    Attributes
+    ----------
+    at : how many were read.
+    """
+
+    def __init__(self, file: IO[bytes], size: int) -> None:
+        self._file, self._size, self.at = file, size, 0
+
+    def read(self, count: int) -> bytes:
+        """At most `count` bytes."""
+        data = self._file.read(min(count, self._size - self.at))
+        self.at += len(data)
+        return data
 
 
 def _meta(item: Metadata, path: Path) -> dict[str, Any]:
@@ -239,11 +301,3 @@ def _record(topic: str, message: Message, path: Path) -> Record | None:
             f"{path} holds a message on {topic} that is none of mpucal's ({error})",
             "give a capture that mpucal recorded",
         ) from error
-
-
-def _recovered(name: str, records: list[Record], lost: int) -> str:
-    seconds = (records[-1].t_ns - records[0].t_ns) / 1e9 if records else 0.0
-    held = f"{len(records)} records over {seconds:.1f} s are whole"
-    if lost:
-        return f"{name} is cut short or damaged: {held}, the {lost} bytes after them are lost."
-    return f"{name} was never closed: its {held}, what may have followed is lost."

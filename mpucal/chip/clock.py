@@ -14,6 +14,8 @@ with a rate of its own (pieces.py); that is found for the final times, not for t
 from __future__ import annotations
 
 import math
+from array import array
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -26,6 +28,9 @@ NS = 1e-9
 
 # PS-MPU-6000A r3.4, section 6.6: the PLL on a gyroscope is within 1 %.
 RATE_TOLERANCE = 0.01
+# (n,) s of samples number (n,) of segments (n,)
+Times = Callable[[NDArray[np.int64], NDArray[np.int64]], Vector]
+
 # More samples than any segment holds.
 FAR = 2.0**40
 # A look falls anywhere between two samples: a uniform distribution's standard deviation.
@@ -54,13 +59,15 @@ class _Segment:
     taken: int = 0
     tt: int = 0
     t_taken: int = 0
-    looks: list[tuple[int, int]] = field(default_factory=list)
+    looks_ns: array[int] = field(default_factory=lambda: array("q"))
+    looked: array[int] = field(default_factory=lambda: array("q"))
 
     def look(self, t_ns: int, taken: int) -> None:
         if self.n == 0:
             self.origin_ns = t_ns
         t = t_ns - self.origin_ns
-        self.looks.append((t_ns, taken))
+        self.looks_ns.append(t_ns)
+        self.looked.append(taken)
         self.n += 1
         self.t += t
         self.taken += taken
@@ -120,7 +127,7 @@ class SampleClock:
         self._forgotten += len(self._segments[:-1])
         self._segments = self._segments[-1:]
         for each in self._segments:
-            each.looks.clear()
+            del each.looks_ns[:], each.looked[:]
 
     def look(self, t_ns: int, taken: int) -> None:
         """At `t_ns` the chip had taken `taken` samples of this segment."""
@@ -141,19 +148,23 @@ class SampleClock:
         taken_mean = np.array([s.taken_mean for s in self._segments])
         return np.asarray(t_mean_s[segment] + (index + 0.5 - taken_mean[segment]) / self.rate_hz, np.float64)
 
-    def final_times_s(self, segment: NDArray[np.int64], index: NDArray[np.int64]) -> Vector:
-        """The same with all that is known: each piece of a clock whose rate changed keeps its own."""
+    def final(self) -> Times:
+        """`times_s` with all that is known: each piece of a clock whose rate changed keeps its own."""
         pieces = [
             (number, line)
             for number, each in enumerate(self._segments, self._forgotten)
-            if each.looks
-            for line in lines(*np.array(each.looks, np.float64).T * [[NS], [1.0]])
+            if each.looks_ns
+            for line in lines(np.array(each.looks_ns) * NS, np.array(each.looked, np.float64))
         ]
         rates_hz = steady([line for _, line in pieces], self._nominal_hz, RATE_TOLERANCE)
         begins = np.array([number * FAR + line.first for number, line in pieces])
-        at = np.searchsorted(begins, segment * FAR + index, side="right") - 1
-        t_s, taken = np.array([(line.t_s, line.y) for _, line in pieces]).T
-        return np.asarray(t_s[at] + (index + 0.5 - taken[at]) / rates_hz[at], np.float64)
+        t_s, taken = np.array([(line.t_s, line.y) for _, line in pieces]).reshape(-1, 2).T
+
+        def times_s(segment: NDArray[np.int64], index: NDArray[np.int64]) -> Vector:
+            at = np.searchsorted(begins, segment * FAR + index, side="right") - 1
+            return np.asarray(t_s[at] + (index + 0.5 - taken[at]) / rates_hz[at], np.float64)
+
+        return times_s
 
 
 def increasing(t_s: Vector, step_s: float) -> Vector:

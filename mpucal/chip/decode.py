@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from ..data import Recording, Samples
+from ..data import Recording, Samples, Sensor
 from ..errors import RecordingError
 from . import registers as reg
 from .access import Transaction
 from .families import Part
-from .fifo import Fault, FifoDecoder
+from .fifo import Fault, FifoDecoder, Run
 from .identity import Evidence
 from .settings import Settings
 
@@ -58,6 +58,15 @@ class Decoder:
             )
         return self._evidence.part(self._held[reg.WHO_AM_I])
 
+    def saw(self, transaction: Transaction) -> None:
+        """An access was made, or failed."""
+        if transaction.error is not None:
+            return
+        if transaction.op == "read":
+            self.saw_read(transaction.register, transaction.data, transaction.t_ns)
+        else:
+            self.saw_write(transaction.register, transaction.data)
+
     def saw_read(self, register: int, data: bytes, t_ns: int) -> None:
         """`data` was read from `register` on, at `t_ns`."""
         if self._fifo is None:
@@ -95,6 +104,19 @@ class Decoder:
         """The samples since the last `take`, with the times that are known now."""
         return self._fifo.take() if self._fifo is not None else Samples.empty()
 
+    def release(self) -> list[Run]:
+        """The frames since the last time, let go of: `final` makes samples of them once there are no more."""
+        return self._fifo.release() if self._fifo is not None else []
+
+    def final(self, runs: Iterable[Run]) -> Iterator[Samples]:
+        """The samples of runs that were released, in the same order, with the best times there are."""
+        return self._fifo.final(runs) if self._fifo is not None else iter(())
+
+    @property
+    def sensor(self) -> Sensor:
+        """What is known of the sensor so far."""
+        return replace(Sensor() if self._fifo is None else self._fifo.sensor, accel_offsets=self._accel_offsets)
+
     def forget(self) -> None:
         """Let go of all that was taken: `recording` holds what comes from now on."""
         if self._fifo is not None:
@@ -105,8 +127,7 @@ class Decoder:
         if self._fifo is None:
             empty = Samples.empty()
             return Recording(**vars(empty), name=self._name)
-        recording = self._fifo.recording(self._name)
-        return replace(recording, sensor=replace(recording.sensor, accel_offsets=self._accel_offsets))
+        return replace(self._fifo.recording(self._name), sensor=self.sensor)
 
     def _hold(self, register: int, data: bytes) -> None:
         self._held.update(enumerate(data, register))
@@ -139,12 +160,7 @@ def decode(transactions: Iterable[Transaction], name: str = "recording") -> Reco
     """
     decoder = Decoder(name)
     for transaction in transactions:
-        if transaction.error is not None:
-            continue
-        if transaction.op == "read":
-            decoder.saw_read(transaction.register, transaction.data, transaction.t_ns)
-        else:
-            decoder.saw_write(transaction.register, transaction.data)
+        decoder.saw(transaction)
     recording = decoder.recording()
     if len(recording) < 2:
         raise RecordingError(f"{name} holds {len(recording)} samples", "record for longer")

@@ -8,6 +8,7 @@ temperature to be told by where they begin: there a part of a frame tells, since
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from typing import Any
@@ -15,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data import Mask, Recording, Samples, Vector
+from ..data import Mask, Recording, Samples, Sensor, Vector
 from . import registers as reg
-from .clock import SampleClock, increasing
+from .clock import SampleClock, Times, increasing
 from .settings import Settings
 
 Counts = NDArray[np.int16]
@@ -45,7 +46,7 @@ class Fault(StrEnum):
 
 
 @dataclass(frozen=True)
-class _Run:
+class Run:
     """Frames (n, 7 or 3) that follow each other, the first of them number `first` of `segment`."""
 
     segment: int
@@ -64,9 +65,10 @@ class FifoDecoder:
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._clock = SampleClock(settings.nominal_rate_hz)
-        self._runs: list[_Run] = []
+        self._runs: list[Run] = []
         self._taken = 0
         self._begun = False
+        self._believed = self._warmth = 0
         self._temperature: int | None = None
         self._read = 0
         self._look: tuple[int, int] | None = None
@@ -125,8 +127,11 @@ class FifoDecoder:
         self._alike = kept[believed:]
         if believed:
             first = self._read - len(kept)
-            self._runs.append(_Run(self._clock.segment, first, kept[:believed], gap=self._gap_before(first)))
+            self._runs.append(Run(self._clock.segment, first, kept[:believed], gap=self._gap_before(first)))
             self._begun = True
+            if not self._settings.accel_alone:
+                self._believed += believed
+                self._warmth += int(kept[:believed, TEMPERATURE].sum(dtype=np.int64))
 
     def _stuck(self, kept: Counts) -> bool:
         """Whether a frame repeats itself for too long."""
@@ -149,12 +154,23 @@ class FifoDecoder:
         runs, self._taken = self._runs[self._taken :], len(self._runs)
         if not runs:
             return Samples.empty()
-        samples = self._samples(runs)
-        t = samples.t
-        if self._last_t_s is not None:
-            t = increasing(np.insert(t, 0, self._last_t_s), LEAST_STEP / self._clock.rate_hz)[1:]
-        self._last_t_s = float(t[-1])
-        return replace(samples, t=t)
+        samples = self._after(self._last_t_s, self._samples(runs, self._clock.times_s))
+        self._last_t_s = float(samples.t[-1])
+        return samples
+
+    def release(self) -> list[Run]:
+        """The frames since the last time, let go of: `final` makes samples of them once there are no more."""
+        runs, self._runs, self._taken = self._runs, [], 0
+        return runs
+
+    def final(self, runs: Iterable[Run]) -> Iterator[Samples]:
+        """The samples of runs that were released, in the same order, with the best times there are."""
+        times_s = self._clock.final()
+        last_t_s: float | None = None
+        for run in runs:
+            samples = self._after(last_t_s, self._samples([run], times_s))
+            last_t_s = float(samples.t[-1])
+            yield samples
 
     def forget(self) -> None:
         """Let go of all that was taken: `recording` holds what comes from now on."""
@@ -164,13 +180,17 @@ class FifoDecoder:
 
     def recording(self, name: str) -> Recording:
         """All samples so far with the best times there are, and the sensor with its measured rate."""
-        samples = self._samples(self._runs, final=True)
-        sensor = self._settings.sensor
-        if len(samples):
-            mean_c = self._last_c if self._settings.accel_alone else float(samples.temperature_c.mean())
-            sensor = replace(sensor, rate_hz=self._clock.rate_hz, temperature_c=mean_c)
+        samples = self._samples(self._runs, self._clock.final())
         arrays = {f.name: getattr(samples, f.name) for f in fields(Samples)}
-        return Recording(**arrays, sensor=sensor, name=name)
+        return Recording(**arrays, sensor=self.sensor, name=name)
+
+    @property
+    def sensor(self) -> Sensor:
+        """The sensor; once there were samples, with its measured rate and mean temperature."""
+        sensor = self._settings.sensor
+        if not self._begun:
+            return sensor
+        return replace(sensor, rate_hz=self._clock.rate_hz, temperature_c=self._mean_c)
 
     def _aligned(self, frames: Counts) -> bool:
         if not len(frames) or self._settings.accel_alone:
@@ -185,7 +205,14 @@ class FifoDecoder:
     def _gap_before(self, first: int) -> bool:
         return first == DROPPED_FRAMES and self._begun
 
-    def _samples(self, runs: list[_Run], final: bool = False) -> Samples:
+    def _after(self, last_t_s: float | None, samples: Samples) -> Samples:
+        """The same, each later than `last_t_s`."""
+        if last_t_s is None:
+            return samples
+        t = increasing(np.insert(samples.t, 0, last_t_s), LEAST_STEP / self._clock.rate_hz)[1:]
+        return replace(samples, t=t)
+
+    def _samples(self, runs: list[Run], times_s: Times) -> Samples:
         if not runs:
             return Samples.empty()
         frames = np.concatenate([run.frames for run in runs])
@@ -193,7 +220,7 @@ class FifoDecoder:
         gap = np.zeros(len(frames), bool)
         gap[np.cumsum([0] + [len(run.frames) for run in runs[:-1]])] = [run.gap for run in runs]
         alone = Samples(
-            t=self._times_s(runs, final),
+            t=self._times_s(runs, times_s),
             acc=frames[:, ACCEL] * settings.mps2_per_lsb,
             gyr=np.full((len(frames), 3), np.nan),
             temperature_c=np.full(len(frames), np.nan),
@@ -215,16 +242,17 @@ class FifoDecoder:
         return counts / family.lsb_per_c + family.zero_c
 
     @property
-    def _last_c(self) -> float | None:
-        """What the temperature register showed last."""
-        return None if self._temperature is None else float(self._celsius(self._temperature))
+    def _mean_c(self) -> float | None:
+        """Of all frames; where they hold no temperature, what its register showed last."""
+        if self._settings.accel_alone:
+            return None if self._temperature is None else float(self._celsius(self._temperature))
+        return float(self._celsius(self._warmth / self._believed))
 
-    def _times_s(self, runs: list[_Run], final: bool) -> Vector:
+    def _times_s(self, runs: list[Run], times_s: Times) -> Vector:
         lengths = [len(run.frames) for run in runs]
         starts = np.cumsum([0, *lengths[:-1]])
         segment = np.repeat([run.segment for run in runs], lengths)
         index = np.arange(sum(lengths)) + np.repeat([run.first for run in runs] - starts, lengths)
-        times_s = self._clock.final_times_s if final else self._clock.times_s
         return increasing(times_s(segment, index), LEAST_STEP / self._clock.rate_hz)
 
 

@@ -41,8 +41,8 @@ Write = Callable[[Samples], None]
 def open_rows(path: Path) -> Rows:
     """The samples of any recording that `load` reads.
 
-    A table and an archive are read as they are gone through. A capture is decoded whole, since the times of its first
-    samples are known only with its last.
+    A table and an archive are read as they are gone through. A capture is gone through before, since the times of its
+    first samples are known only with its last. A vehicle's log is decoded whole.
 
     Raises
     ------
@@ -56,8 +56,13 @@ def open_rows(path: Path) -> Rows:
         from .npz import npz_rows  # noqa: PLC0415
 
         return npz_rows(path)
-    from .. import load  # noqa: PLC0415
+    from .. import captures_of, load  # noqa: PLC0415
 
+    parts = captures_of(path) if path.is_dir() else [path]
+    if parts[0].is_file() and parts[0].suffix.lower() == ".mcap":
+        from .capture import capture_rows  # noqa: PLC0415
+
+        return capture_rows(parts)
     recording = load(path)
     return Rows(
         (recording.part(first, first + ROWS) for first in range(0, len(recording), ROWS)),
