@@ -6,6 +6,7 @@ import ctypes
 import json
 import os
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -16,6 +17,7 @@ from pathlib import Path
 import pytest
 
 HARNESS = Path(__file__).parent / "harness"
+TIME_AND_HEARD, NOBODY_LISTENS = struct.Struct("<qq"), -1
 PRELOAD = "LD_PRELOAD"
 
 
@@ -41,7 +43,8 @@ class Device:
     def __init__(self, text: str, folder: Path, clock: Path) -> None:
         self.folder, time = folder, folder / "clock"
         # an uptime of a quarter of an hour: a monotonic clock does not begin at zero
-        time.write_bytes((900 * 10**9).to_bytes(8, "little"))
+        time.write_bytes(TIME_AND_HEARD.pack(900 * 10**9, NOBODY_LISTENS))
+        self._time = time
         command = [sys.executable, HARNESS / "device.py", text, time]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         mocked = json.loads(self._process.stdout.readline())
@@ -78,6 +81,7 @@ class Device:
 
     def session(self, *words) -> Result:
         """The same, guiding the simulated hand through a session; it may fail before."""
+        self._heard(0)
         command = [Path(sys.executable).parent / "mpucal", "session", "--bus", "/dev/i2c-1", "--json-events", *words]
         with subprocess.Popen(
             [str(word) for word in command],
@@ -86,15 +90,23 @@ class Device:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            text=True,
         ) as process:
-            said = []
+            said = b""
             for line in process.stderr:
-                said.append(line)
-                event = json.loads(line) if line.startswith("{") else {}
+                event = json.loads(line) if line.startswith(b"{") else {}
                 if event.get("event") == "prompt":
                     self.tell(prompt={"kind": event["kind"], "down": event.get("down")})
-            return Result(process.wait(), process.stdout.read(), "".join(said))
+                said += line
+                self._heard(len(said))
+            out = process.stdout.read().decode()
+            self._heard(NOBODY_LISTENS)
+            return Result(process.wait(), out, said.decode())
+
+    def _heard(self, count: int) -> None:
+        """So many bytes of what the program says were heard; see harness/clock.c."""
+        with self._time.open("r+b") as file:
+            file.seek(8)
+            file.write(count.to_bytes(8, "little", signed=True))
 
     def forbid(self) -> None:
         """Let the kernel refuse to open the device file, to root as well: a setting of /proc that is read only."""

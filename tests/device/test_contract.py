@@ -19,6 +19,7 @@ PROMISES = (
     "test_closing_ends_it",
     "test_only_a_replay_ends",
 )
+PWR_MGMT_1, DEVICE_RESET = "107", "80"
 # one I2cBus in a process for which /dev/i2c-1 is there
 SERVER = """
 import json, sys
@@ -76,9 +77,16 @@ def _contract():
     return module
 
 
+@pytest.fixture(scope="module")
+def still(device_of_module):
+    return device_of_module("still")
+
+
 @pytest.fixture
-def bus(device):
-    distant = DistantBus(device("still"))
+def bus(still):
+    """On a chip as after power-on."""
+    still.tell(registers={PWR_MGMT_1: DEVICE_RESET})
+    distant = DistantBus(still)
     yield distant
     distant.end()
 
