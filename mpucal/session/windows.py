@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,20 +36,27 @@ class Windows:
 
     def __init__(self, length_s: float) -> None:
         self._length_s = length_s
-        self._pending = Samples.empty()
+        self._parts: list[Samples] = []
+        self._full_s = -math.inf
 
     def add(self, samples: Samples) -> list[Window]:
         """The windows that `samples` complete."""
-        pending = Samples.joined([self._pending, samples]) if len(self._pending) else samples
+        if not len(samples):
+            return []
+        self._parts.append(samples)
+        if samples.t[-1] < self._full_s:
+            return []
+        pending = Samples.joined(self._parts)
         windows: list[Window] = []
         first = 0
-        while first < len(pending):
-            last = int(np.searchsorted(pending.t, pending.t[first] + self._length_s - 1e-9))
-            if last >= len(pending):
+        while True:
+            self._full_s = float(pending.t[first]) + self._length_s - 1e-9
+            last = int(np.searchsorted(pending.t, self._full_s))
+            if last == len(pending):
                 break
             windows.append(_window(pending, first, last))
             first = last
-        self._pending = _tail(pending, first)
+        self._parts = [_tail(pending, first)]
         return windows
 
 
