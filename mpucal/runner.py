@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from .bus.parts import RESUMED
-from .bus.records import SessionEvent
 from .capture import FORGET
 from .chip.access import EndOfCapture
-from .data import Recording, Samples, Sensor
+from .data import Recording, Sensor
 from .errors import Abandoned, BusError, CaptureError, ChipError
-from .live.fits import Live
+from .live.questions import Here, Questions, Worker
 from .live.verdict import verified
+from .ports import KEY, LATE, Note, Source, Talk
 from .result import Calibration
 from .session.events import (
     Abort,
@@ -28,7 +29,6 @@ from .session.events import (
     Forget,
     Key,
     Measured,
-    Output,
     Prompt,
     Redo,
     Resumed,
@@ -42,72 +42,7 @@ from .session.table import State
 from .sinks.file import result_files, save
 
 MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
-KEY = "key"
 _PRESSED: dict[Key, Event] = {Key.ENOUGH: Enough(), Key.REDO: Redo(), Key.ABORT: Abort()}
-
-
-class Source(Protocol):
-    """What delivers samples: the chip's driver, over whatever bus."""
-
-    def start(self) -> Sensor:
-        """Set the sensor up and begin to measure."""
-        ...
-
-    def poll(self) -> Samples:
-        """Wait a little, and return the samples that came meanwhile; EndOfCapture if there will be none."""
-        ...
-
-    def recording(self) -> Recording:
-        """All samples so far, with their final times."""
-        ...
-
-    def forget(self) -> None:
-        """Let go of all samples so far: `recording` holds what comes from now on, for hours if need be."""
-        ...
-
-    def now_ns(self) -> int:
-        """The source's clock, in which the samples' times are."""
-        ...
-
-    def stop(self) -> None:
-        """Put the sensor to rest."""
-        ...
-
-
-class Talk(Protocol):
-    """The person: who is told, and who says."""
-
-    def hear(self, output: Output) -> None:
-        """Be told."""
-        ...
-
-    def pressed(self) -> Sequence[Key]:
-        """What was pressed since the last call; never waits."""
-        ...
-
-
-class Replayed:
-    """The person in a capture: presses the recorded keys where they were pressed. Somebody else listens.
-
-    Parameters
-    ----------
-    listener : hears, and may abort. pending : the session events recorded since the last access, each once.
-    """
-
-    def __init__(self, listener: Talk, pending: Callable[[], Sequence[SessionEvent]]) -> None:
-        self._listener, self._pending = listener, pending
-
-    def hear(self, output: Output) -> None:
-        """Be told."""
-        self._listener.hear(output)
-
-    def pressed(self) -> Sequence[Key]:
-        """The recorded keys, and a listener's abort."""
-        recorded = [Key(event.data[KEY]) for event in self._pending() if event.name == KEY]
-        return [*recorded, *(key for key in self._listener.pressed() if key is Key.ABORT)]
-
-
-Note = Callable[[str, int, Mapping[str, Any]], None]
 
 
 class Runner:
@@ -122,6 +57,8 @@ class Runner:
     listeners : hear each prompt besides the person: the hand that turns a simulated board.
     go_on : after the source has ended, lets it go on with the next part of what was recorded in parts: True where
         there is one. The last part of a resumed session is the sensor itself.
+    late : whether to wait for an answer that is late now, or is not; in a replay, where its session waited.
+    hire : begins who computes the answers.
     """
 
     def __init__(
@@ -132,12 +69,16 @@ class Runner:
         plan: Plan | None = None,
         listeners: Sequence[Callable[[Prompt], None]] = (),
         go_on: Callable[[], bool] = lambda: False,
+        late: Callable[[bool], bool] = bool,
+        hire: Callable[[Plan, Sensor], Worker] = Here,
     ) -> None:
         self._source, self._talk, self._note = source, talk, note
         self._plan = plan or Plan()
-        self._listeners, self._go_on = listeners, go_on
+        self._listeners, self._go_on, self._late, self._hire = listeners, go_on, late, hire
         self._machine = Machine(self._plan.until_end, self._plan.target, self._plan.tilt_only)
-        self._live: Live | None = None
+        self._questions: Questions | None = None
+        # what must not reach the machine before an answer that is late
+        self._arrived: deque[Event] = deque()
         self._forgotten: list[Forget] = []
         self._said = Decision("")
         self._ended = False
@@ -155,7 +96,7 @@ class Runner:
             self._ask()
             self._connect()
             if self.sensor is not None:
-                self._live = Live(self._plan, self.sensor)
+                self._questions = Questions(self._plan, self.sensor, self._hire)
             while self._machine.state in MEASURING:
                 self._ask()
                 if self._machine.state in MEASURING:
@@ -166,8 +107,8 @@ class Runner:
                 self._rest()
             raise
         finally:
-            if self._live is not None:
-                self._live.close()
+            if self._questions is not None:
+                self._questions.close()
         self._rest()
         return self._recording()
 
@@ -237,7 +178,7 @@ class Runner:
         try:
             self.sensor = self._source.start()
         except EndOfCapture:
-            self._source_ended()
+            self._ends(SourceEnded())
         else:
             self._feed(Connected(self.sensor))
 
@@ -245,34 +186,45 @@ class Runner:
         try:
             samples = self._source.poll()
         except EndOfCapture:
-            self._source_ended()
+            self._ends(SourceEnded())
         except (BusError, ChipError) as error:
-            # what ended one part of a session that was resumed does not end the session
-            if self._next_part():
-                return
-            self._ended = True
             # a CaptureError is none of these: what does not replay is not calibrated either
-            if self._machine.state not in (State.ROTATE, State.VERIFY):
-                raise
-            self._feed(SourceEnded(error.what))
+            self._ends(SourceEnded(error.what), error)
         else:
-            self._measured(samples)
-            if self._machine.state in MEASURING:
-                self._feed(Tick(self._source.now_ns() * 1e-9))
+            self._arrived += Measured(samples), Tick(self._source.now_ns() * 1e-9)
+            self._catch_up()
 
-    def _measured(self, samples: Samples) -> None:
-        if self._live is not None:
-            self._live.add(samples)
-        self._feed(Measured(samples))
-        for answer in self._live.answers() if self._live is not None else ():
-            if self._machine.state in MEASURING:
-                self._feed(answer)
+    def _catch_up(self, wait: bool = False) -> None:
+        """Tell the machine what arrived, each answer in its place; where one is late, the source goes on meanwhile."""
+        while self._machine.state in MEASURING:
+            if self._questions is not None and self._questions.due:
+                if not wait and self._late(self._questions.late):
+                    self._note(LATE, self._source.now_ns(), {})
+                    return
+                for answer in self._questions.answers():
+                    if self._machine.state in MEASURING:
+                        self._feed(answer)
+            elif self._arrived:
+                event = self._arrived.popleft()
+                if self._questions is not None and isinstance(event, Measured):
+                    self._questions.add(event.samples)
+                self._feed(event)
+            else:
+                return
+        self._arrived.clear()
 
-    def _source_ended(self) -> None:
-        """That was all, or all of one part."""
-        if not self._next_part():
-            self._ended = True
-            self._feed(SourceEnded())
+    def _ends(self, event: SourceEnded, error: BusError | ChipError | None = None) -> None:
+        """That was all, or all of one part: what ended that does not end a session that was resumed."""
+        self._catch_up(wait=True)
+        enough = self.sensor is not None and self._machine.state not in MEASURING
+        if not enough and self._next_part():
+            return
+        self._ended = True
+        if enough:
+            return
+        if error is not None and self._machine.state not in (State.ROTATE, State.VERIFY):
+            raise error
+        self._feed(event)
 
     def _next_part(self) -> bool:
         """Go on with the next part of a resumed session; False where there is none."""
@@ -309,7 +261,10 @@ class Runner:
 
     def _press(self, key: Key) -> None:
         self._note(KEY, self._source.now_ns(), {KEY: key.value})
-        self._feed(_PRESSED[key])
+        if self._arrived and key is not Key.ABORT:
+            self._arrived.append(_PRESSED[key])
+        else:
+            self._feed(_PRESSED[key])
 
     def _feed(self, event: Event) -> None:
         for output in self._machine.handle(event):
@@ -330,7 +285,7 @@ class Runner:
         if isinstance(command, Forget):
             self._forgotten = [f for f in self._forgotten if f.first != command.first] + [command]
             self._note(FORGET, self._source.now_ns(), {"first": command.first, "last": command.last})
-            if self._live is not None:
-                self._live.forget(command.first)
-        elif self._live is not None:
-            self._live.ask(command)
+            if self._questions is not None:
+                self._questions.forget(command.first)
+        elif self._questions is not None:
+            self._questions.ask(command)

@@ -1,4 +1,5 @@
 import json
+from functools import partial
 
 import numpy as np
 import pytest
@@ -8,8 +9,10 @@ from mpucal.bus.records import SessionEvent
 from mpucal.chip.access import EndOfCapture
 from mpucal.data import Recording, Samples, Sensor
 from mpucal.errors import Abandoned, BusError, CaptureError, ChipError, NoAnswer, OutputError
+from mpucal.live.questions import Here
+from mpucal.ports import Replayed
 from mpucal.result import Calibration
-from mpucal.runner import Replayed, Runner
+from mpucal.runner import Runner
 from mpucal.session.events import Decision, Key, Prompt, PromptKind
 from mpucal.session.plan import Plan
 
@@ -212,10 +215,10 @@ def test_recorded_keys_are_pressed_again_at_their_place():
     # a bus gives each recorded event once, when the accesses before it are done
     pending = list(notes)
 
-    def events():
+    def events(name):
         due = [event for event in pending if event.t_ns <= again.now_ns()]
         del pending[: len(due)]
-        return due
+        return [event for event in due if event.name == name]
 
     replayed = Runner(again, Replayed(listener, events), Notes()).measure()
     assert np.array_equal(live.t, replayed.t)
@@ -223,9 +226,71 @@ def test_recorded_keys_are_pressed_again_at_their_place():
     assert "you said that is enough" in listener.words()
 
 
+class Late:
+    """Knows the same as anybody, but each answer only once the source was polled so many times more."""
+
+    def __init__(self, source, polls, plan, sensor):
+        self.source, self.polls, self.here = source, polls, Here(plan, sensor)
+
+    def submit(self, task):
+        answer, at = self.here.submit(task), self.source.polls + self.polls
+        answer.done = lambda: self.source.polls >= at
+        return answer
+
+    def close(self):
+        self.here.close()
+
+
+def late_session(polls, keys=None, ends_at=170):
+    """Of the same source, with answers so late."""
+    source, person, notes = Source({ends_at: EndOfCapture()}), Person(keys), Notes()
+    runner = Runner(source, person, notes, hire=partial(Late, source, polls))
+    return runner.measure(), person, notes
+
+
+def waits(notes):
+    return [note.t_ns for note in notes if note.name == "late"]
+
+
+def test_while_an_answer_is_late_the_source_goes_on_and_the_session_says_the_same():
+    punctual, heard, notes = late_session(0)
+    assert not waits(notes)
+    late, heard_late, notes = late_session(12)
+    assert len(waits(notes)) > 10
+    assert np.array_equal(late.t, punctual.t)
+    assert heard_late.heard == heard.heard
+
+
+@pytest.mark.parametrize("ends_at", [170, 131], ids=["in the end", "while one is late"])
+def test_a_replay_waits_where_its_session_did(ends_at):
+    # a person who has enough while an answer is late is heard in the same place
+    live, person, notes = late_session(12, {141: [Key.ENOUGH]}, ends_at)
+    assert waits(notes)
+    again, listener = Source({ends_at: EndOfCapture()}), Person()
+    pending, notes_again = list(notes), Notes()
+
+    def events(name):
+        due = [event for event in pending if event.t_ns <= again.now_ns() and event.name == name]
+        pending[:] = [event for event in pending if event not in due]
+        return due
+
+    runner = Runner(again, Replayed(listener, events), notes_again, late=lambda _late: bool(events("late")))
+    assert np.array_equal(runner.measure().t, live.t)
+    assert listener.heard == person.heard
+    assert notes_again == notes
+    assert not pending
+
+
+def test_ctrl_c_does_not_wait_for_a_late_answer():
+    source = Source()
+    with pytest.raises(Abandoned, match="interrupted"):
+        Runner(source, Person({150: [Key.ABORT]}), Notes(), hire=partial(Late, source, 1000)).measure()
+    assert source.polls == 148
+
+
 def test_who_watches_a_replay_may_stop_it_but_not_steer_it():
     watcher = Person({3: [Key.ENOUGH], 5: [Key.ABORT]})
-    replayed = Replayed(watcher, lambda: [SessionEvent("option", 0, {})])
+    replayed = Replayed(watcher, lambda _name: [])
     assert [list(replayed.pressed()) for _ in range(5)] == [[], [], [], [], [Key.ABORT]]
 
 

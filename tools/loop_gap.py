@@ -3,32 +3,62 @@
 python tools/loop_gap.py --rate 1000 --seconds 70
 python tools/loop_gap.py --rate 200 --seconds 70
 
-A session on the simulated chip at a person's pace: the gap is the time between two looks into the FIFO, which at 1 kHz
-overflows 36 ms after it was emptied. The simulation itself takes most of the time; its share is measured apart, by the
-same session without fits.
+A session on the simulated chip at a person's pace, recorded into a capture: the gap is the time between two looks into
+the FIFO, which at 1 kHz overflows 36 ms after it was emptied. Compared are a session without fits, with fits in the
+loop, and with fits in a process of their own, as a session has them. The simulation itself takes a part of the time.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from mpucal.bus.simulated import open_simulated
+from mpucal.bus.tap import Tap
+from mpucal.capture.mcap import CaptureWriter
 from mpucal.chip import registers as reg
 from mpucal.chip.access import Bus, EndOfCapture, Reply
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.live.fits import Live
+from mpucal.data import Sensor
+from mpucal.live.apart import Apart
+from mpucal.live.fits import Task
+from mpucal.live.questions import Here, Worker
 from mpucal.runner import Runner
-from mpucal.session.events import Key, Output
+from mpucal.session.events import Event, Key, Output
 from mpucal.session.plan import Plan
 
 FIFO_FRAMES = 512 // reg.FRAME_BYTES
+
+
+Hire = Callable[[Plan, Sensor], Worker]
+
+
+class Idle:
+    """Answers nothing, at once."""
+
+    def __init__(self, _plan: Plan, _sensor: Sensor) -> None: ...
+
+    def submit(self, _task: Task) -> Future[Event | None]:
+        """See Worker."""
+        answer: Future[Event | None] = Future()
+        answer.set_result(None)
+        return answer
+
+    def close(self) -> None:
+        """See Worker."""
+
+
+HIRED: dict[str, Hire] = {"without fits": Idle, "with fits in the loop": Here, "with fits apart": Apart}
 
 
 class Timed:
@@ -84,37 +114,40 @@ class Measured:
     share: float
 
 
-def measure(rate_hz: float, seconds: float, fits: bool) -> Measured:
+def measure(rate_hz: float, seconds: float, hire: Hire) -> Measured:
     """One session of so long."""
     chip = open_simulated("sim:pace=real", seed=1)
     bus = Timed(chip, seconds)
     plan = Plan(Config(rate_hz=rate_hz), target="best")
-    runner = Runner(Driver(bus, plan.config), Nobody(bus), lambda *_: None, plan, (chip.hear,))
-    restored: Callable[..., object] = Live.ask
-    if not fits:
-        Live.ask = lambda *_: None  # type: ignore[method-assign]
-    begun, cpu = time.monotonic(), time.process_time()
-    try:
+    with tempfile.TemporaryDirectory() as folder, CaptureWriter(Path(folder) / "capture.mcap") as writer:
+        writer.start({})
+        driver = Driver(Tap(bus, writer), plan.config)
+        runner = Runner(driver, Nobody(bus), writer.event, plan, (chip.hear,), hire=hire)
+        begun, used_s = time.monotonic(), _used_s()
         runner.measure()
-    finally:
-        Live.ask = restored  # type: ignore[method-assign]
-    share = (time.process_time() - cpu) / (time.monotonic() - begun)
+        share = (_used_s() - used_s) / (time.monotonic() - begun)
     return Measured(np.diff(bus.looks_ns) * 1e-6, share)
 
 
+def _used_s() -> float:
+    """CPU time of this process and of those that have ended."""
+    used = os.times()
+    return used.user + used.system + used.children_user + used.children_system
+
+
 def main() -> int:
-    """Measure with and without fits."""
+    """Measure all of them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--rate", type=float, default=1000.0)
     parser.add_argument("--seconds", type=float, default=70.0)
     arguments = parser.parse_args()
     print(f"{arguments.rate:g} Hz, {arguments.seconds:g} s; a 512-byte FIFO holds", end=" ")
     print(f"{1000.0 * FIFO_FRAMES / arguments.rate:.0f} ms")
-    for fits in (False, True):
-        found = measure(arguments.rate, arguments.seconds, fits)
+    for name, hire in HIRED.items():
+        found = measure(arguments.rate, arguments.seconds, hire)
         gaps = found.gaps_ms
         print(
-            f"{'with' if fits else 'without'} fits: gaps {np.median(gaps):.1f} ms in the median, "
+            f"{name}: gaps {np.median(gaps):.1f} ms in the median, "
             f"{np.quantile(gaps, 0.99):.1f} at 99 %, {gaps.max():.1f} at worst; {found.share:.0%} of a core",
             flush=True,
         )

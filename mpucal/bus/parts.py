@@ -54,9 +54,9 @@ class PartsBus:
         for part in self._parts:
             part.close()
 
-    def pending_events(self) -> list[SessionEvent]:
+    def pending_events(self, name: str) -> list[SessionEvent]:
         """See ReplayBus; none where nothing is replayed."""
-        return self._part.pending_events() if isinstance(self._part, ReplayBus) else []
+        return self._part.pending_events(name) if isinstance(self._part, ReplayBus) else []
 
     def unread(self) -> int:
         """How many recorded accesses of the last part nobody has asked for."""

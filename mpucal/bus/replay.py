@@ -51,13 +51,14 @@ class ReplayBus:
     def close(self) -> None:
         """Nothing to let go of; `unread` tells whether the capture was used up."""
 
-    def pending_events(self) -> list[SessionEvent]:
-        """The events recorded since the last replayed access, each once.
+    def pending_events(self, name: str) -> list[SessionEvent]:
+        """The events of that name recorded before the next access, each once.
 
         Asked where the recording session asked its keyboard, what was recorded between two accesses
         comes between the same two.
         """
-        pending, self._pending = self._pending, []
+        pending = [event for event in self._pending if event.name == name]
+        self._pending = [event for event in self._pending if event.name != name]
         return pending
 
     def unread(self) -> int:

@@ -58,7 +58,7 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     search = _Search(prepare(*thinned(recording, flat, SEARCH_HZ), gravity))
     theta, noise = search.run(initialise(fine.problem, fine.flat.b_omega))
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
-        noise = Noise("white", _likeliest(fine.white, _near(noise.sigma), theta))
+        noise = Noise("white", _likeliest(fine.white, near(noise.sigma), theta))
     problem = _with_doubted_moves(noise.problem(fine), fine, theta)
     prior = _prior(fine.flat)
     minimum = minimise(problem, theta, len(NAMES), prior, frozen=True)
@@ -131,7 +131,7 @@ def _likeliest(problem_of: Callable[[float], Problem], sigmas: tuple[float, ...]
     return min(sigmas, key=lambda sigma: value(problem_of(sigma), theta))
 
 
-def _near(sigma: float) -> tuple[float, ...]:
+def near(sigma: float) -> tuple[float, ...]:
     """The neighbours of a sigma on the grid, itself among them, zero excepted."""
     at = WHITE_MPS2.index(sigma)
     return WHITE_MPS2[max(at - 1, 1) : at + 3]

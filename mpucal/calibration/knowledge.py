@@ -13,20 +13,18 @@ import numpy as np
 
 from ..data import Recording, Vector
 from .gyro import K_MEAN, K_SD
-from .hand import DELAY_SD_S, FARTHER, HONEST, LEVER_SD_M, PIVOT_MPS2, WHITE_MPS2
+from .hand import DELAY_SD_S, FARTHER, FIRST_MPS2, HONEST, LEVER_SD_M, PIVOT_MPS2, WHITE_MPS2, near
 from .initialise import initialise
-from .likelihood import NAMES, Problem, Theta, evaluate, trace, value
+from .likelihood import NAMES, Problem, Series, Theta, evaluate, trace, value
 from .minimise import Minimum, Prior, minimise
 from .model import Flat, rotation
 from .moves import POSE_MPS2
 from .scene import CORRELATION_S, FLOOR_MPS2, MOVING_RAD_S, Scene, jerk_density, prepare
 from .thin import thinned
 
-# Fast enough for a hand's moves, few enough samples for a fit within a poll or two ...
+# Fast enough for a hand's moves, few enough samples for a fit within a poll or two.
 FIT_HZ = 50.0
-# ... and these for what a further rest would add, asked for every direction.
-ADVICE_HZ = 10.0
-ROUGHLY, MOST_ROUGHLY = 0.05, 12
+ROUGHLY, MOST_ROUGHLY = 0.05, 4
 
 # So weak that nothing measured gives way to them, strong enough for a D of which nothing is known yet.
 D_SD, B_A_SD_MPS2 = 0.5, 5.0
@@ -44,14 +42,17 @@ class Known:
 
     Attributes
     ----------
-    theta : the estimate. covariance : (12, 12) of D row-major and b_a.
-    sigma : m/s^2, of the hand's acceleration while it moves. rests : how many there were after the flat segment.
+    theta : the estimate. H : (27, 27) its Fisher matrix with the prior's. covariance : (12, 12) of D row-major and b_a.
+    problem : the series up to now. sigma : m/s^2, of the hand's acceleration while it moves.
+    converged : whether the search ended; if not, the next begins anew.
     """
 
     theta: Theta
+    H: Vector
     covariance: Vector
+    problem: Problem
     sigma: float
-    rests: int
+    converged: bool
 
     @property
     def D_std(self) -> Vector:  # noqa: N802 - the paper's letter
@@ -67,14 +68,14 @@ class Known:
 def know(recording: Recording, flat: Flat, gravity: float, before: Known | None = None) -> Known:
     """What `recording` tells so far; `before` is where the search starts, where there was one."""
     scene = prepare(*thinned(recording, flat, FIT_HZ), gravity)
-    theta = initialise(scene.problem, scene.flat.b_omega) if before is None else before.theta
     prior = _prior(scene.flat)
-    minimum = _minimum(scene, theta, prior)
-    if before is not None and not minimum.converged:
-        minimum = min(
-            (minimum, _minimum(scene, initialise(scene.problem, scene.flat.b_omega), prior)), key=lambda m: m.V
-        )
-    sigma = _likeliest(scene, minimum.theta)
+    if before is None or not before.converged:
+        theta = _from_afar(scene, prior, () if before is None else (before.theta,))
+        sigma = _likeliest(scene, theta, WHITE_MPS2)
+    else:
+        theta, sigma = before.theta, before.sigma
+    problem = scene.white(sigma, CORRELATION_S)
+    minimum = _minimum(problem, theta, prior)
     H = minimum.H
     if not scene.rests_often:
         # who does not pause leans on a hand's travel, of which little is known: as the calibration, admit more of it
@@ -82,48 +83,52 @@ def know(recording: Recording, flat: Flat, gravity: float, before: Known | None 
         doubt = scene.pivot(HONEST * FARTHER * pivot, FLOOR_MPS2)
         H = evaluate(doubt, minimum.theta, len(NAMES)).fisher + np.diag(prior.precision)
     covariance = replace(minimum, H=H).covariance()[:12, :12]
-    return Known(minimum.theta, covariance, sigma, scene.rests)
+    sigma = _likeliest(scene, minimum.theta, near(sigma))
+    return Known(minimum.theta, H, covariance, problem, sigma, minimum.converged)
 
 
-def most_helpful(
-    known: Known, recording: Recording, flat: Flat, gravity: float, wanted: Vector, directions: Vector
-) -> int:
+def most_helpful(known: Known, wanted: Vector, directions: Vector) -> int:
     """Which of `directions`, pointing down at rest, would reduce the uncertainty fastest.
 
-    The Fisher information of a move there and a rest is added to that of the recording; what counts is the sum of
+    The Fisher information of a move there and a rest is added to what is known; what counts is the sum of
     (variance / wanted^2), by how much a second reduces its logarithm.
 
     Parameters
     ----------
     wanted : (12,) standard deviations, of D row-major and b_a. directions : (k, 3) unit vectors in the body frame.
     """
-    scene = prepare(*thinned(recording, flat, ADVICE_HZ), gravity)
-    problem = scene.white(known.sigma, CORRELATION_S)
-    prior = np.diag(_prior(scene.flat).precision)
-    s = trace(problem, known.theta).s[-1]
+    s = trace(known.problem, known.theta).s[-1]
     here = -s / np.linalg.norm(s)
-    now = _badness(evaluate(problem, known.theta, len(NAMES)).fisher + prior, wanted)
+    now = _badness(known.H, wanted)
     best, most = 0, -np.inf
     for i, down in enumerate(directions):
         angle = math.acos(float(np.clip(here @ down, -1.0, 1.0)))
         if angle < NEAR_RAD:
             continue
         seconds = max(MOVE_S, angle / FAST_RAD_S)
-        longer = _with_rest(problem, known, s, down, seconds)
-        then = _badness(evaluate(longer, known.theta, len(NAMES)).fisher + prior, wanted)
+        then = _badness(known.H + _information(_move_and_rest(known, s, down, seconds), known.theta, s), wanted)
         gain = (math.log(now) - math.log(then)) / (seconds + REST_S)
         if gain > most:
             best, most = i, gain
     return best
 
 
-def _minimum(scene: Scene, theta: Theta, prior: Prior) -> Minimum:
-    problem = scene.white(_likeliest(scene, theta), CORRELATION_S)
+def _from_afar(scene: Scene, prior: Prior, more: tuple[Theta, ...]) -> Theta:
+    """A first theta, by a loss that finds the way from afar: of a perfect sensor, the linear estimate, and `more`."""
+    problem = replace(scene.white(FIRST_MPS2), tail=0.0)
+    flat = scene.flat
+    u = flat.y / np.linalg.norm(flat.y)
+    perfect = Theta.start(np.eye(3), flat.y - problem.gravity * u, flat.b_omega, u)
+    starts = (perfect, initialise(scene.problem, flat.b_omega), *more)
+    return _minimum(problem, min(starts, key=lambda theta: value(problem, theta) + prior.cost(theta)), prior).theta
+
+
+def _minimum(problem: Problem, theta: Theta, prior: Prior) -> Minimum:
     return minimise(problem, theta, len(NAMES), prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True)
 
 
-def _likeliest(scene: Scene, theta: Theta) -> float:
-    return min(WHITE_MPS2, key=lambda sigma: value(scene.white(sigma), theta))
+def _likeliest(scene: Scene, theta: Theta, sigmas: tuple[float, ...]) -> float:
+    return min(sigmas, key=lambda sigma: value(scene.white(sigma), theta))
 
 
 def _prior(flat: Flat) -> Prior:
@@ -143,10 +148,19 @@ def _badness(H: Vector, wanted: Vector) -> float:
     return float(np.sum(np.abs(variance[:12]) / wanted**2))
 
 
-def _with_rest(problem: Problem, known: Known, s: Vector, down: Vector, seconds: float) -> Problem:
-    """The problem, and after it the shortest turn from gravity s (3,) to `down` (3,), and a rest there."""
-    series, theta = problem.series, known.theta
-    dt = float(np.median(series.dt))
+def _information(problem: Problem, theta: Theta, s: Vector) -> Vector:
+    """(p, p) Fisher matrix of a problem that begins at rest with gravity s (3,), whatever the pose there."""
+    F = evaluate(problem, replace(theta, u=s / np.linalg.norm(s)), len(NAMES)).fisher
+    pose = slice(12, 14)
+    F = F - F[:, pose] @ np.linalg.solve(F[pose, pose], F[pose])
+    F[:, pose] = F[pose] = 0.0
+    return F
+
+
+def _move_and_rest(known: Known, s: Vector, down: Vector, seconds: float) -> Problem:
+    """A rest with gravity s (3,), the shortest turn from there to `down` (3,) in so many seconds, and a rest there."""
+    problem, theta = known.problem, known.theta
+    dt = float(np.median(problem.series.dt))
     move, rest = max(round(seconds / dt), 2), max(round(REST_S / dt), 2)
     turn = _shortest_turn(s / np.linalg.norm(s), -down)
     # s in the body's axes turns against the body
@@ -158,26 +172,20 @@ def _with_rest(problem: Problem, known: Known, s: Vector, down: Vector, seconds:
     moving = speed2 / (speed2 + MOVING_RAD_S**2)
     longer = 1.0 + 2.0 * CORRELATION_S / dt
     resting = np.arange(move + rest) >= move
-    reset = np.where(np.arange(move + rest) == move, TREMOR_MPS2, -1.0)
-    if series.reset is not None:
-        reset[0] = 0.0
-    added = {
-        "y": path @ theta.D.T + theta.b_a,
-        "omega": omega @ np.linalg.inv(theta.K).T + theta.b_omega,
-        "dt": np.full(move + rest, dt),
-        "r_scale": np.ones(move + rest),
-        "q_scale": np.ones(move + rest),
-        "q_extra": np.zeros(move + rest),
-        "rate": omega,
-        "alpha": np.zeros_like(omega),
-        "r_extra": np.where(resting, POSE_MPS2**2 * rest, longer * known.sigma**2 * moving),
-        "jerk": np.where(resting, jerk_density(TREMOR_MPS2, problem.lam), 0.0),
-        "reset": reset,
-    }
-    present = {name: getattr(series, name) for name in added if getattr(series, name) is not None}
-    return replace(
-        problem, series=replace(series, **{name: np.concatenate([old, added[name]]) for name, old in present.items()})
+    reset = np.full(move + rest, -1.0)
+    reset[0], reset[move] = 0.0, TREMOR_MPS2
+    series = Series(
+        y=path @ theta.D.T + theta.b_a,
+        omega=omega @ np.linalg.inv(theta.K).T + theta.b_omega,
+        dt=np.full(move + rest, dt),
+        rate=omega,
+        alpha=np.zeros_like(omega),
+        r_extra=np.where(resting, POSE_MPS2**2 * rest, longer * known.sigma**2 * moving),
+        jerk=np.where(resting, jerk_density(TREMOR_MPS2, problem.lam), 0.0),
+        reset=reset,
     )
+    flat = replace(problem.flat, first=0, last=rest, y=theta.D @ s + theta.b_a)
+    return replace(problem, series=series, flat=flat)
 
 
 def _shortest_turn(a: Vector, b: Vector) -> Vector:

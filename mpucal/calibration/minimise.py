@@ -36,6 +36,11 @@ class Prior:
             mean[place], precision[place] = centre, 1.0 / np.square(sd)
         return cls(mean, precision)
 
+    def cost(self, theta: Theta) -> float:
+        """What it adds to V."""
+        away = values(theta) - self.mean
+        return 0.5 * float(self.precision @ (away * away))
+
 
 PLACES = {"D": (0, 9), "b_a": (9, 12), "b_omega": (14, 17), "K": (17, 23), "tau": (23, 24), "r": (24, 27)}
 

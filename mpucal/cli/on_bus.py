@@ -15,12 +15,11 @@ from ..capture.mcap import CaptureWriter
 from ..chip.access import Bus
 from ..chip.driver import Driver
 from ..errors import CaptureError
-from ..runner import Replayed, Talk
+from ..ports import LATE, Replayed, Talk
 from ..session.events import Prompt
 from ..session.plan import Plan
 from ..sinks.file import CAPTURE
 from .opened import Measuring, Say
-from .opened import never_on as _never
 
 # of a capture's head: what to open to go on with the session
 SOURCE = "source"
@@ -33,7 +32,7 @@ class OnBus:
     Attributes
     ----------
     bus : open. replay : the same bus where it is a replay.
-    words : the options by which it was opened, for who resumes the session.
+    words : the options by which it was opened, for who resumes the session. real_time : see Opened.
     """
 
     bus: Bus
@@ -44,6 +43,7 @@ class OnBus:
     recovered: str | None = None
     capture_name: str = CAPTURE
     words: Mapping[str, Any] = field(default_factory=dict)
+    real_time: bool = True
 
     def source_meta(self) -> dict[str, Any]:
         """For the head of a capture."""
@@ -59,9 +59,15 @@ class OnBus:
         with closing(self.bus), CaptureWriter(capture) as writer:
             writer.start({"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.source_meta()})
             driver = Driver(Tap(self.bus, writer), self.plan.config, capture.name, lambda text: say(f"  {text}."))
-            yield Measuring(driver, writer.event, _never if self.replay is None else self.replay.go_on)
+            if self.replay is None:
+                yield Measuring(driver, writer.event)
+            else:
+                yield Measuring(driver, writer.event, self.replay.go_on, self._was_late)
         if self.replay is not None and self.replay.unread():
             raise CaptureError(
                 f"the replay ended with {self.replay.unread()} accesses of its capture unread",
                 "replay it with the mpucal that recorded it, or use `mpucal calibrate`",
             )
+
+    def _was_late(self, _late: bool) -> bool:
+        return self.replay is not None and bool(self.replay.pending_events(LATE))

@@ -22,7 +22,7 @@ from ..mavlink.replay import Replay
 from ..mavlink.source import VehicleSource, one_of
 from ..mavlink.tlog import Tlog, TlogWriter, read_tlog
 from ..mavlink.transport import Transport
-from ..runner import Replayed, Talk
+from ..ports import LATE, Replayed, Talk
 from ..session.events import Prompt
 from ..session.plan import Plan
 from .opened import Measuring, Say
@@ -42,7 +42,7 @@ class OnLink:
     ----------
     transport : open. plan : what to do; of its `config` the rate matters. system : whom to lock to.
     key : to sign with, or None. listeners : hear the prompts, besides the vehicle.
-    truth : of a simulated vehicle. replay : the same transport where it is a replay.
+    truth : of a simulated vehicle. replay : the same transport where it is a replay. real_time : see Opened.
 
     Attributes
     ----------
@@ -62,11 +62,13 @@ class OnLink:
         truth: Mapping[str, Any] | None = None,
         replay: Replay | None = None,
         recovered: str | None = None,
+        real_time: bool = True,
     ) -> None:
         self.plan = plan
         self.listeners = (self._prompt, *listeners)
         self.truth = truth
         self.recovered = recovered
+        self.real_time = real_time and replay is None
         self.link: Link | None = None
         self._transport = transport
         self._system = system
@@ -87,7 +89,7 @@ class OnLink:
             notes.keep(SESSION, 0, {MPUCAL: __version__, RECORDED: recorded, **plan})
             source = VehicleSource(link, self.plan.config.rate_hz, self._system, say, capture.name)
             try:
-                yield Measuring(source, notes.keep)
+                yield Measuring(source, notes.keep, late=self._was_late)
             finally:
                 # until when nothing more came: a replay ends its last poll there
                 notes.keep(END, 0, {})
@@ -116,10 +118,13 @@ class OnLink:
             with suppress(LinkError):
                 self.link.send(to_message(prompt))
 
-    def _pending(self) -> Sequence[SessionEvent]:
+    def _was_late(self, late: bool) -> bool:
+        return late if self._replay is None else bool(self._pending(LATE))
+
+    def _pending(self, name: str) -> Sequence[SessionEvent]:
         if self._replay is None:
             return []
-        return [SessionEvent(noted.note.name, noted.t_ns, noted.note.data) for noted in self._replay.pending()]
+        return [SessionEvent(noted.note.name, noted.t_ns, noted.note.data) for noted in self._replay.pending(name)]
 
 
 @dataclass(frozen=True)
@@ -132,6 +137,7 @@ class OnRecording:
     listeners: Sequence[Callable[[Prompt], None]] = ()
     truth: Mapping[str, Any] | None = None
     capture_name: str = CAPTURE
+    real_time: bool = False
 
     @property
     def recovered(self) -> str | None:
@@ -178,7 +184,7 @@ def open_tlog(file: Path, asked: Plan, system: int | None) -> OnLink | OnRecordi
     """
     tlog = read_tlog(file)
     replay = Replay(tlog)
-    head = next((noted.note for noted in replay.pending() if noted.note.name == SESSION), None)
+    head = next((noted.note for noted in replay.pending(SESSION)), None)
     if head is None:
         return OnRecording(tlog, read_log(tlog, system), asked)
     if head.data.get(SOURCE) != SOURCE_VERSION:

@@ -16,7 +16,7 @@ from ..capture.mcap import CaptureWriter, read_capture
 from ..capture.parts import capture_name, captures_in
 from ..chip.driver import Driver
 from ..errors import UsageError
-from ..runner import Talk
+from ..ports import KEY, LATE, Talk
 from ..session.events import Key, Output, Prompt
 from ..session.plan import Plan
 from .on_bus import SOURCE, OnBus
@@ -44,6 +44,11 @@ class OnParts:
         return self.live.truth
 
     @property
+    def real_time(self) -> bool:
+        """See Opened."""
+        return self.live.real_time
+
+    @property
     def listeners(self) -> Sequence[Callable[[Prompt], None]]:
         """See Opened; what was said before is not said again."""
         return [self._now(listener) for listener in self.live.listeners]
@@ -59,7 +64,10 @@ class OnParts:
             writer.start({"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.live.source_meta()})
             recorder = _Recorder(writer, self.bus)
             driver = Driver(Tap(self.bus, recorder), self.plan.config, capture.name, lambda text: say(f"  {text}."))
-            yield Measuring(driver, recorder.event, self.bus.go_on)
+            yield Measuring(driver, recorder.event, self.bus.go_on, self._late)
+
+    def _late(self, late: bool) -> bool:
+        return bool(self.bus.pending_events(LATE)) if self.bus.replaying else late
 
     def _now(self, listener: Callable[[Prompt], None]) -> Callable[[Prompt], None]:
         return lambda prompt: None if self.bus.replaying else listener(prompt)
@@ -96,7 +104,7 @@ class _Later:
     def pressed(self) -> Sequence[Key]:
         """As recorded; then as pressed now."""
         if self._bus.replaying:
-            return [Key(event.data["key"]) for event in self._bus.pending_events() if event.name == "key"]
+            return [Key(event.data[KEY]) for event in self._bus.pending_events(KEY)]
         return self._person.pressed()
 
 

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from ..runner import Note, Source, Talk
+from ..ports import Note, Source, Talk
 from ..session.events import Prompt
 from ..session.plan import Plan
 
@@ -20,11 +20,18 @@ def never_on() -> bool:
 
 
 class Measuring(NamedTuple):
-    """A source that is being recorded, what keeps session events beside it, and what begins its next part."""
+    """A source that is being recorded.
+
+    Attributes
+    ----------
+    note : keeps session events beside it. go_on : begins its next part.
+    late : whether to wait for an answer that is late now, or is not; see Runner.
+    """
 
     source: Source
     note: Note
     go_on: Callable[[], bool] = never_on
+    late: Callable[[bool], bool] = bool
 
 
 class Opened(Protocol):
@@ -35,6 +42,7 @@ class Opened(Protocol):
     plan : what to do with it. listeners : hear the prompts besides the person.
     truth : of a simulated sensor. recovered : how much of a damaged capture it holds.
     capture_name : of the file that its kind is recorded into.
+    real_time : its time passes by itself, and waits for nobody.
     """
 
     @property
@@ -51,6 +59,9 @@ class Opened(Protocol):
 
     @property
     def capture_name(self) -> str: ...  # noqa: D102
+
+    @property
+    def real_time(self) -> bool: ...  # noqa: D102
 
     def talk(self, person: Talk) -> Talk:
         """Who presses the keys: the person, or the person in the capture."""

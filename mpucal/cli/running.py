@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from ..console import Console
+from ..live.apart import Apart
+from ..live.questions import Here
 from ..runner import Runner
 from .opened import Opened
 
@@ -23,8 +25,16 @@ def running(source: Opened, capture: Path, person: Console) -> Iterator[Runner]:
     with source.measuring(capture, person.say, now().isoformat()) as measuring, person.listening():
         if source.recovered is not None:
             person.say(f"  {source.recovered}")
-        talk = source.talk(person)
-        yield Runner(measuring.source, talk, measuring.note, source.plan, source.listeners, measuring.go_on)
+        yield Runner(
+            measuring.source,
+            source.talk(person),
+            measuring.note,
+            source.plan,
+            source.listeners,
+            measuring.go_on,
+            measuring.late,
+            Apart if source.real_time else Here,
+        )
 
 
 def now() -> datetime:

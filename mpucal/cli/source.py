@@ -34,7 +34,9 @@ def open_bus(text: str, plan: Plan, address: int | None, seed: int | None) -> On
         if address is not None:
             raise UsageError("--address is where a real chip answers, and --bus names a simulated one", "leave it out")
         bus = open_simulated(text, plan.gravity, seed)
-        return OnBus(bus, plan, (bus.hear,), bus.truth_document(), words={"bus": text, "seed": seed})
+        return OnBus(
+            bus, plan, (bus.hear,), bus.truth_document(), words={"bus": text, "seed": seed}, real_time=bus.real_time
+        )
     if seed is not None:
         raise UsageError("--seed chooses a simulated sensor, and --bus names a real one", "leave it out")
     return OnBus(I2cBus(text, address), plan, words={"bus": text, "address": address})
@@ -72,7 +74,11 @@ def open_replay(file: Path) -> OnBus:
     bus = PartsBus([ReplayBus(part, name) for part in parts_of(capture.records for capture in captures)])
     recovered = [capture.recovered for capture in captures if capture.recovered]
     return OnBus(
-        bus, Plan.of_capture(captures[0].meta, name), replay=bus, recovered=recovered[-1] if recovered else None
+        bus,
+        Plan.of_capture(captures[0].meta, name),
+        replay=bus,
+        recovered=recovered[-1] if recovered else None,
+        real_time=False,
     )
 
 
@@ -109,7 +115,8 @@ def _simulated_vehicle(text: str, plan: Plan, system: int | None, key: bytes | N
     from .on_link import OnLink  # noqa: PLC0415
 
     vehicle = Vehicle(Options.parse(text), plan.gravity, key)
-    return OnLink(SimulatedTransport(vehicle), plan, system, key, truth=vehicle.truth_document())
+    transport = SimulatedTransport(vehicle)
+    return OnLink(transport, plan, system, key, truth=vehicle.truth_document(), real_time=transport.real_time)
 
 
 def open_vehicle_replay(file: Path, plan: Plan, system: int | None) -> Opened:

@@ -17,8 +17,8 @@ from ..chip.access import EndOfCapture
 from ..correction import Correction, correction
 from ..data import STANDARD_GRAVITY_MPS2, Samples
 from ..errors import OutputError, UsageError
+from ..ports import Source
 from ..result import Calibration
-from ..runner import Source
 from .options import check_source, source_options
 from .running import now
 from .source import opened

@@ -1,15 +1,8 @@
-"""The fits that a session asks for, computed beside its reading loop. Knows no source and no person.
-
-What is asked for after so many samples is brought after a fixed number more, and waited for if it is late: what the
-session does then depends on the samples alone, and a replay repeats it to the last bit.
-"""
+"""The fits of a session, from the samples so far. Knows no clock, no source and no person."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,27 +16,31 @@ from ..calibration.stationary import find_flat, flat_statistics
 from ..calibration.verification import unseen_rests
 from ..data import Recording, Samples, Sensor
 from ..session.aims import AIMS, directions
-from ..session.events import Ask, Checked, Event, Learnt, Tried, Wish
+from ..session.events import Checked, Event, Learnt, Tried, Wish
 from ..session.plan import Plan
 from .disagreement import judged
 from .knowledge import knowledge, wanted
 from .store import Store
 
 CONTRADICTION = "inconsistent"
-# So soon the worker gives way to the reading loop, which must miss no FIFO for it; Python's own is ten times as long.
-GIVE_WAY_S = 0.0005
 
 
-@dataclass(frozen=True)
-class _Due:
-    """An answer, and the number of samples after which it is brought."""
+class Task(NamedTuple):
+    """What came since the last task, and what is to be done then.
 
-    at: int
-    answer: Future[Event | None]
+    Attributes
+    ----------
+    samples : that arrived. wish : what to compute of all there are; None: nothing.
+    forget : the samples from this number on are not used, nor what was computed of them; None: all are.
+    """
+
+    samples: Samples
+    wish: Wish | None = None
+    forget: int | None = None
 
 
-class Live:
-    """One session's fits; `close` it in the end.
+class Fits:
+    """Computes one task after another; the answers depend on the tasks alone.
 
     Parameters
     ----------
@@ -51,63 +48,30 @@ class Live:
     """
 
     def __init__(self, plan: Plan, sensor: Sensor) -> None:
-        self._plan, self._rate_hz = plan, sensor.rate_hz or 200.0
+        self._plan = plan
         self._store = Store(sensor)
-        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="fit")
-        self._gave_way_s = sys.getswitchinterval()
-        sys.setswitchinterval(GIVE_WAY_S)
-        self._count = 0
-        self._due: list[_Due] = []
-        # what follows is the worker's own
         self._flat: Flat | None = None
         self._known: Known | None = None
         self._tried: Evidence | None = None
         self._since = 0
 
-    def add(self, samples: Samples) -> None:
-        """They arrived."""
-        self._store.add(samples)
-        self._count += len(samples)
+    def do(self, task: Task) -> Event | None:
+        """The answer to the task's wish, where there is one."""
+        self._store.add(task.samples)
+        if task.forget is not None:
+            self._store.forget(task.forget)
+            self._known, self._tried = None, None
+        match task.wish:
+            case Wish.KNOW | Wish.ADVISE:
+                return self._learnt(task.wish is Wish.ADVISE)
+            case Wish.TRY:
+                return self._try()
+            case Wish.CHECK:
+                return self._check()
+        return None
 
-    def ask(self, ask: Ask) -> None:
-        """Begin to compute."""
-        recording = self._store.recording()
-        work: dict[Wish, Callable[[Recording], Event | None]] = {
-            Wish.KNOW: lambda r: self._learnt(r, advice=False),
-            Wish.ADVISE: lambda r: self._learnt(r, advice=True),
-            Wish.TRY: self._try,
-            Wish.CHECK: self._check,
-        }
-        at = self._count + round(ask.wait_s * self._rate_hz)
-        self._due.append(_Due(at, self._worker.submit(work[ask.wish], recording)))
-
-    def answers(self) -> Sequence[Event]:
-        """What is due by now; waits for what is late."""
-        due = [item for item in self._due if item.at <= self._count]
-        self._due = [item for item in self._due if item.at > self._count]
-        answers = [item.answer.result() for item in due]
-        return [answer for answer in answers if answer is not None]
-
-    def forget(self, first: int) -> None:
-        """The samples from number `first` on are not used; nor is what was computed of them."""
-        for item in self._due:
-            item.answer.cancel()
-        self._due = []
-        self._store.forget(first)
-        self._worker.submit(self._forget)
-
-    def close(self) -> None:
-        """Stop computing."""
-        self._worker.shutdown(wait=True, cancel_futures=True)
-        sys.setswitchinterval(self._gave_way_s)
-
-    # The worker's side.
-
-    def _forget(self) -> None:
-        self._known, self._tried = None, None
-
-    def _learnt(self, recording: Recording, advice: bool) -> Event | None:
-        recording = with_masks(recording)
+    def _learnt(self, advice: bool) -> Event | None:
+        recording = with_masks(self._store.recording())
         if self._flat is None:
             segment = find_flat(recording)
             if segment is None:
@@ -120,10 +84,11 @@ class Live:
         if advice:
             x, y, z = (-flat.y / np.linalg.norm(flat.y)).tolist()
             allowed = directions((x, y, z), self._plan.tilt_only)
-            down = allowed[most_helpful(self._known, recording, flat, gravity, wanted(target), allowed)]
+            down = allowed[most_helpful(self._known, wanted(target), allowed)]
         return Learnt(knowledge(self._known, target, float(recording.t[-1]), down), advice)
 
-    def _try(self, recording: Recording) -> Event:
+    def _try(self) -> Event:
+        recording = self._store.recording()
         evidence, _ = weigh(recording, self._plan.model, self._plan.gravity)
         self._tried, self._since = evidence, len(recording)
         quality = judge(evidence)
@@ -132,12 +97,12 @@ class Live:
         first = reasons[0] if reasons else {"code": "", "message": ""}
         return Tried(quality["verdict"], first["message"], first["code"])
 
-    def _check(self, recording: Recording) -> Event:
+    def _check(self) -> Event:
         of = AIMS[self._plan.target].verify
         evidence = self._tried
         if evidence is None or evidence.fit is None or evidence.flat is None:
             return Checked((), False, "verification_failed", "there is nothing to verify", "turn the board again")
-        recording = with_masks(recording)
+        recording: Recording = with_masks(self._store.recording())
         rests = unseen_rests(recording, evidence.flat, evidence.fit, self._plan.gravity, self._since)
         reasons = judge(evidence)["reasons"]
         contradiction = next((reason["message"] for reason in reasons if reason["code"] == CONTRADICTION), "")

@@ -68,11 +68,14 @@ class Replay:
     def close(self) -> None:
         """See Transport."""
 
-    def pending(self) -> Sequence[Noted]:
-        """The notes made until now that stand before the next packet, each once."""
-        due = [noted for noted in self._pending if noted.t_ns <= self._now_ns]
-        self._pending = self._pending[len(due) :]
-        return due
+    def pending(self, name: str) -> Sequence[Noted]:
+        """The notes of that name made until now that stand before the next packet, each once."""
+
+        def is_due(noted: Noted) -> bool:
+            return noted.t_ns <= self._now_ns and noted.note.name == name
+
+        pending, self._pending = self._pending, [noted for noted in self._pending if not is_due(noted)]
+        return [noted for noted in pending if is_due(noted)]
 
     def _pass_own(self) -> None:
         """Go on to the next packet that is not of mpucal."""

@@ -46,7 +46,7 @@ class Young:
 def test_each_part_ends_before_the_next_begins():
     bus = PartsBus([ReplayBus([read(1), key("enough")]), ReplayBus([read(2)])])
     assert bus.read(0x75, 1).t_ns == S
-    assert [found.name for found in bus.pending_events()] == ["key"]
+    assert [found.name for found in bus.pending_events("key")] == ["key"]
     with pytest.raises(EndOfCapture):
         bus.read(0x75, 1)
     assert bus.go_on()
@@ -62,7 +62,7 @@ def test_only_what_was_recorded_is_replayed():
     assert bus.replaying
     bus.go_on()
     assert not bus.replaying
-    assert bus.pending_events() == []
+    assert bus.pending_events("key") == []
     assert bus.unread() == 0
     bus.close()
     assert young.closed

@@ -94,26 +94,28 @@ def test_raises_the_recorded_error_and_goes_on(failure, kind):
 def test_events_come_between_the_accesses_they_were_recorded_between():
     a, b, c, d = map(key, (1, 1500, 1600, 2500))
     bus = ReplayBus([a, READ, b, c, WRITE, d])
-    assert bus.pending_events() == [a]
-    assert bus.pending_events() == []
+    assert bus.pending_events("key") == [a]
+    assert bus.pending_events("key") == []
     bus.read(0x75, 1)
-    assert bus.pending_events() == [b, c]
+    assert bus.pending_events("key") == [b, c]
     bus.write(0x6B, b"\x80")
-    assert bus.pending_events() == [d]
+    assert bus.pending_events("key") == [d]
 
 
 def test_an_event_nobody_asked_for_waits():
-    a, b = key(1), key(1500)
-    bus = ReplayBus([a, READ, b])
+    a, b, late = key(1), key(1500), SessionEvent("late", 1600, {})
+    bus = ReplayBus([a, READ, b, late])
     bus.read(0x75, 1)
-    assert bus.pending_events() == [a, b]
+    assert bus.pending_events("key") == [a, b]
+    assert bus.pending_events("late") == [late]
+    assert bus.pending_events("late") == []
 
 
 def test_an_event_does_not_come_before_a_refused_access():
     bus = ReplayBus([READ, key(1500)])
     with pytest.raises(CaptureError):
         bus.read(0x76, 1)
-    assert bus.pending_events() == []
+    assert bus.pending_events("key") == []
 
 
 def test_what_a_tap_records_of_a_replay_is_the_capture():

@@ -53,7 +53,7 @@ def test_the_same_driver_runs_on_the_capture(measured):
     bus = ReplayBus(read_capture(folder / "capture.mcap").records)
     same(measure(bus, 150), recording)
     assert bus.unread() == 0
-    assert [event.name for event in bus.pending_events()] == ["key"]
+    assert [event.name for event in bus.pending_events("key")] == ["key"]
 
 
 def test_a_capture_that_was_cut_gives_its_beginning(measured, tmp_path):

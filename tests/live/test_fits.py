@@ -1,17 +1,19 @@
-"""Live fits: asked for and brought at fixed numbers of samples, and right about what is known."""
+"""Live fits: right about what is known, and the same for the same samples."""
+
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from mpucal.data import Samples, Sensor
-from mpucal.live.fits import Live
+from mpucal.live.fits import Fits, Task
 from mpucal.live.store import Store
-from mpucal.session.events import Ask, Checked, Learnt, Tried, Wish
+from mpucal.session.events import Checked, Learnt, Tried, Wish
 from mpucal.session.plan import Plan
 from mpucal.simulation.scenarios import GRAVITY_MPS2, hand_scenario
 
 SENSOR = Sensor(chip="MPU-6050", rate_hz=200.0)
-POLL = 20
+NONE = Samples.empty()
 
 
 @pytest.fixture(scope="module")
@@ -20,45 +22,21 @@ def poses():
     return hand_scenario(3, "pose12").recording
 
 
-def polls(recording, first, last):
-    """Samples first..last-1 as they arrive."""
-    names = ("t", "acc", "gyr", "temperature_c", "gap", "acc_clipped", "gyr_clipped")
-    for a in range(first, last, POLL):
-        yield Samples(*(getattr(recording, name)[a : min(a + POLL, last)] for name in names))
+def part(recording, first_s, last_s=None):
+    """The samples of that time."""
+    chosen = slice(round(first_s * 200), None if last_s is None else round(last_s * 200))
+    return Samples(*(getattr(recording, field.name)[chosen] for field in fields(Samples)))
 
 
-def live_at(recording, seconds):
-    live = Live(Plan(gravity=GRAVITY_MPS2), SENSOR)
-    for samples in polls(recording, 0, round(seconds * 200)):
-        live.add(samples)
-    return live
+@pytest.fixture
+def fits():
+    return Fits(Plan(gravity=GRAVITY_MPS2), SENSOR)
 
 
-def answer(live, recording, first, wish, wait_s=0.1):
-    """What comes of an ask, and after how many samples."""
-    live.ask(Ask(wish, wait_s))
-    for count, samples in enumerate(polls(recording, first, len(recording))):
-        live.add(samples)
-        answers = live.answers()
-        if answers:
-            return answers[0], (count + 1) * POLL
-    raise AssertionError("no answer came")
-
-
-def test_an_answer_comes_after_the_asked_number_of_samples_and_no_sooner(poses):
-    live = live_at(poses, 20)
-    _, count = answer(live, poses, 4000, Wish.KNOW, wait_s=0.5)
-    live.close()
-    assert count == 100
-
-
-def test_more_orientations_are_better_known(poses):
+def test_more_orientations_are_better_known(fits, poses):
     found = []
-    for seconds in (18, 26, 44):
-        live = live_at(poses, seconds)
-        learnt, _ = answer(live, poses, seconds * 200, Wish.KNOW)
-        live.close()
-        found.append(learnt.knowledge)
+    for first, last in ((0, 18), (18, 26), (26, 44)):
+        found.append(fits.do(Task(part(poses, first, last), Wish.KNOW)).knowledge)
     assert [k.overall for k in found] == sorted(k.overall for k in found)
     assert max(found[0].bias_mg) > 3 * max(found[2].bias_mg)
     assert found[2].overall > 0.9
@@ -66,20 +44,15 @@ def test_more_orientations_are_better_known(poses):
     assert not any(k.doubt for k in found)
 
 
-def test_the_same_samples_give_the_same_bits(poses):
-    def run():
-        live = live_at(poses, 22)
-        learnt = answer(live, poses, 4400, Wish.ADVISE)[0]
-        live.close()
-        return learnt
-
-    assert run() == run()
+def test_the_same_tasks_give_the_same_bits_however_the_samples_come(poses):
+    whole, pieces = (Fits(Plan(gravity=GRAVITY_MPS2), SENSOR) for _ in range(2))
+    for second in range(22):
+        pieces.do(Task(part(poses, second, second + 1)))
+    assert pieces.do(Task(NONE, Wish.ADVISE)) == whole.do(Task(part(poses, 0, 22), Wish.ADVISE))
 
 
-def test_the_advised_orientation_is_a_turn_away(poses):
-    live = live_at(poses, 22)
-    learnt, _ = answer(live, poses, 4400, Wish.ADVISE)
-    live.close()
+def test_the_advised_orientation_is_a_turn_away(fits, poses):
+    learnt = fits.do(Task(part(poses, 0, 22), Wish.ADVISE))
     assert isinstance(learnt, Learnt)
     assert learnt.advice
     down = np.array(learnt.knowledge.down)
@@ -88,32 +61,25 @@ def test_the_advised_orientation_is_a_turn_away(poses):
     assert here @ down < np.cos(np.radians(20.0))
 
 
-def test_a_try_and_its_check_agree_on_good_data(poses):
-    live = live_at(poses, 40)
-    tried, _ = answer(live, poses, 8000, Wish.TRY)
-    live.close()
+def test_a_try_and_its_check_agree_on_good_data(fits, poses):
+    tried = fits.do(Task(part(poses, 0, 40), Wish.TRY))
     assert isinstance(tried, Tried)
     assert tried.verdict in ("good", "usable")
-
-    live = live_at(poses, 40)
-    live.ask(Ask(Wish.TRY, 0.1))
-    for samples in polls(poses, 8000, len(poses)):
-        live.add(samples)
-    live.ask(Ask(Wish.CHECK, 0.0))
-    checked = live.answers()[-1]
-    live.close()
+    checked = fits.do(Task(part(poses, 40), Wish.CHECK))
     assert isinstance(checked, Checked)
     assert checked.agrees, checked
     assert all(v.direction_deg < 1.0 and abs(v.magnitude_mps2) < 0.1 for v in checked.found)
 
 
-def test_what_is_forgotten_is_not_computed(poses):
-    live = live_at(poses, 30)
-    live.ask(Ask(Wish.KNOW, 0.0))
-    live.forget(2200)
-    assert not live.answers()
-    learnt, _ = answer(live, poses, 6000, Wish.KNOW, wait_s=4.0)
-    live.close()
+def test_nothing_is_known_of_a_board_that_never_lay_still(fits, poses):
+    rates = np.random.default_rng(1).normal(scale=2.0, size=(2000, 3))
+    assert fits.do(Task(replace(part(poses, 0, 10), gyr=rates), Wish.KNOW)) is None
+
+
+def test_what_is_forgotten_is_not_computed(fits, poses):
+    fits.do(Task(part(poses, 0, 30), Wish.KNOW))
+    fits.do(Task(NONE, forget=2200))
+    learnt = fits.do(Task(part(poses, 30, 34), Wish.KNOW))
     assert learnt.knowledge.overall < 0.2
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from ...chip.access import Reply
 from ..i2c_errors import transfer_error
 from .chip import Chip
-from .clock import Clock
+from .clock import Clock, RealClock
 from .faults import Faults
 from .hand import Prompt
 from .motion import Motion
@@ -38,6 +38,11 @@ class SimulatedBus:
     ) -> None:
         self._chip, self._clock, self._motion, self._truth, self._faults = chip, clock, motion, truth, faults
         self._bit_ns = round(1e6 / khz)
+
+    @property
+    def real_time(self) -> bool:
+        """Whether its time passes by itself."""
+        return isinstance(self._clock, RealClock)
 
     def read(self, register: int, count: int) -> Reply:
         """`count` bytes from `register` on, and when the read began.

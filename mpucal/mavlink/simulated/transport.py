@@ -26,6 +26,11 @@ class SimulatedTransport:
         self._begun_monotonic_ns = time.monotonic_ns()
         self._queue: deque[Bytes] = deque()
 
+    @property
+    def real_time(self) -> bool:
+        """Whether its time passes by itself."""
+        return self._vehicle.options.pace == REAL
+
     def now_ns(self) -> int:
         """See Transport."""
         return self._begun_ns + self._vehicle.now_us * US
@@ -47,6 +52,6 @@ class SimulatedTransport:
         """See Transport."""
 
     def _keep_pace(self) -> None:
-        if self._vehicle.options.pace == REAL:
+        if self.real_time:
             ahead_ns = self._begun_monotonic_ns + self._vehicle.now_us * US - time.monotonic_ns()
             time.sleep(max(ahead_ns, 0) * 1e-9)
