@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from ..data import Recording
 from ..mavlink.log import read_log
-from ..mavlink.tlog import read_tlog
+from ..mavlink.tlog import TlogFile
 
 
 def load_tlog(path: Path) -> Recording:
@@ -16,4 +17,6 @@ def load_tlog(path: Path) -> Recording:
     ------
     CaptureError : it cannot be read. RecordingError : it holds no vehicle, several, or no IMU that tells the truth.
     """
-    return read_log(read_tlog(path))
+    file = TlogFile(path)
+    recording = read_log(file, file.name)
+    return replace(recording, recovered=file.recovered)

@@ -186,7 +186,7 @@ def open_tlog(file: Path, asked: Plan, system: int | None) -> OnLink | OnRecordi
     replay = Replay(tlog)
     head = next((noted.note for noted in replay.pending(SESSION)), None)
     if head is None:
-        return OnRecording(tlog, read_log(tlog, system), asked)
+        return OnRecording(tlog, read_log(tlog.records, tlog.name, system), asked)
     if head.data.get(SOURCE) != SOURCE_VERSION:
         raise CaptureError(
             f"{tlog.name} was recorded by version {head.data.get(SOURCE)} of the source, and this is {SOURCE_VERSION}",

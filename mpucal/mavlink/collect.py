@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -33,49 +34,65 @@ class Row(NamedTuple):
     reading: Reading
 
 
+# of a reading: acceleration, rate, temperature
+NUMBERS = 7
+
+
 class Gathered:
-    """What one stream delivered."""
+    """What one stream delivered: 64 bytes a reading."""
 
     def __init__(self, stream: Stream) -> None:
         self.stream = stream
         self._clock = VehicleClock(stream.unit_us)
-        self._rows: dict[int, Row] = {}
+        self._times_us, self._numbers = array("q"), array("d")
+        self._in_order = 0
         self._newest_us: int | None = None
 
     def __len__(self) -> int:
-        return len(self._rows)
+        """How many came in their order."""
+        return self._in_order
 
     def add(self, reading: Reading, received_ns: int) -> tuple[Row | None, Jump]:
         """Keep a reading; the row where it is newer than all before it, and what the clock did before it."""
         t_us, jump = self._clock.us(reading.time, received_ns)
-        row = self._rows.setdefault(t_us, Row(t_us, reading))
+        self._times_us.append(t_us)
+        self._numbers.extend(_numbers(reading))
         if self._newest_us is not None and t_us <= self._newest_us:
             return None, jump
         self._newest_us = t_us
-        return row, jump
+        self._in_order += 1
+        return Row(t_us, reading), jump
 
     def forget(self) -> None:
         """Let go of all that was kept."""
-        self._rows.clear()
+        del self._times_us[:], self._numbers[:]
+        self._in_order = 0
 
     def times_us(self) -> Vector:
         """(n,) us, increasing."""
-        return np.array(sorted(self._rows), dtype=np.float64)
+        return np.unique(self._times_us).astype(np.float64)
 
     def samples(self, t_us: Vector | None = None) -> Samples:
         """All readings in the order of their times, or of those given instead."""
-        rows = [self._rows[key] for key in sorted(self._rows)]
-        return samples_of(rows, self.times_us() if t_us is None else t_us)
+        # of two readings of one time the first is kept: the other is the same packet once more
+        times_us, first = np.unique(self._times_us, return_index=True)
+        numbers = np.array(self._numbers).reshape(-1, NUMBERS)[first]
+        return _samples(numbers, times_us.astype(np.float64) if t_us is None else t_us)
 
 
-def samples_of(rows: Sequence[Row], t_us: Vector, before_us: float | None = None) -> Samples:
-    """Rows as samples.
+def samples_of(rows: Sequence[Row], before_us: float | None) -> Samples:
+    """Rows in their order as samples; `before_us` is the time of the sample before the first, where there was one."""
+    numbers = np.array([_numbers(row.reading) for row in rows]).reshape(-1, NUMBERS)
+    return _samples(numbers, np.array([row.t_us for row in rows], np.float64), before_us)
 
-    Parameters
-    ----------
-    t_us : (n,) increasing. before_us : the time of the sample before the first, where there was one.
-    """
-    n = len(rows)
+
+def _numbers(reading: Reading) -> tuple[float, ...]:
+    return (*reading.acc, *reading.gyr, reading.temperature_c)
+
+
+def _samples(numbers: Vector, t_us: Vector, before_us: float | None = None) -> Samples:
+    """Samples of (n, NUMBERS) at (n,) increasing times."""
+    n = len(t_us)
     if not n:
         return Samples.empty()
     steps = np.diff(t_us, prepend=t_us[0] if before_us is None else before_us) / US_PER_S
@@ -83,9 +100,9 @@ def samples_of(rows: Sequence[Row], t_us: Vector, before_us: float | None = None
     no = np.zeros(n, bool)
     return Samples(
         t=t_us / US_PER_S,
-        acc=np.array([row.reading.acc for row in rows]),
-        gyr=np.array([row.reading.gyr for row in rows]),
-        temperature_c=np.array([row.reading.temperature_c for row in rows]),
+        acc=numbers[:, :3],
+        gyr=numbers[:, 3:6],
+        temperature_c=numbers[:, 6],
         gap=steps > limit,
         acc_clipped=no,
         gyr_clipped=no.copy(),

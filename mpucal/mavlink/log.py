@@ -6,8 +6,7 @@ is taken.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from ..calibration.stationary import find_flat
@@ -18,7 +17,7 @@ from .collect import Gatherer, Row
 from .dialect import Message, Parser, dialect
 from .imu import Reading, reading
 from .parameters.encoding import is_parameter, of_wire
-from .tlog import Tlog
+from .tlog import Record
 from .truth import ARDUPILOT, PX4, truthful
 
 # whose change alters the streams
@@ -102,44 +101,53 @@ def with_others(recordings: list[Recording]) -> Recording:
     return replace(first, others=tuple(others))
 
 
-def read_log(tlog: Tlog, system: int | None = None) -> Recording:
+def read_log(records: Iterable[Record], name: str, system: int | None = None) -> Recording:
     """The recording in a .tlog.
 
     Parameters
     ----------
-    system : whose, where several vehicles are in it.
+    records : of the .tlog, gone through twice. name : what to call it. system : whose, of several vehicles in it.
 
     Raises
     ------
     RecordingError : it holds none, or several vehicles, or no IMU messages that tell the truth.
     """
-    parser = Parser(dialect().MAVLink(None))
-    messages = [(record.t_ns, packet.message) for record in tlog.records for packet in parser.datagram(record.data)]
-    vehicles = _vehicles(messages)
+    vehicles = _vehicles(records)
     if system is not None:
         vehicles = {ids: firmware for ids, firmware in vehicles.items() if ids[0] == system}
     if len(vehicles) != 1:
-        raise _not_one(tlog.name, vehicles)
+        raise _not_one(name, vehicles)
     ((ids, firmware),) = vehicles.items()
     log = Log(firmware)
-    for t_ns, message in messages:
-        if (message.get_srcSystem(), message.get_srcComponent()) == ids:
+    for t_ns, message in _messages(records):
+        if _sender(message) == ids:
             log.add(message, t_ns)
-    return replace(log.recording(tlog.name), recovered=tlog.recovered)
+    return log.recording(name)
 
 
-def _vehicles(messages: list[tuple[int, Message]]) -> dict[tuple[int, int], str]:
+def _messages(records: Iterable[Record]) -> Iterator[tuple[int, Message]]:
+    parser = Parser(dialect().MAVLink(None))
+    for record in records:
+        for packet in parser.datagram(record.data):
+            yield record.t_ns, packet.message
+
+
+def _sender(message: Message) -> tuple[int, int]:
+    return message.get_srcSystem(), message.get_srcComponent()
+
+
+def _vehicles(records: Iterable[Record]) -> dict[tuple[int, int], str]:
     """(system, component) of those who sent an autopilot's HEARTBEAT and IMU messages, with their firmware."""
     m = dialect()
     firmware: dict[tuple[int, int], str] = {}
-    imu: Counter[tuple[int, int]] = Counter()
-    for _, message in messages:
-        ids = (message.get_srcSystem(), message.get_srcComponent())
+    imu: set[tuple[int, int]] = set()
+    for _, message in _messages(records):
+        ids = _sender(message)
         if message.get_type() == "HEARTBEAT" and message.autopilot != m.MAV_AUTOPILOT_INVALID:
             firmware[ids] = PX4 if message.autopilot == m.MAV_AUTOPILOT_PX4 else ARDUPILOT
-        elif reading(message) is not None:
-            imu[ids] += 1
-    return {ids: name for ids, name in firmware.items() if imu[ids]} or firmware
+        elif ids not in imu and reading(message) is not None:
+            imu.add(ids)
+    return {ids: name for ids, name in firmware.items() if ids in imu} or firmware
 
 
 def _not_one(name: str, vehicles: Mapping[tuple[int, int], str]) -> RecordingError:

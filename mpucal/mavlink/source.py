@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from ..data import Recording, Samples, Sensor
 from ..errors import LinkError, UsageError
 from .clock import Jump
@@ -96,10 +94,9 @@ class VehicleSource:
         self._check()
         self._weigh()
         rows, self._rows = self._rows, []
-        t_us = np.array([row.t_us for row in rows], dtype=np.float64)
-        samples = samples_of(rows, t_us, self._last_us)
+        samples = samples_of(rows, self._last_us)
         if rows:
-            self._last_us = float(t_us[-1])
+            self._last_us = float(rows[-1].t_us)
         return samples
 
     def recording(self) -> Recording:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Iterator
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import NamedTuple, Self
 
@@ -91,21 +93,50 @@ def read_tlog(path: Path) -> Tlog:
     ------
     CaptureError : it cannot be read, or holds no packet.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise CaptureError(f"cannot read {path} ({error.strerror})", "check the path and its permissions") from error
-    records = tuple(_records(data))
-    if not records:
-        raise CaptureError(f"{path} holds no MAVLink packet", "give a .tlog that a ground station recorded")
-    lost = len(data) - sum(STAMP.size + len(record.data) for record in records)
-    recovered = (
-        f"{path.name} is cut short or damaged: {lost} of its {len(data)} bytes are no packets." if lost else None
-    )
-    return Tlog(records, path.name, recovered)
+    file = TlogFile(path)
+    records = tuple(file)
+    return Tlog(records, file.name, file.recovered)
 
 
-def _records(data: bytes) -> Iterator[Record]:
+class TlogFile:
+    """The records of a .tlog, read as they are gone through, as often as that; what is damaged is left out.
+
+    Attributes
+    ----------
+    name, recovered : see Tlog; the latter once all records were read.
+
+    Raises
+    ------
+    CaptureError : where records are asked for, it cannot be read, or holds no packet.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.name = path.name
+        self.recovered: str | None = None
+
+    def __iter__(self) -> Iterator[Record]:
+        whole = size = 0
+        try:
+            with self._path.open("rb") as file:
+                size = os.fstat(file.fileno()).st_size
+                # what has no bytes cannot be mapped
+                if size:
+                    with mmap(file.fileno(), 0, access=ACCESS_READ) as data:
+                        for record in _records(data):
+                            whole += STAMP.size + len(record.data)
+                            yield record
+        except OSError as error:
+            raise CaptureError(
+                f"cannot read {self._path} ({error.strerror})", "check the path and its permissions"
+            ) from error
+        if not whole:
+            raise CaptureError(f"{self._path} holds no MAVLink packet", "give a .tlog that a ground station recorded")
+        if lost := size - whole:
+            self.recovered = f"{self.name} is cut short or damaged: {lost} of its {size} bytes are no packets."
+
+
+def _records(data: mmap) -> Iterator[Record]:
     at = 0
     while at + STAMP.size < len(data):
         (stamp_us,) = STAMP.unpack_from(data, at)

@@ -1,6 +1,7 @@
 import struct
 import subprocess
 import sys
+import tracemalloc
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -123,7 +124,7 @@ def test_several_vehicles_are_listed_and_one_can_be_chosen(station, tmp_path):
     path = log_of(tmp_path, sorted(packets, key=lambda packet: packet[0]))
     with pytest.raises(RecordingError, match=r"several vehicles: system 1 \(ArduPilot\), system 7"):
         mpucal.load(path)
-    assert len(read_log(read_tlog(path), system=7)) == 49
+    assert len(read_log(read_tlog(path).records, path.name, system=7)) == 49
 
 
 def test_px4_highres_is_believed_only_without_the_estimators_bias(station, tmp_path):
@@ -152,3 +153,21 @@ def test_a_log_without_imu_messages(station, tmp_path):
 def test_a_log_without_a_vehicle(station, tmp_path):
     with pytest.raises(RecordingError, match="no autopilot's heartbeat"):
         mpucal.load(log_of(tmp_path, [(0.0, station().raw(1000))]))
+
+
+def test_a_log_is_not_held_as_messages(station, tmp_path):
+    """A message takes two thousand bytes, what is read of it two hundred at most."""
+    vehicle = station()
+    path = tmp_path / "long.tlog"
+    with TlogWriter(path) as writer:
+        writer.packet(START_NS, vehicle.heartbeat())
+        for k in range(1, 3000):
+            writer.packet(START_NS + 10_000_000 * k, vehicle.raw(10_000 * k))
+    mpucal.load(path)
+    tracemalloc.start()
+    try:
+        assert len(mpucal.load(path)) == 2999
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 400 * 3000
