@@ -12,7 +12,9 @@ from mpucal.bus.bridge.store import Store
 from mpucal.bus.simulated.clock import FastClock
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.errors import BusError, MpucalError
+from mpucal.errors import BusError, MpucalError, WriteBackError
+from mpucal.result import Calibration
+from mpucal.sinks.bridge import BridgeSink
 from mpucal.wire.blob import Blob
 
 MS = 1_000_000
@@ -280,3 +282,46 @@ def test_spoiled_bytes_never_leave_a_part_of_a_blob(rig, to_host, to_device):
     made.line.to_host = made.line.to_device = bytes
     store.greet()
     assert store.read() == new if done else store.read() in (old, new)
+
+
+class Reset(Mortal):
+    """A bridge that starts anew, with what its memory holds, where its supply failed."""
+
+    def __init__(self, bridge, anew):
+        super().__init__(bridge)
+        self.anew = anew
+
+    def work(self):
+        out = super().work()
+        self.bridge = self.bridge or self.anew()
+        return out
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(held_before=st.booleans(), bytes_left=st.integers(0, 230), to_host=faults, to_device=faults)
+def test_the_sink_says_truly_which_calibration_is_there(rig, held_before, bytes_left, to_host, to_device):
+    """Whatever byte the supply fails at, and whatever becomes of those on the line."""
+    made, memory = rig(), Memory()
+    calibration = Calibration(np.diag([1.01, 0.98, 1.03]), np.array([0.2, 0.1, -0.3]), quality={"verdict": "good"})
+    old, new = blob(1.0) if held_before else None, calibration.blob().encode()
+    made.line.device = made.new_bridge(memory=memory)
+    if old is not None:
+        store_on(made.line).write(old)
+    shaky = made.new_bridge(memory=Shaky(memory.data, bytes_left))
+    made.line.device = Reset(shaky, lambda: made.new_bridge(memory=memory))
+    sink = BridgeSink(store_on(made.line))
+    made.line.to_host, made.line.to_device = (
+        Faulty([(n // 16, *rest) for n, *rest in to_host]),
+        Faulty([(n // 10, *rest) for n, *rest in to_device]),
+    )
+    try:
+        sink.write(calibration)
+    except WriteBackError as error:
+        assert error.exit_code == 6
+        unsure = "the old calibration or the new one, never a part" in error.what
+        possible = (old, new) if unsure else (old,)
+    else:
+        possible = (new,)
+    made.line.to_host = made.line.to_device = bytes
+    made.line.device = made.new_bridge(memory=memory)
+    assert store_on(made.line).read() in possible
