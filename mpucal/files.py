@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -21,6 +21,47 @@ def write_atomically(path: Path, data: bytes) -> None:
     """
     with whole_file(Path(path)) as file:
         file.write(data)
+
+
+def write_together(files: Mapping[Path, bytes]) -> None:
+    """Write all files, or, where one cannot be written, none: the old ones are there again.
+
+    A crash between two of them leaves the old one of the second.
+
+    Raises
+    ------
+    OutputError : a folder or file cannot be written.
+    """
+    old = {path: _held(path) for path in files}
+    try:
+        with ExitStack() as stack:
+            # what is entered last takes its place first
+            for path in reversed(list(files)):
+                file = stack.enter_context(whole_file(path))
+                file.write(files[path])
+                file.flush()
+    except BaseException:
+        for path, data in old.items():
+            with suppress(OSError, OutputError):
+                _put_back(path, data)
+        raise
+
+
+def _held(path: Path) -> bytes | None:
+    try:
+        return path.read_bytes() if path.is_file() else None
+    except OSError as error:
+        raise OutputError(
+            f"cannot write {path}, as what is there cannot be read ({error.strerror})", "choose another folder with -o"
+        ) from error
+
+
+def _put_back(path: Path, data: bytes | None) -> None:
+    if data is None:
+        if path.is_file():
+            path.unlink()
+    elif path.read_bytes() != data:
+        write_atomically(path, data)
 
 
 @contextmanager

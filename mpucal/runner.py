@@ -148,19 +148,20 @@ class Runner:
         recording: Recording,
         truth: Mapping[str, Any] | None = None,
     ) -> tuple[Path, ...]:
-        """Write the results, each file whole or not at all; Abandoned where the person stopped it.
+        """Write the results, all files or none; Abandoned where the person stopped it.
 
         Raises
         ------
         OutputError : a file cannot be written.
         """
-        written: list[Path] = []
+        files: dict[str, bytes] = {}
         for name, data in result_files(calibration, recording, truth):
             self._ask()
-            written.append(save(folder, name, data))
+            files[name] = data
+        written = save(folder, files)
         self._ask()
-        self._feed(Written(tuple(path.name for path in written)))
-        return tuple(written)
+        self._feed(Written(tuple(files)))
+        return written
 
     def _collect(self, seconds: float | None) -> int:
         """The same without a prompt: of the accelerometer alone no session is made."""

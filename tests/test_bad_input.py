@@ -120,7 +120,7 @@ STATES = {
     "lay flat": (LayFlat, "add"),
     "rotate": (Rotate, "add"),
     "calibrate": (command, "calibrate_vehicle"),
-    "write": (sink, "write_atomically"),
+    "write": (sink, "write_together"),
 }
 
 
@@ -138,10 +138,10 @@ def test_ctrl_c_is_4_and_the_capture_stays_whole(mpucal, tmp_path, monkeypatch, 
 
 
 def test_a_full_disk_is_3_and_keeps_what_was_recorded(mpucal, tmp_path, monkeypatch):
-    def full(path, data):
-        raise sink.OutputError(f"cannot write {path} (No space left on device)", "make room")
+    def full(files):
+        raise sink.OutputError(f"cannot write {min(files)} (No space left on device)", "make room")
 
-    monkeypatch.setattr(sink, "write_atomically", full)
+    monkeypatch.setattr(sink, "write_together", full)
     code, said = mpucal("session", "--replay", FIXTURE, "-o", "board")
     assert code == 3
     assert "What was recorded is kept in board/capture.mcap; go on with --resume board." in said

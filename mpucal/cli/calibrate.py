@@ -31,10 +31,10 @@ def command(recording: Path, folder: Path | None, as_json: bool, gravity: float,
     if samples.recovered is not None:
         click.echo(f"mpucal: {samples.recovered}", err=True)
     calibration = calibrate_vehicle(samples, model=model, gravity=gravity)
-    paths = []
+    paths: tuple[Path, ...] = ()
     if folder is not None:
         make_folder(folder)
-        paths = [save(folder, name, data) for name, data in result_files(calibration, samples)]
+        paths = save(folder, dict(result_files(calibration, samples)))
     if as_json:
         click.echo(calibration.json(), nl=False)
     else:

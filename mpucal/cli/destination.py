@@ -21,6 +21,7 @@ from .write import TARGETS
 from .write_back import WRITTEN, ask, write_to
 
 FILE = "file"
+ON_AUTOPILOT = "calibration-on-autopilot.json"
 # the source that each sink is behind
 BEHIND = {"chip": ("bus", "serial"), "bridge": ("serial",), "autopilot": ("mavlink",)}
 # what the sensor's user reads it from; a chip's registers forget it with the supply, and hold b_a alone
@@ -122,15 +123,12 @@ def recorder(
 
     def record(name: str, now: Calibration) -> Calibration:
         if name == "autopilot":
-            now.save(folder / "calibration-on-autopilot.json")
             extra = {**measured.extra, WRITTEN: now.extra[WRITTEN]}
-            now = replace(measured, extra=MappingProxyType(extra))
-            save(folder, DOCUMENT, now.json().encode())
-            return now
-        # calibration.json last: it is what says that the others hold
-        files = dict(result_files(now, recording, truth)) if name == "chip" else {DOCUMENT: now.json().encode()}
-        for file, data in sorted(files.items(), key=lambda item: item[0] == DOCUMENT):
-            save(folder, file, data)
+            of_now, now = now, replace(measured, extra=MappingProxyType(extra))
+            files = {ON_AUTOPILOT: of_now.json().encode(), DOCUMENT: now.json().encode()}
+        else:
+            files = dict(result_files(now, recording, truth)) if name == "chip" else {DOCUMENT: now.json().encode()}
+        save(folder, files)
         return now
 
     return record

@@ -8,7 +8,7 @@ import click
 
 from ..merge import merge
 from ..result import Calibration
-from ..sinks.file import BLOB, DOCUMENT, make_folder
+from ..sinks.file import BLOB, DOCUMENT, make_folder, save
 from .summary import summary
 
 EXAMPLE = "Example: `mpucal merge cold/calibration.json warm/calibration.json hot/calibration.json -o merged`"
@@ -26,8 +26,7 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, as_json: bool) 
     made = merge([Calibration.load(path) for path in calibrations])
     if folder is not None:
         make_folder(folder)
-        for name in (BLOB, DOCUMENT):
-            made.calibration.save(folder / name)
+        save(folder, {BLOB: made.calibration.blob().encode(), DOCUMENT: made.calibration.json().encode()})
     for sentence in (made.why, *made.remarks):
         click.echo(f"mpucal: {sentence}", err=True)
     if as_json:

@@ -13,7 +13,7 @@ import click
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import UsageError, WriteBackError
 from ..result import FORMAT, Calibration
-from ..sinks.file import make_folder
+from ..sinks.file import make_folder, save
 from ..sinks.sink import Restorable, Sink
 from .at_rest import put_down
 from .on_bus import OnBus
@@ -119,8 +119,7 @@ def _is_calibration(path: Path) -> bool:
 
 
 def _save(now: Calibration, path: Path) -> Calibration:
-    now.save(path.with_suffix(".bin"))
-    now.save(path)
+    save(path.parent, {path.with_suffix(".bin").name: now.blob().encode(), path.name: now.json().encode()})
     return now
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..data import Recording
 from ..errors import OutputError
-from ..files import write_atomically
+from ..files import write_together
 from ..report import render
 from ..result import REFUSED, Calibration
 
@@ -40,16 +40,15 @@ def result_files(
         yield TRUTH, (json.dumps(truth, indent=2) + "\n").encode()
 
 
-def save(folder: Path, name: str, data: bytes) -> Path:
-    """Write one of them, whole or not at all.
+def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
+    """Write files by their names, all or none; calibration.json last, as it says that the others hold.
 
     Raises
     ------
-    OutputError : the folder or file cannot be written.
+    OutputError : the folder or one of them cannot be written.
     """
-    path = folder / name
-    write_atomically(path, data)
-    return path
+    write_together({folder / name: files[name] for name in sorted(files, key=lambda name: name == DOCUMENT)})
+    return tuple(folder / name for name in files)
 
 
 def make_folder(folder: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import hypothesis.extra.numpy as hnp
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import NonSeekingReader, make_reader
 
@@ -83,6 +83,7 @@ def test_a_table_comes_out_as_it_went_in(warm, tmp_path):
         np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
 
 
+@settings(deadline=None)
 @given(hnp.arrays(float, st.tuples(st.integers(1, 4), st.integers(1, 3)), elements=st.floats(allow_subnormal=True)))
 def test_text_gives_back_each_number_that_there_is(table):
     text = lines(table)

@@ -24,6 +24,7 @@ WORDS = {
     "rate": 200.0,
     "accel_range": "4",
     "gyro_range": "500",
+    "dlpf": 3,
     "gravity": 9.80665,
     "model": "auto",
     "store": False,
