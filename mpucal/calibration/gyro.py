@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..data import Vector
-from .likelihood import K_NAMES
-from .minimise import PLACES, Minimum
+from .likelihood import K_NAMES, PLACES
+from .minimise import Minimum
 
 # What a data sheet promises: +-3 % of scale, +-2 % across axes, taken as uniform; K is the symmetric part.
 K_MEAN = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0])

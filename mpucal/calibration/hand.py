@@ -13,13 +13,13 @@ from typing import Literal
 
 import numpy as np
 
-from ..data import Recording
+from ..data import Recording, Vector
 from .gyro import K_MEAN, K_SD, WALD_99, at_prior, wald
 from .initialise import initialise
 from .likelihood import NAMES, Problem, Theta, evaluate, value
-from .minimise import Prior, minimise
+from .minimise import Minimum, Prior, minimise
 from .model import Fit, Flat
-from .moves import q_scale_of_moves
+from .moves import explaining, leverages, moves_of, q_scale
 from .scene import CORRELATION_S, FLOOR_MPS2, Scene, prepare
 from .thin import thinned
 
@@ -34,8 +34,8 @@ WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
 HAND_MPS2 = WHITE_MPS2[4:]  # who goes from rest to rest, has a hand
 PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 # A pivot travels farther than a bounded position of one lambda, the more the wilder it is: sigma (1.5 + 0.5 sigma) for
-# the estimate, and five times that for what its covariance admits.
-FARTHER, FARTHER_STILL, HONEST = 1.5, 0.5, 5.0
+# the estimate, and six times that for what its covariance admits.
+FARTHER, FARTHER_STILL, HONEST = 1.5, 0.5, 6.0
 
 
 @dataclass(frozen=True)
@@ -59,30 +59,60 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     theta, noise = search.run(initialise(fine.problem, fine.flat.b_omega))
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
         noise = Noise("white", _likeliest(fine.white, near(noise.sigma), theta))
-    problem = _with_doubted_moves(noise.problem(fine), fine, theta)
-    prior = _prior(fine.flat)
+    problem = _moved(noise.problem(fine), fine, theta)
+    prior = prior_of(fine.flat)
     minimum = minimise(problem, theta, len(NAMES), prior, frozen=True)
     iterations = search.iterations + minimum.iterations
     if wald(minimum) < WALD_99:
         perfect = replace(minimum.theta, K=np.eye(3))
         minimum = minimise(problem, perfect, len(NAMES), prior, fixed=("K",), frozen=True)
         iterations += minimum.iterations
-    if noise.kind == "pivot":
-        doubt = replace(noise, sigma=HONEST * noise.sigma).problem(fine)
-        doubt = replace(doubt, series=replace(doubt.series, q_scale=problem.series.q_scale))
-        fisher = evaluate(doubt, minimum.theta, len(NAMES)).fisher
-        minimum = replace(minimum, H=fisher + np.diag(prior.precision))
+    minimum = _doubted(minimum, noise, search.scene, fine)
     known = at_prior(minimum.covariance()) if minimum.free.all() else ()
     return replace(minimum, iterations=iterations).as_fit(known)
 
 
-def _with_doubted_moves(problem: Problem, scene: Scene, theta: Theta) -> Problem:
+def _doubted(minimum: Minimum, noise: Noise, rough: Scene, fine: Scene) -> Minimum:
+    """The minimum with an honest H.
+
+    What moves miss by after the fit is less than what the gyroscope erred by: few moves and many parameters leave next
+    to nothing. Their noise is found anew, by misses that count for what an estimate leaves of them; the estimate itself
+    gains nothing by it.
+    """
+    if noise.kind == "none":
+        return minimum
+    if noise.kind == "pivot":
+        noise = replace(noise, sigma=HONEST * noise.sigma)
+    prior, fixed = prior_of(fine.flat), () if minimum.free.all() else ("K",)
+    at, problem, moves = minimum, noise.problem(rough), moves_of(rough, minimum.theta)
+    variance, leverage = explaining(moves), np.zeros(1)
+    for _ in range(PASSES if moves else 0):
+        leverage = leverages(moves, rough, at.theta, at.covariance(), variance)
+        variance = explaining(moves, leverage)
+        problem = _scaled(problem, q_scale(moves, variance, len(problem.series)))
+        at = _roughly(problem, at.theta, prior, fixed)
+        moves = moves_of(rough, at.theta)
+    problem, moves = noise.problem(fine), moves_of(fine, at.theta)
+    if moves:  # rests are found anew here, and their number may differ by one
+        variance = explaining(moves, float(leverage.mean()))
+        problem = _scaled(problem, q_scale(moves, variance, len(problem.series)))
+    fisher = evaluate(problem, minimum.theta, len(NAMES)).fisher
+    return replace(minimum, H=fisher + np.diag(prior.precision))
+
+
+def _moved(problem: Problem, scene: Scene, theta: Theta) -> Problem:
     """The problem with as much noise of the gyroscope between rests as the rests show, under theta."""
-    factor = q_scale_of_moves(scene.recording, scene.flat, problem.series, theta, scene.runs, problem.gravity)
+    moves = moves_of(scene, theta)
+    return _scaled(problem, q_scale(moves, explaining(moves), len(problem.series))) if moves else problem
+
+
+def _scaled(problem: Problem, factor: Vector) -> Problem:
+    """The problem with `factor` (n,) of the gyroscope's noise."""
     return replace(problem, series=replace(problem.series, q_scale=factor))
 
 
-def _prior(flat: Flat) -> Prior:
+def prior_of(flat: Flat) -> Prior:
+    """What is known beforehand: b_omega by the flat segment, K by a data sheet, tau and r by chips and hands."""
     return Prior.of(
         b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)),
         K=(K_MEAN, K_SD),
@@ -96,7 +126,7 @@ class _Search:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.prior = _prior(scene.flat)
+        self.prior = prior_of(scene.flat)
         self.iterations = 0
 
     def run(self, theta: Theta) -> tuple[Theta, Noise]:
@@ -117,13 +147,17 @@ class _Search:
             sigma = _likeliest(scene.pivot, PIVOT_MPS2, theta)
             noise = Noise("pivot", (FARTHER + FARTHER_STILL * sigma) * sigma)
         for _ in range(PASSES):
-            theta = self._roughly(_with_doubted_moves(noise.problem(scene), scene, theta), theta)
+            theta = self._roughly(_moved(noise.problem(scene), scene, theta), theta)
         return theta, noise
 
     def _roughly(self, problem: Problem, theta: Theta) -> Theta:
-        minimum = minimise(problem, theta, len(NAMES), self.prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True)
+        minimum = _roughly(problem, theta, self.prior)
         self.iterations += minimum.iterations
         return minimum.theta
+
+
+def _roughly(problem: Problem, theta: Theta, prior: Prior, fixed: tuple[str, ...] = ()) -> Minimum:
+    return minimise(problem, theta, len(NAMES), prior, fixed, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True)
 
 
 def _likeliest(problem_of: Callable[[float], Problem], sigmas: tuple[float, ...], theta: Theta) -> float:

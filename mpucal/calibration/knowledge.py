@@ -18,8 +18,7 @@ from .initialise import initialise
 from .likelihood import NAMES, Problem, Series, Theta, evaluate, trace, value
 from .minimise import Minimum, Prior, minimise
 from .model import Flat, rotation
-from .moves import POSE_MPS2
-from .scene import CORRELATION_S, FLOOR_MPS2, MOVING_RAD_S, Scene, jerk_density, prepare
+from .scene import CORRELATION_S, FLOOR_MPS2, MOVING_RAD_S, POSE_MPS2, Scene, jerk_density, prepare
 from .thin import thinned
 
 # Fast enough for a hand's moves, few enough samples for a fit within a poll or two.

@@ -21,6 +21,7 @@ K_NAMES = ("K_xx", "K_xy", "K_xz", "K_yy", "K_yz", "K_zz")
 R_NAMES = ("r_x", "r_y", "r_z")
 
 NAMES = (*D_NAMES, *B_A_NAMES, *TILT_NAMES, *B_OMEGA_NAMES, *K_NAMES, "tau", *R_NAMES)
+PLACES = {"D": (0, 9), "b_a": (9, 12), "b_omega": (14, 17), "K": (17, 23), "tau": (23, 24), "r": (24, 27)}
 # where the kernel keeps each of them (Lanes in kernel/filter.hpp)
 LANES = np.array([0, 1, 2, 4, 5, 6, 8, 9, 10, 3, 7, 11, 15, 16, 12, 13, 14, *range(17, 27)])
 # lane groups of the exact filter that hold the first so many parameters

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Vector
-from .likelihood import NAMES, Evaluation, Problem, Theta, evaluate
+from .likelihood import NAMES, PLACES, Evaluation, Problem, Theta, evaluate
 from .model import Fit
 
 DECREMENT = 1e-3  # g' H^-1 g / 2: 0.04 standard deviations from the optimum, whatever the units
@@ -42,9 +42,6 @@ class Prior:
         return 0.5 * float(self.precision @ (away * away))
 
 
-PLACES = {"D": (0, 9), "b_a": (9, 12), "b_omega": (14, 17), "K": (17, 23), "tau": (23, 24), "r": (24, 27)}
-
-
 @dataclass(frozen=True)
 class Minimum:
     """Where the minimiser stopped.
@@ -68,7 +65,7 @@ class Minimum:
         """(p, p) inverse of H over the free parameters; zero for those held fixed."""
         covariance = np.zeros_like(self.H)
         free = np.ix_(self.free, self.free)
-        covariance[free] = _inverse(self.H[free])
+        covariance[free] = inverse(self.H[free])
         return covariance
 
     def as_fit(self, at_prior: tuple[str, ...] = (), spread: float = 1.0) -> Fit:
@@ -162,15 +159,15 @@ def values(theta: Theta) -> Vector:
     return np.concatenate([theta.D.ravel(), theta.b_a, [0.0, 0.0], theta.b_omega, six, [theta.tau], theta.r])
 
 
-def _inverse(H: Vector) -> Vector:
+def inverse(H: Vector) -> Vector:
     """H^-1 with H scaled to a unit diagonal; of what nothing is known, the variance is infinite in all but name."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
     scaled = H * np.outer(scale, scale)
     try:
-        inverse = np.linalg.inv(scaled)
+        result = np.linalg.inv(scaled)
     except np.linalg.LinAlgError:
-        inverse = np.linalg.pinv(scaled, hermitian=True)
-    return np.asarray(inverse * np.outer(scale, scale))
+        result = np.linalg.pinv(scaled, hermitian=True)
+    return np.asarray(result * np.outer(scale, scale))
 
 
 def _solve(H: Vector, g: Vector) -> Vector:

@@ -11,17 +11,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..data import Recording, Vector
-from .likelihood import Series, Theta
-from .model import Flat, product, rotation
-from .still import Runs
+from ..data import Vector
+from .likelihood import NAMES, PLACES, Theta
+from .model import cross, product, rotation
+from .scene import POSE_MPS2, Scene
 
-POSE_MPS2 = 0.0003  # no pose is known better than its mounting is stiff
 SPEED_OF_TREMOR_S = 0.04  # what a tremor's speed is to its acceleration
 FEWEST_MOVES = 3
 DEGREES_OF_FREEDOM = 4.0
 # a move of less weight is weighed down by itself; the others differ by chance
 WORTHLESS = 0.02
+# of the two that a miss has, what an estimate leaves at least, in all moves together
+LEAST_LEFT = 1.0
 
 
 class Rest(NamedTuple):
@@ -38,44 +39,123 @@ class Rest(NamedTuple):
     variance: float
 
 
-def q_scale_of_moves(
-    recording: Recording, flat: Flat, series: Series, theta: Theta, runs: Runs, gravity: float
-) -> Vector | None:
-    """(n,) factor of Sigma_omega over the series, with which noise explains all moves; None where they are too few.
+class Move(NamedTuple):
+    """From one rest to the next.
 
-    The gravity of one rest, carried to the next by the gyroscope, misses it by e; z = |e|^2 / (2 v) with v what noise
-    explains. All moves have a common scale c, the mean of z by Student's t; a lost one has a scale of its own.
+    span : its steps of the series. F : (m, 3, 3) what each of them does to gravity in the body frame.
+    leaving, coming : (3,) m/s^2, gravity at its start and its end. miss : (3,) rad, from where the gyroscope carries
+    the one to where the other is. variance : rad^2 an axis, of the miss by noise; of_gyro : the gyroscope's share.
     """
+
+    span: slice
+    F: Vector
+    leaving: Vector
+    coming: Vector
+    miss: Vector
+    variance: float
+    of_gyro: float
+
+
+def moves_of(scene: Scene, theta: Theta) -> list[Move]:
+    """The moves under theta; none where they are too few to speak for each other."""
+    series, flat = scene.problem.series, scene.flat
     turns = -series.dt[:, None] * ((series.omega - theta.b_omega) @ theta.K.T)
-    rests = _rests(recording, flat, turns, theta, runs, gravity)
+    rests = _rests(scene, turns, theta)
     if len(rests) <= FEWEST_MOVES:
-        return None
+        return []
     F = rotation(turns)
-    spans, v, z, noise = [], [], [], []
+    moves = []
     for one, other in pairwise(rests):
         span = slice(one.last - flat.last, other.first + 1 - flat.last)
-        e = _miss(product(F[span]) @ one.leaving, other.coming)
+        miss = _miss(product(F[span]) @ one.leaving, other.coming)
         of_gyro = float(np.sum(series.dt[span] ** 2) * flat.Sigma_omega.mean())
         known = of_gyro + (0.0 if series.q_extra is None else float(series.q_extra[span].sum()))
         variance = known + one.variance + other.variance
-        spans.append(span)
-        v.append(variance)
-        z.append(0.5 * float(e @ e) / variance)
-        noise.append(of_gyro)
-    weight, scale = _weights(np.array(z))
-    factor = np.ones(len(series))
-    for span, w, variance, of_gyro in zip(spans, weight, v, noise, strict=True):
-        factor[span] += (scale / (w if w < WORTHLESS else 1.0) - 1.0) * variance / of_gyro
+        moves.append(Move(span, F[span], one.leaving, other.coming, miss, variance, of_gyro))
+    return moves
+
+
+def explaining(moves: list[Move], leverage: Vector | float = 0.0) -> Vector:
+    """(k,) rad^2 an axis: the variances with which noise explains all misses.
+
+    z = |miss|^2 / (2 variance). All moves have a common scale c, the mean of z by Student's t; a lost one has a scale
+    of its own.
+
+    leverage : (k,), what the estimate took of the two degrees of freedom of each miss. The likeliest scale, of the
+        estimate itself, knows of none; an honest one counts what is left.
+    """
+    z = np.array([0.5 * float(move.miss @ move.miss) / move.variance for move in moves])
+    left = max(float(np.sum(2.0 - leverage + np.zeros(len(moves)))), LEAST_LEFT)
+    nu, c = DEGREES_OF_FREEDOM, 1.0
+    for _ in range(50):
+        w = (nu + 2.0) / (nu + 2.0 * z / c)
+        c = max(1.0, 2.0 * float(np.sum(w * z)) / left)
+    weight = (nu + 2.0) / (nu + 2.0 * z / c)
+    return c / np.where(weight < WORTHLESS, weight, 1.0) * [move.variance for move in moves]
+
+
+def q_scale(moves: list[Move], variance: Vector, n: int) -> Vector:
+    """(n,) factor of Sigma_omega over a series, that gives the misses these variances (k,)."""
+    factor = np.ones(n)
+    for move, wanted in zip(moves, variance.tolist(), strict=True):
+        factor[move.span] += (wanted - move.variance) / move.of_gyro
     return factor
 
 
-def _rests(recording: Recording, flat: Flat, turns: Vector, theta: Theta, runs: Runs, gravity: float) -> list[Rest]:
+def leverages(moves: list[Move], scene: Scene, theta: Theta, covariance: Vector, variance: Vector) -> Vector:
+    """(k,) tr(J C J') / variance of each miss, 0 to 2.
+
+    J : (3, p) the miss by the parameters, C : `covariance` (p, p) of theta, which the misses of `variance` (k,) gave.
+    """
+    inverse = np.asarray(np.linalg.pinv(theta.D))
+    J = np.array([_jacobian(move, scene, theta, inverse) for move in moves])
+    taken = np.einsum("kip,pq,kiq->k", J, covariance, J, optimize=True)
+    return np.asarray(np.clip(taken / variance, 0.0, 2.0))
+
+
+def _jacobian(move: Move, scene: Scene, theta: Theta, inverse: Vector) -> Vector:
+    """(3, p) of the miss u x v by the parameters in the order of NAMES, with u and v near each other."""
+    series = scene.problem.series
+    R = _to_the_end(move.F) * series.dt[move.span, None, None]
+    # phi, the error of the turn in the axes of its end: a step's is -dt dK (omega - b_omega); b_omega the rests tell
+    phi = np.zeros((3, len(NAMES)))
+    by_K = -np.einsum("mij,mk->ijk", R, series.omega[move.span] - theta.b_omega)
+    by_K += np.swapaxes(by_K, 1, 2) * (1.0 - np.eye(3))
+    i, j = np.triu_indices(3)
+    phi[:, slice(*PLACES["K"])] = by_K[:, i, j]
+    # s = inv(D) (y - b_a): ds = -inv(D) (dD s + db_a)
+    whole = product(move.F)
+    u, v = whole @ move.leaving, move.coming
+    du, dv = whole @ _by_accelerometer(inverse, move.leaving), _by_accelerometer(inverse, move.coming)
+    du -= cross(u) @ phi
+    return np.asarray((cross(u) @ dv - cross(v) @ du) / (np.linalg.norm(u) * np.linalg.norm(v)))
+
+
+def _by_accelerometer(inverse: Vector, s: Vector) -> Vector:
+    """(3, p) of a measured gravity s by D and b_a."""
+    ds = np.zeros((3, len(NAMES)))
+    ds[:, slice(*PLACES["D"])] = -np.einsum("ki,j->kij", inverse, s).reshape(3, 9)
+    ds[:, slice(*PLACES["b_a"])] = -inverse
+    return ds
+
+
+def _to_the_end(F: Vector) -> Vector:
+    """(m, 3, 3) F[m-1] ... F[i], for every i."""
+    R, step = F.copy(), 1
+    while step < len(R):
+        R[:-step] = R[step:] @ R[:-step]
+        step *= 2
+    return R
+
+
+def _rests(scene: Scene, turns: Vector, theta: Theta) -> list[Rest]:
     """The flat segment and the rests after it; `turns` (n, 3) rad are the steps of the series."""
+    recording, flat = scene.recording, scene.flat
     inverse = np.linalg.pinv(theta.D)  # a search may pass through a singular D: that is no reason to stop it
     dt = 1.0 / recording.rate_hz
     turns = np.vstack([np.zeros((flat.last, 3)), turns])
     rests = []
-    for first, last in runs.tolist():
+    for first, last in scene.runs.tolist():
         if last <= flat.last + 1:
             continue
         acc = recording.acc[first:last]
@@ -83,10 +163,10 @@ def _rests(recording: Recording, flat: Flat, turns: Vector, theta: Theta, runs: 
         # a board in a hand turns a little as it rests: each sample counts in the axes of either end
         turned = np.cumsum(turns[first:last], axis=0)
         across = _mean_cross(turned, (acc - theta.b_a) @ inverse.T)
-        coming, leaving = s - across + np.cross(turned[0], s), s + np.cross(turned[-1], s) - across
+        coming, leaving = s - across + cross(turned[0]) @ s, s + cross(turned[-1]) @ s - across
         tremor = max(float(np.mean(acc.var(0) - flat.Sigma_a)), 0.0)
         of_tremor = 2.0 * tremor * (SPEED_OF_TREMOR_S / ((last - first) * dt)) ** 2
-        variance = (POSE_MPS2**2 + flat.Sigma_a.mean() / (last - first) + of_tremor) / gravity**2
+        variance = (POSE_MPS2**2 + flat.Sigma_a.mean() / (last - first) + of_tremor) / scene.problem.gravity**2
         rests.append(Rest(first, last, coming, leaving, variance))
     return rests
 
@@ -99,13 +179,4 @@ def _mean_cross(a: Vector, b: Vector) -> Vector:
 
 def _miss(carried: Vector, seen: Vector) -> Vector:
     """(3,) sine of the angle between two directions, along their axis."""
-    return np.cross(carried, seen) / (np.linalg.norm(carried) * np.linalg.norm(seen))
-
-
-def _weights(z: Vector) -> tuple[Vector, float]:
-    """Student-t weights (k,) of the moves, and the scale c >= 1 of the moves that agree."""
-    nu, c = DEGREES_OF_FREEDOM, 1.0
-    for _ in range(50):
-        w = (nu + 2.0) / (nu + 2.0 * z / c)
-        c = max(1.0, float(np.mean(w * z)))
-    return (nu + 2.0) / (nu + 2.0 * z / c), c
+    return np.asarray(cross(carried) @ seen / (np.linalg.norm(carried) * np.linalg.norm(seen)))

@@ -11,7 +11,6 @@ from ..data import Recording, Vector
 from .likelihood import Problem, Series
 from .masks import mask
 from .model import Flat
-from .moves import POSE_MPS2
 from .stationary import flat_statistics
 from .still import Runs, still_runs, without_drift
 
@@ -23,6 +22,7 @@ TREMOR_OF_NOISE = 0.2  # a tremor below this share of the sensor's noise is none
 CORRELATION_S = 0.2  # of the acceleration of a hand that goes from rest to rest
 FLOOR_CORRELATION_S = 0.05  # of jerks
 FLOOR_MPS2 = 0.12  # white acceleration that jerks leave beside the pivot's own
+POSE_MPS2 = 0.0003  # no pose is known better than its mounting is stiff
 MANY_RESTS = 6
 
 

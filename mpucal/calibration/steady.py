@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Recording, Vector
-from .gyro import K_MEAN, K_SD
-from .hand import DELAY_SD_S, FARTHER, FARTHER_STILL, LEVER_SD_M, PIVOT_MPS2, WHITE_MPS2
+from .hand import FARTHER, FARTHER_STILL, PIVOT_MPS2, WHITE_MPS2, prior_of
 from .likelihood import NAMES, Problem, Series, Theta, evaluate, value
-from .minimise import Prior, minimise, values
+from .minimise import inverse, minimise, values
 from .model import Fit, Flat
 from .scene import CORRELATION_S, FLOOR_MPS2, Scene, prepare
 from .thin import thinned
@@ -52,7 +51,7 @@ def likeliest_change(recording: Recording, flat: Flat, fit: Fit, gravity: float)
     n = len(scene.problem.series)
     if n < FEWEST_BLOCKS:
         return None
-    prior = _prior(scene.flat)
+    prior = prior_of(scene.flat)
     start = _start(fit, scene)
     problem = _with_noise(scene, start)
     theta = minimise(problem, start, len(NAMES), prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True).theta
@@ -73,15 +72,6 @@ def likeliest_change(recording: Recording, flat: Flat, fit: Fit, gravity: float)
             )
         )
     return max(changes)
-
-
-def _prior(flat: Flat) -> Prior:
-    return Prior.of(
-        b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)),
-        K=(K_MEAN, K_SD),
-        tau=(0.0, DELAY_SD_S),
-        r=(0.0, LEVER_SD_M),
-    )
 
 
 def _start(fit: Fit, scene: Scene) -> Theta:
@@ -110,7 +100,6 @@ def _newton(H: Vector, gradient: Vector, H_after: Vector, gradient_after: Vector
     """d (12,) and its covariance, beside theta (p,): H (p, p), and what the part after says of d: (p, 12), (12,)."""
     p = len(H)
     joint = np.block([[H, H_after], [H_after.T, H_after[:12] + np.diag(CHANGE_SD**-2.0)]])
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(joint), 1e-300))
-    covariance = np.linalg.pinv(joint * np.outer(scale, scale), hermitian=True) * np.outer(scale, scale)
+    covariance = inverse(joint)
     step = -covariance @ np.append(gradient, gradient_after)
     return step[p:], covariance[p:, p:]
