@@ -22,7 +22,7 @@ _TRANSFER = {
     errno.EAGAIN: ("another master took the I2C bus", "let no other master use this bus"),
     errno.EBUSY: (
         "a driver of the kernel holds the chip",
-        "remove its overlay or unbind it: /sys/bus/i2c/devices/N-00{address:02x}/driver names it",
+        "remove its overlay, or: echo {chip} | sudo tee /sys/bus/i2c/devices/{chip}/driver/unbind",
     ),
     errno.EOPNOTSUPP: (
         "the adapter cannot move this transfer",
@@ -61,15 +61,22 @@ def transfer_error(error: OSError, path: str, address: int) -> BusError:
         error.errno or 0,
         (f"a transfer failed ({error.strerror})", "check the wires, and start again"),
     )
-    return BusError(f"{what} (0x{address:02x} on {path})", remedy.format(address=address))
+    chip = f"{_number(path) or 'N'}-{address:04x}"
+    return BusError(f"{what} (0x{address:02x} on {path})", remedy.format(chip=chip))
 
 
 def nobody(path: str, addresses: tuple[int, ...]) -> NoAnswer:
     """Nothing acknowledges any of `addresses`."""
     places = " or ".join(f"0x{address:02x}" for address in addresses)
-    number = path.rpartition("i2c-")[2]
-    who = f"; `i2cdetect -y {number}` shows who answers" if number.isdecimal() else ""
+    number = _number(path)
+    who = f"; `i2cdetect -y {number}` shows who answers" if number else ""
     return NoAnswer(f"nothing answers at {places} on {path}", WIRES + who)
+
+
+def _number(path: str) -> str:
+    """Of the adapter; empty where its path has none."""
+    number = path.rpartition("i2c-")[2]
+    return number if number.isdecimal() else ""
 
 
 def _others() -> str:

@@ -20,6 +20,7 @@ from ..chip.families import PARTS, Family, Part
 from ..chip.identity import remark
 from ..chip.offsets import PLACES, Block, restore
 from ..chip.port import Port
+from ..chip.probe import read_identity
 from ..chip.response import measured_response
 from ..chip.self_test import run_self_test
 from ..data import Sensor
@@ -40,6 +41,8 @@ def examine(bus: Bus, config: Config, seconds: float, way: Look = examine_speed)
     """
     port = Port(bus, Decoder("doctor"))
     try:
+        # a stranger is not written to
+        read_identity(port)
         olds = [Block.read(port, place) for place in PLACES]
         yield from way(bus)
         with suppress(ChipError), Bench(port) as bench:

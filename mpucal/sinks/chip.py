@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..chip import registers as reg
 from ..chip.access import Bus
 from ..chip.bench import Bench
 from ..chip.decode import Decoder
 from ..chip.families import PARTS
 from ..chip.offsets import PLACES, Block, Place, Words, difference, moved, restore
 from ..chip.port import Port
+from ..chip.probe import read_identity
 from ..chip.response import Response, measured_response
 from ..chip.setup import reset
 from ..data import STANDARD_GRAVITY_MPS2, Vector
@@ -70,6 +70,7 @@ class ChipSink:
         """
         wanted = _kept(kept)
         with _refusing():
+            read_identity(self._port)
             olds = self._blocks()
         with self._old_or_new(olds):
             for block in wanted:
@@ -116,7 +117,7 @@ class ChipSink:
 
     def _identified(self, calibration: Calibration) -> Place:
         """Where the offset registers are by the chip's name; ChipError where it is another chip than was calibrated."""
-        who_am_i = self._port.read(reg.WHO_AM_I, 1)[0]
+        who_am_i = read_identity(self._port)
         calibrated = calibration.sensor
         if calibrated.who_am_i not in (None, who_am_i):
             raise ChipError(

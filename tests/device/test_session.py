@@ -60,7 +60,7 @@ def test_its_bias_goes_into_the_chip_and_out_again(guided):
         ({"address": 0x50}, "nothing answers at 0x68 or 0x69 on /dev/i2c-1: check VCC"),
         ({"fails": errno.ETIMEDOUT}, "a wire holds SDA or SCL low"),
         ({"fails": errno.EIO}, "a transfer broke off"),
-        ({"bound": [0x68, 0x69]}, "a driver of the kernel holds the chip"),
+        ({"bound": [0x68, 0x69]}, "echo 1-0068 | sudo tee /sys/bus/i2c/devices/1-0068/driver/unbind"),
         ({"fails": errno.ENODEV}, "the adapter is gone"),
     ],
     ids=["nobody", "stuck", "broken", "bound", "gone"],
@@ -82,6 +82,22 @@ def test_a_correction_in_the_chip_is_noticed_as_a_session_starts(device):
     assert result.code == 0, result.err
     assert "offset registers held a correction, (4660, " in result.err
     assert load(mocked.folder / "x.mcap").sensor.accel_offsets[0] != 0x1234
+
+
+def test_a_clock_at_the_same_address_is_one_sentence_and_goes_on(device):
+    mocked = device("DS3231")
+    Calibration(np.eye(3), np.full(3, 0.1), quality={"verdict": "good", "reasons": []}).save(mocked.folder / "c.json")
+    words = "the chip at this address is a real-time clock (a DS1307 or DS3231), not an MPU"
+    session = mocked.mpucal("session", "--bus", NODE)
+    write = mocked.mpucal("write", "c.json", "chip", "--bus", NODE)
+    doctor = mocked.mpucal("doctor", "--bus", NODE, "--json")
+    assert (session.code, write.code, doctor.code) == (3, 6, 3)
+    remedy = "tie the MPU's AD0 to VCC and give --address 0x69"
+    assert session.sentences == [f"mpucal: {words}: {remedy}."]
+    assert f"nothing was written: {words}: {remedy}." in write.err
+    chip = next(finding for finding in json.loads(doctor.out)["findings"] if finding["topic"] == "chip")
+    assert (chip["what"], chip["remedy"]) == (words, remedy)
+    assert mocked.run("i2cget", "-y", "1", "0x68", "0x05").out.strip() == "0x12"
 
 
 def test_no_permission_is_one_sentence(device):

@@ -24,8 +24,9 @@ from mpucal.bus.simulated import Chip, RecordedFeed, SimulatedBus, open_simulate
 from mpucal.bus.simulated.clock import CLOCKS, Clock
 from mpucal.bus.simulated.factory import Factory
 from mpucal.bus.simulated.models import MODELS
+from mpucal.chip.access import Reply
 
-NODE, STILL = "/dev/i2c-1", "still"
+NODE, STILL, CLOCK_CHIP = "/dev/i2c-1", "still", "DS3231"
 DEVICES = """\
 P: /devices/platform/i2c-1
 E: SUBSYSTEM=i2c
@@ -63,8 +64,27 @@ class SharedClock:
         return int.from_bytes(self._page, "little")
 
 
-def open_bus(text: str, clock: Path) -> SimulatedBus:
+class ClockChip:
+    """A DS3231 at the MPU's address, 23:59:45 on the 31st of December; it remembers what was written to it."""
+
+    def __init__(self) -> None:
+        self._registers = bytearray.fromhex("45592307311299") + bytes(12)
+
+    def read(self, register: int, count: int) -> Reply:
+        """Its nineteen registers, again and again."""
+        return Reply(bytes(self._registers[(register + i) % len(self._registers)] for i in range(count)), 0)
+
+    def write(self, register: int, data: bytes) -> int:
+        """Any of them."""
+        for at, value in enumerate(data, register):
+            self._registers[at % len(self._registers)] = value
+        return 0
+
+
+def open_bus(text: str, clock: Path) -> SimulatedBus | ClockChip:
     """The bus that `text` names, in the time of `clock`."""
+    if text == CLOCK_CHIP:
+        return ClockChip()
     if text == STILL:
         counts = [(12, -34, 4096)] * 10_000, [(56, -78, 90)] * 10_000
         feed = RecordedFeed(*counts, rate_hz=200.0, accel_range_g=8.0, gyro_range_dps=500.0)
