@@ -13,6 +13,9 @@ from .result import GOOD, Calibration
 
 # how sure "they differ" is: of two calibrations of one unchanged sensor, 1 in 100 are called different
 CONFIDENCE = 0.99
+# How much too sure a calibration with reservations may be: of one unchanged sensor, halves of real recordings with
+# such a verdict were apart by up to 2.3 times what two good ones may be.
+RESERVED = 3.0
 AXES = "xyz"
 # K is symmetric to rounding where the calibration was made in the body frame
 SYMMETRIC = 1e-6
@@ -47,11 +50,13 @@ class Comparison:
     ----------
     numbers : the accelerometer's twelve. gyroscope : its bias, which changes from day to day.
     remarks : what else differs, a sentence each.
+    margin : by what factor the uncertainties may be too small: 1 for two good calibrations.
     """
 
     numbers: tuple[Difference, ...]
     gyroscope: tuple[Difference, ...]
     remarks: tuple[str, ...]
+    margin: float = 1.0
 
     @property
     def limit(self) -> float:
@@ -61,13 +66,26 @@ class Comparison:
 
     @property
     def same(self) -> bool | None:
-        """Whether they are one sensor's, unchanged, as far as they know; None where no uncertainty is known."""
-        return all(abs(d.z) <= self.limit for d in self._known) if self._known else None
+        """Whether they are one sensor's, unchanged, as far as they know.
+
+        None where that cannot be told: no uncertainty is known, or something is doubtful.
+        """
+        if self.changed:
+            return False
+        return None if self.doubtful or not self._known else True
 
     @property
     def changed(self) -> tuple[Difference, ...]:
-        """What differs by more than the uncertainties, the surest first."""
-        return tuple(sorted((d for d in self._known if abs(d.z) > self.limit), key=lambda d: -abs(d.z)))
+        """What differs by more than the uncertainties, even if they are too small; the surest first."""
+        return self._beyond(self.limit * self.margin)
+
+    @property
+    def doubtful(self) -> tuple[Difference, ...]:
+        """What else differs by more than the uncertainties, if these are to be relied on; the surest first."""
+        return self._beyond(self.limit)[len(self.changed) :]
+
+    def _beyond(self, limit: float) -> tuple[Difference, ...]:
+        return tuple(sorted((d for d in self._known if abs(d.z) > limit), key=lambda d: -abs(d.z)))
 
     @property
     def _known(self) -> list[Difference]:
@@ -84,7 +102,8 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
         *_leans(a, b),
     ]
     turned = _row("gyroscope's bias", "deg/s", 180 / math.pi, b.b_omega - a.b_omega, a.b_omega_std, b.b_omega_std)
-    return Comparison(tuple(numbers), tuple(turned), tuple(_remarks(a, b)))
+    margin = RESERVED if _reserved(a) or _reserved(b) else 1.0
+    return Comparison(tuple(numbers), tuple(turned), tuple(_remarks(a, b)), margin)
 
 
 def in_body_frame(c: Calibration) -> Calibration:
@@ -114,7 +133,7 @@ def _leans(a: Calibration, b: Calibration) -> list[Difference]:
 
 
 def _remarks(a: Calibration, b: Calibration) -> list[str]:
-    said = [_reservations(name, c) for name, c in (("A", a), ("B", b)) if c.verdict != GOOD and "verdict" in c.quality]
+    said = [_reservations(name, c) for name, c in (("A", a), ("B", b)) if _reserved(c)]
     if None not in (a.sensor.who_am_i, b.sensor.who_am_i) and a.sensor.who_am_i != b.sensor.who_am_i:
         said.append(
             f"They are of two chips: WHO_AM_I is 0x{a.sensor.who_am_i:02x} of A and 0x{b.sensor.who_am_i:02x} of B."
@@ -143,6 +162,14 @@ def _remarks(a: Calibration, b: Calibration) -> list[str]:
     return said
 
 
+def _reserved(c: Calibration) -> bool:
+    """Whether its verdict has reservations; a blob has no verdict."""
+    return c.verdict != GOOD and "verdict" in c.quality
+
+
 def _reservations(name: str, c: Calibration) -> str:
     codes = ", ".join(str(reason["code"]) for reason in c.quality.get("reasons", ()))
-    return f"{name} is {c.verdict} ({codes}): it may be less sure than it says, and a difference may come from that."
+    return (
+        f"{name} is {c.verdict} ({codes}), and its uncertainties may be too small: a difference counts from"
+        f" {RESERVED:g} times as much on."
+    )

@@ -23,7 +23,8 @@ EXAMPLE = "Example: `mpucal diff board7/calibration.json board7-today/calibratio
 def command(a: Path, b: Path, as_json: bool) -> None:
     """Say how calibration B (.json or .bin) differs from A, in mg, % and deg, and whether that is more than chance.
 
-    Of one unchanged sensor, calibrated twice, 1 pair in 100 is called different.
+    Of one unchanged sensor, calibrated well twice, 1 pair in 100 is called different. Where one of them is usable
+    with reservations, its uncertainties may be too small, and a small difference cannot be told from none.
     """
     found = compare(Calibration.load(a), Calibration.load(b))
     click.echo(json.dumps(_document(found), indent=2) if as_json else _page(found))
@@ -34,6 +35,7 @@ def _document(found: Comparison) -> dict[str, Any]:
         "same": found.same,
         "confidence": CONFIDENCE,
         "limit": found.limit,
+        "margin": found.margin,
         "numbers": [_plain(d) for d in found.numbers],
         "gyroscope": [_plain(d) for d in found.gyroscope],
         "remarks": list(found.remarks),
@@ -58,12 +60,14 @@ def _stars(d: Difference, limit: float) -> str:
 
 
 def _verdict(found: Comparison) -> str:
-    if found.same is None:
-        return "Whether they differ cannot be told: neither says how sure it is, as no config blob does."
     if found.same:
         return "The same: no number of the accelerometer differs by more than both calibrations' uncertainties."
-    first = found.changed[0]
+    apart = found.changed or found.doubtful
+    if not apart:
+        return "Not to be told: neither says how sure it is, as no config blob does."
+    said = "Different" if found.changed else "Not to be told"
     return (
-        f"Different: {len(found.changed)} of the accelerometer's numbers changed by more than both calibrations'"
-        f" uncertainties,\nmost surely the {first.name}, by {first.value:+.3g} {first.unit}."
+        f"{said}: {len(apart)} of the accelerometer's numbers changed by more than both calibrations' uncertainties,\n"
+        f"most surely the {apart[0].name}, by {apart[0].value:+.3g} {apart[0].unit}"
+        f"{'.' if found.changed else ', and these may be too small.'}"
     )
