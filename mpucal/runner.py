@@ -190,7 +190,7 @@ class Runner:
             self._ends(SourceEnded())
         except (BusError, ChipError) as error:
             # a CaptureError is none of these: what does not replay is not calibrated either
-            self._ends(SourceEnded(error.what), error)
+            self._ends(SourceEnded(f"{error.what}: {error.remedy}"), error)
         else:
             self._arrived += Measured(samples), Tick(self._source.now_ns() * 1e-9)
             self._catch_up()
