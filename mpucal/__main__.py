@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 # next to nothing here: what takes a while to load does so where Ctrl-C finds its sentence
+import os
 import sys
 from collections.abc import Sequence
 
 from .errors import Abandoned, MpucalError
 
 BUG = 1
+# Matrices are small here: a second thread would wait for the first, and take its core from who reads the sensor.
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 INTERRUPTED = "mpucal: interrupted; what was recorded until then is kept."
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command, and leave with its exit code."""
+    for library in THREADS:
+        os.environ.setdefault(library, "1")
     sys.exit(run(arguments))
 
 
