@@ -54,6 +54,26 @@ def test_its_bias_goes_into_the_chip_and_out_again(guided):
     assert mocked.run("i2cget", "-y", "1", "0x68", "0x77", "w").out == before
 
 
+def test_a_clone_that_calls_itself_a_6050_gets_its_bias_where_a_6500_keeps_it(device):
+    mocked = device("sim:chip=clone98,who_am_i=0x68,D=1/0/0/0/1/0/0/0/1,b_a=0.3/-0.2/0.4")
+    mocked.tell(prompt={"kind": "lay_flat", "down": None})
+    b_a = np.array([0.3, -0.2, 0.4])
+    Calibration(np.eye(3), b_a, quality={"verdict": "good", "reasons": []}).save(mocked.folder / "c.json")
+
+    def held(first):
+        words = [mocked.run("i2cget", "-y", "1", "0x68", hex(first + 3 * axis), "w").out for axis in range(3)]
+        return [int.from_bytes(int(word, 16).to_bytes(2, "little"), "big", signed=True) for word in words]
+
+    mine, other = held(0x77), mocked.run("i2cget", "-y", "1", "0x68", "0x06", "w").out
+    written = mocked.mpucal("write", "c.json", "chip", "--bus", NODE)
+    assert written.code == 0, written.err
+    assert "the offset registers at 0x77" in written.out
+    assert mocked.run("i2cget", "-y", "1", "0x68", "0x06", "w").out == other
+    # 2048 LSB/g, and bit 0 is kept
+    assert np.subtract(mine, held(0x77)) == pytest.approx(b_a / 9.80665 * 2048, abs=2)
+    assert [word & 1 for word in mine] == [word & 1 for word in held(0x77)]
+
+
 @pytest.mark.parametrize(
     ("adapter", "words"),
     [
