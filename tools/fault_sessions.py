@@ -42,7 +42,7 @@ LEAST_STD = 1e-4
 CODES = (0, 3, 4, 5)
 CHIPS = ("mpu6050", "mpu6500", "clone98")
 BEGIN_S, END_S = 0.0, 75.0
-RECORDED_S, POLL_S = 45, 0.1
+RECORDED_S, POLL_S = 45, 0.2
 # every kind alone, and every pair
 COMBINATIONS = [*((name,) for name in KINDS), *combinations_with_replacement(KINDS, 2)]
 
