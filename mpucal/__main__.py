@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import errno
+
 # next to nothing here: what takes a while to load does so where Ctrl-C finds its sentence
 import os
 import sys
 from collections.abc import Sequence
 
-from .errors import Abandoned, MpucalError
+from .errors import Abandoned, MpucalError, OutputError
 
 BUG = 1
+# of a full disk or quota behind stdout
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 # Matrices are small here: a second thread would wait for the first, and take its core from who reads the sensor.
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 INTERRUPTED = "mpucal: interrupted; what was recorded until then is kept."
@@ -49,12 +53,23 @@ def _run(arguments: Sequence[str] | None) -> int:
     except SystemExit:
         # click's own end where who read the results has left: that is no error
         return 0
+    except OSError as error:
+        if error.errno not in NO_ROOM:
+            return _bug()
+        # Python would complain again while it flushes
+        sys.stdout = None
+        print(f"mpucal: the output cannot be written ({error.strerror}): make room where it goes.", file=sys.stderr)
+        return OutputError.exit_code
     except Exception:
-        import traceback  # noqa: PLC0415
+        return _bug()
 
-        traceback.print_exc()
-        click.echo("mpucal: this is a bug in mpucal: please report it with the lines above.", err=True)
-        return BUG
+
+def _bug() -> int:
+    import traceback  # noqa: PLC0415
+
+    traceback.print_exc()
+    print("mpucal: this is a bug in mpucal: please report it with the lines above.", file=sys.stderr)
+    return BUG
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """How fast `mpucal apply` goes, and in how much memory, beside NumPy's own formula on an array in memory.
 
-python tools/apply_speed.py                       1 GB of samples, archive to archive
-python tools/apply_speed.py --gigabytes 0.1 --to .csv .mcap
+python tools/apply_speed.py                                             1 GB of samples, archive to archive
+python tools/apply_speed.py --gigabytes 0.1 --of .csv .npz --to .csv .mcap
+python tools/apply_speed.py --gigabytes 0.1 --of .mcap                  a capture: a stored session's polls, repeated
 """
 
 from __future__ import annotations
@@ -12,16 +13,21 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from mpucal.capture.mcap import CaptureWriter, read_capture
 from mpucal.capture.rows import ROWS, Rows, open_writer
+from mpucal.chip import registers as reg
+from mpucal.chip.access import Transaction
 from mpucal.data import Samples
 from mpucal.result import Calibration
 
 # t, acc, gyr and temperature as float64, and three masks
 BYTES = 8 * 8 + 3
+SESSION = Path(__file__).parents[1] / "fixtures" / "sessions" / "mpu6050.mcap"
 D = np.array([[1.021, 0.013, -0.007], [-0.009, 0.987, 0.021], [0.004, -0.016, 1.034]])
 B_A = np.array([0.31, -0.22, 1.08])
 
@@ -38,26 +44,45 @@ def write_samples(path: Path, count: int) -> None:
             write(Samples(*(getattr(run, name)[:n] for name in Samples.__dataclass_fields__)))
 
 
-def applied(folder: Path, source: Path, target: Path) -> tuple[float, float]:
-    """Seconds and peak megabytes of `mpucal apply`, a process of its own."""
+def write_capture(path: Path, count: int) -> None:
+    """A capture of at least that many samples: those of a stored session, again and again."""
+    capture = read_capture(SESSION)
+    accesses = [record for record in capture.records if isinstance(record, Transaction)]
+    begin = next(i for i, access in enumerate(accesses) if access.register == reg.FIFO_R_W) - 1
+    # the last three put the chip to rest
+    polls, length_ns = accesses[begin:-3], accesses[-4].t_ns - accesses[begin].t_ns
+    frames = sum(len(access.data) for access in polls if access.register == reg.FIFO_R_W) // reg.FRAME_BYTES
+    with CaptureWriter(path) as writer:
+        writer.start(capture.meta)
+        for access in accesses[:begin]:
+            writer.transaction(access)
+        for again in range(-(-count // frames)):
+            for access in polls:
+                writer.transaction(replace(access, t_ns=access.t_ns + again * length_ns))
+
+
+def applied(folder: Path, source: Path, target: Path) -> tuple[float, float, float]:
+    """Seconds, the processor's seconds and peak megabytes of `mpucal apply`, a process of its own."""
     words = [sys.executable, "-m", "mpucal", "apply", "c.json", source.name, "-o", target.name]
     code = (
         "import json, resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL);"
-        "print(json.dumps(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss))"
+        "used = resource.getrusage(resource.RUSAGE_CHILDREN);"
+        "print(json.dumps([used.ru_utime + used.ru_stime, used.ru_maxrss / 1024]))"
     )
     begun = time.perf_counter()
     done = subprocess.run([sys.executable, "-c", code, *words], cwd=folder, capture_output=True, text=True, check=True)
-    return time.perf_counter() - begun, json.loads(done.stdout) / 1024
+    processor_s, peak = json.loads(done.stdout)
+    return time.perf_counter() - begun, processor_s, peak
 
 
 def in_memory(count: int) -> float:
-    """Samples a second of the formula alone, on arrays that are there."""
+    """Samples the processor's second of the formula alone, on arrays that are there."""
     rng = np.random.default_rng(1)
     acc, gyr = rng.normal(size=(count, 3)), rng.normal(size=(count, 3))
     gain, K, b_omega = np.linalg.inv(D), np.eye(3), np.zeros(3)
-    begun = time.perf_counter()
+    begun = time.process_time()
     a, w = (acc - B_A) @ gain.T, (gyr - b_omega) @ K.T
-    seconds = time.perf_counter() - begun
+    seconds = time.process_time() - begun
     return len(a) / seconds if len(w) else 0.0
 
 
@@ -71,32 +96,44 @@ def copied(source: Path) -> float:
 
 
 def main() -> None:
-    """Measure, and print a line for each kind of file."""
+    """Measure what the options name."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--gigabytes", type=float, default=1.0)
-    parser.add_argument("--to", nargs="+", default=[".npz"], choices=[".npz", ".csv", ".mcap"])
+    kinds = [".npz", ".csv", ".mcap"]
+    parser.add_argument("--of", nargs="+", default=[".npz"], choices=kinds)
+    parser.add_argument("--to", nargs="+", default=[".npz"], choices=kinds)
     parser.add_argument("--folder", type=Path, default=None, help="On which disk; by default a temporary folder's.")
     options = parser.parse_args()
     count = round(options.gigabytes * 1e9 / BYTES)
+    formula = in_memory(min(count, 5_000_000)) / 1e6
+    print(f"NumPy's formula on arrays in memory: {formula:.1f} million samples a second of the processor's")
     with tempfile.TemporaryDirectory(dir=options.folder) as name:
         folder = Path(name)
         Calibration(D, B_A, quality={"verdict": "good", "reasons": []}).save(folder / "c.json")
-        source = folder / "in.npz"
-        write_samples(source, count)
-        small = folder / "small.npz"
-        write_samples(small, 2 * ROWS)
-        _, least = applied(folder, small, folder / "out.npz")
-        print(f"{count} samples, {source.stat().st_size / 1e9:.2f} GB; a plain copy: {copied(source):.0f} MB/s")
-        print(f"NumPy's formula on arrays in memory: {in_memory(min(count, 5_000_000)) / 1e6:.1f} million samples/s")
-        for ending in options.to:
-            target = folder / f"out{ending}"
-            seconds, peak = applied(folder, source, target)
-            print(
-                f"mpucal apply, .npz to {ending}: {count / seconds / 1e6:.2f} million samples/s,"
-                f" {source.stat().st_size / 1e6 / seconds:.0f} MB/s read, {peak:.0f} MB of memory at most"
-                f" ({least:.0f} MB with {2 * ROWS} samples)"
-            )
-            target.unlink()
+        for source in options.of:
+            measure(folder, source, options.to, count)
+
+
+def measure(folder: Path, kind: str, endings: list[str], count: int) -> None:
+    """Print a line for each ending: `count` samples of a kind of file applied to."""
+    write = write_capture if kind == ".mcap" else write_samples
+    source, small = folder / f"in{kind}", folder / f"small{kind}"
+    write(source, count)
+    write(small, 2 * ROWS)
+    *_, least = applied(folder, small, folder / "out.npz")
+    size = source.stat().st_size
+    print(f"{kind} of {count} samples, {size / 1e9:.2f} GB; a plain copy: {copied(source):.0f} MB/s")
+    for ending in endings:
+        target = folder / f"out{ending}"
+        seconds, processor_s, peak = applied(folder, source, target)
+        print(
+            f"mpucal apply, {kind} to {ending}: {count / seconds / 1e6:.2f} million samples/s,"
+            f" {count / processor_s / 1e6:.2f} a second of the processor's,"
+            f" {size / 1e6 / processor_s:.0f} MB read in it, {peak:.0f} MB of memory at most"
+            f" ({least:.0f} MB with {2 * ROWS} samples)"
+        )
+        target.unlink()
+    source.unlink()
 
 
 if __name__ == "__main__":

@@ -23,6 +23,8 @@ from ..errors import CaptureError, OutputError
 
 FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 1
 BUS, SESSION = "/bus", "/session"
+# the metadata of a file of calibrated samples, which is no capture
+CALIBRATED = "mpucal.imu"
 
 # half of the second that a killed program may lose: the other half is for the wait between two records
 CHUNK_NS = 500_000_000
@@ -215,6 +217,11 @@ class CaptureReader:
             whole, finished = stream.at, item is None
             if isinstance(item, Metadata) and item.name == FORMAT:
                 meta = _meta(item, self._path)
+            elif isinstance(item, Metadata) and item.name == CALIBRATED:
+                raise CaptureError(
+                    f"{self._path} holds samples that are calibrated already ({item.metadata.get('done')})",
+                    "give the recording that they were made of",
+                )
             elif isinstance(item, Channel):
                 channels[item.id] = item.topic
             elif isinstance(item, Message):
@@ -281,12 +288,12 @@ def _meta(item: Metadata, path: Path) -> dict[str, Any]:
 
 def _record(topic: str, message: Message, path: Path) -> Record | None:
     """The record of a message; None for a topic that a newer mpucal added."""
+    if topic not in (BUS, SESSION):
+        return None
     try:
         content = json.loads(message.data)
         if topic == SESSION:
             return SessionEvent(content["name"], message.log_time, content["data"])
-        if topic != BUS:
-            return None
         error = content.get("error")
         return Transaction(
             content["op"],

@@ -197,7 +197,9 @@ class FifoDecoder:
             return True
         temperature = frames[:, TEMPERATURE].astype(np.int64)
         before = temperature[0] if self._temperature is None else self._temperature
-        if (np.abs(np.diff(temperature, prepend=before)) > MAX_TEMPERATURE_STEP).any():
+        if abs(temperature[0] - before) > MAX_TEMPERATURE_STEP:
+            return False
+        if (np.abs(temperature[1:] - temperature[:-1]) > MAX_TEMPERATURE_STEP).any():
             return False
         self._temperature = int(temperature[-1])
         return True

@@ -95,11 +95,12 @@ def test_b_a_follows_the_temperature(mpucal, session, calibration):
     np.testing.assert_allclose(load("out.npz").acc, (recording.acc - b_a) @ np.linalg.inv(D).T, atol=1e-12)
 
 
-def test_what_is_calibrated_already_is_refused(mpucal, session, calibration):
-    mpucal("apply", "c.json", session.folder, "-o", "out.npz")
-    again = mpucal("apply", "c.json", "out.npz", "-o", "twice.npz")
-    assert again.code == 2
-    assert "calibrated already" in again.err
+@pytest.mark.parametrize(("ending", "code"), [(".npz", 2), (".mcap", 3)])
+def test_what_is_calibrated_already_is_refused(mpucal, session, calibration, ending, code):
+    mpucal("apply", "c.json", session.folder, "-o", f"out{ending}")
+    again = mpucal("apply", "c.json", f"out{ending}", "-o", "twice.npz")
+    assert again.code == code
+    assert "calibrated already (calibrated with c.json of" in again.err
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,13 @@
+import errno
+import io
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from mpucal.cli import COMMANDS
+from mpucal.result import Calibration
 
 HEAVY = ("numpy", "mcap", "smbus2", "rich", "scipy", "matplotlib")
 
@@ -49,3 +53,15 @@ def test_the_unexpected_is_a_bug_with_a_trace(mpucal, monkeypatch):
     assert result.code == 1
     assert "ZeroDivisionError" in result.err
     assert "this is a bug in mpucal" in result.err
+
+
+def test_a_full_disk_behind_stdout_is_3(mpucal, tmp_path, monkeypatch):
+    class Full(io.StringIO):
+        def write(self, _text):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    Calibration(np.eye(3), np.zeros(3)).save("c.json")
+    monkeypatch.setattr(sys, "stdout", Full())
+    result = mpucal("show", "c.json")
+    assert result.code == 3
+    assert result.err == "mpucal: the output cannot be written (No space left on device): make room where it goes.\n"

@@ -20,11 +20,11 @@ from ... import __version__
 from ...data import Samples
 from ...errors import RecordingError
 from ...files import whole_file
+from ..mcap import CALIBRATED
 from . import Write
 from .chunks import ChunkWriter
 
 TOPIC, FRAME_ID = "/imu/data", "imu"
-LIBRARY = "mpucal.imu"
 S = 1_000_000_000
 # sensor_msgs/Imu: a first covariance of -1 says that there is no such measurement
 NOT_MEASURED = -1.0
@@ -104,10 +104,10 @@ def imu_file(path: Path, done: str) -> Iterator[Write]:
         writer = ChunkWriter(
             file,
             MESSAGE,
-            Header(profile="ros2", library=f"{LIBRARY} {__version__}"),
+            Header(profile="ros2", library=f"{CALIBRATED} {__version__}"),
             Schema(id=1, data=SCHEMA.encode(), encoding=SchemaEncoding.ROS2, name="sensor_msgs/msg/Imu"),
             Channel(id=1, topic=TOPIC, message_encoding=MessageEncoding.CDR, metadata={}, schema_id=1),
-            Metadata(LIBRARY, {"done": done}),
+            Metadata(CALIBRATED, {"done": done}),
         )
         yield lambda samples: writer.add(*messages(samples))
         writer.finish()
