@@ -51,6 +51,7 @@ def correction(calibration: Calibration, sensor: Sensor, autopilot: Autopilot | 
             f" 0x{sensor.who_am_i:02x}",
             "give the calibration of this chip",
         )
+    _check_source(calibration, sensor, autopilot)
     _check_parameters(calibration, autopilot)
     return _with_registers(calibration, sensor)
 
@@ -69,9 +70,23 @@ def _with_registers(calibration: Calibration, sensor: Sensor) -> Correction:
     if not same and not np.any(applied):
         raise UsageError(
             f"the offset registers held {now} while these samples were taken, and {calibrated} when it was calibrated",
-            "give the calibration that the write into the registers left, calibration-on-chip.json",
+            "give the calibration of this chip, or calibration-on-chip.json, which a write into its registers left",
         )
     return Correction(calibration)
+
+
+def _check_source(calibration: Calibration, sensor: Sensor, autopilot: Autopilot | None) -> None:
+    """A chip's own samples, or those that an autopilot has turned and corrected: never the one for the other."""
+    if autopilot is not None and calibration.sensor.who_am_i is not None:
+        raise UsageError(
+            f"the calibration is of a chip's own samples, and these came through {autopilot.firmware}",
+            "give the calibration of this vehicle",
+        )
+    if calibration.extra.get("autopilot") and sensor.who_am_i is not None:
+        raise UsageError(
+            "the calibration is of an autopilot's stream, and these are a chip's own samples",
+            "give the calibration of this chip",
+        )
 
 
 def _check_parameters(calibration: Calibration, autopilot: Autopilot | None) -> None:
