@@ -15,7 +15,7 @@ from mcap.reader import NonSeekingReader, make_reader
 from mpucal.capture import load
 from mpucal.capture.mcap import CaptureWriter, read_capture
 from mpucal.capture.npz import save_npz
-from mpucal.capture.rows import ROWS, open_rows, open_writer
+from mpucal.capture.rows import ROWS, Rows, open_rows, open_writer
 from mpucal.capture.rows import capture as rows_capture
 from mpucal.capture.rows import csv as rows_csv
 from mpucal.capture.rows._text import lines, numbers
@@ -275,6 +275,26 @@ def test_the_frames_of_a_long_capture_wait_in_a_file(monkeypatch):
     assert [run.gap for run in runs] == [False] * 100 + [True] + [False] * 99
     assert [(run.segment, run.first) for run in runs] == [(i // 100, i % 100 * 500) for i in range(200)]
     np.testing.assert_array_equal(np.concatenate([run.frames for run in runs]), np.tile(frames, (100, 1)))
+
+
+@pytest.mark.parametrize("target", [".csv", ".npz", ".mcap"])
+@pytest.mark.parametrize("source", [".csv", ".npz"])
+def test_memory_is_that_of_a_run_however_many_there_are(source, target, tmp_path):
+    def peak(runs):
+        whole = recording(runs * ROWS)
+        path = tmp_path / f"{runs}{source}"
+        with open_writer(path, Rows(iter(())), "") as write:
+            for first in range(0, len(whole), ROWS):
+                write(whole.part(first, first + ROWS))
+        del whole
+        tracemalloc.start()
+        through(path, tmp_path / f"out{target}")
+        _, heaviest = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return heaviest
+
+    # the samples of the runs between take 6 MB
+    assert peak(9) - peak(3) < 600_000
 
 
 def test_other_endings_are_refused(archive, tmp_path):

@@ -29,7 +29,7 @@ from . import ROWS, Rows, Write, cannot_read
 DONE = "done"
 SMALL = ("flat", "flat_samples", "sensor", DONE)
 MASKS = ("gap", "acc_clipped", "gyr_clipped")
-COPIED = 1 << 22
+COPIED = 1 << 20
 
 
 class _Column:
