@@ -17,7 +17,9 @@ from pathlib import Path
 import pytest
 
 HARNESS = Path(__file__).parent / "harness"
-TIME_AND_HEARD, NOBODY_LISTENS = struct.Struct("<qq"), -1
+# the words that harness/clock.c shares: the time; what was heard; what a worker was told and has done, and its process
+WORDS, HEARD_AT, NOBODY_LISTENS = struct.Struct("<5q"), 8, -1
+UPTIME_NS = 900 * 10**9
 PRELOAD = "LD_PRELOAD"
 
 
@@ -43,7 +45,7 @@ class Device:
     def __init__(self, text: str, folder: Path, clock: Path) -> None:
         self.folder, time = folder, folder / "clock"
         # an uptime of a quarter of an hour: a monotonic clock does not begin at zero
-        time.write_bytes(TIME_AND_HEARD.pack(900 * 10**9, NOBODY_LISTENS))
+        time.write_bytes(WORDS.pack(UPTIME_NS, NOBODY_LISTENS, 0, 0, 0))
         self._time = time
         command = [sys.executable, HARNESS / "device.py", text, time]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
@@ -81,7 +83,7 @@ class Device:
 
     def session(self, *words) -> Result:
         """The same, guiding the simulated hand through a session; it may fail before."""
-        self._heard(0)
+        self._share(0, told=0, worked=0, worker=0)
         command = [Path(sys.executable).parent / "mpucal", "session", "--bus", "/dev/i2c-1", "--json-events", *words]
         with subprocess.Popen(
             [str(word) for word in command],
@@ -97,16 +99,17 @@ class Device:
                 if event.get("event") == "prompt":
                     self.tell(prompt={"kind": event["kind"], "down": event.get("down")})
                 said += line
-                self._heard(len(said))
+                self._share(len(said))
             out = process.stdout.read().decode()
-            self._heard(NOBODY_LISTENS)
+            self._share(NOBODY_LISTENS, told=0, worked=0, worker=0)
             return Result(process.wait(), out, said.decode())
 
-    def _heard(self, count: int) -> None:
+    def _share(self, heard: int, **worker: int) -> None:
         """So many bytes of what the program says were heard; see harness/clock.c."""
+        words = struct.pack(f"<{1 + len(worker)}q", heard, *worker.values())
         with self._time.open("r+b") as file:
-            file.seek(8)
-            file.write(count.to_bytes(8, "little", signed=True))
+            file.seek(HEARD_AT)
+            file.write(words)
 
     def forbid(self) -> None:
         """Let the kernel refuse to open the device file, to root as well: a setting of /proc that is read only."""
