@@ -126,9 +126,7 @@ class Runner:
         long_ns = math.inf if seconds is None else seconds * 1e9
         while self._machine.state in MEASURING:
             if self._talk.pressed() or self._source.now_ns() - begun_ns >= long_ns:
-                # as a key: a session that replays this goes on to calibrate, or has nothing to
-                with suppress(Abandoned):
-                    self._press(Key.ENOUGH if self._machine.state is State.ROTATE else Key.ABORT)
+                self._stop_here()
                 break
             self._poll()
         self._rest()
@@ -170,10 +168,16 @@ class Runner:
             end_ns = math.inf if seconds is None else self._source.now_ns() + seconds * 1e9
             while self._source.now_ns() < end_ns and not self._talk.pressed():
                 self._source.poll()
-            # a replay stops where this did
-            self._note(KEY, self._source.now_ns(), {KEY: Key.ENOUGH.value})
+            self._stop_here()
             self._source.stop()
         return len(self._source.recording())
+
+    def _stop_here(self) -> None:
+        """As by a key: a session that replays this goes on to calibrate, or has nothing to."""
+        if self._machine.state is State.ROTATE:
+            self._press(Key.ENOUGH)
+        else:
+            self._note(KEY, self._source.now_ns(), {KEY: Key.ABORT.value})
 
     def _connect(self) -> None:
         try:
