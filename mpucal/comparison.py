@@ -13,9 +13,9 @@ from .result import GOOD, Calibration
 
 # how sure "they differ" is: of two calibrations of one unchanged sensor, 1 in 100 are called different
 CONFIDENCE = 0.99
-# How much too sure a calibration with reservations may be: of one unchanged sensor, halves of real recordings with
-# such a verdict were apart by up to 2.3 times what two good ones may be.
-RESERVED = 3.0
+# How much too sure a calibration with reservations may be: of one unchanged sensor, halves of a real recording with
+# such a verdict were 1.1 times as far apart as two good ones may be, and worse recordings than that one there are.
+RESERVED = 2.0
 AXES = "xyz"
 # K is symmetric to rounding where the calibration was made in the body frame
 SYMMETRIC = 1e-6

@@ -105,9 +105,9 @@ def test_what_else_differs_is_said(change, says):
     [
         ("mpu9150_a", 10.0),
         ("mpu9150_b", 10.0),
-        ("broad_01", 30.0),
-        ("imucal_session", 10.0),
-        ("mpu6050_session", 200.0),
+        ("broad_01", 100.0),
+        ("imucal_session", 30.0),
+        ("mpu6050_session", 300.0),
     ],
 )
 def test_halves_of_a_real_recording_are_never_called_different(name, seen_mg, monkeypatch):
