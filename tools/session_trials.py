@@ -33,18 +33,20 @@ from mpucal.runner import Runner
 from mpucal.session.events import Caution, Decision, Key, Knowledge, Meter, Output, Prompt, PromptKind, Verification
 from mpucal.session.plan import Plan
 
-# name: what comes after --bus, options of the chip, what is wrong with it
-SABOTAGE: dict[str, tuple[str, dict[str, Any], str]] = {
-    "never still": ("sim:hand=restless", {}, "never_still"),
-    "one orientation": ("sim:hand=still", {}, "few_orientations"),
-    "one axis": ("sim:hand=one_axis", {}, "few_orientations"),
-    "flipped axis": ("sim:D=1/0/0/0/-1/0/0/0/1", {}, "left_handed"),
-    "swapped axes": ("sim:D=0/1/0/1/0/0/0/0/-1", {}, "swapped_axes"),
-    "wrong range": ("sim:D=2/0/0/0/2/0/0/0/2", {}, "wrong_range"),
-    "gyro clipping": ("sim:hand=hasty", {"gyro_range_dps": 250}, "gyro_clipped"),
-    "a knock": ("sim:hand=knocking", {}, "verification_failed"),
-    "a slip": ("sim:hand=slipping", {}, "inconsistent"),
-    "warming by 15 C": ("sim:hand=warming", {}, "temperature_moved"),
+# what changes while the board is turned is seen by what was turned, or by what verifies it
+CHANGED = "inconsistent", "verification_failed"
+# name: what comes after --bus, options of the chip, and which reason is to be given first
+SABOTAGE: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
+    "never still": ("sim:hand=restless", {}, ("never_still",)),
+    "one orientation": ("sim:hand=still", {}, ("few_orientations",)),
+    "one axis": ("sim:hand=one_axis", {}, ("few_orientations",)),
+    "flipped axis": ("sim:D=1/0/0/0/-1/0/0/0/1", {}, ("left_handed",)),
+    "swapped axes": ("sim:D=0/1/0/1/0/0/0/0/-1", {}, ("swapped_axes",)),
+    "wrong range": ("sim:D=2/0/0/0/2/0/0/0/2", {}, ("wrong_range",)),
+    "gyro clipping": ("sim:hand=hasty", {"gyro_range_dps": 250}, ("gyro_clipped",)),
+    "a knock": ("sim:hand=knocking", {}, CHANGED),
+    "a slip": ("sim:hand=slipping", {}, CHANGED),
+    "warming by 15 C": ("sim:hand=warming", {}, ("temperature_moved",)),
 }
 
 
@@ -194,7 +196,7 @@ def main() -> int:
         wrong = 0
         for name, trial in sabotage(plan, arguments.first).items():
             expected = SABOTAGE[name][2]
-            as_it_should = trial.verdict in ("refused", "abandoned") and expected in trial.reasons
+            as_it_should = trial.verdict in ("refused", "abandoned") and trial.reasons[:1] in [(c,) for c in expected]
             wrong += not as_it_should
             print(f"{'ok ' if as_it_should else 'NOT'} {name:<16} {trial.verdict:<10} {', '.join(trial.reasons)}")
             print(f"    {trial.why[0] if trial.why else ''}")

@@ -43,7 +43,7 @@ class Known:
     ----------
     theta : the estimate. H : (27, 27) its Fisher matrix with the prior's. covariance : (12, 12) of D row-major and b_a.
     problem : the series up to now. sigma : m/s^2, of the hand's acceleration while it moves.
-    converged : whether the search ended; if not, the next begins anew.
+    converged : whether the search settled.
     """
 
     theta: Theta
@@ -65,14 +65,21 @@ class Known:
 
 
 def know(recording: Recording, flat: Flat, gravity: float, before: Known | None = None) -> Known:
-    """What `recording` tells so far; `before` is where the search starts, where there was one."""
+    """What `recording` tells so far.
+
+    The search goes on from `before`, where that had settled and nothing else explains the recording better by now; else
+    it begins with a loss that finds its way from afar.
+    """
     scene = prepare(*thinned(recording, flat, FIT_HZ), gravity)
     prior = _prior(scene.flat)
-    if before is None or not before.converged:
-        theta = _from_afar(scene, prior, () if before is None else (before.theta,))
-        sigma = _likeliest(scene, theta, WHITE_MPS2)
+    rough = replace(scene.white(FIRST_MPS2), tail=0.0)
+    starts = _starts(scene) if before is None else (*_starts(scene), before.theta)
+    theta = min(starts, key=lambda start: value(rough, start) + prior.cost(start))
+    if before is not None and before.converged and theta is before.theta:
+        sigma = before.sigma
     else:
-        theta, sigma = before.theta, before.sigma
+        theta = _right_handed(_minimum(rough, theta, prior).theta)
+        sigma = _likeliest(scene, theta, WHITE_MPS2)
     problem = scene.white(sigma, CORRELATION_S)
     minimum = _minimum(problem, theta, prior)
     H = minimum.H
@@ -112,14 +119,17 @@ def most_helpful(known: Known, wanted: Vector, directions: Vector) -> int:
     return best
 
 
-def _from_afar(scene: Scene, prior: Prior, more: tuple[Theta, ...]) -> Theta:
-    """A first theta, by a loss that finds the way from afar: of a perfect sensor, the linear estimate, and `more`."""
-    problem = replace(scene.white(FIRST_MPS2), tail=0.0)
+def _starts(scene: Scene) -> tuple[Theta, ...]:
+    """A perfect sensor, but for the bias that the flat mean then says, and the linear estimate."""
     flat = scene.flat
     u = flat.y / np.linalg.norm(flat.y)
-    perfect = Theta.start(np.eye(3), flat.y - problem.gravity * u, flat.b_omega, u)
-    starts = (perfect, initialise(scene.problem, flat.b_omega), *more)
-    return _minimum(problem, min(starts, key=lambda theta: value(problem, theta) + prior.cost(theta)), prior).theta
+    perfect = Theta.start(np.eye(3), flat.y - scene.problem.gravity * u, flat.b_omega, u)
+    return perfect, initialise(scene.problem, flat.b_omega)
+
+
+def _right_handed(theta: Theta) -> Theta:
+    """Of (D, u) and (-D, -u), which fit equally well, the one with det D > 0."""
+    return theta if np.linalg.det(theta.D) > 0.0 else replace(theta, D=-theta.D, u=-theta.u)
 
 
 def _minimum(problem: Problem, theta: Theta, prior: Prior) -> Minimum:

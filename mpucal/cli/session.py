@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -57,7 +58,8 @@ def command(
     anything to calibrate; 5: the calibration was refused; 6: the write-back was refused or failed.
     """
     resume: Path | None = options.pop("resume")
-    source, names, options = _opened(resume, options, sinks, no_write)
+    attended = not yes and sys.stdin.isatty()
+    source, names, options = _opened(resume, options, sinks, no_write, attended)
     check_gyroscope(source.plan.config)
     folder = resume or folder
     person = console(quiet=yes, as_json=json_events, beep=beep, title=source_name(options))
@@ -78,7 +80,8 @@ def command(
         if not finished and place.capture.exists():
             person.say(f"  What was recorded is kept in {place.capture}; go on with --resume {place.folder}.")
     if not as_json:
-        click.echo(err=True)
+        if not json_events:
+            click.echo(err=True)
         click.echo(f"{summary(calibration)}\n\n{written([place.capture, *paths])}")
     record = recorder(place.folder, calibration, recording, source.truth)
     words = {**options, "gravity": source.plan.gravity, "model": source.plan.model, "store": False}
@@ -87,13 +90,13 @@ def command(
 
 
 def _opened(
-    resume: Path | None, options: dict[str, Any], sinks: tuple[str, ...], no_write: bool
+    resume: Path | None, options: dict[str, Any], sinks: tuple[str, ...], no_write: bool, attended: bool
 ) -> tuple[Opened, tuple[str, ...], dict[str, Any]]:
     """The source, the sinks that the result goes to, and the options that name the source."""
     if resume is None:
         check_source(click.get_current_context())
         names = destinations(sinks, no_write, options)
-        return opened(options), names, options
+        return opened({**options, "attended": attended}), names, options
     check_resumed(click.get_current_context())
     source = open_resumed(resume, open_again)
     options = {**options, **source.live.words}

@@ -138,7 +138,7 @@ def open_vehicle_replay(file: Path, plan: Plan, system: int | None) -> Opened:
 def opened(options: Mapping[str, Any], until_end: bool = False) -> Opened:
     """What --bus, --serial, --mavlink or --replay of a command's `options` names, with the options beside it."""
     config = Config(int(options["accel_range"]), int(options["gyro_range"]), options["rate"], options["dlpf"])
-    aim = {name: options[name] for name in ("target", "tilt_only") if name in options}
+    aim = {name: options[name] for name in ("target", "tilt_only", "attended") if name in options}
     model = "tilt" if options["model"] == "auto" and options.get("tilt_only") else options["model"]
     plan = Plan(config, options["gravity"], model, until_end, **aim)
     if options["serial"] is not None:

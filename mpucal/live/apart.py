@@ -36,14 +36,13 @@ class Apart:
     """
 
     def __init__(self, plan: Plan, sensor: Sensor) -> None:
-        # found as this program found it, wherever that runs
-        serving = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import serve; serve()"
         self._process = subprocess.Popen(
-            [sys.executable, "-c", serving],
+            [sys.executable, "-P", "-m", __name__],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            env={**os.environ, **ONE_THREAD},
+            # what this program imports is imported from the same places
+            env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(sys.path)},
             # Ctrl-C is for the session, which ends this process too
             process_group=0,
         )
@@ -119,3 +118,7 @@ def _of(pipe: IO[bytes] | None) -> IO[bytes]:
     if pipe is None:
         raise EOFError
     return pipe
+
+
+if __name__ == "__main__":
+    serve()

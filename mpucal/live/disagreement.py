@@ -35,18 +35,33 @@ def judged(rests: list[Rest], of: int, recording: Recording, contradiction: str)
     if rests and all(rest.clipped for rest in rests):
         what = "every turn went beyond what the gyroscope can measure, so nothing says where gravity went"
         return Checked(found, False, "gyro_clipped", what, CLIPPED)
-    if not all(result.agrees for result in found) and recording.gyr_clipped.mean() > MUCH_CLIPPED:
+    if not all(result.agrees for result in found) and much_clipped(recording):
         what = "the new orientations disagree, after turns beyond what the gyroscope can measure"
         return Checked(found, False, "gyro_clipped", what, CLIPPED)
     if not rests:
         what = "the board was never still in a new orientation, so nothing verifies the calibration"
         return Checked(found, False, "verification_failed", what, "run the session again, and hold the board still")
     if contradiction:
-        what, _, remedy = contradiction.partition("; ")
-        return Checked(found, False, "inconsistent", what, remedy)
+        return Checked(found, False, "inconsistent", *explained(contradiction, recording))
     if all(result.agrees for result in found):
         return Checked(found, True)
     return Checked(found, False, "verification_failed", *_why(rests, recording))
+
+
+def explained(contradiction: str, recording: Recording) -> tuple[str, str]:
+    """What contradicts itself, and what to do, by the message of that reason; a knock is the likeliest cause."""
+    what, _, remedy = contradiction.partition("; ")
+    if recording.acc_clipped.any():
+        return (
+            f"something knocked the board (the accelerometer stood at the end of its range), and {what}",
+            "let nothing knock it, fasten the sensor, and run the session again",
+        )
+    return what, remedy
+
+
+def much_clipped(recording: Recording) -> bool:
+    """Whether turns beyond what the gyroscope can measure may explain whatever does not fit."""
+    return bool(recording.gyr_clipped.mean() > MUCH_CLIPPED)
 
 
 def _why(rests: list[Rest], recording: Recording) -> tuple[str, str]:
@@ -72,8 +87,8 @@ def _why(rests: list[Rest], recording: Recording) -> tuple[str, str]:
     knock = " after a knock" if recording.acc_clipped.any() else ""
     return (
         f"in a new orientation |a| is {worst.magnitude:+.3f} m/s² off{knock}, and {worst.magnitude_std:.3f} m/s² was"
-        f" promised: the accelerometer changed while it was turned",
-        "let nothing press on, knock or warm the sensor, and run the session again",
+        f" promised: the accelerometer changed, or slipped on its mount, while it was turned",
+        "fasten the sensor, let nothing press on, knock or warm it, and run the session again",
     )
 
 

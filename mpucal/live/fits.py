@@ -18,11 +18,12 @@ from ..data import Recording, Samples, Sensor
 from ..session.aims import AIMS, directions
 from ..session.events import Checked, Event, Learnt, Tried, Wish
 from ..session.plan import Plan
-from .disagreement import judged
+from .disagreement import explained, judged, much_clipped
 from .knowledge import knowledge, wanted
 from .store import Store
 
-CONTRADICTION = "inconsistent"
+CONTRADICTION, CLIPPED = "inconsistent", "gyro_clipped"
+OF_THE_SENSOR = "left_handed", "swapped_axes", "wrong_range"
 
 
 class Task(NamedTuple):
@@ -92,10 +93,14 @@ class Fits:
         evidence, _ = weigh(recording, self._plan.model, self._plan.gravity)
         self._tried, self._since = evidence, len(recording)
         quality = judge(evidence)
-        # an estimate that contradicts itself does not settle either: that is the truer reason
-        reasons = sorted(quality["reasons"], key=lambda reason: reason["code"] != CONTRADICTION)
+        # what is wrong with the sensor, or was not measured, contradicts itself as well; and what does, does not settle
+        truer = (*OF_THE_SENSOR, *((CLIPPED,) if much_clipped(evidence.recording) else ()), CONTRADICTION)
+        reasons = sorted(quality["reasons"], key=lambda r: truer.index(r["code"]) if r["code"] in truer else len(truer))
         first = reasons[0] if reasons else {"code": "", "message": ""}
-        return Tried(quality["verdict"], first["message"], first["code"])
+        why = first["message"]
+        if first["code"] == CONTRADICTION:
+            why = "; ".join(explained(why, evidence.recording))
+        return Tried(quality["verdict"], why, first["code"])
 
     def _check(self) -> Event:
         of = AIMS[self._plan.target].verify

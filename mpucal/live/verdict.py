@@ -7,16 +7,17 @@ from dataclasses import asdict, replace
 from types import MappingProxyType
 from typing import Any
 
-from ..result import REFUSED, Calibration
+from ..result import REFUSED, USABLE, Calibration
 from ..session.events import Checked
 
 _FOUND = "agrees", "magnitude_mps2", "magnitude_std_mps2", "direction_deg", "direction_std_deg", "down"
 
 
 def verified(calibration: Calibration, checked: Checked | None) -> Calibration:
-    """The calibration with `quality.verification`; refused where the new orientations disagree with it.
+    """The calibration with `quality.verification`.
 
-    Without a verification (the source ended, the person had enough) nothing is added.
+    Refused where the new orientations disagree with it, usable at most where none was shown. Without a verification
+    (the source ended, the person had enough) nothing is added.
     """
     if checked is None:
         return calibration
@@ -28,5 +29,7 @@ def verified(calibration: Calibration, checked: Checked | None) -> Calibration:
     if not checked.agrees:
         reasons: list[Mapping[str, Any]] = [r for r in quality.get("reasons", []) if r["code"] != checked.code]
         message = "; ".join(text for text in (checked.why, checked.remedy) if text)
-        quality |= {"verdict": REFUSED, "reasons": [{"code": checked.code, "message": message}, *reasons]}
+        refused = checked.agrees is not None or quality["verdict"] == REFUSED
+        verdict = REFUSED if refused else USABLE
+        quality |= {"verdict": verdict, "reasons": [{"code": checked.code, "message": message}, *reasons]}
     return replace(calibration, quality=MappingProxyType(quality))

@@ -95,11 +95,12 @@ class Tried:
 class Checked:
     """What the new orientations say of the first calibration; `why` and `remedy` where they disagree.
 
-    `code` is the reason's: verification_failed, or a truer one.
+    `agrees` is None where nothing was shown that says anything. `code` is the reason's: verification_failed, or a truer
+    one.
     """
 
     found: tuple[Verification, ...]
-    agrees: bool
+    agrees: bool | None
     code: str = ""
     why: str = ""
     remedy: str = ""
@@ -183,6 +184,7 @@ class PromptKind(StrEnum):
     LAY_FLAT = "lay_flat"
     ROTATE = "rotate"
     VERIFY = "verify"
+    AGAIN = "again"
     REST = "rest"
 
 

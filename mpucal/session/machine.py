@@ -39,6 +39,7 @@ from .verify import Verify
 SILENT_S = 5.0
 
 REST = Prompt(PromptKind.REST, "You can put the board down.")
+COMPUTING = Prompt(PromptKind.REST, "You can put the board down. The calibration is being computed; give it a moment.")
 ABORTED = "the session was interrupted"
 START_AGAIN = "start again when you are ready"
 ENOUGH = "you said that is enough"
@@ -51,21 +52,29 @@ class Machine:
     ----------
     until_end : each step takes its time, and turning ends with the source.
     target : one of AIMS. tilt_only : ask for tilts alone, of a board that cannot be turned over.
+    attended : somebody can press keys.
 
     Attributes
     ----------
-    state : where the session is. checked : what the verification found; None where there was none.
+    state : where the session is.
     """
 
-    def __init__(self, until_end: bool = False, target: str = NORMAL, tilt_only: bool = False) -> None:
+    def __init__(
+        self, until_end: bool = False, target: str = NORMAL, tilt_only: bool = False, attended: bool = False
+    ) -> None:
         self.state = State.CONNECT
         self._until_end, self._aim, self._tilt_only = until_end, AIMS[target], tilt_only
+        self._attended = attended
         self._step: lay_flat.LayFlat | Rotate | Verify = lay_flat.LayFlat(patient=until_end)
         self._watch: Watch | None = None
         self._flat: Rested | None = None
         self._samples = self._flat_samples = 0
         self._sampled_s: float | None = None
-        self.checked: Checked | None = None
+
+    @property
+    def checked(self) -> Checked | None:
+        """What the verification found; None where there was none."""
+        return self._step.checked if isinstance(self._step, Verify) else None
 
     def handle(self, event: Event) -> list[Output]:
         """Take one event, and answer it.
@@ -89,7 +98,7 @@ class Machine:
             case Turned(why):
                 return [Decision(why), *self._verify()]
             case Finished(why):
-                return [Decision(why), REST]
+                return [Decision(why), COMPUTING]
             case Enough():
                 return self._enough(before)
             case Redo():
@@ -124,7 +133,7 @@ class Machine:
     def _verify(self) -> list[Output]:
         if not isinstance(self._step, Rotate):
             raise TypeError("the board is verified after it was turned")
-        verify = Verify(self._aim, self._step.coverage, self._step.directions, self._tilt_only)
+        verify = Verify(self._aim, self._step.coverage, self._step.directions, self._tilt_only, self._attended)
         self._step = verify
         return verify.begin()
 
@@ -134,11 +143,8 @@ class Machine:
             case Learnt(knowledge, advice), Rotate() as rotate:
                 return self._follow(rotate.learn(knowledge, advice))
             case Tried(), Verify() as verify:
-                found = verify.tried(event)
-                self.checked = verify.checked
-                return self._follow(found)
+                return self._follow(verify.tried(event))
             case Checked(), Verify() as verify:
-                self.checked = event
                 return self._follow(verify.check(event))
         return []
 
@@ -164,8 +170,8 @@ class Machine:
     def _enough(self, state: State) -> list[Output]:
         if state is State.ROTATE:
             return self.handle(Finished(ENOUGH) if self._until_end else Turned(ENOUGH))
-        if state is State.VERIFY:
-            return self.handle(Finished(f"{ENOUGH}: not verified"))
+        if state is State.VERIFY and isinstance(self._step, Verify):
+            return self.handle(self._step.enough())
         if state is State.LAY_FLAT and isinstance(self._step, lay_flat.LayFlat):
             rested = self._step.enough()
             return self.handle(rested) if rested else []
@@ -176,7 +182,6 @@ class Machine:
         if state not in (State.ROTATE, State.VERIFY) or self._flat is None:
             return []
         forget = Forget(self._flat_samples, self._samples)
-        self.checked = None
         return [Decision("you want to turn it again: what was turned is forgotten"), forget, *self._turn(self._flat)]
 
     def _resumed(self) -> list[Output]:
@@ -186,7 +191,7 @@ class Machine:
     def _ended(self, state: State, why: str | None) -> list[Output]:
         if state in (State.ROTATE, State.VERIFY):
             what = f"the source failed while you turned the board ({why})" if why else "the source ended"
-            return [Decision(f"{what}; calibrating with what it gave"), REST]
+            return [Decision(f"{what}; calibrating with what it gave"), COMPUTING]
         if why:
             return [Decision(why), REST]
         return [

@@ -91,9 +91,10 @@ class Rotate:
             return [*found, Turned(f"the target is reached: {knowledge.words}")]
         if advice and knowledge.down is not None:
             self._said_s = knowledge.t_s
-            # near level every tilt teaches: all of them are asked for
-            advised = np.array(knowledge.down)
-            down = self.coverage.farthest_down(self.directions) if self._tilt_only else advised
+            # near level every tilt teaches: all of them are asked for. And nobody is asked twice for the same one, even
+            # by an estimate that takes up for down, as that of a sensor whose axes are mirrored
+            elsewhere = self._tilt_only or knowledge.down == self.prompt.down
+            down = self.coverage.farthest_down(self.directions) if elsewhere else np.array(knowledge.down)
             self.prompt = self._prompt_for(down)
             found.append(self.prompt)
         return found

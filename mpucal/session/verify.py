@@ -32,6 +32,21 @@ TRY_WAIT_S = 3.0
 # ... and what the last one says of it is soon told.
 CHECK_WAIT_S = 0.5
 REFUSED = "refused"
+# What turning the board anew may put right; the other reasons lie in the sensor, or in how it is connected.
+ANEW = frozenset(
+    {
+        "few_orientations",
+        "gyro_clipped",
+        "accel_clipped",
+        "data_lost",
+        "not_converged",
+        "inconsistent",
+        "verification_failed",
+    }
+)
+OFFERED_S = 60.0
+UNVERIFIED = "the board was not held still in any of the orientations that were asked for, so nothing verifies it"
+HOLD = "run the session again, and hold the board still for two seconds in each"
 
 
 class Verify:
@@ -40,10 +55,19 @@ class Verify:
     Parameters
     ----------
     coverage : what the turning has shown. directions : (k, 3) that may be asked to point down.
+    attended : somebody can press keys, and is asked whether to turn it anew where that may help.
+
+    Attributes
+    ----------
+    prompt : the last one. checked : what was found; None where that is still to come, or was not wanted.
     """
 
-    def __init__(self, aim: Aim, coverage: Coverage, directions: Vector, tilt_only: bool = False) -> None:
+    def __init__(
+        self, aim: Aim, coverage: Coverage, directions: Vector, tilt_only: bool = False, attended: bool = False
+    ) -> None:
         self._aim, self._coverage, self._directions, self._tilt_only = aim, coverage, directions, tilt_only
+        self._attended = attended
+        self._refusal: Finished | None = None
         self._pauses = Pauses()
         self._number = 0
         self._asked = False
@@ -61,6 +85,8 @@ class Verify:
         t_s = float(samples.t[-1])
         if self._begun_s is None:
             self._begun_s = self._said_s = t_s
+        if self._refusal is not None:
+            return [self._refusal] if t_s - self._begun_s >= OFFERED_S else []
         found: list[Output | Finished] = []
         for sight in self._pauses.add(samples):
             found += [sight] if isinstance(sight, Countdown) else self._hold(sight)
@@ -69,27 +95,46 @@ class Verify:
         if t_s - self._said_s >= SAY_AGAIN_S:
             self._said_s = t_s
             found.append(Caution(t_s, "not_turned", "that orientation is still to come", self.prompt.text))
-        if t_s - self._begun_s >= PATIENCE_S:
-            return [*found, Finished(f"no verification: {self._number} of {self._aim.verify} orientations were shown")]
-        return found
+        if t_s - self._begun_s < PATIENCE_S:
+            return found
+        if self._number:
+            self._asked = True
+            return [*found, Ask(Wish.CHECK, CHECK_WAIT_S)]
+        self.checked = Checked((), None, "verification_failed", UNVERIFIED, HOLD)
+        return [*found, Finished(f"not verified: {UNVERIFIED}")]
 
     def tried(self, tried: Tried) -> list[Output | Finished]:
         """The first calibration; a refused one is not worth verifying."""
         if tried.verdict != REFUSED:
             return []
         self.checked = Checked((), False, tried.code, tried.why)
-        return [Finished(f"not to be verified: {tried.why}")]
+        return [self._refused(Finished(f"not to be verified: {tried.why}"), tried.code)]
 
     def check(self, checked: Checked) -> list[Output | Finished]:
         """What the orientations say."""
-        agree = "the new orientations agree with what was promised"
-        return [*checked.found, Finished(agree if checked.agrees else checked.why)]
+        self.checked = checked
+        if checked.agrees:
+            return [*checked.found, Finished("the new orientations agree with what was promised")]
+        return [*checked.found, self._refused(Finished(checked.why), checked.code)]
+
+    def enough(self) -> Finished:
+        """The person does not want to go on."""
+        return self._refusal or Finished("you said that is enough: not verified")
 
     def resumed(self) -> list[Output]:
         """The board may be anywhere now."""
         self._begun_s = None
         self._pauses.forget()
         return [self.prompt]
+
+    def _refused(self, refusal: Finished, code: str) -> Prompt | Finished:
+        """The end, unless the person may want to turn the board anew."""
+        if not self._attended or code not in ANEW:
+            return refusal
+        self._refusal, self._begun_s = refusal, None
+        text = f"Turn it again from the start (r), or leave it refused (Enter)? The reason: {refusal.why}."
+        self.prompt = Prompt(PromptKind.AGAIN, text)
+        return self.prompt
 
     def _hold(self, held: Held) -> list[Output | Finished]:
         if self._asked or held.seconds < HOLD_S - 1e-6:

@@ -77,7 +77,8 @@ def caution_rows(view: View, columns: int, glyphs: Glyphs) -> list[Text]:
 def keys(view: View) -> Text:
     """What can be pressed."""
     kind = view.prompt.kind if view.prompt is not None else None
-    return Text(f" {KEYS_REDO if kind in (PromptKind.ROTATE, PromptKind.VERIFY) else KEYS}", style="dim")
+    turning = kind in (PromptKind.ROTATE, PromptKind.VERIFY, PromptKind.AGAIN)
+    return Text(f" {KEYS_REDO if turning else KEYS}", style="dim")
 
 
 def _progress(view: View, glyphs: Glyphs) -> list[Text]:

@@ -21,6 +21,7 @@ HEADINGS = {
     PromptKind.LAY_FLAT: "LAY FLAT",
     PromptKind.ROTATE: "ROTATE",
     PromptKind.VERIFY: "VERIFY",
+    PromptKind.AGAIN: "AGAIN?",
     PromptKind.REST: "REST",
 }
 HOW_TO_ANSWER = "(Enter: go on now; r and Enter: rotate again; q and Enter, or Ctrl-C: stop.)"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -16,6 +17,8 @@ from .view import View
 
 # as often as an eye follows, and a slow line can carry
 LEAST_INTERVAL_S = 0.16
+# so soon the drawing gives way to the reading loop, which must miss no FIFO for it; Python's own is ten times as long
+GIVE_WAY_S = 0.0005
 # a terminal that takes no output any more is not waited for longer
 LAST_WORD_S = 1.0
 
@@ -66,8 +69,10 @@ class Screen:
         """Meanwhile the screen is shown; whatever happens, the terminal is as it was afterwards."""
         painter = Painter(self._out)
         drawing = threading.Thread(target=self._draw, args=(painter,), name="screen", daemon=True)
+        gave_way_s = sys.getswitchinterval()
         with self._keys.listening():
             try:
+                sys.setswitchinterval(GIVE_WAY_S)
                 painter.show()
                 self._open = True
                 drawing.start()
@@ -77,6 +82,7 @@ class Screen:
                 self._changed.set()
                 drawing.join(LAST_WORD_S)
                 painter.give_back()
+                sys.setswitchinterval(gave_way_s)
                 self._open = False
                 for note in self._view.notes:
                     self.say(f"  {note}")

@@ -28,6 +28,7 @@ HEADLINES = {
     PromptKind.LAY_FLAT: "LAY FLAT",
     PromptKind.ROTATE: "TURN IT",
     PromptKind.VERIFY: "CHECK",
+    PromptKind.AGAIN: "AGAIN?",
     PromptKind.REST: "PUT IT DOWN",
 }
 CONNECTING = "WAIT"

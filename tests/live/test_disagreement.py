@@ -58,10 +58,10 @@ def test_says_what_is_wrong(rests, data, contradiction, code, words):
     assert len(checked.found) == len(rests)
 
 
-def calibration():
+def calibration(verdict="usable"):
     zeros = np.zeros(3)
     reasons = [{"code": "few_orientations", "message": "too few"}]
-    return Calibration(np.eye(3), zeros, np.zeros((3, 3)), zeros, quality={"verdict": "usable", "reasons": reasons})
+    return Calibration(np.eye(3), zeros, np.zeros((3, 3)), zeros, quality={"verdict": verdict, "reasons": reasons})
 
 
 def test_a_disagreement_refuses_and_comes_first():
@@ -70,6 +70,14 @@ def test_a_disagreement_refuses_and_comes_first():
     assert [reason["code"] for reason in found.quality["reasons"]] == ["verification_failed", "few_orientations"]
     assert found.quality["reasons"][0]["message"] == "it moved; fasten it"
     assert not found.quality["verification"]["agrees"]
+
+
+@pytest.mark.parametrize(("verdict", "then"), [("good", "usable"), ("usable", "usable"), ("refused", "refused")])
+def test_what_nothing_verified_is_usable_at_most(verdict, then):
+    found = verified(calibration(verdict), Checked((), None, "verification_failed", "nothing verifies it", "hold it"))
+    assert found.verdict == then
+    assert found.quality["reasons"][0]["message"] == "nothing verifies it; hold it"
+    assert found.quality["verification"] == {"agrees": None, "orientations": []}
 
 
 def test_an_agreement_changes_no_verdict_and_none_adds_nothing():

@@ -286,8 +286,52 @@ def test_a_refused_first_calibration_is_not_verified(board, rotating, varied):
 def test_who_does_not_verify_is_not_waited_for_for_ever(board, verifying):
     verifying.feed(board.still(41.0))
     assert verifying.state is State.CALIBRATE
-    assert "no verification: 0 of 3" in verifying.words()
-    assert verifying.machine.checked is None
+    assert "not verified: the board was not held still" in verifying.words()
+    assert verifying.machine.checked.agrees is None
+
+
+def test_what_was_shown_before_patience_ended_is_looked_at(board, verifying, varied):
+    show(verifying, board, varied[9:10])
+    assert Wish.CHECK not in [ask.wish for ask in verifying.of(Ask)]
+    verifying.feed(board.still(41.0))
+    assert [ask.wish for ask in verifying.of(Ask)][-1] is Wish.CHECK
+    assert verifying.state is State.CALIBRATE
+    assert verifying.machine.checked.agrees
+
+
+@pytest.fixture
+def offered(board, varied):
+    """A session in which somebody may press keys, and the new orientations disagree."""
+    session = Session(attended=True).feed(board.still(10.6))
+    session.overall = 1.0
+    session.checked = Checked((), False, "verification_failed", "the sensor moved on its mount", "fasten it")
+    show(show(session, board, varied[:9]), board, varied[9:12])
+    assert session.state is State.VERIFY
+    assert session.prompts()[-1] is PromptKind.AGAIN
+    assert "Turn it again from the start (r)" in session.words()
+    return session
+
+
+def test_who_is_refused_may_turn_it_again(board, offered):
+    offered.feed(board.still(50.0)).give(Redo())
+    assert offered.state is State.ROTATE
+    assert offered.machine.checked is None
+    assert len(offered.of(Forget)) == 1
+
+
+@pytest.mark.parametrize("end", [lambda s, _: s.give(Enough()), lambda s, board: s.feed(board.still(61.0))])
+def test_who_does_not_is_left_with_the_refusal(board, offered, end):
+    end(offered, board)
+    assert offered.state is State.CALIBRATE
+    assert offered.machine.checked.code == "verification_failed"
+    assert offered.words().count("the sensor moved on its mount") == 2
+
+
+def test_turning_again_is_not_offered_where_it_would_not_help(board, varied):
+    session = Session(attended=True).feed(board.still(10.6))
+    session.overall, session.tried = 1.0, Tried("refused", "an axis is flipped", "left_handed")
+    show(session, board, varied[:9])
+    assert session.state is State.CALIBRATE
 
 
 def test_redo_turns_again_without_laying_flat_again(board, verifying):
