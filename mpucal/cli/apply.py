@@ -35,7 +35,7 @@ EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calib
 def command(calibration: Path, file: Path, target: Path | None, as_json: bool) -> None:
     """Apply a calibration (.json or .bin) to a recording of any kind, however long: m/s² and rad/s in its body frame.
 
-    A .csv or .npz passes through as it is read; a capture or log is decoded whole first.
+    A table or an archive passes through as it is read; a capture is gone through before; a vehicle's log is held whole.
     """
     if as_json and target is None:
         raise UsageError("--json was given without -o, and the samples go to stdout", "name a file with -o")
