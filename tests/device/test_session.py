@@ -162,6 +162,18 @@ def test_a_fault_that_stays_ends_a_session_with_one_sentence(device, fault, word
     assert (mocked.folder / "x" / "capture.mcap").exists()
 
 
+def test_a_noisy_bus_and_a_hurried_clock_are_lived_with(device):
+    mocked = device("sim:fault=bitflips@2/clock@4")
+    result = mocked.mpucal("record", "--bus", NODE, "-o", "x.mcap", "--seconds", "8", "--rate", "50")
+    assert result.code == 0, result.err
+    recording = load(mocked.folder / "x.mcap")
+    assert len(recording) > 250
+    assert (np.diff(recording.t) > 0).all()
+    # the last second has the hurried clock's pace
+    before, after = (np.median(np.diff(part)) for part in (recording.t[:50], recording.t[-50:]))
+    assert after / before == pytest.approx(1 / 1.01, abs=0.003)
+
+
 def test_faults_that_pass_leave_no_hole_that_is_not_told(device):
     faults = {"nack": 2, "brownout": 4, "overflow": 6, "timeout": 10, "slip": 12, "frozen": 14}
     mocked = device("sim:fault=" + "/".join(f"{name}@{at_s}" for name, at_s in faults.items()))
