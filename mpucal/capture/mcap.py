@@ -29,7 +29,17 @@ CALIBRATED = "mpucal.imu"
 # half of the second that a killed program may lose: the other half is for the wait between two records
 CHUNK_NS = 500_000_000
 
-_DAMAGE = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, EOFError)
+# the last two: a length that no memory holds
+_DAMAGE = (
+    McapError,
+    CRCValidationError,
+    ZstdError,
+    struct.error,
+    UnicodeDecodeError,
+    EOFError,
+    OverflowError,
+    MemoryError,
+)
 
 _BUS_SCHEMA = {
     "title": "mpucal.Transaction",

@@ -8,8 +8,10 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -22,6 +24,10 @@ using Out = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
 
 // The longest double without an exponent, within the bounds below: a sign, "0.0000", and 17 digits.
 constexpr std::size_t WIDEST = 32;
+
+#ifdef __cpp_lib_to_chars
+
+using Apart = nb::gil_scoped_release;
 constexpr double LEAST_PLAIN = 1e-5, MOST_PLAIN = 1e15;
 
 // In as few digits as give the same number back; without an exponent where a person would write none.
@@ -32,12 +38,40 @@ char* put(char* at, double value) {
                 : std::to_chars(at, at + WIDEST, value)).ptr;
 }
 
+bool is_number(const char* begin, const char* end, double& value) {
+  const auto [stopped, error] = std::from_chars(begin, end, value);
+  return error == std::errc() && stopped == end;
+}
+
+#else  // GCC before 11, and libc++: Python's own, which is slower and wants its lock
+
+struct Apart {
+  ~Apart() {}
+};
+
+char* put(char* at, double value) {
+  const std::unique_ptr<char, void (*)(void*)> text(PyOS_double_to_string(value, 'r', 0, 0, nullptr), PyMem_Free);
+  if (!text) throw nb::python_error();
+  return std::copy_n(text.get(), std::strlen(text.get()), at);
+}
+
+bool is_number(const char* begin, const char* end, double& value) {
+  if (begin < end && *begin == '+') return false;  // as std::from_chars
+  const std::string text(begin, end);
+  value = PyOS_string_to_double(text.c_str(), nullptr, nullptr);
+  const bool is_one = !PyErr_Occurred();
+  PyErr_Clear();
+  return is_one;
+}
+
+#endif
+
 nb::bytes lines(const Table& table) {
   const std::size_t rows = table.shape(0), columns = table.shape(1);
   std::vector<char> text(rows * columns * (WIDEST + 1));
   char* at = text.data();
   {
-    nb::gil_scoped_release release;
+    const Apart apart;
     const double* value = table.data();
     for (std::size_t i = 0; i < rows * columns; ++i) {
       at = put(at, value[i]);
@@ -53,8 +87,7 @@ constexpr bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 bool take(const char* begin, const char* end, double& value) {
   while (begin < end && is_blank(*begin)) ++begin;
   while (begin < end && is_blank(end[-1])) --end;
-  const auto [stopped, error] = std::from_chars(begin, end, value);
-  return error == std::errc() && stopped == end;
+  return is_number(begin, end, value);
 }
 
 // One line's cells at `places` into `row`; false where it is no plain line of `width` cells.
@@ -78,7 +111,7 @@ std::optional<Out> numbers(nb::bytes data, std::size_t width, const std::vector<
   auto values = std::make_unique<std::vector<double>>();
   bool plain = true;
   {
-    nb::gil_scoped_release release;
+    const Apart apart;
     std::vector<const char*> cells;
     for (std::size_t at = 0; plain && at < text.size();) {
       const std::size_t end = std::min(text.find('\n', at), text.size());
@@ -103,5 +136,5 @@ NB_MODULE(_text, m) {
   m.def("lines", &lines, nb::arg("table"), "(n, k) as n lines of text, each number in as few digits as give it back.");
   m.def("numbers", &numbers, nb::arg("text"), nb::arg("width"), nb::arg("places"),
         "(n, k) of the cells at `places` of lines of `width` cells, empty lines left out; None where a line has"
-        " another number of cells, a quotation mark, or what std::from_chars does not take.");
+        " another number of cells, a quotation mark, or what is no plain number.");
 }
