@@ -32,7 +32,7 @@ class Derivatives {
 
   // The next `count` steps; rows of the Fisher matrix, kRowsOfFour for four steps
   void run(const Coefficients* steps, int count, Lane (*rows)[G]) {
-    for_each<G>([&](auto g) { run_group<g>(steps, count, rows); });
+    for_each<(G + 1) / 2>([&](auto pair) { run_groups<2 * pair, (2 * pair + 1 < G ? 2 : 1)>(steps, count, rows); });
   }
 
   void write(double* gradient) const {
@@ -40,79 +40,108 @@ class Derivatives {
   }
 
  private:
-  template <int g>
-  MPUCAL_APART void run_group(const Coefficients* steps, int count, Lane (*rows)[G]) {
-    Lane s[3], P[6], gradient = gradient_[g];
-    for (int a = 0; a < 3; ++a) s[a] = ds_[g][a];
-    for (int m = 0; m < 6; ++m) P[m] = dP_[g][m];
+  // `width` groups from `first` on: what they share is loaded once, and one computes while the other waits
+  template <int first, int width>
+  MPUCAL_APART void run_groups(const Coefficients* steps, int count, Lane (*rows)[G]) {
+    Lane s[width][3], P[width][6], gradient[width];
+    for (int w = 0; w < width; ++w) {
+      for (int a = 0; a < 3; ++a) s[w][a] = ds_[first + w][a];
+      for (int m = 0; m < 6; ++m) P[w][m] = dP_[first + w][m];
+      gradient[w] = gradient_[first + w];
+    }
     for (int i = 0; i < count; ++i) {
       const Coefficients& c = steps[i / 4];
       const int t = i % 4;
       Lane(*const of_four)[G] = rows + i / 4 * kRowsOfFour;
-      if (t == 0) information_in_S<g>(c, P, of_four);
-      measure<g>(c, t, s, P, gradient, of_four + 6 + 3 * t);
-      Lane next_s[3], next_P[6];
-      carry_s<g>(c, t, s, P, next_s);
-      carry_P<g>(c, t, P, next_P);
-      add_process_noise(c, t, next_s, next_P);
-      for (int a = 0; a < 3; ++a) s[a] = next_s[a];
-      for (int m = 0; m < 6; ++m) P[m] = next_P[m];
+      if (t == 0) for_each<width>([&](auto w) { information_in_S<first + w>(c, P[w], of_four); });
+      measure<first, width>(c, t, s, P, gradient, of_four + 6 + 3 * t);
+      Lane next_s[width][3], next_P[width][6];
+      carry_s<first, width>(c, t, s, P, next_s);
+      carry_P<first, width>(c, t, P, next_P);
+      add_process_noise<width>(c, t, next_s, next_P);
+      for (int w = 0; w < width; ++w) {
+        for (int a = 0; a < 3; ++a) s[w][a] = next_s[w][a];
+        for (int m = 0; m < 6; ++m) P[w][m] = next_P[w][m];
+      }
     }
-    for (int a = 0; a < 3; ++a) ds_[g][a] = s[a];
-    for (int m = 0; m < 6; ++m) dP_[g][m] = P[m];
-    gradient_[g] = gradient;
+    for (int w = 0; w < width; ++w) {
+      for (int a = 0; a < 3; ++a) ds_[first + w][a] = s[w][a];
+      for (int m = 0; m < 6; ++m) dP_[first + w][m] = P[w][m];
+      gradient_[first + w] = gradient[w];
+    }
   }
 
   // -L^-1 de, a row of the Fisher matrix for each component, and V
-  template <int g>
-  MPUCAL_INLINE static void measure(const Coefficients& c, int t, const Lane (&s)[3], const Lane (&P)[6],
-                                    Lane& gradient, Lane (*rows)[G]) {
-    Lane e[3];
+  template <int first, int width>
+  MPUCAL_INLINE static void measure(const Coefficients& c, int t, const Lane (&s)[width][3], const Lane (&P)[width][6],
+                                    Lane (&gradient)[width], Lane (*rows)[G]) {
+    Lane e[width][3], by_P[width], by_e[width];
     for (int a = 0; a < 3; ++a) {
-      e[a] = madd(at(c.T[a][2], t), s[2], madd(at(c.T[a][1], t), s[1], at(c.T[a][0], t) * s[0]));
-      if constexpr (g < 3)
-        if (a >= g) e[a] = madd(at(c.white[a][g], t), c.q[t], e[a]);
-      rows[a][g] = e[a];
+      product<width>(c.T[a], t, s, [&](int w) -> Lane& { return e[w][a]; });
+      for_each<width>([&](auto w) {
+        constexpr int g = first + w;
+        if constexpr (g < 3)
+          if (a >= g) e[w][a] = madd(at(c.white[a][g], t), c.q[t], e[w][a]);
+        rows[a][g] = e[w][a];
+      });
     }
-    Lane by_P = at(c.dV[0], t) * P[0], by_e = at(c.residual[0], t) * e[0];
-    for (int m = 1; m < 6; ++m) by_P = madd(at(c.dV[m], t), P[m], by_P);
-    for (int a = 1; a < 3; ++a) by_e = madd(at(c.residual[a], t), e[a], by_e);
-    if constexpr (g < 3) by_P = by_P + c.dV_dD[t][g];
-    gradient = gradient + (by_P - by_e);
+    product<width>(c.dV, t, P, [&](int w) -> Lane& { return by_P[w]; });
+    product<width>(c.residual, t, e, [&](int w) -> Lane& { return by_e[w]; });
+    for_each<width>([&](auto w) {
+      if constexpr (first + w < 3) by_P[w] = by_P[w] + c.dV_dD[t][first + w];
+      gradient[w] = gradient[w] + (by_P[w] - by_e[w]);
+    });
+  }
+
+  // out(w) = row . x[w]
+  template <int width, int n, typename Out>
+  MPUCAL_INLINE static void product(const Lane (&row)[n], int t, const Lane (&x)[width][n], Out out) {
+    Lane sum[width];
+    for (int k = 0; k < n; ++k) {
+      const Lane factor = all(at(row[k], t));
+      for (int w = 0; w < width; ++w) sum[w] = k ? madd(factor, x[w][k], sum[w]) : factor * x[w][k];
+    }
+    for (int w = 0; w < width; ++w) out(w) = sum[w];
   }
 
   // F N W (ds + dP z), what the parameters do of themselves in D and b_a, and eta x s
-  template <int g>
-  MPUCAL_INLINE static void carry_s(const Coefficients& c, int t, const Lane (&s)[3], const Lane (&P)[6],
-                                    Lane (&out)[3]) {
-    Lane x[3];
-    for (int a = 0; a < 3; ++a) {
-      x[a] = s[a];
-      for (int b = 0; b < 3; ++b) x[a] = madd(at(c.z[b], t), P[kSym[a][b]], x[a]);
+  template <int first, int width>
+  MPUCAL_INLINE static void carry_s(const Coefficients& c, int t, const Lane (&s)[width][3], const Lane (&P)[width][6],
+                                    Lane (&out)[width][3]) {
+    Lane x[width][3];
+    for (int w = 0; w < width; ++w)
+      for (int a = 0; a < 3; ++a) x[w][a] = s[w][a];
+    for (int b = 0; b < 3; ++b) {
+      const Lane z = all(at(c.z[b], t));
+      for (int w = 0; w < width; ++w)
+        for (int a = 0; a < 3; ++a) x[w][a] = madd(z, P[w][kSym[a][b]], x[w][a]);
     }
-    for (int a = 0; a < 3; ++a) {
-      out[a] = madd(at(c.FNW[a][2], t), x[2], madd(at(c.FNW[a][1], t), x[1], at(c.FNW[a][0], t) * x[0]));
+    for (int a = 0; a < 3; ++a) product<width>(c.FNW[a], t, x, [&](int w) -> Lane& { return out[w][a]; });
+    for_each<width>([&](auto w) {
+      constexpr int g = first + w;
       if constexpr (g < 3)
-        out[a] = nmadd(at(c.FNK[a][g], t), c.q_plus[t], madd(at(c.v[g], t), c.FNP[t][a], out[a]));
-    }
-    if constexpr (turns(g)) add_cross(eta<g>(c, t), at(c.s[0], t), at(c.s[1], t), at(c.s[2], t), out);
+        for (int a = 0; a < 3; ++a)
+          out[w][a] = nmadd(at(c.FNK[a][g], t), c.q_plus[t], madd(at(c.v[g], t), c.FNP[t][a], out[w][a]));
+      if constexpr (turns(g)) add_cross(eta<g>(c, t), at(c.s[0], t), at(c.s[1], t), at(c.s[2], t), out[w]);
+    });
   }
 
-  // F W dP (F W)' and the same for P; a row of F W dP serves its row of the product, and is done with
-  template <int g>
-  MPUCAL_INLINE static void carry_P(const Coefficients& c, int t, const Lane (&P)[6], Lane (&out)[6]) {
-    for (int a = 0; a < 3; ++a) {
-      Lane row[3];
-      for (int b = 0; b < 3; ++b)
-        row[b] = madd(at(c.FW[a][2], t), P[kSym[2][b]],
-                      madd(at(c.FW[a][1], t), P[kSym[1][b]], at(c.FW[a][0], t) * P[kSym[0][b]]));
-      for (int b = a; b < 3; ++b) {
-        Lane& x = out[kSym[a][b]];
-        x = madd(at(c.FW[b][2], t), row[2], madd(at(c.FW[b][1], t), row[1], at(c.FW[b][0], t) * row[0]));
-        if constexpr (g < 3) x = nmadd(at(c.FK[b][g], t), c.FP[t][a], nmadd(at(c.FK[a][g], t), c.FP[t][b], x));
-      }
+  // F W dP (F W)', and what the parameters do of themselves in D
+  template <int first, int width>
+  MPUCAL_INLINE static void carry_P(const Coefficients& c, int t, const Lane (&P)[width][6], Lane (&out)[width][6]) {
+    for (int m = 0; m < 6; ++m) {
+      product<width>(c.carry[m], t, P, [&](int w) -> Lane& { return out[w][m]; });
+      const int a = kRow[m], b = kCol[m];
+      for_each<width>([&](auto w) {
+        constexpr int g = first + w;
+        if constexpr (g < 3)
+          out[w][m] = nmadd(at(c.FK[b][g], t), c.FP[t][a], nmadd(at(c.FK[a][g], t), c.FP[t][b], out[w][m]));
+      });
     }
-    if constexpr (turns(g)) add_turn(eta<g>(c, t), c, t, out);
+    for_each<width>([&](auto w) {
+      constexpr int g = first + w;
+      if constexpr (turns(g)) add_turn(eta<g>(c, t), c, t, out[w]);
+    });
   }
 
   // d(F x) = eta x (F x), for the groups that hold the gyro's parameters
@@ -128,26 +157,32 @@ class Derivatives {
 
   // [eta]x PF with its transpose
   MPUCAL_INLINE static void add_turn(const Lane (&n)[3], const Coefficients& c, int t, Lane (&P)[6]) {
-    const double xx = at(c.PF[0], t), xy = at(c.PF[1], t), xz = at(c.PF[2], t);
-    const double yy = at(c.PF[3], t), yz = at(c.PF[4], t), zz = at(c.PF[5], t);
+    const double x = at(c.PF_beside[0], t), y = at(c.PF_beside[1], t), z = at(c.PF_beside[2], t);
     const Lane n2[3] = {n[0] + n[0], n[1] + n[1], n[2] + n[2]};
-    P[0] = nmadd(xy, n2[2], madd(xz, n2[1], P[0]));
-    P[3] = nmadd(yz, n2[0], madd(xy, n2[2], P[3]));
-    P[5] = nmadd(xz, n2[1], madd(yz, n2[0], P[5]));
-    P[1] = madd(xx - yy, n[2], nmadd(xz, n[0], madd(yz, n[1], P[1])));
-    P[2] = madd(zz - xx, n[1], nmadd(yz, n[2], madd(xy, n[0], P[2])));
-    P[4] = madd(yy - zz, n[0], nmadd(xy, n[1], madd(xz, n[2], P[4])));
+    P[0] = nmadd(z, n2[2], madd(y, n2[1], P[0]));
+    P[3] = nmadd(x, n2[0], madd(z, n2[2], P[3]));
+    P[5] = nmadd(y, n2[1], madd(x, n2[0], P[5]));
+    P[1] = madd(at(c.PF_apart[2], t), n[2], nmadd(y, n[0], madd(x, n[1], P[1])));
+    P[2] = madd(at(c.PF_apart[1], t), n[1], nmadd(x, n[2], madd(z, n[0], P[2])));
+    P[4] = madd(at(c.PF_apart[0], t), n[0], nmadd(z, n[1], madd(y, n[2], P[4])));
   }
 
   // the derivative of [s]x diag(c) [s]x'
-  MPUCAL_INLINE static void add_process_noise(const Coefficients& c, int t, const Lane (&s)[3], Lane (&P)[6]) {
-    const Lane s2[3] = {s[0] + s[0], s[1] + s[1], s[2] + s[2]};
-    P[0] = madd(at(c.sc[2][1], t), s2[2], madd(at(c.sc[1][2], t), s2[1], P[0]));
-    P[3] = madd(at(c.sc[2][0], t), s2[2], madd(at(c.sc[0][2], t), s2[0], P[3]));
-    P[5] = madd(at(c.sc[1][0], t), s2[1], madd(at(c.sc[0][1], t), s2[0], P[5]));
-    P[1] = nmadd(at(c.sc[1][2], t), s[0], nmadd(at(c.sc[0][2], t), s[1], P[1]));
-    P[2] = nmadd(at(c.sc[2][1], t), s[0], nmadd(at(c.sc[0][1], t), s[2], P[2]));
-    P[4] = nmadd(at(c.sc[2][0], t), s[1], nmadd(at(c.sc[1][0], t), s[2], P[4]));
+  template <int width>
+  MPUCAL_INLINE static void add_process_noise(const Coefficients& c, int t, const Lane (&s)[width][3],
+                                              Lane (&P)[width][6]) {
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b)
+        if (a != b) {
+          // s_a c_b stands in the diagonal's place of the third axis, and beside b
+          const int other = 3 - a - b;
+          const Lane factor = all(at(c.sc[a][b], t));
+          for (int w = 0; w < width; ++w) {
+            Lane &diagonal = P[w][kSym[other][other]], &beside = P[w][kSym[a][other]];
+            diagonal = madd(factor, s[w][a] + s[w][a], diagonal);
+            beside = nmadd(factor, s[w][other], beside);
+          }
+        }
   }
 
   // L^-1 dS L^-T: six rows of the Fisher matrix's second term, 1/2 tr(S^-1 dS S^-1 dS). It is small beside the first

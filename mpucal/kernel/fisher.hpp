@@ -51,14 +51,24 @@ class Fisher {
  private:
   template <int height, int width>
   MPUCAL_INLINE void tile(const Lane (*rows)[G], int count, int i, int j) {
-    Lane sum[height][width];
+    constexpr int abreast = height * width < 8 ? 2 : 1;  // rows: a small tile's sums would wait for each other
+    Lane sum[abreast][height][width];
     for (int a = 0; a < height; ++a)
-      for (int b = 0; b < width; ++b) sum[a][b] = H_[4 * i + a][j + b];
-    for (int k = 0; k < count; ++k)
+      for (int b = 0; b < width; ++b) {
+        sum[0][a][b] = H_[4 * i + a][j + b];
+        if constexpr (abreast > 1) sum[1][a][b] = all(0.0);
+      }
+    const auto add_row = [&](const Lane (&row)[G], Lane (&to)[height][width]) {
       for (int a = 0; a < height; ++a)
-        for (int b = 0; b < width; ++b) sum[a][b] = madd(at(rows[k][i], a), rows[k][j + b], sum[a][b]);
+        for (int b = 0; b < width; ++b) to[a][b] = madd(at(row[i], a), row[j + b], to[a][b]);
+    };
+    int k = 0;
+    for (; k + abreast <= count; k += abreast)
+      for (int r = 0; r < abreast; ++r) add_row(rows[k + r], sum[r]);
+    if (k < count) add_row(rows[k], sum[0]);
     for (int a = 0; a < height; ++a)
-      for (int b = 0; b < width; ++b) H_[4 * i + a][j + b] = sum[a][b];
+      for (int b = 0; b < width; ++b)
+        H_[4 * i + a][j + b] = abreast > 1 ? sum[0][a][b] + sum[abreast - 1][a][b] : sum[0][a][b];
   }
 
   Lane H_[4 * G][G];

@@ -63,6 +63,18 @@ MPUCAL_INLINE void multiply_transposed(const A (&a)[3][3], const B (&x)[3], C (&
   for (int i = 0; i < 3; ++i) c[i] = madd(a[2][i], x[2], madd(a[1][i], x[1], a[0][i] * x[0]));
 }
 
+// C of a x a' = C x, x symmetric
+template <typename T>
+MPUCAL_INLINE void congruence(const T (&a)[3][3], T (&C)[6][6]) {
+  for (int m = 0; m < 6; ++m)
+    for (int n = 0; n < 6; ++n) {
+      const auto &left = a[kRow[m]], &right = a[kCol[m]];
+      const int k = kRow[n], l = kCol[n];
+      C[m][n] = left[k] * right[l];
+      if (k != l) C[m][n] = madd(left[l], right[k], C[m][n]);
+    }
+}
+
 // c = a x, a symmetric
 template <typename T>
 MPUCAL_INLINE void multiply(const T (&a)[6], const T (&x)[3], T (&c)[3]) {

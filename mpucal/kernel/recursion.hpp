@@ -12,9 +12,9 @@
 namespace mpucal {
 namespace {  // each build of the filter keeps its own
 
-// m and M before the measurement of four steps, one to a lane
+// m and M before the measurement of four steps, one to a lane; g / |s| after it, over the determinant
 struct Predicted {
-  Lane m[3], M[6];
+  Lane m[3], M[6], stretch;
 };
 
 class Recursion {
@@ -50,7 +50,8 @@ class Recursion {
       determinants *= adjugate.determinant;
       squares += square;
       if (flat && i == 0) flat_square = square;
-      follow(four, t, adjugate, adjugate_e, reciprocal, m, M);
+      const double stretch = follow(four, t, adjugate, adjugate_e, reciprocal, m, M);
+      if constexpr (kept) put(predicted[i / 4].stretch, t, stretch);
     }
     V_ += 0.5 * (squares + std::log(determinants));
     squares_ += squares - flat_square;
@@ -61,7 +62,7 @@ class Recursion {
  private:
   // Update and turn. x is F s times the determinant; its length, which a turn keeps, gives the one that s should have
   // and, as Q = [s]x diag(c) [s]x', that of Q.
-  MPUCAL_INLINE void follow(const Steps& four, int t, const Adjugate<double>& adjugate, const double (&adjugate_e)[3],
+  MPUCAL_INLINE double follow(const Steps& four, int t, const Adjugate<double>& adjugate, const double (&adjugate_e)[3],
                             double reciprocal, double (&m)[3], double (&M)[6]) const {
     double x[3], GR[3][3], GR_S[3][3], spent[6], Q[6];
     for (int a = 0; a < 3; ++a) {
@@ -76,6 +77,7 @@ class Recursion {
     const double stretch2 = gravity_ * gravity_ / dot(x, x), stretch = std::sqrt(stretch2);
     for (int k = 0; k < 6; ++k) M[k] = madd(stretch2, Q[k], nmadd(reciprocal, spent[k], at(four.G_R_G[k], t)));
     for (int a = 0; a < 3; ++a) m[a] = stretch * dot(D_[a], x);
+    return stretch;
   }
 
   // D [x]x diag(c) [x]x' D'
