@@ -1,4 +1,7 @@
 // One step of position, velocity and acceleration under d^3p/dt^3 = -3 lam a - 3 lam^2 v - lam^3 p + white noise.
+//
+// They are carried as a, b = -2 lam a - 3 lam^2 v - lam^3 p and c = lam^2 a + 2 lam^3 v + lam^4 p, where a' = -lam a + b,
+// b' = -lam b + c and c' = -lam c beside the noise: a step is a triangle, and a, which is measured, is one of them.
 #pragma once
 #include <cmath>
 
@@ -25,9 +28,10 @@ constexpr Factorials kOfDecay(1.0, 1), kOfSum(0.2, 6);
 
 // sum of c_n x^n; remainders below 1e-17 for |x| < 1
 MPUCAL_INLINE Lane series(const Factorials& f, const Lane& x) {
-  Lane sum = all(f.c[f.count - 1]);
-  for (int n = f.count - 2; n >= 0; --n) sum = madd(x, sum, f.c[n]);
-  return sum;
+  const Lane x2 = x * x;
+  Lane even = all(f.c[f.count - 2]), odd = all(f.c[f.count - 1]);  // powers, which need not wait for each other
+  for (int n = f.count - 4; n >= 0; n -= 2) even = madd(x2, even, f.c[n]), odd = madd(x2, odd, f.c[n + 1]);
+  return madd(x, odd, even);
 }
 
 constexpr double kShortStep = 0.5;
@@ -50,32 +54,29 @@ MPUCAL_INLINE Decay decay_of(const Lane& z) {
   return {series(kOfDecay, -1.0 * z), series(kOfSum, 2.0 * z)};
 }
 
-// Three equal poles at -lam keep the position bounded. Phi = exp(A h); Q is the integral of g g', g(t) the response
-// of (p, v, a) to an impulse of jerk, for unit spectral density. Four steps, one to a lane.
+// Three equal poles at -lam keep the position bounded. Phi holds the first row of the triangle exp(A h), whose diagonals
+// are constant; Q is the integral of g g', g(t) the response of (a, b, c) to an impulse of jerk, for unit spectral
+// density. Four steps, one to a lane.
 struct Chain {
-  Lane Phi[3][3], Q[6];
+  Lane Phi[3], Q[6];
 
   MPUCAL_INLINE void compute(const Lane& h, double lam) {
     const Decay of_step = decay_of(lam * h);
-    transition(h, lam, of_step.decay);
+    Phi[0] = of_step.decay;
+    Phi[1] = h * Phi[0];
+    Phi[2] = 0.5 * h * Phi[1];
     noise(h, lam, of_step.decay * of_step.decay, of_step.sum);
   }
 
- private:
-  // N = A + lam I has N^3 = 0 and N^2 = left right'
-  MPUCAL_INLINE void transition(const Lane& h, double lam, const Lane& decay) {
-    const double l2 = lam * lam, l3 = lam * l2;
-    const double N[3][3] = {{lam, 1, 0}, {0, lam, 1}, {-l3, -3 * l2, -2 * lam}};
-    const double left[3] = {1, -lam, l2}, right[3] = {l2, 2 * lam, 1};
-    const Lane first = decay * h, second = 0.5 * first * h;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) {
-        Phi[i][j] = madd(first, N[i][j], left[i] * right[j] * second);
-        if (i == j) Phi[i][j] = Phi[i][j] + decay;
-      }
+  // What p = 0, v and a of these standard deviations, are as covariance of (0, a, b, c)
+  static void rest(double lam, double sd_v, double sd_a, Lane (&P)[4]) {
+    const Lane a{0.0, sd_a, -2.0 * lam * sd_a, lam * lam * sd_a};
+    const Lane v{0.0, 0.0, -3.0 * lam * lam * sd_v, 2.0 * lam * lam * lam * sd_v};
+    for (int k = 0; k < 4; ++k) P[k] = at(a, k) * a + at(v, k) * v;
   }
 
-  // p = t^2/2, v = t - lam t^2/2, a = 1 - 2 lam t + lam^2 t^2/2, all times exp(-lam t)
+ private:
+  // a = 1 - 2 lam t + lam^2 t^2/2, b = -2 lam + lam^2 t, c = lam^2, all times exp(-lam t)
   MPUCAL_INLINE void noise(const Lane& h, double lam, const Lane& decay2, const Lane& sum) {
     Lane ends[5], I[5];  // of t^m exp(-2 lam t) from 0 to h: the last by its series, downward without cancellation
     ends[1] = h * decay2;
@@ -83,12 +84,12 @@ struct Chain {
     I[4] = h * ends[4] * sum;
     for (int m = 4; m > 0; --m) I[m - 1] = (1.0 / m) * madd(2.0 * lam, I[m], ends[m]);
     const double l2 = lam * lam, l3 = lam * l2, l4 = l2 * l2;
-    Q[0] = 0.25 * I[4];
-    Q[1] = nmadd(0.25 * lam, I[4], 0.5 * I[3]);
-    Q[2] = madd(0.25 * l2, I[4], nmadd(lam, I[3], 0.5 * I[2]));
-    Q[3] = madd(0.25 * l2, I[4], nmadd(lam, I[3], I[2]));
-    Q[4] = nmadd(0.25 * l3, I[4], madd(1.5 * l2, I[3], nmadd(2.5 * lam, I[2], I[1])));
-    Q[5] = madd(0.25 * l4, I[4], nmadd(2.0 * l3, I[3], madd(5.0 * l2, I[2], nmadd(4.0 * lam, I[1], I[0]))));
+    Q[0] = madd(0.25 * l4, I[4], nmadd(2.0 * l3, I[3], madd(5.0 * l2, I[2], nmadd(4.0 * lam, I[1], I[0]))));
+    Q[1] = madd(0.5 * l4, I[3], nmadd(3.0 * l3, I[2], nmadd(2.0 * lam, I[0], 5.0 * l2 * I[1])));
+    Q[2] = madd(0.5 * l4, I[2], nmadd(2.0 * l3, I[1], l2 * I[0]));
+    Q[3] = madd(l4, I[2], nmadd(4.0 * l3, I[1], 4.0 * l2 * I[0]));
+    Q[4] = nmadd(2.0 * l3, I[0], l4 * I[1]);
+    Q[5] = l4 * I[0];
   }
 };
 

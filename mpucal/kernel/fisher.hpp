@@ -1,24 +1,11 @@
 // The Fisher matrix, a sum of outer products of rows: gathered over some steps, then added a tile at a time, so that
 // the tile stays in registers.
 #pragma once
-#include <type_traits>
-#include <utility>
-
 #include "filter.hpp"
 #include "lane.hpp"
 
 namespace mpucal {
 namespace {  // each build of the filter keeps its own
-
-// function(0), function(1) ... as constants
-template <typename Function, int... g>
-MPUCAL_INLINE void for_each(Function function, std::integer_sequence<int, g...>) {
-  (function(std::integral_constant<int, g>{}), ...);
-}
-template <int count, typename Function>
-MPUCAL_INLINE void for_each(Function function) {
-  for_each(function, std::make_integer_sequence<int, count>{});
-}
 
 // Lower triangle of the matrix over G lane groups
 template <int G>

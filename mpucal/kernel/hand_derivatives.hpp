@@ -160,9 +160,9 @@ class HandDerivatives {
     } else {
       const auto& Phi = four.chain.Phi;
       for (int a = 0; a < 3; ++a) {
-        const Lane p = x[a][1], v = x[a][2], m = x[a][3];
-        for (int k = 0; k < 3; ++k)
-          x[a][k + 1] = madd(at(Phi[k][2], t), m, madd(at(Phi[k][1], t), v, at(Phi[k][0], t) * p));
+        x[a][1] = madd(at(Phi[2], t), x[a][3], madd(at(Phi[1], t), x[a][2], at(Phi[0], t) * x[a][1]));
+        x[a][2] = madd(at(Phi[1], t), x[a][3], at(Phi[0], t) * x[a][2]);
+        x[a][3] = at(Phi[0], t) * x[a][3];
       }
     }
     if constexpr (g == Lanes::b_omega / 4) add_turn(c.eta_b[t], next, x);

@@ -7,7 +7,7 @@
 namespace mpucal {
 namespace {
 
-constexpr int kFours = 2;  // worked on together: what they share stays in the first cache
+constexpr int kFours = 4;  // worked on together: what they share stays in the first cache
 constexpr long kBlock = 4 * kFours;
 
 // Whitened innovations, s and a of the samples among these steps
@@ -37,7 +37,7 @@ template <Wanted wanted>
 void run(const HandParameters& p, const HandSeries& series, const HandConstants& c, HandResult& result) {
   constexpr bool derive = wanted == Wanted::derivatives;
   const long all_steps = static_cast<long>(series.n) + 1;
-  double C[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  Lane C[3] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
   HandSteps steps[kFours];
   HandPredicted predicted[kFours] = {};
   HandRecursion recursion(p, c);

@@ -1,6 +1,7 @@
 // The recursion of the hand's x and P, a step at a time, and V along it.
 //
-// The four vectors of x are the four places of a Lane, so that the chain is one 4 x 4 matrix for all axes.
+// The four vectors of x, s and the chain's a, b, c, are the four places of a Lane, so that the chain is one 4 x 4 matrix
+// for all axes.
 #pragma once
 #include "hand_steps.hpp"
 
@@ -8,14 +9,14 @@ namespace mpucal {
 namespace {  // each build of the filters keeps its own
 
 constexpr double kSpeedOfReset = 0.04;     // s: a rest that trembles by a moves at this times a
-constexpr int kState = 4, kS = 0, kA = 3;  // places of s and a in (s, p, v, a)
+constexpr int kState = 4, kS = 0, kA = 1;  // places of s and a in (s, a, b, c)
 
 // What four measurements met and did, one to a lane or [step]
 struct HandPredicted {
   Lane s[3], a[3];             // of x before the measurement
   Lane e[3], S[6], w;          // w: the robust weight
   Lane plus[3];                // s + K e
-  Lane K[4][3][3];             // [step][axis][measurement], of (s, p, v, a)
+  Lane K[4][3][3];             // [step][axis][measurement], of (s, a, b, c)
   Lane x_next[4][3];           // [step][axis], before the next measurement
 };
 
@@ -55,7 +56,7 @@ class HandRecursion {
         adjugate = Adjugate<double>(S);
         reciprocal = 1.0 / adjugate.determinant;
       }
-      update(A, adjugate, reciprocal, e, K);
+      gain(A, adjugate, reciprocal, e, K);
       if constexpr (kept) {
         HandPredicted& kept_four = predicted[i / 4];
         put(kept_four.w, t, w);
@@ -64,7 +65,7 @@ class HandRecursion {
           for (int j = 0; j < 3; ++j) kept_four.K[t][a][j] = K[a][j];
         }
       }
-      follow(four, t);
+      follow(four, t, A, K);
       if (at(four.reset, t) >= 0.0) reset(at(four.reset, t));
       if constexpr (kept)
         for (int a = 0; a < 3; ++a) predicted[i / 4].x_next[t][a] = x_[a];
@@ -93,15 +94,15 @@ class HandRecursion {
       for (int a = 0; a < 3; ++a)
         e[j] = nmadd(at(four.Ha[j][a], t), at(x_[a], kA), nmadd(at(four.Hs[j][a], t), at(x_[a], kS), e[j]));
     }
-    for (int m = 0; m < 6; ++m) {
-      const int i = kRow[m], j = kCol[m];
+    for_each<6>([&](auto m) {
+      constexpr int i = kRow[m], j = kCol[m];
       double by_s = i == j ? R[i] : 0.0, by_a = 0.0;
       for (int a = 0; a < 3; ++a) {
         by_s = madd(at(four.Hs[i][a], t), at(A[a][j], kS), by_s);
         by_a = madd(at(four.Ha[i][a], t), at(A[a][j], kA), by_a);
       }
       S[m] = by_s + by_a;
-    }
+    });
   }
 
   MPUCAL_INLINE void keep(const double (&e)[3], const double (&S)[6], int t, HandPredicted& kept) const {
@@ -130,9 +131,9 @@ class HandRecursion {
     return 1.0;
   }
 
-  // K = A S^-1; x + K e and P - K A'
-  MPUCAL_INLINE void update(const Lane (&A)[3][3], const Adjugate<double>& adjugate, double reciprocal,
-                            const double (&e)[3], Lane (&K)[3][3]) {
+  // K = A S^-1; x + K e
+  MPUCAL_INLINE void gain(const Lane (&A)[3][3], const Adjugate<double>& adjugate, double reciprocal,
+                          const double (&e)[3], Lane (&K)[3][3]) {
     double inverse[6];
     for (int m = 0; m < 6; ++m) inverse[m] = reciprocal * adjugate.m[m];
     for (int a = 0; a < 3; ++a)
@@ -141,15 +142,31 @@ class HandRecursion {
                        madd(inverse[kSym[1][j]], A[a][1], inverse[kSym[0][j]] * A[a][0]));
         x_[a] = madd(e[j], K[a][j], x_[a]);
       }
-    for (int m = 0; m < 6; ++m)
-      for (int i = 0; i < kState; ++i)
-        for (int j = 0; j < 3; ++j)
-          P_[kRow[m]][kCol[m]][i] = nmadd(at(K[kRow[m]][j], i), A[kCol[m]][j], P_[kRow[m]][kCol[m]][i]);
   }
 
-  // s its length again; x <- Phi x, P <- Phi P Phi' + the noise of the jerk and of the gyro
-  MPUCAL_INLINE void follow(const HandSteps& four, int t) {
-    double s[3] = {at(x_[0], kS), at(x_[1], kS), at(x_[2], kS)};
+  // P <- Phi (P - K A') Phi' + the noise of the jerk and of the gyro; s its length again, x <- Phi x. The length comes
+  // late, so what needs it comes last.
+  MPUCAL_INLINE void follow(const HandSteps& four, int t, const Lane (&A)[3][3], const Lane (&K)[3][3]) {
+    const double Phi[3] = {at(four.chain.Phi[0], t), at(four.chain.Phi[1], t), at(four.chain.Phi[2], t)};
+    for (int m = 0; m < 6; ++m) {
+      const int a = kRow[m], b = kCol[m];
+      Lane P[kState], X[kState];
+      for (int i = 0; i < kState; ++i) {
+        P[i] = P_[a][b][i];
+        for (int j = 0; j < 3; ++j) P[i] = nmadd(at(K[a][j], i), A[b][j], P[i]);
+      }
+      chained(Phi, P);
+      transpose(P[0], P[1], P[2], P[3], X[0], X[1], X[2], X[3]);
+      chained(Phi, X);
+      if (a == b) {
+        for (int k = 0; k < 3; ++k) X[k + 1] = X[k + 1] + four.noise[t][k];
+        for (int i = 0; i < kState; ++i) P_[a][a][i] = X[i];
+      } else {
+        P_[b][a][kS] = X[kS], P_[b][a][kA] = X[kA];
+        transpose(X[0], X[1], X[2], X[3], P_[a][b][0], P_[a][b][1], P_[a][b][2], P_[a][b][3]);
+      }
+    }
+    double s[3] = {at(x_[0], kS), at(x_[1], kS), at(x_[2], kS)}, N[6];
     const double stretch = c_.gravity / std::sqrt(dot(s, s));
     for (int a = 0; a < 3; ++a) {
       s[a] *= stretch;
@@ -157,30 +174,15 @@ class HandRecursion {
       for (int k = 0; k < 3; ++k) x = madd(at(x_[a], k + 1), four.column[t][k], x);
       x_[a] = x;
     }
-    double Phi[3][3], N[6];
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) Phi[i][j] = at(four.chain.Phi[i][j], t);
     process_noise(four, t, s, N);
-    for (int m = 0; m < 6; ++m) {
-      const int a = kRow[m], b = kCol[m];
-      Lane(&P)[kState] = P_[a][b], (&PT)[kState] = P_[b][a];
-      Lane X[kState];
-      chained(Phi, P);
-      transpose(P[0], P[1], P[2], P[3], X[0], X[1], X[2], X[3]);
-      chained(Phi, X);
-      X[kS] = X[kS] + Lane{N[m], 0.0, 0.0, 0.0};
-      if (a == b)
-        for (int k = 0; k < 3; ++k) X[k + 1] = X[k + 1] + four.noise[t][k];
-      else
-        transpose(X[0], X[1], X[2], X[3], P[0], P[1], P[2], P[3]);
-      for (int i = 0; i < kState; ++i) PT[i] = X[i];
-    }
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b) P_[a][b][kS] = P_[a][b][kS] + Lane{N[kSym[a][b]], 0.0, 0.0, 0.0};
   }
 
-  // rows of (p, v, a) by Phi
-  MPUCAL_INLINE static void chained(const double (&Phi)[3][3], Lane (&rows)[kState]) {
-    const Lane p = rows[1], v = rows[2], a = rows[3];
-    for (int k = 0; k < 3; ++k) rows[k + 1] = madd(Phi[k][2], a, madd(Phi[k][1], v, Phi[k][0] * p));
+  MPUCAL_INLINE static void chained(const double (&Phi)[3], Lane (&rows)[kState]) {
+    rows[1] = madd(Phi[2], rows[3], madd(Phi[1], rows[2], Phi[0] * rows[1]));
+    rows[2] = madd(Phi[1], rows[3], Phi[0] * rows[2]);
+    rows[3] = Phi[0] * rows[3];
   }
 
   // [s]x c [s]x'
@@ -203,22 +205,22 @@ class HandRecursion {
   // p = v = a = 0, uncorrelated with all
   void reset(double sigma) {
     const Lane s_alone{1.0, 0.0, 0.0, 0.0};
-    const double speed = kSpeedOfReset * sigma;
     for (int a = 0; a < 3; ++a) {
       x_[a] = x_[a] * s_alone;
       for (auto& block : P_[a]) {
         block[kS] = block[kS] * s_alone;
         for (int k = 1; k < kState; ++k) block[k] = all(0.0);
       }
-      P_[a][a][2] = Lane{0.0, 0.0, speed * speed, 0.0};
-      P_[a][a][kA] = Lane{0.0, 0.0, 0.0, sigma * sigma};
+      const Lane s = P_[a][a][kS];
+      Chain::rest(c_.lam, kSpeedOfReset * sigma, sigma, P_[a][a]);
+      P_[a][a][kS] = s;
     }
   }
 
   const HandConstants& c_;
   const double threshold_;
-  Lane x_[3];             // (s, p, v, a) along each axis
-  Lane P_[3][3][kState];  // [a][b]: rows of (s, p, v, a) along a, lanes along b
+  Lane x_[3];             // (s, a, b, c) along each axis
+  Lane P_[3][3][kState];  // [a][b]: rows of (s, a, b, c) along a, lanes along b; where b < a, of s and a alone
   double V_ = 0.0, squares_ = 0.0;
 };
 

@@ -17,33 +17,34 @@ struct HandSteps : Given {
   Lane C[3][3], C_next[3][3];       // the turn at the measurement, and after the step's
   Lane Hs[3][3], Ha[3][3];          // what s and a add to the measurement: D E C and D C
   Chain chain;
-  Lane column[4][3], noise[4][3];   // [step][k] of Phi, in the places of p, v, a; of jerk Q
+  Lane column[4][3], noise[4][3];   // [step][k] of the triangle Phi, in the places of a, b, c; of jerk Q
   Lane c_first[6];                  // C_next' diag(c) C_next
   Lane reset;                       // of the next sample
 
-  // C is the first measurement's, and becomes that of the measurement after these
+  // The rows of C are the first measurement's, and become those of the measurement after these
   MPUCAL_APART void read(const HandParameters& p, const HandSeries& series, const HandConstants& constants, long k,
-                         double (&C_at)[3][3]) {
+                         Lane (&rows)[3]) {
     Given::read(p, series, constants, k);
-    turn_on(C_at);
+    turn_on(rows);
     read_hand(p, series, k);
     observe(p);
     travel(series, constants, k);
   }
 
  private:
-  MPUCAL_INLINE void turn_on(double (&C_at)[3][3]) {
-    for (int t = 0; t < 4; ++t) {
-      double F[3][3], turned[3][3];
+  MPUCAL_INLINE void turn_on(Lane (&rows)[3]) {
+    Lane at_step[5][3];
+    for (int a = 0; a < 3; ++a) at_step[0][a] = rows[a];
+    for (int t = 0; t < 4; ++t)
       for (int a = 0; a < 3; ++a)
-        for (int b = 0; b < 3; ++b) F[a][b] = at(turn.F[a][b], t);
-      multiply(F, C_at, turned);
-      for (int a = 0; a < 3; ++a)
-        for (int b = 0; b < 3; ++b) {
-          put(C[a][b], t, C_at[a][b]);
-          put(C_next[a][b], t, turned[a][b]);
-          C_at[a][b] = turned[a][b];
-        }
+        at_step[t + 1][a] = madd(at(turn.F[a][2], t), at_step[t][2],
+                                 madd(at(turn.F[a][1], t), at_step[t][1], at(turn.F[a][0], t) * at_step[t][0]));
+    for (int a = 0; a < 3; ++a) {
+      Lane unused;
+      transpose(at_step[0][a], at_step[1][a], at_step[2][a], at_step[3][a], C[a][0], C[a][1], C[a][2], unused);
+      transpose(at_step[1][a], at_step[2][a], at_step[3][a], at_step[4][a], C_next[a][0], C_next[a][1], C_next[a][2],
+                unused);
+      rows[a] = at_step[4][a];
     }
     for (int m = 0; m < 6; ++m) {
       const int a = kRow[m], b = kCol[m];
@@ -95,7 +96,8 @@ struct HandSteps : Given {
     reset = samples.read(series.reset, -1.0);
     const auto& Phi = chain.Phi;
     for (int i = 0; i < 3; ++i) {
-      transpose(zero, Phi[0][i], Phi[1][i], Phi[2][i], column[0][i], column[1][i], column[2][i], column[3][i]);
+      transpose(zero, Phi[i], i > 0 ? Phi[i - 1] : zero, i > 1 ? Phi[i - 2] : zero, column[0][i], column[1][i],
+                column[2][i], column[3][i]);
       transpose(zero, jerk * chain.Q[kSym[i][0]], jerk * chain.Q[kSym[i][1]], jerk * chain.Q[kSym[i][2]], noise[0][i],
                 noise[1][i], noise[2][i], noise[3][i]);
     }

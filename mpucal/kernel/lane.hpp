@@ -1,6 +1,8 @@
 // Four doubles that are worked on at once, in the widest registers the build may use; and the same names for one double.
 #pragma once
 #include <cmath>
+#include <type_traits>
+#include <utility>
 
 #if defined(__AVX2__) && defined(__FMA__)
 #include <immintrin.h>
@@ -89,6 +91,16 @@ MPUCAL_INLINE Lane madd(X x, Y y, Z z) {
 template <typename X, typename Y, typename Z>
 MPUCAL_INLINE Lane nmadd(X x, Y y, Z z) {
   return nmadd(lane(x), lane(y), lane(z));
+}
+
+// function(0), function(1) ... as constants
+template <typename Function, int... g>
+MPUCAL_INLINE void for_each(Function function, std::integer_sequence<int, g...>) {
+  (function(std::integral_constant<int, g>{}), ...);
+}
+template <int count, typename Function>
+MPUCAL_INLINE void for_each(Function function) {
+  for_each(function, std::make_integer_sequence<int, count>{});
 }
 
 // Rows to columns: out[i] = a_i, b_i, c_i, d_i
