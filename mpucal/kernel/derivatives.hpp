@@ -32,7 +32,10 @@ class Derivatives {
 
   // The next `count` steps; rows of the Fisher matrix, kRowsOfFour for four steps
   void run(const Coefficients* steps, int count, Lane (*rows)[G]) {
-    for_each<(G + 1) / 2>([&](auto pair) { run_groups<2 * pair, (2 * pair + 1 < G ? 2 : 1)>(steps, count, rows); });
+    for_each<(G + kGroupsAbreast - 1) / kGroupsAbreast>([&](auto i) {
+      constexpr int first = kGroupsAbreast * i, left = G - first;
+      run_groups<first, (left < kGroupsAbreast ? left : kGroupsAbreast)>(steps, count, rows);
+    });
   }
 
   void write(double* gradient) const {

@@ -118,8 +118,7 @@ class HandDerivatives {
         rows[3 * i + a][g] = row;
         gradient = madd(at(c.residual[a], t), row, gradient);
       }
-      update(met[i / 4].K[t], c, t, e, x);
-      follow<g>(four, c, t, met[i / 4].x_next[t], x);
+      follow<g>(four, met[i / 4], c, t, e, x);
     }
     for (int a = 0; a < 3; ++a)
       for (int k = 0; k < kState; ++k) dx_[g][a][k] = x[a][k];
@@ -140,34 +139,30 @@ class HandDerivatives {
     }
   }
 
-  // x + K e, and s keeps its length
-  MPUCAL_INLINE static void update(const Lane (&K)[3][3], const HandCoefficients& c, int t, const Lane (&e)[3],
-                                   State& x) {
-    for (int a = 0; a < 3; ++a)
-      for (int j = 0; j < 3; ++j)
-        for (int k = 0; k < kState; ++k) x[a][k] = madd(at(K[a][j], k), e[j], x[a][k]);
-    Lane along = at(c.direction[0], t) * x[0][kS];
-    for (int a = 1; a < 3; ++a) along = madd(at(c.direction[a], t), x[a][kS], along);
-    for (int a = 0; a < 3; ++a) x[a][kS] = at(c.stretch, t) * nmadd(at(c.direction[a], t), along, x[a][kS]);
-  }
-
-  // Phi x + eta x (Phi x); a new beginning forgets p, v and a
+  // x + K e, and s keeps its length; then Phi x + eta x (Phi x). A new beginning forgets the chain.
   template <int g>
-  MPUCAL_INLINE static void follow(const HandSteps& four, const HandCoefficients& c, int t, const Lane (&next)[3],
-                                   State& x) {
-    if (at(four.reset, t) >= 0.0) {
-      for (int a = 0; a < 3; ++a) x[a][1] = x[a][2] = x[a][3] = all(0.0);
-    } else {
-      const auto& Phi = four.chain.Phi;
-      for (int a = 0; a < 3; ++a) {
-        x[a][1] = madd(at(Phi[2], t), x[a][3], madd(at(Phi[1], t), x[a][2], at(Phi[0], t) * x[a][1]));
-        x[a][2] = madd(at(Phi[1], t), x[a][3], at(Phi[0], t) * x[a][2]);
-        x[a][3] = at(Phi[0], t) * x[a][3];
-      }
+  MPUCAL_INLINE static void follow(const HandSteps& four, const HandPredicted& met, const HandCoefficients& c, int t,
+                                   const Lane (&e)[3], State& x) {
+    const auto& K = met.K[t];
+    Lane along;
+    for (int a = 0; a < 3; ++a) {
+      for (int j = 0; j < 3; ++j) x[a][kS] = madd(at(K[a][j], kS), e[j], x[a][kS]);
+      along = a ? madd(at(c.direction[a], t), x[a][kS], along) : at(c.direction[a], t) * x[a][kS];
     }
-    if constexpr (g == Lanes::b_omega / 4) add_turn(c.eta_b[t], next, x);
-    if constexpr (g == Lanes::K / 4) add_turn(c.eta_K[t], next, x);
-    if constexpr (g == Lanes::K / 4 + 1) add_turn(c.eta_K2[t], next, x);
+    const auto& Phi = four.chain.Phi;
+    for (int a = 0; a < 3; ++a) {
+      x[a][kS] = at(c.stretch, t) * nmadd(at(c.direction[a], t), along, x[a][kS]);
+      for (int k = 1; k < kState; ++k)
+        for (int j = 0; j < 3; ++j) x[a][k] = madd(at(K[a][j], k), e[j], x[a][k]);
+      x[a][1] = madd(at(Phi[2], t), x[a][3], madd(at(Phi[1], t), x[a][2], at(Phi[0], t) * x[a][1]));
+      x[a][2] = madd(at(Phi[1], t), x[a][3], at(Phi[0], t) * x[a][2]);
+      x[a][3] = at(Phi[0], t) * x[a][3];
+    }
+    if (at(four.reset, t) >= 0.0)
+      for (auto& axis : x) axis[1] = axis[2] = axis[3] = all(0.0);
+    if constexpr (g == Lanes::b_omega / 4) add_turn(c.eta_b[t], met.x_next[t], x);
+    if constexpr (g == Lanes::K / 4) add_turn(c.eta_K[t], met.x_next[t], x);
+    if constexpr (g == Lanes::K / 4 + 1) add_turn(c.eta_K2[t], met.x_next[t], x);
   }
 
   // x += n x next

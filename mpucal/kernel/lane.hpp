@@ -31,7 +31,8 @@ inline double root(double x) { return std::sqrt(x); }
 #if defined(__AVX2__) && defined(__FMA__)
 
 typedef double Lane __attribute__((vector_size(32)));
-constexpr int kLanesInATile = 3;  // of the Fisher matrix: four times as many sums stay in registers
+constexpr int kLanesInATile = 3;   // of the Fisher matrix: four times as many sums stay in registers
+constexpr int kGroupsAbreast = 2;  // of derivatives: what they share is loaded once
 inline Lane all(double x) { return Lane{x, x, x, x}; }
 inline Lane madd(Lane x, Lane y, Lane z) { return (Lane)_mm256_fmadd_pd((__m256d)x, (__m256d)y, (__m256d)z); }
 inline Lane nmadd(Lane x, Lane y, Lane z) { return (Lane)_mm256_fnmadd_pd((__m256d)x, (__m256d)y, (__m256d)z); }
@@ -57,7 +58,7 @@ struct Lane {
   Lane(double a, double b, double c, double d) : low{a, b}, high{c, d} {}
   Lane(Pair l, Pair h) : low(l), high(h) {}
 };
-constexpr int kLanesInATile = 1;
+constexpr int kLanesInATile = 1, kGroupsAbreast = 1;
 inline Lane all(double x) { return {x, x, x, x}; }
 inline Lane operator+(Lane a, Lane b) { return {a.low + b.low, a.high + b.high}; }
 inline Lane operator-(Lane a, Lane b) { return {a.low - b.low, a.high - b.high}; }
