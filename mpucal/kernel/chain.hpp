@@ -1,7 +1,7 @@
 // One step of position, velocity and acceleration under d^3p/dt^3 = -3 lam a - 3 lam^2 v - lam^3 p + white noise.
 //
-// They are carried as a, b = -2 lam a - 3 lam^2 v - lam^3 p and c = lam^2 a + 2 lam^3 v + lam^4 p, where a' = -lam a + b,
-// b' = -lam b + c and c' = -lam c beside the noise: a step is a triangle, and a, which is measured, is one of them.
+// They are carried as a, b = -2 lam a - 3 lam^2 v - lam^3 p and c = lam^2 a + 2 lam^3 v + lam^4 p. Beside the noise
+// a' = -lam a + b, b' = -lam b + c and c' = -lam c: a step is a triangle, and a, which is measured, is one of them.
 #pragma once
 #include <cmath>
 
@@ -54,8 +54,8 @@ MPUCAL_INLINE Decay decay_of(const Lane& z) {
   return {series(kOfDecay, -1.0 * z), series(kOfSum, 2.0 * z)};
 }
 
-// Three equal poles at -lam keep the position bounded. Phi holds the first row of the triangle exp(A h), whose diagonals
-// are constant; Q is the integral of g g', g(t) the response of (a, b, c) to an impulse of jerk, for unit spectral
+// Three equal poles at -lam keep the position bounded. Phi holds the first row of the triangle exp(A h), its diagonals
+// being constant; Q is the integral of g g', g(t) the response of (a, b, c) to an impulse of jerk, for unit spectral
 // density. Four steps, one to a lane.
 struct Chain {
   Lane Phi[3], Q[6];
@@ -68,7 +68,7 @@ struct Chain {
     noise(h, lam, of_step.decay * of_step.decay, of_step.sum);
   }
 
-  // What p = 0, v and a of these standard deviations, are as covariance of (0, a, b, c)
+  // The covariance of (0, a, b, c) where p = 0, and v and a have these standard deviations
   static void rest(double lam, double sd_v, double sd_a, Lane (&P)[4]) {
     const Lane a{0.0, sd_a, -2.0 * lam * sd_a, lam * lam * sd_a};
     const Lane v{0.0, 0.0, -3.0 * lam * lam * sd_v, 2.0 * lam * lam * lam * sd_v};

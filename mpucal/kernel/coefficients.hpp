@@ -90,6 +90,7 @@ struct Coefficients {
     }
   }
 
+  // scale: g / |s| after the update
   MPUCAL_INLINE void update_and_turn(const Parameters& p, const Constants& constants, const Steps& steps,
                                      const Lane (&P)[6], const Lane (&K)[3][3], const Lane (&plus)[3], Lane scale) {
     const Lane (&F)[3][3] = steps.turn.F;

@@ -1,7 +1,7 @@
 // The recursion of the hand's x and P, a step at a time, and V along it.
 //
-// The four vectors of x, s and the chain's a, b, c, are the four places of a Lane, so that the chain is one 4 x 4 matrix
-// for all axes.
+// The four vectors of x, s and the chain's a, b and c, are the four places of a Lane, so that the chain is one 4 x 4
+// matrix for all axes.
 #pragma once
 #include "hand_steps.hpp"
 
@@ -179,6 +179,7 @@ class HandRecursion {
       for (int b = 0; b < 3; ++b) P_[a][b][kS] = P_[a][b][kS] + Lane{N[kSym[a][b]], 0.0, 0.0, 0.0};
   }
 
+  // rows of (s, a, b, c) by Phi
   MPUCAL_INLINE static void chained(const double (&Phi)[3], Lane (&rows)[kState]) {
     rows[1] = madd(Phi[2], rows[3], madd(Phi[1], rows[2], Phi[0] * rows[1]));
     rows[2] = madd(Phi[1], rows[3], Phi[0] * rows[2]);
