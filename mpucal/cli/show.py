@@ -109,6 +109,9 @@ def _facts(recording: Recording) -> dict[str, Any]:
     """What a recording holds, in JSON's own types."""
     flat = recording.flat or find_flat(recording)
     temperature = recording.temperature_c[np.isfinite(recording.temperature_c)]
+    if not len(temperature) and recording.sensor.temperature_c is not None:
+        # of the accelerometer alone it is that of the start
+        temperature = np.array([recording.sensor.temperature_c])
     return {
         "chip": _chip(recording.sensor),
         "accel_range_g": recording.sensor.accel_range_g,

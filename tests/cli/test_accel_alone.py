@@ -31,6 +31,7 @@ def test_it_is_recorded_and_shown(mpucal, capture):
     assert shown["samples"] == pytest.approx(2000, abs=40)
     assert shown["rate_hz"] == pytest.approx(4000, rel=0.01)
     assert shown["gyro_range_dps"] is shown["fastest_dps"] is None
+    assert shown["temperature_c"][0] == pytest.approx(25, abs=15)
     assert "fastest turn  not measured" in mpucal("show", capture).out
 
 

@@ -162,6 +162,15 @@ def test_a_fault_that_stays_ends_a_session_with_one_sentence(device, fault, word
     assert (mocked.folder / "x" / "capture.mcap").exists()
 
 
+def test_the_accelerometer_alone_runs_at_4_khz(device):
+    mocked = device("sim:chip=mpu6500,hand=still")
+    result = mocked.mpucal("record", "--bus", NODE, "-o", "x.mcap", "--seconds", "1", "--rate", "4000")
+    assert result.code == 0, result.err
+    recording = load(mocked.folder / "x.mcap")
+    assert len(recording) == pytest.approx(4000, rel=0.02)
+    assert not recording.gap.any()
+
+
 def test_a_noisy_bus_and_a_hurried_clock_are_lived_with(device):
     mocked = device("sim:fault=bitflips@2/clock@4")
     result = mocked.mpucal("record", "--bus", NODE, "-o", "x.mcap", "--seconds", "8", "--rate", "50")
