@@ -6,11 +6,14 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 PROJECT = Path(__file__).parents[1]
 SHARED = PROJECT.parent / "shared"
-RECORDING = SHARED / "recordings" / "mpu6050_session.npz"
+RECORDINGS = SHARED / "recordings"
+RECORDING = RECORDINGS / "mpu6050_session.npz"
+BROAD_HZ = 250.0
 YARDSTICK = SHARED / "check" / "gravity_transport.py"
 
 pytestmark = pytest.mark.skipif(
@@ -60,9 +63,9 @@ def by_accel(capture):
     return outcome(capture.parent / "accel", "calibrate", capture, "--model", "accel")
 
 
-def transported_deg(*words):
-    """Median angle [deg] between gravity as the gyroscope carries it and as the accelerometer says; untrimmed."""
-    done = call(YARDSTICK, RECORDING, *words, "--json")
+def transported_deg(*words, recording=RECORDING):
+    """Median angle [deg] between gravity as the gyroscope carries it and as the accelerometer says."""
+    done = call(YARDSTICK, recording, *words, "--json")
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)["median_deg"]
 
@@ -85,3 +88,51 @@ def test_the_gyroscope_carries_gravity_to_where_the_accelerometer_finds_it(sessi
     assert transported_deg() > 8
     assert transported_deg(session.file) <= 1.3
     assert transported_deg(by_accel.file) <= 1.3
+
+
+def test_what_no_pose_shows_is_not_claimed(session):
+    """None of its poses tilts x and y together: |a| alone knows nothing of how these two lean to each other."""
+    D_std = np.array(session.document["accelerometer"]["D_std"])
+    assert D_std[0, 1] > 10 * D_std[0, 0]
+    assert D_std[1, 0] > 10 * D_std[1, 1]
+    assert session.document["accelerometer"]["b_a"][2] == pytest.approx(-1.1, abs=0.02)
+
+
+def session_of(folder, recording):
+    """The same way for another recording."""
+    made = call(PROJECT / "tools" / "make_capture.py", recording, "-o", folder / "capture.mcap", "--gravity", 9.81)
+    assert made.returncode == 0, made.stderr
+    assert "abandoned" not in made.stdout
+    return outcome(folder / "board", "session", "--replay", folder / "capture.mcap")
+
+
+@pytest.mark.parametrize(("name", "most_deg"), [("mpu9150_a", 0.1), ("mpu9150_b", 0.1), ("imucal_session", 0.15)])
+def test_a_recording_whose_person_was_told_nothing_is_calibrated(tmp_path, name, most_deg):
+    """They lay flat for less than ten seconds; the MPU-9150s' show spikes to 74 m/s^2 where they were put down."""
+    recording = RECORDINGS / f"{name}.npz"
+    found = session_of(tmp_path, recording)
+    assert (found.code, found.document["quality"]["verdict"]) == (0, "good")
+    assert transported_deg(found.file, "--trim", 0.5, "--gravity", 9.81, recording=recording) <= most_deg
+
+
+def test_one_that_never_rests_between_is_calibrated_and_known_less_well(tmp_path):
+    """Continuous rotation, 285.7 Hz, drawn through to a rate that the chip has."""
+    broad = np.load(RECORDINGS / "broad_01.npz")
+    t = np.arange(broad["t"][0], broad["t"][-1], 1.0 / BROAD_HZ)
+    drawn = {
+        name: np.stack([np.interp(t, broad["t"], axis) for axis in broad[name].T], axis=1) for name in ("acc", "gyr")
+    }
+    np.savez(tmp_path / "broad.npz", t=t, **drawn)
+    found = session_of(tmp_path, tmp_path / "broad.npz")
+    assert (found.code, found.document["quality"]["verdict"]) == (0, "good")
+    assert 0.005 < max(found.document["accelerometer"]["b_a_std"]) < 0.05
+
+
+@pytest.mark.parametrize(("name", "words"), [("mpu6050_turn90", "known to"), ("mpu6050_static", "hardly turned")])
+def test_one_that_was_hardly_turned_is_refused_for_that(tmp_path, name, words):
+    found = session_of(tmp_path, RECORDINGS / f"{name}.npz")
+    assert (found.code, found.document["quality"]["verdict"]) == (5, "refused")
+    (reason,) = found.document["quality"]["reasons"]
+    assert reason["code"] == "few_orientations"
+    assert words in reason["message"]
+    assert not (found.file.parent / "calibration.bin").exists()

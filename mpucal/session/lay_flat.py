@@ -11,6 +11,8 @@ WINDOW_S = 0.5
 FLAT_S = 10.0
 # What a person may cut it short to, by a key.
 SHORTEST_S = 2.0
+# What a recording may hold of it, whose person was told nothing.
+RECORDED_S = 5.0
 PATIENCE_S = 60.0
 # Stillness shorter than this is not worth saying that it was interrupted ...
 WORTH_SAYING_S = 1.0
@@ -24,7 +26,7 @@ PROMPT = Prompt(
 
 
 class LayFlat:
-    """Waits for stillness, and says what disturbs it; `patient`: for ever."""
+    """Waits for stillness, and says what disturbs it; `patient`: for ever, and a shorter one will do as it ends."""
 
     def __init__(self, patient: bool = False) -> None:
         self._patient = patient
@@ -43,6 +45,8 @@ class LayFlat:
                 self._begun_s = self._spoke_s = window.start_s
             t_s, sight = window.end_s, self._stillness.add(window)
             if isinstance(sight, Moved):
+                if self._patient and self._still is not None and self._still.seconds >= RECORDED_S:
+                    return [*found, self._rested(self._still)]
                 found += self._moved(sight, t_s)
                 if not self._patient and t_s - self._begun_s >= PATIENCE_S:
                     return [*found, _never_still(sight)]

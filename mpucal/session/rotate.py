@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..data import Samples, Vector
 from .aims import Aim, directions
-from .coverage import Coverage
+from .coverage import DISTINCT_RAD, Coverage
 from .events import (
     Ask,
     Caution,
@@ -38,6 +40,8 @@ LEAST_MPS2, MOST_MPS2 = 5.0, 15.0
 
 # How often what is known is looked at (after a long time, less), and how long the session lets a fit take.
 KNOW_EVERY_S = TELL_EVERY_S = 1.0
+# Where nothing is asked for, it is only shown.
+SHOW_EVERY_S = 5.0
 SELDOM = 40.0
 WAIT_S = 0.5
 
@@ -94,10 +98,14 @@ class Rotate:
             # near level every tilt teaches: all of them are asked for. And nobody is asked twice for the same one, even
             # by an estimate that takes up for down, as that of a sensor whose axes are mirrored
             elsewhere = self._tilt_only or knowledge.down == self.prompt.down
-            down = self.coverage.farthest_down(self.directions) if elsewhere else np.array(knowledge.down)
-            self.prompt = self._prompt_for(down)
+            self.prompt = self._prompt_for(self._elsewhere() if elsewhere else np.array(knowledge.down))
             found.append(self.prompt)
         return found
+
+    def _elsewhere(self) -> Vector:
+        """(3,) what is least like all that was shown, and not what was asked for last."""
+        last = np.array(self.prompt.down)
+        return self.coverage.farthest_down(self.directions[self.directions @ last < math.cos(DISTINCT_RAD)])
 
     def resumed(self) -> list[Output]:
         """The board may be anywhere now."""
@@ -124,7 +132,8 @@ class Rotate:
     def _at(self, t_s: float) -> list[Output]:
         found: list[Output] = []
         turning_s = t_s - (self._begun_s or t_s)
-        if not self._asked and t_s - self._known_s >= max(KNOW_EVERY_S, turning_s / SELDOM):
+        every_s = SHOW_EVERY_S if self._until_end else max(KNOW_EVERY_S, turning_s / SELDOM)
+        if not self._asked and t_s - self._known_s >= every_s:
             self._asked, self._known_s = True, t_s
             found.append(Ask(Wish.KNOW, WAIT_S))
         if t_s - self._told_s >= TELL_EVERY_S:

@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -245,6 +247,15 @@ def test_no_new_orientation_for_a_minute_ends_the_turning(board, rotating):
     assert "no new orientation for 60 s, 2 are there" in rotating.words()
 
 
+def test_nobody_is_asked_twice_for_the_same_orientation(board, rotating, varied):
+    rotating.overall = 0.1
+    show(rotating, board, varied[:4])
+    asked = [prompt.down for prompt in rotating.of(Prompt) if prompt.kind is PromptKind.ROTATE]
+    # the advice is the same each time
+    assert asked.count(DOWN) >= 2
+    assert all(one != other for one, other in pairwise(asked))
+
+
 @pytest.fixture
 def verifying(board, rotating, varied):
     rotating.overall = 1.0
@@ -378,6 +389,13 @@ def test_the_meter_follows_the_board(board, rotating):
     np.testing.assert_allclose(meters[-1].down, -board.up, atol=0.02)
     assert meters[-1].rate_hz == pytest.approx(100.0, rel=0.05)
     assert meters[-1].temperature_c == 25.0
+
+
+@pytest.mark.parametrize(("seconds", "state"), [(6.0, State.ROTATE), (3.0, State.LAY_FLAT)])
+def test_until_end_takes_a_shorter_rest_as_it_ends(board, seconds, state):
+    session = Session(until_end=True).feed(board.still(seconds))
+    assert session.state is State.LAY_FLAT
+    assert session.feed(board.turn((1, 0, 0), 1.0, 1.0)).state is state
 
 
 def test_until_end_turns_until_the_source_ends(board, varied):

@@ -1,0 +1,94 @@
+"""A sensor that was tilted and never turned over: right where it was, and nothing claimed of the rest."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from mpucal.calibration.model import B_A_NAMES, D_NAMES, rotation
+from mpucal.calibration.stationary import find_flat, flat_statistics
+from mpucal.calibration.tilt import BIAS_SD_MPS2, CONE_RAD, GAIN_SD, LEAN_SD, fit_tilt, tilted_directions
+from mpucal.data import Recording
+
+GRAVITY_MPS2 = 9.80665
+RATE_HZ = 100.0
+TILT_RAD = np.radians(30.0)
+D = np.array([[1.02, 0.01, -0.015], [-0.012, 0.98, 0.02], [0.018, -0.01, 1.01]])
+B_A = np.array([0.4, -0.3, 0.25])
+B_OMEGA = np.array([0.02, -0.01, 0.03])
+
+
+def tilts(angle_rad, around=8):
+    """(k, 3) unit vectors that point up one after the other: level, then leaning to so many sides."""
+    side = np.arange(around) * 2.0 * np.pi * 3 / around
+    across, along = np.sin(angle_rad), np.full(around, np.cos(angle_rad))
+    return np.vstack([[0.0, 0.0, 1.0], np.stack([across * np.cos(side), across * np.sin(side), along], axis=1)])
+
+
+def tilted(seed):
+    """Ten seconds flat, then a move of 1.6 s to each tilt and a rest of 2 s there; and gravity's path (n, 3)."""
+    rng = np.random.default_rng(seed)
+    ups = tilts(TILT_RAD)
+    s, rate = [np.tile(ups[0], (1000, 1))], [np.zeros((1000, 3))]
+    for one, other in pairwise(ups):
+        axis = np.cross(one, other)
+        turn = axis / np.linalg.norm(axis) * np.arccos(np.clip(one @ other, -1.0, 1.0))
+        s += [rotation(np.arange(1, 161)[:, None] / 160.0 * turn) @ one, np.tile(other, (200, 1))]
+        rate += [np.tile(-turn / 1.6, (160, 1)), np.zeros((200, 3))]
+    path, rates = GRAVITY_MPS2 * np.vstack(s), np.vstack(rate)
+    n = len(path)
+    acc = path @ D.T + B_A + rng.normal(scale=0.03, size=(n, 3))
+    gyr = rates + B_OMEGA + rng.normal(scale=0.002, size=(n, 3))
+    return Recording.from_arrays(np.arange(n) / RATE_HZ, acc, gyr), path
+
+
+def fitted(recording):
+    return fit_tilt(recording, flat_statistics(recording, find_flat(recording)), GRAVITY_MPS2)
+
+
+@pytest.fixture(scope="module")
+def found():
+    recording, path = tilted(1)
+    return fitted(recording), recording, path
+
+
+def test_gravity_is_right_where_the_board_was_tilted(found):
+    fit, recording, path = found
+    assert fit.converged
+    calibrated = (recording.acc - fit.b_a) @ np.linalg.inv(fit.D).T
+    raw = np.linalg.norm((recording.acc - path)[1000:].mean(0))
+    assert np.abs((calibrated - path)[1000:].mean(0)).max() < 0.05 * raw
+    assert np.sqrt(np.mean((calibrated - path)[1000:] ** 2)) < 0.06
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_claimed_is_within_its_standard_deviations(seed):
+    fit = fitted(tilted(seed)[0])
+    z = np.append((fit.D - D).ravel(), fit.b_a - B_A) / fit.std(*D_NAMES, *B_A_NAMES)
+    assert np.abs(z).max() < 3.5
+    assert np.sqrt(np.mean(z**2)) < 1.5
+
+
+def test_what_tilts_do_not_show_is_named_and_no_better_known_than_before(found):
+    fit = found[0]
+    # near level a gain of the vertical looks like its bias, and those of the others are cosines
+    left = {name for name in fit.at_prior if name in D_NAMES + B_A_NAMES}
+    assert left == {"D_xx", "D_yy", "D_zz", "b_a_z"}
+    assert fit.std("D_zz")[0] > GAIN_SD
+    assert fit.std("b_a_x")[0] < 0.1 * BIAS_SD_MPS2
+
+
+def test_nothing_is_claimed_beyond_the_data_sheet_of_a_board_that_lay_still():
+    recording = tilted(1)[0].part(0, 1200)
+    fit = fitted(recording)
+    assert set(D_NAMES) <= set(fit.at_prior)
+    np.testing.assert_allclose(fit.D, np.eye(3), atol=3.0 * max(GAIN_SD, LEAN_SD))
+    assert np.abs(fit.b_a).max() < 3.0 * BIAS_SD_MPS2
+
+
+def test_the_cone_holds_the_directions_near_how_it_lay():
+    down = np.array([0.0, 0.0, -1.0])
+    angles = np.radians([0.0, 20.0, 34.0, 36.0, 90.0, 180.0])
+    directions = np.stack([np.sin(angles), np.zeros(6), -np.cos(angles)], axis=1)
+    np.testing.assert_array_equal(tilted_directions(down, directions), directions[:3])
+    assert np.degrees(CONE_RAD) == pytest.approx(35.0)
