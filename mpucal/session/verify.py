@@ -72,7 +72,7 @@ class Verify:
         self._number = 0
         self._asked = False
         self._begun_s: float | None = None
-        self._said_s = 0.0
+        self._said_s = self._now_s = 0.0
         self.checked: Checked | None = None
         self.prompt = self._next()
 
@@ -82,7 +82,7 @@ class Verify:
 
     def add(self, samples: Samples) -> list[Output | Finished]:
         """What `samples` show; Finished comes last and ends the step."""
-        t_s = float(samples.t[-1])
+        t_s = self._now_s = float(samples.t[-1])
         if self._begun_s is None:
             self._begun_s = self._said_s = t_s
         if self._refusal is not None:
@@ -108,14 +108,14 @@ class Verify:
         if tried.verdict != REFUSED:
             return []
         self.checked = Checked((), False, tried.code, tried.why)
-        return [self._refused(Finished(f"not to be verified: {tried.why}"), tried.code)]
+        return self._refused(Finished(f"not to be verified: {tried.why}"), self.checked)
 
     def check(self, checked: Checked) -> list[Output | Finished]:
         """What the orientations say."""
         self.checked = checked
         if checked.agrees:
             return [*checked.found, Finished("the new orientations agree with what was promised")]
-        return [*checked.found, self._refused(Finished(checked.why), checked.code)]
+        return [*checked.found, *self._refused(Finished(checked.why), checked)]
 
     def enough(self) -> Finished:
         """The person does not want to go on."""
@@ -127,14 +127,14 @@ class Verify:
         self._pauses.forget()
         return [self.prompt]
 
-    def _refused(self, refusal: Finished, code: str) -> Prompt | Finished:
+    def _refused(self, refusal: Finished, checked: Checked) -> list[Output | Finished]:
         """The end, unless the person may want to turn the board anew."""
-        if not self._attended or code not in ANEW:
-            return refusal
+        if not self._attended or checked.code not in ANEW:
+            return [refusal]
         self._refusal, self._begun_s = refusal, None
-        text = f"Turn it again from the start (r), or leave it refused (Enter)? The reason: {refusal.why}."
-        self.prompt = Prompt(PromptKind.AGAIN, text)
-        return self.prompt
+        what, _, remedy = checked.why.partition("; ")
+        self.prompt = Prompt(PromptKind.AGAIN, "Turn it again from the start (r), or leave it refused (Enter)?")
+        return [self.prompt, Caution(self._now_s, "refused", what, checked.remedy or remedy)]
 
     def _hold(self, held: Held) -> list[Output | Finished]:
         if self._asked or held.seconds < HOLD_S - 1e-6:

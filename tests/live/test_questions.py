@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from concurrent.futures import Future
 from dataclasses import fields, replace
 
@@ -133,3 +135,9 @@ def test_a_closed_process_is_gone(apart):
     apart.close()
     with pytest.raises(ProcessLookupError):
         os.kill(apart.pid, 0)
+
+
+def test_a_process_ends_with_the_program_that_began_it():
+    """Nothing more comes from its stdin then, however the program ended."""
+    done = subprocess.run([sys.executable, "-m", "mpucal.live.apart"], stdin=subprocess.DEVNULL, check=False)
+    assert done.returncode == 0

@@ -320,6 +320,7 @@ def offered(board, varied):
     assert session.state is State.VERIFY
     assert session.prompts()[-1] is PromptKind.AGAIN
     assert "Turn it again from the start (r)" in session.words()
+    assert (session.of(Caution)[-1].what, session.of(Caution)[-1].do) == ("the sensor moved on its mount", "fasten it")
     return session
 
 
