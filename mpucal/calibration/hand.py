@@ -63,7 +63,7 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     prior = prior_of(fine.flat)
     minimum = minimise(problem, theta, len(NAMES), prior, frozen=True)
     iterations = search.iterations + minimum.iterations
-    if wald(minimum) < WALD_99:
+    if wald(minimum) < WALD_99 and not at_prior(minimum.covariance()):
         perfect = replace(minimum.theta, K=np.eye(3))
         minimum = minimise(problem, perfect, len(NAMES), prior, fixed=("K",), frozen=True)
         iterations += minimum.iterations

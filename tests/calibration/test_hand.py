@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate
+from mpucal.calibration.gyro import K_SD
 from mpucal.calibration.hand import fit_hand
 from mpucal.calibration.likelihood import K_NAMES
 from mpucal.calibration.model import B_A_NAMES, D_NAMES
@@ -127,12 +128,20 @@ def test_auto_takes_it_for_a_hand(hand, motion):
     assert "expected 3" in calibration.fit["why"]
 
 
-def test_a_perfect_gyroscope_on_a_bench_keeps_its_matrix(ideal):
-    for seed in range(4):
-        fit = fitted(ideal(seed).recording)
+def test_a_perfect_gyroscope_keeps_its_matrix_where_all_of_it_is_known():
+    for seed in range(3):
+        fit = fitted(hand_scenario(seed, "calm jerks", rate_hz=200).recording)
         np.testing.assert_array_equal(fit.K, np.eye(3))
         assert not set(K_NAMES) & set(fit.names)
         assert np.isnan(fit.std("K_xx")).all()
+
+
+def test_what_is_not_known_of_the_gyroscope_is_not_taken_for_perfect(ideal):
+    """Three turns in noise leave two elements of K open: D is as unsure as they are, whatever the Wald test says."""
+    for seed in range(4):
+        fit = fitted(ideal(seed).recording)
+        assert fit.at_prior == ("K_xy", "K_zz")
+        assert (fit.std(*fit.at_prior) > 0.5 * K_SD[[1, 5]]).all()
 
 
 def test_jerks_do_little(hand):
