@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Mask, Recording
 from .blockers import Check, Reason
-from .evidence import Evidence
+from .evidence import Evidence, Rests
 from .tilt import CONE_RAD
 
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.1, 0.4
@@ -25,6 +25,8 @@ MOST_CLIPPED = 0.2
 # show most, makes it 10 with a real sensor.
 STEADY, STEADY_BY_RESTS = 5.0, 12.0
 UNSTEADY_BY_FAR = 4.0
+# So well agree no rests of a sensor that changed.
+AGREE_MPS2, AGREE_RAD = 0.015, np.deg2rad(0.1)
 
 
 def moved_while_still(e: Evidence) -> Reason | None:
@@ -228,6 +230,8 @@ def changed_midway(e: Evidence) -> Reason | None:
     r = e.recording
     if r.gyr_clipped.any() or r.acc_clipped.any() or r.gap.any() or e.change is None:
         return None
+    if e.change.rests_often and _agree(e.rests):
+        return None
     limit = STEADY_BY_RESTS if e.change.rests_often else STEADY
     if e.change.significance <= limit:
         return None
@@ -238,6 +242,10 @@ def changed_midway(e: Evidence) -> Reason | None:
         "record again",
         e.change.significance > UNSTEADY_BY_FAR * limit,
     )
+
+
+def _agree(rests: Rests | None) -> bool:
+    return rests is not None and rests.magnitude_rms < AGREE_MPS2 and rests.miss_median < AGREE_RAD
 
 
 def tilted_only(e: Evidence) -> Reason | None:

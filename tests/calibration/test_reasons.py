@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from mpucal.calibration import calibrate
+from mpucal.calibration import calibrate, weigh
 from mpucal.calibration.evidence import Evidence
 from mpucal.calibration.model import rotation
 from mpucal.calibration.quality import judge
+from mpucal.calibration.steady import Change
 from mpucal.data import Recording
 from mpucal.simulation.scenarios import paper_scenario
 
@@ -387,6 +388,14 @@ def test_a_mount_that_slips_between_rests(in_hand):
     recording = in_hand.recording
     slipped = np.concatenate([recording.acc[:3000], recording.acc[3000:] @ rotation(np.radians([0.0, 3.0, 0.0])).T])
     assert "inconsistent" in judged(replace(recording, acc=slipped)).reasons
+
+
+def test_rests_that_agree_are_believed_before_a_change(in_hand):
+    """A change of any significance, in a recording whose rests know of none."""
+    for rests_often, said in ((True, []), (False, ["inconsistent"])):
+        evidence, _ = weigh(in_hand.recording, "auto", G)
+        vars(evidence)["change"] = Change(100.0, 20.0, rests_often)
+        assert [reason["code"] for reason in judge(evidence)["reasons"]] == said
 
 
 def test_what_clipped_is_not_said_to_have_slipped(hand):
