@@ -194,7 +194,7 @@ def check_source(context: click.Context) -> None:
 
     Raises
     ------
-    UsageError : none, several, or options that do not fit the source.
+    UsageError : none, several, or options that do not fit the source or each other.
     """
     given = [name for name in SOURCES if context.params.get(name) is not None]
     if len(given) != 1:
@@ -209,6 +209,10 @@ def check_source(context: click.Context) -> None:
     for name in OF_A_BUS if given == ["mavlink"] else OF_A_VEHICLE:
         if _was_given(context, name):
             raise UsageError(f"{_spelled(name)} was given beside --{given[0]}, which has none", "leave it out")
+    model = context.params.get("model")
+    if context.params.get("tilt_only") and model not in ("auto", "tilt"):
+        what = f"--model {model} was given beside --tilt-only, and tilts alone do not determine it"
+        raise UsageError(what, "leave it out: tilts are fitted by the model tilt")
 
 
 def check_resumed(context: click.Context) -> None:

@@ -58,6 +58,7 @@ class Rotate:
 
     def __init__(self, flat: Direction, aim: Aim, until_end: bool = False, tilt_only: bool = False) -> None:
         self._aim, self._until_end, self._tilt_only = aim, until_end, tilt_only
+        self._least = TILTS if tilt_only else aim.least
         self._pauses, self._passes = Pauses(), Windows(PASS_WINDOW_S)
         self.coverage = Coverage()
         self.coverage.pauses(np.array(flat))
@@ -92,7 +93,9 @@ class Rotate:
         if self._until_end:
             return found
         if self._content():
-            return [*found, Turned(f"the target is reached: {knowledge.words}")]
+            # tilts leave some parameters as they were assumed: no target is claimed of them
+            what = "enough tilts were shown" if self._tilt_only else "the target is reached"
+            return [*found, Turned(f"{what}: {knowledge.words}")]
         if advice and knowledge.down is not None:
             self._said_s = knowledge.t_s
             # near level every tilt teaches: all of them are asked for. And nobody is asked twice for the same one, even
@@ -139,17 +142,16 @@ class Rotate:
         if t_s - self._told_s >= TELL_EVERY_S:
             self._told_s = t_s
             number = self.coverage.number
-            found.append(Progress(t_s, number, self._aim.least, f"orientation {number} of {self._aim.least}"))
+            found.append(Progress(t_s, number, self._least, f"orientation {number} of {self._least}"))
         if not self._until_end and t_s - max(self._new_s, self._said_s) >= SAY_AGAIN_S:
             self._said_s = t_s
             found.append(Caution(t_s, "not_turned", "nothing new was shown for a while", self.prompt.text))
         return found
 
     def _content(self) -> bool:
-        if self._tilt_only:
-            return self.coverage.number >= TILTS
-        enough = self.coverage.number >= self._aim.least
-        return enough and self.coverage.varied and self._knowledge is not None and self._knowledge.overall >= 1.0
+        if self.coverage.number < self._least or self._tilt_only:
+            return self.coverage.number >= self._least
+        return self.coverage.varied and self._knowledge is not None and self._knowledge.overall >= 1.0
 
     def _turned(self, t_s: float) -> Turned | None:
         known = f": {self._knowledge.words}" if self._knowledge else ""

@@ -79,6 +79,7 @@ def test_machines_read_json_alone_and_a_folder_of_its_own_is_named_by_the_chip(m
         (["--bus", "/dev/i2c-99", "--seed", "1"], 2, "--seed chooses a simulated sensor"),
         (["--bus", "sim", "--rate", "0"], 2, "rate"),
         (["--bus", "sim:colour=red"], 2, "colour"),
+        (["--bus", "sim", "--tilt-only", "--model", "hand"], 2, "--model hand was given beside --tilt-only"),
         (["--bus", "/dev/i2c-99"], 3, "/dev/i2c-99"),
         (["--replay", "missing.mcap"], 3, "missing.mcap"),
         (["--replay", "text.mcap"], 3, "text.mcap is no MCAP file"),

@@ -214,6 +214,20 @@ def test_enough_orientations_and_the_target_lead_on_to_verify(board, rotating, v
     assert "orientation 5 of 10" in rotating.words()
 
 
+def test_enough_tilts_end_the_turning_and_claim_no_target(board):
+    session = Session(tilt_only=True).feed(board.still(10.6))
+    session.overall = 0.1
+    around = np.radians(np.arange(0.0, 300.0, 60.0))
+    tilts = [(0.5 * np.cos(angle), 0.5 * np.sin(angle), 0.87) for angle in around]
+    show(session, board, tilts[:4])
+    assert session.state is State.ROTATE
+    show(session, board, tilts[4:])
+    assert session.state is State.VERIFY
+    assert "orientation 5 of 6" in session.words()
+    assert "enough tilts were shown: bias to 3 mg" in session.words()
+    assert "the target is reached" not in session.words()
+
+
 def test_the_target_alone_is_not_enough(board, rotating):
     """The numbers may claim what they like: faces alone never tilt two axes together."""
     rotating.overall = 1.0
