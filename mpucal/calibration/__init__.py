@@ -19,7 +19,7 @@ from .likelihood import K_NAMES
 from .masks import with_masks
 from .model import B_A_NAMES, B_OMEGA_NAMES, D_NAMES, Fit, Flat
 from .quality import judge
-from .stationary import find_flat, flat_statistics
+from .stationary import find_flat, flat_statistics, tells
 
 __all__ = ["MODELS", "calibrate", "weigh"]
 
@@ -61,7 +61,7 @@ def weigh(
         return before, {"model": model, "why": "nothing could be estimated"}
     recording = with_masks(recording)
     segment = recording.flat or find_flat(recording)
-    flat = None if segment is None or segment[1] - segment[0] < 2 else flat_statistics(recording, segment)
+    flat = flat_statistics(recording, segment) if segment is not None and tells(recording, segment) else None
     before = Evidence(recording, gravity, flat, None, model)
     if flat is None or any(check(before) for check in BLOCKERS):
         return before, {"model": model, "why": "nothing could be estimated"}

@@ -12,6 +12,7 @@ from .model import Flat
 
 WINDOW_S = 0.5
 SHORTEST_FLAT_S = 1.0
+SHORTEST_GIVEN_S = 0.25  # of which means over blocks, by which a fit begins, leave a variance
 ENOUGH_FLAT_S = 5.0
 
 # Above these a window is not still, however noisy the quietest part of a recording is ...
@@ -64,6 +65,11 @@ def find_flat(recording: Recording) -> tuple[int, int] | None:
     # the outermost windows may hold the first and last of a movement
     trim = n if last - first >= 6 * n else 0
     return first + trim, last - trim
+
+
+def tells(recording: Recording, flat: tuple[int, int]) -> bool:
+    """Whether a flat segment, given by a caller, is long enough to tell noise and bias."""
+    return flat[1] - flat[0] >= max(round(SHORTEST_GIVEN_S * recording.rate_hz), 2)
 
 
 def flat_statistics(recording: Recording, flat: tuple[int, int]) -> Flat:

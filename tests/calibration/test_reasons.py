@@ -79,6 +79,20 @@ def test_a_board_that_was_turned_from_the_first_sample_never_lay_still(good):
     refused_for("never_still", replace(good.part(500, 1500), flat=None), "never lay still")
 
 
+@pytest.mark.parametrize("n", [1, 2, 5])
+def test_a_flat_segment_of_a_few_samples_is_said_to_be_too_short(in_hand, n):
+    given = replace(in_hand.recording, flat=(0, n))
+    refused_for("never_still", given, f"samples 0 to {n - 1}, is too short", "leave it out")
+
+
+@pytest.mark.parametrize("model", ["auto", "hand", "imu", "accel", "tilt"])
+def test_a_quarter_of_a_second_that_lies_flat_is_enough_to_begin_with(in_hand, model):
+    recording = in_hand.recording
+    found = calibrate(replace(recording, flat=(0, round(0.25 * recording.rate_hz))), model, G)
+    assert np.isfinite(found.D).all()
+    assert np.isfinite(found.quality["error_std"]["rms"])
+
+
 def test_a_rest_that_comes_last_is_said_to_come_last(good):
     last = Recording.from_arrays(good.t, np.roll(good.acc, -500, axis=0), np.roll(good.gyr, -500, axis=0))
     # the turn about the vertical just before looks like a rest with another bias
