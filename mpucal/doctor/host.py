@@ -13,7 +13,8 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from .finding import Finding, Mark
+from ..bus.i2c_errors import transfer_error
+from .finding import Finding, Mark, failed
 
 SYS = Path("/sys")
 FAST_HZ = 400_000
@@ -21,6 +22,8 @@ FIRST, LAST = 0x08, 0x77
 # a quick write could upset these, which are EEPROMs; a read could upset the others
 READ_ONLY = (*range(0x30, 0x38), *range(0x50, 0x60))
 OURS = (0x68, 0x69)
+# one slow device may hold the bus for a while; a wire that stays low does it to every address, a second each
+HELD_IN_A_ROW = 3
 
 GUESSES = {
     0x0C: "an AK8963 magnetometer (behind an MPU-9250's bypass)",
@@ -118,7 +121,10 @@ def _who_answers(path: str) -> Iterator[Finding]:
         return
     try:
         can_i2c = bool(bus.funcs & smbus2.I2cFunc.I2C)
-        found = {address: answer for address in range(FIRST, LAST + 1) if (answer := _answer(bus, address))}
+        found = _answers(bus)
+    except TimeoutError as error:
+        yield failed("on the bus", transfer_error(error, path, FIRST))
+        return
     finally:
         bus.close()
     if not can_i2c:
@@ -134,13 +140,32 @@ def _who_answers(path: str) -> Iterator[Finding]:
     )
 
 
+def _answers(bus: object) -> dict[int, str]:
+    """How each address answers that does; TimeoutError where the bus is held."""
+    found, held = {}, 0
+    for address in range(FIRST, LAST + 1):
+        try:
+            answer = _answer(bus, address)
+        except TimeoutError:
+            held += 1
+            if held == HELD_IN_A_ROW:
+                raise
+            continue
+        held = 0
+        if answer:
+            found[address] = answer
+    return found
+
+
 def _answer(bus: object, address: int) -> str:
-    """Empty where nothing answers."""
+    """Empty where nothing answers; TimeoutError where the transfer did not end."""
     try:
         if address in READ_ONLY:
             bus.read_byte(address)  # type: ignore[attr-defined]
         else:
             bus.write_quick(address)  # type: ignore[attr-defined]
+    except TimeoutError:
+        raise
     except OSError as error:
         return "busy" if error.errno == errno.EBUSY else ""
     return "there"
