@@ -11,6 +11,7 @@ MpucalError
 │   │   ├── BusHeld          a wire is held low, so that every transfer takes its time-out
 │   │   └── LinkError        the link to a vehicle broke, or cannot be used
 │   └── ChipError            the chip answers, but not as its register map says
+│       └── OddOffsets       so do its offset registers, wherever they were looked for
 ├── OutputError           3  a result cannot be written where it was asked to go
 ├── Abandoned             4  the session ended before there was anything to calibrate
 ├── RefusedError          5  the calibration was refused, or failed its verification
@@ -82,6 +83,10 @@ class BusHeld(BusError):  # noqa: N818 - reads as the sentence it is
 
 class ChipError(SourceError):
     """The chip answers, but not as its register map says."""
+
+
+class OddOffsets(ChipError):  # noqa: N818 - reads as the sentence it is
+    """The accelerometer's offset registers answer in no known place, or as in no known one."""
 
 
 class OutputError(MpucalError):

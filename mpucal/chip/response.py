@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Vector
-from ..errors import ChipError
+from ..errors import ChipError, OddOffsets
 from .bench import Bench
 from .offsets import PLACES, Block, Place, difference, moved, restored
 from .port import Port
@@ -47,8 +47,8 @@ def measured_response(port: Port, bench: Bench, likely: Place = PLACES[0]) -> Re
 
     Raises
     ------
-    BusError : a transfer failed. ChipError : no place answers, one answers as no register map says, the board moves,
-        or the old words could not be restored.
+    BusError : a transfer failed. OddOffsets : no place answers, or one answers as no register map says.
+    ChipError : the board moves, or the old words could not be restored.
     """
     for place in sorted(PLACES, key=lambda place: place != likely):
         old = Block.read(port, place)
@@ -68,7 +68,7 @@ def measured_response(port: Port, bench: Bench, likely: Place = PLACES[0]) -> Re
         shift = during - (before + after) / 2
         if (np.abs(shift) > NOTHING_G).any():
             return _understood(place, shift / np.array(difference(probe.words, old.words)))
-    raise ChipError(
+    raise OddOffsets(
         "the accelerometer does not answer to its offset registers, neither at 0x77 nor at 0x06",
         "use the calibration's files: this chip cannot hold a correction",
     )
@@ -79,7 +79,7 @@ def _understood(place: Place, g_per_lsb: Vector) -> Response:
         if (np.abs(g_per_lsb * scale - 1) < TOLERANCE).all():
             return Response(place, scale, g_per_lsb)
     per_256 = ", ".join(f"{256_000 * value:+.0f}" for value in g_per_lsb)
-    raise ChipError(
+    raise OddOffsets(
         f"the offset registers at 0x{place[0]:02x} answer to 256 counts with {per_256} mg, where 125 or 62.5 are known",
         "use the calibration's files: a correction would land in the wrong place",
     )

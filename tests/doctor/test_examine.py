@@ -50,6 +50,7 @@ def test_the_true_rate_is_measured():
         ("noise=6", "accelerometer noise", Mark.BAD),
         ("noise=2", "gyroscope noise", Mark.NOTE),
         ("offsets=readonly", "offset registers", Mark.NOTE),
+        ("offsets=readonly", "genuine?", Mark.NOTE),
         ("b_omega=0.5/0/0", "zero rate", Mark.NOTE),
         ("b_a=0/0/3", "at rest", Mark.NOTE),
         ("temperature_c=90", "temperature", Mark.NOTE),

@@ -37,7 +37,7 @@ class Adapter:
     ----------
     bus : the chip's. address : where it answers. functions : what the adapter says that it can.
     bound : addresses that a driver of the kernel holds. pi : one read message at most, and that last.
-    fails : errno of every transfer from now on, 0: none. ioctls : how many were asked for, by request.
+    fails : errno of every transfer from now on, 0: none.
     """
 
     bus: Any
