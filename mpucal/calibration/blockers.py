@@ -91,8 +91,8 @@ def never_still(e: Evidence) -> Reason | None:
         first, last = e.recording.flat
         return Reason(
             "never_still",
-            f"the flat segment that was given, samples {first} to {last - 1}, is too short to tell the gyroscope's bias "
-            "and the noise; give a second or more of it, or leave it out, and it is looked for",
+            f"the flat segment that was given, samples {first} to {last - 1}, is too short to tell the gyroscope's "
+            "bias and the noise; give a second or more of it, or leave it out, and it is looked for",
             True,
         )
     if e.flat is None and e.turned_in_degrees:
