@@ -26,7 +26,9 @@ def judge(evidence: Evidence) -> Mapping[str, Any]:
     checks = CHECKS if evidence.fit is not None else (*BLOCKERS, *CHECKS)
     if no_gyroscope(evidence) is not None:
         checks = (no_gyroscope,)
-    reasons = [reason for check in checks if (reason := check(evidence)) is not None]
+    found = [reason for check in checks if (reason := check(evidence)) is not None]
+    # what refuses it comes before mere reservations
+    reasons = sorted(found, key=lambda reason: not reason.refuse)
     return MappingProxyType(
         {
             "verdict": REFUSED if any(r.refuse for r in reasons) else USABLE if reasons else GOOD,

@@ -231,7 +231,17 @@ def test_lost_samples_are_counted_and_mended(ideal, pick):
     result = judged(pick(simulated.recording, kept))
     assert result.verdict == "usable"
     assert "in 2 places (0.84 s in all)" in result.reasons["data_lost"]
-    assert "faster bus or a lower rate" in result.reasons["data_lost"]
+    assert "unless the measurement was interrupted there, use a faster bus" in result.reasons["data_lost"]
+
+
+def test_what_refuses_comes_before_reservations(ideal, pick):
+    recording = ideal(0).recording
+    kept = np.ones(len(recording), bool)
+    kept[700:710] = False
+    mirrored = replace(recording, acc=recording.acc * [1.0, 1.0, -1.0])
+    result = judged(pick(mirrored, kept))
+    assert result.verdict == "refused"
+    assert list(result.reasons) == ["left_handed", "data_lost"]
 
 
 def test_a_recording_that_is_mostly_lost_is_refused(good, pick):
