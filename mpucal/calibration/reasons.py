@@ -83,12 +83,12 @@ def data_lost(e: Evidence) -> Reason | None:
         return None
     places = int(np.count_nonzero(gaps & ~np.append(False, gaps[:-1])))
     lost = float(np.diff(e.recording.t, prepend=e.recording.t[0])[gaps].sum())
+    better = "a faster bus" if e.recording.autopilot is None else "a nearer or faster link"
     # a session that was resumed has a gap that no bus is to blame for
     return Reason(
         "data_lost",
         f"samples are missing in {places} place{'s' if places > 1 else ''} ({lost:.2f} s in all); unless the "
-        f"measurement was interrupted there, use {'a faster bus' if e.recording.autopilot is None else 'a nearer or faster link'} "
-        "or a lower rate",
+        f"measurement was interrupted there, use {better} or a lower rate",
         lost > 0.5 * float(e.recording.t[-1] - e.recording.t[0]),
     )
 
