@@ -88,6 +88,7 @@ def test_a_bus_that_fails_says_why_and_leaves_nothing(mpucal, tmp_path, monkeypa
         (["session", "--bus", "sim", "--rate", "3"], "take 3.90625 Hz"),
         (["record", "--bus", "sim", "--seconds", "0"], "--seconds"),
         (["record"], "no source was given"),
+        (["doctor", "--bus", ""], "no bus is named"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )

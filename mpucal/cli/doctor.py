@@ -48,7 +48,7 @@ def command(as_json: bool, seconds: float, **options: Any) -> int:
 def _findings(options: Mapping[str, Any], seconds: float) -> Iterator[Finding]:
     bus = options["bus"]
     if bus is not None and not bus.startswith("sim"):
-        yield from examine_host(f"/dev/i2c-{bus}" if bus.isdecimal() else bus)
+        yield from examine_host(bus)
     try:
         source = opened({**options, "gravity": STANDARD_GRAVITY_MPS2, "model": "auto"})
     except SourceError as error:

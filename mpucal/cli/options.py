@@ -57,6 +57,18 @@ class Integer(click.ParamType[int]):
             self.fail(f"{value!r} is no whole number.", param, ctx)
 
 
+class BusName(click.ParamType[str]):
+    """An adapter by its path or number, or the simulated chip; a number becomes the path."""
+
+    name = "text"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The path, or the words of the simulated chip."""
+        if not value:
+            self.fail("no bus is named: give /dev/i2c-N, or sim.", param, ctx)
+        return f"/dev/i2c-{value}" if value.isdecimal() else str(value)
+
+
 class Gravity(click.ParamType[float]):
     """A local gravity in m/s²."""
 
@@ -77,7 +89,12 @@ def source_options(command: F) -> F:
     """--bus, --serial, --mavlink or --replay, and how the sensor is set."""
     for option in reversed(
         (
-            click.option("--bus", metavar="BUS", help="/dev/i2c-N, or sim[:key=value,...] for the simulated chip."),
+            click.option(
+                "--bus",
+                metavar="BUS",
+                type=BusName(),
+                help="/dev/i2c-N or N, or sim[:key=value,...] for the simulated chip.",
+            ),
             click.option(
                 "--serial",
                 metavar="PORT[:BAUD]",

@@ -17,7 +17,7 @@ from ..errors import UsageError
 from ..result import Calibration
 from ..wire.blob import Blob
 from .merge import slope
-from .options import Integer
+from .options import BusName, Integer
 from .summary import formula, summary
 
 EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --json`, or `mpucal show --serial PORT`"
@@ -33,7 +33,9 @@ CALIBRATIONS = (".json", ".bin")
     flag_value="",
     help="What a board with the bridge's firmware stores, instead of a file.",
 )
-@click.option("--bus", metavar="BUS", help="What the chip on /dev/i2c-N, or sim, holds now; nothing is written.")
+@click.option(
+    "--bus", metavar="BUS", type=BusName(), help="What the chip on /dev/i2c-N, or sim, holds now; nothing is written."
+)
 @click.option("--mavlink", metavar="URL", help="What a vehicle's accelerometer parameters are; nothing is written.")
 @click.option("--address", type=Integer(), help="I2C address; by default 0x68, then 0x69.")
 @click.option("--system", metavar="N", type=click.IntRange(1, 255), help="Which vehicle, if several.")

@@ -49,8 +49,9 @@ def test_its_bias_goes_into_the_chip_and_out_again(guided):
     assert applied == pytest.approx(b_a, abs=0.006)
     if shutil.which("i2cget"):
         assert mocked.run("i2cget", "-y", "1", "0x68", "0x77", "w").out != before
-    back = mocked.mpucal("write", "board/chip-offsets.json", "chip", "--bus", NODE)
+    back = mocked.mpucal("write", "board/chip-offsets.json", "chip", "--bus", "1")
     assert back.code == 0, back.err
+    assert f"the chip on {NODE} " in back.out
     assert mocked.run("i2cget", "-y", "1", "0x68", "0x77", "w").out == before
 
 
