@@ -73,6 +73,8 @@ def accelerometer_unit(e: Evidence) -> Reason | None:
 
 def gyroscope_unit(e: Evidence) -> Reason | None:
     """Rates in deg/s or counts."""
+    if time_unit(e) is not None:  # by wrong times no rate fits how gravity turned
+        return None
     rate = float(np.quantile(np.abs(e.recording.gyr), 0.99))
     if rate <= np.deg2rad(FASTEST_GYRO_DPS) and not e.turned_in_degrees:
         return None

@@ -49,8 +49,15 @@ def moved_while_still(e: Evidence) -> Reason | None:
 
 def few_orientations(e: Evidence) -> Reason | None:
     """A direction that the data leave open."""
-    if e.sure is None or e.sure.rms_mps2 <= GOOD_RMS_MPS2:
+    if e.fit is None or (e.sure is not None and e.sure.rms_mps2 <= GOOD_RMS_MPS2):
         return None
+    if e.sure is None:
+        return Reason(
+            "few_orientations",
+            "the recording says so little that no direction can be calibrated by it; does its accelerometer follow the "
+            "board throughout? Rest it in ten orientations that differ",
+            True,
+        )
     worst, rms = e.sure.worst, e.sure.rms_mps2
     known = f"known to {rms:.2g} m/s^2 only" if rms < e.gravity else "not known at all"
     side = "".join(f" {'+' if w > 0 else '-'}{axis}" for axis, w in zip("xyz", worst, strict=True) if abs(w) > 0.4)
@@ -58,7 +65,7 @@ def few_orientations(e: Evidence) -> Reason | None:
         "few_orientations",
         f"a calibrated direction is {known}, worst with{side} up; rest it in more orientations, above all with{side} "
         "up, down and aslant",
-        rms > USABLE_RMS_MPS2,
+        not rms <= USABLE_RMS_MPS2,
     )
 
 

@@ -151,6 +151,11 @@ def test_times_that_are_no_seconds(good, unit):
     refused_for("units_suspect", replace(good, t=good.t * factor), f"in {name}seconds", "convert them to seconds")
 
 
+def test_times_that_are_no_seconds_speak_against_no_gyroscope(in_hand):
+    in_ms = replace(in_hand.recording, t=in_hand.recording.t * 1e3)
+    refused_for("units_suspect", in_ms, "in milliseconds")
+
+
 @pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
 def test_an_axis_that_is_stuck(good, axis):
     for code, sensor, name in (("inconsistent", "accelerometer", "acc"), ("gyro_off", "gyroscope", "gyr")):
@@ -435,6 +440,16 @@ def test_before_there_is_anything_to_judge_only_that_is_said(good):
     quality = judge(Evidence(good, G, None, None, "auto"))
     assert quality["verdict"] == "refused"
     assert [reason["code"] for reason in quality["reasons"]] == ["never_still"]
+
+
+@pytest.mark.parametrize(
+    "spoilt", [{"D": np.diag([1.0, 1.0, 0.0])}, {"covariance": np.full((27, 27), np.nan)}], ids=list
+)
+def test_an_estimate_of_which_nothing_is_sure_is_refused(in_hand, spoilt):
+    evidence, _ = weigh(in_hand.recording, "hand", G)
+    quality = judge(replace(evidence, fit=replace(evidence.fit, **spoilt)))
+    assert quality["verdict"] == "refused"
+    assert "few_orientations" in [reason["code"] for reason in quality["reasons"]]
 
 
 # ---- the traps of real recordings
