@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 FIRST = "capture.mcap"
@@ -10,6 +11,11 @@ FIRST = "capture.mcap"
 def capture_name(number: int) -> str:
     """Of the capture number 1, 2, ..."""
     return FIRST if number == 1 else f"capture-{number}.mcap"
+
+
+def is_part(name: str) -> bool:
+    """Whether a file of this name is a session's capture, which others may follow or precede."""
+    return re.fullmatch(r"capture(-\d+)?\.mcap", name) is not None
 
 
 def captures_in(folder: Path) -> list[Path]:

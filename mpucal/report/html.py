@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from .. import __version__
+from ..capture.parts import is_part
 from ..data import STANDARD_GRAVITY_MPS2, Recording
 from ..result import GOOD, REFUSED, USABLE, Calibration
 from .elements import as_float, code, heading, number, paragraph, quantity, section, table
@@ -88,8 +89,9 @@ def _how_sure(calibration: Calibration) -> list[str]:
     if calibration.verdict == REFUSED or not (math.isfinite(rms) and math.isfinite(direction)):
         return []
     mg = 1000.0 * rms / STANDARD_GRAVITY_MPS2
+    where = "over the tilts that it holds for" if calibration.fit.get("model") == "tilt" else "over all orientations"
     return [
-        f"A calibrated reading is off by {rms:.2g} m/s² ({mg:.2g} mg) rms over all orientations, and its direction"
+        f"A calibrated reading is off by {rms:.2g} m/s² ({mg:.2g} mg) rms {where}, and its direction"
         f" by {direction:.2g} deg."
     ]
 
@@ -163,10 +165,11 @@ def _reproduction(calibration: Calibration, recording: Recording | None) -> str:
     gravity, model = as_float(calibration.fit.get("gravity")), calibration.fit.get("model")
     if recording is None or model is None or not math.isfinite(gravity):
         return ""
-    name = PurePath(recording.name)
-    lines = [f"mpucal calibrate {name} --model {model} --gravity {gravity:.9g} -o again"]
-    if name.suffix in CAPTURES:
-        lines.append(f"mpucal session --replay {name} -o replayed")
+    # one file of a session that was resumed is not all that was recorded: its folder is
+    source = "." if is_part(recording.name) else recording.name
+    lines = [f"mpucal calibrate {source} --model {model} --gravity {gravity:.9g} -o again"]
+    if PurePath(recording.name).suffix in CAPTURES:
+        lines.append(f"mpucal session --replay {source} -o replayed")
     said = paragraph(
         "In the folder of this page. The first fits the recording again; the second runs the whole session again, "
         "prompt by prompt, where a session made it."

@@ -3,6 +3,7 @@
 import html
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -99,6 +100,19 @@ def test_it_says_how_to_fit_it_again(result):
     fit = result.document["fit"]
     assert commands[0] == f"mpucal calibrate mpu6050.mcap --model {fit['model']} --gravity {fit['gravity']} -o again"
     assert commands[1] == "mpucal session --replay mpu6050.mcap -o replayed"
+
+
+@pytest.mark.parametrize("name", ["capture.mcap", "capture-2.mcap"])
+def test_a_session_is_fitted_again_from_all_its_captures(result, name):
+    page = render(result.calibration, replace(result.recording, name=name))
+    assert "mpucal calibrate . --model" in page
+    assert "mpucal session --replay . -o replayed" in page
+
+
+def test_what_was_only_tilted_claims_its_tilts_alone(result):
+    document = {**result.document, "fit": {**result.document["fit"], "model": "tilt"}}
+    sentence = re.search(r'id="verdict">(.*?)</p>', render(Calibration.from_document(document)))[1]
+    assert "rms over the tilts that it holds for" in sentence
 
 
 def test_the_verification(result):
