@@ -29,7 +29,7 @@ class Prior:
 
     @classmethod
     def of(cls, **known: tuple[Vector | float, Vector | float]) -> Prior:
-        """Of keywords b_omega, K (its six), tau, r, each (mean, standard deviation)."""
+        """Of keys of PLACES (D row-major, K as its six), each (mean, standard deviation)."""
         mean, precision = np.zeros(len(NAMES)), np.zeros(len(NAMES))
         for name, (centre, sd) in known.items():
             place = slice(*PLACES[name])

@@ -17,6 +17,7 @@ GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.1, 0.4
 CONSISTENT_NIS = 5.0
 WORST_AXES_RAD = np.deg2rad(60.0)
 GYRO_SCALE_OFF, GYRO_CROSS_OFF = 0.06, 0.04
+MOST_GAIN = 2.5  # one way or the other; the paper simulates sensors of 0.5 to 1.5
 WARMER_C = 5.0
 RESTS_MPS2, RESTS_RAD = 0.08, np.deg2rad(1.5)
 HONEST_FACTOR = 5.0
@@ -120,6 +121,22 @@ def wrong_range(e: Evidence) -> Reason | None:
         "wrong_range",
         f"all three gains are near {2.0 ** power[0]:g}: the accelerometer's range is not the one assumed (or it is an "
         "early revision with half the sensitivity); give the true range",
+        True,
+    )
+
+
+def accelerometer_factor(e: Evidence) -> Reason | None:
+    """All three gains off by one factor that is no range's, and far beyond what a sensor is off by."""
+    if e.fit is None or not _trustworthy(e) or wrong_range(e) is not None:
+        return None
+    gains = np.linalg.norm(e.fit.D, axis=0)
+    factor = float(gains.mean())
+    if 1.0 / MOST_GAIN < factor < MOST_GAIN or not (np.abs(gains / factor - 1.0) < 0.05).all():
+        return None
+    return Reason(
+        "units_suspect",
+        f"all three gains are near {factor:.3g}, and no accelerometer is off by that: it seems to be in another unit "
+        "than m/s^2; convert it to m/s^2",
         True,
     )
 
@@ -279,6 +296,7 @@ CHECKS: tuple[Check, ...] = (
     clipped("accel_clipped", "accelerometer", "move more gently, or choose a larger range", lambda r: r.acc_clipped),
     data_lost,
     wrong_range,
+    accelerometer_factor,
     axes,
     gyro_off,
     temperature_moved,

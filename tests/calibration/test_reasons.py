@@ -311,6 +311,12 @@ def test_a_wrong_range_is_named(ideal, factor):
     assert judged(replace(recording, acc=recording.acc / factor)).verdict == "good", "the remedy helps"
 
 
+@pytest.mark.parametrize(("factor", "said"), [(3.28, "near 3.2"), (0.305, "near 0.3")], ids=str)
+def test_a_factor_that_is_no_range_is_named(ideal, factor, said):
+    recording = ideal(0).recording
+    refused_for("units_suspect", replace(recording, acc=recording.acc * factor), said, "convert it")
+
+
 @pytest.mark.parametrize(
     "gains", [(0.5, 1.0, 1.5), (0.5, 0.5, 0.6), (1.5, 1.5, 1.5), (0.54, 0.54, 0.54), (1.05, 0.95, 1.0)], ids=str
 )
