@@ -93,7 +93,7 @@ def _value(key: str, text: str) -> Any:
     try:
         return parse(text)
     except (ValueError, KeyError):
-        raise UsageError(f"{key}={text} is not {expected}", f"write {key}=VALUE with {expected}") from None
+        raise UsageError(f"{key}={text} is not {expected}", "correct it, or leave it out") from None
 
 
 def _fault(text: str) -> dict[str, float]:
