@@ -111,13 +111,17 @@ def _scaled(problem: Problem, factor: Vector) -> Problem:
     return replace(problem, series=replace(problem.series, q_scale=factor))
 
 
-def prior_of(flat: Flat) -> Prior:
-    """What is known beforehand: b_omega by the flat segment, K by a data sheet, tau and r by chips and hands."""
+def prior_of(flat: Flat, **more: tuple[Vector | float, Vector | float]) -> Prior:
+    """What is known beforehand: b_omega by the flat segment, K by a data sheet, tau and r by chips and hands.
+
+    more : of further parameters, as Prior.of takes them.
+    """
     return Prior.of(
         b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)),
         K=(K_MEAN, K_SD),
         tau=(0.0, DELAY_SD_S),
         r=(0.0, LEVER_SD_M),
+        **more,
     )
 
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Recording, Vector
-from .gyro import K_MEAN, K_SD
-from .hand import DELAY_SD_S, FARTHER, FIRST_MPS2, HONEST, LEVER_SD_M, PIVOT_MPS2, WHITE_MPS2, near
+from .hand import FARTHER, FIRST_MPS2, HONEST, PIVOT_MPS2, WHITE_MPS2, near, prior_of
 from .initialise import initialise
 from .likelihood import NAMES, Problem, Series, Theta, evaluate, trace, value
 from .minimise import Minimum, Prior, minimise
@@ -141,14 +140,7 @@ def _likeliest(scene: Scene, theta: Theta, sigmas: tuple[float, ...]) -> float:
 
 
 def _prior(flat: Flat) -> Prior:
-    return Prior.of(
-        D=(np.eye(3).ravel(), D_SD),
-        b_a=(0.0, B_A_SD_MPS2),
-        b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)),
-        K=(K_MEAN, K_SD),
-        tau=(0.0, DELAY_SD_S),
-        r=(0.0, LEVER_SD_M),
-    )
+    return prior_of(flat, D=(np.eye(3).ravel(), D_SD), b_a=(0.0, B_A_SD_MPS2))
 
 
 def _badness(H: Vector, wanted: Vector) -> float:

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import Recording, Vector
-from .gyro import K_MEAN, K_SD, KNOWN, at_prior
-from .hand import DELAY_SD_S, LEVER_SD_M, ROUGHLY, WHITE_MPS2
+from .gyro import KNOWN, at_prior
+from .hand import ROUGHLY, WHITE_MPS2, prior_of
 from .likelihood import NAMES, Problem, Theta, value
 from .minimise import Minimum, Prior, minimise
 from .model import B_A_NAMES, D_NAMES, Fit, Flat
@@ -52,14 +52,7 @@ def _white(scene: Scene, sigma: float) -> Problem:
 
 def _prior(flat: Flat) -> Prior:
     sd = np.where(np.eye(3) > 0, GAIN_SD, LEAN_SD).ravel()
-    return Prior.of(
-        D=(np.eye(3).ravel(), sd),
-        b_a=(0.0, BIAS_SD_MPS2),
-        b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)),
-        K=(K_MEAN, K_SD),
-        tau=(0.0, DELAY_SD_S),
-        r=(0.0, LEVER_SD_M),
-    )
+    return prior_of(flat, D=(np.eye(3).ravel(), sd), b_a=(0.0, BIAS_SD_MPS2))
 
 
 def _as_fit(minimum: Minimum) -> Fit:
