@@ -32,7 +32,7 @@ def load_csv(path: str | Path) -> Recording:
     try:
         header = [name.strip().lower() for name in next(rows, [])]
         places = places_of(header, path)
-        values = [numbers_of(row, places, len(header), rows.line_num, path) for row in rows if any(row)]
+        values = [numbers_of(row, places, len(header), rows.line_num, path) for row in rows if not is_empty(row)]
     except csv.Error as error:
         raise RecordingError(f"{path}: line {rows.line_num} is no line of a table ({error})", _REMEDY) from error
     if not values:
@@ -90,6 +90,11 @@ def places_of(header: list[str], path: Path) -> dict[str, int]:
     if twice:
         raise RecordingError(f"{path}: its first line names {', '.join(twice)} twice", _REMEDY)
     return {name: header.index(name) for name in wanted}
+
+
+def is_empty(row: list[str]) -> bool:
+    """Whether nothing is written in a row's cells."""
+    return not any(map(str.strip, row))
 
 
 def numbers_of(row: list[str], places: dict[str, int], width: int, line: int, path: Path) -> list[float]:

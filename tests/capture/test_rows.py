@@ -83,6 +83,60 @@ def test_a_table_comes_out_as_it_went_in(warm, tmp_path):
         np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
 
 
+@pytest.mark.parametrize("kind", [".csv", ".npz"])
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("acc", np.nan, "acc is not a finite number in sample 16484"),
+        ("gyr", -np.inf, "gyr is not a finite number in sample 16484"),
+        ("t", np.nan, "t is not a finite number in sample 16484"),
+        ("t", 0.0, "time does not increase at sample 16484"),
+    ],
+)
+def test_a_sample_that_is_none_is_named_and_leaves_no_file(kind, key, value, said, tmp_path):
+    arrays = {name: getattr(recording(), name).copy() for name in ("t", "acc", "gyr")}
+    arrays[key][ROWS + 100] = value
+    source = tmp_path / f"in{kind}"
+    if kind == ".npz":
+        np.savez(source, **arrays)
+    else:
+        table = np.column_stack([arrays["t"], arrays["acc"], arrays["gyr"]])
+        source.write_bytes(b"t,ax,ay,az,gx,gy,gz\n" + lines(table))
+    with pytest.raises(RecordingError, match=said):
+        through(source, tmp_path / "out.csv")
+    assert not (tmp_path / "out.csv").exists()
+
+
+def test_time_increases_from_run_to_run(tmp_path):
+    t = recording().t.copy()
+    t[ROWS] = t[ROWS - 1]
+    np.savez(tmp_path / "in.npz", t=t, acc=recording().acc, gyr=recording().gyr)
+    with pytest.raises(RecordingError, match=f"time does not increase at sample {ROWS}"):
+        through(tmp_path / "in.npz", tmp_path / "out.npz")
+
+
+def test_a_table_of_no_samples_is_no_recording(tmp_path):
+    (tmp_path / "in.csv").write_text("t,ax,ay,az,gx,gy,gz\n\n")
+    with pytest.raises(RecordingError, match="holds no samples"):
+        through(tmp_path / "in.csv", tmp_path / "out.csv")
+
+
+@pytest.mark.parametrize("more", [{"gap": (300, 2)}, {"acc_clipped": (7,)}, {"temperature_c": (300, 1)}])
+def test_an_array_of_another_shape_is_named(more, tmp_path):
+    some = recording(300)
+    arrays = {key: np.zeros(shape) for key, shape in more.items()}
+    np.savez(tmp_path / "in.npz", t=some.t, acc=some.acc, gyr=some.gyr, **arrays)
+    with pytest.raises(RecordingError, match=f"{next(iter(more))} has shape"):
+        through(tmp_path / "in.npz", tmp_path / "out.npz")
+
+
+@pytest.mark.parametrize("cell", ["0.1", '"0.1"'])
+def test_a_line_of_blanks_is_an_empty_one(cell, tmp_path):
+    path = tmp_path / "in.csv"
+    path.write_text(f"t,ax,ay,az,gx,gy,gz\n  \n0,{cell},0,9.8,0,0,0\n \t\n1,{cell},0,9.8,0,0,0\n  ")
+    assert sum(map(len, open_rows(path).runs)) == len(load(path)) == 2
+
+
 @settings(deadline=None)
 @given(hnp.arrays(float, st.tuples(st.integers(1, 4), st.integers(1, 3)), elements=st.floats(allow_subnormal=True)))
 def test_text_gives_back_each_number_that_there_is(table):

@@ -7,6 +7,8 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from ...data import Autopilot, Samples, Sensor
 from ...errors import OutputError, RecordingError
 
@@ -46,7 +48,7 @@ def open_rows(path: Path) -> Rows:
 
     Raises
     ------
-    RecordingError, CaptureError, ChipError : see load; a table's bad line when it is come to.
+    RecordingError, CaptureError, ChipError : see load; a table's bad line and an odd sample when they are come to.
     """
     if path.is_file() and path.suffix.lower() == ".csv":
         from .csv import csv_rows  # noqa: PLC0415 - each kind's own
@@ -103,6 +105,35 @@ def open_writer(path: Path, rows: Rows, done: str) -> AbstractContextManager[Wri
 
         return imu_file(path, done)
     raise OutputError(f"{path} ends with no kind of file that is written", f"end it with {', '.join(WRITERS)}")
+
+
+def checked(runs: Iterator[Samples], name: str) -> Iterator[Samples]:
+    """The runs, of which is asked what is asked of a Recording's samples.
+
+    Raises
+    ------
+    RecordingError : there are none; acc, gyr or t is not finite; time does not increase.
+    """
+    at, last = 0, -np.inf
+    for samples in runs:
+        for key, values in (("acc", samples.acc), ("gyr", samples.gyr), ("t", samples.t)):
+            finite = np.isfinite(values)
+            if not finite.all():
+                first = at + int(finite.reshape(len(samples), -1).all(axis=1).argmin())
+                raise RecordingError(
+                    f"{name}: {key} is not a finite number in sample {first}",
+                    "leave out what is no number, and keep the times of the others",
+                )
+        back = np.diff(samples.t, prepend=last) <= 0
+        if back.any():
+            raise RecordingError(
+                f"{name}: time does not increase at sample {at + int(back.argmax())}",
+                "sort the samples by time and drop repeated ones",
+            )
+        at, last = at + len(samples), samples.t[-1]
+        yield samples
+    if at == 0:
+        raise RecordingError(f"{name} holds no samples", "record it again")
 
 
 def cannot_read(path: Path, error: OSError) -> RecordingError:

@@ -13,8 +13,8 @@ import numpy as np
 from ...data import Samples, Vector
 from ...errors import RecordingError
 from ...files import whole_file
-from ..csv import COLUMNS, TEMPERATURE, numbers_of, places_of
-from . import Rows, Write, cannot_read
+from ..csv import COLUMNS, TEMPERATURE, is_empty, numbers_of, places_of
+from . import Rows, Write, cannot_read, checked
 from ._text import lines, numbers
 
 ALL = (*COLUMNS, TEMPERATURE)
@@ -41,7 +41,7 @@ def csv_rows(path: Path) -> Rows:
     except (UnicodeDecodeError, csv.Error) as error:
         raise RecordingError(f"{path} is no table of text ({error})", "give one whose first line is text") from error
     begin = len(begun) - len(text.removeprefix(first).encode())
-    return Rows(_runs(path, begin, header, places_of(header, path)), name=path.name)
+    return Rows(checked(_runs(path, begin, header, places_of(header, path)), path.name), name=path.name)
 
 
 def _runs(path: Path, begin: int, header: list[str], places: dict[str, int]) -> Iterator[Samples]:
@@ -72,7 +72,7 @@ def _odd(block: bytes, header: list[str], places: dict[str, int], line: int, pat
     except UnicodeDecodeError as error:
         raise RecordingError(f"{path} is no text from line {line} on", "record it again") from error
     rows = csv.reader(StringIO(text, newline=""))
-    values = [numbers_of(row, places, len(header), line + rows.line_num - 1, path) for row in rows if any(row)]
+    values = [numbers_of(row, places, len(header), line + rows.line_num - 1, path) for row in rows if not is_empty(row)]
     return np.array(values).reshape(-1, len(places))
 
 

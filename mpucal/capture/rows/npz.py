@@ -24,10 +24,11 @@ from ...data import Samples
 from ...errors import RecordingError
 from ...files import whole_file
 from ..npz import flat_of, load_npz, sensor_of
-from . import ROWS, Rows, Write, cannot_read
+from . import ROWS, Rows, Write, cannot_read, checked
 
 DONE = "done"
 SMALL = ("flat", "flat_samples", "sensor", DONE)
+TEMPERATURES = ("temperature_c", "temperature")
 MASKS = ("gap", "acc_clipped", "gyr_clipped")
 COPIED = 1 << 20
 
@@ -67,22 +68,26 @@ def npz_rows(path: Path) -> Rows:
         recording = load_npz(path)
         runs = (recording.part(first, first + ROWS) for first in range(0, len(recording), ROWS))
         return Rows(runs, recording.sensor, recording.flat, name=recording.name, done=done)
-    return Rows(_runs(path), sensor_of(small, path), flat_of(small, path), name=path.name, done=done)
+    return Rows(
+        checked(_runs(path), path.name), sensor_of(small, path), flat_of(small, path), name=path.name, done=done
+    )
 
 
 def _streamed(archive: zipfile.ZipFile) -> bool:
     """Whether its arrays lie there by rows, as they nearly always do; what is odd or wrong is load_npz's."""
     shapes = {}
-    for key in ("t", "acc", "gyr"):
+    for key in ("t", "acc", "gyr", *TEMPERATURES, *MASKS):
         if f"{key}.npy" not in archive.namelist():
-            return False
+            continue
         with archive.open(f"{key}.npy") as file:
             column = _Column(file)
-        if column.fortran or column.dtype.hasobject or column.dtype.kind not in "fiu":
+        if column.fortran or column.dtype.kind not in ("fiub" if key in MASKS else "fiu"):
             return False
         shapes[key] = column.shape
-    n = shapes["t"][0] if len(shapes["t"]) == 1 else -1
-    return n >= 2 and shapes["acc"] == shapes["gyr"] == (n, 3)
+    if not {"t", "acc", "gyr"} <= shapes.keys() or len(shapes["t"]) != 1:
+        return False
+    n = shapes["t"][0]
+    return n >= 2 and all(shape == ((n, 3) if key in ("acc", "gyr") else (n,)) for key, shape in shapes.items())
 
 
 def _runs(path: Path) -> Iterator[Samples]:
@@ -96,7 +101,7 @@ def _runs(path: Path) -> Iterator[Samples]:
                 return None if key is None else _Column(stack.enter_context(archive.open(f"{key}.npy")))
 
             t, acc, gyr = (_Column(stack.enter_context(archive.open(f"{key}.npy"))) for key in ("t", "acc", "gyr"))
-            warm, masks = column("temperature_c", "temperature"), [column(key) for key in MASKS]
+            warm, masks = column(*TEMPERATURES), [column(key) for key in MASKS]
             for first in range(0, t.shape[0], ROWS):
                 n = min(ROWS, t.shape[0] - first)
                 yield Samples(
