@@ -11,12 +11,14 @@ from typing import Any
 import click
 import numpy as np
 
+from ..capture import captures_of
 from ..capture.rows import Rows, open_rows, open_writer
 from ..capture.rows.csv import CsvText
 from ..correction import correction
 from ..data import Samples
 from ..errors import UsageError
 from ..result import Calibration
+from .options import check_not_among
 
 EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calibrated.mcap`"
 
@@ -39,8 +41,8 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool) -
     """
     if as_json and target is None:
         raise UsageError("--json was given without -o, and the samples go to stdout", "name a file with -o")
-    if target is not None and target.exists() and target.samefile(file):
-        raise UsageError(f"{target} is the recording itself", "name another file with -o")
+    if target is not None:
+        check_not_among(target, (calibration, file, *(captures_of(file) if file.is_dir() else ())))
     rows = open_rows(file)
     if rows.done:
         raise UsageError(f"{file} is calibrated already ({rows.done})", "give what was measured")

@@ -10,6 +10,7 @@ import click
 from ..export import FORMS, form
 from ..files import write_atomically
 from ..result import Calibration
+from .options import check_not_among
 
 EXAMPLE = "Example: `mpucal export board7/calibration.json --to c-header -o calibration.h`"
 
@@ -24,6 +25,8 @@ def command(calibration: Path, name: str, file: Path | None, as_json: bool) -> N
 
     Exit code 5: the calibration was refused; 6: the form cannot hold it.
     """
+    if file is not None:
+        check_not_among(file, [calibration])
     chosen = form(name)
     text, notes = chosen.export(Calibration.load(calibration))
     if file is not None:

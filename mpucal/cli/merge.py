@@ -9,6 +9,7 @@ import click
 from ..merge import merge
 from ..result import Calibration
 from ..sinks.file import BLOB, DOCUMENT, make_folder, save
+from .options import check_not_among
 from .summary import summary
 
 EXAMPLE = "Example: `mpucal merge cold/calibration.json warm/calibration.json hot/calibration.json -o merged`"
@@ -23,6 +24,9 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, as_json: bool) 
 
     Where they do not, it says why, and b_a is their mean. `mpucal apply`, the blob and mpucal_apply.h use b_a(T).
     """
+    if folder is not None:
+        for name in (BLOB, DOCUMENT):
+            check_not_among(folder / name, calibrations)
     made = merge([Calibration.load(path) for path in calibrations])
     if folder is not None:
         make_folder(folder)

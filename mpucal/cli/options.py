@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -268,3 +268,9 @@ def _was_given(context: click.Context, name: str) -> bool:
 
 def _spelled(name: str) -> str:
     return f"--{name.replace('_', '-')}"
+
+
+def check_not_among(target: Path, inputs: Iterable[Path]) -> None:
+    """A result never takes the place of what it was made of; UsageError where `target` is one of `inputs`."""
+    if target.exists() and any(given.exists() and target.samefile(given) for given in inputs):
+        raise UsageError(f"{target} is what was given to be read", "choose another name with -o")

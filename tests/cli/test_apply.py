@@ -1,6 +1,7 @@
 """`mpucal apply`: the formula on every kind of file, and no bias that is removed twice."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -133,6 +134,25 @@ def test_nothing_is_written_over_the_recording(mpucal, session, calibration):
     before = Path("in.npz").read_bytes()
     assert mpucal("apply", "c.json", "in.npz", "-o", "in.npz").code == 2
     assert Path("in.npz").read_bytes() == before
+
+
+def test_nothing_is_written_over_the_capture_in_the_folder(mpucal, session, calibration):
+    Path("board7").mkdir()
+    capture = Path(shutil.copy(session.folder / "capture.mcap", "board7"))
+    assert mpucal("apply", "c.json", "board7", "-o", capture).code == 2
+    assert capture.read_bytes() == (session.folder / "capture.mcap").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("export", "c.json", "--to", "c-header", "-o", "c.json"), ("merge", "calibration.json", "c.json", "-o", ".")],
+)
+def test_nothing_is_written_over_a_calibration_that_it_is_made_of(mpucal, calibration, words):
+    shutil.copy("c.json", "calibration.json")
+    before = Path("c.json").read_bytes()
+    result = mpucal(*words)
+    assert result.code == 2 and "was given to be read" in result.err
+    assert Path("c.json").read_bytes() == Path("calibration.json").read_bytes() == before
 
 
 @pytest.mark.parametrize(
