@@ -13,7 +13,9 @@ from .model import Fit
 DECREMENT = 1e-3  # g' H^-1 g / 2: 0.04 standard deviations from the optimum, whatever the units
 LAST = 30.0  # so near, a whole step leaves a thousandth of the decrement: nobody need look back
 MOST_ITERATIONS = 60
-FROZEN_SLACK = 1.0  # by how much V may rise in such a step
+# By how much V may rise in such a step; where the decrement falls to less than this share of it, the root is near, and
+# V, which then has its minimum elsewhere, says nothing.
+FROZEN_SLACK, NEAR_A_ROOT, SLACK_NEAR_A_ROOT = 1.0, 0.1, 200.0
 DAMPING, EASIER, HARDER, HOPELESS = 1e-3, 0.1, 8.0, 1e12
 
 
@@ -120,11 +122,17 @@ def minimise(
             break
         step[free] = -_solve(H + damping * np.diag(np.diag(H)), gradient)
         trial = _At(problem, at.theta.moved(step), parameters, prior)
-        if trial.V < at.V or (frozen and trial.decrement(free) < decrement and trial.V < at.V + FROZEN_SLACK):
+        if trial.V < at.V or (frozen and _nearer(trial, at, free, decrement)):
             at, damping, iterations = trial, damping * EASIER, iterations + 1
         else:
             damping *= HARDER
     return Minimum(at.theta, at.V, at.data.squares / max(len(problem.series), 1), at.H, free, iterations, converged)
+
+
+def _nearer(trial: _At, at: _At, free: Vector, decrement: float) -> bool:
+    """Whether a step came nearer to the root of frozen gains' gradient than the decrement before it."""
+    then, risen = trial.decrement(free), trial.V - at.V
+    return then < decrement and risen < (SLACK_NEAR_A_ROOT if then < NEAR_A_ROOT * decrement else FROZEN_SLACK)
 
 
 class _At:

@@ -7,7 +7,7 @@ import pytest
 
 from mpucal.calibration.initialise import initialise
 from mpucal.calibration.likelihood import Problem, Series, evaluate
-from mpucal.calibration.minimise import DECREMENT, PLACES, Prior, minimise
+from mpucal.calibration.minimise import DECREMENT, PLACES, Prior, _nearer, minimise
 from mpucal.calibration.stationary import flat_statistics
 from mpucal.simulation.scenarios import paper_scenario
 
@@ -118,3 +118,20 @@ def test_a_cost_that_overflows_is_turned_away_from(problem, start):
     minimum = minimise(absurd, start, ACCEL, NOTHING)
     assert not minimum.converged
     assert np.isfinite(minimum.theta.D).all()
+
+
+@pytest.mark.parametrize(
+    ("then", "risen", "accepted"),
+    [(5.0, 0.9, True), (5.0, 1.1, False), (0.9, 100.0, True), (0.9, 300.0, False), (11.0, 0.5, False)],
+)
+def test_a_step_of_frozen_gains_may_raise_V_where_it_all_but_ends_at_a_root(then, risen, accepted):  # noqa: N802
+    """Of a decrement of 10: a search that may not take such a step creeps beside the root for ever."""
+
+    class At:
+        def __init__(self, cost, decrement):
+            self.V, self._decrement = cost, decrement
+
+        def decrement(self, _free):
+            return self._decrement
+
+    assert _nearer(At(risen, then), At(0.0, 10.0), np.ones(1, bool), 10.0) == accepted
