@@ -16,7 +16,8 @@ BUG = 1
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 # Matrices are small here: a second thread would wait for the first, and take its core from who reads the sensor.
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-INTERRUPTED = "mpucal: interrupted; what was recorded until then is kept."
+# the commands whose capture is written as it happens
+RECORDING = ("session", "record")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -31,7 +32,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(arguments)
     except KeyboardInterrupt:
-        print(INTERRUPTED, file=sys.stderr)
+        words = sys.argv[1:] if arguments is None else arguments
+        kept = "; what was recorded until then is kept" if words and words[0] in RECORDING else ""
+        print(f"mpucal: interrupted{kept}.", file=sys.stderr)
         return Abandoned.exit_code
 
 

@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+KEPT = "; what was recorded until then is kept"
+
 PROGRAM = """
 import sys
 
@@ -15,14 +17,25 @@ class CtrlC:
 
 sys.meta_path.insert(0, CtrlC())
 from mpucal.__main__ import main
-main(["session", "--bus", "sim", "-o", {folder!r}])
+main({words!r})
 """
 
 
 @pytest.mark.parametrize("module", ["click", "mpucal.cli", "mpucal.cli.session", "numpy", "mpucal.runner"])
 def test_ctrl_c_while_python_imports_is_one_sentence(tmp_path, module):
-    program = PROGRAM.format(module=module, folder=str(tmp_path / "board"))
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-    assert done.stderr.lstrip() == "mpucal: interrupted; what was recorded until then is kept.\n"
+    done = interrupted(module, ["session", "--bus", "sim", "-o", str(tmp_path / "board")])
+    assert done.stderr.lstrip() == f"mpucal: interrupted{KEPT}.\n"
     assert done.returncode == 4
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_records_nothing_keeps_nothing(tmp_path):
+    done = interrupted("mpucal.cli.apply", ["apply", "calibration.json", "walk.csv", "-o", str(tmp_path / "out.csv")])
+    assert done.stderr.lstrip() == "mpucal: interrupted.\n"
+    assert done.returncode == 4
+
+
+def interrupted(module, words):
+    """A command that is interrupted where it first imports a module."""
+    program = PROGRAM.format(module=module, words=words)
+    return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

@@ -36,7 +36,7 @@ def export(calibration: Calibration) -> tuple[str, tuple[str, ...]]:
     gain = inverse(calibration)
     scale = np.linalg.norm(gain, axis=0)
     notes = (*_losses(calibration, why), *without_gyroscope(calibration), *without_temperature(calibration))
-    remarks = [f"# {line}" for line in (f"{head(calibration)}.", "# usage: sh FILE /sys/bus/iio/devices/iio:deviceN")]
+    remarks = [f"# {line}" for line in (f"{head(calibration)}.", "usage: sh FILE /sys/bus/iio/devices/iio:deviceN")]
     remarks += [f"# {note}" for note in notes]
     lines = ["#!/bin/sh", *remarks, "set -e", _DEVICE, _PUT]
     if words is not None:
