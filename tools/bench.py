@@ -37,6 +37,8 @@ from mpucal.simulation.scenarios import GRAVITY_MPS2, hand_scenario, paper_scena
 FLAT_S, TURNS = 10.0, 3
 # long enough for a loop's start not to count, and what the twins do in a second
 KERNEL_STEPS, TWIN_STEPS = 10_000, 300
+# a millisecond or two each: so many that a burst of other work does not make the median
+MORE_OF_A_KERNEL = 15
 ACCEL, IMU, HAND = 17, 23, 27
 GROWTH = (1_000, 10_000, 100_000, 1_000_000)
 HELP = "from mpucal.__main__ import run; run(['--help']); import sys; sys.stderr.write(str('numpy' in sys.modules))"
@@ -113,6 +115,7 @@ def cut(problem: Problem, steps: int) -> Problem:
 def kernel(runs: int) -> list[dict[str, Any]]:
     """Of one step of V, and of V with gradient and Fisher matrix, beside the NumPy twin."""
     problem, theta = problem_of(turned(60.0, 200.0))
+    runs *= MORE_OF_A_KERNEL
     rows = []
     for parameters, of in ((ACCEL, problem), (IMU, problem), (HAND, as_hand(problem))):
         long, short = cut(of, KERNEL_STEPS), cut(of, TWIN_STEPS)
