@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-import errno
-
 # next to nothing here: what takes a while to load does so where Ctrl-C finds its sentence
+import errno
 import os
 import sys
 from collections.abc import Sequence
 
 from .errors import Abandoned, MpucalError, OutputError
+from .threads import ONE_THREAD
 
 BUG = 1
 # of a full disk or quota behind stdout
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
-# Matrices are small here: a second thread would wait for the first, and take its core from who reads the sensor.
-THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 # the commands whose capture is written as it happens
 RECORDING = ("session", "record")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command, and leave with its exit code."""
-    for library in THREADS:
-        os.environ.setdefault(library, "1")
+    for variable, one in ONE_THREAD.items():
+        os.environ.setdefault(variable, one)
     sys.exit(run(arguments))
 
 

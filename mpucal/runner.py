@@ -75,8 +75,7 @@ class Runner:
         self._source, self._talk, self._note = source, talk, note
         self._plan = plan or Plan()
         self._listeners, self._go_on, self._late, self._hire = listeners, go_on, late, hire
-        plan = self._plan
-        self._machine = Machine(plan.until_end, plan.target, plan.tilt_only, plan.attended)
+        self._machine = Machine(self._plan.until_end, self._plan.target, self._plan.tilt_only, self._plan.attended)
         self._questions: Questions | None = None
         # what must not reach the machine before an answer that is late
         self._arrived: deque[Event] = deque()

@@ -85,7 +85,7 @@ def explaining(moves: list[Move], leverage: Vector | float = 0.0) -> Vector:
         estimate itself, knows of none; an honest one counts what is left.
     """
     z = np.array([0.5 * float(move.miss @ move.miss) / move.variance for move in moves])
-    left = max(float(np.sum(2.0 - leverage + np.zeros(len(moves)))), LEAST_LEFT)
+    left = max(float(np.sum(2.0 - np.broadcast_to(leverage, len(moves)))), LEAST_LEFT)
     nu, c = DEGREES_OF_FREEDOM, 1.0
     for _ in range(50):
         w = (nu + 2.0) / (nu + 2.0 * z / c)

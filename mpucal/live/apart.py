@@ -19,12 +19,11 @@ from ..data import Sensor
 from ..errors import Abandoned
 from ..session.events import Event
 from ..session.plan import Plan
+from ..threads import ONE_THREAD
 from .fits import Fits, Task
 
 # the reading loop goes first
 NICER = 5
-# a second thread would take the reading loop's core, and there is nothing in a fit for it to do
-ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 class Apart:
