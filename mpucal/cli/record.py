@@ -32,5 +32,9 @@ def command(file: Path | None, seconds: float | None, **options: Any) -> None:
     if file.exists():
         raise OutputError(f"{file} is there already", "choose another file with -o")
     with running(source, file, console(quiet=False)) as runner:
-        samples = runner.record(seconds)
+        try:
+            samples = runner.record(seconds)
+        finally:
+            if runner.sensor is None:  # it never answered: nothing may stand in the way of the next try
+                file.unlink(missing_ok=True)
     click.echo(f"{file}: {samples} samples.")

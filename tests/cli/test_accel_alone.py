@@ -92,3 +92,12 @@ def test_the_filter_is_chosen(mpucal, tmp_path):
     assert mpucal("record", "--bus", "sim", "--dlpf", "6", "--seconds", "0.2", "-o", "slow.mcap").code == 0
     assert mpucal("record", "--bus", "sim", "--dlpf", "7").code == 2
     assert mpucal("record", "--bus", "sim:chip=mpu6500", "--dlpf", "0", "-o", "wide.mcap").code == 3
+
+
+def test_a_chip_that_refuses_leaves_no_file_in_the_way_of_the_next_try(mpucal, tmp_path):
+    slow = ("record", "--bus", "sim:chip=mpu6050,hand=still", "--seconds", "0.1", "-o", "a.mcap")
+    refused = mpucal(*slow, "--rate", "4000")
+    assert refused.code == 3
+    assert "--rate 1000 or less" in refused.err
+    assert list(tmp_path.iterdir()) == []
+    assert mpucal(*slow, "--rate", "1000").code == 0
