@@ -14,20 +14,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .calibration import calibrate
-    from .capture import load
     from .data import Recording
     from .errors import MpucalError
-    from .result import Calibration
+    from .files import load
+    from .result.calibration import Calibration
 
 __all__ = ["Calibration", "MpucalError", "Recording", "calibrate", "load"]
 __version__ = "0.1.0"
 
 _HOME = {
-    "Calibration": ".result",
+    "Calibration": ".result.calibration",
     "MpucalError": ".errors",
     "Recording": ".data",
     "calibrate": ".calibration",
-    "load": ".capture",
+    "load": ".files",
 }
 
 

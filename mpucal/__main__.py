@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 
 from .errors import Abandoned, MpucalError, OutputError
-from .threads import ONE_THREAD
+from .session.threads import ONE_THREAD
 
 BUG = 1
 # of a full disk or quota behind stdout

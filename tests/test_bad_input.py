@@ -11,12 +11,12 @@ import pytest
 import smbus2
 
 from mpucal.__main__ import run
-from mpucal.capture.mcap import read_capture
 from mpucal.chip.driver import Driver
 from mpucal.cli import session as command
+from mpucal.files.mcap import read_capture
+from mpucal.session import results as sink
 from mpucal.session.lay_flat import LayFlat
 from mpucal.session.rotate import Rotate
-from mpucal.sinks import file as sink
 
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "sessions" / "mpu6500.mcap"
 INSTALLED = Path(sys.executable).parent / "mpucal"

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from mpucal.bus.simulated.faults import KINDS, Fault
+from mpucal.simulated.chip.faults import KINDS, Fault
 
 TOOLS = Path(__file__).parents[1] / "tools"
 PAIRS = list(combinations_with_replacement(KINDS, 2))

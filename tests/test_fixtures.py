@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpucal.bus.records import SessionEvent
-from mpucal.capture.mcap import read_capture
 from mpucal.chip.driver import DRIVER_VERSION
+from mpucal.chip.records import SessionEvent
+from mpucal.files.mcap import read_capture
 
 PROJECT = Path(__file__).parents[1]
 FIXTURES = PROJECT / "fixtures"
@@ -44,9 +44,8 @@ def test_the_tool_makes_them(tmp_path):
     files = sorted(path.relative_to(FIXTURES) for path in FIXTURES.glob("*/*"))
     assert files == sorted(path.relative_to(tmp_path) for path in tmp_path.glob("*/*"))
     for path in files:
-        if path.parent.name == "vectors":
-            assert (tmp_path / path).read_bytes() == (FIXTURES / path).read_bytes()
-        elif path.suffix == ".json":
+        # the vectors have a test of their own
+        if path.parent.name != "vectors" and path.suffix == ".json":
             # another machine's sines may move a count by one
             made, stored = (json.loads((folder / path).read_text()) for folder in (tmp_path, FIXTURES))
             if path.parent.name == "faults":

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 import mpucal
-from mpucal.bus.simulated.options import PARSERS
 from mpucal.calibration import MODELS
 from mpucal.cli import commands
+from mpucal.simulated.chip.options import PARSERS
 
 PROJECT = Path(__file__).parents[1]
 README = (PROJECT / "README.md").read_text()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mpucal.__main__ import run
-from mpucal.capture.mcap import read_capture
+from mpucal.files.mcap import read_capture
 
 SESSIONS = Path(__file__).parents[1] / "fixtures" / "sessions"
 NAMES = sorted(path.stem for path in SESSIONS.glob("*.mcap"))

@@ -18,12 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
-from mpucal.capture.mcap import CaptureWriter, read_capture
-from mpucal.capture.rows import ROWS, Rows, open_writer
 from mpucal.chip import registers as reg
 from mpucal.chip.access import Transaction
 from mpucal.data import Samples
-from mpucal.result import Calibration
+from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.files.rows import ROWS, Rows, open_writer
+from mpucal.result.calibration import Calibration
 
 # t, acc, gyr and temperature as float64, and three masks
 BYTES = 8 * 8 + 3

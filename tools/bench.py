@@ -32,7 +32,7 @@ from mpucal.calibration.reference import evaluate_reference
 from mpucal.calibration.stationary import flat_statistics
 from mpucal.data import Recording
 from mpucal.kernel import _kernel
-from mpucal.simulation.scenarios import GRAVITY_MPS2, hand_scenario, paper_scenario
+from mpucal.simulated.study.scenarios import GRAVITY_MPS2, hand_scenario, paper_scenario
 
 FLAT_S, TURNS = 10.0, 3
 # long enough for a loop's start not to count, and what the twins do in a second

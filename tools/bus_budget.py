@@ -16,18 +16,18 @@ from pathlib import Path
 
 import numpy as np
 
-from mpucal.bus.simulated.bus import SimulatedBus
-from mpucal.bus.simulated.chip import Chip
-from mpucal.bus.simulated.clock import FastClock
-from mpucal.bus.simulated.factory import Factory
-from mpucal.bus.simulated.models import MODELS
-from mpucal.bus.simulated.sensor import Counts, Setting
-from mpucal.bus.tap import Tap
-from mpucal.capture.mcap import read_capture
 from mpucal.chip.access import Transaction
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.data import Recording, Vector
+from mpucal.files.mcap import read_capture
+from mpucal.simulated.chip.bus import SimulatedBus
+from mpucal.simulated.chip.chip import Chip
+from mpucal.simulated.chip.clock import FastClock
+from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.sensor import Counts, Setting
+from mpucal.sources.tap import Tap
 
 BUS_HZ = 400_000
 READ_BITS, WRITE_BITS, BYTE_BITS = 30, 20, 9

@@ -23,8 +23,8 @@ from tables import number
 import mpucal
 from mpucal.calibration.model import rotation
 from mpucal.data import Recording
-from mpucal.simulation.metrics import sph_rms
-from mpucal.simulation.scenarios import GRAVITY_MPS2, MOTIONS, hand_scenario
+from mpucal.simulated.study.metrics import sph_rms
+from mpucal.simulated.study.scenarios import GRAVITY_MPS2, MOTIONS, hand_scenario
 
 # (what changes, by how much: deg, m/s^2, deg/s), about a random axis
 CHANGES = (("nothing", 0.0), ("mount", 4.0), ("accelerometer", 0.5), ("accelerometer", 1.0), ("gyroscope", 3.0))

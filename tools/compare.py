@@ -28,8 +28,8 @@ from tables import number
 import mpucal
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from mpucal.errors import MpucalError
-from mpucal.simulation.metrics import sph_rms
-from mpucal.simulation.scenarios import GRAVITY_MPS2, MOTIONS, Truth, hand_scenario
+from mpucal.simulated.study.metrics import sph_rms
+from mpucal.simulated.study.scenarios import GRAVITY_MPS2, MOTIONS, Truth, hand_scenario
 
 RAW, AUTO = "uncalibrated", "mpucal auto"
 # section 4.1, Galaxy S5, ||g|| = 9.82: mean and sd of the magnitude after calibration; nothing is printed of before

@@ -32,9 +32,9 @@ from mpucal.calibration.stationary import find_flat, flat_statistics
 from mpucal.calibration.still import still_runs
 from mpucal.data import Recording, Vector
 from mpucal.errors import RecordingError
-from mpucal.simulation.metrics import sph_rms, tilt_errors_deg
-from mpucal.simulation.scenarios import Truth
-from mpucal.simulation.sensors import misaligned, non_orthogonality
+from mpucal.simulated.study.metrics import sph_rms, tilt_errors_deg
+from mpucal.simulated.study.scenarios import Truth
+from mpucal.simulated.study.sensors import misaligned, non_orthogonality
 
 GAIN, SKEW_RAD, MISALIGNMENT_RAD, BIAS_MPS2 = 0.1, np.radians(5.0), np.radians(3.0), 1.0
 GOALS = {"sph_rms": 0.094, "roll_deg": 0.47, "pitch_deg": 0.22}

@@ -25,16 +25,16 @@ from pathlib import Path
 import numpy as np
 
 from mpucal.__main__ import run
-from mpucal.bus.simulated import open_simulated
-from mpucal.bus.simulated.faults import KINDS, Fault
 from mpucal.calibration import calibrate
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import RefusedError, SourceError
-from mpucal.result import REFUSED
-from mpucal.runner import Runner
+from mpucal.result.calibration import REFUSED
 from mpucal.session.events import Key
 from mpucal.session.plan import Plan
+from mpucal.session.runner import Runner
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip.faults import KINDS, Fault
 
 # what is true may lie so many promised standard deviations away; nobody promises less than 1e-4
 FARTHEST = 6.0

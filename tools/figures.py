@@ -22,8 +22,8 @@ from tables import efficiency
 
 import mpucal
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Vector
-from mpucal.simulation.motions import FLAT_S
-from mpucal.simulation.scenarios import GRAVITY_MPS2, hand_scenario, paper_scenario
+from mpucal.simulated.study.motions import FLAT_S
+from mpucal.simulated.study.scenarios import GRAVITY_MPS2, hand_scenario, paper_scenario
 
 BEFORE, AFTER, INK, FAINT = "#c8503c", "#2b6cb0", "#333333", "#b8b8b8"
 STYLE = {

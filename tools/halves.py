@@ -30,8 +30,8 @@ from mpucal.calibration.stationary import find_flat, flat_statistics
 from mpucal.calibration.still import still_runs
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from mpucal.errors import MpucalError, RecordingError
-from mpucal.simulation.scenarios import GRAVITY_MPS2, MOTIONS, Simulated, hand_scenario, paper_scenario
-from mpucal.simulation.sensors import hand_sensor, paper_sensor
+from mpucal.simulated.study.scenarios import GRAVITY_MPS2, MOTIONS, Simulated, hand_scenario, paper_scenario
+from mpucal.simulated.study.sensors import hand_sensor, paper_sensor
 
 # of 12 parameters each: what an honest claim gives, and what is wanted of the median and of the worst
 MEDIAN, WORST = (0.7, 1.3), 2.0

@@ -20,12 +20,12 @@ from pathlib import Path
 
 import numpy as np
 
-from mpucal.bus.records import SessionEvent
 from mpucal.calibration import calibrate
-from mpucal.capture import load
-from mpucal.capture.mcap import CaptureWriter, read_capture
-from mpucal.capture.parts import captures_in
-from mpucal.result import Calibration
+from mpucal.chip.records import SessionEvent
+from mpucal.files import load
+from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.files.parts import captures_in
+from mpucal.result.calibration import Calibration
 
 LONGEST_LOST_S = 1.0
 

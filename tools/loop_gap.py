@@ -22,20 +22,20 @@ from pathlib import Path
 
 import numpy as np
 
-from mpucal.bus.simulated import open_simulated
-from mpucal.bus.tap import Tap
-from mpucal.capture.mcap import CaptureWriter
 from mpucal.chip import registers as reg
 from mpucal.chip.access import Bus, EndOfCapture, Reply
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.data import Sensor
-from mpucal.live.apart import Apart
-from mpucal.live.fits import Task
-from mpucal.live.questions import Here, Worker
-from mpucal.runner import Runner
+from mpucal.files.mcap import CaptureWriter
 from mpucal.session.events import Event, Key, Output
+from mpucal.session.live.apart import Apart
+from mpucal.session.live.fits import Task
+from mpucal.session.live.questions import Here, Worker
 from mpucal.session.plan import Plan
+from mpucal.session.runner import Runner
+from mpucal.simulated.chip import open_simulated
+from mpucal.sources.tap import Tap
 
 FIFO_FRAMES = 512 // reg.FRAME_BYTES
 

@@ -19,17 +19,17 @@ from pathlib import Path
 
 import numpy as np
 
-from mpucal.bus.simulated import open_recorded
-from mpucal.capture import load
-from mpucal.capture.npz import load_npz
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
-from mpucal.cli.on_bus import OnBus
 from mpucal.cli.running import running
-from mpucal.console import console
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from mpucal.errors import Abandoned, MpucalError, OutputError, RecordingError
+from mpucal.files import load
+from mpucal.files.npz import load_npz
 from mpucal.session.plan import Plan
+from mpucal.simulated.chip import open_recorded
+from mpucal.sources.on_chip import OnBus
+from mpucal.terminal.console import console
 
 # a count of the recording is one of the chip's where they differ by less than this
 SAME_SCALE = 0.01

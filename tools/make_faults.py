@@ -11,16 +11,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from mpucal.bus.simulated import open_simulated
-from mpucal.bus.simulated.faults import KINDS
-from mpucal.bus.tap import Tap
-from mpucal.capture.mcap import CaptureWriter
 from mpucal.chip.access import Bus, EndOfCapture
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.data import Recording
 from mpucal.errors import SourceError
+from mpucal.files.mcap import CaptureWriter
 from mpucal.session.plan import Plan
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip.faults import KINDS
+from mpucal.sources.tap import Tap
 
 FOLDER = Path(__file__).parent.parent / "fixtures" / "faults"
 PLAN = Plan(Config(rate_hz=50))

@@ -20,12 +20,12 @@ from typing import Any
 import make_faults
 import make_vectors
 
-from mpucal.bus.records import SessionEvent
 from mpucal.calibration import calibrate
-from mpucal.capture.mcap import CaptureWriter, read_capture
 from mpucal.chip.config import Config
+from mpucal.chip.records import SessionEvent
 from mpucal.cli.running import running
 from mpucal.cli.source import open_bus
+from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.session.events import Key, Output, Progress
 from mpucal.session.plan import Plan
 from mpucal.terminal.keys import Keys

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from mpucal.wire import messages as wire
-from mpucal.wire.blob import Blob
-from mpucal.wire.frame import Frame, stuff
+from mpucal.result.blob import Blob
+from mpucal.sources.bridge import messages as wire
+from mpucal.sources.bridge.frame import Frame, stuff
 
 FOLDER = Path(__file__).parent.parent / "fixtures" / "vectors"
 

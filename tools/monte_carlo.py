@@ -42,9 +42,9 @@ from mpucal.calibration.paper import fit_paper
 from mpucal.calibration.stationary import flat_statistics
 from mpucal.data import Vector
 from mpucal.errors import MpucalError
-from mpucal.simulation.metrics import sph_rms, tilt_errors_deg
-from mpucal.simulation.scenarios import GRAVITY_MPS2, MOTIONS, Simulated, hand_scenario, paper_scenario
-from mpucal.simulation.sensors import paper_sensor
+from mpucal.simulated.study.metrics import sph_rms, tilt_errors_deg
+from mpucal.simulated.study.scenarios import GRAVITY_MPS2, MOTIONS, Simulated, hand_scenario, paper_scenario
+from mpucal.simulated.study.sensors import paper_sensor
 
 # on data that conform to the model NIS is 3, and tens where the fit ended in a wrong optimum
 NIS_WRONG = 10.0

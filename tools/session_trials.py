@@ -24,14 +24,14 @@ from typing import Any
 
 import numpy as np
 
-from mpucal.bus.simulated import open_simulated
 from mpucal.calibration import calibrate
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import Abandoned
-from mpucal.runner import Runner
 from mpucal.session.events import Caution, Decision, Key, Knowledge, Meter, Output, Prompt, PromptKind, Verification
 from mpucal.session.plan import Plan
+from mpucal.session.runner import Runner
+from mpucal.simulated.chip import open_simulated
 
 # what changes while the board is turned is seen by what was turned, or by what verifies it
 CHANGED = "inconsistent", "verification_failed"

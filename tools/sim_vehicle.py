@@ -31,9 +31,9 @@ from typing import NoReturn
 from mpucal.errors import MpucalError, UsageError
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.signing import read_key
-from mpucal.mavlink.simulated import Options, Vehicle
-from mpucal.mavlink.simulated.line import Line
-from mpucal.mavlink.simulated.ports import Port, PtyPort, TcpPort, UdpPort
+from mpucal.simulated.vehicle import Options, Vehicle
+from mpucal.simulated.vehicle.line import Line
+from mpucal.simulated.vehicle.ports import Port, PtyPort, TcpPort, UdpPort
 
 STEP_S = 0.002
 STRANGER_US = 20_000

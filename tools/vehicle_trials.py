@@ -27,10 +27,10 @@ from mpucal.mavlink.lines import open_transport
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.names import place
 from mpucal.mavlink.shaping import read_shaping
-from mpucal.mavlink.simulated import Options, Vehicle
 from mpucal.mavlink.source import one_of
 from mpucal.mavlink.truth import ARDUPILOT, PX4
 from mpucal.mavlink.url import parse_url
+from mpucal.simulated.vehicle import Options, Vehicle
 
 HERE = Path(__file__).parent
 MPUCAL = Path(sys.executable).parent / "mpucal"

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import UsageError
-from ..result import Calibration, unknown
+from ..result.calibration import Calibration, unknown
 from .blockers import BLOCKERS, no_gyroscope
 from .estimate import METHODS, Choice, choose
 from .evidence import Evidence

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..data import Vector
-from ..result import GOOD, REFUSED, USABLE
+from ..result.calibration import GOOD, REFUSED, USABLE
 from .blockers import BLOCKERS, no_gyroscope
 from .evidence import Evidence
 from .reasons import CHECKS

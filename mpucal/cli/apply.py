@@ -11,13 +11,13 @@ from typing import Any
 import click
 import numpy as np
 
-from ..capture import captures_of
-from ..capture.rows import Rows, open_rows, open_writer
-from ..capture.rows.csv import CsvText
-from ..correction import correction
 from ..data import Samples
 from ..errors import UsageError
-from ..result import Calibration
+from ..files import captures_of
+from ..files.rows import Rows, open_rows, open_writer
+from ..files.rows.csv import CsvText
+from ..result.calibration import Calibration
+from ..result.correction import correction
 from .options import check_not_among
 
 EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calibrated.mcap`"

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
-from ..capture import load
 from ..errors import RefusedError
+from ..files import load
 from ..mavlink.calibrate import calibrate_vehicle
-from ..result import REFUSED
-from ..sinks.file import BLOB, make_folder, result_files, save
+from ..result.calibration import REFUSED
+from ..session.results import BLOB, make_folder, result_files, save
 from .options import fit_options
 from .summary import summary, written
 

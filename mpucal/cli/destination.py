@@ -13,8 +13,8 @@ import click
 
 from ..data import Recording
 from ..errors import KeepsNothing, SourceError, UsageError, WriteBackError
-from ..result import REFUSED, Calibration
-from ..sinks.file import DOCUMENT, result_files, save
+from ..result.calibration import REFUSED, Calibration
+from ..session.results import DOCUMENT, result_files, save
 from ..sinks.sink import Applied
 from .options import SOURCES
 from .write import TARGETS

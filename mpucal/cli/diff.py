@@ -9,9 +9,9 @@ from typing import Any
 
 import click
 
-from ..comparison import CONFIDENCE, Comparison, Difference, compare
 from ..report.units import with_std
-from ..result import Calibration
+from ..result.calibration import Calibration
+from ..result.comparison import CONFIDENCE, Comparison, Difference, compare
 
 EXAMPLE = "Example: `mpucal diff board7/calibration.json board7-today/calibration.json`"
 

@@ -17,8 +17,8 @@ from ..doctor.host import examine_host
 from ..doctor.page import document, text
 from ..doctor.speed import examine_speed
 from ..errors import SourceError, UsageError
+from ..sources.on_chip import OnBus
 from .at_rest import put_down
-from .on_bus import OnBus
 from .options import check_gyroscope, check_source, source_options
 from .source import opened
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import click
 
 from ..export import FORMS, form
-from ..files import write_atomically
-from ..result import Calibration
+from ..result.atomic import write_atomically
+from ..result.calibration import Calibration
 from .options import check_not_among
 
 EXAMPLE = "Example: `mpucal export board7/calibration.json --to c-header -o calibration.h`"

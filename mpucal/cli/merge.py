@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from ..merge import merge
-from ..result import Calibration
-from ..sinks.file import BLOB, DOCUMENT, make_folder, save
+from ..result.calibration import Calibration
+from ..result.merge import merge
+from ..session.results import BLOB, DOCUMENT, make_folder, save
 from .options import check_not_among
 from .summary import summary
 

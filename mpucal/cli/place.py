@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..capture.parts import captures_in
 from ..errors import OutputError
-from ..sinks.file import make_folder
+from ..files.parts import captures_in
+from ..session.results import make_folder
 from .running import stamp
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from ..console import console
 from ..errors import OutputError
+from ..terminal.console import console
 from .options import check_source, fit_options, source_options
 from .running import running, stamp
 from .source import opened

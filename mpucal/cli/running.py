@@ -7,11 +7,11 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
-from ..console import Console
-from ..live.apart import Apart
-from ..live.questions import Here
-from ..runner import Runner
-from .opened import Opened
+from ..session.live.apart import Apart
+from ..session.live.questions import Here
+from ..session.runner import Runner
+from ..sources.opened import Opened
+from ..terminal.console import Console
 
 
 @contextmanager

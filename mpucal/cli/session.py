@@ -10,16 +10,16 @@ from typing import Any
 
 import click
 
-from ..console import console
 from ..data import Recording
 from ..errors import RefusedError
 from ..mavlink.calibrate import calibrate_vehicle
-from ..result import REFUSED, Calibration
-from ..runner import Runner
+from ..result.calibration import REFUSED, Calibration
+from ..session.runner import Runner
 from ..sinks.sink import Applied
+from ..sources.opened import Opened
+from ..sources.resumed import open_resumed
+from ..terminal.console import console
 from .destination import destinations, recorder, said, sink_options, written_back
-from .on_parts import open_resumed
-from .opened import Opened
 from .options import aim_options, check_gyroscope, check_resumed, check_source, fit_options, source_name, source_options
 from .place import Place
 from .running import running

@@ -10,12 +10,12 @@ import click
 import numpy as np
 
 from ..calibration.stationary import find_flat
-from ..capture import load
-from ..capture.dataflash import is_dataflash
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Sensor
 from ..errors import UsageError
-from ..result import Calibration
-from ..wire.blob import Blob
+from ..files import load
+from ..files.dataflash import is_dataflash
+from ..result.blob import Blob
+from ..result.calibration import Calibration
 from .merge import slope
 from .options import BusName, Integer
 from .summary import formula, summary
@@ -82,7 +82,7 @@ def _show_recording(file: Path, as_json: bool) -> None:
 
 def _stored(port: str) -> tuple[str, Calibration]:
     """What the bridge on `port` stores, and where that is, in words."""
-    from ..bus.bridge import open_store  # noqa: PLC0415 - a file needs no serial port
+    from ..sources.bridge import open_store  # noqa: PLC0415 - a file needs no serial port
 
     with open_store(port) as store:
         number, blob = store.take()

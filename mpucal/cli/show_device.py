@@ -17,7 +17,7 @@ from ..chip.port import Port
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import UsageError
 from ..session.plan import Plan
-from .on_bus import OnBus
+from ..sources.on_chip import OnBus
 from .source import open_bus, open_vehicle
 
 # the accelerometer's six bytes, then the thermometer's two
@@ -70,7 +70,7 @@ def of_vehicle(text: str, system: int | None) -> dict[str, Any]:
     """
     from ..mavlink.shaping import read_shaping  # noqa: PLC0415 - pymavlink is slow to load
     from ..mavlink.truth import ARDUPILOT, PX4  # noqa: PLC0415
-    from .on_link import OnLink  # noqa: PLC0415
+    from ..sources.on_vehicle import OnLink  # noqa: PLC0415
 
     source = open_vehicle(text, Plan(), system, None)
     if not isinstance(source, OnLink):

@@ -9,17 +9,17 @@ from typing import Any
 
 import click
 
-from ..bus.i2c import I2cBus
-from ..bus.parts import PartsBus, parts_of
-from ..bus.replay import ReplayBus
-from ..bus.simulated import open_simulated
-from ..capture.mcap import read_capture
-from ..capture.parts import captures_in
 from ..chip.config import Config
 from ..errors import UsageError
+from ..files.mcap import read_capture
+from ..files.parts import captures_in
 from ..session.plan import Plan
-from .on_bus import OnBus
-from .opened import Opened
+from ..simulated.chip import open_simulated
+from ..sources.i2c import I2cBus
+from ..sources.on_chip import OnBus
+from ..sources.opened import Opened
+from ..sources.parts import PartsBus, parts_of
+from ..sources.replay import ReplayBus
 from .options import SIMULATED, TLOG, refuse_fixed
 
 
@@ -50,7 +50,7 @@ def open_serial(text: str, plan: Plan, address: int | None, seed: int | None) ->
     UsageError : no port was named. BusError : no such port, no permission, or no bridge on it.
     """
     # pyserial is of no use to a chip on another bus
-    from ..bus.bridge import open_bridge  # noqa: PLC0415
+    from ..sources.bridge import open_bridge  # noqa: PLC0415
 
     if seed is not None:
         raise UsageError("--seed chooses a simulated sensor, and --serial names a real one", "leave it out")
@@ -100,7 +100,7 @@ def open_vehicle(text: str, plan: Plan, system: int | None, key: Path | None) ->
     from ..mavlink.lines import open_transport  # noqa: PLC0415
     from ..mavlink.signing import read_key  # noqa: PLC0415
     from ..mavlink.url import parse_url  # noqa: PLC0415
-    from .on_link import OnLink  # noqa: PLC0415
+    from ..sources.on_vehicle import OnLink  # noqa: PLC0415
 
     signing_key = None if key is None else read_key(key)
     if text == SIMULATED or text.startswith(SIMULATED + ":"):
@@ -110,9 +110,9 @@ def open_vehicle(text: str, plan: Plan, system: int | None, key: Path | None) ->
 
 
 def _simulated_vehicle(text: str, plan: Plan, system: int | None, key: bytes | None) -> Opened:
-    from ..mavlink.simulated import Options, Vehicle  # noqa: PLC0415
-    from ..mavlink.simulated.transport import SimulatedTransport  # noqa: PLC0415
-    from .on_link import OnLink  # noqa: PLC0415
+    from ..simulated.vehicle import Options, Vehicle  # noqa: PLC0415
+    from ..simulated.vehicle.transport import SimulatedTransport  # noqa: PLC0415
+    from ..sources.on_vehicle import OnLink  # noqa: PLC0415
 
     vehicle = Vehicle(Options.parse(text), plan.gravity, key)
     transport = SimulatedTransport(vehicle)
@@ -127,7 +127,7 @@ def open_vehicle_replay(file: Path, plan: Plan, system: int | None) -> Opened:
     CaptureError : no .tlog, or one of another version. RecordingError : no vehicle or no IMU in it.
     UsageError : options that a .tlog of mpucal fixes.
     """
-    from .on_link import OnLink, open_tlog  # noqa: PLC0415
+    from ..sources.on_vehicle import OnLink, open_tlog  # noqa: PLC0415
 
     source = open_tlog(file, plan, system)
     if isinstance(source, OnLink):

@@ -12,13 +12,13 @@ from typing import Any
 
 import click
 
-from ..capture.rows.csv import CsvText
 from ..chip.access import EndOfCapture
-from ..correction import Correction, correction
 from ..data import STANDARD_GRAVITY_MPS2, Samples
 from ..errors import OutputError, UsageError
-from ..ports import Source
-from ..result import Calibration
+from ..files.rows.csv import CsvText
+from ..result.calibration import Calibration
+from ..result.correction import Correction, correction
+from ..session.ports import Source
 from .options import check_source, source_options
 from .running import now
 from .source import opened

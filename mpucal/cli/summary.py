@@ -11,8 +11,8 @@ import numpy as np
 
 from ..report.units import accelerometer, with_std
 from ..report.use import left_to_subtract
-from ..result import ACCELEROMETER_FORMULA, GOOD, REFUSED, USABLE, Calibration
-from ..sinks.file import BLOB, DOCUMENT, REPORT
+from ..result.calibration import ACCELEROMETER_FORMULA, GOOD, REFUSED, USABLE, Calibration
+from ..session.results import BLOB, DOCUMENT, REPORT
 
 AXES = "xyz"
 # what fits a terminal of 80 columns

@@ -12,11 +12,11 @@ import click
 
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import UsageError, WriteBackError
-from ..result import FORMAT, Calibration
-from ..sinks.file import make_folder, save
+from ..result.calibration import FORMAT, Calibration
+from ..session.results import make_folder, save
 from ..sinks.sink import Restorable, Sink
+from ..sources.on_chip import OnBus
 from .at_rest import put_down
-from .on_bus import OnBus
 from .options import check_source, source_options
 from .source import opened
 from .write_back import ask, keep, write_to
@@ -42,8 +42,8 @@ def in_bridge(options: Mapping[str, Any]) -> Iterator[Sink]:
     """The memory of the bridge that the options name."""
     if options["serial"] is None:
         raise UsageError("a bridge is written over its own port", "give --serial PORT")
-    from ..bus.bridge import open_store  # noqa: PLC0415
     from ..sinks.bridge import BridgeSink  # noqa: PLC0415
+    from ..sources.bridge import open_store  # noqa: PLC0415
 
     with open_store(options["serial"]) as store:
         yield BridgeSink(store)
@@ -55,7 +55,7 @@ def on_autopilot(options: Mapping[str, Any]) -> Iterator[Sink]:
     if options["mavlink"] is None:
         raise UsageError("an autopilot is written over MAVLink", "give --mavlink URL")
     from ..sinks.autopilot import AutopilotSink  # noqa: PLC0415
-    from .on_link import OnLink  # noqa: PLC0415
+    from ..sources.on_vehicle import OnLink  # noqa: PLC0415
 
     source = opened(options)
     if not isinstance(source, OnLink):

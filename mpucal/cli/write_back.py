@@ -11,7 +11,7 @@ from types import MappingProxyType
 import click
 
 from ..errors import OutputError, WriteBackError
-from ..result import Calibration
+from ..result.calibration import Calibration
 from ..sinks.sink import Applied, Restorable, Sink
 from .running import now
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..bus.bridge import BridgeBus
 from ..chip.access import Bus
-from ..wire.messages import Feature
+from ..sources.bridge import BridgeBus
+from ..sources.bridge.messages import Feature
 from .finding import Finding, Mark
 from .speed import LONG_BYTES, median_ms
 

@@ -13,7 +13,7 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from ..bus.i2c_errors import transfer_error
+from ..sources.i2c_errors import transfer_error
 from .finding import Finding, Mark, failed
 
 SYS = Path("/sys")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Protocol, cast
 
-from ..result import Calibration
+from ..result.calibration import Calibration
 
 # as `--to` spells it: the module
 FORMS = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..report.use import in_c
-from ..result import Calibration
+from ..result.calibration import Calibration
 from .losses import check_usable, head, in_float, with_hardware, without_gyroscope, without_temperature
 
 ENDING = ".ino"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..result import Calibration
+from ..result.calibration import Calibration
 
 ENDING = ".json"
 

@@ -15,7 +15,7 @@ from ..chip.offsets import moved
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
 from ..report.use import inverse
-from ..result import Calibration
+from ..result.calibration import Calibration
 from .losses import check_usable, head, mps2, without_gyroscope, without_temperature
 
 ENDING = ".sh"

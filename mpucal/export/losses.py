@@ -6,7 +6,7 @@ import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import RefusedError
-from ..result import REFUSED, Calibration
+from ..result.calibration import REFUSED, Calibration
 
 FLOAT_EPS = float(np.finfo(np.float32).eps)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..mavlink.parameters.encoding import as_float32
 from ..mavlink.parameters.plan import changes, left_out
-from ..result import Calibration
+from ..result.calibration import Calibration
 
 
 def values(calibration: Calibration, firmware: str) -> dict[str, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..mavlink.parameters.text import params_text
 from ..mavlink.truth import PX4
-from ..result import Calibration
+from ..result.calibration import Calibration
 from .parameters import notes, remarks, values
 
 ENDING = ".params"

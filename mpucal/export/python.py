@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..report.use import in_python, py_matrix
-from ..result import Calibration
+from ..result.calibration import Calibration
 from .losses import check_usable, head, with_hardware, without_temperature
 
 ENDING = ".py"

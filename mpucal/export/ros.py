@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Vector
 from ..report.use import inverse, left_to_subtract
-from ..result import Calibration
+from ..result.calibration import Calibration
 from .losses import check_usable, head, with_hardware, without_gyroscope, without_temperature
 
 ENDING = ".yaml"

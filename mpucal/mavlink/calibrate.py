@@ -9,7 +9,7 @@ from typing import Any
 
 from ..calibration import calibrate
 from ..data import STANDARD_GRAVITY_MPS2, Recording
-from ..result import Calibration
+from ..result.calibration import Calibration
 from .parameters.document import autopilot_document
 
 OTHERS, AUTOPILOT = "others", "autopilot"

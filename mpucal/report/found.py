@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..result import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA, Calibration
-from ..session.words import side_down
+from ..result.calibration import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA, Calibration
+from ..result.orientation import side_down
 from .elements import code, number, paragraph, section, table
 from .units import Measured, accelerometer, gyroscope, with_std
 from .use import formula

@@ -10,9 +10,9 @@ from types import MappingProxyType
 from typing import Any
 
 from .. import __version__
-from ..capture.parts import is_part
 from ..data import STANDARD_GRAVITY_MPS2, Recording
-from ..result import GOOD, REFUSED, USABLE, Calibration
+from ..files.parts import is_part
+from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from .elements import as_float, code, heading, number, paragraph, quantity, section, table
 from .found import (
     accelerometer_section,

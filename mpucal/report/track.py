@@ -13,7 +13,7 @@ from ..calibration.scene import Scene, prepare
 from ..calibration.stationary import find_flat, flat_statistics
 from ..calibration.still import Runs, still_runs
 from ..data import STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
-from ..result import Calibration
+from ..result.calibration import Calibration
 
 # The hand's acceleration while it moves, as the filter that makes the innovations is told: what hands do.
 HAND_MPS2 = 0.5

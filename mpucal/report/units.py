@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
-from ..result import Calibration, unknown
+from ..result.calibration import Calibration, unknown
 
 
 @dataclass(frozen=True)

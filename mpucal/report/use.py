@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
-from ..result import Calibration
+from ..result.calibration import Calibration
 
 COUNTS = 32768  # full scale of a 16-bit reading
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from ..result import Calibration
+from ..result.calibration import Calibration
 from .elements import as_float, heading, paragraph, section, table
 from .found import accelerometer_table
 

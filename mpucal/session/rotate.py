@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ..data import Samples, Vector
+from ..result.orientation import side_down, tilt_down
 from .aims import Aim, directions
 from .coverage import DISTINCT_RAD, Coverage
 from .events import (
@@ -25,7 +26,6 @@ from .events import (
 )
 from .pauses import HOLD_S, Held, Pauses
 from .windows import Window, Windows
-from .words import side_down, tilt_down
 
 PASS_WINDOW_S = 0.1
 # So long in one orientation is a pause.

@@ -7,23 +7,11 @@ import math
 import numpy as np
 
 from ..data import Samples, Vector
+from ..result.orientation import side_down, tilt_down
 from .aims import Aim
 from .coverage import DISTINCT_RAD, Coverage
-from .events import (
-    Ask,
-    Caution,
-    Checked,
-    Countdown,
-    Finished,
-    Output,
-    Progress,
-    Prompt,
-    PromptKind,
-    Tried,
-    Wish,
-)
+from .events import Ask, Caution, Checked, Countdown, Finished, Output, Progress, Prompt, PromptKind, Tried, Wish
 from .pauses import HOLD_S, Held, Pauses
-from .words import side_down, tilt_down
 
 PATIENCE_S = 40.0
 SAY_AGAIN_S = 8.0

@@ -8,7 +8,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import LinkError, RecordingError, WriteBackError
-from ..files import write_atomically
 from ..mavlink.dialect import dialect
 from ..mavlink.ftp import Storage
 from ..mavlink.link import Link
@@ -24,7 +23,8 @@ from ..mavlink.request import command
 from ..mavlink.shaping import read_shaping
 from ..mavlink.still import Stillness
 from ..mavlink.truth import ARDUPILOT, PX4
-from ..result import Calibration
+from ..result.atomic import write_atomically
+from ..result.calibration import Calibration
 from .sink import Applied
 
 OLD_PARAMETERS = "autopilot_old"

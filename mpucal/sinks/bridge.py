@@ -5,11 +5,11 @@ from __future__ import annotations
 from contextlib import suppress
 from pathlib import Path
 
-from ..bus.bridge.store import Held, Store
 from ..errors import BusError, WriteBackError
-from ..files import write_atomically
-from ..result import REFUSED, Calibration
-from ..wire.blob import BlobError
+from ..result.atomic import write_atomically
+from ..result.blob import BlobError
+from ..result.calibration import REFUSED, Calibration
+from ..sources.bridge.store import Held, Store
 from .sink import Applied
 
 UNTOUCHED = "nothing was written"

@@ -25,8 +25,8 @@ from ..chip.response import Response, measured_response
 from ..chip.setup import reset
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError, RecordingError, SourceError, WriteBackError
-from ..files import write_atomically
-from ..result import REFUSED, Calibration
+from ..result.atomic import write_atomically
+from ..result.calibration import REFUSED, Calibration
 from .sink import Applied
 
 KEPT, FORMAT = "chip-offsets.json", "mpucal.chip_offsets"

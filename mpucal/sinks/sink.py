@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from ..result import Calibration
+from ..result.calibration import Calibration
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mpucal.data import Recording, Samples
-from mpucal.simulation.scenarios import Truth, hand_scenario, paper_scenario
-from mpucal.simulation.sensors import SensorTruth
+from mpucal.simulated.study.scenarios import Truth, hand_scenario, paper_scenario
+from mpucal.simulated.study.sensors import SensorTruth
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 G = 9.82

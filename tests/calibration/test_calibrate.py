@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from mpucal.calibration import MODELS, calibrate
 from mpucal.data import Recording, Sensor
 from mpucal.errors import MpucalError, UsageError
-from mpucal.simulation.metrics import sph_rms
-from mpucal.simulation.scenarios import hand_scenario, paper_scenario
+from mpucal.simulated.study.metrics import sph_rms
+from mpucal.simulated.study.scenarios import hand_scenario, paper_scenario
 
 G = 9.82
 

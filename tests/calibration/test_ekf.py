@@ -1,15 +1,7 @@
 import numpy as np
 import pytest
 
-from mpucal.calibration.ekf import (
-    Ekf,
-    exponential,
-    gravity_jacobian,
-    inverse,
-    orientation_of,
-    product,
-    specific_force,
-)
+from mpucal.calibration.ekf import Ekf, exponential, gravity_jacobian, inverse, orientation_of, product, specific_force
 from mpucal.calibration.model import Flat, rotation
 from mpucal.data import Recording
 

@@ -12,8 +12,8 @@ from mpucal.calibration.minimise import Prior, minimise
 from mpucal.calibration.model import B_A_NAMES, D_NAMES
 from mpucal.calibration.paper import expand
 from mpucal.calibration.stationary import flat_statistics
-from mpucal.simulation.metrics import sph_rms
-from mpucal.simulation.scenarios import paper_scenario
+from mpucal.simulated.study.metrics import sph_rms
+from mpucal.simulated.study.scenarios import paper_scenario
 
 G = 9.82
 THETA_A = (*D_NAMES, *B_A_NAMES)

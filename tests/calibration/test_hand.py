@@ -12,8 +12,8 @@ from mpucal.calibration.likelihood import K_NAMES
 from mpucal.calibration.model import B_A_NAMES, D_NAMES
 from mpucal.calibration.stationary import flat_statistics
 from mpucal.calibration.still import still_runs
-from mpucal.simulation.metrics import sph_rms
-from mpucal.simulation.scenarios import hand_scenario
+from mpucal.simulated.study.metrics import sph_rms
+from mpucal.simulated.study.scenarios import hand_scenario
 
 G = 9.82
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from mpucal.calibration import calibrate
 from mpucal.calibration.model import rotation
 from mpucal.data import Recording
-from mpucal.simulation.metrics import sph_rms
-from mpucal.simulation.scenarios import Truth, hand_scenario, paper_scenario
+from mpucal.simulated.study.metrics import sph_rms
+from mpucal.simulated.study.scenarios import Truth, hand_scenario, paper_scenario
 
 G = 9.82
 SCENES = ("paper", "pose12", "pose9", "pose6", "continuous", "turns")

@@ -8,8 +8,8 @@ from mpucal.calibration.masks import mask, with_masks
 from mpucal.calibration.model import rotation
 from mpucal.calibration.stationary import flat_statistics
 from mpucal.data import Recording
-from mpucal.simulation.metrics import sph_rms
-from mpucal.simulation.scenarios import paper_scenario
+from mpucal.simulated.study.metrics import sph_rms
+from mpucal.simulated.study.scenarios import paper_scenario
 
 
 def problem_of(simulated):

@@ -8,7 +8,7 @@ from mpucal.calibration.likelihood import Series
 from mpucal.calibration.masks import ACC_RANGES, CLIPPED_R_SCALE, GYRO_RANGES, mask, with_masks
 from mpucal.calibration.stationary import flat_statistics
 from mpucal.data import Recording
-from mpucal.simulation.metrics import sph_rms
+from mpucal.simulated.study.metrics import sph_rms
 
 
 def noise(n=1000, seed=0, **changes):

@@ -9,7 +9,7 @@ from mpucal.calibration.initialise import initialise
 from mpucal.calibration.likelihood import Problem, Series, evaluate
 from mpucal.calibration.minimise import DECREMENT, PLACES, Prior, _nearer, minimise
 from mpucal.calibration.stationary import flat_statistics
-from mpucal.simulation.scenarios import paper_scenario
+from mpucal.simulated.study.scenarios import paper_scenario
 
 ACCEL, IMU = 17, 23
 NOTHING = Prior.of()

@@ -9,8 +9,8 @@ from mpucal.calibration.model import B_A_NAMES, D_NAMES
 from mpucal.calibration.paper import MAX_ITERATIONS, expand, fit_paper
 from mpucal.calibration.stationary import flat_statistics
 from mpucal.data import Recording
-from mpucal.simulation.metrics import sph_rms
-from mpucal.simulation.scenarios import Truth, paper_scenario
+from mpucal.simulated.study.metrics import sph_rms
+from mpucal.simulated.study.scenarios import Truth, paper_scenario
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "simulated"
 G = 9.82

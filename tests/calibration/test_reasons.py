@@ -11,7 +11,7 @@ from mpucal.calibration.model import rotation
 from mpucal.calibration.quality import judge
 from mpucal.calibration.steady import Change
 from mpucal.data import Recording
-from mpucal.simulation.scenarios import paper_scenario
+from mpucal.simulated.study.scenarios import paper_scenario
 
 G = 9.82
 CODES = {

@@ -7,7 +7,7 @@ import pytest
 
 from mpucal.calibration import steady, weigh
 from mpucal.calibration.steady import likeliest_change
-from mpucal.simulation.scenarios import paper_scenario
+from mpucal.simulated.study.scenarios import paper_scenario
 
 G = 9.82
 

@@ -5,16 +5,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mpucal.bus.simulated.bus import SimulatedBus
-from mpucal.bus.simulated.chip import Chip
-from mpucal.bus.simulated.clock import FastClock
-from mpucal.bus.simulated.factory import Factory
-from mpucal.bus.simulated.models import MODELS
-from mpucal.bus.tap import Tap
 from mpucal.chip.access import Reply
 from mpucal.chip.driver import Driver
 from mpucal.data import Samples
 from mpucal.errors import BusError
+from mpucal.simulated.chip.bus import SimulatedBus
+from mpucal.simulated.chip.chip import Chip
+from mpucal.simulated.chip.clock import FastClock
+from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.models import MODELS
+from mpucal.sources.tap import Tap
 
 
 class NumberedFeed:

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from mpucal.bus.simulated import open_simulated
-from mpucal.bus.simulated.faults import KINDS
-from mpucal.bus.tap import Tap
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, ChipError
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip.faults import KINDS
+from mpucal.sources.tap import Tap
 
 ALONE = Config(rate_hz=4000)
 

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mpucal.bus.replay import ReplayBus
 from mpucal.chip import registers as reg
 from mpucal.chip.access import EndOfCapture
 from mpucal.chip.config import Config
@@ -14,6 +13,7 @@ from mpucal.chip.driver import Driver
 from mpucal.chip.port import TRIES
 from mpucal.data import Samples
 from mpucal.errors import BusError, BusHeld, ChipError, NoAnswer
+from mpucal.sources.replay import ReplayBus
 
 CHIPS = ["mpu6050", "mpu6500", "clone98"]
 # accesses of stop()

@@ -5,8 +5,6 @@ import re
 import numpy as np
 import pytest
 
-from mpucal.bus.simulated import open_simulated
-from mpucal.bus.tap import Tap
 from mpucal.chip import registers as reg
 from mpucal.chip.access import Reply
 from mpucal.chip.config import Config
@@ -16,6 +14,8 @@ from mpucal.chip.families import CLONE98, MPU6050, MPU6500, PARTS
 from mpucal.chip.identity import Evidence, remark
 from mpucal.data import Sensor
 from mpucal.errors import ChipError
+from mpucal.simulated.chip import open_simulated
+from mpucal.sources.tap import Tap
 
 FILLING = {reg.FIFO_EN: reg.FIFO_EN_FRAME}
 WIDENED = FILLING | {reg.ACCEL_CONFIG2: reg.FIFO_SIZE}

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from mpucal.capture import load
-from mpucal.result import Calibration
+from mpucal.files import load
+from mpucal.result.calibration import Calibration
 
 FAST = ("--bus", "sim:chip=mpu6500,hand=still,D=1.02/0/0/0/0.98/0/0/0/1.01,b_a=0.3/-0.2/0.4", "--rate", "4000")
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpucal.capture import load
-from mpucal.capture.csv import save_csv
-from mpucal.capture.npz import save_npz
-from mpucal.result import Calibration
+from mpucal.files import load
+from mpucal.files.csv import save_csv
+from mpucal.files.npz import save_npz
+from mpucal.result.calibration import Calibration
 
 ROOT = Path(__file__).parents[2]
 RECORDINGS = ROOT.parent / "shared" / "recordings"

@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 
-from mpucal.result import Calibration
+from mpucal.result.calibration import Calibration
 
 RATE_HZ, FLAT_S, TURN_S = 100.0, 10.0, 10.0
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 import click
 import pytest
 
-from mpucal.capture import load
-from mpucal.capture.npz import save_npz
 from mpucal.cli import COMMANDS, commands
-from mpucal.result import Calibration
+from mpucal.files import load
+from mpucal.files.npz import save_npz
+from mpucal.result.calibration import Calibration
 
 # what stands there for what a person has; a bridge's own tests show what it keeps
 DEVICES = {"/dev/i2c-1": "sim:seed=3", "sim": "sim:seed=3"}

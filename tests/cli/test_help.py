@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mpucal.cli import COMMANDS
-from mpucal.result import Calibration
+from mpucal.result.calibration import Calibration
 
 HEAVY = ("numpy", "mcap", "smbus2", "rich", "scipy", "matplotlib")
 

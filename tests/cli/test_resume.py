@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpucal.bus.records import SessionEvent
 from mpucal.calibration import calibrate
-from mpucal.capture import load
-from mpucal.capture.mcap import CaptureWriter, read_capture
+from mpucal.chip.records import SessionEvent
 from mpucal.data import Samples
-from mpucal.result import Calibration
+from mpucal.files import load
+from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.result.calibration import Calibration
 
 STORED = Path(__file__).parents[2] / "fixtures" / "sessions" / "enter.mcap"
 WORDS = ("session", "--json-events", "--yes")

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.bus.records import SessionEvent
-from mpucal.capture.mcap import CaptureWriter, read_capture
-from mpucal.result import Calibration
+from mpucal.chip.records import SessionEvent
+from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.result.calibration import Calibration
 
 
 def rewritten(capture, path, records=None, **meta):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mpucal.cli.summary import formula, summary, written
-from mpucal.result import Calibration
+from mpucal.result.calibration import Calibration
 
 
 def calibration(verdict="good", **changes):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.result import Calibration
+from mpucal.result.calibration import Calibration
 
 
 @pytest.mark.parametrize("chip", ["mpu6050", "mpu6500"])

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from mpucal.__main__ import run
-from mpucal.capture import load
-from mpucal.result import Calibration
+from mpucal.files import load
+from mpucal.result.calibration import Calibration
 
 D = np.array([[1.021, 0.013, -0.007], [-0.009, 0.987, 0.021], [0.004, -0.016, 1.034]])
 B_A = np.array([0.31, -0.22, 1.08])

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mpucal.capture import load
 from mpucal.cli import write_back
 from mpucal.cli.destination import destinations, recorder, said, written_back
 from mpucal.cli.write import TARGETS
 from mpucal.errors import BusError, KeepsNothing, OutputError, UsageError, WriteBackError
-from mpucal.result import Calibration
+from mpucal.files import load
+from mpucal.result.calibration import Calibration
 from mpucal.sinks.sink import Applied
 
 BIAS = np.array([0.3, -0.2, 1.0])

@@ -8,7 +8,7 @@ import pytest
 
 from mpucal.cli.destination import recorder, written_back
 from mpucal.errors import WriteBackError
-from mpucal.result import Calibration
+from mpucal.result.calibration import Calibration
 
 SOURCE = {
     "bus": None,

@@ -10,7 +10,7 @@ import pytest
 
 from mpucal.chip.access import Reply
 
-CONTRACT = Path(__file__).parents[1] / "bus" / "test_contract.py"
+CONTRACT = Path(__file__).parents[1] / "sources" / "test_contract.py"
 PROMISES = (
     "test_a_register_keeps_what_was_written",
     "test_the_fifo_register_does_not_increment",
@@ -23,7 +23,7 @@ PWR_MGMT_1, DEVICE_RESET = "107", "80"
 # one I2cBus in a process for which /dev/i2c-1 is there
 SERVER = """
 import json, sys
-from mpucal.bus.i2c import I2cBus
+from mpucal.sources.i2c import I2cBus
 bus = I2cBus("/dev/i2c-1")
 for line in sys.stdin:
     name, *arguments = json.loads(line)

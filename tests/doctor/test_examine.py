@@ -4,12 +4,12 @@ import json
 
 import pytest
 
-from mpucal.bus.simulated import open_simulated
 from mpucal.chip.config import Config
 from mpucal.doctor.examine import examine
 from mpucal.doctor.finding import Finding, Mark
 from mpucal.doctor.page import document, text
 from mpucal.session.events import Prompt, PromptKind
+from mpucal.simulated.chip import open_simulated
 
 
 def findings(bus):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mpucal.data import Sensor
-from mpucal.result import Calibration
+from mpucal.result.calibration import Calibration
 
 D = np.array([[1.021, 0.013, -0.007], [-0.009, 0.987, 0.021], [0.004, -0.016, 1.034]])
 

@@ -14,7 +14,7 @@ import pytest
 from mpucal.data import STANDARD_GRAVITY_MPS2
 from mpucal.errors import MpucalError, RefusedError
 from mpucal.export import FORMS, form
-from mpucal.result import Calibration
+from mpucal.result.calibration import Calibration
 
 # what the header says of itself
 FLOAT_MPS2 = 2e-4

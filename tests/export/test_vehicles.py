@@ -10,7 +10,7 @@ import pytest
 from mpucal.data import Autopilot
 from mpucal.export import form
 from mpucal.mavlink.parameters.document import autopilot_document
-from mpucal.result import Calibration
+from mpucal.result.calibration import Calibration
 
 RNG = np.random.default_rng(6)
 TRUE_OFFSET = np.array([0.31, -0.22, 0.58])

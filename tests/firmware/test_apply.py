@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpucal.wire.blob import LENGTH, MAX_LENGTH, Blob, BlobError
+from mpucal.result.blob import LENGTH, MAX_LENGTH, Blob, BlobError
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "tools" / "firmware" / "src"

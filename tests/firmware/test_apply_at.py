@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpucal.wire.blob import Blob
+from mpucal.result.blob import Blob
 
 ROOT = Path(__file__).parents[2]
 VECTORS = ROOT / "fixtures" / "vectors"

@@ -12,17 +12,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpucal.bus.bridge.bus import BridgeBus
-from mpucal.bus.bridge.link import Link
-from mpucal.bus.bridge.store import Store
-from mpucal.bus.simulated import Chip, SimulatedBus, open_simulated
-from mpucal.bus.simulated.factory import Factory
-from mpucal.bus.simulated.models import MODELS
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, NoAnswer
-from mpucal.wire.blob import Blob
+from mpucal.result.blob import Blob
+from mpucal.simulated.chip import Chip, SimulatedBus, open_simulated
+from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.models import MODELS
+from mpucal.sources.bridge.bus import BridgeBus
+from mpucal.sources.bridge.link import Link
+from mpucal.sources.bridge.store import Store
 
 ROOT = Path(__file__).parents[2]
 OLD = (ROOT / "fixtures" / "vectors" / "blob_measured.bin").read_bytes()

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mpucal.wire.blob import Blob
+from mpucal.result.blob import Blob
 
 VECTORS = Path(__file__).parents[2] / "fixtures" / "vectors"
 SEAL_BYTES = 8

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from mpucal.wire import messages as wire
-from mpucal.wire.frame import Deframer, Frame
-from mpucal.wire.messages import Status
+from mpucal.sources.bridge import messages as wire
+from mpucal.sources.bridge.frame import Deframer, Frame
+from mpucal.sources.bridge.messages import Status
 
 SEQ = 9
 BYTES = 14

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 import mpucal
 from mpucal.cli import commands
-from mpucal.result import REFUSED, Calibration
+from mpucal.result.calibration import REFUSED, Calibration
 
 AXES = "XYZ"
 

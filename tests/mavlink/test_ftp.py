@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from mpucal.errors import LinkError
 from mpucal.mavlink.ftp import MOST_DATA, Payload, Storage
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.simulated import Options, Vehicle
-from mpucal.mavlink.simulated.transport import SimulatedTransport
+from mpucal.simulated.vehicle import Options, Vehicle
+from mpucal.simulated.vehicle.transport import SimulatedTransport
 
 
 @pytest.fixture

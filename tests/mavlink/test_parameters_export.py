@@ -10,7 +10,7 @@ from mpucal.errors import WriteBackError
 from mpucal.export import ardupilot, px4
 from mpucal.mavlink.parameters.document import autopilot_document
 from mpucal.mavlink.parameters.text import read_parameters_file
-from mpucal.result import Calibration
+from mpucal.result.calibration import Calibration
 
 D = np.array([[1.02, 0.01, 0.0], [0.0, 0.98, 0.0], [0.0, -0.01, 1.01]])
 B_A = np.array([0.3, -0.2, 0.1])

@@ -9,11 +9,11 @@ from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.names import ardupilot_place, mounting
 from mpucal.mavlink.replay import Replay
 from mpucal.mavlink.shaping import read_shaping, shaping_names
-from mpucal.mavlink.simulated import Options, Vehicle
-from mpucal.mavlink.simulated.transport import SimulatedTransport
 from mpucal.mavlink.source import VehicleSource
 from mpucal.mavlink.tlog import Record, Tlog
 from mpucal.mavlink.truth import ARDUPILOT
+from mpucal.simulated.vehicle import Options, Vehicle
+from mpucal.simulated.vehicle.transport import SimulatedTransport
 
 
 class Disturbed(SimulatedTransport):

@@ -14,8 +14,8 @@ from mpucal.mavlink.lines import open_transport
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.encoding import name_bytes, of_wire, to_wire
 from mpucal.mavlink.prompts import Heard, to_message
-from mpucal.mavlink.simulated import Options, Vehicle
 from mpucal.mavlink.url import parse_url
+from mpucal.simulated.vehicle import Options, Vehicle
 
 S_US = 1_000_000
 HIGHRES, RAW, SCALED, SCALED2 = 105, 27, 26, 116

@@ -15,11 +15,11 @@ from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.document import autopilot_document
 from mpucal.mavlink.prompts import Heard, to_message
-from mpucal.mavlink.simulated import Options, Vehicle
-from mpucal.mavlink.simulated.transport import SimulatedTransport
-from mpucal.result import Calibration
+from mpucal.result.blob import Blob
+from mpucal.result.calibration import Calibration
+from mpucal.simulated.vehicle import Options, Vehicle
+from mpucal.simulated.vehicle.transport import SimulatedTransport
 from mpucal.sinks.autopilot import AutopilotSink
-from mpucal.wire.blob import Blob
 
 FIRMWARES = ("ardupilot", "px4")
 SCALED = ("SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")

@@ -8,7 +8,7 @@ import pytest
 
 from mpucal.data import Recording, Sensor
 from mpucal.report import render
-from mpucal.result import Calibration
+from mpucal.result.calibration import Calibration
 
 VOID = {"meta", "br", "link", "img", "hr", "input"}
 DIGITS = 3e-6  # what six decimals may hide

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mpucal.report import render
-from mpucal.result import Calibration
+from mpucal.result.calibration import Calibration
 
 CELL = re.compile(r"([-+]?[\d.]+) ±\u00a0([\d.]+)")
 TABLE = r'<table id="{}">(.*?)</table>'

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.bus.bridge.store import Held
 from mpucal.errors import BusError, WriteBackError
-from mpucal.result import Calibration
+from mpucal.result.calibration import Calibration
 from mpucal.sinks.bridge import BridgeSink
+from mpucal.sources.bridge.store import Held
 
 OLD = b"an old blob"
 

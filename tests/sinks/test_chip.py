@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mpucal.bus.simulated import Chip, SimulatedBus
-from mpucal.bus.simulated.clock import FastClock
-from mpucal.bus.simulated.factory import Factory
-from mpucal.bus.simulated.models import MODELS, OFFSETS
 from mpucal.chip import registers as reg
 from mpucal.chip.access import Reply
 from mpucal.data import STANDARD_GRAVITY_MPS2, Sensor
 from mpucal.errors import BusError, NoAnswer, RecordingError, WriteBackError
-from mpucal.result import REFUSED, Calibration
+from mpucal.result.calibration import REFUSED, Calibration
+from mpucal.simulated.chip import Chip, SimulatedBus
+from mpucal.simulated.chip.clock import FastClock
+from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.models import MODELS, OFFSETS
 from mpucal.sinks.chip import KEPT, ChipSink
 
 BIAS_G = np.array([0.032, -0.011, -0.054])

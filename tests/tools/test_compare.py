@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from mpucal.simulation.scenarios import GRAVITY_MPS2, hand_scenario
+from mpucal.simulated.study.scenarios import GRAVITY_MPS2, hand_scenario
 
 
 @pytest.fixture

@@ -7,8 +7,8 @@ from rich.console import Console
 
 from mpucal.calibration.ekf import specific_force
 from mpucal.errors import RecordingError
-from mpucal.simulation.scenarios import GRAVITY_MPS2, paper_scenario
-from mpucal.simulation.sensors import SensorTruth
+from mpucal.simulated.study.scenarios import GRAVITY_MPS2, paper_scenario
+from mpucal.simulated.study.sensors import SensorTruth
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.model import rotation
-from mpucal.simulation.scenarios import GRAVITY_MPS2, hand_scenario
+from mpucal.simulated.study.scenarios import GRAVITY_MPS2, hand_scenario
 
 
 @pytest.fixture

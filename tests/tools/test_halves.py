@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 from mpucal.errors import RecordingError
-from mpucal.simulation.scenarios import GRAVITY_MPS2, hand_scenario, paper_scenario
+from mpucal.simulated.study.scenarios import GRAVITY_MPS2, hand_scenario, paper_scenario
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...result import Calibration
+from ...result.calibration import Calibration
 from .document import NEW, OLD
 from .names import place_of
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2, Autopilot
-from ...result import Calibration
+from ...result.calibration import Calibration
 from .compose import compose
 from .names import mounting, place
 

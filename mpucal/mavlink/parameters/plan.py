@@ -11,7 +11,7 @@ import numpy as np
 
 from ...data import Vector
 from ...errors import WriteBackError
-from ...result import REFUSED, Calibration
+from ...result.calibration import REFUSED, Calibration
 from ..imu import SCALED, Stream
 from .compose import Correction
 from .document import NEW, OLD, RESIDUAL

@@ -20,11 +20,11 @@ from types import SimpleNamespace
 from adapter import Adapter
 from umockdev import Testbed
 
-from mpucal.bus.simulated import Chip, RecordedFeed, SimulatedBus, open_simulated
-from mpucal.bus.simulated.clock import CLOCKS, Clock
-from mpucal.bus.simulated.factory import Factory
-from mpucal.bus.simulated.models import MODELS
 from mpucal.chip.access import Reply
+from mpucal.simulated.chip import Chip, RecordedFeed, SimulatedBus, open_simulated
+from mpucal.simulated.chip.clock import CLOCKS, Clock
+from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.models import MODELS
 
 NODE, STILL, CLOCK_CHIP = "/dev/i2c-1", "still", "DS3231"
 DEVICES = """\

@@ -19,8 +19,8 @@ import tty
 from collections.abc import Callable
 from pathlib import Path
 
-from mpucal.bus.simulated import open_simulated
 from mpucal.session.events import Prompt, PromptKind
+from mpucal.simulated.chip import open_simulated
 
 sys.path.insert(0, str(Path(__file__).parent))
 from board import Board, BoardClock, build_library

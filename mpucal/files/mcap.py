@@ -1,0 +1,320 @@
+"""Captures as MCAP files: every register access and session event as it happened. Knows no chip."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any, Self, cast
+
+from mcap.exceptions import McapError
+from mcap.records import Channel, Message, Metadata
+from mcap.stream_reader import CRCValidationError, StreamReader
+from mcap.well_known import MessageEncoding, SchemaEncoding
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
+from zstandard import ZstdError
+
+from ..chip.access import Failure, Transaction
+from ..chip.records import Record, SessionEvent
+from ..errors import CaptureError, OutputError
+
+FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 1
+BUS, SESSION = "/bus", "/session"
+# the metadata of a file of calibrated samples, which is no capture
+CALIBRATED = "mpucal.imu"
+
+# half of the second that a killed program may lose: the other half is for the wait between two records
+CHUNK_NS = 500_000_000
+
+# the last two: a length that no memory holds
+_DAMAGE = (
+    McapError,
+    CRCValidationError,
+    ZstdError,
+    struct.error,
+    UnicodeDecodeError,
+    EOFError,
+    OverflowError,
+    MemoryError,
+)
+
+_BUS_SCHEMA = {
+    "title": "mpucal.Transaction",
+    "description": "A register access; the message's time is the bus's clock.",
+    "type": "object",
+    "properties": {
+        "op": {"enum": ["read", "write"]},
+        "register": {"type": "integer", "minimum": 0, "maximum": 255},
+        "count": {"type": "integer", "description": "bytes asked for or given"},
+        "data": {"type": "string", "description": "bytes moved, hexadecimal"},
+        "error": {
+            "type": "object",
+            "description": "how the transfer failed",
+            "properties": {key: {"type": "string"} for key in Failure._fields},
+        },
+    },
+}
+_SESSION_SCHEMA = {
+    "title": "mpucal.SessionEvent",
+    "description": "A key press, an option, the end; the message's time is the bus's clock.",
+    "type": "object",
+    "properties": {"name": {"type": "string"}, "data": {"type": "object"}},
+}
+
+
+class CaptureWriter:
+    """Writes a capture as it happens; a program that is killed loses the last second at most.
+
+    Raises
+    ------
+    OutputError : the file cannot be created or written.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._path = Path(path)
+        try:
+            self._file = self._path.open("wb")
+        except OSError as error:
+            raise self._cannot_write(error) from error
+        # the chunks' index grows by 4 MB an hour: in vain where nothing is kept
+        chunked = self._path != Path(os.devnull)
+        self._writer = Writer(self._file, compression=CompressionType.ZSTD, enable_data_crcs=True, use_chunking=chunked)
+        self._channels: dict[str, int] = {}
+        self._chunk_began_ns: int | None = None
+
+    def start(self, meta: Mapping[str, Any]) -> None:
+        """Write the head of the file: what is captured, by what and how; values of JSON's own types."""
+        try:
+            self._writer.start(profile="", library=FORMAT)
+            texts = {key: json.dumps(value) for key, value in {**meta, VERSION_KEY: VERSION}.items()}
+            self._writer.add_metadata(FORMAT, texts)
+            for topic, schema in ((BUS, _BUS_SCHEMA), (SESSION, _SESSION_SCHEMA)):
+                id_ = self._writer.register_schema(
+                    str(schema["title"]), SchemaEncoding.JSONSchema, json.dumps(schema).encode()
+                )
+                self._channels[topic] = self._writer.register_channel(topic, MessageEncoding.JSON, id_)
+            self._writer.flush()
+        except OSError as error:
+            raise self._cannot_write(error) from error
+
+    def transaction(self, transaction: Transaction) -> None:
+        """Keep a register access."""
+        content: dict[str, Any] = {
+            "op": transaction.op,
+            "register": transaction.register,
+            "count": transaction.count,
+            "data": transaction.data.hex(),
+        }
+        if transaction.error is not None:
+            content["error"] = transaction.error._asdict()
+        self._add(BUS, transaction.t_ns, content)
+
+    def event(self, name: str, t_ns: int, data: Mapping[str, Any] | None = None) -> None:
+        """Keep a session event; `data` of JSON's own types."""
+        self._add(SESSION, t_ns, {"name": name, "data": dict(data or {})})
+
+    def close(self) -> None:
+        """Write the index and close the file."""
+        try:
+            with self._file:
+                if self._channels:
+                    self._writer.finish()
+        except OSError as error:
+            raise self._cannot_write(error) from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _add(self, topic: str, t_ns: int, content: dict[str, Any]) -> None:
+        data = json.dumps(content, separators=(",", ":")).encode()
+        try:
+            self._writer.add_message(self._channels[topic], t_ns, data, publish_time=t_ns)
+            if self._chunk_began_ns is None:
+                self._chunk_began_ns = t_ns
+            elif t_ns - self._chunk_began_ns >= CHUNK_NS:
+                self._writer.flush()
+                self._chunk_began_ns = None
+        except OSError as error:
+            raise self._cannot_write(error) from error
+
+    def _cannot_write(self, error: OSError) -> OutputError:
+        return OutputError(
+            f"cannot write the capture {self._path} ({error.strerror or error})",
+            "choose a place that you may write to, with room on it, with -o",
+        )
+
+
+@dataclass(frozen=True)
+class Capture:
+    """What a capture file holds.
+
+    Attributes
+    ----------
+    meta : what `CaptureWriter.start` was given. records : in the order in which they happened.
+    recovered : None, or the sentence that says how much of a damaged file this is.
+    name : what to call the file in a message.
+    """
+
+    meta: Mapping[str, Any]
+    records: tuple[Record, ...]
+    recovered: str | None = None
+    name: str = "the capture"
+
+
+def read_capture(path: str | Path) -> Capture:
+    """Read a capture; of a file that was cut short, all that is whole.
+
+    Raises
+    ------
+    CaptureError : the file cannot be read, or is no capture of mpucal.
+    """
+    reader = CaptureReader(path)
+    records = tuple(reader)
+    return Capture(reader.meta, records, reader.recovered, reader.name)
+
+
+class CaptureReader:
+    """The records of a capture, one after the other, as they are read; of a file that was cut short, all that is whole.
+
+    To be gone through once.
+
+    Attributes
+    ----------
+    name : what to call the file in a message. meta, recovered : see Capture; once all records were read.
+
+    Raises
+    ------
+    CaptureError : the file cannot be read, or is no capture of mpucal; some of it only where the records come to it.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._path = Path(path)
+        self.name = self._path.name
+        self.meta: Mapping[str, Any] = {}
+        self.recovered: str | None = None
+        self._count = self._first_ns = self._last_ns = 0
+
+    def __iter__(self) -> Iterator[Record]:
+        try:
+            with self._path.open("rb") as file:
+                yield from self._records(file)
+        except OSError as error:
+            raise CaptureError(
+                f"cannot read {self._path} ({error.strerror})", "check the path and its permissions"
+            ) from error
+
+    def _records(self, file: IO[bytes]) -> Iterator[Record]:
+        size = os.fstat(file.fileno()).st_size
+        self._check(file.read(len(MCAP0_MAGIC)))
+        file.seek(0)
+        channels: dict[int, str] = {}
+        meta: Mapping[str, Any] | None = None
+        whole, finished = 0, False
+        stream = _Bounded(file, size)
+        items = StreamReader(cast("IO[bytes]", stream), validate_crcs=True, record_size_limit=size).records
+        while not finished:
+            try:
+                item = next(items, None)
+            except _DAMAGE:
+                # what was read until here is whole, and `recovered` says what is not
+                break
+            whole, finished = stream.at, item is None
+            if isinstance(item, Metadata) and item.name == FORMAT:
+                meta = _meta(item, self._path)
+            elif isinstance(item, Metadata) and item.name == CALIBRATED:
+                raise CaptureError(
+                    f"{self._path} holds samples that are calibrated already ({item.metadata.get('done')})",
+                    "give the recording that they were made of",
+                )
+            elif isinstance(item, Channel):
+                channels[item.id] = item.topic
+            elif isinstance(item, Message):
+                record = _record(channels.get(item.channel_id, ""), item, self._path)
+                if record is not None:
+                    self._counted(record)
+                    yield record
+        if meta is None:
+            raise CaptureError(
+                f"{self._path} does not hold the head of a capture of mpucal", "give a capture that mpucal recorded"
+            )
+        self.meta = meta
+        self.recovered = None if finished else self._why_recovered(size - whole)
+
+    def _check(self, magic: bytes) -> None:
+        if not magic:
+            raise CaptureError(f"{self._path} is empty", "record it again")
+        if magic != MCAP0_MAGIC:
+            raise CaptureError(f"{self._path} is no MCAP file", "give a capture that mpucal recorded")
+
+    def _counted(self, record: Record) -> None:
+        self._first_ns = self._first_ns if self._count else record.t_ns
+        self._last_ns = record.t_ns
+        self._count += 1
+
+    def _why_recovered(self, lost: int) -> str:
+        held = f"{self._count} records over {(self._last_ns - self._first_ns) / 1e9:.1f} s are whole"
+        if lost:
+            return f"{self.name} is cut short or damaged: {held}, the {lost} bytes after them are lost."
+        return f"{self.name} was never closed: its {held}, what may have followed is lost."
+
+
+class _Bounded:
+    """A file of `size` bytes that is not asked for more of them: a damaged length would take all memory.
+
+    Attributes
+    ----------
+    at : how many were read.
+    """
+
+    def __init__(self, file: IO[bytes], size: int) -> None:
+        self._file, self._size, self.at = file, size, 0
+
+    def read(self, count: int) -> bytes:
+        """At most `count` bytes."""
+        data = self._file.read(min(count, self._size - self.at))
+        self.at += len(data)
+        return data
+
+
+def _meta(item: Metadata, path: Path) -> dict[str, Any]:
+    try:
+        meta = {key: json.loads(value) for key, value in item.metadata.items()}
+        version = int(meta.pop(VERSION_KEY))
+    except (ValueError, KeyError, TypeError) as error:
+        raise CaptureError(f"the head of {path} is damaged ({error})", "record it again") from error
+    if version > VERSION:
+        raise CaptureError(
+            f"{path} is a capture of version {version}, and this mpucal reads up to {VERSION}",
+            "update mpucal",
+        )
+    return meta
+
+
+def _record(topic: str, message: Message, path: Path) -> Record | None:
+    """The record of a message; None for a topic that a newer mpucal added."""
+    if topic not in (BUS, SESSION):
+        return None
+    try:
+        content = json.loads(message.data)
+        if topic == SESSION:
+            return SessionEvent(content["name"], message.log_time, content["data"])
+        error = content.get("error")
+        return Transaction(
+            content["op"],
+            content["register"],
+            content["count"],
+            bytes.fromhex(content["data"]),
+            message.log_time,
+            None if error is None else Failure(**error),
+        )
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise CaptureError(
+            f"{path} holds a message on {topic} that is none of mpucal's ({error})",
+            "give a capture that mpucal recorded",
+        ) from error

@@ -1,0 +1,113 @@
+"""Samples as sensor_msgs/msg/Imu in an MCAP file, which ROS 2 and Foxglove read. Knows no capture.
+
+CDR, little-endian (OMG DDS-XTypes 1.3, section 7.4): after the four bytes of its header every number lies at a
+multiple of its size, counted from there. With one frame_id all messages have the same layout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.records import Channel, Header, Metadata, Schema
+from mcap.well_known import MessageEncoding, SchemaEncoding
+from numpy.typing import NDArray
+
+from ... import __version__
+from ...data import Samples
+from ...errors import RecordingError
+from ...result.atomic import whole_file
+from ..mcap import CALIBRATED
+from . import Write
+from .chunks import ChunkWriter
+
+TOPIC, FRAME_ID = "/imu/data", "imu"
+S = 1_000_000_000
+# sensor_msgs/Imu: a first covariance of -1 says that there is no such measurement
+NOT_MEASURED = -1.0
+
+MESSAGE = np.dtype(
+    [
+        ("cdr", "V4"),
+        ("sec", "<i4"),
+        ("nanosec", "<u4"),
+        ("frame_id_size", "<u4"),
+        ("frame_id", "S4"),
+        ("orientation", "<f8", 4),
+        ("orientation_covariance", "<f8", 9),
+        ("angular_velocity", "<f8", 3),
+        ("angular_velocity_covariance", "<f8", 9),
+        ("linear_acceleration", "<f8", 3),
+        ("linear_acceleration_covariance", "<f8", 9),
+    ]
+)
+SCHEMA = """\
+std_msgs/Header header
+geometry_msgs/Quaternion orientation
+float64[9] orientation_covariance
+geometry_msgs/Vector3 angular_velocity
+float64[9] angular_velocity_covariance
+geometry_msgs/Vector3 linear_acceleration
+float64[9] linear_acceleration_covariance
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+================================================================================
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+"""
+
+
+def messages(samples: Samples) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    """Times (n,) [ns] and messages (n,), each the CDR bytes of a sample.
+
+    Raises
+    ------
+    RecordingError : a time that no message can hold.
+    """
+    if not (np.isfinite(samples.t) & (samples.t >= 0.0) & (samples.t < 2.0**31)).all():
+        raise RecordingError("a time is no number of seconds from 0 to 2^31", "give times in seconds, from any origin")
+    t_ns = np.rint(samples.t * S).astype(np.int64)
+    rows = np.zeros(len(samples), MESSAGE)
+    rows["cdr"] = np.void(b"\0\1\0\0")
+    rows["sec"], rows["nanosec"] = t_ns // S, t_ns % S
+    rows["frame_id"], rows["frame_id_size"] = FRAME_ID.encode(), len(FRAME_ID) + 1
+    rows["orientation"][:, 3] = 1.0
+    rows["orientation_covariance"][:, 0] = NOT_MEASURED
+    turned = np.asarray(np.isfinite(samples.gyr).all(axis=1))
+    rows["angular_velocity_covariance"][~turned, 0] = NOT_MEASURED
+    rows["angular_velocity"] = np.where(turned[:, None], samples.gyr, 0.0)
+    rows["linear_acceleration"] = samples.acc
+    return t_ns, rows
+
+
+@contextmanager
+def imu_file(path: Path, done: str) -> Iterator[Write]:
+    """An MCAP file of Imu messages on TOPIC; `done`, what was done to the samples, is its metadata. See open_writer."""
+    with whole_file(path) as file:
+        writer = ChunkWriter(
+            file,
+            MESSAGE,
+            Header(profile="ros2", library=f"{CALIBRATED} {__version__}"),
+            Schema(id=1, data=SCHEMA.encode(), encoding=SchemaEncoding.ROS2, name="sensor_msgs/msg/Imu"),
+            Channel(id=1, topic=TOPIC, message_encoding=MessageEncoding.CDR, metadata={}, schema_id=1),
+            Metadata(CALIBRATED, {"done": done}),
+        )
+        yield lambda samples: writer.add(*messages(samples))
+        writer.finish()

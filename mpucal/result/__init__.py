@@ -1,0 +1,1 @@
+"""What a calibration is, and what is done with it: kept, applied, compared, merged."""

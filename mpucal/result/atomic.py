@@ -1,0 +1,103 @@
+"""Whole files or the old ones: atomic writing. Knows nothing of what it writes."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import IO
+
+from ..errors import OutputError
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Write `data` to `path` so that a crash leaves the old file or the new one, never a part.
+
+    Raises
+    ------
+    OutputError : the folder or file cannot be written.
+    """
+    with whole_file(Path(path)) as file:
+        file.write(data)
+
+
+def write_together(files: Mapping[Path, bytes]) -> None:
+    """Write all files, or, where one cannot be written, none: the old ones are there again.
+
+    A crash between two of them leaves the old one of the second.
+
+    Raises
+    ------
+    OutputError : a folder or file cannot be written.
+    """
+    old = {path: _held(path) for path in files}
+    try:
+        with ExitStack() as stack:
+            # what is entered last takes its place first
+            for path in reversed(list(files)):
+                file = stack.enter_context(whole_file(path))
+                file.write(files[path])
+                file.flush()
+    except BaseException:
+        for path, data in old.items():
+            with suppress(OSError, OutputError):
+                _put_back(path, data)
+        raise
+
+
+def _held(path: Path) -> bytes | None:
+    try:
+        return path.read_bytes() if path.is_file() else None
+    except OSError as error:
+        raise OutputError(
+            f"cannot write {path}, as what is there cannot be read ({error.strerror})", "choose another folder with -o"
+        ) from error
+
+
+def _put_back(path: Path, data: bytes | None) -> None:
+    if data is None:
+        if path.is_file():
+            path.unlink()
+    elif path.read_bytes() != data:
+        write_atomically(path, data)
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[IO[bytes]]:
+    """A file to be filled, which takes the place of `path` once it is; whatever fails meanwhile leaves the old one.
+
+    Raises
+    ------
+    OutputError : the folder or file cannot be written.
+    """
+    temporary = None
+    try:
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
+            temporary = Path(file.name)
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.chmod(0o644)
+        temporary.replace(path)
+        _sync_folder(path.parent)
+    except BaseException as error:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+        if not isinstance(error, OSError):
+            raise
+        raise OutputError(
+            f"cannot write {path} ({error.strerror or error})",
+            "choose a folder that you may write to with -o",
+        ) from error
+
+
+def _sync_folder(folder: Path) -> None:
+    # The rename itself is durable only once its folder is. Where that fails the new file is there nevertheless.
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

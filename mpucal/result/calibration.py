@@ -1,0 +1,293 @@
+"""The result of a calibration, and its two files: calibration.json and the config blob."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..data import Sensor, Vector
+from ..errors import RecordingError
+from .atomic import write_atomically
+from .blob import NO_RANGE, Blob, BlobError
+
+FORMAT, VERSION = "mpucal.calibration", 1
+ACCELEROMETER_FORMULA = "a = inv(D) @ (y - b_a)"
+GYROSCOPE_FORMULA = "w = K @ (y - b_omega)"
+
+# top-level keys of the document that are kept as they are
+EXTRA = ("autopilot", "others", "written", "merged")
+
+GOOD, USABLE, REFUSED = "good", "usable", "refused"
+
+
+def unknown(*shape: int) -> Vector:
+    """NaN of a shape: a number that nobody knows."""
+    return np.full(shape, np.nan)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """An accelerometer's D and b_a (the paper's equation 3), how sure they are, and what they rest on.
+
+    Attributes
+    ----------
+    D : (3, 3), b_a : (3,) m/s^2: y = D s + b_a; D_std, b_a_std : their standard deviations.
+    noise_std : (3,) m/s^2, the accelerometer's noise a sample.
+    K : (3, 3), b_omega : (3,) rad/s: w = K (y - b_omega); K_std, b_omega_std, gyro_noise_std : likewise.
+    fit, quality : mappings with the keys of calibration.json.
+    sensor : what was calibrated.
+    created : ISO 8601 time.
+    applied_in_hardware : (3,) m/s^2 that offset registers subtract already; a consumer uses b_a minus this.
+    b_a_slope : (3,) m/s^2 a degree Celsius, of which b_a grows away from sensor.temperature_c; zeros: not known to.
+    b_a_slope_std : (3,). temperature_range_c : (2,) degrees Celsius, within which that was seen.
+    extra : further top-level keys of the document (autopilot, others, written, merged).
+
+    Unknown numbers are NaN (null in the file).
+    """
+
+    D: Vector
+    b_a: Vector
+    D_std: Vector = field(default_factory=lambda: unknown(3, 3))
+    b_a_std: Vector = field(default_factory=lambda: unknown(3))
+    noise_std: Vector = field(default_factory=lambda: unknown(3))
+    K: Vector = field(default_factory=lambda: np.eye(3))
+    b_omega: Vector = field(default_factory=lambda: unknown(3))
+    K_std: Vector = field(default_factory=lambda: unknown(3, 3))
+    b_omega_std: Vector = field(default_factory=lambda: unknown(3))
+    gyro_noise_std: Vector = field(default_factory=lambda: unknown(3))
+    fit: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    quality: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    sensor: Sensor = field(default_factory=Sensor)
+    created: str = ""
+    applied_in_hardware: Vector = field(default_factory=lambda: np.zeros(3))
+    extra: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    b_a_slope: Vector = field(default_factory=lambda: np.zeros(3))
+    b_a_slope_std: Vector = field(default_factory=lambda: unknown(3))
+    temperature_range_c: Vector = field(default_factory=lambda: unknown(2))
+
+    @property
+    def follows_temperature(self) -> bool:
+        """Whether b_a(T) is known, and not b_a alone."""
+        return bool(np.any(self.b_a_slope))
+
+    def b_a_at(self, temperature_c: ArrayLike | None = None) -> Vector:
+        """b_a(T) (..., 3) m/s^2 at (...) degrees Celsius; b_a where that is NaN, None, or b_a(T) is not known.
+
+        Beyond the range in which it was seen, b_a(T) stays as at its end.
+        """
+        if temperature_c is None or not self.follows_temperature:
+            return self.b_a
+        T_0 = self.sensor.temperature_c
+        T = np.clip(np.asarray(temperature_c, float), *self.temperature_range_c)
+        away = np.nan_to_num(T - (np.nan if T_0 is None else T_0))
+        return np.asarray(self.b_a + away[..., None] * self.b_a_slope)
+
+    @property
+    def verdict(self) -> str:
+        """good, usable or refused; refused where nobody judged."""
+        return str(self.quality.get("verdict", REFUSED))
+
+    def apply(self, acc: ArrayLike, gyr: ArrayLike | None = None, temperature_c: ArrayLike | None = None) -> Any:
+        """Calibrated measurements (the paper's equation 4).
+
+        Parameters
+        ----------
+        acc : (..., 3) m/s^2 as measured. gyr : (..., 3) rad/s as measured, or None.
+        temperature_c : (...) degrees Celsius of the chip, for b_a(T); None: b_a.
+
+        Returns
+        -------
+        (..., 3) m/s^2, inv(D) (y - b_a); with gyr the pair of it and K (y - b_omega), (..., 3) rad/s.
+        """
+        # b_a minus what the offset registers subtract: y comes from the chip with that already gone
+        y = np.asarray(acc, float) - (self.b_a_at(temperature_c) - self.applied_in_hardware)
+        a: NDArray[np.float64] = y @ np.linalg.inv(self.D).T
+        if gyr is None:
+            return a
+        return a, (np.asarray(gyr, float) - np.nan_to_num(self.b_omega)) @ self.K.T
+
+    def document(self) -> dict[str, Any]:
+        """The content of calibration.json; NaN becomes None."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "created": self.created,
+            "accelerometer": {
+                "D": _plain(self.D),
+                "b_a": _plain(self.b_a),
+                "D_std": _plain(self.D_std),
+                "b_a_std": _plain(self.b_a_std),
+                "noise_std": _plain(self.noise_std),
+                "formula": ACCELEROMETER_FORMULA,
+                **self._temperature_document(),
+            },
+            "gyroscope": {
+                "K": _plain(self.K),
+                "b_omega": _plain(self.b_omega),
+                "K_std": _plain(self.K_std),
+                "b_omega_std": _plain(self.b_omega_std),
+                "noise_std": _plain(self.gyro_noise_std),
+                "formula": GYROSCOPE_FORMULA,
+            },
+            "fit": _plain(dict(self.fit)),
+            "quality": _plain(dict(self.quality)),
+            "sensor": _plain(asdict(self.sensor)),
+            "applied_in_hardware": {"b_a": _plain(self.applied_in_hardware)},
+            **_plain(dict(self.extra)),
+        }
+
+    def _temperature_document(self) -> dict[str, Any]:
+        if not self.follows_temperature:
+            return {}
+        return {
+            "b_a_slope": _plain(self.b_a_slope),
+            "b_a_slope_std": _plain(self.b_a_slope_std),
+            "temperature_range_c": _plain(self.temperature_range_c),
+        }
+
+    def json(self) -> str:
+        """The document as text."""
+        return json.dumps(self.document(), indent=2, allow_nan=False) + "\n"
+
+    def blob(self) -> Blob:
+        """The config blob of this calibration, see firmware_protocol.md."""
+        number = {f.name: getattr(self.sensor, f.name) for f in fields(Sensor)}
+        return Blob(
+            who_am_i=number["who_am_i"] or 0,
+            accel_range_g=number["accel_range_g"] or 0.0,
+            gyro_range_dps=number["gyro_range_dps"] or 0.0,
+            D=tuple(self.D.ravel().tolist()),
+            b_a=tuple(self.b_a.tolist()),
+            gravity=float(self.fit.get("gravity") or math.nan),
+            temperature_c=math.nan if number["temperature_c"] is None else number["temperature_c"],
+            created=self.created,
+            applied_b_a=tuple(self.applied_in_hardware.tolist()),
+            K=tuple(self.K.ravel().tolist()),
+            b_omega=tuple(self.b_omega.tolist()),
+            b_a_slope=tuple(self.b_a_slope.tolist()),
+            temperature_range_c=tuple(self.temperature_range_c.tolist()) if self.follows_temperature else NO_RANGE,
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write calibration.json (`.json`) or the config blob (`.bin`), atomically.
+
+        Raises
+        ------
+        OutputError : the file cannot be written.
+        ValueError : another ending, or a blob of a calibration that holds unknown numbers.
+        """
+        path = Path(path)
+        if path.suffix == ".json":
+            write_atomically(path, self.json().encode())
+        elif path.suffix == ".bin":
+            write_atomically(path, self.blob().encode())
+        else:
+            raise ValueError(f"{path.name}: a calibration is saved as .json or .bin")
+
+    @classmethod
+    def load(cls, path: str | Path) -> Calibration:
+        """Read a calibration.json or a config blob.
+
+        Raises
+        ------
+        RecordingError : no such file, or no calibration in it.
+        """
+        path = Path(path)
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path") from error
+        if path.suffix == ".bin":
+            try:
+                return cls.from_blob(Blob.decode(data))
+            except BlobError as error:
+                raise RecordingError(f"{path} is no config blob: {error}", "give an undamaged blob") from error
+        try:
+            return cls.from_document(json.loads(data))
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise RecordingError(
+                f"{path} holds no calibration ({type(error).__name__}: {error})", "give a calibration.json"
+            ) from error
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> Calibration:
+        """The inverse of `document`; unknown keys are ignored, missing ones are unknown numbers."""
+        if document.get("format") != FORMAT:
+            raise ValueError(f'"format" is {document.get("format")!r}, not {FORMAT!r}')
+        if document.get("version", 0) > VERSION:
+            raise ValueError(f"version {document['version']} is newer than {VERSION}")
+        acc, gyr = document["accelerometer"], document.get("gyroscope", {})
+        return cls(
+            D=_array(acc["D"], 3, 3),
+            b_a=_array(acc["b_a"], 3),
+            D_std=_array(acc.get("D_std"), 3, 3),
+            b_a_std=_array(acc.get("b_a_std"), 3),
+            noise_std=_array(acc.get("noise_std"), 3),
+            K=_array(gyr["K"], 3, 3) if gyr.get("K") else np.eye(3),
+            b_omega=_array(gyr.get("b_omega"), 3),
+            K_std=_array(gyr.get("K_std"), 3, 3),
+            b_omega_std=_array(gyr.get("b_omega_std"), 3),
+            gyro_noise_std=_array(gyr.get("noise_std"), 3),
+            fit=MappingProxyType(dict(document.get("fit", {}))),
+            quality=MappingProxyType(dict(document.get("quality", {}))),
+            sensor=Sensor.of(document.get("sensor", {})),
+            created=str(document.get("created", "")),
+            applied_in_hardware=_array(document.get("applied_in_hardware", {}).get("b_a", [0, 0, 0]), 3),
+            b_a_slope=_array(acc.get("b_a_slope", [0, 0, 0]), 3),
+            b_a_slope_std=_array(acc.get("b_a_slope_std"), 3),
+            temperature_range_c=_array(acc.get("temperature_range_c"), 2),
+            extra=MappingProxyType({key: document[key] for key in EXTRA if key in document}),
+        )
+
+    @classmethod
+    def from_blob(cls, blob: Blob) -> Calibration:
+        """A calibration of a blob's numbers; what a blob does not hold is unknown."""
+        return cls(
+            D=np.array(blob.D).reshape(3, 3),
+            b_a=np.array(blob.b_a),
+            K=np.array(blob.K).reshape(3, 3),
+            b_omega=np.array(blob.b_omega),
+            fit=MappingProxyType({"gravity": blob.gravity}),
+            sensor=Sensor(
+                who_am_i=blob.who_am_i or None,
+                accel_range_g=blob.accel_range_g or None,
+                gyro_range_dps=blob.gyro_range_dps or None,
+                temperature_c=None if math.isnan(blob.temperature_c) else blob.temperature_c,
+            ),
+            created=blob.created,
+            applied_in_hardware=np.array(blob.applied_b_a),
+            b_a_slope=np.array(blob.b_a_slope),
+            temperature_range_c=np.array(blob.temperature_range_c),
+        )
+
+
+def _array(values: Any, *shape: int) -> Vector:
+    if values is None:
+        return unknown(*shape)
+    array = np.array(values, dtype=np.float64)  # None becomes NaN
+    if array.shape != shape:
+        raise ValueError(f"shape {array.shape} where {shape} belongs")
+    return array
+
+
+def _plain(value: Any) -> Any:
+    """JSON's own types; NaN and infinities become None."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,178 @@
+"""Calibrations of one sensor at different temperatures made into one with b_a(T), where they support it. Knows no file.
+
+    b_a,k = b_a + slope (T_k - T_0) + e_k,    e_k of the standard deviation that calibration k says,
+
+a straight line an axis, by weighted least squares, T_0 the weighted mean of the T_k: there b_a and slope are
+independent. D is the weighted mean: a sensor whose D changes, too, is left with half the change at the ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from ..data import Vector
+from ..errors import RefusedError, UsageError
+from .calibration import REFUSED, Calibration
+from .comparison import compare, in_body_frame
+
+# so far apart at least: a chip's thermometer is good to a degree, and a day's own drift looks like a slope
+LEAST_SPAN_C = 5.0
+# standard deviations: a slope is one beyond the first, and the line fits within the second
+SLOPED, FITS = 3.0, 4.0
+
+
+@dataclass(frozen=True)
+class Merged:
+    """What several calibrations make together.
+
+    Attributes
+    ----------
+    calibration : the one. why : one sentence: whether it holds b_a(T), and what speaks for or against it.
+    remarks : what else a person should know, a sentence each.
+    """
+
+    calibration: Calibration
+    why: str
+    remarks: tuple[str, ...]
+
+
+def merge(calibrations: Sequence[Calibration]) -> Merged:
+    """One calibration of several, with b_a(T) where their temperatures and uncertainties support it.
+
+    Raises
+    ------
+    UsageError : fewer than two, of different sensors, or some that do not say at which temperature or how sure.
+    RefusedError : one of them was refused.
+    """
+    _check(calibrations)
+    all_ = [in_body_frame(c) for c in calibrations]
+    T = np.array([c.sensor.temperature_c for c in all_], float)
+    b_a, weight = np.array([c.b_a for c in all_]), np.array([c.b_a_std for c in all_]) ** -2.0
+    # one T_0 for the three axes, since a blob has one
+    T_0 = float((weight.sum(1) * T).sum() / weight.sum())
+    constant = (weight * b_a).sum(0) / weight.sum(0)
+    line, line_std, slope, slope_std = _line(T - T_0, b_a, weight)
+    worst_constant = _worst(b_a - constant, weight)
+    worst_line = _worst(b_a - line - np.outer(T - T_0, slope), weight)
+    sure = float(np.abs(slope / slope_std).max()) if np.ptp(T) >= LEAST_SPAN_C else 0.0
+    why = _against(T, sure, worst_line, worst_constant, len(all_))
+    base = _together(all_, T_0, T)
+    if why is not None:
+        merged = replace(base, b_a=constant, b_a_std=weight.sum(0) ** -0.5)
+        return Merged(merged, f"The data do not support b_a(T): {why}", _remarks(all_))
+    merged = replace(
+        base,
+        b_a=line,
+        b_a_std=line_std,
+        b_a_slope=slope,
+        b_a_slope_std=slope_std,
+        temperature_range_c=np.array([T.min(), T.max()]),
+    )
+    said = (
+        f"b_a(T) is a line from {T.min():.1f} to {T.max():.1f} °C, {sure:.0f} standard deviations steep at most; the"
+        f" calibrations lie within {worst_line:.1f} of it."
+    )
+    if len(all_) == 2:
+        said += " Two points always lie on a line: a third temperature would show whether it is one."
+    return Merged(merged, said, _remarks(all_))
+
+
+def _check(calibrations: Sequence[Calibration]) -> None:
+    if len(calibrations) < 2:
+        raise UsageError("one calibration alone was given", "give two or more, made at different temperatures")
+    if any(c.quality.get("verdict") == REFUSED for c in calibrations):
+        raise RefusedError("one of the calibrations was refused", "repeat its session as its reasons say")
+    if any(c.sensor.temperature_c is None or not _is_sure(c) for c in calibrations):
+        raise UsageError(
+            "one of the calibrations does not say at which temperature it was made, or how sure it is",
+            "give a calibration.json of a chip's session, not its blob",
+        )
+    if any(c.follows_temperature for c in calibrations):
+        raise UsageError("one of the calibrations is merged already", "merge those that it was made of")
+    if any("autopilot" in c.extra for c in calibrations):
+        raise UsageError(
+            "one of the calibrations is of an autopilot's stream, whose parameters change meanwhile",
+            "use the autopilot's own temperature calibration, or a chip's session",
+        )
+    for name in ("who_am_i", "accel_offsets"):
+        if len({value for c in calibrations if (value := getattr(c.sensor, name)) is not None}) > 1:
+            raise UsageError(f"the calibrations are of different sensors ({name} differs)", "give those of one")
+    if len({c.fit.get("gravity") for c in calibrations}) > 1:
+        raise UsageError("the calibrations were fitted with different gravities", "fit them again with --gravity")
+    if len({tuple(c.applied_in_hardware) for c in calibrations}) > 1:
+        raise UsageError(
+            "the calibrations say differently what the offset registers subtract", "give those made before a write"
+        )
+
+
+def _is_sure(c: Calibration) -> bool:
+    return bool(np.isfinite(c.b_a_std).all() and np.isfinite(c.D_std).all() and c.b_a_std.all() and c.D_std.all())
+
+
+def _line(away: Vector, b_a: Vector, weight: Vector) -> tuple[Vector, Vector, Vector, Vector]:
+    """b_a and slope at `away` = 0, (3,) each, with their standard deviations."""
+    values = np.zeros((4, 3))
+    for i in range(3):
+        w = weight[:, i]
+        normal = np.array([[w.sum(), (w * away).sum()], [(w * away).sum(), (w * away**2).sum()]])
+        if np.ptp(away) == 0.0:
+            values[:, i] = (w * b_a[:, i]).sum() / w.sum(), w.sum() ** -0.5, 0.0, np.inf
+            continue
+        covariance = np.linalg.inv(normal)
+        found = covariance @ [(w * b_a[:, i]).sum(), (w * away * b_a[:, i]).sum()]
+        std = np.sqrt(np.diag(covariance))
+        values[:, i] = found[0], std[0], found[1], std[1]
+    return values[0], values[1], values[2], values[3]
+
+
+def _worst(residual: Vector, weight: Vector) -> float:
+    return float(np.abs(residual * np.sqrt(weight)).max())
+
+
+def _against(T: Vector, sure: float, worst_line: float, worst_constant: float, count: int) -> str | None:
+    """What speaks against a line, or None."""
+    if np.ptp(T) < LEAST_SPAN_C:
+        return f"their temperatures span {np.ptp(T):.1f} °C, and {LEAST_SPAN_C:g} are needed."
+    if worst_line > FITS and count > 2:
+        return (
+            f"no line fits them, the worst is {worst_line:.1f} standard deviations off it; b_a is their mean, of which"
+            f" the worst is {worst_constant:.1f} off."
+        )
+    if sure < SLOPED:
+        return f"a slope is not seen ({sure:.1f} standard deviations at most); b_a is their mean."
+    return None
+
+
+def _together(all_: Sequence[Calibration], T_0: float, T: Vector) -> Calibration:
+    """What is no bias: weighted means, and which they were made of."""
+    weight = np.array([c.D_std for c in all_]) ** -2.0
+    D = (weight * np.array([c.D for c in all_])).sum(0) / weight.sum(0)
+    made_of: list[dict[str, Any]] = [
+        {"created": c.created, "temperature_c": float(t), "b_a": c.b_a.tolist()} for c, t in zip(all_, T, strict=True)
+    ]
+    last = max(all_, key=lambda c: c.created)
+    worst = max(all_, key=lambda c: c.verdict != "good")
+    return replace(
+        last,
+        D=np.asarray(D),
+        D_std=np.asarray(weight.sum(0) ** -0.5),
+        K=np.asarray(np.mean([c.K for c in all_], axis=0)),
+        quality=worst.quality,
+        sensor=replace(last.sensor, temperature_c=T_0),
+        extra=MappingProxyType({"merged": made_of}),
+    )
+
+
+def _remarks(all_: Sequence[Calibration]) -> tuple[str, ...]:
+    """Where D changed by more than its uncertainties."""
+    coldest, warmest = (pick(all_, key=lambda c: c.sensor.temperature_c or 0.0) for pick in (min, max))
+    changed = [d for d in compare(coldest, warmest).changed if d.unit != "mg"]
+    if not changed:
+        return ()
+    named = ", ".join(f"{d.name} by {d.value:+.3f} {d.unit}" for d in changed[:3])
+    return (f"From the coldest to the warmest D changed, too ({named}): at the ends half of that is left.",)

@@ -1,0 +1,114 @@
+"""The fits of a session, from the samples so far. Knows no clock, no source and no person."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...calibration import weigh
+from ...calibration.evidence import Evidence
+from ...calibration.knowledge import Known, know, most_helpful
+from ...calibration.masks import with_masks
+from ...calibration.model import Flat
+from ...calibration.quality import judge
+from ...calibration.stationary import find_flat, flat_statistics
+from ...calibration.verification import unseen_rests
+from ...data import Recording, Samples, Sensor
+from ..aims import AIMS, directions
+from ..events import Checked, Event, Learnt, Tried, Wish
+from ..plan import Plan
+from .disagreement import explained, judged, much_clipped
+from .knowledge import knowledge, wanted
+from .store import Store
+
+CONTRADICTION, CLIPPED = "inconsistent", "gyro_clipped"
+OF_THE_SENSOR = "left_handed", "swapped_axes", "wrong_range"
+
+
+class Task(NamedTuple):
+    """What came since the last task, and what is to be done then.
+
+    Attributes
+    ----------
+    samples : that arrived. wish : what to compute of all there are; None: nothing.
+    forget : the samples from this number on are not used, nor what was computed of them; None: all are.
+    """
+
+    samples: Samples
+    wish: Wish | None = None
+    forget: int | None = None
+
+
+class Fits:
+    """Computes one task after another; the answers depend on the tasks alone.
+
+    Parameters
+    ----------
+    plan : what the session is to do. sensor : what it measures with.
+    """
+
+    def __init__(self, plan: Plan, sensor: Sensor) -> None:
+        self._plan = plan
+        self._store = Store(sensor)
+        self._flat: Flat | None = None
+        self._known: Known | None = None
+        self._tried: Evidence | None = None
+        self._since = 0
+
+    def do(self, task: Task) -> Event | None:
+        """The answer to the task's wish, where there is one."""
+        self._store.add(task.samples)
+        if task.forget is not None:
+            self._store.forget(task.forget)
+            self._known, self._tried = None, None
+        match task.wish:
+            case Wish.KNOW | Wish.ADVISE:
+                return self._learnt(task.wish is Wish.ADVISE)
+            case Wish.TRY:
+                return self._try()
+            case Wish.CHECK:
+                return self._check()
+        return None
+
+    def _learnt(self, advice: bool) -> Event | None:
+        recording = with_masks(self._store.recording())
+        if self._flat is None:
+            segment = find_flat(recording)
+            if segment is None:
+                return None
+            self._flat = flat_statistics(recording, segment)
+        flat, gravity = self._flat, self._plan.gravity
+        self._known = know(recording, flat, gravity, self._known)
+        target = AIMS[self._plan.target].target
+        down = None
+        if advice:
+            x, y, z = (-flat.y / np.linalg.norm(flat.y)).tolist()
+            allowed = directions((x, y, z), self._plan.tilt_only)
+            down = allowed[most_helpful(self._known, wanted(target), allowed)]
+        return Learnt(knowledge(self._known, target, float(recording.t[-1]), down), advice)
+
+    def _try(self) -> Event:
+        recording = self._store.recording()
+        evidence, _ = weigh(recording, self._plan.model, self._plan.gravity)
+        self._tried, self._since = evidence, len(recording)
+        quality = judge(evidence)
+        # what is wrong with the sensor, or was not measured, contradicts itself as well; and what does, does not settle
+        truer = (*OF_THE_SENSOR, *((CLIPPED,) if much_clipped(evidence.recording) else ()), CONTRADICTION)
+        reasons = sorted(quality["reasons"], key=lambda r: truer.index(r["code"]) if r["code"] in truer else len(truer))
+        first = reasons[0] if reasons else {"code": "", "message": ""}
+        why = first["message"]
+        if first["code"] == CONTRADICTION:
+            why = "; ".join(explained(why, evidence.recording))
+        return Tried(quality["verdict"], why, first["code"])
+
+    def _check(self) -> Event:
+        of = AIMS[self._plan.target].verify
+        evidence = self._tried
+        if evidence is None or evidence.fit is None or evidence.flat is None:
+            return Checked((), False, "verification_failed", "there is nothing to verify", "turn the board again")
+        recording: Recording = with_masks(self._store.recording())
+        rests = unseen_rests(recording, evidence.flat, evidence.fit, self._plan.gravity, self._since)
+        reasons = judge(evidence)["reasons"]
+        contradiction = next((reason["message"] for reason in reasons if reason["code"] == CONTRADICTION), "")
+        return judged(rests[:of], of, recording, contradiction)

@@ -1,0 +1,81 @@
+"""The samples of a session so far, averaged where they come faster than a fit needs them. Knows no fit."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+
+from ...data import Mask, Recording, Samples, Sensor, Vector
+
+# Means of what comes faster: a hand does nothing that is not seen at this rate.
+MOST_HZ = 200.0
+
+
+class Store:
+    """Grows by samples as they arrive; the times are those known then.
+
+    Parameters
+    ----------
+    sensor : whose rate is known.
+    """
+
+    def __init__(self, sensor: Sensor) -> None:
+        self._sensor = sensor
+        rate_hz = sensor.rate_hz or MOST_HZ
+        self._size = max(int(rate_hz / MOST_HZ * (1.0 + 1e-6)), 1)
+        self._done = Samples.empty()
+        self._parts: list[Samples] = []
+        self._rest = Samples.empty()
+        self._torn = False
+
+    def add(self, samples: Samples) -> None:
+        """They came after all others."""
+        if self._torn and len(samples):
+            samples = replace(samples, gap=np.append(True, samples.gap[1:]))
+            self._torn = False
+        if self._size > 1:
+            pending = Samples.joined([self._rest, samples])
+            used = len(pending) // self._size * self._size
+            samples, self._rest = _means(_cut(pending, 0, used), self._size), _cut(pending, used, len(pending))
+        if len(samples):
+            self._parts.append(samples)
+
+    def forget(self, first: int) -> None:
+        """Keep those of the first so many that were added, and mark a gap before what follows."""
+        self._join()
+        self._done, self._rest, self._torn = _cut(self._done, 0, first // self._size), Samples.empty(), True
+
+    def recording(self) -> Recording:
+        """All of them."""
+        self._join()
+        return Recording(**vars(self._done), sensor=self._sensor)
+
+    def _join(self) -> None:
+        if self._parts:
+            self._done, self._parts = Samples.joined([self._done, *self._parts]), []
+
+
+def _cut(samples: Samples, first: int, last: int) -> Samples:
+    return Samples(*(getattr(samples, f.name)[first:last] for f in fields(Samples)))
+
+
+def _means(samples: Samples, size: int) -> Samples:
+    """Means of `size` samples each; a mark on one of them marks the mean."""
+    n = len(samples) // size
+
+    def mean(values: Vector) -> Vector:
+        return np.asarray(values.reshape(n, size, *values.shape[1:]).mean(1))
+
+    def marked(values: Mask) -> Mask:
+        return np.asarray(values.reshape(n, size).any(1))
+
+    return Samples(
+        mean(samples.t),
+        mean(samples.acc),
+        mean(samples.gyr),
+        mean(samples.temperature_c),
+        marked(samples.gap),
+        marked(samples.acc_clipped),
+        marked(samples.gyr_clipped),
+    )

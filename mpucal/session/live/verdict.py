@@ -1,0 +1,35 @@
+"""A final calibration together with what its verification found. Knows no estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from types import MappingProxyType
+from typing import Any
+
+from ...result.calibration import REFUSED, USABLE, Calibration
+from ..events import Checked
+
+_FOUND = "agrees", "magnitude_mps2", "magnitude_std_mps2", "direction_deg", "direction_std_deg", "down"
+
+
+def verified(calibration: Calibration, checked: Checked | None) -> Calibration:
+    """The calibration with `quality.verification`.
+
+    Refused where the new orientations disagree with it, usable at most where none was shown. Without a verification
+    (the source ended, the person had enough) nothing is added.
+    """
+    if checked is None:
+        return calibration
+    found = [{key: value for key, value in asdict(rest).items() if key in _FOUND} for rest in checked.found]
+    quality: dict[str, Any] = {
+        **calibration.quality,
+        "verification": {"agrees": checked.agrees, "orientations": found},
+    }
+    if not checked.agrees:
+        reasons: list[Mapping[str, Any]] = [r for r in quality.get("reasons", []) if r["code"] != checked.code]
+        message = "; ".join(text for text in (checked.why, checked.remedy) if text)
+        refused = checked.agrees is not None or quality["verdict"] == REFUSED
+        verdict = REFUSED if refused else USABLE
+        quality |= {"verdict": verdict, "reasons": [{"code": checked.code, "message": message}, *reasons]}
+    return replace(calibration, quality=MappingProxyType(quality))

@@ -1,0 +1,295 @@
+"""Where source, session, person, fit and files meet. Knows no terminal and no kind of source."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ..chip.access import EndOfCapture
+from ..chip.records import FORGET, KEY, LATE, RESUMED
+from ..data import Recording, Sensor
+from ..errors import Abandoned, BusError, CaptureError, ChipError
+from ..result.calibration import Calibration
+from .events import (
+    Abort,
+    Command,
+    Connected,
+    Decision,
+    Enough,
+    Event,
+    Fitted,
+    Forget,
+    Key,
+    Measured,
+    Prompt,
+    Redo,
+    Resumed,
+    SourceEnded,
+    Tick,
+    Written,
+)
+from .live.questions import Here, Questions, Worker
+from .live.verdict import verified
+from .machine import Machine
+from .plan import Plan
+from .ports import Note, Source, Talk
+from .results import result_files, save
+from .table import State
+
+MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
+_PRESSED: dict[Key, Event] = {Key.ENOUGH: Enough(), Key.REDO: Redo(), Key.ABORT: Abort()}
+
+
+class Runner:
+    """Runs one session on one source; every step is asked for in the order in which it stands here.
+
+    What reaches the machine depends on the source's bytes and the keys alone, so that a replay repeats it.
+
+    Parameters
+    ----------
+    talk : the person. note : keeps a session event in the capture (name, time [ns], data).
+    plan : what the session is to do.
+    listeners : hear each prompt besides the person: the hand that turns a simulated board.
+    go_on : after the source has ended, lets it go on with the next part of what was recorded in parts: True where
+        there is one. The last part of a resumed session is the sensor itself.
+    late : whether to wait for an answer that is late now, or is not; in a replay, where its session waited.
+    hire : begins who computes the answers.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        talk: Talk,
+        note: Note,
+        plan: Plan | None = None,
+        listeners: Sequence[Callable[[Prompt], None]] = (),
+        go_on: Callable[[], bool] = lambda: False,
+        late: Callable[[bool], bool] = bool,
+        hire: Callable[[Plan, Sensor], Worker] = Here,
+    ) -> None:
+        self._source, self._talk, self._note = source, talk, note
+        self._plan = plan or Plan()
+        self._listeners, self._go_on, self._late, self._hire = listeners, go_on, late, hire
+        self._machine = Machine(self._plan.until_end, self._plan.target, self._plan.tilt_only, self._plan.attended)
+        self._questions: Questions | None = None
+        # what must not reach the machine before an answer that is late
+        self._arrived: deque[Event] = deque()
+        self._forgotten: list[Forget] = []
+        self._said = Decision("")
+        self._ended = False
+        self.sensor: Sensor | None = None
+
+    def measure(self) -> Recording:
+        """Connect, lay flat, rotate, verify.
+
+        Raises
+        ------
+        Abandoned : the person stopped it, never held still, or the source ended before the board was turned.
+        SourceError : the source failed before the board was turned, or does not replay.
+        """
+        try:
+            self._ask()
+            self._connect()
+            if self.sensor is not None:
+                self._questions = Questions(self._plan, self.sensor, self._hire)
+            while self._machine.state in MEASURING:
+                self._ask()
+                if self._machine.state in MEASURING:
+                    self._poll()
+        except Abandoned:
+            # a replay that is stopped by who watches it went on when it was recorded
+            with suppress(CaptureError):
+                self._rest()
+            raise
+        finally:
+            if self._questions is not None:
+                self._questions.close()
+        self._rest()
+        return self._recording()
+
+    def record(self, seconds: float | None) -> int:
+        """Measure for `seconds`, or until any key or the source's end; returns how many samples came.
+
+        Raises
+        ------
+        SourceError : the source failed before the board was turned.
+        """
+        if self._plan.config.accel_alone:
+            return self._collect(seconds)
+        self._connect()
+        begun_ns = self._source.now_ns()
+        long_ns = math.inf if seconds is None else seconds * 1e9
+        while self._machine.state in MEASURING:
+            if self._talk.pressed() or self._source.now_ns() - begun_ns >= long_ns:
+                self._stop_here()
+                break
+            self._poll()
+        self._rest()
+        return len(self._source.recording())
+
+    def calibrate(self, recording: Recording, fit: Callable[[Recording], Calibration]) -> Calibration:
+        """Fit, and join what the verification found; Abandoned where the person stopped it meanwhile."""
+        calibration = verified(fit(recording), self._machine.checked)
+        self._ask()
+        self._feed(Fitted(calibration.verdict))
+        return calibration
+
+    def write(
+        self,
+        folder: Path,
+        calibration: Calibration,
+        recording: Recording,
+        truth: Mapping[str, Any] | None = None,
+    ) -> tuple[Path, ...]:
+        """Write the results, all files or none; Abandoned where the person stopped it.
+
+        Raises
+        ------
+        OutputError : a file cannot be written.
+        """
+        files: dict[str, bytes] = {}
+        for name, data in result_files(calibration, recording, truth):
+            self._ask()
+            files[name] = data
+        written = save(folder, files)
+        self._ask()
+        self._feed(Written(tuple(files)))
+        return written
+
+    def _collect(self, seconds: float | None) -> int:
+        """The same without a prompt: of the accelerometer alone no session is made."""
+        with suppress(EndOfCapture):
+            self.sensor = self._source.start()
+            end_ns = math.inf if seconds is None else self._source.now_ns() + seconds * 1e9
+            while self._source.now_ns() < end_ns and not self._talk.pressed():
+                self._source.poll()
+            self._stop_here()
+            self._source.stop()
+        return len(self._source.recording())
+
+    def _stop_here(self) -> None:
+        """As by a key: a session that replays this goes on to calibrate, or has nothing to."""
+        if self._machine.state is State.ROTATE:
+            self._press(Key.ENOUGH)
+        else:
+            self._note(KEY, self._source.now_ns(), {KEY: Key.ABORT.value})
+
+    def _connect(self) -> None:
+        try:
+            self.sensor = self._source.start()
+        except EndOfCapture:
+            self._ends(SourceEnded())
+        else:
+            self._feed(Connected(self.sensor))
+
+    def _poll(self) -> None:
+        try:
+            samples = self._source.poll()
+        except EndOfCapture:
+            self._ends(SourceEnded())
+        except (BusError, ChipError) as error:
+            # a CaptureError is none of these: what does not replay is not calibrated either
+            self._ends(SourceEnded(f"{error.what}: {error.remedy}"), error)
+        else:
+            self._arrived += Measured(samples), Tick(self._source.now_ns() * 1e-9)
+            self._catch_up()
+
+    def _catch_up(self, wait: bool = False) -> None:
+        """Tell the machine what arrived, each answer in its place; where one is late, the source goes on meanwhile."""
+        while self._machine.state in MEASURING:
+            if self._questions is not None and self._questions.due:
+                if not wait and self._late(self._questions.late):
+                    self._note(LATE, self._source.now_ns(), {})
+                    return
+                for answer in self._questions.answers():
+                    if self._machine.state in MEASURING:
+                        self._feed(answer)
+            elif self._arrived:
+                event = self._arrived.popleft()
+                if self._questions is not None and isinstance(event, Measured):
+                    self._questions.add(event.samples)
+                self._feed(event)
+            else:
+                return
+        self._arrived.clear()
+
+    def _ends(self, event: SourceEnded, error: BusError | ChipError | None = None) -> None:
+        """That was all, or all of one part: what ended that does not end a session that was resumed."""
+        self._catch_up(wait=True)
+        enough = self.sensor is not None and self._machine.state not in MEASURING
+        if not enough and self._next_part():
+            return
+        self._ended = True
+        if enough:
+            return
+        if error is not None and self._machine.state not in (State.ROTATE, State.VERIFY):
+            raise error
+        self._feed(event)
+
+    def _next_part(self) -> bool:
+        """Go on with the next part of a resumed session; False where there is none."""
+        ended_ns = self._source.now_ns()
+        while self._go_on():
+            self._note(RESUMED, ended_ns, {})
+            try:
+                sensor = self._source.start()
+            except EndOfCapture:
+                continue
+            gap_s = (self._source.now_ns() - ended_ns) * 1e-9
+            self._feed(Connected(sensor) if self.sensor is None else Resumed(gap_s))
+            self.sensor = sensor
+            return True
+        return False
+
+    def _recording(self) -> Recording:
+        """All samples but those that the person did not want."""
+        recording = self._source.recording()
+        for forget in sorted(self._forgotten, key=lambda f: f.first, reverse=True):
+            recording = recording.without(forget.first, forget.last)
+        return recording
+
+    def _rest(self) -> None:
+        if self._ended:
+            return
+        # the samples are in: a sensor that cannot be put to rest takes nothing from them
+        with suppress(BusError, ChipError, EndOfCapture):
+            self._source.stop()
+
+    def _ask(self) -> None:
+        for key in self._talk.pressed():
+            self._press(key)
+
+    def _press(self, key: Key) -> None:
+        self._note(KEY, self._source.now_ns(), {KEY: key.value})
+        if self._arrived and key is not Key.ABORT:
+            self._arrived.append(_PRESSED[key])
+        else:
+            self._feed(_PRESSED[key])
+
+    def _feed(self, event: Event) -> None:
+        for output in self._machine.handle(event):
+            if isinstance(output, Command):
+                self._do(output)
+                continue
+            if isinstance(output, Decision):
+                self._said = output
+            self._talk.hear(output)
+            if isinstance(output, Prompt):
+                for listener in self._listeners:
+                    listener(output)
+        if self._machine.state is State.ABORTED:
+            raise Abandoned(self._said.why, self._said.remedy)
+
+    def _do(self, command: Command) -> None:
+        """What the machine asks of its owner."""
+        if isinstance(command, Forget):
+            self._forgotten = [f for f in self._forgotten if f.first != command.first] + [command]
+            self._note(FORGET, self._source.now_ns(), {"first": command.first, "last": command.last})
+            if self._questions is not None:
+                self._questions.forget(command.first)
+        elif self._questions is not None:
+            self._questions.ask(command)

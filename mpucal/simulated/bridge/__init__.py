@@ -1,0 +1,169 @@
+"""An emulated bridge: what the firmware does, byte for byte, with any bus as its I2C bus. Knows no port.
+
+It stands in for a microcontroller in tests and trials. See firmware_protocol.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from ...chip.access import Bus
+from ...errors import BusError, NoAnswer
+from ...result.blob import MAX_LENGTH
+from ...sources.bridge import messages as wire
+from ...sources.bridge.clock import US, WRAP_US
+from ...sources.bridge.frame import Deframer, Frame
+from ...sources.bridge.messages import Frames, Message, Reply, Status
+from .keeper import Keeper
+from .line import EmulatedLine
+from .pusher import Pusher
+from .storage import Memory
+
+__all__ = ["EmulatedBridge", "EmulatedLine", "Memory"]
+
+ADDRESSES = (0x68, 0x69)
+NAME = b"emulated bridge"
+
+
+class EmulatedBridge:
+    """A bridge with a chip on it; whoever owns it carries its bytes and gives it time.
+
+    Parameters
+    ----------
+    chip : at `address`; None: nothing is connected. now_ns : its clock. memory : its EEPROM.
+    features : of those that a bridge may have. window : how many requests it takes at once.
+    """
+
+    def __init__(
+        self,
+        chip: Bus | None,
+        now_ns: Callable[[], int],
+        memory: Memory | None = None,
+        *,
+        address: int = ADDRESSES[0],
+        features: wire.Feature = wire.Feature.STREAM | wire.Feature.BLOB,
+        window: int = 4,
+    ) -> None:
+        self._chip, self._now_ns, self._address = chip, now_ns, address
+        self._keeper = Keeper(memory or Memory())
+        self._features, self._window = features, window
+        self._deframer = Deframer()
+        self._inbox: list[Frame] = []
+        self._greeted = False
+        self._chosen = 0
+        self._drops = 0
+        self._pusher: Pusher | None = None
+
+    def receive(self, data: bytes) -> None:
+        """Bytes came in."""
+        self._inbox += self._deframer.feed(data)
+
+    def work(self) -> bytes:
+        """Do what there is to do, and return what goes out; to be called once a millisecond."""
+        out = [self._handle(frame) for frame in self._inbox]
+        self._inbox.clear()
+        pusher = self._pusher
+        if pusher is not None:
+            out += [_encoded(Frames.TYPE, pusher.seq, frames) for frames in pusher.look()]
+        return b"".join(out)
+
+    def _handle(self, frame: Frame) -> bytes:
+        kind = frame.type | wire.REPLY_BIT
+        return b"".join(_encoded(kind, frame.seq, reply) for reply in self._answer(frame))
+
+    def _answer(self, frame: Frame) -> Sequence[Reply]:
+        kind = wire.REQUESTS.get(frame.type)
+        if not self._greeted and kind is not wire.Hello:
+            return [self._said(Status.NO_HELLO)]
+        try:
+            request = None if kind is None else kind.decode(frame.payload)
+        except wire.MessageError:
+            return [self._said(Status.BAD_PAYLOAD)]
+        try:
+            return self._done(request, frame.seq)
+        except NoAnswer:
+            return [self._said(Status.NO_ANSWER)]
+        except BusError:
+            return [self._said(Status.BUS_FAILED)]
+
+    def _done(self, request: Message | None, seq: int) -> Sequence[Reply]:
+        match request:
+            case wire.Hello():
+                return [self._hello(request)]
+            case wire.Read():
+                return [self._read(request)]
+            case wire.Burst():
+                return self._burst(request)
+            case wire.Write():
+                return [self._write(request)]
+            case wire.Stream() if wire.Feature.STREAM in self._features:
+                return [self._stream(request, seq)]
+            case wire.Message() if wire.Feature.BLOB in self._features:
+                if isinstance(request, wire.BlobBegin):
+                    self._stop()
+                return [self._keeper.answer(request, self._time())]
+        return [self._said(Status.UNKNOWN_TYPE)]
+
+    def _time(self) -> int:
+        return self._now_ns() // US % WRAP_US
+
+    def _said(self, status: Status) -> Reply:
+        return Reply(status, self._time())
+
+    def _hello(self, request: wire.Hello) -> Reply:
+        if request.magic != wire.MAGIC:
+            return self._said(Status.BAD_PAYLOAD)
+        status = Status.OK if request.major == wire.MAJOR else Status.BAD_VERSION
+        if status == Status.OK:
+            asked = (request.address,) if request.address else ADDRESSES
+            self._chosen = self._address if self._chip is not None and self._address in asked else 0
+            self._greeted, self._pusher, self._drops = True, None, 0
+            self._keeper.give_up()
+        room = MAX_LENGTH if wire.Feature.BLOB in self._features else 0
+        identity = (wire.MAGIC, wire.MAJOR, wire.MINOR, self._chosen)
+        return wire.HelloReply(
+            status, self._time(), *identity, self._features, self._window, room, NAME.ljust(16, b"\0")
+        )
+
+    def _bus(self) -> Bus:
+        if self._chip is None or not self._chosen:
+            raise NoAnswer("nothing answers the emulated bridge", "connect a chip")
+        return self._chip
+
+    def _read(self, request: wire.Read) -> Reply:
+        if not 1 <= request.count <= wire.MAX_READ:
+            return self._said(Status.BAD_PAYLOAD)
+        began = self._time()
+        return wire.ReadReply(Status.OK, began, self._bus().read(request.register, request.count).data)
+
+    def _burst(self, request: wire.Burst) -> list[Reply]:
+        if not 1 <= request.count <= wire.MAX_BURST:
+            return [self._said(Status.BAD_PAYLOAD)]
+        replies: list[Reply] = []
+        for offset in range(0, request.count, wire.MAX_READ):
+            began, count = self._time(), min(wire.MAX_READ, request.count - offset)
+            replies.append(wire.BurstReply(Status.OK, began, offset, self._bus().read(request.register, count).data))
+        return replies
+
+    def _write(self, request: wire.Write) -> Reply:
+        if not 1 <= len(request.data) <= wire.MAX_WRITE:
+            return self._said(Status.BAD_PAYLOAD)
+        began = self._time()
+        self._bus().write(request.register, request.data)
+        return wire.WriteReply(Status.OK, began)
+
+    def _stream(self, request: wire.Stream, seq: int) -> Reply:
+        if request.frame_bytes > wire.MAX_READ or (request.frame_bytes and not 1 <= request.batch <= wire.MAX_LOOK):
+            return self._said(Status.BAD_PAYLOAD)
+        self._stop()
+        if request.frame_bytes:
+            self._pusher = Pusher(self._bus(), seq, request, self._drops, self._now_ns)
+        return wire.StreamReply(Status.OK, self._time())
+
+    def _stop(self) -> None:
+        if self._pusher is not None:
+            self._drops, self._pusher = self._pusher.drops, None
+
+
+def _encoded(kind: int, seq: int, reply: Reply) -> bytes:
+    return Frame(kind, seq, reply.payload()).encode()

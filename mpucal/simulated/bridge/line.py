@@ -1,0 +1,116 @@
+"""A serial line to an emulated bridge, as a port, in a time that runs only while the host waits. Opens nothing."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Protocol
+
+from ...sources.bridge.port import BAUDS, Chunk
+from ...sources.bridge.port_errors import gone
+
+STEP_NS = 500_000
+BITS_A_BYTE = 10
+# the host's clock and the bridge's begin at different times
+HOST_AHEAD_NS = 7_000_000_000
+
+Fault = Callable[[bytes], bytes]
+
+
+class Device(Protocol):
+    """What is at the other end."""
+
+    def receive(self, data: bytes) -> None:
+        """Bytes came in."""
+        ...
+
+    def work(self) -> bytes:
+        """Do what there is to do, and return what goes out."""
+        ...
+
+
+class SteppedClock(Protocol):
+    """A clock that can be moved on."""
+
+    def now(self) -> int:
+        """What it shows, ns."""
+        ...
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Go on to `t_ns`."""
+        ...
+
+
+class EmulatedLine:
+    """A port whose other end is `device`; `clock` is the device's, too.
+
+    Parameters
+    ----------
+    latency_ns : how long an adapter holds back what the device sends.
+
+    Attributes
+    ----------
+    device : may be replaced: that is a reset. to_host, to_device : what the line makes of bytes.
+    unplugged : the port is gone while this is set. written : what the host has sent.
+    """
+
+    def __init__(self, device: Device, clock: SteppedClock, latency_ns: int = 1_000_000) -> None:
+        self.name, self.bauds = "the emulated line", BAUDS[:1]
+        self.device = device
+        self.to_host: Fault = _unchanged
+        self.to_device: Fault = _unchanged
+        self.unplugged = False
+        self.written = bytearray()
+        self._clock, self._latency_ns = clock, latency_ns
+        self._coming: deque[Chunk] = deque()
+        self._free_ns = 0
+
+    def now_ns(self) -> int:
+        """The host's clock."""
+        return self._clock.now() + HOST_AHEAD_NS
+
+    def read(self, until_ns: int) -> Chunk | None:
+        """See Port."""
+        while True:
+            self._check()
+            if self._coming and self._coming[0].t_ns <= self.now_ns():
+                return self._coming.popleft()
+            if self.now_ns() >= until_ns:
+                return None
+            self._step()
+
+    def write(self, data: bytes) -> None:
+        """See Port."""
+        self._check()
+        self.written += data
+        self.device.receive(self.to_device(data))
+
+    def set_baud(self, baud: int) -> None:
+        """See Port; it runs at any."""
+
+    def reopen(self, until_ns: int) -> None:
+        """See Port."""
+        while self.unplugged and self.now_ns() < until_ns:
+            self._step()
+        self._check()
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+    def _step(self) -> None:
+        self._clock.sleep_until(self._clock.now() + STEP_NS)
+        data = self.device.work()
+        if data and not self.unplugged:
+            data = self.to_host(data)
+            sent_ns = max(self._free_ns, self.now_ns()) + len(data) * BITS_A_BYTE * 1_000_000_000 // self.bauds[0]
+            self._free_ns = sent_ns
+            self._coming.append(Chunk(data, sent_ns + self._latency_ns))
+
+    def _check(self) -> None:
+        if self.unplugged:
+            self._coming.clear()
+            raise gone(self.name)
+
+
+def _unchanged(data: bytes) -> bytes:
+    return data

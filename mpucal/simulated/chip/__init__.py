@@ -1,0 +1,97 @@
+"""A simulated MPU-6050 or MPU-6500 in a simulated hand, as a bus. Knows no driver and no session."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...data import STANDARD_GRAVITY_MPS2
+from ..hand import KINDS
+from ..motion import Motion
+from ..sensor import Truth, in_symmetric_frame
+from .bus import SimulatedBus
+from .chip import Chip
+from .clock import CLOCKS, Clock, FastClock
+from .factory import Factory
+from .faults import Faults
+from .feed import Feed, RecordedFeed, SensorFeed
+from .models import MODELS, OFFSETS
+from .options import Options
+
+__all__ = ["Chip", "Feed", "RecordedFeed", "SimulatedBus", "Truth", "open_recorded", "open_simulated"]
+
+
+def open_simulated(
+    text: str = "sim",
+    gravity: float = STANDARD_GRAVITY_MPS2,
+    seed: int | None = None,
+    clock: Clock | None = None,
+) -> SimulatedBus:
+    """The simulated chip that `sim:key=value,...` describes.
+
+    Parameters
+    ----------
+    text : `sim`, or with keys: chip, who_am_i, offsets, seed, hand, pace, fault, rate_error_ppm, D, b_a, K,
+        b_omega, noise, temperature_c, khz. gravity : m/s^2, where the board is. seed : beside the text.
+    clock : time in place of `pace`'s, where something else moves the bus.
+
+    Raises
+    ------
+    UsageError : unknown keys or values.
+    """
+    options = Options.parse(text, seed)
+    truth = _truth(options, gravity)
+    of_hand, of_motion, of_noise, of_trim, of_faults = np.random.default_rng([options.seed, 2]).spawn(5)
+    motion = Motion(KINDS[options.hand](of_hand), of_motion, gravity)
+    model = replace(MODELS[options.chip], **OFFSETS[options.offsets])
+    if options.who_am_i is not None:
+        model = replace(model, who_am_i=options.who_am_i)
+    factory = Factory.draw(of_trim, model.family)
+    chip = Chip(model, SensorFeed(truth, motion, of_noise), truth.rate_error_ppm, factory)
+    clock = clock or CLOCKS[options.pace]()
+    faults = Faults(options.fault, chip, clock, of_faults) if options.fault else None
+    return SimulatedBus(chip, clock, motion, truth, faults, options.khz)
+
+
+def open_recorded(
+    acc_counts: ArrayLike,
+    gyr_counts: ArrayLike,
+    rate_hz: float,
+    accel_range_g: float,
+    gyro_range_dps: float,
+    *,
+    rate_error_ppm: float = 0.0,
+    chip: str = "mpu6050",
+) -> SimulatedBus:
+    """A simulated chip that serves the int16 counts (n, 3) of a recording, and then ends with EndOfCapture.
+
+    Its sample clock is `rate_error_ppm` faster than `rate_hz`, to which the chip is to be set.
+
+    Raises
+    ------
+    RecordingError : counts that are no int16, or not as many of both.
+    """
+    feed = RecordedFeed(acc_counts, gyr_counts, rate_hz, accel_range_g, gyro_range_dps)
+    return SimulatedBus(Chip(MODELS[chip], feed, rate_error_ppm, Factory()), FastClock())
+
+
+def _truth(options: Options, gravity: float) -> Truth:
+    """As drawn, but for what was asked for; brought to the frame in which K is symmetric."""
+    drawn = Truth.draw(options.seed, options.chip, gravity)
+    asked: dict[str, Any] = {
+        key: getattr(options, key)
+        for key in ("D", "b_a", "K", "b_omega", "rate_error_ppm", "temperature_c")
+        if getattr(options, key) is not None
+    }
+    truth = replace(drawn, **asked)
+    D, K = in_symmetric_frame(truth.D, truth.K)
+    return replace(
+        truth,
+        D=D,
+        K=K,
+        accel_noise_density=truth.accel_noise_density * options.noise,
+        gyro_noise_density=truth.gyro_noise_density * options.noise,
+    )

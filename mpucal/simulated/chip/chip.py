@@ -1,0 +1,251 @@
+"""The simulated chip: registers, a sample clock of its own and a FIFO. Knows neither bus nor physics.
+
+Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...chip import registers as reg
+from ...chip.access import EndOfCapture
+from ...chip.fifo import GYRO
+from ...data import Vector
+from ..sensor import Counts, Setting
+from .factory import Factory, Three
+from .feed import Feed
+from .fifo import Fifo
+from .models import Model
+
+# A write to one of these starts the sample clock anew,
+SAMPLING = frozenset((reg.SMPLRT_DIV, reg.CONFIG, reg.PWR_MGMT_1))
+# and to one of these where it changes the rate.
+PACING = frozenset((reg.PWR_MGMT_2, reg.ACCEL_CONFIG2))
+
+
+class Chip:
+    """A chip as its bus sees it; `t_ns` never goes back.
+
+    Parameters
+    ----------
+    model : which chip. feed : where its samples come from.
+    rate_error_ppm : how much faster than nominal its sample clock runs.
+    factory : what this piece brings along.
+    """
+
+    def __init__(self, model: Model, feed: Feed, rate_error_ppm: float, factory: Factory) -> None:
+        self._model, self._feed, self._factory = model, feed, factory
+        self._speed = 1 + rate_error_ppm * 1e-6
+        self._writable = model.writable()
+        self._fifo = Fifo(model.family.fifo_bytes)
+        self._ended = False
+        self._setting: Setting | None = None
+        self._unread: Vector | None = None
+        self._frozen_until_ns = 0
+        self._frozen: Counts | None = None
+        self.reset(0)
+
+    def read(self, register: int, count: int, t_ns: int) -> bytes:
+        """`count` bytes from `register` on; FIFO_R_W does not auto-increment.
+
+        Raises
+        ------
+        EndOfCapture : the feed has ended and the FIFO is drained.
+        """
+        self._advance(t_ns)
+        data, address = bytearray(), register
+        while len(data) < count and address != reg.FIFO_R_W:
+            data.append(self._read_byte(address))
+            address = (address + 1) & 0x7F
+        return bytes(data) + self._fifo.pop(count - len(data))
+
+    def write(self, register: int, data: bytes, t_ns: int) -> None:
+        """Write from `register` on; what no register keeps is ignored."""
+        self._advance(t_ns)
+        for i, value in enumerate(data):
+            if register + i in self._writable:
+                self._write_byte(register + i, value, t_ns)
+
+    def reset(self, t_ns: int) -> None:
+        """All registers as after power-on, and the FIFO empty."""
+        self._registers = self._model.reset_values(self._factory)
+        self._fifo.size = self._model.family.fifo_bytes
+        self._fifo.clear()
+        self._latest, self._unread = bytes(reg.FRAME_BYTES), None
+        self._setting = None
+        self._start_clock(t_ns)
+
+    def _read_byte(self, address: int) -> int:
+        if reg.ACCEL_XOUT_H <= address < reg.ACCEL_XOUT_H + reg.FRAME_BYTES:
+            return self._latest_sample()[address - reg.ACCEL_XOUT_H]
+        if address == reg.INT_STATUS:
+            status, self._registers[reg.INT_STATUS] = self._registers[reg.INT_STATUS], 0
+            return status
+        if address == reg.FIFO_COUNT_H:
+            self._latch_fifo_count()
+        return self._registers[address]
+
+    def _write_byte(self, address: int, value: int, t_ns: int) -> None:
+        if address == reg.PWR_MGMT_1 and value & reg.PWR_MGMT_1_DEVICE_RESET:
+            self.reset(t_ns)
+            return
+        if address == reg.USER_CTRL:
+            value = self._user_control(value)
+        elif address == reg.SIGNAL_PATH_RESET:
+            value = 0
+        changed = self._registers[address] != value
+        self._registers[address] = value
+        self._setting = None
+        if address == reg.ACCEL_CONFIG2 and self._model.fifo_size_bits:
+            self._fifo.size = self._model.family.fifo_bytes << (value >> 6)
+        if (address in SAMPLING and changed) or (address in PACING and self._rate() != self._rate_hz):
+            self._start_clock(t_ns)
+
+    def _user_control(self, value: int) -> int:
+        """Does what its self-clearing bits ask for, and returns the others."""
+        if value & reg.USER_CTRL_FIFO_RESET and not (
+            self._model.reset_needs_fifo_off and value & reg.USER_CTRL_FIFO_EN
+        ):
+            self._fifo.clear()
+        if value & reg.USER_CTRL_SIG_COND_RESET:
+            self._latest, self._unread = bytes(reg.FRAME_BYTES), None
+        return value & ~(reg.USER_CTRL_FIFO_RESET | reg.USER_CTRL_SIG_COND_RESET)
+
+    def _latch_fifo_count(self) -> None:
+        if self._ended and not len(self._fifo):
+            raise EndOfCapture
+        count = len(self._fifo).to_bytes(2, "big")
+        self._registers[reg.FIFO_COUNT_H : reg.FIFO_COUNT_L + 1] = count
+
+    # What goes wrong with it.
+
+    def hurry(self, factor: float, t_ns: int) -> None:
+        """Its sample clock runs `factor` times as fast from now on."""
+        self._advance(t_ns)
+        self._speed *= factor
+        self._start_clock(t_ns)
+
+    def freeze(self, until_ns: int) -> None:
+        """It measures the same again and again, until then."""
+        self._frozen_until_ns, self._frozen = until_ns, None
+
+    def slip(self, t_ns: int) -> None:
+        """Its FIFO loses a byte."""
+        self._advance(t_ns)
+        self._fifo.pop(1)
+
+    # The sample clock.
+
+    def _start_clock(self, t_ns: int) -> None:
+        self._start_ns, self._taken = t_ns, 0
+        self._rate_hz = self._rate()
+
+    def _rate(self) -> float:
+        """Nominal samples a second."""
+        divider, dlpf = self._registers[reg.SMPLRT_DIV], self._registers[reg.CONFIG] & reg.CONFIG_DLPF_CFG
+        if not self._model.family.has_accel_config2:
+            return reg.sample_rate_hz(divider, dlpf)
+        if self._in_standby() and self._registers[reg.ACCEL_CONFIG2] & reg.ACCEL_FCHOICE_B:
+            return reg.ACCEL_ALONE_HZ
+        # RM-MPU-9250A, register 25: what comes from the filter at 8 kHz is not divided
+        base_hz = reg.base_rate_hz(dlpf)
+        return base_hz if base_hz > reg.MAX_RATE_HZ else reg.sample_rate_hz(divider, dlpf)
+
+    def _in_standby(self) -> bool:
+        """Whether the gyroscope is."""
+        return self._registers[reg.PWR_MGMT_2] & reg.STANDBY_GYRO == reg.STANDBY_GYRO
+
+    def _advance(self, t_ns: int) -> None:
+        """Take the samples that are due."""
+        if self._registers[reg.PWR_MGMT_1] & reg.PWR_MGMT_1_SLEEP:
+            return
+        period_s = 1.0 / (self._rate_hz * self._speed)
+        due = int((t_ns - self._start_ns) * 1e-9 / period_s)
+        if due <= self._taken:
+            return
+        sources = self._registers[reg.FIFO_EN]
+        collecting = self._registers[reg.USER_CTRL] & reg.USER_CTRL_FIFO_EN and sources
+        # what nobody can read is not measured: only the last sample where the FIFO is off
+        first = self._taken if collecting else due - 1
+        edges_s: Vector = self._start_ns * 1e-9 + period_s * np.arange(first, due + 1, dtype=np.float64)
+        self._taken = due
+        self._registers[reg.INT_STATUS] |= reg.INT_DATA_RDY
+        if not collecting:
+            self._unread = edges_s
+            return
+        self._collect(self._measure(edges_s), sources)
+
+    def _collect(self, counts: Counts, sources: int) -> None:
+        self._unread = None
+        if not len(counts):
+            return
+        words = counts.astype(">i2")
+        self._latest = words[-1].tobytes()
+        stop = bool(self._registers[reg.CONFIG] & reg.CONFIG_FIFO_MODE_STOP)
+        if self._fifo.push(words[:, _columns(sources)].tobytes(), stop):
+            self._registers[reg.INT_STATUS] |= reg.INT_FIFO_OFLOW
+
+    def _latest_sample(self) -> bytes:
+        if self._unread is not None:
+            counts = self._measure(self._unread)
+            self._unread = None
+            if not len(counts):
+                raise EndOfCapture
+            self._latest = counts[-1].astype(">i2").tobytes()
+        return self._latest
+
+    def _measure(self, edges_s: Vector) -> Counts:
+        counts = self._feed.samples(edges_s, self._how())
+        if self._in_standby():
+            counts[:, GYRO] = 0
+        self._ended = len(counts) < len(edges_s) - 1
+        if len(counts) and edges_s[0] * 1e9 < self._frozen_until_ns:
+            self._frozen = counts[:1] if self._frozen is None else self._frozen
+            return np.repeat(self._frozen, len(counts), axis=0)
+        return counts
+
+    def _how(self) -> Setting:
+        if self._setting is None:
+            self._setting = _setting(self._registers, self._rate_hz, self._model, self._factory)
+        return self._setting
+
+
+def _columns(sources: int) -> list[int]:
+    """Which of a sample's seven words FIFO_EN asks for, in register order."""
+    accel = [0, 1, 2] if sources & reg.FIFO_EN_ACCEL else []
+    others = (reg.FIFO_EN_TEMP, reg.FIFO_EN_XG, reg.FIFO_EN_YG, reg.FIFO_EN_ZG)
+    return accel + [3 + i for i, bit in enumerate(others) if sources & bit]
+
+
+def _setting(registers: bytearray, rate_hz: float, model: Model, factory: Factory) -> Setting:
+    """What the registers say about how to measure."""
+    accel, gyro = registers[reg.ACCEL_CONFIG], registers[reg.GYRO_CONFIG]
+    ax, ay, az = (
+        ((_word(registers, address) & ~1) - (trim & ~1)) / model.offset_lsb_per_g + more
+        for address, trim, more in zip(
+            model.family.accel_offset_h, factory.accel_trim, _tested(accel, factory.accel_self_test_g), strict=True
+        )
+    )
+    gx, gy, gz = (
+        _word(registers, reg.XG_OFFSET_H + 2 * axis) / reg.GYRO_OFFSET_LSB_PER_DPS + more
+        for axis, more in enumerate(_tested(gyro, factory.gyro_self_test_dps))
+    )
+    return Setting(
+        rate_hz=rate_hz,
+        accel_range_g=reg.ACCEL_RANGES_G[(accel & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT] / model.accel_sensitivity,
+        gyro_range_dps=reg.GYRO_RANGES_DPS[(gyro & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT],
+        lsb_per_c=model.family.lsb_per_c,
+        zero_c=model.family.zero_c,
+        accel_offset_g=(ax, ay, az),
+        gyro_offset_dps=(gx, gy, gz),
+    )
+
+
+def _tested(config: int, responses: Three) -> Three:
+    """What the self test adds to x, y, z, as bits 7, 6 and 5 ask for it."""
+    x, y, z = (response if config & 0x80 >> axis else 0.0 for axis, response in enumerate(responses))
+    return x, y, z
+
+
+def _word(registers: bytearray, address: int) -> int:
+    return int.from_bytes(registers[address : address + 2], "big", signed=True)

@@ -1,0 +1,190 @@
+"""The board's motion as a hand makes it: finely integrated, averaged over any span. Knows no sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from ..data import Vector
+from . import rotation
+from .hand import REACTION_S, Hand, Prompt, Stance
+from .legs import STEP_HZ, STEP_S, Leg, steps
+
+# Shorter than any reaction: a prompt never reaches what has been computed already.
+AHEAD_S = REACTION_S[0] / 2
+
+JERKS_HZ = 0.3
+SINES = 12
+
+
+class Wobble:
+    """Band-limited noise as a sum of sines, three axes.
+
+    Parameters
+    ----------
+    band_hz : lowest and highest frequency. rms : of each axis.
+    """
+
+    def __init__(self, rng: np.random.Generator, band_hz: tuple[float, float], rms: float) -> None:
+        self._pulsation = 2 * np.pi * rng.uniform(*band_hz, (3, SINES))
+        self._phase = rng.uniform(0.0, 2 * np.pi, (3, SINES))
+        self._amplitude = rms * np.sqrt(2 / SINES)
+        angle = self._pulsation[:, :, None] * np.arange(steps(AHEAD_S) + 1) * STEP_S
+        self._waves = np.concatenate((np.cos(angle), np.sin(angle)), axis=1)
+
+    def at(self, first: int, n: int) -> Vector:
+        """(n, 3) at the steps from `first` on, no more than are settled ahead."""
+        angle = self._pulsation * (first * STEP_S) + self._phase
+        return self._sum(np.sin(angle), np.cos(angle), n)
+
+    def integral(self, first: int, n: int) -> Vector:
+        """(n, 3) the integral over time, without its mean, at the steps from `first` on."""
+        angle = self._pulsation * (first * STEP_S) + self._phase
+        return self._sum(-np.cos(angle) / self._pulsation, np.sin(angle) / self._pulsation, n)
+
+    def _sum(self, cosines: Vector, sines: Vector, n: int) -> Vector:
+        weights = np.concatenate((cosines, sines), axis=1) * self._amplitude
+        return np.asarray(np.matmul(weights[:, None, :], self._waves[:, :, :n])[:, 0].T)
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """A jerk: half a sine of `peak_mps2` (3,) that starts at `start_s`."""
+
+    start_s: float
+    seconds: float
+    peak_mps2: Vector
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, start_s: float) -> Self:
+        """2 to 6 m/s^2 for 60 to 120 ms, in any direction."""
+        direction = rng.normal(size=3)
+        peak = direction / np.linalg.norm(direction) * rng.uniform(2.0, 6.0)
+        return cls(start_s, rng.uniform(0.06, 0.12), peak)
+
+    @property
+    def end_s(self) -> float:
+        """When it is over."""
+        return self.start_s + self.seconds
+
+    def at(self, t_s: Vector) -> Vector:
+        """(n, 3) m/s^2 at times (n,)."""
+        share = np.clip((t_s - self.start_s) / self.seconds, 0.0, 1.0)
+        return np.sin(np.pi * share)[:, None] * self.peak_mps2
+
+
+class Motion:
+    """Where the board is, what it feels and how it turns.
+
+    Integrated at 2 kHz; the turn between two steps is the logarithm of the attitude's change, so that
+    rates integrate to the attitude.
+
+    Parameters
+    ----------
+    hand : decides on the legs. rng : the hand's tremor, lever and clumsiness. gravity : m/s^2.
+    """
+
+    def __init__(self, hand: Hand, rng: np.random.Generator, gravity: float) -> None:
+        self._hand = hand
+        self._gravity = gravity
+        lever = rng.normal(size=3)
+        self._lever_m = lever / np.linalg.norm(lever) * rng.uniform(0.15, 0.3)
+        self._tremble = Wobble(rng, (2.0, 10.0), rng.uniform(0.05, 0.1))
+        self._quiver = Wobble(rng, (2.0, 10.0), np.radians(1.0) / np.sqrt(3))
+        self._push = Wobble(rng, (0.5, 4.0), 0.3)
+        self._fate = rng.spawn(1)[0]
+        self._stance = hand.first_stance()
+        self._rate = np.zeros(3)
+        self._pulses: list[Pulse] = []
+        self._first = 0
+        self._sums = np.zeros((1, 6))
+        self._attitudes = self._shaken(self._stance.attitude[None], 0, np.ones(1))
+
+    def hear(self, prompt: Prompt, t_s: float) -> None:
+        """The hand hears `prompt` at `t_s`."""
+        self._hand.hear(prompt, t_s)
+
+    def means(self, edges_s: Vector) -> tuple[Vector, Vector]:
+        """Mean specific force (n, 3) [m/s^2] and rate (n, 3) [rad/s] between (n + 1,) increasing times [s].
+
+        What lies before the last edge is forgotten then.
+        """
+        self._extend(float(edges_s[-1]))
+        place = edges_s * STEP_HZ - self._first
+        node = np.minimum(place.astype(int), len(self._sums) - 2)
+        part = (place - node)[:, None]
+        sums = (1 - part) * self._sums[node] + part * self._sums[node + 1]
+        means = (sums[1:] - sums[:-1]) / (edges_s[1:] - edges_s[:-1])[:, None]
+        self._forget(int(node[-1]))
+        return self._hand.mishap.felt(means[:, :3], means[:, 3:], edges_s[1:])
+
+    def warmer_c(self, edges_s: Vector) -> Vector:
+        """(n,) by how much the chip is warmer than at first, between (n + 1,) times [s]."""
+        return self._hand.mishap.warmer_c(edges_s[1:])
+
+    def attitude(self, t_s: float) -> Vector:
+        """The quaternion (4,) at `t_s`, which is not before what `means` was last asked for."""
+        self._extend(t_s)
+        place = t_s * STEP_HZ - self._first
+        node = min(int(place), len(self._attitudes) - 2)
+        near = self._attitudes[node : node + 2]
+        return rotation.product(near[0], rotation.exp((place - node) * rotation.between(near)[0]))
+
+    def _extend(self, t_s: float) -> None:
+        while self._stance.step <= t_s * STEP_HZ:
+            self._go_on()
+
+    def _forget(self, nodes: int) -> None:
+        self._first += nodes
+        self._sums = self._sums[nodes:]
+        self._attitudes = self._attitudes[nodes:]
+
+    def _go_on(self) -> None:
+        """The next quarter of a second, or less where a leg ends."""
+        leg = self._hand.leg(self._stance)
+        first, last = self._stance.step, min(leg.last, self._stance.step + steps(AHEAD_S))
+        nodes = np.arange(first, last + 1, dtype=float)
+        turns, grip = leg.turns(nodes), leg.grip(nodes)
+        planned = leg.attitudes(self._stance.attitude, turns)
+        attitudes = self._shaken(planned, first, grip)
+        up = rotation.up_in_board(attitudes)
+        force = self._gravity * (up[1:] + up[:-1]) / 2
+        force += self._swing(turns / STEP_S) + self._clumsiness(leg, nodes, grip)
+        felt = np.hstack((force * STEP_S, rotation.between(attitudes)))
+        sums = self._sums[-1] + np.cumsum(felt, axis=0)
+        self._sums = np.concatenate((self._sums, sums))
+        self._attitudes = np.concatenate((self._attitudes, attitudes[1:]))
+        self._stance = Stance(last, planned[-1], float(grip[-1]))
+
+    def _shaken(self, planned: Vector, first: int, grip: Vector) -> Vector:
+        """The attitudes (n, 4) as the hand meant them, with its tremor in it."""
+        if not grip.any():
+            return planned
+        return rotation.product(planned, rotation.exp(self._quiver.integral(first, len(grip)) * grip[:, None]))
+
+    def _swing(self, rates: Vector) -> Vector:
+        """What a sensor on the lever r feels of (n, 3) rad/s: alpha x r + w x (w x r)."""
+        if not (rates.any() or self._rate.any()):
+            return np.zeros_like(rates)
+        alpha = np.diff(rates, axis=0, prepend=self._rate[None]) / STEP_S
+        self._rate = rates[-1]
+        r = self._lever_m
+        return np.cross(alpha, r) + np.cross(rates, np.cross(rates, r))
+
+    def _clumsiness(self, leg: Leg, nodes: Vector, grip: Vector) -> Vector:
+        """The hand's own acceleration (n, 3) in each step: tremor, wandering, jerks."""
+        first, t_s = int(nodes[0]), nodes[1:] * STEP_S
+        effort = leg.effort(nodes)[1:, None]
+        push = np.zeros((len(t_s), 3))
+        if grip.any():
+            push += self._tremble.at(first, len(t_s)) * grip[1:, None]
+        if effort.any():
+            push += self._push.at(first, len(t_s)) * effort
+            for _ in range(self._fate.poisson(JERKS_HZ * len(t_s) * STEP_S)):
+                self._pulses.append(Pulse.draw(self._fate, float(self._fate.uniform(t_s[0], t_s[-1]))))
+        for pulse in self._pulses:
+            push += pulse.at(t_s)
+        self._pulses = [pulse for pulse in self._pulses if pulse.end_s > t_s[-1]]
+        return push

@@ -1,0 +1,124 @@
+"""ArduPilot, as far as its accelerometers go: a 4.7 Copter. Knows no link."""
+
+from __future__ import annotations
+
+from itertools import chain
+
+import numpy as np
+
+from ...data import Vector
+from ...mavlink.dialect import Message, dialect
+from ...mavlink.parameters.encoding import REAL32, Parameter
+from ...mavlink.parameters.names import CUSTOM_ANGLES
+from .filter import LowPass
+from .firmware import HIGHRES_IMU, RAW_IMU, SCALED_IMUS, SYS_STATUS, Firmware
+from .options import Options
+from .store import AXES, INT8, INT16, INT32
+
+LOOP_HZ = 400
+# 0.8 of the loop's rate is the most, and an interval has whole ms
+SHORTEST_MS = 3
+DEVICE_IDS = (2753028, 2753036, 2753044)
+# what a SITL's parameters are, which is not the identity
+OFFSET, SCALE = 0.001, 1.001
+INCONSISTENT_MPS2 = 0.75
+
+
+def stem(imu: int) -> str:
+    """What the names of IMU `imu`'s parameters begin with."""
+    return "INS_ACC" if imu == 0 else f"INS_ACC{imu + 1}"
+
+
+class ArduPilot(Firmware):
+    """Corrects in the sensor's axes, turns to the vehicle's, then filters (AP_InertialSensor)."""
+
+    autopilot = 3
+    tick_us = 1_000_000 // LOOP_HZ
+    folder = "/APM/"
+    bytewise = False
+
+    def __init__(self, options: Options) -> None:
+        super().__init__(options)
+        store = self.store
+        store.add("SYSID_THISMAV", options.system, INT16)
+        store.add("AHRS_ORIENTATION", options.rotation, INT8)
+        for name in chain(*CUSTOM_ANGLES.values()):
+            store.add(name, 0.0)
+        for axis in AXES:
+            store.add(f"AHRS_TRIM_{axis}", 0.0)
+        store.add("INS_ACCEL_FILTER", 20, INT16)
+        store.add("INS_GYRO_FILTER", 20, INT16)
+        for imu in range(3):
+            there = imu < options.imus
+            store.add_vector(stem(imu) + "OFFS_", OFFSET if there else 0.0)
+            store.add_vector(stem(imu) + "SCAL_", SCALE if there else 1.0)
+            store.add(stem(imu) + "_ID", DEVICE_IDS[imu] if there else 0, INT32)
+            store.add("INS_USE" + (str(imu + 1) if imu else ""), 1, INT8)
+
+    def start(self) -> None:
+        """Filters begin anew."""
+        cutoffs = [[float(self.store["INS_ACCEL_FILTER"])], [float(self.store["INS_GYRO_FILTER"])]]
+        self._low_pass = LowPass(cutoffs, LOOP_HZ)
+        self._taken = -1
+
+    def sense(self, raw: Vector) -> None:
+        """(raw - OFFS) * SCAL in the sensor's axes, R_b, low pass."""
+        if self._taken != self.store.version:
+            self._taken = self.store.version
+            corrections = [self.correction(imu) for imu in range(len(raw))]
+            self._offsets, self._scales = (np.array(part) for part in zip(*corrections, strict=True))
+        in_sensor = raw.copy()
+        in_sensor[:, 0] = (raw[:, 0] - self._offsets) * self._scales
+        self.corrected = self._low_pass(in_sensor @ self.rotation.T)
+
+    def message(self, message_id: int, t_us: int) -> Message | None:
+        """RAW_IMU is IMU 1, corrected and filtered like the rest."""
+        if message_id == RAW_IMU:
+            centi = round(self.temperature_c * 100)
+            return dialect().MAVLink_raw_imu_message(t_us, *self.milli(0), 0, 0, 0, 0, centi)
+        if message_id == HIGHRES_IMU and self.options.highres:
+            return self.highres_imu(t_us, np.zeros(3))
+        if message_id in SCALED_IMUS and SCALED_IMUS.index(message_id) < self.options.imus:
+            return self.scaled_imu(SCALED_IMUS.index(message_id), t_us)
+        return self.sys_status() if message_id == SYS_STATUS else None
+
+    def interval(self, message_id: int, interval_us: int) -> tuple[int, int]:
+        """In whole ms; too short a one is denied, and what was before stays."""
+        m = dialect()
+        known = self.message(message_id, 0) is not None or message_id in SCALED_IMUS
+        if not known or 0 < interval_us < SHORTEST_MS * 1000:
+            return m.MAV_RESULT_DENIED, -1
+        return m.MAV_RESULT_ACCEPTED, max(interval_us, 0) // 1000 * 1000
+
+    def group(self, rate_hz: int) -> list[tuple[int, int]]:
+        """All that a stream group holds; HIGHRES_IMU is in none."""
+        interval_us = 1_000_000 // rate_hz if rate_hz else 0
+        return [(message_id, interval_us) for message_id in (SYS_STATUS, RAW_IMU, *SCALED_IMUS[1 : self.options.imus])]
+
+    def set(self, wanted: Parameter) -> list[Parameter | int]:
+        """Echoes it, and with one axis of a vector all three; silent for an unknown name or NaN."""
+        if wanted.name not in self.store or not np.isfinite(wanted.value) or wanted.name == self.options.refuse:
+            return []
+        self.store[wanted.name] = wanted.value
+        echoed = [wanted.name]
+        if wanted.name[:-1].endswith("_") and self.store.type(wanted.name) == REAL32:
+            echoed = [wanted.name[:-1] + axis for axis in AXES]
+        return [self.store.parameter(name) for name in echoed]
+
+    def correction(self, imu: int) -> tuple[Vector, Vector]:
+        """As stored, at once."""
+        return self.store.vector(stem(imu) + "OFFS_"), self.store.vector(stem(imu) + "SCAL_")
+
+    def save_ids(self) -> None:
+        """Every IMU that is there."""
+        for imu in range(self.options.imus):
+            self.store[stem(imu) + "_ID"] = DEVICE_IDS[imu]
+
+    def complaints(self) -> list[str]:
+        """Of AP_Arming's: every IMU calibrated, and all of one opinion."""
+        for imu in range(self.options.imus):
+            offset, scale = self.correction(imu)
+            if self.store[stem(imu) + "_ID"] != DEVICE_IDS[imu] or not offset.any() or not scale.all():
+                return ["PreArm: 3D Accel calibration needed"]
+        apart = np.abs(self.corrected[:, 0] - self.corrected[0, 0]).max()
+        return ["PreArm: Accels inconsistent"] if apart > INCONSISTENT_MPS2 else []

@@ -1,0 +1,115 @@
+"""What ArduPilot and PX4 both have: parameters that correct IMUs, and messages made of them. Knows no link."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from ...data import STANDARD_GRAVITY_MPS2, Vector
+from ...mavlink.dialect import Message, dialect
+from ...mavlink.parameters.encoding import Parameter
+from ...mavlink.parameters.names import CUSTOM_ANGLES
+from ...mavlink.parameters.rotation import euler, orientation
+from .options import Options
+from .store import Store
+
+MILLI_G = STANDARD_GRAVITY_MPS2 / 1000
+# SCALED_IMU, SCALED_IMU2, SCALED_IMU3
+SCALED_IMUS = (26, 116, 129)
+SYS_STATUS, RAW_IMU, HIGHRES_IMU = 1, 27, 105
+PREARM_CHECK = 0x10000000
+ACCELEROMETER = 2
+
+
+class Firmware(ABC):
+    """An autopilot's firmware.
+
+    Attributes
+    ----------
+    autopilot : MAV_AUTOPILOT. tick_us : how often it runs. bytewise : how its integers travel.
+    folder : of its card. store : its parameters.
+    corrected : (imus, 2, 3) specific force [m/s^2] and rate [rad/s] in the vehicle's axes.
+    """
+
+    autopilot: int
+    tick_us: int
+    bytewise: bool
+    folder: str
+    streams: tuple[tuple[int, int], ...] = ()
+
+    def __init__(self, options: Options) -> None:
+        self.options = options
+        self.store = Store()
+        self.rotation = mounted(options)
+        self.corrected = np.zeros((options.imus, 2, 3))
+        self.temperature_c = 0.0
+        self.armed = False
+
+    @abstractmethod
+    def start(self) -> None:
+        """Boot: take what is stored."""
+
+    @abstractmethod
+    def sense(self, raw: Vector) -> None:
+        """Correct a sample (imus, 2, 3) in the sensors' axes, a tick after the last one."""
+
+    @abstractmethod
+    def message(self, message_id: int, t_us: int) -> Message | None:
+        """The message, `t_us` after the boot; None for one that it does not know."""
+
+    @abstractmethod
+    def interval(self, message_id: int, interval_us: int) -> tuple[int, int]:
+        """Asked for a message each `interval_us`: MAV_RESULT, and the interval that it will be."""
+
+    @abstractmethod
+    def set(self, wanted: Parameter) -> list[Parameter | int]:
+        """Set a parameter: the echoes, or the MAV_PARAM_ERROR; nothing where it says nothing."""
+
+    @abstractmethod
+    def correction(self, imu: int) -> tuple[Vector, Vector]:
+        """Offset and scale (3,) that IMU `imu` is corrected by now."""
+
+    @abstractmethod
+    def complaints(self) -> list[str]:
+        """Why it would not arm."""
+
+    @abstractmethod
+    def save_ids(self) -> None:
+        """Take the present sensors for the calibrated ones (MAV_CMD_PREFLIGHT_CALIBRATION, param5 = 76)."""
+
+    def group(self, rate_hz: int) -> list[tuple[int, int]]:
+        """What REQUEST_DATA_STREAM of everything at `rate_hz` sets: message, interval [us]."""
+        return []
+
+    def milli(self, imu: int) -> list[int]:
+        """Its sample in whole milli-g and mrad/s, truncated toward zero."""
+        acc, gyr = self.corrected[imu]
+        return [int(value) for value in (*(acc / MILLI_G), *(gyr * 1000))]
+
+    def scaled_imu(self, imu: int, t_us: int) -> Message:
+        """SCALED_IMU, SCALED_IMU2 or SCALED_IMU3."""
+        m = dialect()
+        kind = (m.MAVLink_scaled_imu_message, m.MAVLink_scaled_imu2_message, m.MAVLink_scaled_imu3_message)[imu]
+        return kind(t_us // 1000, *self.milli(imu), 0, 0, 0, round(self.temperature_c * 100))
+
+    def highres_imu(self, t_us: int, bias: Vector) -> Message:
+        """HIGHRES_IMU of IMU 0, with `bias` (3,) [m/s^2] subtracted."""
+        acc, gyr = self.corrected[0]
+        values = [*(acc - bias).tolist(), *gyr.tolist(), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.temperature_c]
+        return dialect().MAVLink_highres_imu_message(t_us, *values, 0x103F, 0)
+
+    def sys_status(self) -> Message:
+        """SYS_STATUS, whose health says whether it would arm."""
+        sensors = ACCELEROMETER | PREARM_CHECK
+        health = ACCELEROMETER | (0 if self.complaints() else PREARM_CHECK)
+        return dialect().MAVLink_sys_status_message(sensors, sensors, health, 100, 12000, -1, -1, 0, 0, 0, 0, 0, 0)
+
+
+def mounted(options: Options) -> Vector:
+    """R_b (3, 3) of a board that is turned by a known orientation, or by angles of its own."""
+    if options.rotation in CUSTOM_ANGLES:
+        degrees = [options.parameters.get(name, 0.0) for name in CUSTOM_ANGLES[options.rotation]]
+        return euler(*np.radians(degrees).tolist())
+    rotation = orientation(options.rotation)
+    return np.eye(3) if rotation is None else rotation

@@ -1,0 +1,98 @@
+"""The vehicle's IMUs in one hand: what each measures in its own axes. Knows no parameter and no message."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...data import Vector
+from ..hand import KINDS, Prompt
+from ..motion import Motion
+from ..sensor import Response, Setting, Truth
+from .options import Options
+
+# the hand's axes have z up, a vehicle's have z down
+FROM_HAND = np.diag([1.0, -1.0, -1.0])
+# what autopilots set their IMUs to
+ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 2000.0
+BLOCK = 40
+# autopilots take the gyroscope's bias at each start, but for what then warms up
+GYRO_BIAS_LEFT = 0.03
+
+
+class Imus:
+    """All IMUs of one vehicle: rigidly joined, each with its own errors.
+
+    Parameters
+    ----------
+    rotation : R_b (3, 3), from their axes to the vehicle's. rate_hz : samples a second. gravity : m/s^2.
+    """
+
+    def __init__(self, options: Options, rotation: Vector, rate_hz: float, gravity: float) -> None:
+        of_hand, of_motion, self._rng = np.random.default_rng([options.seed, 3]).spawn(3)
+        self._motion = Motion(KINDS[options.hand](of_hand), of_motion, gravity)
+        self._rotation, self._rate_hz = rotation, rate_hz
+        self.truths = tuple(_truth(options.seed, number, gravity) for number in range(options.imus))
+        self._setting = Setting(rate_hz, ACCEL_RANGE_G, GYRO_RANGE_DPS, lsb_per_c=333.87, zero_c=21.0)
+        self._responses = tuple(truth.response(self._setting) for truth in self.truths)
+        self._sample = 0
+        self._block = np.empty((0, options.imus, 2, 3))
+
+    @property
+    def temperature_c(self) -> float:
+        """Of their dies."""
+        return self.truths[0].temperature_c
+
+    def hear(self, prompt: Prompt, t_s: float) -> None:
+        """The hand hears `prompt`, whose `down` is in the vehicle's axes."""
+        down = prompt.down
+        self._motion.hear(Heard(str(prompt.kind), None if down is None else tuple(FROM_HAND @ down)), t_s)
+
+    def next(self) -> Vector:
+        """The next sample: (imus, 2, 3), specific force [m/s^2] and rate [rad/s], in the sensors' axes."""
+        at = self._sample % BLOCK
+        if at == 0:
+            self._block = self._measured()
+        self._sample += 1
+        return np.asarray(self._block[at])
+
+    def truth(self, number: int, offset: Vector, scale: Vector) -> dict[str, Any]:
+        """What is true of IMU `number`'s stream, in the vehicle's axes, while `offset` and `scale` are its parameters.
+
+        The stream is R_b diag(scale) (raw - offset), and raw = D R_b^T s + b_a.
+        """
+        R, true = self._rotation, self.truths[number]
+        stream = replace(
+            true,
+            D=R @ np.diag(scale) @ true.D @ R.T,
+            b_a=R @ (scale * (true.b_a - offset)),
+            K=R @ true.K @ R.T,
+            b_omega=R @ true.b_omega,
+        )
+        return stream.document()
+
+    def _measured(self) -> Vector:
+        edges = (self._sample + np.arange(BLOCK + 1)) / self._rate_hz
+        force, rate = (means @ FROM_HAND @ self._rotation for means in self._motion.means(edges))
+        return np.stack([self._in_si(response, force, rate) for response in self._responses], axis=1)
+
+    def _in_si(self, response: Response, force: Vector, rate: Vector) -> Vector:
+        counts = response.counts(force, rate, self._rng)
+        acc, gyr = counts[:, :3] * self._setting.mps2_per_lsb, counts[:, 4:] * self._setting.rad_s_per_lsb
+        return np.stack((acc, gyr), axis=1)
+
+
+class Heard:
+    """A prompt as the hand hears it; see bus.simulated.hand.Prompt."""
+
+    def __init__(self, kind: str, down: tuple[float, ...] | None) -> None:
+        self.kind = kind
+        self.down: Any = down
+
+
+def _truth(seed: int, number: int, gravity: float) -> Truth:
+    """IMU `number`'s errors; the chips on an autopilot are of the newer kind."""
+    drawn = Truth.draw(seed + 1000 * number, "mpu6500", gravity)
+    return replace(drawn, b_omega=drawn.b_omega * GYRO_BIAS_LEFT, rate_error_ppm=0.0)

@@ -1,0 +1,118 @@
+"""PX4, as far as its accelerometers go: 1.17. Knows no link."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...data import STANDARD_GRAVITY_MPS2, Vector
+from ...mavlink.dialect import Message, dialect
+from ...mavlink.parameters.encoding import Parameter
+from .firmware import HIGHRES_IMU, RAW_IMU, SCALED_IMUS, SYS_STATUS, Firmware
+from .options import Options
+from .store import INT32
+
+LOOP_HZ = 250
+SHORTEST_US = 8000
+SLOTS = 4
+DEVICE_IDS = (1310988, 1310996, 1311004)
+UNNOTICED = 0.01  # a change whose norm is less, in m/s^2 or of the scale, is not taken over
+# MAV_PARAM_ERROR
+DOES_NOT_EXIST, PERMISSION_DENIED, TYPE_MISMATCH = 1, 3, 7
+LEARN_S, LARGEST_BIAS_MPS2 = 15.0, 0.4
+LEARN_ACCELEROMETER = 2
+ALL_OF_THEM = 7
+
+
+class Px4(Firmware):
+    """Corrects in the sensor's axes and turns to the vehicle's; the EKF's bias is taken from HIGHRES_IMU."""
+
+    autopilot = 12
+    tick_us = 1_000_000 // LOOP_HZ
+    folder = "/fs/microsd/"
+    bytewise = True
+    streams = ((HIGHRES_IMU, 20_000), (SYS_STATUS, 1_000_000))
+
+    def __init__(self, options: Options) -> None:
+        super().__init__(options)
+        store = self.store
+        store.add("MAV_SYS_ID", options.system, INT32)
+        store.add("SENS_BOARD_ROT", options.rotation, INT32)
+        store.add_vector("SENS_BOARD_", 0.0, "_OFF")
+        store.add("EKF2_IMU_CTRL", ALL_OF_THEM, INT32)
+        for slot in range(SLOTS):
+            there = slot < options.imus
+            store.add(f"CAL_ACC{slot}_ID", DEVICE_IDS[slot] if there else 0, INT32)
+            store.add(f"CAL_ACC{slot}_PRIO", 50 if there else -1, INT32)
+            store.add(f"CAL_ACC{slot}_ROT", -1, INT32)
+            store.add_vector(f"CAL_ACC{slot}_", 0.0, "OFF")
+            store.add_vector(f"CAL_ACC{slot}_", 1.0, "SCALE")
+
+    def start(self) -> None:
+        """From the identity, what is stored is taken over where it differs enough."""
+        self._offset, self._scale = np.zeros((self.options.imus, 3)), np.ones((self.options.imus, 3))
+        self._bias = np.zeros(3)
+        self._take_over()
+
+    def _take_over(self) -> None:
+        for imu in range(self.options.imus):
+            slot = self._slot(imu)
+            if slot is None:
+                continue
+            for running, tail in ((self._offset, "OFF"), (self._scale, "SCALE")):
+                stored = self.store.vector(f"CAL_ACC{slot}_", tail)
+                if np.linalg.norm(stored - running[imu]) > UNNOTICED:
+                    running[imu] = stored
+
+    def _slot(self, imu: int) -> int | None:
+        """Where the sensor with this id keeps its correction."""
+        ids = [self.store[f"CAL_ACC{slot}_ID"] for slot in range(SLOTS)]
+        return ids.index(DEVICE_IDS[imu]) if DEVICE_IDS[imu] in ids else None
+
+    def sense(self, raw: Vector) -> None:
+        """R_b ((raw - OFF) * SCALE), and what the EKF makes of IMU 1."""
+        self.corrected[:, 0] = (raw[:, 0] - self._offset) * self._scale @ self.rotation.T
+        self.corrected[:, 1] = raw[:, 1] @ self.rotation.T
+        if int(self.store["EKF2_IMU_CTRL"]) & LEARN_ACCELEROMETER:
+            felt = self.corrected[0, 0] - self._bias
+            missing = felt * (1 - STANDARD_GRAVITY_MPS2 / np.linalg.norm(felt))
+            learnt = self._bias + missing * self.tick_us * 1e-6 / LEARN_S
+            self._bias = np.clip(learnt, -LARGEST_BIAS_MPS2, LARGEST_BIAS_MPS2)
+
+    def message(self, message_id: int, t_us: int) -> Message | None:
+        """No RAW_IMU, ever."""
+        if message_id == HIGHRES_IMU:
+            return self.highres_imu(t_us, self._bias)
+        if message_id in SCALED_IMUS and SCALED_IMUS.index(message_id) < self.options.imus:
+            return self.scaled_imu(SCALED_IMUS.index(message_id), t_us)
+        return self.sys_status() if message_id == SYS_STATUS else None
+
+    def interval(self, message_id: int, interval_us: int) -> tuple[int, int]:
+        """Acknowledged for any stream that it knows; no faster than it can."""
+        m = dialect()
+        if message_id == RAW_IMU or message_id not in (HIGHRES_IMU, SYS_STATUS, *SCALED_IMUS):
+            return m.MAV_RESULT_FAILED, -1
+        return m.MAV_RESULT_ACCEPTED, max(interval_us, SHORTEST_US) if interval_us > 0 else 0
+
+    def set(self, wanted: Parameter) -> list[Parameter | int]:
+        """Echoes it; an unknown name or another type is an error."""
+        if wanted.name not in self.store:
+            return [DOES_NOT_EXIST]
+        if wanted.name == self.options.refuse:
+            return [PERMISSION_DENIED]
+        if wanted.type != self.store.type(wanted.name):
+            return [TYPE_MISMATCH]
+        self.store[wanted.name] = wanted.value
+        self._take_over()
+        return [self.store.parameter(wanted.name)]
+
+    def correction(self, imu: int) -> tuple[Vector, Vector]:
+        """As it was taken over."""
+        return self._offset[imu], self._scale[imu]
+
+    def save_ids(self) -> None:
+        """Does not: each slot names its sensor."""
+
+    def complaints(self) -> list[str]:
+        """Every sensor needs a slot."""
+        missing = [imu for imu in range(self.options.imus) if self._slot(imu) is None]
+        return [f"Preflight Fail: Accel {imu} uncalibrated" for imu in missing]

@@ -1,0 +1,57 @@
+"""The simulated vehicle as a link's transport, in this process: `--mavlink sim`. Knows no packet."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+
+from ...mavlink.transport import US, Bytes
+from .line import Line
+from .vehicle import Vehicle
+
+ADDRESS = "the simulated vehicle"
+FAST, REAL = "fast", "real"
+
+
+class SimulatedTransport:
+    """A vehicle that lives on only while it is listened to; see Transport."""
+
+    datagrams, outward = True, True
+    name = ADDRESS
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._vehicle = vehicle
+        self._line = Line(vehicle.options.faults, vehicle.options.seed)
+        self._begun_ns = time.time_ns() // US * US
+        self._begun_monotonic_ns = time.monotonic_ns()
+        self._queue: deque[Bytes] = deque()
+
+    @property
+    def real_time(self) -> bool:
+        """Whether its time passes by itself."""
+        return self._vehicle.options.pace == REAL
+
+    def now_ns(self) -> int:
+        """See Transport."""
+        return self._begun_ns + self._vehicle.now_us * US
+
+    def receive(self, until_ns: int) -> Bytes | None:
+        """See Transport."""
+        tick_us = self._vehicle.firmware.tick_us
+        while not self._queue and self.now_ns() < until_ns:
+            sent = self._vehicle.go_on(self._vehicle.now_us + tick_us)
+            self._keep_pace()
+            self._queue.extend(Bytes(data, ADDRESS, self.now_ns()) for data in self._line.carry([s.data for s in sent]))
+        return self._queue.popleft() if self._queue else None
+
+    def send(self, data: bytes, address: str | None) -> None:
+        """See Transport."""
+        self._vehicle.hear(data)
+
+    def close(self) -> None:
+        """See Transport."""
+
+    def _keep_pace(self) -> None:
+        if self.real_time:
+            ahead_ns = self._begun_monotonic_ns + self._vehicle.now_us * US - time.monotonic_ns()
+            time.sleep(max(ahead_ns, 0) * 1e-9)

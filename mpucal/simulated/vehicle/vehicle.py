@@ -1,0 +1,251 @@
+"""A simulated vehicle on a line: hears packets, sends packets, as time goes on. Knows no socket and no clock."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, NamedTuple
+
+from ...data import STANDARD_GRAVITY_MPS2
+from ...errors import UsageError
+from ...mavlink.dialect import Message, Parser, dialect
+from ...mavlink.ftp import Payload
+from ...mavlink.parameters.encoding import Parameter, name_bytes, of_wire, to_wire
+from ...mavlink.prompts import Heard, of_message
+from .ardupilot import ArduPilot
+from .firmware import Firmware
+from .imus import Imus
+from .mishaps import Mishaps
+from .options import Options
+from .px4 import Px4
+from .storage import Card
+from .streams import Streams
+
+FIRMWARES: dict[str, type[Firmware]] = {"ardupilot": ArduPilot, "px4": Px4}
+
+COMPONENT = 1
+S_US = 1_000_000
+HEARTBEAT = 0
+SLOWER_WHILE_BUSY = 4
+SEQUENCE = 256
+QUADROTOR = 2
+ARMED = 128
+FORCE_SAVE = 76
+REBOOT_US = 2 * S_US
+SECOND_STATION_HZ = 4
+
+
+class Sent(NamedTuple):
+    """A packet, and when it went out [us of the vehicle's world]."""
+
+    t_us: int
+    data: bytes
+
+
+class Vehicle:
+    """A vehicle that is switched on at 0 us, in a hand.
+
+    Parameters
+    ----------
+    key : 32 bytes with which it signs, and wants to be answered; None: neither.
+    """
+
+    def __init__(self, options: Options, gravity: float = STANDARD_GRAVITY_MPS2, key: bytes | None = None) -> None:
+        self.options = options
+        self.firmware = FIRMWARES[options.firmware](options)
+        for name, value in options.parameters.items():
+            if name not in self.firmware.store:
+                raise UsageError(f"the simulated vehicle has no parameter {name}", "leave it out, or spell it anew")
+            self.firmware.store[name] = value
+        self.imus = Imus(options, self.firmware.rotation, S_US / self.firmware.tick_us, gravity)
+        self._mav: Any = dialect().MAVLink(None, options.system, COMPONENT)
+        if key is not None:
+            self._mav.signing.secret_key, self._mav.signing.sign_outgoing = key, True
+        self._parser = Parser(self._mav)
+        self._now_us = 0
+        self._silent_until_us: float = 0
+        self.card = Card(None if "no_storage" in options.faults else self.firmware.folder)
+        self._mishaps = Mishaps(options.faults)
+        self._out: deque[Sent] = deque()
+        self._boot()
+        if options.rotate_at is not None:
+            self.imus.hear(Heard("rotate", None), options.rotate_at)
+
+    @property
+    def now_us(self) -> int:
+        """How far it has gone on."""
+        return self._now_us
+
+    def hear(self, data: bytes, datagram: bool = True) -> None:
+        """Bytes arrive now: a datagram of whole packets, or a piece of a stream."""
+        if self._now_us < self._silent_until_us:
+            return
+        for packet in self._parser.datagram(data) if datagram else self._parser.stream(data):
+            answer = self._HANDLERS.get(packet.message.get_type())
+            if answer is not None and getattr(packet.message, "target_system", 0) in (0, self.options.system):
+                answer(self, packet.message)
+
+    def go_on(self, until_us: int) -> list[Sent]:
+        """Live until `until_us`; the packets that went out since the last call."""
+        while self._now_us + self.firmware.tick_us <= until_us:
+            self._now_us += self.firmware.tick_us
+            self._tick()
+        sent = list(self._out)
+        self._out.clear()
+        return sent
+
+    def truth_document(self) -> dict[str, Any]:
+        """What is true of the streams while the parameters are as they are: of IMU 1, and of the others."""
+        first, *others = (self.imus.truth(imu, *self.firmware.correction(imu)) for imu in range(self.options.imus))
+        return {**first, "others": others}
+
+    def _boot(self) -> None:
+        self._booted_us = self._now_us
+        self._streams = Streams()
+        self._streams.set(HEARTBEAT, S_US, self._now_us)
+        for message_id, interval_us in self.firmware.streams:
+            self._streams.set(message_id, interval_us, self._now_us)
+        self._list: deque[str] = deque()
+        self.firmware.start()
+        self.firmware.temperature_c = self.imus.temperature_c
+
+    def _tick(self) -> None:
+        for mishap in self._mishaps.due(self._now_us):
+            self._MISHAPS[mishap](self)
+        self.firmware.sense(self.imus.next())
+        if self._now_us < self._silent_until_us:
+            return
+        for message_id in self._streams.due(self._now_us, SLOWER_WHILE_BUSY if self._list else 1):
+            message = self._heartbeat() if message_id == HEARTBEAT else self._message(message_id)
+            if message is not None:
+                self._send(message)
+        if self._list:
+            self._send(self._value(self.firmware.store.parameter(self._list.popleft())))
+
+    def _message(self, message_id: int) -> Message | None:
+        return self.firmware.message(message_id, self._now_us - self._booted_us)
+
+    def _heartbeat(self) -> Message:
+        mode = ARMED if self.firmware.armed else 0
+        state = dialect().MAV_STATE_ACTIVE if self.firmware.armed else dialect().MAV_STATE_STANDBY
+        return dialect().MAVLink_heartbeat_message(QUADROTOR, self.firmware.autopilot, 81 | mode, 0, state, 3)
+
+    def _send(self, message: Message) -> None:
+        data = bytes(message.pack(self._mav))
+        self._mav.seq = (self._mav.seq + 1) % SEQUENCE
+        self._out.append(Sent(self._now_us, data))
+
+    def _value(self, parameter: Parameter) -> Message:
+        value = to_wire(parameter.value, parameter.type, self.firmware.bytewise)
+        return dialect().MAVLink_param_value_message(
+            name_bytes(parameter.name), value, parameter.type, parameter.count, parameter.index
+        )
+
+    def _param_request_read(self, message: Message) -> None:
+        store = self.firmware.store
+        name = message.param_id
+        if message.param_index >= 0:
+            name = next(itertools.islice(store, message.param_index, None), "")
+        if name in store:
+            self._send(self._value(store.parameter(name)))
+        elif self.firmware.bytewise:
+            self._param_error(name, 1)
+
+    def _param_request_list(self, message: Message) -> None:
+        self._list = deque(self.firmware.store)
+
+    def _param_set(self, message: Message) -> None:
+        for echo in self.firmware.set(of_wire(message, self.firmware.bytewise)):
+            if isinstance(echo, Parameter):
+                self._send(self._value(echo))
+            else:
+                self._param_error(message.param_id, echo)
+
+    def _param_error(self, name: str, error: int) -> None:
+        self._send(dialect().MAVLink_param_error_message(self.options.system, COMPONENT, name_bytes(name), -1, error))
+
+    def _request_data_stream(self, message: Message) -> None:
+        rate_hz = message.req_message_rate if message.start_stop else 0
+        for message_id, interval_us in self.firmware.group(rate_hz):
+            self._streams.set(message_id, interval_us, self._now_us)
+
+    def _command_long(self, message: Message) -> None:
+        m = dialect()
+        handlers = {
+            m.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
+            m.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+            m.MAV_CMD_RUN_PREARM_CHECKS: self._run_prearm_checks,
+            m.MAV_CMD_PREFLIGHT_CALIBRATION: self._preflight_calibration,
+        }
+        answer = handlers.get(message.command)
+        result = m.MAV_RESULT_UNSUPPORTED if answer is None else answer(message)
+        self._send(m.MAVLink_command_ack_message(message.command, result))
+
+    def _set_message_interval(self, message: Message) -> int:
+        message_id = int(message.param1)
+        result, interval_us = self.firmware.interval(message_id, int(message.param2))
+        if result == dialect().MAV_RESULT_ACCEPTED:
+            self._streams.set(message_id, interval_us, self._now_us)
+        return result
+
+    def _request_message(self, message: Message) -> int:
+        wanted = self._message(int(message.param1))
+        if wanted is None:
+            return int(dialect().MAV_RESULT_FAILED)
+        self._send(wanted)
+        return int(dialect().MAV_RESULT_ACCEPTED)
+
+    def _run_prearm_checks(self, message: Message) -> int:
+        if self.firmware.armed:
+            return int(dialect().MAV_RESULT_TEMPORARILY_REJECTED)
+        for complaint in self.firmware.complaints():
+            self._send(dialect().MAVLink_statustext_message(dialect().MAV_SEVERITY_CRITICAL, complaint.encode()))
+        return int(dialect().MAV_RESULT_ACCEPTED)
+
+    def _preflight_calibration(self, message: Message) -> int:
+        if self.firmware.armed or message.param5 != FORCE_SAVE:
+            return int(dialect().MAV_RESULT_FAILED)
+        self.firmware.save_ids()
+        return int(dialect().MAV_RESULT_ACCEPTED)
+
+    def _statustext(self, message: Message) -> None:
+        prompt = of_message(message)
+        if prompt is not None:
+            self.imus.hear(prompt, self._now_us / S_US)
+
+    def _arm(self) -> None:
+        self.firmware.armed = True
+
+    def _reboot(self) -> None:
+        self._silent_until_us = self._now_us + REBOOT_US
+        self._boot()
+
+    def _fall_silent(self) -> None:
+        self._silent_until_us = math.inf
+
+    def _obey_second_station(self) -> None:
+        """A ground station at its default rate."""
+        for message_id, interval_us in self.firmware.group(SECOND_STATION_HZ):
+            self._streams.set(message_id, interval_us, self._now_us)
+
+    def _file_transfer_protocol(self, message: Message) -> None:
+        reply = self.card.answer(Payload.decode(bytes(message.payload)))
+        self._send(dialect().MAVLink_file_transfer_protocol_message(0, 0, 0, bytearray(reply.encode())))
+
+    _MISHAPS: ClassVar[Mapping[str, Callable[[Vehicle], None]]] = {
+        "arm": _arm,
+        "reboot": _reboot,
+        "silence": _fall_silent,
+        "second_station": _obey_second_station,
+    }
+    _HANDLERS: ClassVar[Mapping[str, Callable[[Vehicle, Message], None]]] = {
+        "PARAM_REQUEST_READ": _param_request_read,
+        "PARAM_REQUEST_LIST": _param_request_list,
+        "PARAM_SET": _param_set,
+        "REQUEST_DATA_STREAM": _request_data_stream,
+        "COMMAND_LONG": _command_long,
+        "STATUSTEXT": _statustext,
+        "FILE_TRANSFER_PROTOCOL": _file_transfer_protocol,
+    }

@@ -1,0 +1,236 @@
+"""A chip behind a serial bridge, as a bus. Knows of the chip what makes its FIFO run, and no frame's meaning.
+
+What the bridge pushes is read-ahead below the bus: FIFO_COUNT and FIFO_R_W are answered from it, each count with
+the time at which the bridge read it, and what was lost on the way shows as an overflow in INT_STATUS. Nothing is
+read ahead of a FIFO that was started without a reset: whoever lets it fill sees it fill.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+
+from ...chip import registers as reg
+from ...chip.access import Reply
+from ...errors import BusError, NoAnswer
+from .fifo_watch import CONTROLS, FifoWatch
+from .link import MS, Answer, Link, LinkLost
+from .link_errors import no_chip, no_reply, refused
+from .messages import (
+    MAX_BURST,
+    MAX_READ,
+    MAX_WRITE,
+    Burst,
+    BurstReply,
+    Feature,
+    Frames,
+    Message,
+    Read,
+    ReadReply,
+    Status,
+    Stream,
+    Write,
+)
+from .port import Port
+from .read_ahead import ReadAhead
+
+# Four frames of 14 bytes fill one message.
+BATCH = 4
+GONE_NS = 500 * MS
+# A cable is plugged in again, and a boot loader waits for two seconds.
+RECOVER_NS = 10_000 * MS
+
+
+class BridgeBus:
+    """The chip behind the bridge on `port`; its clock is the bridge's.
+
+    Parameters
+    ----------
+    port : open; the bus closes it. address : where the chip is; None lets the bridge try 0x68, then 0x69.
+
+    Raises
+    ------
+    BusError : no bridge answers. NoAnswer : it finds no chip.
+    """
+
+    def __init__(self, port: Port, address: int | None = None) -> None:
+        self.link = Link(port, self._pushed)
+        self._port = port
+        self._watch = FifoWatch()
+        self._ahead: ReadAhead | None = None
+        self._lost = False
+        self._dead: BusError | None = None
+        try:
+            self._address = self.link.greet(address or 0).address
+            if not self._address:
+                raise NoAnswer(*no_chip(port.name, address))
+        except BaseException:
+            port.close()
+            raise
+
+    @property
+    def address(self) -> int:
+        """Where the chip answers."""
+        return self._address
+
+    def read(self, register: int, count: int) -> Reply:
+        """`count` bytes from `register` on; where that is more than MAX_READ, in several transfers."""
+        ahead = self._ahead
+        if ahead is not None and (register, count) == (reg.FIFO_COUNT_H, 2):
+            held, t_ns = self._count(ahead)
+            return Reply(held.to_bytes(2, "big"), t_ns)
+        if ahead is not None and register == reg.FIFO_R_W:
+            return Reply(*ahead.pop(count))
+        reply = self._read_now(register, count)
+        at = reg.INT_STATUS - register
+        return self._judged(reply, at) if register != reg.FIFO_R_W and 0 <= at < count else reply
+
+    def write(self, register: int, data: bytes) -> int:
+        """Write `data` from `register` on, and return the time."""
+        if len(data) > MAX_WRITE:
+            raise BusError(f"a bridge writes at most {MAX_WRITE} bytes at once, not {len(data)}", "write less at once")
+        requests: list[Message] = []
+        controls = not CONTROLS.isdisjoint(range(register, register + len(data)))
+        if controls and self._ahead is not None:
+            self._ahead = None
+            requests.append(Stream(0, 0))
+        requests.append(Write(register, data))
+        self._watch.saw_write(register, data)
+        if controls and self._can_read_ahead:
+            return self._start(*requests)
+        return self._seen_from(self._ask(*requests)[-1][-1].t_ns)
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Wait until the bridge's clock shows `t_ns`, as far as is known, and take what it pushes."""
+        while True:
+            host_ns = self._port.now_ns()
+            left_ns = t_ns - self.link.clock.now(host_ns)
+            if left_ns <= 0:
+                return
+            try:
+                self.link.wait(host_ns + left_ns)
+            except BusError:
+                # the next access says so
+                return
+
+    def close(self) -> None:
+        """Stop what the bridge pushes, if it still listens, and let go of the port."""
+        if self._ahead is not None and self._dead is None:
+            with suppress(BusError):
+                self.link.ask(Stream(0, 0))
+        self.link.close()
+
+    def _read_now(self, register: int, count: int) -> Reply:
+        if count > MAX_BURST:
+            raise BusError(f"a bridge reads at most {MAX_BURST} bytes at once, not {count}", "read less at once")
+        answers = [answer for several in self._ask(*_reads(register, count)) for answer in several]
+        return Reply(b"".join(_data(answers)), self._seen_from(answers[0].t_ns))
+
+    def _judged(self, reply: Reply, at: int) -> Reply:
+        """What was read, with INT_STATUS at `at`: it tells what was lost on the way to the host, too."""
+        if self._ahead is not None:
+            if reply.data[at] & reg.INT_FIFO_OFLOW:
+                # the reading cleared it, and the bridge does not see it any more
+                self._ahead.lose(reply.t_ns)
+            lost = self._ahead.take_overflow()
+        else:
+            lost, self._lost = self._lost, False
+        data = bytearray(reply.data)
+        data[at] |= reg.INT_FIFO_OFLOW * lost
+        return Reply(bytes(data), reply.t_ns)
+
+    def _seen_from(self, t_ns: int) -> int:
+        return t_ns if self._ahead is None else self._ahead.seen_from(t_ns)
+
+    @property
+    def _can_read_ahead(self) -> bool:
+        has_stream = bool(self.link.bridge.features & Feature.STREAM)
+        return has_stream and self._ahead is None and bool(self._watch.frame_bytes)
+
+    def _start(self, *before: Message) -> int:
+        """Let the bridge push, right behind the requests `before`; returns the time of the last of those.
+
+        The FIFO must not fill while the host waits for a reply, so all of them are sent at once.
+        """
+        self._lost = False
+        frame_bytes = self._watch.frame_bytes
+        # before it is asked for: what it pushes may come together with its reply
+        self._ahead = ReadAhead(self.link.seq_of(len(before)), frame_bytes)
+        try:
+            answers = self._ask(*before, Stream(frame_bytes, BATCH))
+        except BusError:
+            if self._ahead is not None:
+                self._ahead = None
+                with suppress(BusError):
+                    self.link.ask(Stream(0, 0))
+            raise
+        return answers[-2][-1].t_ns
+
+    def _count(self, ahead: ReadAhead) -> tuple[int, int]:
+        give_up_ns = self._port.now_ns() + GONE_NS
+        while not ahead.can_count:
+            try:
+                if self._port.now_ns() >= give_up_ns:
+                    raise LinkLost(*no_reply(self._port.name))
+                self.link.wait(give_up_ns)
+            except BusError as error:
+                self._recover(error)
+                raise
+        return ahead.count()
+
+    def _pushed(self, seq: int, frames: Frames, t_ns: int) -> None:
+        if self._ahead is not None and seq == self._ahead.seq:
+            self._ahead.push(frames, t_ns)
+
+    def _ask(self, *requests: Message) -> list[list[Answer]]:
+        """The answers, none of them a failure.
+
+        Raises
+        ------
+        BusError : the bridge could not do it; or it was lost, and is greeted again: then asking again may help.
+        """
+        if self._dead is not None:
+            raise self._dead
+        try:
+            answers = self.link.ask(*requests)
+        except BusError as error:
+            self._recover(error)
+            raise
+        for several in answers:
+            status = several[-1].reply.status
+            if status != Status.OK:
+                kind = NoAnswer if status == Status.NO_ANSWER else BusError
+                raise kind(*refused(self._port.name, status))
+        return answers
+
+    def _recover(self, error: BusError) -> None:
+        """Greet the bridge again, on its port opened anew where that was gone; what it pushed is lost.
+
+        Raises
+        ------
+        BusError : it does not come back.
+        """
+        self._ahead, self._lost = None, True
+        until_ns = self._port.now_ns() + RECOVER_NS
+        try:
+            if not isinstance(error, LinkLost):
+                self._port.reopen(until_ns)
+            self.link.greet(self._address, until_ns - self._port.now_ns())
+        except BusError as still:
+            self._dead = error
+            raise error from still
+
+
+def _reads(register: int, count: int) -> Iterator[Message]:
+    """The requests for `count` bytes from `register` on."""
+    if register == reg.FIFO_R_W:
+        yield Burst(register, count) if count > MAX_READ else Read(register, count)
+        return
+    for at in range(0, count, MAX_READ):
+        yield Read(register + at, min(MAX_READ, count - at))
+
+
+def _data(answers: Iterable[Answer]) -> Iterator[bytes]:
+    for answer in answers:
+        if isinstance(answer.reply, ReadReply | BurstReply):
+            yield answer.reply.data

@@ -1,0 +1,239 @@
+"""Requests to a bridge and the replies to them: sequence numbers, timeouts, repeats, the first hello.
+
+Knows no register's meaning. See firmware_protocol.md, "Sequence numbers" and "Timing".
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import cycle
+from typing import NamedTuple
+
+from ...chip.registers import FIFO_R_W, INT_STATUS
+from ...errors import BusError
+from .clock import BridgeClock
+from .frame import DELIMITER, Deframer, Frame
+from .greeting import Heard
+from .link_errors import no_reply, other_version, restarted
+from .messages import (
+    MAJOR,
+    MIN_WINDOW,
+    REPLY_BIT,
+    BlobBegin,
+    BlobCommit,
+    BlobData,
+    BlobErase,
+    Burst,
+    BurstReply,
+    Frames,
+    Hello,
+    HelloReply,
+    Message,
+    MessageError,
+    Read,
+    Reply,
+    Status,
+    answer_of,
+)
+from .port import Chunk, Port
+
+MS = 1_000_000
+# two and a half times what a bridge takes at most
+REPLY_NS = 250 * MS
+STORE_NS = 2500 * MS
+TRIES = 3
+HELLO_NS = 300 * MS
+GREET_NS = 5000 * MS
+
+STORING = (BlobBegin, BlobData, BlobCommit, BlobErase)
+
+Pushed = Callable[[int, Frames, int], None]
+
+
+class LinkLost(BusError):  # noqa: N818 - reads as the sentence it is
+    """The bridge does not answer, or has forgotten that it was greeted; `greet` may bring it back."""
+
+
+class Answer(NamedTuple):
+    """A reply, and its bus time."""
+
+    reply: Reply
+    t_ns: int
+
+
+@dataclass
+class _Asked:
+    """A request on its way, and what came for it."""
+
+    seq: int
+    request: Message
+    answers: list[Answer] = field(default_factory=list)
+
+    @property
+    def done(self) -> bool:
+        if not self.answers:
+            return False
+        last = self.answers[-1].reply
+        if last.status != Status.OK or not isinstance(last, BurstReply) or not isinstance(self.request, Burst):
+            return True
+        return last.offset + len(last.data) >= self.request.count
+
+    @property
+    def repeatable(self) -> bool:
+        """Whether it does no harm when carried out twice: reading these two takes something away."""
+        if isinstance(self.request, Burst):
+            return False
+        if not isinstance(self.request, Read):
+            return True
+        first = self.request.register
+        return not first <= INT_STATUS < first + self.request.count and first != FIFO_R_W
+
+    def is_answered_by(self, frame: Frame, reply: Reply) -> bool:
+        """Whether `reply` is what it waits for: of a BURST, a piece behind one that was lost is not."""
+        if self.done or (frame.seq, frame.type) != (self.seq, self.request.TYPE | REPLY_BIT):
+            return False
+        if not isinstance(reply, BurstReply):
+            return True
+        return reply.offset == sum(len(a.reply.data) for a in self.answers if isinstance(a.reply, BurstReply))
+
+    def encoded(self) -> bytes:
+        return Frame(self.request.TYPE, self.seq, self.request.payload()).encode()
+
+
+class Link:
+    """One bridge on one port.
+
+    Parameters
+    ----------
+    port : open. pushed : is told of each FRAMES: its seq, the message, its bus time [ns].
+
+    Attributes
+    ----------
+    clock : the bridge's. bridge : what it said of itself; of meaning after `greet`.
+    """
+
+    def __init__(self, port: Port, pushed: Pushed) -> None:
+        self.port = port
+        self.clock = BridgeClock()
+        self.bridge: HelloReply
+        self._pushed = pushed
+        self._deframer = Deframer()
+        self._seq = 0
+        self._window = MIN_WINDOW
+
+    def greet(self, address: int = 0, within_ns: int = GREET_NS) -> HelloReply:
+        """Say HELLO until the bridge answers: an Arduino's boot loader takes two seconds.
+
+        Parameters
+        ----------
+        address : where its chip is; 0 lets it look.
+
+        Raises
+        ------
+        BusError : nothing answers, or something that is no bridge, or one of another version.
+        """
+        heard = Heard()
+        give_up_ns = self.port.now_ns() + within_ns
+        for baud in cycle(self.port.bauds):
+            if self.port.now_ns() >= give_up_ns:
+                break
+            if len(self.port.bauds) > 1:
+                self.port.set_baud(baud)
+            reply = self._hello(address, heard, baud)
+            if reply is not None:
+                self.bridge, self._window = reply, max(MIN_WINDOW, reply.window)
+                return reply
+        raise heard.why_nobody(self.port.name, self.port.bauds)
+
+    def ask(self, *requests: Message) -> list[list[Answer]]:
+        """The answers to each request, the last of which may tell that it failed; several are on their way at once.
+
+        Raises
+        ------
+        LinkLost : the bridge does not answer, or was reset. BusError : the port is gone.
+        """
+        waiting, flying = deque(self._numbered(requests)), list[_Asked]()
+        asked = list(waiting)
+        patience_ns = STORE_NS if any(isinstance(request, STORING) for request in requests) else REPLY_NS
+        tries, deadline_ns = 1, self.port.now_ns() + patience_ns
+        while waiting or flying:
+            while waiting and len(flying) < self._window:
+                flying.append(waiting.popleft())
+                self.port.write(flying[-1].encoded())
+            chunk = self.port.read(deadline_ns)
+            if chunk is None:
+                if tries == TRIES or not all(one.repeatable for one in flying):
+                    raise LinkLost(*no_reply(self.port.name))
+                tries += 1
+                self.port.write(DELIMITER + b"".join(one.encoded() for one in flying))
+            elif not self._handle(chunk, flying):
+                continue
+            deadline_ns = self.port.now_ns() + patience_ns
+            flying = [one for one in flying if not one.done]
+        return [one.answers for one in asked]
+
+    def seq_of(self, n: int) -> int:
+        """The sequence number that the next request will have (n = 0), or one behind it."""
+        return (self._seq + 1 + n) % 256
+
+    def wait(self, until_ns: int) -> bool:
+        """Take what is pushed until the host's clock shows `until_ns`; True as soon as something came.
+
+        Raises
+        ------
+        BusError : the port is gone.
+        """
+        chunk = self.port.read(until_ns)
+        if chunk is not None:
+            self._handle(chunk, [])
+        return chunk is not None
+
+    def close(self) -> None:
+        """Let go of the port."""
+        self.port.close()
+
+    def _numbered(self, requests: Sequence[Message]) -> Iterator[_Asked]:
+        for request in requests:
+            self._seq = (self._seq + 1) % 256
+            yield _Asked(self._seq, request)
+
+    def _hello(self, address: int, heard: Heard, baud: int) -> HelloReply | None:
+        (asked,) = self._numbered([Hello(address=address)])
+        self.port.write(DELIMITER + asked.encoded())
+        until_ns = self.port.now_ns() + HELLO_NS
+        while True:
+            chunk = self.port.read(until_ns)
+            if chunk is None:
+                return None
+            heard.take(chunk.data, baud)
+            for frame, reply in self._messages(chunk):
+                if not asked.is_answered_by(frame, reply):
+                    continue
+                if not isinstance(reply, HelloReply) or reply.major != MAJOR:
+                    raise BusError(*other_version(self.port.name, reply))
+                self.clock.greeted(reply.t_us, chunk.t_ns)
+                return reply
+
+    def _handle(self, chunk: Chunk, flying: Sequence[_Asked]) -> bool:
+        """Give each message to whom it is for; whether a request was answered."""
+        answered = False
+        for frame, reply in self._messages(chunk):
+            if isinstance(reply, Frames):
+                self._pushed(frame.seq, reply, self.clock.seen(reply.t_us, chunk.t_ns))
+                continue
+            for one in flying:
+                if one.is_answered_by(frame, reply):
+                    if reply.status == Status.NO_HELLO:
+                        # its clock began anew: the time means nothing here
+                        raise LinkLost(*restarted(self.port.name))
+                    one.answers.append(Answer(reply, self.clock.seen(reply.t_us, chunk.t_ns)))
+                    answered = True
+        return answered
+
+    def _messages(self, chunk: Chunk) -> Iterator[tuple[Frame, Reply]]:
+        for frame in self._deframer.feed(chunk.data):
+            with suppress(MessageError):
+                yield frame, answer_of(frame.type, frame.payload)

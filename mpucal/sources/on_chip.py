@@ -1,0 +1,74 @@
+"""A chip on a bus as a session's source: its driver, tapped into an MCAP capture. Knows no option."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..chip.access import Bus
+from ..chip.driver import Driver
+from ..chip.records import LATE
+from ..errors import CaptureError
+from ..files.mcap import CaptureWriter
+from ..session.events import Prompt
+from ..session.plan import Plan
+from ..session.ports import Replayed, Talk
+from ..session.results import CAPTURE
+from .opened import Measuring, Say
+from .parts import PartsBus
+from .tap import Tap
+
+# of a capture's head: what to open to go on with the session
+SOURCE = "source"
+
+
+@dataclass(frozen=True)
+class OnBus:
+    """A bus, and what comes with its kind; see Opened.
+
+    Attributes
+    ----------
+    bus : open. replay : the same bus where it is a replay.
+    words : the options by which it was opened, for who resumes the session. real_time : see Opened.
+    """
+
+    bus: Bus
+    plan: Plan
+    listeners: Sequence[Callable[[Prompt], None]] = ()
+    truth: Mapping[str, Any] | None = None
+    replay: PartsBus | None = None
+    recovered: str | None = None
+    capture_name: str = CAPTURE
+    words: Mapping[str, Any] = field(default_factory=dict)
+    real_time: bool = True
+
+    def source_meta(self) -> dict[str, Any]:
+        """For the head of a capture."""
+        return {SOURCE: dict(self.words)} if self.words else {}
+
+    def talk(self, person: Talk) -> Talk:
+        """See Opened."""
+        return person if self.replay is None else Replayed(person, self.replay.pending_events)
+
+    @contextmanager
+    def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[Measuring]:
+        """See Opened."""
+        with closing(self.bus), CaptureWriter(capture) as writer:
+            writer.start({"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.source_meta()})
+            driver = Driver(Tap(self.bus, writer), self.plan.config, capture.name, lambda text: say(f"  {text}."))
+            if self.replay is None:
+                yield Measuring(driver, writer.event)
+            else:
+                yield Measuring(driver, writer.event, self.replay.go_on, self._was_late)
+        if self.replay is not None and self.replay.unread():
+            raise CaptureError(
+                f"the replay ended with {self.replay.unread()} accesses of its capture unread",
+                "replay it with the mpucal that recorded it, or use `mpucal calibrate`",
+            )
+
+    def _was_late(self, _late: bool) -> bool:
+        return self.replay is not None and bool(self.replay.pending_events(LATE))

@@ -1,0 +1,202 @@
+"""A vehicle, or its .tlog, as a session's source, recorded into a .tlog. Knows no option."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..chip.config import Config
+from ..chip.records import LATE, SessionEvent
+from ..data import Recording
+from ..errors import CaptureError, LinkError, UsageError
+from ..mavlink.link import Link
+from ..mavlink.log import read_log
+from ..mavlink.notes import Note, to_messages
+from ..mavlink.prompts import to_message
+from ..mavlink.recorded import RecordedSource
+from ..mavlink.replay import Replay
+from ..mavlink.source import VehicleSource, one_of
+from ..mavlink.tlog import Tlog, TlogWriter, read_tlog
+from ..mavlink.transport import Transport
+from ..session.events import Prompt
+from ..session.plan import Plan
+from ..session.ports import Replayed, Talk
+from .opened import Measuring, Say
+
+CAPTURE = "capture.tlog"
+SESSION, END = "session", "end"
+MPUCAL, RECORDED, SOURCE, PLAN, SYSTEM = "mpucal", "recorded", "source", "plan", "system"
+# counts up with every change of what the source sends and believes
+SOURCE_VERSION = 2
+NOTE_IDS = 65535
+
+
+class OnLink:
+    """A transport to a vehicle, and what comes with its kind; see Opened.
+
+    Parameters
+    ----------
+    transport : open. plan : what to do; of its `config` the rate matters. system : whom to lock to.
+    key : to sign with, or None. listeners : hear the prompts, besides the vehicle.
+    truth : of a simulated vehicle. replay : the same transport where it is a replay. real_time : see Opened.
+
+    Attributes
+    ----------
+    link : to the vehicle, while it measures.
+    """
+
+    capture_name = CAPTURE
+
+    def __init__(
+        self,
+        transport: Transport,
+        plan: Plan,
+        system: int | None = None,
+        key: bytes | None = None,
+        *,
+        listeners: Sequence[Callable[[Prompt], None]] = (),
+        truth: Mapping[str, Any] | None = None,
+        replay: Replay | None = None,
+        recovered: str | None = None,
+        real_time: bool = True,
+    ) -> None:
+        self.plan = plan
+        self.listeners = (self._prompt, *listeners)
+        self.truth = truth
+        self.recovered = recovered
+        self.real_time = real_time and replay is None
+        self.link: Link | None = None
+        self._transport = transport
+        self._system = system
+        self._key = key
+        self._replay = replay
+
+    def talk(self, person: Talk) -> Talk:
+        """See Opened."""
+        return person if self._replay is None else Replayed(person, self._pending)
+
+    @contextmanager
+    def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[Measuring]:
+        """See Opened."""
+        with closing(self._transport), TlogWriter(capture) as writer:
+            link = self.link = Link(self._transport, writer.packet, self._key)
+            notes = _Noting(link)
+            plan = {SOURCE: SOURCE_VERSION, PLAN: asdict(self.plan), SYSTEM: self._system}
+            notes.keep(SESSION, 0, {MPUCAL: __version__, RECORDED: recorded, **plan})
+            source = VehicleSource(link, self.plan.config.rate_hz, self._system, say, capture.name)
+            try:
+                yield Measuring(source, notes.keep, late=self._was_late)
+            finally:
+                # until when nothing more came: a replay ends its last poll there
+                notes.keep(END, 0, {})
+
+    @contextmanager
+    def connected(self, say: Say) -> Iterator[Link]:
+        """A link that is locked to the vehicle, and recorded nowhere.
+
+        Raises
+        ------
+        UsageError : a .tlog, or several vehicles. NoAnswer, LinkError : see Link.
+        """
+        if self._replay is not None:
+            raise UsageError("a .tlog has no vehicle to write to", "give the vehicle's --mavlink URL")
+        with closing(self._transport):
+            link = self.link = Link(self._transport, lambda _t_ns, _packet: None, self._key)
+            vehicle = one_of(link.listen(), self._system)
+            say(f"This is {vehicle}; what is asked and written goes there alone.")
+            link.lock(vehicle)
+            yield link
+
+    def _prompt(self, prompt: Prompt) -> None:
+        """Tell the vehicle, whose log then says what was done to it."""
+        if self.link is not None:
+            # a vehicle that is gone is no reason to keep a prompt from the person
+            with suppress(LinkError):
+                self.link.send(to_message(prompt))
+
+    def _was_late(self, late: bool) -> bool:
+        return late if self._replay is None else bool(self._pending(LATE))
+
+    def _pending(self, name: str) -> Sequence[SessionEvent]:
+        if self._replay is None:
+            return []
+        return [SessionEvent(noted.note.name, noted.t_ns, noted.note.data) for noted in self._replay.pending(name)]
+
+
+@dataclass(frozen=True)
+class OnRecording:
+    """A .tlog of another ground station, and what comes with it; see Opened."""
+
+    tlog: Tlog
+    measured: Recording
+    plan: Plan
+    listeners: Sequence[Callable[[Prompt], None]] = ()
+    truth: Mapping[str, Any] | None = None
+    capture_name: str = CAPTURE
+    real_time: bool = False
+
+    @property
+    def recovered(self) -> str | None:
+        """See Opened."""
+        return self.tlog.recovered
+
+    def talk(self, person: Talk) -> Talk:
+        """See Opened."""
+        return person
+
+    @contextmanager
+    def measuring(self, capture: Path, _say: Say, _recorded: str) -> Iterator[Measuring]:
+        """See Opened; the capture is a copy."""
+        with TlogWriter(capture) as writer:
+            for record in self.tlog.records:
+                writer.packet(record.t_ns, record.data)
+            yield Measuring(RecordedSource(self.measured), lambda _name, _t_ns, _data: None)
+
+
+class _Noting:
+    """Keeps session events among a link's packets."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._notes = 0
+
+    def keep(self, name: str, _t_ns: int, data: Mapping[str, Any]) -> None:
+        """Keep an event; its time is the link's."""
+        for message in to_messages(Note(name, data), 1 + self._notes % NOTE_IDS):
+            self._link.note(message)
+        self._notes += 1
+
+
+def open_tlog(file: Path, asked: Plan, system: int | None) -> OnLink | OnRecording:
+    """A .tlog to be run again: one of mpucal's sessions as it was, any other until its end.
+
+    Parameters
+    ----------
+    asked : the plan for one of another ground station.
+
+    Raises
+    ------
+    CaptureError : it cannot be read, or another version of mpucal made it. RecordingError : it holds no IMU.
+    """
+    tlog = read_tlog(file)
+    replay = Replay(tlog)
+    head = next((noted.note for noted in replay.pending(SESSION)), None)
+    if head is None:
+        return OnRecording(tlog, read_log(tlog.records, tlog.name, system), asked)
+    if head.data.get(SOURCE) != SOURCE_VERSION:
+        raise CaptureError(
+            f"{tlog.name} was recorded by version {head.data.get(SOURCE)} of the source, and this is {SOURCE_VERSION}",
+            "use `mpucal calibrate` on it, which reads a .tlog of every version",
+        )
+    try:
+        plan = dict(head.data[PLAN])
+        made = Plan(**{**plan, "config": Config(**plan["config"])})
+        return OnLink(replay, made, head.data[SYSTEM], replay=replay, recovered=tlog.recovered)
+    except (KeyError, TypeError, ValueError) as error:
+        raise CaptureError(
+            f"the head of {tlog.name} does not say how it was made ({error})", "use `mpucal calibrate` on it"
+        ) from error

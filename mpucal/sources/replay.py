@@ -1,0 +1,88 @@
+"""A bus that answers from a capture, and from nothing else. Knows no chip and no file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ..chip.access import EndOfCapture, Reply, Transaction
+from ..chip.records import Record, SessionEvent
+from ..errors import BusError, BusHeld, CaptureError, NoAnswer
+
+_RAISES: dict[str, type[BusError]] = {kind.__name__: kind for kind in (NoAnswer, BusHeld)}
+
+
+class ReplayBus:
+    """Gives the recorded replies to the recorded accesses, in their order.
+
+    Raises EndOfCapture after the last one, CaptureError on an access that is not the recorded one,
+    and the recorded error where the recorded access failed.
+
+    Parameters
+    ----------
+    records : as recorded. name : what to call the capture in a message.
+    """
+
+    def __init__(self, records: Iterable[Record], name: str = "the capture") -> None:
+        self._name = name
+        self._accesses: list[Transaction] = []
+        # the events that lie before each access, and those after the last
+        self._events: list[list[SessionEvent]] = [[]]
+        for record in records:
+            if isinstance(record, SessionEvent):
+                self._events[-1].append(record)
+            else:
+                self._accesses.append(record)
+                self._events.append([])
+        self._next = 0
+        self._pending = list(self._events[0])
+
+    def read(self, register: int, count: int) -> Reply:
+        """See Bus."""
+        recorded = self._recorded(Transaction("read", register, count, b"", 0))
+        return Reply(recorded.data, recorded.t_ns)
+
+    def write(self, register: int, data: bytes) -> int:
+        """See Bus."""
+        return self._recorded(Transaction("write", register, len(data), data, 0)).t_ns
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Return at once: the replies carry their times."""
+
+    def close(self) -> None:
+        """Nothing to let go of; `unread` tells whether the capture was used up."""
+
+    def pending_events(self, name: str) -> list[SessionEvent]:
+        """The events of that name recorded before the next access, each once.
+
+        Asked where the recording session asked its keyboard, what was recorded between two accesses
+        comes between the same two.
+        """
+        pending = [event for event in self._pending if event.name == name]
+        self._pending = [event for event in self._pending if event.name != name]
+        return pending
+
+    def unread(self) -> int:
+        """How many recorded accesses nobody has asked for."""
+        return len(self._accesses) - self._next
+
+    def _recorded(self, asked: Transaction) -> Transaction:
+        if self._next == len(self._accesses):
+            raise EndOfCapture(f"{self._name} ends before {_words(asked)}")
+        recorded = self._accesses[self._next]
+        if _words(asked) != _words(recorded):
+            raise CaptureError(
+                f"the program asked for {_words(asked)}, but access {self._next} of {self._name} is {_words(recorded)}",
+                "replay it with the mpucal and options that recorded it, or calibrate it without replaying",
+            )
+        self._next += 1
+        self._pending += self._events[self._next]
+        if recorded.error is not None:
+            raise _RAISES.get(recorded.error.name, BusError)(recorded.error.what, recorded.error.remedy)
+        return recorded
+
+
+def _words(access: Transaction) -> str:
+    """An access as words; two accesses are the same where these are."""
+    if access.op == "read":
+        return f"a read of {access.count} bytes from 0x{access.register:02x}"
+    return f"a write of {access.data.hex(' ') or 'nothing'} to 0x{access.register:02x}"

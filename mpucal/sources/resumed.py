@@ -1,0 +1,140 @@
+"""A session that was interrupted, as a session's source: its captures, then the sensor itself. Knows no option."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..chip.driver import Driver
+from ..chip.records import KEY, LATE
+from ..errors import UsageError
+from ..files.mcap import CaptureWriter, read_capture
+from ..files.parts import capture_name, captures_in
+from ..session.events import Key, Output, Prompt
+from ..session.plan import Plan
+from ..session.ports import Talk
+from .on_chip import SOURCE, OnBus
+from .opened import Measuring, Say
+from .parts import LaterBus, PartsBus, parts_of
+from .replay import ReplayBus
+from .tap import Tap
+
+
+@dataclass(frozen=True)
+class OnParts:
+    """What was recorded of a session, and the sensor to go on with; see Opened.
+
+    Attributes
+    ----------
+    bus : the recorded parts, then the sensor, which alone is recorded again. live : how the sensor was opened.
+    """
+
+    bus: PartsBus
+    live: OnBus
+    plan: Plan
+    recovered: str | None
+    capture_name: str
+
+    @property
+    def truth(self) -> Mapping[str, Any] | None:
+        """See Opened."""
+        return self.live.truth
+
+    @property
+    def real_time(self) -> bool:
+        """See Opened."""
+        return self.live.real_time
+
+    @property
+    def listeners(self) -> Sequence[Callable[[Prompt], None]]:
+        """See Opened; what was said before is not said again."""
+        return [self._now(listener) for listener in self.live.listeners]
+
+    def talk(self, person: Talk) -> Talk:
+        """See Opened."""
+        return _Later(person, self.bus)
+
+    @contextmanager
+    def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[Measuring]:
+        """See Opened."""
+        with closing(self.bus), CaptureWriter(capture) as writer:
+            writer.start({"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.live.source_meta()})
+            recorder = _Recorder(writer, self.bus)
+            driver = Driver(Tap(self.bus, recorder), self.plan.config, capture.name, lambda text: say(f"  {text}."))
+            yield Measuring(driver, recorder.event, self.bus.go_on, self._late)
+
+    def _late(self, late: bool) -> bool:
+        return bool(self.bus.pending_events(LATE)) if self.bus.replaying else late
+
+    def _now(self, listener: Callable[[Prompt], None]) -> Callable[[Prompt], None]:
+        return lambda prompt: None if self.bus.replaying else listener(prompt)
+
+
+class _Recorder:
+    """Keeps what happens now, and not what was recorded before."""
+
+    def __init__(self, writer: CaptureWriter, bus: PartsBus) -> None:
+        self._writer, self._bus = writer, bus
+
+    def transaction(self, transaction: Any) -> None:
+        """See Recorder."""
+        if not self._bus.replaying:
+            self._writer.transaction(transaction)
+
+    def event(self, name: str, t_ns: int, data: Mapping[str, Any]) -> None:
+        """See Note."""
+        if not self._bus.replaying:
+            self._writer.event(name, t_ns, data)
+
+
+class _Later:
+    """The person, who heard and pressed before what is in the captures."""
+
+    def __init__(self, person: Talk, bus: PartsBus) -> None:
+        self._person, self._bus = person, bus
+
+    def hear(self, output: Output) -> None:
+        """Be told, if it is new."""
+        if not self._bus.replaying:
+            self._person.hear(output)
+
+    def pressed(self) -> Sequence[Key]:
+        """As recorded; then as pressed now."""
+        if self._bus.replaying:
+            return [Key(event.data[KEY]) for event in self._bus.pending_events(KEY)]
+        return self._person.pressed()
+
+
+def open_resumed(folder: Path, open_live: Callable[[Mapping[str, Any], Plan], OnBus]) -> OnParts:
+    """The session in `folder`, to go on with the source that its first capture names.
+
+    Raises
+    ------
+    UsageError : there is no session, or its source cannot be opened again. CaptureError : a damaged head.
+    """
+    files = captures_in(folder)
+    if not files:
+        raise UsageError(f"{folder} holds no session that could be resumed", "give the folder of an interrupted one")
+    captures = [read_capture(file) for file in files]
+    plan = Plan.of_capture(captures[0].meta, captures[0].name)
+    source = captures[0].meta.get(SOURCE)
+    if not source:
+        raise UsageError(
+            f"the capture in {folder} does not name a source to go on with", "use `mpucal calibrate` on the folder"
+        )
+    live = open_live(source, plan)
+    records = parts_of((capture.records for capture in captures), more=True)
+    last_ns = max((record.t_ns for part in records for record in part), default=0)
+    replays = [ReplayBus(part, folder.name) for part in records]
+    recovered = [capture.recovered for capture in captures if capture.recovered]
+    return OnParts(
+        PartsBus([*replays, LaterBus(live.bus, last_ns)]),
+        live,
+        plan,
+        recovered[-1] if recovered else None,
+        capture_name(len(files) + 1),
+    )

@@ -1,0 +1,54 @@
+"""The person of this process, as the streams allow: a screen, lines of words, or lines of JSON."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from typing import Protocol
+
+from ..session.events import Key, Output
+from .keys import Keys
+from .lines import JsonLines, Lines
+
+
+class Console(Protocol):
+    """Says what the session says, and asks the keyboard where there is one."""
+
+    def hear(self, output: Output) -> None:
+        """Be told."""
+        ...
+
+    def say(self, text: str) -> None:
+        """A line of talk."""
+        ...
+
+    def pressed(self) -> Sequence[Key]:
+        """What was pressed since the last call; never waits."""
+        ...
+
+    def listening(self) -> AbstractContextManager[None]:
+        """Meanwhile the person is shown the session and may press keys, Ctrl-C among them."""
+        ...
+
+
+def console(quiet: bool, as_json: bool = False, beep: bool | None = None, title: str = "") -> Console:
+    """The console on stderr and stdin.
+
+    Parameters
+    ----------
+    quiet : nobody is asked anything. as_json : one JSON object a line in place of words.
+    beep : ring at each change of prompt; None: where there is a screen. title : what is measured.
+    """
+    term = os.environ.get("TERM", "dumb")
+    drawn = sys.stderr.isatty() and term not in ("", "dumb") and not as_json
+    keys = Keys(None if quiet or not sys.stdin.isatty() else sys.stdin, single=drawn)
+    if as_json:
+        return JsonLines(sys.stderr, keys)
+    if not drawn:
+        return Lines(sys.stderr, keys, bell=bool(beep))
+    from .glyphs import glyphs_of  # noqa: PLC0415 - draws with rich, which takes a while to load
+    from .screen import Screen  # noqa: PLC0415
+
+    return Screen(sys.stderr, keys, glyphs_of(sys.stderr, term), bell=beep is not False, title=title)

@@ -1,1 +1,0 @@
-"""Pure codecs, as firmware_protocol.md says: bytes in, values out, and back. Knows no file or port."""

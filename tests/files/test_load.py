@@ -1,0 +1,108 @@
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+import mpucal
+from mpucal.chip.driver import Driver
+from mpucal.data import Recording
+from mpucal.errors import CaptureError, RecordingError
+from mpucal.files.csv import save_csv
+from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.files.npz import save_npz
+from mpucal.simulated.chip import open_simulated
+from mpucal.sources.replay import ReplayBus
+from mpucal.sources.tap import Tap
+
+
+def same(a, b):
+    for field in fields(Recording):
+        if field.name not in ("name", "recovered"):
+            np.testing.assert_array_equal(getattr(a, field.name), getattr(b, field.name), field.name)
+
+
+def measure(bus, polls):
+    driver = Driver(bus)
+    driver.start()
+    for _ in range(polls):
+        driver.poll()
+    return driver.recording()
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """A session's folder with three seconds of the simulated chip, and what the driver made of them."""
+    folder = tmp_path_factory.mktemp("session")
+    with CaptureWriter(folder / "capture.mcap") as writer:
+        writer.start({"source": "sim"})
+        recording = measure(Tap(open_simulated("sim", seed=1), writer), 150)
+        writer.event("key", int(recording.t[-1] * 1e9), {"key": "enough"})
+    return folder, recording
+
+
+def test_a_capture_gives_what_the_driver_gave(measured):
+    folder, recording = measured
+    assert len(recording) > 500
+    same(mpucal.load(folder / "capture.mcap"), recording)
+    same(mpucal.load(str(folder)), recording)
+    assert mpucal.load(folder).recovered is None
+
+
+def test_the_same_driver_runs_on_the_capture(measured):
+    folder, recording = measured
+    bus = ReplayBus(read_capture(folder / "capture.mcap").records)
+    same(measure(bus, 150), recording)
+    assert bus.unread() == 0
+    assert [event.name for event in bus.pending_events("key")] == ["key"]
+
+
+def test_a_capture_that_was_cut_gives_its_beginning(measured, tmp_path):
+    folder, recording = measured
+    whole = (folder / "capture.mcap").read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: len(whole) // 2])
+    read = mpucal.load(cut)
+    assert 100 < len(read) < len(recording)
+    np.testing.assert_array_equal(read.acc, recording.acc[: len(read)])
+    assert "cut.mcap is cut short" in read.recovered
+
+
+def test_a_capture_cut_before_its_first_sample_is_no_recording(measured, tmp_path):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes((measured[0] / "capture.mcap").read_bytes()[:600])
+    with pytest.raises(RecordingError, match="0 samples"):
+        mpucal.load(cut)
+
+
+def test_the_ending_says_how_to_read(measured, tmp_path):
+    _, recording = measured
+    save_npz(recording, tmp_path / "a.npz")
+    save_csv(recording, tmp_path / "A.CSV")
+    same(mpucal.load(tmp_path / "a.npz"), recording)
+    np.testing.assert_array_equal(mpucal.load(tmp_path / "A.CSV").acc, recording.acc)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("none.npz", "there is no file"),
+        ("none.mcap", "there is no file"),
+        ("notes.txt", r"give a \.mcap, \.tlog, \.bin, \.npz, \.csv file or the folder"),
+        ("none", "there is no file"),
+        ("no_ending", "no kind of recording"),
+        ("folder", r"holds no capture\.mcap"),
+    ],
+)
+def test_what_is_no_recording(tmp_path, name, says):
+    (tmp_path / "notes.txt").write_text("hello")
+    (tmp_path / "no_ending").write_text("hello")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(RecordingError, match=says) as raised:
+        mpucal.load(tmp_path / name)
+    assert str(tmp_path / name) in str(raised.value)
+
+
+def test_text_by_the_name_of_a_capture(tmp_path):
+    (tmp_path / "a.mcap").write_text("t,ax,ay,az\n")
+    with pytest.raises(CaptureError, match="no MCAP file"):
+        mpucal.load(tmp_path / "a.mcap")

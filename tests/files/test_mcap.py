@@ -1,0 +1,222 @@
+import json
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+
+from mpucal.chip.access import Failure, Transaction
+from mpucal.chip.records import SessionEvent
+from mpucal.errors import CaptureError, OutputError
+from mpucal.files import mcap
+from mpucal.files.mcap import CaptureWriter, read_capture
+
+META = {"mpucal": "0.1.0", "chip": "MPU-6050", "options": {"gravity": 9.81, "seed": None}}
+
+times = st.integers(0, 2**63)
+words = st.text(max_size=30)
+registers = st.integers(0, 255)
+data = st.binary(max_size=40)
+failures = st.none() | st.builds(Failure, words, words, words)
+reads = st.builds(lambda r, d, t, f: Transaction("read", r, len(d), d, t, f), registers, data, times, failures)
+writes = st.builds(lambda r, d, t, f: Transaction("write", r, len(d), d, t, f), registers, data, times, failures)
+plain = st.none() | st.booleans() | st.integers(-(2**53), 2**53) | st.floats(allow_nan=False) | words
+events = st.builds(SessionEvent, words, times, st.dictionaries(words, plain, max_size=3))
+
+
+def write(path, records, meta=META):
+    with CaptureWriter(path) as writer:
+        writer.start(meta)
+        for record in records:
+            if isinstance(record, SessionEvent):
+                writer.event(record.name, record.t_ns, record.data)
+            else:
+                writer.transaction(record)
+
+
+def polls(count, period_ns=20_000_000):
+    """Reads of a FIFO, every one different."""
+    return [Transaction("read", 0x74, 4, i.to_bytes(4, "big"), i * period_ns) for i in range(count)]
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "capture.mcap"
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=25, deadline=None)
+@given(
+    st.lists(reads | writes | events, max_size=20),
+    st.dictionaries(words.filter(lambda word: word != mcap.VERSION_KEY), plain),
+)
+def test_reads_what_was_written_in_the_order_in_which_it_happened(path, records, meta):
+    write(path, records, meta)
+    capture = read_capture(path)
+    assert list(capture.records) == records
+    assert capture.meta == meta
+    assert capture.recovered is None
+
+
+def test_other_programs_read_it(path):
+    """The library's own reader, by index: what a viewer of MCAP files does."""
+    write(path, [*polls(200), SessionEvent("key", 5_000_000_000, {"key": "enough"})])
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary.statistics.message_count == 201
+        assert summary.statistics.chunk_count > 1
+        assert {channel.topic for channel in summary.channels.values()} == {"/bus", "/session"}
+        for schema in summary.schemas.values():
+            assert schema.encoding == "jsonschema"
+            assert json.loads(schema.data)["type"] == "object"
+        messages = [(c.topic, json.loads(m.data)) for _, c, m in reader.iter_messages(starting_at=3_900_000_000)]
+        assert messages[0] == ("/bus", {"op": "read", "register": 0x74, "count": 4, "data": "000000c3"})
+        assert messages[-1] == ("/session", {"name": "key", "data": {"key": "enough"}})
+        (metadata,) = reader.iter_metadata()
+        assert json.loads(metadata.metadata["chip"]) == "MPU-6050"
+
+
+KILLED = """
+import sys
+from mpucal.files.mcap import CaptureWriter
+from mpucal.chip.access import Transaction
+writer = CaptureWriter(sys.argv[1])
+writer.start({"chip": "MPU-6050"})
+for i in range(int(sys.argv[2])):
+    writer.transaction(Transaction("read", 0x74, 4, i.to_bytes(4, "big"), i * 20_000_000))
+print("written", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.parametrize("count", [0, 30, 523], ids=["at the start", "in the first second", "later"])
+def test_a_killed_program_loses_its_last_second_at_most(path, count):
+    child = subprocess.Popen(
+        [sys.executable, "-c", KILLED, str(path), str(count)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    with child:
+        assert child.stdout.readline() == b"written\n"
+        child.send_signal(signal.SIGKILL)
+    assert child.returncode == -signal.SIGKILL
+    capture = read_capture(path)
+    kept = len(capture.records)
+    assert list(capture.records) == polls(count)[:kept]
+    assert count - kept <= 50  # polls in a second
+    assert "was never closed" in capture.recovered
+    assert f"{kept} records" in capture.recovered
+
+
+def test_of_a_file_cut_anywhere_all_whole_chunks_are_read(path):
+    records = polls(120)
+    write(path, records)
+    whole = path.read_bytes()
+    held, kept = [], 0
+    for size in [*range(1, len(whole), 37), len(whole) - 1]:
+        path.write_bytes(whole[:size])
+        try:
+            capture = read_capture(path)
+        except CaptureError:
+            assert kept == 0, "the head was there before"
+            continue
+        assert list(capture.records) == records[: len(capture.records)]
+        assert capture.recovered.startswith("capture.mcap")
+        assert len(capture.records) >= kept
+        kept = len(capture.records)
+        held.append(kept)
+    assert held[0] == 0
+    assert held[-1] == 120
+    assert len(set(held)) == 6  # nothing, then a chunk of 26 polls more each time
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None)
+@given(share=st.floats(0.0, 1.0, exclude_max=True), bit=st.integers(0, 7))
+def test_a_changed_bit_is_noticed_and_what_precedes_it_is_kept(path, share, bit):
+    records = polls(60)
+    write(path, records)
+    whole = bytearray(path.read_bytes())
+    whole[int(share * len(whole))] ^= 1 << bit
+    path.write_bytes(whole)
+    try:
+        capture = read_capture(path)
+    except CaptureError:
+        return
+    kept = [record for record in records if record in capture.records]
+    assert list(capture.records) == kept
+    assert capture.recovered is not None or kept == records
+
+
+def test_a_chunk_longer_than_any_memory_is_damage(path):
+    records = polls(60)
+    write(path, records)
+    whole = path.read_bytes()
+    kept = []
+    for name in re.finditer(b"zstd", whole):
+        # a chunk: its length without compression (8), a checksum (4), the length of the name (4), the name
+        damaged = bytearray(whole)
+        damaged[name.start() - 9] |= 0x80
+        path.write_bytes(damaged)
+        capture = read_capture(path)
+        kept.append(len(capture.records))
+        assert list(capture.records) == records[: kept[-1]]
+    assert min(kept) == 0
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        pytest.param(b"", "is empty", id="empty"),
+        pytest.param(b"t,ax,ay,az\n0,0,0,9.8\n", "no MCAP file", id="text"),
+        pytest.param(b"\x89MCAP0\r\n", "does not hold the head", id="magic alone"),
+        pytest.param(b"\x89MCAP0\r\n" + bytes(range(256)), "does not hold the head", id="junk after the magic"),
+    ],
+)
+def test_what_is_no_capture_is_refused(path, content, says):
+    path.write_bytes(content)
+    with pytest.raises(CaptureError, match=says):
+        read_capture(path)
+
+
+def test_a_missing_file_and_a_folder_are_refused(tmp_path):
+    with pytest.raises(CaptureError, match="No such file"):
+        read_capture(tmp_path / "none.mcap")
+    with pytest.raises(CaptureError, match="directory"):
+        read_capture(tmp_path)
+
+
+def test_a_capture_of_a_newer_version_is_refused(path, monkeypatch):
+    with monkeypatch.context() as newer:
+        newer.setattr(mcap, "VERSION", 2)
+        write(path, polls(3))
+    with pytest.raises(CaptureError, match="version 2"):
+        read_capture(path)
+
+
+def test_an_mcap_file_of_another_program_is_refused(path):
+    from mcap.writer import Writer
+
+    writer = Writer(str(path))
+    writer.start()
+    writer.add_metadata("camera", {"lens": "wide"})
+    writer.finish()
+    with pytest.raises(CaptureError, match="head of a capture"):
+        read_capture(path)
+
+
+def test_a_folder_that_is_not_there_cannot_be_written(tmp_path):
+    with pytest.raises(OutputError, match="No such file"):
+        CaptureWriter(tmp_path / "none" / "capture.mcap")
+
+
+def test_a_full_disk_is_an_output_error():
+    with pytest.raises(OutputError, match="No space left"), CaptureWriter("/dev/full") as writer:
+        writer.start(META)
+
+
+def test_closing_before_the_start_leaves_an_empty_file(path):
+    with CaptureWriter(path):
+        pass
+    assert path.read_bytes() == b""

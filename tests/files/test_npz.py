@@ -1,0 +1,130 @@
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpucal.data import Recording, Sensor
+from mpucal.errors import OutputError, RecordingError
+from mpucal.files.npz import load_npz, save_npz
+
+N = 50
+
+
+@pytest.fixture
+def arrays():
+    random = np.random.default_rng(1)
+    return {"t": np.arange(N) / 100, "acc": random.normal(size=(N, 3)), "gyr": random.normal(size=(N, 3))}
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "made.npz"
+
+
+def test_reads_what_was_saved(arrays, path):
+    mask = np.arange(N) % 7 == 0
+    sensor = Sensor("MPU-6050", 0x68, 4.0, 500.0, 200.0, 31.5)
+    recording = Recording.from_arrays(
+        **arrays,
+        flat=(3, 20),
+        temperature_c=np.linspace(20, 30, N),
+        gap=mask,
+        acc_clipped=~mask,
+        gyr_clipped=mask,
+        sensor=sensor,
+    )
+    save_npz(recording, path)
+    read = load_npz(path)
+    for field in fields(Recording):
+        if field.name != "name":
+            np.testing.assert_array_equal(getattr(read, field.name), getattr(recording, field.name), field.name)
+    assert read.name == "made.npz"
+
+
+def test_what_is_not_there_is_unknown(arrays, path):
+    np.savez(path, **arrays, units="s, m/s^2, rad/s", notes="ignored")
+    read = load_npz(path)
+    assert read.flat is None
+    assert read.sensor == Sensor()
+    assert np.isnan(read.temperature_c).all()
+    assert not (read.gap | read.acc_clipped | read.gyr_clipped).any()
+
+
+@pytest.mark.parametrize(
+    ("extra", "flat"),
+    [({"flat": (5, 15)}, (5, 15)), ({"flat_samples": 20}, (0, 20)), ({"flat_samples": [20]}, (0, 20))],
+    ids=["a range", "how many", "how many, in a list"],
+)
+def test_the_flat_part(arrays, path, extra, flat):
+    np.savez(path, **arrays, **extra)
+    assert load_npz(path).flat == flat
+
+
+def test_temperature_by_its_short_name(arrays, path):
+    np.savez(path, **arrays, temperature=np.full(N, 25.0))
+    assert (load_npz(path).temperature_c == 25.0).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        pytest.param({"gyr": None}, "has no gyr; it has t, acc", id="no gyr"),
+        pytest.param({"acc": np.zeros((N, 2))}, r"made\.npz: acc has shape \(50, 2\)", id="two columns"),
+        pytest.param({"t": np.zeros(N)}, "time does not increase at sample 1", id="time stands still"),
+        pytest.param({"acc": np.full((N, 3), np.nan)}, "acc is not a finite number", id="NaN"),
+        pytest.param({"t": np.array(["a"] * N)}, "t holds values that are no numbers", id="words"),
+        pytest.param({"flat": (1, 2, 3)}, "flat is", id="flat of three"),
+        pytest.param({"flat": (40, 60)}, "does not lie within", id="flat beyond the end"),
+        pytest.param({"flat_samples": np.nan}, "flat_samples is nan", id="flat NaN"),
+        pytest.param({"temperature": np.zeros(3)}, "temperature_c has shape", id="temperature too short"),
+        pytest.param({"sensor": "MPU"}, "sensor is no JSON object", id="sensor no JSON"),
+        pytest.param({"sensor": "[1]"}, "sensor is no JSON object", id="sensor a list"),
+    ],
+)
+def test_arrays_that_are_no_recording(arrays, path, change, says):
+    np.savez(path, **{key: value for key, value in (arrays | change).items() if value is not None})
+    with pytest.raises(RecordingError, match=says):
+        load_npz(path)
+
+
+def test_files_that_are_no_archive(arrays, path, tmp_path):
+    np.savez_compressed(path, **arrays)
+    whole = path.read_bytes()
+    broken = bytearray(whole)
+    broken[len(whole) // 2] ^= 0xFF
+    np.save(tmp_path / "one.npy", arrays["t"])
+    contents = [b"", b"t,acc,gyr", whole[:-30], whole[: len(whole) // 2], bytes(broken)]
+    for content in [*contents, (tmp_path / "one.npy").read_bytes()]:
+        path.write_bytes(content)
+        with pytest.raises(RecordingError, match="no whole NumPy archive"):
+            load_npz(path)
+
+
+def test_an_archive_of_objects_runs_no_code(arrays, path):
+    class Trap:
+        def __reduce__(self):
+            return (pytest.fail, ("a pickle was loaded",))
+
+    np.savez(path, **(arrays | {"t": np.array([Trap()], dtype=object)}))
+    with pytest.raises(RecordingError, match="allow_pickle=False"):
+        load_npz(path)
+
+
+def test_places_that_cannot_be_read_or_written(arrays, tmp_path):
+    with pytest.raises(RecordingError, match="No such file"):
+        load_npz(tmp_path / "none.npz")
+    with pytest.raises(OutputError):
+        save_npz(Recording.from_arrays(**arrays), tmp_path / "none" / "made.npz")
+
+
+def test_real_and_simulated_recordings_of_others_are_read():
+    shared = Path(__file__).parents[2].parent / "shared"
+    paths = sorted([*shared.glob("recordings/*.npz"), *shared.glob("simulated/*.npz")])
+    if not paths:
+        pytest.skip("the folder shared with recordings of others is not beside the project")
+    for path in paths:
+        with np.load(path) as archive:
+            recording = load_npz(path)
+            np.testing.assert_array_equal(recording.acc, archive["acc"])
+            assert recording.flat == ((0, archive["flat_samples"]) if "flat_samples" in archive else None)

@@ -1,0 +1,92 @@
+import os
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mpucal.errors import OutputError
+from mpucal.result.atomic import write_atomically, write_together
+
+
+def test_writes_a_new_file_and_replaces_an_old_one(tmp_path):
+    path = tmp_path / "a.json"
+    for content in (b"first", b"second, longer", b""):
+        write_atomically(path, content)
+        assert path.read_bytes() == content
+    assert [p.name for p in tmp_path.iterdir()] == ["a.json"]
+    assert path.stat().st_mode & 0o777 == 0o644
+
+
+class Failing:
+    """The system's calls that make it, bring it to the disk, and give it its rights and name; number `at` fails."""
+
+    def __init__(self, at, patch):
+        self.at, self.count = at, 0
+        steps = ((tempfile, "NamedTemporaryFile"), (os, "open"), (Path, "chmod"), (Path, "replace"))
+        for module, name in steps:
+            patch.setattr(module, name, self.counted(getattr(module, name)))
+        patch.setattr(os, "fsync", self.counted(lambda _handle: None))
+
+    def counted(self, call):
+        def step(*words, **named):
+            self.count += 1
+            if self.count == self.at:
+                raise OSError(28, "No space left on device")
+            return call(*words, **named)
+
+        return step
+
+
+@settings(deadline=None, max_examples=40)
+@given(at=st.integers(1, 8), there_before=st.booleans())
+def test_a_fault_at_any_step_leaves_the_old_file_or_the_new_one(tmp_path_factory, at, there_before):
+    path = tmp_path_factory.mktemp("faults") / "a.json"
+    if there_before:
+        write_atomically(path, b"old")
+    with pytest.MonkeyPatch.context() as patch:
+        Failing(at, patch)
+        try:
+            write_atomically(path, b"new")
+        except OutputError as error:
+            assert error.exit_code == 3
+            assert "No space left on device" in error.what
+            new = False
+        else:
+            new = True
+    held = path.read_bytes() if path.exists() else None
+    assert held == (b"new" if new else b"old" if there_before else None)
+    # beyond the last step nothing fails, and a folder that was not synced holds the new file
+    assert new == (at > 5)
+    assert [p.name for p in path.parent.iterdir()] == (["a.json"] if path.exists() else [])
+
+
+@settings(deadline=None, max_examples=40)
+@given(at=st.integers(1, 25), there_before=st.sets(st.sampled_from("abc")))
+def test_a_fault_at_any_step_leaves_all_old_files_or_all_new_ones(tmp_path_factory, at, there_before):
+    folder = tmp_path_factory.mktemp("faults")
+    for name in there_before:
+        write_atomically(folder / name, b"old")
+    with pytest.MonkeyPatch.context() as patch:
+        Failing(at, patch)
+        try:
+            write_together({folder / name: name.encode() for name in "abc"})
+        except OutputError:
+            expected = dict.fromkeys(there_before, b"old")
+        else:
+            expected = {name: name.encode() for name in "abc"}
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == expected
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(OutputError, match=r"none/a\.json.*No such file") as raised:
+        write_atomically(tmp_path / "none" / "a.json", b"")
+    assert "-o" in raised.value.remedy
+
+
+def test_a_folder_in_the_files_place_is_an_output_error(tmp_path):
+    (tmp_path / "a.json").mkdir()
+    with pytest.raises(OutputError, match="Is a directory"):
+        write_atomically(tmp_path / "a.json", b"")
+    assert [p.name for p in tmp_path.iterdir()] == ["a.json"]

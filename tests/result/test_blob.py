@@ -1,0 +1,278 @@
+import json
+import math
+import re
+import runpy
+import struct
+import zlib
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mpucal.result.blob import (
+    FIELDS,
+    FORMULA,
+    LENGTH,
+    LENGTH_WITH_SLOPE,
+    MAX_LENGTH,
+    SLOPE,
+    Blob,
+    BlobError,
+)
+
+PROJECT = Path(__file__).parents[2]
+VECTORS = PROJECT / "fixtures" / "vectors"
+PROTOCOL = (PROJECT / "firmware_protocol.md").read_text().split("\n## The config blob\n")[1]
+
+floats = st.floats(width=32, allow_nan=False, allow_infinity=False)
+maybe = floats | st.just(math.nan)
+times = st.integers(min_value=1, max_value=253_402_300_799)  # to the end of the year 9999
+
+
+def several(count, values=floats):
+    return st.tuples(*[values] * count)
+
+
+@st.composite
+def blobs(draw):
+    return Blob(
+        who_am_i=draw(st.integers(0, 255)),
+        accel_range_g=draw(floats),
+        gyro_range_dps=draw(floats),
+        D=draw(several(9)),
+        b_a=draw(several(3)),
+        gravity=draw(maybe),
+        temperature_c=draw(maybe),
+        created=np.datetime64(draw(times), "s").item().isoformat() + "+00:00",
+        applied_b_a=draw(several(3)),
+        K=draw(several(9, maybe)),
+        b_omega=draw(several(3, maybe)),
+    )
+
+
+@st.composite
+def sloped(draw):
+    """With b_a(T), which needs a temperature within its range."""
+    low, at, high = sorted(draw(several(3)))
+    slope = draw(several(3).filter(any))
+    return replace(draw(blobs()), temperature_c=at, b_a_slope=slope, temperature_range_c=(low, high))
+
+
+def plain(blob):
+    """Values that compare equal where NaN stands for NaN."""
+    return repr(asdict(blob))
+
+
+def sealed(body, length=None):
+    """A body with its length field and checksum made right."""
+    body = bytearray(body)
+    struct.pack_into("<H", body, 6, len(body) + 4 if length is None else length)
+    return bytes(body) + struct.pack("<I", zlib.crc32(body))
+
+
+@given(sloped())
+def test_decode_is_the_inverse_of_encode_with_a_slope(blob):
+    data = blob.encode()
+    assert (len(data), data[5]) == (LENGTH_WITH_SLOPE, 1)
+    assert plain(Blob.decode(data)) == plain(blob)
+
+
+@given(sloped(), st.sampled_from(["b_a_slope", "temperature_range_c", "temperature_c"]))
+def test_a_slope_that_cannot_be_used_is_none(blob, name):
+    spoilt = (math.nan,) * 3 if name == "b_a_slope" else (math.inf, 0.0) if name == "temperature_range_c" else math.nan
+    read = Blob.decode(replace(blob, **{name: spoilt}).encode())
+    assert not any(read.b_a_slope)
+    assert (read.D, read.b_a) == (blob.D, blob.b_a)
+
+
+@pytest.fixture
+def blob():
+    return Blob.decode((VECTORS / "blob_measured.bin").read_bytes())
+
+
+@given(blobs())
+def test_decode_is_the_inverse_of_encode(blob):
+    data = blob.encode()
+    assert len(data) == LENGTH <= MAX_LENGTH
+    assert plain(Blob.decode(data)) == plain(blob)
+
+
+@given(blobs(), st.data())
+def test_no_changed_byte_goes_unnoticed(blob, data):
+    good = blob.encode()
+    at, bits = data.draw(st.integers(0, len(good) - 1)), data.draw(st.integers(1, 255))
+    # `reserved` is under the checksum too
+    with pytest.raises(BlobError):
+        Blob.decode(good[:at] + bytes([good[at] ^ bits]) + good[at + 1 :])
+
+
+@given(st.binary(max_size=300))
+def test_junk_is_rejected(junk):
+    with pytest.raises(BlobError):
+        Blob.decode(junk)
+
+
+def test_every_shorter_blob_is_rejected(blob):
+    data = blob.encode()
+    for size in range(len(data)):
+        with pytest.raises(BlobError):
+            Blob.decode(data[:size])
+
+
+def test_trailing_junk_is_rejected(blob):
+    with pytest.raises(BlobError, match="188 bytes long and is 189"):
+        Blob.decode(blob.encode() + b"\0")
+
+
+@given(st.binary(max_size=MAX_LENGTH - LENGTH_WITH_SLOPE))
+def test_appended_fields_of_a_newer_minor_version_are_skipped(appended):
+    blob = Blob.decode((VECTORS / "blob_sloped.bin").read_bytes())
+    body = bytearray(blob.encode()[:-4] + appended)
+    body[5] += 1
+    assert Blob.decode(sealed(body)) == blob
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        pytest.param(lambda body: sealed(b"XXXX" + body[4:]), "begins with", id="magic"),
+        pytest.param(lambda body: sealed(body[:4] + b"\2" + body[5:]), "major version 2", id="newer major"),
+        pytest.param(lambda body: sealed(body[:4] + b"\0" + body[5:]), "major version 0", id="major 0"),
+        pytest.param(lambda body: sealed(body[:-4]), "184 bytes long, where", id="fields missing"),
+        pytest.param(lambda body: sealed(body + bytes(80)), "268 bytes long, where", id="too long"),
+        pytest.param(lambda body: sealed(body, length=190), "190 bytes long and is 188", id="wrong length"),
+        pytest.param(lambda body: body + bytes(4), "checksum", id="no checksum"),
+    ],
+)
+def test_a_wrong_header_is_named(blob, change, says):
+    with pytest.raises(BlobError, match=says):
+        Blob.decode(change(blob.encode()[:-4]))
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(("name", "at"), [("D", 60), ("b_a", 96), ("applied_b_a", 124)])
+def test_unusable_numbers_are_refused_on_both_sides(blob, name, at, bad):
+    values = (bad, *getattr(blob, name)[1:])
+    with pytest.raises(BlobError, match=f"{name} holds"):
+        replace(blob, **{name: values}).encode()
+    body = bytearray(blob.encode()[:-4])
+    struct.pack_into("<f", body, at, bad)
+    with pytest.raises(BlobError, match=f"{name} holds"):
+        Blob.decode(sealed(body))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param({"who_am_i": 256}, id="who_am_i over a byte"),
+        pytest.param({"gravity": 1e39}, id="beyond float32"),
+        pytest.param({"D": (1.0,) * 8}, id="D too short"),
+        pytest.param({"created": "yesterday"}, id="no time"),
+        pytest.param({"created": "1969-12-31T23:59:59+00:00"}, id="before 1970"),
+    ],
+)
+def test_values_that_do_not_fit_are_refused(blob, change):
+    with pytest.raises(BlobError):
+        replace(blob, **change).encode()
+
+
+def test_a_time_out_of_range_is_rejected(blob):
+    body = bytearray(blob.encode()[:-4])
+    struct.pack_into("<Q", body, 112, 2**64 - 1)
+    with pytest.raises(BlobError, match="out of range"):
+        Blob.decode(sealed(body))
+
+
+@pytest.mark.parametrize(
+    ("created", "read"),
+    [
+        ("", ""),
+        ("2024-05-17T09:30:00", "2024-05-17T09:30:00+00:00"),
+        ("2024-05-17T09:30:00Z", "2024-05-17T09:30:00+00:00"),
+        ("2024-05-17T11:30:00.987+02:00", "2024-05-17T09:30:00+00:00"),
+    ],
+    ids=["unknown", "no offset", "UTC", "another offset, fraction"],
+)
+def test_created_is_kept_in_whole_seconds_of_utc(blob, created, read):
+    assert Blob.decode(replace(blob, created=created).encode()).created == read
+
+
+# The document and the codec
+
+
+def from_json(value):
+    if isinstance(value, list):
+        return tuple(map(from_json, value))
+    return math.nan if value is None else value
+
+
+def vector_names():
+    return sorted(path.stem for path in VECTORS.glob("blob_*.bin"))
+
+
+@pytest.mark.parametrize("name", vector_names())
+def test_golden_vector(name):
+    data = (VECTORS / f"{name}.bin").read_bytes()
+    expected = json.loads((VECTORS / f"{name}.json").read_text())
+    if "rejected" in expected:
+        with pytest.raises(BlobError):
+            Blob.decode(data)
+        return
+    blob = Blob.decode(data)
+    values = {key: from_json(value) for key, value in expected["blob"].items()}
+    assert plain(blob) == plain(Blob(**values))
+    a = np.linalg.inv(np.reshape(blob.D, (3, 3))) @ (np.array(expected["y"]) - blob.b_a + blob.applied_b_a)
+    np.testing.assert_allclose(a, expected["a"], rtol=1e-12)
+
+
+def test_the_tool_writes_the_vectors_that_are_there(tmp_path, monkeypatch):
+    tool = PROJECT / "tools" / "make_vectors.py"
+    monkeypatch.setattr("sys.argv", [str(tool), str(tmp_path)])
+    runpy.run_path(str(tool), run_name="__main__")
+    made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    stored = {path.name: path.read_bytes() for path in VECTORS.iterdir()}
+    assert made.keys() == stored.keys()
+    for name, content in stored.items():
+        if name.endswith(".json") and b'"a": ' in content:
+            # another machine's LAPACK may round the last digit of an inverse differently
+            ours, theirs = json.loads(made[name]), json.loads(content)
+            for key in {"a", "a_at"} & theirs.keys():
+                np.testing.assert_allclose(ours.pop(key), theirs.pop(key), rtol=1e-12)
+            assert ours == theirs
+        else:
+            assert made[name] == content
+
+
+def test_the_documents_table_is_the_codecs_format():
+    codes = {"char": "{}s", "u8": "B", "u16": "H", "u32": "I", "u64": "Q", "f32": "f"}
+    rows = re.findall(r"^\| (\d+)(?:-(\d+))? \| (\w+) \| (\w+)(?:\[(\d+)\])? \|", PROTOCOL, re.M)
+    expected, at = "<", 0
+    for first, last, name, kind, count in rows:
+        assert int(first) == at, name
+        code = f"{count}s" if kind == "char" else f"{count}{codes[kind]}"
+        code = f"{count}x" if name == "reserved" else code
+        assert struct.calcsize("<" + code) == int(last or first) - int(first) + 1, name
+        expected, at = f"{expected} {code}", int(last or first) + 1
+    assert expected.replace("< ", "<") == f"{FIELDS.format} {SLOPE.format[1:]}"
+    assert at + 4 == LENGTH_WITH_SLOPE
+
+
+def test_every_number_of_the_table_is_naturally_aligned():
+    sizes = {"u8": 1, "u16": 2, "u64": 8, "f32": 4}
+    rows = re.findall(r"^\| (\d+)(?:-\d+)? \| (\w+) \| (u8|u16|u64|f32)", PROTOCOL, re.M)
+    assert len(rows) == 17
+    assert [name for first, name, kind in rows if int(first) % sizes[kind]] == []
+
+
+def test_the_documents_example_is_the_blob_of_its_numbers(blob):
+    lines = re.findall(r"^    ([0-9a-f]{4})  ((?:[0-9a-f]{2} ?)+)$", PROTOCOL, re.M)
+    assert [int(offset, 16) for offset, _ in lines] == list(range(0, LENGTH, 16))
+    assert bytes.fromhex(" ".join(row for _, row in lines)) == blob.encode()
+    for number in (*blob.D, *blob.b_a, blob.gravity, blob.temperature_c):
+        assert f"{number:.9g}" in PROTOCOL
+    assert FORMULA in PROTOCOL
+    a = [f"{value:.5f}" for value in json.loads((VECTORS / "blob_measured.json").read_text())["a"]]
+    assert ", ".join(a) in PROTOCOL

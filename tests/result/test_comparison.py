@@ -1,0 +1,136 @@
+"""Two calibrations compared: the same as often as promised, and otherwise by how much they differ."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mpucal
+from mpucal.data import Sensor
+from mpucal.result.calibration import Calibration
+from mpucal.result.comparison import CONFIDENCE, compare
+
+ROOT = Path(__file__).parents[2]
+RECORDINGS = ROOT.parent / "shared" / "recordings"
+DRAWS = 3000
+
+D_STD = np.full((3, 3), 2e-4) * [[1.0, 0.5, 2.0], [0.7, 1.5, 0.3], [1.1, 0.9, 0.4]]
+B_STD = np.array([0.004, 0.01, 0.02])
+TRUTH = Calibration(
+    np.eye(3) + 0.01 * np.arange(9).reshape(3, 3),
+    np.array([0.3, -0.2, 1.1]),
+    D_STD,
+    B_STD,
+    b_omega=np.zeros(3),
+    b_omega_std=np.full(3, 1e-4),
+    quality={"verdict": "good", "reasons": []},
+    fit={"gravity": 9.80665},
+)
+
+
+def drawn(rng, scale=1.0):
+    noise = {
+        "D": TRUTH.D + scale * rng.normal(size=(3, 3)) * D_STD,
+        "b_a": TRUTH.b_a + scale * rng.normal(size=3) * B_STD,
+    }
+    return replace(TRUTH, **noise)
+
+
+def test_one_sensor_is_called_the_same_as_often_as_promised():
+    rng = np.random.default_rng(8)
+    same = np.mean([compare(drawn(rng), drawn(rng)).same for _ in range(DRAWS)])
+    assert same == pytest.approx(CONFIDENCE, abs=3 * np.sqrt(CONFIDENCE * (1 - CONFIDENCE) / DRAWS))
+
+
+def test_what_changed_is_named():
+    moved = replace(TRUTH, b_a=TRUTH.b_a + np.array([0.0, 0.098, 0.0]))
+    found = compare(TRUTH, moved)
+    assert found.same is False
+    assert [d.name for d in found.changed] == ["bias y"]
+    assert found.changed[0].value == pytest.approx(0.098 / 9.80665 * 1000)
+    assert found.changed[0].std == pytest.approx(np.sqrt(2) * 0.01 / 9.80665 * 1000)
+
+
+@pytest.mark.parametrize(
+    ("claims", "verdict", "same", "changed", "doubtful"),
+    [
+        (2.0, "usable", True, 0, 0),
+        (5.0, "usable", None, 0, 1),
+        (11.0, "usable", False, 1, 0),
+        (5.0, "good", False, 1, 0),
+    ],
+)
+def test_a_calibration_with_reservations_may_be_too_sure(claims, verdict, same, changed, doubtful):
+    moved = replace(TRUTH, b_a=TRUTH.b_a + np.array([0.0, claims * np.sqrt(2) * B_STD[1], 0.0]))
+    found = compare(TRUTH, replace(moved, quality={"verdict": verdict, "reasons": [{"code": "gyro_clipped"}]}))
+    assert found.same is same
+    assert (len(found.changed), len(found.doubtful)) == (changed, doubtful)
+    assert any("B is usable (gyro_clipped)" in remark for remark in found.remarks) == (verdict == "usable")
+
+
+def test_the_frame_makes_no_difference():
+    """The same sensor seen from a frame 5 deg away, with the K that says so."""
+    c, s = np.cos(np.radians(5.0)), np.sin(np.radians(5.0))
+    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    turned = replace(TRUTH, K=R @ TRUTH.K, D=TRUTH.D @ R.T)
+    assert max(abs(d.value) for d in compare(TRUTH, turned).numbers) < 1e-9
+
+
+def test_without_uncertainties_nothing_is_claimed():
+    blob = Calibration.from_blob(TRUTH.blob())
+    assert compare(blob, blob).same is None
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"sensor": Sensor(who_am_i=0x70)}, "two chips"),
+        ({"sensor": Sensor(temperature_c=40.0)}, "mpucal merge"),
+        ({"sensor": Sensor(accel_offsets=(1, 2, 4))}, "offset registers"),
+        ({"fit": {"gravity": 9.81}}, r"\+0.034 % of gain"),
+        ({"quality": {"verdict": "usable", "reasons": [{"code": "few_orientations", "message": ""}]}}, "B is usable"),
+        ({"extra": {"autopilot": {"params_old": {"INS_ACCOFFS_X": 1.0}}}}, "parameters of the autopilot"),
+    ],
+)
+def test_what_else_differs_is_said(change, says):
+    first = replace(TRUTH, sensor=Sensor(who_am_i=0x68, temperature_c=20.0, accel_offsets=(1, 2, 3)))
+    (remark,) = compare(first, replace(first, **change)).remarks
+    assert re.search(says, remark)
+
+
+@pytest.mark.parametrize(
+    ("name", "seen_mg"),
+    [
+        ("mpu9150_a", 10.0),
+        ("mpu9150_b", 10.0),
+        ("broad_01", 100.0),
+        ("imucal_session", 30.0),
+        ("mpu6050_session", 300.0),
+    ],
+)
+def test_halves_of_a_real_recording_are_never_called_different(name, seen_mg, monkeypatch):
+    path = RECORDINGS / f"{name}.npz"
+    if not path.exists():
+        pytest.skip("the real recordings are not beside the project")
+    monkeypatch.syspath_prepend(str(ROOT / "tools"))
+    from halves import halves
+
+    recording = mpucal.load(path)
+    first, second = (mpucal.calibrate(half, gravity=9.81) for half in halves(recording))
+    found = compare(first, second)
+    assert not found.changed
+    if first.verdict == second.verdict == "good":
+        assert found.same, found.doubtful
+    # not because they know nothing: so much on an axis would be seen
+    moved = replace(second, b_a=second.b_a + np.array([0.0, 0.0, 0.00981 * seen_mg]))
+    assert compare(first, moved).same is False
+
+
+def test_two_real_sensors_differ():
+    paths = [RECORDINGS / f"mpu9150_{which}.npz" for which in "ab"]
+    if not all(path.exists() for path in paths):
+        pytest.skip("the real recordings are not beside the project")
+    a, b = (mpucal.calibrate(mpucal.load(path), gravity=9.81) for path in paths)
+    assert compare(a, b).same is False

@@ -1,0 +1,85 @@
+"""What unseen rests are said to mean."""
+
+import numpy as np
+import pytest
+
+from mpucal.calibration.verification import Rest
+from mpucal.data import Recording
+from mpucal.result.calibration import Calibration
+from mpucal.session.events import Checked
+from mpucal.session.live.disagreement import judged
+from mpucal.session.live.verdict import verified
+
+
+def rest(magnitude=0.0, direction=0.0, turn=(1.2, 0.0, 0.0), miss=(0.0, 0.0, 0.0), clipped=False):
+    down = np.array([0.0, 0.6, -0.8])
+    return Rest(down, magnitude, 0.005, direction, np.radians(0.1), np.array(turn), np.array(miss), clipped)
+
+
+def recording(warmer_c=0.0, acc_clipped=0, gyr_clipped=0):
+    n = 1000
+    marks = np.arange(n)
+    return Recording.from_arrays(
+        np.arange(n) / 100.0,
+        np.zeros((n, 3)),
+        np.zeros((n, 3)),
+        temperature_c=25.0 + warmer_c * (np.arange(n) > n // 2),
+        acc_clipped=marks < acc_clipped,
+        gyr_clipped=marks < gyr_clipped,
+    )
+
+
+TURNED = [rest(direction=0.05, turn=(0.0, 0.0, turn), miss=(0.0, 0.0, 0.04 * turn)) for turn in (1.2, -1.0, 1.5)]
+
+
+@pytest.mark.parametrize(
+    ("rests", "data", "contradiction", "code", "words"),
+    [
+        ([rest(), rest(), rest()], recording(), "", "", ""),
+        ([rest(0.05), rest()], recording(), "", "verification_failed", "|a| is +0.050 m/s² off"),
+        ([rest(0.05), rest()], recording(acc_clipped=3), "", "verification_failed", "after a knock"),
+        ([rest(direction=0.06), rest()], recording(), "", "verification_failed", "the sensor moved on its mount"),
+        (TURNED, recording(), "", "verification_failed", "scale about z is off by 4%"),
+        ([rest(clipped=True)], recording(gyr_clipped=50), "", "gyro_clipped", "every turn went beyond"),
+        ([rest(0.05), rest()], recording(gyr_clipped=50), "", "gyro_clipped", "beyond what the gyroscope"),
+        ([rest()], recording(warmer_c=15.0), "", "temperature_moved", "rose by 15 C"),
+        ([rest()], recording(warmer_c=-12.0), "", "temperature_moved", "fell by 12 C"),
+        ([], recording(), "", "verification_failed", "never still in a new orientation"),
+        ([rest()], recording(), "the rests contradict each other; fasten it", "inconsistent", "contradict"),
+    ],
+    ids=["agree", "length", "knock", "slip", "scale", "clipped", "some clipped", "warm", "cold", "no rest", "rests"],
+)
+def test_says_what_is_wrong(rests, data, contradiction, code, words):
+    checked = judged(rests, 3, data, contradiction)
+    assert checked.agrees == (code == "")
+    assert checked.code == code
+    assert words in checked.why
+    assert bool(checked.remedy) == (code != "")
+    assert len(checked.found) == len(rests)
+
+
+def calibration(verdict="usable"):
+    zeros = np.zeros(3)
+    reasons = [{"code": "few_orientations", "message": "too few"}]
+    return Calibration(np.eye(3), zeros, np.zeros((3, 3)), zeros, quality={"verdict": verdict, "reasons": reasons})
+
+
+def test_a_disagreement_refuses_and_comes_first():
+    found = verified(calibration(), Checked((), False, "verification_failed", "it moved", "fasten it"))
+    assert found.verdict == "refused"
+    assert [reason["code"] for reason in found.quality["reasons"]] == ["verification_failed", "few_orientations"]
+    assert found.quality["reasons"][0]["message"] == "it moved; fasten it"
+    assert not found.quality["verification"]["agrees"]
+
+
+@pytest.mark.parametrize(("verdict", "then"), [("good", "usable"), ("usable", "usable"), ("refused", "refused")])
+def test_what_nothing_verified_is_usable_at_most(verdict, then):
+    found = verified(calibration(verdict), Checked((), None, "verification_failed", "nothing verifies it", "hold it"))
+    assert found.verdict == then
+    assert found.quality["reasons"][0]["message"] == "nothing verifies it; hold it"
+    assert found.quality["verification"] == {"agrees": None, "orientations": []}
+
+
+def test_an_agreement_changes_no_verdict_and_none_adds_nothing():
+    assert verified(calibration(), Checked((), True)).verdict == "usable"
+    assert "verification" not in verified(calibration(), None).quality

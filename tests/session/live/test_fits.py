@@ -1,0 +1,100 @@
+"""Live fits: right about what is known, and the same for the same samples."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from mpucal.data import Samples, Sensor
+from mpucal.session.events import Checked, Learnt, Tried, Wish
+from mpucal.session.live.fits import Fits, Task
+from mpucal.session.live.store import Store
+from mpucal.session.plan import Plan
+from mpucal.simulated.study.scenarios import GRAVITY_MPS2, hand_scenario
+
+SENSOR = Sensor(chip="MPU-6050", rate_hz=200.0)
+NONE = Samples.empty()
+
+
+@pytest.fixture(scope="module")
+def poses():
+    """Twelve poses of an MPU-6050 in a hand, 200 Hz."""
+    return hand_scenario(3, "pose12").recording
+
+
+def part(recording, first_s, last_s=None):
+    """The samples of that time."""
+    chosen = slice(round(first_s * 200), None if last_s is None else round(last_s * 200))
+    return Samples(*(getattr(recording, field.name)[chosen] for field in fields(Samples)))
+
+
+@pytest.fixture
+def fits():
+    return Fits(Plan(gravity=GRAVITY_MPS2), SENSOR)
+
+
+def test_more_orientations_are_better_known(fits, poses):
+    found = []
+    for first, last in ((0, 18), (18, 26), (26, 44)):
+        found.append(fits.do(Task(part(poses, first, last), Wish.KNOW)).knowledge)
+    assert [k.overall for k in found] == sorted(k.overall for k in found)
+    assert max(found[0].bias_mg) > 3 * max(found[2].bias_mg)
+    assert found[2].overall > 0.9
+    assert all(0.0 <= p <= 1.0 for k in found for p in (*k.gain, *k.misalignment, *k.bias))
+    assert not any(k.doubt for k in found)
+
+
+def test_the_same_tasks_give_the_same_bits_however_the_samples_come(poses):
+    whole, pieces = (Fits(Plan(gravity=GRAVITY_MPS2), SENSOR) for _ in range(2))
+    for second in range(22):
+        pieces.do(Task(part(poses, second, second + 1)))
+    assert pieces.do(Task(NONE, Wish.ADVISE)) == whole.do(Task(part(poses, 0, 22), Wish.ADVISE))
+
+
+def test_the_advised_orientation_is_a_turn_away(fits, poses):
+    learnt = fits.do(Task(part(poses, 0, 22), Wish.ADVISE))
+    assert isinstance(learnt, Learnt)
+    assert learnt.advice
+    down = np.array(learnt.knowledge.down)
+    assert np.linalg.norm(down) == pytest.approx(1.0)
+    here = -poses.acc[4390:4400].mean(0) / np.linalg.norm(poses.acc[4390:4400].mean(0))
+    assert here @ down < np.cos(np.radians(20.0))
+
+
+def test_a_try_and_its_check_agree_on_good_data(fits, poses):
+    tried = fits.do(Task(part(poses, 0, 40), Wish.TRY))
+    assert isinstance(tried, Tried)
+    assert tried.verdict in ("good", "usable")
+    checked = fits.do(Task(part(poses, 40), Wish.CHECK))
+    assert isinstance(checked, Checked)
+    assert checked.agrees, checked
+    assert all(v.direction_deg < 1.0 and abs(v.magnitude_mps2) < 0.1 for v in checked.found)
+
+
+def test_nothing_is_known_of_a_board_that_never_lay_still(fits, poses):
+    rates = np.random.default_rng(1).normal(scale=2.0, size=(2000, 3))
+    assert fits.do(Task(replace(part(poses, 0, 10), gyr=rates), Wish.KNOW)) is None
+
+
+def test_what_is_forgotten_is_not_computed(fits, poses):
+    fits.do(Task(part(poses, 0, 30), Wish.KNOW))
+    fits.do(Task(NONE, forget=2200))
+    learnt = fits.do(Task(part(poses, 30, 34), Wish.KNOW))
+    assert learnt.knowledge.overall < 0.2
+
+
+@pytest.mark.parametrize(("rate_hz", "size"), [(50.0, 1), (200.0, 1), (1000.0, 5), (500.0, 2)])
+def test_faster_samples_are_averaged(rate_hz, size):
+    n = 1003
+    t = np.arange(n) / rate_hz
+    no = np.zeros(n, bool)
+    gap = no.copy()
+    gap[501] = True
+    samples = Samples(t, np.tile(t[:, None], (1, 3)), np.zeros((n, 3)), np.full(n, 25.0), gap, no, no)
+    store = Store(Sensor(rate_hz=rate_hz))
+    for first in range(0, n, 7):
+        store.add(Samples(*(array[first : first + 7] for array in vars(samples).values())))
+    recording = store.recording()
+    assert len(recording) == n // size
+    np.testing.assert_allclose(recording.acc[:, 0], recording.t)
+    assert np.flatnonzero(recording.gap).tolist() == [501 // size]

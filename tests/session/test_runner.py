@@ -1,0 +1,316 @@
+import json
+from functools import partial
+
+import numpy as np
+import pytest
+
+from mpucal.chip.access import EndOfCapture
+from mpucal.chip.records import SessionEvent
+from mpucal.data import Recording, Samples, Sensor
+from mpucal.errors import Abandoned, BusError, CaptureError, ChipError, NoAnswer, OutputError
+from mpucal.result.calibration import Calibration
+from mpucal.session import runner as module
+from mpucal.session.events import Decision, Key, Prompt, PromptKind
+from mpucal.session.live.questions import Here
+from mpucal.session.plan import Plan
+from mpucal.session.ports import Replayed
+from mpucal.session.runner import Runner
+
+RATE_HZ, POLL = 100.0, 10
+FLAT_POLLS = 110
+
+NOT_THERE = NoAnswer("nothing answers at 0x68 any more", "check the wires")
+
+
+class Source:
+    """Lies flat for eleven seconds, then in one more orientation after another, and ends; `fails` by number of poll."""
+
+    def __init__(self, fails=None, start=None):
+        self.fails, self.start_fails = fails or {170: EndOfCapture()}, start
+        self.polls, self.stops = 0, 0
+        self.parts = []
+
+    def start(self):
+        if self.start_fails:
+            raise self.start_fails
+        return Sensor(chip="MPU-6050", accel_range_g=4.0, gyro_range_dps=500.0)
+
+    def poll(self):
+        self.polls += 1
+        if self.polls in self.fails:
+            raise self.fails[self.polls]
+        turned = max(self.polls - FLAT_POLLS, 0) // 20
+        up = np.random.default_rng(turned).normal(size=3) if turned else np.array([0.0, 0.0, 1.0])
+        t = (np.arange(POLL) + 1 + self.polls * POLL) / RATE_HZ
+        acc = np.tile(9.8 * up / np.linalg.norm(up), (POLL, 1))
+        no = np.zeros(POLL, bool)
+        samples = Samples(t, acc, np.zeros((POLL, 3)), np.full(POLL, 25.0), no, no, no)
+        self.parts.append(samples)
+        return samples
+
+    def recording(self):
+        return Recording(**vars(Samples.joined(self.parts)), sensor=Sensor(chip="MPU-6050"))
+
+    def now_ns(self):
+        return int(self.polls * POLL / RATE_HZ * 1e9)
+
+    def stop(self):
+        self.stops += 1
+
+
+class Person:
+    """Presses keys when asked for the n-th time."""
+
+    def __init__(self, keys=None):
+        self.keys, self.asked, self.heard = keys or {}, 0, []
+
+    def hear(self, output):
+        self.heard.append(output)
+
+    def pressed(self):
+        self.asked += 1
+        return self.keys.get(self.asked, [])
+
+    def words(self):
+        return " | ".join(output.why for output in self.heard if isinstance(output, Decision))
+
+
+class Notes(list):
+    def __call__(self, name, t_ns, data):
+        self.append(SessionEvent(name, t_ns, data))
+
+
+def fit(recording, verdict="good"):
+    zeros = np.zeros(3)
+    return Calibration(np.eye(3), zeros, np.zeros((3, 3)), zeros, quality={"verdict": verdict, "reasons": []})
+
+
+def runner_of(source, person=None, **options):
+    return Runner(source, person or Person(), Notes(), **options)
+
+
+def test_runs_through_and_writes_the_results(tmp_path):
+    source, person = Source(), Person()
+    runner = runner_of(source, person)
+    recording = runner.measure()
+    calibration = runner.calibrate(recording, fit)
+    paths = runner.write(tmp_path, calibration, recording, {"D": 1})
+    assert [path.name for path in paths] == ["calibration.json", "calibration.bin", "report.html", "truth.json"]
+    assert json.loads((tmp_path / "calibration.json").read_text())["quality"]["verdict"] == "good"
+    assert len(recording) == 169 * POLL
+    assert runner.sensor.chip == "MPU-6050"
+
+
+def test_listeners_hear_the_prompts():
+    heard = []
+    runner_of(Source(), listeners=[heard.append]).measure()
+    assert [prompt.kind for prompt in heard] == [PromptKind.LAY_FLAT, PromptKind.ROTATE, PromptKind.REST]
+    assert all(isinstance(prompt, Prompt) for prompt in heard)
+
+
+def test_a_refused_calibration_has_no_blob(tmp_path):
+    runner = runner_of(Source())
+    recording = runner.measure()
+    calibration = runner.calibrate(recording, lambda r: fit(r, "refused"))
+    paths = runner.write(tmp_path, calibration, recording)
+    assert [path.name for path in paths] == ["calibration.json", "report.html"]
+
+
+def test_unknown_numbers_make_no_blob(tmp_path):
+    runner = runner_of(Source())
+    recording = runner.measure()
+    calibration = Calibration(np.full((3, 3), np.nan), np.zeros(3), quality={"verdict": "usable", "reasons": []})
+    paths = runner.write(tmp_path, runner.calibrate(recording, lambda _: calibration), recording)
+    assert "calibration.bin" not in [path.name for path in paths]
+
+
+@pytest.mark.parametrize("asked", [1, 2, 50, 150], ids=["before connecting", "connected", "lay flat", "rotate"])
+def test_ctrl_c_while_measuring_is_abandoned_and_leaves_the_sensor_at_rest(asked):
+    source, notes = Source(), Notes()
+    with pytest.raises(Abandoned, match="interrupted"):
+        Runner(source, Person({asked: [Key.ABORT]}), notes).measure()
+    assert source.stops == 1
+    assert [(note.name, note.data) for note in notes] == [("key", {"key": "abort"})]
+
+
+def test_ctrl_c_during_the_fit_is_abandoned():
+    person = Person()
+    runner = runner_of(Source(), person)
+    recording = runner.measure()
+    person.keys = {person.asked + 1: [Key.ABORT]}
+    with pytest.raises(Abandoned):
+        runner.calibrate(recording, fit)
+
+
+@pytest.mark.parametrize(
+    ("files", "left"),
+    [(1, []), (2, []), (4, ["calibration.bin", "calibration.json", "report.html"])],
+    ids=["before the first file", "between two", "after all"],
+)
+def test_ctrl_c_leaves_all_files_or_none(tmp_path, files, left):
+    person = Person()
+    runner = runner_of(Source(), person)
+    recording = runner.measure()
+    calibration = runner.calibrate(recording, fit)
+    person.keys = {person.asked + files: [Key.ABORT]}
+    with pytest.raises(Abandoned):
+        runner.write(tmp_path, calibration, recording)
+    assert sorted(path.name for path in tmp_path.iterdir()) == left
+
+
+@pytest.mark.parametrize(
+    "error", [NOT_THERE, ChipError("the MPU-6050 lost its settings", "check")], ids=["bus", "chip"]
+)
+def test_a_source_that_fails_while_rotating_is_calibrated(error):
+    source, person = Source({150: error}), Person()
+    recording = runner_of(source, person).measure()
+    assert len(recording) == 149 * POLL
+    assert error.what in person.words()
+    assert source.stops == 0
+
+
+@pytest.mark.parametrize("poll", [1, 50], ids=["at once", "lay flat"])
+def test_a_source_that_fails_before_is_its_own_error(poll):
+    with pytest.raises(NoAnswer, match="nothing answers"):
+        runner_of(Source({poll: NOT_THERE})).measure()
+
+
+def test_a_sensor_that_does_not_start_is_its_own_error():
+    runner = runner_of(Source(start=NOT_THERE))
+    with pytest.raises(BusError):
+        runner.measure()
+    assert runner.sensor is None
+
+
+@pytest.mark.parametrize("source", [Source({20: EndOfCapture()}), Source(start=EndOfCapture())], ids=["flat", "start"])
+def test_a_source_that_ends_before_turning_is_abandoned(source):
+    with pytest.raises(Abandoned, match="ended before the board was turned"):
+        runner_of(source).measure()
+
+
+def test_a_source_that_ends_while_rotating_is_calibrated():
+    assert len(runner_of(Source({130: EndOfCapture()})).measure()) == 129 * POLL
+
+
+def test_a_capture_that_does_not_replay_is_never_calibrated():
+    with pytest.raises(CaptureError, match="access 7"):
+        runner_of(Source({150: CaptureError("access 7 is another one", "calibrate it")})).measure()
+
+
+def test_a_folder_that_vanished_is_an_output_error(tmp_path):
+    runner = runner_of(Source())
+    recording = runner.measure()
+    calibration = runner.calibrate(recording, fit)
+    with pytest.raises(OutputError, match="cannot write"):
+        runner.write(tmp_path / "gone", calibration, recording)
+
+
+def test_recorded_keys_are_pressed_again_at_their_place():
+    notes, person = Notes(), Person({141: [Key.ENOUGH]})
+    source = Source()
+    live = Runner(source, person, notes).measure()
+
+    again = Source()
+    listener = Person()
+    # a bus gives each recorded event once, when the accesses before it are done
+    pending = list(notes)
+
+    def events(name):
+        due = [event for event in pending if event.t_ns <= again.now_ns()]
+        del pending[: len(due)]
+        return [event for event in due if event.name == name]
+
+    replayed = Runner(again, Replayed(listener, events), Notes()).measure()
+    assert np.array_equal(live.t, replayed.t)
+    assert listener.heard == person.heard
+    assert "you said that is enough" in listener.words()
+
+
+class Late:
+    """Knows the same as anybody, but each answer only once the source was polled so many times more."""
+
+    def __init__(self, source, polls, plan, sensor):
+        self.source, self.polls, self.here = source, polls, Here(plan, sensor)
+
+    def submit(self, task):
+        answer, at = self.here.submit(task), self.source.polls + self.polls
+        answer.done = lambda: self.source.polls >= at
+        return answer
+
+    def close(self):
+        self.here.close()
+
+
+def late_session(polls, keys=None, ends_at=170):
+    """Of the same source, with answers so late."""
+    source, person, notes = Source({ends_at: EndOfCapture()}), Person(keys), Notes()
+    runner = Runner(source, person, notes, hire=partial(Late, source, polls))
+    return runner.measure(), person, notes
+
+
+def waits(notes):
+    return [note.t_ns for note in notes if note.name == "late"]
+
+
+def test_while_an_answer_is_late_the_source_goes_on_and_the_session_says_the_same():
+    punctual, heard, notes = late_session(0)
+    assert not waits(notes)
+    late, heard_late, notes = late_session(12)
+    assert len(waits(notes)) > 10
+    assert np.array_equal(late.t, punctual.t)
+    assert heard_late.heard == heard.heard
+
+
+@pytest.mark.parametrize("ends_at", [170, 131], ids=["in the end", "while one is late"])
+def test_a_replay_waits_where_its_session_did(ends_at):
+    # a person who has enough while an answer is late is heard in the same place
+    live, person, notes = late_session(12, {141: [Key.ENOUGH]}, ends_at)
+    assert waits(notes)
+    again, listener = Source({ends_at: EndOfCapture()}), Person()
+    pending, notes_again = list(notes), Notes()
+
+    def events(name):
+        due = [event for event in pending if event.t_ns <= again.now_ns() and event.name == name]
+        pending[:] = [event for event in pending if event not in due]
+        return due
+
+    runner = Runner(again, Replayed(listener, events), notes_again, late=lambda _late: bool(events("late")))
+    assert np.array_equal(runner.measure().t, live.t)
+    assert listener.heard == person.heard
+    assert notes_again == notes
+    assert not pending
+
+
+def test_ctrl_c_does_not_wait_for_a_late_answer():
+    source = Source()
+    with pytest.raises(Abandoned, match="interrupted"):
+        Runner(source, Person({150: [Key.ABORT]}), Notes(), hire=partial(Late, source, 1000)).measure()
+    assert source.polls == 148
+
+
+def test_who_watches_a_replay_may_stop_it_but_not_steer_it():
+    watcher = Person({3: [Key.ENOUGH], 5: [Key.ABORT]})
+    replayed = Replayed(watcher, lambda _name: [])
+    assert [list(replayed.pressed()) for _ in range(5)] == [[], [], [], [], [Key.ABORT]]
+
+
+@pytest.mark.parametrize(
+    ("person", "seconds", "polls", "key"),
+    [
+        (Person(), 3.0, 30, "abort"),
+        (Person(), 15.0, 150, "enough"),
+        (Person({41: [Key.ABORT]}), None, 40, "abort"),
+        (Person({151: [Key.ENOUGH]}), 99.0, 150, "enough"),
+    ],
+    ids=["seconds, flat", "seconds, rotating", "Ctrl-C, flat", "Enter, rotating"],
+)
+def test_recording_ends_when_asked_and_leaves_the_key_that_replays_it(person, seconds, polls, key):
+    source, notes = Source(), Notes()
+    assert Runner(source, person, notes, plan=Plan(until_end=True)).record(seconds) == polls * POLL
+    assert [note.data for note in notes] == [{module.KEY: key}]
+    assert source.stops == 1
+
+
+def test_recording_ends_with_the_source():
+    source = Source({300: EndOfCapture()})
+    assert runner_of(source, plan=Plan(until_end=True)).record(None) == 299 * POLL

@@ -1,0 +1,180 @@
+import io
+
+import numpy as np
+import pytest
+
+from mpucal.chip import registers as reg
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.errors import BusError, NoAnswer
+from mpucal.sources.bridge.messages import Feature
+from mpucal.sources.replay import ReplayBus
+from mpucal.sources.tap import Tap
+
+MS = 1_000_000
+
+
+@pytest.mark.parametrize("latency_ms", [1, 16])
+@pytest.mark.parametrize("model", ["mpu6050", "mpu6500", "clone98"])
+@pytest.mark.parametrize("rate_hz", [50, 200, 1000])
+def test_the_driver_runs_through_it_and_nothing_is_lost(rig, numbers, stream, model, rate_hz, latency_ms):
+    """16 ms is what an FTDI adapter holds bytes back by default."""
+    bus = rig(model, latency_ms * MS).bus()
+    driver = Driver(bus, Config(rate_hz=rate_hz))
+    driver.start()
+    stream(driver, 4)
+    driver.stop()
+    bus.close()
+    recording = driver.recording()
+    assert not recording.gap.any()
+    assert set(np.diff(numbers(recording))) == {1}
+    assert len(recording) > 3.8 * rate_hz
+    assert recording.sensor.rate_hz == pytest.approx(rate_hz * 1.0025, rel=300e-6)
+
+
+@pytest.mark.parametrize("latency_ms", [1, 16])
+def test_without_streaming_200_hz_go_through_as_well(rig, numbers, stream, latency_ms):
+    bus = rig(latency_ns=latency_ms * MS, features=Feature(0)).bus()
+    driver = Driver(bus, Config(rate_hz=200))
+    driver.start()
+    stream(driver, 4)
+    recording = driver.recording()
+    assert not recording.gap.any()
+    assert set(np.diff(numbers(recording))) == {1}
+    assert len(recording) > 3.5 * 200
+
+
+def test_a_long_burst_is_one_request(rig):
+    """Several would cost 16 ms each with an FTDI adapter."""
+    made = rig(latency_ns=16 * MS)
+    bus = made.bus()
+    bus.write(reg.PWR_MGMT_1, bytes([reg.CLKSEL_PLL]))
+    bus.write(reg.SMPLRT_DIV, b"\x04\x03")
+    bus.write(reg.FIFO_EN, bytes([reg.FIFO_EN_FRAME]))
+    began = bus.write(reg.USER_CTRL, bytes([reg.USER_CTRL_FIFO_EN]))
+    bus.sleep_until(began + 300 * MS)
+    before = made.line.now_ns()
+    data = bus.read(reg.FIFO_R_W, 700).data
+    assert len(data) == 700
+    assert {data[i : i + 14][4:6] for i in range(0, 700, 14)} == {b"\x20\x00"}
+    # 700 bytes at 400 kHz and at 500 kbaud, and one delay
+    assert made.line.now_ns() - before < 60 * MS
+
+
+def test_many_registers_at_once(rig):
+    bus = rig().bus()
+    whole = bus.read(0, 114).data
+    assert len(whole) == 114
+    assert whole[reg.PWR_MGMT_1] == reg.PWR_MGMT_1_SLEEP
+
+
+@pytest.mark.parametrize(
+    ("access", "words"),
+    [
+        (lambda bus: bus.read(reg.FIFO_R_W, 4097), "reads at most 4096 bytes at once, not 4097"),
+        (lambda bus: bus.write(0, bytes(33)), "writes at most 32 bytes at once, not 33"),
+    ],
+    ids=["read", "write"],
+)
+def test_more_than_a_bridge_moves_at_once(rig, access, words):
+    with pytest.raises(BusError, match=words):
+        access(rig().bus())
+
+
+def test_who_lets_the_fifo_fill_sees_it_fill(rig):
+    """Nothing is read ahead of a FIFO that was started without a reset."""
+    bus = rig().bus()
+    bus.write(reg.PWR_MGMT_1, bytes([reg.CLKSEL_PLL]))
+    bus.write(reg.FIFO_EN, bytes([reg.FIFO_EN_FRAME]))
+    t_ns = bus.write(reg.USER_CTRL, bytes([reg.USER_CTRL_FIFO_EN]))
+    bus.sleep_until(t_ns + 1000 * MS)
+    assert int.from_bytes(bus.read(reg.FIFO_COUNT_H, 2).data, "big") == 1024
+    assert bus.read(reg.INT_STATUS, 1).data[0] & reg.INT_FIFO_OFLOW
+
+
+def test_a_host_that_was_away_catches_up_without_a_gap(rig, numbers, stream):
+    """The chip's FIFO holds 73 ms at 1 kHz; the bridge pushes on, and the host's memory is larger."""
+    made = rig()
+    driver = Driver(made.bus(), Config(rate_hz=1000))
+    driver.start()
+    stream(driver, 0.5)
+    # the host computes; its port goes on to take what comes
+    for _ in range(4000):
+        made.line._step()
+    stream(driver, 3)
+    recording = driver.recording()
+    assert not recording.gap.any()
+    assert set(np.diff(numbers(recording))) == {1}
+    assert len(recording) > 3300
+
+
+def test_time_never_goes_back_in_a_capture(rig, stream):
+    made, records = rig(latency_ns=16 * MS), Records()
+    driver = Driver(Tap(made.bus(), records), Config(rate_hz=1000))
+    driver.start()
+    stream(driver, 2)
+    driver.stop()
+    times = [t.t_ns for t in records]
+    assert times == sorted(times)
+
+
+def test_a_capture_of_it_replays(rig, stream):
+    made, records = rig(), Records()
+    driver = Driver(Tap(made.bus(), records), Config(rate_hz=200))
+    driver.start()
+    stream(driver, 1)
+    made.line.device = made.new_bridge()
+    stream(driver, 3)
+    driver.stop()
+    again = Driver(ReplayBus(records), Config(rate_hz=200))
+    again.start()
+    while again.now_ns() < driver.now_ns() and again.recording().t.size < driver.recording().t.size:
+        again.poll()
+    for name in ("t", "acc", "gyr", "gap"):
+        np.testing.assert_array_equal(getattr(again.recording(), name), getattr(driver.recording(), name))
+    assert driver.recording().gap.sum() == 1
+    assert any(t.error for t in records)
+
+
+def test_no_chip_on_the_bridge(rig):
+    made = rig()
+    made.chip = None
+    made.line.device = made.new_bridge()
+    with pytest.raises(NoAnswer, match="answers, but nothing answers it at 0x68 or 0x69 on its I2C bus: check"):
+        made.bus()
+    with pytest.raises(NoAnswer, match="at 0x69 on its"):
+        rig().bus(address=0x69)
+
+
+def test_a_chip_at_the_other_address(rig):
+    assert rig(address=0x69).bus().address == 0x69
+
+
+def test_a_chip_that_comes_off_while_it_streams(rig, stream):
+    made = rig()
+    driver = Driver(made.bus(), Config(rate_hz=200))
+    driver.start()
+    stream(driver, 0.5)
+    made.line.device.bridge._chip = None
+    with pytest.raises(NoAnswer, match="the chip no longer answers the bridge on the emulated line: check the chip's"):
+        stream(driver, 5)
+    assert len(driver.recording()) > 80
+
+
+class Records(list):
+    def transaction(self, transaction):
+        self.append(transaction)
+
+
+def test_closing_stops_what_the_bridge_pushes(rig, stream):
+    made = rig()
+    bus = made.bus()
+    driver = Driver(bus, Config(rate_hz=200))
+    driver.start()
+    stream(driver, 0.3)
+    bus.close()
+    sent = io.BytesIO()
+    for _ in range(2000):
+        made.clock.sleep_until(made.clock.now() + MS)
+        sent.write(made.line.device.work())
+    assert sent.getvalue() == b""

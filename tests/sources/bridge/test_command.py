@@ -1,0 +1,125 @@
+"""The command line on a board with an emulated bridge: record, store, show."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mpucal.__main__ import run
+from mpucal.errors import BusError
+from mpucal.result.calibration import Calibration
+from mpucal.session.events import Prompt, PromptKind
+from mpucal.simulated.bridge import EmulatedBridge, Memory
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip.clock import FastClock
+
+BLOB = Path(__file__).parents[3] / "fixtures" / "vectors" / "blob_measured.bin"
+
+
+@pytest.fixture
+def board(serve):
+    """A bridge on a socket; its memory outlives it."""
+    made = SimpleNamespace(memory=Memory(), clock=FastClock())
+    made.chip = open_simulated("sim:seed=5", clock=made.clock)
+    bridge = EmulatedBridge(made.chip, made.clock.now, made.memory)
+    made.server = serve(bridge, made.clock, "socket")
+    made.name = made.server.name
+    return made
+
+
+@pytest.fixture
+def mpucal(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words):
+        capsys.readouterr()
+        code = run(list(words))
+        out, err = capsys.readouterr()
+        return SimpleNamespace(code=code, out=out, err=err)
+
+    return call
+
+
+def test_a_recording(board, mpucal):
+    recorded = mpucal("record", "--serial", board.name, "-o", "board.mcap", "--seconds", "2", "--rate", "1000")
+    assert recorded.code == 0, recorded.err
+    shown = json.loads(mpucal("show", "board.mcap", "--json").out)
+    # how much of the two seconds the start takes, the load of the machine decides
+    assert (shown["gaps"], shown["samples"] > 1000) == (0, True)
+
+
+def test_into_the_memory_and_back(board, mpucal, tmp_path):
+    nothing = mpucal("show", "--serial", board.name)
+    assert nothing.code == BusError.exit_code
+    assert f"the bridge on {board.name} stores no calibration: store one: mpucal write" in nothing.err
+    made = Calibration.load(BLOB)
+    made.save("calibration.json")
+    stored = mpucal("write", "calibration.json", "bridge", "--serial", board.name, "--yes")
+    assert stored.code == 0, stored.err
+    assert "as its blob number 1 (188 bytes, CRC-32 " in stored.out
+    # another bridge with the same memory: the power was off
+    board.server.device = EmulatedBridge(board.chip, board.clock.now, board.memory)
+    shown = mpucal("show", "--serial", board.name, "--json")
+    assert shown.code == 0, shown.err
+    kept = json.loads(shown.out)["accelerometer"]
+    assert (kept["D"], kept["b_a"]) == (made.D.tolist(), made.b_a.tolist())
+    assert "blob number 1 of the bridge on" in mpucal("show", "--serial", board.name).out
+    anew = mpucal("write", "calibration.json", "bridge", "--serial", board.name, "-o", "kept")
+    assert "bridge-blob-1.bin" in anew.err
+    assert (tmp_path / "kept" / "bridge-blob-1.bin").read_bytes() == BLOB.read_bytes()
+
+
+def test_the_doctor_tells_bridge_and_chip(board, mpucal):
+    board.chip.hear(Prompt(PromptKind.LAY_FLAT, ""))
+    told = mpucal("doctor", "--serial", board.name, "--seconds", "2", "--json")
+    assert told.code == 0, told.out
+    found = {finding["topic"]: finding for finding in json.loads(told.out)["findings"]}
+    assert found["bridge"]["data"]["name"] == "emulated bridge"
+    assert found["bridge"]["data"]["pushes"]
+    assert found["offset registers"]["data"]["place"] == 0x06
+    # what passes through a serial line does not show the speed of the bus behind it
+    assert "serial line" in found
+    assert "bus speed" not in found
+
+
+def test_a_bias_goes_into_the_chip_behind_it_and_out_again(board, mpucal, tmp_path):
+    board.chip.hear(Prompt(PromptKind.LAY_FLAT, ""))
+    truth = board.chip.truth_document()
+    Calibration(np.array(truth["D"]), np.array(truth["b_a"])).save("calibration.json")
+    before = board.chip.read(0x06, 6).data
+    written = mpucal("write", "calibration.json", "chip", "--serial", board.name, "--yes", "--json")
+    assert written.code == 0, written.err
+    assert json.loads(written.out)["applied_in_hardware"]["b_a"] == pytest.approx(truth["b_a"], abs=0.006)
+    assert board.chip.read(0x06, 6).data != before
+    kept = json.loads((tmp_path / "chip-offsets.json").read_text())
+    assert kept["where"] == f"the chip on {board.name}"
+    assert mpucal("write", "chip-offsets.json", "chip", "--serial", board.name, "--yes").code == 0
+    assert board.chip.read(0x06, 6).data == before
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "sentence"),
+    [
+        (["session", "--serial"], 2, "no serial port was named"),
+        (["session", "--serial", "/dev/there-is-none"], 3, "there is no serial port /dev/there-is-none"),
+        (
+            ["session", "--serial", "x", "--seed", "1"],
+            2,
+            "--seed chooses a simulated sensor, and --serial names a real",
+        ),
+        (["session", "--serial", "x", "--system", "1"], 2, "--system was given beside --serial, which has none"),
+        (["session", "--serial", "x", "--bus", "sim"], 2, "--bus and --serial were given together"),
+        (["show", "--serial"], 2, "no serial port was named"),
+        (["show"], 2, "nothing to show was named"),
+        (["show", "x.json", "--serial", "x"], 2, "a file and --serial were given together"),
+        (["write", str(BLOB), "bridge", "--bus", "sim"], 2, "give --serial PORT"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_wrong_words_are_one_sentence(mpucal, words, code, sentence):
+    result = mpucal(*words)
+    assert (result.code, result.out) == (code, "")
+    assert sentence in result.err
+    assert "Traceback" not in result.err

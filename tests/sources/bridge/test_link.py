@@ -1,0 +1,124 @@
+from dataclasses import replace
+
+import pytest
+
+from mpucal.chip import registers as reg
+from mpucal.errors import BusError
+from mpucal.sources.bridge.frame import Deframer, Frame
+from mpucal.sources.bridge.link import Link, LinkLost
+from mpucal.sources.bridge.messages import Burst, Hello, HelloReply, Read, Status, Write
+
+WHO = Read(reg.WHO_AM_I, 1)
+
+
+@pytest.fixture
+def link(rig):
+    made = rig()
+    made.link = Link(made.line, lambda seq, frames, t_ns: None)
+    made.link.greet()
+    made.line.written.clear()
+    return made
+
+
+def sent(line):
+    return list(Deframer().feed(bytes(line.written)))
+
+
+def lose(line, replies):
+    """The next `replies` pieces that the bridge sends do not come."""
+    left = iter(range(replies))
+    line.to_host = lambda data: data if next(left, None) is None else b""
+
+
+def test_a_lost_reply_is_asked_for_again_under_its_number(link):
+    lose(link.line, 2)
+    ((answer,),) = link.link.ask(WHO)
+    assert answer.reply.data == b"\x68"
+    assert [frame.seq for frame in sent(link.line)] == [sent(link.line)[0].seq] * 3
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [Read(reg.FIFO_R_W, 14), Read(reg.INT_STATUS, 1), Read(reg.INT_ENABLE, 3), Burst(reg.FIFO_R_W, 70)],
+    ids=repr,
+)
+def test_what_takes_something_away_is_never_repeated(link, request_):
+    lose(link.line, 1)
+    with pytest.raises(LinkLost, match="no longer answers"):
+        link.link.ask(request_)
+    assert len(sent(link.line)) == 1
+
+
+def test_a_bridge_that_was_reset_is_noticed_by_its_answer(link):
+    link.line.device = link.new_bridge()
+    with pytest.raises(LinkLost, match="the bridge on the emulated line was reset"):
+        link.link.ask(WHO)
+    link.link.greet()
+    assert link.link.ask(WHO)[0][0].reply.data == b"\x68"
+
+
+def test_several_requests_fly_at_once_and_no_more_than_the_bridge_takes(rig):
+    made = rig(latency_ns=16_000_000, window=3)
+    link = Link(made.line, lambda seq, frames, t_ns: None)
+    link.greet()
+    made.line.written.clear()
+    made.line.device.work()
+    before_ns = made.line.now_ns()
+    answers = link.ask(*[Write(reg.SMPLRT_DIV, bytes([n])) for n in range(9)], Read(reg.SMPLRT_DIV, 1))
+    assert answers[-1][0].reply.status == Status.OK
+    # ten one after the other would take ten latencies
+    assert made.line.now_ns() - before_ns < 5 * 20_000_000
+    assert [frame.seq for frame in sent(made.line)] == sorted(frame.seq for frame in sent(made.line))
+
+
+def test_a_boot_loader_is_waited_for(rig):
+    made = rig(boot_ns=2_000_000_000)
+    assert Link(made.line, lambda seq, frames, t_ns: None).greet().address == 0x68
+    assert 2e9 < made.clock.now() < 3e9
+
+
+@pytest.mark.parametrize(
+    ("theirs", "status", "remedy"),
+    [(2, Status.BAD_VERSION, "newer mpucal on this machine"), (0, Status.OK, "newer firmware on the bridge")],
+    ids=["newer", "older"],
+)
+def test_another_version_is_named(rig, theirs, status, remedy):
+    made = rig()
+
+    def other(data):
+        made_of = [
+            Frame(f.type, f.seq, replace(HelloReply.decode(f.payload), status=status, major=theirs).payload()).encode()
+            for f in Deframer().feed(data)
+        ]
+        return b"".join(made_of)
+
+    made.line.to_host = other
+    with pytest.raises(BusError, match=f"speaks version {theirs} of the protocol, and mpucal 1: put a {remedy}"):
+        Link(made.line, lambda seq, frames, t_ns: None).greet()
+
+
+def test_both_rates_are_tried_in_turn(rig):
+    made, rates = rig(), []
+    made.line.bauds = (500_000, 115_200)
+    made.line.set_baud = rates.append
+    made.line.to_device = lambda data: data if rates[-1] == 115_200 else b"\xf0" * len(data)
+    Link(made.line, lambda seq, frames, t_ns: None).greet()
+    assert rates == [500_000, 115_200]
+
+
+def test_an_unknown_status_is_a_failure_and_named(rig):
+    made = rig()
+    bus = made.bus()
+
+    def odd(data):
+        return b"".join(Frame(f.type, f.seq, b"\x63" + f.payload[1:]).encode() for f in Deframer().feed(data))
+
+    made.line.to_host = odd
+    with pytest.raises(BusError, match="answers with status 99: put a newer mpucal"):
+        bus.read(reg.WHO_AM_I, 1)
+
+
+def test_a_hello_asks_for_the_address(rig):
+    made = rig(address=0x69)
+    Link(made.line, lambda seq, frames, t_ns: None).greet(0x69)
+    assert Hello.decode(sent(made.line)[0].payload).address == 0x69

@@ -1,0 +1,120 @@
+"""What every bus promises, asked of each of them."""
+
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from mpucal.chip import registers as reg
+from mpucal.chip.access import EndOfCapture
+from mpucal.errors import UsageError
+from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
+from mpucal.sources import BUSES, opener
+from mpucal.sources.bridge import BridgeBus
+from mpucal.sources.i2c import I2cBus
+from mpucal.sources.replay import ReplayBus
+from mpucal.sources.tap import Tap
+
+
+def script(bus):
+    """The accesses of all tests here, so that a replay can hold them: what was read, and the times of all."""
+    times, replies = [], []
+
+    def read(register, count):
+        reply = bus.read(register, count)
+        replies.append(reply.data)
+        times.append(reply.t_ns)
+
+    def write(register, data):
+        times.append(bus.write(register, data))
+
+    read(reg.WHO_AM_I, 1)
+    write(reg.PWR_MGMT_1, bytes([reg.CLKSEL_PLL]))
+    write(reg.SMPLRT_DIV, b"\x04\x03\x08\x10")
+    read(reg.SMPLRT_DIV, 4)
+    write(reg.FIFO_EN, bytes([reg.FIFO_EN_FRAME]))
+    write(reg.USER_CTRL, bytes([reg.USER_CTRL_FIFO_EN]))
+    bus.sleep_until(times[-1] + 50_000_000)
+    read(reg.FIFO_COUNT_H, 2)
+    read(reg.FIFO_R_W, 28)
+    read(reg.FIFO_COUNT_H, 2)
+    return SimpleNamespace(times=times, replies=replies)
+
+
+@pytest.fixture(params=["bridge", "i2c", "sim", "replay", "tap"])
+def bus(request, adapter, still_chip):
+    recorder = _List()
+    if request.param == "i2c":
+        return I2cBus(str(adapter().path))
+    simulated, clock = still_chip()
+    if request.param == "bridge":
+        return BridgeBus(EmulatedLine(EmulatedBridge(simulated, clock.now), clock))
+    if request.param == "sim":
+        return simulated
+    if request.param == "tap":
+        return Tap(simulated, recorder)
+    script(Tap(simulated, recorder))
+    return ReplayBus(recorder)
+
+
+class _List(list):
+    def transaction(self, transaction):
+        self.append(transaction)
+
+
+def test_a_register_keeps_what_was_written(bus):
+    who_am_i, settings, *_ = script(bus).replies
+    assert who_am_i == b"\x68"
+    assert settings == b"\x04\x03\x08\x10"
+
+
+def test_the_fifo_register_does_not_increment(bus):
+    *_, before, data, after = script(bus).replies
+    held, left = (int.from_bytes(count, "big") for count in (before, after))
+    accel = (12).to_bytes(2, "big") + (-34).to_bytes(2, "big", signed=True)
+    assert [data[i : i + 4] for i in (0, 14)] == [accel, accel]
+    assert len(data) == 28
+    assert held in range(9 * 14, 11 * 14)
+    assert left in (held - 28, held - 14)
+
+
+def test_time_never_goes_back_and_sleeping_takes_it(bus):
+    times = script(bus).times
+    assert times == sorted(times)
+    assert times[-3] - times[-4] >= 50_000_000
+    assert all(isinstance(t, int) for t in times)
+
+
+def test_replies_are_bytes(bus):
+    assert {type(reply) for reply in script(bus).replies} == {bytes}
+
+
+def test_closing_ends_it(bus):
+    script(bus)
+    bus.close()
+
+
+def test_only_a_replay_ends(bus):
+    script(bus)
+    if isinstance(bus, ReplayBus):
+        with pytest.raises(EndOfCapture):
+            bus.read(reg.WHO_AM_I, 1)
+    else:
+        assert bus.read(reg.WHO_AM_I, 1).data == b"\x68"
+
+
+@pytest.mark.parametrize("name", BUSES)
+def test_every_bus_of_the_list_can_be_asked_for(name):
+    assert callable(opener(name))
+
+
+def test_an_unknown_bus_names_the_known():
+    with pytest.raises(UsageError, match="no bus called spi: take one of bridge, i2c, replay, sim"):
+        opener("spi")
+
+
+def test_no_library_of_a_bus_is_loaded_before_it_is_asked_for():
+    program = "import sys, mpucal.sources; print(sorted({'smbus2', 'serial', 'numpy', 'mcap'} & set(sys.modules)))"
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"

@@ -1,0 +1,242 @@
+"""Linux I2C through the real smbus2, whose ioctls a simulated chip answers."""
+
+import errno
+import os
+
+import pytest
+from smbus2 import smbus2
+
+import mpucal.sources.i2c_errors
+from mpucal.chip import registers as reg
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.errors import BusError, BusHeld, NoAnswer
+from mpucal.sources.i2c import I2cBus
+
+
+def test_registers_are_read_in_one_burst(adapter):
+    kernel = adapter()
+    bus = I2cBus(str(kernel.path))
+    assert bus.read(reg.WHO_AM_I, 1).data == b"\x68"
+    bus.write(reg.SMPLRT_DIV, b"\x04\x03")
+    assert bus.read(reg.SMPLRT_DIV, 3).data == b"\x04\x03\x00"
+    assert kernel.transfers == [[(0, 1), (1, 1)], [(0, 3)], [(0, 1), (1, 3)]]
+
+
+@pytest.mark.parametrize("address", [0x68, 0x69])
+def test_both_addresses_are_tried(adapter, address):
+    kernel = adapter(address=address)
+    bus = I2cBus(str(kernel.path))
+    assert bus.address == address
+    assert bus.read(reg.WHO_AM_I, 1).data == b"\x68"
+
+
+def test_a_given_address_is_the_only_one_tried(adapter):
+    kernel = adapter(address=0x69)
+    with pytest.raises(NoAnswer, match="nothing answers at 0x68 on"):
+        I2cBus(str(kernel.path), 0x68)
+
+
+def test_nobody_at_either_address(adapter):
+    kernel = adapter(address=0x50)
+    with pytest.raises(NoAnswer, match=r"nothing answers at 0x68 or 0x69 on .*i2c-1: .*i2cdetect -y 1"):
+        I2cBus(str(kernel.path))
+
+
+def test_a_kernel_driver_is_noticed_by_a_plain_read_first(adapter):
+    kernel = adapter()
+    kernel.failures[smbus2.I2C_SLAVE] = errno.EBUSY
+    with pytest.raises(
+        BusError, match=r"a driver of the kernel holds the chip .*: remove .*echo 1-0068 .*/1-0068/driver/unbind"
+    ):
+        I2cBus(str(kernel.path), 0x68)
+    assert smbus2.I2C_RDWR not in kernel.requests
+
+
+@pytest.mark.parametrize(
+    ("number", "kind", "words"),
+    [
+        (errno.EREMOTEIO, NoAnswer, "nothing answers at 0x68"),
+        (errno.ENXIO, NoAnswer, "nothing answers at 0x68"),
+        (errno.ETIMEDOUT, BusHeld, "does not come free .*holds SDA or SCL low"),
+        (errno.EIO, BusError, "broke off .*shorten the wires"),
+        (errno.EAGAIN, BusError, "another master"),
+        (errno.EBUSY, BusError, "driver of the kernel"),
+        (errno.ENODEV, BusError, "adapter is gone"),
+        (errno.EFAULT, BusError, "a transfer failed .Bad address"),
+    ],
+    ids=lambda value: errno.errorcode.get(value) if isinstance(value, int) else None,
+)
+@pytest.mark.parametrize("op", ["read", "write"])
+def test_a_failed_transfer_is_a_sentence_and_not_repeated(adapter, op, number, kind, words):
+    kernel = adapter()
+    bus = I2cBus(str(kernel.path))
+    kernel.failures[smbus2.I2C_RDWR] = number
+    kernel.requests.clear()
+    with pytest.raises(BusError, match=words) as caught:
+        bus.read(reg.FIFO_R_W, 4) if op == "read" else bus.write(reg.USER_CTRL, b"\0")
+    assert type(caught.value) is kind
+    assert isinstance(caught.value.__cause__, OSError)
+    assert kernel.requests == [smbus2.I2C_RDWR]
+
+
+def test_no_such_bus_names_those_there_are(tmp_path, monkeypatch):
+    monkeypatch.setattr(mpucal.sources.i2c_errors, "DEVICES", tmp_path)
+    with pytest.raises(BusError, match=r"there is no I2C bus .*i2c-7: enable I2C"):
+        I2cBus(str(tmp_path / "i2c-7"))
+    (tmp_path / "i2c-1").touch()
+    with pytest.raises(BusError, match=r"there is no I2C bus .*i2c-7: take one of .*i2c-1"):
+        I2cBus(str(tmp_path / "i2c-7"))
+
+
+def test_a_number_is_a_bus_of_dev(monkeypatch):
+    opened = []
+
+    def refuse(path, flags):
+        opened.append(path)
+        raise FileNotFoundError(errno.ENOENT, "No such file or directory")
+
+    monkeypatch.setattr(os, "open", refuse)
+    for adapter in (3, "3"):
+        with pytest.raises(BusError, match="/dev/i2c-3"):
+            I2cBus(adapter)
+    assert opened == ["/dev/i2c-3"] * 2
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (errno.EACCES, "no permission to use .*usermod -aG i2c"),
+        (errno.ENXIO, "no adapter is behind"),
+        (errno.EMFILE, "cannot open .*Too many open files"),
+    ],
+    ids=["EACCES", "ENXIO", "EMFILE"],
+)
+def test_what_opening_can_say(monkeypatch, number, words):
+    def refuse(path, flags):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "open", refuse)
+    with pytest.raises(BusError, match=words):
+        I2cBus("/dev/i2c-1")
+
+
+def test_another_file_is_no_bus_and_is_closed_again(tmp_path):
+    """The kernel's own ENOTTY."""
+    other = tmp_path / "notes.txt"
+    other.write_text("no bus")
+    handles = len(os.listdir("/proc/self/fd"))  # noqa: PTH208
+    for path in (other, tmp_path):
+        with pytest.raises(BusError, match="is no I2C bus"):
+            I2cBus(str(path))
+    assert len(os.listdir("/proc/self/fd")) == handles  # noqa: PTH208
+
+
+def test_an_adapter_of_single_bytes_is_refused(adapter):
+    kernel = adapter()
+    kernel.functions = int(smbus2.I2cFunc.SMBUS_BYTE_DATA)
+    with pytest.raises(BusError, match="moves single bytes only"):
+        I2cBus(str(kernel.path))
+
+
+def test_an_smbus_adapter_moves_blocks_of_32_bytes(adapter):
+    kernel = adapter()
+    kernel.functions = int(smbus2.I2cFunc.SMBUS_BYTE_DATA | smbus2.I2cFunc.SMBUS_I2C_BLOCK)
+    driver = Driver(I2cBus(str(kernel.path)), Config(rate_hz=100))
+    driver.start()
+    while driver.now_ns() < 3e9:
+        driver.poll()
+    recording = driver.recording()
+    assert len(recording) > 200
+    assert not recording.gap.any()
+    assert smbus2.I2C_RDWR not in kernel.requests
+    assert max(length for transfer in kernel.transfers for _, length in transfer) == 32
+
+
+def test_registers_in_blocks_are_those_in_one_burst(adapter):
+    whole, parts = adapter(), adapter("mpu6050")
+    expected = I2cBus(str(whole.path)).read(0x00, 100).data
+    parts.functions = int(smbus2.I2cFunc.SMBUS_BYTE_DATA | smbus2.I2cFunc.SMBUS_I2C_BLOCK)
+    assert I2cBus(str(parts.path)).read(0x00, 100).data == expected
+
+
+def test_the_longest_message_of_an_adapter_is_found(adapter):
+    """As i2c-core refuses what an adapter's quirks do not allow; no byte of the FIFO is lost by it."""
+    kernel = adapter()
+    kernel.longest = 70
+    driver = Driver(I2cBus(str(kernel.path)))
+    driver.start()
+    while driver.now_ns() < 3e9:
+        driver.poll()
+    assert not driver.recording().gap.any()
+    assert len(driver.recording()) > 400
+
+
+def test_an_adapter_without_repeated_start_writes_and_reads_apart(adapter):
+    kernel = adapter()
+    kernel.repeats_start = False
+    driver = Driver(I2cBus(str(kernel.path)))
+    assert driver.start().who_am_i == 0x68
+    while driver.now_ns() < 3e9:
+        driver.poll()
+    assert not driver.recording().gap.any()
+    assert len(driver.recording()) > 400
+    # whole bursts still
+    assert max(length for transfer in kernel.transfers for _, length in transfer) >= 4 * reg.FRAME_BYTES
+
+
+@pytest.mark.parametrize("op", ["read", "write"])
+def test_an_adapter_that_moves_nothing_is_a_sentence(adapter, op):
+    kernel = adapter()
+    bus = I2cBus(str(kernel.path))
+    kernel.failures[smbus2.I2C_RDWR] = errno.EOPNOTSUPP
+    with pytest.raises(BusError, match="cannot move this transfer"):
+        bus.read(reg.FIFO_R_W, 14) if op == "read" else bus.write(reg.USER_CTRL, b"\0")
+
+
+def test_a_kernel_driver_is_noticed_without_repeated_start_too(adapter):
+    kernel = adapter()
+    kernel.repeats_start = False
+    kernel.failures[smbus2.I2C_SLAVE] = errno.EBUSY
+    with pytest.raises(BusError, match="a driver of the kernel holds the chip"):
+        I2cBus(str(kernel.path), 0x68)
+
+
+def test_a_known_part_is_preferred_to_a_clock_at_the_other_address(adapter, monkeypatch):
+    kernel = adapter(address=0x69)
+    acknowledge = kernel._acknowledge
+    monkeypatch.setattr(kernel, "_acknowledge", lambda address: address == 0x68 or acknowledge(address))
+    read = kernel.bus.read
+
+    def both(register, count):
+        reply = read(register, count)
+        return reply._replace(data=b"\x13") if kernel._chosen == 0x68 else reply
+
+    monkeypatch.setattr(kernel.bus, "read", both)
+    assert I2cBus(str(kernel.path)).address == 0x69
+    assert I2cBus(str(kernel.path), 0x68).address == 0x68
+
+
+def test_more_than_the_kernel_moves_at_once(adapter):
+    bus = I2cBus(str(adapter().path))
+    assert len(bus.read(reg.FIFO_R_W, 8192).data) == 8192
+    with pytest.raises(BusError, match="at most 8192 bytes"):
+        bus.read(reg.FIFO_R_W, 8193)
+
+
+@pytest.mark.parametrize("model", ["mpu6050", "mpu6500", "clone98"])
+@pytest.mark.parametrize("rate_hz", [200, 1000])
+def test_the_driver_runs_through_it(adapter, model, rate_hz):
+    kernel = adapter(model)
+    bus = I2cBus(str(kernel.path))
+    driver = Driver(bus, Config(rate_hz=rate_hz))
+    driver.start()
+    while driver.now_ns() < 5e9:
+        driver.poll()
+    driver.stop()
+    bus.close()
+    recording = driver.recording()
+    assert recording.sensor.rate_hz == pytest.approx(rate_hz * 1.0025, rel=200e-6)
+    assert len(recording) > 4 * rate_hz
+    assert not recording.gap.any()
+    assert recording.acc[-1] == pytest.approx([12 * 9.80665 / 8192, -34 * 9.80665 / 8192, 9.80665])

@@ -1,0 +1,103 @@
+"""A session in parts: what was recorded, then the rest, on one clock."""
+
+import pytest
+
+from mpucal.chip.access import EndOfCapture, Reply, Transaction
+from mpucal.chip.records import RESUMED, SessionEvent
+from mpucal.sources.parts import PAUSE_NS, LaterBus, PartsBus, parts_of
+from mpucal.sources.replay import ReplayBus
+
+S = 1_000_000_000
+
+
+def read(t_s, register=0x75):
+    return Transaction("read", register, 1, b"\x68", round(t_s * S))
+
+
+def event(name, **data):
+    return SessionEvent(name, 0, data)
+
+
+def key(name):
+    return event("key", key=name)
+
+
+class Young:
+    """A bus that was opened a moment ago."""
+
+    def __init__(self):
+        self.t_ns, self.slept_ns = 5, []
+
+    def read(self, register, count):
+        self.t_ns += 100
+        return Reply(bytes(count), self.t_ns)
+
+    def write(self, register, data):
+        self.t_ns += 100
+        return self.t_ns
+
+    def sleep_until(self, t_ns):
+        self.slept_ns.append(t_ns)
+
+    def close(self):
+        self.closed = True
+
+
+def test_each_part_ends_before_the_next_begins():
+    bus = PartsBus([ReplayBus([read(1), key("enough")]), ReplayBus([read(2)])])
+    assert bus.read(0x75, 1).t_ns == S
+    assert [found.name for found in bus.pending_events("key")] == ["key"]
+    with pytest.raises(EndOfCapture):
+        bus.read(0x75, 1)
+    assert bus.go_on()
+    assert bus.unread() == 1
+    assert bus.read(0x75, 1).t_ns == 2 * S
+    assert bus.unread() == 0
+    assert not bus.go_on()
+
+
+def test_only_what_was_recorded_is_replayed():
+    young = Young()
+    bus = PartsBus([ReplayBus([]), young])
+    assert bus.replaying
+    bus.go_on()
+    assert not bus.replaying
+    assert bus.pending_events("key") == []
+    assert bus.unread() == 0
+    bus.close()
+    assert young.closed
+
+
+def test_a_later_clock_goes_on_where_the_earlier_one_stopped():
+    young = Young()
+    bus = LaterBus(young, 7 * S)
+    bus.sleep_until(3 * S)
+    assert young.slept_ns == []
+    first_ns = bus.read(0x75, 1).t_ns
+    assert first_ns == 7 * S + PAUSE_NS
+    assert bus.write(0x6B, b"\x00") == first_ns + 100
+    bus.sleep_until(first_ns + 1000)
+    assert young.slept_ns == [105 + 1000]
+
+
+def test_a_clock_that_is_later_by_itself_stays():
+    young = Young()
+    young.t_ns = 100 * S
+    assert LaterBus(young, 7 * S).read(0x75, 1).t_ns == young.t_ns
+
+
+@pytest.mark.parametrize(
+    ("captures", "more", "lengths"),
+    [
+        ([[read(1), read(2)]], False, [2]),
+        ([[read(1)], [event(RESUMED), read(2)]], False, [1, 1]),
+        ([[read(1), event(RESUMED), read(2), read(3)]], False, [1, 2]),
+        ([[read(1), key("abort"), read(2)], [event(RESUMED), read(3)]], False, [1, 1]),
+        ([[read(1), key("abort"), read(2)]], False, [3]),
+        ([[read(1), key("abort"), read(2)]], True, [1]),
+        ([[read(1), key("enough"), read(2)]], True, [3]),
+    ],
+    ids=["one", "two files", "one file of two", "stopped, then resumed", "stopped", "to be resumed", "another key"],
+)
+def test_captures_are_cut_where_they_were_resumed(captures, more, lengths):
+    assert [len(part) for part in parts_of(captures, more)] == lengths

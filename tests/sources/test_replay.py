@@ -1,0 +1,135 @@
+import pytest
+
+from mpucal.chip.access import EndOfCapture, Failure, Reply, Transaction
+from mpucal.chip.records import SessionEvent
+from mpucal.errors import BusError, BusHeld, CaptureError, NoAnswer
+from mpucal.sources.replay import ReplayBus
+from mpucal.sources.tap import Tap
+
+READ = Transaction("read", 0x75, 1, b"\x68", 1000)
+WRITE = Transaction("write", 0x6B, 1, b"\x80", 2000)
+FIFO = Transaction("read", 0x74, 3, b"\1\2\3", 3000)
+
+
+def key(t_ns):
+    return SessionEvent("key", t_ns, {"key": "enough"})
+
+
+def test_gives_the_recorded_replies_and_times():
+    bus = ReplayBus([READ, WRITE, FIFO])
+    assert bus.unread() == 3
+    assert bus.read(0x75, 1) == Reply(b"\x68", 1000)
+    bus.sleep_until(10**18)
+    assert bus.write(0x6B, b"\x80") == 2000
+    assert bus.unread() == 1
+    assert bus.read(0x74, 3) == Reply(b"\1\2\3", 3000)
+    assert bus.unread() == 0
+
+
+@pytest.mark.parametrize("records", [[], [key(5)], [READ]], ids=["nothing", "an event", "all read"])
+def test_ends_after_the_last_access(records):
+    bus = ReplayBus(records, "old.mcap")
+    for _ in range(bus.unread()):
+        bus.read(0x75, 1)
+    for access in (lambda: bus.read(0x3A, 1), lambda: bus.write(0x6B, b"\0")):
+        with pytest.raises(EndOfCapture, match=r"old\.mcap"):
+            access()
+
+
+@pytest.mark.parametrize(
+    ("recorded", "access", "words"),
+    [
+        pytest.param(
+            READ,
+            lambda bus: bus.read(0x74, 1),
+            ["read of 1 bytes from 0x74", "read of 1 bytes from 0x75"],
+            id="another register",
+        ),
+        pytest.param(READ, lambda bus: bus.read(0x75, 2), ["2 bytes from 0x75", "1 bytes from"], id="another count"),
+        pytest.param(
+            READ,
+            lambda bus: bus.write(0x75, b"\x68"),
+            ["write of 68 to 0x75", "read of 1"],
+            id="a write for a read",
+        ),
+        pytest.param(WRITE, lambda bus: bus.read(0x6B, 1), ["read of 1", "write of 80"], id="a read for a write"),
+        pytest.param(
+            WRITE,
+            lambda bus: bus.write(0x6B, b"\x01"),
+            ["write of 01", "write of 80 to 0x6b"],
+            id="other bytes",
+        ),
+        pytest.param(WRITE, lambda bus: bus.write(0x6C, b"\x80"), ["to 0x6c", "to 0x6b"], id="written elsewhere"),
+    ],
+)
+def test_refuses_an_access_that_the_capture_does_not_hold(recorded, access, words):
+    bus = ReplayBus([FIFO, recorded], "old.mcap")
+    bus.read(0x74, 3)
+    with pytest.raises(CaptureError, match=r"access 1 of old\.mcap") as raised:
+        access(bus)
+    for word in words:
+        assert word in str(raised.value)
+    assert bus.unread() == 1
+
+
+@pytest.mark.parametrize(
+    ("failure", "kind"),
+    [
+        (Failure("NoAnswer", "nothing at 0x68", "check the wires"), NoAnswer),
+        (Failure("BusHeld", "the bus does not come free", "look for a short"), BusHeld),
+        (Failure("BusError", "the transfer failed", "try again"), BusError),
+        (Failure("BusErrorOfTheFuture", "the transfer failed", "try again"), BusError),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_raises_the_recorded_error_and_goes_on(failure, kind):
+    bus = ReplayBus([Transaction("read", 0x75, 1, b"", 0, failure), READ])
+    with pytest.raises(BusError) as raised:
+        bus.read(0x75, 1)
+    assert type(raised.value) is kind
+    assert (raised.value.what, raised.value.remedy) == (failure.what, failure.remedy)
+    assert bus.read(0x75, 1).data == b"\x68"
+
+
+def test_events_come_between_the_accesses_they_were_recorded_between():
+    a, b, c, d = map(key, (1, 1500, 1600, 2500))
+    bus = ReplayBus([a, READ, b, c, WRITE, d])
+    assert bus.pending_events("key") == [a]
+    assert bus.pending_events("key") == []
+    bus.read(0x75, 1)
+    assert bus.pending_events("key") == [b, c]
+    bus.write(0x6B, b"\x80")
+    assert bus.pending_events("key") == [d]
+
+
+def test_an_event_nobody_asked_for_waits():
+    a, b, late = key(1), key(1500), SessionEvent("late", 1600, {})
+    bus = ReplayBus([a, READ, b, late])
+    bus.read(0x75, 1)
+    assert bus.pending_events("key") == [a, b]
+    assert bus.pending_events("late") == [late]
+    assert bus.pending_events("late") == []
+
+
+def test_an_event_does_not_come_before_a_refused_access():
+    bus = ReplayBus([READ, key(1500)])
+    with pytest.raises(CaptureError):
+        bus.read(0x76, 1)
+    assert bus.pending_events("key") == []
+
+
+def test_what_a_tap_records_of_a_replay_is_the_capture():
+    failed = Transaction("write", 0x6B, 1, b"\x01", 2000, Failure("NoAnswer", "gone", "come back"))
+    kept = []
+
+    class Recorder:
+        def transaction(self, transaction):
+            kept.append(transaction)
+
+    tap = Tap(ReplayBus([READ, WRITE, failed, FIFO]), Recorder())
+    tap.read(0x75, 1)
+    tap.write(0x6B, b"\x80")
+    with pytest.raises(NoAnswer):
+        tap.write(0x6B, b"\x01")
+    tap.read(0x74, 3)
+    assert kept == [READ, WRITE, failed, FIFO]

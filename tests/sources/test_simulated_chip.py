@@ -1,0 +1,371 @@
+"""The simulated chip's registers, sample clock and FIFO, against the register map."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.chip import registers as reg
+from mpucal.chip.access import EndOfCapture
+from mpucal.simulated.chip.chip import Chip
+from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.models import MODELS, OFFSETS
+
+MS = 1_000_000
+TRIM = (-1500, 2001, 700)
+PIECE = Factory(TRIM, (13, 22, 31), (9, 1, 30), (0.4, 0.5, 0.6), (30.0, -40.0, 50.0))
+
+
+class Counter:
+    """A feed whose samples are numbered: words 7 k, 7 k + 1, ... of sample k; remembers how it was asked."""
+
+    def __init__(self, end=None):
+        self.next, self.end, self.settings, self.edges = 0, end, [], []
+
+    def samples(self, edges_s, setting):
+        self.settings.append(setting)
+        self.edges.append(edges_s)
+        n = len(edges_s) - 1
+        if self.end is not None:
+            n = min(n, self.end - self.next)
+        rows = np.arange(7 * self.next, 7 * (self.next + n)).reshape(n, 7)
+        self.next += n
+        return rows.astype(np.int16)
+
+
+def chip(model="mpu6050", feed=None, ppm=0.0):
+    return Chip(MODELS[model], feed or Counter(), ppm, PIECE)
+
+
+def collecting(device, divider=4, sources=0xF8, config=1):
+    """The chip awake at 1 kHz / (1 + divider) from 0 on, its FIFO on."""
+    for register, value in (
+        (reg.PWR_MGMT_1, 0x01),
+        (reg.CONFIG, config),
+        (reg.SMPLRT_DIV, divider),
+        (reg.FIFO_EN, sources),
+        (reg.USER_CTRL, reg.USER_CTRL_FIFO_EN),
+    ):
+        device.write(register, bytes([value]), 0)
+    return device
+
+
+def count(device, t_ns):
+    return int.from_bytes(device.read(reg.FIFO_COUNT_H, 2, t_ns), "big")
+
+
+def words(data):
+    return np.frombuffer(data, ">i2").tolist()
+
+
+@pytest.mark.parametrize(
+    ("model", "register", "value"),
+    [
+        pytest.param("mpu6050", reg.WHO_AM_I, 0x68, id="6050 identity"),
+        pytest.param("mpu6500", reg.WHO_AM_I, 0x70, id="6500 identity"),
+        pytest.param("clone98", reg.WHO_AM_I, 0x98, id="clone identity"),
+        pytest.param("mpu6050", reg.PWR_MGMT_1, 0x40, id="6050 asleep"),
+        pytest.param("mpu6500", reg.PWR_MGMT_1, 0x01, id="6500 awake"),
+        pytest.param("mpu6050", reg.SMPLRT_DIV, 0, id="divider"),
+        pytest.param("mpu6050", 0x06, 0xFA, id="6050 trim, high byte of x"),
+        pytest.param("mpu6050", 0x07, 0x24, id="6050 trim, low byte of x"),
+        pytest.param("mpu6050", 0x77, 0x00, id="6050 has none at the 6500's address"),
+        pytest.param("mpu6500", 0x7A, 0x07, id="6500 trim, high byte of y"),
+        pytest.param("mpu6500", 0x7B, 0xD1, id="6500 trim, low byte of y"),
+        pytest.param("mpu6500", 0x06, 0x00, id="6500 has none at the 6050's address"),
+    ],
+)
+def test_values_after_reset(model, register, value):
+    device = chip(model)
+    device.write(reg.SMPLRT_DIV, b"\x09", 0)
+    device.write(reg.PWR_MGMT_1, b"\x80", 0)
+    assert device.read(register, 1, 0) == bytes([value])
+
+
+@pytest.mark.parametrize(
+    ("model", "register", "written", "kept"),
+    [
+        pytest.param("mpu6050", reg.SMPLRT_DIV, 0x13, 0x13, id="a configuration register"),
+        pytest.param("mpu6050", reg.WHO_AM_I, 0x12, 0x68, id="read-only"),
+        pytest.param("mpu6050", 0x50, 0xFF, 0x00, id="no such register"),
+        pytest.param("mpu6050", reg.ACCEL_CONFIG2, 0x03, 0x00, id="6050 has no ACCEL_CONFIG2"),
+        pytest.param("mpu6500", reg.ACCEL_CONFIG2, 0x03, 0x03, id="6500 has"),
+        pytest.param("mpu6050", reg.SIGNAL_PATH_RESET, 0x07, 0x00, id="clears itself"),
+        pytest.param("mpu6050", reg.USER_CTRL, 0x44, 0x40, id="FIFO_RESET clears itself"),
+        pytest.param("mpu6050", reg.USER_CTRL, 0x01, 0x00, id="SIG_COND_RESET clears itself"),
+        pytest.param("mpu6050", 0x07, 0xFF, 0xFF, id="an offset"),
+        pytest.param("mpu6500", 0x7E, 0xFE, 0xFE, id="an offset of the 6500"),
+    ],
+)
+def test_what_a_write_leaves(model, register, written, kept):
+    device = chip(model)
+    device.write(register, bytes([written]), 0)
+    assert device.read(register, 1, 0) == bytes([kept])
+
+
+def test_a_burst_goes_on_from_register_to_register():
+    device = chip()
+    device.write(reg.SMPLRT_DIV, b"\x04\x03\x08\x10", 0)
+    assert device.read(reg.SMPLRT_DIV, 4, 0) == b"\x04\x03\x08\x10"
+
+
+def test_asleep_it_takes_no_samples():
+    device = collecting(chip())
+    device.write(reg.PWR_MGMT_1, b"\x40", 20 * MS)
+    assert count(device, 900 * MS) == 4 * 14
+
+
+def test_the_sensor_registers_hold_the_last_sample():
+    feed = Counter()
+    device = collecting(chip(feed=feed), divider=9)
+    assert words(device.read(reg.ACCEL_XOUT_H, 14, 39 * MS)) == list(range(14, 21))
+    assert words(device.read(reg.GYRO_XOUT_H, 2, 39 * MS)) == [18]
+
+
+def test_without_fifo_only_the_last_sample_is_measured():
+    feed = Counter()
+    device = chip(feed=feed)
+    device.write(reg.CONFIG, b"\x01", 0)
+    device.write(reg.PWR_MGMT_1, b"\x01", 0)
+    assert words(device.read(reg.TEMP_OUT_H, 2, 500 * MS)) == [3]
+    np.testing.assert_allclose(feed.edges[0], [0.499, 0.500])
+
+
+def test_reading_int_status_clears_it():
+    device = collecting(chip())
+    seen = [device.read(reg.INT_STATUS, 1, t * MS)[0] for t in (1, 6, 7, 11)]
+    assert seen == [0, reg.INT_DATA_RDY, 0, reg.INT_DATA_RDY]
+
+
+@pytest.mark.parametrize(
+    ("sources", "columns"),
+    [
+        pytest.param(0xF8, [0, 1, 2, 3, 4, 5, 6], id="all"),
+        pytest.param(0x08, [0, 1, 2], id="accelerometer"),
+        pytest.param(0x78, [0, 1, 2, 4, 5, 6], id="without temperature"),
+        pytest.param(0x80, [3], id="temperature"),
+        pytest.param(0x30, [5, 6], id="gyroscope y and z"),
+    ],
+)
+def test_a_frame_holds_the_enabled_sources_in_register_order(sources, columns):
+    device = collecting(chip(), sources=sources)
+    assert count(device, 10 * MS) == 2 * 2 * len(columns)
+    frames = device.read(reg.FIFO_R_W, 2 * 2 * len(columns), 10 * MS)
+    assert words(frames) == columns + [7 + c for c in columns]
+
+
+def test_a_frame_is_big_endian():
+    class Odd(Counter):
+        def samples(self, edges_s, setting):
+            return np.full((len(edges_s) - 1, 7), -2, np.int16)
+
+    assert collecting(chip(feed=Odd())).read(reg.FIFO_R_W, 4, 5 * MS) == b"\xff\xfe\xff\xfe"
+
+
+def test_reading_the_high_byte_latches_the_count():
+    device = collecting(chip(), divider=0)
+    assert device.read(reg.FIFO_COUNT_H, 1, 20 * MS) == b"\x01"
+    assert device.read(reg.FIFO_COUNT_L, 1, 60 * MS) == b"\x18"  # 20 frames, not 60
+    assert count(device, 60 * MS) == 60 * 14
+
+
+def test_an_empty_fifo_returns_the_last_byte_again():
+    device = collecting(chip())
+    assert device.read(reg.FIFO_R_W, 17, 5 * MS) == bytes([0, 0, 0, 1, 0, 2, 0, 3, 0, 4, 0, 5, 0, 6, 6, 6, 6])
+
+
+@pytest.mark.parametrize(
+    ("model", "accel_config2", "size"),
+    [
+        pytest.param("mpu6050", None, 1024, id="6050"),
+        pytest.param("mpu6500", None, 512, id="6500"),
+        pytest.param("clone98", None, 512, id="clone"),
+        pytest.param("clone98", 0xC0, 4096, id="clone, widened"),
+    ],
+)
+def test_overflow_drops_the_oldest_bytes_and_misaligns(model, accel_config2, size):
+    device = chip(model)
+    if accel_config2 is not None:
+        device.write(reg.ACCEL_CONFIG2, bytes([accel_config2]), 0)
+    collecting(device, divider=0)
+    frames = size // 14 + 5
+    assert count(device, frames * MS) == size
+    assert device.read(reg.INT_STATUS, 1, frames * MS)[0] & reg.INT_FIFO_OFLOW
+    everything = np.arange(7 * frames).astype(">i2").tobytes()
+    assert device.read(reg.FIFO_R_W, size, frames * MS) == everything[-size:]
+    assert size % 14 != 0
+
+
+def test_after_an_overflow_frames_stay_misaligned_until_the_fifo_is_reset():
+    device = collecting(chip(), divider=0)
+    count(device, 100 * MS)
+    device.read(reg.FIFO_R_W, 14 * 73, 100 * MS)
+    misaligned = device.read(reg.FIFO_R_W, 14, 110 * MS)
+    assert words(misaligned)[0] % 7 != 0
+    for value in (0x00, 0x04, 0x40):
+        device.write(reg.USER_CTRL, bytes([value]), 110 * MS)
+    aligned = device.read(reg.FIFO_R_W, 14, 111 * MS)
+    assert words(aligned) == list(range(770, 777))
+
+
+def test_told_to_stop_when_full_it_keeps_the_oldest():
+    device = collecting(chip(), divider=0, config=1 | reg.CONFIG_FIFO_MODE_STOP)
+    assert count(device, 100 * MS) == 1024
+    assert words(device.read(reg.FIFO_R_W, 14, 100 * MS)) == list(range(7))
+
+
+@pytest.mark.parametrize(
+    ("model", "value", "left"),
+    [
+        pytest.param("mpu6050", 0x44, 28, id="6050, still on: not reset"),
+        pytest.param("mpu6050", 0x04, 0, id="6050, off"),
+        pytest.param("mpu6500", 0x44, 0, id="6500, still on"),
+    ],
+)
+def test_fifo_reset(model, value, left):
+    device = collecting(chip(model))
+    device.write(reg.USER_CTRL, bytes([value]), 11 * MS)
+    assert count(device, 11 * MS) == left
+
+
+@pytest.mark.parametrize("ppm", [-8000.0, 0.0, 4000.0])
+def test_it_fills_at_its_own_clock(ppm):
+    feed = Counter()
+    device = collecting(chip(feed=feed, ppm=ppm), sources=reg.FIFO_EN_TEMP)
+    for t in range(20, 20_001, 20):
+        device.read(reg.FIFO_R_W, count(device, t * MS), t * MS)
+    edges = np.unique(np.round(np.concatenate(feed.edges), 9))
+    np.testing.assert_allclose(np.diff(edges), 1 / (200 * (1 + ppm * 1e-6)), rtol=1e-5)
+    assert feed.next == int(20 * 200 * (1 + ppm * 1e-6))
+
+
+@pytest.mark.parametrize(
+    ("config", "divider", "rate_hz"),
+    [
+        pytest.param(3, 4, 200.0, id="filtered"),
+        pytest.param(0, 7, 1000.0, id="filter 0 has a base of 8 kHz"),
+        pytest.param(7, 39, 200.0, id="filter 7 too"),
+    ],
+)
+def test_the_rate_follows_divider_and_filter(config, divider, rate_hz):
+    feed = Counter()
+    collecting(chip(feed=feed), divider=divider, config=config).read(reg.FIFO_R_W, 1, 10 * MS)
+    assert feed.settings[-1].rate_hz == rate_hz
+
+
+@pytest.mark.parametrize("code", range(4))
+def test_the_ranges_follow_the_configuration(code):
+    feed = Counter()
+    device = chip(feed=feed)
+    device.write(reg.GYRO_CONFIG, bytes([code << 3, code << 3]), 0)
+    collecting(device).read(reg.FIFO_R_W, 1, 5 * MS)
+    setting = feed.settings[-1]
+    assert (setting.accel_range_g, setting.gyro_range_dps) == (2 << code, 250 << code)
+
+
+@pytest.mark.parametrize(
+    ("model", "address"), [pytest.param("mpu6050", 0x08, id="6050"), pytest.param("mpu6500", 0x7A, id="6500")]
+)
+def test_offset_registers_act_by_what_differs_from_the_factory_trim(model, address):
+    feed = Counter()
+    device = chip(model, feed)
+    old = int.from_bytes(device.read(address, 2, 0), "big", signed=True)
+    device.write(address, (old + 256).to_bytes(2, "big", signed=True), 0)
+    device.write(reg.XG_OFFSET_H, (131).to_bytes(2, "big"), 0)
+    collecting(device).read(reg.FIFO_R_W, 1, 5 * MS)
+    setting = feed.settings[-1]
+    assert setting.accel_offset_g == (0.0, 0.125, 0.0)
+    assert setting.gyro_offset_dps == pytest.approx((4.0, 0.0, 0.0))
+    device.write(reg.PWR_MGMT_1, b"\x80", 6 * MS)
+    assert int.from_bytes(device.read(address, 2, 6 * MS), "big", signed=True) == old
+
+
+def test_bit_0_of_an_offset_is_reserved():
+    feed = Counter()
+    device = chip(feed=feed)
+    device.write(0x08, (TRIM[1] ^ 1).to_bytes(2, "big", signed=True), 0)
+    collecting(device).read(reg.FIFO_R_W, 1, 5 * MS)
+    assert feed.settings[-1].accel_offset_g == (0.0, 0.0, 0.0)
+
+
+def test_a_feed_that_ends_is_served_to_its_last_sample():
+    device = collecting(chip(feed=Counter(end=5)))
+    assert count(device, 20 * MS) == 4 * 14
+    assert count(device, 90 * MS) == 5 * 14
+    assert words(device.read(reg.FIFO_R_W, 5 * 14, 95 * MS)) == list(range(35))
+    with pytest.raises(EndOfCapture):
+        count(device, 100 * MS)
+
+
+def test_the_sensor_registers_end_with_the_feed():
+    device = chip(feed=Counter(end=0))
+    device.write(reg.PWR_MGMT_1, b"\x01", 0)
+    with pytest.raises(EndOfCapture):
+        device.read(reg.ACCEL_XOUT_H, 6, 10 * MS)
+
+
+def test_another_identity_is_still_the_same_chip():
+    device = Chip(replace(MODELS["mpu6500"], who_am_i=0x71), Counter(), 0.0, PIECE)
+    assert device.read(reg.WHO_AM_I, 1, 0) == b"\x71"
+    assert device.read(0x77, 2, 0) == TRIM[0].to_bytes(2, "big", signed=True)
+
+
+@pytest.mark.parametrize(
+    ("model", "held"),
+    [
+        # x: 0b01101 and 9, y: 0b10110 and 1, z: 0b11111 and 30
+        pytest.param(
+            "mpu6050", {0x0D: 0b011_01001, 0x0E: 0b101_00001, 0x0F: 0b111_11110, 0x10: 0b01_10_11}, id="packed"
+        ),
+        pytest.param("mpu6500", {0x00: 9, 0x01: 1, 0x02: 30, 0x0D: 13, 0x0E: 22, 0x0F: 31}, id="a byte each"),
+    ],
+)
+def test_the_factorys_self_test_codes(model, held):
+    device = chip(model)
+    assert {register: device.read(register, 1, 0)[0] for register in held} == held
+
+
+@pytest.mark.parametrize("model", ["mpu6050", "mpu6500", "clone98"])
+def test_self_test_adds_what_the_piece_answers_on_the_axes_asked_for(model):
+    feed = Counter()
+    device = chip(model, feed)
+    device.write(reg.GYRO_CONFIG, b"\x80\x68", 0)
+    collecting(device).read(reg.FIFO_R_W, 1, 5 * MS)
+    assert feed.settings[-1].gyro_offset_dps == (30.0, 0.0, 0.0)
+    assert feed.settings[-1].accel_offset_g == (0.0, 0.5, 0.6)
+    assert feed.settings[-1].accel_range_g == 4
+
+
+@pytest.mark.parametrize("model", ["mpu6050", "mpu6500"])
+def test_a_drawn_piece_answers_its_self_test_as_its_codes_say(model):
+    family = MODELS[model].family
+    for seed in range(20):
+        piece = Factory.draw(np.random.default_rng(seed), family)
+        for axis in range(3):
+            accel, gyro = piece.accel_codes[axis], piece.gyro_codes[axis]
+            if family.packed_self_test:
+                expected = 0.34 * (0.92 / 0.34) ** ((accel - 1) / 30), (25, -25, 25)[axis] * 1.046 ** (gyro - 1)
+            else:
+                expected = 2620 * 1.01 ** (accel - 1) / 16384, 2620 * 1.01 ** (gyro - 1) / 131
+            answered = piece.accel_self_test_g[axis], piece.gyro_self_test_dps[axis]
+            assert np.divide(answered, expected) == pytest.approx([1, 1], abs=0.05)
+            assert 0.2 < answered[0] < 1.0
+
+
+def test_revision_c_has_half_the_sensitivity():
+    feed = Counter()
+    device = collecting(chip("mpu6050c", feed))
+    device.write(reg.ACCEL_CONFIG, b"\x08", 0)
+    device.read(reg.FIFO_R_W, 1, 5 * MS)
+    assert feed.settings[-1].accel_range_g == 8
+
+
+@pytest.mark.parametrize(
+    ("offsets", "offset_g"), [("2048", 0.125), ("4096", 0.0625), ("readonly", 0.0)], ids=["2048", "4096", "readonly"]
+)
+def test_what_an_offset_does_can_be_chosen(offsets, offset_g):
+    feed = Counter()
+    device = Chip(replace(MODELS["mpu6050"], **OFFSETS[offsets]), feed, 0.0, PIECE)
+    device.write(0x06, (TRIM[0] + 256).to_bytes(2, "big", signed=True), 0)
+    collecting(device).read(reg.FIFO_R_W, 1, 5 * MS)
+    assert feed.settings[-1].accel_offset_g == (offset_g, 0.0, 0.0)

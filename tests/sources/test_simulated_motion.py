@@ -1,0 +1,233 @@
+"""The simulated hand's motion: what the samples average, and what the kinds of hand do when they are told."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mpucal.simulated import rotation
+from mpucal.simulated.hand import KINDS
+from mpucal.simulated.motion import AHEAD_S, Motion, Wobble
+
+GRAVITY = 9.81
+PERIOD_S = 1 / (200 * 1.00371)
+
+
+def prompt(kind, down=None):
+    return SimpleNamespace(kind=kind, down=down)
+
+
+class Run:
+    """A session with a hand: prompts (s, prompt) at their times, and means over every sample."""
+
+    def __init__(self, kind, prompts, seconds, seed=3, poll=20):
+        hand, motion = np.random.default_rng(seed).spawn(2)
+        self.motion = Motion(KINDS[kind](hand), motion, GRAVITY)
+        self.first_attitude = self.motion.attitude(0.0)
+        forces, rates, waiting = [], [], list(prompts)
+        for i in range(0, int(seconds / PERIOD_S), poll):
+            while waiting and waiting[0][0] <= i * PERIOD_S:
+                self.motion.hear(waiting.pop(0)[1], i * PERIOD_S)
+            force, rate = self.motion.means(np.arange(i, i + poll + 1) * PERIOD_S)
+            forces.append(force)
+            rates.append(rate)
+        self.force, self.rate = np.concatenate(forces), np.concatenate(rates)
+        self.end_s = len(self.force) * PERIOD_S
+
+    def part(self, array, first_s, last_s):
+        return array[int(first_s / PERIOD_S) : int(last_s / PERIOD_S)]
+
+    def pauses(self):
+        """The mean specific force of every second in which the board did not turn."""
+        n = int(1 / PERIOD_S)
+        seconds = [slice(i, i + n) for i in range(0, len(self.rate) - n, n // 4)]
+        return np.array([self.force[s].mean(0) for s in seconds if np.abs(self.rate[s]).max() < 0.1])
+
+
+def matrix(q):
+    """The rotation matrix of a quaternion, by Rodrigues' formula instead of the quaternion's."""
+    angle = 2 * np.arctan2(np.linalg.norm(q[1:]), q[0])
+    if angle == 0:
+        return np.eye(3)
+    x, y, z = q[1:] / np.linalg.norm(q[1:])
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def turned(rates):
+    """The product of every sample's turn, as matrices."""
+    R = np.eye(3)
+    for half in rates * PERIOD_S / 2:
+        angle = np.linalg.norm(half)
+        R = R @ matrix(np.concatenate(([np.cos(angle)], half * np.sinc(angle / np.pi))))
+    return R
+
+
+SESSION = ((0.0, prompt("lay_flat")), (12.0, prompt("rotate")))
+
+
+@pytest.mark.parametrize("kind", ["guided", "random", "restless"])
+def test_the_rates_integrate_to_the_attitude(kind):
+    run = Run(kind, SESSION, 60.0)
+    R = matrix(run.first_attitude) @ turned(run.rate)
+    error = R.T @ matrix(run.motion.attitude(run.end_s))
+    assert np.degrees(np.arccos(min(1.0, (np.trace(error) - 1) / 2))) < 0.02
+
+
+@pytest.mark.parametrize("poll", [1, 4, 100])
+def test_the_motion_does_not_depend_on_how_it_is_asked(poll):
+    run, other = Run("guided", SESSION[:1], 10.0), Run("guided", SESSION[:1], 10.0, poll=poll)
+    n = min(len(run.force), len(other.force))
+    np.testing.assert_allclose(other.force[:n], run.force[:n], atol=1e-9)
+    np.testing.assert_allclose(other.rate[:n], run.rate[:n], atol=1e-9)
+
+
+def test_another_seed_is_another_person():
+    a, b = Run("guided", SESSION, 14.0, seed=1), Run("guided", SESSION, 14.0, seed=2)
+    assert np.abs(a.force - b.force).max() > 0.1
+
+
+def test_it_reacts_no_sooner_than_a_person_and_no_later():
+    for seed in range(10):
+        run = Run("guided", ((4.0, prompt("lay_flat")), (12.0, prompt("rotate"))), 14.5, seed=seed)
+        flat = np.abs(run.rate).max(axis=1) < 1e-9
+        assert not run.part(flat, 0.0, 4.5).any()
+        assert run.part(flat, 11.0, 12.4).all()
+        assert not run.part(flat, 13.7, 14.5).any()
+
+
+def test_what_is_settled_ahead_is_less_than_a_reaction():
+    assert AHEAD_S < 0.5
+
+
+def test_told_to_lay_flat_the_board_lies_flat_and_perfectly_still():
+    run = Run("guided", SESSION[:1], 12.0)
+    np.testing.assert_allclose(run.part(run.force, 5.0, 12.0), [[0, 0, GRAVITY]] * 1405, atol=1e-9)
+    assert np.abs(run.part(run.rate, 5.0, 12.0)).max() < 1e-12
+
+
+def test_told_to_be_still_while_laying_flat_it_goes_on_laying_flat():
+    run = Run("guided", ((0.0, prompt("lay_flat")), (0.1, prompt("hold_still"))), 8.0)
+    np.testing.assert_allclose(run.force[-1], [0, 0, GRAVITY], atol=1e-9)
+
+
+def test_told_to_rest_it_puts_the_board_down():
+    run = Run("guided", (*SESSION, (25.0, prompt("rest"))), 35.0)
+    assert np.abs(run.part(run.rate, 31.0, 35.0)).max() < 1e-12
+
+
+def test_told_the_same_twice_it_goes_on():
+    once = Run("guided", SESSION, 30.0)
+    twice = Run("guided", (*SESSION, (17.0, prompt("rotate"))), 30.0)
+    np.testing.assert_array_equal(once.force, twice.force)
+
+
+def test_a_prompt_it_does_not_know_changes_nothing():
+    np.testing.assert_array_equal(
+        Run("guided", (*SESSION, (17.0, prompt("sing"))), 30.0).rate.round(3)[:3000],
+        Run("guided", SESSION, 30.0).rate.round(3)[:3000],
+    )
+
+
+def test_in_the_hand_still_is_not_still():
+    trembles = []
+    for seed in range(12):
+        run = Run("still", (), 10.0, seed=seed)
+        up = run.force.mean(axis=0)
+        trembles.append((run.force - up).std(axis=0).mean())
+        assert 0.5 < np.degrees(np.sqrt((run.rate**2).sum(axis=1).mean())) < 1.5
+    # tremor of 0.05 to 0.1 m/s^2, and some tilting
+    assert 0.04 < min(trembles) < max(trembles) < 0.15
+
+
+def test_asked_for_a_direction_it_misses_by_less_than_8_degrees():
+    misses = []
+    for seed in range(16):
+        down = np.array([0.6, 0.0, 0.8]) if seed % 2 else np.array([-1.0, 0.0, 0.0])
+        run = Run("guided", ((0.0, prompt("lay_flat")), (6.0, prompt("rotate", tuple(down)))), 10.5, seed=seed)
+        force = run.part(run.force, 9.4, 9.9).mean(axis=0)
+        misses.append(np.degrees(np.arccos(-force @ down / np.linalg.norm(force))))
+    assert np.median(misses) > 3.0
+    assert max(misses) < 9.0
+
+
+def test_turning_it_shows_different_orientations_with_pauses():
+    run = Run("guided", SESSION, 62.0)
+    poses = run.pauses() / np.linalg.norm(run.pauses(), axis=1, keepdims=True)
+    distinct = []
+    for pose in poses:
+        if all(pose @ other < np.cos(np.radians(25)) for other in distinct):
+            distinct.append(pose)
+    assert len(distinct) >= 12
+    tilted = [pose for pose in distinct if np.sort(np.abs(pose))[1] > 0.4]
+    assert len(tilted) >= 5
+    assert np.abs(np.linalg.norm(run.pauses(), axis=1) - GRAVITY).max() < 0.2
+
+
+def test_moving_the_hand_accelerates_the_board():
+    run = Run("guided", SESSION, 62.0)
+    moving = np.linalg.norm(run.rate, axis=1) > 0.5
+    excess = np.linalg.norm(run.force, axis=1)[moving] - GRAVITY
+    assert 0.2 < excess.std() < 1.5
+    assert np.degrees(np.abs(run.rate).max()) < 250
+
+
+def test_the_random_hand_turns_all_the_time():
+    run = Run("random", SESSION, 62.0)
+    rate = np.degrees(run.part(run.rate, 16.0, 62.0))
+    np.testing.assert_allclose(rate.std(axis=0), 80, atol=20)
+    assert len(run.pauses()) < 60
+    assert np.abs(rate).max() < 500
+
+
+def test_the_still_hand_does_not_turn():
+    run = Run("still", SESSION, 30.0)
+    assert np.abs(run.part(run.rate, 5.0, 30.0)).max() < 1e-12
+
+
+def test_the_restless_hand_never_lies_still():
+    run = Run("restless", SESSION[:1], 30.0)
+    for i in range(0, len(run.rate) - 200, 100):
+        assert run.rate[i : i + 200].std(axis=0).max() > 0.03
+
+
+def test_a_wobble_has_its_strength_and_its_integral():
+    wobble = Wobble(np.random.default_rng(5), (2.0, 10.0), 0.3)
+    n, step = 400, 1 / 2000
+    blocks = [(wobble.at(first, n), wobble.integral(first, n)) for first in range(0, 40000, n)]
+    values, integral = (np.concatenate(part) for part in zip(*blocks, strict=True))
+    np.testing.assert_allclose(values.std(axis=0), 0.3, rtol=0.1)
+    slope = np.gradient(integral, step, axis=0)
+    np.testing.assert_allclose(slope[1:-1], values[1:-1], atol=2e-3)
+    spectrum = np.abs(np.fft.rfft(values, axis=0)) ** 2
+    frequency = np.fft.rfftfreq(len(values), step)
+    assert spectrum[(frequency > 1.5) & (frequency < 10.5)].sum() > 0.99 * spectrum.sum()
+
+
+def test_quaternions_against_matrices():
+    rng = np.random.default_rng(1)
+    steps = rng.normal(size=(300, 3)) * 0.3
+    running = rotation.running_product(rotation.IDENTITY, rotation.exp(steps))
+    R = np.eye(3)
+    for q, step in zip(running[1:], steps, strict=True):
+        R = R @ matrix(rotation.exp(step))
+        np.testing.assert_allclose(matrix(q), R, atol=1e-9)
+        np.testing.assert_allclose(rotation.up_in_board(q), R[2], atol=1e-9)
+    np.testing.assert_allclose(rotation.between(running), steps, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("a", "b"),
+    [
+        pytest.param([0, 0, 1], [0, 0, 1], id="the same"),
+        pytest.param([0, 0, 1], [0, 0, -1], id="opposite"),
+        pytest.param([1, 0, 0], [-1, 0, 0], id="opposite x"),
+        pytest.param([1, 0, 0], [0, 0.6, 0.8], id="across"),
+        pytest.param([0, 0, 1], [0, 1e-5, 1], id="nearly the same"),
+    ],
+)
+def test_the_shortest_turn(a, b):
+    a, b = (np.array(v) / np.linalg.norm(v) for v in (a, b))
+    turn = rotation.shortest_turn(a, b)
+    np.testing.assert_allclose(matrix(rotation.exp(turn)) @ a, b, atol=1e-9)
+    assert np.linalg.norm(turn) == pytest.approx(np.arccos(np.clip(a @ b, -1, 1)), abs=1e-7)

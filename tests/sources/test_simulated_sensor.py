@@ -1,0 +1,111 @@
+"""The simulated sensor: its truth, and what it makes of a motion."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mpucal.simulated.sensor import Setting, Truth, in_symmetric_frame
+
+G0 = 9.80665
+STILL = np.tile([0.0, 0.0, 9.81], (4000, 1))
+NO_TURN = np.zeros((4000, 3))
+
+
+def setting(rate_hz=200.0, accel_range_g=4.0, gyro_range_dps=500.0, **offsets):
+    return Setting(rate_hz, accel_range_g, gyro_range_dps, 340.0, 36.53, **offsets)
+
+
+def counts(truth, how, force=STILL, omega=NO_TURN):
+    return truth.response(how).counts(force, omega, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_a_drawn_sensor_lies_within_the_data_sheet(seed):
+    truth = Truth.draw(seed)
+    gyro = np.linalg.inv(truth.K)
+    np.testing.assert_array_equal(truth.K, truth.K.T)
+    # the symmetric half of +-3 % on and +-2 % off the diagonal
+    assert np.abs(gyro - np.eye(3)).max() < 0.035
+    gains = np.linalg.norm(truth.D, axis=1)
+    assert np.all((gains > 0.97 - 1e-9) & (gains < 1.03 + 1e-9))
+    # misalignment and cross-axis, and half of the gyro's own
+    assert np.abs(truth.D - np.diag(np.diag(truth.D))).max() < 0.085
+    assert np.abs(truth.b_a).max() <= 0.08 * G0
+    assert np.degrees(np.abs(truth.b_omega)).max() <= 20
+    assert abs(truth.rate_error_ppm) <= 10_000
+
+
+def test_a_seed_is_a_sensor():
+    assert Truth.draw(7).document() == Truth.draw(7).document()
+    assert Truth.draw(7).document() != Truth.draw(8).document()
+
+
+def test_the_document_is_plain_json():
+    truth = Truth.draw(1, "mpu6500", 9.82)
+    document = json.loads(json.dumps(truth.document()))
+    assert document["D"] == truth.D.tolist()
+    assert {"D", "b_a", "K", "b_omega", "gravity", "seed", "rate_error_ppm", "chip"} <= set(document)
+    assert (document["gravity"], document["seed"], document["chip"]) == (9.82, 1, "mpu6500")
+
+
+def test_the_symmetric_frame_is_another_view_of_the_same_sensor():
+    rng = np.random.default_rng(2)
+    D, K = np.eye(3) + rng.normal(size=(3, 3)) * 0.1, np.eye(3) + rng.normal(size=(3, 3)) * 0.1
+    D2, K2 = in_symmetric_frame(D, K)
+    np.testing.assert_allclose(K2, K2.T, atol=1e-12)
+    assert np.all(np.linalg.eigvalsh(K2) > 0)
+    # what is seen by both of one turn and one force: K and D differ by one rotation
+    Q = K2 @ np.linalg.inv(K)
+    np.testing.assert_allclose(Q @ Q.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(Q) == pytest.approx(1.0)
+    np.testing.assert_allclose(D2 @ Q, D, atol=1e-12)
+
+
+@pytest.mark.parametrize("rate_hz", [100.0, 1000.0])
+@pytest.mark.parametrize(("g", "dps"), [(2.0, 250.0), (16.0, 2000.0)])
+def test_counts_at_rest_have_the_truth_as_mean_and_the_density_as_spread(rate_hz, g, dps):
+    truth = Truth.draw(3)
+    seen = counts(truth, setting(rate_hz, g, dps)).astype(float)
+    lsb_per_g, lsb_per_dps = 32768 / g, 131 * 250 / dps
+    force = truth.D[:, 2] * 9.81 + truth.b_a
+    acc, gyr = (density * np.sqrt(rate_hz / 2) for density in (400e-6 * lsb_per_g, 0.005 * lsb_per_dps))
+    means = seen.mean(axis=0)
+    np.testing.assert_allclose(means[:3], force / G0 * lsb_per_g, atol=4.5 * acc / np.sqrt(len(seen)) + 0.1)
+    rest = np.degrees(truth.b_omega) * lsb_per_dps
+    np.testing.assert_allclose(means[4:], rest, atol=4.5 * gyr / np.sqrt(len(seen)) + 0.1)
+    assert seen[:, 3].mean() / 340 + 36.53 == pytest.approx(truth.temperature_c, abs=0.01)
+    rounding = 1 / 12
+    np.testing.assert_allclose(seen[:, :3].std(axis=0), np.sqrt(acc**2 + rounding), rtol=0.05)
+    # a spread below the step is rounded to one of two counts
+    if gyr > 0.5:
+        np.testing.assert_allclose(seen[:, 4:].std(axis=0), np.sqrt(gyr**2 + rounding), rtol=0.05)
+
+
+def test_rates_and_forces_come_back_through_the_calibration():
+    truth = Truth.draw(4)
+    rng = np.random.default_rng(4)
+    force, omega = rng.uniform(-15, 15, (5000, 3)), rng.uniform(-3, 3, (5000, 3))
+    seen = counts(truth, setting(), force, omega)
+    y_a = seen[:, :3] / 8192 * G0
+    y_w = np.radians(seen[:, 4:] / 65.5)
+    back = np.linalg.solve(truth.D, (y_a - truth.b_a).T).T - force
+    np.testing.assert_allclose(back.mean(axis=0), 0, atol=0.003)
+    assert np.abs(back).max() < 0.25
+    rates = (y_w - truth.b_omega) @ truth.K.T - omega
+    np.testing.assert_allclose(rates.mean(axis=0), 0, atol=1e-4)
+    assert np.abs(rates).max() < 0.01
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_it_saturates_at_the_ends_of_the_range(sign):
+    seen = counts(Truth.draw(5), setting(accel_range_g=2.0), sign * 100 * np.ones((9, 3)), sign * 50 * np.ones((9, 3)))
+    end = 32767 if sign > 0 else -32768
+    assert np.all(seen[:, [0, 1, 2, 4, 5, 6]] == end)
+
+
+def test_offsets_add_what_the_registers_say():
+    truth = Truth.draw(6)
+    plain = counts(truth, setting()).astype(float).mean(axis=0)
+    moved = counts(truth, setting(accel_offset_g=(0.125, 0, -0.5), gyro_offset_dps=(0, 4, 0)))
+    np.testing.assert_allclose(moved.astype(float).mean(axis=0) - plain, [1024, 0, -4096, 0, 0, 262, 0], atol=0.1)

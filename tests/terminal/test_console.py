@@ -1,0 +1,43 @@
+"""Which kind of talk the streams allow; the kinds themselves are tested in tests/terminal."""
+
+import io
+import sys
+
+import pytest
+
+from mpucal.session.events import Prompt, PromptKind
+from mpucal.terminal.console import console
+from mpucal.terminal.lines import JsonLines, Lines
+from mpucal.terminal.screen import Screen
+
+
+class Terminal(io.StringIO):
+    encoding = "utf-8"
+
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize(
+    ("err", "term", "as_json", "kind"),
+    [
+        (Terminal, "xterm-256color", False, Screen),
+        (Terminal, "dumb", False, Lines),
+        (Terminal, "", False, Lines),
+        (Terminal, "xterm", True, JsonLines),
+        (io.StringIO, "xterm", False, Lines),
+        (io.StringIO, "xterm", True, JsonLines),
+    ],
+    ids=["terminal", "dumb", "no TERM", "terminal, json", "pipe", "pipe, json"],
+)
+def test_what_the_streams_allow(monkeypatch, err, term, as_json, kind):
+    monkeypatch.setattr(sys, "stderr", err())
+    monkeypatch.setenv("TERM", term)
+    assert type(console(quiet=False, as_json=as_json)) is kind
+
+
+@pytest.mark.parametrize(("beep", "rings"), [(None, 0), (True, 1), (False, 0)])
+def test_lines_ring_only_when_asked(monkeypatch, beep, rings):
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    console(quiet=True, beep=beep).hear(Prompt(PromptKind.ROTATE, "Turn it."))
+    assert sys.stderr.getvalue().count("\a") == rings
