@@ -9,6 +9,7 @@ from itertools import product as choices
 import numpy as np
 
 from ..data import Mask, Recording
+from ..result.error_model import sensor_axes
 from .blockers import Check, Reason
 from .evidence import Evidence, Rests
 from .tilt import CONE_RAD
@@ -113,7 +114,7 @@ def wrong_range(e: Evidence) -> Reason | None:
     """All three gains near one power of two."""
     if e.fit is None or not _trustworthy(e):
         return None
-    gains = np.linalg.norm(e.fit.D, axis=0)
+    gains = np.diag(sensor_axes(e.fit.D))
     power = np.round(np.log2(gains)).astype(int)
     if power[0] == 0 or not (power == power[0]).all() or not (np.abs(gains / 2.0 ** power[0] - 1.0) < 0.05).all():
         return None
@@ -129,7 +130,7 @@ def accelerometer_factor(e: Evidence) -> Reason | None:
     """All three gains off by one factor that is no range's, and far beyond what a sensor is off by."""
     if e.fit is None or not _trustworthy(e) or wrong_range(e) is not None:
         return None
-    gains = np.linalg.norm(e.fit.D, axis=0)
+    gains = np.diag(sensor_axes(e.fit.D))
     factor = float(gains.mean())
     if 1.0 / MOST_GAIN < factor < MOST_GAIN or not (np.abs(gains / factor - 1.0) < 0.05).all():
         return None

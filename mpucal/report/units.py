@@ -1,4 +1,4 @@
-"""A calibration in the units that people use: %, mg, degrees. Knows no page and no terminal."""
+"""The rows that the report and the terminal show of a calibration: %, mg and degrees with their standard deviations."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..data import Vector
+from ..result import error_model
 from ..result.calibration import Calibration, unknown
 
 
@@ -28,9 +29,8 @@ class Measured:
 
 def accelerometer(c: Calibration) -> list[Measured]:
     """Gain error, bias, and how far each axis leans towards the other two; NaN where that is itself."""
-    gain = Measured("gain error", "%", 100.0 * (np.diag(c.D) - 1.0), 100.0 * np.diag(c.D_std))
-    to_mg = 1000.0 / STANDARD_GRAVITY_MPS2
-    return [gain, Measured("bias", "mg", to_mg * c.b_a, to_mg * c.b_a_std), *_leans(c.D, c.D_std)]
+    bias = Measured("bias", "mg", error_model.bias_mg(c.b_a), error_model.bias_mg(c.b_a_std))
+    return [_gain(c.D, c.D_std), bias, *_leans(c.D, c.D_std)]
 
 
 def gyroscope(c: Calibration) -> list[Measured]:
@@ -38,18 +38,18 @@ def gyroscope(c: Calibration) -> list[Measured]:
     known = np.isfinite(c.K).all() and np.linalg.matrix_rank(c.K) == 3
     matrix = np.asarray(np.linalg.inv(c.K)) if known else unknown(3, 3)
     # the deviations of inv(K) are those of K to first order, which is what a K near the identity is good for
-    gain = Measured("gain error", "%", 100.0 * (np.diag(matrix) - 1.0), 100.0 * np.diag(c.K_std))
     bias = Measured("bias", "deg/s", np.degrees(c.b_omega), np.degrees(c.b_omega_std))
-    return [gain, bias, *_leans(matrix, c.K_std)]
+    return [_gain(matrix, c.K_std), bias, *_leans(matrix, c.K_std)]
+
+
+def _gain(matrix: Vector, std: Vector) -> Measured:
+    value = error_model.scale_factor_error(matrix)
+    return Measured("gain error", "%", value, error_model.scale_factor_error_std(std))
 
 
 def _leans(matrix: Vector, std: Vector) -> list[Measured]:
-    diagonal = np.diag(matrix)[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        lean, lean_std = (np.degrees(values / diagonal) for values in (matrix, std))
-    for values in (lean, lean_std):
-        np.fill_diagonal(values, np.nan)
-    return [Measured(f"lean to {axis}", "deg", lean[:, j], np.abs(lean_std[:, j])) for j, axis in enumerate("xyz")]
+    lean, lean_std = error_model.misalignment(matrix), error_model.misalignment_std(matrix, std)
+    return [Measured(f"lean to {axis}", "deg", lean[:, j], lean_std[:, j]) for j, axis in enumerate(error_model.AXES)]
 
 
 def with_std(value: float, std: float, most_digits: int = 5) -> str:

@@ -1,4 +1,4 @@
-"""How two calibrations differ, and whether that is more than their uncertainties. Knows no file and no terminal."""
+"""How two calibrations differ, number by number, and whether that is more than their uncertainties."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from statistics import NormalDist
 
 import numpy as np
 
-from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..data import Vector
+from . import error_model
 from .calibration import GOOD, Calibration
+from .error_model import AXES
 
 # how sure "they differ" is: of two calibrations of one unchanged sensor, 1 in 100 are called different
 CONFIDENCE = 0.99
 # How much too sure a calibration with reservations may be: of one unchanged sensor, halves of a real recording with
 # such a verdict were 1.1 times as far apart as two good ones may be, and worse recordings than that one there are.
 RESERVED = 2.0
-AXES = "xyz"
 # K is symmetric to rounding where the calibration was made in the body frame
 SYMMETRIC = 1e-6
 WARMER_C = 3.0
@@ -97,11 +98,12 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
     a, b = in_body_frame(a), in_body_frame(b)
     bias = b.b_a_at(a.sensor.temperature_c) - a.b_a_at(b.sensor.temperature_c if not b.follows_temperature else None)
     numbers = [
-        *_row("bias", "mg", 1000 / STANDARD_GRAVITY_MPS2, bias, a.b_a_std, b.b_a_std),
-        *_row("gain", "%", 100.0, np.diag(b.D - a.D), np.diag(a.D_std), np.diag(b.D_std)),
-        *_leans(a, b),
+        *_row("bias", "mg", error_model.bias_mg(bias), error_model.bias_mg(np.hypot(a.b_a_std, b.b_a_std))),
+        *_scale_factor_errors(a, b),
+        *_misalignments(a, b),
     ]
-    turned = _row("gyroscope's bias", "deg/s", 180 / math.pi, b.b_omega - a.b_omega, a.b_omega_std, b.b_omega_std)
+    std = np.hypot(a.b_omega_std, b.b_omega_std)
+    turned = _row("gyroscope's bias", "deg/s", np.degrees(b.b_omega - a.b_omega), np.degrees(std))
     margin = RESERVED if _reserved(a) or _reserved(b) else 1.0
     return Comparison(tuple(numbers), tuple(turned), tuple(_remarks(a, b)), margin)
 
@@ -116,16 +118,23 @@ def in_body_frame(c: Calibration) -> Calibration:
     return replace(c, D=c.D @ Q.T, K=Q @ c.K)
 
 
-def _row(name: str, unit: str, factor: float, value: Vector, *stds: Vector) -> list[Difference]:
-    std = factor * np.sqrt(sum(s**2 for s in stds))
-    return [Difference(f"{name} {axis}", unit, factor * float(value[i]), float(std[i])) for i, axis in enumerate(AXES)]
+def _row(name: str, unit: str, value: Vector, std: Vector) -> list[Difference]:
+    return [Difference(f"{name} {axis}", unit, float(value[i]), float(std[i])) for i, axis in enumerate(AXES)]
 
 
-def _leans(a: Calibration, b: Calibration) -> list[Difference]:
-    value = np.degrees(b.D - a.D)
-    std = np.degrees(np.hypot(a.D_std, b.D_std))
+def _scale_factor_errors(a: Calibration, b: Calibration) -> list[Difference]:
+    value = error_model.scale_factor_error(b.D) - error_model.scale_factor_error(a.D)
+    std = np.hypot(*(error_model.scale_factor_error_std(c.D_std) for c in (a, b)))
+    return _row("scale factor error", "%", value, std)
+
+
+def _misalignments(a: Calibration, b: Calibration) -> list[Difference]:
+    value = error_model.misalignment(b.D) - error_model.misalignment(a.D)
+    # an angle beyond a half turn is one the other way round
+    value = (value + 180.0) % 360.0 - 180.0
+    std = np.hypot(*(error_model.misalignment_std(c.D, c.D_std) for c in (a, b)))
     return [
-        Difference(f"lean of {AXES[i]} to {AXES[j]}", "deg", float(value[i, j]), float(std[i, j]))
+        Difference(f"misalignment {AXES[i]}->{AXES[j]}", "deg", float(value[i, j]), float(std[i, j]))
         for i in range(3)
         for j in range(3)
         if i != j
@@ -154,7 +163,7 @@ def _remarks(a: Calibration, b: Calibration) -> list[str]:
     if abs(gravity[1] - gravity[0]) > 1e-6:
         said.append(
             f"A was fitted with a gravity of {gravity[0]:.5f} m/s² and B with {gravity[1]:.5f}: that alone makes"
-            f" {100 * (gravity[1] / gravity[0] - 1):+.3f} % of gain."
+            f" {100 * (gravity[1] / gravity[0] - 1):+.3f} % of scale factor."
         )
     old = [c.extra.get("autopilot", {}).get("params_old") for c in (a, b)]
     if old[0] != old[1]:

@@ -54,7 +54,11 @@ def test_gains_and_biases(result, accelerometer):
 def test_leans(result, accelerometer, axis):
     D, D_std = accelerometer["D"], accelerometer["D_std"]
     expected = [
-        [math.nan if i == axis else math.degrees(matrix[i, axis] / D[i, i]) for i in range(3)] for matrix in (D, D_std)
+        [math.nan if i == axis else angle(i) for i in range(3)]
+        for angle in (
+            lambda i: math.degrees(math.atan(D[i, axis] / D[i, i])),
+            lambda i: math.degrees(math.hypot(D_std[i, axis], D_std[i, i] * D[i, axis] / D[i, i]) / D[i, i]),
+        )
     ]
     agree(table(result.html, "accelerometer")[f"lean to {'xyz'[axis]}, deg"], *expected)
 

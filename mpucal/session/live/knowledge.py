@@ -1,11 +1,12 @@
-"""What is known, in the units that people use. Knows no estimator."""
+"""A fit's standard deviations as a session shows them: in %, deg and mg, and against its target."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...calibration.knowledge import Known
-from ...data import STANDARD_GRAVITY_MPS2, Vector
+from ...data import Vector
+from ...result import error_model
 from ..events import Direction, Knowledge, Target
 
 
@@ -13,7 +14,7 @@ def wanted(target: Target) -> Vector:
     """(12,) the target's standard deviations, of D row-major and b_a [m/s^2]."""
     D = np.full((3, 3), np.deg2rad(target.misalignment_deg))
     np.fill_diagonal(D, target.gain_pct / 100.0)
-    return np.concatenate([D.ravel(), np.full(3, target.bias_mg / 1000.0 * STANDARD_GRAVITY_MPS2)])
+    return np.concatenate([D.ravel(), np.full(3, target.bias_mg / error_model.MG_PER_MPS2)])
 
 
 def knowledge(known: Known, target: Target, t_s: float, down: Vector | None) -> Knowledge:
@@ -24,12 +25,9 @@ def knowledge(known: Known, target: Target, t_s: float, down: Vector | None) -> 
     down : (3,) the orientation that would help most, if that was asked.
     """
     D = known.theta.D
-    gains = np.abs(np.diag(D))
-    gain = 100.0 * np.diag(known.D_std)
-    lean = np.degrees(known.D_std / np.maximum(gains, 0.1)[:, None])
-    np.fill_diagonal(lean, 0.0)
-    misalignment = lean.max(1)
-    bias = 1000.0 * known.b_a_std / STANDARD_GRAVITY_MPS2
+    gain = error_model.scale_factor_error_std(known.D_std)
+    misalignment = np.nanmax(error_model.misalignment_std(D, known.D_std), axis=1)
+    bias = error_model.bias_mg(known.b_a_std)
     wishes = ((target.gain_pct, gain), (target.misalignment_deg, misalignment), (target.bias_mg, bias))
     progress = [np.clip(wish / np.maximum(std, 1e-9), 0.0, 1.0) for wish, std in wishes]
     return Knowledge(
@@ -56,7 +54,7 @@ def _doubt(D: Vector, known: Known) -> str:
     """What the numbers say already that no good sensor's would."""
     if known.D_std.max() > 0.02:
         return ""
-    gains = np.linalg.norm(D, axis=0)
+    gains = np.diag(error_model.sensor_axes(D))
     if np.trace(D) < 1.5 * gains.mean():
         return "the accelerometer's axes do not match the gyroscope's: one is flipped or swapped"
     if (np.abs(np.log2(gains)) > 0.8).all():

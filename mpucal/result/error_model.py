@@ -1,0 +1,63 @@
+"""Scale factor error, misalignment and bias of a sensor: the one definition of each.
+
+A sensor reads y = M s + b, with s in the body frame (the one in which K is symmetric). For the accelerometer M = D and
+b = b_a; for the gyroscope M = inv(K) and b = b_omega.
+
+    scale factor error of axis i    100 (M_ii - 1)             %
+    misalignment i->j               atan2(M_ij, M_ii)          deg, i != j
+    bias of axis i                  1000 b_i / 9.80665         mg (deg/s of a gyroscope)
+
+The diagonal of M holds the scale factors, and what is beside it the cross-coupling, as in P. D. Groves, Principles of
+GNSS, Inertial, and Multisensor Integrated Navigation Systems, 2nd ed., section 4.4. Misalignment i->j is the angle by
+which the sensitive axis i leans towards the body's axis j. Standard deviations are the numbers' own (1 sigma), carried
+over to first order without correlations.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..data import STANDARD_GRAVITY_MPS2, Vector
+
+AXES = "xyz"
+MG_PER_MPS2 = 1000.0 / STANDARD_GRAVITY_MPS2
+
+
+def scale_factor_error(M: Vector) -> Vector:
+    """(3,) % of x, y, z, of the (3, 3) matrix in y = M s + b."""
+    return np.asarray(100.0 * (np.diag(M) - 1.0))
+
+
+def scale_factor_error_std(M_std: Vector) -> Vector:
+    """(3,) %, of the (3, 3) standard deviations of M."""
+    return np.asarray(100.0 * np.diag(M_std))
+
+
+def misalignment(M: Vector) -> Vector:
+    """(3, 3) deg: [i, j] is misalignment i->j; NaN on the diagonal."""
+    angle = np.degrees(np.arctan2(M, np.diag(M)[:, None]))
+    np.fill_diagonal(angle, np.nan)
+    return np.asarray(angle)
+
+
+def misalignment_std(M: Vector, M_std: Vector) -> Vector:
+    """(3, 3) deg, of `misalignment`; NaN on the diagonal."""
+    along, along_std = np.diag(M)[:, None], np.diag(M_std)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        std = np.degrees(np.hypot(along * M_std, M * along_std) / (M**2 + along**2))
+    np.fill_diagonal(std, np.nan)
+    return np.asarray(std)
+
+
+def bias_mg(b: Vector) -> Vector:
+    """A bias, or its standard deviation, of (...) m/s^2 in mg; 1 mg is a thousandth of standard gravity."""
+    return np.asarray(MG_PER_MPS2 * b)
+
+
+def sensor_axes(M: Vector) -> Vector:
+    """(3, 3) M as seen along the sensor's own axes: M Q^T, with Q the rotation nearest to M.
+
+    Its diagonal holds the scale factors of a sensor whose axes are swapped, mirrored or turned against the body's.
+    """
+    U, S, _ = np.linalg.svd(M)
+    return np.asarray((U * S) @ U.T)
