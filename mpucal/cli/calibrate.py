@@ -10,7 +10,8 @@ from ..errors import RefusedError
 from ..files import load
 from ..mavlink.calibrate import calibrate_vehicle
 from ..result.calibration import REFUSED
-from ..session.results import BLOB, make_folder, result_files, save
+from ..result.session_files import BLOB
+from ..session.results import make_folder, result_files, save
 from .options import fit_options
 from .summary import summary, written
 
@@ -43,6 +44,6 @@ def command(recording: Path, folder: Path | None, as_json: bool, gravity: float,
             click.echo("\n" + written(paths))
     if calibration.verdict != REFUSED:
         return 0
-    if folder is not None and (folder / BLOB).exists():
-        click.echo(f"mpucal: {folder / BLOB} is of an earlier calibration, and was left as it is.", err=True)
+    if folder is not None and (folder / BLOB.name).exists():
+        click.echo(f"mpucal: {folder / BLOB.name} is of an earlier calibration, and was left as it is.", err=True)
     return RefusedError.exit_code

@@ -14,7 +14,8 @@ import click
 from ..data import Recording
 from ..errors import KeepsNothing, SourceError, UsageError, WriteBackError
 from ..result.calibration import REFUSED, Calibration
-from ..session.results import DOCUMENT, result_files, save
+from ..result.session_files import DOCUMENT
+from ..session.results import result_files, save
 from ..sinks.sink import Applied
 from .options import SOURCES
 from .write import TARGETS
@@ -125,9 +126,11 @@ def recorder(
         if name == "autopilot":
             extra = {**measured.extra, WRITTEN: now.extra[WRITTEN]}
             of_now, now = now, replace(measured, extra=MappingProxyType(extra))
-            files = {ON_AUTOPILOT: of_now.json().encode(), DOCUMENT: now.json().encode()}
+            files = {ON_AUTOPILOT: of_now.json().encode(), DOCUMENT.name: now.json().encode()}
         else:
-            files = dict(result_files(now, recording, truth)) if name == "chip" else {DOCUMENT: now.json().encode()}
+            files = (
+                dict(result_files(now, recording, truth)) if name == "chip" else {DOCUMENT.name: now.json().encode()}
+            )
         save(folder, files)
         return now
 

@@ -8,7 +8,8 @@ import click
 
 from ..result.calibration import Calibration
 from ..result.merge import merge
-from ..session.results import BLOB, DOCUMENT, make_folder, save
+from ..result.session_files import BLOB, DOCUMENT
+from ..session.results import make_folder, save
 from .options import check_not_among
 from .summary import summary
 
@@ -25,12 +26,12 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, as_json: bool) 
     Where they do not, it says why, and b_a is their mean. `mpucal apply`, the blob and mpucal_apply.h use b_a(T).
     """
     if folder is not None:
-        for name in (BLOB, DOCUMENT):
-            check_not_among(folder / name, calibrations)
+        for file in (BLOB, DOCUMENT):
+            check_not_among(folder / file.name, calibrations)
     made = merge([Calibration.load(path) for path in calibrations])
     if folder is not None:
         make_folder(folder)
-        save(folder, {BLOB: made.calibration.blob().encode(), DOCUMENT: made.calibration.json().encode()})
+        save(folder, {BLOB.name: made.calibration.blob().encode(), DOCUMENT.name: made.calibration.json().encode()})
     for sentence in (made.why, *made.remarks):
         click.echo(f"mpucal: {sentence}", err=True)
     if as_json:
@@ -38,7 +39,7 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, as_json: bool) 
         return
     click.echo(f"{summary(made.calibration)}\n{slope(made.calibration)}")
     if folder is not None:
-        click.echo(f"\nWritten to {folder}:\n  {BLOB}, {DOCUMENT}")
+        click.echo(f"\nWritten to {folder}:\n  {BLOB.name}, {DOCUMENT.name}")
 
 
 def slope(calibration: Calibration) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from ..report.units import accelerometer, with_std
 from ..report.use import left_to_subtract
 from ..result.calibration import ACCELEROMETER_FORMULA, GOOD, REFUSED, USABLE, Calibration
-from ..session.results import BLOB, DOCUMENT, REPORT
+from ..result.session_files import BLOB, DOCUMENT, REPORT
 
 AXES = "xyz"
 # what fits a terminal of 80 columns
@@ -37,15 +37,15 @@ def written(paths: Sequence[Path]) -> str:
     """The files, and what to do with them."""
     folder = paths[0].parent
     lines = [f"Written to {folder}:", "  " + ", ".join(path.name for path in paths)]
-    if any(path.name == BLOB for path in paths):
+    if any(path.name == BLOB.name for path in paths):
         lines += [
             "Next:",
-            f"  look at      {folder / REPORT}",
-            f'  in Python    a = mpucal.Calibration.load("{folder / DOCUMENT}").apply(acc)',
-            f"  in firmware  {folder / BLOB}, as firmware_protocol.md describes it",
+            f"  look at      {folder / REPORT.name}",
+            f'  in Python    a = mpucal.Calibration.load("{folder / DOCUMENT.name}").apply(acc)',
+            f"  in firmware  {folder / BLOB.name}, as firmware_protocol.md describes it",
         ]
     else:
-        lines += [f"Next: look at {folder / REPORT}, mend what is named above, and run the session again."]
+        lines += [f"Next: look at {folder / REPORT.name}, mend what is named above, and run the session again."]
     return "\n".join(lines)
 
 

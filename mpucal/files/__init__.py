@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..data import Recording
 from ..errors import RecordingError
+from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from .parts import captures_in
 
 KINDS = (".mcap", ".tlog", ".bin", ".npz", ".csv")
@@ -81,6 +82,7 @@ def captures_of(folder: Path) -> list[Path]:
     found = captures_in(folder)
     if found:
         return found
-    if (folder / "capture.tlog").exists():
-        return [folder / "capture.tlog"]
-    raise RecordingError(f"the folder {folder} holds no capture.mcap and no capture.tlog", _REMEDY)
+    of_vehicle = folder / CAPTURE_OF_VEHICLE.name
+    if of_vehicle.exists():
+        return [of_vehicle]
+    raise RecordingError(f"the folder {folder} holds no {CAPTURE.name} and no {CAPTURE_OF_VEHICLE.name}", _REMEDY)

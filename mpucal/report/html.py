@@ -11,8 +11,8 @@ from typing import Any
 
 from .. import __version__
 from ..data import STANDARD_GRAVITY_MPS2, Recording
-from ..files.parts import is_part
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
+from ..result.session_files import CAPTURE
 from .elements import as_float, code, heading, number, paragraph, quantity, section, table
 from .found import (
     accelerometer_section,
@@ -166,7 +166,7 @@ def _reproduction(calibration: Calibration, recording: Recording | None) -> str:
     if recording is None or model is None or not math.isfinite(gravity):
         return ""
     # one file of a session that was resumed is not all that was recorded: its folder is
-    source = "." if is_part(recording.name) else recording.name
+    source = "." if CAPTURE.is_one(recording.name) else recording.name
     lines = [f"mpucal calibrate {source} --model {model} --gravity {gravity:.9g} -o again"]
     if PurePath(recording.name).suffix in CAPTURES:
         lines.append(f"mpucal session --replay {source} -o replayed")

@@ -1,10 +1,12 @@
-"""The files that a calibration leaves in a folder. Knows no other place to write to."""
+"""The files that a calibration leaves in a folder: their content, and writing all of them or none."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
@@ -14,30 +16,55 @@ from ..errors import OutputError
 from ..report import render
 from ..result.atomic import write_together
 from ..result.calibration import REFUSED, Calibration
+from ..result.session_files import DOCUMENT, SESSION_FILES
 
-CAPTURE, DOCUMENT, BLOB, REPORT, TRUTH = (
-    "capture.mcap",
-    "calibration.json",
-    "calibration.bin",
-    "report.html",
-    "truth.json",
-)
+
+@dataclass(frozen=True)
+class Result:
+    """What the files are made of; truth : what a simulated sensor really is."""
+
+    calibration: Calibration
+    recording: Recording
+    truth: Mapping[str, Any] | None
+
+
+# makes a file's content; None: there is no such file of this result
+Maker = Callable[[Result], bytes | None]
 
 
 def result_files(
     calibration: Calibration, recording: Recording, truth: Mapping[str, Any] | None = None
 ) -> Iterator[tuple[str, bytes]]:
-    """Name and content of each file, made one at a time; a refused calibration has no blob.
+    """Name and content of each file that is made of a result, one at a time; truth : see Result."""
+    result = Result(calibration, recording, truth)
+    for file in SESSION_FILES:
+        if file.made_by is not None:
+            make: Maker = resolve_name(file.made_by)
+            content = make(result)
+            if content is not None:
+                yield file.name, content
 
-    truth : what a simulated sensor really is.
-    """
-    yield DOCUMENT, calibration.json().encode()
+
+def document(result: Result) -> bytes:
+    """calibration.json."""
+    return result.calibration.json().encode()
+
+
+def blob(result: Result) -> bytes | None:
+    """calibration.bin; none of a calibration that was refused, or whose D or b_a is not known."""
+    calibration = result.calibration
     known = np.isfinite(calibration.D).all() and np.isfinite(calibration.b_a).all()
-    if calibration.verdict != REFUSED and known:
-        yield BLOB, calibration.blob().encode()
-    yield REPORT, render(calibration, recording).encode()
-    if truth is not None:
-        yield TRUTH, (json.dumps(truth, indent=2) + "\n").encode()
+    return calibration.blob().encode() if calibration.verdict != REFUSED and known else None
+
+
+def report(result: Result) -> bytes:
+    """report.html."""
+    return render(result.calibration, result.recording).encode()
+
+
+def simulated_truth(result: Result) -> bytes | None:
+    """truth.json; none of a real sensor."""
+    return None if result.truth is None else (json.dumps(result.truth, indent=2) + "\n").encode()
 
 
 def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
@@ -47,7 +74,7 @@ def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     ------
     OutputError : the folder or one of them cannot be written.
     """
-    write_together({folder / name: files[name] for name in sorted(files, key=lambda name: name == DOCUMENT)})
+    write_together({folder / name: files[name] for name in sorted(files, key=lambda name: name == DOCUMENT.name)})
     return tuple(folder / name for name in files)
 
 

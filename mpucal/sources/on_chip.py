@@ -14,10 +14,10 @@ from ..chip.driver import Driver
 from ..chip.records import LATE
 from ..errors import CaptureError
 from ..files.mcap import CaptureWriter
+from ..result.session_files import CAPTURE
 from ..session.events import Prompt
 from ..session.plan import Plan
 from ..session.ports import Replayed, Talk
-from ..session.results import CAPTURE
 from .opened import Measuring, Say
 from .parts import PartsBus
 from .tap import Tap
@@ -42,7 +42,7 @@ class OnBus:
     truth: Mapping[str, Any] | None = None
     replay: PartsBus | None = None
     recovered: str | None = None
-    capture_name: str = CAPTURE
+    capture_name: str = CAPTURE.name
     words: Mapping[str, Any] = field(default_factory=dict)
     real_time: bool = True
 

@@ -22,12 +22,12 @@ from ..mavlink.replay import Replay
 from ..mavlink.source import VehicleSource, one_of
 from ..mavlink.tlog import Tlog, TlogWriter, read_tlog
 from ..mavlink.transport import Transport
+from ..result.session_files import CAPTURE_OF_VEHICLE
 from ..session.events import Prompt
 from ..session.plan import Plan
 from ..session.ports import Replayed, Talk
 from .opened import Measuring, Say
 
-CAPTURE = "capture.tlog"
 SESSION, END = "session", "end"
 MPUCAL, RECORDED, SOURCE, PLAN, SYSTEM = "mpucal", "recorded", "source", "plan", "system"
 # counts up with every change of what the source sends and believes
@@ -49,7 +49,7 @@ class OnLink:
     link : to the vehicle, while it measures.
     """
 
-    capture_name = CAPTURE
+    capture_name = CAPTURE_OF_VEHICLE.name
 
     def __init__(
         self,
@@ -136,7 +136,7 @@ class OnRecording:
     plan: Plan
     listeners: Sequence[Callable[[Prompt], None]] = ()
     truth: Mapping[str, Any] | None = None
-    capture_name: str = CAPTURE
+    capture_name: str = CAPTURE_OF_VEHICLE.name
     real_time: bool = False
 
     @property

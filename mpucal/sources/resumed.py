@@ -13,7 +13,8 @@ from ..chip.driver import Driver
 from ..chip.records import KEY, LATE
 from ..errors import UsageError
 from ..files.mcap import CaptureWriter, read_capture
-from ..files.parts import capture_name, captures_in
+from ..files.parts import captures_in
+from ..result.session_files import CAPTURE
 from ..session.events import Key, Output, Prompt
 from ..session.plan import Plan
 from ..session.ports import Talk
@@ -136,5 +137,5 @@ def open_resumed(folder: Path, open_live: Callable[[Mapping[str, Any], Plan], On
         live,
         plan,
         recovered[-1] if recovered else None,
-        capture_name(len(files) + 1),
+        CAPTURE.numbered(len(files) + 1),
     )

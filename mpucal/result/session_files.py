@@ -1,0 +1,66 @@
+"""The files that a session leaves in its folder, one row each: name, what it is, and what makes it.
+
+The README's table is the same rows. A sink's files stand in the sink's own row (`mpucal/sinks/table.py`).
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class SessionFile:
+    """A file of a session's folder.
+
+    Attributes
+    ----------
+    name : of the first one; further ones are numbered. what : its content, in Markdown, for the README's table.
+    made_by : "module:attribute" of the function that makes its content of a result (see
+        `mpucal.session.results.Maker`); None where it is not made of a result.
+    """
+
+    name: str
+    what: str
+    made_by: str | None = None
+
+    def numbered(self, number: int) -> str:
+        """Name of the file number 1, 2, ...: capture.mcap, capture-2.mcap, ..."""
+        path = Path(self.name)
+        return self.name if number == 1 else f"{path.stem}-{number}{path.suffix}"
+
+    def is_one(self, name: str) -> bool:
+        """Whether `name` is that of such a file, of any number."""
+        path = Path(self.name)
+        return re.fullmatch(rf"{re.escape(path.stem)}(-\d+)?{re.escape(path.suffix)}", name) is not None
+
+    def free_in(self, folder: Path) -> Path:
+        """The first name that no file in `folder` has: what is there stays."""
+        number = 1
+        while (path := folder / self.numbered(number)).exists():
+            number += 1
+        return path
+
+
+CAPTURE = SessionFile(
+    "capture.mcap",
+    "every register access and key press with its time, written as it happens; a killed program loses a second at most",
+)
+CAPTURE_OF_VEHICLE = SessionFile(
+    "capture.tlog", "with `--mavlink`, in place of it: every packet with its time, as ground stations record it"
+)
+DOCUMENT = SessionFile(
+    "calibration.json",
+    "D, b_a and the gyroscope's K, b_omega with standard deviations, the fit, the verdict and its reasons",
+    "mpucal.session.results:document",
+)
+BLOB = SessionFile(
+    "calibration.bin",
+    "the same for firmware, as [firmware_protocol.md](firmware_protocol.md) describes it; not of a refused calibration",
+    "mpucal.session.results:blob",
+)
+REPORT = SessionFile("report.html", "the same for a person, on one page", "mpucal.session.results:report")
+TRUTH = SessionFile("truth.json", "of a simulated chip: what it really is", "mpucal.session.results:simulated_truth")
+
+SESSION_FILES = (CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT, BLOB, REPORT, TRUTH)

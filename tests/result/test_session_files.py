@@ -1,0 +1,32 @@
+"""The table of a session's files: their numbered names, and the README's copy of it."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from mpucal.result.session_files import CAPTURE, SESSION_FILES
+
+README = Path(__file__).parents[2] / "README.md"
+
+
+def test_the_readme_has_the_same_rows():
+    section = re.search(r"## What a session leaves\n(.*?)\n\n[^|]", README.read_text(encoding="utf-8"), re.DOTALL)[1]
+    rows = re.findall(r"^\| `(.+?)` \| (.+) \|$", section, re.MULTILINE)
+    assert rows[: len(SESSION_FILES)] == [(file.name, file.what) for file in SESSION_FILES]
+
+
+def test_each_one_is_free_until_it_is_there(tmp_path):
+    names = []
+    for _ in range(3):
+        path = CAPTURE.free_in(tmp_path)
+        path.write_bytes(b"")
+        names.append(path.name)
+    assert names == ["capture.mcap", "capture-2.mcap", "capture-3.mcap"]
+    assert names == [CAPTURE.numbered(number) for number in (1, 2, 3)]
+    assert all(map(CAPTURE.is_one, names))
+
+
+@pytest.mark.parametrize("name", ["capture.tlog", "capture-.mcap", "capture-x.mcap", "my-capture.mcap", "captureXmcap"])
+def test_another_file_is_none(name):
+    assert not CAPTURE.is_one(name)
