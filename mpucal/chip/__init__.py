@@ -1,1 +1,1 @@
-"""The chip above any bus: its register map, its FIFO, its clock and the driver. Knows no bus."""
+"""The chip above any bus: the table of chips, the registers, the FIFO, the sample clock and the driver."""

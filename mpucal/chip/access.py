@@ -1,4 +1,4 @@
-"""What the chip's driver needs from a bus. Knows no bus."""
+"""What the chip's driver asks of a bus, and a record of each access."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """A chip made to measure for a moment and put back as it was, without the reset that would reload its trim.
 
-Knows no FIFO and no calibration: it looks at the data registers.
+It reads the data registers; the FIFO is not touched.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""When each sample was taken: the sample index regressed on the bus's clock. Knows no bus and no frame.
+"""When each sample was taken: the sample index regressed on the bus's clock.
 
 The chip samples with a clock of its own, up to 1 % off. All that is seen of it is how many samples it had
 taken by the time of each look. A look at `taken` samples finds the newest half an interval old on average, so

@@ -1,4 +1,4 @@
-"""What a person may choose of how a chip measures, checked. Knows no register's address."""
+"""What a person may choose of how a chip measures, checked against what chips have."""
 
 from __future__ import annotations
 

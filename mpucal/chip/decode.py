@@ -1,4 +1,4 @@
-"""Register accesses to samples, as they happen or from a capture. Knows no bus and makes no access itself."""
+"""Register accesses to samples, as they happen or from a capture."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..errors import RecordingError
 from . import registers as reg
 from .access import Transaction
 from .families import Part
-from .fifo import Fault, FifoDecoder, Run
+from .fifo import FifoDecoder, FifoFault, Run
 from .identity import Evidence
 from .settings import Settings
 
@@ -35,7 +35,7 @@ class Decoder:
         self._fifo: FifoDecoder | None = None
         self._before_reset: dict[int, int] = {}
         self._accel_offsets: Words | None = None
-        self.fault: Fault | None = None
+        self.fault: FifoFault | None = None
 
     @property
     def corrected(self) -> tuple[Words, Words] | None:

@@ -1,4 +1,4 @@
-"""The MPU driver over any bus: identify, configure, drain the FIFO, recover. Knows no clock of its own and no frame.
+"""The MPU driver over any bus: identify, configure, drain the FIFO, recover.
 
 What it accesses depends on nothing but the replies and their times, so that a replay asks for the same
 accesses. DRIVER_VERSION counts up with every change of them.
@@ -18,9 +18,10 @@ from .access import Bus, EndOfCapture
 from .clock import look_phase
 from .config import Config
 from .decode import Decoder
-from .families import MPU6050, MPU6500, Part
-from .fifo import Fault
+from .families import Part
+from .fifo import FifoFault
 from .identity import remark
+from .offsets import PLACES
 from .port import Port
 from .probe import probe, read_identity
 from .settings import Settings
@@ -55,7 +56,12 @@ class Need(Enum):
     SET_UP = auto()
 
 
-_CURES = {None: Need.NOTHING, Fault.OVERFLOW: Need.RESTART, Fault.MISALIGNED: Need.RESTART, Fault.LOST: Need.RESTART}
+_CURES = {
+    None: Need.NOTHING,
+    FifoFault.OVERFLOW: Need.RESTART,
+    FifoFault.MISALIGNED: Need.RESTART,
+    FifoFault.LOST: Need.RESTART,
+}
 
 
 class Driver:
@@ -165,8 +171,8 @@ class Driver:
         self._port.read(reg.PWR_MGMT_1, 2)
 
     def _look_at_offsets(self) -> None:
-        for family in (MPU6050, MPU6500):
-            first, _, last = family.accel_offset_h
+        # the oldest place first: captures replay only with the same accesses
+        for first, _, last in reversed(PLACES):
             self._port.read(first, last + 2 - first)
 
     def _correction(self) -> str | None:
@@ -195,7 +201,7 @@ class Driver:
             return Need.RESTART
         if frames:
             self._frame_ns = min(self._frame_ns, (self._port.now_ns - begun_ns) / frames)
-        self._overflows += self._decoder.fault is Fault.OVERFLOW
+        self._overflows += self._decoder.fault is FifoFault.OVERFLOW
         return _CURES.get(self._decoder.fault, Need.SET_UP)
 
     def _check_pace(self, settings: Settings) -> None:

@@ -1,4 +1,6 @@
-"""What differs from one family of chips to the next, and which family an identity belongs to. Knows no bus.
+"""The table of chips: one row for each family, with all that differs between them; the rest is in registers.py.
+
+A chip with the same registers is one more row, or one more identity in a row. Simulated chips are made of these rows.
 
 Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4, PS-MPU-6000A r3.4, PS-MPU-9250A r1.0.
 """
@@ -6,8 +8,32 @@ Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4, PS-MPU-6000A r3.4, PS-MPU-9250A r1
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import Enum
+from typing import NamedTuple
 
 from ..errors import ChipError
+from . import registers as reg
+
+
+class Group(Enum):
+    """A group of words in a FIFO frame; the value is its number of words."""
+
+    ACCEL = "accelerometer", 3
+    TEMPERATURE = "temperature", 1
+    GYRO = "gyroscope", 3
+
+    @property
+    def words(self) -> int:
+        """How many."""
+        return self.value[1]
+
+
+class Columns(NamedTuple):
+    """Where the groups lie in a frame of seven words."""
+
+    accel: slice
+    temperature: int
+    gyro: slice
 
 
 @dataclass(frozen=True)
@@ -16,27 +42,56 @@ class Family:
 
     Attributes
     ----------
-    name : for a message.
+    name : what a chip of unknown identity is called that behaves so.
+    parts : WHO_AM_I and name of each part.
     fifo_bytes : size of the FIFO as this driver configures it.
+    widest_fifo_bytes : its size with both FIFO_SIZE bits of ACCEL_CONFIG2 set; None: they do nothing.
+    frame : the order of a FIFO frame.
     lsb_per_c, zero_c : temperature is counts / lsb_per_c + zero_c.
     accel_offset_h : addresses of the high bytes of the accelerometer offsets x, y, z; the low byte follows.
-    accel_offset_lsb_per_g : what one count of such a 16-bit word is nominally; bit 0 is reserved.
+    accel_offset_lsb_per_g : nominal scale of such a 16-bit word; bit 0 is reserved.
+    gyro_range_shift : position of FS_SEL in GYRO_CONFIG.
+    has_accel_config2 : the accelerometer's filter has a register of its own, ACCEL_CONFIG2, which also lets it measure
+        alone at ACCEL_ALONE_HZ.
     packed_self_test : the factory's self-test codes are 5 bits each in SELF_TEST_ACCEL and the three registers
         after it; otherwise 8 bits each, from SELF_TEST_GYRO and from SELF_TEST_ACCEL on.
-    has_accel_config2 : the accelerometer's filter has a register of its own, ACCEL_CONFIG2.
+    asleep : it sleeps after power-on and reset.
+    fifo_reset_needs_stop : FIFO_RESET acts only while FIFO_EN of USER_CTRL is 0 (RM-MPU-6000A, register 106).
+    half_range_revision : letter of a revision whose accelerometer has half the sensitivity; empty where there is none.
     accel_delay_ms, gyro_delay_ms : group delay of the low-pass filter by DLPF_CFG = 0..6.
+    accel_noise_ug, gyro_noise_dps : typical noise densities, ug/sqrt(Hz) and deg/s/sqrt(Hz).
+    zero_rate_dps : tolerance of the gyroscope's output at rest, deg/s.
     """
 
     name: str
+    parts: tuple[tuple[int, str], ...]
     fifo_bytes: int
     lsb_per_c: float
     zero_c: float
     accel_offset_h: tuple[int, int, int]
-    accel_offset_lsb_per_g: float
-    packed_self_test: bool
     has_accel_config2: bool
+    packed_self_test: bool
+    asleep: bool
     accel_delay_ms: tuple[float, ...]
     gyro_delay_ms: tuple[float, ...]
+    accel_noise_ug: float
+    gyro_noise_dps: float
+    zero_rate_dps: float
+    accel_offset_lsb_per_g: float = 2048.0
+    widest_fifo_bytes: int | None = None
+    frame: tuple[Group, ...] = (Group.ACCEL, Group.TEMPERATURE, Group.GYRO)
+    gyro_range_shift: int = reg.FULL_SCALE_SHIFT
+    fifo_reset_needs_stop: bool = False
+    half_range_revision: str = ""
+
+    @property
+    def columns(self) -> Columns:
+        """Where the groups lie in a frame."""
+        first, at = 0, {}
+        for group in self.frame:
+            at[group] = slice(first, first + group.words)
+            first += group.words
+        return Columns(at[Group.ACCEL], at[Group.TEMPERATURE].start, at[Group.GYRO])
 
 
 @dataclass(frozen=True)
@@ -45,8 +100,8 @@ class Part:
 
     Attributes
     ----------
-    chip : its name. who_am_i : what it answers to WHO_AM_I. family : how to treat it.
-    accel_sensitivity : accelerometer counts a g, over the nominal; revision C of the 6050 has half.
+    chip : its name. who_am_i : its answer to WHO_AM_I. family : its row of the table.
+    accel_sensitivity : accelerometer counts a g, relative to the nominal; a half-range revision has 0.5.
     """
 
     chip: str
@@ -57,64 +112,63 @@ class Part:
 
 MPU6050 = Family(
     name="MPU-6050",
+    parts=((0x68, "MPU-6050"),),
     fifo_bytes=1024,
     lsb_per_c=340.0,
     zero_c=36.53,
     accel_offset_h=(0x06, 0x08, 0x0A),
-    accel_offset_lsb_per_g=2048.0,
-    packed_self_test=True,
     has_accel_config2=False,
+    packed_self_test=True,
+    asleep=True,
     accel_delay_ms=(0.0, 2.0, 3.0, 4.9, 8.5, 13.8, 19.0),
     gyro_delay_ms=(0.98, 1.9, 2.8, 4.8, 8.3, 13.4, 18.6),
+    accel_noise_ug=400.0,
+    gyro_noise_dps=0.005,
+    zero_rate_dps=20.0,
+    fifo_reset_needs_stop=True,
+    half_range_revision="C",
 )
 
 MPU6500 = Family(
     name="MPU-6500",
+    parts=((0x70, "MPU-6500"), (0x71, "MPU-9250"), (0x73, "MPU-9255"), (0x74, "MPU-6515")),
     fifo_bytes=512,
     lsb_per_c=333.87,
     zero_c=21.0,
     accel_offset_h=(0x77, 0x7A, 0x7D),
-    accel_offset_lsb_per_g=2048.0,
-    packed_self_test=False,
     has_accel_config2=True,
+    packed_self_test=False,
+    asleep=False,
     accel_delay_ms=(1.88, 1.88, 2.88, 4.88, 8.87, 16.83, 32.48),
     gyro_delay_ms=(0.97, 2.9, 3.9, 5.9, 9.9, 17.85, 33.48),
+    accel_noise_ug=300.0,
+    gyro_noise_dps=0.01,
+    zero_rate_dps=5.0,
 )
 
-MPU6880 = replace(MPU6500, name="MPU-6880", fifo_bytes=4096)
+MPU6880 = replace(MPU6500, name="MPU-6880", parts=((0x78, "MPU-6880"),), fifo_bytes=4096)
 
-# FIFO_SIZE in ACCEL_CONFIG2 could widen this FIFO to 4096 bytes; the driver leaves it at 0, 512 bytes.
-CLONE98 = Family(
+ICM20689 = replace(
+    MPU6500,
     name="ICM-20689",
-    fifo_bytes=512,
+    parts=(
+        (0x98, "ICM-20689"),
+        (0x11, "ICM-20600"),
+        (0x12, "ICM-20602"),
+        (0x20, "ICM-20690"),
+        (0xA9, "IAM-20680"),
+        (0xAE, "ICM-20608D"),
+        (0xAF, "ICM-20608"),
+    ),
     lsb_per_c=326.8,
     zero_c=25.0,
-    accel_offset_h=MPU6500.accel_offset_h,
-    accel_offset_lsb_per_g=MPU6500.accel_offset_lsb_per_g,
-    packed_self_test=False,
-    has_accel_config2=True,
-    accel_delay_ms=MPU6500.accel_delay_ms,
-    gyro_delay_ms=MPU6500.gyro_delay_ms,
+    asleep=True,
+    widest_fifo_bytes=4096,
 )
 
-PARTS = {
-    part.who_am_i: part
-    for part in (
-        Part("MPU-6050", 0x68, MPU6050),
-        Part("MPU-6500", 0x70, MPU6500),
-        Part("MPU-9250", 0x71, MPU6500),
-        Part("MPU-9255", 0x73, MPU6500),
-        Part("MPU-6515", 0x74, MPU6500),
-        Part("MPU-6880", 0x78, MPU6880),
-        Part("ICM-20689", 0x98, CLONE98),
-        Part("ICM-20600", 0x11, CLONE98),
-        Part("ICM-20602", 0x12, CLONE98),
-        Part("ICM-20690", 0x20, CLONE98),
-        Part("IAM-20680", 0xA9, CLONE98),
-        Part("ICM-20608D", 0xAE, CLONE98),
-        Part("ICM-20608", 0xAF, CLONE98),
-    )
-}
+FAMILIES = (MPU6050, MPU6500, MPU6880, ICM20689)
+
+PARTS = {who_am_i: Part(chip, who_am_i, family) for family in FAMILIES for who_am_i, chip in family.parts}
 
 
 def part_of(who_am_i: int) -> Part:
@@ -122,13 +176,23 @@ def part_of(who_am_i: int) -> Part:
 
     Raises
     ------
-    ChipError : no part that is known here answers that.
+    ChipError : no part of the table answers that.
     """
     try:
         return PARTS[who_am_i]
     except KeyError:
-        known = ", ".join(f"0x{value:02x} {part.chip}" for value, part in sorted(PARTS.items()))
         raise ChipError(
             f"the chip answers 0x{who_am_i:02x} to WHO_AM_I, which is no part that is known here",
-            f"check which chip is at this address (known are {known})",
+            f"check which chip is at this address (known are {known_parts()})",
         ) from None
+
+
+def known_parts() -> str:
+    """All parts of the table with their identities, for a message."""
+    return ", ".join(f"0x{value:02x} {part.chip}" for value, part in sorted(PARTS.items()))
+
+
+def of_fifo(fifo_bytes: int) -> tuple[Family, ...]:
+    """The families of the smallest FIFO in the table that holds `fifo_bytes`; none where all are smaller."""
+    sizes = [family.fifo_bytes for family in FAMILIES if family.fifo_bytes >= fifo_bytes]
+    return tuple(family for family in FAMILIES if sizes and family.fifo_bytes == min(sizes))

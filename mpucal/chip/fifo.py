@@ -1,7 +1,7 @@
-"""FIFO bytes to samples: aligned or not, clipped or not, and when. Knows no bus and no register.
+"""FIFO bytes to samples: checks alignment and clipping, and gives each sample its time.
 
-A frame is 14 bytes, big-endian int16 in register order: accelerometer x, y, z, temperature, gyroscope x, y, z
-(RM-MPU-6000A r4.2, registers 59 to 72 and 116); of the accelerometer alone it is the first six. Those have no
+A frame is 14 bytes, big-endian int16: accelerometer x, y, z, temperature, gyroscope x, y, z in the order of its
+family's row (RM-MPU-6000A r4.2, registers 59 to 72 and 116); of the accelerometer alone it is six. Those have no
 temperature to be told by where they begin: there a part of a frame tells, since what slips is bytes.
 """
 
@@ -23,7 +23,6 @@ from .settings import Settings
 
 Counts = NDArray[np.int16]
 
-ACCEL, TEMPERATURE, GYRO = slice(0, 3), 3, slice(4, 7)
 FULL_SCALE_COUNT = 32767
 
 # The die does not change by 1.2 C from one sample to the next; a misaligned frame shows another word here.
@@ -36,7 +35,7 @@ STUCK_FRAMES, STUCK_S = 10, 0.05
 LEAST_STEP = 0.1
 
 
-class Fault(StrEnum):
+class FifoFault(StrEnum):
     """Why what lay in the FIFO is worth nothing."""
 
     OVERFLOW = "overflow"
@@ -63,7 +62,7 @@ class FifoDecoder:
     """
 
     def __init__(self, settings: Settings) -> None:
-        self._settings = settings
+        self._settings, self._columns = settings, settings.columns
         self._clock = SampleClock(settings.nominal_rate_hz)
         self._runs: list[Run] = []
         self._taken = 0
@@ -92,7 +91,7 @@ class FifoDecoder:
         """`data` was read from the FIFO."""
         self._pending += data
 
-    def judged(self, overflow: bool, lost: bool = False) -> Fault | None:
+    def judged(self, overflow: bool, lost: bool = False) -> FifoFault | None:
         """Believe what the poll read, or say why not; then only a reset helps.
 
         Frames at the end that are all alike wait until one that is not follows them.
@@ -101,19 +100,19 @@ class FifoDecoder:
         self._pending.clear()
         self._look = None
         if lost:
-            return Fault.LOST
+            return FifoFault.LOST
         if overflow:
-            return Fault.OVERFLOW
+            return FifoFault.OVERFLOW
         if self._odd_bytes or len(data) % self._settings.frame_bytes:
-            return Fault.MISALIGNED
+            return FifoFault.MISALIGNED
         frames = np.frombuffer(data, ">i2").reshape(-1, self._settings.frame_words).astype(np.int16)
         kept = frames[max(DROPPED_FRAMES - self._read, 0) :]
         if not self._aligned(kept):
-            return Fault.MISALIGNED
+            return FifoFault.MISALIGNED
         self._read += len(frames)
         kept = np.concatenate((self._alike, kept))
         if self._stuck(kept):
-            return Fault.STUCK
+            return FifoFault.STUCK
         if look is not None:
             self._clock.look(*look)
         self._believe(kept)
@@ -131,7 +130,7 @@ class FifoDecoder:
             self._begun = True
             if not self._settings.accel_alone:
                 self._believed += believed
-                self._warmth += int(kept[:believed, TEMPERATURE].sum(dtype=np.int64))
+                self._warmth += int(kept[:believed, self._columns.temperature].sum(dtype=np.int64))
 
     def _stuck(self, kept: Counts) -> bool:
         """Whether a frame repeats itself for too long."""
@@ -195,7 +194,7 @@ class FifoDecoder:
     def _aligned(self, frames: Counts) -> bool:
         if not len(frames) or self._settings.accel_alone:
             return True
-        temperature = frames[:, TEMPERATURE].astype(np.int64)
+        temperature = frames[:, self._columns.temperature].astype(np.int64)
         before = temperature[0] if self._temperature is None else self._temperature
         if abs(temperature[0] - before) > MAX_TEMPERATURE_STEP:
             return False
@@ -223,20 +222,20 @@ class FifoDecoder:
         gap[np.cumsum([0] + [len(run.frames) for run in runs[:-1]])] = [run.gap for run in runs]
         alone = Samples(
             t=self._times_s(runs, times_s),
-            acc=frames[:, ACCEL] * settings.mps2_per_lsb,
+            acc=frames[:, self._columns.accel] * settings.mps2_per_lsb,
             gyr=np.full((len(frames), 3), np.nan),
             temperature_c=np.full(len(frames), np.nan),
             gap=gap,
-            acc_clipped=_clipped(frames[:, ACCEL]),
+            acc_clipped=_clipped(frames[:, self._columns.accel]),
             gyr_clipped=np.zeros(len(frames), bool),
         )
         if settings.accel_alone:
             return alone
         return replace(
             alone,
-            gyr=frames[:, GYRO] * reg.rad_s_per_lsb(settings.fs_sel),
-            temperature_c=self._celsius(frames[:, TEMPERATURE]),
-            gyr_clipped=_clipped(frames[:, GYRO]),
+            gyr=frames[:, self._columns.gyro] * reg.rad_s_per_lsb(settings.fs_sel),
+            temperature_c=self._celsius(frames[:, self._columns.temperature]),
+            gyr_clipped=_clipped(frames[:, self._columns.gyro]),
         )
 
     def _celsius(self, counts: Any) -> Any:

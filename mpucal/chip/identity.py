@@ -1,4 +1,4 @@
-"""Which part a chip is, by how it behaved and not by what it calls itself. Knows no bus and makes no access.
+"""Which part a chip is, from what it answered and how its FIFO behaved; makes no access itself.
 
 Clones answer WHO_AM_I as they like. What they cannot disguise is how many bytes their FIFO holds: 1024 in a 6050,
 512 in a 6500 (PS-MPU-6000A r3.4 section 1.2, PS-MPU-9250A r1.0 section 1.3), 512 that grow to 4096 where a word in
@@ -15,11 +15,10 @@ from statistics import median
 from ..data import Sensor
 from ..errors import ChipError
 from . import registers as reg
-from .families import CLONE98, MPU6050, MPU6500, MPU6880, PARTS, Family, Part, part_of
+from .families import PARTS, Family, Part, of_fifo, part_of
 
 # a full FIFO may say a few bytes less than it holds
 FIFO_SLACK_BYTES = 8
-BY_FIFO_BYTES = {family.fifo_bytes: family for family in (MPU6050, MPU6500, MPU6880)}
 
 # magnitudes [g] that a board in somebody's hand shows, at half the sensitivity
 HALF_G = (0.35, 0.65)
@@ -57,8 +56,9 @@ class Evidence:
         if self.fifo_bytes is None:
             return part_of(who_am_i)
         part = self._behaving(who_am_i, self.fifo_bytes)
-        if part.family is MPU6050 and self._magnitudes_g and HALF_G[0] < median(self._magnitudes_g) < HALF_G[1]:
-            return replace(part, chip=f"{part.chip}C", accel_sensitivity=HALF)
+        revision = part.family.half_range_revision
+        if revision and self._magnitudes_g and HALF_G[0] < median(self._magnitudes_g) < HALF_G[1]:
+            return replace(part, chip=f"{part.chip}{revision}", accel_sensitivity=HALF)
         return part
 
     def _behaving(self, who_am_i: int, fifo_bytes: int) -> Part:
@@ -66,8 +66,8 @@ class Evidence:
         grows = self._fifo_bytes.get(True, 0) > fifo_bytes + FIFO_SLACK_BYTES
         family = _family(fifo_bytes, grows)
         if known is not None and (family is None or family.fifo_bytes == known.family.fifo_bytes):
-            if known.family is MPU6500 and grows:
-                return Part(CLONE98.name, who_am_i, CLONE98)
+            if family is not None and family.widest_fifo_bytes and not known.family.widest_fifo_bytes:
+                return Part(family.name, who_am_i, family)
             return known if family is not None else replace(known, family=replace(known.family, fifo_bytes=fifo_bytes))
         if family is None:
             raise ChipError(
@@ -79,10 +79,9 @@ class Evidence:
 
 
 def _family(fifo_bytes: int, grows: bool) -> Family | None:
-    for size, family in BY_FIFO_BYTES.items():
-        if size - FIFO_SLACK_BYTES <= fifo_bytes <= size:
-            return CLONE98 if grows and family is MPU6500 else family
-    return None
+    near = [family for family in of_fifo(fifo_bytes) if family.fifo_bytes - FIFO_SLACK_BYTES <= fifo_bytes]
+    alike = [family for family in near if bool(family.widest_fifo_bytes) == grows]
+    return next(iter(alike or near), None)
 
 
 def remark(sensor: Sensor) -> str | None:
@@ -95,6 +94,8 @@ def remark(sensor: Sensor) -> str | None:
     answers = f"the chip answers 0x{sensor.who_am_i:02x} to WHO_AM_I"
     if named is None:
         return f"{answers}, which no part known here does; it behaves as an {sensor.chip} and is treated as one"
-    if sensor.chip == f"{named.chip}C":
-        return f"the chip is an {named.chip} of revision C, with half the sensitivity: its range is twice the nominal"
+    revision = named.family.half_range_revision
+    if revision and sensor.chip == f"{named.chip}{revision}":
+        half = "with half the sensitivity: its range is twice the nominal"
+        return f"the chip is an {named.chip} of revision {revision}, {half}"
     return f"{answers} as an {named.chip} does, but behaves as an {sensor.chip} and is treated as one"

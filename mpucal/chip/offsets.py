@@ -1,6 +1,6 @@
 """The accelerometer's offset registers: where they may be, what they hold, and how to write them whole.
 
-Knows no calibration, and nothing of what a count does: response.py measures that.
+response.py measures what a count of them does.
 
 Source: RM-MPU-6000A (0x06, two bytes an axis, one after the other); RM-MPU-9250A r1.4, registers 119 to 126 (0x77,
 with a reserved byte after each axis). 15 bits in [15:1]; bit 0 is reserved and kept. A factory trim is in them after
@@ -15,13 +15,14 @@ from dataclasses import dataclass
 from typing import Self
 
 from ..errors import BusError, ChipError
-from .families import MPU6050, MPU6500
+from .families import FAMILIES
 from .port import Port
 
 Place = tuple[int, int, int]
 Words = tuple[int, int, int]
 
-PLACES: tuple[Place, ...] = (MPU6500.accel_offset_h, MPU6050.accel_offset_h)
+# the latest of the table first
+PLACES: tuple[Place, ...] = tuple(dict.fromkeys(family.accel_offset_h for family in reversed(FAMILIES)))
 
 RESERVED = 1
 LEAST, MOST = -32768, 32767

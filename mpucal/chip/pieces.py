@@ -1,4 +1,4 @@
-"""Where a straight line broke: least squares in pieces, for a sample clock whose rate changed. Knows no clock.
+"""Where a straight line broke: least squares in pieces, for a sample clock whose rate changed.
 
 Binary segmentation: of all places, the one at which two lines explain the points best is a break where they do so
 beyond chance; then the same on either side of it.

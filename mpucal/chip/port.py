@@ -1,7 +1,4 @@
-"""One chip's registers over any bus: with retries of what may be repeated, and everything told to a decoder.
-
-Knows no sequence of accesses, and no clock but the bus's.
-"""
+"""One chip's registers over any bus: with retries of what may be repeated, and every access told to a decoder."""
 
 from __future__ import annotations
 

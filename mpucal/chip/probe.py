@@ -1,13 +1,13 @@
-"""Finds out which chip it is: refuses strangers by reading alone, then watches how it behaves. Knows no verdict.
+"""The accesses that tell which chip it is: strangers are refused by reading alone, then its behaviour is tried.
 
-What the replies say is decided in identity.py, from a capture as well.
+identity.py decides from the replies, live and from a capture.
 """
 
 from __future__ import annotations
 
 from ..errors import ChipError
 from . import registers as reg
-from .families import MPU6050, MPU6500, PARTS
+from .families import PARTS, known_parts, of_fifo
 from .port import Port
 
 MS = 1_000_000
@@ -42,10 +42,9 @@ def read_identity(port: Port) -> int:
             "tie the MPU's AD0 to VCC and give --address 0x69",
         )
     if who_am_i in (0x00, 0xFF) or power & POWER_UNUSED or count > FIFO_COUNT_MAX:
-        known = ", ".join(f"0x{value:02x} {part.chip}" for value, part in sorted(PARTS.items()))
         raise ChipError(
             f"the chip answers 0x{who_am_i:02x} to WHO_AM_I and has no MPU's registers",
-            f"check which chip is at this address (known are {known})",
+            f"check which chip is at this address (known are {known_parts()})",
         )
     return who_am_i
 
@@ -69,12 +68,12 @@ def probe(port: Port) -> None:
     port.write(reg.FIFO_EN, reg.FIFO_EN_FRAME)
     port.write(reg.USER_CTRL, reg.USER_CTRL_FIFO_EN)
     full = _filled(port)
-    if full <= MPU6500.fifo_bytes:
+    if any(family.widest_fifo_bytes for family in of_fifo(full)):
         port.write(reg.ACCEL_CONFIG2, reg.FIFO_SIZE)
         _filled(port)
     port.write(reg.FIFO_EN, 0)
     port.write(reg.USER_CTRL, 0)
-    if MPU6500.fifo_bytes < full <= MPU6050.fifo_bytes:
+    if any(family.half_range_revision for family in of_fifo(full)):
         for _ in range(SIGHTS):
             port.sleep(SIGHT_NS)
             port.read(reg.ACCEL_XOUT_H, 6)

@@ -1,4 +1,4 @@
-"""What a capture holds, one after the other. Knows no file and no order of events."""
+"""What a capture holds, one after the other: register accesses and session events."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The register map of the MPU-6000 and MPU-6500 families as data. Knows no bus, and no chip from another.
+"""The registers that the MPU-6000 and MPU-6500 families share: addresses, bits, ranges and sample rates.
 
 Source: RM-MPU-6000A r4.2 and RM-MPU-9250A r1.4 (registers), PS-MPU-6000A r3.4 (scales). What differs
 between the families is in families.py.
@@ -45,12 +45,12 @@ CONFIG_DLPF_CFG: Final = 0x07
 SELF_TEST: Final = 0xE0
 FULL_SCALE_SHIFT: Final = 3
 FULL_SCALE: Final = 0x18
-GYRO_FCHOICE_B: Final = 0x03
+FULL_SCALE_CODES: Final = 0x03
 
 # ACCEL_CONFIG2 (6500 only)
 ACCEL_FCHOICE_B: Final = 0x08
-A_DLPF_CFG: Final = 0x07
-FIFO_SIZE: Final = 0xC0  # ICM-20689 and its like
+FIFO_SIZE: Final = 0xC0  # ICM-20689 and its like: 512 bytes, doubled so many times
+FIFO_SIZE_SHIFT: Final = 6
 
 # FIFO_EN
 FIFO_EN_TEMP: Final = 0x80
@@ -75,7 +75,6 @@ USER_CTRL_SIG_COND_RESET: Final = 0x01
 # PWR_MGMT_1
 PWR_MGMT_1_DEVICE_RESET: Final = 0x80
 PWR_MGMT_1_SLEEP: Final = 0x40
-PWR_MGMT_1_CLKSEL: Final = 0x07
 CLKSEL_PLL: Final = 0x01
 
 # PWR_MGMT_2
@@ -93,8 +92,7 @@ ACCEL_LSB_PER_G: Final = (16384.0, 8192.0, 4096.0, 2048.0)
 # Each is half of the one before; the data sheet prints 32.8 and 16.4.
 GYRO_LSB_PER_DPS: Final = (131.0, 65.5, 32.75, 16.375)
 
-# Offset registers: one scale at every full scale.
-ACCEL_OFFSET_LSB_PER_G: Final = 2048.0
+# The gyroscope's offset registers: one scale at every full scale.
 GYRO_OFFSET_LSB_PER_DPS: Final = 32.75
 
 DLPF_CODES: Final = (0, 1, 2, 3, 4, 5, 6)

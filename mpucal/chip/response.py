@@ -1,4 +1,4 @@
-"""Where a chip's offset registers really are and what a count of them does, by measuring. Knows no calibration.
+"""Where a chip's offset registers really are and what a count of them does, by measuring.
 
 Clones move them, and even InvenSense's own drivers disagree on the scale: so a known step is written, half a second
 is averaged, and the step is taken away again.
@@ -69,7 +69,8 @@ def measured_response(port: Port, bench: Bench, likely: Place = PLACES[0]) -> Re
         if (np.abs(shift) > NOTHING_G).any():
             return _understood(place, shift / np.array(difference(probe.words, old.words)))
     raise OddOffsets(
-        "the accelerometer does not answer to its offset registers, neither at 0x77 nor at 0x06",
+        "the accelerometer does not answer to its offset registers, neither at "
+        + " nor at ".join(f"0x{place[0]:02x}" for place in PLACES),
         "use the calibration's files: this chip cannot hold a correction",
     )
 

@@ -1,7 +1,5 @@
 """The factory's self test: each axis is pushed by a built-in force, and its answer compared with the factory's code.
 
-Knows no verdict on the whole chip, and which family it is only by what it is given.
-
 Source: RM-MPU-6000A r4.2, registers 13 to 16, 27 and 28, and PS-MPU-6000A r3.4, sections 6.1 and 6.2 (within 14 %);
 for the 6500 RM-MPU-9250A r1.4, registers 0 to 15, with the limits of Linux' drivers/iio/imu/inv_mpu6050.
 """

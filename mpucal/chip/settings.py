@@ -1,4 +1,4 @@
-"""How a chip is configured to measure: to its registers and back. Knows no bus and no order of writing.
+"""How a chip is configured to measure: to register values and back.
 
 Source: RM-MPU-6000A r4.2 registers 25 to 28, RM-MPU-9250A r1.4 register 29.
 """
@@ -12,7 +12,7 @@ from typing import Self
 from ..data import Sensor
 from ..errors import RecordingError
 from . import registers as reg
-from .families import Part
+from .families import Columns, Part
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,12 @@ class Settings:
         return 2 * self.frame_words
 
     @property
+    def columns(self) -> Columns:
+        """Where a frame's words lie; of the accelerometer alone, its own only."""
+        columns = self.part.family.columns
+        return columns._replace(accel=slice(0, reg.ACCEL_WORDS)) if self.accel_alone else columns
+
+    @property
     def mps2_per_lsb(self) -> float:
         """m/s^2 of one count of the accelerometer."""
         return reg.mps2_per_lsb(self.afs_sel) / self.part.accel_sensitivity
@@ -77,7 +83,7 @@ class Settings:
             reg.INT_ENABLE: reg.INT_FIFO_OFLOW,
             reg.SMPLRT_DIV: self.smplrt_div,
             reg.CONFIG: self.dlpf_cfg,
-            reg.GYRO_CONFIG: self.fs_sel << reg.FULL_SCALE_SHIFT,
+            reg.GYRO_CONFIG: self.fs_sel << self.part.family.gyro_range_shift,
             reg.ACCEL_CONFIG: self.afs_sel << reg.FULL_SCALE_SHIFT,
         }
         if self.part.family.has_accel_config2:
@@ -103,7 +109,7 @@ class Settings:
             part=part,
             smplrt_div=held[reg.SMPLRT_DIV],
             dlpf_cfg=held[reg.CONFIG] & reg.CONFIG_DLPF_CFG,
-            fs_sel=(held[reg.GYRO_CONFIG] & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT,
-            afs_sel=(held[reg.ACCEL_CONFIG] & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT,
+            fs_sel=held[reg.GYRO_CONFIG] >> part.family.gyro_range_shift & reg.FULL_SCALE_CODES,
+            afs_sel=held[reg.ACCEL_CONFIG] >> reg.FULL_SCALE_SHIFT & reg.FULL_SCALE_CODES,
             accel_alone=held.get(reg.PWR_MGMT_2, 0) & reg.STANDBY_GYRO == reg.STANDBY_GYRO,
         )

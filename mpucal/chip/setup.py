@@ -1,4 +1,4 @@
-"""Sets a chip up and starts its FIFO, in the order that its register map asks for. Knows no FIFO data.
+"""Sets a chip up and starts its FIFO, in the order that its register map asks for.
 
 Source: RM-MPU-6000A r4.2 registers 104, 106 and 107; the start-up times of both product specifications are shorter.
 """

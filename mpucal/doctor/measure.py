@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..chip.clock import RATE_TOLERANCE
 from ..chip.families import Family
 from ..data import STANDARD_GRAVITY_MPS2, Recording
-from .datasheet import RATE_TOLERANCE, data_sheet
 from .finding import Finding, Mark
 from .noise import density, trembles
 
@@ -26,15 +26,15 @@ def examine_stream(recording: Recording, nominal_hz: float, seconds: float, fami
     yield _rate(recording, nominal_hz)
     yield _losses(recording, seconds)
     acc, gyr = recording.acc, np.degrees(recording.gyr)
-    hz, sheet = float(recording.sensor.rate_hz or nominal_hz), data_sheet(family)
+    hz = float(recording.sensor.rate_hz or nominal_hz)
     if trembles(acc, hz):
         yield Finding("noise", Mark.UNKNOWN, "the board moved", "lay it on something firm, and ask again")
         return
     ug = density(acc, hz) / STANDARD_GRAVITY_MPS2 * 1e6
-    yield _noise("accelerometer noise", ug, sheet.accel_noise_ug, "ug_rthz", "µg/√Hz")
-    yield _noise("gyroscope noise", density(gyr, hz), sheet.gyro_noise_dps, "dps_rthz", "deg/s/√Hz")
+    yield _noise("accelerometer noise", ug, family.accel_noise_ug, "ug_rthz", "µg/√Hz")
+    yield _noise("gyroscope noise", density(gyr, hz), family.gyro_noise_dps, "dps_rthz", "deg/s/√Hz")
     yield _gravity(recording)
-    yield _zero_rate(gyr.mean(0).tolist(), sheet.zero_rate_dps)
+    yield _zero_rate(gyr.mean(0).tolist(), family.zero_rate_dps)
     yield _temperature(float(recording.temperature_c.mean()))
 
 

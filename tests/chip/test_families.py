@@ -1,9 +1,19 @@
-"""Identities and what they mean."""
+"""Identities and what they mean; a relative is one row."""
 
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
 import pytest
 
-from mpucal.chip.families import MPU6050, MPU6500, part_of
+from mpucal.chip import families
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.chip.families import FAMILIES, MPU6050, MPU6500, Group, Part, part_of
 from mpucal.errors import ChipError
+from mpucal.simulated.chip import models, open_simulated
+
+PAGE = Path(__file__).parents[2] / "docs" / "chips.md"
 
 
 @pytest.mark.parametrize(
@@ -37,3 +47,43 @@ def test_the_6500_has_strides_of_three_and_a_register_for_the_accelerometer_filt
     assert MPU6500.accel_offset_h == (0x77, 0x7A, 0x7D)
     assert MPU6500.has_accel_config2
     assert not MPU6050.has_accel_config2
+
+
+def row(family):
+    wide = f", {family.widest_fifo_bytes} once ACCEL_CONFIG2 asks for it" if family.widest_fifo_bytes else ""
+    offsets = ", ".join(f"0x{address:02X}" for address in family.accel_offset_h)
+    parts = ", ".join(f"0x{who_am_i:02X} {chip}" for who_am_i, chip in family.parts)
+    temperature = f"raw / {family.lsb_per_c:g} + {family.zero_c:g}"
+    return f"| {family.name} | {family.fifo_bytes}{wide} | {offsets} | {temperature} | {parts} |"
+
+
+def test_the_page_holds_the_table():
+    lines = PAGE.read_text().split("| family |")[1].split("\n\n")[0].splitlines()[2:]
+    assert lines == [row(family) for family in FAMILIES]
+
+
+def test_a_relative_is_one_row(monkeypatch):
+    """Its simulated model and the driver both follow the row: frame, ranges, temperature, FIFO."""
+    made_up = replace(
+        MPU6500,
+        name="MADE-UP",
+        parts=((0x46, "MADE-UP"),),
+        fifo_bytes=1536,
+        lsb_per_c=100.0,
+        zero_c=10.0,
+        frame=(Group.GYRO, Group.TEMPERATURE, Group.ACCEL),
+        gyro_range_shift=2,
+        asleep=True,
+    )
+    monkeypatch.setattr(families, "FAMILIES", (*FAMILIES, made_up))
+    monkeypatch.setitem(families.PARTS, 0x46, Part("MADE-UP", 0x46, made_up))
+    monkeypatch.setitem(models.MODELS, "made_up", models.Model("made_up", made_up))
+    bus = open_simulated("sim:chip=made_up,seed=2,temperature_c=31,b_omega=0.1/0.2/-0.3,noise=0,hand=still")
+    driver = Driver(bus, Config(gyro_range_dps=1000))
+    assert driver.start().chip == "MADE-UP"
+    for _ in range(20):
+        driver.poll()
+    recording = driver.recording()
+    assert recording.temperature_c.mean() == pytest.approx(31, abs=0.1)
+    assert np.linalg.norm(recording.acc, axis=1).mean() == pytest.approx(9.8, abs=1)
+    np.testing.assert_allclose(recording.gyr.mean(0), [0.1, 0.2, -0.3], atol=0.03)

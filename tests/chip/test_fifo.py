@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mpucal.chip.families import part_of
-from mpucal.chip.fifo import DROPPED_FRAMES, Fault, FifoDecoder
+from mpucal.chip.fifo import DROPPED_FRAMES, FifoDecoder, FifoFault
 from mpucal.chip.settings import Settings
 
 SETTINGS = Settings(part_of(0x68), smplrt_div=4, dlpf_cfg=3, fs_sel=1, afs_sel=1)
@@ -90,17 +90,17 @@ def test_the_first_frames_are_dropped_whatever_they_hold():
 def test_misaligned_frames_are_noticed_at_the_first(shift):
     decoder = fresh()
     stream = packed(*[(100, -200, 8192, -2000, 950, -900, 700)] * 6)
-    assert poll(decoder, stream[shift : shift + 5 * 14], 1) is Fault.MISALIGNED
+    assert poll(decoder, stream[shift : shift + 5 * 14], 1) is FifoFault.MISALIGNED
     assert len(decoder.take()) == 0
 
 
 @pytest.mark.parametrize(
     ("data", "overflow", "fault"),
     [
-        pytest.param(packed(QUIET), True, Fault.OVERFLOW, id="overflow while reading"),
-        pytest.param(b"", True, Fault.OVERFLOW, id="overflow before"),
-        pytest.param(packed(QUIET)[:-1], False, Fault.MISALIGNED, id="a part of a frame"),
-        pytest.param(packed(QUIET, (*QUIET[:3], -1500, *QUIET[4:])), False, Fault.MISALIGNED, id="jump"),
+        pytest.param(packed(QUIET), True, FifoFault.OVERFLOW, id="overflow while reading"),
+        pytest.param(b"", True, FifoFault.OVERFLOW, id="overflow before"),
+        pytest.param(packed(QUIET)[:-1], False, FifoFault.MISALIGNED, id="a part of a frame"),
+        pytest.param(packed(QUIET, (*QUIET[:3], -1500, *QUIET[4:])), False, FifoFault.MISALIGNED, id="jump"),
     ],
 )
 def test_what_cannot_be_believed_is_left_out_and_leaves_a_gap(data, overflow, fault):
@@ -117,7 +117,7 @@ def test_a_count_of_no_whole_number_of_frames_is_misaligned_even_where_the_value
     decoder = fresh()
     decoder.counted(1, 2 * 14 + 4)
     decoder.data(packed(*calm(2)))
-    assert decoder.judged(False) is Fault.MISALIGNED
+    assert decoder.judged(False) is FifoFault.MISALIGNED
 
 
 def test_a_reset_before_any_sample_leaves_no_gap():
@@ -173,7 +173,7 @@ def test_a_frame_that_repeats_itself_is_not_delivered(cut):
     faults = [poll(decoder, packed(*before, *stuck[:cut]), 1)]
     if faults[0] is None:
         faults.append(poll(decoder, packed(*stuck[cut:]), 2))
-    assert faults[-1] is Fault.STUCK
+    assert faults[-1] is FifoFault.STUCK
     # the first of the run may be as true as those before it
     assert len(decoder.take()) == (0 if len(faults) == 1 else 4 if cut == 1 else 3)
     decoder.reset()
@@ -197,5 +197,5 @@ def test_a_chip_that_was_reset_is_not_believed():
     decoder = fresh()
     decoder.counted(1, 28)
     decoder.data(packed(*calm(2)))
-    assert decoder.judged(overflow=False, lost=True) is Fault.LOST
+    assert decoder.judged(overflow=False, lost=True) is FifoFault.LOST
     assert len(decoder.take()) == 0

@@ -10,7 +10,7 @@ from mpucal.chip.access import Reply
 from mpucal.chip.config import Config
 from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
-from mpucal.chip.families import CLONE98, MPU6050, MPU6500, PARTS
+from mpucal.chip.families import ICM20689, MPU6050, MPU6500, PARTS
 from mpucal.chip.identity import Evidence, remark
 from mpucal.data import Sensor
 from mpucal.errors import ChipError
@@ -41,12 +41,12 @@ def evidence(fifo_bytes, widened_bytes=None, magnitude_g=None):
         pytest.param(0x68, evidence(1024, magnitude_g=0.55), "MPU-6050C", MPU6050, id="of revision C"),
         pytest.param(0x70, evidence(512, 512), "MPU-6500", MPU6500, id="a 6500"),
         pytest.param(0x71, evidence(512, 512), "MPU-9250", MPU6500, id="a 9250"),
-        pytest.param(0x98, evidence(512, 4096), "ICM-20689", CLONE98, id="the 0x98 clone"),
-        pytest.param(0x98, evidence(512, 512), "ICM-20689", CLONE98, id="whose FIFO does not grow"),
-        pytest.param(0xAF, evidence(512, 512), "ICM-20608", CLONE98, id="a 20608"),
+        pytest.param(0x98, evidence(512, 4096), "ICM-20689", ICM20689, id="the 0x98 clone"),
+        pytest.param(0x98, evidence(512, 512), "ICM-20689", ICM20689, id="whose FIFO does not grow"),
+        pytest.param(0xAF, evidence(512, 512), "ICM-20608", ICM20689, id="a 20608"),
         pytest.param(0x68, evidence(512, 512), "MPU-6500", MPU6500, id="a 6500 that answers as a 6050"),
-        pytest.param(0x68, evidence(512, 4096), "ICM-20689", CLONE98, id="a 0x98 clone that answers as a 6050"),
-        pytest.param(0x70, evidence(512, 4096), "ICM-20689", CLONE98, id="or as a 6500"),
+        pytest.param(0x68, evidence(512, 4096), "ICM-20689", ICM20689, id="a 0x98 clone that answers as a 6050"),
+        pytest.param(0x70, evidence(512, 4096), "ICM-20689", ICM20689, id="or as a 6500"),
         pytest.param(0x70, evidence(1024, magnitude_g=1), "MPU-6050", MPU6050, id="a 6050 that answers as a 6500"),
         pytest.param(0x72, evidence(512, 512), "MPU-6500", MPU6500, id="an unknown clone of a 6500"),
         pytest.param(0x19, evidence(1024, magnitude_g=1), "MPU-6050", MPU6050, id="an unknown clone of a 6050"),

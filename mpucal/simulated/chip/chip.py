@@ -1,15 +1,17 @@
-"""The simulated chip: registers, a sample clock of its own and a FIFO. Knows neither bus nor physics.
+"""The simulated chip: registers, a sample clock of its own and a FIFO.
 
 Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...chip import registers as reg
 from ...chip.access import EndOfCapture
-from ...chip.fifo import GYRO
+from ...chip.families import Group
 from ...data import Vector
 from ..sensor import Counts, Setting
 from .factory import Factory, Three
@@ -96,16 +98,15 @@ class Chip:
         changed = self._registers[address] != value
         self._registers[address] = value
         self._setting = None
-        if address == reg.ACCEL_CONFIG2 and self._model.fifo_size_bits:
-            self._fifo.size = self._model.family.fifo_bytes << (value >> 6)
+        if address == reg.ACCEL_CONFIG2:
+            self._fifo.size = self._model.fifo_bytes(value)
         if (address in SAMPLING and changed) or (address in PACING and self._rate() != self._rate_hz):
             self._start_clock(t_ns)
 
     def _user_control(self, value: int) -> int:
         """Does what its self-clearing bits ask for, and returns the others."""
-        if value & reg.USER_CTRL_FIFO_RESET and not (
-            self._model.reset_needs_fifo_off and value & reg.USER_CTRL_FIFO_EN
-        ):
+        running = value & reg.USER_CTRL_FIFO_EN and self._model.family.fifo_reset_needs_stop
+        if value & reg.USER_CTRL_FIFO_RESET and not running:
             self._fifo.clear()
         if value & reg.USER_CTRL_SIG_COND_RESET:
             self._latest, self._unread = bytes(reg.FRAME_BYTES), None
@@ -182,7 +183,7 @@ class Chip:
         words = counts.astype(">i2")
         self._latest = words[-1].tobytes()
         stop = bool(self._registers[reg.CONFIG] & reg.CONFIG_FIFO_MODE_STOP)
-        if self._fifo.push(words[:, _columns(sources)].tobytes(), stop):
+        if self._fifo.push(words[:, _columns(sources, self._model.family.frame)].tobytes(), stop):
             self._registers[reg.INT_STATUS] |= reg.INT_FIFO_OFLOW
 
     def _latest_sample(self) -> bytes:
@@ -210,18 +211,25 @@ class Chip:
         return self._setting
 
 
-def _columns(sources: int) -> list[int]:
-    """Which of a sample's seven words FIFO_EN asks for, in register order."""
-    accel = [0, 1, 2] if sources & reg.FIFO_EN_ACCEL else []
-    others = (reg.FIFO_EN_TEMP, reg.FIFO_EN_XG, reg.FIFO_EN_YG, reg.FIFO_EN_ZG)
-    return accel + [3 + i for i, bit in enumerate(others) if sources & bit]
+# FIFO_EN's bit of each of a sample's seven words, in register order
+WORD_BITS = {
+    Group.ACCEL: [(word, reg.FIFO_EN_ACCEL) for word in (0, 1, 2)],
+    Group.TEMPERATURE: [(3, reg.FIFO_EN_TEMP)],
+    Group.GYRO: [(4, reg.FIFO_EN_XG), (5, reg.FIFO_EN_YG), (6, reg.FIFO_EN_ZG)],
+}
+GYRO = slice(4, 7)
+
+
+def _columns(sources: int, frame: Sequence[Group]) -> list[int]:
+    """Which of a sample's seven words FIFO_EN asks for, in the frame's order."""
+    return [word for group in frame for word, bit in WORD_BITS[group] if sources & bit]
 
 
 def _setting(registers: bytearray, rate_hz: float, model: Model, factory: Factory) -> Setting:
     """What the registers say about how to measure."""
     accel, gyro = registers[reg.ACCEL_CONFIG], registers[reg.GYRO_CONFIG]
     ax, ay, az = (
-        ((_word(registers, address) & ~1) - (trim & ~1)) / model.offset_lsb_per_g + more
+        ((_word(registers, address) & ~1) - (trim & ~1)) / model.offset_scale + more
         for address, trim, more in zip(
             model.family.accel_offset_h, factory.accel_trim, _tested(accel, factory.accel_self_test_g), strict=True
         )
@@ -230,10 +238,12 @@ def _setting(registers: bytearray, rate_hz: float, model: Model, factory: Factor
         _word(registers, reg.XG_OFFSET_H + 2 * axis) / reg.GYRO_OFFSET_LSB_PER_DPS + more
         for axis, more in enumerate(_tested(gyro, factory.gyro_self_test_dps))
     )
+    afs_sel = accel >> reg.FULL_SCALE_SHIFT & reg.FULL_SCALE_CODES
+    fs_sel = gyro >> model.family.gyro_range_shift & reg.FULL_SCALE_CODES
     return Setting(
         rate_hz=rate_hz,
-        accel_range_g=reg.ACCEL_RANGES_G[(accel & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT] / model.accel_sensitivity,
-        gyro_range_dps=reg.GYRO_RANGES_DPS[(gyro & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT],
+        accel_range_g=reg.ACCEL_RANGES_G[afs_sel] / model.accel_sensitivity,
+        gyro_range_dps=reg.GYRO_RANGES_DPS[fs_sel],
         lsb_per_c=model.family.lsb_per_c,
         zero_c=model.family.zero_c,
         accel_offset_g=(ax, ay, az),

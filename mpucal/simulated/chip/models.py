@@ -1,12 +1,12 @@
-"""The chips that can be simulated: a family, and what this one of it is like when it is switched on."""
+"""The chips that can be simulated: rows of the table of chips, and how one of them deviates from its row."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ...chip import registers as reg
-from ...chip.families import CLONE98, MPU6050, MPU6500, MPU6880, Family
+from ...chip.families import ICM20689, MPU6050, MPU6500, MPU6880, Family
 from .factory import Factory
 
 AWAKE = 0x01
@@ -14,28 +14,33 @@ AWAKE = 0x01
 
 @dataclass(frozen=True)
 class Model:
-    """One kind of chip.
+    """One kind of chip; without deviations it is the first part of its family.
 
     Attributes
     ----------
-    name : as in an option. family : its register map.
-    who_am_i : its identity. power_on : PWR_MGMT_1 after a reset.
-    accel_sensitivity : counts a g, over the nominal; revision C of the 6050 has half.
-    offset_lsb_per_g : what one count of an accelerometer offset really does.
+    name : as in an option. family : its row.
+    who_am_i : another identity than the first part's.
+    accel_sensitivity : counts a g, relative to the nominal.
+    offset_lsb_per_g : another scale of its accelerometer offsets than the nominal.
     offsets_kept : its accelerometer offsets can be written.
-    reset_needs_fifo_off : FIFO_RST works only while FIFO_EN is 0 (RM-MPU-6000A, register 106).
-    fifo_size_bits : ACCEL_CONFIG2 [7:6] doubles the FIFO that many times.
     """
 
     name: str
     family: Family
-    who_am_i: int
-    power_on: int
+    who_am_i: int | None = None
     accel_sensitivity: float = 1.0
-    offset_lsb_per_g: float = 2048.0
+    offset_lsb_per_g: float | None = None
     offsets_kept: bool = True
-    reset_needs_fifo_off: bool = False
-    fifo_size_bits: bool = False
+
+    @property
+    def identity(self) -> int:
+        """Its answer to WHO_AM_I."""
+        return self.family.parts[0][0] if self.who_am_i is None else self.who_am_i
+
+    @property
+    def offset_scale(self) -> float:
+        """LSB/g of its accelerometer offsets."""
+        return self.offset_lsb_per_g or self.family.accel_offset_lsb_per_g
 
     def writable(self) -> frozenset[int]:
         """The addresses that keep what is written to them."""
@@ -43,11 +48,16 @@ class Model:
         own = {reg.ACCEL_CONFIG2} if self.family.has_accel_config2 else set()
         return frozenset(WRITABLE | offsets | own)
 
+    def fifo_bytes(self, accel_config2: int) -> int:
+        """Size of its FIFO while ACCEL_CONFIG2 holds this; each step of FIFO_SIZE doubles it."""
+        steps = (accel_config2 & reg.FIFO_SIZE) >> reg.FIFO_SIZE_SHIFT
+        return min(self.family.fifo_bytes << steps, self.family.widest_fifo_bytes or self.family.fifo_bytes)
+
     def reset_values(self, factory: Factory) -> bytearray:
         """All 128 registers after a reset, with what the factory left in this piece."""
         values = bytearray(128)
-        values[reg.PWR_MGMT_1] = self.power_on
-        values[reg.WHO_AM_I] = self.who_am_i
+        values[reg.PWR_MGMT_1] = reg.PWR_MGMT_1_SLEEP if self.family.asleep else AWAKE
+        values[reg.WHO_AM_I] = self.identity
         for address, value in factory.registers(self.family).items():
             values[address] = value
         return values
@@ -77,13 +87,14 @@ OFFSETS: dict[str, dict[str, Any]] = {
     "readonly": {"offsets_kept": False},
 }
 
+_MPU6050 = Model("mpu6050", MPU6050)
 MODELS = {
     model.name: model
     for model in (
-        Model("mpu6050", MPU6050, 0x68, reg.PWR_MGMT_1_SLEEP, reset_needs_fifo_off=True),
-        Model("mpu6050c", MPU6050, 0x68, reg.PWR_MGMT_1_SLEEP, accel_sensitivity=0.5, reset_needs_fifo_off=True),
-        Model("mpu6500", MPU6500, 0x70, AWAKE),
-        Model("mpu6880", MPU6880, 0x78, AWAKE),
-        Model("clone98", CLONE98, 0x98, reg.PWR_MGMT_1_SLEEP, fifo_size_bits=True),
+        _MPU6050,
+        replace(_MPU6050, name="mpu6050c", accel_sensitivity=0.5),
+        Model("mpu6500", MPU6500),
+        Model("mpu6880", MPU6880),
+        Model("clone98", ICM20689),
     )
 }
