@@ -24,12 +24,14 @@ from rich.console import Console
 from rich.table import Table
 
 import mpucal
-from mpucal.calibration.estimate import METHODS, choose, fit_accel
+from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.hand_reference import evaluate_hand_reference
-from mpucal.calibration.initialise import initialise
-from mpucal.calibration.likelihood import Problem, Series, Theta, evaluate, value
+from mpucal.calibration.initial_estimate import initialise
+from mpucal.calibration.likelihood import evaluate, value
+from mpucal.calibration.model_selection import METHODS, choose, fit_accel
+from mpucal.calibration.problem import Problem, Series
 from mpucal.calibration.reference import evaluate_reference
-from mpucal.calibration.stationary import flat_statistics
+from mpucal.calibration.theta import Theta
 from mpucal.data import Recording
 from mpucal.kernel import _kernel
 from mpucal.simulated.study.scenarios import GRAVITY_MPS2, hand_scenario, paper_scenario

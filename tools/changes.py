@@ -21,7 +21,7 @@ from rich.table import Table
 from tables import number
 
 import mpucal
-from mpucal.calibration.model import rotation
+from mpucal.calibration.rotation import rotation
 from mpucal.data import Recording
 from mpucal.simulated.study.metrics import sph_rms
 from mpucal.simulated.study.scenarios import GRAVITY_MPS2, MOTIONS, hand_scenario

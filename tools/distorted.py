@@ -27,9 +27,9 @@ from tables import number
 import mpucal
 from mpucal.calibration import MODELS
 from mpucal.calibration.ekf import Ekf, specific_force
+from mpucal.calibration.flat_segment import find_flat, flat_statistics
 from mpucal.calibration.masks import with_masks
-from mpucal.calibration.stationary import find_flat, flat_statistics
-from mpucal.calibration.still import still_runs
+from mpucal.calibration.static_intervals import static_intervals
 from mpucal.data import Recording, Vector
 from mpucal.errors import RecordingError
 from mpucal.simulated.study.metrics import sph_rms, tilt_errors_deg
@@ -140,7 +140,7 @@ def orientations(recording: Recording, D: Vector, b_a: Vector, K: Vector, gravit
         ekf = Ekf.after(flat_statistics(of_gyro, (flat.first, flat.last)), of_gyro, gravity)
         x = np.concatenate([block.x for block in ekf.run(D[sets], b_a[sets])])
         s[:, sets] = specific_force(x, gravity)
-    return s, int(still_runs(recording, flat)[-1, 0]) - flat.last
+    return s, int(static_intervals(recording, flat)[-1, 0]) - flat.last
 
 
 def tilt_errors(s_true: Vector, s: Vector) -> tuple[tuple[float, ...], tuple[float, ...]]:

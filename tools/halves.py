@@ -24,10 +24,10 @@ from tables import number
 
 import mpucal
 from mpucal.calibration import MODELS, weigh
+from mpucal.calibration.fit import Fit
+from mpucal.calibration.flat_segment import find_flat, flat_statistics
 from mpucal.calibration.masks import with_masks
-from mpucal.calibration.model import Fit
-from mpucal.calibration.stationary import find_flat, flat_statistics
-from mpucal.calibration.still import still_runs
+from mpucal.calibration.static_intervals import static_intervals
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from mpucal.errors import MpucalError, RecordingError
 from mpucal.simulated.study.scenarios import GRAVITY_MPS2, MOTIONS, Simulated, hand_scenario, paper_scenario
@@ -72,7 +72,7 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
     flat = recording.flat or find_flat(recording)
     if flat is None:
         raise RecordingError(f"{recording.name}: no rest to begin with", "give a recording that begins at rest")
-    runs = still_runs(recording, flat_statistics(recording, flat))
+    runs = static_intervals(recording, flat_statistics(recording, flat))
     runs = runs[runs[:, 1] - runs[:, 0] >= LEAST_REST_S * recording.rate_hz]
     n, middle = len(recording), (flat[1] + len(recording)) // 2
     inner = runs[(runs[:, 0] > flat[1]) & (np.abs(runs.mean(1) - middle) < 0.25 * n)]

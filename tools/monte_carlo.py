@@ -36,10 +36,10 @@ from tables import (
 import mpucal
 from mpucal.calibration import MODELS
 from mpucal.calibration.ekf import Ekf, specific_force
-from mpucal.calibration.estimate import fit_accel
-from mpucal.calibration.model import Fit
+from mpucal.calibration.fit import Fit
+from mpucal.calibration.flat_segment import flat_statistics
+from mpucal.calibration.model_selection import fit_accel
 from mpucal.calibration.paper import fit_paper
-from mpucal.calibration.stationary import flat_statistics
 from mpucal.data import Vector
 from mpucal.errors import MpucalError
 from mpucal.simulated.study.metrics import sph_rms, tilt_errors_deg

@@ -12,10 +12,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from mpucal.calibration.flat_segment import Flat, find_flat, flat_statistics
 from mpucal.calibration.masks import with_masks
-from mpucal.calibration.model import Flat, cross, product, rotation
-from mpucal.calibration.stationary import find_flat, flat_statistics
-from mpucal.calibration.still import Runs, still_runs
+from mpucal.calibration.rotation import cross, product, rotation
+from mpucal.calibration.static_intervals import Intervals, static_intervals
 from mpucal.data import Recording, Vector
 
 FACE_RAD = np.deg2rad(25.0)  # a face may be as far from straight up: a large bias tilts what is measured
@@ -47,7 +47,7 @@ class Rests:
 
     recording: Recording
     flat: Flat
-    runs: Runs
+    runs: Intervals
 
     @classmethod
     def of(cls, recording: Recording) -> Rests:
@@ -62,7 +62,7 @@ class Rests:
         if segment is None:
             raise Unfit("never still")
         flat = flat_statistics(recording, segment)
-        runs = still_runs(recording, flat)
+        runs = static_intervals(recording, flat)
         return cls(recording, flat, runs[runs[:, 1] - runs[:, 0] >= SHORTEST_S * recording.rate_hz])
 
     @cached_property

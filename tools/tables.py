@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from mpucal.calibration.model import B_A_NAMES, D_NAMES, Fit
+from mpucal.calibration.fit import Fit
+from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.data import Vector
 
 PAPER = {"uncalibrated": "8.3 (7.1) / 8.3 (6.9)", "calibrated": "0.32 (0.40) / 0.33 (0.43)", "iterations": "<= 6 (10)"}

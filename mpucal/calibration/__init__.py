@@ -13,13 +13,13 @@ from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import UsageError
 from ..result.calibration import Calibration, unknown
 from .blockers import BLOCKERS, no_gyroscope
-from .estimate import METHODS, Choice, choose
 from .evidence import Evidence
-from .likelihood import K_NAMES
+from .fit import Fit
+from .flat_segment import Flat, find_flat, flat_statistics, tells
 from .masks import with_masks
-from .model import B_A_NAMES, B_OMEGA_NAMES, D_NAMES, Fit, Flat
+from .model_selection import METHODS, Choice, choose
+from .parameters import B_A_NAMES, B_OMEGA_NAMES, D_NAMES, K_NAMES
 from .quality import judge
-from .stationary import find_flat, flat_statistics, tells
 
 __all__ = ["MODELS", "calibrate", "weigh"]
 

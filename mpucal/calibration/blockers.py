@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .evidence import Evidence
-from .stationary import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
+from .flat_segment import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
 
 FEWEST_SAMPLES = 50
 LEAST_TURN_RAD = np.deg2rad(20.0)

@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Recording, Vector
-from .information import DIRECTIONS, Uncertainty, uncertainty
-from .initialise import fibonacci_sphere
-from .model import Fit, Flat, product, rotation
-from .stationary import find_flat, flat_statistics
-from .steady import Change, likeliest_change
-from .still import still_runs
+from .change_detection import Change, likeliest_change
+from .fit import Fit
+from .flat_segment import Flat, find_flat, flat_statistics
+from .rotation import product, rotation
+from .sphere import fibonacci_sphere
+from .static_intervals import static_intervals
 from .tilt import tilted_directions
+from .uncertainty import DIRECTIONS, Uncertainty, uncertainty
 
 HALF_SECOND = 0.5
 LEAST_MOVE_RAD = np.deg2rad(2.0)  # of gravity in half a second, above noise
@@ -130,7 +131,7 @@ class Evidence:
         fit, flat, r = self.fit, self.flat, self.recording
         if fit is None or flat is None or self.calibrated is None:
             return None
-        runs = still_runs(r, flat)
+        runs = static_intervals(r, flat)
         if len(runs) < 3:
             return None
         poses = np.array([self.calibrated[a:b].mean(0) for a, b in runs])

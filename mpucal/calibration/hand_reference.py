@@ -7,9 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Vector
-from .likelihood import NAMES, Evaluation, Problem, Theta
-from .model import cross, rotation, tangents
-from .reference import K_BASIS, left_jacobian
+from .likelihood import Evaluation
+from .parameters import NAMES
+from .problem import Problem
+from .reference import K_BASIS
+from .rotation import cross, left_jacobian, rotation
+from .sphere import tangents
+from .theta import Theta
 
 LONGEST_STEP_S, SPEED_OF_RESET_S = 0.2, 0.04
 _P = len(NAMES)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
-from .likelihood import Series
-from .model import Flat
+from .flat_segment import Flat
+from .problem import Series
 
 ACC_RANGES = STANDARD_GRAVITY_MPS2 * np.array([2.0, 4.0, 8.0, 16.0])
 GYRO_RANGES = np.deg2rad([125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0])

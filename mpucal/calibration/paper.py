@@ -8,7 +8,9 @@ import numpy as np
 
 from ..data import Recording, Vector
 from .ekf import Ekf, inverse
-from .model import B_A_NAMES, D_NAMES, Fit, Flat
+from .fit import Fit
+from .flat_segment import Flat
+from .parameters import B_A_NAMES, D_NAMES
 
 MAX_ITERATIONS = 10
 EPSILON_1 = 1e-3  # of the Newton decrement: 0.04 sigma from the optimum, whatever the units

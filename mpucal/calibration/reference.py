@@ -7,8 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Vector
-from .likelihood import Evaluation, Problem, Theta
-from .model import cross, rotation, tangents
+from .likelihood import Evaluation
+from .problem import Problem
+from .rotation import cross, left_jacobian, rotation
+from .sphere import tangents
+from .theta import Theta
 
 K_BASIS = np.zeros((6, 3, 3))
 for _m, (_i, _j) in enumerate([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]):
@@ -111,12 +114,3 @@ def _propagate(state: _State, problem: Problem, theta: Theta, i: int) -> _State:
     X, dX = cross(turned), cross(dturned)
     half = dX @ c @ X.T
     return _State(turned, Fp + X @ c @ X.T, dturned, dFp + half + np.swapaxes(half, 1, 2))
-
-
-def left_jacobian(phi: Vector) -> Vector:
-    """J_l of d exp([phi]x) = [J_l dphi]x exp([phi]x)."""
-    angle = float(np.linalg.norm(phi))
-    X = cross(phi)
-    if angle < 1e-3:
-        return np.eye(3) + X / 2 + X @ X / 6
-    return np.asarray(np.eye(3) + (1 - np.cos(angle)) / angle**2 * X + (angle - np.sin(angle)) / angle**3 * (X @ X))

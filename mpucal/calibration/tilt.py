@@ -11,12 +11,18 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import Recording, Vector
-from .gyro import KNOWN, at_prior
-from .hand import ROUGHLY, WHITE_MPS2, prior_of
-from .likelihood import NAMES, Problem, Theta, value
-from .minimise import Minimum, Prior, minimise
-from .model import B_A_NAMES, D_NAMES, Fit, Flat
-from .scene import CORRELATION_S, Scene, prepare
+from .fit import Fit
+from .flat_segment import Flat
+from .gyro_matrix import KNOWN, at_prior
+from .hand import ROUGHLY
+from .hand_noise import WHITE_MPS2
+from .levenberg_marquardt import Minimum, minimise
+from .likelihood import value
+from .parameters import B_A_NAMES, D_NAMES, NAMES
+from .preprocessing import CORRELATION_S, Preprocessed, preprocess
+from .prior import Prior, prior_of
+from .problem import Problem
+from .theta import Theta
 
 # PS-MPU-6000A r3.4, section 6.2: +-3 % of gain, +-2 % across axes; a breakout sits askew by some degrees.
 GAIN_SD, LEAN_SD, BIAS_SD_MPS2 = 0.02, 0.025, 0.5
@@ -29,14 +35,14 @@ HONEST = 2.5
 
 def fit_tilt(recording: Recording, flat: Flat, gravity: float) -> Fit:
     """D, b_a, b_omega, K of a sensor that stayed within a tilt of how it lay flat."""
-    scene = prepare(recording, (flat.first, flat.last), gravity)
-    prior = _prior(scene.flat)
-    u = scene.flat.y / np.linalg.norm(scene.flat.y)
-    theta = Theta.start(np.eye(3), np.zeros(3), scene.flat.b_omega, u)
-    minimum = minimise(_white(scene, 0.0), theta, len(NAMES), prior, frozen=True)
+    prepared = preprocess(recording, (flat.first, flat.last), gravity)
+    prior = _prior(prepared.flat)
+    u = prepared.flat.y / np.linalg.norm(prepared.flat.y)
+    theta = Theta.start(np.eye(3), np.zeros(3), prepared.flat.b_omega, u)
+    minimum = minimise(_white(prepared, 0.0), theta, len(NAMES), prior, frozen=True)
     for _ in range(ROUNDS):
-        sigma = min(WHITE_MPS2, key=lambda s: value(scene.white(s), minimum.theta))
-        minimum = minimise(_white(scene, sigma), minimum.theta, len(NAMES), prior, until=ROUGHLY, frozen=True)
+        sigma = min(WHITE_MPS2, key=lambda s: value(prepared.white(s), minimum.theta))
+        minimum = minimise(_white(prepared, sigma), minimum.theta, len(NAMES), prior, until=ROUGHLY, frozen=True)
     return _as_fit(minimum)
 
 
@@ -45,9 +51,9 @@ def tilted_directions(down: Vector, directions: Vector) -> Vector:
     return np.asarray(directions[directions @ down >= np.cos(CONE_RAD)])
 
 
-def _white(scene: Scene, sigma: float) -> Problem:
+def _white(prepared: Preprocessed, sigma: float) -> Problem:
     # a redescending loss forgets a start that is far away
-    return replace(scene.white(sigma, CORRELATION_S), tail=0.0 if sigma == 0.0 else 1.0)
+    return replace(prepared.white(sigma, CORRELATION_S), tail=0.0 if sigma == 0.0 else 1.0)
 
 
 def _prior(flat: Flat) -> Prior:

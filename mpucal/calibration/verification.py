@@ -13,9 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Recording, Vector
-from .likelihood import K_NAMES
-from .model import B_A_NAMES, D_NAMES, Fit, Flat, product, rotation
-from .still import still_runs, without_drift
+from .fit import Fit
+from .flat_segment import Flat
+from .gyro_drift import without_drift
+from .parameters import B_A_NAMES, D_NAMES, K_NAMES
+from .rotation import product, rotation
+from .static_intervals import static_intervals
 
 # What nobody promises: a mounting is not stiffer, and the gyroscope's bias wanders while the board is turned.
 FLOOR_MPS2, FLOOR_RAD, BIAS_RAD_S = 0.003, math.radians(0.05), math.radians(0.02)
@@ -58,7 +61,7 @@ class Rest:
 
 def unseen_rests(recording: Recording, flat: Flat, fit: Fit, gravity: float, since: int) -> list[Rest]:
     """What the rests that begin after sample `since` say of `fit`, one after the other."""
-    runs = still_runs(recording, flat)
+    runs = static_intervals(recording, flat)
     recording = without_drift(recording, flat, runs)
     long = [(a, b) for a, b in runs.tolist() if b - a >= LEAST_REST_S * recording.rate_hz]
     first = next((k for k, (a, _) in enumerate(long) if a >= since), len(long))

@@ -9,7 +9,7 @@ from typing import Any
 import click
 import numpy as np
 
-from ..calibration.stationary import find_flat
+from ..calibration.flat_segment import find_flat
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Sensor
 from ..errors import UsageError
 from ..files import load

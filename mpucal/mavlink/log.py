@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from ..calibration.stationary import find_flat
+from ..calibration.flat_segment import find_flat
 from ..data import Recording
 from ..errors import RecordingError
 from .clock import Jump

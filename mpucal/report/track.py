@@ -8,10 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..calibration.likelihood import Theta, trace
-from ..calibration.scene import Scene, prepare
-from ..calibration.stationary import find_flat, flat_statistics
-from ..calibration.still import Runs, still_runs
+from ..calibration.flat_segment import find_flat, flat_statistics
+from ..calibration.likelihood import trace
+from ..calibration.preprocessing import Preprocessed, preprocess
+from ..calibration.static_intervals import Intervals, static_intervals
+from ..calibration.theta import Theta
 from ..data import STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
 from ..result.calibration import Calibration
 
@@ -51,11 +52,11 @@ class Track:
         return flat
 
     @cached_property
-    def runs(self) -> Runs:
+    def runs(self) -> Intervals:
         """(k, 2) first and last + 1 of the samples of each rest."""
         if self.flat is None:
             return np.zeros((0, 2), np.intp)
-        return still_runs(self.recording, flat_statistics(self.recording, self.flat))
+        return static_intervals(self.recording, flat_statistics(self.recording, self.flat))
 
     @cached_property
     def resting(self) -> Mask:
@@ -79,12 +80,12 @@ class Track:
         known = (c.D, c.b_a, c.K, c.b_omega)
         if self.flat is None or not all(np.isfinite(values).all() for values in known):
             return None
-        scene = prepare(self.recording, self.flat, self.gravity)
-        predicted = trace(scene.white(HAND_MPS2), self._theta(scene)).s
+        prepared = preprocess(self.recording, self.flat, self.gravity)
+        predicted = trace(prepared.white(HAND_MPS2), self._theta(prepared)).s
         return np.asarray(self.calibrated[-len(predicted) :] - predicted)
 
-    def _theta(self, scene: Scene) -> Theta:
+    def _theta(self, prepared: Preprocessed) -> Theta:
         c = self.calibration
-        s = np.linalg.solve(c.D, scene.flat.y - (c.b_a - c.applied_in_hardware))
+        s = np.linalg.solve(c.D, prepared.flat.y - (c.b_a - c.applied_in_hardware))
         D, b_a = c.D, c.b_a - c.applied_in_hardware
         return Theta(D, b_a, c.b_omega, s / np.linalg.norm(s), c.K, 0.0, np.zeros(3))

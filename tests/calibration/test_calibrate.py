@@ -23,9 +23,9 @@ def numbers(calibration):
 
 
 @pytest.mark.parametrize("model", ["accel", "imu", "hand", "auto"])
-@pytest.mark.parametrize("scene", ["paper", "pose12", "continuous"])
-def test_the_same_recording_twice_gives_the_same_bits(hand, model, scene):
-    recording = (paper_scenario(0, rate_hz=50) if scene == "paper" else hand(1, scene)).recording
+@pytest.mark.parametrize("prepared", ["paper", "pose12", "continuous"])
+def test_the_same_recording_twice_gives_the_same_bits(hand, model, prepared):
+    recording = (paper_scenario(0, rate_hz=50) if prepared == "paper" else hand(1, prepared)).recording
     first, second = calibrate(recording, model, G), calibrate(recording, model, G)
     for name in ("D", "b_a", "K", "b_omega", "D_std", "b_a_std", "K_std"):
         assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
@@ -52,10 +52,10 @@ def test_when_it_began_makes_no_difference(ideal):
     np.testing.assert_allclose(calibrate(late, "auto", G).D, calibrate(recording, "auto", G).D, atol=1e-7)
 
 
-@pytest.mark.parametrize("scene", ["paper", "pose12"])
-def test_jittered_times_are_measured_times(scene):
+@pytest.mark.parametrize("prepared", ["paper", "pose12"])
+def test_jittered_times_are_measured_times(prepared):
     """A jitter of the clock that is written down does no harm: the motion is sampled where the times say."""
-    simulated = paper_scenario(0, rate_hz=200) if scene == "paper" else hand_scenario(1, scene, rate_hz=200)
+    simulated = paper_scenario(0, rate_hz=200) if prepared == "paper" else hand_scenario(1, prepared, rate_hz=200)
     recording, truth = simulated.recording, simulated.truth
     rng = np.random.default_rng(0)
     # one of each two samples: 5, 10 or 15 ms apart

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.ekf import Ekf, exponential, gravity_jacobian, inverse, orientation_of, product, specific_force
-from mpucal.calibration.model import Flat, rotation
+from mpucal.calibration.flat_segment import Flat
+from mpucal.calibration.rotation import rotation
 from mpucal.data import Recording
 
 G = 9.82

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.evidence import Evidence
-from mpucal.calibration.model import B_A_NAMES, D_NAMES, Fit
-from mpucal.calibration.stationary import flat_statistics
+from mpucal.calibration.fit import Fit
+from mpucal.calibration.flat_segment import flat_statistics
+from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 
 G = 9.82
 

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate
-from mpucal.calibration.gyro import K_SD
+from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.hand import fit_hand
-from mpucal.calibration.likelihood import K_NAMES
-from mpucal.calibration.model import B_A_NAMES, D_NAMES
-from mpucal.calibration.stationary import flat_statistics
-from mpucal.calibration.still import still_runs
+from mpucal.calibration.parameters import B_A_NAMES, D_NAMES, K_NAMES
+from mpucal.calibration.prior import K_SD
+from mpucal.calibration.static_intervals import static_intervals
 from mpucal.simulated.study.metrics import sph_rms
 from mpucal.simulated.study.scenarios import hand_scenario
 
@@ -159,7 +158,7 @@ def test_jerks_do_little(hand):
 def test_one_lost_move_does_little(hand, pick, how, k):
     run = hand(1, "pose12")
     recording = run.recording
-    runs = still_runs(recording, flat_statistics(recording, recording.flat))
+    runs = static_intervals(recording, flat_statistics(recording, recording.flat))
     first, last = runs[k][1], runs[k + 1][0]
     if how == "left out":
         kept = np.ones(len(recording), bool)
@@ -179,7 +178,7 @@ def test_a_move_that_slipped_unseen_never_passes_for_good_unless_it_did_no_harm(
     run = hand(1, "pose12")
     recording = run.recording
     flat = flat_statistics(recording, recording.flat)
-    runs = still_runs(recording, flat)
+    runs = static_intervals(recording, flat)
     gyr, rng = recording.gyr.copy(), np.random.default_rng(0)
     slipped = slice(runs[k][1], runs[k + 1][0])
     gyr[slipped] = flat.b_omega + 0.002 * rng.standard_normal((slipped.stop - slipped.start, 3))

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mpucal.calibration import calibrate
-from mpucal.calibration.model import rotation
+from mpucal.calibration.rotation import rotation
 from mpucal.data import Recording
 from mpucal.simulated.study.metrics import sph_rms
 from mpucal.simulated.study.scenarios import Truth, hand_scenario, paper_scenario
@@ -21,9 +21,9 @@ UNITS = ((1.0, 1.0), (1 / 9.80665, 1.0), (1e3 / 9.80665, 1.0), (1.0, np.degrees(
 
 
 @cache
-def base(scene, seed):
+def base(prepared, seed):
     """200 Hz, of which a recording takes some samples."""
-    return paper_scenario(seed, rate_hz=200) if scene == "paper" else hand_scenario(seed, scene, rate_hz=200)
+    return paper_scenario(seed, rate_hz=200) if prepared == "paper" else hand_scenario(seed, prepared, rate_hz=200)
 
 
 def turned(truth, Q):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate
-from mpucal.calibration.likelihood import Series
+from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.masks import ACC_RANGES, CLIPPED_R_SCALE, GYRO_RANGES, mask, with_masks
-from mpucal.calibration.stationary import flat_statistics
+from mpucal.calibration.problem import Series
 from mpucal.data import Recording
 from mpucal.simulated.study.metrics import sph_rms
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.ekf import Ekf
-from mpucal.calibration.model import B_A_NAMES, D_NAMES
+from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.paper import MAX_ITERATIONS, expand, fit_paper
-from mpucal.calibration.stationary import flat_statistics
+from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.data import Recording
 from mpucal.simulated.study.metrics import sph_rms
 from mpucal.simulated.study.scenarios import Truth, paper_scenario
@@ -39,7 +39,7 @@ def test_it_finds_simulated_sensors_and_knows_how_well():
 @pytest.mark.parametrize("number", range(4))
 def test_it_finds_the_sensors_of_another_simulator(number):
     with np.load(SHARED / f"paper_{number}.npz") as file:
-        every = 4  # thinned: a quarter of the time, twice the error
+        every = 4  # downsampled: a quarter of the time, twice the error
         n_flat = int(file["flat_samples"]) // every
         columns = (file[key][::every] for key in ("t", "acc", "gyr"))
         recording = Recording.from_arrays(*columns, flat=(0, n_flat))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate, weigh
+from mpucal.calibration.change_detection import Change
 from mpucal.calibration.evidence import Evidence
-from mpucal.calibration.model import rotation
 from mpucal.calibration.quality import judge
-from mpucal.calibration.steady import Change
+from mpucal.calibration.rotation import rotation
 from mpucal.data import Recording
 from mpucal.simulated.study.scenarios import paper_scenario
 

@@ -5,8 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from mpucal.calibration.model import B_A_NAMES, D_NAMES, rotation
-from mpucal.calibration.stationary import find_flat, flat_statistics
+from mpucal.calibration.flat_segment import find_flat, flat_statistics
+from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
+from mpucal.calibration.rotation import rotation
 from mpucal.calibration.tilt import BIAS_SD_MPS2, CONE_RAD, GAIN_SD, LEAN_SD, fit_tilt, tilted_directions
 from mpucal.data import Recording
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from mpucal.calibration.likelihood import Series, Theta
-from mpucal.calibration.model import Flat
+from mpucal.calibration.flat_segment import Flat
+from mpucal.calibration.problem import Series
+from mpucal.calibration.theta import Theta
 from mpucal.kernel import _kernel
 
 N = 300

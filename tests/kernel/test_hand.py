@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.hand_reference import evaluate_hand_reference, gains, innovations
-from mpucal.calibration.likelihood import NAMES, Problem, Series, evaluate, trace, value
+from mpucal.calibration.likelihood import evaluate, trace, value
+from mpucal.calibration.parameters import NAMES
+from mpucal.calibration.problem import Problem, Series
 from mpucal.kernel import _kernel
 
 ALL = len(NAMES)

@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration.likelihood import NAMES, Problem, Series, evaluate
+from mpucal.calibration.likelihood import evaluate
+from mpucal.calibration.parameters import NAMES
+from mpucal.calibration.problem import Problem, Series
 from mpucal.calibration.reference import evaluate_reference
 from mpucal.kernel import _kernel
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mpucal.calibration.model import rotation
+from mpucal.calibration.rotation import rotation
 from mpucal.simulated.study.metrics import sph_rms, tilt_errors_deg
 from mpucal.simulated.study.scenarios import Truth
 

@@ -3,7 +3,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from mpucal.calibration.model import rotation
+from mpucal.calibration.rotation import rotation
 from mpucal.simulated.study.motions import (
     FLAT_S,
     attitude,

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpucal.calibration.model import rotation
+from mpucal.calibration.rotation import rotation
 from mpucal.errors import UsageError
 from mpucal.simulated.study.metrics import sph_rms
 from mpucal.simulated.study.scenarios import GRAVITY_MPS2, MOTIONS, hand_scenario, paper_scenario

@@ -3,7 +3,7 @@ import sys
 import numpy as np
 import pytest
 
-from mpucal.calibration.model import rotation
+from mpucal.calibration.rotation import rotation
 from mpucal.simulated.study.scenarios import GRAVITY_MPS2, hand_scenario
 
 

@@ -3,7 +3,7 @@ import sys
 import numpy as np
 import pytest
 
-from mpucal.calibration.model import rotation
+from mpucal.calibration.rotation import rotation
 from mpucal.data import Recording
 
 GRAVITY, RATE_HZ, HOLD, MOVE = 9.81, 100, 200, 100

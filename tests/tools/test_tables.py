@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from mpucal.calibration.model import B_A_NAMES, D_NAMES, Fit
+from mpucal.calibration.fit import Fit
+from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 
 NAN = (np.nan,) * 3
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from ...calibration import weigh
 from ...calibration.evidence import Evidence
-from ...calibration.knowledge import Known, know, most_helpful
+from ...calibration.flat_segment import Flat, find_flat, flat_statistics
+from ...calibration.interim import InterimEstimate, interim_estimate
 from ...calibration.masks import with_masks
-from ...calibration.model import Flat
+from ...calibration.next_orientation import next_orientation
 from ...calibration.quality import judge
-from ...calibration.stationary import find_flat, flat_statistics
 from ...calibration.verification import unseen_rests
 from ...data import Recording, Samples, Sensor
 from ..aims import AIMS, directions
@@ -52,7 +52,7 @@ class Fits:
         self._plan = plan
         self._store = Store(sensor)
         self._flat: Flat | None = None
-        self._known: Known | None = None
+        self._known: InterimEstimate | None = None
         self._tried: Evidence | None = None
         self._since = 0
 
@@ -79,13 +79,13 @@ class Fits:
                 return None
             self._flat = flat_statistics(recording, segment)
         flat, gravity = self._flat, self._plan.gravity
-        self._known = know(recording, flat, gravity, self._known)
+        self._known = interim_estimate(recording, flat, gravity, self._known)
         target = AIMS[self._plan.target].target
         down = None
         if advice:
             x, y, z = (-flat.y / np.linalg.norm(flat.y)).tolist()
             allowed = directions((x, y, z), self._plan.tilt_only)
-            down = allowed[most_helpful(self._known, wanted(target), allowed)]
+            down = allowed[next_orientation(self._known, wanted(target), allowed)]
         return Learnt(knowledge(self._known, target, float(recording.t[-1]), down), advice)
 
     def _try(self) -> Event:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...calibration.knowledge import Known
+from ...calibration.interim import InterimEstimate
 from ...data import Vector
 from ...result import error_model
 from ..events import Direction, Knowledge, Target
@@ -17,7 +17,7 @@ def wanted(target: Target) -> Vector:
     return np.concatenate([D.ravel(), np.full(3, target.bias_mg / error_model.MG_PER_MPS2)])
 
 
-def knowledge(known: Known, target: Target, t_s: float, down: Vector | None) -> Knowledge:
+def knowledge(known: InterimEstimate, target: Target, t_s: float, down: Vector | None) -> Knowledge:
     """The same in %, deg and mg, and how far that is from the target.
 
     Parameters
@@ -50,7 +50,7 @@ def _words(gain: Vector, misalignment: Vector, bias: Vector) -> str:
     return f"gains to {gain.max():.2g} %, axes to {misalignment.max():.2g} deg, bias to {bias.max():.2g} mg"
 
 
-def _doubt(D: Vector, known: Known) -> str:
+def _doubt(D: Vector, known: InterimEstimate) -> str:
     """What the numbers say already that no good sensor's would."""
     if known.D_std.max() > 0.02:
         return ""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...calibration.model import rotation
+from ...calibration.rotation import rotation
 from ...data import Vector
 
 FLAT_S, MOVING_S = 10.0, 40.0

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from ...calibration.model import rotation
+from ...calibration.rotation import rotation
 from ...data import Recording, Sensor, Vector
 from ...errors import UsageError
 from .hand import Hand

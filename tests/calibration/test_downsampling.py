@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration.stationary import flat_statistics
-from mpucal.calibration.thin import thinned
+from mpucal.calibration.downsampling import downsampled
+from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.data import Recording
 
 
@@ -16,7 +16,7 @@ def recording_of(n, rate_hz=200.0):
 @pytest.mark.parametrize("flat", [(0, 400), (3, 401), (10, 402), (0, 403)], ids=str)
 def test_blocks_are_means_and_none_holds_both_rest_and_move(flat):
     recording = recording_of(1003)
-    thin, (first, last) = thinned(recording, flat_statistics(recording, flat), 50.0)
+    thin, (first, last) = downsampled(recording, flat_statistics(recording, flat), 50.0)
     assert thin.rate_hz == pytest.approx(50.0)
     boundary = recording.t[flat[1]]
     # block `last` is the first that moves
@@ -32,7 +32,7 @@ def test_a_mark_survives_in_its_block():
     marks = np.zeros(1000, bool)
     marks[[401, 777]] = True
     marked = replace(recording, gap=marks, acc_clipped=marks, gyr_clipped=marks)
-    thin, _ = thinned(marked, flat_statistics(recording, (0, 400)), 50.0)
+    thin, _ = downsampled(marked, flat_statistics(recording, (0, 400)), 50.0)
     for name in ("gap", "acc_clipped", "gyr_clipped"):
         assert np.flatnonzero(getattr(thin, name)).tolist() == [100, 194]
 
@@ -40,6 +40,6 @@ def test_a_mark_survives_in_its_block():
 @pytest.mark.parametrize("rate_hz", [50.0, 60.0, 20.0])
 def test_what_is_slow_already_stays(rate_hz):
     recording = recording_of(1000, rate_hz)
-    thin, flat = thinned(recording, flat_statistics(recording, (5, 300)), 50.0)
+    thin, flat = downsampled(recording, flat_statistics(recording, (5, 300)), 50.0)
     assert thin is recording
     assert flat == (5, 300)

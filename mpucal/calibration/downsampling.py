@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import Mask, Recording, Vector
-from .model import Flat
+from .flat_segment import Flat
 
 
-def thinned(recording: Recording, flat: Flat, rate_hz: float) -> tuple[Recording, tuple[int, int]]:
+def downsampled(recording: Recording, flat: Flat, rate_hz: float) -> tuple[Recording, tuple[int, int]]:
     """The recording at about `rate_hz` or a little more, by means over blocks, and where the flat segment lies then.
 
     Blocks are aligned to the end of the flat segment; what does not fill a block at either end is left out. A block

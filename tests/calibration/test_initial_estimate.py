@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
 
-from mpucal.calibration.estimate import fit_accel
-from mpucal.calibration.initialise import fibonacci_sphere, initialise
-from mpucal.calibration.likelihood import Problem, Series
+from mpucal.calibration.flat_segment import flat_statistics
+from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.masks import mask, with_masks
-from mpucal.calibration.model import rotation
-from mpucal.calibration.stationary import flat_statistics
+from mpucal.calibration.model_selection import fit_accel
+from mpucal.calibration.problem import Problem, Series
+from mpucal.calibration.rotation import rotation
+from mpucal.calibration.sphere import fibonacci_sphere
 from mpucal.data import Recording
 from mpucal.simulated.study.metrics import sph_rms
 from mpucal.simulated.study.scenarios import paper_scenario

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..data import Recording, Vector
-from .model import Flat
 
 WINDOW_S = 0.5
 SHORTEST_FLAT_S = 1.0
@@ -24,6 +24,30 @@ GYRO_STEP_RAD_S, ACC_STEP_MPS2 = 0.01, 0.03
 
 # No sensor of this kind is quieter; data without noise are simulated, or stuck.
 QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S = 1e-4, 1e-5
+
+
+@dataclass(frozen=True)
+class Flat:
+    """Line 1 of Algorithm 1: what the stationary segment says.
+
+    Attributes
+    ----------
+    first, last : samples first..last-1 are the segment.
+    y : (3,) m/s^2, mean of the accelerometer. b_omega : (3,) rad/s, mean of the gyroscope.
+    Sigma_a : (3,) (m/s^2)^2 and Sigma_omega : (3,) (rad/s)^2, the diagonals of the covariances.
+    """
+
+    first: int
+    last: int
+    y: Vector
+    b_omega: Vector
+    Sigma_a: Vector
+    Sigma_omega: Vector
+
+    @property
+    def n(self) -> int:
+        """Number of samples."""
+        return self.last - self.first
 
 
 def find_flat(recording: Recording) -> tuple[int, int] | None:

@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration.initialise import initialise
-from mpucal.calibration.likelihood import Problem, Series, evaluate
-from mpucal.calibration.minimise import DECREMENT, PLACES, Prior, _nearer, minimise
-from mpucal.calibration.stationary import flat_statistics
+from mpucal.calibration.flat_segment import flat_statistics
+from mpucal.calibration.initial_estimate import initialise
+from mpucal.calibration.levenberg_marquardt import DECREMENT, _nearer, minimise
+from mpucal.calibration.likelihood import evaluate
+from mpucal.calibration.parameters import PLACES
+from mpucal.calibration.prior import Prior
+from mpucal.calibration.problem import Problem, Series
 from mpucal.simulated.study.scenarios import paper_scenario
 
 ACCEL, IMU = 17, 23

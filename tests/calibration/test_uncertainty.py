@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mpucal.calibration.information import uncertainty
+from mpucal.calibration.uncertainty import uncertainty
 
 G = 9.82
 D = np.array([[1.1, 0.05, -0.1], [0.2, 0.8, 0.0], [-0.05, 0.1, 0.9]])

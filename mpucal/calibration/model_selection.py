@@ -9,16 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Recording
-from .gyro import K_MEAN, K_SD, WALD_99, at_prior, wald
+from .downsampling import downsampled
+from .fit import Fit
+from .flat_segment import Flat, flat_statistics
+from .gyro_matrix import WALD_99, at_prior, wald
 from .hand import fit_hand
-from .initialise import initialise
-from .likelihood import Problem, Series
+from .initial_estimate import initialise
+from .levenberg_marquardt import Minimum, minimise
 from .masks import mask
-from .minimise import Minimum, Prior, minimise
-from .model import Fit, Flat
 from .paper import fit_paper
-from .stationary import flat_statistics
-from .thin import thinned
+from .prior import K_MEAN, K_SD, Prior
+from .problem import Problem, Series
 from .tilt import fit_tilt
 
 # The mean ||e||^2 of white noise is 3; a hand, or a gyroscope's scale, makes it tens to thousands.
@@ -83,7 +84,7 @@ def choose(recording: Recording, flat: Flat, gravity: float) -> Choice:
 
 def _rough(recording: Recording, flat: Flat, gravity: float, parameters: int) -> Minimum:
     """On means over blocks: white noise leaves little in a block beside its mean."""
-    thin, at = thinned(recording, flat, SEARCH_HZ)
+    thin, at = downsampled(recording, flat, SEARCH_HZ)
     problem = _problem(thin, flat_statistics(thin, at), gravity)
     theta = initialise(problem, flat.b_omega)
     return minimise(problem, theta, parameters, _prior(flat), until=ROUGHLY)

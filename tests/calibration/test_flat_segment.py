@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration.stationary import QUIETEST_ACC_MPS2, find_flat, flat_statistics
+from mpucal.calibration.flat_segment import QUIETEST_ACC_MPS2, find_flat, flat_statistics
 from mpucal.data import Recording
 from mpucal.simulated.study.scenarios import hand_scenario, paper_scenario
 

@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from ..data import Recording, Vector
-from .likelihood import Problem, Series
+from .flat_segment import Flat, flat_statistics
+from .gyro_drift import without_drift
 from .masks import mask
-from .model import Flat
-from .stationary import flat_statistics
-from .still import Runs, still_runs, without_drift
+from .problem import Problem, Series
+from .static_intervals import Intervals, static_intervals
 
 HUBER = 2.0
 MOVING_RAD_S = 0.3  # the rate at which a hand's acceleration is half of what it grows to
@@ -27,7 +27,7 @@ MANY_RESTS = 6
 
 
 @dataclass(frozen=True)
-class Scene:
+class Preprocessed:
     """A recording after its flat segment, and the parts that its noise is made of.
 
     Attributes
@@ -41,7 +41,7 @@ class Scene:
     recording: Recording
     flat: Flat
     problem: Problem
-    runs: Runs
+    runs: Intervals
     rests: int
     motion: Vector
     pose: Vector
@@ -72,10 +72,10 @@ class Scene:
         return replace(self.problem, series=replace(self.problem.series, **series))
 
 
-def prepare(recording: Recording, at: tuple[int, int], gravity: float) -> Scene:
-    """The scene of a recording whose flat segment is at[0]..at[1]-1."""
+def preprocess(recording: Recording, at: tuple[int, int], gravity: float) -> Preprocessed:
+    """The prepared of a recording whose flat segment is at[0]..at[1]-1."""
     flat = flat_statistics(recording, at)
-    runs = still_runs(recording, flat)
+    runs = static_intervals(recording, flat)
     recording = without_drift(recording, flat, runs)
     flat = flat_statistics(recording, at)
     series = mask(Series.after(recording, flat), recording, flat)
@@ -96,7 +96,7 @@ def prepare(recording: Recording, at: tuple[int, int], gravity: float) -> Scene:
     problem = Problem(series, flat, gravity, huber=HUBER, tail=1.0, lam=lam)
     # between rests nothing is trusted to be at rest: the ends of a move are slow, and yet the hand's
     motion = np.where(rest, 0.0, 1.0) if len(after) >= MANY_RESTS else speed2 / (speed2 + MOVING_RAD_S**2)
-    return Scene(recording, flat, problem, runs, len(after), motion, pose)
+    return Preprocessed(recording, flat, problem, runs, len(after), motion, pose)
 
 
 def jerk_density(sigma: float, lam: float) -> float:

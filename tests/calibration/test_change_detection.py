@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration import steady, weigh
-from mpucal.calibration.steady import likeliest_change
+from mpucal.calibration import change_detection, weigh
+from mpucal.calibration.change_detection import likeliest_change
 from mpucal.simulated.study.scenarios import paper_scenario
 
 G = 9.82
@@ -51,7 +51,7 @@ def test_one_newton_step_finds_the_change_of_a_linear_problem():
     d = 0.01 * rng.standard_normal(12)
     y = [np.zeros(200), second[:, :12] @ d]
     H = first.T @ first + second.T @ second
-    step, covariance = steady._newton(
+    step, covariance = change_detection._newton(
         H, -(first.T @ y[0] + second.T @ y[1]), (second.T @ second)[:, :12], -(second.T @ y[1])[:12]
     )
     np.testing.assert_allclose(step, d, atol=1e-5)

@@ -7,8 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Vector
-from .likelihood import NAMES, PLACES, Evaluation, Problem, Theta, evaluate
-from .model import Fit
+from .fit import Fit
+from .likelihood import Evaluation, evaluate
+from .parameters import NAMES, PLACES
+from .prior import Prior
+from .problem import Problem
+from .theta import Theta, values
 
 DECREMENT = 1e-3  # g' H^-1 g / 2: 0.04 standard deviations from the optimum, whatever the units
 LAST = 30.0  # so near, a whole step leaves a thousandth of the decrement: nobody need look back
@@ -17,31 +21,6 @@ MOST_ITERATIONS = 60
 # V, which then has its minimum elsewhere, says nothing.
 FROZEN_SLACK, NEAR_A_ROOT, SLACK_NEAR_A_ROOT = 1.0, 0.1, 200.0
 DAMPING, EASIER, HARDER, HOPELESS = 1e-3, 0.1, 8.0, 1e12
-
-
-@dataclass(frozen=True)
-class Prior:
-    """What is known beforehand: sum of precision (x - mean)^2 / 2, (27,) in the order of NAMES; precision 0: nothing.
-
-    The tilts have no prior.
-    """
-
-    mean: Vector
-    precision: Vector
-
-    @classmethod
-    def of(cls, **known: tuple[Vector | float, Vector | float]) -> Prior:
-        """Of keys of PLACES (D row-major, K as its six), each (mean, standard deviation)."""
-        mean, precision = np.zeros(len(NAMES)), np.zeros(len(NAMES))
-        for name, (centre, sd) in known.items():
-            place = slice(*PLACES[name])
-            mean[place], precision[place] = centre, 1.0 / np.square(sd)
-        return cls(mean, precision)
-
-    def cost(self, theta: Theta) -> float:
-        """What it adds to V."""
-        away = values(theta) - self.mean
-        return 0.5 * float(self.precision @ (away * away))
 
 
 @dataclass(frozen=True)
@@ -150,7 +129,7 @@ class _At:
         self.H = self.data.fisher + np.diag(precision)
 
     def step(self, step: Vector, decrement: float) -> None:
-        """Move theta by the last step, by which V falls by the decrement."""
+        """Transition theta by the last step, by which V falls by the decrement."""
         self.theta = self.theta.moved(step)
         self.V -= decrement
 
@@ -158,13 +137,6 @@ class _At:
         """Newton decrement g' H^-1 g / 2 over the free parameters: how much V would still fall."""
         gradient = self.gradient[free]
         return float(gradient @ _solve(self.H[np.ix_(free, free)], gradient)) / 2.0
-
-
-def values(theta: Theta) -> Vector:
-    """(27,) in the order of NAMES; the tilts are zero by definition."""
-    K = theta.K
-    six = [K[0, 0], K[0, 1], K[0, 2], K[1, 1], K[1, 2], K[2, 2]]
-    return np.concatenate([theta.D.ravel(), theta.b_a, [0.0, 0.0], theta.b_omega, six, [theta.tau], theta.r])
 
 
 def inverse(H: Vector) -> Vector:

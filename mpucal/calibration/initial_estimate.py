@@ -8,9 +8,11 @@ import numpy as np
 
 from ..data import Vector
 from ..kernel import _kernel
-from .likelihood import Problem, Series, Theta, evaluate
+from .likelihood import evaluate
 from .masks import GAP_ANGLE_VARIANCE, LOST_RAD
-from .model import tangents
+from .problem import Problem, Series
+from .sphere import fibonacci_sphere, tangents
+from .theta import Theta
 
 POINTS = 300
 REFINEMENTS = 5
@@ -86,14 +88,6 @@ def _misfit(problem: Problem, theta: Theta) -> float:
     flat = replace(problem.flat, Sigma_a=problem.flat.Sigma_a + ROUGH_MPS2**2)
     V = evaluate(Problem(series, flat, problem.gravity), theta, 0).V
     return V if np.isfinite(V) else np.inf
-
-
-def fibonacci_sphere(n: int) -> Vector:
-    """(n, 3) unit vectors spread evenly over the sphere."""
-    k = np.arange(n) + 0.5
-    z, turn = 1.0 - 2.0 * k / n, np.pi * (1.0 + np.sqrt(5.0)) * k
-    across = np.sqrt(1.0 - z * z)
-    return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
 
 
 class _Sums:

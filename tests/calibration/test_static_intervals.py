@@ -3,15 +3,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration.stationary import flat_statistics
-from mpucal.calibration.still import still_runs, without_drift
+from mpucal.calibration.flat_segment import flat_statistics
+from mpucal.calibration.gyro_drift import without_drift
+from mpucal.calibration.static_intervals import static_intervals
 from mpucal.data import Recording
 
 
 def found(simulated):
     recording = simulated.recording
     flat = flat_statistics(recording, recording.flat)
-    return recording, flat, still_runs(recording, flat)
+    return recording, flat, static_intervals(recording, flat)
 
 
 @pytest.mark.parametrize("motion", ["pose6", "pose9", "pose12"])
@@ -48,7 +49,7 @@ def test_a_turn_at_constant_rate_is_no_rest():
     gyr[1000:, 2] += 0.5
     acc = [0.0, 0.0, 9.8] + 0.01 * rng.standard_normal((2000, 3))
     recording = Recording.from_arrays(0.01 * np.arange(2000), acc, gyr)
-    runs = still_runs(recording, flat_statistics(recording, (0, 900)))
+    runs = static_intervals(recording, flat_statistics(recording, (0, 900)))
     assert runs[:, 1].max() <= 1010
 
 
@@ -57,14 +58,14 @@ def test_a_gap_parts_a_rest(in_hand):
     gap = np.zeros(len(recording), bool)
     gap[500] = True
     flat = flat_statistics(recording, recording.flat)
-    runs = still_runs(replace(recording, gap=gap), flat)
+    runs = static_intervals(replace(recording, gap=gap), flat)
     assert not any(a <= 500 < b for a, b in runs)
-    assert len(runs) == len(still_runs(recording, flat)) + 1
+    assert len(runs) == len(static_intervals(recording, flat)) + 1
 
 
 def test_shorter_than_a_window_has_no_runs():
     recording = Recording.from_arrays(0.01 * np.arange(20), np.ones((20, 3)), np.zeros((20, 3)))
-    assert still_runs(recording, flat_statistics(recording, (0, 20))).shape == (0, 2)
+    assert static_intervals(recording, flat_statistics(recording, (0, 20))).shape == (0, 2)
 
 
 def drifting(in_hand, drift):
@@ -80,7 +81,7 @@ def drifting(in_hand, drift):
 def test_drift_is_removed(in_hand, drift):
     recording = drifting(in_hand, drift)
     flat = flat_statistics(recording, recording.flat)
-    runs = still_runs(recording, flat)
+    runs = static_intervals(recording, flat)
     mended = without_drift(recording, flat, runs)
     for a, b in runs[1:]:
         np.testing.assert_allclose(mended.gyr[a:b].mean(0), flat.b_omega, atol=5e-4)
@@ -92,7 +93,7 @@ def test_drift_is_removed(in_hand, drift):
 def test_a_bias_that_stays_is_left_nearly_alone(in_hand):
     recording = in_hand.recording
     flat = flat_statistics(recording, recording.flat)
-    mended = without_drift(recording, flat, still_runs(recording, flat))
+    mended = without_drift(recording, flat, static_intervals(recording, flat))
     one_rest = np.sqrt(flat.Sigma_omega / 150).max()
     assert np.abs(mended.gyr - recording.gyr).max() < 2.0 * one_rest
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Vector
-from .initialise import fibonacci_sphere
+from .sphere import fibonacci_sphere
 
 DIRECTIONS = 400
 

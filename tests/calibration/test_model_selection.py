@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.ekf import Ekf, exponential, orientation_of, product
-from mpucal.calibration.estimate import ACCEL, METHODS, choose, fit_accel, fit_imu
-from mpucal.calibration.gyro import K_SD
-from mpucal.calibration.initialise import initialise
-from mpucal.calibration.likelihood import K_NAMES, Problem, Series
-from mpucal.calibration.minimise import Prior, minimise
-from mpucal.calibration.model import B_A_NAMES, D_NAMES
+from mpucal.calibration.flat_segment import flat_statistics
+from mpucal.calibration.initial_estimate import initialise
+from mpucal.calibration.levenberg_marquardt import minimise
+from mpucal.calibration.model_selection import ACCEL, METHODS, choose, fit_accel, fit_imu
 from mpucal.calibration.paper import expand
-from mpucal.calibration.stationary import flat_statistics
+from mpucal.calibration.parameters import B_A_NAMES, D_NAMES, K_NAMES
+from mpucal.calibration.prior import K_SD, Prior
+from mpucal.calibration.problem import Problem, Series
 from mpucal.simulated.study.metrics import sph_rms
 from mpucal.simulated.study.scenarios import paper_scenario
 

@@ -12,12 +12,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Recording, Vector
-from .hand import FARTHER, FARTHER_STILL, PIVOT_MPS2, WHITE_MPS2, prior_of
-from .likelihood import NAMES, Problem, Series, Theta, evaluate, value
-from .minimise import inverse, minimise, values
-from .model import Fit, Flat
-from .scene import CORRELATION_S, FLOOR_MPS2, Scene, prepare
-from .thin import thinned
+from .downsampling import downsampled
+from .fit import Fit
+from .flat_segment import Flat
+from .hand_noise import FARTHER, FARTHER_STILL, PIVOT_MPS2, WHITE_MPS2
+from .levenberg_marquardt import inverse, minimise
+from .likelihood import evaluate, value
+from .parameters import NAMES
+from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed, preprocess
+from .prior import prior_of
+from .problem import Problem, Series
+from .theta import Theta, values
 
 TEST_HZ = 25.0
 SHARES = (0.25, 0.5, 0.75)  # of the recording, after which something may have changed
@@ -47,13 +52,13 @@ def likeliest_change(recording: Recording, flat: Flat, fit: Fit, gravity: float)
     Let D and b_a be theta's before a time and theirs + d after it. One Newton step from d = 0 needs nothing but the
     gradient and the Fisher matrix of the whole and of the part before.
     """
-    scene = prepare(*thinned(recording, flat, TEST_HZ), gravity)
-    n = len(scene.problem.series)
+    prepared = preprocess(*downsampled(recording, flat, TEST_HZ), gravity)
+    n = len(prepared.problem.series)
     if n < FEWEST_BLOCKS:
         return None
-    prior = prior_of(scene.flat)
-    start = _start(fit, scene)
-    problem = _with_noise(scene, start)
+    prior = prior_of(prepared.flat)
+    start = _start(fit, prepared)
+    problem = _with_noise(prepared, start)
     theta = minimise(problem, start, len(NAMES), prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True).theta
     whole = evaluate(problem, theta, len(NAMES))
     gradient = whole.gradient + prior.precision * (values(theta) - prior.mean)
@@ -67,26 +72,26 @@ def likeliest_change(recording: Recording, flat: Flat, fit: Fit, gravity: float)
         changes.append(
             Change(
                 float(d @ np.linalg.solve(covariance + np.diag(DRIFT_SD**2), d)) / len(d),
-                float(scene.recording.t[scene.flat.last + cut]),
-                scene.rests_often,
+                float(prepared.recording.t[prepared.flat.last + cut]),
+                prepared.rests_often,
             )
         )
     return max(changes)
 
 
-def _start(fit: Fit, scene: Scene) -> Theta:
+def _start(fit: Fit, prepared: Preprocessed) -> Theta:
     """Of the fit, without a lever arm and a delay, which it does not tell."""
-    u = np.linalg.solve(fit.D, scene.flat.y - fit.b_a)
-    return replace(Theta.start(fit.D, fit.b_a, scene.flat.b_omega, u / np.linalg.norm(u)), K=fit.K)
+    u = np.linalg.solve(fit.D, prepared.flat.y - fit.b_a)
+    return replace(Theta.start(fit.D, fit.b_a, prepared.flat.b_omega, u / np.linalg.norm(u)), K=fit.K)
 
 
-def _with_noise(scene: Scene, theta: Theta) -> Problem:
+def _with_noise(prepared: Preprocessed, theta: Theta) -> Problem:
     """The likeliest noise of the hand: white from rest to rest, else a pivot's, which a calm one does not need."""
-    if scene.rests_often:
-        sigma = min(WHITE_MPS2, key=lambda s: value(scene.white(s), theta))
-        return scene.white(sigma, CORRELATION_S)
-    sigma = min(PIVOT_MPS2, key=lambda s: value(scene.pivot(s, FLOOR_MPS2), theta))
-    return scene.pivot((FARTHER + FARTHER_STILL * sigma) * sigma, FLOOR_MPS2)
+    if prepared.rests_often:
+        sigma = min(WHITE_MPS2, key=lambda s: value(prepared.white(s), theta))
+        return prepared.white(sigma, CORRELATION_S)
+    sigma = min(PIVOT_MPS2, key=lambda s: value(prepared.pivot(s, FLOOR_MPS2), theta))
+    return prepared.pivot((FARTHER + FARTHER_STILL * sigma) * sigma, FLOOR_MPS2)
 
 
 def _first(problem: Problem, n: int) -> Problem:

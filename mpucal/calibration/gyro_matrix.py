@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..data import Vector
-from .likelihood import K_NAMES, PLACES
-from .minimise import Minimum
+from .levenberg_marquardt import Minimum
+from .parameters import K_NAMES, PLACES
+from .prior import K_MEAN, K_SD
 
-# What a data sheet promises: +-3 % of scale, +-2 % across axes, taken as uniform; K is the symmetric part.
-K_MEAN = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
-K_SD = np.array([0.02, 0.01, 0.01, 0.02, 0.01, 0.02])
 # chi^2 of six degrees of freedom at 99 %: below it, K is not told from the identity
 WALD_99 = 16.8
 # a parameter is known where the data halve what was open before

@@ -3,9 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration.likelihood import NAMES, Series, Theta
-from mpucal.calibration.moves import Move, explaining, leverages, moves_of, q_scale
-from mpucal.calibration.scene import prepare
+from mpucal.calibration.parameters import NAMES
+from mpucal.calibration.preprocessing import preprocess
+from mpucal.calibration.problem import Series
+from mpucal.calibration.theta import Theta
+from mpucal.calibration.transitions import Transition, leverages, miss_variances, q_scale, transitions_of
 
 G = 9.82
 
@@ -15,8 +17,8 @@ class Moved:
 
     def __init__(self, simulated, gyr=None):
         recording = simulated.recording if gyr is None else replace(simulated.recording, gyr=gyr)
-        self.scene = prepare(recording, recording.flat, G)
-        self.flat, self.runs = self.scene.flat, self.scene.runs
+        self.prepared = preprocess(recording, recording.flat, G)
+        self.flat, self.runs = self.prepared.flat, self.prepared.runs
         truth = simulated.truth
         u = simulated.specific_force[0] / G
         start = Theta.start(truth.D, truth.b_a, self.flat.b_omega, u)
@@ -24,8 +26,8 @@ class Moved:
 
     def scale(self):
         """(n,) the factor of the gyroscope's noise."""
-        moves = moves_of(self.scene, self.theta)
-        return q_scale(moves, explaining(moves), len(self.scene.problem.series))
+        moves = transitions_of(self.prepared, self.theta)
+        return q_scale(moves, miss_variances(moves), len(self.prepared.problem.series))
 
     def move(self, k):
         """Samples of the series between rest k and rest k + 1."""
@@ -39,14 +41,16 @@ def test_moves_that_agree_keep_their_noise(hand):
 
 @pytest.mark.parametrize("k", [3, 6])
 def test_the_move_that_lost_its_gyroscope_is_the_one_that_is_doubted(in_hand, k):
-    scene = Moved(in_hand)
+    prepared = Moved(in_hand)
     gyr = in_hand.recording.gyr.copy()
-    first, last = scene.runs[k][1], scene.runs[k + 1][0]
-    gyr[first:last] = scene.flat.b_omega
+    first, last = prepared.runs[k][1], prepared.runs[k + 1][0]
+    gyr[first:last] = prepared.flat.b_omega
     factor = Moved(in_hand, gyr).scale()
-    assert factor.shape == (len(in_hand.recording) - scene.flat.last,)
+    assert factor.shape == (len(in_hand.recording) - prepared.flat.last,)
     # rests are found anew without a gyroscope: they reach a little into the move
-    in_the_middle = [factor[(move.start + move.stop) // 2] for move in map(scene.move, range(len(scene.runs) - 1))]
+    in_the_middle = [
+        factor[(move.start + move.stop) // 2] for move in map(prepared.move, range(len(prepared.runs) - 1))
+    ]
     doubted = in_the_middle.pop(k)
     assert doubted > 100.0
     assert max(in_the_middle) < 1e-3 * doubted
@@ -54,30 +58,30 @@ def test_the_move_that_lost_its_gyroscope_is_the_one_that_is_doubted(in_hand, k)
 
 def test_the_doubt_is_as_large_as_the_miss(in_hand):
     """The variance of the move's angle grows to about the square of what gravity missed by."""
-    scene = Moved(in_hand)
+    prepared = Moved(in_hand)
     gyr = in_hand.recording.gyr.copy()
-    first, last = scene.runs[5][1], scene.runs[6][0]
-    gyr[first:last] = scene.flat.b_omega
+    first, last = prepared.runs[5][1], prepared.runs[6][0]
+    gyr[first:last] = prepared.flat.b_omega
     factor = Moved(in_hand, gyr).scale()
-    series = Series.after(in_hand.recording, scene.flat)
-    span = scene.move(5)
-    variance = np.sum(series.dt[span] ** 2 * factor[span]) * scene.flat.Sigma_omega.mean()
-    before, after = (in_hand.specific_force[(a + b) // 2] for a, b in scene.runs[5:7])
+    series = Series.after(in_hand.recording, prepared.flat)
+    span = prepared.move(5)
+    variance = np.sum(series.dt[span] ** 2 * factor[span]) * prepared.flat.Sigma_omega.mean()
+    before, after = (in_hand.specific_force[(a + b) // 2] for a, b in prepared.runs[5:7])
     missed = np.linalg.norm(np.cross(before, after)) / G**2
     assert 0.2 * missed < np.sqrt(variance) < 5.0 * missed
 
 
 def test_fewer_than_three_moves_cannot_outvote_one(in_hand):
     moved = Moved(in_hand)
-    few = replace(moved.scene, runs=moved.runs[:3])
-    assert moves_of(few, moved.theta) == []
+    few = replace(moved.prepared, runs=moved.runs[:3])
+    assert transitions_of(few, moved.theta) == []
 
 
 def test_a_miss_depends_on_the_parameters_as_its_jacobian_says(in_hand):
     """The trace of J C J' for a C of one parameter, against central differences of the miss."""
     moved = Moved(in_hand)
-    scene, theta = moved.scene, moved.theta
-    moves = moves_of(scene, theta)
+    prepared, theta = moved.prepared, moved.theta
+    moves = transitions_of(prepared, theta)
     ones = np.ones(len(moves))
     for p, name in enumerate(NAMES):
         if not name.startswith(("D_", "b_a_", "K_")):
@@ -86,11 +90,11 @@ def test_a_miss_depends_on_the_parameters_as_its_jacobian_says(in_hand):
         C = np.zeros((len(NAMES), len(NAMES)))
         C[p, p] = 1e-4  # so small that no leverage reaches its limit of two
         ahead, behind = (
-            np.array([move.miss for move in moves_of(scene, theta.moved(step * np.eye(len(NAMES))[p]))])
+            np.array([move.miss for move in transitions_of(prepared, theta.moved(step * np.eye(len(NAMES))[p]))])
             for step in (h, -h)
         )
         wanted = 1e-4 * np.sum(((ahead - behind) / (2 * h)) ** 2, axis=1)
-        given = leverages(moves, scene, theta, C, ones)
+        given = leverages(moves, prepared, theta, C, ones)
         assert given == pytest.approx(wanted, rel=0.03, abs=1e-6), name
 
 
@@ -99,11 +103,13 @@ def test_misses_that_an_estimate_took_up_leave_more_noise():
     rng = np.random.default_rng(0)
     still = np.eye(3)[None]
     moves = [
-        Move(slice(0, 1), still, np.eye(3)[2], np.eye(3)[2], np.append(rng.normal(0.0, np.sqrt(2.0), 2), 0.0), 1.0, 1.0)
+        Transition(
+            slice(0, 1), still, np.eye(3)[2], np.eye(3)[2], np.append(rng.normal(0.0, np.sqrt(2.0), 2), 0.0), 1.0, 1.0
+        )
         for _ in range(400)
     ]
     # Student's t weighs the many that agree more than the tail
-    blind = explaining(moves).mean()
+    blind = miss_variances(moves).mean()
     assert blind == pytest.approx(2.0, rel=0.35)
-    assert explaining(moves, np.ones(400)).mean() > 1.8 * blind
-    assert explaining(moves, 1.0) == pytest.approx(explaining(moves, np.ones(400)))
+    assert miss_variances(moves, np.ones(400)).mean() > 1.8 * blind
+    assert miss_variances(moves, 1.0) == pytest.approx(miss_variances(moves, np.ones(400)))

@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Vector
-from .likelihood import NAMES, PLACES, Theta
-from .model import cross, product, rotation
-from .scene import POSE_MPS2, Scene
+from .parameters import NAMES, PLACES
+from .preprocessing import POSE_MPS2, Preprocessed
+from .rotation import cross, product, rotation
+from .theta import Theta
 
 SPEED_OF_TREMOR_S = 0.04  # what a tremor's speed is to its acceleration
 FEWEST_MOVES = 3
@@ -39,7 +40,7 @@ class Rest(NamedTuple):
     variance: float
 
 
-class Move(NamedTuple):
+class Transition(NamedTuple):
     """From one rest to the next.
 
     span : its steps of the series. F : (m, 3, 3) what each of them does to gravity in the body frame.
@@ -56,11 +57,11 @@ class Move(NamedTuple):
     of_gyro: float
 
 
-def moves_of(scene: Scene, theta: Theta) -> list[Move]:
+def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
     """The moves under theta; none where they are too few to speak for each other."""
-    series, flat = scene.problem.series, scene.flat
+    series, flat = prepared.problem.series, prepared.flat
     turns = -series.dt[:, None] * ((series.omega - theta.b_omega) @ theta.K.T)
-    rests = _rests(scene, turns, theta)
+    rests = _rests(prepared, turns, theta)
     if len(rests) <= FEWEST_MOVES:
         return []
     F = rotation(turns)
@@ -71,11 +72,11 @@ def moves_of(scene: Scene, theta: Theta) -> list[Move]:
         of_gyro = float(np.sum(series.dt[span] ** 2) * flat.Sigma_omega.mean())
         known = of_gyro + (0.0 if series.q_extra is None else float(series.q_extra[span].sum()))
         variance = known + one.variance + other.variance
-        moves.append(Move(span, F[span], one.leaving, other.coming, miss, variance, of_gyro))
+        moves.append(Transition(span, F[span], one.leaving, other.coming, miss, variance, of_gyro))
     return moves
 
 
-def explaining(moves: list[Move], leverage: Vector | float = 0.0) -> Vector:
+def miss_variances(moves: list[Transition], leverage: Vector | float = 0.0) -> Vector:
     """(k,) rad^2 an axis: the variances with which noise explains all misses.
 
     z = |miss|^2 / (2 variance). All moves have a common scale c, the mean of z by Student's t; a lost one has a scale
@@ -94,7 +95,7 @@ def explaining(moves: list[Move], leverage: Vector | float = 0.0) -> Vector:
     return c / np.where(weight < WORTHLESS, weight, 1.0) * [move.variance for move in moves]
 
 
-def q_scale(moves: list[Move], variance: Vector, n: int) -> Vector:
+def q_scale(moves: list[Transition], variance: Vector, n: int) -> Vector:
     """(n,) factor of Sigma_omega over a series, that gives the misses these variances (k,)."""
     factor = np.ones(n)
     for move, wanted in zip(moves, variance.tolist(), strict=True):
@@ -102,20 +103,22 @@ def q_scale(moves: list[Move], variance: Vector, n: int) -> Vector:
     return factor
 
 
-def leverages(moves: list[Move], scene: Scene, theta: Theta, covariance: Vector, variance: Vector) -> Vector:
+def leverages(
+    moves: list[Transition], prepared: Preprocessed, theta: Theta, covariance: Vector, variance: Vector
+) -> Vector:
     """(k,) tr(J C J') / variance of each miss, 0 to 2.
 
     J : (3, p) the miss by the parameters, C : `covariance` (p, p) of theta, which the misses of `variance` (k,) gave.
     """
     inverse = np.asarray(np.linalg.pinv(theta.D))
-    J = np.array([_jacobian(move, scene, theta, inverse) for move in moves])
+    J = np.array([_jacobian(move, prepared, theta, inverse) for move in moves])
     taken = np.einsum("kip,pq,kiq->k", J, covariance, J, optimize=True)
     return np.asarray(np.clip(taken / variance, 0.0, 2.0))
 
 
-def _jacobian(move: Move, scene: Scene, theta: Theta, inverse: Vector) -> Vector:
+def _jacobian(move: Transition, prepared: Preprocessed, theta: Theta, inverse: Vector) -> Vector:
     """(3, p) of the miss u x v by the parameters in the order of NAMES, with u and v near each other."""
-    series = scene.problem.series
+    series = prepared.problem.series
     R = _to_the_end(move.F) * series.dt[move.span, None, None]
     # phi, the error of the turn in the axes of its end: a step's is -dt dK (omega - b_omega); b_omega the rests tell
     phi = np.zeros((3, len(NAMES)))
@@ -148,14 +151,14 @@ def _to_the_end(F: Vector) -> Vector:
     return R
 
 
-def _rests(scene: Scene, turns: Vector, theta: Theta) -> list[Rest]:
+def _rests(prepared: Preprocessed, turns: Vector, theta: Theta) -> list[Rest]:
     """The flat segment and the rests after it; `turns` (n, 3) rad are the steps of the series."""
-    recording, flat = scene.recording, scene.flat
+    recording, flat = prepared.recording, prepared.flat
     inverse = np.linalg.pinv(theta.D)  # a search may pass through a singular D: that is no reason to stop it
     dt = 1.0 / recording.rate_hz
     turns = np.vstack([np.zeros((flat.last, 3)), turns])
     rests = []
-    for first, last in scene.runs.tolist():
+    for first, last in prepared.runs.tolist():
         if last <= flat.last + 1:
             continue
         acc = recording.acc[first:last]
@@ -166,7 +169,7 @@ def _rests(scene: Scene, turns: Vector, theta: Theta) -> list[Rest]:
         coming, leaving = s - across + cross(turned[0]) @ s, s + cross(turned[-1]) @ s - across
         tremor = max(float(np.mean(acc.var(0) - flat.Sigma_a)), 0.0)
         of_tremor = 2.0 * tremor * (SPEED_OF_TREMOR_S / ((last - first) * dt)) ** 2
-        variance = (POSE_MPS2**2 + flat.Sigma_a.mean() / (last - first) + of_tremor) / scene.problem.gravity**2
+        variance = (POSE_MPS2**2 + flat.Sigma_a.mean() / (last - first) + of_tremor) / prepared.problem.gravity**2
         rests.append(Rest(first, last, coming, leaving, variance))
     return rests
 

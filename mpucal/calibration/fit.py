@@ -1,0 +1,50 @@
+"""What a fit returns, whatever the model: parameters, covariance, how it ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..data import Vector
+from .parameters import D_NAMES
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Estimated parameters, whatever the method.
+
+    Attributes
+    ----------
+    D : (3, 3). b_a : (3,) m/s^2. b_omega : (3,) rad/s. K : (3, 3).
+    names : p names of the parameters that were estimated, D row-major first, then b_a.
+    covariance : (p, p), in the order of `names`.
+    iterations : of the minimiser. converged : whether it met its stopping rule.
+    nis : mean of ||e_t||^2 weighted by the inverse of S_t, over all samples; 3 where the model holds.
+    V : the cost function (8) at the estimate.
+    at_prior : names of those parameters of which the data say little: they are what was known beforehand.
+    """
+
+    D: Vector
+    b_a: Vector
+    b_omega: Vector
+    K: Vector
+    names: tuple[str, ...]
+    covariance: Vector
+    iterations: int
+    converged: bool
+    nis: float
+    V: float
+    at_prior: tuple[str, ...] = ()
+
+    def std(self, *names: str) -> Vector:
+        """Standard deviations of the named parameters, NaN for those that were not estimated."""
+        variance = dict(zip(self.names, np.diag(self.covariance), strict=True))
+        return np.sqrt([max(variance.get(name, np.nan), 0.0) for name in names])
+
+    def right_handed(self) -> Fit:
+        """Of (D, u) and (-D, -u), which fit equally well, the one with det D > 0."""
+        if not np.linalg.det(self.D) < 0.0:
+            return self
+        sign = np.array([-1.0 if name in D_NAMES else 1.0 for name in self.names])
+        return replace(self, D=-self.D, covariance=self.covariance * np.outer(sign, sign))

@@ -1,0 +1,56 @@
+"""The gyroscope's bias as a random walk, seen at the rests: smoothed and removed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..data import Recording, Vector
+from .flat_segment import Flat
+from .static_intervals import Intervals
+
+LONG_ENOUGH_FOR_BIAS_S = 0.5
+
+TREMOR_S = 0.05  # correlation time of a hand's tremor
+
+RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # (rad/s)^2 a second
+
+
+def without_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recording:
+    """The recording with its gyroscope's drift removed: in every run, the mean rate is the flat segment's.
+
+    The bias is a random walk seen through the runs' means, smoothed (Rauch, Tung, Striebel), its density chosen by
+    likelihood; between runs it is drawn straight.
+    """
+    runs = runs[runs[:, 1] - runs[:, 0] >= LONG_ENOUGH_FOR_BIAS_S * recording.rate_hz]
+    if len(runs) < 2:
+        return recording
+    t = np.array([0.5 * (recording.t[a] + recording.t[b - 1]) for a, b in runs])
+    n = (runs[:, 1] - runs[:, 0])[:, None]
+    rests = [recording.gyr[a:b].T for a, b in runs]
+    tremor = np.maximum([[axis.var() for axis in rest] for rest in rests] - 1.2 * flat.Sigma_omega, 0.0)
+    variance = flat.Sigma_omega / n + tremor * np.minimum(1.0, 2.0 * TREMOR_S * recording.rate_hz / n)
+    walk = _smoothed(t, np.array([[axis.mean() for axis in rest] for rest in rests]), variance)
+    bias = np.stack([np.interp(recording.t, t, column) for column in walk.T], axis=1)
+    return replace(recording, gyr=recording.gyr - bias + flat.b_omega)
+
+
+def _smoothed(t: Vector, mean: Vector, variance: Vector) -> Vector:
+    """(k, 3) the random walks behind the rows of measurements (k, 3) of given variance, each of the likeliest density.
+
+    All densities go side by side; (k, 3, q) in between.
+    """
+    k, q = len(t), RANDOM_WALKS
+    m, P, m_before, P_before = (np.empty((k, 3, len(q))) for _ in range(4))
+    cost = np.zeros((3, len(q)))
+    m[0], P[0] = mean[0, :, None], variance[0, :, None]
+    for i in range(1, k):
+        m_before[i], P_before[i] = m[i - 1], P[i - 1] + q * (t[i] - t[i - 1])
+        S = P_before[i] + variance[i, :, None]
+        gain, e = P_before[i] / S, mean[i, :, None] - m_before[i]
+        cost += np.log(S) + e * e / S
+        m[i], P[i] = m_before[i] + gain * e, (1.0 - gain) * P_before[i]
+    for i in range(k - 2, -1, -1):
+        m[i] += P[i] / P_before[i + 1] * (m[i + 1] - m_before[i + 1])
+    return np.asarray(m[:, np.arange(3), cost.argmin(1)])

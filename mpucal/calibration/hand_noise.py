@@ -1,0 +1,49 @@
+"""The hand's acceleration as noise: its kinds, the grids of sigma, and the likeliest of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from .likelihood import value
+from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed
+from .problem import Problem
+from .theta import Theta
+
+FIRST_MPS2 = 0.3
+
+WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
+
+HAND_MPS2 = WHITE_MPS2[4:]  # who goes from rest to rest, has a hand
+
+PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
+
+# A pivot travels farther than a bounded position of one lambda, the more the wilder it is: sigma (1.5 + 0.5 sigma) for
+# the estimate, and six times that for what its covariance admits.
+FARTHER, FARTHER_STILL, HONEST = 1.5, 0.5, 6.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The hand's acceleration while it moves: none, white (correlated), or a pivot's, of sigma m/s^2."""
+
+    kind: Literal["none", "white", "pivot"]
+    sigma: float
+
+    def problem(self, prepared: Preprocessed) -> Problem:
+        """The prepared with this noise."""
+        if self.kind == "pivot":
+            return prepared.pivot(self.sigma, FLOOR_MPS2)
+        return prepared.white(self.sigma, CORRELATION_S if self.kind == "white" else 0.0)
+
+
+def likeliest(problem_of: Callable[[float], Problem], sigmas: tuple[float, ...], theta: Theta) -> float:
+    """The sigma of least V at theta."""
+    return min(sigmas, key=lambda sigma: value(problem_of(sigma), theta))
+
+
+def near(sigma: float) -> tuple[float, ...]:
+    """The neighbours of a sigma on the grid, itself among them, zero excepted."""
+    at = WHITE_MPS2.index(sigma)
+    return WHITE_MPS2[max(at - 1, 1) : at + 3]

@@ -1,0 +1,93 @@
+"""What a filter runs over: the series of a recording, and what is constant over it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..data import Recording, Vector
+from .flat_segment import Flat
+
+
+@dataclass(frozen=True)
+class Series:
+    """What the filter runs over, one row a sample after the flat segment; None stands for the value in brackets.
+
+    Attributes
+    ----------
+    y : (n, 3) m/s^2. omega : (n, 3) rad/s, the mean measured rate over the step that leads to the sample.
+    dt : (n,) s, that step. r_scale, q_scale : (n,) factors of Sigma_a and Sigma_omega [1].
+    q_extra : (n,) rad^2 added to the step's angle variance [0].
+
+    What follows is for the hand's filter alone.
+
+    rate, alpha : (n, 3) rad/s, rad/s^2 at the sample, for lever arm and delay [neither].
+    r_extra : (n,) (m/s^2)^2 added to the noise of every axis [0].
+    jerk : (n,) (m/s^3)^2/Hz, spectral density of the hand's jerk over the step that leads to the sample [0].
+    reset : (n,) m/s^2, not below zero where the hand comes to rest or leaves it: its travel begins anew from rest, with
+        this standard deviation of its acceleration [nowhere].
+    """
+
+    y: Vector
+    omega: Vector
+    dt: Vector
+    r_scale: Vector | None = None
+    q_scale: Vector | None = None
+    q_extra: Vector | None = None
+    rate: Vector | None = None
+    alpha: Vector | None = None
+    r_extra: Vector | None = None
+    jerk: Vector | None = None
+    reset: Vector | None = None
+
+    def __len__(self) -> int:
+        return len(self.dt)
+
+    @classmethod
+    def after(cls, recording: Recording, flat: Flat) -> Series:
+        """The samples after the flat segment, with midpoint rates (omega_t + omega_t+1) / 2."""
+        last = flat.last
+        gyr = recording.gyr[last - 1 :]
+        return cls(
+            y=np.ascontiguousarray(recording.acc[last:]),
+            omega=0.5 * (gyr[:-1] + gyr[1:]),
+            dt=np.diff(recording.t[last - 1 :]),
+        )
+
+    def arrays(self, names: tuple[str, ...]) -> dict[str, Any]:
+        """The named fields as the kernel's keyword arguments."""
+        values = {name: getattr(self, name) for name in names}
+        return {name: None if value is None else np.ascontiguousarray(value) for name, value in values.items()}
+
+
+COMMON = ("y", "omega", "dt", "r_scale", "q_scale", "q_extra")
+
+HAND = ("rate", "alpha", "r_extra", "jerk", "reset")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A series with what is constant over it; huber, tail and lam are the hand's filter's alone.
+
+    Attributes
+    ----------
+    gravity : m/s^2. huber : threshold on |L^-1 e| beyond which a sample weighs less.
+    tail : beyond it, rho grows as the distance (0, Huber) or as its logarithm (1, redescending).
+    lam : 1/s, the three poles that bring the hand's travel back.
+    """
+
+    series: Series
+    flat: Flat
+    gravity: float
+    huber: float = np.inf
+    tail: float = 1.0
+    lam: float = 5.0
+
+    def constants(self) -> Vector:
+        """The kernel's layout: gravity, Sigma_a, Sigma_omega, the flat mean, its count, then huber, tail and lam."""
+        flat = self.flat
+        return np.array(
+            [self.gravity, *flat.Sigma_a, *flat.Sigma_omega, *flat.y, flat.n, self.huber, self.tail, self.lam]
+        )

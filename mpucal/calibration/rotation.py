@@ -1,0 +1,47 @@
+"""What the estimators share: the stationary segment's statistics and what a fit returns. Knows no algorithm."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data import Vector
+
+
+def cross(v: Vector) -> NDArray[np.float64]:
+    """[v]x, the matrix of the cross product: (..., 3) -> (..., 3, 3)."""
+    matrix = np.zeros((*v.shape[:-1], 3, 3))
+    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    return matrix - np.swapaxes(matrix, -1, -2)
+
+
+def rotation(phi: Vector) -> NDArray[np.float64]:
+    """exp([phi]x), the rotation by the vector phi [rad]: (..., 3) -> (..., 3, 3)."""
+    angle2 = np.sum(phi * phi, axis=-1)[..., None, None]
+    angle = np.sqrt(angle2)
+    X = cross(phi)
+    # sinc and its companion, finite at zero
+    a = np.sinc(angle / np.pi)
+    b = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+    turn: NDArray[np.float64] = np.eye(3) + a * X + b * (X @ X)
+    return turn
+
+
+def product(F: Vector) -> Vector:
+    """F[n-1] ... F[1] F[0] of matrices (n, 3, 3), by halves; the identity of none."""
+    if len(F) == 0:
+        return np.eye(3)
+    while len(F) > 1:
+        odd = F[-1:] if len(F) % 2 else F[:0]
+        pairs = F[: len(F) - len(odd)]
+        F = np.concatenate([pairs[1::2] @ pairs[::2], odd])
+    return np.asarray(F[0])
+
+
+def left_jacobian(phi: Vector) -> Vector:
+    """J_l of d exp([phi]x) = [J_l dphi]x exp([phi]x)."""
+    angle = float(np.linalg.norm(phi))
+    X = cross(phi)
+    if angle < 1e-3:
+        return np.eye(3) + X / 2 + X @ X / 6
+    return np.asarray(np.eye(3) + (1 - np.cos(angle)) / angle**2 * X + (angle - np.sin(angle)) / angle**3 * (X @ X))
