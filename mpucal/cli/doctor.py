@@ -17,9 +17,10 @@ from ..doctor.host import examine_host
 from ..doctor.page import document, text
 from ..doctor.speed import examine_speed
 from ..errors import SourceError, UsageError
+from ..session.at_rest import put_down
 from ..sources.on_chip import OnBus
-from .at_rest import put_down
 from .options import check_gyroscope, check_source, source_options
+from .person import say
 from .source import opened
 
 EXAMPLE = "Example: `mpucal doctor --bus /dev/i2c-1`, or `mpucal doctor --bus sim:chip=clone98,who_am_i=0x68`"
@@ -58,6 +59,6 @@ def _findings(options: Mapping[str, Any], seconds: float) -> Iterator[Finding]:
         raise UsageError("a doctor examines a chip on its own bus", "give --bus BUS or --serial PORT")
     check_gyroscope(source.plan.config)
     with closing(source.bus):
-        put_down(source.listeners)
+        put_down(source.listeners, say)
         way = examine_speed if options["serial"] is None else examine_bridge
         yield from examine(source.bus, source.plan.config, seconds, way)

@@ -8,9 +8,10 @@ from typing import Any
 import click
 
 from ..errors import OutputError
+from ..result.clock import stamp
 from ..terminal.console import console
 from .options import check_source, fit_options, source_options
-from .running import running, stamp
+from .running import running
 from .source import opened
 
 EXAMPLE = "Example: `mpucal record --bus /dev/i2c-1 -o capture.mcap --seconds 60`"

@@ -1,12 +1,12 @@
-"""A session's runner with its capture, from opening to closing both. Knows no result and no kind of source."""
+"""A session's runner with its capture, from opening to closing both."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from pathlib import Path
 
+from ..result.clock import now
 from ..session.live.apart import Apart
 from ..session.live.questions import Here
 from ..session.runner import Runner
@@ -35,13 +35,3 @@ def running(source: Opened, capture: Path, person: Console) -> Iterator[Runner]:
             measuring.late,
             Apart if source.real_time else Here,
         )
-
-
-def now() -> datetime:
-    """The time of day, to the second."""
-    return datetime.now(UTC).replace(microsecond=0)
-
-
-def stamp() -> str:
-    """The same, for a file's name."""
-    return now().strftime("%Y%m%d-%H%M%S")

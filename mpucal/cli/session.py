@@ -14,14 +14,19 @@ from ..data import Recording
 from ..errors import RefusedError
 from ..mavlink.calibrate import calibrate_vehicle
 from ..result.calibration import REFUSED, Calibration
+from ..session.place import Place
 from ..session.runner import Runner
+from ..sinks.choose import announced, chosen
+from ..sinks.kind import SinkKind
+from ..sinks.record import in_session
 from ..sinks.sink import Applied
+from ..sinks.write_back import write_to_all
 from ..sources.opened import Opened
 from ..sources.resumed import open_resumed
 from ..terminal.console import console
-from .destination import destinations, recorder, said, sink_options, written_back
+from .destination import device, session_sink_options, source_given
 from .options import aim_options, check_gyroscope, check_resumed, check_source, fit_options, source_name, source_options
-from .place import Place
+from .person import ask
 from .running import running
 from .source import open_again, opened
 from .summary import summary, written
@@ -33,7 +38,7 @@ EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board
 @source_options
 @fit_options
 @aim_options
-@sink_options
+@session_sink_options
 @click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Where the results go.")
 @click.option(
     "--resume", metavar="DIR", type=click.Path(path_type=Path), help="Go on with the interrupted session in DIR."
@@ -59,7 +64,7 @@ def command(
     """
     resume: Path | None = options.pop("resume")
     attended = not yes and sys.stdin.isatty()
-    source, names, options = _opened(resume, options, sinks, no_write, attended)
+    source, kinds, options = _opened(resume, options, sinks, no_write, attended)
     check_gyroscope(source.plan.config)
     folder = resume or folder
     person = console(quiet=yes, as_json=json_events, beep=beep, title=source_name(options))
@@ -69,7 +74,7 @@ def command(
         with running(source, place.capture, person) as runner:
             # a program that reads the events finds it in calibration.json
             if not json_events:
-                person.say(f"  {said(names, no_write)}")
+                person.say(f"  {announced(kinds, no_write)}")
             try:
                 recording = runner.measure()
             finally:
@@ -83,24 +88,25 @@ def command(
         if not json_events:
             click.echo(err=True)
         click.echo(f"{summary(calibration)}\n\n{written([place.capture, *paths])}")
-    record = recorder(place.folder, calibration, recording, source.truth)
-    words = {**options, "gravity": source.plan.gravity, "model": source.plan.model, "store": False}
-    _report(calibration, written_back(names, calibration, words, yes, place.folder, record, sinks), as_json)
+    record = in_session(place.folder, calibration, recording, source.truth)
+    sensor = device({**options, "gravity": source.plan.gravity, "model": source.plan.model})
+    confirm = partial(ask, yes=yes)
+    _report(calibration, write_to_all(kinds, calibration, sensor, place.folder, record, confirm, sinks), as_json)
     return RefusedError.exit_code if calibration.verdict == REFUSED else 0
 
 
 def _opened(
     resume: Path | None, options: dict[str, Any], sinks: tuple[str, ...], no_write: bool, attended: bool
-) -> tuple[Opened, tuple[str, ...], dict[str, Any]]:
+) -> tuple[Opened, tuple[SinkKind, ...], dict[str, Any]]:
     """The source, the sinks that the result goes to, and the options that name the source."""
     if resume is None:
         check_source(click.get_current_context())
-        names = destinations(sinks, no_write, options)
-        return opened({**options, "attended": attended}), names, options
+        kinds = chosen(sinks, no_write, source_given(options))
+        return opened({**options, "attended": attended}), kinds, options
     check_resumed(click.get_current_context())
     source = open_resumed(resume, open_again)
     options = {**options, **source.live.words}
-    return source, destinations(sinks, no_write, options), options
+    return source, chosen(sinks, no_write, source_given(options)), options
 
 
 def _report(calibration: Calibration, writing: Iterator[Applied], as_json: bool) -> None:

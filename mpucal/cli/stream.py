@@ -17,10 +17,10 @@ from ..data import STANDARD_GRAVITY_MPS2, Samples
 from ..errors import OutputError, UsageError
 from ..files.rows.csv import CsvText
 from ..result.calibration import Calibration
+from ..result.clock import now
 from ..result.correction import Correction, correction
 from ..session.ports import Source
 from .options import check_source, source_options
-from .running import now
 from .source import opened
 
 EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.json --seconds 10`"

@@ -1,1 +1,1 @@
-"""Where a calibration is written to."""
+"""Where a calibration is written to besides files: a chip's registers, a bridge's memory, an autopilot."""

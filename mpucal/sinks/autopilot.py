@@ -1,4 +1,4 @@
-"""An autopilot's accelerometer parameters as a place for a calibration. Knows no person and no fit."""
+"""An autopilot's accelerometer parameters as a sink: set, read back, and seen in its streams, or put back."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..mavlink.parameters.applied import applied, of_imu
 from ..mavlink.parameters.client import Parameters
 from ..mavlink.parameters.names import all_places
 from ..mavlink.parameters.plan import NOTHING, Change, changes, left_out, moved
-from ..mavlink.parameters.text import PARAM, PARAMS, param_text, params_text, read_parameters_file
+from ..mavlink.parameters.text import param_text, params_text, read_parameters_file
 from ..mavlink.parameters.verify import OtherPlacesError, verify
 from ..mavlink.parameters.write import Writer
 from ..mavlink.prearm import Prearm, Watch, prearm
@@ -25,12 +25,29 @@ from ..mavlink.still import Stillness
 from ..mavlink.truth import ARDUPILOT, PX4
 from ..result.atomic import write_atomically
 from ..result.calibration import Calibration
+from ..session.at_rest import put_down
+from ..sources.on_vehicle import OnLink
+from .kind import Device
 from .sink import Applied
+from .table import OLD_PARAM, OLD_PARAMS
 
-OLD_PARAMETERS = "autopilot_old"
 FILE, FOLDERS = "{}mpucal-imu{}.bin", {ARDUPILOT: "/APM/", PX4: "/fs/microsd/"}
 CORRECTION = re.compile(r"(OFFS|SCAL)_[XYZ]$|[XYZ](OFF|SCALE)$")
 SAVE_IDS = 76
+
+
+@contextmanager
+def open_autopilot(device: Device) -> Iterator[AutopilotSink]:
+    """The parameters of the vehicle on a link, once its person was asked to put it down.
+
+    Raises
+    ------
+    LinkError : it cannot be opened, or there is no vehicle.
+    """
+    source: OnLink = device.open()
+    with source.connected(device.say) as link:
+        put_down(source.listeners, device.say)
+        yield AutopilotSink(link, "store" in device.flags)
 
 
 class AutopilotSink:
@@ -41,8 +58,6 @@ class AutopilotSink:
     link : locked to the vehicle; the sink leaves it open.
     store : keep D and b_a, which parameters do not hold in full, as files in the vehicle's storage too.
     """
-
-    name = "autopilot"
 
     def __init__(self, link: Link, store: bool = False) -> None:
         self._link = link
@@ -65,12 +80,11 @@ class AutopilotSink:
         held = read_shaping(self._link, self._firmware)
         values = {name: value for name, value in held.items() if CORRECTION.search(name)}
         remarks = [f"Accelerometer parameters of {self.where} before mpucal wrote new ones"]
-        ending, text = PARAM, param_text(values, remarks)
+        file, text = OLD_PARAM, param_text(values, remarks)
         if self._firmware == PX4:
-            ending, text = PARAMS, params_text(values, remarks, self._link.vehicle.system)
+            file, text = OLD_PARAMS, params_text(values, remarks, self._link.vehicle.system)
         # an earlier file holds an earlier state: it stays
-        names = (OLD_PARAMETERS + ending, *(f"{OLD_PARAMETERS}-{n}{ending}" for n in range(2, 1000)))
-        path = next(folder / name for name in names if not (folder / name).exists())
+        path = file.free_in(folder)
         write_atomically(path, text.encode())
         return (path,)
 

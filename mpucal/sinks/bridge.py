@@ -1,24 +1,38 @@
-"""The memory of a serial bridge as a place that keeps a calibration. Knows no message and no port."""
+"""The memory of a serial bridge as a sink: the config blob stored, read back, and found valid by its firmware."""
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import BusError, WriteBackError
 from ..result.atomic import write_atomically
 from ..result.blob import BlobError
 from ..result.calibration import REFUSED, Calibration
+from ..sources.bridge import open_store
 from ..sources.bridge.store import Held, Store
+from .kind import Device
 from .sink import Applied
+from .table import BRIDGE_BLOB
 
 UNTOUCHED = "nothing was written"
 
 
+@contextmanager
+def open_bridge(device: Device) -> Iterator[BridgeSink]:
+    """The memory of the bridge on a port.
+
+    Raises
+    ------
+    BusError : no such port, no bridge on it, or one that keeps nothing.
+    """
+    with open_store(device.name) as store:
+        yield BridgeSink(store)
+
+
 class BridgeSink:
     """The config blob that the bridge behind `store` keeps for the firmware that uses it."""
-
-    name = "bridge"
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -29,7 +43,7 @@ class BridgeSink:
         held, old = self._store.state(), self._store.read()
         if held is None or old is None:
             return ()
-        path = folder / f"bridge-blob-{held.generation}.bin"
+        path = folder / BRIDGE_BLOB.name.replace("N", str(held.generation))
         write_atomically(path, old)
         return (path,)
 

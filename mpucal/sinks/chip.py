@@ -1,4 +1,4 @@
-"""A chip's accelerometer offset registers as a place that keeps b_a. Knows no kind of bus.
+"""A chip's accelerometer offset registers as a sink of b_a: written, read back, and seen in the samples.
 
 Only b_a fits there, in steps of 1 mg; D has no register. They are volatile: what is written is gone with the supply,
 and with the reset that a session begins with.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,9 +27,13 @@ from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError, RecordingError, SourceError, WriteBackError
 from ..result.atomic import write_atomically
 from ..result.calibration import REFUSED, Calibration
+from ..session.at_rest import put_down
+from ..sources.on_chip import OnBus
+from .kind import Device
 from .sink import Applied
+from .table import CHIP_OFFSETS
 
-KEPT, FORMAT = "chip-offsets.json", "mpucal.chip_offsets"
+FORMAT = "mpucal.chip_offsets"
 
 # a calibration that fits the chip brings gravity out within 20 mg, wherever the board lies
 GRAVITY_MPS2 = 0.2
@@ -42,10 +46,22 @@ VOLATILE = (
 )
 
 
+@contextmanager
+def open_chip(device: Device) -> Iterator[ChipSink]:
+    """The offset registers of the chip on a bus, once its person was asked to put it down.
+
+    Raises
+    ------
+    BusError : no such bus or port, or no chip on it.
+    """
+    source: OnBus = device.open()
+    with closing(source.bus):
+        put_down(source.listeners, device.say)
+        yield ChipSink(source.bus, f"the chip on {device.name}")
+
+
 class ChipSink:
     """The offset registers of the chip on `bus`; `where` says which one, in words."""
-
-    name = "chip"
 
     def __init__(self, bus: Bus, where: str) -> None:
         self._port = Port(bus, Decoder(where))
@@ -56,8 +72,7 @@ class ChipSink:
         registers = {f"0x{block.place[0]:02x}": block.data.hex() for block in self._blocks()}
         document = {"format": FORMAT, "version": 1, "where": self.where, "registers": registers}
         # an earlier file holds an earlier state: it stays
-        names = (KEPT, *(f"{Path(KEPT).stem}-{n}.json" for n in range(2, 1000)))
-        path = next(folder / name for name in names if not (folder / name).exists())
+        path = CHIP_OFFSETS.free_in(folder)
         write_atomically(path, (json.dumps(document, indent=2) + "\n").encode())
         return (path,)
 
@@ -201,9 +216,9 @@ def _kept(path: Path) -> list[Block]:
         registers = {int(first, 0): bytes.fromhex(data) for first, data in document["registers"].items()}
         blocks = [Block(place, registers[place[0]]) for place in PLACES if place[0] in registers]
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise RecordingError(f"{path} holds no offset registers ({error})", f"give a {KEPT}") from error
+        raise RecordingError(f"{path} holds no offset registers ({error})", f"give a {CHIP_OFFSETS.name}") from error
     if not blocks or any(len(block.data) != block.place[2] + 2 - block.place[0] for block in blocks):
-        raise RecordingError(f"{path} does not hold the offset registers of a chip", f"give a {KEPT}")
+        raise RecordingError(f"{path} does not hold the offset registers of a chip", f"give a {CHIP_OFFSETS.name}")
     return blocks
 
 

@@ -1,4 +1,4 @@
-"""What every place that a calibration is written to has in common. Knows none of them."""
+"""What every sink does: keep what it holds, write a calibration, and perhaps put back what it kept."""
 
 from __future__ import annotations
 
@@ -28,14 +28,11 @@ class Sink(Protocol):
 
     Attributes
     ----------
-    name : as `--to` and `mpucal write` spell it. where : the very device, in words.
+    where : the very device, in words.
     """
 
     @property
-    def name(self) -> str: ...  # noqa: D102 - see above
-
-    @property
-    def where(self) -> str: ...  # noqa: D102
+    def where(self) -> str: ...  # noqa: D102 - see above
 
     def keep(self, folder: Path) -> tuple[Path, ...]:
         """Save what the place holds now to files in `folder`, before anything is changed; none where it is empty.

@@ -6,9 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mpucal.cli.destination import recorder, written_back
+from mpucal.cli.destination import device
 from mpucal.errors import WriteBackError
 from mpucal.result.calibration import Calibration
+from mpucal.sinks.record import in_session
+from mpucal.sinks.table import SINKS
+from mpucal.sinks.write_back import write_to_all
 
 SOURCE = {
     "bus": None,
@@ -27,7 +30,6 @@ WORDS = {
     "dlpf": 3,
     "gravity": 9.80665,
     "model": "auto",
-    "store": False,
 }
 
 
@@ -64,10 +66,10 @@ def test_its_own_recording_takes_the_calibration_of_what_was_measured(flown, mpu
 
 def test_a_vehicle_that_refuses_keeps_what_it_held(flown, tmp_path):
     measured = Calibration.load(flown.folder / "calibration.json")
-    record = recorder(tmp_path, measured, None, None)
-    words = {**WORDS, "mavlink": "sim:imus=1,refuse=INS_ACCSCAL_Y"}
+    record = in_session(tmp_path, measured, None, None)
+    vehicle = device({**WORDS, "mavlink": "sim:imus=1,refuse=INS_ACCSCAL_Y"})
     with pytest.raises(WriteBackError) as raised:
-        list(written_back(("autopilot",), measured, words, True, tmp_path, record))
+        list(write_to_all((SINKS["autopilot"],), measured, vehicle, tmp_path, record, lambda question: None))
     assert raised.value.exit_code == 6
     # nothing says that anything was written
     assert not (tmp_path / "calibration.json").exists()

@@ -17,7 +17,8 @@ from mpucal.simulated.chip import Chip, SimulatedBus
 from mpucal.simulated.chip.clock import FastClock
 from mpucal.simulated.chip.factory import Factory
 from mpucal.simulated.chip.models import MODELS, OFFSETS
-from mpucal.sinks.chip import KEPT, ChipSink
+from mpucal.sinks.chip import ChipSink
+from mpucal.sinks.table import CHIP_OFFSETS
 
 BIAS_G = np.array([0.032, -0.011, -0.054])
 TRIM = (-1501, 2000, 701)
@@ -155,7 +156,7 @@ def test_the_old_words_come_back_from_their_file(calibration, tmp_path):
     (kept,) = board.sink().keep(tmp_path)
     board.sink().write(calibration())
     assert board.words() != TRIM
-    assert KEPT in board.sink().put_back(kept)
+    assert CHIP_OFFSETS.name in board.sink().put_back(kept)
     assert board.words() == TRIM
 
 
@@ -172,7 +173,7 @@ def test_what_was_kept_is_not_written_over(tmp_path):
     ids=["empty", "list", "other", "short"],
 )
 def test_another_file_is_not_put_back(tmp_path, text):
-    board, path = Board(), tmp_path / KEPT
+    board, path = Board(), tmp_path / CHIP_OFFSETS.name
     path.write_text(text)
     with pytest.raises(RecordingError, match="offset registers"):
         board.sink().put_back(path)

@@ -1,4 +1,4 @@
-"""The folder that a session fills: the asked one, or a new one named by chip and time. Knows no result."""
+"""The folder that a session fills: the asked one, or a new one named by chip and time."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from pathlib import Path
 
 from ..errors import OutputError
 from ..files.parts import captures_in
-from ..session.results import make_folder
-from .running import stamp
+from ..result.clock import stamp
+from .results import make_folder
 
 
 class Place:

@@ -1,0 +1,25 @@
+"""The person at the terminal, beside the results on stdout: what is said to them, and a question that they confirm."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from ..errors import WriteBackError
+
+
+def say(text: str) -> None:
+    """A sentence, on stderr."""
+    click.echo(f"mpucal: {text}", err=True)
+
+
+def ask(question: str, yes: bool) -> None:
+    """Go on where the person agrees, or cannot be asked.
+
+    Raises
+    ------
+    WriteBackError : the person said no.
+    """
+    if not yes and sys.stdin.isatty() and not click.confirm(question, err=True):
+        raise WriteBackError("nothing was written: you said no", "repeat it when you want it written")

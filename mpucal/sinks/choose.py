@@ -1,0 +1,59 @@
+"""Which sinks a session writes to: what --to named, or what belongs to the source."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..errors import UsageError
+from .kind import SinkKind
+from .table import SINKS
+
+# of --to: the files of a session, which are written in any case
+FILE = "file"
+
+
+def chosen(asked: Sequence[str], no_write: bool, source: str) -> tuple[SinkKind, ...]:
+    """The sinks to write to besides the files, in the table's order.
+
+    Parameters
+    ----------
+    asked : what --to named; none: what is a default of the source. source : the option that names the source.
+
+    Raises
+    ------
+    UsageError : a sink that is not behind the source, or sinks beside --no-write.
+    """
+    if no_write and asked:
+        raise UsageError("--to and --no-write were given together", "leave one of them out")
+    for name in asked:
+        if name != FILE:
+            check_behind(SINKS[name], source, f"--to {name} was given", ", or leave it out")
+    if no_write:
+        return ()
+    return tuple(kind for kind in SINKS.values() if (kind.name in asked if asked else source in kind.default_of))
+
+
+def check_behind(kind: SinkKind, source: str, given: str, otherwise: str = "") -> None:
+    """Refuse a sink that is not behind the source.
+
+    Raises
+    ------
+    UsageError : `given`, and the source has none; give another one, `otherwise` do what that says.
+    """
+    if source not in kind.behind:
+        has = "has no sensor to write to" if source == "replay" else f"has no {kind.name}"
+        raise UsageError(f"{given}, and --{source} {has}", f"give {kind.sources}{otherwise}")
+
+
+def announced(kinds: Sequence[SinkKind], no_write: bool) -> str:
+    """Where the result will go, in a sentence for the person."""
+    if no_write:
+        return "The result goes to files, and nowhere else."
+    listed = " and ".join(["files", *(kind.where for kind in kinds)])
+    return f"The result goes to {listed}; --to and --no-write choose otherwise."
+
+
+def defaults() -> str:
+    """Where a session writes by default, for the help."""
+    listed = [f"{kind.where} of --{source}" for kind in SINKS.values() for source in kind.default_of]
+    return f"by default {', '.join(listed)}, else files alone"

@@ -1,0 +1,88 @@
+"""What the program asks of a kind of sink: its name, the sources it is behind, what opens it, what a write changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from enum import Enum
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any
+
+from ..result.session_files import SessionFile
+
+if TYPE_CHECKING:
+    from .sink import Sink
+
+Say = Callable[[str], None]
+
+
+class Effect(Enum):
+    """What a write does to the samples that the sensor delivers from then on, and so what a session records of it."""
+
+    NONE = "they stay as they were: calibration.json says that it was written"
+    LESS_BIAS = "a part of b_a is gone from them: all result files are made again, and say how much"
+    OTHER_STREAM = "they need another calibration, which has a file of its own; calibration.json stays as measured"
+
+
+@dataclass(frozen=True)
+class Flag:
+    """An option of `mpucal write` for one kind of sink: its name, and what the help says."""
+
+    name: str
+    help: str
+
+
+@dataclass(frozen=True)
+class Device:
+    """What a sink is opened on.
+
+    Attributes
+    ----------
+    name : as the source's option says it, such as /dev/i2c-1. open : opens the source.
+    say : tells the person a sentence. flags : the names of those that were given.
+    """
+
+    name: str
+    open: Callable[[], Any]
+    say: Say
+    flags: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class SinkKind:
+    """A kind of sink: one row of the table.
+
+    Attributes
+    ----------
+    name : as `--to` and `mpucal write` spell it. behind : the source options whose devices have one.
+    default_of : those of them whose sessions write to it where --to does not choose.
+    where : it, in a sentence for a person. holds : what of a calibration it holds, for the documentation.
+    opener : "module:attribute" of a context manager from a Device to a Sink; imported when it is opened.
+    effect : see Effect. kept : the files in which the old state may be kept. flags : see Flag.
+    """
+
+    name: str
+    behind: tuple[str, ...]
+    where: str
+    holds: str
+    opener: str
+    default_of: tuple[str, ...] = ()
+    effect: Effect = Effect.NONE
+    kept: tuple[SessionFile, ...] = ()
+    flags: tuple[Flag, ...] = ()
+
+    def open(self, device: Device) -> AbstractContextManager[Sink]:
+        """The sink on `device`; closed when the context ends.
+
+        Raises
+        ------
+        SourceError : the device cannot be opened; KeepsNothing, where it holds no calibration at all.
+        """
+        opener: Callable[[Device], AbstractContextManager[Sink]] = resolve_name(self.opener)
+        return opener(device)
+
+    @property
+    def sources(self) -> str:
+        """The options of the sources that it is behind, as a person writes them."""
+        return " or ".join(f"--{source}" for source in self.behind)

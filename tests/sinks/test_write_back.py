@@ -1,0 +1,156 @@
+"""A calibration on its way to a sink: what is kept, what is recorded, and what is left of a failure."""
+
+import json
+import sys
+from contextlib import contextmanager
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mpucal.errors import BusError, KeepsNothing, OutputError, WriteBackError
+from mpucal.result.calibration import Calibration
+from mpucal.sinks.kind import Device, SinkKind
+from mpucal.sinks.sink import Applied
+from mpucal.sinks.write_back import put_back, write_to, write_to_all
+
+BIAS = np.array([0.3, -0.2, 1.0])
+GOOD = {"verdict": "good", "reasons": []}
+
+
+class Registers:
+    """A place that subtracts what was written, where each step may fail: keep, write, read back, put back."""
+
+    where = "the chip of the test"
+
+    def __init__(self, fails):
+        self.held, self.fails, self.steps = np.zeros(3), fails, 0
+
+    def _step(self):
+        self.steps += 1
+        if self.steps in self.fails:
+            raise BusError("a transfer broke off", "check the wires")
+
+    def keep(self, folder):
+        self._step()
+        (folder / "old").write_text(json.dumps(self.held.tolist()))
+        return (folder / "old",)
+
+    def write(self, calibration):
+        old = self.held
+        try:
+            self._step()
+            self.held = calibration.b_a
+            self._step()
+        except BusError as error:
+            self.held = old
+            raise WriteBackError(f"{error.what}; the old state holds", error.remedy) from error
+        return Applied(replace(calibration, applied_in_hardware=self.held), "it is written")
+
+    def put_back(self, kept):
+        self.held = np.array(json.loads(kept.read_text()))
+        return "it holds again what it held"
+
+
+KIND = SinkKind("made", behind=("bus",), where="the made-up sink", holds="all", opener="made_up_sink:opened")
+
+
+def write_all(monkeypatch, sink, calibration, folder, record, asked=(), said=print):
+    """Write to a made-up sink, or what is raised where it is opened."""
+
+    @contextmanager
+    def opened(_device):
+        if isinstance(sink, Exception):
+            raise sink
+        yield sink
+
+    monkeypatch.setitem(sys.modules, "made_up_sink", SimpleNamespace(opened=opened))
+    device = Device("/dev/made-up", lambda: None, said)
+    return list(write_to_all((KIND,), calibration, device, folder, record, lambda question: None, asked))
+
+
+def unsaved(kind, now):
+    raise OutputError("cannot write calibration.json (no space left)", "make room")
+
+
+def as_it_is(kind, now):
+    return now
+
+
+@settings(deadline=None, max_examples=60)
+@given(fails=st.sets(st.integers(1, 4), max_size=2), full_after=st.none() | st.integers(0, 4))
+def test_the_old_state_or_the_new_one_and_the_files_say_which(tmp_path_factory, fails, full_after):
+    folder = tmp_path_factory.mktemp("faults")
+    measured = Calibration(np.eye(3), BIAS, quality=GOOD)
+    measured.save(folder / "calibration.json")
+    sink, saved = Registers(fails), []
+
+    def record(kind, now):
+        if full_after is not None and len(saved) >= full_after:
+            unsaved(kind, now)
+        saved.append(kind.name)
+        now.save(folder / "calibration.json")
+        return now
+
+    with pytest.MonkeyPatch.context() as patch:
+        try:
+            (applied,) = write_all(patch, sink, measured, folder, record)
+        except WriteBackError:
+            new = False
+        else:
+            new = True
+            assert applied.calibration.extra["written"][0]["where"] == sink.where
+    assert np.array_equal(sink.held, BIAS if new else np.zeros(3))
+    # whoever reads the file subtracts what is left, and never twice
+    of_file = Calibration.load(folder / "calibration.json")
+    assert np.array_equal(of_file.applied_in_hardware, sink.held)
+    assert new == (not fails & {1, 2, 3} and full_after != 0)
+
+
+def test_a_place_that_cannot_be_restored_says_what_it_keeps(tmp_path):
+    class Kept(Registers):
+        put_back = None
+
+        def keep(self, folder):
+            return ()
+
+    with pytest.raises(OutputError, match="it is written, but cannot write"):
+        write_to(KIND, Kept(set()), Calibration(np.eye(3), BIAS, quality=GOOD), tmp_path, unsaved, print)
+
+
+def test_a_place_that_takes_calibrations_alone_is_given_nothing_else(tmp_path):
+    sink = Registers(set())
+    sink.put_back = None
+    with pytest.raises(WriteBackError, match="old is no calibration"):
+        put_back(KIND, sink, tmp_path / "old", tmp_path, print)
+    assert sink.steps == 0
+
+
+@pytest.mark.parametrize("verdict", ["refused", "good"])
+def test_only_what_is_not_refused_is_written(tmp_path, monkeypatch, verdict):
+    sink = Registers(set())
+    calibration = Calibration(np.eye(3), BIAS, quality={"verdict": verdict, "reasons": []})
+    done = write_all(monkeypatch, sink, calibration, tmp_path, as_it_is)
+    assert len(done) == (verdict == "good") == bool(sink.held.any())
+
+
+def test_a_device_that_is_gone_is_a_write_back_that_failed(tmp_path, monkeypatch):
+    gone = BusError("there is no serial port /dev/x", "plug it in")
+    calibration = Calibration(np.eye(3), BIAS, quality=GOOD)
+    with pytest.raises(WriteBackError, match="nothing was written to the made-up sink: there is no serial port"):
+        write_all(monkeypatch, gone, calibration, tmp_path, as_it_is)
+
+
+@pytest.mark.parametrize("asked", [(), ("made",)], ids=["by default", "asked for"])
+def test_a_device_that_keeps_nothing_is_a_failure_where_it_was_asked_for(tmp_path, monkeypatch, asked):
+    keeps_nothing = KeepsNothing("the firmware of the bridge on x keeps no calibration", "flash another")
+    calibration, said = Calibration(np.eye(3), BIAS, quality=GOOD), []
+    if asked:
+        with pytest.raises(WriteBackError):
+            write_all(monkeypatch, keeps_nothing, calibration, tmp_path, as_it_is, asked)
+    else:
+        assert write_all(monkeypatch, keeps_nothing, calibration, tmp_path, as_it_is, said=said.append) == []
+        assert "in files alone" in said[0]
