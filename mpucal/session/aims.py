@@ -1,4 +1,4 @@
-"""Which orientations a session may ask for, and what it wants to know. Knows no board."""
+"""The targets of a session (standard uncertainty, 1 sigma), and the orientations that it may ask for."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ TILT_RAD = math.radians(30.0)
 
 @dataclass(frozen=True)
 class Aim:
-    """When a session is content.
+    """What a session must reach before it ends the turning.
 
     Attributes
     ----------
-    target : standard deviations. least : orientations that must have been seen, however sure the numbers seem.
-    longest_s : of turning, after which it is as good as it gets. verify : new orientations that verify it.
+    target : standard uncertainties (1 sigma). least : orientations that must have been seen, whatever the target.
+    longest_s : time limit of the turning [s]. verify : new orientations that verify it.
     """
 
     target: Target

@@ -1,6 +1,6 @@
-"""Which orientations the board has been in, how many they are, and whether they are varied.
+"""Coverage: which orientations the board has been in, how many, and whether they are spread over the sphere.
 
-Knows raw accelerometer directions only: a bias or a gain bends them by some degrees, which does no harm here.
+Directions are of the raw acceleration: bias and scale factor error bend them by a few degrees, which does no harm.
 """
 
 from __future__ import annotations

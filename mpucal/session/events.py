@@ -1,4 +1,4 @@
-"""What happens to a session and what it answers, as plain values. Knows no rule of what follows what."""
+"""The inputs (events) and outputs (prompts, progress, decisions, requests) of a session, as frozen values."""
 
 from __future__ import annotations
 
@@ -172,7 +172,6 @@ Event = (
     | Finished
     | Stopped
 )
-Found = Rested | Turned | Finished | Stopped
 
 
 # What the session answers.
@@ -279,7 +278,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Target:
-    """Standard deviations at which a session is content."""
+    """Standard uncertainties (1 sigma) to reach: of scale factor error, misalignment and bias."""
 
     gain_pct: float
     misalignment_deg: float
@@ -288,17 +287,17 @@ class Target:
 
 @dataclass(frozen=True)
 class Knowledge:
-    """How well the accelerometer is known by now, about once a second while the board is turned.
+    """Standard uncertainties of the accelerometer's parameters so far, about once a second while the board is turned.
 
     Attributes
     ----------
-    gain_pct, misalignment_deg, bias_mg : (x, y, z) standard deviations [%], [deg], [mg]; of an axis' two leans the
-        worse. 1e3 or so means: nothing is known yet.
+    gain_pct, misalignment_deg, bias_mg : (x, y, z) standard uncertainties (1 sigma) of the scale factor error [%], the
+        misalignment [deg] (of an axis' two the larger) and the bias [mg]. 1e3 or so: not observable yet.
     target : what is wanted of each.
     gain, misalignment, bias : (x, y, z) progress toward it, 0..1. overall : the least of all nine.
     down : unit vector in the board's axes: the still orientation that would help most if it pointed down now.
-        None where every one is known well enough.
-    words : that orientation in words ("corner +x -y down"), or what the knowledge amounts to.
+        None where every one has reached its target.
+    words : the largest uncertainty of each kind, in words.
     doubt : one line where the data contradict each other already (a flipped axis, a wrong range), else empty.
     """
 
@@ -318,14 +317,15 @@ class Knowledge:
 
 @dataclass(frozen=True)
 class Verification:
-    """What one orientation that the fit had not seen says of it.
+    """The check of a calibration in one orientation that its fit had not seen.
 
     Attributes
     ----------
     number, of : which one of how many. down : unit vector in the board's axes that pointed down.
-    magnitude_mps2, magnitude_std_mps2 : |a| - g there, and what the covariance promises of it.
-    direction_deg, direction_std_deg : angle of gravity as the gyroscope carried it to it as measured, and its promise.
-    agrees : both are within the promise. text : the same in words.
+    magnitude_mps2, magnitude_std_mps2 : |a| - g there, and its predicted standard uncertainty.
+    direction_deg, direction_std_deg : angle between gravity as predicted by the gyroscope and as measured, and its
+        predicted standard uncertainty.
+    agrees : both are within four of these. text : the same in words.
     """
 
     t_s: float

@@ -1,4 +1,4 @@
-"""The first step of a session: the board lies flat and still for ten seconds. Knows no other step."""
+"""The first step of a session: wait until the board has been flat and still for ten seconds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SAY_AGAIN_S = 5.0
 
 PROMPT = Prompt(
     PromptKind.LAY_FLAT,
-    f"Lay the board flat on something firm and let go of it, until it has been still for {FLAT_S:.0f} s.",
+    f"Lay the board flat on a firm surface, let go of it, and leave it still for {FLAT_S:.0f} s.",
 )
 
 
@@ -78,7 +78,11 @@ class LayFlat:
         before, self._still = self._still, still
         if before is not None and still.run != before.run and before.seconds >= WORTH_SAYING_S:
             self._spoke_s = t_s
-            found.append(Caution(t_s, "moved", f"it was moved: {self._shaken}", "let go of it; the time starts again"))
+            found.append(
+                Caution(
+                    t_s, "moved", f"the board was moved: {self._shaken}", "let go of it; the countdown starts again"
+                )
+            )
         remaining = max(FLAT_S - still.seconds, 0.0)
         return [
             *found,
@@ -90,11 +94,13 @@ class LayFlat:
         self._shaken = moved.what
         found: list[Output] = [
             Countdown(t_s, max(FLAT_S - self._stillness.seconds, 0.0), FLAT_S, paused=True),
-            self._progress(t_s, "waiting until it is still"),
+            self._progress(t_s, "waiting for the board to be still"),
         ]
         if moved.after_s >= WORTH_SAYING_S or t_s - self._spoke_s >= SAY_AGAIN_S:
             self._spoke_s = t_s
-            found.append(Caution(t_s, "trembling", f"not still: {moved.what}", "let go of it, on something firm"))
+            found.append(
+                Caution(t_s, "trembling", f"not still: {moved.what}", "put it on a firm surface and let go of it")
+            )
         return found
 
     def _progress(self, t_s: float, text: str) -> Progress:
@@ -103,6 +109,6 @@ class LayFlat:
 
 def _never_still(moved: Moved) -> Stopped:
     return Stopped(
-        f"the board was not still for {FLAT_S:.0f} s within {PATIENCE_S:.0f} s (last, {moved.what})",
-        "lay it on something firm, away from what shakes it, and start again",
+        f"the board was not still for {FLAT_S:.0f} s within {PATIENCE_S:.0f} s (last: {moved.what})",
+        "put it on a firm surface, away from vibration, and start again",
     )

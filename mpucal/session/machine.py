@@ -1,4 +1,7 @@
-"""A guided session: events in; prompts, progress, decisions and questions out. Knows no clock, device or screen."""
+"""The state machine of a guided session: events in; prompts, progress, decisions and requests for fits out.
+
+Time comes with the events, so a replayed session gives the same outputs.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ from .events import (
     Turned,
     Written,
 )
-from .meter import Watch
+from .meter import MotionWatch
 from .rotate import Rotate
 from .table import State, next_state
 from .verify import Verify
@@ -39,10 +42,10 @@ from .verify import Verify
 SILENT_S = 5.0
 
 REST = Prompt(PromptKind.REST, "You can put the board down.")
-COMPUTING = Prompt(PromptKind.REST, "You can put the board down. The calibration is being computed; give it a moment.")
+COMPUTING = Prompt(PromptKind.REST, "You can put the board down. The calibration is being computed.")
 ABORTED = "the session was interrupted"
 START_AGAIN = "start again when you are ready"
-ENOUGH = "you said that is enough"
+ENOUGH = "you chose to go on"
 
 
 class Machine:
@@ -66,7 +69,7 @@ class Machine:
         self._until_end, self._aim, self._tilt_only = until_end, AIMS[target], tilt_only
         self._attended = attended
         self._step: lay_flat.LayFlat | Rotate | Verify = lay_flat.LayFlat(patient=until_end)
-        self._watch: Watch | None = None
+        self._watch: MotionWatch | None = None
         self._flat: Rested | None = None
         self._samples = self._flat_samples = 0
         self._sampled_s: float | None = None
@@ -90,11 +93,11 @@ class Machine:
             case Tick(t_s):
                 return self._tick(t_s)
             case Connected(sensor):
-                self._watch = Watch(sensor)
+                self._watch = MotionWatch(sensor)
                 return [lay_flat.PROMPT]
             case Rested(still_s):
                 self._flat, self._flat_samples = event, self._samples
-                return [Decision(f"flat and still for {still_s:.0f} s: that will do"), *self._turn(event)]
+                return [Decision(f"flat and still for {still_s:.0f} s: done"), *self._turn(event)]
             case Turned(why):
                 return [Decision(why), *self._verify()]
             case Finished(why):
@@ -182,16 +185,20 @@ class Machine:
         if state not in (State.ROTATE, State.VERIFY) or self._flat is None:
             return []
         forget = Forget(self._flat_samples, self._samples)
-        return [Decision("you want to turn it again: what was turned is forgotten"), forget, *self._turn(self._flat)]
+        return [
+            Decision("the turning starts again; what was turned so far is discarded"),
+            forget,
+            *self._turn(self._flat),
+        ]
 
     def _resumed(self) -> list[Output]:
         self._sampled_s = None
-        return [Decision("the session goes on where it was"), *self._step.resumed()]
+        return [Decision("the session resumes where it stopped"), *self._step.resumed()]
 
     def _ended(self, state: State, why: str | None) -> list[Output]:
         if state in (State.ROTATE, State.VERIFY):
-            what = f"the source failed while you turned the board ({why})" if why else "the source ended"
-            return [Decision(f"{what}; calibrating with what it gave"), COMPUTING]
+            what = f"the source failed while the board was turned ({why})" if why else "the source ended"
+            return [Decision(f"{what}; calibrating with the data so far"), COMPUTING]
         if why:
             return [Decision(why), REST]
         return [

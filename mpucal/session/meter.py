@@ -1,4 +1,4 @@
-"""What the board does this moment, and what is wrong with the way it is moved. Knows no step of a session."""
+"""How the board moves now (Meter, 4 a second), and cautions about turning too fast, clipping and lost samples."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from ..data import Samples, Sensor, Vector
 from .events import Caution, Direction, Meter, Output
-from .stillness import IN_THE_HAND, Limits, Moved, Stillness
+from .stillness import IN_THE_HAND, Moved, Stillness, StillnessLimits
 from .windows import Window, Windows
 
 WINDOW_S = 0.25
@@ -17,7 +17,7 @@ SAY_AGAIN_S = 5.0
 NEAR_RANGE = 0.8
 
 
-class Watch:
+class MotionWatch:
     """Turns samples into Meter and Caution, whatever the step.
 
     Parameters
@@ -25,7 +25,7 @@ class Watch:
     sensor : whose ranges are known. limits : of what counts as still.
     """
 
-    def __init__(self, sensor: Sensor, limits: Limits = IN_THE_HAND) -> None:
+    def __init__(self, sensor: Sensor, limits: StillnessLimits = IN_THE_HAND) -> None:
         self._sensor = sensor
         self._windows = Windows(WINDOW_S)
         self._stillness = Stillness(limits)
@@ -62,14 +62,16 @@ class Watch:
         limit = self._sensor.gyro_range_dps
         fastest = math.degrees(float(np.abs(samples.gyr).max()))
         if samples.gyr_clipped.any():
-            what = f"you turn it faster than the {limit:.0f} deg/s that the gyroscope can measure" if limit else ""
-            found.append(Caution(t_s, "clipped", what or "the gyroscope is at its end", "turn it more slowly"))
+            what = f"turned faster than the gyroscope's range of {limit:.0f} deg/s" if limit else ""
+            found.append(
+                Caution(t_s, "clipped", what or "turned faster than the gyroscope's range", "turn it more slowly")
+            )
         elif limit and fastest > NEAR_RANGE * limit:
-            what = f"that was {fastest:.0f} deg/s, and the gyroscope ends at {limit:.0f}"
+            what = f"turned at {fastest:.0f} deg/s, close to the gyroscope's range of {limit:.0f} deg/s"
             found.append(Caution(t_s, "too_fast", what, "turn it more slowly"))
         if samples.acc_clipped.any():
-            what = "a knock went beyond what the accelerometer can measure"
-            found.append(Caution(t_s, "knocked", what, "handle it gently, and do not set it down hard"))
+            what = "a shock exceeded the accelerometer's range"
+            found.append(Caution(t_s, "knocked", what, "handle the board gently, and set it down softly"))
         if samples.gap.any():
             found.append(Caution(t_s, "data_lost", "samples were lost", "hold this orientation a moment longer"))
         return found

@@ -1,4 +1,4 @@
-"""The board held in one orientation after another: when one is complete. Knows no prompt and no purpose."""
+"""Pauses of a board in a hand: when it has been held still in one orientation for long enough."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HOLD_S = 1.25
 
 
 @dataclass(frozen=True)
-class Held:
+class Pause:
     """The board has been still in one orientation for `seconds`; `run` numbers the stillnesses.
 
     Attributes
@@ -47,9 +47,9 @@ class Pauses:
         """What comes next has nothing to do with what was."""
         self._stillness.forget()
 
-    def add(self, samples: Samples) -> list[Held | Countdown]:
+    def add(self, samples: Samples) -> list[Pause | Countdown]:
         """What `samples` show, a window at a time."""
-        found: list[Held | Countdown] = []
+        found: list[Pause | Countdown] = []
         for window in self._windows.add(samples):
             sight = self._stillness.add(window)
             if self._left is None:
@@ -59,5 +59,5 @@ class Pauses:
             if sight.seconds < HOLD_S + WINDOW_S - 1e-6:
                 remaining = max(HOLD_S - sight.seconds, 0.0)
                 found.append(Countdown(window.end_s, remaining, HOLD_S, paused=False))
-            found.append(Held(window.end_s, sight.seconds, np.asarray(sight.acc), sight.run))
+            found.append(Pause(window.end_s, sight.seconds, np.asarray(sight.acc), sight.run))
         return found

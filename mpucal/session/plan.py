@@ -1,4 +1,4 @@
-"""What a session is to do, and how its capture says so. Knows no source and no option's spelling."""
+"""The settings of a session (sensor, gravity, model, target), and how the head of its capture stores them."""
 
 from __future__ import annotations
 

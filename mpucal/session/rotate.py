@@ -1,4 +1,4 @@
-"""The second step of a session: the board is turned until enough is known. Knows no other step."""
+"""The second step of a session: ask for orientations until the target uncertainty is reached."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .events import (
     Turned,
     Wish,
 )
-from .pauses import HOLD_S, Held, Pauses
+from .pauses import HOLD_S, Pause, Pauses
 from .windows import Window, Windows
 
 PASS_WINDOW_S = 0.1
@@ -47,7 +47,7 @@ WAIT_S = 0.5
 
 
 class Rotate:
-    """Asks for one orientation after the other, until enough is known.
+    """Asks for one orientation after the other, until the target is reached.
 
     Parameters
     ----------
@@ -93,8 +93,8 @@ class Rotate:
         if self._until_end:
             return found
         if self._content():
-            # tilts leave some parameters as they were assumed: no target is claimed of them
-            what = "enough tilts were shown" if self._tilt_only else "the target is reached"
+            # tilts leave some parameters at their prior: the target does not apply to them
+            what = "enough tilts seen" if self._tilt_only else "target reached"
             return [*found, Turned(f"{what}: {knowledge.words}")]
         if advice and knowledge.down is not None:
             self._said_s = knowledge.t_s
@@ -120,7 +120,7 @@ class Rotate:
         if window.whole and LEAST_MPS2 < np.linalg.norm(window.acc) < MOST_MPS2 and self.coverage.passes(window.acc):
             self._new_s = window.end_s
 
-    def _hold(self, held: Held) -> list[Output | Turned]:
+    def _hold(self, held: Pause) -> list[Output | Turned]:
         found: list[Output | Turned] = []
         if held.seconds >= PAUSE_S - 1e-6 and self.coverage.pauses(held.acc):
             self._new_s = held.t_s
@@ -145,7 +145,7 @@ class Rotate:
             found.append(Progress(t_s, number, self._least, f"orientation {number} of {self._least}"))
         if not self._until_end and t_s - max(self._new_s, self._said_s) >= SAY_AGAIN_S:
             self._said_s = t_s
-            found.append(Caution(t_s, "not_turned", "nothing new was shown for a while", self.prompt.text))
+            found.append(Caution(t_s, "not_turned", "no new orientation for a while", self.prompt.text))
         return found
 
     def _content(self) -> bool:
@@ -156,18 +156,18 @@ class Rotate:
     def _turned(self, t_s: float) -> Turned | None:
         known = f": {self._knowledge.words}" if self._knowledge else ""
         if t_s - self._new_s >= PATIENCE_S:
-            return Turned(f"no new orientation for {PATIENCE_S:.0f} s, {self.coverage.number} are there{known}")
+            return Turned(f"no new orientation for {PATIENCE_S:.0f} s, {self.coverage.number} seen{known}")
         if self._begun_s is not None and t_s - self._begun_s >= self._aim.longest_s:
-            return Turned(f"{self._aim.longest_s:.0f} s of turning are as good as it gets{known}")
+            return Turned(f"time limit of {self._aim.longest_s:.0f} s for turning reached{known}")
         return None
 
     def _prompt_for(self, down: Vector) -> Prompt:
         x, y, z = down.tolist()
         if self._until_end:
-            text = "Now turn it through different orientations, tilted ones too, and hold each for two seconds."
+            text = "Turn the board through many different orientations, tilted ones too, and hold each for 2 s."
             return Prompt(PromptKind.ROTATE, text)
         side = tilt_down(down) if self._tilt_only else f"{side_down(down)} down"
-        return Prompt(PromptKind.ROTATE, f"Turn it: {side}, and hold it still.", (x, y, z))
+        return Prompt(PromptKind.ROTATE, f"Turn the board: {side}, then hold it still.", (x, y, z))
 
 
 def _down(acc: Vector) -> Direction:

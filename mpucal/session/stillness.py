@@ -1,4 +1,4 @@
-"""Whether the board lies still, for how long, and what moved it. Knows no prompt and no state."""
+"""Stillness detection: whether the board is still, for how long, and what moved it, from windows of samples."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .windows import Window
 
 
 @dataclass(frozen=True)
-class Limits:
+class StillnessLimits:
     """What still counts as still; the accelerometer's in m/s^2, the gyro's in rad/s.
 
     Attributes
@@ -29,8 +29,8 @@ class Limits:
 
 
 # A table may hum; a hand trembles by 0.1 m/s^2 and 1 deg/s at 2 to 10 Hz.
-ON_A_TABLE = Limits(acc_sd=0.15, gyr_sd=0.03, acc_step=0.08, gyr_step=0.02)
-IN_THE_HAND = Limits(acc_sd=0.3, gyr_sd=0.06, acc_step=0.3, gyr_step=0.06)
+ON_A_TABLE = StillnessLimits(acc_sd=0.15, gyr_sd=0.03, acc_step=0.08, gyr_step=0.02)
+IN_THE_HAND = StillnessLimits(acc_sd=0.3, gyr_sd=0.06, acc_step=0.3, gyr_step=0.06)
 
 # A noisier sensor may exceed these by what its quietest window shows, up to this factor ...
 OF_QUIETEST = 2.5
@@ -79,7 +79,7 @@ class Stillness:
     rest_rad_s : (3,) what the gyroscope read at the last stillness: its bias.
     """
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: StillnessLimits) -> None:
         self._limits = limits
         self._acc_quiet = np.full(3, np.inf)
         self._gyr_quiet = np.full(3, np.inf)
@@ -164,7 +164,7 @@ class Stillness:
         if gyr_ratio.max() > acc_ratio.max():
             return _turned(gyr_step)
         axis = int(acc_ratio.argmax())
-        return f"it tilted by {abs(acc_step[axis]):.2f} m/s² along {AXES[axis]}"
+        return f"the acceleration along {AXES[axis]} changed by {abs(acc_step[axis]):.2f} m/s²"
 
 
 def _turned(gyr: Vector) -> str:

@@ -1,4 +1,4 @@
-"""Which event leads from which state to which: all about transitions, nothing about why they happen."""
+"""The transition table of a session: which event leads from which state to which."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many threads linear algebra may use: one. Knows nothing, and imports nothing."""
+"""The environment that keeps linear algebra to one thread; it must be set before NumPy loads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The third step of a session: orientations that the first calibration has not seen. Knows no other step."""
+"""The third step of a session: check the first calibration in orientations that it has not seen."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..result.orientation import side_down, tilt_down
 from .aims import Aim
 from .coverage import DISTINCT_RAD, Coverage
 from .events import Ask, Caution, Checked, Countdown, Finished, Output, Progress, Prompt, PromptKind, Tried, Wish
-from .pauses import HOLD_S, Held, Pauses
+from .pauses import HOLD_S, Pause, Pauses
 
 PATIENCE_S = 40.0
 SAY_AGAIN_S = 8.0
@@ -33,8 +33,8 @@ ANEW = frozenset(
     }
 )
 OFFERED_S = 60.0
-UNVERIFIED = "the board was not held still in any of the orientations that were asked for, so nothing verifies it"
-HOLD = "run the session again, and hold the board still for two seconds in each"
+UNVERIFIED = "the board was held still in none of the requested orientations, so the calibration is not verified"
+HOLD = "run the session again, and hold the board still for 2 s in each"
 
 
 class Verify:
@@ -82,32 +82,32 @@ class Verify:
             return found
         if t_s - self._said_s >= SAY_AGAIN_S:
             self._said_s = t_s
-            found.append(Caution(t_s, "not_turned", "that orientation is still to come", self.prompt.text))
+            found.append(Caution(t_s, "not_turned", "this orientation has not been held yet", self.prompt.text))
         if t_s - self._begun_s < PATIENCE_S:
             return found
         if self._number:
             self._asked = True
             return [*found, Ask(Wish.CHECK, CHECK_WAIT_S)]
         self.checked = Checked((), None, "verification_failed", UNVERIFIED, HOLD)
-        return [*found, Finished(f"not verified: {UNVERIFIED}")]
+        return [*found, Finished(UNVERIFIED)]
 
     def tried(self, tried: Tried) -> list[Output | Finished]:
         """The first calibration; a refused one is not worth verifying."""
         if tried.verdict != REFUSED:
             return []
         self.checked = Checked((), False, tried.code, tried.why)
-        return self._refused(Finished(f"not to be verified: {tried.why}"), self.checked)
+        return self._refused(Finished(f"not verified: {tried.why}"), self.checked)
 
     def check(self, checked: Checked) -> list[Output | Finished]:
         """What the orientations say."""
         self.checked = checked
         if checked.agrees:
-            return [*checked.found, Finished("the new orientations agree with what was promised")]
+            return [*checked.found, Finished("verified: the new orientations agree with the predicted uncertainty")]
         return [*checked.found, *self._refused(Finished(checked.why), checked)]
 
     def enough(self) -> Finished:
         """The person does not want to go on."""
-        return self._refusal or Finished("you said that is enough: not verified")
+        return self._refusal or Finished("you chose to go on: not verified")
 
     def resumed(self) -> list[Output]:
         """The board may be anywhere now."""
@@ -121,17 +121,19 @@ class Verify:
             return [refusal]
         self._refusal, self._begun_s = refusal, None
         what, _, remedy = checked.why.partition("; ")
-        self.prompt = Prompt(PromptKind.AGAIN, "Turn it again from the start (r), or leave it refused (Enter)?")
+        self.prompt = Prompt(
+            PromptKind.AGAIN, "Turn the board again from the start (r), or end with the refusal (Enter)?"
+        )
         return [self.prompt, Caution(self._now_s, "refused", what, checked.remedy or remedy)]
 
-    def _hold(self, held: Held) -> list[Output | Finished]:
+    def _hold(self, held: Pause) -> list[Output | Finished]:
         if self._asked or held.seconds < HOLD_S - 1e-6:
             return []
         self._pauses.leave(held.run)
         self._coverage.pauses(held.acc)
         self._number += 1
         self._said_s = held.t_s
-        progress = Progress(held.t_s, self._number, self._aim.verify, f"shown {self._number} of {self._aim.verify}")
+        progress = Progress(held.t_s, self._number, self._aim.verify, f"held {self._number} of {self._aim.verify}")
         if self._number == self._aim.verify:
             self._asked = True
             return [progress, Ask(Wish.CHECK, CHECK_WAIT_S)]
@@ -146,4 +148,4 @@ class Verify:
         x, y, z = np.asarray(down).tolist()
         side = tilt_down(down) if self._tilt_only else f"{side_down(down)} down"
         number = f"{self._number + 1} of {self._aim.verify}"
-        return Prompt(PromptKind.VERIFY, f"To verify, {number}: {side}, and hold it still.", (x, y, z))
+        return Prompt(PromptKind.VERIFY, f"Verification {number}: {side}, then hold it still.", (x, y, z))

@@ -1,4 +1,4 @@
-"""Half a second at a time: what each short run of samples looks like. Judges nothing."""
+"""Windows of fixed length over a stream of samples: mean and standard deviation of each."""
 
 from __future__ import annotations
 

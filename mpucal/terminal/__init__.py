@@ -1,1 +1,1 @@
-"""The terminal before the person: what is shown there, and what is pressed. Knows no rule of a session."""
+"""The terminal: what a session shows on it, as a screen, as lines or as JSON, and which keys are pressed."""

@@ -1,4 +1,4 @@
-"""The rows below the pictures: stillness, what is known, the last warning, the keys. Knows no terminal."""
+"""The rows below the pictures: stillness, uncertainties, the last caution, the keys."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .view import View
 from .words import Group, groups, sentence
 
 KNOWLEDGE_ROWS = 3
-_LABEL, _NEEDLE = 14, 24
+_LABEL, _NEEDLE = 19, 20
 _WIDE = 110
 # words are wrapped no narrower, and cut instead
 NARROWEST = 12
@@ -46,7 +46,7 @@ def meter(view: View, glyphs: Glyphs) -> Text:
 
 
 def knowledge_rows(view: View, columns: int, glyphs: Glyphs) -> list[Text]:
-    """KNOWLEDGE_ROWS rows: how well each group of parameters is known, or what there is to say instead."""
+    """KNOWLEDGE_ROWS rows: the uncertainty of each group of parameters, or what there is to say instead."""
     kind = view.prompt.kind if view.prompt is not None else None
     if kind is PromptKind.VERIFY and view.verified:
         rows = [_said(v.text, "green" if v.agrees else "bold yellow") for v in view.verified[-KNOWLEDGE_ROWS:]]
@@ -89,13 +89,13 @@ def _progress(view: View, glyphs: Glyphs) -> list[Text]:
 
 
 def _group(group: Group, columns: int, glyphs: Glyphs) -> Text:
-    """The least known axis of a group; all three where there is space."""
+    """The least certain axis of a group; all three where there is space."""
     least = group.progress[group.worst]
     shown = range(3) if columns >= _WIDE else (group.worst,)
     values = "  ".join(f"{'xyz'[i]} {group.said(i)}" for i in shown)
     style = "green" if least >= 1.0 else "cyan"
     text = Text.assemble(f" {group.name:<{_LABEL}}", (bar(least, _NEEDLE, glyphs), style), f"  {values}")
-    return text.append(f"  (wanted {group.target:g})", style="dim")
+    return text.append(f"  (target {group.target:g})", style="dim")
 
 
 def _said(text: str, style: str) -> Text:

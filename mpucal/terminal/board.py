@@ -1,4 +1,4 @@
-"""The little picture of the board: a plate with its chip and its axes, one side of it down. Knows no session."""
+"""The picture of the board: a plate with its chip and its axes, turned as a down direction says."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lines on a grid of characters: braille dots, or what comes near them in ASCII. Knows no picture."""
+"""Lines and letters on a grid of characters: braille dots, or ASCII strokes."""
 
 from __future__ import annotations
 

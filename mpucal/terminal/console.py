@@ -1,4 +1,4 @@
-"""The person of this process, as the streams allow: a screen, lines of words, or lines of JSON."""
+"""Chooses how a session talks on stderr: a screen, lines of text, or lines of JSON."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The map of the sphere that fills up: which sides of the board have been down. Knows no session."""
+"""The map of orientations: which directions of the board have pointed down, in equal-area projection."""
 
 from __future__ import annotations
 

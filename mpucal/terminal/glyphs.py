@@ -1,4 +1,4 @@
-"""Which characters a terminal can show. Knows nothing of what is shown."""
+"""The characters that a terminal can show: Unicode, or replacements in ASCII."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the person presses: keys or lines of them, Ctrl-C, a signal to end. Knows nothing of what is shown."""
+"""Key presses: single keys or lines of them, Ctrl-C, and signals that end the program."""
 
 from __future__ import annotations
 

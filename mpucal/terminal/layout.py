@@ -1,4 +1,4 @@
-"""The one screen of a session: a view in, lines of text out. Knows no terminal, clock or thread."""
+"""The layout of a session's screen: a view in, lines of text out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Letters that are read from across a table: five rows of blocks each. Knows no terminal."""
+"""Large letters, readable from across a table: five rows of blocks each."""
 
 from __future__ import annotations
 

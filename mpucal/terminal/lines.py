@@ -1,4 +1,4 @@
-"""A session in lines, where there is no terminal to draw on: of words, or of JSON. Knows no screen."""
+"""A session as lines of text or of JSON, where there is no terminal to draw on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The terminal's own screen: shown, painted, and given back. Only rows that changed are sent. Knows no session."""
+"""Paints lines on the terminal's alternate screen; only rows that changed are sent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A session on a terminal: one view that is kept up to date. Drawing has its own thread and delays nobody."""
+"""A session on a terminal: one view that is kept up to date by a drawing thread of its own."""
 
 from __future__ import annotations
 

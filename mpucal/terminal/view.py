@@ -1,4 +1,4 @@
-"""What a screen knows of a session by now: outputs in, one frozen value out. Knows no terminal and no clock."""
+"""The state of a session's screen: outputs of the session in, one frozen value out."""
 
 from __future__ import annotations
 

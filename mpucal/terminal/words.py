@@ -1,4 +1,4 @@
-"""How a session's numbers and warnings are worded, on a screen as in lines. Knows neither."""
+"""The wording of uncertainties and cautions, the same on the screen and in lines."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 from ..session.events import Direction, Knowledge
 
-# standard deviations from here on mean that nothing is known
+# standard uncertainties from here on are said to be not observable
 UNKNOWN = 100.0
 
 
 @dataclass(frozen=True)
 class Group:
-    """Parameters of one kind, of x, y and z: progress 0..1 and standard deviations, and what is wanted of these."""
+    """Parameters of one kind, of x, y and z: progress 0..1, standard uncertainties (1 sigma), and their target."""
 
     name: str
     unit: str
@@ -26,23 +26,23 @@ class Group:
         return min(range(3), key=lambda i: self.progress[i])
 
     def said(self, axis: int) -> str:
-        """How well it is known."""
-        return f"±{rounded(self.std[axis])} {self.unit}" if self.std[axis] < UNKNOWN else "unknown"
+        """The uncertainty of an axis in words."""
+        return f"±{rounded(self.std[axis])} {self.unit}" if self.std[axis] < UNKNOWN else "not observable"
 
 
 def groups(k: Knowledge) -> tuple[Group, Group, Group]:
-    """All that is wanted."""
+    """Scale factor error, misalignment and bias."""
     return (
-        Group("gain", "%", k.gain, k.gain_pct, k.target.gain_pct),
+        Group("scale factor error", "%", k.gain, k.gain_pct, k.target.gain_pct),
         Group("misalignment", "deg", k.misalignment, k.misalignment_deg, k.target.misalignment_deg),
         Group("bias", "mg", k.bias, k.bias_mg, k.target.bias_mg),
     )
 
 
 def known(k: Knowledge) -> str:
-    """How well the worst of each group is known, and what is wanted."""
-    said = ", ".join(f"{g.name} {g.said(g.worst)} (wanted {g.target:g})" for g in groups(k))
-    return f"so far: {said}" + (f"; {k.doubt}" if k.doubt else "")
+    """The largest uncertainty of each group, and its target."""
+    said = ", ".join(f"{g.name} {g.said(g.worst)} (target {g.target:g})" for g in groups(k))
+    return f"1 sigma: {said}" + (f"; {k.doubt}" if k.doubt else "")
 
 
 def rounded(value: float) -> str:

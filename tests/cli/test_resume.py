@@ -66,7 +66,7 @@ def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, tmp_path, s
     assert resumed.code == 0, resumed.err
     said = [json.loads(line) for line in resumed.err.splitlines() if line.startswith("{")]
     assert said[0]["event"] in ("note", "decision")
-    assert "the session goes on where it was" in resumed.err
+    assert "the session resumes where it stopped" in resumed.err
     prompts = [event["kind"] for event in said if event["event"] == "prompt"]
     assert prompts[0] == ("lay_flat" if after_s < 10 else "rotate")
     assert prompts[-2:] == ["verify", "rest"]

@@ -210,7 +210,7 @@ def test_enough_orientations_and_the_target_lead_on_to_verify(board, rotating, v
     assert [seen.number for seen in rotating.of(Seen)] == [2, 3, 4, 5, 6, 7, 8, 9]
     show(rotating, board, varied[8:9])
     assert rotating.state is State.VERIFY
-    assert "the target is reached: bias to 3 mg" in rotating.words()
+    assert "target reached: bias to 3 mg" in rotating.words()
     assert "orientation 5 of 10" in rotating.words()
 
 
@@ -224,8 +224,8 @@ def test_enough_tilts_end_the_turning_and_claim_no_target(board):
     show(session, board, tilts[4:])
     assert session.state is State.VERIFY
     assert "orientation 5 of 6" in session.words()
-    assert "enough tilts were shown: bias to 3 mg" in session.words()
-    assert "the target is reached" not in session.words()
+    assert "enough tilts seen: bias to 3 mg" in session.words()
+    assert "target reached" not in session.words()
 
 
 def test_the_target_alone_is_not_enough(board, rotating):
@@ -249,16 +249,16 @@ def test_without_the_target_turning_goes_on_for_two_minutes(board, rotating):
         rotating.feed(board.turn(rng.normal(size=3), rng.uniform(1.5, 2.5), 1.5))
     assert rotating.state is State.VERIFY
     assert 119.0 < board.t_s - begun_s < 123.0
-    assert "as good as it gets: bias to 3 mg" in rotating.words()
+    assert "for turning reached: bias to 3 mg" in rotating.words()
 
 
 def test_no_new_orientation_for_a_minute_ends_the_turning(board, rotating):
     rotating.feed(board.turn_to((1, 0, 0))).feed(board.still(59.0))
     assert rotating.state is State.ROTATE
-    assert "nothing new was shown for a while" in rotating.words()
+    assert "no new orientation for a while" in rotating.words()
     rotating.feed(board.still(3.0))
     assert rotating.state is State.VERIFY
-    assert "no new orientation for 60 s, 2 are there" in rotating.words()
+    assert "no new orientation for 60 s, 2 seen" in rotating.words()
 
 
 def test_nobody_is_asked_twice_for_the_same_orientation(board, rotating, varied):
@@ -288,7 +288,7 @@ def test_verifies_in_three_orientations_that_were_not_seen(board, verifying, var
         verifying.feed(board.turn_to([-v for v in asked.down])).feed(board.still(2.0))
     assert [ask.wish for ask in verifying.of(Ask) if ask.wish in (Wish.TRY, Wish.CHECK)] == [Wish.TRY, Wish.CHECK]
     assert verifying.state is State.CALIBRATE
-    assert "agree with what was promised" in verifying.words()
+    assert "agree with the predicted uncertainty" in verifying.words()
     assert verifying.machine.checked.agrees
 
 
@@ -304,14 +304,14 @@ def test_a_refused_first_calibration_is_not_verified(board, rotating, varied):
     rotating.overall, rotating.tried = 1.0, Tried("refused", "an axis is flipped", "left_handed")
     show(rotating, board, varied[:9])
     assert rotating.state is State.CALIBRATE
-    assert "not to be verified: an axis is flipped" in rotating.words()
+    assert "not verified: an axis is flipped" in rotating.words()
     assert rotating.machine.checked.code == "left_handed"
 
 
 def test_who_does_not_verify_is_not_waited_for_for_ever(board, verifying):
     verifying.feed(board.still(41.0))
     assert verifying.state is State.CALIBRATE
-    assert "not verified: the board was not held still" in verifying.words()
+    assert "held still in none of the requested orientations" in verifying.words()
     assert verifying.machine.checked.agrees is None
 
 
@@ -333,7 +333,7 @@ def offered(board, varied):
     show(show(session, board, varied[:9]), board, varied[9:12])
     assert session.state is State.VERIFY
     assert session.prompts()[-1] is PromptKind.AGAIN
-    assert "Turn it again from the start (r)" in session.words()
+    assert "Turn the board again from the start (r)" in session.words()
     assert (session.of(Caution)[-1].what, session.of(Caution)[-1].do) == ("the sensor moved on its mount", "fasten it")
     return session
 

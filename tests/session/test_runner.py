@@ -223,7 +223,7 @@ def test_recorded_keys_are_pressed_again_at_their_place():
     replayed = Runner(again, Replayed(listener, events), Notes()).measure()
     assert np.array_equal(live.t, replayed.t)
     assert listener.heard == person.heard
-    assert "you said that is enough" in listener.words()
+    assert "you chose to go on" in listener.words()
 
 
 class Late:

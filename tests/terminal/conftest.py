@@ -46,20 +46,20 @@ def knowledge(t_s, down=CORNER, doubt=""):
     )
 
 
-LAY_FLAT = Prompt(PromptKind.LAY_FLAT, "Lay the board flat on something firm and let go of it.")
-TURN = Prompt(PromptKind.ROTATE, "Turn it: corner +X -Y +Z down, and hold it still.", CORNER)
+LAY_FLAT = Prompt(PromptKind.LAY_FLAT, "Lay the board flat on a firm surface and let go of it.")
+TURN = Prompt(PromptKind.ROTATE, "Turn the board: corner +X -Y +Z down, then hold it still.", CORNER)
 VERIFY = Prompt(PromptKind.VERIFY, "Now show it this side.", (0.0, 1.0, 0.0))
 REST = Prompt(PromptKind.REST, "You can put the board down.")
 
 LAID = [LAY_FLAT, meter(10.0), Progress(10.0, 3.0, 10.0, "still for 3 of 10 s"), Countdown(10.0, 6.6, 10.0, False)]
 TURNED = [
     *LAID,
-    Decision("flat and still for 10 s: that will do"),
+    Decision("flat and still for 10 s: done"),
     TURN,
     *(Seen(20.0 + k, k + 1, (math.cos(k), math.sin(k), 0.5 * (-1) ** k), True) for k in range(4)),
     Seen(24.5, 1, (0.0, 0.6, -0.8), False),
     knowledge(25.0),
-    Caution(25.0, "too_fast", "it turned at 480 deg/s, near the gyroscope's range", "turn it more slowly"),
+    Caution(25.0, "too_fast", "turned at 480 deg/s, close to the gyroscope's range", "turn it more slowly"),
     meter(25.25, still=False, down=(0.1, -0.2, 0.97), what="it turned at 30 deg/s about z"),
 ]
 CHECKED = [

@@ -34,16 +34,16 @@ def test_all_that_a_person_needs_is_there(views, size):
         "200.0 Hz",
         "31.2 °C",
         "0:15",
-        "Turn it: corner +X -Y +Z down, and hold it still.",
+        "Turn the board: corner +X -Y +Z down, then hold it still.",
         "now",
         "turn it like this",
         "+Z up",
         "-Z up",
         "moving: it turned at 30 deg/s about z",
         "y ±0.31 %",
-        "z unknown",
-        "wanted 0.05",
-        "! It turned at 480 deg/s, near the gyroscope's range",
+        "z not observable",
+        "target 0.05",
+        "! Turned at 480 deg/s, close to the gyroscope's range",
         "→ Turn it more slowly.",
         "q or Ctrl-C: stop",
         "█████",
@@ -62,7 +62,7 @@ def test_on_a_low_screen_the_words_are_left(views):
     drawn = text_of(views["turned"], 40, 12)
     assert not BRAILLE.search("".join(drawn))
     assert "+X -Y +Z DOWN" in drawn[1]
-    assert "Turn it: corner" in drawn[2]
+    assert "Turn the board: corner" in drawn[2]
 
 
 def test_a_warning_grows_quiet(views):

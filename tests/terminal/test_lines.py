@@ -73,7 +73,7 @@ def test_a_whole_session_is_told(out, session):
     for words in (
         "LAY FLAT",
         "still for 3 of 10 s",
-        "so far: gain ±0.31 % (wanted 0.1), misalignment unknown (wanted 0.05), bias ±3 mg",
+        "1 sigma: scale factor error ±0.31 % (target 0.1), misalignment not observable (target 0.05), bias ±3 mg",
         "Turn it more slowly.",
         "VERIFY",
         "orientation 1 of 2 agrees",

@@ -20,7 +20,7 @@ from ..events import Checked, Event, Learnt, Tried, Wish
 from ..plan import Plan
 from .disagreement import explained, judged, much_clipped
 from .knowledge import knowledge, wanted
-from .store import Store
+from .store import SampleStore
 
 CONTRADICTION, CLIPPED = "inconsistent", "gyro_clipped"
 OF_THE_SENSOR = "left_handed", "swapped_axes", "wrong_range"
@@ -50,7 +50,7 @@ class Fits:
 
     def __init__(self, plan: Plan, sensor: Sensor) -> None:
         self._plan = plan
-        self._store = Store(sensor)
+        self._store = SampleStore(sensor)
         self._flat: Flat | None = None
         self._known: InterimEstimate | None = None
         self._tried: Evidence | None = None

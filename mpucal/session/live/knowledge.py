@@ -1,4 +1,4 @@
-"""A fit's standard deviations as a session shows them: in %, deg and mg, and against its target."""
+"""The uncertainties of a live fit as an event: in %, deg and mg, and as progress toward the target."""
 
 from __future__ import annotations
 
@@ -47,7 +47,10 @@ def knowledge(known: InterimEstimate, target: Target, t_s: float, down: Vector |
 
 
 def _words(gain: Vector, misalignment: Vector, bias: Vector) -> str:
-    return f"gains to {gain.max():.2g} %, axes to {misalignment.max():.2g} deg, bias to {bias.max():.2g} mg"
+    return (
+        f"scale factor error {gain.max():.2g} %, misalignment {misalignment.max():.2g} deg, bias {bias.max():.2g} mg"
+        " (1 sigma)"
+    )
 
 
 def _doubt(D: Vector, known: InterimEstimate) -> str:

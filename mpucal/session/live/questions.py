@@ -1,4 +1,4 @@
-"""The questions of a session to its fits, and when their answers are brought. Knows no source and no person.
+"""The requests of a session to its live fits, and when their answers are brought.
 
 What is asked for after so many samples is brought after a fixed number more, and waited for if it is late: what the
 session does then depends on the samples alone, and a replay repeats it to the last bit.

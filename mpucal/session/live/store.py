@@ -1,4 +1,4 @@
-"""The samples of a session so far, averaged where they come faster than a fit needs them. Knows no fit."""
+"""The samples of a session so far, averaged to at most 200 Hz for the live fits."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...data import Mask, Recording, Samples, Sensor, Vector
 MOST_HZ = 200.0
 
 
-class Store:
+class SampleStore:
     """Grows by samples as they arrive; the times are those known then.
 
     Parameters

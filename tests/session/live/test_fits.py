@@ -8,7 +8,7 @@ import pytest
 from mpucal.data import Samples, Sensor
 from mpucal.session.events import Checked, Learnt, Tried, Wish
 from mpucal.session.live.fits import Fits, Task
-from mpucal.session.live.store import Store
+from mpucal.session.live.store import SampleStore
 from mpucal.session.plan import Plan
 from mpucal.simulated.study.scenarios import GRAVITY_MPS2, hand_scenario
 
@@ -91,7 +91,7 @@ def test_faster_samples_are_averaged(rate_hz, size):
     gap = no.copy()
     gap[501] = True
     samples = Samples(t, np.tile(t[:, None], (1, 3)), np.zeros((n, 3)), np.full(n, 25.0), gap, no, no)
-    store = Store(Sensor(rate_hz=rate_hz))
+    store = SampleStore(Sensor(rate_hz=rate_hz))
     for first in range(0, n, 7):
         store.add(Samples(*(array[first : first + 7] for array in vars(samples).values())))
     recording = store.recording()
