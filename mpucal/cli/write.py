@@ -10,7 +10,7 @@ import click
 from ..data import STANDARD_GRAVITY_MPS2
 from ..result.calibration import Calibration
 from ..session.results import make_folder
-from ..sinks.record import in_file, is_calibration, on_sink
+from ..sinks.record import in_file, is_calibration
 from ..sinks.table import SINKS
 from ..sinks.write_back import put_back, write_to
 from .destination import check_sink, device, sink_flags
@@ -47,7 +47,7 @@ def command(calibration: Path, to: str, folder: Path | None, yes: bool, as_json:
         if written is None:
             click.echo(f"Done: {put_back(kind, sink, calibration, folder, say)}.")
             return
-        path = folder / on_sink(kind, calibration.stem)
+        path = folder / kind.after_write(calibration.stem)
         applied = write_to(kind, sink, written, folder, in_file(path), say)
     if as_json:
         click.echo(applied.calibration.json(), nl=False)

@@ -6,10 +6,11 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from enum import Enum
+from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
-from ..result.session_files import SessionFile
+from ..result.session_files import DOCUMENT, SessionFile
 
 if TYPE_CHECKING:
     from .sink import Sink
@@ -81,6 +82,18 @@ class SinkKind:
         """
         opener: Callable[[Device], AbstractContextManager[Sink]] = resolve_name(self.opener)
         return opener(device)
+
+    def after_write(self, stem: str) -> str:
+        """Name of the file with the calibration `stem` of the sensor as it is after a write."""
+        return f"{stem}-on-{self.name}.json"
+
+    @property
+    def session_files(self) -> tuple[SessionFile, ...]:
+        """What a write leaves in a session's folder besides what is there without one."""
+        if self.effect is not Effect.OTHER_STREAM:
+            return self.kept
+        name = self.after_write(Path(DOCUMENT.name).stem)
+        return (*self.kept, SessionFile(name, f"the calibration of the sensor as it is after a write to {self.where}"))
 
     @property
     def sources(self) -> str:

@@ -22,11 +22,6 @@ WRITTEN = "written"
 Record = Callable[[SinkKind, Calibration], Calibration]
 
 
-def on_sink(kind: SinkKind, stem: str) -> str:
-    """Name of the file with the calibration `stem` of the sensor as it is after a write."""
-    return f"{stem}-on-{kind.name}.json"
-
-
 def in_session(folder: Path, measured: Calibration, recording: Recording, truth: Mapping[str, Any] | None) -> Record:
     """Records in a session's folder, as the sink's effect demands; `measured` is what the session found."""
 
@@ -37,7 +32,7 @@ def in_session(folder: Path, measured: Calibration, recording: Recording, truth:
         held = now
         files = {}
         if kind.effect is Effect.OTHER_STREAM:
-            files[on_sink(kind, Path(DOCUMENT.name).stem)] = now.json().encode()
+            files[kind.after_write(Path(DOCUMENT.name).stem)] = now.json().encode()
             held = replace(measured, extra=MappingProxyType({**measured.extra, WRITTEN: now.extra[WRITTEN]}))
         save(folder, {**files, DOCUMENT.name: held.json().encode()})
         return held

@@ -1,0 +1,119 @@
+"""A sink that is one module and one row is known to every command that writes a calibration."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpucal.result.calibration import Calibration
+
+PROGRAM = Path(__file__).with_name("logbook.py")
+SIM = ("--bus", "sim:seed=3", "--rate", "100", "--yes")
+
+
+def call(folder, *words):
+    """The command line of a program that has the row of the logbook, too."""
+    return subprocess.run(
+        [sys.executable, PROGRAM, *map(str, words)], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """A folder in which a session on a source with a logbook has written to it, asked by nobody."""
+    folder = tmp_path_factory.mktemp("logbook")
+    return folder, call(folder, "session", *SIM, "-o", "board")
+
+
+@pytest.fixture
+def board(measured, tmp_path):
+    """A copy of it, to be changed."""
+    shutil.copytree(measured[0], tmp_path, dirs_exist_ok=True)
+    return tmp_path
+
+
+def test_a_session_writes_to_it_by_default_and_records_its_effect(measured):
+    folder, done = measured
+    assert done.returncode == 0, done.stderr
+    assert "The result goes to files and the logbook; --to and --no-write choose otherwise." in done.stderr
+    assert "Done: the logbook of sim:seed=3 says b_a." in done.stdout
+    found = Calibration.load(folder / "board" / "calibration.json")
+    assert (folder / "logbook.txt").read_text() == f"b_a: {found.b_a.tolist()}\n"
+    assert [(entry["to"], entry["where"]) for entry in found.extra["written"]] == [
+        ("logbook", "the logbook of sim:seed=3")
+    ]
+    assert not Calibration.load(folder / "board" / "calibration-on-logbook.json").b_a.any()
+    assert (folder / "board" / "logbook-old.txt").read_text() == "b_a: nothing\n"
+    assert "`mpucal write board/logbook-old.txt logbook ...` brings it back" in done.stderr
+
+
+def test_a_session_leaves_it_alone_where_told_to(tmp_path):
+    done = call(tmp_path, "session", *SIM, "-o", "board", "--no-write")
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "logbook.txt").exists()
+    assert not (tmp_path / "board" / "calibration-on-logbook.json").exists()
+
+
+def test_it_is_written_to_among_others_in_the_order_of_the_table(tmp_path):
+    done = call(tmp_path, "session", *SIM, "-o", "board", "--to", "logbook", "--to", "chip")
+    assert done.returncode == 0, done.stderr
+    written = Calibration.load(tmp_path / "board" / "calibration.json").extra["written"]
+    assert [entry["to"] for entry in written] == ["chip", "logbook"]
+
+
+def test_a_calibration_is_written_and_what_was_there_comes_back(board):
+    first = (board / "logbook.txt").read_text()
+    Calibration(np.eye(3), np.array([0.5, 0.0, 0.0])).save(board / "later.json")
+    written = call(board, "write", "later.json", "logbook", "--bus", "sim", "--ink", "--json")
+    assert written.returncode == 0, written.stderr
+    assert "this is sim, in ink" in written.stderr
+    assert (board / "logbook.txt").read_text() == "b_a: [0.5, 0.0, 0.0]\n"
+    assert json.loads(written.stdout) == json.loads((board / "later-on-logbook.json").read_text())
+
+    back = call(board, "write", "logbook-old.txt", "logbook", "--bus", "sim")
+    assert (back.returncode, back.stdout) == (0, "Done: the logbook of sim says again what logbook-old.txt says.\n")
+    assert (board / "logbook.txt").read_text() == first
+    # what was there between is kept as well
+    assert (board / "logbook-old-2.txt").read_text() == "b_a: [0.5, 0.0, 0.0]\n"
+
+
+def test_what_cannot_be_recorded_is_undone(board):
+    before = (board / "logbook.txt").read_text()
+    (board / "board" / "calibration-on-logbook.json").unlink()
+    (board / "board" / "calibration-on-logbook.json").mkdir()
+    done = call(board, "write", "board/calibration.json", "logbook", "--bus", "sim")
+    assert done.returncode == 6
+    assert "the logbook of sim says again what logbook-old-2.txt says" in done.stderr
+    assert (board / "logbook.txt").read_text() == before
+
+
+@pytest.mark.parametrize("command", ["session", "write"])
+def test_the_help_names_it(tmp_path, command):
+    said = " ".join(call(tmp_path, command, "--help").stdout.split())
+    assert {"session": "the logbook of --bus", "write": "--ink logbook: write it in ink."}[command] in said
+    assert "autopilot|logbook" in said
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("session", "--mavlink", "sim", "--to", "logbook"), "--mavlink has no logbook: give --bus, or leave it out."),
+        (("session", *SIM, "--to", "logbook", "--no-write"), "--to and --no-write were given together"),
+        (("session", *SIM, "--to", "diary"), "'logbook'"),
+        (("write", "c.json", "logbook", "--mavlink", "sim"), "--mavlink has no logbook: give --bus."),
+        (("write", "c.json", "logbook", "--replay", "c.mcap"), "--replay has no sensor to write to: give --bus."),
+        (("write", "c.json", "chip", "--bus", "sim", "--ink"), "--ink was given, and the chip's offset registers"),
+        (("write", "c.json", "logbook", "--bus", "sim", "--store"), "--store was given, and the logbook"),
+        (("write", "c.json", "diary", "--bus", "sim"), "'logbook'"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_wrong_usage_is_told_with_its_name(tmp_path, words, says):
+    done = call(tmp_path, *words)
+    assert done.returncode == 2
+    assert says in " ".join(done.stderr.split())
+    assert not list(tmp_path.iterdir())
