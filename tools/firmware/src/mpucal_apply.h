@@ -1,7 +1,7 @@
 /* Apply a config blob to a sample: a = inv(D) (y - b_a + applied_b_a), from counts, in float.
  *
- * One header in C99 (or C++11) for any microcontroller: no heap, no tables, no library to link. It knows the blob of
- * firmware_protocol.md and nothing of where the blob or the counts come from. 48 bytes of RAM a sensor.
+ * One header in C99 (or C++11) for any microcontroller: no heap, no tables, no library to link, 48 bytes of RAM a
+ * sensor. The blob is the one of firmware_protocol.md.
  *
  *     static struct mpucal sensor;
  *     if (mpucal_load(&sensor, blob, sizeof blob, 0x68, 4.0f) == MPUCAL_OK) {

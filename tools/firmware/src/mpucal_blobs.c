@@ -1,5 +1,4 @@
-/* The messages that read and replace the stored blob; firmware_protocol.md, "BLOB_STATE" to "BLOB_ERASE". */
-#include "mpucal_messages.h"
+#include "mpucal_blobs.h"
 
 static uint8_t on_state(struct mpucal_bridge *bridge, struct mpucal_message *reply) {
     const struct mpucal_memory *memory = bridge->port->memory;

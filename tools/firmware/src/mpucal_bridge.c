@@ -2,7 +2,9 @@
 
 #include <string.h>
 
+#include "mpucal_blobs.h"
 #include "mpucal_messages.h"
+#include "mpucal_stream.h"
 
 #define HELLO_MAGIC "MPUB"
 #define HELLO_VERSION_BYTES 6
@@ -12,15 +14,6 @@
 #define FEATURE_STREAM 1
 #define FEATURE_BLOB 2
 #define MAX_I2C_ADDRESS 0x7F
-
-void mpucal_bridge_send(struct mpucal_bridge *bridge, const struct mpucal_message *message) {
-    uint8_t *out = bridge->out;
-    out[TYPE_AT] = message->type;
-    out[SEQ_AT] = message->seq;
-    out[PAYLOAD_AT] = message->code;
-    mpucal_put_u32(out + PAYLOAD_AT + 1, message->t_us);
-    bridge->port->send(out, mpucal_frame_close(out, (uint8_t)(BODY_AT - TYPE_AT + message->body_size)));
-}
 
 /* The asked address, or with 0 the first of the chip's two, that acknowledges; 0: none. */
 static uint8_t find_chip(const struct mpucal_port *port, uint8_t asked) {
@@ -91,7 +84,7 @@ static uint8_t on_burst(struct mpucal_bridge *bridge, struct mpucal_request requ
         if (reply->code != MPUCAL_CODE_OK || piece == left) {
             return reply->code;
         }
-        mpucal_bridge_send(bridge, reply);
+        mpucal_send(bridge, reply);
         offset = (uint16_t)(offset + piece);
     }
 }
@@ -143,5 +136,9 @@ void mpucal_bridge_receive(struct mpucal_bridge *bridge, uint8_t byte) {
     if (reply.code != MPUCAL_CODE_OK && reply.code != MPUCAL_CODE_BAD_VERSION) {
         reply.body_size = 0;
     }
-    mpucal_bridge_send(bridge, &reply);
+    mpucal_send(bridge, &reply);
+}
+
+void mpucal_bridge_look(struct mpucal_bridge *bridge) {
+    mpucal_stream_look(bridge);
 }

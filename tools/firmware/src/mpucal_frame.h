@@ -1,4 +1,4 @@
-/* A frame: COBS(type | seq | payload | CRC-16) and a zero. In place, in one buffer; knows no message.
+/* A frame: COBS(type | seq | payload | CRC-16) and a zero. Made and opened in place, in one buffer.
  *
  * firmware_protocol.md, "Framing". Byte 0 of the buffer is COBS's, the content begins at byte 1.
  */

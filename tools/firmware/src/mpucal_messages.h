@@ -1,8 +1,8 @@
-/* What the parts of the bridge share: the reply that is being made, and who carries out what. Private to them. */
+/* What the parts of the bridge share: a request, the reply that is being made, and how it is sent. Private to them. */
 #ifndef MPUCAL_MESSAGES_H
 #define MPUCAL_MESSAGES_H
 
-#include "mpucal_bridge.h"
+#include "mpucal_state.h"
 
 /* Offsets in a frame's buffer: COBS's byte, then type, seq, payload; a bridge's begins with status and t_us. */
 #define TYPE_AT 1
@@ -40,11 +40,7 @@ static inline uint32_t mpucal_get_u32(const uint8_t *bytes) {
     return mpucal_get_u16(bytes) | (uint32_t)mpucal_get_u16(bytes + 2) << 16;
 }
 
-void mpucal_bridge_send(struct mpucal_bridge *bridge, const struct mpucal_message *message);
-
-/* Handlers: carry a request out, put the reply's body into bridge->out, and return the reply's code. */
-uint8_t mpucal_on_stream(struct mpucal_bridge *bridge, struct mpucal_request request, struct mpucal_message *reply);
-uint8_t mpucal_on_blob(struct mpucal_bridge *bridge, uint8_t type, struct mpucal_request request,
-                       struct mpucal_message *reply);
+/* Send a message whose body lies in bridge->out. */
+void mpucal_send(struct mpucal_bridge *bridge, const struct mpucal_message *message);
 
 #endif

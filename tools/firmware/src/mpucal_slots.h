@@ -1,7 +1,7 @@
 /* Two slots for a config blob, of which at least one is whole at any moment: firmware_protocol.md, "Storage".
  *
- * Knows the memory only through its functions. Power may fail at any moment, and leave any value in the byte that is
- * being written: until the seal of the new blob is whole the old one counts, from then on the new one.
+ * Power may fail at any moment, and leave any value in the byte that is being written: until the seal of the new blob
+ * is whole the old one counts, from then on the new one.
  */
 #ifndef MPUCAL_SLOTS_H
 #define MPUCAL_SLOTS_H

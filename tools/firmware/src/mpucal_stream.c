@@ -1,9 +1,8 @@
-/* The stream: looks at the chip's FIFO and pushes what it collects; firmware_protocol.md, "FRAMES". */
-#include <string.h>
+#include "mpucal_stream.h"
 
 #include "mpucal_messages.h"
 
-/* The registers that a bridge knows. */
+/* The registers that a bridge reads by itself. */
 #define INT_STATUS 0x3A
 #define INT_STATUS_FIFO_OFLOW 0x10
 #define FIFO_COUNT_H 0x72
@@ -39,7 +38,7 @@ static void push(struct mpucal_bridge *bridge, uint32_t t_us, uint8_t frames) {
     mpucal_put_u16(body, stream->index);
     mpucal_put_u16(body + 2, stream->drops);
     body[4] = stream->left;
-    mpucal_bridge_send(bridge, &message);
+    mpucal_send(bridge, &message);
     stream->index = (uint16_t)(stream->index + frames);
     stream->sent_us = bridge->port->now_us();
 }
@@ -101,7 +100,7 @@ static void push_next(struct mpucal_bridge *bridge) {
     }
 }
 
-void mpucal_bridge_look(struct mpucal_bridge *bridge) {
+void mpucal_stream_look(struct mpucal_bridge *bridge) {
     struct mpucal_stream *stream = &bridge->stream;
     uint32_t now_us = bridge->port->now_us();
     if (!stream->frame_bytes) {

@@ -1,0 +1,13 @@
+/* The stream: looks at the chip's FIFO and pushes what it collects; firmware_protocol.md, "FRAMES". Private. */
+#ifndef MPUCAL_STREAM_H
+#define MPUCAL_STREAM_H
+
+#include "mpucal_messages.h"
+
+/* Carry out STREAM: begin, replace or end the stream; the reply's code. */
+uint8_t mpucal_on_stream(struct mpucal_bridge *bridge, struct mpucal_request request, struct mpucal_message *reply);
+
+/* Push a message of the stream, if one is due. */
+void mpucal_stream_look(struct mpucal_bridge *bridge);
+
+#endif
