@@ -16,6 +16,8 @@ MpucalError
 ├── Abandoned             4  the session ended before there was anything to calibrate
 ├── RefusedError          5  the calibration was refused, or failed its verification
 └── WriteBackError        6  the write-back was refused or failed; the old state holds
+
+EndOfCapture is no error: with it a source says that its recording has ended.
 """
 
 from __future__ import annotations
@@ -111,3 +113,7 @@ class WriteBackError(MpucalError):
     """The write-back was refused or failed; the old state holds."""
 
     exit_code = 6
+
+
+class EndOfCapture(Exception):  # noqa: N818 - no error, and of no exit code: the recording behind a source has ended
+    """The source holds no more."""

@@ -23,10 +23,11 @@ from pathlib import Path
 import numpy as np
 
 from mpucal.chip import registers as reg
-from mpucal.chip.access import Bus, EndOfCapture, Reply
+from mpucal.chip.access import Bus, Reply
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.data import Sensor
+from mpucal.errors import EndOfCapture
 from mpucal.files.mcap import CaptureWriter
 from mpucal.session.events import Event, Key, Output
 from mpucal.session.live.apart import Apart

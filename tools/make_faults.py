@@ -11,11 +11,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from mpucal.chip.access import Bus, EndOfCapture
+from mpucal.chip.access import Bus
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.data import Recording
-from mpucal.errors import SourceError
+from mpucal.errors import EndOfCapture, SourceError
 from mpucal.files.mcap import CaptureWriter
 from mpucal.session.plan import Plan
 from mpucal.simulated.chip import open_simulated

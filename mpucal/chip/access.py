@@ -65,7 +65,3 @@ class Transaction:
     data: bytes
     t_ns: int
     error: Failure | None = None
-
-
-class EndOfCapture(Exception):  # noqa: N818 - not an error: the source has ended
-    """The source holds no more transactions."""

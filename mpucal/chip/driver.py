@@ -12,9 +12,9 @@ from contextlib import suppress
 from enum import Enum, auto
 
 from ..data import Recording, Samples, Sensor
-from ..errors import BusError, BusHeld, ChipError
+from ..errors import BusError, BusHeld, ChipError, EndOfCapture
 from . import registers as reg
-from .access import Bus, EndOfCapture
+from .access import Bus
 from .clock import look_phase
 from .config import Config
 from .decode import Decoder

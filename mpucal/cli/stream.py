@@ -12,9 +12,8 @@ from typing import Any
 
 import click
 
-from ..chip.access import EndOfCapture
 from ..data import STANDARD_GRAVITY_MPS2, Samples
-from ..errors import OutputError, UsageError
+from ..errors import EndOfCapture, OutputError, UsageError
 from ..files.rows.csv import CsvText
 from ..result.calibration import Calibration
 from ..result.clock import now

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..chip.access import EndOfCapture
 from ..data import Recording, Samples, Sensor
+from ..errors import EndOfCapture
 
 POLL_S = 0.05
 

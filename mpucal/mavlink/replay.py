@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..chip.access import EndOfCapture
+from ..errors import EndOfCapture
 from .dialect import Packet, Parser, dialect
 from .notes import Note, Notes, is_own
 from .tlog import Tlog

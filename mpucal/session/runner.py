@@ -9,10 +9,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..chip.access import EndOfCapture
 from ..chip.records import FORGET, KEY, LATE, RESUMED
 from ..data import Recording, Sensor
-from ..errors import Abandoned, BusError, CaptureError, ChipError
+from ..errors import Abandoned, BusError, CaptureError, ChipError, EndOfCapture
 from ..result.calibration import Calibration
 from .events import (
     Abort,

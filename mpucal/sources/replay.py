@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..chip.access import EndOfCapture, Reply, Transaction
+from ..chip.access import Reply, Transaction
 from ..chip.records import Record, SessionEvent
-from ..errors import BusError, BusHeld, CaptureError, NoAnswer
+from ..errors import BusError, BusHeld, CaptureError, EndOfCapture, NoAnswer
 
 _RAISES: dict[str, type[BusError]] = {kind.__name__: kind for kind in (NoAnswer, BusHeld)}
 

@@ -6,13 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.chip import registers as reg
-from mpucal.chip.access import EndOfCapture
 from mpucal.chip.config import Config
 from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
 from mpucal.chip.port import TRIES
 from mpucal.data import Samples
-from mpucal.errors import BusError, BusHeld, ChipError, NoAnswer
+from mpucal.errors import BusError, BusHeld, ChipError, EndOfCapture, NoAnswer
 from mpucal.sources.replay import ReplayBus
 
 CHIPS = ["mpu6050", "mpu6500", "clone98"]

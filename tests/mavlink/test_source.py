@@ -3,8 +3,7 @@ from itertools import chain
 import numpy as np
 import pytest
 
-from mpucal.chip.access import EndOfCapture
-from mpucal.errors import LinkError, UsageError
+from mpucal.errors import EndOfCapture, LinkError, UsageError
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.names import ardupilot_place, mounting
 from mpucal.mavlink.replay import Replay

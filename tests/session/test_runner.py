@@ -4,10 +4,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from mpucal.chip.access import EndOfCapture
 from mpucal.chip.records import SessionEvent
 from mpucal.data import Recording, Samples, Sensor
-from mpucal.errors import Abandoned, BusError, CaptureError, ChipError, NoAnswer, OutputError
+from mpucal.errors import Abandoned, BusError, CaptureError, ChipError, EndOfCapture, NoAnswer, OutputError
 from mpucal.result.calibration import Calibration
 from mpucal.session import runner as module
 from mpucal.session.events import Decision, Key, Prompt, PromptKind

@@ -7,8 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from mpucal.chip import registers as reg
-from mpucal.chip.access import EndOfCapture
-from mpucal.errors import UsageError
+from mpucal.errors import EndOfCapture, UsageError
 from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
 from mpucal.sources import BUSES, opener
 from mpucal.sources.bridge import BridgeBus

@@ -2,8 +2,9 @@
 
 import pytest
 
-from mpucal.chip.access import EndOfCapture, Reply, Transaction
+from mpucal.chip.access import Reply, Transaction
 from mpucal.chip.records import RESUMED, SessionEvent
+from mpucal.errors import EndOfCapture
 from mpucal.sources.parts import PAUSE_NS, LaterBus, PartsBus, parts_of
 from mpucal.sources.replay import ReplayBus
 

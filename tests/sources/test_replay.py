@@ -1,8 +1,8 @@
 import pytest
 
-from mpucal.chip.access import EndOfCapture, Failure, Reply, Transaction
+from mpucal.chip.access import Failure, Reply, Transaction
 from mpucal.chip.records import SessionEvent
-from mpucal.errors import BusError, BusHeld, CaptureError, NoAnswer
+from mpucal.errors import BusError, BusHeld, CaptureError, EndOfCapture, NoAnswer
 from mpucal.sources.replay import ReplayBus
 from mpucal.sources.tap import Tap
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from mpucal.chip import registers as reg
-from mpucal.chip.access import EndOfCapture
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.data import Samples
-from mpucal.errors import RecordingError, UsageError
+from mpucal.errors import EndOfCapture, RecordingError, UsageError
 from mpucal.simulated.chip import open_recorded, open_simulated
 from mpucal.simulated.chip.clock import RealClock
 

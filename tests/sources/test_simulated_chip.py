@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mpucal.chip import registers as reg
-from mpucal.chip.access import EndOfCapture
+from mpucal.errors import EndOfCapture
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.factory import Factory
 from mpucal.simulated.chip.models import MODELS, OFFSETS

@@ -2,8 +2,8 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from mpucal.chip.access import EndOfCapture, Failure, Reply, Transaction
-from mpucal.errors import BusError, NoAnswer
+from mpucal.chip.access import Failure, Reply, Transaction
+from mpucal.errors import BusError, EndOfCapture, NoAnswer
 from mpucal.sources.tap import Tap
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from ...chip.access import EndOfCapture
-from ...errors import MpucalError, WriteBackError
+from ...errors import EndOfCapture, MpucalError, WriteBackError
 from ..link import Link, S
 from ..prearm import Watch
 from .client import Parameters

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...chip import registers as reg
-from ...chip.access import EndOfCapture
 from ...chip.families import Group
 from ...data import Vector
+from ...errors import EndOfCapture
 from ..sensor import Counts, Setting
 from .factory import Factory, Three
 from .feed import Feed
