@@ -12,7 +12,8 @@ import numpy as np
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import UsageError
 from ..result.calibration import Calibration, unknown
-from .blockers import BLOCKERS, no_gyroscope
+from .checks import unusable_for_a_fit
+from .checks.unusable import no_gyroscope
 from .evidence import Evidence
 from .fit import Fit
 from .flat_segment import Flat, find_flat, flat_statistics, tells
@@ -63,7 +64,7 @@ def weigh(
     segment = recording.flat or find_flat(recording)
     flat = flat_statistics(recording, segment) if segment is not None and tells(recording, segment) else None
     before = Evidence(recording, gravity, flat, None, model)
-    if flat is None or any(check(before) for check in BLOCKERS):
+    if flat is None or unusable_for_a_fit(before):
         return before, {"model": model, "why": "nothing could be estimated"}
     choice = _fit(recording, flat, gravity, model)
     evidence = Evidence(recording, gravity, flat, choice.fit.right_handed(), choice.model)

@@ -1,4 +1,4 @@
-"""The verdict on an estimate: good, usable or refused, with its reasons. Knows no estimator."""
+"""The verdict on an estimate: good, usable or refused, with its reasons."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..data import Vector
+from ..reasons import Reason
 from ..result.calibration import GOOD, REFUSED, USABLE
-from .blockers import BLOCKERS, no_gyroscope
+from .checks import found
 from .evidence import Evidence
-from .reasons import CHECKS
 
 
 def judge(evidence: Evidence) -> Mapping[str, Any]:
@@ -22,17 +22,11 @@ def judge(evidence: Evidence) -> Mapping[str, Any]:
     direction [deg].
     """
     sure = evidence.sure
-    # a fit there is only where nothing blocked it
-    checks = CHECKS if evidence.fit is not None else (*BLOCKERS, *CHECKS)
-    if no_gyroscope(evidence) is not None:
-        checks = (no_gyroscope,)
-    found = [reason for check in checks if (reason := check(evidence)) is not None]
-    # what refuses it comes before mere reservations
-    reasons = sorted(found, key=lambda reason: not reason.refuse)
+    reasons = found(evidence)
     return MappingProxyType(
         {
-            "verdict": REFUSED if any(r.refuse for r in reasons) else USABLE if reasons else GOOD,
-            "reasons": [{"code": r.code, "message": r.message} for r in reasons],
+            "verdict": verdict(reasons),
+            "reasons": [reason.document() for reason in reasons],
             "magnitude_before": _magnitude(evidence.recording.acc),
             "magnitude_after": _magnitude(evidence.calibrated),
             "error_std": {
@@ -42,6 +36,11 @@ def judge(evidence: Evidence) -> Mapping[str, Any]:
             },
         }
     )
+
+
+def verdict(reasons: list[Reason]) -> str:
+    """What they amount to."""
+    return REFUSED if any(reason.refuse for reason in reasons) else USABLE if reasons else GOOD
 
 
 def _magnitude(acc: Vector | None) -> dict[str, float]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from ..data import Samples, Sensor
+from ..reasons import Reason
 
 Direction = tuple[float, float, float]
 
@@ -81,29 +82,22 @@ class Learnt:
 
 @dataclass(frozen=True)
 class Tried:
-    """A first calibration from the turning alone, to be verified: its verdict, and why it is not good.
-
-    code : of the reason that weighs most.
-    """
+    """A first calibration from the turning alone, to be verified: its verdict, and the likeliest reason against it."""
 
     verdict: str
-    why: str
-    code: str = ""
+    reason: Reason | None = None
 
 
 @dataclass(frozen=True)
 class Checked:
-    """What the new orientations say of the first calibration; `why` and `remedy` where they disagree.
+    """What the new orientations say of the first calibration, and the reason where they do not agree.
 
-    `agrees` is None where nothing was shown that says anything. `code` is the reason's: verification_failed, or a truer
-    one.
+    `agrees` is None where nothing was shown that says anything.
     """
 
     found: tuple[Verification, ...]
     agrees: bool | None
-    code: str = ""
-    why: str = ""
-    remedy: str = ""
+    reason: Reason | None = None
 
 
 @dataclass(frozen=True)

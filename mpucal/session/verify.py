@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ..data import Samples, Vector
+from ..reasons import KINDS, Reason, reason
 from ..result.orientation import side_down, tilt_down
 from .aims import Aim
 from .coverage import DISTINCT_RAD, Coverage
@@ -20,21 +21,7 @@ TRY_WAIT_S = 3.0
 # ... and what the last one says of it is soon told.
 CHECK_WAIT_S = 0.5
 REFUSED = "refused"
-# What turning the board anew may put right; the other reasons lie in the sensor, or in how it is connected.
-ANEW = frozenset(
-    {
-        "few_orientations",
-        "gyro_clipped",
-        "accel_clipped",
-        "data_lost",
-        "not_converged",
-        "inconsistent",
-        "verification_failed",
-    }
-)
 OFFERED_S = 60.0
-UNVERIFIED = "the board was held still in none of the requested orientations, so the calibration is not verified"
-HOLD = "run the session again, and hold the board still for 2 s in each"
 
 
 class Verify:
@@ -88,22 +75,23 @@ class Verify:
         if self._number:
             self._asked = True
             return [*found, Ask(Wish.CHECK, CHECK_WAIT_S)]
-        self.checked = Checked((), None, "verification_failed", UNVERIFIED, HOLD)
-        return [*found, Finished(UNVERIFIED)]
+        not_shown = reason("verification_failed", "not_shown")
+        self.checked = Checked((), None, not_shown)
+        return [*found, Finished(not_shown.what)]
 
     def tried(self, tried: Tried) -> list[Output | Finished]:
         """The first calibration; a refused one is not worth verifying."""
-        if tried.verdict != REFUSED:
+        if tried.verdict != REFUSED or tried.reason is None:
             return []
-        self.checked = Checked((), False, tried.code, tried.why)
-        return self._refused(Finished(f"not verified: {tried.why}"), self.checked)
+        self.checked = Checked((), False, tried.reason)
+        return self._refused(Finished(f"not verified: {tried.reason.message}"), tried.reason)
 
     def check(self, checked: Checked) -> list[Output | Finished]:
         """What the orientations say."""
         self.checked = checked
-        if checked.agrees:
+        if checked.reason is None:
             return [*checked.found, Finished("verified: the new orientations agree with the predicted uncertainty")]
-        return [*checked.found, *self._refused(Finished(checked.why), checked)]
+        return [*checked.found, *self._refused(Finished(checked.reason.what), checked.reason)]
 
     def enough(self) -> Finished:
         """The person does not want to go on."""
@@ -115,16 +103,15 @@ class Verify:
         self._pauses.forget()
         return [self.prompt]
 
-    def _refused(self, refusal: Finished, checked: Checked) -> list[Output | Finished]:
-        """The end, unless the person may want to turn the board anew."""
-        if not self._attended or checked.code not in ANEW:
+    def _refused(self, refusal: Finished, against: Reason) -> list[Output | Finished]:
+        """The end, unless the person may want to turn the board again."""
+        if not self._attended or not KINDS[against.code].turn_again:
             return [refusal]
         self._refusal, self._begun_s = refusal, None
-        what, _, remedy = checked.why.partition("; ")
         self.prompt = Prompt(
             PromptKind.AGAIN, "Turn the board again from the start (r), or end with the refusal (Enter)?"
         )
-        return [self.prompt, Caution(self._now_s, "refused", what, checked.remedy or remedy)]
+        return [self.prompt, Caution(self._now_s, "refused", against.what, against.remedy)]
 
     def _hold(self, held: Pause) -> list[Output | Finished]:
         if self._asked or held.seconds < HOLD_S - 1e-6:

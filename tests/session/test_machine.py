@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mpucal.data import Samples, Sensor
+from mpucal.reasons import Reason
 from mpucal.session.events import (
     Abort,
     Ask,
@@ -37,6 +38,8 @@ from mpucal.session.table import State
 
 MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
 DOWN = (0.0, 0.6, -0.8)
+MOVED = Reason("verification_failed", "the sensor moved on its mount", "fasten it", True)
+FLIPPED = Reason("left_handed", "an axis is flipped", "change its sign", True)
 
 
 def learnt(overall=0.1, advice=True, down=DOWN):
@@ -56,7 +59,7 @@ class Session:
     """
 
     def __init__(self, **options):
-        self.overall, self.tried, self.checked = None, Tried("good", ""), Checked((), agrees=True)
+        self.overall, self.tried, self.checked = None, Tried("good"), Checked((), agrees=True)
         self.machine = Machine(**options)
         self.said = self.machine.handle(Connected(Sensor(accel_range_g=4.0, gyro_range_dps=500.0)))
 
@@ -293,19 +296,19 @@ def test_verifies_in_three_orientations_that_were_not_seen(board, verifying, var
 
 
 def test_a_disagreement_is_told_and_kept(board, verifying, varied):
-    verifying.checked = Checked((), False, "verification_failed", "the sensor moved on its mount", "fasten it")
+    verifying.checked = Checked((), False, MOVED)
     show(verifying, board, varied[9:12])
     assert verifying.state is State.CALIBRATE
     assert "the sensor moved on its mount" in verifying.words()
-    assert verifying.machine.checked.code == "verification_failed"
+    assert verifying.machine.checked.reason == MOVED
 
 
 def test_a_refused_first_calibration_is_not_verified(board, rotating, varied):
-    rotating.overall, rotating.tried = 1.0, Tried("refused", "an axis is flipped", "left_handed")
+    rotating.overall, rotating.tried = 1.0, Tried("refused", FLIPPED)
     show(rotating, board, varied[:9])
     assert rotating.state is State.CALIBRATE
     assert "not verified: an axis is flipped" in rotating.words()
-    assert rotating.machine.checked.code == "left_handed"
+    assert rotating.machine.checked.reason == FLIPPED
 
 
 def test_who_does_not_verify_is_not_waited_for_for_ever(board, verifying):
@@ -329,7 +332,7 @@ def offered(board, varied):
     """A session in which somebody may press keys, and the new orientations disagree."""
     session = Session(attended=True).feed(board.still(10.6))
     session.overall = 1.0
-    session.checked = Checked((), False, "verification_failed", "the sensor moved on its mount", "fasten it")
+    session.checked = Checked((), False, MOVED)
     show(show(session, board, varied[:9]), board, varied[9:12])
     assert session.state is State.VERIFY
     assert session.prompts()[-1] is PromptKind.AGAIN
@@ -349,13 +352,13 @@ def test_who_is_refused_may_turn_it_again(board, offered):
 def test_who_does_not_is_left_with_the_refusal(board, offered, end):
     end(offered, board)
     assert offered.state is State.CALIBRATE
-    assert offered.machine.checked.code == "verification_failed"
+    assert offered.machine.checked.reason == MOVED
     assert offered.words().count("the sensor moved on its mount") == 2
 
 
 def test_turning_again_is_not_offered_where_it_would_not_help(board, varied):
     session = Session(attended=True).feed(board.still(10.6))
-    session.overall, session.tried = 1.0, Tried("refused", "an axis is flipped", "left_handed")
+    session.overall, session.tried = 1.0, Tried("refused", FLIPPED)
     show(session, board, varied[:9])
     assert session.state is State.CALIBRATE
 

@@ -39,7 +39,7 @@ EVENTS = {
     "Abort": Abort(),
     "Resumed": Resumed(3.0),
     "Learnt": Learnt(Knowledge(0.0, ONE, ONE, ONE, Target(0.1, 0.05, 1.0), ONE, ONE, ONE, 1.0, None, ""), advice=True),
-    "Tried": Tried("good", ""),
+    "Tried": Tried("good"),
     "Checked": Checked((), agrees=True),
     "SourceEnded": SourceEnded(),
     "Fitted": Fitted("good"),

@@ -1,4 +1,4 @@
-"""What unseen rests say of a first calibration, in words with a remedy. Knows no filter."""
+"""What new orientations say of a first calibration: whether they agree, and the likeliest reason where they do not."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from ...calibration.verification import Rest
 from ...data import Recording
+from ...reasons import Reason, reason
 from ..events import Checked, Direction, Verification
 
 AXES = "xyz"
@@ -13,50 +14,39 @@ AXES = "xyz"
 LEAST_TURN_RAD = np.deg2rad(40.0)
 WARMER_C = 8.0
 MUCH_CLIPPED = 0.002
-CLIPPED = "turn the board more slowly, or choose a larger --gyro-range, and run the session again"
 
 
-def judged(rests: list[Rest], of: int, recording: Recording, contradiction: str) -> Checked:
+def judged(rests: list[Rest], of: int, recording: Recording, contradiction: Reason | None) -> Checked:
     """All of them, and what is wrong, if anything is.
 
-    contradiction : what the rests of the turning say against each other; empty where they agree.
+    contradiction : what the pauses of the turning say against each other; None where they agree.
     """
     found = tuple(_found(rest, i + 1, max(of, len(rests)), float(recording.t[-1])) for i, rest in enumerate(rests))
+    against = _against(rests, all(result.agrees for result in found), recording, contradiction)
+    return Checked(found, against is None, against)
+
+
+def _against(rests: list[Rest], agree: bool, recording: Recording, contradiction: Reason | None) -> Reason | None:
+    """The reason that explains most of what is wrong."""
     warmer = _warmer_c(recording)
     if abs(warmer) > WARMER_C:
-        how = "rose" if warmer > 0 else "fell"
-        return Checked(
-            found,
-            False,
-            "temperature_moved",
-            f"the chip's temperature {how} by {abs(warmer):.0f} C since the board lay flat, and its biases with it",
-            "let the board warm up for ten minutes, away from the sun and from draughts, and run the session again",
-        )
+        return reason("temperature_moved", "since_flat", how="rose" if warmer > 0 else "fell", change=abs(warmer))
     if rests and all(rest.clipped for rest in rests):
-        what = "every turn went beyond what the gyroscope can measure, so nothing says where gravity went"
-        return Checked(found, False, "gyro_clipped", what, CLIPPED)
-    if not all(result.agrees for result in found) and much_clipped(recording):
-        what = "the new orientations disagree, after turns beyond what the gyroscope can measure"
-        return Checked(found, False, "gyro_clipped", what, CLIPPED)
+        return reason("gyro_clipped", "every_turn")
+    if not agree and much_clipped(recording):
+        return reason("gyro_clipped", "disagreement")
     if not rests:
-        what = "the board was never still in a new orientation, so nothing verifies the calibration"
-        return Checked(found, False, "verification_failed", what, "run the session again, and hold the board still")
-    if contradiction:
-        return Checked(found, False, "inconsistent", *explained(contradiction, recording))
-    if all(result.agrees for result in found):
-        return Checked(found, True)
-    return Checked(found, False, "verification_failed", *_why(rests, recording))
+        return reason("verification_failed", "never_still")
+    if contradiction is not None:
+        return explained(contradiction, recording)
+    return None if agree else _why(rests, recording)
 
 
-def explained(contradiction: str, recording: Recording) -> tuple[str, str]:
-    """What contradicts itself, and what to do, by the message of that reason; a knock is the likeliest cause."""
-    what, _, remedy = contradiction.partition("; ")
+def explained(contradiction: Reason, recording: Recording) -> Reason:
+    """A contradiction with its likeliest cause: a knock, where the accelerometer clipped."""
     if recording.acc_clipped.any():
-        return (
-            f"something knocked the board (the accelerometer stood at the end of its range), and {what}",
-            "let nothing knock it, fasten the sensor, and run the session again",
-        )
-    return what, remedy
+        return reason("inconsistent", "knock", contradiction=contradiction.what)
+    return contradiction
 
 
 def much_clipped(recording: Recording) -> bool:
@@ -64,32 +54,21 @@ def much_clipped(recording: Recording) -> bool:
     return bool(recording.gyr_clipped.mean() > MUCH_CLIPPED)
 
 
-def _why(rests: list[Rest], recording: Recording) -> tuple[str, str]:
-    """What is most likely wrong, and what to do."""
+def _why(rests: list[Rest], recording: Recording) -> Reason:
+    """What is most likely wrong with a sensor whose new orientations disagree."""
     lengths = [rest for rest in rests if not rest.magnitude_agrees]
     turns = [rest for rest in rests if not rest.direction_agrees]
     if turns and not lengths:
         scale = _scale_off(turns)
         if scale is not None:
             axis, share = scale
-            return (
-                f"your gyroscope's scale about {axis} is off by {abs(share):.0%} against the turning before",
-                "give the gyroscope's true range and rate, turn more slowly, and run the session again",
-            )
+            return reason("verification_failed", "gyroscope", axis=axis, share=abs(share))
         worst = max(turns, key=lambda rest: rest.direction)
-        return (
-            f"gravity, carried by the gyroscope to a new orientation, misses the accelerometer by"
-            f" {np.rad2deg(worst.direction):.1f} deg, and {np.rad2deg(worst.direction_std):.1f} deg was promised:"
-            " the sensor moved on its mount",
-            "fasten the sensor to its board, and run the session again",
-        )
+        miss, std = np.rad2deg([worst.direction, worst.direction_std])
+        return reason("verification_failed", "direction", miss=miss, std=std)
     worst = max(lengths, key=lambda rest: abs(rest.magnitude))
     knock = " after a knock" if recording.acc_clipped.any() else ""
-    return (
-        f"in a new orientation |a| is {worst.magnitude:+.3f} m/s² off{knock}, and {worst.magnitude_std:.3f} m/s² was"
-        f" promised: the accelerometer changed, or slipped on its mount, while it was turned",
-        "fasten the sensor, let nothing press on, knock or warm it, and run the session again",
-    )
+    return reason("verification_failed", "magnitude", error=worst.magnitude, knock=knock, std=worst.magnitude_std)
 
 
 def _scale_off(rests: list[Rest]) -> tuple[str, float] | None:

@@ -7,14 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ...calibration import weigh
+from ...calibration.checks import found
 from ...calibration.evidence import Evidence
 from ...calibration.flat_segment import Flat, find_flat, flat_statistics
 from ...calibration.interim import InterimEstimate, interim_estimate
 from ...calibration.masks import with_masks
 from ...calibration.next_orientation import next_orientation
-from ...calibration.quality import judge
+from ...calibration.quality import verdict
 from ...calibration.verification import unseen_rests
 from ...data import Recording, Samples, Sensor
+from ...reasons import KINDS, Reason, reason
 from ..aims import AIMS, directions
 from ..events import Checked, Event, Learnt, Tried, Wish
 from ..plan import Plan
@@ -23,7 +25,6 @@ from .knowledge import knowledge, wanted
 from .store import SampleStore
 
 CONTRADICTION, CLIPPED = "inconsistent", "gyro_clipped"
-OF_THE_SENSOR = "left_handed", "swapped_axes", "wrong_range"
 
 
 class Task(NamedTuple):
@@ -92,23 +93,29 @@ class Fits:
         recording = self._store.recording()
         evidence, _ = weigh(recording, self._plan.model, self._plan.gravity)
         self._tried, self._since = evidence, len(recording)
-        quality = judge(evidence)
-        # what is wrong with the sensor, or was not measured, contradicts itself as well; and what does, does not settle
-        truer = (*OF_THE_SENSOR, *((CLIPPED,) if much_clipped(evidence.recording) else ()), CONTRADICTION)
-        reasons = sorted(quality["reasons"], key=lambda r: truer.index(r["code"]) if r["code"] in truer else len(truer))
-        first = reasons[0] if reasons else {"code": "", "message": ""}
-        why = first["message"]
-        if first["code"] == CONTRADICTION:
-            why = "; ".join(explained(why, evidence.recording))
-        return Tried(quality["verdict"], why, first["code"])
+        reasons = found(evidence)
+        return Tried(verdict(reasons), _likeliest(reasons, evidence.recording))
 
     def _check(self) -> Event:
         of = AIMS[self._plan.target].verify
         evidence = self._tried
         if evidence is None or evidence.fit is None or evidence.flat is None:
-            return Checked((), False, "verification_failed", "there is nothing to verify", "turn the board again")
+            return Checked((), False, reason("verification_failed", "nothing"))
         recording: Recording = with_masks(self._store.recording())
         rests = unseen_rests(recording, evidence.flat, evidence.fit, self._plan.gravity, self._since)
-        reasons = judge(evidence)["reasons"]
-        contradiction = next((reason["message"] for reason in reasons if reason["code"] == CONTRADICTION), "")
+        contradiction = next((against for against in found(evidence) if against.code == CONTRADICTION), None)
         return judged(rests[:of], of, recording, contradiction)
+
+
+def _likeliest(reasons: list[Reason], recording: Recording) -> Reason | None:
+    """The one to be given: what is wrong with the sensor, or was not measured, contradicts itself as well."""
+
+    def rank(against: Reason) -> int:
+        if KINDS[against.code].of_the_sensor:
+            return 0
+        if against.code == CLIPPED and much_clipped(recording):
+            return 1
+        return 2 if against.code == CONTRADICTION else 3
+
+    first = min(reasons, key=rank, default=None)
+    return explained(first, recording) if first is not None and first.code == CONTRADICTION else first

@@ -1,4 +1,4 @@
-"""A final calibration together with what its verification found. Knows no estimate."""
+"""A final calibration together with what its verification found: `quality.verification`, and its reason and verdict."""
 
 from __future__ import annotations
 
@@ -26,10 +26,8 @@ def verified(calibration: Calibration, checked: Checked | None) -> Calibration:
         **calibration.quality,
         "verification": {"agrees": checked.agrees, "orientations": found},
     }
-    if not checked.agrees:
-        reasons: list[Mapping[str, Any]] = [r for r in quality.get("reasons", []) if r["code"] != checked.code]
-        message = "; ".join(text for text in (checked.why, checked.remedy) if text)
+    if checked.reason is not None:
+        others: list[Mapping[str, Any]] = [r for r in quality.get("reasons", []) if r["code"] != checked.reason.code]
         refused = checked.agrees is not None or quality["verdict"] == REFUSED
-        verdict = REFUSED if refused else USABLE
-        quality |= {"verdict": verdict, "reasons": [{"code": checked.code, "message": message}, *reasons]}
+        quality |= {"verdict": REFUSED if refused else USABLE, "reasons": [checked.reason.document(), *others]}
     return replace(calibration, quality=MappingProxyType(quality))

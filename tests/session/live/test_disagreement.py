@@ -5,6 +5,7 @@ import pytest
 
 from mpucal.calibration.verification import Rest
 from mpucal.data import Recording
+from mpucal.reasons import Reason
 from mpucal.result.calibration import Calibration
 from mpucal.session.events import Checked
 from mpucal.session.live.disagreement import judged
@@ -29,33 +30,54 @@ def recording(warmer_c=0.0, acc_clipped=0, gyr_clipped=0):
     )
 
 
+CONTRADICTION = Reason("inconsistent", "the rests contradict each other", "fasten it", False)
 TURNED = [rest(direction=0.05, turn=(0.0, 0.0, turn), miss=(0.0, 0.0, 0.04 * turn)) for turn in (1.2, -1.0, 1.5)]
 
 
 @pytest.mark.parametrize(
     ("rests", "data", "contradiction", "code", "words"),
     [
-        ([rest(), rest(), rest()], recording(), "", "", ""),
-        ([rest(0.05), rest()], recording(), "", "verification_failed", "|a| is +0.050 m/s² off"),
-        ([rest(0.05), rest()], recording(acc_clipped=3), "", "verification_failed", "after a knock"),
-        ([rest(direction=0.06), rest()], recording(), "", "verification_failed", "the sensor moved on its mount"),
-        (TURNED, recording(), "", "verification_failed", "scale about z is off by 4%"),
-        ([rest(clipped=True)], recording(gyr_clipped=50), "", "gyro_clipped", "every turn went beyond"),
-        ([rest(0.05), rest()], recording(gyr_clipped=50), "", "gyro_clipped", "beyond what the gyroscope"),
-        ([rest()], recording(warmer_c=15.0), "", "temperature_moved", "rose by 15 C"),
-        ([rest()], recording(warmer_c=-12.0), "", "temperature_moved", "fell by 12 C"),
-        ([], recording(), "", "verification_failed", "never still in a new orientation"),
-        ([rest()], recording(), "the rests contradict each other; fasten it", "inconsistent", "contradict"),
+        ([rest(), rest(), rest()], recording(), None, "", ""),
+        ([rest(0.05), rest()], recording(), None, "verification_failed", "|a| is +0.050 m/s² off"),
+        ([rest(0.05), rest()], recording(acc_clipped=3), None, "verification_failed", "after a knock"),
+        ([rest(direction=0.06), rest()], recording(), None, "verification_failed", "the sensor moved on its mount"),
+        (TURNED, recording(), None, "verification_failed", "scale factor about z is off by 4%"),
+        ([rest(clipped=True)], recording(gyr_clipped=50), None, "gyro_clipped", "every turn went beyond"),
+        ([rest(0.05), rest()], recording(gyr_clipped=50), None, "gyro_clipped", "beyond the gyroscope's range"),
+        ([rest()], recording(warmer_c=15.0), None, "temperature_moved", "rose by 15 C"),
+        ([rest()], recording(warmer_c=-12.0), None, "temperature_moved", "fell by 12 C"),
+        ([], recording(), None, "verification_failed", "never still in a new orientation"),
+        ([rest()], recording(), CONTRADICTION, "inconsistent", "contradict"),
+        ([rest()], recording(acc_clipped=3), CONTRADICTION, "inconsistent", "knocked the board"),
     ],
-    ids=["agree", "length", "knock", "slip", "scale", "clipped", "some clipped", "warm", "cold", "no rest", "rests"],
+    ids=[
+        "agree",
+        "length",
+        "knock",
+        "slip",
+        "scale",
+        "clipped",
+        "some clipped",
+        "warm",
+        "cold",
+        "no rest",
+        "rests",
+        "rests after a knock",
+    ],
 )
 def test_says_what_is_wrong(rests, data, contradiction, code, words):
     checked = judged(rests, 3, data, contradiction)
     assert checked.agrees == (code == "")
-    assert checked.code == code
-    assert words in checked.why
-    assert bool(checked.remedy) == (code != "")
+    if code:
+        assert checked.reason.code == code
+        assert words in checked.reason.what
+        assert checked.reason.remedy
+    else:
+        assert checked.reason is None
     assert len(checked.found) == len(rests)
+
+
+MOVED = Reason("verification_failed", "it moved", "fasten it", True)
 
 
 def calibration(verdict="usable"):
@@ -65,18 +87,18 @@ def calibration(verdict="usable"):
 
 
 def test_a_disagreement_refuses_and_comes_first():
-    found = verified(calibration(), Checked((), False, "verification_failed", "it moved", "fasten it"))
+    found = verified(calibration(), Checked((), False, MOVED))
     assert found.verdict == "refused"
     assert [reason["code"] for reason in found.quality["reasons"]] == ["verification_failed", "few_orientations"]
-    assert found.quality["reasons"][0]["message"] == "it moved; fasten it"
+    assert found.quality["reasons"][0] == MOVED.document()
     assert not found.quality["verification"]["agrees"]
 
 
 @pytest.mark.parametrize(("verdict", "then"), [("good", "usable"), ("usable", "usable"), ("refused", "refused")])
 def test_what_nothing_verified_is_usable_at_most(verdict, then):
-    found = verified(calibration(verdict), Checked((), None, "verification_failed", "nothing verifies it", "hold it"))
+    found = verified(calibration(verdict), Checked((), None, MOVED))
     assert found.verdict == then
-    assert found.quality["reasons"][0]["message"] == "nothing verifies it; hold it"
+    assert found.quality["reasons"][0]["message"] == "it moved; fasten it"
     assert found.quality["verification"] == {"agrees": None, "orientations": []}
 
 

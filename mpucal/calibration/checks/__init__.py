@@ -1,0 +1,60 @@
+"""What speaks against an estimate: one function a check, which gives a Reason of mpucal/reasons.py or None.
+
+unusable     before there is a fit: wrong units, no rest, no turn, a dead axis
+recording    moved while still, clipped, lost or warming
+sensor       wrong range, units, axes or gyroscope, by a trustworthy fit
+estimate     directions not observable, no convergence, contradictions, a change midway
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ...reasons import Reason
+from ..evidence import Evidence
+from . import estimate, recording, sensor, unusable
+
+Check = Callable[[Evidence], Reason | None]
+
+UNUSABLE: tuple[Check, ...] = (
+    unusable.time_unit,
+    unusable.accelerometer_unit,
+    unusable.gyroscope_unit,
+    unusable.never_still,
+    unusable.hardly_turned,
+    unusable.dead_accelerometer,
+    unusable.dead_gyroscope,
+)
+
+CHECKS: tuple[Check, ...] = (
+    recording.moved_while_still,
+    estimate.tilted_only,
+    estimate.few_orientations,
+    recording.gyro_clipped,
+    recording.accel_clipped,
+    recording.data_lost,
+    sensor.wrong_range,
+    sensor.accelerometer_factor,
+    sensor.axes,
+    sensor.gyro_off,
+    recording.temperature_moved,
+    estimate.not_converged,
+    estimate.inconsistent,
+    estimate.changed_midway,
+)
+
+
+def found(evidence: Evidence) -> list[Reason]:
+    """All that speaks against it, what refuses it first."""
+    missing = unusable.no_gyroscope(evidence)
+    if missing is not None:
+        return [missing]
+    # a fit there is only where nothing made the recording unusable
+    checks = CHECKS if evidence.fit is not None else (*UNUSABLE, *CHECKS)
+    reasons = [reason for check in checks if (reason := check(evidence)) is not None]
+    return sorted(reasons, key=lambda reason: not reason.refuse)
+
+
+def unusable_for_a_fit(evidence: Evidence) -> bool:
+    """Whether nothing can be estimated."""
+    return any(check(evidence) is not None for check in UNUSABLE)

@@ -1,0 +1,68 @@
+"""Checks of the recording alone: the board moved, samples are clipped or lost, the temperature changed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...data import Mask
+from ...reasons import Reason, reason
+from ..evidence import Evidence
+
+WARMER_C = 5.0
+MOST_CLIPPED = 0.2
+
+
+def moved_while_still(e: Evidence) -> Reason | None:
+    """A flat segment, given by its caller, in which the board moved."""
+    if e.flat is None or e.flat.n < 4:
+        return None
+    half = e.flat.n // 2
+    acc = e.recording.acc[e.flat.first : e.flat.first + 2 * half].reshape(2, half, 3)
+    moved = np.abs(acc[1].mean(0) - acc[0].mean(0))
+    if (moved <= 0.1 + 6.0 * np.sqrt(2.0 * acc.var(1).min(0) / half)).all():
+        return None
+    axis = int(np.argmax(moved))
+    return reason("moved_while_still", "mean", axis="xyz"[axis], moved=moved[axis])
+
+
+def gyro_clipped(e: Evidence) -> Reason | None:
+    """Samples at the end of the gyroscope's range."""
+    return _clipped("gyro_clipped", e.recording.gyr_clipped)
+
+
+def accel_clipped(e: Evidence) -> Reason | None:
+    """Samples at the end of the accelerometer's range."""
+    return _clipped("accel_clipped", e.recording.acc_clipped)
+
+
+def _clipped(code: str, mask: Mask) -> Reason | None:
+    share = float(mask.mean())
+    return reason(code, "samples", share > MOST_CLIPPED, count=int(mask.sum()), share=share) if share else None
+
+
+def data_lost(e: Evidence) -> Reason | None:
+    """Gaps."""
+    gaps, t = e.recording.gap, e.recording.t
+    if not gaps.any():
+        return None
+    places = int(np.count_nonzero(gaps & ~np.append(False, gaps[:-1])))
+    lost = float(np.diff(t, prepend=t[0])[gaps].sum())
+    # a session that was resumed has a gap that no bus is to blame for
+    return reason(
+        "data_lost",
+        "bus" if e.recording.autopilot is None else "link",
+        lost > 0.5 * float(t[-1] - t[0]),
+        places=f"{places} place{'s' if places > 1 else ''}",
+        seconds=lost,
+    )
+
+
+def temperature_moved(e: Evidence) -> Reason | None:
+    """A sensor that warmed or cooled while it was measured."""
+    known = e.recording.temperature_c[np.isfinite(e.recording.temperature_c)]
+    if len(known) < 10:
+        return None
+    low, high = np.quantile(known, [0.02, 0.98])
+    if high - low <= WARMER_C:
+        return None
+    return reason("temperature_moved", "range", low=low, high=high)

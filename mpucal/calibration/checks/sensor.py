@@ -1,0 +1,91 @@
+"""Checks of what a fit says of the sensor: its range, units and axes, and the gyroscope's scale factors."""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+
+import numpy as np
+
+from ...data import Vector
+from ...reasons import Reason, reason
+from ...result.error_model import sensor_axes
+from ..evidence import Evidence
+from .estimate import USABLE_RMS_MPS2, inconsistent
+
+WORST_AXES_RAD = np.deg2rad(60.0)
+GYRO_SCALE_OFF, GYRO_CROSS_OFF = 0.06, 0.04
+# one way or the other; the paper simulates sensors of 0.5 to 1.5
+MOST_SCALE = 2.5
+# so well three scale factors agree on one
+ALIKE = 0.05
+
+
+def trustworthy(e: Evidence) -> bool:
+    """Whether D and K are known well enough to conclude from them what is wrong with the sensor."""
+    if e.fit is None or e.sure is None or not e.fit.converged or e.sure.rms_mps2 > USABLE_RMS_MPS2:
+        return False
+    contradiction = inconsistent(e)
+    return contradiction is None or not contradiction.refuse
+
+
+def wrong_range(e: Evidence) -> Reason | None:
+    """All three scale factors near one power of two."""
+    if e.fit is None or not trustworthy(e):
+        return None
+    scale = _scale_factors(e.fit.D)
+    power = np.round(np.log2(scale)).astype(int)
+    if power[0] == 0 or not (power == power[0]).all() or not (np.abs(scale / 2.0 ** power[0] - 1.0) < ALIKE).all():
+        return None
+    return reason("wrong_range", "power_of_two", factor=2.0 ** power[0])
+
+
+def accelerometer_factor(e: Evidence) -> Reason | None:
+    """All three scale factors off by one factor that is no range's, and far beyond what a sensor is off by."""
+    if e.fit is None or not trustworthy(e) or wrong_range(e) is not None:
+        return None
+    scale = _scale_factors(e.fit.D)
+    factor = float(scale.mean())
+    if 1.0 / MOST_SCALE < factor < MOST_SCALE or not (np.abs(scale / factor - 1.0) < ALIKE).all():
+        return None
+    return reason("units_suspect", "scale_factors", factor=factor)
+
+
+def _scale_factors(D: Vector) -> Vector:
+    """(3,) along the accelerometer's own axes, which may be swapped or turned."""
+    return np.diag(sensor_axes(D))
+
+
+def axes(e: Evidence) -> Reason | None:
+    """Axes that are mirrored or swapped against the gyroscope's."""
+    if e.fit is None or not trustworthy(e):
+        return None
+    U, _, Vt = np.linalg.svd(e.fit.D)
+    Q = U @ Vt
+    if np.arccos(np.clip((np.trace(Q) - 1.0) / 2.0, -1.0, 1.0)) <= WORST_AXES_RAD:
+        return None
+    # (D, u) and (-D, -u) fit equally, and D was made right-handed: a left-handed sensor shows as its mirror
+    M = max(_SIGNED_PERMUTATIONS, key=lambda M: max(np.sum(M * Q), np.sum(M * -Q)) + 0.01 * np.trace(M))
+    if (np.abs(M) == np.eye(3)).all():
+        mirrored = [axis for axis, sign in zip("xyz", np.diag(M), strict=True) if sign < 0]
+        return reason("left_handed", "axes", axes=" and ".join(mirrored))
+    order = ", ".join(("-" if row.sum() < 0 else "") + "xyz"[int(np.argmax(np.abs(row)))] for row in M)
+    return reason("swapped_axes", "axes", order=order)
+
+
+_SIGNED_PERMUTATIONS = [
+    np.eye(3)[list(order)] * np.array(signs)[:, None]
+    for order in permutations(range(3))
+    for signs in product((1.0, -1.0), repeat=3)
+]
+
+
+def gyro_off(e: Evidence) -> Reason | None:
+    """A gyroscope beyond what its data sheet allows."""
+    if e.fit is None or not trustworthy(e):
+        return None
+    off = e.fit.K - np.eye(3)
+    scale, cross = np.abs(np.diag(off)), np.abs(off - np.diag(np.diag(off)))
+    if scale.max() <= GYRO_SCALE_OFF and cross.max() <= GYRO_CROSS_OFF:
+        return None
+    axis = int(np.argmax(scale))
+    return reason("gyro_off", "scale", axis="xyz"[axis], scale=scale[axis], cross=cross.max())

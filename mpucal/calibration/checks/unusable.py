@@ -1,0 +1,114 @@
+"""Checks of a recording that leaves nothing to estimate: wrong units, no rest, no turn, a dead axis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...data import Vector
+from ...reasons import Reason, reason
+from ..evidence import Evidence
+from ..flat_segment import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
+
+FEWEST_SAMPLES = 50
+LEAST_TURN_RAD = np.deg2rad(20.0)
+SLOWEST_HZ = 5.0
+LONGEST_TO_LAY_DOWN_S = 10.0
+# from this many seconds between samples on, times are rather in microseconds, and in nanoseconds
+STEP_OF_MICROSECONDS, STEP_OF_NANOSECONDS = 60.0, 1e5
+FASTEST_GYRO_DPS = 4100.0
+
+
+def no_gyroscope(e: Evidence) -> Reason | None:
+    """A recording of the accelerometer alone; nothing else can be said of it."""
+    if np.isfinite(e.recording.gyr).all():
+        return None
+    return reason("gyro_off", "missing")
+
+
+def time_unit(e: Evidence) -> Reason | None:
+    """Times that are no seconds."""
+    step = 1.0 / e.recording.rate_hz
+    if step < 1.0 / SLOWEST_HZ:
+        return None
+    unit = "nano" if step > STEP_OF_NANOSECONDS else "micro" if step > STEP_OF_MICROSECONDS else "milli"
+    return reason("units_suspect", "times", step=step, unit=unit)
+
+
+def accelerometer_unit(e: Evidence) -> Reason | None:
+    """Accelerations in g or counts."""
+    acc = float(np.median(np.linalg.norm(e.recording.acc, axis=1)))
+    if 0.2 * e.gravity < acc < 5.0 * e.gravity:
+        return None
+    guess = "g" if acc < 5.0 else "mg" if 300.0 < acc < 1700.0 else "raw counts"
+    return reason("units_suspect", "accelerometer", magnitude=acc, gravity=e.gravity, unit=guess)
+
+
+def gyroscope_unit(e: Evidence) -> Reason | None:
+    """Rates in deg/s or counts."""
+    if time_unit(e) is not None:  # by wrong times no rate fits how gravity turned
+        return None
+    rate = float(np.quantile(np.abs(e.recording.gyr), 0.99))
+    if rate <= np.deg2rad(FASTEST_GYRO_DPS) and not e.turned_in_degrees:
+        return None
+    guess = "deg/s" if rate <= FASTEST_GYRO_DPS else "raw counts"
+    return reason("units_suspect", "gyroscope", rate=rate, degrees=np.rad2deg(rate), unit=guess)
+
+
+def never_still(e: Evidence) -> Reason | None:
+    """No flat segment, or none before the board was turned."""
+    if e.flat is None and e.recording.flat is not None:
+        first, last = e.recording.flat
+        return reason("never_still", "short", first=first, last=last - 1)
+    if e.flat is None and e.turned_in_degrees:
+        return None
+    if e.flat is None:
+        return reason("never_still", "at_all")
+    return reason("never_still", "late", seconds=_seconds_before(e)) if _rested_late(e) else None
+
+
+def hardly_turned(e: Evidence) -> Reason | None:
+    """A board that was not rotated after it lay flat."""
+    if e.flat is None or _rested_late(e):
+        return None
+    after = len(e.recording) - e.flat.last
+    if e.gravity_moved >= LEAST_TURN_RAD and after >= FEWEST_SAMPLES:
+        return None
+    return reason("few_orientations", "hardly_turned", degrees=np.rad2deg(e.gravity_moved), samples=after)
+
+
+def _seconds_before(e: Evidence) -> float:
+    """s that passed before the flat segment."""
+    return 0.0 if e.flat is None else float(e.recording.t[e.flat.first] - e.recording.t[0])
+
+
+def _rested_late(e: Evidence) -> bool:
+    """Whether the turns came before the rest; a board that is laid down at the start moves gravity too, but soon."""
+    turned_before = e.gravity_moved_before >= LEAST_TURN_RAD > e.gravity_moved
+    return turned_before and _seconds_before(e) >= LONGEST_TO_LAY_DOWN_S
+
+
+def dead_accelerometer(e: Evidence) -> Reason | None:
+    """An axis of the accelerometer that reads the same throughout."""
+    if e.flat is None:
+        return None
+    axes = _constant(e, e.recording.acc, e.flat.Sigma_a, QUIETEST_ACC_MPS2)
+    return reason("inconsistent", "constant", axes=axes) if axes else None
+
+
+def dead_gyroscope(e: Evidence) -> Reason | None:
+    """An axis of the gyroscope that reads the same throughout."""
+    if e.flat is None:
+        return None
+    axes = _constant(e, e.recording.gyr, e.flat.Sigma_omega, QUIETEST_GYRO_RAD_S)
+    return reason("gyro_off", "constant", axes=axes) if axes else None
+
+
+def _constant(e: Evidence, values: Vector, variance: Vector, quietest: float) -> str:
+    """The axes of `values` (n, 3) that read the same throughout, though the board was turned; empty where none does."""
+    if e.gravity_moved < LEAST_TURN_RAD or (np.ptp(values[:100], axis=0) >= quietest).all():
+        return ""
+    constant = np.ptp(values, axis=0) < quietest
+    # without noise on the other axes the data are computed, and this axis was not turned
+    if not constant.all() and np.sqrt(variance).max() <= quietest:
+        return ""
+    return " and ".join(axis for axis, is_constant in zip("xyz", constant, strict=True) if is_constant)

@@ -1,0 +1,405 @@
+"""What can speak against a calibration: one row a reason code, with its sentences and their remedies.
+
+A check (calibration/checks/, session/live/disagreement.py) decides whether a reason holds, and fills its numbers into
+one of the row's sentences: `reason("gyro_clipped", "samples", refuse=False, count=12, share=0.01)`. A new reason is a
+row here and a check there. docs/reasons.md is made from this table by tools/reasons_page.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Reason:
+    """One thing that speaks against a calibration.
+
+    Attributes
+    ----------
+    code : of a row of KINDS. what, remedy : a clause each: what is wrong, what to do. refuse : nobody should use it.
+    """
+
+    code: str
+    what: str
+    remedy: str
+    refuse: bool
+
+    def __post_init__(self) -> None:
+        if self.code not in KINDS:
+            raise ValueError(f"there is no reason {self.code!r} in mpucal/reasons.py")
+
+    @property
+    def message(self) -> str:
+        """Both as one sentence, without its full stop."""
+        return f"{self.what}; {self.remedy}"
+
+    def document(self) -> dict[str, str]:
+        """As calibration.json has it in quality.reasons."""
+        return {"code": self.code, "message": self.message, "remedy": self.remedy}
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """One way in which a reason is said, with {places} for numbers; `refuse` None where the check decides."""
+
+    what: str
+    remedy: str
+    refuse: bool | None = None
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A reason code.
+
+    Attributes
+    ----------
+    meaning : what is wrong, for the documentation. sentences : by the name that a check gives.
+    reproduce : how to see it on the simulated chip: a `mpucal session`, or Python that calibrates a spoilt copy of r,
+        the recording of a good session.
+    refused_when : it refuses, where that depends. turn_again : turning the board again from the start may help.
+    of_the_sensor : a contradiction in the data may come from it.
+    """
+
+    meaning: str
+    sentences: Mapping[str, Sentence]
+    reproduce: str
+    refused_when: str = ""
+    turn_again: bool = False
+    of_the_sensor: bool = False
+
+    @property
+    def refuses(self) -> str:
+        """Always, never, or depends."""
+        refusals = {sentence.refuse for sentence in self.sentences.values()}
+        if len(refusals) > 1 or None in refusals:
+            return "depends"
+        return "always" if True in refusals else "never"
+
+
+def reason(code: str, sentence: str, refuse: bool | None = None, **numbers: object) -> Reason:
+    """A reason in words, with `numbers` in the places of its sentence.
+
+    Raises
+    ------
+    KeyError : no such code, sentence or place. ValueError : `refuse` is given where the table decides, or is missing.
+    """
+    row = KINDS[code].sentences[sentence]
+    if (refuse is None) == (row.refuse is None):
+        raise ValueError(f"{code}, {sentence}: whether it refuses is said in the table or by the check, not by both")
+    decided = bool(refuse if row.refuse is None else row.refuse)
+    return Reason(code, row.what.format(**numbers), row.remedy.format(**numbers), decided)
+
+
+_LAY_IT_DOWN = "lay it on a table for ten seconds before you turn it"
+_SLOWER = "turn more slowly, or choose a larger --gyro-range"
+
+KINDS: Mapping[str, Kind] = {
+    "never_still": Kind(
+        "The board did not lie still before it was turned, so the gyroscope's bias and the noise are not known.",
+        {
+            "at_all": Sentence(
+                "the board never lay still for a second, so the gyroscope's bias and the noise are not known",
+                _LAY_IT_DOWN,
+                True,
+            ),
+            "late": Sentence(
+                "the board lay still only after {seconds:.0f} s, when its turns were over", _LAY_IT_DOWN, True
+            ),
+            "short": Sentence(
+                "the flat segment that was given, samples {first} to {last}, is too short to tell the gyroscope's bias"
+                " and the noise",
+                "give a second or more of it, or leave it out, and it is looked for",
+                True,
+            ),
+        },
+        "mpucal.calibrate(without_flat(r))",
+    ),
+    "few_orientations": Kind(
+        "Some directions of acceleration are not observable, or known too little: the board was not held in enough"
+        " orientations that differ.",
+        {
+            "hardly_turned": Sentence(
+                "the board was hardly turned (gravity moved {degrees:.0f} deg in all, in {samples} samples after it lay"
+                " flat)",
+                "turn it so that each of its sides, edges and corners points down once",
+                True,
+            ),
+            "nothing_known": Sentence(
+                "no direction can be calibrated from this recording",
+                "check that the accelerometer follows the board throughout, and hold the board still in ten"
+                " orientations that differ",
+                True,
+            ),
+            "uncertain": Sentence(
+                "a calibrated reading is known to {rms:.2g} m/s^2 (1 sigma) only, least certain with{side} up",
+                "hold the board still in more orientations:{side} up,{side} down, and tilted",
+            ),
+            "not_observable": Sentence(
+                "not every direction is observable from this recording, least of all with{side} up",
+                "hold the board still in more orientations:{side} up,{side} down, and tilted",
+                True,
+            ),
+            "tilted": Sentence(
+                "the board was only tilted: the calibration holds within {degrees:.0f} deg of how it lay flat{left}",
+                "turn it upside down to observe the rest",
+                False,
+            ),
+        },
+        "mpucal session --bus sim:hand=one_axis --seed 1",
+        "the error of a calibrated reading is above 0.4 m/s² (1 sigma) or not known",
+        turn_again=True,
+    ),
+    "gyro_clipped": Kind(
+        "The board was turned faster than the gyroscope's range can measure, so the angle of that turn is not known.",
+        {
+            "samples": Sentence(
+                "the gyroscope was at the end of its range in {count} samples ({share:.1%})",
+                "turn more slowly, or choose a larger range",
+            ),
+            "every_turn": Sentence(
+                "every turn went beyond the gyroscope's range, so nothing says where gravity went",
+                f"{_SLOWER}, and run the session again",
+                True,
+            ),
+            "disagreement": Sentence(
+                "the new orientations disagree, after turns beyond the gyroscope's range",
+                f"{_SLOWER}, and run the session again",
+                True,
+            ),
+        },
+        "mpucal session --bus sim:hand=hasty --gyro-range 250 --seed 1",
+        "more than 20 % of the samples are clipped, or new orientations cannot be verified for it",
+        turn_again=True,
+    ),
+    "accel_clipped": Kind(
+        "The accelerometer reached the end of its range: a knock, or a range that is too small.",
+        {
+            "samples": Sentence(
+                "the accelerometer was at the end of its range in {count} samples ({share:.1%})",
+                "move more gently, or choose a larger range",
+            ),
+        },
+        "mpucal session --bus sim:hand=knocking --seed 1",
+        "more than 20 % of the samples are clipped",
+        turn_again=True,
+    ),
+    "data_lost": Kind(
+        "Samples are missing: the bus or the link was too slow or failed, or the session was interrupted.",
+        {
+            "bus": Sentence(
+                "samples are missing in {places} ({seconds:.2f} s in all)",
+                "unless the measurement was interrupted there, use a faster bus or a lower rate",
+            ),
+            "link": Sentence(
+                "samples are missing in {places} ({seconds:.2f} s in all)",
+                "unless the measurement was interrupted there, use a nearer or faster link or a lower rate",
+            ),
+        },
+        "mpucal session --bus sim:fault=overflow@30 --seed 1",
+        "more than half of the recording is missing",
+        turn_again=True,
+    ),
+    "left_handed": Kind(
+        "One or three axes of the accelerometer have the opposite sign of the gyroscope's.",
+        {
+            "axes": Sentence(
+                "the accelerometer's axes are left-handed against the gyroscope's",
+                "change the sign of its {axes} axis",
+                True,
+            ),
+        },
+        "mpucal session --bus sim:D=1/0/0/0/-1/0/0/0/1 --seed 1",
+        of_the_sensor=True,
+    ),
+    "swapped_axes": Kind(
+        "The accelerometer's axes are named in another order, or with other signs, than the gyroscope's.",
+        {
+            "axes": Sentence(
+                "the accelerometer's axes x, y, z lie along the gyroscope's {order}",
+                "name them so that both agree",
+                True,
+            ),
+        },
+        "mpucal session --bus sim:D=0/1/0/1/0/0/0/0/-1 --seed 1",
+        of_the_sensor=True,
+    ),
+    "wrong_range": Kind(
+        "The accelerometer was set to another full-scale range than the one that its counts were converted with.",
+        {
+            "power_of_two": Sentence(
+                "all three scale factors are near {factor:g}: the accelerometer's range is not the one assumed (or it"
+                " is an early revision with half the sensitivity)",
+                "give the true range",
+                True,
+            ),
+        },
+        "mpucal session --bus sim:D=2/0/0/0/2/0/0/0/2 --seed 1",
+        of_the_sensor=True,
+    ),
+    "units_suspect": Kind(
+        "Times, accelerations or rates seem to be in another unit than s, m/s² and rad/s.",
+        {
+            "times": Sentence(
+                "the samples are {step:.4g} s apart, too far to follow a turn: their times seem to be in {unit}seconds",
+                "convert them to seconds",
+                True,
+            ),
+            "accelerometer": Sentence(
+                "the accelerometer's median magnitude is {magnitude:.4g}, not near {gravity:.4g} m/s^2: it seems to be"
+                " in {unit}",
+                "convert it to m/s^2",
+                True,
+            ),
+            "scale_factors": Sentence(
+                "all three scale factors are near {factor:.3g}, and no accelerometer is off by that: it seems to be in"
+                " another unit than m/s^2",
+                "convert it to m/s^2",
+                True,
+            ),
+            "gyroscope": Sentence(
+                "the gyroscope reads up to {rate:.4g}, which as rad/s is {degrees:.0f} deg/s and does not fit how"
+                " gravity turned: it seems to be in {unit}",
+                "convert it to rad/s",
+                True,
+            ),
+        },
+        "mpucal.calibrate(replace(r, acc=r.acc / 9.80665))",
+    ),
+    "moved_while_still": Kind(
+        "The board moved in the segment in which it was said to lie flat.",
+        {
+            "mean": Sentence(
+                "the board moved while it should have lain flat ({axis} changed by {moved:.2g} m/s^2)",
+                "lay it down, take the hands off, and wait for ten seconds",
+                True,
+            ),
+        },
+        "mpucal.calibrate(replace(r, flat=(0, len(r) // 2)))",
+    ),
+    "gyro_off": Kind(
+        "The gyroscope's scale factors are beyond its data sheet, or it did not measure at all.",
+        {
+            "missing": Sentence(
+                "the recording holds the accelerometer alone, as a chip measures at 4000 Hz, and nothing says how the"
+                " board was turned",
+                "record it at 1000 Hz or less",
+                True,
+            ),
+            "constant": Sentence(
+                "the gyroscope reads the same on {axes} in every sample, though the board was turned: it is broken or"
+                " was not recorded",
+                "check its wiring and the recording",
+                True,
+            ),
+            "scale": Sentence(
+                "the gyroscope is off by {scale:.1%} on {axis} and {cross:.1%} across axes, more than its data sheet"
+                " allows",
+                "check its range and the sample rate",
+                False,
+            ),
+        },
+        "mpucal.calibrate(replace(r, gyr=1.1 * r.gyr))",
+        "it did not measure; a scale factor that is off is estimated as well, and the result is usable",
+    ),
+    "temperature_moved": Kind(
+        "The chip warmed or cooled while it was measured, and its biases moved with it.",
+        {
+            "range": Sentence(
+                "the temperature moved from {low:.1f} to {high:.1f} C, and the biases with it",
+                "let the board warm up first",
+                False,
+            ),
+            "since_flat": Sentence(
+                "the chip's temperature {how} by {change:.0f} C since the board lay flat, and its biases with it",
+                "let the board warm up for ten minutes, away from the sun and from draughts, and run the session again",
+                True,
+            ),
+        },
+        "mpucal session --bus sim:hand=warming --seed 1",
+        "it moved by more than 8 °C between laying flat and the verification",
+    ),
+    "not_converged": Kind(
+        "The estimate had not settled when its iterations were over.",
+        {
+            "iterations": Sentence(
+                "the estimate had not settled after {iterations} iterations",
+                "record again, with slower turns and pauses",
+                True,
+            ),
+        },
+        "",
+        turn_again=True,
+    ),
+    "inconsistent": Kind(
+        "The model does not explain the data: the sensor changed or moved on its board, or was disturbed.",
+        {
+            "constant": Sentence(
+                "the accelerometer reads the same on {axes} in every sample, though the board was turned: it is broken"
+                " or was not recorded",
+                "check its wiring and the recording",
+                True,
+            ),
+            "innovations": Sentence(
+                "the model does not explain the data (normalised innovations {nis:.0f}, expected 3): a hand's own"
+                " acceleration or the gyroscope's scale factors",
+                "use --model hand, turn slowly, and hold the board still often",
+            ),
+            "pauses": Sentence(
+                "the orientations in which the board was still contradict each other: |a| differs from gravity by"
+                " {magnitude:.2g} m/s^2, and gravity carried by the gyroscope misses by {degrees:.1f} deg",
+                "check that the sensor is firmly fixed to the board, hold the board still when you pause, and turn more"
+                " slowly",
+            ),
+            "change": Sentence(
+                "the sensor was not the same before and after about {seconds:.0f} s: what each part of the recording"
+                " says of it differs by more than noise",
+                "check whether its mount slipped or something knocked it, fasten it, and record again",
+            ),
+            "knock": Sentence(
+                "something knocked the board (the accelerometer was at the end of its range), and {contradiction}",
+                "let nothing knock it, fasten the sensor, and run the session again",
+                True,
+            ),
+        },
+        "mpucal session --bus sim:hand=slipping --seed 1",
+        "the contradiction is several times the limit",
+        turn_again=True,
+    ),
+    "verification_failed": Kind(
+        "New orientations, which the calibration has not seen, disagree with it, or none was shown.",
+        {
+            "not_shown": Sentence(
+                "the board was held still in none of the requested orientations, so the calibration is not verified",
+                "run the session again, and hold the board still for 2 s in each",
+                False,
+            ),
+            "never_still": Sentence(
+                "the board was never still in a new orientation, so the calibration is not verified",
+                "run the session again, and hold the board still",
+                True,
+            ),
+            "nothing": Sentence("there is nothing to verify", "turn the board again", True),
+            "gyroscope": Sentence(
+                "the gyroscope's scale factor about {axis} is off by {share:.0%} against the turning before",
+                "give the gyroscope's true range and rate, turn more slowly, and run the session again",
+                True,
+            ),
+            "direction": Sentence(
+                "gravity, carried by the gyroscope to a new orientation, misses the accelerometer by {miss:.1f} deg,"
+                " where {std:.1f} deg (1 sigma) was predicted: the sensor moved on its mount",
+                "fasten the sensor to its board, and run the session again",
+                True,
+            ),
+            "magnitude": Sentence(
+                "in a new orientation |a| is {error:+.3f} m/s² off{knock}, where {std:.3f} m/s² (1 sigma) was"
+                " predicted: the accelerometer changed, or slipped on its mount, while it was turned",
+                "fasten the sensor, let nothing press on, knock or warm it, and run the session again",
+                True,
+            ),
+        },
+        "mpucal session --bus sim:hand=slipping --seed 1",
+        "a new orientation disagrees; where none was shown the calibration is usable",
+        turn_again=True,
+    ),
+}

@@ -1,0 +1,80 @@
+"""The table of reasons: whole, used, and the only way to make one."""
+
+import ast
+from pathlib import Path
+from string import Formatter
+
+import pytest
+
+import mpucal
+from mpucal.reasons import KINDS, Reason, reason
+
+PACKAGE = Path(mpucal.__file__).parent
+ALL = {(code, name): row for code, kind in KINDS.items() for name, row in kind.sentences.items()}
+
+
+def calls():
+    """{(code, sentence): [the keywords of a call]}, of every call of `reason` in the package."""
+    found = {}
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "reason":
+                code, *rest = node.args
+                codes = [value.value for value in CODES_BY_ARGUMENT.get(ast.unparse(code), [code])]
+                for sentence in ast.walk(rest[0]):
+                    if isinstance(sentence, ast.Constant) and isinstance(sentence.value, str):
+                        for each in codes:
+                            found.setdefault((each, sentence.value), []).append((len(rest), node.keywords))
+    return found
+
+
+# a helper that is called for two codes
+CODES_BY_ARGUMENT = {"code": [ast.Constant("gyro_clipped"), ast.Constant("accel_clipped")]}
+
+
+def test_every_sentence_is_used_and_every_use_fills_its_places():
+    made = calls()
+    assert made.keys() == ALL.keys()
+    for key, uses in made.items():
+        row = ALL[key]
+        places = {name for text in (row.what, row.remedy) for _, name, _, _ in Formatter().parse(text) if name}
+        for arguments, keywords in uses:
+            given = {keyword.arg for keyword in keywords}
+            assert given - {"refuse"} == places, key
+            assert (row.refuse is None) == (arguments == 2 or "refuse" in given), key
+
+
+@pytest.mark.parametrize("code", KINDS)
+def test_a_row_is_whole(code):
+    kind = KINDS[code]
+    assert kind.meaning.endswith(".")
+    assert (kind.refuses == "depends") == bool(kind.refused_when)
+    for row in kind.sentences.values():
+        assert row.what
+        assert row.remedy
+        assert not row.what.endswith((".", ";"))
+        assert not row.remedy.endswith(".")
+
+
+def test_a_code_that_is_not_in_the_table_cannot_be_made():
+    with pytest.raises(ValueError, match="no_such_code"):
+        Reason("no_such_code", "something is wrong", "do something", True)
+    with pytest.raises(KeyError):
+        reason("no_such_code", "samples")
+
+
+def test_who_decides_whether_it_refuses():
+    assert reason("never_still", "at_all").refuse
+    assert not reason("gyro_clipped", "samples", False, count=1, share=0.01).refuse
+    for refuse, of in ((None, ("gyro_clipped", "samples")), (False, ("never_still", "at_all"))):
+        with pytest.raises(ValueError, match=of[0]):
+            reason(*of, refuse=refuse, count=1, share=0.01)
+
+
+def test_a_document_holds_the_sentence_and_its_remedy():
+    document = reason("gyro_clipped", "samples", False, count=12, share=0.014).document()
+    what, remedy = (
+        "the gyroscope was at the end of its range in 12 samples (1.4%)",
+        "turn more slowly, or choose a larger range",
+    )
+    assert document == {"code": "gyro_clipped", "message": f"{what}; {remedy}", "remedy": remedy}
