@@ -22,7 +22,7 @@ bench: $(READY)
 	@$(BIN)/python tools/bench.py
 
 # what is compiled here is what a rebuild hangs on
-$(READY): tools/set_up pyproject.toml CMakeLists.txt $(shell find mpucal -name '*.[ch]pp')
+$(READY): tools/set_up pyproject.toml CMakeLists.txt mpucal/calibration/parameters.py $(shell find mpucal -name '*.[ch]pp')
 	@tools/set_up $(VENV)
 	@touch $@
 

@@ -29,6 +29,7 @@ from mpucal.calibration.hand_reference import evaluate_hand_reference
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.likelihood import evaluate, value
 from mpucal.calibration.model_selection import METHODS, choose, fit_accel
+from mpucal.calibration.parameters import ACCEL, HAND, IMU
 from mpucal.calibration.problem import Problem, Series
 from mpucal.calibration.reference import evaluate_reference
 from mpucal.calibration.theta import Theta
@@ -41,7 +42,6 @@ FLAT_S, TURNS = 10.0, 3
 KERNEL_STEPS, TWIN_STEPS = 10_000, 300
 # a millisecond or two each: so many that a burst of other work does not make the median
 MORE_OF_A_KERNEL = 15
-ACCEL, IMU, HAND = 17, 23, 27
 GROWTH = (1_000, 10_000, 100_000, 1_000_000)
 HELP = "from mpucal.__main__ import run; run(['--help']); import sys; sys.stderr.write(str('numpy' in sys.modules))"
 

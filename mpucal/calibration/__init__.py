@@ -19,8 +19,9 @@ from .fit import Fit
 from .flat_segment import Flat, find_flat, flat_statistics, tells
 from .masks import with_masks
 from .model_selection import METHODS, Choice, choose
-from .parameters import B_A_NAMES, B_OMEGA_NAMES, D_NAMES, K_NAMES
+from .parameters import B_A_NAMES, B_OMEGA_NAMES, BY_NAME, D_NAMES
 from .quality import judge
+from .theta import from_elements
 
 __all__ = ["MODELS", "calibrate", "weigh"]
 
@@ -108,7 +109,7 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
         D_std=_claimed(fit, D_NAMES).reshape(3, 3),
         b_a_std=_claimed(fit, B_A_NAMES),
         K=fit.K,
-        K_std=_symmetric(_claimed(fit, K_NAMES).tolist()),
+        K_std=from_elements(BY_NAME["K"].form, _claimed(fit, BY_NAME["K"].names)),
         b_omega=fit.b_omega,
         b_omega_std=fit.std(*B_OMEGA_NAMES),
         fit=MappingProxyType({**about, **numbers}),
@@ -119,9 +120,3 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
 def _claimed(fit: Fit, names: Sequence[str]) -> Vector:
     """Standard deviations; unknown of what the data say little."""
     return np.where([name in fit.at_prior for name in names], np.nan, fit.std(*names))
-
-
-def _symmetric(six: list[float]) -> Vector:
-    """(3, 3) of its upper triangle xx, xy, xz, yy, yz, zz."""
-    xx, xy, xz, yy, yz, zz = six
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

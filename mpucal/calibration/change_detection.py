@@ -18,7 +18,7 @@ from .flat_segment import Flat
 from .hand_noise import FARTHER, FARTHER_STILL, PIVOT_MPS2, WHITE_MPS2
 from .levenberg_marquardt import inverse, minimise
 from .likelihood import evaluate, value
-from .parameters import NAMES
+from .parameters import HAND
 from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed, preprocess
 from .prior import prior_of
 from .problem import Problem, Series
@@ -59,14 +59,14 @@ def likeliest_change(recording: Recording, flat: Flat, fit: Fit, gravity: float)
     prior = prior_of(prepared.flat)
     start = _start(fit, prepared)
     problem = _with_noise(prepared, start)
-    theta = minimise(problem, start, len(NAMES), prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True).theta
-    whole = evaluate(problem, theta, len(NAMES))
+    theta = minimise(problem, start, HAND, prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True).theta
+    whole = evaluate(problem, theta, HAND)
     gradient = whole.gradient + prior.precision * (values(theta) - prior.mean)
     H = whole.fisher + np.diag(prior.precision)
     changes = []
     for share in SHARES:
         cut = int(share * n)
-        before = evaluate(_first(problem, cut), theta, len(NAMES))
+        before = evaluate(_first(problem, cut), theta, HAND)
         of_after, H_after = whole.gradient - before.gradient, whole.fisher - before.fisher
         d, covariance = _newton(H, gradient, H_after[:, :12], of_after[:12])
         changes.append(

@@ -31,7 +31,7 @@ from .hand_noise import (
 from .initial_estimate import initialise
 from .levenberg_marquardt import Minimum, minimise
 from .likelihood import evaluate
-from .parameters import NAMES
+from .parameters import HAND
 from .preprocessing import Preprocessed, preprocess
 from .prior import Prior, prior_of
 from .problem import Problem
@@ -52,11 +52,11 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
         noise = Noise("white", likeliest(fine.white, near(noise.sigma), theta))
     problem = _moved(noise.problem(fine), fine, theta)
     prior = prior_of(fine.flat)
-    minimum = minimise(problem, theta, len(NAMES), prior, frozen=True)
+    minimum = minimise(problem, theta, HAND, prior, frozen=True)
     iterations = search.iterations + minimum.iterations
     if wald(minimum) < WALD_99 and not at_prior(minimum.covariance()):
         perfect = replace(minimum.theta, K=np.eye(3))
-        minimum = minimise(problem, perfect, len(NAMES), prior, fixed=("K",), frozen=True)
+        minimum = minimise(problem, perfect, HAND, prior, fixed=("K",), frozen=True)
         iterations += minimum.iterations
     minimum = _doubted(minimum, noise, search.prepared, fine)
     known = at_prior(minimum.covariance()) if minimum.free.all() else ()
@@ -87,7 +87,7 @@ def _doubted(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preproce
     if moves:  # rests are found anew here, and their number may differ by one
         variance = miss_variances(moves, float(leverage.mean()))
         problem = _scaled(problem, q_scale(moves, variance, len(problem.series)))
-    fisher = evaluate(problem, minimum.theta, len(NAMES)).fisher
+    fisher = evaluate(problem, minimum.theta, HAND).fisher
     return replace(minimum, H=fisher + np.diag(prior.precision))
 
 
@@ -138,4 +138,4 @@ class _Search:
 
 
 def _roughly(problem: Problem, theta: Theta, prior: Prior, fixed: tuple[str, ...] = ()) -> Minimum:
-    return minimise(problem, theta, len(NAMES), prior, fixed, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True)
+    return minimise(problem, theta, HAND, prior, fixed, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True)

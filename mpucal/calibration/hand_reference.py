@@ -8,7 +8,7 @@ import numpy as np
 
 from ..data import Vector
 from .likelihood import Evaluation
-from .parameters import NAMES
+from .parameters import HAND, PLACES
 from .problem import Problem
 from .reference import K_BASIS
 from .rotation import cross, left_jacobian, rotation
@@ -16,7 +16,6 @@ from .sphere import tangents
 from .theta import Theta
 
 LONGEST_STEP_S, SPEED_OF_RESET_S = 0.2, 0.04
-_P = len(NAMES)
 
 
 class Gain(NamedTuple):
@@ -27,20 +26,20 @@ class Gain(NamedTuple):
     w: float
 
 
-class _Pass:
-    """x = (s, p, v, a) (12,), P (12, 12) and dx (27, 12) on their way through the samples; gains may be given."""
+class HANDass:
+    """x = (s, p, v, a) (12,), P (12, 12) and dx (p, 12) on their way through the samples; gains may be given."""
 
     def __init__(self, problem: Problem, theta: Theta, held: list[Gain] | None = None) -> None:
         self.problem, self.theta, self.held = problem, theta, held
         self.gains: list[Gain] = []
         self.innovations: list[Vector] = []
         self.V, self.squares = 0.0, 0.0
-        self.gradient, self.fisher = np.zeros(_P), np.zeros((_P, _P))
+        self.gradient, self.fisher = np.zeros(HAND), np.zeros((HAND, HAND))
         self.x: Vector = np.zeros(12)
         self.P: Vector = np.zeros((12, 12))
-        self.dx: Vector = np.zeros((_P, 12))
+        self.dx: Vector = np.zeros((HAND, 12))
         self.x[:3] = problem.gravity * theta.u
-        self.dx[12, :3], self.dx[13, :3] = (problem.gravity * t for t in tangents(theta.u))
+        self.dx[PLACES["tilt"], :3] = [problem.gravity * t for t in tangents(theta.u)]
         self._run()
 
     def _run(self) -> None:
@@ -62,8 +61,8 @@ class _Pass:
         series, theta = self.problem.series, self.theta
         dt, rate = series.dt[i], series.omega[i] - theta.b_omega
         phi = -dt * theta.K @ rate
-        dphi = np.zeros((_P, 3))
-        dphi[14:17], dphi[17:23] = dt * theta.K.T, -dt * K_BASIS @ rate
+        dphi = np.zeros((HAND, 3))
+        dphi[PLACES["b_omega"]], dphi[PLACES["K"]] = dt * theta.K.T, -dt * K_BASIS @ rate
         F = np.kron(np.eye(4), rotation(phi))
         dF = np.kron(np.eye(4), cross(dphi @ left_jacobian(phi).T)) @ F
         self.x, self.dx = F @ self.x, self.dx @ F.T + dF @ self.x
@@ -98,10 +97,10 @@ class _Pass:
         q = E @ x[:3] + x[9:] + L @ theta.r
         e = y - theta.D @ q - theta.b_a
         de = -self.dx @ H.T
-        de[:9] -= np.kron(np.eye(3), q[:, None])
-        de[9:12] -= np.eye(3)
-        de[23] -= theta.D @ cross(rate) @ x[:3]
-        de[24:27] -= (theta.D @ L).T
+        de[PLACES["D"]] -= np.kron(np.eye(3), q[:, None])
+        de[PLACES["b_a"]] -= np.eye(3)
+        de[PLACES["tau"]] -= theta.D @ cross(rate) @ x[:3]
+        de[PLACES["r"]] -= (theta.D @ L).T
         gain = self._gain(H, e, np.diag(R), huber) if self.held is None else self.held[len(self.gains)]
         self.gains.append(gain)
         self.innovations.append(e)
@@ -130,18 +129,18 @@ class _Pass:
 
 def evaluate_hand_reference(problem: Problem, theta: Theta) -> Evaluation:
     """The same as likelihood.evaluate of all parameters, with twelve-state matrices and no structure used."""
-    done = _Pass(problem, theta)
+    done = HANDass(problem, theta)
     return Evaluation(done.V, done.squares, done.gradient, done.fisher)
 
 
 def gains(problem: Problem, theta: Theta) -> list[Gain]:
     """What the filter decides at each measurement, the flat mean's first."""
-    return _Pass(problem, theta).gains
+    return HANDass(problem, theta).gains
 
 
 def innovations(problem: Problem, theta: Theta, held: list[Gain]) -> Vector:
     """(n + 1, 3) m/s^2, with the gains held: the function whose derivatives the gradient is made of."""
-    return np.array(_Pass(problem, theta, held).innovations)
+    return np.array(HANDass(problem, theta, held).innovations)
 
 
 def _at(values: Vector | None, i: int, otherwise: float) -> float:

@@ -17,7 +17,7 @@ from .hand_noise import FARTHER, FIRST_MPS2, HONEST, PIVOT_MPS2, WHITE_MPS2, lik
 from .initial_estimate import initialise
 from .levenberg_marquardt import Minimum, minimise
 from .likelihood import evaluate, value
-from .parameters import NAMES
+from .parameters import HAND
 from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed, preprocess
 from .prior import Prior, prior_of
 from .problem import Problem
@@ -37,7 +37,7 @@ class InterimEstimate:
 
     Attributes
     ----------
-    theta : the estimate. H : (27, 27) its Fisher matrix with the prior's. covariance : (12, 12) of D row-major and b_a.
+    theta : the estimate. H : (p, p) its Fisher matrix with the prior's. covariance : (12, 12) of D row-major and b_a.
     problem : the series up to now. sigma : m/s^2, of the hand's acceleration while it moves.
     converged : whether the search settled.
     """
@@ -85,7 +85,7 @@ def interim_estimate(
         # who does not pause leans on a hand's travel, of which little is known: as the calibration, admit more of it
         pivot = min(PIVOT_MPS2, key=lambda s: value(prepared.pivot(s, FLOOR_MPS2), minimum.theta))
         doubt = prepared.pivot(HONEST * FARTHER * pivot, FLOOR_MPS2)
-        H = evaluate(doubt, minimum.theta, len(NAMES)).fisher + np.diag(prior.precision)
+        H = evaluate(doubt, minimum.theta, HAND).fisher + np.diag(prior.precision)
     covariance = replace(minimum, H=H).covariance()[:12, :12]
     sigma = likeliest(prepared.white, near(sigma), minimum.theta)
     return InterimEstimate(minimum.theta, H, covariance, problem, sigma, minimum.converged)
@@ -105,7 +105,7 @@ def _right_handed(theta: Theta) -> Theta:
 
 
 def _minimum(problem: Problem, theta: Theta, prior: Prior) -> Minimum:
-    return minimise(problem, theta, len(NAMES), prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True)
+    return minimise(problem, theta, HAND, prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True)
 
 
 def _prior(flat: Flat) -> Prior:

@@ -85,7 +85,7 @@ def minimise(
     """
     free = np.ones(parameters, bool)
     for name in fixed:
-        free[slice(*PLACES[name])] = False
+        free[PLACES[name]] = False
     at, damping, iterations, converged = _At(problem, theta, parameters, prior), DAMPING, 0, False
     while iterations < most and damping < HOPELESS:
         gradient, H = at.gradient[free], at.H[np.ix_(free, free)]

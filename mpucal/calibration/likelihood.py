@@ -1,4 +1,4 @@
-"""V(theta), its gradient and its Fisher matrix over a recording, by the kernel. Knows no minimiser.
+"""V(theta), its gradient and its Fisher matrix over a recording, by the kernel.
 
 Two filters: the exact one for a sensor that turns in place, and the hand's, whose state holds the hand's travel as well
 (kernel/filter.hpp and kernel/hand.hpp).
@@ -13,9 +13,15 @@ from numpy.typing import NDArray
 
 from ..data import Vector
 from ..kernel import _kernel
-from .parameters import GROUPS, LANES, NAMES
-from .problem import COMMON, HAND, Problem
+from .parameters import ACCEL, HAND, IMU, LANES, LAYOUT, TABLE, estimated, lanes_used
+from .problem import SERIES, SERIES_OF_A_HAND, Problem
 from .theta import Theta
+
+if _kernel.layout != LAYOUT:
+    raise ImportError("the kernel was built for another table of parameters: build it again")
+
+EXACT = estimated("imu")  # what the exact filter knows
+USED = {0: 0, ACCEL: lanes_used("accel"), IMU: lanes_used("imu")}
 
 
 class Evaluation(NamedTuple):
@@ -30,24 +36,21 @@ class Evaluation(NamedTuple):
 def evaluate(problem: Problem, theta: Theta, parameters: int) -> Evaluation:
     """V(theta) with its derivatives by the first `parameters` of NAMES.
 
-    17, 23 (or 0: V alone): equation (8) by the exact filter. 27: by the hand's filter, whose derivatives hold gains and
-    weights: the gradient is zero where the estimate should be, not where V is least.
+    ACCEL, IMU (or 0: V alone): equation (8) by the exact filter. HAND: by the hand's filter, whose derivatives hold
+    gains and weights: the gradient is zero where the estimate should be, not where V is least.
 
     Raises
     ------
     ValueError : the exact filter was asked of a problem that only the hand's filter can solve.
     """
-    if parameters == len(NAMES):
+    if parameters == HAND:
         V, squares, gradient, fisher = _hand(problem, theta, derivatives=True)
     else:
         _refuse_a_hand(problem)
         V, squares, gradient, fisher = _kernel.evaluate(
-            theta.packed(),
-            problem.constants()[:-3],
-            GROUPS[parameters] if parameters else 0,
-            **problem.series.arrays(COMMON),
+            theta.packed(EXACT), problem.constants(), USED[parameters], **problem.series.arrays(SERIES)
         )
-    lanes = LANES[:parameters]
+    lanes = np.array(LANES[:parameters], np.intp)
     return Evaluation(V, squares, gradient[lanes], fisher[np.ix_(lanes, lanes)])
 
 
@@ -69,17 +72,17 @@ class Trace(NamedTuple):
 
 def trace(problem: Problem, theta: Theta) -> Trace:
     """The hand's filter, sample by sample."""
-    series = problem.series.arrays(COMMON + HAND)
-    return Trace(*_kernel.trace_hand(theta.packed_with_hand(), problem.constants(), **series))
+    series = problem.series.arrays(SERIES + SERIES_OF_A_HAND)
+    return Trace(*_kernel.trace_hand(theta.packed(TABLE), problem.constants_of_a_hand(), **series))
 
 
 def _hand(problem: Problem, theta: Theta, derivatives: bool) -> tuple[float, float, Vector, Vector]:
-    series = problem.series.arrays(COMMON + HAND)
-    return _kernel.evaluate_hand(theta.packed_with_hand(), problem.constants(), derivatives, **series)
+    series = problem.series.arrays(SERIES + SERIES_OF_A_HAND)
+    return _kernel.evaluate_hand(theta.packed(TABLE), problem.constants_of_a_hand(), derivatives, **series)
 
 
 def _refuse_a_hand(problem: Problem) -> None:
-    given = [name for name in HAND if getattr(problem.series, name) is not None]
+    given = [name for name in SERIES_OF_A_HAND if getattr(problem.series, name) is not None]
     given += ["huber"] if np.isfinite(problem.huber) else []
     if given:
-        raise ValueError(f"the exact filter knows no {', '.join(given)}: ask for all {len(NAMES)} parameters")
+        raise ValueError(f"the exact filter knows no {', '.join(given)}: ask for all {HAND} parameters")

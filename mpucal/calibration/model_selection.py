@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
-import numpy as np
-
 from ..data import Recording
 from .downsampling import downsampled
 from .fit import Fit
@@ -18,15 +16,14 @@ from .initial_estimate import initialise
 from .levenberg_marquardt import Minimum, minimise
 from .masks import mask
 from .paper import fit_paper
-from .prior import K_MEAN, K_SD, Prior
+from .parameters import ACCEL, IMU
+from .prior import prior_of
 from .problem import Problem, Series
 from .tilt import fit_tilt
 
 # The mean ||e||^2 of white noise is 3; a hand, or a gyroscope's scale, makes it tens to thousands.
 EXPLAINED_NIS = 4.0
 HOPELESS_NIS = 10.0  # of means over blocks, in which white noise is less and a hand's is not
-
-ACCEL, IMU = 17, 23
 
 SEARCH_HZ, ROUGHLY = 50.0, 0.05
 
@@ -87,21 +84,17 @@ def _rough(recording: Recording, flat: Flat, gravity: float, parameters: int) ->
     thin, at = downsampled(recording, flat, SEARCH_HZ)
     problem = _problem(thin, flat_statistics(thin, at), gravity)
     theta = initialise(problem, flat.b_omega)
-    return minimise(problem, theta, parameters, _prior(flat), until=ROUGHLY)
+    return minimise(problem, theta, parameters, prior_of(flat), until=ROUGHLY)
 
 
 def _minimum(recording: Recording, flat: Flat, gravity: float, parameters: int, near: Minimum) -> Minimum:
     """On all samples, from where another search ended."""
-    minimum = minimise(_problem(recording, flat, gravity), near.theta, parameters, _prior(flat))
+    minimum = minimise(_problem(recording, flat, gravity), near.theta, parameters, prior_of(flat))
     return replace(minimum, iterations=near.iterations + minimum.iterations)
 
 
 def _problem(recording: Recording, flat: Flat, gravity: float) -> Problem:
     return Problem(mask(Series.after(recording, flat), recording, flat), flat, gravity)
-
-
-def _prior(flat: Flat) -> Prior:
-    return Prior.of(b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)), K=(K_MEAN, K_SD))
 
 
 def _as_fit(minimum: Minimum) -> Fit:

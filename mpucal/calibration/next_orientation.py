@@ -10,7 +10,7 @@ import numpy as np
 from ..data import Vector
 from .interim import InterimEstimate
 from .likelihood import evaluate, trace
-from .parameters import NAMES
+from .parameters import HAND
 from .preprocessing import CORRELATION_S, MOVING_RAD_S, POSE_MPS2, jerk_density
 from .problem import Problem, Series
 from .rotation import rotation
@@ -60,7 +60,7 @@ def _badness(H: Vector, wanted: Vector) -> float:
 
 def _information(problem: Problem, theta: Theta, s: Vector) -> Vector:
     """(p, p) Fisher matrix of a problem that begins at rest with gravity s (3,), whatever the pose there."""
-    F = evaluate(problem, replace(theta, u=s / np.linalg.norm(s)), len(NAMES)).fisher
+    F = evaluate(problem, replace(theta, u=s / np.linalg.norm(s)), HAND).fisher
     pose = slice(12, 14)
     F = F - F[:, pose] @ np.linalg.solve(F[pose, pose], F[pose])
     F[:, pose] = F[pose] = 0.0

@@ -62,9 +62,9 @@ class Series:
         return {name: None if value is None else np.ascontiguousarray(value) for name, value in values.items()}
 
 
-COMMON = ("y", "omega", "dt", "r_scale", "q_scale", "q_extra")
+SERIES = ("y", "omega", "dt", "r_scale", "q_scale", "q_extra")
 
-HAND = ("rate", "alpha", "r_extra", "jerk", "reset")
+SERIES_OF_A_HAND = ("rate", "alpha", "r_extra", "jerk", "reset")
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,10 @@ class Problem:
     lam: float = 5.0
 
     def constants(self) -> Vector:
-        """The kernel's layout: gravity, Sigma_a, Sigma_omega, the flat mean, its count, then huber, tail and lam."""
+        """The exact filter's: gravity, Sigma_a, Sigma_omega, the flat mean, its count."""
         flat = self.flat
-        return np.array(
-            [self.gravity, *flat.Sigma_a, *flat.Sigma_omega, *flat.y, flat.n, self.huber, self.tail, self.lam]
-        )
+        return np.array([self.gravity, *flat.Sigma_a, *flat.Sigma_omega, *flat.y, flat.n])
+
+    def constants_of_a_hand(self) -> Vector:
+        """The hand's filter's: the exact one's, then huber, tail and lam."""
+        return np.append(self.constants(), [self.huber, self.tail, self.lam])

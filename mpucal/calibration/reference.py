@@ -8,6 +8,7 @@ import numpy as np
 
 from ..data import Vector
 from .likelihood import Evaluation
+from .parameters import ACCEL, PLACES
 from .problem import Problem
 from .rotation import cross, left_jacobian, rotation
 from .sphere import tangents
@@ -41,7 +42,7 @@ def evaluate_reference(problem: Problem, theta: Theta, parameters: int) -> Evalu
     sums = _Sums(p)
     ds = np.zeros((p, 3))
     if p:
-        ds[12], ds[13] = (g * t for t in tangents(theta.u))
+        ds[PLACES["tilt"]] = [g * t for t in tangents(theta.u)]
     state = _State(g * theta.u, np.zeros((3, 3)), ds, np.zeros((p, 3, 3)))
     state = _measure(state, flat.y, flat.Sigma_a / flat.n, theta, g, sums)
     sums.squares = 0.0
@@ -55,9 +56,9 @@ def evaluate_reference(problem: Problem, theta: Theta, parameters: int) -> Evalu
 def _directions(p: int) -> tuple[Vector, Vector]:
     """Derivatives of D (p, 3, 3) and b_a (p, 3) by the parameters."""
     dD, db = np.zeros((p, 3, 3)), np.zeros((p, 3))
-    dD[:9] = np.eye(9).reshape(9, 3, 3)[:p]
     if p:
-        db[9:12] = np.eye(3)
+        dD[PLACES["D"]] = np.eye(9).reshape(9, 3, 3)
+        db[PLACES["b_a"]] = np.eye(3)
     return dD, db
 
 
@@ -100,9 +101,9 @@ def _propagate(state: _State, problem: Problem, theta: Theta, i: int) -> _State:
     F = rotation(phi)
     dphi = np.zeros((p, 3))
     if p:
-        dphi[14:17] = dt * theta.K.T
-    if p > 17:
-        dphi[17:23] = -dt * K_BASIS @ rate
+        dphi[PLACES["b_omega"]] = dt * theta.K.T
+    if p > ACCEL:
+        dphi[PLACES["K"]] = -dt * K_BASIS @ rate
     eta = dphi @ left_jacobian(phi).T
     dF = cross(eta) @ F
     turned, dturned = F @ s, ds @ F.T + dF @ s

@@ -125,7 +125,7 @@ def _jacobian(move: Transition, prepared: Preprocessed, theta: Theta, inverse: V
     by_K = -np.einsum("mij,mk->ijk", R, series.omega[move.span] - theta.b_omega)
     by_K += np.swapaxes(by_K, 1, 2) * (1.0 - np.eye(3))
     i, j = np.triu_indices(3)
-    phi[:, slice(*PLACES["K"])] = by_K[:, i, j]
+    phi[:, PLACES["K"]] = by_K[:, i, j]
     # s = inv(D) (y - b_a): ds = -inv(D) (dD s + db_a)
     whole = product(move.F)
     u, v = whole @ move.leaving, move.coming
@@ -137,8 +137,8 @@ def _jacobian(move: Transition, prepared: Preprocessed, theta: Theta, inverse: V
 def _by_accelerometer(inverse: Vector, s: Vector) -> Vector:
     """(3, p) of a measured gravity s by D and b_a."""
     ds = np.zeros((3, len(NAMES)))
-    ds[:, slice(*PLACES["D"])] = -np.einsum("ki,j->kij", inverse, s).reshape(3, 9)
-    ds[:, slice(*PLACES["b_a"])] = -inverse
+    ds[:, PLACES["D"]] = -np.einsum("ki,j->kij", inverse, s).reshape(3, 9)
+    ds[:, PLACES["b_a"]] = -inverse
     return ds
 
 

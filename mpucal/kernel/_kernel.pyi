@@ -5,10 +5,12 @@ from numpy.typing import NDArray
 
 _Array = NDArray[float64]
 
+layout: str  # of the parameters that it was built for, parameters.LAYOUT
+
 def evaluate(
     theta: _Array,
     constants: _Array,
-    groups: int,
+    lanes: int,
     y: _Array,
     omega: _Array,
     dt: _Array,

@@ -25,8 +25,8 @@ class Derivatives {
       gradient_[g] = all(0.0);
     }
     for (int a = 0; a < 3; ++a) {
-      put(ds_[Lanes::tilt0 / 4][a], Lanes::tilt0 % 4, c.gravity * p.du[0][a]);
-      put(ds_[Lanes::tilt1 / 4][a], Lanes::tilt1 % 4, c.gravity * p.du[1][a]);
+      put(ds_[Lanes::tilt / 4][a], Lanes::tilt % 4, c.gravity * p.du[0][a]);
+      put(ds_[(Lanes::tilt + 1) / 4][a], (Lanes::tilt + 1) % 4, c.gravity * p.du[1][a]);
     }
   }
 
@@ -149,7 +149,7 @@ class Derivatives {
 
   // d(F x) = eta x (F x), for the groups that hold the gyro's parameters
   static constexpr bool turns(int g) {
-    return g == Lanes::b_omega / 4 || (G > 5 && (g == Lanes::K / 4 || g == Lanes::K / 4 + 1));
+    return g == Lanes::b_omega / 4 || (G > groups_of(LanesUsed::accel) && (g == Lanes::K / 4 || g == Lanes::K / 4 + 1));
   }
   template <int g>
   MPUCAL_INLINE static const Lane (&eta(const Coefficients& c, int t))[3] {

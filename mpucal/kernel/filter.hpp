@@ -6,32 +6,21 @@
 //   s <- F s,  P <- F P F' + [s]x diag(c) [s]x',  F = exp(-dt [Gyro (omega_bar - b_omega)]x)
 // and V = sum of 1/2 (e' S^-1 e + log det S), the paper's equation (8).
 //
-// Derivatives run forward, four parameters to a lane group. A parameter's lane is given by `Lanes` below: row j of D
-// and b_a[j] share lane group j, so that their partial derivatives are products of one vector with scalars.
+// Derivatives run forward, four parameters to a lane group. A parameter's lane is given by `Lanes`, which the
+// table of calibration/parameters.py makes: row j of D and b_a[j] share lane group j, so that their partial derivatives
+// are products of one vector with scalars; what turns the body stands where `eta` in coefficients.hpp has it.
 #pragma once
 #include <cstddef>
 
+#include "parameters.hpp"
+
 namespace mpucal {
 
-// Places of the parameters among the lanes (lane group = place / 4).
-struct Lanes {
-  static constexpr int D = 0;         // D[j][k] at 4 j + k, b_a[j] at 4 j + 3
-  static constexpr int b_omega = 12;  // 3
-  static constexpr int tilt0 = 15;
-  static constexpr int tilt1 = 16;
-  static constexpr int K = 17;        // 6: xx, xy, xz, yy, yz, zz
-  static constexpr int tau = 23;      // this and r in the hand's filter alone
-  static constexpr int r = 24;        // 3
-  static constexpr int most = 28;
-  // lanes of the first so many groups that hold parameters estimated together
-  static constexpr int used(int groups) { return groups == 5 ? tilt1 + 1 : groups == 6 ? K + 6 : r + 3; }
-};
+static_assert(Lanes::D == 0 && Lanes::b_a == 3);
+static_assert(Lanes::b_omega % 4 == 0 && Lanes::K % 4 == 1);
 
-struct Parameters {
-  double D[3][3], b_a[3], b_omega[3], K[3][3];
-  double u[3];           // gravity's direction at the start, unit
-  double du[2][3];       // its derivatives by the two tilts
-};
+// How many groups of four hold so many lanes
+constexpr int groups_of(int lanes) { return (lanes + 3) / 4; }
 
 // What the filter runs over, (n,) or (n, 3) row by row; a null pointer means the value in brackets.
 struct Series {
@@ -54,16 +43,16 @@ struct Constants {
 struct Result {
   double V;
   double squares;         // sum of e' S^-1 e over the n samples
-  double* gradient;       // (groups * 4,)
-  double* fisher;         // (groups * 4, groups * 4)
+  double* gradient;       // (lanes,), filled up to whole groups
+  double* fisher;         // (lanes, lanes), likewise
 };
 
-// groups: 0 (value only), 5 (D, b_a, b_omega, tilts), 6 (and K).
-using Evaluate = void (*)(const Parameters&, const Series&, const Constants&, int groups, Result&);
+// lanes: 0 (value only) or those of a model
+using Evaluate = void (*)(const Parameters&, const Series&, const Constants&, int lanes, Result&);
 
-void evaluate_portable(const Parameters&, const Series&, const Constants&, int groups, Result&);
+void evaluate_portable(const Parameters&, const Series&, const Constants&, int lanes, Result&);
 #ifdef MPUCAL_AVX2
-void evaluate_avx2(const Parameters&, const Series&, const Constants&, int groups, Result&);
+void evaluate_avx2(const Parameters&, const Series&, const Constants&, int lanes, Result&);
 #endif
 
 // Sums of the linear initialiser: C_t turns the first body frame into the frame at t (b_omega removed, no K).

@@ -9,8 +9,9 @@ namespace {
 constexpr int kFours = 2;             // worked on together: what they share stays in the first cache
 constexpr long kBlock = 4 * kFours;
 
-template <int G>
+template <int lanes>
 void run(const Parameters& p, const Series& series, const Constants& c, Result& result) {
+  constexpr int G = groups_of(lanes);
   const Model model(p, c);
   const long all_steps = static_cast<long>(series.n) + 1;
   Steps steps[kFours];
@@ -19,7 +20,7 @@ void run(const Parameters& p, const Series& series, const Constants& c, Result& 
   [[maybe_unused]] Coefficients coefficients[G ? kFours : 1];
   [[maybe_unused]] Lane rows[kFours * kRowsOfFour][G ? G : 1];
   Derivatives<G> derivatives(p, c);
-  Fisher<G> fisher;
+  Fisher<lanes> fisher;
   for (long k = 0; k < all_steps; k += kBlock) {
     const int count = static_cast<int>(std::min(kBlock, all_steps - k)), fours = (count + 3) / 4;
     for (int f = 0; f < fours; ++f) steps[f].read(model, series, k + 4 * f);
@@ -40,13 +41,13 @@ void run(const Parameters& p, const Series& series, const Constants& c, Result& 
 
 }  // namespace
 
-void MPUCAL_EVALUATE(const Parameters& p, const Series& given, const Constants& c, int groups, Result& result) {
+void MPUCAL_EVALUATE(const Parameters& p, const Series& given, const Constants& c, int lanes, Result& result) {
   constexpr double rest[3] = {0.0, 0.0, 0.0};
   const Series series = given.n > 0 ? given : Series{0, rest, rest, rest};
-  switch (groups) {
+  switch (lanes) {
     case 0: return run<0>(p, series, c, result);
-    case 5: return run<5>(p, series, c, result);
-    default: return run<6>(p, series, c, result);
+    case LanesUsed::accel: return run<LanesUsed::accel>(p, series, c, result);
+    default: return run<LanesUsed::imu>(p, series, c, result);
   }
 }
 

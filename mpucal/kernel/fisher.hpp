@@ -7,10 +7,10 @@
 namespace mpucal {
 namespace {  // each build of the filter keeps its own
 
-// Lower triangle of the matrix over G lane groups
-template <int G>
+// Lower triangle of the matrix over so many lanes, filled up to G groups
+template <int used>
 class Fisher {
-  static constexpr int used = Lanes::used(G);
+  static constexpr int G = groups_of(used);
 
  public:
   Fisher() {

@@ -14,10 +14,7 @@
 
 namespace mpucal {
 
-struct HandParameters : Parameters {
-  double tau;   // s, by which the accelerometer lags behind the gyroscope
-  double r[3];  // m, the lever arm
-};
+static_assert(Lanes::r % 4 == 0);
 
 struct HandSeries : Series {
   const double* rate;     // rad/s at the sample, bias removed, for lever arm and delay [neither]
@@ -37,8 +34,8 @@ struct HandConstants : Constants {
 struct HandResult {
   double V;
   double squares;      // sum of e' S^-1 e over the n samples
-  double* gradient;    // (28,) in the order of Lanes
-  double* fisher;      // (28, 28)
+  double* gradient;    // (lanes,), filled up to whole groups
+  double* fisher;      // (lanes, lanes), likewise
   double* innovation;  // (n, 3) whitened, L^-1 e
   double* gravity;     // (n, 3) s before the update
   double* motion;      // (n, 3) a before the update

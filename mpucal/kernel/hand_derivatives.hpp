@@ -6,7 +6,7 @@
 namespace mpucal {
 namespace {  // each build of the filters keeps its own
 
-constexpr int kHandGroups = Lanes::most / 4;
+constexpr int kHandGroups = groups_of(LanesUsed::hand);
 
 // What the derivatives of four steps share
 struct HandCoefficients {
@@ -81,8 +81,8 @@ class HandDerivatives {
         for (Lane& lane : axis) lane = all(0.0);
     }
     for (int a = 0; a < 3; ++a) {
-      put(dx_[Lanes::tilt0 / 4][a][kS], Lanes::tilt0 % 4, gravity * p.du[0][a]);
-      put(dx_[Lanes::tilt1 / 4][a][kS], Lanes::tilt1 % 4, gravity * p.du[1][a]);
+      put(dx_[Lanes::tilt / 4][a][kS], Lanes::tilt % 4, gravity * p.du[0][a]);
+      put(dx_[(Lanes::tilt + 1) / 4][a][kS], (Lanes::tilt + 1) % 4, gravity * p.du[1][a]);
     }
   }
 
@@ -93,7 +93,7 @@ class HandDerivatives {
   }
 
   void write(double* gradient) const {
-    for (int i = 0; i < Lanes::most; ++i) gradient[i] = at(gradient_[i / 4], i % 4);
+    for (int i = 0; i < 4 * kHandGroups; ++i) gradient[i] = at(gradient_[i / 4], i % 4);
   }
 
  private:

@@ -44,7 +44,7 @@ void run(const HandParameters& p, const HandSeries& series, const HandConstants&
   [[maybe_unused]] HandCoefficients coefficients[kFours];
   [[maybe_unused]] Lane rows[3 * kBlock][kHandGroups];
   HandDerivatives derivatives(p, c.gravity);
-  Fisher<derive ? kHandGroups : 0> fisher;
+  Fisher<derive ? LanesUsed::hand : 0> fisher;
   for (long k = 0; k < all_steps; k += kBlock) {
     const int count = static_cast<int>(std::min(kBlock, all_steps - k)), fours = (count + 3) / 4;
     for (int f = 0; f < fours; ++f) steps[f].read(p, series, c, k + 4 * f, C);

@@ -99,39 +99,41 @@ HandConstants make_hand_constants(const Array& array) {
   return constants;
 }
 
-int lanes_of(int groups) {
-  if (groups != 0 && (groups < 5 || groups > 6)) throw std::invalid_argument("groups is 0, 5 or 6");
-  return 4 * groups;
+void check(int lanes) {
+  if (lanes != 0 && lanes != LanesUsed::accel && lanes != LanesUsed::imu)
+    throw std::invalid_argument("lanes is 0 or what a model of the exact filter uses");
 }
 
 }  // namespace
 
 NB_MODULE(_kernel, m) {
   m.doc() = "The gravity filter: value, gradient and Fisher matrix of V(theta).";
+  m.attr("layout") = kLayout;
 
   m.def(
       "evaluate",
-      [](const Array& theta, const Array& constants, int groups, const Array& y, const Array& omega, const Array& dt,
+      [](const Array& theta, const Array& constants, int lanes, const Array& y, const Array& omega, const Array& dt,
          const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
          const std::optional<Array>& q_extra) {
         const Series series = make_series(y, omega, dt, r_scale, q_scale, q_extra);
         const auto parameters = make<Parameters>(theta, "theta");
         const auto values = make<Constants>(constants, "constants");
-        const std::size_t p = lanes_of(groups);
+        check(lanes);
+        const std::size_t p = 4 * groups_of(lanes);
         std::vector<double> gradient(p), fisher(p * p);
         Result result{};
         result.gradient = gradient.data();
         result.fisher = fisher.data();
         {
           nb::gil_scoped_release release;
-          evaluate(parameters, series, values, groups, result);
+          evaluate(parameters, series, values, lanes, result);
         }
         return nb::make_tuple(result.V, result.squares, give(std::move(gradient), {p}), give(std::move(fisher), {p, p}));
       },
-      nb::arg("theta"), nb::arg("constants"), nb::arg("groups"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
+      nb::arg("theta"), nb::arg("constants"), nb::arg("lanes"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
       nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
       nb::arg("q_extra").none() = nb::none(),
-      "V, sum of e' S^-1 e over the samples, gradient and Fisher matrix (in lane order; empty for groups = 0).");
+      "V, sum of e' S^-1 e over the samples, gradient and Fisher matrix (in lane order; empty for lanes = 0).");
 
   m.def(
       "evaluate_hand",
@@ -143,7 +145,7 @@ NB_MODULE(_kernel, m) {
             make_series(y, omega, dt, r_scale, q_scale, q_extra), rate, alpha, r_extra, jerk, reset);
         const auto parameters = make<HandParameters>(theta, "theta");
         const HandConstants values = make_hand_constants(constants);
-        const std::size_t p = derivatives ? Lanes::most : 0;
+        const std::size_t p = derivatives ? 4 * groups_of(LanesUsed::hand) : 0;
         std::vector<double> gradient(p), fisher(p * p);
         HandResult result{};
         if (derivatives) {

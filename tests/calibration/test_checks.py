@@ -8,6 +8,7 @@ import pytest
 from mpucal.calibration import calibrate, weigh
 from mpucal.calibration.change_detection import Change
 from mpucal.calibration.evidence import Evidence
+from mpucal.calibration.parameters import HAND
 from mpucal.calibration.quality import judge
 from mpucal.calibration.rotation import rotation
 from mpucal.data import Recording
@@ -443,7 +444,7 @@ def test_before_there_is_anything_to_judge_only_that_is_said(good):
 
 
 @pytest.mark.parametrize(
-    "spoilt", [{"D": np.diag([1.0, 1.0, 0.0])}, {"covariance": np.full((27, 27), np.nan)}], ids=list
+    "spoilt", [{"D": np.diag([1.0, 1.0, 0.0])}, {"covariance": np.full((HAND, HAND), np.nan)}], ids=list
 )
 def test_an_estimate_of_which_nothing_is_sure_is_refused(in_hand, spoilt):
     evidence, _ = weigh(in_hand.recording, "hand", G)

@@ -8,8 +8,7 @@ import pytest
 from mpucal.calibration import calibrate
 from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.hand import fit_hand
-from mpucal.calibration.parameters import B_A_NAMES, D_NAMES, K_NAMES
-from mpucal.calibration.prior import K_SD
+from mpucal.calibration.parameters import B_A_NAMES, BY_NAME, D_NAMES, K_NAMES
 from mpucal.calibration.static_intervals import static_intervals
 from mpucal.simulated.study.metrics import sph_rms
 from mpucal.simulated.study.scenarios import hand_scenario
@@ -140,7 +139,7 @@ def test_what_is_not_known_of_the_gyroscope_is_not_taken_for_perfect(ideal):
     for seed in range(4):
         fit = fitted(ideal(seed).recording)
         assert fit.at_prior == ("K_xy", "K_zz")
-        assert (fit.std(*fit.at_prior) > 0.5 * K_SD[[1, 5]]).all()
+        assert (fit.std(*fit.at_prior) > 0.5 * np.array(BY_NAME["K"].sd)[[1, 5]]).all()
 
 
 def test_jerks_do_little(hand):

@@ -9,12 +9,11 @@ from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.levenberg_marquardt import DECREMENT, _nearer, minimise
 from mpucal.calibration.likelihood import evaluate
-from mpucal.calibration.parameters import PLACES
+from mpucal.calibration.parameters import ACCEL, PLACES
 from mpucal.calibration.prior import Prior
 from mpucal.calibration.problem import Problem, Series
 from mpucal.simulated.study.scenarios import paper_scenario
 
-ACCEL, IMU = 17, 23
 NOTHING = Prior.of()
 
 
@@ -80,7 +79,7 @@ def test_too_few_iterations_do_not_converge(problem, start):
 def test_what_is_fixed_stays(problem, start, name):
     minimum = minimise(problem, start, ACCEL, NOTHING, fixed=(name,))
     np.testing.assert_array_equal(getattr(minimum.theta, name), getattr(start, name))
-    place = slice(*PLACES[name])
+    place = PLACES[name]
     assert not minimum.free[place].any()
     assert (minimum.covariance()[place] == 0.0).all()
     assert (np.diag(minimum.covariance())[minimum.free] > 0).all()
@@ -91,7 +90,7 @@ def test_a_tight_prior_wins_and_a_loose_one_is_forgotten(problem, start):
     elsewhere = free.theta.b_a + 0.5
     tight = minimise(problem, start, ACCEL, Prior.of(b_a=(elsewhere, 1e-5)))
     loose = minimise(problem, start, ACCEL, Prior.of(b_a=(elsewhere, 1e3)))
-    sd = np.sqrt(np.diag(free.covariance()))[slice(*PLACES["b_a"])]
+    sd = np.sqrt(np.diag(free.covariance()))[PLACES["b_a"]]
     np.testing.assert_allclose(tight.theta.b_a, elsewhere, atol=1e-6)
     assert (np.abs(loose.theta.b_a - free.theta.b_a) < 0.1 * sd).all()
     assert tight.V > free.V + 1.0

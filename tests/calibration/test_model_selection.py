@@ -7,16 +7,17 @@ from mpucal.calibration.ekf import Ekf, exponential, orientation_of, product
 from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.levenberg_marquardt import minimise
-from mpucal.calibration.model_selection import ACCEL, METHODS, choose, fit_accel, fit_imu
+from mpucal.calibration.model_selection import METHODS, choose, fit_accel, fit_imu
 from mpucal.calibration.paper import expand
-from mpucal.calibration.parameters import B_A_NAMES, D_NAMES, K_NAMES
-from mpucal.calibration.prior import K_SD, Prior
+from mpucal.calibration.parameters import ACCEL, B_A_NAMES, BY_NAME, D_NAMES, K_NAMES
+from mpucal.calibration.prior import Prior
 from mpucal.calibration.problem import Problem, Series
 from mpucal.simulated.study.metrics import sph_rms
 from mpucal.simulated.study.scenarios import paper_scenario
 
 G = 9.82
 THETA_A = (*D_NAMES, *B_A_NAMES)
+K_SD = np.array(BY_NAME["K"].sd)
 
 
 def by(fit, recording):

@@ -7,11 +7,9 @@ import pytest
 
 from mpucal.calibration.hand_reference import evaluate_hand_reference, gains, innovations
 from mpucal.calibration.likelihood import evaluate, trace, value
-from mpucal.calibration.parameters import NAMES
+from mpucal.calibration.parameters import HAND
 from mpucal.calibration.problem import Problem, Series
 from mpucal.kernel import _kernel
-
-ALL = len(NAMES)
 
 
 @pytest.fixture(scope="module")
@@ -30,25 +28,25 @@ def assert_equal(ours, twin):
 @pytest.mark.parametrize(("huber", "tail"), [(np.inf, 1.0), (2.0, 1.0), (2.0, 0.0), (0.5, 0.0)])
 def test_kernel_equals_its_numpy_twin(problem, theta, huber, tail, lam, instruction_set):
     at = replace(problem, huber=huber, tail=tail, lam=lam)
-    assert_equal(evaluate(at, theta, ALL), evaluate_hand_reference(at, theta))
+    assert_equal(evaluate(at, theta, HAND), evaluate_hand_reference(at, theta))
 
 
 @pytest.mark.parametrize("without", ["r_scale", "q_scale", "q_extra", "r_extra", "jerk", "reset", "lever"])
 def test_a_missing_series_means_its_neutral_value(problem, theta, without, instruction_set):
     missing = ("rate", "alpha") if without == "lever" else (without,)
     at = replace(problem, series=replace(problem.series, **dict.fromkeys(missing)))
-    assert_equal(evaluate(at, theta, ALL), evaluate_hand_reference(at, theta))
+    assert_equal(evaluate(at, theta, HAND), evaluate_hand_reference(at, theta))
 
 
 def test_gradient_and_fisher_equal_central_differences_with_the_gains_held(problem, theta):
     some = {name: value[95:135] for name, value in vars(problem.series).items()}
     problem = replace(problem, series=Series(**some))
-    ours, held = evaluate(problem, theta, ALL), gains(problem, theta)
+    ours, held = evaluate(problem, theta, HAND), gains(problem, theta)
     e = innovations(problem, theta, held)
     scale = 0.001 / np.sqrt(np.diag(ours.fisher))
     de = []
-    for i in range(ALL):
-        step = np.zeros(ALL)
+    for i in range(HAND):
+        step = np.zeros(HAND)
         step[i] = scale[i]
         before, after = (innovations(problem, theta.moved(k * step), held) for k in (-1, 1))
         de.append((after - before) / (2 * step[i]))
@@ -67,19 +65,19 @@ def test_a_hand_that_keeps_still_leaves_the_exact_filter(problem, theta):
 
 def test_without_samples_the_flat_mean_alone_counts(problem, theta, instruction_set):
     none = replace(problem, series=Series(*(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))))
-    assert_equal(evaluate(none, theta, ALL), evaluate_hand_reference(none, theta))
+    assert_equal(evaluate(none, theta, HAND), evaluate_hand_reference(none, theta))
     assert trace(none, theta).s.shape == (0, 3)
 
 
 def test_the_value_alone_is_the_value_with_derivatives(problem, theta, instruction_set):
-    assert pytest.approx(value(problem, theta), rel=1e-14) == evaluate(problem, theta, ALL).V
+    assert pytest.approx(value(problem, theta), rel=1e-14) == evaluate(problem, theta, HAND).V
 
 
 def test_both_instruction_sets_agree(problem, theta):
     results = {}
     for name in ("best", "portable"):
         _kernel.use_instruction_set(name)
-        results[name] = evaluate(problem, theta, ALL)
+        results[name] = evaluate(problem, theta, HAND)
     _kernel.use_instruction_set("best")
     assert pytest.approx(results["portable"].V, rel=1e-12) == results["best"].V
     scale = abs(results["portable"].gradient).max()
@@ -88,7 +86,7 @@ def test_both_instruction_sets_agree(problem, theta):
 
 def test_trace_holds_the_innovations_of_the_value(problem, theta, instruction_set):
     at = trace(problem, theta)
-    assert (at.innovation**2).sum() == pytest.approx(evaluate(problem, theta, ALL).squares, rel=1e-12)
+    assert (at.innovation**2).sum() == pytest.approx(evaluate(problem, theta, HAND).squares, rel=1e-12)
     np.testing.assert_allclose(np.linalg.norm(at.s, axis=1), problem.gravity, rtol=1e-12)
     assert (at.a[[100, 160]] == 0.0).all()
     assert abs(at.a[[99, 101, 159, 162]]).min() > 0.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.likelihood import evaluate
-from mpucal.calibration.parameters import NAMES
+from mpucal.calibration.parameters import ACCEL, IMU, NAMES
 from mpucal.calibration.problem import Problem, Series
 from mpucal.calibration.reference import evaluate_reference
 from mpucal.kernel import _kernel
@@ -22,7 +22,7 @@ def problem(series, flat):
     return Problem(series, flat, 9.82)
 
 
-@pytest.mark.parametrize("parameters", [17, 23])
+@pytest.mark.parametrize("parameters", [ACCEL, IMU])
 def test_kernel_equals_its_numpy_twin(problem, theta, parameters, instruction_set):
     ours = evaluate(problem, theta, parameters)
     twin = evaluate_reference(problem, theta, parameters)
@@ -35,17 +35,17 @@ def test_kernel_equals_its_numpy_twin(problem, theta, parameters, instruction_se
 @pytest.mark.parametrize("without", ["r_scale", "q_scale", "q_extra"])
 def test_a_missing_series_means_its_neutral_value(problem, theta, without, instruction_set):
     part = replace(problem, series=replace(problem.series, **{without: None}))
-    ours, twin = (f(part, theta, 23) for f in (evaluate, evaluate_reference))
+    ours, twin = (f(part, theta, IMU) for f in (evaluate, evaluate_reference))
     assert pytest.approx(twin.V, rel=1e-10) == ours.V
     np.testing.assert_allclose(ours.gradient, twin.gradient, rtol=1e-8, atol=1e-8 * abs(twin.gradient).max())
 
 
 def test_gradient_equals_central_differences(problem, theta):
-    exact = evaluate(problem, theta, 23).gradient
-    scale = np.sqrt(np.diag(evaluate(problem, theta, 23).fisher))
-    for i, name in enumerate(NAMES[:23]):
+    exact = evaluate(problem, theta, IMU).gradient
+    scale = np.sqrt(np.diag(evaluate(problem, theta, IMU).fisher))
+    for i, name in enumerate(NAMES[:IMU]):
         # a step in units of the parameter's own information, extrapolated (Richardson) to fourth order
-        step = np.zeros(23)
+        step = np.zeros(IMU)
         step[i] = 0.02 / scale[i]
         V = [evaluate(problem, theta.moved(k * step), 0).V for k in (-2, -1, 1, 2)]
         difference = (8 * (V[2] - V[1]) - (V[3] - V[0])) / (12 * step[i])
@@ -53,14 +53,14 @@ def test_gradient_equals_central_differences(problem, theta):
 
 
 def test_the_value_alone_is_the_value_with_derivatives(problem, theta):
-    assert pytest.approx(evaluate(problem, theta, 23).V, rel=1e-14) == evaluate(problem, theta, 0).V
+    assert pytest.approx(evaluate(problem, theta, IMU).V, rel=1e-14) == evaluate(problem, theta, 0).V
 
 
 def test_both_instruction_sets_agree(problem, theta):
     results = {}
     for name in ("best", "portable"):
         _kernel.use_instruction_set(name)
-        results[name] = evaluate(problem, theta, 23)
+        results[name] = evaluate(problem, theta, IMU)
     _kernel.use_instruction_set("best")
     assert pytest.approx(results["portable"].V, rel=1e-12) == results["best"].V
     scale = abs(results["portable"].gradient).max()
@@ -79,9 +79,9 @@ def test_both_instruction_sets_agree(problem, theta):
 )
 def test_what_the_filter_cannot_use_is_refused(problem, theta, change, message):
     with pytest.raises(ValueError, match=message):
-        evaluate(replace(problem, series=replace(problem.series, **change)), theta, 17)
+        evaluate(replace(problem, series=replace(problem.series, **change)), theta, ACCEL)
 
 
 def test_a_threshold_is_refused(problem, theta):
     with pytest.raises(ValueError, match="knows no huber"):
-        evaluate(replace(problem, huber=2.0), theta, 17)
+        evaluate(replace(problem, huber=2.0), theta, ACCEL)
