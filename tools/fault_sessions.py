@@ -2,7 +2,7 @@
 
     python tools/fault_sessions.py [--sessions N] [--rounds N] [--seed S] [--rate HZ]
 
-Each session suffers one fault, or two, of mpucal/bus/simulated/faults.py, and ends as a true calibration (what is
+Each session suffers one fault, or two, of mpucal/simulated/faults.py, and ends as a true calibration (what is
 true lies within what is promised), a refusal, or a sentence that says what happened. Exit code 1 where one did not.
 With --rounds, every fault and every pair of them befalls a recording, which is calibrated afterwards: without the
 session's advice and the fits behind it, that takes a tenth of the time.
@@ -34,7 +34,7 @@ from mpucal.session.events import Key
 from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.chip.faults import KINDS, Fault
+from mpucal.simulated.faults import OF_CHIP, Fault, kinds
 
 # what is true may lie so many promised standard deviations away; nobody promises less than 1e-4
 FARTHEST = 6.0
@@ -43,6 +43,7 @@ CODES = (0, 3, 4, 5)
 CHIPS = ("mpu6050", "mpu6500", "clone98")
 BEGIN_S, END_S = 0.0, 75.0
 RECORDED_S, POLL_S = 45, 0.2
+KINDS = kinds(*OF_CHIP)
 # every kind alone, and every pair
 COMBINATIONS = [*((name,) for name in KINDS), *combinations_with_replacement(KINDS, 2)]
 

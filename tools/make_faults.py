@@ -19,7 +19,7 @@ from mpucal.errors import EndOfCapture, SourceError
 from mpucal.files.mcap import CaptureWriter
 from mpucal.session.plan import Plan
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.chip.faults import KINDS
+from mpucal.simulated.faults import OF_CHIP, kinds
 from mpucal.sources.tap import Tap
 
 FOLDER = Path(__file__).parent.parent / "fixtures" / "faults"
@@ -55,7 +55,7 @@ def made_of_it(recording: Recording, why: str | None) -> dict[str, Any]:
 def write(folder: Path) -> None:
     """Make them all."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name in KINDS:
+    for name in kinds(*OF_CHIP):
         simulated = open_simulated(f"sim:seed=8,chip=mpu6500,fault={name}@{FAULT_S:g}")
         with CaptureWriter(folder / f"{name}.mcap") as writer:
             writer.start(PLAN.meta())

@@ -9,9 +9,7 @@
 It prints the station's --mavlink on its first line, then runs until it is stopped. Everything else is KEY=VALUE: the
 vehicle's keys (an unknown one lists them) and its parameters' first values. What a station has to live with:
 
-    fault=loss fault=reorder fault=duplicate           # one packet in five lost, one in ten late, one in ten twice
-    fault=second_station@20                            # another station's REQUEST_DATA_STREAM at 4 Hz, every 15 s
-    fault=arm@30 fault=reboot@30 fault=silence@30      # s after the start
+    fault=loss fault=reboot@30                         # all are listed below; @ begins at so many seconds
     refuse=INS_ACCSCAL_Y                               # a parameter that it will not set
     --vehicles 2                                       # the others are systems of their own, at ports of their own
     --stranger                                         # 50 forged RAW_IMU and 50 truncated packets a second
@@ -31,8 +29,9 @@ from typing import NoReturn
 from mpucal.errors import MpucalError, UsageError
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.signing import read_key
-from mpucal.simulated.vehicle import Options, Vehicle
-from mpucal.simulated.vehicle.line import Line
+from mpucal.simulated.faults import OF_VEHICLE, Where, kinds
+from mpucal.simulated.vehicle import Vehicle, VehicleOptions
+from mpucal.simulated.vehicle.line import PacketLine
 from mpucal.simulated.vehicle.ports import Port, PtyPort, TcpPort, UdpPort
 
 STEP_S = 0.002
@@ -42,7 +41,10 @@ LONGEST_STEP_S = 0.1
 
 def main() -> int:
     """Run it; the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    faults = "\n".join(f"  {name:<16}{kind.what}" for name, kind in kinds(*OF_VEHICLE, Where.HAND).items())
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog=f"faults:\n{faults}", formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("port", metavar="udp:HOST:PORT|tcp:HOST:PORT|pty")
     parser.add_argument("words", metavar="KEY=VALUE", nargs="*")
     parser.add_argument("--vehicles", type=int, default=1, help="how many (udp)")
@@ -52,7 +54,7 @@ def main() -> int:
     arguments = parser.parse_args()
     ports: list[Port] = []
     try:
-        options = Options.parse(":".join(["sim", ",".join(arguments.words)]).rstrip(":"))
+        options = VehicleOptions.parse(":".join(["sim", ",".join(arguments.words)]).rstrip(":"))
         key = None if arguments.signing_key is None else read_key(arguments.signing_key)
         riders: list[Ride | Stranger] = []
         for number in range(arguments.vehicles):
@@ -90,7 +92,7 @@ class Ride:
 
     def __init__(self, vehicle: Vehicle, port: Port) -> None:
         self._vehicle, self._port = vehicle, port
-        self._line = Line(vehicle.options.faults, vehicle.options.seed)
+        self._line = PacketLine(vehicle.options.fault, vehicle.options.seed)
 
     def go_on(self, until_us: int) -> None:
         """Hear what came, and live until `until_us`."""

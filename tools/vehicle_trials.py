@@ -17,7 +17,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -30,7 +30,7 @@ from mpucal.mavlink.shaping import read_shaping
 from mpucal.mavlink.source import one_of
 from mpucal.mavlink.truth import ARDUPILOT, PX4
 from mpucal.mavlink.url import parse_url
-from mpucal.simulated.vehicle import Options, Vehicle
+from mpucal.simulated.vehicle import Vehicle, VehicleOptions
 
 HERE = Path(__file__).parent
 MPUCAL = Path(sys.executable).parent / "mpucal"
@@ -158,9 +158,9 @@ def held(trial: Trial, url: str) -> dict[str, float]:
 
 def apart(trial: Trial, parameters: Mapping[str, float]) -> list[tuple[int, float, float]]:
     """How far they are from what its sensors need: IMU, offset [m/s^2], scale."""
-    options = Options.parse("sim:" + ",".join(trial.words) if trial.words else "sim")
+    options = VehicleOptions.parse("sim:" + ",".join(trial.words) if trial.words else "sim")
     second = (trial.system or options.system) - options.system
-    simulated = Vehicle(Options(**{**vars(options), "seed": options.seed + second}))
+    simulated = Vehicle(replace(options, seed=options.seed + second))
     firmware = PX4 if simulated.firmware.bytewise else ARDUPILOT
     far = []
     for imu, truth in enumerate(simulated.imus.truths, start=1):

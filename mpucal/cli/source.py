@@ -110,11 +110,11 @@ def open_vehicle(text: str, plan: Plan, system: int | None, key: Path | None) ->
 
 
 def _simulated_vehicle(text: str, plan: Plan, system: int | None, key: bytes | None) -> Opened:
-    from ..simulated.vehicle import Options, Vehicle  # noqa: PLC0415
+    from ..simulated.vehicle import Vehicle, VehicleOptions  # noqa: PLC0415
     from ..simulated.vehicle.transport import SimulatedTransport  # noqa: PLC0415
     from ..sources.on_vehicle import OnLink  # noqa: PLC0415
 
-    vehicle = Vehicle(Options.parse(text), plan.gravity, key)
+    vehicle = Vehicle(VehicleOptions.parse(text), plan.gravity, key)
     transport = SimulatedTransport(vehicle)
     return OnLink(transport, plan, system, key, truth=vehicle.truth_document(), real_time=transport.real_time)
 

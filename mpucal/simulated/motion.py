@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
 
@@ -11,6 +12,7 @@ from ..data import Vector
 from . import rotation
 from .hand import REACTION_S, Hand, Prompt, Stance
 from .legs import STEP_HZ, STEP_S, Leg, steps
+from .mishaps import Mishap
 
 # Shorter than any reaction: a prompt never reaches what has been computed already.
 AHEAD_S = REACTION_S[0] / 2
@@ -84,10 +86,12 @@ class Motion:
     Parameters
     ----------
     hand : decides on the legs. rng : the hand's tremor, lever and clumsiness. gravity : m/s^2.
+    mishaps : what befalls the sensor besides the hand's own.
     """
 
-    def __init__(self, hand: Hand, rng: np.random.Generator, gravity: float) -> None:
+    def __init__(self, hand: Hand, rng: np.random.Generator, gravity: float, mishaps: Iterable[Mishap] = ()) -> None:
         self._hand = hand
+        self._mishaps = (hand.mishap, *mishaps)
         self._gravity = gravity
         lever = rng.normal(size=3)
         self._lever_m = lever / np.linalg.norm(lever) * rng.uniform(0.15, 0.3)
@@ -118,11 +122,14 @@ class Motion:
         sums = (1 - part) * self._sums[node] + part * self._sums[node + 1]
         means = (sums[1:] - sums[:-1]) / (edges_s[1:] - edges_s[:-1])[:, None]
         self._forget(int(node[-1]))
-        return self._hand.mishap.felt(means[:, :3], means[:, 3:], edges_s[1:])
+        force, rate = means[:, :3], means[:, 3:]
+        for mishap in self._mishaps:
+            force, rate = mishap.felt(force, rate, edges_s[1:])
+        return force, rate
 
     def warmer_c(self, edges_s: Vector) -> Vector:
         """(n,) by how much the chip is warmer than at first, between (n + 1,) times [s]."""
-        return self._hand.mishap.warmer_c(edges_s[1:])
+        return np.asarray(sum(mishap.warmer_c(edges_s[1:]) for mishap in self._mishaps))
 
     def attitude(self, t_s: float) -> Vector:
         """The quaternion (4,) at `t_s`, which is not before what `means` was last asked for."""

@@ -11,7 +11,7 @@ from mpucal.mavlink.shaping import read_shaping, shaping_names
 from mpucal.mavlink.source import VehicleSource
 from mpucal.mavlink.tlog import Record, Tlog
 from mpucal.mavlink.truth import ARDUPILOT
-from mpucal.simulated.vehicle import Options, Vehicle
+from mpucal.simulated.vehicle import Vehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 
 
@@ -29,7 +29,7 @@ class Disturbed(SimulatedTransport):
 
 def opened(words="", transport=SimulatedTransport, system=None, **how):
     """A source on a simulated vehicle, what it records, and what it says."""
-    vehicle = Vehicle(Options.parse(f"sim:{words}" if words else "sim"))
+    vehicle = Vehicle(VehicleOptions.parse(f"sim:{words}" if words else "sim"))
     record, said = [], []
     link = Link(transport(vehicle, **how), lambda t_ns, data: record.append(Record(t_ns, data)))
     return VehicleSource(link, 100.0, system, said.append, "test"), record, said
@@ -74,7 +74,7 @@ def test_the_parameters_that_shape_the_stream_are_read_first():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_parameter_is_given_up_where_one_packet_in_five_is_lost(seed):
-    vehicle = Vehicle(Options.parse(f"sim:imus=1,fault=loss,seed={seed}"))
+    vehicle = Vehicle(VehicleOptions.parse(f"sim:imus=1,fault=loss,seed={seed}"))
     link = Link(SimulatedTransport(vehicle), lambda t_ns, data: None)
     link.lock(link.listen()[0])
     assert set(read_shaping(link, ARDUPILOT)) == set(shaping_names(ARDUPILOT))

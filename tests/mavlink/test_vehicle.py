@@ -15,7 +15,7 @@ from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.encoding import name_bytes, of_wire, to_wire
 from mpucal.mavlink.prompts import Heard, to_message
 from mpucal.mavlink.url import parse_url
-from mpucal.simulated.vehicle import Options, Vehicle
+from mpucal.simulated.vehicle import Vehicle, VehicleOptions
 
 S_US = 1_000_000
 HIGHRES, RAW, SCALED, SCALED2 = 105, 27, 26, 116
@@ -28,7 +28,7 @@ class Station:
     """Speaks with a vehicle, and reads what it sends."""
 
     def __init__(self, words=""):
-        self.vehicle = Vehicle(Options.parse("sim" + (":" + words if words else "")))
+        self.vehicle = Vehicle(VehicleOptions.parse("sim" + (":" + words if words else "")))
         self.mav = dialect().MAVLink(None, 254, 190)
         self._parser = Parser(dialect().MAVLink(None))
 
@@ -223,7 +223,7 @@ def test_the_hand_obeys_prompts():
 @pytest.mark.parametrize("words", ["imus=9", "firmware=betaflight", "fault=arm", "nonsense", "seed=1,seed=2"], ids=str)
 def test_unknown_words_are_refused(words):
     with pytest.raises(UsageError):
-        Options.parse("sim:" + words)
+        VehicleOptions.parse("sim:" + words)
 
 
 @pytest.mark.parametrize("port", ["tcp:127.0.0.1:0", "pty"])

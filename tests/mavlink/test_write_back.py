@@ -17,7 +17,7 @@ from mpucal.mavlink.parameters.document import autopilot_document
 from mpucal.mavlink.prompts import Heard, to_message
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
-from mpucal.simulated.vehicle import Options, Vehicle
+from mpucal.simulated.vehicle import Vehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 from mpucal.sinks.autopilot import AutopilotSink
 
@@ -45,7 +45,7 @@ class Flying(SimulatedTransport):
 
 def vehicle_of(firmware, words=""):
     """A vehicle that was set down, behind a locked link."""
-    vehicle = Vehicle(Options.parse(f"sim:firmware={firmware}{words}"))
+    vehicle = Vehicle(VehicleOptions.parse(f"sim:firmware={firmware}{words}"))
     transport = Flying(vehicle)
     link = Link(transport, lambda t_ns, packet: None)
     link.lock(link.listen()[0])
@@ -295,7 +295,7 @@ def reboot(transport, number):
 
     def befall(count, message):
         if count == number:
-            transport.vehicle._reboot()
+            transport.vehicle.reboot()
         return True
 
     transport.befall = befall
@@ -331,7 +331,7 @@ def test_a_vehicle_that_is_gone_cannot_be_put_back_and_that_is_said(firmware):
 
     def befall(count, message):
         if count == 4:
-            vehicle._fall_silent()
+            vehicle.fall_silent()
         return True
 
     transport.befall = befall

@@ -1,4 +1,4 @@
-"""An emulated bridge: what the firmware does, byte for byte, with any bus as its I2C bus. Knows no port.
+"""An emulated bridge: what the firmware does, byte for byte, with any bus as its I2C bus.
 
 It stands in for a microcontroller in tests and trials. See firmware_protocol.md.
 """

@@ -1,4 +1,4 @@
-"""How an emulated bridge receives a blob, and tells what it stores. Knows no line."""
+"""How an emulated bridge receives a blob, and tells what it stores."""
 
 from __future__ import annotations
 

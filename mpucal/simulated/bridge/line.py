@@ -1,4 +1,4 @@
-"""A serial line to an emulated bridge, as a port, in a time that runs only while the host waits. Opens nothing."""
+"""A serial line to an emulated bridge, as a port, in a time that runs only while the host waits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BITS_A_BYTE = 10
 # the host's clock and the bridge's begin at different times
 HOST_AHEAD_NS = 7_000_000_000
 
-Fault = Callable[[bytes], bytes]
+Spoil = Callable[[bytes], bytes]
 
 
 class Device(Protocol):
@@ -57,8 +57,8 @@ class EmulatedLine:
     def __init__(self, device: Device, clock: SteppedClock, latency_ns: int = 1_000_000) -> None:
         self.name, self.bauds = "the emulated line", BAUDS[:1]
         self.device = device
-        self.to_host: Fault = _unchanged
-        self.to_device: Fault = _unchanged
+        self.to_host: Spoil = _unchanged
+        self.to_device: Spoil = _unchanged
         self.unplugged = False
         self.written = bytearray()
         self._clock, self._latency_ns = clock, latency_ns

@@ -1,4 +1,4 @@
-"""What an emulated bridge pushes from the FIFO. Knows no line; see firmware_protocol.md, "FRAMES"."""
+"""What an emulated bridge pushes from the FIFO; see firmware_protocol.md, "FRAMES"."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The two slots of an emulated bridge's memory. Knows no message; see firmware_protocol.md, "Storage"."""
+"""The two slots of an emulated bridge's memory; see firmware_protocol.md, "Storage"."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A simulated MPU-6050 or MPU-6500 in a simulated hand, as a bus. Knows no driver and no session."""
+"""A simulated MPU-6050 or MPU-6500 in a simulated hand, as a bus."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...data import STANDARD_GRAVITY_MPS2
+from ..faults import mishaps
 from ..hand import KINDS
 from ..motion import Motion
 from ..sensor import Truth, in_symmetric_frame
@@ -19,7 +20,7 @@ from .factory import Factory
 from .faults import Faults
 from .feed import Feed, RecordedFeed, SensorFeed
 from .models import MODELS, OFFSETS
-from .options import Options
+from .options import ChipOptions
 
 __all__ = ["Chip", "Feed", "RecordedFeed", "SimulatedBus", "Truth", "open_recorded", "open_simulated"]
 
@@ -42,10 +43,10 @@ def open_simulated(
     ------
     UsageError : unknown keys or values.
     """
-    options = Options.parse(text, seed)
+    options = ChipOptions.parse(text, seed)
     truth = _truth(options, gravity)
     of_hand, of_motion, of_noise, of_trim, of_faults = np.random.default_rng([options.seed, 2]).spawn(5)
-    motion = Motion(KINDS[options.hand](of_hand), of_motion, gravity)
+    motion = Motion(KINDS[options.hand](of_hand), of_motion, gravity, mishaps(options.fault))
     model = replace(MODELS[options.chip], **OFFSETS[options.offsets])
     if options.who_am_i is not None:
         model = replace(model, who_am_i=options.who_am_i)
@@ -78,7 +79,7 @@ def open_recorded(
     return SimulatedBus(Chip(MODELS[chip], feed, rate_error_ppm, Factory()), FastClock())
 
 
-def _truth(options: Options, gravity: float) -> Truth:
+def _truth(options: ChipOptions, gravity: float) -> Truth:
     """As drawn, but for what was asked for; brought to the frame in which K is symmetric."""
     drawn = Truth.draw(options.seed, options.chip, gravity)
     asked: dict[str, Any] = {

@@ -1,8 +1,8 @@
-"""A simulated ArduPilot or PX4 vehicle in a simulated hand. Knows no session and no estimate."""
+"""A simulated ArduPilot or PX4 vehicle in a simulated hand."""
 
 from __future__ import annotations
 
-from .options import Options
+from .options import VehicleOptions
 from .vehicle import Sent, Vehicle
 
-__all__ = ["Options", "Sent", "Vehicle"]
+__all__ = ["Sent", "Vehicle", "VehicleOptions"]

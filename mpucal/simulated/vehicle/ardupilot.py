@@ -12,7 +12,7 @@ from ...mavlink.parameters.encoding import REAL32, Parameter
 from ...mavlink.parameters.names import CUSTOM_ANGLES
 from .filter import LowPass
 from .firmware import HIGHRES_IMU, RAW_IMU, SCALED_IMUS, SYS_STATUS, Firmware
-from .options import Options
+from .options import VehicleOptions
 from .store import AXES, INT8, INT16, INT32
 
 LOOP_HZ = 400
@@ -37,7 +37,7 @@ class ArduPilot(Firmware):
     folder = "/APM/"
     bytewise = False
 
-    def __init__(self, options: Options) -> None:
+    def __init__(self, options: VehicleOptions) -> None:
         super().__init__(options)
         store = self.store
         store.add("SYSID_THISMAV", options.system, INT16)

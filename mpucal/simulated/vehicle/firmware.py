@@ -11,7 +11,7 @@ from ...mavlink.dialect import Message, dialect
 from ...mavlink.parameters.encoding import Parameter
 from ...mavlink.parameters.names import CUSTOM_ANGLES
 from ...mavlink.parameters.rotation import euler, orientation
-from .options import Options
+from .options import VehicleOptions
 from .store import Store
 
 MILLI_G = STANDARD_GRAVITY_MPS2 / 1000
@@ -38,7 +38,7 @@ class Firmware(ABC):
     folder: str
     streams: tuple[tuple[int, int], ...] = ()
 
-    def __init__(self, options: Options) -> None:
+    def __init__(self, options: VehicleOptions) -> None:
         self.options = options
         self.store = Store()
         self.rotation = mounted(options)
@@ -106,7 +106,7 @@ class Firmware(ABC):
         return dialect().MAVLink_sys_status_message(sensors, sensors, health, 100, 12000, -1, -1, 0, 0, 0, 0, 0, 0)
 
 
-def mounted(options: Options) -> Vector:
+def mounted(options: VehicleOptions) -> Vector:
     """R_b (3, 3) of a board that is turned by a known orientation, or by angles of its own."""
     if options.rotation in CUSTOM_ANGLES:
         degrees = [options.parameters.get(name, 0.0) for name in CUSTOM_ANGLES[options.rotation]]

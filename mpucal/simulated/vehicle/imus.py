@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from ...data import Vector
+from ..faults import mishaps
 from ..hand import KINDS, Prompt
 from ..motion import Motion
 from ..sensor import Response, Setting, Truth
-from .options import Options
+from .options import VehicleOptions
 
 # the hand's axes have z up, a vehicle's have z down
 FROM_HAND = np.diag([1.0, -1.0, -1.0])
@@ -30,9 +31,9 @@ class Imus:
     rotation : R_b (3, 3), from their axes to the vehicle's. rate_hz : samples a second. gravity : m/s^2.
     """
 
-    def __init__(self, options: Options, rotation: Vector, rate_hz: float, gravity: float) -> None:
+    def __init__(self, options: VehicleOptions, rotation: Vector, rate_hz: float, gravity: float) -> None:
         of_hand, of_motion, self._rng = np.random.default_rng([options.seed, 3]).spawn(3)
-        self._motion = Motion(KINDS[options.hand](of_hand), of_motion, gravity)
+        self._motion = Motion(KINDS[options.hand](of_hand), of_motion, gravity, mishaps(options.fault))
         self._rotation, self._rate_hz = rotation, rate_hz
         self.truths = tuple(_truth(options.seed, number, gravity) for number in range(options.imus))
         self._setting = Setting(rate_hz, ACCEL_RANGE_G, GYRO_RANGE_DPS, lsb_per_c=333.87, zero_c=21.0)

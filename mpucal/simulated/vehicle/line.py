@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from random import Random
 
-LOSS, REORDER, DUPLICATE = "loss", "reorder", "duplicate"
-LOST_SHARE, LATE_SHARE, TWICE_SHARE = 0.2, 0.1, 0.1
+from ..faults import KINDS, Fault, Where
+
 LATE_BY = 3
 
 
-class Line:
+class PacketLine:
     """Carries packets.
 
     Parameters
     ----------
-    faults : of LOSS (one in five is lost), REORDER (one in ten is overtaken), DUPLICATE (one in ten comes twice).
+    faults : those of the link are looked at: loss, reorder, duplicate.
     """
 
-    def __init__(self, faults: Collection[str], seed: int) -> None:
-        self._faults = faults
+    def __init__(self, faults: Sequence[Fault], seed: int) -> None:
+        self._suffered = {fault.name for fault in faults if fault.kind.where is Where.LINK}
         self._random = Random(seed)
         self._late: list[tuple[int, bytes]] = []
 
@@ -27,14 +27,17 @@ class Line:
         """What comes out for what goes in now."""
         out: list[bytes] = []
         for data in packets:
-            if LOSS in self._faults and self._random.random() < LOST_SHARE:
+            if self._befalls("loss"):
                 continue
-            if REORDER in self._faults and self._random.random() < LATE_SHARE:
+            if self._befalls("reorder"):
                 self._late.append((LATE_BY, data))
                 continue
             out.append(data)
-            if DUPLICATE in self._faults and self._random.random() < TWICE_SHARE:
+            if self._befalls("duplicate"):
                 out.append(data)
             out += [late for left, late in self._late if left == 1]
             self._late = [(left - 1, late) for left, late in self._late if left > 1]
         return out
+
+    def _befalls(self, name: str) -> bool:
+        return name in self._suffered and self._random.random() < KINDS[name].share

@@ -8,7 +8,7 @@ from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...mavlink.dialect import Message, dialect
 from ...mavlink.parameters.encoding import Parameter
 from .firmware import HIGHRES_IMU, RAW_IMU, SCALED_IMUS, SYS_STATUS, Firmware
-from .options import Options
+from .options import VehicleOptions
 from .store import INT32
 
 LOOP_HZ = 250
@@ -32,7 +32,7 @@ class Px4(Firmware):
     bytewise = True
     streams = ((HIGHRES_IMU, 20_000), (SYS_STATUS, 1_000_000))
 
-    def __init__(self, options: Options) -> None:
+    def __init__(self, options: VehicleOptions) -> None:
         super().__init__(options)
         store = self.store
         store.add("MAV_SYS_ID", options.system, INT32)

@@ -1,4 +1,4 @@
-"""The simulated vehicle as a link's transport, in this process: `--mavlink sim`. Knows no packet."""
+"""The simulated vehicle as a link's transport, in this process: `--mavlink sim`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import time
 from collections import deque
 
 from ...mavlink.transport import US, Bytes
-from .line import Line
+from .line import PacketLine
 from .vehicle import Vehicle
 
 ADDRESS = "the simulated vehicle"
@@ -21,7 +21,7 @@ class SimulatedTransport:
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._vehicle = vehicle
-        self._line = Line(vehicle.options.faults, vehicle.options.seed)
+        self._line = PacketLine(vehicle.options.fault, vehicle.options.seed)
         self._begun_ns = time.time_ns() // US * US
         self._begun_monotonic_ns = time.monotonic_ns()
         self._queue: deque[Bytes] = deque()

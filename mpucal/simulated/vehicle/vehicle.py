@@ -1,4 +1,4 @@
-"""A simulated vehicle on a line: hears packets, sends packets, as time goes on. Knows no socket and no clock."""
+"""A simulated vehicle on a line: hears packets, sends packets, as its time is moved on."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from ...mavlink.dialect import Message, Parser, dialect
 from ...mavlink.ftp import Payload
 from ...mavlink.parameters.encoding import Parameter, name_bytes, of_wire, to_wire
 from ...mavlink.prompts import Heard, of_message
+from ..faults import Schedule
 from .ardupilot import ArduPilot
 from .firmware import Firmware
 from .imus import Imus
-from .mishaps import Mishaps
-from .options import Options
+from .options import VehicleOptions
 from .px4 import Px4
 from .storage import Card
 from .streams import Streams
@@ -27,6 +27,7 @@ FIRMWARES: dict[str, type[Firmware]] = {"ardupilot": ArduPilot, "px4": Px4}
 
 COMPONENT = 1
 S_US = 1_000_000
+US = 1_000
 HEARTBEAT = 0
 SLOWER_WHILE_BUSY = 4
 SEQUENCE = 256
@@ -52,7 +53,9 @@ class Vehicle:
     key : 32 bytes with which it signs, and wants to be answered; None: neither.
     """
 
-    def __init__(self, options: Options, gravity: float = STANDARD_GRAVITY_MPS2, key: bytes | None = None) -> None:
+    def __init__(
+        self, options: VehicleOptions, gravity: float = STANDARD_GRAVITY_MPS2, key: bytes | None = None
+    ) -> None:
         self.options = options
         self.firmware = FIRMWARES[options.firmware](options)
         for name, value in options.parameters.items():
@@ -66,8 +69,8 @@ class Vehicle:
         self._parser = Parser(self._mav)
         self._now_us = 0
         self._silent_until_us: float = 0
-        self.card = Card(None if "no_storage" in options.faults else self.firmware.folder)
-        self._mishaps = Mishaps(options.faults)
+        self.card = Card(None if options.suffers("no_storage") else self.firmware.folder)
+        self._schedule = Schedule(options.fault)
         self._out: deque[Sent] = deque()
         self._boot()
         if options.rotate_at is not None:
@@ -112,8 +115,9 @@ class Vehicle:
         self.firmware.temperature_c = self.imus.temperature_c
 
     def _tick(self) -> None:
-        for mishap in self._mishaps.due(self._now_us):
-            self._MISHAPS[mishap](self)
+        for fault in self._schedule.due(self._now_us * US):
+            if fault.kind.strike is not None:
+                fault.kind.strike(self)
         self.firmware.sense(self.imus.next())
         if self._now_us < self._silent_until_us:
             return
@@ -215,18 +219,23 @@ class Vehicle:
         if prompt is not None:
             self.imus.hear(prompt, self._now_us / S_US)
 
-    def _arm(self) -> None:
+    # What goes wrong with it.
+
+    def arm(self) -> None:
+        """Somebody arms it."""
         self.firmware.armed = True
 
-    def _reboot(self) -> None:
+    def reboot(self) -> None:
+        """It boots anew, silent meanwhile."""
         self._silent_until_us = self._now_us + REBOOT_US
         self._boot()
 
-    def _fall_silent(self) -> None:
+    def fall_silent(self) -> None:
+        """It sends and hears nothing any more."""
         self._silent_until_us = math.inf
 
-    def _obey_second_station(self) -> None:
-        """A ground station at its default rate."""
+    def obey_second_station(self) -> None:
+        """A ground station asks for everything at its default rate."""
         for message_id, interval_us in self.firmware.group(SECOND_STATION_HZ):
             self._streams.set(message_id, interval_us, self._now_us)
 
@@ -234,12 +243,6 @@ class Vehicle:
         reply = self.card.answer(Payload.decode(bytes(message.payload)))
         self._send(dialect().MAVLink_file_transfer_protocol_message(0, 0, 0, bytearray(reply.encode())))
 
-    _MISHAPS: ClassVar[Mapping[str, Callable[[Vehicle], None]]] = {
-        "arm": _arm,
-        "reboot": _reboot,
-        "silence": _fall_silent,
-        "second_station": _obey_second_station,
-    }
     _HANDLERS: ClassVar[Mapping[str, Callable[[Vehicle, Message], None]]] = {
         "PARAM_REQUEST_READ": _param_request_read,
         "PARAM_REQUEST_LIST": _param_request_list,

@@ -11,7 +11,9 @@ from mpucal.errors import BusError, MpucalError, WriteBackError
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
 from mpucal.simulated.bridge import EmulatedLine, Memory
+from mpucal.simulated.bridge.spoilt import SpoiltBytes
 from mpucal.simulated.chip.clock import FastClock
+from mpucal.simulated.faults import Where, kinds
 from mpucal.sinks.bridge import BridgeSink
 from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.bridge.link import Link
@@ -20,39 +22,9 @@ from mpucal.sources.bridge.store import Store
 MS = 1_000_000
 
 faults = st.lists(
-    st.tuples(
-        st.integers(0, 4000), st.sampled_from(["lost", "twice", "flipped", "late", "noise"]), st.integers(1, 255)
-    ),
+    st.tuples(st.integers(0, 4000), st.sampled_from(list(kinds(Where.SERIAL))), st.integers(1, 255)),
     max_size=8,
 )
-
-
-class Faulty:
-    """Spoils bytes by their number on the line."""
-
-    def __init__(self, at):
-        self.at = {number: (kind, value) for number, kind, value in at}
-        self.number = 0
-        self.held = b""
-
-    def __call__(self, data):
-        out, late = bytearray(self.held), False
-        self.held = b""
-        for byte in data:
-            kind, value = self.at.get(self.number, ("", 0))
-            self.number += 1
-            late = late or kind == "late"
-            made = {
-                "lost": b"",
-                "twice": bytes([byte, byte]),
-                "flipped": bytes([byte ^ value]),
-                "noise": bytes([byte]) + bytes(value % 90),
-            }.get(kind, bytes([byte]))
-            if late:
-                self.held += made
-            else:
-                out += made
-        return bytes(out)
 
 
 def consistent(recording, numbers):
@@ -66,7 +38,10 @@ def consistent(recording, numbers):
 def test_spoiled_bytes(rig, numbers, stream, to_host, to_device, rate_hz):
     made = rig()
     driver = Driver(made.bus(), Config(rate_hz=rate_hz))
-    made.line.to_host, made.line.to_device = Faulty(to_host), Faulty([(n // 16, *rest) for n, *rest in to_device])
+    made.line.to_host, made.line.to_device = (
+        SpoiltBytes(to_host),
+        SpoiltBytes([(n // 16, *rest) for n, *rest in to_device]),
+    )
     driver.start()
     while made.line.to_host.number < 4000:
         driver.poll()
@@ -271,8 +246,8 @@ def test_spoiled_bytes_never_leave_a_part_of_a_blob(rig, to_host, to_device):
     store = store_on(made.line)
     store.write(old)
     made.line.to_host, made.line.to_device = (
-        Faulty([(n // 16, *rest) for n, *rest in to_host]),
-        Faulty([(n // 10, *rest) for n, *rest in to_device]),
+        SpoiltBytes([(n // 16, *rest) for n, *rest in to_host]),
+        SpoiltBytes([(n // 10, *rest) for n, *rest in to_device]),
     )
     try:
         store.write(new)
@@ -311,8 +286,8 @@ def test_the_sink_says_truly_which_calibration_is_there(rig, held_before, bytes_
     made.line.device = Reset(shaky, lambda: made.new_bridge(memory=memory))
     sink = BridgeSink(store_on(made.line))
     made.line.to_host, made.line.to_device = (
-        Faulty([(n // 16, *rest) for n, *rest in to_host]),
-        Faulty([(n // 10, *rest) for n, *rest in to_device]),
+        SpoiltBytes([(n // 16, *rest) for n, *rest in to_host]),
+        SpoiltBytes([(n // 10, *rest) for n, *rest in to_device]),
     )
     try:
         sink.write(calibration)

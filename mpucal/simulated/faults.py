@@ -1,0 +1,210 @@
+"""The table of simulated faults: name, what happens, where; `sim:fault=`, its errors and the docs' tables follow it.
+
+A transfer fails as Linux would tell it: OSError with the errno of Documentation/i2c/fault-codes.rst.
+"""
+
+from __future__ import annotations
+
+import errno
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Self
+
+from .mishaps import Knock, Mishap, Slip, Warmth
+
+
+class Where(StrEnum):
+    """What a fault befalls."""
+
+    CHIP = "chip"
+    BUS = "bus"
+    HAND = "hand"
+    VEHICLE = "vehicle"
+    LINK = "link"
+    SERIAL = "serial"
+
+
+OF_CHIP = (Where.BUS, Where.CHIP)
+OF_VEHICLE = (Where.VEHICLE, Where.LINK)
+
+
+@dataclass(frozen=True)
+class FaultKind:
+    """A row of the table; what is not given does not happen.
+
+    Attributes
+    ----------
+    name : as in an option. where : what it befalls. what : what happens.
+    timed : it begins at a time; otherwise it is there from the start.
+    seconds : how long it lasts. again_s : after which it happens again.
+    errno : with which every transfer fails meanwhile. takes_s : how long such a transfer takes.
+    flips : bytes arrive with bits flipped meanwhile. pause_s : how long the host does nothing.
+    strike : what happens to the chip at a time [ns] until another [ns], or to the vehicle.
+    share : of the packets, or of the bytes, that it befalls.
+    spoils : what a serial line makes of a byte, with a number from 1 to 255 to vary it.
+    mishap : what befalls the sensor.
+    """
+
+    name: str
+    where: Where
+    what: str
+    timed: bool = True
+    seconds: float = 0.0
+    again_s: float | None = None
+    errno: int | None = None
+    takes_s: float = 0.0
+    flips: bool = False
+    pause_s: float = 0.0
+    strike: Callable[..., None] | None = None
+    share: float = 0.0
+    spoils: Callable[[int, int], bytes] | None = None
+    mishap: type[Mishap] | None = None
+
+
+_ROWS = (
+    FaultKind("nack", Where.BUS, "for 0.3 s the chip does not acknowledge", seconds=0.3, errno=errno.EREMOTEIO),
+    FaultKind(
+        "timeout",
+        Where.BUS,
+        "for 0.5 s each transfer takes 0.1 s and fails",
+        seconds=0.5,
+        errno=errno.ETIMEDOUT,
+        takes_s=0.1,
+    ),
+    FaultKind("overflow", Where.BUS, "the host sleeps for 2 s", pause_s=2.0),
+    FaultKind(
+        "brownout",
+        Where.CHIP,
+        "the chip resets, and is gone for 50 ms",
+        seconds=0.05,
+        errno=errno.EREMOTEIO,
+        strike=lambda chip, t_ns, _: chip.reset(t_ns),
+    ),
+    FaultKind(
+        "stuck",
+        Where.BUS,
+        "a wire stays low from then on",
+        seconds=math.inf,
+        errno=errno.ETIMEDOUT,
+        takes_s=0.1,
+    ),
+    FaultKind("unplugged", Where.BUS, "a wire is pulled, for good", seconds=math.inf, errno=errno.EREMOTEIO),
+    FaultKind(
+        "bitflips",
+        Where.BUS,
+        "for 0.5 s one byte in 200 arrives with a bit flipped, in either direction",
+        seconds=0.5,
+        flips=True,
+        share=1 / 200,
+    ),
+    FaultKind(
+        "clock",
+        Where.CHIP,
+        "the sample clock runs 1 % faster from then on",
+        strike=lambda chip, t_ns, _: chip.hurry(1.01, t_ns),
+    ),
+    FaultKind(
+        "frozen",
+        Where.CHIP,
+        "for 1 s the sensor repeats itself",
+        seconds=1.0,
+        strike=lambda chip, _, end_ns: chip.freeze(end_ns),
+    ),
+    FaultKind("slip", Where.CHIP, "the FIFO loses a byte", strike=lambda chip, t_ns, _: chip.slip(t_ns)),
+    FaultKind("loose", Where.HAND, "the accelerometer turns by 8 deg on its mount", mishap=Slip),
+    FaultKind("knock", Where.HAND, "a blow, which leaves the accelerometer's bias changed by 0.4 m/s²", mishap=Knock),
+    FaultKind("warming", Where.HAND, "the chip warms by 15 °C within 40 s, and its biases follow", mishap=Warmth),
+    FaultKind("arm", Where.VEHICLE, "it is armed", strike=lambda vehicle: vehicle.arm()),
+    FaultKind("reboot", Where.VEHICLE, "it boots anew, and is silent for 2 s", strike=lambda vehicle: vehicle.reboot()),
+    FaultKind(
+        "silence", Where.VEHICLE, "it sends and hears nothing any more", strike=lambda vehicle: vehicle.fall_silent()
+    ),
+    FaultKind(
+        "second_station",
+        Where.VEHICLE,
+        "another station asks for 4 Hz of everything, every 15 s, as a MAVProxy at its default does",
+        again_s=15.0,
+        strike=lambda vehicle: vehicle.obey_second_station(),
+    ),
+    FaultKind("no_storage", Where.VEHICLE, "it has no card", timed=False),
+    FaultKind("loss", Where.LINK, "one packet in five is lost", timed=False, share=0.2),
+    FaultKind("reorder", Where.LINK, "one packet in ten is overtaken by three others", timed=False, share=0.1),
+    FaultKind("duplicate", Where.LINK, "one packet in ten comes twice", timed=False, share=0.1),
+    FaultKind("lost", Where.SERIAL, "a byte is lost", spoils=lambda byte, _: b""),
+    FaultKind("twice", Where.SERIAL, "a byte comes twice", spoils=lambda byte, _: bytes([byte, byte])),
+    FaultKind("flipped", Where.SERIAL, "bits of a byte are flipped", spoils=lambda byte, v: bytes([byte ^ v])),
+    FaultKind("noise", Where.SERIAL, "up to 89 bytes of noise", spoils=lambda byte, v: bytes([byte]) + bytes(v % 90)),
+    FaultKind("late", Where.SERIAL, "what follows comes with what is sent next"),
+)
+KINDS = {kind.name: kind for kind in _ROWS}
+
+
+def kinds(*where: Where) -> dict[str, FaultKind]:
+    """The rows of faults that befall any of these, by name."""
+    return {name: kind for name, kind in KINDS.items() if kind.where in where}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A kind of fault, by its name in KINDS, at `at_s` of its world's clock; 0 for one that is not timed."""
+
+    name: str
+    at_s: float = 0.0
+
+    def __str__(self) -> str:
+        return f"{self.name}@{self.at_s:g}" if self.kind.timed else self.name
+
+    @classmethod
+    def parse(cls, text: str, *where: Where) -> Self:
+        """Of NAME@SECONDS, or NAME of one that is not timed; KeyError or ValueError of anything else."""
+        name, at, seconds = text.partition("@")
+        if kinds(*where)[name].timed != bool(at):
+            raise ValueError(text)
+        at_s = float(seconds) if at else 0.0
+        if not 0 <= at_s < math.inf:
+            raise ValueError(text)
+        return cls(name, at_s)
+
+    @property
+    def kind(self) -> FaultKind:
+        """Its row."""
+        return KINDS[self.name]
+
+    @property
+    def begin_ns(self) -> int:
+        """When it begins."""
+        return round(self.at_s * 1e9)
+
+    @property
+    def end_ns(self) -> float:
+        """When it is over."""
+        return self.begin_ns + self.kind.seconds * 1e9
+
+
+class Schedule:
+    """The timed ones of `faults`, each when it begins, and again where it does that."""
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        timed = sorted((fault for fault in faults if fault.kind.timed), key=lambda fault: fault.at_s)
+        self._waiting = [(fault.begin_ns, fault) for fault in timed]
+
+    def due(self, now_ns: int) -> list[Fault]:
+        """Those that begin by `now_ns`, since the last call, in order."""
+        due = [(at_ns, fault) for at_ns, fault in self._waiting if at_ns <= now_ns]
+        self._waiting = [later for later in self._waiting if later[0] > now_ns]
+        for at_ns, fault in due:
+            if fault.kind.again_s is not None:
+                self._waiting.append((at_ns + round(fault.kind.again_s * 1e9), fault))
+        return [fault for _, fault in due]
+
+
+def mishaps(faults: Iterable[Fault]) -> list[Mishap]:
+    """What befalls the sensor in the hand, each begun at its time."""
+    begun = []
+    for fault in faults:
+        if fault.kind.mishap is not None:
+            begun.append(fault.kind.mishap())
+            begun[-1].begin(fault.at_s)
+    return begun

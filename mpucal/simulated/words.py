@@ -1,0 +1,105 @@
+"""The words of `sim:key=value,...`: what the simulated chip's and the simulated vehicle's options have in common."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping
+from typing import Any
+
+from ..errors import UsageError
+from .faults import Fault, Where, kinds
+
+FAULT = "fault"
+# how a value is read, and what it is to be
+Parser = tuple[Callable[[str], Any], str]
+
+
+def parsed(text: str, parsers: Mapping[str, Parser], seed: int | None, others: str | None = None) -> dict[str, Any]:
+    """The values by key of `sim` or `sim:key=value,...`; those of faults given more than once add up.
+
+    Parameters
+    ----------
+    seed : given beside `text`. others : the key under which numbers named in capitals are gathered.
+
+    Raises
+    ------
+    UsageError : an unknown key or value, a key given twice, or two seeds.
+    """
+    values: dict[str, Any] = {} if others is None else {others: {}}
+    words = text.partition(":")[2]
+    for word in words.split(",") if words else []:
+        key, equals, value = word.partition("=")
+        named = others is not None and key.isupper()
+        if not equals or not (named or key in parsers):
+            more = "" if others is None else ", or a parameter's name"
+            raise UsageError(f"sim: does not know {word!r}", f"its keys are {', '.join(parsers)}{more}")
+        made = _value(key, value, (number, "a number") if named else parsers[key])
+        if named:
+            values[str(others)][key] = made
+        elif key in values and key != FAULT:
+            raise UsageError(f"sim: {key} is given twice", "give it once")
+        else:
+            values[key] = (*values.get(key, ()), *made) if key == FAULT else made
+    if seed is not None and values.setdefault("seed", seed) != seed:
+        raise UsageError(f"sim: seed={values['seed']} and --seed {seed} differ", "give one of them")
+    return values
+
+
+def _value(key: str, text: str, parser: Parser) -> Any:
+    parse, expected = parser
+    try:
+        return parse(text)
+    except (ValueError, KeyError):
+        raise UsageError(f"sim: {key}={text} is not {expected}", "correct it, or leave it out") from None
+
+
+def number(text: str) -> float:
+    """A finite one; ValueError of anything else."""
+    if not math.isfinite(value := float(text)):
+        raise ValueError(text)
+    return value
+
+
+def at_least(lowest: float) -> Parser:
+    """A number from `lowest` on."""
+
+    def parse(text: str) -> float:
+        if (value := number(text)) < lowest:
+            raise ValueError(text)
+        return value
+
+    return parse, f"a number from {lowest:g} on"
+
+
+def whole(lowest: int, highest: int | None = None) -> Parser:
+    """A whole number within limits."""
+
+    def parse(text: str) -> int:
+        if (value := int(text)) < lowest or (highest is not None and value > highest):
+            raise ValueError(text)
+        return value
+
+    return parse, f"a whole number from {lowest} " + ("on" if highest is None else f"to {highest}")
+
+
+def one_of(names: Collection[str]) -> Parser:
+    """One of the names that there are as it is read."""
+
+    def parse(text: str) -> str:
+        if text not in names:
+            raise ValueError(text)
+        return text
+
+    return parse, "one of " + ", ".join(names)
+
+
+def faults(*where: Where) -> Parser:
+    """One or several faults that befall any of these."""
+    timed = ", ".join(name for name, kind in kinds(*where).items() if kind.timed)
+    others = ", ".join(name for name, kind in kinds(*where).items() if not kind.timed)
+    expected = f"NAME@SECONDS, or several with / between them, of {timed}"
+
+    def parse(text: str) -> tuple[Fault, ...]:
+        return tuple(Fault.parse(part, *where) for part in text.split("/"))
+
+    return parse, expected + (f"; or, without a time, of {others}" if others else "")

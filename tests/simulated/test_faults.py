@@ -1,0 +1,75 @@
+"""The table of faults: the pages hold it, the options take it, and what befalls the hand befalls chip and vehicle."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mpucal.chip.driver import Driver
+from mpucal.errors import UsageError
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip.options import ChipOptions
+from mpucal.simulated.faults import KINDS, OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, kinds
+from mpucal.simulated.vehicle import Vehicle, VehicleOptions
+
+DOCS = Path(__file__).parents[2] / "docs"
+WORLDS = {ChipOptions: (*OF_CHIP, Where.HAND), VehicleOptions: (*OF_VEHICLE, Where.HAND)}
+
+
+def table(page):
+    return (DOCS / page).read_text().split("| name | what happens |\n|---|---|\n")[1].split("\n\n")[0].splitlines()
+
+
+def test_the_pages_hold_the_table():
+    assert table("chips.md") == [f"| {kind.name} | {kind.what} |" for kind in kinds(*OF_CHIP, Where.HAND).values()]
+    vehicles = kinds(*OF_VEHICLE).values()
+    assert table("mavlink.md") == [f"| {kind.name}{'@' * kind.timed} | {kind.what} |" for kind in vehicles]
+
+
+@pytest.mark.parametrize("options", WORLDS)
+def test_each_world_takes_its_own_faults_and_names_them(options):
+    own = kinds(*WORLDS[options])
+    for name, kind in KINDS.items():
+        word = f"{name}@3" if kind.timed else name
+        if name in own:
+            assert [str(fault) for fault in options.parse(f"sim:fault={word}").fault] == [word]
+            continue
+        with pytest.raises(UsageError) as caught:
+            options.parse(f"sim:fault={word}")
+        assert set(own) <= set(str(caught.value).replace(",", " ").replace(";", " ").replace(":", " ").split())
+
+
+def test_a_time_goes_with_what_begins_at_one():
+    for word in ("arm", "loss@3", "nack@3"):
+        with pytest.raises(UsageError):
+            VehicleOptions.parse(f"sim:fault={word}")
+    both = VehicleOptions.parse("sim:fault=loss,fault=arm@3/reorder").fault
+    assert both == (Fault("loss"), Fault("arm", 3.0), Fault("reorder"))
+
+
+def test_a_schedule_gives_each_once_in_order_and_the_recurring_again():
+    schedule = Schedule((Fault("reboot", 5.0), Fault("second_station", 2.0), Fault("loss"), Fault("arm", 3.0)))
+    seen = [[fault.name for fault in schedule.due(t * 1_000_000_000)] for t in (1, 4, 5, 16, 17, 32)]
+    assert seen == [[], ["second_station", "arm"], ["reboot"], [], ["second_station"], ["second_station"]]
+
+
+def measured(word):
+    """Specific force of a board that lies flat, 10 s after the start."""
+    bus = open_simulated(f"sim:seed=6,hand=still{word}")
+    driver = Driver(bus)
+    driver.start()
+    bus.hear(SimpleNamespace(kind="lay_flat", down=None))
+    while driver.now_ns() < 13e9:
+        driver.poll()
+    recording = driver.recording()
+    return recording.acc[recording.t > 11.0].mean(0)
+
+
+@pytest.mark.parametrize(("name", "least"), [("loose", 1.0), ("knock", 0.3), ("warming", 0.01)])
+def test_what_befalls_the_hand_moves_the_sensor_of_chip_and_vehicle(name, least):
+    assert np.linalg.norm(measured(f",fault={name}@0") - measured("")) > least
+    plain, struck = (Vehicle(VehicleOptions.parse("sim:imus=1,hand=still" + word)) for word in ("", f",fault={name}@0"))
+    for vehicle in (plain, struck):
+        vehicle.go_on(13_000_000)
+    assert np.linalg.norm(struck.firmware.corrected[0, 0] - plain.firmware.corrected[0, 0]) > least / 2
