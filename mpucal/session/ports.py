@@ -1,4 +1,4 @@
-"""What a session's runner meets: a source, a person, a capture. Knows none of them."""
+"""What a session's runner meets: a source, a person, and who keeps session events in a capture."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from typing import Any, Protocol
 from ..chip.records import KEY, SessionEvent
 from ..data import Recording, Samples, Sensor
 from .events import Key, Output
-
-# of a capture: a key that was pressed, and that an answer was waited for
 
 
 class Source(Protocol):
@@ -73,4 +71,5 @@ class Replayed:
         return [*recorded, *(key for key in self._listener.pressed() if key is Key.ABORT)]
 
 
+# keeps a session event in the capture: name, time [ns], data
 Note = Callable[[str, int, Mapping[str, Any]], None]

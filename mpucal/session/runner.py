@@ -1,36 +1,19 @@
-"""Where source, session, person, fit and files meet. Knows no terminal and no kind of source."""
+"""Runs a session or a recording from its source's first byte to the files that it leaves."""
 
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..chip.records import FORGET, KEY, LATE, RESUMED
+from ..chip.records import KEY, RESUMED
 from ..data import Recording, Sensor
 from ..errors import Abandoned, BusError, CaptureError, ChipError, EndOfCapture
 from ..result.calibration import Calibration
-from .events import (
-    Abort,
-    Command,
-    Connected,
-    Decision,
-    Enough,
-    Event,
-    Fitted,
-    Forget,
-    Key,
-    Measured,
-    Prompt,
-    Redo,
-    Resumed,
-    SourceEnded,
-    Tick,
-    Written,
-)
+from .dialogue import Dialogue
+from .events import Connected, Fitted, Key, Prompt, Resumed, SourceEnded, Written
 from .live.questions import Here, Questions, Worker
 from .live.verdict import verified
 from .machine import Machine
@@ -38,9 +21,6 @@ from .plan import Plan
 from .ports import Note, Source, Talk
 from .results import result_files, save
 from .table import State
-
-MEASURING = (State.LAY_FLAT, State.ROTATE, State.VERIFY)
-_PRESSED: dict[Key, Event] = {Key.ENOUGH: Enough(), Key.REDO: Redo(), Key.ABORT: Abort()}
 
 
 class Runner:
@@ -72,13 +52,9 @@ class Runner:
     ) -> None:
         self._source, self._talk, self._note = source, talk, note
         self._plan = plan or Plan()
-        self._listeners, self._go_on, self._late, self._hire = listeners, go_on, late, hire
+        self._go_on, self._hire = go_on, hire
         self._machine = Machine(self._plan.until_end, self._plan.target, self._plan.tilt_only, self._plan.attended)
-        self._questions: Questions | None = None
-        # what must not reach the machine before an answer that is late
-        self._arrived: deque[Event] = deque()
-        self._forgotten: list[Forget] = []
-        self._said = Decision("")
+        self._dialogue = Dialogue(self._machine, talk, listeners, note, source.now_ns, late)
         self._ended = False
         self.sensor: Sensor | None = None
 
@@ -91,13 +67,13 @@ class Runner:
         SourceError : the source failed before the board was turned, or does not replay.
         """
         try:
-            self._ask()
+            self._dialogue.ask()
             self._connect()
             if self.sensor is not None:
-                self._questions = Questions(self._plan, self.sensor, self._hire)
-            while self._machine.state in MEASURING:
-                self._ask()
-                if self._machine.state in MEASURING:
+                self._dialogue.questions = Questions(self._plan, self.sensor, self._hire)
+            while self._dialogue.measuring:
+                self._dialogue.ask()
+                if self._dialogue.measuring:
                     self._poll()
         except Abandoned:
             # a replay that is stopped by who watches it went on when it was recorded
@@ -105,10 +81,10 @@ class Runner:
                 self._rest()
             raise
         finally:
-            if self._questions is not None:
-                self._questions.close()
+            if self._dialogue.questions is not None:
+                self._dialogue.questions.close()
         self._rest()
-        return self._recording()
+        return self._dialogue.remembered(self._source.recording())
 
     def record(self, seconds: float | None) -> int:
         """Measure for `seconds`, or until any key or the source's end; returns how many samples came.
@@ -122,7 +98,7 @@ class Runner:
         self._connect()
         begun_ns = self._source.now_ns()
         long_ns = math.inf if seconds is None else seconds * 1e9
-        while self._machine.state in MEASURING:
+        while self._dialogue.measuring:
             if self._talk.pressed() or self._source.now_ns() - begun_ns >= long_ns:
                 self._stop_here()
                 break
@@ -133,8 +109,8 @@ class Runner:
     def calibrate(self, recording: Recording, fit: Callable[[Recording], Calibration]) -> Calibration:
         """Fit, and join what the verification found; Abandoned where the person stopped it meanwhile."""
         calibration = verified(fit(recording), self._machine.checked)
-        self._ask()
-        self._feed(Fitted(calibration.verdict))
+        self._dialogue.ask()
+        self._dialogue.feed(Fitted(calibration.verdict))
         return calibration
 
     def write(
@@ -152,11 +128,11 @@ class Runner:
         """
         files: dict[str, bytes] = {}
         for name, data in result_files(calibration, recording, truth):
-            self._ask()
+            self._dialogue.ask()
             files[name] = data
         written = save(folder, files)
-        self._ask()
-        self._feed(Written(tuple(files)))
+        self._dialogue.ask()
+        self._dialogue.feed(Written(tuple(files)))
         return written
 
     def _collect(self, seconds: float | None) -> int:
@@ -172,8 +148,8 @@ class Runner:
 
     def _stop_here(self) -> None:
         """As by a key: a session that replays this goes on to calibrate, or has nothing to."""
-        if self._machine.state is State.ROTATE:
-            self._press(Key.ENOUGH)
+        if self._dialogue.state is State.ROTATE:
+            self._dialogue.press(Key.ENOUGH)
         else:
             self._note(KEY, self._source.now_ns(), {KEY: Key.ABORT.value})
 
@@ -183,7 +159,7 @@ class Runner:
         except EndOfCapture:
             self._ends(SourceEnded())
         else:
-            self._feed(Connected(self.sensor))
+            self._dialogue.feed(Connected(self.sensor))
 
     def _poll(self) -> None:
         try:
@@ -194,40 +170,20 @@ class Runner:
             # a CaptureError is none of these: what does not replay is not calibrated either
             self._ends(SourceEnded(f"{error.what}: {error.remedy}"), error)
         else:
-            self._arrived += Measured(samples), Tick(self._source.now_ns() * 1e-9)
-            self._catch_up()
-
-    def _catch_up(self, wait: bool = False) -> None:
-        """Tell the machine what arrived, each answer in its place; where one is late, the source goes on meanwhile."""
-        while self._machine.state in MEASURING:
-            if self._questions is not None and self._questions.due:
-                if not wait and self._late(self._questions.late):
-                    self._note(LATE, self._source.now_ns(), {})
-                    return
-                for answer in self._questions.answers():
-                    if self._machine.state in MEASURING:
-                        self._feed(answer)
-            elif self._arrived:
-                event = self._arrived.popleft()
-                if self._questions is not None and isinstance(event, Measured):
-                    self._questions.add(event.samples)
-                self._feed(event)
-            else:
-                return
-        self._arrived.clear()
+            self._dialogue.arrive(samples)
 
     def _ends(self, event: SourceEnded, error: BusError | ChipError | None = None) -> None:
         """That was all, or all of one part: what ended that does not end a session that was resumed."""
-        self._catch_up(wait=True)
-        enough = self.sensor is not None and self._machine.state not in MEASURING
+        self._dialogue.catch_up(wait=True)
+        enough = self.sensor is not None and not self._dialogue.measuring
         if not enough and self._next_part():
             return
         self._ended = True
         if enough:
             return
-        if error is not None and self._machine.state not in (State.ROTATE, State.VERIFY):
+        if error is not None and self._dialogue.state not in (State.ROTATE, State.VERIFY):
             raise error
-        self._feed(event)
+        self._dialogue.feed(event)
 
     def _next_part(self) -> bool:
         """Go on with the next part of a resumed session; False where there is none."""
@@ -239,17 +195,10 @@ class Runner:
             except EndOfCapture:
                 continue
             gap_s = (self._source.now_ns() - ended_ns) * 1e-9
-            self._feed(Connected(sensor) if self.sensor is None else Resumed(gap_s))
+            self._dialogue.feed(Connected(sensor) if self.sensor is None else Resumed(gap_s))
             self.sensor = sensor
             return True
         return False
-
-    def _recording(self) -> Recording:
-        """All samples but those that the person did not want."""
-        recording = self._source.recording()
-        for forget in sorted(self._forgotten, key=lambda f: f.first, reverse=True):
-            recording = recording.without(forget.first, forget.last)
-        return recording
 
     def _rest(self) -> None:
         if self._ended:
@@ -257,38 +206,3 @@ class Runner:
         # the samples are in: a sensor that cannot be put to rest takes nothing from them
         with suppress(BusError, ChipError, EndOfCapture):
             self._source.stop()
-
-    def _ask(self) -> None:
-        for key in self._talk.pressed():
-            self._press(key)
-
-    def _press(self, key: Key) -> None:
-        self._note(KEY, self._source.now_ns(), {KEY: key.value})
-        if self._arrived and key is not Key.ABORT:
-            self._arrived.append(_PRESSED[key])
-        else:
-            self._feed(_PRESSED[key])
-
-    def _feed(self, event: Event) -> None:
-        for output in self._machine.handle(event):
-            if isinstance(output, Command):
-                self._do(output)
-                continue
-            if isinstance(output, Decision):
-                self._said = output
-            self._talk.hear(output)
-            if isinstance(output, Prompt):
-                for listener in self._listeners:
-                    listener(output)
-        if self._machine.state is State.ABORTED:
-            raise Abandoned(self._said.why, self._said.remedy)
-
-    def _do(self, command: Command) -> None:
-        """What the machine asks of its owner."""
-        if isinstance(command, Forget):
-            self._forgotten = [f for f in self._forgotten if f.first != command.first] + [command]
-            self._note(FORGET, self._source.now_ns(), {"first": command.first, "last": command.last})
-            if self._questions is not None:
-                self._questions.forget(command.first)
-        elif self._questions is not None:
-            self._questions.ask(command)
