@@ -1,4 +1,4 @@
-"""What a person wants to know of a calibration first, in the units people use."""
+"""The summary of a calibration on the terminal: verdict, parameters in %, mg and deg, |a|, files."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..report.units import accelerometer, with_std
+from ..report.units import AXES, accelerometer, estimated_error
 from ..report.use import left_to_subtract
 from ..result.calibration import ACCELEROMETER_FORMULA, GOOD, REFUSED, USABLE, Calibration
 from ..result.session_files import BLOB, DOCUMENT, REPORT
 
-AXES = "xyz"
 # what fits a terminal of 80 columns
-WIDTH, LABEL, COLUMN = 79, 16, 20
+WIDTH, LABEL, COLUMN = 79, 23, 18
 SENTENCES = {
     GOOD: "The calibration is good.",
     USABLE: "The calibration is usable, with reservations:",
@@ -25,12 +24,12 @@ SENTENCES = {
 
 
 def summary(calibration: Calibration) -> str:
-    """The verdict in a sentence, its reasons, what was found and how sure that is."""
+    """The verdict with its reasons, the parameters with their standard uncertainties, and the estimated error."""
     lines = []
     if "verdict" in calibration.quality:
         reasons = calibration.quality.get("reasons", [])
         lines = [SENTENCES[calibration.verdict], *(_reason(reason["message"]) for reason in reasons), ""]
-    return "\n".join([*lines, *_parameters(calibration), *_magnitudes(calibration), *_fit(calibration)])
+    return "\n".join([*lines, *_parameters(calibration), *_accuracy(calibration), *_fit(calibration)])
 
 
 def written(paths: Sequence[Path]) -> str:
@@ -45,7 +44,7 @@ def written(paths: Sequence[Path]) -> str:
             f"  in firmware  {folder / BLOB.name}, as firmware_protocol.md describes it",
         ]
     else:
-        lines += [f"Next: look at {folder / REPORT.name}, mend what is named above, and run the session again."]
+        lines += [f"Next: look at {folder / REPORT.name}, fix what is named above, and run the session again."]
     return "\n".join(lines)
 
 
@@ -63,30 +62,23 @@ def _reason(message: str) -> str:
 
 
 def _parameters(c: Calibration) -> list[str]:
-    """Gain, bias, and how much each axis leans towards the other two; one column an axis."""
-    lines = [f"{'':<{LABEL}}" + "".join(f"{axis:>{COLUMN}}" for axis in AXES)]
-    for row in accelerometer(c):
-        cells = [
-            "" if row.name == f"lean to {axis}" else with_std(float(row.value[i]), float(row.std[i]))
-            for i, axis in enumerate(AXES)
-        ]
-        lines.append(
-            (f"{f'{row.name}, {row.unit}':<{LABEL}}" + "".join(f"{cell:>{COLUMN}}" for cell in cells)).rstrip()
-        )
-    return lines
+    """Scale factor error, bias and misalignment, one column an axis."""
+    rows = [("value ± 1 sigma", list(AXES)), *((f"{row.name}, {row.unit}", row.cells) for row in accelerometer(c))]
+    return [(f"{name:<{LABEL}}" + "".join(f"{cell:>{COLUMN}}" for cell in cells)).rstrip() for name, cells in rows]
 
 
-def _magnitudes(calibration: Calibration) -> list[str]:
+def _accuracy(calibration: Calibration) -> list[str]:
+    """The estimated error, and |a| of all samples."""
     before, after = (calibration.quality.get(f"magnitude_{when}") for when in ("before", "after"))
-    if not before or not after:
-        return []
-    rows = [("before", before), ("after", after)]
-    return ["", *(f"|a| {when:<7}{_statistics(row)}" for when, row in rows)]
+    rows = [("before", before), ("after", after)] if before and after else []
+    magnitudes = [f"|a| {when}, all samples: {_statistics(row)}" for when, row in rows]
+    said = [textwrap.fill(estimated_error(calibration), WIDTH)] if estimated_error(calibration) else []
+    return ["", *said, *magnitudes] if said or magnitudes else []
 
 
 def _statistics(row: Mapping[str, float | None]) -> str:
     median, std = (_number(row.get(key)) for key in ("median", "std"))
-    return f"{median:7.3f} m/s² in the median, spread {std:.3f}"
+    return f"median {median:.3f} m/s², standard deviation {std:.3f} m/s²"
 
 
 def _fit(calibration: Calibration) -> list[str]:

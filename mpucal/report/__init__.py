@@ -1,4 +1,4 @@
-"""The page a person looks at. Knows no estimate and no file."""
+"""The report: a calibration and its recording as one HTML page."""
 
 from .html import render
 

@@ -1,4 +1,4 @@
-"""The few elements of HTML that the page is made of; what comes from outside is escaped here. Knows no calibration."""
+"""The HTML elements that the report is made of; text from outside is escaped here."""
 
 from __future__ import annotations
 

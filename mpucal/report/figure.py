@@ -1,4 +1,4 @@
-"""A figure of matplotlib as SVG that takes its colours from the page. Knows nothing of what is drawn."""
+"""Figures of matplotlib as SVG elements that take their colours from the page."""
 
 from __future__ import annotations
 

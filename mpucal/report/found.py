@@ -1,4 +1,4 @@
-"""What the page says of the numbers: both sensors in people's units, the formula, the matrices. Judges nothing."""
+"""The sections on the parameters: both sensors in %, mg and deg, the formula, the verification, the matrices."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 from ..result.calibration import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA, Calibration
 from ..result.orientation import side_down
 from .elements import code, number, paragraph, section, table
-from .units import Measured, accelerometer, gyroscope, with_std
+from .units import AXES, Row, accelerometer, gyroscope, with_std
 from .use import formula
 
-_AXES = "xyz"
-NO_FORMULA = "D cannot be inverted: these numbers correct nothing."
+NO_FORMULA = "D cannot be inverted: no correction is possible."
+CAPTION = "value ± standard uncertainty (1 sigma)"
 
 
 def is_regular(c: Calibration) -> bool:
@@ -23,48 +23,51 @@ def is_regular(c: Calibration) -> bool:
 
 
 def accelerometer_section(c: Calibration) -> str:
-    """What is wrong with the accelerometer, and how sure that is."""
+    """The errors of the accelerometer, with their uncertainties."""
     explained = paragraph(
-        "An axis that leans to another one feels a part of that one's acceleration; 1 mg is 0.0098 m/s².", note=True
+        "Misalignment x->y is the angle from the sensitive axis x towards the board's axis y (cross-axis sensitivity);"
+        " 1 mg is 0.00981 m/s².",
+        note=True,
     )
     return section("The accelerometer", accelerometer_table(c, "accelerometer"), explained)
 
 
 def accelerometer_table(c: Calibration, id_: str) -> str:
-    """Its gains, biases and leans."""
-    return _in_peoples_units(id_, accelerometer(c))
+    """Its scale factor errors, biases and misalignments."""
+    return _rows(id_, accelerometer(c))
 
 
 def formula_section(c: Calibration) -> str:
-    """What mends it."""
+    """The formula that corrects it."""
     if not is_regular(c):
         return section("The formula", paragraph(NO_FORMULA, "formula", note=True))
-    said = paragraph(f"{ACCELEROMETER_FORMULA}, in m/s², y being what the sensor delivers at its nominal scale:")
+    said = paragraph(f"{ACCELEROMETER_FORMULA}, in m/s², with y the output of the sensor at its nominal scale factor:")
     applied = ""
     if np.any(c.applied_in_hardware):
         applied = paragraph(
-            "The chip's offset registers subtract a part of b_a already; the formula holds what is left to subtract.",
+            "The chip's offset registers subtract a part of b_a already; the formula subtracts the rest.",
             note=True,
         )
     return section("The formula", said, code(formula(c), "formula"), applied)
 
 
 def gyroscope_table(c: Calibration) -> str:
-    """What is wrong with the gyroscope, as far as it was estimated."""
+    """The errors of the gyroscope, as far as they were estimated."""
     estimated = np.isfinite(c.K_std).any()
     rows = gyroscope(c)
     if not estimated:
         rows = [row for row in rows if row.name == "bias"]
     said = (
-        "Estimated together with the accelerometer; what is ± ? the recording does not tell."
+        "Estimated together with the accelerometer. ± ?: not observable from this recording."
         if estimated
-        else "Its gains and axes were taken as they are; the recording did not ask for more, or does not tell."
+        else "Scale factor errors and misalignments were taken as zero: the recording agrees with that, or they are not"
+        " observable from it."
     )
-    return _in_peoples_units("gyroscope", rows) + paragraph(said, note=True)
+    return _rows("gyroscope", rows) + paragraph(said, note=True)
 
 
 def verification_section(c: Calibration) -> str:
-    """What orientations say that the calibration had not seen; empty where nobody asked them."""
+    """The errors in orientations that the calibration had not seen; empty without verification."""
     found = (c.quality.get("verification") or {}).get("orientations") or ()
     rows = [
         [
@@ -77,42 +80,34 @@ def verification_section(c: Calibration) -> str:
     if not rows:
         return ""
     said = paragraph(
-        "Orientations that the calibration had not seen when it was put to the test: how far it was off, and what its "
-        "own uncertainties promise (one standard deviation)."
+        "Errors of the calibration in orientations that it had not seen, each with its predicted standard uncertainty"
+        " (1 sigma)."
     )
-    return section("Verification", said, table("verification", "", ["", "|a| − gravity, m/s²", "direction, deg"], rows))
+    return section(
+        "Verification", said, table("verification", "", ["", "|a| error, m/s²", "direction error, deg"], rows)
+    )
 
 
 def matrices_section(c: Calibration) -> str:
-    """The numbers of calibration.json themselves."""
-    rows = [[f"D {axis}", *map(_pair, c.D[i], c.D_std[i])] for i, axis in enumerate(_AXES)]
+    """The parameters as calibration.json has them."""
+    rows = [[f"D {axis}", *map(_pair, c.D[i], c.D_std[i])] for i, axis in enumerate(AXES)]
     rows.append(["b_a, m/s²", *map(_pair, c.b_a, c.b_a_std)])
     rows.append(["noise, m/s²", *(number(value) for value in c.noise_std)])
-    turned = [[f"K {axis}", *map(_pair, c.K[i], c.K_std[i])] for i, axis in enumerate(_AXES)]
+    turned = [[f"K {axis}", *map(_pair, c.K[i], c.K_std[i])] for i, axis in enumerate(AXES)]
     turned.append(["b_omega, rad/s", *map(_pair, c.b_omega, c.b_omega_std)])
     turned.append(["noise, rad/s", *(number(value) for value in c.gyro_noise_std)])
-    caption = "{}; value ± standard deviation"
+    caption = "{}; " + CAPTION
     return section(
-        "The numbers themselves",
-        table("parameters", caption.format(ACCELEROMETER_FORMULA), ["", *_AXES], rows),
-        table("gyro-parameters", caption.format(GYROSCOPE_FORMULA), ["", *_AXES], turned),
+        "Parameters in calibration.json",
+        table("parameters", caption.format(ACCELEROMETER_FORMULA), ["", *AXES], rows),
+        table("gyro-parameters", caption.format(GYROSCOPE_FORMULA), ["", *AXES], turned),
     )
 
 
-def _in_peoples_units(id_: str, rows: Sequence[Measured]) -> str:
-    """One row a quantity, value ± standard deviation of each axis."""
-    cells = [
-        [f"{row.name}, {row.unit}", *("" if _is_itself(row, i) else _cell(row, i) for i in range(3))] for row in rows
-    ]
-    return table(id_, "value ± standard deviation", ["", *_AXES], cells)
-
-
-def _is_itself(row: Measured, i: int) -> bool:
-    return row.name == f"lean to {_AXES[i]}"
-
-
-def _cell(row: Measured, i: int) -> str:
-    return _unbroken(with_std(float(row.value[i]), float(row.std[i])))
+def _rows(id_: str, rows: Sequence[Row]) -> str:
+    """A table with a column for each axis."""
+    cells = [[f"{row.name}, {row.unit}", *map(_unbroken, row.cells)] for row in rows]
+    return table(id_, CAPTION, ["", *AXES], cells)
 
 
 def _pair(value: float, std: float) -> str:

@@ -1,4 +1,4 @@
-"""All pictures of a page, each with what is to be seen in it. Knows no verdict."""
+"""All pictures of the report with their captions."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from . import pictures, spheres
 from .elements import figure
 from .track import Track
 
-MAGNITUDE = "|a| over time. At rest it should be gravity in every orientation; while the board is moved it is not."
+MAGNITUDE = "|a| over time. At rest it should equal gravity in every orientation; while the board moves it does not."
 SPHERE = (
     "Each dot is the mean of a rest. Calibrated, they lie on the sphere of gravity; hollow ones are on its far side. "
     "Uncalibrated, they lie on an ellipsoid beside it."
 )
 COVERAGE = (
     "Which way was up, in the board's axes: the upper and the lower half of a sphere, seen from above. Dots are rests, "
-    "specks are turns; what is empty was not shown to the sensor."
+    "specks are turns; empty areas were not covered."
 )
 
 
@@ -49,12 +49,12 @@ def _about_innovations(track: Track) -> str:
         if part.any()
     ]
     return (
-        "What the calibrated accelerometer measured minus gravity as the gyroscope had carried it there: "
-        f"{' and '.join(said)} for each axis. At rest it should be noise about zero; while the board moves it is "
-        "mostly the hand's own acceleration."
+        "Innovation: the calibrated acceleration minus gravity as predicted by the gyroscope, "
+        f"{' and '.join(said)} for each axis. At rest it should be noise around zero; while the board moves it is "
+        "mostly the acceleration of the hand."
     )
 
 
 def _about_rates(track: Track) -> str:
     fastest = float(np.degrees(np.abs(track.recording.gyr).max()))
-    return f"Fastest: {fastest:.0f} deg/s. Turns that leave the range are lost to the gyroscope."
+    return f"Fastest: {fastest:.0f} deg/s. Rates beyond the range are clipped."

@@ -1,4 +1,4 @@
-"""The report as one HTML file that needs no network and no script. Judges nothing."""
+"""The report as one HTML file that needs no network and no script."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from pathlib import PurePath
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from .. import __version__
-from ..data import STANDARD_GRAVITY_MPS2, Recording
+from ..data import Recording
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.session_files import CAPTURE
 from .elements import as_float, code, heading, number, paragraph, quantity, section, table
@@ -25,13 +27,14 @@ from .found import (
 from .gallery import gallery
 from .style import CSS
 from .track import Track
+from .units import estimated_error
 from .use import in_c, in_python, in_ros
 from .vehicle import vehicle_section
 
 VERDICTS = {
-    GOOD: "Good: the calibration explains what the sensor measured, and each parameter is well known.",
+    GOOD: "Good: the model explains the measurements, and every parameter is well determined.",
     USABLE: "Usable, with the reservations below.",
-    REFUSED: "Refused: do not use these numbers.",
+    REFUSED: "Refused: do not use these parameters.",
 }
 INSTALL = "pip install 'mpucal[plot]'"
 CAPTURES = (".mcap", ".tlog")
@@ -40,15 +43,18 @@ _NOTHING: Mapping[str, str] = MappingProxyType({})
 
 def render(calibration: Calibration, recording: Recording | None = None) -> str:
     """The page of a calibration; with its recording, also the pictures of that."""
-    drawn, why_not = _pictures(calibration, recording)
+    track = _track(calibration, recording)
+    drawn, why_not = _pictures(recording, track)
     body = (
         _verdict(calibration, recording),
         accelerometer_section(calibration),
         formula_section(calibration),
-        section("|a| before and after", _magnitudes(calibration), why_not, *_those(drawn, "magnitude", "sphere")),
+        section(
+            "|a| before and after", _magnitudes(calibration, track), why_not, *_those(drawn, "magnitude", "sphere")
+        ),
         verification_section(calibration),
-        section("How well it fits", *_those(drawn, "innovations")),
-        section("Where it was turned", *_those(drawn, "coverage")),
+        section("Innovations", *_those(drawn, "innovations")),
+        section("Coverage of orientations", *_those(drawn, "coverage")),
         section("The gyroscope", gyroscope_table(calibration), *_those(drawn, "rates")),
         section("Temperature", *_those(drawn, "temperature")),
         vehicle_section(calibration),
@@ -72,7 +78,7 @@ def _article(chip: str | None) -> str:
 
 def _verdict(calibration: Calibration, recording: Recording | None) -> str:
     verdict = calibration.verdict
-    sentence = " ".join([VERDICTS.get(verdict, f"The verdict is {verdict}."), *_how_sure(calibration)])
+    sentence = " ".join([VERDICTS.get(verdict, f"The verdict is {verdict}."), estimated_error(calibration)]).strip()
     reasons = "".join(
         f"<li><code>{escape(str(reason['code']))}</code>: {escape(str(reason['message']))}</li>\n"
         for reason in calibration.quality.get("reasons", ())
@@ -82,36 +88,32 @@ def _verdict(calibration: Calibration, recording: Recording | None) -> str:
     return f'<p class="verdict {escape(verdict)}" id="verdict">{escape(sentence)}</p>\n{listed}{recovered}'
 
 
-def _how_sure(calibration: Calibration) -> list[str]:
-    """What an error of a calibrated reading amounts to; nothing where it is not known or the result is refused."""
-    error = calibration.quality.get("error_std") or {}
-    rms, direction = as_float(error.get("rms")), as_float(error.get("direction_deg"))
-    if calibration.verdict == REFUSED or not (math.isfinite(rms) and math.isfinite(direction)):
-        return []
-    mg = 1000.0 * rms / STANDARD_GRAVITY_MPS2
-    where = "over the tilts that it holds for" if calibration.fit.get("model") == "tilt" else "over all orientations"
-    return [
-        f"A calibrated reading is off by {rms:.2g} m/s² ({mg:.2g} mg) rms {where}, and its direction"
-        f" by {direction:.2g} deg."
-    ]
+def _track(calibration: Calibration, recording: Recording | None) -> Track | None:
+    """The recording as the calibration sees it; None without one, or where D cannot be inverted."""
+    return None if recording is None or not is_regular(calibration) else Track(recording, calibration)
 
 
-def _magnitudes(calibration: Calibration) -> str:
+def _magnitudes(calibration: Calibration, track: Track | None) -> str:
+    """|a| before and after: of the rests' means, where the recording has rests, and of all samples."""
     rows = []
+    if track is not None and len(track.runs):
+        for name, acc in (("before", track.recording.acc), ("after", track.calibrated)):
+            of_rests = np.linalg.norm(track.at_rest(acc), axis=1)
+            rows.append([f"at rest, {name}", *(number(f(of_rests), 4) for f in (np.median, np.mean, np.std))])
     for name in ("before", "after"):
         values: Mapping[str, Any] = calibration.quality.get(f"magnitude_{name}") or {}
-        rows.append([name, *(number(values.get(key), 4) for key in ("median", "mean", "std"))])
-    return table("magnitudes", "|a|, m/s²", ["", "median", "mean", "std"], rows)
+        rows.append([f"all samples, {name}", *(number(values.get(key), 4) for key in ("median", "mean", "std"))])
+    return table("magnitudes", "|a|, m/s²", ["", "median", "mean", "standard deviation"], rows)
 
 
-def _pictures(calibration: Calibration, recording: Recording | None) -> tuple[Mapping[str, str], str]:
+def _pictures(recording: Recording | None, track: Track | None) -> tuple[Mapping[str, str], str]:
     """The pictures by name, and why there are none."""
     if recording is None:
         return _NOTHING, ""
-    if not is_regular(calibration):
-        return _NOTHING, paragraph("D cannot be inverted: there are no pictures.", note=True)
+    if track is None:
+        return _NOTHING, paragraph("D cannot be inverted, so there are no pictures.", note=True)
     try:
-        return gallery(Track(recording, calibration)), ""
+        return gallery(track), ""
     except ImportError:
         said = f"For pictures install matplotlib ({INSTALL}), then run mpucal calibrate on the recording."
         return _NOTHING, paragraph(said, "no-picture", note=True)
@@ -161,7 +163,7 @@ def _settings(calibration: Calibration, recording: Recording | None) -> str:
 
 
 def _reproduction(calibration: Calibration, recording: Recording | None) -> str:
-    """The commands that give these numbers again; none where nobody says from what."""
+    """The commands that reproduce these numbers; none where the recording is not known."""
     gravity, model = as_float(calibration.fit.get("gravity")), calibration.fit.get("model")
     if recording is None or model is None or not math.isfinite(gravity):
         return ""
@@ -171,7 +173,7 @@ def _reproduction(calibration: Calibration, recording: Recording | None) -> str:
     if PurePath(recording.name).suffix in CAPTURES:
         lines.append(f"mpucal session --replay {source} -o replayed")
     said = paragraph(
-        "In the folder of this page. The first fits the recording again; the second runs the whole session again, "
+        "In the folder of this page. The first fits the recording again; the second replays the whole session, "
         "prompt by prompt, where a session made it."
         if len(lines) > 1
         else "In the folder of the recording:"

@@ -1,4 +1,4 @@
-"""What the page draws over time: magnitudes, innovations, rates, temperature. Judges nothing."""
+"""The pictures over time: magnitudes, innovations, rates, temperature."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BINS = 500
-# innovations beyond this share of them are jerks, which may leave the picture
+# innovations beyond this share of them are jerks, which may lie outside the picture
 _MOST = 0.995
 _LEAST_SPAN_C = 1.0
 
@@ -34,7 +34,7 @@ def magnitude(track: Track) -> str:
 
 
 def innovations(track: Track) -> str:
-    """What was measured minus what gravity and gyroscope foretold; empty where nothing foretells."""
+    """The innovations: measured minus predicted acceleration; empty where the filter cannot run."""
     e = track.innovations
     if e is None:
         return ""

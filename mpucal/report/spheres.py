@@ -1,4 +1,4 @@
-"""What the page draws of directions: the sphere of gravity, and which ways were up. Judges nothing."""
+"""The pictures of directions: measurements beside the sphere of gravity, and the coverage of orientations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the report looks, by daylight and at night, on a desk and on a phone. Knows no content."""
+"""The style sheet of the report: light and dark, wide and narrow screens, print."""
 
 CSS = """
 :root { color-scheme: light dark;

@@ -1,4 +1,4 @@
-"""A recording as its calibration sees it: rests, calibrated samples, innovations. Knows no picture and no page."""
+"""A recording seen through its calibration: rests, calibrated samples, innovations."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Track:
 
     @cached_property
     def innovations(self) -> Vector | None:
-        """(m, 3) m/s^2, the last m samples' calibrated measurement minus gravity as the gyroscope carried it there.
+        """(m, 3) m/s^2, the last m samples' calibrated measurement minus gravity as the gyroscope predicts it.
 
         It is inv(D) e of equation (8), by the hand's filter. None where the filter cannot run.
         """

@@ -1,4 +1,4 @@
-"""The rows that the report and the terminal show of a calibration: %, mg and degrees with their standard deviations."""
+"""The parameters as report and terminal show them: %, mg and deg, with standard uncertainties (1 sigma)."""
 
 from __future__ import annotations
 
@@ -9,54 +9,84 @@ import numpy as np
 
 from ..data import Vector
 from ..result import error_model
-from ..result.calibration import Calibration, unknown
+from ..result.calibration import REFUSED, Calibration, unknown
+
+AXES = error_model.AXES
 
 
 @dataclass(frozen=True)
-class Measured:
-    """A row of numbers with their standard deviations, NaN where unknown.
+class Row:
+    """Numbers of one kind for the axes x, y and z, NaN where unknown.
 
     Attributes
     ----------
-    name, unit : of the row. value, std : (3,) of x, y and z.
+    name, unit : of the row. value, std : (3,) of x, y and z. axes : those that the row has a number for.
     """
 
     name: str
     unit: str
     value: Vector
     std: Vector
+    axes: str = AXES
+
+    @property
+    def cells(self) -> list[str]:
+        """value ± standard uncertainty, one text an axis; empty where the row has none."""
+        return [
+            with_std(float(self.value[i]), float(self.std[i])) if axis in self.axes else ""
+            for i, axis in enumerate(AXES)
+        ]
 
 
-def accelerometer(c: Calibration) -> list[Measured]:
-    """Gain error, bias, and how far each axis leans towards the other two; NaN where that is itself."""
-    bias = Measured("bias", "mg", error_model.bias_mg(c.b_a), error_model.bias_mg(c.b_a_std))
-    return [_gain(c.D, c.D_std), bias, *_leans(c.D, c.D_std)]
+def accelerometer(c: Calibration) -> list[Row]:
+    """Scale factor error, bias and misalignment of each axis."""
+    bias = Row("bias", "mg", error_model.bias_mg(c.b_a), error_model.bias_mg(c.b_a_std))
+    return [_scale_factor_error(c.D, c.D_std), bias, *_misalignments(c.D, c.D_std)]
 
 
-def gyroscope(c: Calibration) -> list[Measured]:
-    """Likewise of the gyroscope, y = inv(K) w + b_omega: what is wrong with it, not what mends it."""
+def gyroscope(c: Calibration) -> list[Row]:
+    """The same of the gyroscope, y = inv(K) w + b_omega."""
     known = np.isfinite(c.K).all() and np.linalg.matrix_rank(c.K) == 3
     matrix = np.asarray(np.linalg.inv(c.K)) if known else unknown(3, 3)
     # the deviations of inv(K) are those of K to first order, which is what a K near the identity is good for
-    bias = Measured("bias", "deg/s", np.degrees(c.b_omega), np.degrees(c.b_omega_std))
-    return [_gain(matrix, c.K_std), bias, *_leans(matrix, c.K_std)]
+    bias = Row("bias", "deg/s", np.degrees(c.b_omega), np.degrees(c.b_omega_std))
+    return [_scale_factor_error(matrix, c.K_std), bias, *_misalignments(matrix, c.K_std)]
 
 
-def _gain(matrix: Vector, std: Vector) -> Measured:
+def _scale_factor_error(matrix: Vector, std: Vector) -> Row:
     value = error_model.scale_factor_error(matrix)
-    return Measured("gain error", "%", value, error_model.scale_factor_error_std(std))
+    return Row("scale factor error", "%", value, error_model.scale_factor_error_std(std))
 
 
-def _leans(matrix: Vector, std: Vector) -> list[Measured]:
-    lean, lean_std = error_model.misalignment(matrix), error_model.misalignment_std(matrix, std)
-    return [Measured(f"lean to {axis}", "deg", lean[:, j], lean_std[:, j]) for j, axis in enumerate(error_model.AXES)]
+def _misalignments(matrix: Vector, std: Vector) -> list[Row]:
+    """Six rows, each with one number in the column of the axis that is misaligned."""
+    angle, angle_std = error_model.misalignment(matrix), error_model.misalignment_std(matrix, std)
+    return [
+        Row(f"misalignment {axis}->{other}", "deg", angle[:, j], angle_std[:, j], axis)
+        for axis in AXES
+        for j, other in enumerate(AXES)
+        if axis != other
+    ]
 
 
 def with_std(value: float, std: float, most_digits: int = 5) -> str:
-    """A value ± its standard deviation, to the second digit of that."""
+    """A value ± its standard uncertainty, to the second digit of that."""
     if not math.isfinite(value):
         return "unknown"
     if not math.isfinite(std) or std <= 0.0:
         return f"{value:+.3f} ± ?"
     digits = min(max(1 - math.floor(math.log10(std)), 0), most_digits)
     return f"{value:+.{digits}f} ± {std:.{digits}f}"
+
+
+def estimated_error(c: Calibration) -> str:
+    """The estimated error of a calibrated acceleration in a sentence; empty where unknown or refused."""
+    error = c.quality.get("error_std") or {}
+    rms, direction = (math.nan if error.get(key) is None else float(error[key]) for key in ("rms", "direction_deg"))
+    if c.verdict == REFUSED or not (math.isfinite(rms) and math.isfinite(direction)):
+        return ""
+    where = "the tilts that it holds for" if c.fit.get("model") == "tilt" else "all orientations"
+    return (
+        f"Estimated error after calibration: {error_model.MG_PER_MPS2 * rms:.2g} mg rms (1 sigma) over {where},"
+        f" {direction:.2g} deg in direction."
+    )

@@ -1,4 +1,4 @@
-"""How a calibration is applied: functions in C, Python and ROS with its numbers in them. Knows no page."""
+"""How a calibration is applied: functions in C, Python and ROS with its numbers in them."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def inverse(c: Calibration) -> Vector:
 
 def formula(c: Calibration) -> str:
     """a = inv(D) (y - b_a), one line an axis."""
-    gain, bias = inverse(c), left_to_subtract(c)
+    inv_D, bias = inverse(c), left_to_subtract(c)
     rows = (
         " ".join(
             f"{factor:+.6f} * (y_{of} {-offset:+.6f})" for factor, of, offset in zip(row, "xyz", bias, strict=True)
         )
-        for row in gain
+        for row in inv_D
     )
     return "\n".join(f"a_{axis} = {row}" for axis, row in zip("xyz", rows, strict=True))
 
@@ -72,7 +72,7 @@ def in_python(c: Calibration) -> str:
 
 def apply(y):
     \"\"\"Calibrated accelerations (..., 3) [m/s^2] of measured ones.\"\"\"
-    return (np.asarray(y) - BIAS) @ GAIN.T
+    return (np.asarray(y) - B_A) @ INV_D.T
 """
 
 
@@ -96,7 +96,7 @@ class Calibrated(Node):
 
     def hear(self, imu):
         y = imu.linear_acceleration
-        y.x, y.y, y.z = (GAIN @ (np.array([y.x, y.y, y.z]) - BIAS)).tolist()
+        y.x, y.y, y.z = (INV_D @ (np.array([y.x, y.y, y.z]) - B_A)).tolist()
 {told}        self.out.publish(imu)
 
 
@@ -109,7 +109,7 @@ if __name__ == "__main__":
 def _matrices(c: Calibration) -> str:
     rows = py_matrix(inverse(c))
     bias = _joined(f"{v:.8f}" for v in left_to_subtract(c))
-    return f"GAIN = np.array([  # inv(D)\n{rows},\n])\nBIAS = np.array([{bias}])  # b_a, m/s^2\n"
+    return f"INV_D = np.array([\n{rows},\n])\nB_A = np.array([{bias}])  # m/s^2\n"
 
 
 def _about_counts(c: Calibration, begin: str, end: str) -> str:

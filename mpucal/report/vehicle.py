@@ -1,4 +1,4 @@
-"""What the page says of a vehicle: its autopilot's parameters and its other IMUs. Judges nothing."""
+"""The section on a vehicle: its autopilot's parameters and its other IMUs."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ def vehicle_section(c: Calibration) -> str:
 
 
 def _parameters(id_: str, autopilot: Mapping[str, Any]) -> list[str]:
-    """The parameters that the calibration sets, as they were and as they shall be."""
+    """The parameters that the calibration sets: old and new values."""
     old, new = autopilot.get("params_old") or {}, autopilot.get("params_new") or {}
     if not new:
         return []
     rows = [[name, _value(old.get(name)), _value(value)] for name, value in new.items()]
     residual = as_float(autopilot.get("residual_mps2"))
-    left = f" What they cannot hold of the calibration is {residual:.2g} m/s² rms." if math.isfinite(residual) else ""
+    left = f" What they cannot represent leaves an error of {residual:.2g} m/s² rms." if math.isfinite(residual) else ""
     said = paragraph(
-        f"An autopilot keeps offsets and scales only, and applies them itself.{left} They are set by mpucal write"
-        " calibration.json autopilot.",
+        f"An autopilot keeps offsets and scale factors only, and applies them itself.{left} "
+        "They are set by mpucal write calibration.json autopilot.",
         note=True,
     )
     return [table(id_, f"parameters of {autopilot.get('firmware', 'the autopilot')}", ["", "old", "new"], rows), said]

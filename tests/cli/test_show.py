@@ -35,10 +35,10 @@ def row(text, name):
 def test_a_summary_is_in_the_units_of_people_and_fits_80_columns():
     text = summary(calibration())
     assert text.startswith("The calibration is good.")
-    assert " ".join(row(text, "gain error, %").split()[3:]) == "+2.000 ± 0.020 -1.000 ± 0.020 +0.000 ± 0.020"
+    assert " ".join(row(text, "scale factor error, %").split()[4:]) == "+2.000 ± 0.020 -1.000 ± 0.020 +0.000 ± 0.020"
     assert row(text, "bias, mg").split()[2:] == ["+10.0", "±", "1.0", "-51.0", "±", "2.0", "+0.000", "±", "?"]
-    assert row(text, "lean to y, deg").endswith("+1.000 ± 0.011")
-    assert "9.800 m/s² in the median" in row(text, "|a| after")
+    assert row(text, "misalignment z->y, deg").endswith("+1.000 ± 0.011")
+    assert "median 9.800 m/s²" in row(text, "|a| after")
     assert max(map(len, text.splitlines())) < 80
 
 
@@ -51,7 +51,7 @@ def test_reservations_are_named(verdict):
 
 def test_nobody_judged_a_blob():
     text = summary(calibration(quality={}, fit={}))
-    assert text.splitlines()[0].split() == ["x", "y", "z"]
+    assert text.splitlines()[0].split() == ["value", "±", "1", "sigma", "x", "y", "z"]
     assert "calibration is" not in text
 
 

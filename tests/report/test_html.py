@@ -110,10 +110,10 @@ def test_shows_the_parameters_with_their_uncertainties(calibration):
 
 def test_shows_the_magnitudes_of_the_document(calibration):
     rows = Page(render(calibration)).tables["magnitudes"]
-    assert rows[0] == ["", "median", "mean", "std"]
+    assert rows[0] == ["", "median", "mean", "standard deviation"]
     for row, name in zip(rows[1:], ("before", "after"), strict=True):
-        expected = [calibration.quality[f"magnitude_{name}"][key] for key in rows[0][1:]]
-        assert row[0] == name
+        expected = [calibration.quality[f"magnitude_{name}"][key] for key in ("median", "mean", "std")]
+        assert row[0] == f"all samples, {name}"
         np.testing.assert_allclose([float(cell) for cell in row[1:]], expected, atol=5.1e-5)
 
 

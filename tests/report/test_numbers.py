@@ -4,6 +4,7 @@ import html
 import math
 import re
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -43,31 +44,27 @@ def accelerometer(result):
     return {name: np.array(result.document["accelerometer"][name]) for name in ("D", "b_a", "D_std", "b_a_std")}
 
 
-def test_gains_and_biases(result, accelerometer):
+def test_scale_factor_errors_and_biases(result, accelerometer):
     rows = table(result.html, "accelerometer")
     a = accelerometer
-    agree(rows["gain error, %"], 100 * (np.diag(a["D"]) - 1), 100 * np.diag(a["D_std"]))
+    agree(rows["scale factor error, %"], 100 * (np.diag(a["D"]) - 1), 100 * np.diag(a["D_std"]))
     agree(rows["bias, mg"], a["b_a"] / MG, a["b_a_std"] / MG)
 
 
-@pytest.mark.parametrize("axis", range(3), ids="xyz")
-def test_leans(result, accelerometer, axis):
+@pytest.mark.parametrize(("i", "j"), list(permutations(range(3), 2)))
+def test_misalignments(result, accelerometer, i, j):
     D, D_std = accelerometer["D"], accelerometer["D_std"]
-    expected = [
-        [math.nan if i == axis else angle(i) for i in range(3)]
-        for angle in (
-            lambda i: math.degrees(math.atan(D[i, axis] / D[i, i])),
-            lambda i: math.degrees(math.hypot(D_std[i, axis], D_std[i, i] * D[i, axis] / D[i, i]) / D[i, i]),
-        )
-    ]
-    agree(table(result.html, "accelerometer")[f"lean to {'xyz'[axis]}, deg"], *expected)
+    angle = math.degrees(math.atan(D[i, j] / D[i, i]))
+    std = math.degrees(math.hypot(D_std[i, j], D_std[i, i] * D[i, j] / D[i, i]) / D[i, i])
+    values, stds = ([number if k == i else math.nan for k in range(3)] for number in (angle, std))
+    agree(table(result.html, "accelerometer")[f"misalignment {'xyz'[i]}->{'xyz'[j]}, deg"], values, stds)
 
 
 def test_the_gyroscope(result):
     gyro = {name: np.array(value) for name, value in result.document["gyroscope"].items() if name != "formula"}
     rows = table(result.html, "gyroscope")
     wrong = np.linalg.inv(gyro["K"])
-    agree(rows["gain error, %"], 100 * (np.diag(wrong) - 1), 100 * np.diag(gyro["K_std"]))
+    agree(rows["scale factor error, %"], 100 * (np.diag(wrong) - 1), 100 * np.diag(gyro["K_std"]))
     agree(rows["bias, deg/s"], np.degrees(gyro["b_omega"]), np.degrees(gyro["b_omega_std"]))
 
 
@@ -86,17 +83,15 @@ def test_magnitudes(result):
     rows = table(result.html, "magnitudes")
     for when in ("before", "after"):
         expected = result.document["quality"][f"magnitude_{when}"]
-        assert rows[when] == [f"{expected[key]:.4f}" for key in ("median", "mean", "std")]
+        assert rows[f"all samples, {when}"] == [f"{expected[key]:.4f}" for key in ("median", "mean", "std")]
 
 
 def test_the_sentence_says_how_sure(result):
     error = result.document["quality"]["error_std"]
     sentence = re.search(r'id="verdict">(.*?)</p>', result.html)[1]
     assert sentence.lower().startswith(result.document["quality"]["verdict"])
-    rms, mg, direction = map(float, re.search(r"off by (\S+) m/s² \((\S+) mg\).*? by (\S+) deg", sentence).groups())
-    np.testing.assert_allclose(
-        [rms, mg * MG, direction], [error["rms"], error["rms"], error["direction_deg"]], rtol=0.06
-    )
+    mg, direction = map(float, re.search(r": (\S+) mg rms \(1 sigma\) .*?, (\S+) deg in direction", sentence).groups())
+    np.testing.assert_allclose([mg * MG, direction], [error["rms"], error["direction_deg"]], rtol=0.06)
 
 
 def test_it_says_how_to_fit_it_again(result):
@@ -116,7 +111,7 @@ def test_a_session_is_fitted_again_from_all_its_captures(result, name):
 def test_what_was_only_tilted_claims_its_tilts_alone(result):
     document = {**result.document, "fit": {**result.document["fit"], "model": "tilt"}}
     sentence = re.search(r'id="verdict">(.*?)</p>', render(Calibration.from_document(document)))[1]
-    assert "rms over the tilts that it holds for" in sentence
+    assert "rms (1 sigma) over the tilts that it holds for" in sentence
 
 
 def test_the_verification(result):
