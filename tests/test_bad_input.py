@@ -84,7 +84,7 @@ def test_a_bus_that_fails_says_why_and_leaves_nothing(mpucal, tmp_path, monkeypa
         (["session", "--bus", "sim", "--gravity", "-9.81"], "'-9.81' is no local gravity"),
         (["session", "--bus", "sim", "--gravity", "nan"], "'nan' is no local gravity"),
         (["calibrate", "walk.npz", "--gravity", "much"], "'much' is no local gravity"),
-        (["session", "--bus", "sim", "--address", "0x68"], "--address is where a real chip answers"),
+        (["session", "--bus", "sim", "--address", "0x68"], "--address was given beside --bus sim, which has none"),
         (["session", "--bus", "sim", "--rate", "3"], "take 3.90625 Hz"),
         (["record", "--bus", "sim", "--seconds", "0"], "--seconds"),
         (["record"], "no source was given"),

@@ -28,7 +28,7 @@ from mpucal.files import load
 from mpucal.files.npz import load_npz
 from mpucal.session.plan import Plan
 from mpucal.simulated.chip import open_recorded
-from mpucal.sources.on_chip import OnBus
+from mpucal.sources.chip import OpenedChip
 from mpucal.terminal.console import console
 
 # a count of the recording is one of the chip's where they differ by less than this
@@ -86,7 +86,7 @@ def make_capture(file: Path, capture: Path, gravity: float, model: str) -> str:
     )
     plan = Plan(config, gravity, model, until_end=True)
     try:
-        with running(OnBus(bus, plan), capture, console(quiet=True)) as runner:
+        with running(OpenedChip(bus, plan), capture, console(quiet=True)) as runner:
             runner.measure()
         note = ""
     except Abandoned as error:

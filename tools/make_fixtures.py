@@ -24,10 +24,10 @@ from mpucal.calibration import calibrate
 from mpucal.chip.config import Config
 from mpucal.chip.records import SessionEvent
 from mpucal.cli.running import running
-from mpucal.cli.source import open_bus
 from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.session.events import Key, Output, Progress
 from mpucal.session.plan import Plan
+from mpucal.sources.opening import open_again
 from mpucal.terminal.keys import Keys
 from mpucal.terminal.lines import JsonLines
 
@@ -83,7 +83,7 @@ class Typist(JsonLines):
 
 def make_session(script: Script, capture: Path) -> dict[str, Any]:
     """Run it into `capture`, and return what it said and found."""
-    source = open_bus(script.bus, Plan(script.config, model=MODEL), address=None, seed=None)
+    source = open_again({"bus": script.bus}, Plan(script.config, model=MODEL))
     person = Typist(script.enter)
     with tempfile.TemporaryDirectory() as folder:
         dated = Path(folder) / capture.name

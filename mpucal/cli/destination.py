@@ -12,9 +12,9 @@ from ..errors import UsageError
 from ..sinks.choose import FILE, check_behind, defaults
 from ..sinks.kind import Device, SinkKind
 from ..sinks.table import SINKS
-from .options import SOURCES
+from ..sources.opening import open_source
+from ..sources.table import kinds_meant
 from .person import say
-from .source import opened
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -45,14 +45,14 @@ def sink_flags(command: F) -> F:
 
 def source_given(options: Mapping[str, Any]) -> str:
     """The option that names the source."""
-    return next(name for name in SOURCES if options.get(name) is not None)
+    return kinds_meant(options)[0].option.name
 
 
 def device(options: Mapping[str, Any]) -> Device:
     """The device that a command's source options name; its sinks' flags are among the options."""
     flags = {flag.name for kind in SINKS.values() for flag in kind.flags}
     given = frozenset(name for name in flags if options.get(name))
-    return Device(str(options[source_given(options)]), partial(opened, options), say, given)
+    return Device(str(options[source_given(options)]), partial(open_source, options), say, given)
 
 
 def check_sink(kind: SinkKind, options: Mapping[str, Any]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,141 +12,85 @@ from click.core import ParameterSource
 
 from ..calibration import MODELS
 from ..chip.config import Config
-from ..chip.registers import DLPF_CODES
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import UsageError
 from ..session.aims import AIMS, NORMAL
-
-TLOG = ".tlog"
+from ..sources import opening
+from ..sources.kind import Option, SourceKind
+from ..sources.table import SOURCES, unique, used_by
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-ACCEL_RANGES_G, GYRO_RANGES_DPS = ("2", "4", "8", "16"), ("250", "500", "1000", "2000")
 
-# what a capture fixes: none of it may be given beside --replay
-FIXED_BY_CAPTURE = (
-    "address",
-    "rate",
-    "dlpf",
-    "accel_range",
-    "gyro_range",
-    "seed",
-    "gravity",
-    "model",
-    "target",
-    "tilt_only",
-    "system",
-    "signing_key",
-)
-SOURCES = ("bus", "serial", "mavlink", "replay")
-SIMULATED = "sim"
-# what only one kind of source has
-OF_A_BUS, OF_A_VEHICLE = ("address", "dlpf", "accel_range", "gyro_range", "seed"), ("system", "signing_key")
-
-
-class Integer(click.ParamType[int]):
-    """A whole number, decimal or 0x hexadecimal."""
-
-    name = "integer"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """The number of its text."""
-        try:
-            return int(str(value), 0)
-        except ValueError:
-            self.fail(f"{value!r} is no whole number.", param, ctx)
-
-
-class BusName(click.ParamType[str]):
-    """An adapter by its path or number, or the simulated chip; a number becomes the path."""
+class Parsed(click.ParamType[Any]):
+    """A value of the text that a person gives, by the parser of its option."""
 
     name = "text"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """The path, or the words of the simulated chip."""
-        if not value:
-            self.fail("no bus is named: give /dev/i2c-N, or sim.", param, ctx)
-        return f"/dev/i2c-{value}" if value.isdecimal() else str(value)
+    def __init__(self, parse: Callable[[str], Any]) -> None:
+        self._parse = parse
 
-
-class Gravity(click.ParamType[float]):
-    """A local gravity in m/s²."""
-
-    name = "float"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The number of its text."""
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The value; a default is one already."""
+        if not isinstance(value, str):
+            return value
         try:
-            gravity = float(value)
-        except ValueError:
-            gravity = math.nan
-        if not 0.0 < gravity < math.inf:
-            self.fail(f"{value!r} is no local gravity: give it in m/s², about 9.81.", param, ctx)
-        return gravity
+            return self._parse(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
 
 
-def source_options(command: F) -> F:
-    """--bus, --serial, --mavlink or --replay, and how the sensor is set."""
-    for option in reversed(
-        (
-            click.option(
-                "--bus",
-                metavar="BUS",
-                type=BusName(),
-                help="/dev/i2c-N or N, or sim[:key=value,...] for the simulated chip.",
-            ),
-            click.option(
-                "--serial",
-                metavar="PORT[:BAUD]",
-                is_flag=False,
-                flag_value="",
-                help="A board with the bridge's firmware: /dev/ttyX or COMn, or a URL such as socket://HOST:PORT.",
-            ),
-            click.option(
-                "--mavlink",
-                metavar="URL",
-                help="udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, /dev/ttyX[:BAUD], or sim[:key=value,...].",
-            ),
-            click.option("--replay", metavar="FILE", type=click.Path(path_type=Path), help="Run a capture again."),
-            click.option("--address", type=Integer(), help="I2C address; by default 0x68, then 0x69."),
-            click.option(
-                "--rate",
-                metavar="HZ",
-                type=float,
-                default=200.0,
-                show_default=True,
-                help="Samples a second, to 1000; 4000 records or streams an MPU-6500's accelerometer alone.",
-            ),
-            click.option(
-                "--dlpf",
-                metavar="CODE",
-                type=click.IntRange(DLPF_CODES[0], DLPF_CODES[-1]),
-                default=3,
-                show_default=True,
-                help="Low-pass filter: 1 (184 Hz) to 6 (5 Hz); 0 (260 Hz) of an MPU-6050 only.",
-            ),
-            click.option(
-                "--accel-range", type=click.Choice(ACCEL_RANGES_G), default="4", show_default=True, help="±g."
-            ),
-            click.option(
-                "--gyro-range",
-                type=click.Choice(GYRO_RANGES_DPS),
-                default="500",
-                show_default=True,
-                help="±deg/s.",
-            ),
-            click.option("--seed", type=click.IntRange(min=0), help="Which simulated sensor and hand."),
-            click.option("--system", metavar="N", type=click.IntRange(1, 255), help="Which vehicle, if several."),
-            click.option(
-                "--signing-key",
-                metavar="FILE",
-                type=click.Path(path_type=Path),
-                help="MAVLink 2 key: 32 bytes, 64 hexadecimal digits, or a passphrase.",
-            ),
-        )
-    ):
-        command = option(command)
-    return command
+def local_gravity(text: str) -> float:
+    """A local gravity in m/s² as text."""
+    try:
+        gravity = float(text)
+    except ValueError:
+        gravity = math.nan
+    if not 0.0 < gravity < math.inf:
+        raise ValueError(f"{text!r} is no local gravity: give it in m/s², about 9.81.")
+    return gravity
+
+
+def source_options(name: str, settings: bool = True) -> Callable[[F], F]:
+    """The sources that the command `name` takes, and what belongs to them; the others are there to be refused.
+
+    Parameters
+    ----------
+    settings : how the sensor is set, too.
+    """
+    taken = used_by(name)
+    belonging = [option for kind in taken for option in kind.options]
+    if settings:
+        belonging += [option for kind in taken for option in kind.settings]
+
+    def decorate(command: F) -> F:
+        for option in reversed(unique(belonging)):
+            command = _declared(option, option.help)(command)
+        for option in reversed(unique(kind.option for kind in SOURCES)):
+            forms = [kind.forms for kind in taken if kind.option is option]
+            command = _declared(option, _sentence(", or ".join(forms)), hidden=not forms)(command)
+        return command
+
+    return decorate
+
+
+def _declared(option: Option, text: str, hidden: bool = False) -> Callable[[F], F]:
+    bare: dict[str, Any] = {} if option.bare is None else {"is_flag": False, "flag_value": option.bare}
+    return click.option(
+        option.spelled,
+        option.name,
+        metavar=option.metavar,
+        type=click.Choice(option.choices) if option.choices else Parsed(option.parse),
+        default=option.default,
+        show_default=option.default is not None,
+        help=text,
+        hidden=hidden,
+        **bare,
+    )
+
+
+def _sentence(words: str) -> str:
+    return f"{words[:1].upper()}{words[1:]}."
 
 
 def fit_options(command: F) -> F:
@@ -154,7 +98,12 @@ def fit_options(command: F) -> F:
     for option in (
         click.option("--model", type=click.Choice(MODELS), default="auto", show_default=True, help="What to estimate."),
         click.option(
-            "--gravity", type=Gravity(), default=STANDARD_GRAVITY_MPS2, show_default=True, help="Local gravity [m/s²]."
+            "--gravity",
+            metavar="MPS2",
+            type=Parsed(local_gravity),
+            default=STANDARD_GRAVITY_MPS2,
+            show_default=True,
+            help="Local gravity [m/s²].",
         ),
     ):
         command = option(command)
@@ -193,84 +142,28 @@ def check_gyroscope(config: Config) -> None:
         )
 
 
-def source_name(options: Mapping[str, Any]) -> str:
-    """The source as a person would name it; empty where none is given."""
-    kind = next((name for name in SOURCES if options.get(name) is not None), None)
-    if kind is None:
-        return ""
-    what = str(options[kind])
-    if kind == "replay":
-        return f"replay of {what}"
-    if what.partition(":")[0] == SIMULATED:
-        return "simulated vehicle" if kind == "mavlink" else "simulated chip"
-    return what
+def given() -> dict[str, str]:
+    """The options of the present command that a person wrote: name to spelling."""
+    context = click.get_current_context()
+    return {
+        str(option.name): option.opts[0]
+        for option in context.command.params
+        if isinstance(option, click.Option)
+        and context.get_parameter_source(str(option.name)) is ParameterSource.COMMANDLINE
+    }
 
 
-def check_source(context: click.Context) -> None:
-    """One source, and beside it nothing that belongs to another, or that the capture fixes.
+def check_source(context: click.Context) -> SourceKind:
+    """One source that the command takes, and nothing beside it that belongs to another; see sources.opening.
 
     Raises
     ------
-    UsageError : none, several, or options that do not fit the source or each other.
+    UsageError : none, several, or options that do not fit the source.
     """
-    given = [name for name in SOURCES if context.params.get(name) is not None]
-    if len(given) != 1:
-        together = " and ".join(f"--{name}" for name in given)
-        what = f"{together} were given together" if given else "no source was given"
-        raise UsageError(what, "give exactly one of --bus BUS, --serial PORT, --mavlink URL and --replay FILE")
-    if given == ["replay"]:
-        # a .tlog of another ground station fixes nothing: its head is looked at where it is opened
-        if context.params["replay"].suffix.lower() != TLOG:
-            refuse_fixed(context)
-        return
-    for name in OF_A_BUS if given == ["mavlink"] else OF_A_VEHICLE:
-        if _was_given(context, name):
-            raise UsageError(f"{_spelled(name)} was given beside --{given[0]}, which has none", "leave it out")
-    model = context.params.get("model")
-    if context.params.get("tilt_only") and model not in ("auto", "tilt"):
-        what = f"--model {model} was given beside --tilt-only, and tilts alone do not determine it"
-        raise UsageError(what, "leave it out: tilts are fitted by the model tilt")
-
-
-def check_resumed(context: click.Context) -> None:
-    """Beside --resume neither a source nor what its capture fixes.
-
-    Raises
-    ------
-    UsageError : it was given.
-    """
-    for name in (*SOURCES, *FIXED_BY_CAPTURE, "folder"):
-        if _was_given(context, name):
-            spelled = "-o" if name == "folder" else _spelled(name)
-            raise UsageError(
-                f"{spelled} was given beside --resume, and a session goes on as it began, in its folder", "leave it out"
-            )
-
-
-def refuse_fixed(context: click.Context) -> None:
-    """Beside --replay, nothing that the capture fixes.
-
-    Raises
-    ------
-    UsageError : it was given.
-    """
-    for name in FIXED_BY_CAPTURE:
-        if _was_given(context, name):
-            raise UsageError(
-                f"{_spelled(name)} was given beside --replay, and the capture fixes it",
-                "leave it out, or use `mpucal calibrate` to fit the capture differently",
-            )
-
-
-def _was_given(context: click.Context, name: str) -> bool:
-    return context.get_parameter_source(name) is ParameterSource.COMMANDLINE
-
-
-def _spelled(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
+    return opening.check_source(context.params, given(), str(context.command.name))
 
 
 def check_not_among(target: Path, inputs: Iterable[Path]) -> None:
     """A result never takes the place of what it was made of; UsageError where `target` is one of `inputs`."""
-    if target.exists() and any(given.exists() and target.samefile(given) for given in inputs):
+    if target.exists() and any(read.exists() and target.samefile(read) for read in inputs):
         raise UsageError(f"{target} is what was given to be read", "choose another name with -o")

@@ -9,16 +9,16 @@ import click
 
 from ..errors import OutputError
 from ..result.clock import stamp
+from ..sources.opening import open_source
 from ..terminal.console import console
-from .options import check_source, fit_options, source_options
+from .options import check_source, fit_options, given, source_options
 from .running import running
-from .source import opened
 
 EXAMPLE = "Example: `mpucal record --bus /dev/i2c-1 -o capture.mcap --seconds 60`"
 
 
 @click.command("record", epilog=EXAMPLE)
-@source_options
+@source_options("record")
 @fit_options
 @click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Where the capture goes.")
 @click.option("--seconds", type=click.FloatRange(min=0.0, min_open=True), help="End after so long.")
@@ -28,7 +28,7 @@ def command(file: Path | None, seconds: float | None, **options: Any) -> None:
     The prompts are those of a session. --gravity and --model are kept for a session that replays it.
     """
     check_source(click.get_current_context())
-    source = opened(options, until_end=True)
+    source = open_source(options, given(), until_end=True)
     file = file or Path(f"record-{stamp()}").with_suffix(Path(source.capture_name).suffix)
     if file.exists():
         raise OutputError(f"{file} is there already", "choose another file with -o")

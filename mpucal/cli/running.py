@@ -1,4 +1,4 @@
-"""A session's runner with its capture, from opening to closing both."""
+"""A session's runner on an open source, recording into a capture, from opening to closing both."""
 
 from __future__ import annotations
 

@@ -22,20 +22,21 @@ from ..sinks.record import in_session
 from ..sinks.sink import Applied
 from ..sinks.write_back import write_to_all
 from ..sources.opened import Opened
+from ..sources.opening import check_resumed, open_source
 from ..sources.resumed import open_resumed
+from ..sources.table import source_title
 from ..terminal.console import console
 from .destination import device, session_sink_options, source_given
-from .options import aim_options, check_gyroscope, check_resumed, check_source, fit_options, source_name, source_options
+from .options import aim_options, check_gyroscope, check_source, fit_options, given, source_options
 from .person import ask
 from .running import running
-from .source import open_again, opened
 from .summary import summary, written
 
 EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board, `mpucal session --bus sim`"
 
 
 @click.command("session", epilog=EXAMPLE)
-@source_options
+@source_options("session")
 @fit_options
 @aim_options
 @session_sink_options
@@ -67,7 +68,7 @@ def command(
     source, kinds, options = _opened(resume, options, sinks, no_write, attended)
     check_gyroscope(source.plan.config)
     folder = resume or folder
-    person = console(quiet=yes, as_json=json_events, beep=beep, title=source_name(options))
+    person = console(quiet=yes, as_json=json_events, beep=beep, title=source_title(options))
     place = Place(folder, source.capture_name, again=resume is not None)
     finished = False
     try:
@@ -102,9 +103,9 @@ def _opened(
     if resume is None:
         check_source(click.get_current_context())
         kinds = chosen(sinks, no_write, source_given(options))
-        return opened({**options, "attended": attended}), kinds, options
-    check_resumed(click.get_current_context())
-    source = open_resumed(resume, open_again)
+        return open_source({**options, "attended": attended}, given()), kinds, options
+    check_resumed(given())
+    source = open_resumed(resume)
     options = {**options, **source.live.words}
     return source, chosen(sinks, no_write, source_given(options)), options
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import click
@@ -16,8 +18,11 @@ from ..files import load
 from ..files.dataflash import is_dataflash
 from ..result.blob import Blob
 from ..result.calibration import Calibration
+from ..sources.kind import SourceKind
+from ..sources.opening import contents, one_of
+from ..sources.table import kinds_meant, used_by
 from .merge import slope
-from .options import BusName, Integer
+from .options import check_source, source_options
 from .summary import formula, summary
 
 EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --json`, or `mpucal show --serial PORT`"
@@ -26,50 +31,43 @@ CALIBRATIONS = (".json", ".bin")
 
 @click.command("show", epilog=EXAMPLE)
 @click.argument("file", metavar="FILE|DIR", type=click.Path(path_type=Path), required=False)
-@click.option(
-    "--serial",
-    metavar="PORT[:BAUD]",
-    is_flag=False,
-    flag_value="",
-    help="What a board with the bridge's firmware stores, instead of a file.",
-)
-@click.option(
-    "--bus", metavar="BUS", type=BusName(), help="What the chip on /dev/i2c-N, or sim, holds now; nothing is written."
-)
-@click.option("--mavlink", metavar="URL", help="What a vehicle's accelerometer parameters are; nothing is written.")
-@click.option("--address", type=Integer(), help="I2C address; by default 0x68, then 0x69.")
-@click.option("--system", metavar="N", type=click.IntRange(1, 255), help="Which vehicle, if several.")
+@source_options("show", settings=False)
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON.")
-def command(
-    file: Path | None,
-    serial: str | None,
-    bus: str | None,
-    mavlink: str | None,
-    address: int | None,
-    system: int | None,
-    as_json: bool,
-) -> None:
-    """Say what is in a calibration (.json), a config blob (.bin), a recording, or a device."""
-    places = {"a file": file, "--serial": serial, "--bus": bus, "--mavlink": mavlink}
-    given = [name for name, what in places.items() if what is not None]
-    if len(given) != 1:
-        raise UsageError(
-            f"{' and '.join(given)} were given together" if given else "nothing to show was named",
-            "give either a file or one of --serial PORT, --bus BUS and --mavlink URL",
-        )
-    if bus is not None or mavlink is not None:
-        from .show_device import of_bus, of_vehicle, page  # noqa: PLC0415 - a file needs no driver
+def command(file: Path | None, as_json: bool, **options: Any) -> None:
+    """Say what is in a calibration (.json), a config blob (.bin), a recording, or a device.
 
-        facts = of_vehicle(str(mavlink), system) if bus is None else of_bus(bus, address)
-        click.echo(json.dumps(facts, indent=2) if as_json else page(facts))
-    elif serial is not None:
-        where, stored = _stored(serial)
-        click.echo(stored.json() if as_json else _calibration(where, stored), nl=not as_json)
-    elif file is not None and file.suffix in CALIBRATIONS and not is_dataflash(file):
-        calibration = Calibration.load(file)
-        click.echo(calibration.json() if as_json else _calibration(str(file), calibration), nl=not as_json)
-    elif file is not None:
+    Of a device it is what its sensor's registers, its memory or its parameters hold now; nothing is written.
+    """
+    sources = kinds_meant(options)
+    places = [*(["a file"] if file is not None else []), *(kind.option.spelled for kind in sources)]
+    if len(places) != 1:
+        raise UsageError(
+            f"{' and '.join(places)} were given together" if places else "nothing to show was named",
+            f"give a file, or {one_of(used_by('show'))}",
+        )
+    if file is None:
+        _show_device(check_source(click.get_current_context()), options, as_json)
+    elif file.suffix in CALIBRATIONS and not is_dataflash(file):
+        _show_calibration(str(file), Calibration.load(file), as_json)
+    else:
         _show_recording(file, as_json)
+
+
+def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) -> None:
+    if kind.store:
+        with resolve_name(kind.store)(options[kind.option.name]) as store:
+            number, blob = store.take()
+            where = f"blob number {number} of the bridge on {store.name}"
+            _show_calibration(where, Calibration.from_blob(Blob.decode(blob)), as_json)
+        return
+    from .show_device import page  # noqa: PLC0415 - a file needs no driver
+
+    facts = contents(options)
+    click.echo(json.dumps(facts, indent=2) if as_json else page(facts))
+
+
+def _show_calibration(where: str, calibration: Calibration, as_json: bool) -> None:
+    click.echo(calibration.json() if as_json else _calibration(where, calibration), nl=not as_json)
 
 
 def _show_recording(file: Path, as_json: bool) -> None:
@@ -78,15 +76,6 @@ def _show_recording(file: Path, as_json: bool) -> None:
         click.echo(f"mpucal: {recording.recovered}", err=True)
     facts = _facts(recording)
     click.echo(json.dumps(facts, indent=2) if as_json else _recording(file, facts))
-
-
-def _stored(port: str) -> tuple[str, Calibration]:
-    """What the bridge on `port` stores, and where that is, in words."""
-    from ..sources.bridge import open_store  # noqa: PLC0415 - a file needs no serial port
-
-    with open_store(port) as store:
-        number, blob = store.take()
-        return f"blob number {number} of the bridge on {store.name}", Calibration.from_blob(Blob.decode(blob))
 
 
 def _calibration(where: str, calibration: Calibration) -> str:

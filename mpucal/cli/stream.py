@@ -13,39 +13,37 @@ from typing import Any
 import click
 
 from ..data import STANDARD_GRAVITY_MPS2, Samples
-from ..errors import EndOfCapture, OutputError, UsageError
+from ..errors import EndOfCapture, OutputError
 from ..files.rows.csv import CsvText
 from ..result.calibration import Calibration
 from ..result.clock import now
 from ..result.correction import Correction, correction
 from ..session.ports import Source
+from ..sources.opening import open_source
 from .options import check_source, source_options
-from .source import opened
 
 EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.json --seconds 10`"
 
 
 @click.command("stream", epilog=EXAMPLE)
-@source_options
+@source_options("stream")
 @click.option("--apply", "calibration", metavar="CALIBRATION", type=click.Path(path_type=Path), required=True)
 @click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Keep the capture, too.")
 @click.option("--seconds", type=click.FloatRange(min=0.0, min_open=True), help="End after so long.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line, in place of a table.")
 def command(calibration: Path, file: Path | None, seconds: float | None, as_json: bool, **options: Any) -> None:
-    """Print calibrated samples, m/s² and rad/s, until Ctrl-C, --seconds or the source's end.
+    """Print calibrated samples, m/s² and rad/s, until Ctrl-C or --seconds; `mpucal apply` does it to recorded ones.
 
-    Each sample is printed as it comes, and then forgotten: it may run for as long as it likes. Times are as first
-    known: a capture's decoding knows them better.
+    Each sample is printed as it comes, and then forgotten: it may run for as long as it likes. Timestamps are
+    provisional; record a capture for final ones.
     """
     check_source(click.get_current_context())
-    if options["replay"] is not None:
-        raise UsageError("--replay was given, and a capture does not stream", "use `mpucal apply CALIBRATION FILE`")
     applied = Calibration.load(calibration)
     if file is not None and file.exists():
         raise OutputError(f"{file} is there already", "choose another file with -o")
     # a simulated chip lives in the gravity in which it was calibrated
     gravity = applied.fit.get("gravity") or STANDARD_GRAVITY_MPS2
-    source = opened({**options, "gravity": gravity, "model": "auto"}, until_end=True)
+    source = open_source({**options, "gravity": gravity}, until_end=True)
     write = _json_lines if as_json else CsvText(lambda text: sys.stdout.write(text.decode())).write
     with source.measuring(file or Path(os.devnull), _say, now().isoformat()) as measuring, suppress(KeyboardInterrupt):
         ready: Correction | None = None

@@ -23,7 +23,7 @@ EXAMPLE = "Example: `mpucal write board7/calibration.json chip --bus /dev/i2c-1`
 @click.command("write", epilog=EXAMPLE)
 @click.argument("calibration", metavar="CALIBRATION", type=click.Path(path_type=Path))
 @click.argument("to", metavar="|".join(SINKS), type=click.Choice(list(SINKS)))
-@source_options
+@source_options("write")
 @sink_flags
 @click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Where the old state is kept.")
 @click.option("--yes", is_flag=True, help="Ask nothing.")
@@ -42,7 +42,7 @@ def command(calibration: Path, to: str, folder: Path | None, yes: bool, as_json:
     make_folder(folder)
     # a simulated chip lives in the gravity in which it was calibrated
     gravity = STANDARD_GRAVITY_MPS2 if written is None else written.fit.get("gravity") or STANDARD_GRAVITY_MPS2
-    with kind.open(device({**options, "gravity": gravity, "model": "auto"})) as sink:
+    with kind.open(device({**options, "gravity": gravity})) as sink:
         ask(f"Write {calibration} to {sink.where}?", yes)
         if written is None:
             click.echo(f"Done: {put_back(kind, sink, calibration, folder, say)}.")

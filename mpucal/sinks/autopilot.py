@@ -26,7 +26,7 @@ from ..mavlink.truth import ARDUPILOT, PX4
 from ..result.atomic import write_atomically
 from ..result.calibration import Calibration
 from ..session.at_rest import put_down
-from ..sources.on_vehicle import OnLink
+from ..sources.vehicle import OpenedVehicle
 from .kind import Device
 from .sink import Applied
 from .table import OLD_PARAM, OLD_PARAMS
@@ -44,7 +44,7 @@ def open_autopilot(device: Device) -> Iterator[AutopilotSink]:
     ------
     LinkError : it cannot be opened, or there is no vehicle.
     """
-    source: OnLink = device.open()
+    source: OpenedVehicle = device.open()
     with source.connected(device.say) as link:
         put_down(source.listeners, device.say)
         yield AutopilotSink(link, "store" in device.flags)

@@ -28,7 +28,7 @@ from ..errors import ChipError, RecordingError, SourceError, WriteBackError
 from ..result.atomic import write_atomically
 from ..result.calibration import REFUSED, Calibration
 from ..session.at_rest import put_down
-from ..sources.on_chip import OnBus
+from ..sources.chip import OpenedChip
 from .kind import Device
 from .sink import Applied
 from .table import CHIP_OFFSETS
@@ -54,7 +54,7 @@ def open_chip(device: Device) -> Iterator[ChipSink]:
     ------
     BusError : no such bus or port, or no chip on it.
     """
-    source: OnBus = device.open()
+    source: OpenedChip = device.open()
     with closing(source.bus):
         put_down(source.listeners, device.say)
         yield ChipSink(source.bus, f"the chip on {device.name}")

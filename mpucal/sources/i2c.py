@@ -1,4 +1,4 @@
-"""A Linux I2C bus on smbus2. Knows no chip but the identity by which it finds one, and repeats nothing.
+"""A chip on a Linux I2C bus, by smbus2.
 
 What an adapter can do is found, not assumed: plain I2C where there is any, else SMBus blocks of 32 bytes; and where
 it refuses a transfer before anything has moved, as one without a repeated start or of shorter messages.
@@ -17,7 +17,9 @@ from ..chip.access import Reply
 from ..chip.families import PARTS
 from ..chip.registers import FIFO_R_W, WHO_AM_I
 from ..errors import BusError, NoAnswer
+from .chip import OpenedChip
 from .i2c_errors import nobody, opening_error, transfer_error
+from .kind import Request
 
 # AD0 low, AD0 high
 ADDRESSES = (0x68, 0x69)
@@ -27,6 +29,11 @@ MAX_MESSAGE_BYTES = 8192
 SMBUS_BLOCK_BYTES = 32
 # an adapter that refuses even this little cannot do what is asked of it at all
 SHORTEST_LIMIT = 4
+
+
+def open_source(request: Request) -> OpenedChip:
+    """The chip on the bus that --bus names; see I2cBus."""
+    return OpenedChip(I2cBus(request.value, request.values.get("address")), request.plan, words=request.words)
 
 
 class I2cBus:

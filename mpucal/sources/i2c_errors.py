@@ -1,4 +1,4 @@
-"""What the kernel's error numbers mean on an I2C bus, as sentences. Knows no transfer.
+"""What the kernel's error numbers mean on an I2C bus, as sentences.
 
 Source: Linux Documentation/i2c/fault-codes.rst.
 """

@@ -1,4 +1,4 @@
-"""What every opened source has, whatever its kind: a chip on a bus, or a vehicle. Knows none of them."""
+"""What every open source has, whatever its kind."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bus that is several, one after the other: what was recorded, then perhaps the sensor itself. Knows no chip."""
+"""Several buses as one, one after the other: what was recorded, then perhaps the sensor itself."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bus that answers from a capture, and from nothing else. Knows no chip and no file."""
+"""A bus that answers from the records of a capture, and from nothing else."""
 
 from __future__ import annotations
 

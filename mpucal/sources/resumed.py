@@ -1,4 +1,4 @@
-"""A session that was interrupted, as a session's source: its captures, then the sensor itself. Knows no option."""
+"""A session that goes on after an interruption: its captures are run again, then the sensor is measured."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ from ..result.session_files import CAPTURE
 from ..session.events import Key, Output, Prompt
 from ..session.plan import Plan
 from ..session.ports import Talk
-from .on_chip import SOURCE, OnBus
+from .chip import SOURCE, OpenedChip
 from .opened import Measuring, Say
+from .opening import open_again
 from .parts import LaterBus, PartsBus, parts_of
 from .replay import ReplayBus
 from .tap import Tap
 
 
 @dataclass(frozen=True)
-class OnParts:
+class ResumedChip:
     """What was recorded of a session, and the sensor to go on with; see Opened.
 
     Attributes
@@ -35,7 +36,7 @@ class OnParts:
     """
 
     bus: PartsBus
-    live: OnBus
+    live: OpenedChip
     plan: Plan
     recovered: str | None
     capture_name: str
@@ -110,7 +111,7 @@ class _Later:
         return self._person.pressed()
 
 
-def open_resumed(folder: Path, open_live: Callable[[Mapping[str, Any], Plan], OnBus]) -> OnParts:
+def open_resumed(folder: Path) -> ResumedChip:
     """The session in `folder`, to go on with the source that its first capture names.
 
     Raises
@@ -127,12 +128,14 @@ def open_resumed(folder: Path, open_live: Callable[[Mapping[str, Any], Plan], On
         raise UsageError(
             f"the capture in {folder} does not name a source to go on with", "use `mpucal calibrate` on the folder"
         )
-    live = open_live(source, plan)
+    live = open_again(source, plan)
+    if not isinstance(live, OpenedChip):
+        raise UsageError(f"a session on {folder}'s source cannot go on", "use `mpucal calibrate` on the folder")
     records = parts_of((capture.records for capture in captures), more=True)
     last_ns = max((record.t_ns for part in records for record in part), default=0)
     replays = [ReplayBus(part, folder.name) for part in records]
     recovered = [capture.recovered for capture in captures if capture.recovered]
-    return OnParts(
+    return ResumedChip(
         PartsBus([*replays, LaterBus(live.bus, last_ns)]),
         live,
         plan,

@@ -1,4 +1,4 @@
-"""A bus that records every access to another bus. Knows not where the records go."""
+"""A bus that passes every access on to another bus, and records it."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ def test_machines_read_json_alone_and_a_folder_of_its_own_is_named_by_the_chip(m
         ([], 2, "no source was given"),
         (["--bus", "sim", "--replay", "x.mcap"], 2, "--bus and --replay were given together"),
         (["--replay", "x.mcap", "--rate", "100"], 2, "--rate was given beside --replay"),
-        (["--bus", "/dev/i2c-99", "--seed", "1"], 2, "--seed chooses a simulated sensor"),
+        (["--bus", "/dev/i2c-99", "--seed", "1"], 2, "--seed was given beside --bus, which has none"),
         (["--bus", "sim", "--rate", "0"], 2, "rate"),
         (["--bus", "sim:colour=red"], 2, "colour"),
         (["--bus", "sim", "--tilt-only", "--model", "hand"], 2, "--model hand was given beside --tilt-only"),

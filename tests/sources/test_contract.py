@@ -1,15 +1,12 @@
 """What every bus promises, asked of each of them."""
 
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import pytest
 
 from mpucal.chip import registers as reg
-from mpucal.errors import EndOfCapture, UsageError
+from mpucal.errors import EndOfCapture
 from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
-from mpucal.sources import BUSES, opener
 from mpucal.sources.bridge import BridgeBus
 from mpucal.sources.i2c import I2cBus
 from mpucal.sources.replay import ReplayBus
@@ -101,19 +98,3 @@ def test_only_a_replay_ends(bus):
             bus.read(reg.WHO_AM_I, 1)
     else:
         assert bus.read(reg.WHO_AM_I, 1).data == b"\x68"
-
-
-@pytest.mark.parametrize("name", BUSES)
-def test_every_bus_of_the_list_can_be_asked_for(name):
-    assert callable(opener(name))
-
-
-def test_an_unknown_bus_names_the_known():
-    with pytest.raises(UsageError, match="no bus called spi: take one of bridge, i2c, replay, sim"):
-        opener("spi")
-
-
-def test_no_library_of_a_bus_is_loaded_before_it_is_asked_for():
-    program = "import sys, mpucal.sources; print(sorted({'smbus2', 'serial', 'numpy', 'mcap'} & set(sys.modules)))"
-    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert ran.stdout.strip() == "[]"

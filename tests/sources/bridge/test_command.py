@@ -107,7 +107,7 @@ def test_a_bias_goes_into_the_chip_behind_it_and_out_again(board, mpucal, tmp_pa
         (
             ["session", "--serial", "x", "--seed", "1"],
             2,
-            "--seed chooses a simulated sensor, and --serial names a real",
+            "--seed was given beside --serial, which has none",
         ),
         (["session", "--serial", "x", "--system", "1"], 2, "--system was given beside --serial, which has none"),
         (["session", "--serial", "x", "--bus", "sim"], 2, "--bus and --serial were given together"),

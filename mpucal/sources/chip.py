@@ -1,4 +1,4 @@
-"""A chip on a bus as a session's source: its driver, tapped into an MCAP capture. Knows no option."""
+"""A chip on a bus, open: its driver measures, and every access goes into an MCAP capture."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 from .. import __version__
 from ..chip.access import Bus
+from ..chip.contents import chip_contents
 from ..chip.driver import Driver
 from ..chip.records import LATE
 from ..errors import CaptureError
@@ -27,13 +28,13 @@ SOURCE = "source"
 
 
 @dataclass(frozen=True)
-class OnBus:
-    """A bus, and what comes with its kind; see Opened.
+class OpenedChip:
+    """A chip on a bus; see Opened.
 
     Attributes
     ----------
     bus : open. replay : the same bus where it is a replay.
-    words : the options by which it was opened, for who resumes the session. real_time : see Opened.
+    words : what opens it again; see Request.words. real_time : see Opened.
     """
 
     bus: Bus
@@ -49,6 +50,16 @@ class OnBus:
     def source_meta(self) -> dict[str, Any]:
         """For the head of a capture."""
         return {SOURCE: dict(self.words)} if self.words else {}
+
+    @property
+    def where(self) -> str:
+        """The very chip, in words."""
+        return f"the chip on {next(iter(self.words.values()), 'its bus')}"
+
+    def contents(self) -> dict[str, Any]:
+        """What its registers hold now, and where it is; nothing is set up or written."""
+        with closing(self.bus):
+            return {"where": self.where, **chip_contents(self.bus)}
 
     def talk(self, person: Talk) -> Talk:
         """See Opened."""

@@ -1,4 +1,4 @@
-"""A vehicle, or its .tlog, as a session's source, recorded into a .tlog. Knows no option."""
+"""A vehicle over MAVLink, or its .tlog, open: every packet goes into a .tlog."""
 
 from __future__ import annotations
 
@@ -13,19 +13,25 @@ from ..chip.config import Config
 from ..chip.records import LATE, SessionEvent
 from ..data import Recording
 from ..errors import CaptureError, LinkError, UsageError
+from ..mavlink.lines import open_transport
 from ..mavlink.link import Link
 from ..mavlink.log import read_log
 from ..mavlink.notes import Note, to_messages
 from ..mavlink.prompts import to_message
 from ..mavlink.recorded import RecordedSource
 from ..mavlink.replay import Replay
+from ..mavlink.shaping import read_shaping
+from ..mavlink.signing import read_key
 from ..mavlink.source import VehicleSource, one_of
 from ..mavlink.tlog import Tlog, TlogWriter, read_tlog
 from ..mavlink.transport import Transport
+from ..mavlink.truth import ARDUPILOT, PX4
+from ..mavlink.url import parse_url
 from ..result.session_files import CAPTURE_OF_VEHICLE
 from ..session.events import Prompt
 from ..session.plan import Plan
 from ..session.ports import Replayed, Talk
+from .kind import Request
 from .opened import Measuring, Say
 
 SESSION, END = "session", "end"
@@ -35,8 +41,8 @@ SOURCE_VERSION = 2
 NOTE_IDS = 65535
 
 
-class OnLink:
-    """A transport to a vehicle, and what comes with its kind; see Opened.
+class OpenedVehicle:
+    """A transport to a vehicle; see Opened.
 
     Parameters
     ----------
@@ -111,6 +117,12 @@ class OnLink:
             link.lock(vehicle)
             yield link
 
+    def contents(self) -> dict[str, Any]:
+        """What its accelerometer parameters are now, and which vehicle it is; nothing is written."""
+        with self.connected(lambda _sentence: None) as link:
+            firmware = PX4 if link.vehicle.is_px4 else ARDUPILOT
+            return {"where": str(link.vehicle), "firmware": firmware, "parameters": dict(read_shaping(link, firmware))}
+
     def _prompt(self, prompt: Prompt) -> None:
         """Tell the vehicle, whose log then says what was done to it."""
         if self.link is not None:
@@ -128,8 +140,8 @@ class OnLink:
 
 
 @dataclass(frozen=True)
-class OnRecording:
-    """A .tlog of another ground station, and what comes with it; see Opened."""
+class OpenedLog:
+    """A .tlog of another ground station; see Opened."""
 
     tlog: Tlog
     measured: Recording
@@ -171,7 +183,29 @@ class _Noting:
         self._notes += 1
 
 
-def open_tlog(file: Path, asked: Plan, system: int | None) -> OnLink | OnRecording:
+def open_source(request: Request) -> OpenedVehicle:
+    """The vehicle at a URL.
+
+    Raises
+    ------
+    UsageError : words that are no URL, or no key. LinkError : it cannot be opened.
+    """
+    key = signing_key(request)
+    return OpenedVehicle(open_transport(parse_url(request.value)), request.plan, request.values.get("system"), key)
+
+
+def signing_key(request: Request) -> bytes | None:
+    """To sign with, where one is named.
+
+    Raises
+    ------
+    UsageError : it cannot be read.
+    """
+    path = request.values.get("signing_key")
+    return None if path is None else read_key(path)
+
+
+def open_tlog(file: Path, asked: Plan, system: int | None) -> OpenedVehicle | OpenedLog:
     """A .tlog to be run again: one of mpucal's sessions as it was, any other until its end.
 
     Parameters
@@ -186,7 +220,7 @@ def open_tlog(file: Path, asked: Plan, system: int | None) -> OnLink | OnRecordi
     replay = Replay(tlog)
     head = next((noted.note for noted in replay.pending(SESSION)), None)
     if head is None:
-        return OnRecording(tlog, read_log(tlog.records, tlog.name, system), asked)
+        return OpenedLog(tlog, read_log(tlog.records, tlog.name, system), asked)
     if head.data.get(SOURCE) != SOURCE_VERSION:
         raise CaptureError(
             f"{tlog.name} was recorded by version {head.data.get(SOURCE)} of the source, and this is {SOURCE_VERSION}",
@@ -195,7 +229,7 @@ def open_tlog(file: Path, asked: Plan, system: int | None) -> OnLink | OnRecordi
     try:
         plan = dict(head.data[PLAN])
         made = Plan(**{**plan, "config": Config(**plan["config"])})
-        return OnLink(replay, made, head.data[SYSTEM], replay=replay, recovered=tlog.recovered)
+        return OpenedVehicle(replay, made, head.data[SYSTEM], replay=replay, recovered=tlog.recovered)
     except (KeyError, TypeError, ValueError) as error:
         raise CaptureError(
             f"the head of {tlog.name} does not say how it was made ({error})", "use `mpucal calibrate` on it"

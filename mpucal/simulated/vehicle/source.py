@@ -1,0 +1,19 @@
+"""The simulated vehicle as a source: what `--mavlink sim` opens."""
+
+from __future__ import annotations
+
+from ...sources.kind import Request
+from ...sources.vehicle import OpenedVehicle, signing_key
+from . import Vehicle, VehicleOptions
+from .transport import SimulatedTransport
+
+
+def open_source(request: Request) -> OpenedVehicle:
+    """The vehicle that `sim:key=value,...` describes, in the gravity of the plan; see VehicleOptions.parse."""
+    key = signing_key(request)
+    vehicle = Vehicle(VehicleOptions.parse(request.value), request.plan.gravity, key)
+    transport = SimulatedTransport(vehicle)
+    system = request.values.get("system")
+    return OpenedVehicle(
+        transport, request.plan, system, key, truth=vehicle.truth_document(), real_time=transport.real_time
+    )

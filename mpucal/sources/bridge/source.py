@@ -1,0 +1,24 @@
+"""A chip behind a serial bridge as a source: what `--serial` opens."""
+
+from __future__ import annotations
+
+from ...errors import UsageError
+from ..chip import OpenedChip
+from ..kind import Request
+from . import open_bridge
+
+
+def open_source(request: Request) -> OpenedChip:
+    """The chip behind the bridge on a port; see open_bridge.
+
+    Raises
+    ------
+    UsageError : more samples a second are asked for than a serial line moves.
+    """
+    config = request.plan.config
+    if config.accel_alone:
+        raise UsageError(
+            f"a bridge does not move {config.rate_hz:g} samples a second",
+            "take --rate 1000 or less, or connect the chip to an I2C bus of this computer",
+        )
+    return OpenedChip(open_bridge(request.value, request.values.get("address")), request.plan, words=request.words)

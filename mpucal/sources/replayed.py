@@ -1,0 +1,54 @@
+"""A capture as a source: the accesses of a bus (.mcap) or the packets of a vehicle (.tlog), run again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from ..files.mcap import read_capture
+from ..files.parts import captures_in
+from ..session.plan import Plan
+from .chip import OpenedChip
+from .kind import Request
+from .opened import Opened
+from .opening import refuse_fixed
+from .parts import PartsBus, parts_of
+from .replay import ReplayBus
+
+TLOG = ".tlog"
+
+
+def open_source(request: Request) -> Opened:
+    """A capture, or all those in the folder of a session that was resumed.
+
+    Raises
+    ------
+    UsageError : options that the capture fixes. CaptureError : no capture, or one of another driver.
+    RecordingError : a .tlog without an IMU.
+    """
+    file: Path = request.value
+    if file.suffix.lower() != TLOG:
+        refuse_fixed(request)
+        return _open_mcap(file)
+    # pymavlink is slow to load, and of no use to a chip on a bus
+    from .vehicle import OpenedVehicle, open_tlog  # noqa: PLC0415
+
+    source = open_tlog(file, replace(request.plan, until_end=True), request.values.get("system"))
+    if isinstance(source, OpenedVehicle):
+        # one of another ground station fixes nothing
+        refuse_fixed(request)
+    return source
+
+
+def _open_mcap(file: Path) -> OpenedChip:
+    captures = [read_capture(path) for path in (captures_in(file) or [file])]
+    name = captures[0].name
+    bus = PartsBus([ReplayBus(part, name) for part in parts_of(capture.records for capture in captures)])
+    recovered = [capture.recovered for capture in captures if capture.recovered]
+    return OpenedChip(
+        bus,
+        Plan.of_capture(captures[0].meta, name),
+        replay=bus,
+        recovered=recovered[-1] if recovered else None,
+        real_time=False,
+    )

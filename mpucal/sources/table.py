@@ -1,0 +1,168 @@
+"""The table of sources: one row for each kind, from which options, help, error messages and documentation are made.
+
+A new source is a module that opens it and a row here. The module, and the library behind it, are imported when a
+source of that kind is opened.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ..chip.registers import ACCEL_RANGES_G, DLPF_CODES, GYRO_RANGES_DPS
+from .kind import Delivers, Option, SourceKind
+
+
+def bus_name(text: str) -> str:
+    """A bus as text; the number of an adapter becomes its path."""
+    if not text:
+        raise ValueError("no bus is named: give /dev/i2c-N, or sim.")
+    return f"/dev/i2c-{text}" if text.isdecimal() else text
+
+
+def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
+    """What parses a whole number from `least` to `most`, decimal or 0x hexadecimal."""
+
+    def parse(text: str) -> int:
+        try:
+            number = int(text, 0)
+        except ValueError:
+            raise ValueError(f"{text!r} is no whole number.") from None
+        if number < least or (most is not None and number > most):
+            allowed = f"{least} or more" if most is None else f"{least} to {most}"
+            raise ValueError(f"{text} is not {allowed}.")
+        return number
+
+    return parse
+
+
+def number(text: str) -> float:
+    """A number as text."""
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is no number.") from None
+
+
+BUS = Option("bus", metavar="BUS", parse=bus_name)
+SERIAL = Option("serial", metavar="PORT[:BAUD]", bare="")
+MAVLINK = Option("mavlink", metavar="URL")
+REPLAY = Option("replay", metavar="FILE", parse=Path)
+
+ADDRESS = Option("address", "I2C address; by default 0x68, then 0x69.", "ADDRESS", whole_number(0, 0x7F))
+SEED = Option("seed", "Which simulated sensor and hand.", "N", whole_number(0))
+SYSTEM = Option("system", "Which vehicle, if several.", "N", whole_number(1, 255))
+SIGNING_KEY = Option(
+    "signing_key", "MAVLink 2 key: 32 bytes, 64 hexadecimal digits, or a passphrase.", "FILE", parse=Path
+)
+
+RATE = Option(
+    "rate",
+    "Samples a second, to 1000; 4000 records or streams an MPU-6500's accelerometer alone.",
+    "HZ",
+    number,
+    default=200.0,
+)
+DLPF = Option(
+    "dlpf",
+    "Low-pass filter: 1 (184 Hz) to 6 (5 Hz); 0 (260 Hz) of an MPU-6050 only.",
+    "CODE",
+    whole_number(DLPF_CODES[0], DLPF_CODES[-1]),
+    default=3,
+)
+ACCEL_RANGE = Option("accel_range", "±g.", choices=tuple(map(str, ACCEL_RANGES_G)), default="4")
+GYRO_RANGE = Option("gyro_range", "±deg/s.", choices=tuple(map(str, GYRO_RANGES_DPS)), default="500")
+OF_A_CHIP = (RATE, DLPF, ACCEL_RANGE, GYRO_RANGE)
+
+SOURCES = [
+    SourceKind(
+        what="a chip on an I2C bus of this computer",
+        option=BUS,
+        forms="/dev/i2c-N or N",
+        opener="mpucal.sources.i2c:open_source",
+        delivers=Delivers.REGISTERS,
+        options=(ADDRESS,),
+        settings=OF_A_CHIP,
+        doctor="mpucal.doctor.sources:examine_chip",
+        host="mpucal.doctor.host:examine_host",
+    ),
+    SourceKind(
+        what="the simulated chip",
+        option=BUS,
+        word="sim",
+        forms="sim[:key=value,...] for the simulated chip",
+        opener="mpucal.simulated.chip.source:open_source",
+        delivers=Delivers.REGISTERS,
+        options=(SEED,),
+        settings=OF_A_CHIP,
+        title="simulated chip",
+        doctor="mpucal.doctor.sources:examine_chip",
+    ),
+    SourceKind(
+        what="a chip behind a microcontroller with the bridge's firmware",
+        option=SERIAL,
+        forms="a board with the bridge's firmware: /dev/ttyX or COMn, or a URL such as socket://HOST:PORT",
+        opener="mpucal.sources.bridge.source:open_source",
+        delivers=Delivers.REGISTERS,
+        options=(ADDRESS,),
+        settings=OF_A_CHIP,
+        store="mpucal.sources.bridge:open_store",
+        doctor="mpucal.doctor.sources:examine_bridge_and_chip",
+    ),
+    SourceKind(
+        what="a vehicle over MAVLink",
+        option=MAVLINK,
+        forms="udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, or /dev/ttyX[:BAUD]",
+        opener="mpucal.sources.vehicle:open_source",
+        delivers=Delivers.SAMPLES,
+        options=(SYSTEM, SIGNING_KEY),
+        settings=(RATE,),
+    ),
+    SourceKind(
+        what="the simulated vehicle",
+        option=MAVLINK,
+        word="sim",
+        forms="sim[:key=value,...] for the simulated vehicle",
+        opener="mpucal.simulated.vehicle.source:open_source",
+        delivers=Delivers.SAMPLES,
+        options=(SYSTEM, SIGNING_KEY),
+        settings=(RATE,),
+        title="simulated vehicle",
+    ),
+    SourceKind(
+        what="a capture that is run again",
+        option=REPLAY,
+        forms="a capture to run again: .mcap, .tlog, or the folder of a session",
+        opener="mpucal.sources.replayed:open_source",
+        delivers=Delivers.CAPTURE,
+        instead="`mpucal calibrate`, `mpucal apply` and `mpucal show` read a capture",
+        title="replay of {}",
+    ),
+]
+
+
+def used_by(command: str) -> list[SourceKind]:
+    """The kinds of source that a command takes."""
+    return [kind for kind in SOURCES if command in kind.commands]
+
+
+def kinds_meant(values: Mapping[str, Any]) -> list[SourceKind]:
+    """The kinds that the options' values name: one for each of their options that has a value."""
+    meant: dict[Option, SourceKind] = {}
+    # what asks for a word or another option is meant rather than what does not
+    for kind in sorted(SOURCES, key=lambda kind: bool(kind.word) + bool(kind.beside)):
+        if kind.is_meant(values):
+            meant[kind.option] = kind
+    return [meant[option] for option in unique(kind.option for kind in SOURCES) if option in meant]
+
+
+def source_title(values: Mapping[str, Any]) -> str:
+    """The source as a person would name it; empty where the options' values name none."""
+    kinds = kinds_meant(values)
+    return kinds[0].title.format(values[kinds[0].option.name]) if kinds else ""
+
+
+def unique(options: Iterable[Option]) -> list[Option]:
+    """Each option once, in their order."""
+    return list(dict.fromkeys(options))

@@ -1,0 +1,94 @@
+"""The table of sources, and what is made from it."""
+
+import subprocess
+import sys
+from pkgutil import resolve_name
+
+import pytest
+
+from mpucal.errors import CaptureError, UsageError
+from mpucal.session.plan import Plan
+from mpucal.sources.kind import Delivers
+from mpucal.sources.opening import check_source, open_again
+from mpucal.sources.table import SOURCES, kinds_meant, source_title, used_by
+
+IDS = [kind.spelled for kind in SOURCES]
+
+
+@pytest.mark.parametrize("kind", SOURCES, ids=IDS)
+def test_all_that_a_row_names_is_there(kind):
+    for place in filter(None, (kind.opener, kind.store, kind.doctor, kind.host)):
+        assert callable(resolve_name(place))
+
+
+@pytest.mark.parametrize("kind", SOURCES, ids=IDS)
+def test_a_row_is_found_by_what_a_person_writes(kind):
+    values = {kind.option.name: f"{kind.word}:a=b" if kind.word else "x"}
+    assert kinds_meant(values) == [kind]
+
+
+def test_none_and_several():
+    assert kinds_meant({"bus": None, "replay": None}) == []
+    assert source_title({"bus": None}) == ""
+    meant = kinds_meant({"bus": "sim", "mavlink": "x", "address": None})
+    assert [kind.spelled for kind in meant] == ["--bus sim", "--mavlink"]
+
+
+@pytest.mark.parametrize(
+    ("values", "title"),
+    [
+        ({"bus": "sim:seed=1"}, "simulated chip"),
+        ({"bus": "/dev/i2c-1"}, "/dev/i2c-1"),
+        ({"bus": "simple"}, "simple"),
+        ({"mavlink": "sim"}, "simulated vehicle"),
+        ({"replay": "board/capture.mcap"}, "replay of board/capture.mcap"),
+    ],
+)
+def test_a_person_names_it(values, title):
+    assert source_title(values) == title
+
+
+@pytest.mark.parametrize("command", ["session", "record", "stream", "write", "show", "doctor"])
+def test_a_command_takes_what_its_help_names_and_refuses_the_rest(command):
+    for kind in SOURCES:
+        values = {kind.option.name: kind.word or "x"}
+        if kind in used_by(command):
+            assert check_source(values, {}, command) is kind
+        else:
+            with pytest.raises(UsageError, match=f"{kind.spelled} was given, and `mpucal {command}` does not take it"):
+                check_source(values, {}, command)
+
+
+def test_each_option_is_refused_beside_the_sources_that_have_it_not():
+    every = {option for kind in SOURCES for option in (*kind.options, *kind.settings)}
+    refused = 0
+    for kind in SOURCES:
+        if kind.delivers is Delivers.CAPTURE:
+            continue
+        for option in every - {*kind.options, *kind.settings}:
+            refused += 1
+            with pytest.raises(UsageError, match=f"{option.spelled} was given beside {kind.spelled}, which has none"):
+                check_source({kind.option.name: kind.word or "x"}, {option.name: option.spelled}, "session")
+    assert refused
+
+
+def test_a_capture_of_an_unknown_source_says_so():
+    with pytest.raises(CaptureError, match=r"does not know \(spi\)"):
+        open_again({"spi": "/dev/spidev0.0"}, Plan())
+
+
+def test_only_text_with_meaning_parses():
+    options = {option.name: option for kind in SOURCES for option in (kind.option, *kind.options, *kind.settings)}
+    assert options["bus"].parse("1") == "/dev/i2c-1"
+    assert options["address"].parse("0x69") == 0x69
+    for name, text in {"bus": "", "address": "0x80", "seed": "-1", "system": "0", "dlpf": "7", "rate": "fast"}.items():
+        with pytest.raises(ValueError, match=r"\.$"):
+            options[name].parse(text)
+
+
+def test_no_library_of_a_source_is_loaded_before_it_is_opened():
+    program = (
+        "import sys, mpucal.sources.table; print(sorted({'smbus2', 'serial', 'mcap', 'pymavlink'} & set(sys.modules)))"
+    )
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"
