@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -88,4 +88,4 @@ class Track:
         c = self.calibration
         s = np.linalg.solve(c.D, prepared.flat.y - (c.b_a - c.applied_in_hardware))
         D, b_a = c.D, c.b_a - c.applied_in_hardware
-        return Theta(D, b_a, c.b_omega, s / np.linalg.norm(s), c.K, 0.0, np.zeros(3))
+        return replace(Theta.start(D, b_a, c.b_omega, s / np.linalg.norm(s)), K=c.K)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.flat_segment import Flat
+from mpucal.calibration.parameters import NAMES
 from mpucal.calibration.problem import Series
 from mpucal.calibration.theta import Theta
 from mpucal.kernel import _kernel
@@ -37,16 +38,8 @@ def hand_series():
 @pytest.fixture(scope="session")
 def theta():
     rng = np.random.default_rng(6)
-    K = rng.normal(0.0, 0.03, (3, 3))
-    return Theta(
-        D=np.eye(3) + rng.normal(0.0, 0.1, (3, 3)),
-        b_a=rng.normal(0.0, 0.5, 3),
-        b_omega=rng.normal(0.0, 0.1, 3),
-        u=np.array([0.1, -0.2, np.sqrt(0.95)]),
-        K=np.eye(3) + K + K.T,
-        tau=0.02,
-        r=np.array([0.1, 0.2, -0.15]),
-    )
+    start = Theta.start(np.eye(3), np.zeros(3), np.zeros(3), np.array([0.1, -0.2, np.sqrt(0.95)]))
+    return start.moved(rng.normal(0.0, 0.05, len(NAMES)))
 
 
 @pytest.fixture(scope="session")
