@@ -28,8 +28,9 @@ from tables import number
 import mpucal
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from mpucal.errors import MpucalError
+from mpucal.simulated.sensor import SensorTruth
 from mpucal.simulated.study.metrics import sph_rms
-from mpucal.simulated.study.scenarios import GRAVITY_MPS2, MOTIONS, Truth, hand_scenario
+from mpucal.simulated.study.scenarios import GRAVITY_MPS2, MOTIONS, hand_scenario
 
 RAW, AUTO = "uncalibrated", "mpucal auto"
 # section 4.1, Galaxy S5, ||g|| = 9.82: mean and sd of the magnitude after calibration; nothing is printed of before
@@ -96,7 +97,7 @@ METHODS: Mapping[str, Callable[[Recording, float], Estimate]] = {
 }
 
 
-def grade(method: str, recording: Recording, gravity: float, truth: Truth | None) -> Grade:
+def grade(method: str, recording: Recording, gravity: float, truth: SensorTruth | None) -> Grade:
     """Calibrate by a method, and judge what it gives."""
     began = time.perf_counter()
     try:

@@ -32,9 +32,8 @@ from mpucal.calibration.masks import with_masks
 from mpucal.calibration.static_intervals import static_intervals
 from mpucal.data import Recording, Vector
 from mpucal.errors import RecordingError
+from mpucal.simulated.sensor import SensorTruth, non_orthogonality, turned
 from mpucal.simulated.study.metrics import sph_rms, tilt_errors_deg
-from mpucal.simulated.study.scenarios import Truth
-from mpucal.simulated.study.sensors import misaligned, non_orthogonality
 
 GAIN, SKEW_RAD, MISALIGNMENT_RAD, BIAS_MPS2 = 0.1, np.radians(5.0), np.radians(3.0), 1.0
 GOALS = {"sph_rms": 0.094, "roll_deg": 0.47, "pitch_deg": 0.22}
@@ -96,7 +95,7 @@ def distortion(seed: int) -> tuple[Vector, Vector]:
     gain = 1.0 + rng.uniform(-GAIN, GAIN, 3)
     skew = rng.uniform(-SKEW_RAD, SKEW_RAD, 3)
     turn = rng.uniform(-MISALIGNMENT_RAD, MISALIGNMENT_RAD, 3)
-    return np.diag(gain) @ non_orthogonality(*skew) @ misaligned(*turn), rng.uniform(-BIAS_MPS2, BIAS_MPS2, 3)
+    return np.diag(gain) @ non_orthogonality(*skew) @ turned(-turn), rng.uniform(-BIAS_MPS2, BIAS_MPS2, 3)
 
 
 def of_seed(seed: int, path: Path, model: str, gravity: float) -> Run:
@@ -112,7 +111,7 @@ def of_seed(seed: int, path: Path, model: str, gravity: float) -> Run:
     result = mpucal.calibrate(recording, model=model, gravity=gravity)
     if not np.isfinite(result.D).all():
         raise RecordingError(f"{path}: nothing could be estimated", "see what `mpucal calibrate` says of it")
-    truth = Truth(D_true, b_true, np.eye(3), np.zeros(3), gravity)
+    truth = SensorTruth(D_true, b_true, np.eye(3), np.zeros(3), gravity)
     D = np.array([np.eye(3), result.D, result.D, D_true])
     b_a = np.array([np.zeros(3), result.b_a, result.b_a, b_true])
     s, turned = orientations(recording, D, b_a, result.K, gravity)

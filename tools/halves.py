@@ -145,7 +145,7 @@ def simulate(scene: str, seed: int) -> Simulated:
         return paper_scenario(seed)
     if scene == "paper, gyro off":
         of_sensor, of_gyro = np.random.default_rng(seed).spawn(2)
-        sensor = replace(paper_sensor(of_sensor), G=hand_sensor(of_gyro, 100.0).G)
+        sensor = replace(paper_sensor(of_sensor), K=hand_sensor(of_gyro).K)
         return paper_scenario(seed, sensor=sensor)
     return hand_scenario(seed, scene)
 

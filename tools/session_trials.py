@@ -32,6 +32,8 @@ from mpucal.session.events import Caution, Decision, Key, Knowledge, Meter, Outp
 from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.sensor import SensorTruth
+from mpucal.simulated.study.metrics import sph_rms
 
 # what changes while the board is turned is seen by what was turned, or by what verifies it
 CHANGED = "inconsistent", "verification_failed"
@@ -118,7 +120,7 @@ def run(bus_words: str, plan: Plan, seed: int) -> Trial:
         finished_s,
         sum(prompt.kind is PromptKind.ROTATE for _, prompt in witness.of(Prompt)),
         tuple(max(v) for _, k in known for v in (k.gain_pct, k.misalignment_deg, k.bias_mg)) or (math.nan,) * 3,
-        _sph_rms(D, b_a, calibration.D, calibration.b_a, plan.gravity),
+        sph_rms(SensorTruth(D, b_a, np.eye(3), np.zeros(3), plan.gravity), calibration.D, calibration.b_a),
         tuple(((calibration.D - D) / calibration.D_std).ravel().tolist())
         + tuple(((calibration.b_a - b_a) / calibration.b_a_std).tolist()),
         tuple(
@@ -130,12 +132,6 @@ def run(bus_words: str, plan: Plan, seed: int) -> Trial:
         tuple(reason["message"] for reason in calibration.quality["reasons"])
         + tuple(decision.why for _, decision in witness.of(Decision)),
     )
-
-
-def _sph_rms(D_true: np.ndarray, b_true: np.ndarray, D: np.ndarray, b_a: np.ndarray, g: float) -> float:
-    A = np.linalg.solve(D, D_true) - np.eye(3)
-    c = np.linalg.solve(D, b_true - b_a)
-    return float(np.sqrt(g**2 / 3.0 * np.sum(A * A) + c @ c))
 
 
 def all_of(bus_words: str, plan: Plan, seeds: Sequence[int], jobs: int) -> list[Trial]:

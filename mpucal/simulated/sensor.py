@@ -1,22 +1,21 @@
-"""What is true of a simulated sensor, and the counts it makes of a motion. Knows no register and no hand."""
+"""The true parameters of a simulated sensor, and what it makes of a motion: counts of a chip, or values in SI units."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..chip.families import MPU6050, MPU6500
+from ..data import STANDARD_GRAVITY_MPS2, Mask, Vector
 
 Counts = NDArray[np.int16]
 
 FULL_SCALE = 32768
 TEMPERATURE_NOISE_C = 0.02
-
-# The data sheets' noise densities: ug/sqrt(Hz), deg/s/sqrt(Hz).
-NOISE_OF_6050, NOISE_OF_6500 = (400.0, 0.005), (300.0, 0.01)
 
 
 @dataclass(frozen=True)
@@ -50,12 +49,30 @@ class Setting:
 
 
 @dataclass(frozen=True)
+class InSi:
+    """A setting whose counts are m/s^2, rad/s and degrees Celsius, of no limit; `rate_hz` as in Setting."""
+
+    rate_hz: float
+    mps2_per_lsb: float = 1.0
+    rad_s_per_lsb: float = 1.0
+    lsb_per_c: float = 1.0
+    zero_c: float = 0.0
+    accel_offset_g: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gyro_offset_dps: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class Response:
     """In counts: (f, w) times `matrix` (6, 7), plus `offset` (7,), plus noise of deviation `noise` (7,)."""
 
     matrix: Vector
     offset: Vector
     noise: Vector
+
+    def values(self, specific_force: Vector, omega: Vector, normal: Vector) -> Vector:
+        """(n, 7) before rounding, with `normal` (n, 7) of unit deviation for its noise; see `counts`."""
+        exact = np.hstack((specific_force, omega)) @ self.matrix + self.offset
+        return np.asarray(exact + normal * self.noise)
 
     def counts(self, specific_force: Vector, omega: Vector, rng: np.random.Generator) -> Counts:
         """What the chip reports of the mean motion over each sample.
@@ -68,36 +85,35 @@ class Response:
         -------
         (n, 7) int16 in register order: accelerometer x, y, z, temperature, gyroscope x, y, z; saturated.
         """
-        exact = np.hstack((specific_force, omega)) @ self.matrix + self.offset
-        noisy = exact + rng.standard_normal(exact.shape) * self.noise
+        noisy = self.values(specific_force, omega, rng.standard_normal((len(omega), len(self.offset))))
         return np.minimum(np.maximum(np.rint(noisy), -FULL_SCALE), FULL_SCALE - 1).astype(np.int16)
 
 
 @dataclass(frozen=True)
-class Truth:
-    """A sensor's true parameters, in the frame in which K is symmetric.
+class SensorTruth:
+    """A sensor's true parameters.
 
     Attributes
     ----------
     D, b_a : (3, 3), (3,) m/s^2: y = D s + b_a of specific force s (the paper's eq. 3).
-    K, b_omega : (3, 3) symmetric, (3,) rad/s: w = K (y - b_omega).
-    accel_noise_density, gyro_noise_density : m/s^2/sqrt(Hz), rad/s/sqrt(Hz).
+    K, b_omega : (3, 3), (3,) rad/s: w = K (y - b_omega).
+    gravity : m/s^2, where the sensor is.
+    accel_noise_density, gyro_noise_density : m/s^2/sqrt(Hz), rad/s/sqrt(Hz), of all axes or of each (3,).
     rate_error_ppm : how much faster than nominal the sample clock runs.
-    gravity : m/s^2, where the sensor is. temperature_c : of the die.
-    chip : its name. seed : what it was drawn from.
+    temperature_c : of the die. chip : its name. seed : what it was drawn from.
     """
 
     D: Vector
     b_a: Vector
     K: Vector
     b_omega: Vector
-    accel_noise_density: float
-    gyro_noise_density: float
-    rate_error_ppm: float
-    gravity: float
-    temperature_c: float
-    chip: str
-    seed: int
+    gravity: float = STANDARD_GRAVITY_MPS2
+    accel_noise_density: float | Vector = 0.0
+    gyro_noise_density: float | Vector = 0.0
+    rate_error_ppm: float = 0.0
+    temperature_c: float = 25.0
+    chip: str = ""
+    seed: int = 0
 
     @classmethod
     def draw(cls, seed: int, chip: str = "mpu6050", gravity: float = STANDARD_GRAVITY_MPS2) -> Self:
@@ -107,35 +123,28 @@ class Truth:
         matrix +-3 % on and +-2 % off the diagonal; sample clock +-0.8 %.
         """
         rng = np.random.default_rng([seed, 1])
-        zeta, eta, rho = rng.uniform(-0.02, 0.02, 3)
-        skew = np.array(
-            [
-                [1.0, 0.0, 0.0],
-                [np.sin(zeta), np.cos(zeta), 0.0],
-                [-np.sin(eta), np.cos(eta) * np.sin(rho), np.cos(eta) * np.cos(rho)],
-            ]
-        )
+        skew = non_orthogonality(*rng.uniform(-0.02, 0.02, 3))
         gains = np.diag(rng.uniform(0.97, 1.03, 3))
-        D = gains @ skew @ rotation_matrix(np.radians(rng.uniform(-2, 2, 3)))
+        D = gains @ skew @ turned(np.radians(rng.uniform(-2, 2, 3)))
         gyro = rng.uniform(-0.02, 0.02, (3, 3))
         np.fill_diagonal(gyro, rng.uniform(0.97, 1.03, 3))
-        D, K = in_symmetric_frame(D, np.linalg.inv(gyro))
-        accel_noise, gyro_noise = NOISE_OF_6050 if chip.startswith("mpu6050") else NOISE_OF_6500
+        D, K, _ = in_symmetric_frame(D, np.linalg.inv(gyro))
+        family = MPU6050 if chip.startswith("mpu6050") else MPU6500
         return cls(
             D=D,
             b_a=rng.uniform(-0.08, 0.08, 3) * STANDARD_GRAVITY_MPS2,
             K=K,
             b_omega=np.radians(rng.uniform(-20, 20, 3)),
-            accel_noise_density=accel_noise * 1e-6 * STANDARD_GRAVITY_MPS2,
-            gyro_noise_density=float(np.radians(gyro_noise)),
-            rate_error_ppm=float(np.round(rng.uniform(-8000, 8000))),
             gravity=gravity,
+            accel_noise_density=family.accel_noise_ug * 1e-6 * STANDARD_GRAVITY_MPS2,
+            gyro_noise_density=float(np.radians(family.gyro_noise_dps)),
+            rate_error_ppm=float(np.round(rng.uniform(-8000, 8000))),
             temperature_c=float(np.round(rng.uniform(22, 34), 1)),
             chip=chip,
             seed=seed,
         )
 
-    def response(self, setting: Setting) -> Response:
+    def response(self, setting: Setting | InSi) -> Response:
         """What the sensor makes of a motion, so set.
 
         A mean over one sample passes white noise up to half the sample rate.
@@ -157,18 +166,43 @@ class Truth:
         """The truth in plain JSON types, in m/s^2, rad/s and the symmetric frame."""
         return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in self.__dict__.items()}
 
+    def symmetric(self) -> tuple[Self, Vector]:
+        """The same sensor in the body frame in which K is symmetric, and Q, which turns the body to that frame."""
+        D, K, Q = in_symmetric_frame(self.D, self.K)
+        return replace(self, D=D, K=K), Q
 
-def in_symmetric_frame(D: Vector, K: NDArray[np.floating[Any]]) -> tuple[Vector, Vector]:
-    """The same sensor in the frame that makes K symmetric: K = U S V^T, Q = V U^T, then D Q^T and Q K."""
+
+def in_symmetric_frame(D: Vector, K: NDArray[np.floating[Any]]) -> tuple[Vector, Vector, Vector]:
+    """D Q^T, the symmetric Q K, and Q: K = U S V^T, Q = V U^T."""
     U, S, Vt = np.linalg.svd(K)
-    symmetric = Vt.T @ np.diag(S) @ Vt
-    return D @ U @ Vt, (symmetric + symmetric.T) / 2
+    Q, symmetric = Vt.T @ U.T, Vt.T @ np.diag(S) @ Vt
+    return D @ Q.T, (symmetric + symmetric.T) / 2, Q
 
 
-def rotation_matrix(angles_rad: Vector) -> Vector:
-    """Rx Ry Rz of three small angles [rad]."""
-    (cx, cy, cz), (sx, sy, sz) = np.cos(angles_rad), np.sin(angles_rad)
-    Rx = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
-    Ry = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
-    Rz = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
-    return np.asarray(Rx @ Ry @ Rz)
+def non_orthogonality(zeta: float, eta: float, rho: float) -> Vector:
+    """C_no of Kok and Schön (2014), section 4.3's skewed axes [rad]."""
+    return np.array(
+        [
+            [1.0, 0.0, 0.0],
+            [np.sin(zeta), np.cos(zeta), 0.0],
+            [-np.sin(eta), np.cos(eta) * np.sin(rho), np.cos(eta) * np.cos(rho)],
+        ]
+    )
+
+
+def turned(angles_rad: Vector) -> Vector:
+    """Rx Ry Rz of three angles [rad]."""
+    return np.asarray(Rotation.from_euler("XYZ", angles_rad).as_matrix())
+
+
+def density(std: Vector, rate_hz: float) -> Vector:
+    """The noise density that gives a deviation `std` a sample at `rate_hz`."""
+    return np.asarray(std / np.sqrt(rate_hz / 2.0))
+
+
+def quantised(y: Vector, step: float) -> tuple[Vector, Mask]:
+    """y (n, 3) as 16-bit counts of size step, and the samples (n,) with an axis at the end of its range."""
+    if step == 0.0:
+        return y, np.zeros(len(y), bool)
+    counts = np.clip(np.rint(y / step), -FULL_SCALE, FULL_SCALE - 1)
+    return counts * step, ((counts == -FULL_SCALE) | (counts == FULL_SCALE - 1)).any(axis=1)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mpucal.data import Recording, Samples
-from mpucal.simulated.study.scenarios import Truth, hand_scenario, paper_scenario
-from mpucal.simulated.study.sensors import SensorTruth
+from mpucal.simulated.sensor import SensorTruth, density
+from mpucal.simulated.study.scenarios import hand_scenario, paper_scenario
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 G = 9.82
@@ -20,20 +20,22 @@ class Other:
     """A recording of a simulator that is not the project's, and its truth."""
 
     recording: Recording
-    truth: Truth
+    truth: SensorTruth
 
 
 def near_ideal(seed=0, D=None, G_gyro=None, **scenario):
     """The paper's turns of a sensor whose axes, gains and biases are nearly right, unless told otherwise."""
+    scenario = {"rate_hz": 50, **scenario}
     sensor = SensorTruth(
         D=np.eye(3) if D is None else np.asarray(D, float),
         b_a=np.array([0.1, -0.2, 0.15]),
-        G=np.eye(3) if G_gyro is None else G_gyro,
+        K=np.eye(3) if G_gyro is None else np.linalg.inv(G_gyro),
         b_omega=np.array([0.02, -0.03, 0.01]),
-        sigma_a=np.full(3, 0.1),
-        sigma_omega=np.full(3, 0.03),
+        gravity=G,
+        accel_noise_density=density(0.1, scenario["rate_hz"]),
+        gyro_noise_density=density(0.03, scenario["rate_hz"]),
     )
-    return paper_scenario(seed, sensor=sensor, **{"rate_hz": 50, **scenario})
+    return paper_scenario(seed, sensor=sensor, **scenario)
 
 
 def samples_of(recording, kept):
@@ -84,7 +86,7 @@ def other_simulator():
             recording = Recording.from_arrays(
                 file["t"], file["acc"], file["gyr"], flat=(0, int(file["flat_samples"])), name=name
             )
-            truth = Truth(*(file[f"true_{key}"] for key in ("D", "b_a", "K", "b_omega")), float(file["gravity"]))
+            truth = SensorTruth(*(file[f"true_{key}"] for key in ("D", "b_a", "K", "b_omega")), float(file["gravity"]))
         return Other(recording, truth)
 
     return load

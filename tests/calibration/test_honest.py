@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from mpucal.calibration import calibrate
 from mpucal.calibration.rotation import rotation
 from mpucal.data import Recording
+from mpucal.simulated.sensor import SensorTruth
 from mpucal.simulated.study.metrics import sph_rms
-from mpucal.simulated.study.scenarios import Truth, hand_scenario, paper_scenario
+from mpucal.simulated.study.scenarios import hand_scenario, paper_scenario
 
 G = 9.82
 SCENES = ("paper", "pose12", "pose9", "pose6", "continuous", "turns")
@@ -28,7 +29,7 @@ def base(prepared, seed):
 
 def turned(truth, Q):
     """The same sensor with the axes of both its sensors turned by Q, so that it starts in another orientation."""
-    return Truth(Q @ truth.D @ Q.T, Q @ truth.b_a, Q @ truth.K @ Q.T, Q @ truth.b_omega, truth.gravity)
+    return SensorTruth(Q @ truth.D @ Q.T, Q @ truth.b_a, Q @ truth.K @ Q.T, Q @ truth.b_omega, truth.gravity)
 
 
 @st.composite

@@ -9,8 +9,9 @@ from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.paper import MAX_ITERATIONS, expand, fit_paper
 from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.data import Recording
+from mpucal.simulated.sensor import SensorTruth
 from mpucal.simulated.study.metrics import sph_rms
-from mpucal.simulated.study.scenarios import Truth, paper_scenario
+from mpucal.simulated.study.scenarios import paper_scenario
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "simulated"
 G = 9.82
@@ -43,7 +44,9 @@ def test_it_finds_the_sensors_of_another_simulator(number):
         n_flat = int(file["flat_samples"]) // every
         columns = (file[key][::every] for key in ("t", "acc", "gyr"))
         recording = Recording.from_arrays(*columns, flat=(0, n_flat))
-        truth = Truth(*(file[f"true_{key}"] for key in ("D", "b_a", "K", "b_omega")), gravity=float(file["gravity"]))
+        truth = SensorTruth(
+            *(file[f"true_{key}"] for key in ("D", "b_a", "K", "b_omega")), gravity=float(file["gravity"])
+        )
     fit = fitted(recording)
     assert fit.converged
     assert sph_rms(truth, fit.D, fit.b_a) < 0.4

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.rotation import rotation
+from mpucal.simulated.sensor import SensorTruth
 from mpucal.simulated.study.metrics import sph_rms, tilt_errors_deg
-from mpucal.simulated.study.scenarios import Truth
 
 RNG = np.random.default_rng(0)
 D = np.eye(3) + 0.1 * RNG.normal(size=(3, 3))
-TRUTH = Truth(D, np.array([0.5, -0.2, 0.1]), np.eye(3), np.zeros(3), 9.82)
+TRUTH = SensorTruth(D, np.array([0.5, -0.2, 0.1]), np.eye(3), np.zeros(3), 9.82)
 
 
 def sphere(n):

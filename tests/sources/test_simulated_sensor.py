@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from mpucal.simulated.sensor import Setting, Truth, in_symmetric_frame
+from mpucal.simulated.sensor import SensorTruth, Setting, in_symmetric_frame
 
 G0 = 9.80665
 STILL = np.tile([0.0, 0.0, 9.81], (4000, 1))
@@ -22,7 +22,7 @@ def counts(truth, how, force=STILL, omega=NO_TURN):
 
 @pytest.mark.parametrize("seed", range(50))
 def test_a_drawn_sensor_lies_within_the_data_sheet(seed):
-    truth = Truth.draw(seed)
+    truth = SensorTruth.draw(seed)
     gyro = np.linalg.inv(truth.K)
     np.testing.assert_array_equal(truth.K, truth.K.T)
     # the symmetric half of +-3 % on and +-2 % off the diagonal
@@ -37,12 +37,12 @@ def test_a_drawn_sensor_lies_within_the_data_sheet(seed):
 
 
 def test_a_seed_is_a_sensor():
-    assert Truth.draw(7).document() == Truth.draw(7).document()
-    assert Truth.draw(7).document() != Truth.draw(8).document()
+    assert SensorTruth.draw(7).document() == SensorTruth.draw(7).document()
+    assert SensorTruth.draw(7).document() != SensorTruth.draw(8).document()
 
 
 def test_the_document_is_plain_json():
-    truth = Truth.draw(1, "mpu6500", 9.82)
+    truth = SensorTruth.draw(1, "mpu6500", 9.82)
     document = json.loads(json.dumps(truth.document()))
     assert document["D"] == truth.D.tolist()
     assert {"D", "b_a", "K", "b_omega", "gravity", "seed", "rate_error_ppm", "chip"} <= set(document)
@@ -52,11 +52,11 @@ def test_the_document_is_plain_json():
 def test_the_symmetric_frame_is_another_view_of_the_same_sensor():
     rng = np.random.default_rng(2)
     D, K = np.eye(3) + rng.normal(size=(3, 3)) * 0.1, np.eye(3) + rng.normal(size=(3, 3)) * 0.1
-    D2, K2 = in_symmetric_frame(D, K)
+    D2, K2, Q = in_symmetric_frame(D, K)
     np.testing.assert_allclose(K2, K2.T, atol=1e-12)
     assert np.all(np.linalg.eigvalsh(K2) > 0)
     # what is seen by both of one turn and one force: K and D differ by one rotation
-    Q = K2 @ np.linalg.inv(K)
+    np.testing.assert_allclose(Q, K2 @ np.linalg.inv(K), atol=1e-12)
     np.testing.assert_allclose(Q @ Q.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(Q) == pytest.approx(1.0)
     np.testing.assert_allclose(D2 @ Q, D, atol=1e-12)
@@ -65,7 +65,7 @@ def test_the_symmetric_frame_is_another_view_of_the_same_sensor():
 @pytest.mark.parametrize("rate_hz", [100.0, 1000.0])
 @pytest.mark.parametrize(("g", "dps"), [(2.0, 250.0), (16.0, 2000.0)])
 def test_counts_at_rest_have_the_truth_as_mean_and_the_density_as_spread(rate_hz, g, dps):
-    truth = Truth.draw(3)
+    truth = SensorTruth.draw(3)
     seen = counts(truth, setting(rate_hz, g, dps)).astype(float)
     lsb_per_g, lsb_per_dps = 32768 / g, 131 * 250 / dps
     force = truth.D[:, 2] * 9.81 + truth.b_a
@@ -83,7 +83,7 @@ def test_counts_at_rest_have_the_truth_as_mean_and_the_density_as_spread(rate_hz
 
 
 def test_rates_and_forces_come_back_through_the_calibration():
-    truth = Truth.draw(4)
+    truth = SensorTruth.draw(4)
     rng = np.random.default_rng(4)
     force, omega = rng.uniform(-15, 15, (5000, 3)), rng.uniform(-3, 3, (5000, 3))
     seen = counts(truth, setting(), force, omega)
@@ -99,13 +99,15 @@ def test_rates_and_forces_come_back_through_the_calibration():
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_it_saturates_at_the_ends_of_the_range(sign):
-    seen = counts(Truth.draw(5), setting(accel_range_g=2.0), sign * 100 * np.ones((9, 3)), sign * 50 * np.ones((9, 3)))
+    seen = counts(
+        SensorTruth.draw(5), setting(accel_range_g=2.0), sign * 100 * np.ones((9, 3)), sign * 50 * np.ones((9, 3))
+    )
     end = 32767 if sign > 0 else -32768
     assert np.all(seen[:, [0, 1, 2, 4, 5, 6]] == end)
 
 
 def test_offsets_add_what_the_registers_say():
-    truth = Truth.draw(6)
+    truth = SensorTruth.draw(6)
     plain = counts(truth, setting()).astype(float).mean(axis=0)
     moved = counts(truth, setting(accel_offset_g=(0.125, 0, -0.5), gyro_offset_dps=(0, 4, 0)))
     np.testing.assert_allclose(moved.astype(float).mean(axis=0) - plain, [1024, 0, -4096, 0, 0, 262, 0], atol=0.1)

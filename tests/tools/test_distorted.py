@@ -7,8 +7,8 @@ from rich.console import Console
 
 from mpucal.calibration.ekf import specific_force
 from mpucal.errors import RecordingError
+from mpucal.simulated.sensor import SensorTruth, density
 from mpucal.simulated.study.scenarios import GRAVITY_MPS2, paper_scenario
-from mpucal.simulated.study.sensors import SensorTruth
 
 
 @pytest.fixture
@@ -32,7 +32,10 @@ def quaternion(R):
 def captured_file(tmp_path_factory):
     """A perfect sensor under motion capture, which loses it for a second; at rest before and after."""
     sensor = SensorTruth(
-        np.eye(3), np.zeros(3), np.eye(3), np.zeros(3), sigma_a=np.full(3, 0.03), sigma_omega=np.full(3, 0.002)
+        *(np.eye(3), np.zeros(3), np.eye(3), np.zeros(3)),
+        gravity=GRAVITY_MPS2,
+        accel_noise_density=density(0.03, 50.0),
+        gyro_noise_density=density(0.002, 50.0),
     )
     simulated = paper_scenario(0, rate_hz=50.0, sensor=sensor)
     recording = simulated.recording

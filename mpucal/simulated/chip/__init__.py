@@ -12,7 +12,7 @@ from ...data import STANDARD_GRAVITY_MPS2
 from ..faults import mishaps
 from ..hand import KINDS
 from ..motion import Motion
-from ..sensor import Truth, in_symmetric_frame
+from ..sensor import SensorTruth
 from .bus import SimulatedBus
 from .chip import Chip
 from .clock import CLOCKS, Clock, FastClock
@@ -22,7 +22,7 @@ from .feed import Feed, RecordedFeed, SensorFeed
 from .models import MODELS, OFFSETS
 from .options import ChipOptions
 
-__all__ = ["Chip", "Feed", "RecordedFeed", "SimulatedBus", "Truth", "open_recorded", "open_simulated"]
+__all__ = ["Chip", "Feed", "RecordedFeed", "SensorTruth", "SimulatedBus", "open_recorded", "open_simulated"]
 
 
 def open_simulated(
@@ -79,20 +79,17 @@ def open_recorded(
     return SimulatedBus(Chip(MODELS[chip], feed, rate_error_ppm, Factory()), FastClock())
 
 
-def _truth(options: ChipOptions, gravity: float) -> Truth:
+def _truth(options: ChipOptions, gravity: float) -> SensorTruth:
     """As drawn, but for what was asked for; brought to the frame in which K is symmetric."""
-    drawn = Truth.draw(options.seed, options.chip, gravity)
+    drawn = SensorTruth.draw(options.seed, options.chip, gravity)
     asked: dict[str, Any] = {
         key: getattr(options, key)
         for key in ("D", "b_a", "K", "b_omega", "rate_error_ppm", "temperature_c")
         if getattr(options, key) is not None
     }
-    truth = replace(drawn, **asked)
-    D, K = in_symmetric_frame(truth.D, truth.K)
+    truth, _ = replace(drawn, **asked).symmetric()
     return replace(
         truth,
-        D=D,
-        K=K,
         accel_noise_density=truth.accel_noise_density * options.noise,
         gyro_noise_density=truth.gyro_noise_density * options.noise,
     )

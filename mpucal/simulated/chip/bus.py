@@ -8,7 +8,7 @@ from ...chip.access import Reply
 from ...sources.i2c_errors import transfer_error
 from ..hand import Prompt
 from ..motion import Motion
-from ..sensor import Truth
+from ..sensor import SensorTruth
 from .chip import Chip
 from .clock import Clock, RealClock
 from .faults import Faults
@@ -32,7 +32,7 @@ class SimulatedBus:
         chip: Chip,
         clock: Clock,
         motion: Motion | None = None,
-        truth: Truth | None = None,
+        truth: SensorTruth | None = None,
         faults: Faults | None = None,
         khz: float = KHZ,
     ) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ...data import Vector
 from ...errors import RecordingError, UsageError
 from ..motion import Motion
-from ..sensor import FULL_SCALE, Counts, Response, Setting, Truth
+from ..sensor import FULL_SCALE, Counts, Response, SensorTruth, Setting
 
 RECORDED_C = 25.0
 TEMPERATURE = 3
@@ -29,7 +29,7 @@ class Feed(Protocol):
 class SensorFeed:
     """What a sensor of known truth measures of a motion."""
 
-    def __init__(self, truth: Truth, motion: Motion, rng: np.random.Generator) -> None:
+    def __init__(self, truth: SensorTruth, motion: Motion, rng: np.random.Generator) -> None:
         self._truth, self._motion, self._rng = truth, motion, rng
         self._set: tuple[Setting, Response] | None = None
 

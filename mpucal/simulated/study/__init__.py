@@ -1,1 +1,1 @@
-"""Recordings with known truth: simulated sensors in simulated hands. Knows no estimator."""
+"""Recordings with known truth: simulated sensors in simulated hands."""

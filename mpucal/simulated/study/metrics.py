@@ -1,14 +1,14 @@
-"""How far an estimate is from the truth, in numbers a person cares about. Knows no estimator."""
+"""How far an estimate is from the truth, in numbers a person cares about."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...data import Vector
-from .scenarios import Truth
+from ..sensor import SensorTruth
 
 
-def sph_rms(truth: Truth, D: Vector, b_a: Vector) -> float:
+def sph_rms(truth: SensorTruth, D: Vector, b_a: Vector) -> float:
     """Root mean square, over all directions of gravity, of the error of a calibrated noise-free vector [m/s^2].
 
     The vector is inv(D) (D_true s + b_true - b_a) = s + A s + c, and the mean of |A s + c|^2 over the sphere |s| = g is

@@ -1,4 +1,4 @@
-"""Whole recordings with known truth: the paper's simulation and an MPU-6050 by hand. Knows no estimator."""
+"""Whole recordings with known truth: the paper's simulation and an MPU-6050 by hand."""
 
 from __future__ import annotations
 
@@ -9,31 +9,17 @@ from functools import partial
 import numpy as np
 
 from ...calibration.rotation import rotation
-from ...data import Recording, Sensor, Vector
+from ...data import STANDARD_GRAVITY_MPS2, Recording, Sensor, Vector
 from ...errors import UsageError
+from ..sensor import InSi, SensorTruth, quantised
 from .hand import Hand
 from .motions import FLAT_S, MOVING_S, attitude, continuous, poses, six_faces, three_turns
-from .sensors import SensorTruth, hand_sensor, paper_sensor
+from .sensors import GRAVITY_MPS2, hand_sensor, paper_sensor
 
-GRAVITY_MPS2 = 9.82
 TRUTH_HZ = 2000.0
+# one count of an MPU-6050 at 2 g and 500 deg/s; the paper's sensors are as fine as float64
+STEPS, UNQUANTISED = (2.0 * STANDARD_GRAVITY_MPS2 / 32768, float(np.radians(500.0)) / 32768), (0.0, 0.0)
 TREMOR_MPS2, TREMOR_RAD_S = 0.1, np.radians(1.0)
-
-
-@dataclass(frozen=True)
-class Truth:
-    """What an estimator should find, in the body frame in which K is symmetric.
-
-    Attributes
-    ----------
-    D : (3, 3), b_a : (3,) m/s^2: y = D s + b_a. K : (3, 3), b_omega : (3,) rad/s: w = K (y - b_omega). gravity : m/s^2.
-    """
-
-    D: Vector
-    b_a: Vector
-    K: Vector
-    b_omega: Vector
-    gravity: float
 
 
 @dataclass(frozen=True)
@@ -42,11 +28,12 @@ class Simulated:
 
     Attributes
     ----------
+    truth : in the body frame in which K is symmetric, as an estimator finds it.
     specific_force : (n, 3) m/s^2, R(x_t) g without the hand's acceleration. attitude : (n, 3, 3), R(x_t).
     """
 
     recording: Recording
-    truth: Truth
+    truth: SensorTruth
     specific_force: Vector
     attitude: Vector
 
@@ -84,12 +71,21 @@ def paper_scenario(
     sensor : drawn from the seed unless given; one given to many seeds makes section 4.4.
     """
     of_sensor, of_noise = np.random.default_rng(seed).spawn(2)
-    sensor = sensor or paper_sensor(of_sensor)
+    sensor = sensor or paper_sensor(of_sensor, rate_hz)
     n_flat, n_turn = round(FLAT_S * rate_hz), round(turn_s * rate_hz)
     omega = np.concatenate([np.zeros((n_flat, 3)), *(np.tile(e, (n_turn, 1)) for e in 2 * np.pi / turn_s * np.eye(3))])
     R = attitude(omega, 1.0 / rate_hz, np.eye(3))[:-1]
     return _measured(
-        f"paper {seed}", sensor, rate_hz, n_flat, omega, GRAVITY_MPS2 * R[..., 2], R, np.zeros_like(omega), of_noise
+        f"paper {seed}",
+        sensor,
+        UNQUANTISED,
+        rate_hz,
+        n_flat,
+        omega,
+        sensor.gravity * R[..., 2],
+        R,
+        np.zeros_like(omega),
+        of_noise,
     )
 
 
@@ -128,7 +124,8 @@ def hand_scenario(
     omega, s, a = (_means(x, per_sample) for x in (omega, s, _delayed(s + a, t, delay_s) - s))
     return _measured(
         f"simulated {motion} {seed}",
-        hand_sensor(of_sensor, rate_hz, scene.perfect_gyro),
+        hand_sensor(of_sensor, scene.perfect_gyro),
+        STEPS,
         rate_hz,
         round(FLAT_S * rate_hz),
         omega,
@@ -142,6 +139,7 @@ def hand_scenario(
 def _measured(
     name: str,
     sensor: SensorTruth,
+    steps: tuple[float, float],
     rate_hz: float,
     n_flat: int,
     omega: Vector,
@@ -150,10 +148,11 @@ def _measured(
     a: Vector,
     rng: np.random.Generator,
 ) -> Simulated:
-    """What the sensor reads of the rates omega and the specific force s + a, all (n, 3)."""
-    acc, acc_clipped = sensor.accelerometer(s + a, rng)
-    gyr, gyr_clipped = sensor.gyroscope(omega, rng)
-    K, Q = sensor.symmetric_frame()
+    """What the sensor reads, in steps [m/s^2, rad/s], of the rates omega and the specific force s + a, all (n, 3)."""
+    normal = np.hstack((rng.standard_normal(s.shape), np.zeros((len(s), 1)), rng.standard_normal(s.shape)))
+    y = sensor.response(InSi(rate_hz)).values(s + a, omega, normal)
+    (acc, acc_clipped), (gyr, gyr_clipped) = quantised(y[:, :3], steps[0]), quantised(y[:, 4:], steps[1])
+    truth, Q = sensor.symmetric()
     recording = Recording.from_arrays(
         np.arange(len(s)) / rate_hz,
         acc,
@@ -164,7 +163,6 @@ def _measured(
         sensor=Sensor(rate_hz=rate_hz),
         name=name,
     )
-    truth = Truth(sensor.D @ Q.T, sensor.b_a, K, sensor.b_omega, GRAVITY_MPS2)
     return Simulated(recording, truth, s @ Q.T, Q @ R)
 
 

@@ -11,7 +11,7 @@ from ...data import Vector
 from ..faults import mishaps
 from ..hand import KINDS, Prompt
 from ..motion import Motion
-from ..sensor import Response, Setting, Truth
+from ..sensor import Response, SensorTruth, Setting
 from .options import VehicleOptions
 
 # the hand's axes have z up, a vehicle's have z down
@@ -93,7 +93,7 @@ class Heard:
         self.down: Any = down
 
 
-def _truth(seed: int, number: int, gravity: float) -> Truth:
+def _truth(seed: int, number: int, gravity: float) -> SensorTruth:
     """IMU `number`'s errors; the chips on an autopilot are of the newer kind."""
-    drawn = Truth.draw(seed + 1000 * number, "mpu6500", gravity)
+    drawn = SensorTruth.draw(seed + 1000 * number, "mpu6500", gravity)
     return replace(drawn, b_omega=drawn.b_omega * GYRO_BIAS_LEFT, rate_error_ppm=0.0)
