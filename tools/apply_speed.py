@@ -21,8 +21,9 @@ import numpy as np
 from mpucal.chip import registers as reg
 from mpucal.chip.access import Transaction
 from mpucal.data import Samples
+from mpucal.files import open_writer
 from mpucal.files.mcap import CaptureWriter, read_capture
-from mpucal.files.rows import ROWS, Rows, open_writer
+from mpucal.files.rows import ROWS, Rows
 from mpucal.result.calibration import Calibration
 
 # t, acc, gyr and temperature as float64, and three masks

@@ -23,8 +23,8 @@ import numpy as np
 from mpucal.calibration import calibrate
 from mpucal.chip.records import SessionEvent
 from mpucal.files import load
+from mpucal.files.folder import captures_in
 from mpucal.files.mcap import CaptureWriter, read_capture
-from mpucal.files.parts import captures_in
 from mpucal.result.calibration import Calibration
 
 LONGEST_LOST_S = 1.0

@@ -13,9 +13,11 @@ import numpy as np
 
 from ..data import Samples
 from ..errors import UsageError
-from ..files import captures_of
-from ..files.rows import Rows, open_rows, open_writer
-from ..files.rows.csv import CsvText
+from ..files import open_rows, open_writer
+from ..files.csv import CsvText
+from ..files.folder import captures_in
+from ..files.formats import held_whole, writable
+from ..files.rows import Rows
 from ..result.calibration import Calibration
 from ..result.correction import correction
 from .options import check_not_among
@@ -23,7 +25,13 @@ from .options import check_not_among
 EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calibrated.mcap`"
 
 
-@click.command("apply", epilog=EXAMPLE)
+HELP = f"""Apply a calibration (.json or .bin) to any recording that `mpucal calibrate` reads, however long.
+
+What is written is in m/s² and rad/s, in the calibration's body frame. Only {held_whole()} is held in memory whole.
+"""
+
+
+@click.command("apply", help=HELP, epilog=EXAMPLE)
 @click.argument("calibration", metavar="CALIBRATION", type=click.Path(path_type=Path))
 @click.argument("file", metavar="FILE|DIR", type=click.Path(path_type=Path))
 @click.option(
@@ -31,18 +39,15 @@ EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calib
     "target",
     metavar="FILE",
     type=click.Path(path_type=Path),
-    help="A .csv, .npz or .mcap (sensor_msgs/Imu, for ROS 2 and Foxglove); by default a table on stdout.",
+    help=f"Where it goes: {writable()}, by its suffix; by default a table on stdout.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print what was done as JSON; needs -o.")
 def command(calibration: Path, file: Path, target: Path | None, as_json: bool) -> None:
-    """Apply a calibration (.json or .bin) to a recording of any kind, however long: m/s² and rad/s in its body frame.
-
-    A table or an archive passes through as it is read; a capture is gone through before; a vehicle's log is held whole.
-    """
+    """Pass the samples through, a run at a time."""
     if as_json and target is None:
         raise UsageError("--json was given without -o, and the samples go to stdout", "name a file with -o")
     if target is not None:
-        check_not_among(target, (calibration, file, *(captures_of(file) if file.is_dir() else ())))
+        check_not_among(target, (calibration, file, *captures_in(file)))
     rows = open_rows(file)
     if rows.done:
         raise UsageError(f"{file} is calibrated already ({rows.done})", "give what was measured")

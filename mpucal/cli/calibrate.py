@@ -8,6 +8,7 @@ import click
 
 from ..errors import RefusedError
 from ..files import load
+from ..files.formats import readable
 from ..mavlink.calibrate import calibrate_vehicle
 from ..result.calibration import REFUSED
 from ..result.session_files import BLOB
@@ -18,16 +19,19 @@ from .summary import summary, written
 EXAMPLE = "Example: `mpucal calibrate capture.mcap -o results` or `mpucal calibrate walk.npz --json`"
 
 
-@click.command("calibrate", epilog=EXAMPLE)
+HELP = f"""Calibrate from {readable()}.
+
+Exit code 5: the calibration was refused, with reasons.
+"""
+
+
+@click.command("calibrate", help=HELP, epilog=EXAMPLE)
 @click.argument("recording", metavar="FILE|DIR", type=click.Path(path_type=Path))
 @click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Write the results there.")
 @click.option("--json", "as_json", is_flag=True, help="Print calibration.json, and nothing else.")
 @fit_options
 def command(recording: Path, folder: Path | None, as_json: bool, gravity: float, model: str) -> int:
-    """Calibrate from a capture (.mcap, .tlog), a dataflash log (.bin), an archive (.npz) or a table (.csv).
-
-    Of a folder, the capture in it is meant. Exit code 5: the calibration was refused, with reasons.
-    """
+    """Fit a recording, and print or write what comes of it."""
     samples = load(recording)
     if samples.recovered is not None:
         click.echo(f"mpucal: {samples.recovered}", err=True)

@@ -15,7 +15,7 @@ from ..calibration.flat_segment import find_flat
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Sensor
 from ..errors import UsageError
 from ..files import load
-from ..files.dataflash import is_dataflash
+from ..files.formats import readable, recognised
 from ..result.blob import Blob
 from ..result.calibration import Calibration
 from ..sources.kind import SourceKind
@@ -29,15 +29,19 @@ EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --
 CALIBRATIONS = (".json", ".bin")
 
 
-@click.command("show", epilog=EXAMPLE)
+HELP = f"""Say what is in a calibration (.json), a config blob (.bin), a device, or a recording.
+
+A recording is {readable()}. Of a device it is what its sensor's
+registers, its memory or its parameters hold now; nothing is written.
+"""
+
+
+@click.command("show", help=HELP, epilog=EXAMPLE)
 @click.argument("file", metavar="FILE|DIR", type=click.Path(path_type=Path), required=False)
 @source_options("show", settings=False)
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON.")
 def command(file: Path | None, as_json: bool, **options: Any) -> None:
-    """Say what is in a calibration (.json), a config blob (.bin), a recording, or a device.
-
-    Of a device it is what its sensor's registers, its memory or its parameters hold now; nothing is written.
-    """
+    """Show the one place that is given."""
     sources = kinds_meant(options)
     places = [*(["a file"] if file is not None else []), *(kind.option.spelled for kind in sources)]
     if len(places) != 1:
@@ -47,7 +51,7 @@ def command(file: Path | None, as_json: bool, **options: Any) -> None:
         )
     if file is None:
         _show_device(check_source(click.get_current_context()), options, as_json)
-    elif file.suffix in CALIBRATIONS and not is_dataflash(file):
+    elif file.suffix in CALIBRATIONS and recognised(file) is None:
         _show_calibration(str(file), Calibration.load(file), as_json)
     else:
         _show_recording(file, as_json)

@@ -14,7 +14,7 @@ import click
 
 from ..data import STANDARD_GRAVITY_MPS2, Samples
 from ..errors import EndOfCapture, OutputError
-from ..files.rows.csv import CsvText
+from ..files.csv import CsvText
 from ..result.calibration import Calibration
 from ..result.clock import now
 from ..result.correction import Correction, correction

@@ -1,22 +1,17 @@
-"""Recording files: captures, NumPy archives and tables, each read by its own module. Knows no estimate."""
+"""Recording files: read whole or a run of samples at a time, and written; `formats` has a row for each format."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 from ..data import Recording
-from ..errors import RecordingError
-from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
-from .parts import captures_in
-
-KINDS = (".mcap", ".tlog", ".bin", ".npz", ".csv")
-_REMEDY = f"give a {', '.join(KINDS)} file or the folder of a session"
+from .formats import format_of, written_format
+from .rows import Rows, Write
 
 
 def load(path: str | Path) -> Recording:
-    """The recording in a file (.mcap, .tlog, .bin of ArduPilot, .npz, .csv), or in the capture of a session's folder.
+    """The recording in a file of any format in `formats.FORMATS` (.mcap, .npz, .csv ...), or in a session's folder.
 
     A capture that was cut short gives what is whole of it, and says so in `recovered`.
 
@@ -26,63 +21,31 @@ def load(path: str | Path) -> Recording:
     CaptureError : a capture that cannot be read.
     ChipError : the capture of a chip that is not known.
     """
-    path = Path(path)
-    parts = [path]
-    if path.is_dir():
-        parts = captures_of(path)
-        path = parts[0]
-    if not path.exists():
-        raise RecordingError(f"there is no file {path}", "check the path")
-    kind = path.suffix.lower()
-    if kind not in KINDS:
-        raise RecordingError(f"{path} is no kind of recording that mpucal knows", _REMEDY)
-    # a kind's library is loaded only when a file of that kind is
-    if kind == ".mcap":
-        return _load_captures(parts)
-    if kind == ".tlog":
-        from .tlog import load_tlog  # noqa: PLC0415
-
-        return load_tlog(path)
-    if kind == ".bin":
-        from .dataflash import load_dataflash  # noqa: PLC0415
-
-        return load_dataflash(path)
-    if kind == ".npz":
-        from .npz import load_npz  # noqa: PLC0415
-
-        return load_npz(path)
-    from .csv import load_csv  # noqa: PLC0415
-
-    return load_csv(path)
+    return format_of(Path(path)).read(Path(path))
 
 
-def _load_captures(paths: Sequence[Path]) -> Recording:
-    """The recording in the captures of one session, without what its person wanted to forget."""
-    from ..chip.decode import decode  # noqa: PLC0415
-    from ..chip.records import FORGET, SessionEvent  # noqa: PLC0415
-    from .mcap import read_capture  # noqa: PLC0415
+def open_rows(path: Path) -> Rows:
+    """The samples of any recording that `load` reads, a run at a time.
 
-    captures = [read_capture(path) for path in paths]
-    records = [record for capture in captures for record in capture.records]
-    accesses = [record for record in records if not isinstance(record, SessionEvent)]
-    recording = decode(accesses, captures[0].name)
-    forgotten = {
-        int(record.data["first"]): int(record.data["last"])
-        for record in records
-        if isinstance(record, SessionEvent) and record.name == FORGET
-    }
-    for first, last in sorted(forgotten.items(), reverse=True):
-        recording = recording.without(first, last)
-    recovered = [capture.recovered for capture in captures if capture.recovered is not None]
-    return replace(recording, recovered=recovered[-1] if recovered else None)
+    A table and an archive are read as they are gone through. A capture is gone through before, since the times of its
+    first samples are known only with its last. A vehicle's log is decoded whole.
+
+    Raises
+    ------
+    RecordingError, CaptureError, ChipError : see load; a table's bad line and an odd sample when they are come to.
+    """
+    return format_of(path).read_rows(path)
 
 
-def captures_of(folder: Path) -> list[Path]:
-    """The captures in the folder of a session; RecordingError where there is none."""
-    found = captures_in(folder)
-    if found:
-        return found
-    of_vehicle = folder / CAPTURE_OF_VEHICLE.name
-    if of_vehicle.exists():
-        return [of_vehicle]
-    raise RecordingError(f"the folder {folder} holds no {CAPTURE.name} and no {CAPTURE_OF_VEHICLE.name}", _REMEDY)
+def open_writer(path: Path, rows: Rows, done: str) -> AbstractContextManager[Write]:
+    """A new file in the format that its suffix names, there once its context ends, whole or not at all.
+
+    Parameters
+    ----------
+    rows : what else is known of the samples. done : what was done to them, which the file then says where it can.
+
+    Raises
+    ------
+    OutputError : another suffix, or the file cannot be made.
+    """
+    return written_format(path).write(path, rows, done)

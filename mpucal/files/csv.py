@@ -1,116 +1,177 @@
-"""Recordings as tables of text: t, ax, ay, az, gx, gy, gz. Knows no capture."""
+"""Tables of text: the columns t [s], ax, ay, az [m/s^2], gx, gy, gz [rad/s], and temperature_c where it is known."""
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
-from ..data import Recording, Vector
+from ..data import Samples, Vector
 from ..errors import RecordingError
-from ..result.atomic import write_atomically
+from ..result.atomic import whole_file
+from ._text import lines, numbers
+from .rows import Rows, Write, cannot_read, checked
 
 COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 TEMPERATURE = "temperature_c"
+ALL = (*COLUMNS, TEMPERATURE)
+# some 16000 lines
+BLOCK = 1 << 21
 _REMEDY = f"name the columns in the first line, in any order: {','.join(COLUMNS)} (s, m/s^2, rad/s)"
 
 
-def load_csv(path: str | Path) -> Recording:
-    """Read a table whose first line names its columns, in any order and any case.
+def csv_rows(path: Path) -> Rows:
+    """The samples of a table whose first line names its columns, in any order and any case.
 
-    `t` [s], `ax`, `ay`, `az` [m/s^2], `gx`, `gy`, `gz` [rad/s], and `temperature_c` where it is there.
     Other columns and empty lines are ignored.
 
     Raises
     ------
-    RecordingError : the file cannot be read, or holds no recording; a bad line is named by its number.
+    RecordingError : it cannot be read, or its first line names no such columns; when it is come to, a bad line, which
+    is named by its number.
     """
-    path = Path(path)
-    rows = csv.reader(StringIO(_text(path), newline=""))
     try:
-        header = [name.strip().lower() for name in next(rows, [])]
-        places = places_of(header, path)
-        values = [numbers_of(row, places, len(header), rows.line_num, path) for row in rows if not is_empty(row)]
-    except csv.Error as error:
-        raise RecordingError(f"{path}: line {rows.line_num} is no line of a table ({error})", _REMEDY) from error
-    if not values:
-        raise RecordingError(f"{path} holds no samples", "record it again")
-    table = np.array(values)
-    return Recording.from_arrays(
-        table[:, 0],
-        table[:, 1:4],
-        table[:, 4:7],
-        temperature_c=table[:, 7] if TEMPERATURE in places else None,
-        name=path.name,
-    )
-
-
-def save_csv(recording: Recording, path: str | Path) -> None:
-    """Write t, acc, gyr and, where any is known, the temperature, so that the same numbers are read back.
-
-    What a table has no column for, the flat part, gaps, clipping and the sensor, is not kept.
-
-    Raises
-    ------
-    OutputError : the file cannot be written.
-    """
-    names: list[str] = list(COLUMNS)
-    table: Vector = np.column_stack([recording.t, recording.acc, recording.gyr])
-    if np.isfinite(recording.temperature_c).any():
-        names.append(TEMPERATURE)
-        table = np.column_stack([table, recording.temperature_c])
-    buffer = StringIO(newline="")
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows(table.tolist())
-    write_atomically(Path(path), buffer.getvalue().encode())
-
-
-def _text(path: Path) -> str:
-    try:
-        text = path.read_text(encoding="utf-8-sig")
+        with path.open("rb") as file:
+            begun = file.readline()
+        text = begun.decode("utf-8-sig")
+        # a line may end with a carriage return alone
+        first = StringIO(text, newline="").readline()
+        header = [name.strip().lower() for name in next(csv.reader([first]), [])]
     except OSError as error:
-        raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path and its permissions") from error
+        raise cannot_read(path, error) from error
     except UnicodeDecodeError as error:
         raise RecordingError(f"{path} is no text", _REMEDY) from error
-    if not text.strip():
-        raise RecordingError(f"{path} is empty", "record it again")
-    return text
+    except csv.Error as error:
+        raise _no_line(path, 1, error) from error
+    if not first.strip():
+        raise RecordingError(f"{path}: its first line is empty", _REMEDY)
+    begin = len(begun) - len(text.removeprefix(first).encode())
+    table = _Table(path, begin, len(header), _places(header, path))
+    return Rows(checked(table.runs(), path.name), name=path.name)
 
 
-def places_of(header: list[str], path: Path) -> dict[str, int]:
+def _places(header: list[str], path: Path) -> dict[str, int]:
     """Column name -> its place, for the columns that are read."""
     missing = [name for name in COLUMNS if name not in header]
     if missing:
         raise RecordingError(f"{path}: its first line names no {', '.join(missing)}", _REMEDY)
-    wanted = [*COLUMNS, TEMPERATURE] if TEMPERATURE in header else COLUMNS
+    wanted = ALL if TEMPERATURE in header else COLUMNS
     twice = [name for name in wanted if header.count(name) > 1]
     if twice:
         raise RecordingError(f"{path}: its first line names {', '.join(twice)} twice", _REMEDY)
     return {name: header.index(name) for name in wanted}
 
 
-def is_empty(row: list[str]) -> bool:
-    """Whether nothing is written in a row's cells."""
-    return not any(map(str.strip, row))
+@dataclass(frozen=True)
+class _Table:
+    """The lines of a table, from byte `begin` on, of `width` cells each; `places`: column name -> which cell."""
 
+    path: Path
+    begin: int
+    width: int
+    places: dict[str, int]
 
-def numbers_of(row: list[str], places: dict[str, int], width: int, line: int, path: Path) -> list[float]:
-    """The numbers of a row in `places`' order; RecordingError names what is none by its line."""
-    if len(row) != width:
-        raise RecordingError(
-            f"{path}: line {line} has {len(row)} values where the first line names {width}",
-            "complete that line or leave it out",
-        )
-    numbers = []
-    for name, place in places.items():
+    def runs(self) -> Iterator[Samples]:
+        """The samples, a block of lines at a time."""
         try:
-            numbers.append(float(row[place]))
-        except ValueError as error:
+            with self.path.open("rb") as file:
+                file.seek(self.begin)
+                line = 2
+                for block in _blocks(file):
+                    values = numbers(block, self.width, list(self.places.values()))
+                    if values is None:
+                        values = self._odd(block, line)
+                    line += block.count(b"\n")
+                    if len(values):
+                        yield _samples(values)
+        except OSError as error:
+            raise cannot_read(self.path, error) from error
+
+    def _odd(self, block: bytes, line: int) -> Vector:
+        """(n, 7 or 8) numbers of lines, the first of which is number `line`: slowly all that Python reads.
+
+        Raises
+        ------
+        RecordingError : what is no number is named by its line.
+        """
+        try:
+            rows = csv.reader(StringIO(block.decode(), newline=""))
+        except UnicodeDecodeError as error:
+            raise RecordingError(f"{self.path} is no text from line {line} on", "record it again") from error
+        try:
+            values = [self._numbers(row, line + rows.line_num - 1) for row in rows if any(map(str.strip, row))]
+        except csv.Error as error:
+            raise _no_line(self.path, line + rows.line_num - 1, error) from error
+        return np.array(values).reshape(-1, len(self.places))
+
+    def _numbers(self, row: list[str], line: int) -> list[float]:
+        """The numbers of a row in the order of `places`."""
+        if len(row) != self.width:
             raise RecordingError(
-                f"{path}: line {line}: {name} is {row[place]!r}, which is no number",
-                "correct or leave out that line",
-            ) from error
-    return numbers
+                f"{self.path}: line {line} has {len(row)} values where the first line names {self.width}",
+                "complete that line or leave it out",
+            )
+        found = []
+        for name, place in self.places.items():
+            try:
+                found.append(float(row[place]))
+            except ValueError as error:
+                raise RecordingError(
+                    f"{self.path}: line {line}: {name} is {row[place]!r}, which is no number",
+                    "correct or leave out that line",
+                ) from error
+        return found
+
+
+def _blocks(file: IO[bytes]) -> Iterator[bytes]:
+    """Whole lines, some BLOCK bytes at a time."""
+    while block := file.read(BLOCK) + file.readline():
+        # the end of a line within quotation marks is none
+        while block.count(b'"') % 2 and (more := file.read(BLOCK) + file.readline()):
+            block += more
+        yield block
+
+
+def _no_line(path: Path, line: int, error: csv.Error) -> RecordingError:
+    return RecordingError(f"{path}: line {line} is no line of a table ({error})", _REMEDY)
+
+
+def _samples(values: Vector) -> Samples:
+    n = len(values)
+    warm = values[:, 7] if values.shape[1] > 7 else np.full(n, np.nan)
+    no = np.zeros(n, bool)
+    return Samples(values[:, 0], values[:, 1:4], values[:, 4:7], warm, no, no, no)
+
+
+class CsvText:
+    """Samples as lines of text, under a first line that names the columns: of what the first samples know.
+
+    Parameters
+    ----------
+    put : takes the text, a run of samples at a time.
+    """
+
+    def __init__(self, put: Callable[[bytes], object]) -> None:
+        self._put = put
+        self._columns: list[int] = []
+
+    def write(self, samples: Samples) -> None:
+        """Take a run of samples."""
+        table: Vector = np.column_stack([samples.t, samples.acc, samples.gyr, samples.temperature_c])
+        if not self._columns:
+            self._columns = np.flatnonzero(~np.isnan(table).all(axis=0)).tolist()
+            self._put(",".join(ALL[column] for column in self._columns).encode() + b"\n")
+        self._put(lines(np.ascontiguousarray(table[:, self._columns])))
+
+
+@contextmanager
+def csv_file(path: Path, _rows: Rows, _done: str) -> Iterator[Write]:
+    """A table as a file; it has no column for the flat part, gaps, clipping and the sensor. See open_writer."""
+    with whole_file(path) as file:
+        yield CsvText(file.write).write

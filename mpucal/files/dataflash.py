@@ -1,4 +1,4 @@
-"""ArduPilot's dataflash logs (.bin) as recordings, by pymavlink's reader. Knows no estimate."""
+"""ArduPilot's dataflash logs (.bin) as recordings, by pymavlink's reader."""
 
 from __future__ import annotations
 

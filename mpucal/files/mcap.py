@@ -1,4 +1,4 @@
-"""Captures as MCAP files: every register access and session event as it happened. Knows no chip."""
+"""Captures as MCAP files: every register access and session event as it happened."""
 
 from __future__ import annotations
 

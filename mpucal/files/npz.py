@@ -1,104 +1,103 @@
-"""Recordings as NumPy archives: `t`, `acc`, `gyr` and what else is known. Knows no capture."""
+"""NumPy archives: `t` [s] (n,), `acc` [m/s^2] (n, 3), `gyr` [rad/s] (n, 3), and what else is known.
+
+That is, where it is there: `flat`, (first, last + 1) samples that lie flat, or `flat_samples`, how many do from the
+first on; `temperature_c` or `temperature`, (n,); `gap`, `acc_clipped`, `gyr_clipped`, (n,); `sensor`, a JSON object;
+`done`, what was done to calibrate the samples. Other keys are ignored.
+
+An archive holds one array after the other: for runs of samples they are read side by side, and written to files of
+their own first.
+"""
 
 from __future__ import annotations
 
 import json
 import zipfile
 import zlib
-from collections.abc import Mapping
-from dataclasses import asdict
-from io import BytesIO
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
+from shutil import copyfileobj
+from tempfile import TemporaryFile
+from typing import IO, Any
 
 import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
 
-from ..data import Recording, Sensor
+from ..data import Recording, Samples, Sensor
 from ..errors import RecordingError
-from ..result.atomic import write_atomically
+from ..result.atomic import whole_file
+from .rows import ROWS, Rows, Write, cannot_read, checked
 
+NEEDED = ("t", "acc", "gyr")
+TEMPERATURES = ("temperature_c", "temperature")
+MASKS = ("gap", "acc_clipped", "gyr_clipped")
+DONE = "done"
+SMALL = ("flat", "flat_samples", "sensor", DONE)
+COPIED = 1 << 20
 _REMEDY = "give an .npz with t [s] (n,), acc [m/s^2] (n, 3) and gyr [rad/s] (n, 3)"
 
 
-def load_npz(path: str | Path) -> Recording:
-    """Read an archive with the keys `t` [s] (n,), `acc` [m/s^2] (n, 3), `gyr` [rad/s] (n, 3).
-
-    Where they are there: `flat`, (first, last + 1) samples that lie flat, or `flat_samples`, how many do
-    from the first on; `temperature_c` or `temperature`, (n,); and `gap`, `acc_clipped`, `gyr_clipped`,
-    `sensor` as `save_npz` writes them. Other keys are ignored.
+def load_npz(path: Path) -> Recording:
+    """The recording in an archive.
 
     Raises
     ------
     RecordingError : the file cannot be read, or holds no recording.
     """
-    path = Path(path)
-    arrays = _arrays(path)
-    missing = [key for key in ("t", "acc", "gyr") if key not in arrays]
+    # no pickles: a recording must not run code
+    with _opened(path) as file, np.load(file, allow_pickle=False) as archive:
+        arrays = dict(archive)
+    missing = [key for key in NEEDED if key not in arrays]
     if missing:
         raise RecordingError(f"{path} has no {', '.join(missing)}; it has {', '.join(arrays) or 'nothing'}", _REMEDY)
     return Recording.from_arrays(
         arrays["t"],
         arrays["acc"],
         arrays["gyr"],
-        flat_of(arrays, path),
-        temperature_c=arrays.get("temperature_c", arrays.get("temperature")),
+        _flat(arrays, path),
+        temperature_c=next((arrays[key] for key in TEMPERATURES if key in arrays), None),
         gap=arrays.get("gap"),
         acc_clipped=arrays.get("acc_clipped"),
         gyr_clipped=arrays.get("gyr_clipped"),
-        sensor=sensor_of(arrays, path),
+        sensor=_sensor(arrays, path),
         name=path.name,
     )
 
 
-def save_npz(recording: Recording, path: str | Path) -> None:
-    """Write a recording with all that is known of it, atomically.
+def npz_rows(path: Path) -> Rows:
+    """The samples of an archive, a run at a time.
 
     Raises
     ------
-    OutputError : the file cannot be written.
+    RecordingError : it cannot be read, or holds no recording.
     """
-    arrays: dict[str, Any] = {
-        "t": recording.t,
-        "acc": recording.acc,
-        "gyr": recording.gyr,
-        "temperature_c": recording.temperature_c,
-        "gap": recording.gap,
-        "acc_clipped": recording.acc_clipped,
-        "gyr_clipped": recording.gyr_clipped,
-        "sensor": json.dumps(asdict(recording.sensor)),
-    }
-    if recording.flat is not None:
-        arrays["flat"] = recording.flat
-    buffer = BytesIO()
-    np.savez_compressed(buffer, **arrays)
-    write_atomically(Path(path), buffer.getvalue())
+    with _opened(path) as file, np.load(file, allow_pickle=False) as archive:
+        small = {key: archive[key] for key in SMALL if key in archive.files}
+        by_rows = _by_rows(archive.zip)
+    done = str(small.get(DONE, ""))
+    if not by_rows:
+        return Rows.of(load_npz(path), done)
+    return Rows(checked(_runs(path), path.name), _sensor(small, path), _flat(small, path), name=path.name, done=done)
 
 
-def _arrays(path: Path) -> dict[str, Any]:
+@contextmanager
+def _opened(path: Path) -> Iterator[IO[bytes]]:
+    """The file of an archive; what is wrong with it becomes a RecordingError."""
     try:
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            if not zipfile.is_zipfile(file):
+                raise RecordingError(f"{path} is no whole NumPy archive", _REMEDY)
+            file.seek(0)
+            yield file
     except OSError as error:
-        raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path and its permissions") from error
-    if not zipfile.is_zipfile(BytesIO(data)):
-        raise RecordingError(f"{path} is no whole NumPy archive", _REMEDY)
-    try:
-        # no pickles: a recording must not run code
-        with np.load(BytesIO(data), allow_pickle=False) as archive:
-            return dict(archive)
-    except (
-        ValueError,
-        TypeError,
-        AttributeError,
-        OSError,
-        EOFError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
+        raise cannot_read(path, error) from error
+    except (ValueError, TypeError, AttributeError, RuntimeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise RecordingError(f"{path} is no whole NumPy archive ({error})", _REMEDY) from error
 
 
-def flat_of(arrays: Mapping[str, Any], path: Path) -> tuple[int, int] | None:
-    """(first, last + 1) samples that an archive says lie flat; RecordingError where that is nonsense."""
+def _flat(arrays: Mapping[str, Any], path: Path) -> tuple[int, int] | None:
     key = "flat" if "flat" in arrays else "flat_samples"
     if key not in arrays:
         return None
@@ -113,8 +112,7 @@ def flat_of(arrays: Mapping[str, Any], path: Path) -> tuple[int, int] | None:
     return first, last
 
 
-def sensor_of(arrays: Mapping[str, Any], path: Path) -> Sensor:
-    """What an archive says of its sensor; RecordingError where that is nonsense."""
+def _sensor(arrays: Mapping[str, Any], path: Path) -> Sensor:
     if "sensor" not in arrays:
         return Sensor()
     try:
@@ -123,3 +121,90 @@ def sensor_of(arrays: Mapping[str, Any], path: Path) -> Sensor:
         raise RecordingError(
             f"{path}: sensor is no JSON object ({error})", "leave sensor out, or write it with mpucal"
         ) from error
+
+
+class _Column:
+    """One array of the archive, read from its beginning to its end."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        version = npy.read_magic(file)
+        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        self.shape, self.fortran, self.dtype = read(file)
+        self._file, self._width = file, int(np.prod(self.shape[1:]))
+
+    def take(self, count: int, dtype: type) -> NDArray[Any]:
+        """The next `count` rows."""
+        data = self._file.read(count * self._width * self.dtype.itemsize)
+        return np.frombuffer(data, self.dtype).reshape(count, *self.shape[1:]).astype(dtype)
+
+
+def _by_rows(archive: zipfile.ZipFile) -> bool:
+    """Whether its arrays lie there by rows, as they nearly always do; what is odd or wrong is load_npz's."""
+    shapes = {}
+    for key in (*NEEDED, *TEMPERATURES, *MASKS):
+        if f"{key}.npy" not in archive.namelist():
+            continue
+        with archive.open(f"{key}.npy") as file:
+            column = _Column(file)
+        if column.fortran or column.dtype.kind not in ("fiub" if key in MASKS else "fiu"):
+            return False
+        shapes[key] = column.shape
+    if not set(NEEDED) <= shapes.keys() or len(shapes["t"]) != 1:
+        return False
+    n = shapes["t"][0]
+    return n >= 2 and all(shape == ((n, 3) if key in ("acc", "gyr") else (n,)) for key, shape in shapes.items())
+
+
+def _runs(path: Path) -> Iterator[Samples]:
+    with _opened(path) as file, ExitStack() as stack:
+        archive = stack.enter_context(zipfile.ZipFile(file))
+        names = set(archive.namelist())
+
+        def column(*keys: str) -> _Column | None:
+            key = next((key for key in keys if f"{key}.npy" in names), None)
+            return None if key is None else _Column(stack.enter_context(archive.open(f"{key}.npy")))
+
+        t, acc, gyr = (_Column(stack.enter_context(archive.open(f"{key}.npy"))) for key in NEEDED)
+        warm, masks = column(*TEMPERATURES), [column(key) for key in MASKS]
+        for first in range(0, t.shape[0], ROWS):
+            n = min(ROWS, t.shape[0] - first)
+            yield Samples(
+                t.take(n, float),
+                acc.take(n, float),
+                gyr.take(n, float),
+                np.full(n, np.nan) if warm is None else warm.take(n, float),
+                *(np.zeros(n, bool) if mask is None else mask.take(n, bool) for mask in masks),
+            )
+
+
+@contextmanager
+def npz_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
+    """An archive, not compressed, with all that is known; see open_writer."""
+    with ExitStack() as stack, whole_file(path) as file:
+        columns = {field.name: stack.enter_context(TemporaryFile(dir=path.parent)) for field in fields(Samples)}
+        count = 0
+
+        def write(samples: Samples) -> None:
+            nonlocal count
+            for name, column in columns.items():
+                column.write(np.ascontiguousarray(getattr(samples, name)).data)
+            count += len(samples)
+
+        yield write
+        small = {"sensor": json.dumps(asdict(rows.sensor)), DONE: done}
+        with zipfile.ZipFile(file, "w") as archive:
+            for name, column in columns.items():
+                _join(archive, name, column, count)
+            for name, value in (small if rows.flat is None else small | {"flat": rows.flat}).items():
+                with archive.open(f"{name}.npy", "w") as member:
+                    npy.write_array(member, np.asarray(value), allow_pickle=False)
+
+
+def _join(archive: zipfile.ZipFile, name: str, column: IO[bytes], count: int) -> None:
+    """Put what was written to `column` into the archive."""
+    like: NDArray[Any] = getattr(Samples.empty(), name)
+    described = npy.header_data_from_array_1_0(like) | {"shape": (count, *like.shape[1:])}
+    column.seek(0)
+    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+        npy.write_array_header_1_0(member, described)
+        copyfileobj(column, member, COPIED)

@@ -1,4 +1,4 @@
-"""MAVLink .tlog files as recordings. Knows no estimate."""
+"""MAVLink .tlog files as recordings."""
 
 from __future__ import annotations
 

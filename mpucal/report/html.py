@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from html import escape
-from pathlib import PurePath
 from types import MappingProxyType
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from .. import __version__
 from ..data import Recording
+from ..files.formats import is_of_session
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.session_files import CAPTURE
 from .elements import as_float, code, heading, number, paragraph, quantity, section, table
@@ -37,7 +37,6 @@ VERDICTS = {
     REFUSED: "Refused: do not use these parameters.",
 }
 INSTALL = "pip install 'mpucal[plot]'"
-CAPTURES = (".mcap", ".tlog")
 _NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
@@ -170,7 +169,7 @@ def _reproduction(calibration: Calibration, recording: Recording | None) -> str:
     # one file of a session that was resumed is not all that was recorded: its folder is
     source = "." if CAPTURE.is_one(recording.name) else recording.name
     lines = [f"mpucal calibrate {source} --model {model} --gravity {gravity:.9g} -o again"]
-    if PurePath(recording.name).suffix in CAPTURES:
+    if is_of_session(recording.name):
         lines.append(f"mpucal session --replay {source} -o replayed")
     said = paragraph(
         "In the folder of this page. The first fits the recording again; the second replays the whole session, "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import OutputError
-from ..files.parts import captures_in
+from ..files.folder import captures_in
 from ..result.clock import stamp
 from .results import make_folder
 

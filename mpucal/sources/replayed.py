@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from ..files.folder import captures_in
 from ..files.mcap import read_capture
-from ..files.parts import captures_in
 from ..session.plan import Plan
 from .chip import OpenedChip
 from .kind import Request

@@ -12,8 +12,8 @@ from .. import __version__
 from ..chip.driver import Driver
 from ..chip.records import KEY, LATE
 from ..errors import UsageError
+from ..files.folder import captures_in
 from ..files.mcap import CaptureWriter, read_capture
-from ..files.parts import captures_in
 from ..result.session_files import CAPTURE
 from ..session.events import Key, Output, Prompt
 from ..session.plan import Plan

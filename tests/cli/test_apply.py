@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 from mpucal.files import load
-from mpucal.files.csv import save_csv
-from mpucal.files.npz import save_npz
 from mpucal.result.calibration import Calibration
 
 ROOT = Path(__file__).parents[2]
@@ -72,9 +70,9 @@ def test_a_capture_goes_into_every_kind(mpucal, session, calibration, name, endi
     assert facts["mean_after_mps2"] == pytest.approx(np.linalg.norm(acc, axis=1).mean(), abs=1e-5)
 
 
-def test_a_table_goes_to_stdout(mpucal, session, calibration, tmp_path):
+def test_a_table_goes_to_stdout(mpucal, save, session, calibration, tmp_path):
     recording = load(session.folder).part(0, 500)
-    save_csv(recording, "in.csv")
+    save(recording, "in.csv")
     done = mpucal("apply", "c.json", "in.csv")
     assert done.code == 0
     (tmp_path / "out.csv").write_text(done.out)
@@ -129,8 +127,8 @@ def test_a_calibration_that_does_not_belong(mpucal, session, calibration, change
         np.testing.assert_allclose(load("out.npz").acc, (recording.acc - left) @ np.linalg.inv(D).T, atol=1e-12)
 
 
-def test_nothing_is_written_over_the_recording(mpucal, session, calibration):
-    save_npz(load(session.folder), "in.npz")
+def test_nothing_is_written_over_the_recording(mpucal, save, session, calibration):
+    save(load(session.folder), "in.npz")
     before = Path("in.npz").read_bytes()
     assert mpucal("apply", "c.json", "in.npz", "-o", "in.npz").code == 2
     assert Path("in.npz").read_bytes() == before

@@ -10,7 +10,6 @@ import pytest
 
 from mpucal.cli import COMMANDS, commands
 from mpucal.files import load
-from mpucal.files.npz import save_npz
 from mpucal.result.calibration import Calibration
 
 # what stands there for what a person has; a bridge's own tests show what it keeps
@@ -28,7 +27,7 @@ def examples():
 
 
 @pytest.fixture
-def belongings(session, tmp_path):
+def belongings(session, save, tmp_path):
     """What the examples name: results of sessions, recordings."""
     made = Calibration.load(session.folder / "calibration.json")
     for number, name in enumerate(("board7", "board7-today", "cold", "warm", "hot")):
@@ -38,7 +37,7 @@ def belongings(session, tmp_path):
         replace(made, sensor=sensor, b_a=made.b_a + 0.01 * number).save(folder / "calibration.json")
     made.save(tmp_path / "calibration.json")
     shutil.copy(session.folder / "capture.mcap", tmp_path)
-    save_npz(load(session.folder), tmp_path / "walk.npz")
+    save(load(session.folder), tmp_path / "walk.npz")
 
 
 @pytest.mark.parametrize("example", list(examples()))

@@ -7,9 +7,7 @@ import mpucal
 from mpucal.chip.driver import Driver
 from mpucal.data import Recording
 from mpucal.errors import CaptureError, RecordingError
-from mpucal.files.csv import save_csv
 from mpucal.files.mcap import CaptureWriter, read_capture
-from mpucal.files.npz import save_npz
 from mpucal.simulated.chip import open_simulated
 from mpucal.sources.replay import ReplayBus
 from mpucal.sources.tap import Tap
@@ -74,10 +72,10 @@ def test_a_capture_cut_before_its_first_sample_is_no_recording(measured, tmp_pat
         mpucal.load(cut)
 
 
-def test_the_ending_says_how_to_read(measured, tmp_path):
+def test_the_suffix_says_how_to_read(measured, save, tmp_path):
     _, recording = measured
-    save_npz(recording, tmp_path / "a.npz")
-    save_csv(recording, tmp_path / "A.CSV")
+    save(recording, tmp_path / "a.npz")
+    save(recording, tmp_path / "A.CSV")
     same(mpucal.load(tmp_path / "a.npz"), recording)
     np.testing.assert_array_equal(mpucal.load(tmp_path / "A.CSV").acc, recording.acc)
 

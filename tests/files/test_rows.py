@@ -16,15 +16,14 @@ from mpucal.chip.access import Transaction
 from mpucal.chip.fifo import Run
 from mpucal.data import Recording, Samples, Sensor
 from mpucal.errors import OutputError, RecordingError
-from mpucal.files import load
+from mpucal.files import capture as capture_module
+from mpucal.files import csv as csv_module
+from mpucal.files import load, open_rows, open_writer
+from mpucal.files._text import lines, numbers
+from mpucal.files.capture import Spool
+from mpucal.files.chunks import MESSAGES
 from mpucal.files.mcap import CaptureWriter, read_capture
-from mpucal.files.npz import save_npz
-from mpucal.files.rows import ROWS, Rows, open_rows, open_writer
-from mpucal.files.rows import capture as rows_capture
-from mpucal.files.rows import csv as rows_csv
-from mpucal.files.rows._text import lines, numbers
-from mpucal.files.rows.capture import Spool
-from mpucal.files.rows.chunks import MESSAGES
+from mpucal.files.rows import ROWS, Rows
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 N = ROWS + 1000
@@ -54,9 +53,9 @@ def through(source, target):
 
 
 @pytest.fixture(scope="module")
-def archive(tmp_path_factory):
+def archive(tmp_path_factory, save):
     path = tmp_path_factory.mktemp("rows") / "recording.npz"
-    save_npz(recording(), path)
+    save(recording(), path)
     return path
 
 
@@ -73,9 +72,9 @@ def test_an_archive_comes_out_as_it_went_in(archive, tmp_path):
 
 
 @pytest.mark.parametrize("warm", [True, False])
-def test_a_table_comes_out_as_it_went_in(warm, tmp_path):
+def test_a_table_comes_out_as_it_went_in(save, warm, tmp_path):
     before = recording(300, warm)
-    save_npz(before, tmp_path / "in.npz")
+    save(before, tmp_path / "in.npz")
     through(tmp_path / "in.npz", tmp_path / "out.csv")
     through(tmp_path / "out.csv", tmp_path / "again.csv")
     after = load(tmp_path / "again.csv")
@@ -172,6 +171,19 @@ def test_what_is_no_plain_line_is_left_to_others(text, found):
     assert values is None if found is None else values.tolist() == found
 
 
+@pytest.mark.parametrize("places", [[], [3], [0, 2**40]])
+def test_cells_outside_a_line_are_refused(places):
+    with pytest.raises(ValueError, match="places"):
+        numbers(b"1,2,3\n", 3, places)
+
+
+@pytest.mark.parametrize("block", [1, 8, 30, 1 << 21])
+def test_the_end_of_a_line_within_quotation_marks_is_none(block, tmp_path, monkeypatch):
+    monkeypatch.setattr(csv_module, "BLOCK", block)
+    (tmp_path / "a.csv").write_text('note,t,ax,ay,az,gx,gy,gz\n"one\ntwo",0,1,2,3,4,5,6\n"a ""b""",1,1,2,3,4,5,6\n')
+    np.testing.assert_array_equal(load(tmp_path / "a.csv").acc, [[1, 2, 3]] * 2)
+
+
 def test_lines_may_end_as_on_an_old_macintosh(tmp_path):
     (tmp_path / "old.csv").write_bytes(b"t,ax,ay,az,gx,gy,gz\r0,1,2,3,4,5,6\r1,7,8,9,10,11,12\r")
     (samples,) = open_rows(tmp_path / "old.csv").runs
@@ -189,7 +201,7 @@ def test_a_table_with_everything_that_load_takes(tmp_path):
 
 @pytest.mark.parametrize("line", [2, 250])
 def test_a_bad_line_is_named(line, tmp_path, monkeypatch):
-    monkeypatch.setattr(rows_csv, "BLOCK", 1000)
+    monkeypatch.setattr(csv_module, "BLOCK", 1000)
     rows = [[i, 1, 2, 3, 4, 5, 6] for i in range(300)]
     rows[line - 2][3] = "nonsense"
     with (tmp_path / "bad.csv").open("w", newline="") as file:
@@ -221,9 +233,9 @@ def cdr(data):
     return stamp, frame_id, numbers
 
 
-def test_ros_reads_what_was_written(tmp_path):
+def test_ros_reads_what_was_written(save, tmp_path):
     before = recording(500)
-    save_npz(before, tmp_path / "in.npz")
+    save(before, tmp_path / "in.npz")
     through(tmp_path / "in.npz", tmp_path / "out.mcap")
     with (tmp_path / "out.mcap").open("rb") as file:
         reader = make_reader(file)
@@ -242,10 +254,10 @@ def test_ros_reads_what_was_written(tmp_path):
         assert numbers[25:28] == before.acc[i].tolist()
 
 
-def test_the_index_of_an_mcap_leads_to_its_messages(tmp_path):
+def test_the_index_of_an_mcap_leads_to_its_messages(save, tmp_path):
     n = 2 * MESSAGES + 5
     before = recording(n)
-    save_npz(before, tmp_path / "in.npz")
+    save(before, tmp_path / "in.npz")
     through(tmp_path / "in.npz", tmp_path / "out.mcap")
     t_ns = np.rint(before.t * 1e9).astype(int).tolist()
     with (tmp_path / "out.mcap").open("rb") as file:
@@ -315,7 +327,7 @@ def test_what_was_forgotten_is_left_out(tmp_path, forgotten):
 
 def test_the_frames_of_a_long_capture_wait_in_a_file(monkeypatch):
     """Nothing of a sample stays in memory; each look at the FIFO leaves 16 bytes there, which are not these."""
-    monkeypatch.setattr(rows_capture, "ROWS", 500)
+    monkeypatch.setattr(capture_module, "ROWS", 500)
     spool, frames = Spool(), np.arange(7000, dtype=np.int16).reshape(1000, 7)
     tracemalloc.start()
     for number in range(100):
@@ -352,7 +364,7 @@ def test_memory_is_that_of_a_run_however_many_there_are(source, target, tmp_path
 
 
 def test_other_endings_are_refused(archive, tmp_path):
-    with pytest.raises(OutputError, match=r"\.csv, \.npz, \.mcap"):
+    with pytest.raises(OutputError, match=r"\.npz, \.csv, \.mcap"):
         open_writer(tmp_path / "out.txt", open_rows(archive), "")
 
 

@@ -1,4 +1,4 @@
-"""MCAP files of one channel whose messages are all of one size, written a chunk at once. Knows no message's content.
+"""MCAP files of one channel whose messages are all of one size, written a chunk at once.
 
 mcap's own writer takes 20 us a message, one after the other; here an array is a chunk. The records are mcap's
 (https://mcap.dev/spec), but for those that repeat a thousand times in a chunk: Message and MessageIndex.

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -107,6 +108,9 @@ bool take_line(std::string_view line, std::size_t width, const std::vector<std::
 }
 
 std::optional<Out> numbers(nb::bytes data, std::size_t width, const std::vector<std::size_t>& places) {
+  const auto outside = [&](std::size_t place) { return place >= width; };
+  if (places.empty() || std::any_of(places.begin(), places.end(), outside))
+    throw std::invalid_argument("places must name cells of a line, 0 to width - 1, and at least one");
   const std::string_view text(data.c_str(), data.size());
   auto values = std::make_unique<std::vector<double>>();
   bool plain = true;

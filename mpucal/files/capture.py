@@ -1,7 +1,7 @@
-"""Captures, a run of samples at a time. Knows no other kind of file.
+"""Captures decoded into samples, whole or a run at a time, without what was measured to be forgotten.
 
-When a capture's first sample was taken is known only with its last look: what the FIFO held goes to a temporary file
-meanwhile, 14 bytes a sample. Of the looks 16 bytes each stay in memory: 1.4 MB an hour.
+When a capture's first sample was taken is known only with its last look at the FIFO: for runs, what the FIFO held goes
+to a temporary file meanwhile, 14 bytes a sample. Of the looks 16 bytes each stay in memory: 1.4 MB an hour.
 """
 
 from __future__ import annotations
@@ -14,37 +14,71 @@ from weakref import finalize
 
 import numpy as np
 
-from ...chip.decode import Decoder
-from ...chip.fifo import Run
-from ...chip.records import FORGET, SessionEvent
-from ...data import Samples
-from ...errors import RecordingError
-from ..mcap import CaptureReader
-from . import ROWS, Rows
+from ..chip.access import Transaction
+from ..chip.decode import Decoder, decode
+from ..chip.fifo import Run
+from ..chip.records import FORGET, SessionEvent
+from ..data import Recording, Samples
+from ..errors import RecordingError
+from .mcap import CaptureReader
+from .rows import ROWS, Rows
 
 
-def capture_rows(paths: Sequence[Path]) -> Rows:
-    """The samples in the captures of one session, without what its person wanted to forget.
+def load_capture(*paths: Path) -> Recording:
+    """The recording in the captures of one session.
 
     Raises
     ------
     CaptureError, RecordingError, ChipError : see load.
     """
-    name = paths[0].name
-    decoder, spool = Decoder(name), Spool()
-    forgotten: dict[int, int] = {}
-    recovered: str | None = None
-    for reader in map(CaptureReader, paths):
-        for record in reader:
-            if not isinstance(record, SessionEvent):
-                decoder.saw(record)
-                spool.add(decoder.release())
-            elif record.name == FORGET:
-                forgotten[int(record.data["first"])] = int(record.data["last"])
-        recovered = reader.recovered or recovered
+    session = _Accesses(paths)
+    recording = decode(session, session.name)
+    for first, last in sorted(session.forgotten.items(), reverse=True):
+        recording = recording.without(first, last)
+    return replace(recording, recovered=session.recovered)
+
+
+def capture_rows(*paths: Path) -> Rows:
+    """The samples in the captures of one session, a run at a time.
+
+    Raises
+    ------
+    CaptureError, RecordingError, ChipError : see load.
+    """
+    session = _Accesses(paths)
+    decoder, spool = Decoder(session.name), Spool()
+    for access in session:
+        decoder.saw(access)
+        spool.add(decoder.release())
     if spool.frames < 2:
-        raise RecordingError(f"{name} holds {spool.frames} samples", "record for longer")
-    return Rows(_without(decoder.final(spool.runs()), forgotten), decoder.sensor, recovered=recovered, name=name)
+        raise RecordingError(f"{session.name} holds {spool.frames} samples", "record for longer")
+    runs = _without(decoder.final(spool.runs()), session.forgotten)
+    return Rows(runs, decoder.sensor, recovered=session.recovered, name=session.name)
+
+
+class _Accesses:
+    """The register accesses in the captures of one session, one after the other; to be gone through once.
+
+    Attributes
+    ----------
+    name : of the first capture. forgotten : first -> last + 1 samples that are to be left out.
+    recovered : see Recording; this and `forgotten` once all accesses were read.
+    """
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self._paths = paths
+        self.name = paths[0].name
+        self.forgotten: dict[int, int] = {}
+        self.recovered: str | None = None
+
+    def __iter__(self) -> Iterator[Transaction]:
+        for reader in map(CaptureReader, self._paths):
+            for record in reader:
+                if not isinstance(record, SessionEvent):
+                    yield record
+                elif record.name == FORGET:
+                    self.forgotten[int(record.data["first"])] = int(record.data["last"])
+            self.recovered = reader.recovered or self.recovered
 
 
 @dataclass

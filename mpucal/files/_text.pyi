@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ...data import Vector
+from ..data import Vector
 
 def lines(table: Vector) -> bytes: ...
 def numbers(text: bytes, width: int, places: Sequence[int]) -> Vector | None: ...

@@ -1,4 +1,4 @@
-"""Samples as sensor_msgs/msg/Imu in an MCAP file, which ROS 2 and Foxglove read. Knows no capture.
+"""Samples as sensor_msgs/msg/Imu in an MCAP file, which ROS 2 and Foxglove read.
 
 CDR, little-endian (OMG DDS-XTypes 1.3, section 7.4): after the four bytes of its header every number lies at a
 multiple of its size, counted from there. With one frame_id all messages have the same layout.
@@ -16,13 +16,13 @@ from mcap.records import Channel, Header, Metadata, Schema
 from mcap.well_known import MessageEncoding, SchemaEncoding
 from numpy.typing import NDArray
 
-from ... import __version__
-from ...data import Samples
-from ...errors import RecordingError
-from ...result.atomic import whole_file
-from ..mcap import CALIBRATED
-from . import Write
+from .. import __version__
+from ..data import Samples
+from ..errors import RecordingError
+from ..result.atomic import whole_file
 from .chunks import ChunkWriter
+from .mcap import CALIBRATED
+from .rows import Rows, Write
 
 TOPIC, FRAME_ID = "/imu/data", "imu"
 S = 1_000_000_000
@@ -98,7 +98,7 @@ def messages(samples: Samples) -> tuple[NDArray[np.int64], NDArray[Any]]:
 
 
 @contextmanager
-def imu_file(path: Path, done: str) -> Iterator[Write]:
+def imu_file(path: Path, _rows: Rows, done: str) -> Iterator[Write]:
     """An MCAP file of Imu messages on TOPIC; `done`, what was done to the samples, is its metadata. See open_writer."""
     with whole_file(path) as file:
         writer = ChunkWriter(

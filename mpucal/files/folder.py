@@ -1,0 +1,40 @@
+"""The folder of a session, and its captures in their order: the first, and one for each time it was resumed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..data import Recording
+from ..errors import RecordingError
+from ..result.session_files import CAPTURE, SessionFile
+from . import formats
+from .rows import Rows
+
+
+def captures_in(folder: Path, capture: SessionFile = CAPTURE) -> list[Path]:
+    """All that are there, the first one first; none where that is missing."""
+    found: list[Path] = []
+    while (path := folder / capture.numbered(len(found) + 1)).exists():
+        found.append(path)
+    return found
+
+
+def load_folder(folder: Path) -> Recording:
+    """The recording in a session's captures; see load."""
+    row, captures = _captured(folder)
+    return row.read(*captures)
+
+
+def folder_rows(folder: Path) -> Rows:
+    """The samples in a session's captures; see open_rows."""
+    row, captures = _captured(folder)
+    return row.read_rows(*captures)
+
+
+def _captured(folder: Path) -> tuple[formats.Format, list[Path]]:
+    captured = {row.session: row for row in formats.FORMATS if row.session}
+    for capture, row in captured.items():
+        if captures := captures_in(folder, capture):
+            return row, captures
+    none = " and ".join(f"no {capture.name}" for capture in captured)
+    raise RecordingError(f"the folder {folder} holds {none}", "give the folder of a session, or a recording in it")

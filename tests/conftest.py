@@ -1,0 +1,23 @@
+"""What tests of several rooms write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mpucal.files import open_writer
+from mpucal.files.rows import Rows
+
+
+@pytest.fixture(scope="session")
+def save():
+    """Write a recording into a file, in the format of its suffix."""
+
+    def call(recording, path):
+        rows = Rows.of(recording)
+        with open_writer(Path(path), rows, "") as write:
+            for samples in rows.runs:
+                write(samples)
+
+    return call
