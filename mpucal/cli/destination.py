@@ -12,6 +12,7 @@ from ..errors import UsageError
 from ..sinks.choose import FILE, check_behind, defaults
 from ..sinks.kind import Device, SinkKind
 from ..sinks.table import SINKS
+from ..sources.kind import SourceKind
 from ..sources.opening import open_source
 from ..sources.table import kinds_meant
 from .person import say
@@ -43,26 +44,22 @@ def sink_flags(command: F) -> F:
     return command
 
 
-def source_given(options: Mapping[str, Any]) -> str:
-    """The option that names the source."""
-    return kinds_meant(options)[0].option.name
-
-
 def device(options: Mapping[str, Any]) -> Device:
     """The device that a command's source options name; its sinks' flags are among the options."""
+    kind = kinds_meant(options)[0]
     flags = {flag.name for kind in SINKS.values() for flag in kind.flags}
     given = frozenset(name for name in flags if options.get(name))
-    return Device(str(options[source_given(options)]), partial(open_source, options), say, given)
+    return Device(kind, str(options[kind.option.name]), partial(open_source, options), say, given)
 
 
-def check_sink(kind: SinkKind, options: Mapping[str, Any]) -> None:
+def check_sink(kind: SinkKind, source: SourceKind, options: Mapping[str, Any]) -> None:
     """Refuse a sink that is not behind the source, and flags of another one.
 
     Raises
     ------
     UsageError : the options do not fit the sink.
     """
-    check_behind(kind, source_given(options), f"{kind.name} was named")
+    check_behind(kind, source, f"{kind.name} was named")
     for other in SINKS.values():
         for flag in other.flags:
             if options.get(flag.name) and flag not in kind.flags:

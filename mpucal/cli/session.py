@@ -24,9 +24,9 @@ from ..sinks.write_back import write_to_all
 from ..sources.opened import Opened
 from ..sources.opening import check_resumed, open_source
 from ..sources.resumed import open_resumed
-from ..sources.table import source_title
+from ..sources.table import kinds_meant, source_title
 from ..terminal.console import console
-from .destination import device, session_sink_options, source_given
+from .destination import device, session_sink_options
 from .options import aim_options, check_gyroscope, check_source, fit_options, given, source_options
 from .person import ask
 from .running import running
@@ -101,13 +101,12 @@ def _opened(
 ) -> tuple[Opened, tuple[SinkKind, ...], dict[str, Any]]:
     """The source, the sinks that the result goes to, and the options that name the source."""
     if resume is None:
-        check_source(click.get_current_context())
-        kinds = chosen(sinks, no_write, source_given(options))
+        kinds = chosen(sinks, no_write, check_source(click.get_current_context()))
         return open_source({**options, "attended": attended}, given()), kinds, options
     check_resumed(given())
     source = open_resumed(resume)
     options = {**options, **source.live.words}
-    return source, chosen(sinks, no_write, source_given(options)), options
+    return source, chosen(sinks, no_write, kinds_meant(options)[0]), options
 
 
 def _report(calibration: Calibration, writing: Iterator[Applied], as_json: bool) -> None:

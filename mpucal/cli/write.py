@@ -32,11 +32,10 @@ def command(calibration: Path, to: str, folder: Path | None, yes: bool, as_json:
     """Write a calibration (.json or .bin), read it back, and see its effect; whatever fails, the old state is restored.
 
     Where CALIBRATION is the file in which an earlier write kept the old state, that is written back. Exit code 6:
-    refused or failed, and the place holds what it held.
+    refused or failed, and nothing was changed.
     """
-    check_source(click.get_current_context())
     kind = SINKS[to]
-    check_sink(kind, options)
+    check_sink(kind, check_source(click.get_current_context()), options)
     written = Calibration.load(calibration) if is_calibration(calibration) else None
     folder = folder or calibration.parent
     make_folder(folder)

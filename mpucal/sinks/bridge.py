@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from pkgutil import resolve_name
 
 from ..errors import BusError, WriteBackError
 from ..result.atomic import write_atomically
 from ..result.blob import BlobError
 from ..result.calibration import REFUSED, Calibration
-from ..sources.bridge import open_store
 from ..sources.bridge.store import Held, Store
 from .kind import Device
 from .sink import Applied
@@ -27,7 +27,7 @@ def open_bridge(device: Device) -> Iterator[BridgeSink]:
     ------
     BusError : no such port, no bridge on it, or one that keeps nothing.
     """
-    with open_store(device.name) as store:
+    with resolve_name(device.kind.store)(device.name) as store:
         yield BridgeSink(store)
 
 

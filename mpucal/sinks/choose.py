@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..errors import UsageError
+from ..sources.kind import Delivers, SourceKind
+from ..sources.opening import one_of
+from ..sources.table import SOURCES, unique
 from .kind import SinkKind
 from .table import SINKS
 
@@ -12,12 +15,12 @@ from .table import SINKS
 FILE = "file"
 
 
-def chosen(asked: Sequence[str], no_write: bool, source: str) -> tuple[SinkKind, ...]:
+def chosen(asked: Sequence[str], no_write: bool, source: SourceKind) -> tuple[SinkKind, ...]:
     """The sinks to write to besides the files, in the table's order.
 
     Parameters
     ----------
-    asked : what --to named; none: what is a default of the source. source : the option that names the source.
+    asked : what --to named; none: what is written to by default. source : of the session.
 
     Raises
     ------
@@ -30,19 +33,21 @@ def chosen(asked: Sequence[str], no_write: bool, source: str) -> tuple[SinkKind,
             check_behind(SINKS[name], source, f"--to {name} was given", ", or leave it out")
     if no_write:
         return ()
-    return tuple(kind for kind in SINKS.values() if (kind.name in asked if asked else source in kind.default_of))
+    return tuple(
+        kind for kind in SINKS.values() if (kind.name in asked if asked else kind.default and kind.behind(source))
+    )
 
 
-def check_behind(kind: SinkKind, source: str, given: str, otherwise: str = "") -> None:
+def check_behind(kind: SinkKind, source: SourceKind, given: str, otherwise: str = "") -> None:
     """Refuse a sink that is not behind the source.
 
     Raises
     ------
     UsageError : `given`, and the source has none; give another one, `otherwise` do what that says.
     """
-    if source not in kind.behind:
-        has = "has no sensor to write to" if source == "replay" else f"has no {kind.name}"
-        raise UsageError(f"{given}, and --{source} {has}", f"give {kind.sources}{otherwise}")
+    if not kind.behind(source):
+        has = "has no sensor to write to" if source.delivers is Delivers.CAPTURE else f"has no {kind.name}"
+        raise UsageError(f"{given}, and {source.spelled} {has}", f"{one_of(filter(kind.behind, SOURCES))}{otherwise}")
 
 
 def announced(kinds: Sequence[SinkKind], no_write: bool) -> str:
@@ -55,5 +60,10 @@ def announced(kinds: Sequence[SinkKind], no_write: bool) -> str:
 
 def defaults() -> str:
     """Where a session writes by default, for the help."""
-    listed = [f"{kind.where} of --{source}" for kind in SINKS.values() for source in kind.default_of]
+    listed = [f"{kind.where} of {' or '.join(behind(kind))}" for kind in SINKS.values() if kind.default]
     return f"by default {', '.join(listed)}, else files alone"
+
+
+def behind(kind: SinkKind) -> list[str]:
+    """The options of the sources that have the sink, as a person writes them."""
+    return [option.spelled for option in unique(source.option for source in SOURCES if kind.behind(source))]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from ..result.session_files import DOCUMENT, SessionFile
 
 if TYPE_CHECKING:
+    from ..sources.kind import SourceKind
     from .sink import Sink
 
 Say = Callable[[str], None]
@@ -40,10 +41,11 @@ class Device:
 
     Attributes
     ----------
-    name : as the source's option says it, such as /dev/i2c-1. open : opens the source.
+    kind : of the source. name : as the source's option says it, such as /dev/i2c-1. open : opens the source.
     say : tells the person a sentence. flags : the names of those that were given.
     """
 
+    kind: SourceKind
     name: str
     open: Callable[[], Any]
     say: Say
@@ -56,19 +58,19 @@ class SinkKind:
 
     Attributes
     ----------
-    name : as `--to` and `mpucal write` spell it. behind : the source options whose devices have one.
-    default_of : those of them whose sessions write to it where --to does not choose.
+    name : as `--to` and `mpucal write` spell it. behind : whether the devices of a kind of source have one.
     where : it, in a sentence for a person. holds : what of a calibration it holds, for the documentation.
     opener : "module:attribute" of a context manager from a Device to a Sink; imported when it is opened.
+    default : whether a session on such a device writes to it where --to does not choose.
     effect : see Effect. kept : the files in which the old state may be kept. flags : see Flag.
     """
 
     name: str
-    behind: tuple[str, ...]
+    behind: Callable[[SourceKind], bool]
     where: str
     holds: str
     opener: str
-    default_of: tuple[str, ...] = ()
+    default: bool = False
     effect: Effect = Effect.NONE
     kept: tuple[SessionFile, ...] = ()
     flags: tuple[Flag, ...] = ()
@@ -94,8 +96,3 @@ class SinkKind:
             return self.kept
         name = self.after_write(Path(DOCUMENT.name).stem)
         return (*self.kept, SessionFile(name, f"the calibration of the sensor as it is after a write to {self.where}"))
-
-    @property
-    def sources(self) -> str:
-        """The options of the sources that it is behind, as a person writes them."""
-        return " or ".join(f"--{source}" for source in self.behind)

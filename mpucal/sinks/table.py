@@ -7,6 +7,8 @@ that kind is opened.
 from __future__ import annotations
 
 from ..result.session_files import SessionFile
+from ..sources.kind import Delivers
+from ..sources.table import MAVLINK
 from .kind import Effect, Flag, SinkKind
 
 CHIP_OFFSETS = SessionFile("chip-offsets.json", "what a chip's offset registers held before a write")
@@ -21,7 +23,7 @@ SINKS = {
     for kind in (
         SinkKind(
             "chip",
-            behind=("bus", "serial"),
+            behind=lambda source: source.delivers is Delivers.REGISTERS,
             where="the chip's offset registers",
             holds="b_a alone, in steps of 1 mg, until the chip's supply goes",
             opener="mpucal.sinks.chip:open_chip",
@@ -30,8 +32,8 @@ SINKS = {
         ),
         SinkKind(
             "bridge",
-            behind=("serial",),
-            default_of=("serial",),
+            behind=lambda source: bool(source.store),
+            default=True,
             where="the bridge's memory",
             holds="the config blob: D, b_a, K, b_omega, and b_a(T) where it is known",
             opener="mpucal.sinks.bridge:open_bridge",
@@ -39,8 +41,8 @@ SINKS = {
         ),
         SinkKind(
             "autopilot",
-            behind=("mavlink",),
-            default_of=("mavlink",),
+            behind=lambda source: source.option is MAVLINK,
+            default=True,
             where="the autopilot",
             holds="offsets and scales; cross-axis terms stay, and it says what error that leaves",
             opener="mpucal.sinks.autopilot:open_autopilot",

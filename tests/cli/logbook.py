@@ -16,6 +16,7 @@ from mpucal.result.session_files import SessionFile
 from mpucal.sinks.kind import Effect, Flag, SinkKind
 from mpucal.sinks.sink import Applied
 from mpucal.sinks.table import SINKS
+from mpucal.sources.table import BUS
 
 OLD = SessionFile("logbook-old.txt", "what the logbook held before a write")
 BOOK = Path("logbook.txt")
@@ -52,8 +53,8 @@ class Logbook:
 
 ROW = SinkKind(
     "logbook",
-    behind=("bus",),
-    default_of=("bus",),
+    behind=lambda source: source.option is BUS,
+    default=True,
     where="the logbook",
     holds="b_a in words",
     opener=f"{Path(__file__).stem}:open_logbook",

@@ -101,11 +101,17 @@ def test_the_help_names_it(tmp_path, command):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("session", "--mavlink", "sim", "--to", "logbook"), "--mavlink has no logbook: give --bus, or leave it out."),
+        (
+            ("session", "--mavlink", "sim", "--to", "logbook"),
+            "has no logbook: give --bus BUS, or leave it out.",
+        ),
         (("session", *SIM, "--to", "logbook", "--no-write"), "--to and --no-write were given together"),
         (("session", *SIM, "--to", "diary"), "'logbook'"),
-        (("write", "c.json", "logbook", "--mavlink", "sim"), "--mavlink has no logbook: give --bus."),
-        (("write", "c.json", "logbook", "--replay", "c.mcap"), "--replay has no sensor to write to: give --bus."),
+        (("write", "c.json", "logbook", "--mavlink", "sim"), "--mavlink sim has no logbook: give --bus BUS."),
+        (
+            ("write", "c.json", "logbook", "--replay", "c.mcap"),
+            "`mpucal write` does not take it",
+        ),
         (("write", "c.json", "chip", "--bus", "sim", "--ink"), "--ink was given, and the chip's offset registers"),
         (("write", "c.json", "logbook", "--bus", "sim", "--store"), "--store was given, and the logbook"),
         (("write", "c.json", "diary", "--bus", "sim"), "'logbook'"),

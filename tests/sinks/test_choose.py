@@ -1,13 +1,20 @@
 """Which sinks a session writes to."""
 
+import re
+
 import pytest
 
 from mpucal.errors import UsageError
 from mpucal.sinks.choose import announced, chosen
+from mpucal.sources.table import kinds_meant
+
+
+def source(name):
+    return kinds_meant({name: "x"})[0]
 
 
 @pytest.mark.parametrize(
-    ("asked", "no_write", "source", "names"),
+    ("asked", "no_write", "name", "names"),
     [
         ((), False, "bus", []),
         ((), False, "serial", ["bridge"]),
@@ -19,8 +26,8 @@ from mpucal.sinks.choose import announced, chosen
         (("bridge", "chip"), False, "serial", ["chip", "bridge"]),
     ],
 )
-def test_a_session_chooses_the_sink_that_fits_its_source(asked, no_write, source, names):
-    kinds = chosen(asked, no_write, source)
+def test_a_session_chooses_the_sink_that_fits_its_source(asked, no_write, name, names):
+    kinds = chosen(asked, no_write, source(name))
     assert [kind.name for kind in kinds] == names
     said = announced(kinds, no_write)
     assert said.startswith("The result goes to files")
@@ -28,15 +35,15 @@ def test_a_session_chooses_the_sink_that_fits_its_source(asked, no_write, source
 
 
 @pytest.mark.parametrize(
-    ("asked", "no_write", "source", "says"),
+    ("asked", "no_write", "name", "says"),
     [
         (("chip",), True, "bus", "leave one of them out"),
-        (("bridge",), False, "bus", "--bus has no bridge: give --serial, or leave it out"),
+        (("bridge",), False, "bus", "--bus has no bridge: give --serial PORT[:BAUD], or leave it out"),
         (("autopilot",), False, "bus", "give --mavlink"),
-        (("chip",), False, "mavlink", "--mavlink has no chip: give --bus or --serial"),
+        (("chip",), False, "mavlink", "--mavlink has no chip: give exactly one of --bus BUS and --serial"),
         (("chip",), False, "replay", "--replay has no sensor to write to"),
     ],
 )
-def test_a_sink_that_is_not_there_is_wrong_usage_before_anything_begins(asked, no_write, source, says):
-    with pytest.raises(UsageError, match=says):
-        chosen(asked, no_write, source)
+def test_a_sink_that_is_not_there_is_wrong_usage_before_anything_begins(asked, no_write, name, says):
+    with pytest.raises(UsageError, match=re.escape(says)):
+        chosen(asked, no_write, source(name))

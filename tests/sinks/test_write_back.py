@@ -55,7 +55,7 @@ class Registers:
         return "it holds again what it held"
 
 
-KIND = SinkKind("made", behind=("bus",), where="the made-up sink", holds="all", opener="made_up_sink:opened")
+KIND = SinkKind("made", behind=lambda source: True, where="the made-up sink", holds="all", opener="made_up_sink:opened")
 
 
 def write_all(monkeypatch, sink, calibration, folder, record, asked=(), said=print):
@@ -68,7 +68,7 @@ def write_all(monkeypatch, sink, calibration, folder, record, asked=(), said=pri
         yield sink
 
     monkeypatch.setitem(sys.modules, "made_up_sink", SimpleNamespace(opened=opened))
-    device = Device("/dev/made-up", lambda: None, said)
+    device = Device(None, "/dev/made-up", lambda: None, said)
     return list(write_to_all((KIND,), calibration, device, folder, record, lambda question: None, asked))
 
 

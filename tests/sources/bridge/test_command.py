@@ -114,7 +114,7 @@ def test_a_bias_goes_into_the_chip_behind_it_and_out_again(board, mpucal, tmp_pa
         (["show", "--serial"], 2, "no serial port was named"),
         (["show"], 2, "nothing to show was named"),
         (["show", "x.json", "--serial", "x"], 2, "a file and --serial were given together"),
-        (["write", str(BLOB), "bridge", "--bus", "sim"], 2, "give --serial"),
+        (["write", str(BLOB), "bridge", "--bus", "sim"], 2, "give --serial PORT"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
