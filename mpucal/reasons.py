@@ -2,7 +2,7 @@
 
 A check (calibration/checks/, session/live/disagreement.py) decides whether a reason holds, and fills its numbers into
 one of the row's sentences: `reason("gyro_clipped", "samples", refuse=False, count=12, share=0.01)`. A new reason is a
-row here and a check there. docs/reasons.md is made from this table by tools/reasons_page.py.
+row here and a check there. docs/reasons.md is made from this table by tools/make_reasons.py.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ KINDS: Mapping[str, Kind] = {
                 True,
             ),
         },
-        "mpucal.calibrate(without_flat(r))",
+        "mpucal.calibrate(replace(r, acc=r.acc[::-1], gyr=-r.gyr[::-1]))",
     ),
     "few_orientations": Kind(
         "Some directions of acceleration are not observable, or known too little: the board was not held in enough"
@@ -132,12 +132,12 @@ KINDS: Mapping[str, Kind] = {
                 True,
             ),
             "uncertain": Sentence(
-                "a calibrated reading is known to {rms:.2g} m/s^2 (1 sigma) only, least certain with{side} up",
-                "hold the board still in more orientations:{side} up,{side} down, and tilted",
+                "a calibrated reading is known to {rms:.2g} m/s^2 (1 sigma) only, least certain with {side} up",
+                "hold the board still in more orientations: {side} up, {side} down, and tilted",
             ),
             "not_observable": Sentence(
-                "not every direction is observable from this recording, least of all with{side} up",
-                "hold the board still in more orientations:{side} up,{side} down, and tilted",
+                "not every direction is observable from this recording, least of all with {side} up",
+                "hold the board still in more orientations: {side} up, {side} down, and tilted",
                 True,
             ),
             "tilted": Sentence(
@@ -146,7 +146,7 @@ KINDS: Mapping[str, Kind] = {
                 False,
             ),
         },
-        "mpucal session --bus sim:hand=one_axis --seed 1",
+        "mpucal session --bus sim:hand=still --seed 1",
         "the error of a calibrated reading is above 0.4 m/s² (1 sigma) or not known",
         turn_again=True,
     ),
@@ -169,7 +169,7 @@ KINDS: Mapping[str, Kind] = {
             ),
         },
         "mpucal session --bus sim:hand=hasty --gyro-range 250 --seed 1",
-        "more than 20 % of the samples are clipped, or new orientations cannot be verified for it",
+        "more than 20 % of the samples are clipped, or the new orientations cannot be verified because of it",
         turn_again=True,
     ),
     "accel_clipped": Kind(
@@ -300,7 +300,7 @@ KINDS: Mapping[str, Kind] = {
             ),
         },
         "mpucal.calibrate(replace(r, gyr=1.1 * r.gyr))",
-        "it did not measure; a scale factor that is off is estimated as well, and the result is usable",
+        "it did not measure; where its scale factors are off they are estimated, and the calibration is usable",
     ),
     "temperature_moved": Kind(
         "The chip warmed or cooled while it was measured, and its biases moved with it.",
@@ -328,7 +328,7 @@ KINDS: Mapping[str, Kind] = {
                 True,
             ),
         },
-        "",
+        "mpucal.calibrate(r.part(0, 1500))",
         turn_again=True,
     ),
     "inconsistent": Kind(
@@ -362,7 +362,7 @@ KINDS: Mapping[str, Kind] = {
                 True,
             ),
         },
-        "mpucal session --bus sim:hand=slipping --seed 1",
+        "mpucal session --bus sim:hand=knocking --seed 1",
         "the contradiction is several times the limit",
         turn_again=True,
     ),

@@ -28,7 +28,7 @@ def few_orientations(e: Evidence) -> Reason | None:
     if e.sure is None:
         return reason("few_orientations", "nothing_known")
     worst, rms = e.sure.worst, e.sure.rms_mps2
-    side = "".join(f" {'+' if w > 0 else '-'}{axis}" for axis, w in zip("xyz", worst, strict=True) if abs(w) > 0.4)
+    side = " ".join(f"{'+' if w > 0 else '-'}{axis}" for axis, w in zip("xyz", worst, strict=True) if abs(w) > 0.4)
     if rms < e.gravity:
         return reason("few_orientations", "uncertain", rms > USABLE_RMS_MPS2, rms=rms, side=side)
     return reason("few_orientations", "not_observable", side=side)

@@ -1,0 +1,41 @@
+"""The page of reasons: the table's, and true."""
+
+import json
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import mpucal
+from mpucal.__main__ import run
+from mpucal.reasons import KINDS
+
+SESSIONS = Path(__file__).parents[2] / "fixtures" / "sessions"
+
+
+def test_the_page_is_the_tables(tool):
+    make_reasons = tool("make_reasons")
+    assert make_reasons.PAGE.read_text(encoding="utf-8") == make_reasons.page(), "run tools/make_reasons.py"
+
+
+def codes(quality):
+    return [reason["code"] for reason in quality["reasons"]]
+
+
+SESSION = {code: kind.reproduce for code, kind in KINDS.items() if kind.reproduce.startswith("mpucal session ")}
+
+
+@pytest.mark.parametrize("command", dict.fromkeys(SESSION.values()), ids=lambda words: words.split()[3])
+def test_a_session_shows_its_reasons(command, capsys, tmp_path):
+    run([*shlex.split(command)[1:], "-o", str(tmp_path / "s"), "--no-write", "--yes", "--json"])
+    found = codes(json.loads(capsys.readouterr().out)["quality"])
+    assert {code for code in SESSION if SESSION[code] == command} <= set(found)
+
+
+@pytest.mark.parametrize("code", [code for code in KINDS if code not in SESSION])
+def test_a_spoilt_recording_shows_its_reason(code):
+    r = mpucal.load(SESSIONS / "mpu6050.mcap")
+    assert mpucal.calibrate(r).verdict == "good"
+    found = eval(KINDS[code].reproduce, {"mpucal": mpucal, "replace": replace, "r": r})
+    assert code in codes(found.quality)
