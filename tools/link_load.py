@@ -18,11 +18,11 @@ import time
 from pathlib import Path
 
 from mpucal.mavlink.dialect import dialect
-from mpucal.mavlink.lines import Udp
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.source import VehicleSource
 from mpucal.mavlink.tlog import TlogWriter
+from mpucal.mavlink.transports import Udp
 from mpucal.mavlink.url import Kind, Url
+from mpucal.mavlink.vehicle_source import VehicleSource
 
 
 def vehicle(port: int, rate_hz: float) -> None:

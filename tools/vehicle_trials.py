@@ -23,13 +23,13 @@ from pathlib import Path
 
 import numpy as np
 
-from mpucal.mavlink.lines import open_transport
+from mpucal.mavlink.firmwares import ARDUPILOT, PX4
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.names import place
-from mpucal.mavlink.shaping import read_shaping
-from mpucal.mavlink.source import one_of
-from mpucal.mavlink.truth import ARDUPILOT, PX4
+from mpucal.mavlink.stream_parameters import read_stream_parameters
+from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import parse_url
+from mpucal.mavlink.vehicle_source import one_of
 from mpucal.simulated.vehicle import Vehicle, VehicleOptions
 
 HERE = Path(__file__).parent
@@ -153,7 +153,7 @@ def held(trial: Trial, url: str) -> dict[str, float]:
         link = Link(transport, lambda _t_ns, _packet: None)
         link.lock(one_of(link.listen(), trial.system))
         firmware = PX4 if link.vehicle.is_px4 else ARDUPILOT
-        return read_shaping(link, firmware)
+        return read_stream_parameters(link, firmware)
 
 
 def apart(trial: Trial, parameters: Mapping[str, float]) -> list[tuple[int, float, float]]:

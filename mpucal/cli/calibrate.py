@@ -9,7 +9,7 @@ import click
 from ..errors import RefusedError
 from ..files import load
 from ..files.formats import readable
-from ..mavlink.calibrate import calibrate_vehicle
+from ..mavlink.calibrate_vehicle import calibrate_vehicle
 from ..result.calibration import REFUSED
 from ..result.session_files import BLOB
 from ..session.results import make_folder, result_files, save

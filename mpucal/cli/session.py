@@ -12,7 +12,7 @@ import click
 
 from ..data import Recording
 from ..errors import RefusedError
-from ..mavlink.calibrate import calibrate_vehicle
+from ..mavlink.calibrate_vehicle import calibrate_vehicle
 from ..result.calibration import REFUSED, Calibration
 from ..session.place import Place
 from ..session.runner import Runner

@@ -1,1 +1,1 @@
-"""What is the matter with a chip and its bus: examined step by step, told on one page. Repairs nothing."""
+"""What is the matter with a chip and its bus: examined step by step, told on one page."""

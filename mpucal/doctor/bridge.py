@@ -1,4 +1,4 @@
-"""A serial bridge: what it says of itself, and how long a register takes through it. Knows no port and no chip."""
+"""A serial bridge: what it says of itself, and how long a register takes through it."""
 
 from __future__ import annotations
 

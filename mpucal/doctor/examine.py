@@ -1,4 +1,4 @@
-"""The examination of a chip on any bus, step by step. Knows no kind of bus and no page.
+"""The examination of a chip on any bus, step by step.
 
 The offset registers hold afterwards what they held before: the reset that identifying takes reloads the factory's
 trim, and whoever had corrected it would miss that.

@@ -1,4 +1,4 @@
-"""One thing that was found out, and what it means. Knows no way to find it."""
+"""One thing that was found out, and what it means."""
 
 from __future__ import annotations
 

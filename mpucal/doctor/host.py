@@ -1,4 +1,4 @@
-"""The Linux side of an I2C bus: its device file, adapter, kernel drivers and who answers. Knows no chip's registers.
+"""The Linux side of an I2C bus: its device file, adapter, kernel drivers and who answers.
 
 Source: Linux Documentation/i2c/dev-interface.rst and sysfs; i2c-tools' i2cdetect for how to ask politely.
 """

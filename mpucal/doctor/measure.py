@@ -1,4 +1,4 @@
-"""What the stream of a board at rest says about its chip. Knows no bus, and asks nothing."""
+"""What the stream of a board at rest says about its chip: rate, losses, noise, gravity, zero rate, temperature."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The noise of a sensor at rest as a density, whatever its low-pass filter. Knows no sensor."""
+"""The noise of a sensor at rest as a density, whatever its low-pass filter."""
 
 from __future__ import annotations
 

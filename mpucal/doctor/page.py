@@ -1,4 +1,4 @@
-"""The page: findings as text for a bug report, or as JSON. Knows no way to find anything."""
+"""The page: findings as text for a bug report, or as JSON."""
 
 from __future__ import annotations
 

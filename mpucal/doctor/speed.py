@@ -1,4 +1,4 @@
-"""How fast a bus moves bytes, by the times of its own replies. Knows no kind of bus."""
+"""How fast a bus moves bytes, by the times of its own replies."""
 
 from __future__ import annotations
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ..mavlink.firmwares import ARDUPILOT
 from ..mavlink.parameters.text import param_text
-from ..mavlink.truth import ARDUPILOT
 from ..result.calibration import Calibration
 from .parameters import notes, remarks, values
 

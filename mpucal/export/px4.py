@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ..mavlink.firmwares import PX4
 from ..mavlink.parameters.text import params_text
-from ..mavlink.truth import PX4
 from ..result.calibration import Calibration
 from .parameters import notes, remarks, values
 

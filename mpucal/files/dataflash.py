@@ -12,9 +12,9 @@ from typing import Any
 
 from ..data import Recording
 from ..errors import RecordingError
+from ..mavlink.firmwares import ARDUPILOT
 from ..mavlink.imu import DATAFLASH, Reading, Stream
 from ..mavlink.log import Log
-from ..mavlink.truth import ARDUPILOT
 
 MAGIC = b"\xa3\x95"
 PARAMETER = "PARM"

@@ -1,4 +1,4 @@
-"""A vehicle's clock, unwrapped and followed through resets. Knows no message."""
+"""A vehicle's clock, unwrapped and followed through resets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""pymavlink's messages, loaded when asked for, and bytes made into them. Knows no address and no clock."""
+"""pymavlink's messages, loaded when asked for, and bytes made into them."""
 
 from __future__ import annotations
 

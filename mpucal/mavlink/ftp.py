@@ -1,7 +1,8 @@
-"""Whole files on a vehicle's storage, by MAVLink FTP (FILE_TRANSFER_PROTOCOL, 110). Knows no file's meaning.
+"""Whole files on a vehicle's storage, by MAVLink FTP (FILE_TRANSFER_PROTOCOL, 110).
 
 Payload: sequence u16, session u8, opcode u8, size u8, requested opcode u8, burst u8, padding, offset u32, data.
-Sizes and check sums that vehicles report are not believed: what was put is read back.
+Sizes and check sums that vehicles report are not believed: what was put is read back. Not by pymavlink's mavftp, for
+reasons that docs/architecture.md gives.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""IMU messages made into m/s^2, rad/s and their own clock's time. Knows no stream and no vehicle.
+"""IMU messages made into m/s^2, rad/s and their own clock's time.
 
 HIGHRES_IMU (105) carries floats; RAW_IMU (27), SCALED_IMU (26), SCALED_IMU2 (116) and SCALED_IMU3 (129) carry whole
 milli-g and mrad/s, which ArduPilot and PX4 truncate toward zero.

@@ -1,4 +1,4 @@
-"""The link to one vehicle: listen, lock to it, then hear and answer it alone. Knows no stream and no parameter.
+"""The link to one vehicle: listen, lock to it, then hear and answer it alone.
 
 One thread: nothing arrives but in `messages`, and every message of the vehicle goes to all who subscribed, whoever
 called `messages`. The time is that of the transport, as of the last message or deadline: a replay repeats it.

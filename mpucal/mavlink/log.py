@@ -1,4 +1,4 @@
-"""A whole .tlog of any ground station made into a recording of each IMU. Knows no session.
+"""A whole log of a vehicle, a .tlog of any ground station among them, made into a recording of each IMU.
 
 What was measured before a reboot, and under other accelerometer parameters, belongs to another recording: the longest
 is taken.
@@ -13,12 +13,12 @@ from ..calibration.flat_segment import find_flat
 from ..data import Recording
 from ..errors import RecordingError
 from .clock import Jump
-from .collect import Gatherer, Row
 from .dialect import Message, Parser, dialect
+from .firmwares import ARDUPILOT, PX4, preferred_messages
+from .gatherer import Gatherer, Row
 from .imu import Reading, reading
 from .parameters.encoding import is_parameter, of_wire
 from .tlog import Record
-from .truth import ARDUPILOT, PX4, truthful
 
 # whose change alters the streams
 MOUNTED = ("AHRS_ORIENTATION", "AHRS_CUSTOM", "CUST_ROT", "SENS_BOARD")
@@ -85,7 +85,7 @@ class Log:
         RecordingError : it holds no IMU messages that tell the truth.
         """
         longest = max(self.segments, key=len)
-        order = truthful(self.firmware, longest.parameters)
+        order = preferred_messages(self.firmware, longest.parameters)
         recordings = longest.gatherer.recordings(order, name, self.firmware, longest.parameters)
         if not recordings:
             raise _no_imu(name, self.firmware, longest.gatherer)

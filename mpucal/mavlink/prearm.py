@@ -1,4 +1,4 @@
-"""Whether a vehicle would arm, and whether it has: what it says itself. Changes nothing."""
+"""Whether a vehicle would arm, and whether it has: what it says itself."""
 
 from __future__ import annotations
 

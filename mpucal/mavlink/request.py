@@ -1,4 +1,4 @@
-"""A message to a vehicle and its answer, asked for again where one of them is lost. Knows no meaning of either."""
+"""A message to a vehicle and its answer, asked for again where one of them is lost."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The key of MAVLink 2 signing, from a file. Knows no packet."""
+"""The key of MAVLink 2 signing, from a file."""
 
 from __future__ import annotations
 

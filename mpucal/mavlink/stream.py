@@ -1,4 +1,4 @@
-"""A vehicle's IMU streams: asked for, their rates watched, asked for again. Knows no sample's content."""
+"""A vehicle's IMU streams: asked for, their rates watched, asked for again."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 
 from ..errors import LinkError
 from .dialect import Message, dialect
+from .firmwares import PX4, preferred_messages
 from .imu import HIGHRES, MESSAGE_ID, RAW, Stream, reading
 from .link import Link, S
 from .request import command
-from .truth import PX4, truthful
 
 US_PER_S = 1e6
 # what ArduPilot gives at a loop of 400 Hz: a rate that it denies is followed by the next lower one
@@ -36,7 +36,7 @@ class Streams:
     ) -> None:
         self._link = link
         self._firmware = firmware
-        self._order = [name for name in truthful(firmware, parameters) if name in MESSAGE_ID]
+        self._order = [name for name in preferred_messages(firmware, parameters) if name in MESSAGE_ID]
         self._rate_hz = rate_hz
         self._say = say
         self._counts: Counter[Stream] = Counter()

@@ -1,4 +1,4 @@
-"""The .tlog that ground stations write: repeated [8 bytes big-endian, us since 1970] + packet. Knows no message."""
+"""The .tlog that ground stations write: repeated [8 bytes big-endian, us since 1970] + packet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a link needs of that which moves its bytes. Knows no packet, and no kind of line."""
+"""The protocol of what moves a link's bytes and has the clock: UDP, TCP, serial, a .tlog, a simulated vehicle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a vehicle is, in a URL's words: udp:14550, tcp:HOST:PORT, a serial device. Opens nothing."""
+"""Where a vehicle is, in a URL's words: udp:14550, tcp:HOST:PORT, a serial device."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who sends an autopilot's HEARTBEAT, and from where. Knows no link."""
+"""Who sends an autopilot's HEARTBEAT, and from where."""
 
 from __future__ import annotations
 

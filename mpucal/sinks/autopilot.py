@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..errors import LinkError, RecordingError, WriteBackError
 from ..mavlink.dialect import dialect
+from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..mavlink.ftp import Storage
 from ..mavlink.link import Link
 from ..mavlink.parameters.applied import applied, of_imu
@@ -20,9 +21,8 @@ from ..mavlink.parameters.verify import OtherPlacesError, verify
 from ..mavlink.parameters.write import Writer
 from ..mavlink.prearm import Prearm, Watch, prearm
 from ..mavlink.request import command
-from ..mavlink.shaping import read_shaping
-from ..mavlink.still import Stillness
-from ..mavlink.truth import ARDUPILOT, PX4
+from ..mavlink.stillness import Stillness
+from ..mavlink.stream_parameters import read_stream_parameters
 from ..result.atomic import write_atomically
 from ..result.calibration import Calibration
 from ..session.at_rest import put_down
@@ -77,7 +77,7 @@ class AutopilotSink:
         ------
         LinkError : they cannot be read. OutputError : they cannot be saved.
         """
-        held = read_shaping(self._link, self._firmware)
+        held = read_stream_parameters(self._link, self._firmware)
         values = {name: value for name, value in held.items() if CORRECTION.search(name)}
         remarks = [f"Accelerometer parameters of {self.where} before mpucal wrote new ones"]
         file, text = OLD_PARAM, param_text(values, remarks)
@@ -130,13 +130,13 @@ class AutopilotSink:
             self._check(planned)
             before = prearm(self._link)
             old = writer.held()
-            rest = stillness.rest()
+            rest = stillness.wait()
         if rest is None:
             raise WriteBackError(f"{NOTHING}: the vehicle did not lie still", "set it down, then write again")
         new = {name: value for change in planned for name, value in change.place.values(change.new).items()}
         now = applied(calibration, [change.imu for change in planned])
         with self._stored(now, planned) as paths:
-            writer.write(old, new, lambda: verify(planned, old, rest, stillness.rest()))
+            writer.write(old, new, lambda: verify(planned, old, rest, stillness.wait()))
         after = self._settled(planned)
         return Applied(now, "; ".join([*self._said(planned, left_out(calibration), before, after), *paths]))
 

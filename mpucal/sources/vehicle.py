@@ -13,20 +13,20 @@ from ..chip.config import Config
 from ..chip.records import LATE, SessionEvent
 from ..data import Recording
 from ..errors import CaptureError, LinkError, UsageError
-from ..mavlink.lines import open_transport
+from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..mavlink.link import Link
 from ..mavlink.log import read_log
-from ..mavlink.notes import Note, to_messages
 from ..mavlink.prompts import to_message
-from ..mavlink.recorded import RecordedSource
-from ..mavlink.replay import Replay
-from ..mavlink.shaping import read_shaping
+from ..mavlink.recorded_source import RecordedSource
+from ..mavlink.session_events import Note, to_messages
 from ..mavlink.signing import read_key
-from ..mavlink.source import VehicleSource, one_of
+from ..mavlink.stream_parameters import read_stream_parameters
 from ..mavlink.tlog import Tlog, TlogWriter, read_tlog
+from ..mavlink.tlog_replay import Replay
 from ..mavlink.transport import Transport
-from ..mavlink.truth import ARDUPILOT, PX4
+from ..mavlink.transports import open_transport
 from ..mavlink.url import parse_url
+from ..mavlink.vehicle_source import VehicleSource, one_of
 from ..result.session_files import CAPTURE_OF_VEHICLE
 from ..session.events import Prompt
 from ..session.plan import Plan
@@ -121,7 +121,11 @@ class OpenedVehicle:
         """What its accelerometer parameters are now, and which vehicle it is; nothing is written."""
         with self.connected(lambda _sentence: None) as link:
             firmware = PX4 if link.vehicle.is_px4 else ARDUPILOT
-            return {"where": str(link.vehicle), "firmware": firmware, "parameters": dict(read_shaping(link, firmware))}
+            return {
+                "where": str(link.vehicle),
+                "firmware": firmware,
+                "parameters": dict(read_stream_parameters(link, firmware)),
+            }
 
     def _prompt(self, prompt: Prompt) -> None:
         """Tell the vehicle, whose log then says what was done to it."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import mpucal
 from mpucal.cli import commands
 from mpucal.errors import RecordingError
-from mpucal.mavlink.calibrate import calibrate_vehicle
+from mpucal.mavlink.calibrate_vehicle import calibrate_vehicle
 
 D = np.array([[1.02, 0.003, 0.0], [0.0, 0.99, -0.004], [0.002, 0.0, 0.97]])
 B_A = np.array([-0.2, 0.3, 0.25])

@@ -3,7 +3,7 @@ import pytest
 from mpucal.errors import LinkError, NoAnswer, UsageError
 from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM, Link, S
 from mpucal.mavlink.request import ask, command
-from mpucal.mavlink.source import one_of
+from mpucal.mavlink.vehicle_source import one_of
 
 KEY = b"k" * 32
 HOME, STRANGER = "10.0.0.2:14555", "10.0.0.66:999"

@@ -11,10 +11,10 @@ import pytest
 
 import mpucal
 from mpucal.errors import NoAnswer
-from mpucal.mavlink.lines import Udp
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.source import VehicleSource
+from mpucal.mavlink.transports import Udp
 from mpucal.mavlink.url import Kind, Url
+from mpucal.mavlink.vehicle_source import VehicleSource
 
 MAVPROXY = shutil.which("mavproxy.py")
 TOOL = Path(__file__).parents[2] / "tools" / "sim_vehicle.py"

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
 from mpucal.mavlink.parameters.compose import Correction, compose
-from mpucal.mavlink.parameters.rotation import orientation
+from mpucal.mavlink.rotation import orientation
 
 ORIENTATIONS = [number for number in range(41) if orientation(number) is not None]
 

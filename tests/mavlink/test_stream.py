@@ -2,10 +2,10 @@ import pytest
 
 from mpucal.errors import LinkError
 from mpucal.mavlink.dialect import dialect
+from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.imu import Stream
 from mpucal.mavlink.link import Link, S
 from mpucal.mavlink.stream import Streams
-from mpucal.mavlink.truth import ARDUPILOT
 
 HOME = "10.0.0.2:14555"
 RAW, HIGHRES, SCALED2 = 27, 105, 116

@@ -10,10 +10,10 @@ import pytest
 
 from mpucal.errors import UsageError
 from mpucal.mavlink.dialect import Parser, dialect
-from mpucal.mavlink.lines import open_transport
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.encoding import name_bytes, of_wire, to_wire
 from mpucal.mavlink.prompts import Heard, to_message
+from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import parse_url
 from mpucal.simulated.vehicle import Vehicle, VehicleOptions
 

@@ -1,4 +1,4 @@
-"""A calibration of a vehicle's streams as they are once its new parameters are in place. Knows no link."""
+"""A calibration of a vehicle's streams as they are once its new parameters are in place."""
 
 from __future__ import annotations
 

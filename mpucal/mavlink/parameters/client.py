@@ -1,4 +1,4 @@
-"""A vehicle's parameters read and set over its link, each one confirmed. Knows no parameter's meaning."""
+"""A vehicle's parameters read and set over its link, each one confirmed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A calibration of a stream, and the parameters behind the stream, made into new parameters. Knows no name and no link.
+"""New parameters from a calibration of a stream and the parameters behind the stream.
 
 An autopilot delivers y = R_b K (s - o) of what its sensor measures, s: offset o and scale K = diag(k) in the sensor's
 axes, then the board's rotation R_b. The calibration says y = D f + b of the specific force f, so that with

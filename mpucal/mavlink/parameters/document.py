@@ -1,4 +1,4 @@
-"""What calibration.json says of an autopilot: old parameters, new ones, and what they leave. Knows no link."""
+"""What calibration.json says of an autopilot: old parameters, new ones, and what they leave."""
 
 from __future__ import annotations
 

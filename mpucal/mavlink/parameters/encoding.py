@@ -1,4 +1,4 @@
-"""A parameter's value in PARAM_VALUE and PARAM_SET, which carry a float whatever the type is. Knows no name."""
+"""A parameter's value in PARAM_VALUE and PARAM_SET, which carry a float whatever the type is."""
 
 from __future__ import annotations
 

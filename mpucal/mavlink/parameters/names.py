@@ -1,4 +1,4 @@
-"""Which parameters of which firmware correct which IMU, and how it is mounted. Knows no link and no estimate."""
+"""Which parameters of which firmware correct which IMU, and how it is mounted."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...data import Vector
-from ..truth import PX4
+from ..firmwares import PX4
+from ..rotation import euler, orientation
 from .compose import Correction
-from .rotation import euler, orientation
 
 Values = Mapping[str, float]
 

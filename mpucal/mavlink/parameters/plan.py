@@ -1,4 +1,4 @@
-"""What is to be written to a vehicle for a calibration, or why nothing is. Asks nobody."""
+"""What is to be written to a vehicle for a calibration, or why nothing is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parameters in the text files of ground stations. Knows no link.
+"""Parameters in the text files of ground stations.
 
 `.param` is what Mission Planner and MAVProxy load: `NAME,VALUE` a line. `.params` is QGroundControl's: vehicle,
 component, name, value and MAV_PARAM_TYPE, with tabs between. Both take lines that begin with # as remarks.

@@ -1,4 +1,4 @@
-"""New parameters seen in the streams of a vehicle that lies still. Writes nothing."""
+"""Verify new parameters by what the streams of a vehicle that lies still make of them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...errors import WriteBackError
-from ..still import Rest
+from ..stillness import StillMeans
 from .plan import Change
 
 # a step of the stream, and what an attitude by the gyroscope is worse than one that did not change
@@ -30,7 +30,7 @@ class OtherPlacesError(WriteBackError):
         self.order = order
 
 
-def verify(planned: Sequence[Change], old: Mapping[str, float], before: Rest, after: Rest | None) -> None:
+def verify(planned: Sequence[Change], old: Mapping[str, float], before: StillMeans, after: StillMeans | None) -> None:
     """See in each stream what its new parameters must make of it.
 
     Parameters
@@ -67,7 +67,13 @@ def verify(planned: Sequence[Change], old: Mapping[str, float], before: Rest, af
 
 
 def _miss(
-    imu: Change, at: Change, old: Mapping[str, float], before: Rest, after: Rest, turned: Vector, angle: float
+    imu: Change,
+    at: Change,
+    old: Mapping[str, float],
+    before: StillMeans,
+    after: StillMeans,
+    turned: Vector,
+    angle: float,
 ) -> float:
     """By how much [m/s^2] the stream differs more than it may; not above 0 where it agrees, or shows nothing."""
     held = at.place.correction(old)

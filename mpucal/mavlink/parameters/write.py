@@ -1,4 +1,4 @@
-"""New parameters written to a vehicle, all of them or none. Knows no calibration."""
+"""New parameters written to a vehicle, all of them or none."""
 
 from __future__ import annotations
 

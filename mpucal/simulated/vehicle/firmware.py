@@ -10,7 +10,7 @@ from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...mavlink.dialect import Message, dialect
 from ...mavlink.parameters.encoding import Parameter
 from ...mavlink.parameters.names import CUSTOM_ANGLES
-from ...mavlink.parameters.rotation import euler, orientation
+from ...mavlink.rotation import euler, orientation
 from .options import VehicleOptions
 from .store import Store
 

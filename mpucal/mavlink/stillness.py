@@ -1,4 +1,4 @@
-"""How a vehicle's IMUs read while it lies still, and how it was turned in between. Knows no parameter."""
+"""How a vehicle's IMUs read while it lies still, and how it was turned in between."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from .dialect import Message, dialect
 from .imu import MESSAGE_ID, Reading, Stream, reading
 from .link import Link, S
 from .request import command
+from .rotation import turn
 
 WINDOW_NS, PATIENCE_NS = 2 * S, 30 * S
 FEWEST = 20
@@ -23,7 +24,7 @@ LONGEST_STEP_S = 1.0
 
 
 @dataclass(frozen=True)
-class Rest:
+class StillMeans:
     """What the streams said while the vehicle lay still.
 
     Attributes
@@ -54,7 +55,7 @@ class Stillness:
         self._found: dict[Stream, list[Reading]] = {}
         link.subscribe(self._hear)
 
-    def rest(self) -> Rest | None:
+    def wait(self) -> StillMeans | None:
         """Wait until all streams lay still for two windows, and return the second; None where they did not.
 
         Two, because a person who is told to set it down takes a second to begin.
@@ -65,12 +66,12 @@ class Stillness:
         """
         end_ns = self._link.now_ns() + PATIENCE_NS
         self._ask()
-        last: Rest | None = None
+        last: StillMeans | None = None
         while True:
             self._window()
             missing = [stream for stream in self._streams if len(self._found[stream]) < FEWEST]
             still = not missing and all(is_still(readings) for readings in self._found.values())
-            now = self._rest() if still else None
+            now = self._means() if still else None
             if now is not None and last is not None and _agree(last, now):
                 return now
             last = now
@@ -106,7 +107,7 @@ class Stillness:
         if self._gyro_bias is not None and 0 < step_s < LONGEST_STEP_S:
             self._attitude = self._attitude @ turn((np.array(content.gyr) - self._gyro_bias) * step_s)
 
-    def _rest(self) -> Rest:
+    def _means(self) -> StillMeans:
         mean, error = {}, {}
         for stream, readings in self._found.items():
             acc = np.array([r.acc for r in readings])
@@ -114,10 +115,10 @@ class Stillness:
             # a hand trembles slowly: its samples are no independent ones
             error[stream] = acc.std(axis=0) / 4
         self._gyro_bias = np.mean([r.gyr for r in self._found[self._streams[0]]], axis=0)
-        return Rest(mean, error, self._attitude)
+        return StillMeans(mean, error, self._attitude)
 
 
-def _agree(one: Rest, other: Rest) -> bool:
+def _agree(one: StillMeans, other: StillMeans) -> bool:
     return all(np.abs(one.mean[stream] - other.mean[stream]).max() < STILL_MPS2 / 2 for stream in one.mean)
 
 
@@ -128,13 +129,3 @@ def is_still(readings: Sequence[Reading]) -> bool:
     drift = acc[:half].mean(axis=0) - acc[half:].mean(axis=0)
     calm = acc.std(axis=0).max() < STILL_MPS2 and gyr.std(axis=0).max() < STILL_RAD_S
     return bool(calm and np.abs(drift).max() < STILL_MPS2 / 2 and np.abs(gyr.mean(axis=0)).max() < STILL_RAD_S)
-
-
-def turn(angle_rad: Vector) -> Vector:
-    """The rotation matrix (3, 3) of a rotation vector (3,) [rad] (Rodrigues)."""
-    angle = float(np.linalg.norm(angle_rad))
-    x, y, z = angle_rad
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(
-        np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * cross @ cross
-    )

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from mpucal.errors import EndOfCapture, LinkError, UsageError
+from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.names import ardupilot_place, mounting
-from mpucal.mavlink.replay import Replay
-from mpucal.mavlink.shaping import read_shaping, shaping_names
-from mpucal.mavlink.source import VehicleSource
+from mpucal.mavlink.stream_parameters import read_stream_parameters, stream_parameter_names
 from mpucal.mavlink.tlog import Record, Tlog
-from mpucal.mavlink.truth import ARDUPILOT
+from mpucal.mavlink.tlog_replay import Replay
+from mpucal.mavlink.vehicle_source import VehicleSource
 from mpucal.simulated.vehicle import Vehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 
@@ -77,7 +77,7 @@ def test_no_parameter_is_given_up_where_one_packet_in_five_is_lost(seed):
     vehicle = Vehicle(VehicleOptions.parse(f"sim:imus=1,fault=loss,seed={seed}"))
     link = Link(SimulatedTransport(vehicle), lambda t_ns, data: None)
     link.lock(link.listen()[0])
-    assert set(read_shaping(link, ARDUPILOT)) == set(shaping_names(ARDUPILOT))
+    assert set(read_stream_parameters(link, ARDUPILOT)) == set(stream_parameter_names(ARDUPILOT))
 
 
 def test_the_angles_of_a_board_that_is_turned_by_its_own_are_asked_for():

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM
-from mpucal.mavlink.notes import Note, Notes, to_messages
+from mpucal.mavlink.session_events import Note, Notes, to_messages
 
 LEAVES = st.none() | st.booleans() | st.integers(-9, 9) | st.text(max_size=60)
 DATA = st.dictionaries(st.text(max_size=9), LEAVES | st.lists(LEAVES, max_size=4), max_size=4)

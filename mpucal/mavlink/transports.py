@@ -1,4 +1,4 @@
-"""Bytes to and from a vehicle over UDP, TCP or a serial line, with the time. Knows no packet."""
+"""Bytes to and from a vehicle over UDP, TCP or a serial line, with the time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A session's own events as STATUSTEXT messages of its own ids, so that any tool opens the .tlog. Knows no file.
+"""A session's own events as STATUSTEXT messages of its own ids, so that any tool opens the .tlog.
 
 The text is `mpucal ` and a JSON object; STATUSTEXT (253) holds 50 characters, and chunks of one `id` what is longer.
 A chunk of less than 50 characters is the last one.

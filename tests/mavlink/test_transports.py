@@ -9,7 +9,7 @@ from contextlib import closing
 import pytest
 
 from mpucal.errors import LinkError, NoAnswer
-from mpucal.mavlink.lines import open_transport
+from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import Kind, Url
 
 SOON_NS = 5_000_000_000

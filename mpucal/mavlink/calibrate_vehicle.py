@@ -1,4 +1,4 @@
-"""All IMUs of a vehicle calibrated from one rotation. Knows no link; the estimate is that of any recording."""
+"""Calibrate all IMUs of a vehicle from one rotation, each as any recording is, and add what its parameters become."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ..errors import EndOfCapture
 from .dialect import Packet, Parser, dialect
-from .notes import Note, Notes, is_own
+from .session_events import Note, Notes, is_own
 from .tlog import Tlog
 from .transport import Bytes
 

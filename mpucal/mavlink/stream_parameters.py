@@ -1,14 +1,14 @@
-"""The parameters that shape a vehicle's IMU streams, asked of it before it is turned. Writes none."""
+"""Read the parameters that change what a vehicle's IMU streams hold: corrections, mounting, sensor ids."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from .dialect import Message
+from .firmwares import EKF2_IMU_CTRL, PX4
 from .link import Link, S
 from .parameters.encoding import is_parameter, name_bytes, of_wire
 from .parameters.names import CUSTOM_ANGLES
-from .truth import EKF2_IMU_CTRL, PX4
 
 ORIENTATION = "AHRS_ORIENTATION"
 AXES = "XYZ"
@@ -20,7 +20,7 @@ ROUND_NS, SILENT_ROUNDS = S // 2, 8
 AT_ONCE = 12
 
 
-def shaping_names(firmware: str) -> tuple[str, ...]:
+def stream_parameter_names(firmware: str) -> tuple[str, ...]:
     """Names of the parameters that stand between the sensors and the streams, and of the sensors' ids."""
     if firmware == PX4:
         kinds = ("ID", "PRIO", "ROT", *(f"{axis}{kind}" for kind in ("OFF", "SCALE") for axis in AXES))
@@ -32,14 +32,14 @@ def shaping_names(firmware: str) -> tuple[str, ...]:
     return (ORIENTATION, *(f"{acc}{kind}" for acc in accs for kind in kinds))
 
 
-def read_shaping(link: Link, firmware: str) -> dict[str, float]:
-    """The values of `shaping_names` that the vehicle holds, and the angles of a board that is turned by its own.
+def read_stream_parameters(link: Link, firmware: str) -> dict[str, float]:
+    """The values of `stream_parameter_names` that the vehicle holds, and the angles of a custom orientation.
 
     Raises
     ------
     EndOfCapture, LinkError : see Link.messages.
     """
-    held = read_parameters(link, shaping_names(firmware), firmware)
+    held = read_parameters(link, stream_parameter_names(firmware), firmware)
     angles = CUSTOM_ANGLES.get(round(held.get(ORIENTATION, 0)), ())
     return held | read_parameters(link, angles, firmware)
 

@@ -1,4 +1,4 @@
-"""A vehicle as a session's source: locked to, its parameters read, its IMUs streamed. Knows no person and no fit."""
+"""A vehicle as a session's source: locked to, its parameters read, its IMUs streamed."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Callable
 from ..data import Recording, Samples, Sensor
 from ..errors import LinkError, UsageError
 from .clock import Jump
-from .collect import Row, chip, least_noise, samples_of
 from .dialect import Message
+from .firmwares import ARDUPILOT, PX4
+from .gatherer import Row, chip, least_noise, samples_of
 from .imu import Stream, reading
 from .link import Link, S
 from .log import Log
 from .prearm import ARMED
-from .shaping import read_shaping
 from .stream import Streams
-from .truth import ARDUPILOT, PX4
+from .stream_parameters import read_stream_parameters
 from .vehicle import Vehicle
 
 POLL_NS = S // 20
@@ -66,7 +66,7 @@ class VehicleSource:
         firmware = PX4 if vehicle.is_px4 else ARDUPILOT
         self._log = Log(firmware)
         self._link.subscribe(self._hear)
-        parameters = read_shaping(self._link, firmware)
+        parameters = read_stream_parameters(self._link, firmware)
         self._streams = Streams(self._link, firmware, parameters, self._rate_hz, self._say)
         self._stream = self._streams.start()
         self._rows = []

@@ -1,4 +1,4 @@
-"""Which IMU messages of which firmware tell the truth. Knows no link."""
+"""ArduPilot and PX4 by name, and which of their IMU messages a calibration takes."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ EKF2_IMU_CTRL, ACCEL_BIAS = "EKF2_IMU_CTRL", 1 << 1
 SCALED_ORDER = ("SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
 
 
-def truthful(firmware: str, parameters: Mapping[str, float]) -> tuple[str, ...]:
-    """Names of the messages to calibrate from, the truest first.
+def preferred_messages(firmware: str, parameters: Mapping[str, float]) -> tuple[str, ...]:
+    """Names of the messages to calibrate from, those nearest to the sensor first.
 
     PX4's HIGHRES_IMU has the estimator's bias subtracted, which follows the very errors that are sought, unless
     EKF2_IMU_CTRL's bit 1 is clear; and PX4 sends no RAW_IMU.

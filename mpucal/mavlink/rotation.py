@@ -1,4 +1,7 @@
-"""How an autopilot is mounted: MAV_SENSOR_ORIENTATION as a rotation matrix. Knows no parameter's name."""
+"""Rotation matrices (3, 3): of MAV_SENSOR_ORIENTATION, of roll, pitch and yaw, of a rotation vector.
+
+scipy.spatial.transform loads where one is made.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,8 @@ import re
 
 import numpy as np
 
-from ...data import Vector
-from ..dialect import dialect
+from ..data import Vector
+from .dialect import dialect
 
 CUSTOM = 100
 _ANGLE = re.compile(r"(ROLL|PITCH|YAW)_(\d+)")
@@ -15,11 +18,16 @@ _ANGLE = re.compile(r"(ROLL|PITCH|YAW)_(\d+)")
 
 def euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Vector:
     """R_b (3, 3) that takes the sensor's axes to the vehicle's: R_z(yaw) R_y(pitch) R_x(roll)."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos((roll_rad, pitch_rad, yaw_rad)), np.sin((roll_rad, pitch_rad, yaw_rad))
-    Rx = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
-    Ry = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
-    Rz = np.array([[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]])
-    return np.asarray(Rz @ Ry @ Rx)
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to load
+
+    return np.asarray(Rotation.from_euler("xyz", (roll_rad, pitch_rad, yaw_rad)).as_matrix())
+
+
+def turn(angle_rad: Vector) -> Vector:
+    """The rotation matrix (3, 3) of a rotation vector (3,) [rad]."""
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to load
+
+    return np.asarray(Rotation.from_rotvec(angle_rad).as_matrix())
 
 
 def orientation(number: int) -> Vector | None:

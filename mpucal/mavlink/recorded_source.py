@@ -1,4 +1,4 @@
-"""A recording as a session's source: its samples come as if they were measured now. Knows no link."""
+"""A recording as a session's source: its samples come as if they were measured now."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Readings of a vehicle's IMUs gathered, and made into one recording an IMU. Knows no link and no parameter."""
+"""Gather the readings of a vehicle's IMUs, and make one recording of each IMU."""
 
 from __future__ import annotations
 
