@@ -1,4 +1,4 @@
-"""Whether the sensor stayed the same from start to end, by a score test on means over blocks. Knows no verdict.
+"""Whether the sensor stayed the same from start to end, by a score test on means over blocks.
 
 A calibration averages over a mount that slipped or a bias that stepped, and nothing in its covariance shows it. But the
 parts of the recording then pull it to different sides.
@@ -15,10 +15,10 @@ from ..data import Recording, Vector
 from .downsampling import downsampled
 from .fit import Fit
 from .flat_segment import Flat
-from .hand_noise import FARTHER, FARTHER_STILL, PIVOT_MPS2, WHITE_MPS2
+from .hand_noise import PIVOT_MPS2, WHITE_MPS2, farther, likeliest
 from .levenberg_marquardt import inverse, minimise
-from .likelihood import evaluate, value
-from .parameters import HAND
+from .likelihood import evaluate
+from .parameters import ACCELEROMETER, HAND
 from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed, preprocess
 from .prior import prior_of
 from .problem import Problem, Series
@@ -68,7 +68,7 @@ def likeliest_change(recording: Recording, flat: Flat, fit: Fit, gravity: float)
         cut = int(share * n)
         before = evaluate(_first(problem, cut), theta, HAND)
         of_after, H_after = whole.gradient - before.gradient, whole.fisher - before.fisher
-        d, covariance = _newton(H, gradient, H_after[:, :12], of_after[:12])
+        d, covariance = _newton(H, gradient, H_after[:, ACCELEROMETER], of_after[ACCELEROMETER])
         changes.append(
             Change(
                 float(d @ np.linalg.solve(covariance + np.diag(DRIFT_SD**2), d)) / len(d),
@@ -88,10 +88,9 @@ def _start(fit: Fit, prepared: Preprocessed) -> Theta:
 def _with_noise(prepared: Preprocessed, theta: Theta) -> Problem:
     """The likeliest noise of the hand: white from rest to rest, else a pivot's, which a calm one does not need."""
     if prepared.rests_often:
-        sigma = min(WHITE_MPS2, key=lambda s: value(prepared.white(s), theta))
-        return prepared.white(sigma, CORRELATION_S)
-    sigma = min(PIVOT_MPS2, key=lambda s: value(prepared.pivot(s, FLOOR_MPS2), theta))
-    return prepared.pivot((FARTHER + FARTHER_STILL * sigma) * sigma, FLOOR_MPS2)
+        return prepared.white(likeliest(prepared.white, WHITE_MPS2, theta), CORRELATION_S)
+    sigma = likeliest(lambda sigma: prepared.pivot(sigma, FLOOR_MPS2), PIVOT_MPS2, theta)
+    return prepared.pivot(farther(sigma), FLOOR_MPS2)
 
 
 def _first(problem: Problem, n: int) -> Problem:
@@ -104,7 +103,7 @@ def _first(problem: Problem, n: int) -> Problem:
 def _newton(H: Vector, gradient: Vector, H_after: Vector, gradient_after: Vector) -> tuple[Vector, Vector]:
     """d (12,) and its covariance, beside theta (p,): H (p, p), and what the part after says of d: (p, 12), (12,)."""
     p = len(H)
-    joint = np.block([[H, H_after], [H_after.T, H_after[:12] + np.diag(CHANGE_SD**-2.0)]])
+    joint = np.block([[H, H_after], [H_after.T, H_after[ACCELEROMETER] + np.diag(CHANGE_SD**-2.0)]])
     covariance = inverse(joint)
     step = -covariance @ np.append(gradient, gradient_after)
     return step[p:], covariance[p:, p:]

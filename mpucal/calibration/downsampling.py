@@ -1,4 +1,4 @@
-"""Fewer, better samples: means over blocks. Knows no estimator."""
+"""Downsampling by means over blocks of samples, aligned to the end of the flat segment."""
 
 from __future__ import annotations
 

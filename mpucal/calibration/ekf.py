@@ -1,4 +1,7 @@
-"""The paper's quaternion EKF, many parameter sets in one pass. Knows no cost function and no minimiser."""
+"""The paper's quaternion EKF, many parameter sets in one pass.
+
+Olsson, Kok, Halvorsen, Schön (2016), equations (1) to (3) and (6); quaternions (4,) are scalar first.
+"""
 
 from __future__ import annotations
 

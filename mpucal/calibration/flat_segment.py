@@ -1,4 +1,4 @@
-"""Where the board lies still, and what that says (line 1 of Algorithm 1). Knows no motion model."""
+"""The segment in which the board lies flat: where it is, and its means and variances (line 1 of Algorithm 1)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S = 1e-4, 1e-5
 
 @dataclass(frozen=True)
 class Flat:
-    """Line 1 of Algorithm 1: what the stationary segment says.
+    """Line 1 of Algorithm 1: what the flat segment says.
 
     Attributes
     ----------

@@ -1,4 +1,7 @@
-"""The gyroscope's bias as a random walk, seen at the rests: smoothed and removed."""
+"""The gyroscope's bias as a random walk, seen at the rests: smoothed and removed.
+
+Source of the smoother: Rauch, Tung, Striebel (1965).
+"""
 
 from __future__ import annotations
 
@@ -11,16 +14,14 @@ from .flat_segment import Flat
 from .static_intervals import Intervals
 
 LONG_ENOUGH_FOR_BIAS_S = 0.5
-
 TREMOR_S = 0.05  # correlation time of a hand's tremor
-
 RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # (rad/s)^2 a second
 
 
 def without_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recording:
     """The recording with its gyroscope's drift removed: in every run, the mean rate is the flat segment's.
 
-    The bias is a random walk seen through the runs' means, smoothed (Rauch, Tung, Striebel), its density chosen by
+    The bias is a random walk seen through the runs' means, smoothed, its density chosen by
     likelihood; between runs it is drawn straight.
     """
     runs = runs[runs[:, 1] - runs[:, 0] >= LONG_ENOUGH_FOR_BIAS_S * recording.rate_hz]

@@ -10,7 +10,7 @@ from .parameters import BY_NAME, PLACES
 
 K = BY_NAME["K"]
 
-# chi^2 of six degrees of freedom at 99 %: below it, K is not told from the identity
+# scipy.stats.chi2.ppf(0.99, 6): below it, K is not told from the identity
 WALD_99 = 16.8
 # a parameter is known where the data halve what was open before
 KNOWN = 0.5

@@ -17,20 +17,18 @@ from .fit import Fit
 from .flat_segment import Flat
 from .gyro_matrix import WALD_99, at_prior, wald
 from .hand_noise import (
-    FARTHER,
-    FARTHER_STILL,
     FIRST_MPS2,
     HAND_MPS2,
     HONEST,
     PIVOT_MPS2,
     WHITE_MPS2,
     Noise,
+    farther,
     likeliest,
     near,
 )
 from .initial_estimate import initialise
-from .levenberg_marquardt import Minimum, minimise
-from .likelihood import evaluate
+from .levenberg_marquardt import Minimum, information, minimise
 from .parameters import HAND
 from .preprocessing import Preprocessed, preprocess
 from .prior import Prior, prior_of
@@ -87,8 +85,7 @@ def _doubted(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preproce
     if moves:  # rests are found anew here, and their number may differ by one
         variance = miss_variances(moves, float(leverage.mean()))
         problem = _scaled(problem, q_scale(moves, variance, len(problem.series)))
-    fisher = evaluate(problem, minimum.theta, HAND).fisher
-    return replace(minimum, H=fisher + np.diag(prior.precision))
+    return replace(minimum, H=information(problem, minimum.theta, prior))
 
 
 def _moved(problem: Problem, prepared: Preprocessed, theta: Theta) -> Problem:
@@ -126,7 +123,7 @@ class _Search:
             sigma = likeliest(prepared.pivot, PIVOT_MPS2, theta)
             theta = self._roughly(prepared.pivot(sigma), theta)
             sigma = likeliest(prepared.pivot, PIVOT_MPS2, theta)
-            noise = Noise("pivot", (FARTHER + FARTHER_STILL * sigma) * sigma)
+            noise = Noise("pivot", farther(sigma))
         for _ in range(PASSES):
             theta = self._roughly(_moved(noise.problem(prepared), prepared, theta), theta)
         return theta, noise

@@ -11,12 +11,9 @@ from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed
 from .problem import Problem
 from .theta import Theta
 
-FIRST_MPS2 = 0.3
-
+FIRST_MPS2 = 0.3  # by which a search begins
 WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
-
 HAND_MPS2 = WHITE_MPS2[4:]  # who goes from rest to rest, has a hand
-
 PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 
 # A pivot travels farther than a bounded position of one lambda, the more the wilder it is: sigma (1.5 + 0.5 sigma) for
@@ -32,7 +29,7 @@ class Noise:
     sigma: float
 
     def problem(self, prepared: Preprocessed) -> Problem:
-        """The prepared with this noise."""
+        """What the filter runs over with this noise."""
         if self.kind == "pivot":
             return prepared.pivot(self.sigma, FLOOR_MPS2)
         return prepared.white(self.sigma, CORRELATION_S if self.kind == "white" else 0.0)
@@ -41,6 +38,11 @@ class Noise:
 def likeliest(problem_of: Callable[[float], Problem], sigmas: tuple[float, ...], theta: Theta) -> float:
     """The sigma of least V at theta."""
     return min(sigmas, key=lambda sigma: value(problem_of(sigma), theta))
+
+
+def farther(sigma: float) -> float:
+    """The sigma of a pivot, whose likeliest bounded position has this one."""
+    return (FARTHER + FARTHER_STILL * sigma) * sigma
 
 
 def near(sigma: float) -> tuple[float, ...]:

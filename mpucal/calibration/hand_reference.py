@@ -1,10 +1,14 @@
-"""The hand filter's plain NumPy twin, a step at a time, in the body frame: slow, and the oracle of its tests."""
+"""The hand's filter in plain NumPy, a step at a time, in the body frame: slow, and the oracle of the kernel's tests.
+
+x = (s, p, v, a) (12,) and P (12, 12), as kernel/hand.hpp has them.
+"""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import expm
 
 from ..data import Vector
 from .likelihood import Evaluation
@@ -75,7 +79,7 @@ class HANDass:
         """(p, v, a) along the chain; Phi and Q from one matrix exponential (Van Loan 1978)."""
         lam, h = self.problem.lam, min(self.problem.series.dt[i], LONGEST_STEP_S)
         A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-(lam**3), -3.0 * lam**2, -3.0 * lam]])
-        both = _expm(h * np.block([[-A, np.diag([0.0, 0.0, 1.0])], [np.zeros((3, 3)), A.T]]))
+        both = expm(h * np.block([[-A, np.diag([0.0, 0.0, 1.0])], [np.zeros((3, 3)), A.T]]))
         Phi: Vector = np.eye(4)
         Q: Vector = np.zeros((4, 4))
         Phi[1:, 1:] = both[3:, 3:].T
@@ -145,16 +149,3 @@ def innovations(problem: Problem, theta: Theta, held: list[Gain]) -> Vector:
 
 def _at(values: Vector | None, i: int, otherwise: float) -> float:
     return otherwise if values is None else float(values[i])
-
-
-def _expm(M: Vector) -> Vector:
-    """exp(M) by scaling, the series, and squaring."""
-    squarings = max(0, int(np.ceil(np.log2(max(np.abs(M).sum(axis=0).max(), 1e-300)))) + 3)
-    M = M / 2.0**squarings
-    result = term = np.eye(len(M))
-    for k in range(1, 15):
-        term = term @ M / k
-        result = result + term
-    for _ in range(squarings):
-        result = result @ result
-    return np.asarray(result)

@@ -1,7 +1,7 @@
-"""How well D and b_a are known while the board is still being turned, and which rest would teach most.
+"""The estimate while the board is still being turned: D and b_a so far, with their covariance.
 
-The hand's model on averaged samples, by one search from the last estimate: rougher than a calibration, and twenty times
-as fast. Knows no session and no clock.
+The hand's model on samples averaged to 50 Hz, by one search from the last estimate: rougher than a calibration, and
+twenty times as fast.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from .downsampling import downsampled
 from .flat_segment import Flat
 from .hand_noise import FARTHER, FIRST_MPS2, HONEST, PIVOT_MPS2, WHITE_MPS2, likeliest, near
 from .initial_estimate import initialise
-from .levenberg_marquardt import Minimum, minimise
-from .likelihood import evaluate, value
-from .parameters import HAND
+from .levenberg_marquardt import Minimum, information, minimise
+from .likelihood import value
+from .parameters import ACCELEROMETER, HAND, PLACES
 from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed, preprocess
 from .prior import Prior, prior_of
 from .problem import Problem
@@ -52,12 +52,12 @@ class InterimEstimate:
     @property
     def D_std(self) -> Vector:  # noqa: N802 - the paper's letter
         """(3, 3) standard deviations."""
-        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance)[:9], 0.0)).reshape(3, 3))
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance)[PLACES["D"]], 0.0)).reshape(3, 3))
 
     @property
     def b_a_std(self) -> Vector:
         """(3,) standard deviations [m/s^2]."""
-        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance)[9:], 0.0)))
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance)[PLACES["b_a"]], 0.0)))
 
 
 def interim_estimate(
@@ -85,8 +85,8 @@ def interim_estimate(
         # who does not pause leans on a hand's travel, of which little is known: as the calibration, admit more of it
         pivot = min(PIVOT_MPS2, key=lambda s: value(prepared.pivot(s, FLOOR_MPS2), minimum.theta))
         doubt = prepared.pivot(HONEST * FARTHER * pivot, FLOOR_MPS2)
-        H = evaluate(doubt, minimum.theta, HAND).fisher + np.diag(prior.precision)
-    covariance = replace(minimum, H=H).covariance()[:12, :12]
+        H = information(doubt, minimum.theta, prior)
+    covariance = replace(minimum, H=H).covariance()[ACCELEROMETER, ACCELEROMETER]
     sigma = likeliest(prepared.white, near(sigma), minimum.theta)
     return InterimEstimate(minimum.theta, H, covariance, problem, sigma, minimum.converged)
 

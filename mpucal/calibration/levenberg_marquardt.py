@@ -1,4 +1,7 @@
-"""Levenberg-Marquardt on V(theta) plus a quadratic prior. Knows no sensor."""
+"""Levenberg-Marquardt on V(theta) plus a quadratic prior, with the Fisher matrix for the Hessian.
+
+Source: Nocedal, Wright, "Numerical Optimization" (2006), section 10.3; Marquardt's scaling by the diagonal of H.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ import numpy as np
 from ..data import Vector
 from .fit import Fit
 from .likelihood import Evaluation, evaluate
-from .parameters import NAMES, PLACES
+from .parameters import HAND, NAMES, PLACES
 from .prior import Prior
 from .problem import Problem
 from .theta import Theta, values
@@ -137,6 +140,11 @@ class _At:
         """Newton decrement g' H^-1 g / 2 over the free parameters: how much V would still fall."""
         gradient = self.gradient[free]
         return float(gradient @ _solve(self.H[np.ix_(free, free)], gradient)) / 2.0
+
+
+def information(problem: Problem, theta: Theta, prior: Prior) -> Vector:
+    """(p, p) Fisher matrix of the hand's filter over all parameters, with the prior's."""
+    return np.asarray(evaluate(problem, theta, HAND).fisher + np.diag(prior.precision))
 
 
 def inverse(H: Vector) -> Vector:

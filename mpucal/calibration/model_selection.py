@@ -1,4 +1,7 @@
-"""The estimators without a hand, and the choice among all of them. Knows no verdict."""
+"""The models `accel` and `imu`, of a sensor that turns in place, and the choice among all models.
+
+The simplest model is chosen that explains the data: by the mean squared innovation, and for K by a Wald test.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The orientation to ask for next: the rest that reduces the uncertainty fastest, by its Fisher information."""
+"""The orientation to ask for next: the rest that reduces the uncertainty fastest, by its Fisher information.
+
+A weighted A-criterion: the sum of (variance / wanted^2) over D and b_a (docs/method.md, equation 17).
+"""
 
 from __future__ import annotations
 
@@ -10,20 +13,18 @@ import numpy as np
 from ..data import Vector
 from .interim import InterimEstimate
 from .likelihood import evaluate, trace
-from .parameters import HAND
+from .parameters import ACCELEROMETER, HAND, PLACES
 from .preprocessing import CORRELATION_S, MOVING_RAD_S, POSE_MPS2, jerk_density
 from .problem import Problem, Series
-from .rotation import rotation
+from .rotation import rotation, shortest_turn
 from .theta import Theta
 
 # What a person does when asked for an orientation.
 MOVE_S, REST_S = 1.6, 2.0
-
 FAST_RAD_S = math.radians(130.0) / MOVE_S
-
 TREMOR_MPS2 = 0.07
 
-NEAR_RAD = math.radians(25.0)
+NEAR_RAD = math.radians(25.0)  # a direction as near as that is where the board is already
 
 
 def next_orientation(known: InterimEstimate, wanted: Vector, directions: Vector) -> int:
@@ -55,13 +56,13 @@ def next_orientation(known: InterimEstimate, wanted: Vector, directions: Vector)
 def _badness(H: Vector, wanted: Vector) -> float:
     scale = 1.0 / np.sqrt(np.diag(H))
     variance = np.diag(np.linalg.inv(H * np.outer(scale, scale))) * scale**2
-    return float(np.sum(np.abs(variance[:12]) / wanted**2))
+    return float(np.sum(np.abs(variance[ACCELEROMETER]) / wanted**2))
 
 
 def _information(problem: Problem, theta: Theta, s: Vector) -> Vector:
     """(p, p) Fisher matrix of a problem that begins at rest with gravity s (3,), whatever the pose there."""
     F = evaluate(problem, replace(theta, u=s / np.linalg.norm(s)), HAND).fisher
-    pose = slice(12, 14)
+    pose = PLACES["tilt"]
     F = F - F[:, pose] @ np.linalg.solve(F[pose, pose], F[pose])
     F[:, pose] = F[pose] = 0.0
     return F
@@ -72,7 +73,7 @@ def _move_and_rest(known: InterimEstimate, s: Vector, down: Vector, seconds: flo
     problem, theta = known.problem, known.theta
     dt = float(np.median(problem.series.dt))
     move, rest = max(round(seconds / dt), 2), max(round(REST_S / dt), 2)
-    turn = _shortest_turn(s / np.linalg.norm(s), -down)
+    turn = shortest_turn(s / np.linalg.norm(s), -down)
     # s in the body's axes turns against the body
     share = np.append(np.arange(1, move + 1) / move, np.ones(rest))
     path = rotation(share[:, None] * turn) @ s
@@ -96,15 +97,3 @@ def _move_and_rest(known: InterimEstimate, s: Vector, down: Vector, seconds: flo
     )
     flat = replace(problem.flat, first=0, last=rest, y=theta.D @ s + theta.b_a)
     return replace(problem, series=series, flat=flat)
-
-
-def _shortest_turn(a: Vector, b: Vector) -> Vector:
-    """(3,) rad, the rotation vector that takes unit vector a to b."""
-    axis = np.cross(a, b)
-    sine = float(np.linalg.norm(axis))
-    if sine < 1e-6:
-        if a @ b > 0.0:
-            return np.zeros(3)
-        axis = np.cross(a, np.eye(3)[int(np.argmin(np.abs(a)))])
-        return np.asarray(math.pi * axis / np.linalg.norm(axis))
-    return np.asarray(axis / sine * math.atan2(sine, float(a @ b)))

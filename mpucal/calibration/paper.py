@@ -1,4 +1,4 @@
-"""Algorithm 1 of the paper, as printed: the estimator that the others are measured against. Knows no robustness."""
+"""Algorithm 1 of the paper, as printed: the estimator that the others are measured against."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording prepared for the hand's model: rests, rates for the lever arm, noise of the hand. Knows no minimiser."""
+"""A recording prepared for the hand's model: its rests, rates for the lever arm, and the hand's noise."""
 
 from __future__ import annotations
 

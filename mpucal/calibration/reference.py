@@ -1,4 +1,4 @@
-"""The exact filter's plain NumPy twin, a step at a time: slow, short, and the oracle of its tests."""
+"""The exact filter in plain NumPy, a step at a time: slow, short, and the oracle of the kernel's tests."""
 
 from __future__ import annotations
 

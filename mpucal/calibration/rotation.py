@@ -1,6 +1,11 @@
-"""What the estimators share: the stationary segment's statistics and what a fit returns. Knows no algorithm."""
+"""Rotations: exp of a rotation vector as a matrix, its left Jacobian, products of many, and the shortest turn.
+
+Source: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics" (2018), appendix B.
+"""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,3 +50,15 @@ def left_jacobian(phi: Vector) -> Vector:
     if angle < 1e-3:
         return np.eye(3) + X / 2 + X @ X / 6
     return np.asarray(np.eye(3) + (1 - np.cos(angle)) / angle**2 * X + (angle - np.sin(angle)) / angle**3 * (X @ X))
+
+
+def shortest_turn(a: Vector, b: Vector) -> Vector:
+    """(3,) rad, the rotation vector that takes unit vector a to b."""
+    axis = np.cross(a, b)
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-6:
+        if a @ b > 0.0:
+            return np.zeros(3)
+        axis = np.cross(a, np.eye(3)[int(np.argmin(np.abs(a)))])
+        return np.asarray(math.pi * axis / np.linalg.norm(axis))
+    return np.asarray(axis / sine * math.atan2(sine, float(a @ b)))

@@ -1,4 +1,8 @@
-"""Where the board rests between moves, and what the gyroscope's bias does meanwhile. Knows no accelerometer model."""
+"""Where the board rests: intervals of samples in which both sensors spread little and the rate is the bias.
+
+A moving-window static detector, as in Tedaldi, Pretto, Menegatti (ICRA 2014), with the gyroscope beside the
+accelerometer.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +17,6 @@ TRIM, LEAST_TRIM_S, MOST_TRIM_S = 0.125, 0.1, 0.25  # of a rest at either end: a
 TIMES_QUIET = 2.5
 GYRO_SD_RAD_S, ACC_SD_MPS2 = 0.03, 0.15
 GYRO_MEAN_RAD_S = 0.05
-
 
 Intervals = NDArray[np.intp]
 

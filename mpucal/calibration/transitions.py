@@ -1,4 +1,4 @@
-"""How far the gyroscope is believed between two rests. Knows no minimiser.
+"""Transitions between two rests: how far the gyroscope is believed over each.
 
 A real gyroscope errs by more than its noise: by its scale's non-linearity, by steps too long for a fast turn. The rests
 on both sides of a move show by how much.

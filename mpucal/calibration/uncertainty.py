@@ -1,4 +1,4 @@
-"""How sure the estimate is, in the units that a person cares about. Knows no recording."""
+"""The uncertainty of a calibrated measurement over all directions of gravity, by the covariance of D and b_a."""
 
 from __future__ import annotations
 

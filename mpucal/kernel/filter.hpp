@@ -1,4 +1,4 @@
-// The gravity filter and its exact derivatives: plain arrays in, plain numbers out, nothing known of Python.
+// The gravity filter and its exact derivatives: plain arrays in, plain numbers out.
 //
 // One step, with s the gravity vector in the body frame (m/s^2), P its covariance:
 //   e = y - D s - b_a,  S = D P D' + R,  R = diag(r_scale Sigma_a)

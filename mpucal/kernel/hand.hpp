@@ -1,4 +1,4 @@
-// The filter of a sensor that a hand moves: gravity, and the hand's bounded travel beside it. Nothing known of Python.
+// The filter of a sensor that a hand moves: gravity, and the hand's bounded travel beside it: arrays in, numbers out.
 //
 // The state is four vectors that turn with the body, s gravity (|s| = g), p, v, a the hand's travel, speed and
 // acceleration; x = (s, p, v, a), P its covariance:

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from mpucal.calibration.ekf import Ekf, exponential, orientation_of, product
 from mpucal.calibration.flat_segment import flat_statistics
+from mpucal.calibration.gyro_matrix import WALD_99
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.levenberg_marquardt import minimise
 from mpucal.calibration.model_selection import METHODS, choose, fit_accel, fit_imu
@@ -207,3 +209,7 @@ def test_gravity_scales_the_gains_alone(gravity):
     here, there = fit_accel(recording, flat, G), fit_accel(recording, flat, gravity)
     np.testing.assert_allclose(there.D * gravity, here.D * G, rtol=1e-3, atol=1e-3)
     np.testing.assert_allclose(there.b_a, here.b_a, atol=1e-2)
+
+
+def test_the_wald_threshold_is_the_quantile_that_it_is_said_to_be():
+    assert pytest.approx(chi2.ppf(0.99, len(BY_NAME["K"].names)), rel=1e-3) == WALD_99
