@@ -11,16 +11,16 @@ from .. import __version__
 # name: what --help says of it; the command stands in the module of that name
 COMMANDS = {
     "session": "Guide a person through a calibration, and write the result.",
-    "record": "Record a sensor into a capture, without calibrating.",
+    "record": "Record a sensor to a capture file, without calibrating.",
     "calibrate": "Calibrate from a capture or another recording.",
-    "write": "Write a calibration to the sensor's own memory, or what was there back.",
-    "apply": "Calibrated data of recorded data.",
-    "stream": "Calibrated samples as they come.",
-    "export": "Write a calibration in the form that another program reads.",
-    "diff": "How two calibrations differ, and whether that is more than chance.",
-    "merge": "One calibration of sessions at different temperatures.",
-    "doctor": "Examine a chip and its bus, on one page.",
-    "show": "Say what is in a calibration, a config blob or a recording.",
+    "write": "Write a calibration to the device, or restore its previous state.",
+    "apply": "Apply a calibration to a recording.",
+    "stream": "Print calibrated samples live.",
+    "export": "Convert a calibration to the format of another program.",
+    "diff": "Compare two calibrations, and say whether the difference is significant.",
+    "merge": "Combine calibrations at different temperatures.",
+    "doctor": "Examine a chip and its bus.",
+    "show": "Show a calibration, a config blob, a recording or a device.",
 }
 
 

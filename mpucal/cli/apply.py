@@ -1,4 +1,4 @@
-"""`mpucal apply`: calibrated data of recorded data."""
+"""`mpucal apply`: apply a calibration to a recording."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calib
 
 HELP = f"""Apply a calibration (.json or .bin) to any recording that `mpucal calibrate` reads, however long.
 
-What is written is in m/s² and rad/s, in the calibration's body frame. Only {held_whole()} is held in memory whole.
+The result is in m/s² and rad/s, in the calibration's body frame. Only {held_whole()} is loaded into memory as a whole.
 """
 
 
@@ -41,7 +41,7 @@ What is written is in m/s² and rad/s, in the calibration's body frame. Only {he
     type=click.Path(path_type=Path),
     help=f"Where it goes: {writable()}, by its suffix; by default a table on stdout.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print what was done as JSON; needs -o.")
+@click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON; needs -o.")
 def command(calibration: Path, file: Path, target: Path | None, as_json: bool) -> None:
     """Pass the samples through, a run at a time."""
     if as_json and target is None:
@@ -50,7 +50,7 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool) -
         check_not_among(target, (calibration, file, *captures_in(file)))
     rows = open_rows(file)
     if rows.done:
-        raise UsageError(f"{file} is calibrated already ({rows.done})", "give what was measured")
+        raise UsageError(f"{file} is calibrated already ({rows.done})", "give the uncalibrated recording")
     ready = correction(Calibration.load(calibration), rows.sensor, rows.autopilot)
     for remark in (*ready.remarks, *_remarks(rows)):
         click.echo(f"mpucal: {remark}", err=True)

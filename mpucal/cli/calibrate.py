@@ -1,4 +1,4 @@
-"""`mpucal calibrate`: fit a recording that is there already."""
+"""`mpucal calibrate`: calibrate from a recording."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ Exit code 5: the calibration was refused, with reasons.
 
 @click.command("calibrate", help=HELP, epilog=EXAMPLE)
 @click.argument("recording", metavar="FILE|DIR", type=click.Path(path_type=Path))
-@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Write the results there.")
-@click.option("--json", "as_json", is_flag=True, help="Print calibration.json, and nothing else.")
+@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for the results.")
+@click.option("--json", "as_json", is_flag=True, help="Print only calibration.json.")
 @fit_options
 def command(recording: Path, folder: Path | None, as_json: bool, gravity: float, model: str) -> int:
     """Fit a recording, and print or write what comes of it."""

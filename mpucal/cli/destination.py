@@ -23,13 +23,13 @@ F = TypeVar("F", bound=Callable[..., Any])
 def session_sink_options(command: F) -> F:
     """--to and --no-write."""
     for option in (
-        click.option("--no-write", is_flag=True, help="Leave the files, and write nothing else."),
+        click.option("--no-write", is_flag=True, help="Write only files."),
         click.option(
             "--to",
             "sinks",
             type=click.Choice([FILE, *SINKS]),
             multiple=True,
-            help=f"Where to write it, once or more often; {defaults()}.",
+            help=f"Where to write the result, may be repeated; {defaults()}.",
         ),
     ):
         command = option(command)

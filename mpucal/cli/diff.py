@@ -1,4 +1,4 @@
-"""`mpucal diff`: how two calibrations differ, and whether that is more than they know."""
+"""`mpucal diff`: compare two calibrations, and say whether the difference is significant."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ EXAMPLE = "Example: `mpucal diff board7/calibration.json board7-today/calibratio
 @click.command("diff", epilog=EXAMPLE)
 @click.argument("a", metavar="A", type=click.Path(path_type=Path))
 @click.argument("b", metavar="B", type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="Print it as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def command(a: Path, b: Path, as_json: bool) -> None:
-    """Say how calibration B (.json or .bin) differs from A, in mg, % and deg, and whether that is more than chance.
+    """Compare calibration B (.json or .bin) with A: bias in mg, scale factor error in %, misalignment in deg.
 
-    Of one unchanged sensor, calibrated well twice, 1 pair in 100 is called different. Where one of them is usable
-    with reservations, its uncertainties may be too small, and a small difference cannot be told from none.
+    Two good calibrations of one unchanged sensor are called different in 1 of 100 cases. If one of them is usable with
+    reservations, its uncertainties may be too small, and a small difference is reported as undecided.
     """
     found = compare(Calibration.load(a), Calibration.load(b))
     click.echo(json.dumps(_document(found), indent=2) if as_json else _page(found))
@@ -61,13 +61,13 @@ def _stars(d: Difference, limit: float) -> str:
 
 def _verdict(found: Comparison) -> str:
     if found.same:
-        return "The same: no number of the accelerometer differs by more than both calibrations' uncertainties."
+        return "The same: no parameter of the accelerometer differs by more than the combined uncertainty."
     apart = found.changed or found.doubtful
     if not apart:
-        return "Not to be told: neither says how sure it is, as no config blob does."
-    said = "Different" if found.changed else "Not to be told"
+        return "Undecided: a calibration has no uncertainties (a config blob never has)."
+    said = "Different" if found.changed else "Undecided"
     return (
-        f"{said}: {len(apart)} of the accelerometer's numbers changed by more than both calibrations' uncertainties,\n"
-        f"most surely the {apart[0].name}, by {apart[0].value:+.3g} {apart[0].unit}"
-        f"{'.' if found.changed else ', and these may be too small.'}"
+        f"{said}: {len(apart)} of the accelerometer's parameters changed by more than the combined uncertainty,\n"
+        f"most significantly {apart[0].name}, by {apart[0].value:+.3g} {apart[0].unit}"
+        f"{'.' if found.changed else ', but the uncertainties may be too small.'}"
     )

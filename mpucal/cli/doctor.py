@@ -1,4 +1,4 @@
-"""`mpucal doctor`: examine a chip and its bus, and tell it on one page."""
+"""`mpucal doctor`: examine a chip and its bus, and print the findings on one page."""
 
 from __future__ import annotations
 
@@ -23,13 +23,15 @@ EXAMPLE = "Example: `mpucal doctor --bus /dev/i2c-1`, or `mpucal doctor --bus si
 
 @click.command("doctor", epilog=EXAMPLE)
 @source_options("doctor")
-@click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON, and nothing else.")
-@click.option("--seconds", type=click.FloatRange(2.0), default=10.0, show_default=True, help="Watch the stream.")
+@click.option("--json", "as_json", is_flag=True, help="Print only the findings, as JSON.")
+@click.option(
+    "--seconds", type=click.FloatRange(2.0), default=10.0, show_default=True, help="Time to observe the samples [s]."
+)
 def command(as_json: bool, seconds: float, **options: Any) -> int:
-    """Say what is on a bus, which chip it really is and whether it does what it should; for a bug report.
+    """Examine what is on a bus, which chip it really is and whether it works as specified; for a bug report.
 
-    The board is to lie still. The chip is reset; its offset registers hold afterwards what they held before.
-    Exit code 3: something is at fault.
+    Keep the board still. The chip is reset; its offset registers are restored afterwards. Exit code 3: a fault was
+    found.
     """
     kind = check_source(click.get_current_context())
     value = options[kind.option.name]

@@ -1,4 +1,4 @@
-"""`mpucal export`: a calibration in the form that somebody else's program reads."""
+"""`mpucal export`: convert a calibration to the format of another program."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ EXAMPLE = "Example: `mpucal export board7/calibration.json --to c-header -o cali
 
 @click.command("export", epilog=EXAMPLE)
 @click.argument("calibration", metavar="CALIBRATION", type=click.Path(path_type=Path))
-@click.option("--to", "name", type=click.Choice(list(FORMS)), required=True, help="Who is to read it.")
-@click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Where it goes; by default stdout.")
-@click.option("--json", "as_json", is_flag=True, help="Print form, text and what it cannot carry as JSON.")
+@click.option("--to", "name", type=click.Choice(list(FORMS)), required=True, help="Output format.")
+@click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Output file; default: stdout.")
+@click.option("--json", "as_json", is_flag=True, help="Print format, text and what is lost as JSON.")
 def command(calibration: Path, name: str, file: Path | None, as_json: bool) -> None:
-    """Write a calibration (.json or .bin) in another program's form, and say what that cannot carry.
+    """Convert a calibration (.json or .bin) to the format of another program, and say what is lost.
 
-    Exit code 5: the calibration was refused; 6: the form cannot hold it.
+    Exit code 5: the calibration was refused; 6: the format cannot represent it.
     """
     if file is not None:
         check_not_among(file, [calibration])

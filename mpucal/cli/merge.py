@@ -1,4 +1,4 @@
-"""`mpucal merge`: sessions at different temperatures made into one calibration."""
+"""`mpucal merge`: combine calibrations at different temperatures into one."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ EXAMPLE = "Example: `mpucal merge cold/calibration.json warm/calibration.json ho
 
 @click.command("merge", epilog=EXAMPLE)
 @click.argument("calibrations", metavar="A B ...", nargs=-1, type=click.Path(path_type=Path))
-@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Write the result there.")
-@click.option("--json", "as_json", is_flag=True, help="Print calibration.json, and nothing else.")
+@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for the result.")
+@click.option("--json", "as_json", is_flag=True, help="Print only calibration.json.")
 def command(calibrations: tuple[Path, ...], folder: Path | None, as_json: bool) -> None:
-    """Combine calibrations of one chip at different temperatures into one with b_a(T), where they support it.
+    """Combine calibrations of one chip at different temperatures into one with b_a(T).
 
-    Where they do not, it says why, and b_a is their mean. `mpucal apply`, the blob and mpucal_apply.h use b_a(T).
+    If the data do not support b_a(T), b_a is their mean, and the reason is printed. `mpucal apply`, the blob and
+    mpucal_apply.h use b_a(T).
     """
     if folder is not None:
         for file in (BLOB, DOCUMENT):
@@ -45,10 +46,10 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, as_json: bool) 
 def slope(calibration: Calibration) -> str:
     """b_a(T) in a sentence."""
     if not calibration.follows_temperature:
-        return "b_a is taken to hold at every temperature."
+        return "b_a is assumed to be the same at every temperature."
     steps = ", ".join(f"{1000 * value / 9.80665:+.3f}" for value in calibration.b_a_slope)
     low, high = calibration.temperature_range_c
     return (
-        f"b_a grows by ({steps}) mg a degree from what it is at {calibration.sensor.temperature_c:.1f} °C, between"
+        f"b_a changes by ({steps}) mg/°C, relative to {calibration.sensor.temperature_c:.1f} °C, between"
         f" {low:.1f} and {high:.1f} °C."
     )

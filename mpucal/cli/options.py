@@ -114,14 +114,18 @@ def aim_options(command: F) -> F:
     """--target and --tilt-only."""
     for option in (
         click.option(
-            "--tilt-only", is_flag=True, help="Of what cannot be turned over: ask for tilts, claim what they show."
+            "--tilt-only",
+            is_flag=True,
+            help="For boards that cannot be turned upside down: use tilts only; parameters that tilts do not show keep "
+            "their defaults.",
         ),
         click.option(
             "--target",
             type=click.Choice(tuple(AIMS)),
             default=NORMAL,
             show_default=True,
-            help="How well to know it: normal is 1 mg of bias, 0.1 % of gain, 0.05 deg.",
+            help="Required accuracy (1 sigma): normal is 1 mg of bias, 0.1 % of scale factor error, 0.05 deg of "
+            "misalignment.",
         ),
     ):
         command = option(command)

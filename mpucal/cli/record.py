@@ -1,4 +1,4 @@
-"""`mpucal record`: keep what a sensor says, for later."""
+"""`mpucal record`: record a sensor to a capture file."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ EXAMPLE = "Example: `mpucal record --bus /dev/i2c-1 -o capture.mcap --seconds 60
 @click.command("record", epilog=EXAMPLE)
 @source_options("record")
 @fit_options
-@click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Where the capture goes.")
-@click.option("--seconds", type=click.FloatRange(min=0.0, min_open=True), help="End after so long.")
+@click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="The capture file.")
+@click.option("--seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop after this time [s].")
 def command(file: Path | None, seconds: float | None, **options: Any) -> None:
-    """Record into a capture until Enter, Ctrl-C or --seconds end it; `mpucal calibrate` reads it.
+    """Record to a capture file until Enter, Ctrl-C or --seconds; `mpucal calibrate` reads it.
 
-    The prompts are those of a session. --gravity and --model are kept for a session that replays it.
+    The prompts are those of a session. --gravity and --model are stored for its replay.
     """
     check_source(click.get_current_context())
     source = open_source(options, given(), until_end=True)

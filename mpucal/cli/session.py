@@ -40,14 +40,14 @@ EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board
 @fit_options
 @aim_options
 @session_sink_options
-@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Where the results go.")
+@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for the results.")
 @click.option(
-    "--resume", metavar="DIR", type=click.Path(path_type=Path), help="Go on with the interrupted session in DIR."
+    "--resume", metavar="DIR", type=click.Path(path_type=Path), help="Continue the interrupted session in DIR."
 )
-@click.option("--yes", is_flag=True, help="Ask nothing.")
-@click.option("--json", "as_json", is_flag=True, help="Print calibration.json, and nothing else.")
-@click.option("--json-events", is_flag=True, help="Say each event as a line of JSON, on stderr.")
-@click.option("--beep/--no-beep", default=None, help="Ring at each change of prompt; by default on a terminal.")
+@click.option("--yes", is_flag=True, help="Ask no questions.")
+@click.option("--json", "as_json", is_flag=True, help="Print only calibration.json.")
+@click.option("--json-events", is_flag=True, help="Print each event as a line of JSON on stderr.")
+@click.option("--beep/--no-beep", default=None, help="Ring the bell at each new prompt; default: on a terminal.")
 def command(
     folder: Path | None,
     yes: bool,
@@ -58,10 +58,11 @@ def command(
     no_write: bool,
     **options: Any,
 ) -> int:
-    """Lay flat, rotate, calibrate: leaves capture.mcap, calibration.json, calibration.bin and report.html.
+    """Guide a person through laying flat, turning and verifying; calibrate; write the results.
 
-    A bridge and an autopilot are then given the calibration to keep. Exit code 4: it was stopped before there was
-    anything to calibrate; 5: the calibration was refused; 6: the write-back was refused or failed.
+    Files: capture.mcap, calibration.json, calibration.bin, report.html. A bridge and an autopilot also store the
+    calibration. Exit code 4: stopped before there was enough data; 5: the calibration was refused; 6: the write-back
+    was refused or failed.
     """
     resume: Path | None = options.pop("resume")
     attended = not yes and sys.stdin.isatty()

@@ -1,4 +1,4 @@
-"""`mpucal show`: what is in a file, as a person would ask first."""
+"""`mpucal show`: show the contents of a calibration, a recording or a device."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --
 CALIBRATIONS = (".json", ".bin")
 
 
-HELP = f"""Say what is in a calibration (.json), a config blob (.bin), a device, or a recording.
+HELP = f"""Show a calibration (.json), a config blob (.bin), a recording, or what a device holds.
 
-A recording is {readable()}. Of a device it is what its sensor's
-registers, its memory or its parameters hold now; nothing is written.
+A recording is {readable()}. Of a device, its registers, memory or
+parameters are read; nothing is written.
 """
 
 
 @click.command("show", help=HELP, epilog=EXAMPLE)
 @click.argument("file", metavar="FILE|DIR", type=click.Path(path_type=Path), required=False)
 @source_options("show", settings=False)
-@click.option("--json", "as_json", is_flag=True, help="Print it as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def command(file: Path | None, as_json: bool, **options: Any) -> None:
     """Show the one place that is given."""
     sources = kinds_meant(options)
@@ -139,7 +139,7 @@ def _recording(file: Path, facts: dict[str, Any]) -> str:
         "samples": f"{facts['samples']} in {facts['seconds']:.1f} s, at {facts['rate_hz']:.2f} Hz",
         "lost": f"{facts['gaps']} gaps" if facts["gaps"] else "none",
         "clipped": f"{facts['acc_clipped']} accelerometer, {facts['gyr_clipped']} gyroscope samples",
-        "lies flat": "nowhere" if flat is None else f"from {flat[0]:.1f} to {flat[1]:.1f} s",
+        "lies flat": "never" if flat is None else f"from {flat[0]:.1f} to {flat[1]:.1f} s",
         "median |a|": f"{facts['magnitude_mps2']:.3f} m/s²",
         "fastest turn": "not measured" if facts["fastest_dps"] is None else f"{facts['fastest_dps']:.0f} deg/s",
         "temperature": "unknown" if warm is None else f"{warm[0]:.1f} to {warm[1]:.1f} °C",

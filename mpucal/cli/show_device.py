@@ -22,7 +22,7 @@ def _vehicle_rows(facts: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _chip_rows(facts: Mapping[str, Any]) -> dict[str, str]:
-    name = facts["chip"] or "no chip that mpucal knows"
+    name = facts["chip"] or "unknown chip"
     rows = {
         "chip": f"{name}, WHO_AM_I 0x{facts['who_am_i']:02x}{', asleep' if facts['asleep'] else ''}",
         "ranges": f"±{facts['accel_range_g']} g, ±{facts['gyro_range_dps']} deg/s",

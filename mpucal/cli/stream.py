@@ -1,4 +1,4 @@
-"""`mpucal stream`: calibrated samples as they come, for another program to read."""
+"""`mpucal stream`: print calibrated samples live, for another program to read."""
 
 from __future__ import annotations
 
@@ -28,14 +28,13 @@ EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.j
 @click.command("stream", epilog=EXAMPLE)
 @source_options("stream")
 @click.option("--apply", "calibration", metavar="CALIBRATION", type=click.Path(path_type=Path), required=True)
-@click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Keep the capture, too.")
-@click.option("--seconds", type=click.FloatRange(min=0.0, min_open=True), help="End after so long.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a line, in place of a table.")
+@click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Record a capture as well.")
+@click.option("--seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop after this time [s].")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a line instead of a table.")
 def command(calibration: Path, file: Path | None, seconds: float | None, as_json: bool, **options: Any) -> None:
     """Print calibrated samples, m/s² and rad/s, until Ctrl-C or --seconds; `mpucal apply` does it to recorded ones.
 
-    Each sample is printed as it comes, and then forgotten: it may run for as long as it likes. Timestamps are
-    provisional; record a capture for final ones.
+    Memory use is constant, so it may run for days. Timestamps are provisional; record a capture for final ones.
     """
     check_source(click.get_current_context())
     applied = Calibration.load(calibration)

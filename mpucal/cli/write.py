@@ -1,4 +1,4 @@
-"""`mpucal write`: put a calibration where the sensor's user will use it, or back what was there before."""
+"""`mpucal write`: write a calibration to the device that uses it, or restore the previous state."""
 
 from __future__ import annotations
 
@@ -25,14 +25,16 @@ EXAMPLE = "Example: `mpucal write board7/calibration.json chip --bus /dev/i2c-1`
 @click.argument("to", metavar="|".join(SINKS), type=click.Choice(list(SINKS)))
 @source_options("write")
 @sink_flags
-@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Where the old state is kept.")
-@click.option("--yes", is_flag=True, help="Ask nothing.")
-@click.option("--json", "as_json", is_flag=True, help="Print the calibration as it is applied now, and nothing else.")
+@click.option(
+    "-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for the saved previous state."
+)
+@click.option("--yes", is_flag=True, help="Ask no questions.")
+@click.option("--json", "as_json", is_flag=True, help="Print only the calibration as it is applied now.")
 def command(calibration: Path, to: str, folder: Path | None, yes: bool, as_json: bool, **options: Any) -> None:
-    """Write a calibration (.json or .bin), read it back, and see its effect; whatever fails, the old state is restored.
+    """Write a calibration (.json or .bin) to a device, read it back and check its effect.
 
-    Where CALIBRATION is the file in which an earlier write kept the old state, that is written back. Exit code 6:
-    refused or failed, and nothing was changed.
+    If a step fails, the previous state is restored. If CALIBRATION is a file in which an earlier write saved the
+    previous state, that is restored. Exit code 6: refused or failed, nothing was changed.
     """
     kind = SINKS[to]
     check_sink(kind, check_source(click.get_current_context()), options)

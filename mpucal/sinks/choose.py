@@ -53,15 +53,15 @@ def check_behind(kind: SinkKind, source: SourceKind, given: str, otherwise: str 
 def announced(kinds: Sequence[SinkKind], no_write: bool) -> str:
     """Where the result will go, in a sentence for the person."""
     if no_write:
-        return "The result goes to files, and nowhere else."
+        return "Results are written to files only."
     listed = " and ".join(["files", *(kind.where for kind in kinds)])
-    return f"The result goes to {listed}; --to and --no-write choose otherwise."
+    return f"Results are written to {listed} (change with --to or --no-write)."
 
 
 def defaults() -> str:
     """Where a session writes by default, for the help."""
     listed = [f"{kind.where} of {' or '.join(behind(kind))}" for kind in SINKS.values() if kind.default]
-    return f"by default {', '.join(listed)}, else files alone"
+    return f"by default {', '.join(listed)}, else files only"
 
 
 def behind(kind: SinkKind) -> list[str]:

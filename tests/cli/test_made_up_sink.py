@@ -39,7 +39,7 @@ def board(measured, tmp_path):
 def test_a_session_writes_to_it_by_default_and_records_its_effect(measured):
     folder, done = measured
     assert done.returncode == 0, done.stderr
-    assert "The result goes to files and the logbook; --to and --no-write choose otherwise." in done.stderr
+    assert "Results are written to files and the logbook (change with --to or --no-write)." in done.stderr
     assert "Done: the logbook of sim:seed=3 says b_a." in done.stdout
     found = Calibration.load(folder / "board" / "calibration.json")
     assert (folder / "logbook.txt").read_text() == f"b_a: {found.b_a.tolist()}\n"

@@ -107,7 +107,7 @@ def test_shows_a_recording_of_which_little_is_known(mpucal, tmp_path):
     result = mpucal("show", "walk.npz")
     assert result.code == 0
     assert "unnamed sensor" in result.out
-    assert "nowhere" in result.out
+    assert "lies flat     never" in result.out
     assert json.loads(mpucal("show", "walk.npz", "--json").out)["flat_s"] is None
 
 

@@ -48,5 +48,5 @@ def test_what_is_applied_is_said_and_not_subtracted_again(mpucal, tmp_path):
     out = mpucal("show", "c.json").out
     assert "subtract (+25.5, -51.0, +76.5) mg of b_a" in out
     assert "Written at 2024-05-17T09:30:00+00:00: the registers subtract it." in out
-    assert "b_a grows by (+1.020, +0.000, -2.039) mg a degree" in out
+    assert "b_a changes by (+1.020, +0.000, -2.039) mg/°C" in out
     assert "y_x -0.00000" in out or "y_x +0.00000" in out

@@ -54,7 +54,7 @@ def test_a_session_writes_to_the_chip_and_says_so(mpucal):
         Calibration.load("board/calibration.bin").applied_in_hardware, np.float32(made.applied_in_hardware)
     )
     assert "offset registers" in Path("board/report.html").read_text()
-    assert "The result goes to files and the chip's offset registers" in result.err
+    assert "Results are written to files and the chip's offset registers" in result.err
     # its own capture was measured before: all of b_a is subtracted of that
     mpucal("apply", "board/calibration.json", "board", "-o", "out.npz")
     acc = (load("board").acc - made.b_a) @ np.linalg.inv(made.D).T

@@ -47,7 +47,7 @@ def test_the_new_parameters_are_there_and_the_files_say_so(flown):
     (entry,) = document["written"]
     assert entry["to"] == "autopilot"
     assert "read back and seen in its streams" in entry["what"]
-    assert "The result goes to files and the autopilot" in flown.result.err
+    assert "Results are written to files and the autopilot" in flown.result.err
     # of what was measured, as truth.json is; of the streams that come now, the other file
     truth = json.loads((flown.folder / "truth.json").read_text())
     measured = Calibration.load(flown.folder / "calibration.json")

@@ -30,7 +30,7 @@ def test_a_session_chooses_the_sink_that_fits_its_source(asked, no_write, name, 
     kinds = chosen(asked, no_write, source(name))
     assert [kind.name for kind in kinds] == names
     said = announced(kinds, no_write)
-    assert said.startswith("The result goes to files")
+    assert said.startswith("Results are written to files")
     assert all(kind.where in said for kind in kinds)
 
 
