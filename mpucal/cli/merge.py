@@ -11,7 +11,7 @@ from ..result.merge import merge
 from ..result.session_files import BLOB, DOCUMENT
 from ..session.results import make_folder, save
 from .options import check_not_among
-from .summary import summary
+from .summary import slope, summary
 
 EXAMPLE = "Example: `mpucal merge cold/calibration.json warm/calibration.json hot/calibration.json -o merged`"
 
@@ -41,15 +41,3 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, as_json: bool) 
     click.echo(f"{summary(made.calibration)}\n{slope(made.calibration)}")
     if folder is not None:
         click.echo(f"\nWritten to {folder}:\n  {BLOB.name}, {DOCUMENT.name}")
-
-
-def slope(calibration: Calibration) -> str:
-    """b_a(T) in a sentence."""
-    if not calibration.follows_temperature:
-        return "b_a is assumed to be the same at every temperature."
-    steps = ", ".join(f"{1000 * value / 9.80665:+.3f}" for value in calibration.b_a_slope)
-    low, high = calibration.temperature_range_c
-    return (
-        f"b_a changes by ({steps}) mg/°C, relative to {calibration.sensor.temperature_c:.1f} °C, between"
-        f" {low:.1f} and {high:.1f} °C."
-    )

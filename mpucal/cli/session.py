@@ -14,8 +14,7 @@ from ..data import Recording
 from ..errors import RefusedError
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
 from ..result.calibration import REFUSED, Calibration
-from ..session.place import Place
-from ..session.runner import Runner
+from ..session.folder import SessionFolder
 from ..sinks.choose import announced, chosen
 from ..sinks.kind import SinkKind
 from ..sinks.record import in_session
@@ -25,7 +24,7 @@ from ..sources.opened import Opened
 from ..sources.opening import check_resumed, open_source
 from ..sources.resumed import open_resumed
 from ..sources.table import kinds_meant, source_title
-from ..terminal.console import console
+from ..terminal.console import Console, console
 from .destination import device, session_sink_options
 from .options import aim_options, check_gyroscope, check_source, fit_options, given, source_options
 from .person import ask
@@ -68,32 +67,18 @@ def command(
     attended = not yes and sys.stdin.isatty()
     source, kinds, options = _opened(resume, options, sinks, no_write, attended)
     check_gyroscope(source.plan.config)
-    folder = resume or folder
     person = console(quiet=yes, as_json=json_events, beep=beep, title=source_title(options))
-    place = Place(folder, source.capture_name, again=resume is not None)
-    finished = False
-    try:
-        with running(source, place.capture, person) as runner:
-            # a program that reads the events finds it in calibration.json
-            if not json_events:
-                person.say(f"  {announced(kinds, no_write)}")
-            try:
-                recording = runner.measure()
-            finally:
-                _settle(place, runner)
-            calibration, paths = _finish(runner, source, place, recording)
-        finished = True
-    finally:
-        if not finished and place.capture.exists():
-            person.say(f"  What was recorded is kept in {place.capture}; go on with --resume {place.folder}.")
+    into = SessionFolder(resume or folder, source.capture_name, again=resume is not None)
+    # a program that reads the events finds it in calibration.json
+    recording, calibration, paths = _run(source, into, person, "" if json_events else announced(kinds, no_write))
     if not as_json:
         if not json_events:
             click.echo(err=True)
-        click.echo(f"{summary(calibration)}\n\n{written([place.capture, *paths])}")
-    record = in_session(place.folder, calibration, recording, source.truth)
+        click.echo(f"{summary(calibration)}\n\n{written([into.capture, *paths])}")
+    record = in_session(into.path, calibration, recording, source.truth)
     sensor = device({**options, "gravity": source.plan.gravity, "model": source.plan.model})
     confirm = partial(ask, yes=yes)
-    _report(calibration, write_to_all(kinds, calibration, sensor, place.folder, record, confirm, sinks), as_json)
+    _report(calibration, write_to_all(kinds, calibration, sensor, into.path, record, confirm, sinks), as_json)
     return RefusedError.exit_code if calibration.verdict == REFUSED else 0
 
 
@@ -110,6 +95,27 @@ def _opened(
     return source, chosen(sinks, no_write, kinds_meant(options)[0]), options
 
 
+def _run(
+    source: Opened, folder: SessionFolder, person: Console, announcement: str
+) -> tuple[Recording, Calibration, tuple[Path, ...]]:
+    """Measure, calibrate, write the files; whatever ends it before, the capture is kept, and the person told where."""
+    fit = partial(calibrate_vehicle, model=source.plan.model, gravity=source.plan.gravity)
+    try:
+        with running(source, folder.capture, person) as runner:
+            if announcement:
+                person.say(f"  {announcement}")
+            try:
+                recording = runner.measure()
+            finally:
+                folder.settle(runner.sensor)
+            calibration = runner.calibrate(recording, fit)
+            return recording, calibration, runner.write(folder.path, calibration, recording, source.truth)
+    except BaseException:
+        if folder.capture.exists():
+            person.say(f"  What was recorded is kept in {folder.capture}; go on with --resume {folder.path}.")
+        raise
+
+
 def _report(calibration: Calibration, writing: Iterator[Applied], as_json: bool) -> None:
     """Write to the sinks, and say what was done; whatever becomes of that, there is a result."""
     try:
@@ -119,17 +125,3 @@ def _report(calibration: Calibration, writing: Iterator[Applied], as_json: bool)
     finally:
         if as_json:
             click.echo(calibration.json(), nl=False)
-
-
-def _settle(place: Place, runner: Runner) -> None:
-    """Name the folder by the chip, or take it away where no chip answered."""
-    if runner.sensor is None:
-        place.discard()
-    elif runner.sensor.chip:
-        place.name_by(runner.sensor.chip)
-
-
-def _finish(runner: Runner, source: Opened, place: Place, recording: Recording) -> tuple[Calibration, tuple[Path, ...]]:
-    fit = partial(calibrate_vehicle, model=source.plan.model, gravity=source.plan.gravity)
-    calibration = runner.calibrate(recording, fit)
-    return calibration, runner.write(place.folder, calibration, recording, source.truth)

@@ -21,9 +21,8 @@ from ..result.calibration import Calibration
 from ..sources.kind import SourceKind
 from ..sources.opening import contents, one_of
 from ..sources.table import kinds_meant, used_by
-from .merge import slope
 from .options import check_source, source_options
-from .summary import formula, summary
+from .summary import formula, slope, summary
 
 EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --json`, or `mpucal show --serial PORT`"
 CALIBRATIONS = (".json", ".bin")

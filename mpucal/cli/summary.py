@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..data import STANDARD_GRAVITY_MPS2
 from ..report.units import AXES, accelerometer, estimated_error
 from ..report.use import left_to_subtract
 from ..result.calibration import ACCELEROMETER_FORMULA, GOOD, REFUSED, USABLE, Calibration
@@ -55,6 +56,18 @@ def formula(calibration: Calibration) -> str:
         for axis, row, bias in zip(AXES, np.linalg.inv(calibration.D), left_to_subtract(calibration), strict=True)
     ]
     return "\n".join([f"{ACCELEROMETER_FORMULA} [m/s²]", *rows])
+
+
+def slope(calibration: Calibration) -> str:
+    """b_a(T) in a sentence."""
+    if not calibration.follows_temperature:
+        return "b_a is assumed to be the same at every temperature."
+    steps = ", ".join(f"{1000 * value / STANDARD_GRAVITY_MPS2:+.3f}" for value in calibration.b_a_slope)
+    low, high = calibration.temperature_range_c
+    return (
+        f"b_a changes by ({steps}) mg/°C, relative to {calibration.sensor.temperature_c:.1f} °C, between"
+        f" {low:.1f} and {high:.1f} °C."
+    )
 
 
 def _reason(message: str) -> str:
