@@ -64,34 +64,36 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
 def _doubted(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:
     """The minimum with an honest H.
 
-    What moves miss by after the fit is less than what the gyroscope erred by: few moves and many parameters leave next
-    to nothing. Their noise is found anew, by misses that count for what an estimate leaves of them; the estimate itself
-    gains nothing by it.
+    What transitions miss by after the fit is less than what the gyroscope erred by: few transitions and many parameters
+    leave next to nothing. Their noise is found anew, by misses that count for what an estimate leaves of them; the
+    estimate itself gains nothing by it.
     """
     if noise.kind == "none":
         return minimum
     if noise.kind == "pivot":
         noise = replace(noise, sigma=HONEST * noise.sigma)
     prior, fixed = prior_of(fine.flat), () if minimum.free.all() else ("K",)
-    at, problem, moves = minimum, noise.problem(rough), transitions_of(rough, minimum.theta)
-    variance, leverage = miss_variances(moves), np.zeros(1)
-    for _ in range(PASSES if moves else 0):
-        leverage = leverages(moves, rough, at.theta, at.covariance(), variance)
-        variance = miss_variances(moves, leverage)
-        problem = _scaled(problem, q_scale(moves, variance, len(problem.series)))
+    at, problem, transitions = minimum, noise.problem(rough), transitions_of(rough, minimum.theta)
+    variance, leverage = miss_variances(transitions), np.zeros(1)
+    for _ in range(PASSES if transitions else 0):
+        leverage = leverages(transitions, rough, at.theta, at.covariance(), variance)
+        variance = miss_variances(transitions, leverage)
+        problem = _scaled(problem, q_scale(transitions, variance, len(problem.series)))
         at = _roughly(problem, at.theta, prior, fixed)
-        moves = transitions_of(rough, at.theta)
-    problem, moves = noise.problem(fine), transitions_of(fine, at.theta)
-    if moves:  # rests are found anew here, and their number may differ by one
-        variance = miss_variances(moves, float(leverage.mean()))
-        problem = _scaled(problem, q_scale(moves, variance, len(problem.series)))
+        transitions = transitions_of(rough, at.theta)
+    problem, transitions = noise.problem(fine), transitions_of(fine, at.theta)
+    if transitions:  # rests are found anew here, and their number may differ by one
+        variance = miss_variances(transitions, float(leverage.mean()))
+        problem = _scaled(problem, q_scale(transitions, variance, len(problem.series)))
     return replace(minimum, H=information(problem, minimum.theta, prior))
 
 
 def _moved(problem: Problem, prepared: Preprocessed, theta: Theta) -> Problem:
     """The problem with as much noise of the gyroscope between rests as the rests show, under theta."""
-    moves = transitions_of(prepared, theta)
-    return _scaled(problem, q_scale(moves, miss_variances(moves), len(problem.series))) if moves else problem
+    transitions = transitions_of(prepared, theta)
+    if not transitions:
+        return problem
+    return _scaled(problem, q_scale(transitions, miss_variances(transitions), len(problem.series)))
 
 
 def _scaled(problem: Problem, factor: Vector) -> Problem:

@@ -1,7 +1,7 @@
 """Transitions between two rests: how far the gyroscope is believed over each.
 
 A real gyroscope errs by more than its noise: by its scale's non-linearity, by steps too long for a fast turn. The rests
-on both sides of a move show by how much.
+on both sides of a transition show by how much.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from .rotation import cross, product, rotation
 from .theta import Theta
 
 SPEED_OF_TREMOR_S = 0.04  # what a tremor's speed is to its acceleration
-FEWEST_MOVES = 3
+FEWEST_TRANSITIONS = 3
 DEGREES_OF_FREEDOM = 4.0
-# a move of less weight is weighed down by itself; the others differ by chance
+# a transition of less weight is weighed down by itself; the others differ by chance
 WORTHLESS = 0.02
-# of the two that a miss has, what an estimate leaves at least, in all moves together
+# of the two that a miss has, what an estimate leaves at least, in all transitions together
 LEAST_LEFT = 1.0
 
 
-class Rest(NamedTuple):
-    """A rest as the moves see it.
+class StaticPose(NamedTuple):
+    """A rest as the transitions see it.
 
     first, last : samples of the recording. coming, leaving : (3,) m/s^2, its mean specific force in the body's axes at
     the first and at the last sample. variance : rad^2 an axis, of its direction.
@@ -58,78 +58,78 @@ class Transition(NamedTuple):
 
 
 def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
-    """The moves under theta; none where they are too few to speak for each other."""
+    """The transitions under theta; none where they are too few to speak for each other."""
     series, flat = prepared.problem.series, prepared.flat
     turns = -series.dt[:, None] * ((series.omega - theta.b_omega) @ theta.K.T)
     rests = _rests(prepared, turns, theta)
-    if len(rests) <= FEWEST_MOVES:
+    if len(rests) <= FEWEST_TRANSITIONS:
         return []
     F = rotation(turns)
-    moves = []
+    transitions = []
     for one, other in pairwise(rests):
         span = slice(one.last - flat.last, other.first + 1 - flat.last)
         miss = _miss(product(F[span]) @ one.leaving, other.coming)
         of_gyro = float(np.sum(series.dt[span] ** 2) * flat.Sigma_omega.mean())
         known = of_gyro + (0.0 if series.q_extra is None else float(series.q_extra[span].sum()))
         variance = known + one.variance + other.variance
-        moves.append(Transition(span, F[span], one.leaving, other.coming, miss, variance, of_gyro))
-    return moves
+        transitions.append(Transition(span, F[span], one.leaving, other.coming, miss, variance, of_gyro))
+    return transitions
 
 
-def miss_variances(moves: list[Transition], leverage: Vector | float = 0.0) -> Vector:
+def miss_variances(transitions: list[Transition], leverage: Vector | float = 0.0) -> Vector:
     """(k,) rad^2 an axis: the variances with which noise explains all misses.
 
-    z = |miss|^2 / (2 variance). All moves have a common scale c, the mean of z by Student's t; a lost one has a scale
-    of its own.
+    z = |miss|^2 / (2 variance). All transitions have a common scale c, the mean of z by Student's t; a lost one has a
+    scale of its own.
 
     leverage : (k,), what the estimate took of the two degrees of freedom of each miss. The likeliest scale, of the
         estimate itself, knows of none; an honest one counts what is left.
     """
-    z = np.array([0.5 * float(move.miss @ move.miss) / move.variance for move in moves])
-    left = max(float(np.sum(2.0 - np.broadcast_to(leverage, len(moves)))), LEAST_LEFT)
+    z = np.array([0.5 * float(transition.miss @ transition.miss) / transition.variance for transition in transitions])
+    left = max(float(np.sum(2.0 - np.broadcast_to(leverage, len(transitions)))), LEAST_LEFT)
     nu, c = DEGREES_OF_FREEDOM, 1.0
     for _ in range(50):
         w = (nu + 2.0) / (nu + 2.0 * z / c)
         c = max(1.0, 2.0 * float(np.sum(w * z)) / left)
     weight = (nu + 2.0) / (nu + 2.0 * z / c)
-    return c / np.where(weight < WORTHLESS, weight, 1.0) * [move.variance for move in moves]
+    return c / np.where(weight < WORTHLESS, weight, 1.0) * [transition.variance for transition in transitions]
 
 
-def q_scale(moves: list[Transition], variance: Vector, n: int) -> Vector:
+def q_scale(transitions: list[Transition], variance: Vector, n: int) -> Vector:
     """(n,) factor of Sigma_omega over a series, that gives the misses these variances (k,)."""
     factor = np.ones(n)
-    for move, wanted in zip(moves, variance.tolist(), strict=True):
-        factor[move.span] += (wanted - move.variance) / move.of_gyro
+    for transition, wanted in zip(transitions, variance.tolist(), strict=True):
+        factor[transition.span] += (wanted - transition.variance) / transition.of_gyro
     return factor
 
 
 def leverages(
-    moves: list[Transition], prepared: Preprocessed, theta: Theta, covariance: Vector, variance: Vector
+    transitions: list[Transition], prepared: Preprocessed, theta: Theta, covariance: Vector, variance: Vector
 ) -> Vector:
     """(k,) tr(J C J') / variance of each miss, 0 to 2.
 
     J : (3, p) the miss by the parameters, C : `covariance` (p, p) of theta, which the misses of `variance` (k,) gave.
     """
     inverse = np.asarray(np.linalg.pinv(theta.D))
-    J = np.array([_jacobian(move, prepared, theta, inverse) for move in moves])
+    J = np.array([_jacobian(transition, prepared, theta, inverse) for transition in transitions])
     taken = np.einsum("kip,pq,kiq->k", J, covariance, J, optimize=True)
     return np.asarray(np.clip(taken / variance, 0.0, 2.0))
 
 
-def _jacobian(move: Transition, prepared: Preprocessed, theta: Theta, inverse: Vector) -> Vector:
+def _jacobian(transition: Transition, prepared: Preprocessed, theta: Theta, inverse: Vector) -> Vector:
     """(3, p) of the miss u x v by the parameters in the order of NAMES, with u and v near each other."""
     series = prepared.problem.series
-    R = _to_the_end(move.F) * series.dt[move.span, None, None]
+    R = _to_the_end(transition.F) * series.dt[transition.span, None, None]
     # phi, the error of the turn in the axes of its end: a step's is -dt dK (omega - b_omega); b_omega the rests tell
     phi = np.zeros((3, len(NAMES)))
-    by_K = -np.einsum("mij,mk->ijk", R, series.omega[move.span] - theta.b_omega)
+    by_K = -np.einsum("mij,mk->ijk", R, series.omega[transition.span] - theta.b_omega)
     by_K += np.swapaxes(by_K, 1, 2) * (1.0 - np.eye(3))
     i, j = np.triu_indices(3)
     phi[:, PLACES["K"]] = by_K[:, i, j]
     # s = inv(D) (y - b_a): ds = -inv(D) (dD s + db_a)
-    whole = product(move.F)
-    u, v = whole @ move.leaving, move.coming
-    du, dv = whole @ _by_accelerometer(inverse, move.leaving), _by_accelerometer(inverse, move.coming)
+    whole = product(transition.F)
+    u, v = whole @ transition.leaving, transition.coming
+    du, dv = whole @ _by_accelerometer(inverse, transition.leaving), _by_accelerometer(inverse, transition.coming)
     du -= cross(u) @ phi
     return np.asarray((cross(u) @ dv - cross(v) @ du) / (np.linalg.norm(u) * np.linalg.norm(v)))
 
@@ -151,7 +151,7 @@ def _to_the_end(F: Vector) -> Vector:
     return R
 
 
-def _rests(prepared: Preprocessed, turns: Vector, theta: Theta) -> list[Rest]:
+def _rests(prepared: Preprocessed, turns: Vector, theta: Theta) -> list[StaticPose]:
     """The flat segment and the rests after it; `turns` (n, 3) rad are the steps of the series."""
     recording, flat = prepared.recording, prepared.flat
     inverse = np.linalg.pinv(theta.D)  # a search may pass through a singular D: that is no reason to stop it
@@ -170,7 +170,7 @@ def _rests(prepared: Preprocessed, turns: Vector, theta: Theta) -> list[Rest]:
         tremor = max(float(np.mean(acc.var(0) - flat.Sigma_a)), 0.0)
         of_tremor = 2.0 * tremor * (SPEED_OF_TREMOR_S / ((last - first) * dt)) ** 2
         variance = (POSE_MPS2**2 + flat.Sigma_a.mean() / (last - first) + of_tremor) / prepared.problem.gravity**2
-        rests.append(Rest(first, last, coming, leaving, variance))
+        rests.append(StaticPose(first, last, coming, leaving, variance))
     return rests
 
 

@@ -8,8 +8,6 @@ from ..data import Vector
 
 SMALL_RAD = 1e-8
 
-IDENTITY: Vector = np.array([1.0, 0.0, 0.0, 0.0])
-
 
 def product(p: Vector, q: Vector) -> Vector:
     """The quaternions p q of (..., 4) and (..., 4): first q, then p."""

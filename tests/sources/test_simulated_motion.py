@@ -207,7 +207,7 @@ def test_a_wobble_has_its_strength_and_its_integral():
 def test_quaternions_against_matrices():
     rng = np.random.default_rng(1)
     steps = rng.normal(size=(300, 3)) * 0.3
-    running = rotation.running_product(rotation.IDENTITY, rotation.exp(steps))
+    running = rotation.running_product(np.array([1.0, 0.0, 0.0, 0.0]), rotation.exp(steps))
     R = np.eye(3)
     for q, step in zip(running[1:], steps, strict=True):
         R = R @ matrix(rotation.exp(step))
