@@ -1,4 +1,4 @@
-"""The measured values that travel through mpucal. Knows no file, bus or estimate."""
+"""Samples and recordings, with what is known of their sensor: arrays in s, m/s^2, rad/s and degrees Celsius."""
 
 from __future__ import annotations
 

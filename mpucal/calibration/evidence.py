@@ -1,4 +1,4 @@
-"""The facts that a verdict rests on, each computed once. Knows no verdict."""
+"""The facts that a verdict rests on, each computed once: uncertainties, pauses, how gravity turned, a change midway."""
 
 from __future__ import annotations
 

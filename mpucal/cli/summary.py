@@ -12,7 +12,8 @@ import numpy as np
 from ..data import STANDARD_GRAVITY_MPS2
 from ..report.units import AXES, accelerometer, estimated_error
 from ..report.use import left_to_subtract
-from ..result.calibration import ACCELEROMETER_FORMULA, GOOD, REFUSED, USABLE, Calibration
+from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
+from ..result.document import ACCELEROMETER_FORMULA
 from ..result.session_files import BLOB, DOCUMENT, REPORT
 
 # what fits a terminal of 80 columns

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..result.calibration import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA, Calibration
+from ..result.calibration import Calibration
+from ..result.document import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA
 from ..result.orientation import side_down
 from .elements import code, number, paragraph, section, table
 from .units import AXES, Row, accelerometer, gyroscope, with_std

@@ -1,1 +1,1 @@
-"""What a calibration is, and what is done with it: kept, applied, compared, merged."""
+"""A calibration as a result: its files, its numbers in common units, applied, compared, merged."""

@@ -1,4 +1,4 @@
-"""Whole files or the old ones: atomic writing. Knows nothing of what it writes."""
+"""Atomic writing of files: after a crash the old file is there or the new one, never a part."""
 
 from __future__ import annotations
 

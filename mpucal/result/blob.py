@@ -1,4 +1,4 @@
-"""The config blob of firmware_protocol.md: a calibration as firmware reads it. Knows no file or chip."""
+"""The config blob: a calibration as firmware reads it, encoded and decoded as firmware_protocol.md says."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""The result of a calibration, and its two files: calibration.json and the config blob."""
+"""The result of a calibration: its numbers, how they are applied, and its two files."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -17,13 +17,7 @@ from ..data import Sensor, Vector
 from ..errors import RecordingError
 from .atomic import write_atomically
 from .blob import NO_RANGE, Blob, BlobError
-
-FORMAT, VERSION = "mpucal.calibration", 1
-ACCELEROMETER_FORMULA = "a = inv(D) @ (y - b_a)"
-GYROSCOPE_FORMULA = "w = K @ (y - b_omega)"
-
-# top-level keys of the document that are kept as they are
-EXTRA = ("autopilot", "others", "written", "merged")
+from .document import arguments, content
 
 GOOD, USABLE, REFUSED = "good", "usable", "refused"
 
@@ -116,42 +110,7 @@ class Calibration:
 
     def document(self) -> dict[str, Any]:
         """The content of calibration.json; NaN becomes None."""
-        return {
-            "format": FORMAT,
-            "version": VERSION,
-            "created": self.created,
-            "accelerometer": {
-                "D": _plain(self.D),
-                "b_a": _plain(self.b_a),
-                "D_std": _plain(self.D_std),
-                "b_a_std": _plain(self.b_a_std),
-                "noise_std": _plain(self.noise_std),
-                "formula": ACCELEROMETER_FORMULA,
-                **self._temperature_document(),
-            },
-            "gyroscope": {
-                "K": _plain(self.K),
-                "b_omega": _plain(self.b_omega),
-                "K_std": _plain(self.K_std),
-                "b_omega_std": _plain(self.b_omega_std),
-                "noise_std": _plain(self.gyro_noise_std),
-                "formula": GYROSCOPE_FORMULA,
-            },
-            "fit": _plain(dict(self.fit)),
-            "quality": _plain(dict(self.quality)),
-            "sensor": _plain(asdict(self.sensor)),
-            "applied_in_hardware": {"b_a": _plain(self.applied_in_hardware)},
-            **_plain(dict(self.extra)),
-        }
-
-    def _temperature_document(self) -> dict[str, Any]:
-        if not self.follows_temperature:
-            return {}
-        return {
-            "b_a_slope": _plain(self.b_a_slope),
-            "b_a_slope_std": _plain(self.b_a_slope_std),
-            "temperature_range_c": _plain(self.temperature_range_c),
-        }
+        return content(self)
 
     def json(self) -> str:
         """The document as text."""
@@ -159,15 +118,15 @@ class Calibration:
 
     def blob(self) -> Blob:
         """The config blob of this calibration, see firmware_protocol.md."""
-        number = {f.name: getattr(self.sensor, f.name) for f in fields(Sensor)}
+        sensor = self.sensor
         return Blob(
-            who_am_i=number["who_am_i"] or 0,
-            accel_range_g=number["accel_range_g"] or 0.0,
-            gyro_range_dps=number["gyro_range_dps"] or 0.0,
+            who_am_i=sensor.who_am_i or 0,
+            accel_range_g=sensor.accel_range_g or 0.0,
+            gyro_range_dps=sensor.gyro_range_dps or 0.0,
             D=tuple(self.D.ravel().tolist()),
             b_a=tuple(self.b_a.tolist()),
             gravity=float(self.fit.get("gravity") or math.nan),
-            temperature_c=math.nan if number["temperature_c"] is None else number["temperature_c"],
+            temperature_c=math.nan if sensor.temperature_c is None else sensor.temperature_c,
             created=self.created,
             applied_b_a=tuple(self.applied_in_hardware.tolist()),
             K=tuple(self.K.ravel().tolist()),
@@ -220,32 +179,7 @@ class Calibration:
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Calibration:
         """The inverse of `document`; unknown keys are ignored, missing ones are unknown numbers."""
-        if document.get("format") != FORMAT:
-            raise ValueError(f'"format" is {document.get("format")!r}, not {FORMAT!r}')
-        if document.get("version", 0) > VERSION:
-            raise ValueError(f"version {document['version']} is newer than {VERSION}")
-        acc, gyr = document["accelerometer"], document.get("gyroscope", {})
-        return cls(
-            D=_array(acc["D"], 3, 3),
-            b_a=_array(acc["b_a"], 3),
-            D_std=_array(acc.get("D_std"), 3, 3),
-            b_a_std=_array(acc.get("b_a_std"), 3),
-            noise_std=_array(acc.get("noise_std"), 3),
-            K=_array(gyr["K"], 3, 3) if gyr.get("K") else np.eye(3),
-            b_omega=_array(gyr.get("b_omega"), 3),
-            K_std=_array(gyr.get("K_std"), 3, 3),
-            b_omega_std=_array(gyr.get("b_omega_std"), 3),
-            gyro_noise_std=_array(gyr.get("noise_std"), 3),
-            fit=MappingProxyType(dict(document.get("fit", {}))),
-            quality=MappingProxyType(dict(document.get("quality", {}))),
-            sensor=Sensor.of(document.get("sensor", {})),
-            created=str(document.get("created", "")),
-            applied_in_hardware=_array(document.get("applied_in_hardware", {}).get("b_a", [0, 0, 0]), 3),
-            b_a_slope=_array(acc.get("b_a_slope", [0, 0, 0]), 3),
-            b_a_slope_std=_array(acc.get("b_a_slope_std"), 3),
-            temperature_range_c=_array(acc.get("temperature_range_c"), 2),
-            extra=MappingProxyType({key: document[key] for key in EXTRA if key in document}),
-        )
+        return cls(**arguments(document))
 
     @classmethod
     def from_blob(cls, blob: Blob) -> Calibration:
@@ -267,27 +201,3 @@ class Calibration:
             b_a_slope=np.array(blob.b_a_slope),
             temperature_range_c=np.array(blob.temperature_range_c),
         )
-
-
-def _array(values: Any, *shape: int) -> Vector:
-    if values is None:
-        return unknown(*shape)
-    array = np.array(values, dtype=np.float64)  # None becomes NaN
-    if array.shape != shape:
-        raise ValueError(f"shape {array.shape} where {shape} belongs")
-    return array
-
-
-def _plain(value: Any) -> Any:
-    """JSON's own types; NaN and infinities become None."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return _plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

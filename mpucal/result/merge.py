@@ -1,4 +1,4 @@
-"""Calibrations of one sensor at different temperatures made into one with b_a(T), where they support it. Knows no file.
+"""Calibrations of one sensor at different temperatures merged into one with b_a(T), where they support it.
 
     b_a,k = b_a + slope (T_k - T_0) + e_k,    e_k of the standard deviation that calibration k says,
 
@@ -119,14 +119,12 @@ def _line(away: Vector, b_a: Vector, weight: Vector) -> tuple[Vector, Vector, Ve
     values = np.zeros((4, 3))
     for i in range(3):
         w = weight[:, i]
-        normal = np.array([[w.sum(), (w * away).sum()], [(w * away).sum(), (w * away**2).sum()]])
         if np.ptp(away) == 0.0:
             values[:, i] = (w * b_a[:, i]).sum() / w.sum(), w.sum() ** -0.5, 0.0, np.inf
             continue
-        covariance = np.linalg.inv(normal)
-        found = covariance @ [(w * b_a[:, i]).sum(), (w * away * b_a[:, i]).sum()]
-        std = np.sqrt(np.diag(covariance))
-        values[:, i] = found[0], std[0], found[1], std[1]
+        (slope, intercept), covariance = np.polyfit(away, b_a[:, i], 1, w=np.sqrt(w), cov="unscaled")
+        slope_std, intercept_std = np.sqrt(np.diag(covariance))
+        values[:, i] = intercept, intercept_std, slope, slope_std
     return values[0], values[1], values[2], values[3]
 
 

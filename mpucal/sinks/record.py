@@ -10,7 +10,8 @@ from types import MappingProxyType
 from typing import Any
 
 from ..data import Recording
-from ..result.calibration import FORMAT, Calibration
+from ..result.calibration import Calibration
+from ..result.document import FORMAT
 from ..result.session_files import DOCUMENT
 from ..session.results import result_files, save
 from .kind import Effect, SinkKind

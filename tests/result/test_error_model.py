@@ -5,12 +5,12 @@ import pytest
 
 from mpucal.data import STANDARD_GRAVITY_MPS2 as G
 from mpucal.result import error_model
-from mpucal.simulated.sensor import Truth
+from mpucal.simulated.sensor import SensorTruth
 
 
 @pytest.fixture(params=range(5), ids=str)
 def true(request):
-    return Truth.draw(request.param)
+    return SensorTruth.draw(request.param)
 
 
 def test_six_positions_measure_the_same(true):

@@ -1,0 +1,127 @@
+"""calibration.json: its arrays by one table of keys, read and written by the same rows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..data import Sensor, Vector
+
+if TYPE_CHECKING:
+    from .calibration import Calibration
+
+FORMAT, VERSION = "mpucal.calibration", 1
+# (key, attribute of a Calibration, shape) of the two objects
+ACCELEROMETER = (
+    ("D", "D", (3, 3)),
+    ("b_a", "b_a", (3,)),
+    ("D_std", "D_std", (3, 3)),
+    ("b_a_std", "b_a_std", (3,)),
+    ("noise_std", "noise_std", (3,)),
+)
+# written where b_a(T) is known
+TEMPERATURE = (
+    ("b_a_slope", "b_a_slope", (3,)),
+    ("b_a_slope_std", "b_a_slope_std", (3,)),
+    ("temperature_range_c", "temperature_range_c", (2,)),
+)
+GYROSCOPE = (
+    ("K", "K", (3, 3)),
+    ("b_omega", "b_omega", (3,)),
+    ("K_std", "K_std", (3, 3)),
+    ("b_omega_std", "b_omega_std", (3,)),
+    ("noise_std", "gyro_noise_std", (3,)),
+)
+ACCELEROMETER_FORMULA = "a = inv(D) @ (y - b_a)"
+GYROSCOPE_FORMULA = "w = K @ (y - b_omega)"
+# top-level keys that are kept as they are
+EXTRA = ("autopilot", "others", "written", "merged")
+
+
+def content(c: Calibration) -> dict[str, Any]:
+    """The content of calibration.json; NaN becomes None."""
+    values = {
+        "format": FORMAT,
+        "version": VERSION,
+        "created": c.created,
+        "accelerometer": {
+            **_written(c, ACCELEROMETER),
+            "formula": ACCELEROMETER_FORMULA,
+            **_written(c, TEMPERATURE if c.follows_temperature else ()),
+        },
+        "gyroscope": {**_written(c, GYROSCOPE), "formula": GYROSCOPE_FORMULA},
+        "fit": c.fit,
+        "quality": c.quality,
+        "sensor": asdict(c.sensor),
+        "applied_in_hardware": {"b_a": c.applied_in_hardware},
+        **c.extra,
+    }
+    return {key: _plain(value) for key, value in values.items()}
+
+
+def arguments(document: Mapping[str, Any]) -> dict[str, Any]:
+    """What a Calibration is made of; unknown keys are ignored, missing ones are left to its defaults.
+
+    Raises
+    ------
+    ValueError, KeyError, TypeError, AttributeError : it is no such document.
+    """
+    if document.get("format") != FORMAT:
+        raise ValueError(f'"format" is {document.get("format")!r}, not {FORMAT!r}')
+    if document.get("version", 0) > VERSION:
+        raise ValueError(f"version {document['version']} is newer than {VERSION}")
+    acc = document["accelerometer"]
+    for key in ("D", "b_a"):
+        if key not in acc:
+            raise KeyError(key)
+    hardware = document.get("applied_in_hardware", {})
+    return {
+        "D": np.full((3, 3), np.nan),
+        "b_a": np.full(3, np.nan),
+        **_read(acc, ACCELEROMETER + TEMPERATURE),
+        **_read(document.get("gyroscope", {}), GYROSCOPE),
+        **_read(hardware, (("b_a", "applied_in_hardware", (3,)),)),
+        "fit": MappingProxyType(dict(document.get("fit", {}))),
+        "quality": MappingProxyType(dict(document.get("quality", {}))),
+        "sensor": Sensor.of(document.get("sensor", {})),
+        "created": str(document.get("created", "")),
+        "extra": MappingProxyType({key: document[key] for key in EXTRA if key in document}),
+    }
+
+
+Rows = tuple[tuple[str, str, tuple[int, ...]], ...]
+
+
+def _written(c: Calibration, rows: Rows) -> dict[str, Vector]:
+    return {key: getattr(c, attribute) for key, attribute, _ in rows}
+
+
+def _read(values: Mapping[str, Any], rows: Rows) -> dict[str, Vector]:
+    return {attribute: _array(values[key], shape) for key, attribute, shape in rows if values.get(key) is not None}
+
+
+def _array(values: Any, shape: tuple[int, ...]) -> Vector:
+    array = np.array(values, dtype=np.float64)  # None becomes NaN
+    if array.shape != shape:
+        raise ValueError(f"shape {array.shape} where {shape} belongs")
+    return array
+
+
+def _plain(value: Any) -> Any:
+    """JSON's own types; NaN and infinities become None."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
