@@ -1,4 +1,4 @@
-"""A calibration prepared for the samples of one source: the same chip, registers and parameters, no bias removed twice."""
+"""A calibration made ready for the samples of one source: of the same chip, and no bias removed twice."""
 
 from __future__ import annotations
 
