@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from ..export import FORMS, form
+from ..export.forms import FORMS, form
 from ..result.atomic import write_atomically
 from ..result.calibration import Calibration
 from .options import check_not_among
@@ -15,16 +15,24 @@ from .options import check_not_among
 EXAMPLE = "Example: `mpucal export board7/calibration.json --to c-header -o calibration.h`"
 
 
-@click.command("export", epilog=EXAMPLE)
+# the marks of Markdown are for docs/use.md; \b keeps click from filling the lines
+_ROWS = "\n".join(f"{row.name:<12}{row.read_by.replace('`', '')}" for row in FORMS)
+HELP = f"""Convert a calibration (.json or .bin) to the format of another program, and say what is lost.
+
+\b
+{_ROWS}
+
+Exit code 5: the calibration was refused; 6: the format cannot represent it.
+"""
+
+
+@click.command("export", help=HELP, epilog=EXAMPLE)
 @click.argument("calibration", metavar="CALIBRATION", type=click.Path(path_type=Path))
-@click.option("--to", "name", type=click.Choice(list(FORMS)), required=True, help="Output format.")
+@click.option("--to", "name", type=click.Choice([row.name for row in FORMS]), required=True, help="Output format.")
 @click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Output file; default: stdout.")
 @click.option("--json", "as_json", is_flag=True, help="Print format, text and what is lost as JSON.")
 def command(calibration: Path, name: str, file: Path | None, as_json: bool) -> None:
-    """Convert a calibration (.json or .bin) to the format of another program, and say what is lost.
-
-    Exit code 5: the calibration was refused; 6: the format cannot represent it.
-    """
+    """Make the file's text, and put it where it is asked to go."""
     if file is not None:
         check_not_among(file, [calibration])
     chosen = form(name)
@@ -34,7 +42,7 @@ def command(calibration: Path, name: str, file: Path | None, as_json: bool) -> N
     for note in notes:
         click.echo(f"mpucal: {note}", err=True)
     if as_json:
-        document = {"to": name, "ending": chosen.ENDING, "text": text, "cannot_carry": notes}
+        document = {"to": name, "ending": chosen.suffix, "text": text, "cannot_carry": notes}
         click.echo(json.dumps(document, indent=2))
     elif file is not None:
         click.echo(f"Written to {file}.")

@@ -7,11 +7,8 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from ..data import STANDARD_GRAVITY_MPS2
 from ..report.units import AXES, accelerometer, estimated_error
-from ..report.use import left_to_subtract
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.document import ACCELEROMETER_FORMULA
 from ..result.session_files import BLOB, DOCUMENT, REPORT
@@ -54,7 +51,7 @@ def formula(calibration: Calibration) -> str:
     """The calibrated acceleration, with its numbers."""
     rows = [
         f"  [{' '.join(f'{value:+.6f}' for value in row)}]   y_{axis} {-bias:+.5f}"
-        for axis, row, bias in zip(AXES, np.linalg.inv(calibration.D), left_to_subtract(calibration), strict=True)
+        for axis, row, bias in zip(AXES, calibration.inverse, calibration.b_a_to_subtract, strict=True)
     ]
     return "\n".join([f"{ACCELEROMETER_FORMULA} [m/s²]", *rows])
 

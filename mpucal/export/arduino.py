@@ -2,34 +2,23 @@
 
 from __future__ import annotations
 
-from ..report.use import in_c
-from ..result.calibration import Calibration
-from .losses import check_usable, head, in_float, with_hardware, without_gyroscope, without_temperature
+from collections.abc import Sequence
 
-ENDING = ".ino"
+from ..result.calibration import Calibration
+from .code import in_c
+from .losses import head
+
 ACCEL_CONFIG = {2.0: 0x00, 4.0: 0x08, 8.0: 0x10, 16.0: 0x18}
 DEFAULT_RANGE_G = 4.0
 
 
-def export(calibration: Calibration) -> tuple[str, tuple[str, ...]]:
-    """The sketch's text, and what it cannot carry.
-
-    Raises
-    ------
-    RefusedError : see losses.check_usable.
-    """
-    check_usable(calibration)
-    notes = (
-        *in_float(calibration),
-        *without_gyroscope(calibration),
-        *without_temperature(calibration),
-        *with_hardware(calibration),
-    )
+def text(calibration: Calibration, notes: Sequence[str]) -> str:
+    """The sketch's text, with `notes` in its head."""
     range_g = calibration.sensor.accel_range_g
     if range_g not in ACCEL_CONFIG:
         range_g = DEFAULT_RANGE_G
     remarks = "\n".join(f"// {line}" for line in (f"{head(calibration)}.", *notes))
-    return f"{remarks}\n{_SKETCH_HEAD}{in_c(calibration)}{_body(range_g)}", notes
+    return f"{remarks}\n{_SKETCH_HEAD}{in_c(calibration)}{_body(range_g)}"
 
 
 _SKETCH_HEAD = """

@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-from ..report.use import c_matrix, in_c
+from collections.abc import Sequence
+
 from ..result.calibration import Calibration
-from .losses import check_usable, head, in_float, with_hardware, without_gyroscope, without_temperature
+from .code import c_matrix, in_c
+from .losses import head
 
-ENDING = ".h"
 
-
-def export(calibration: Calibration) -> tuple[str, tuple[str, ...]]:
-    """The header's text (C99 or C++11), and what it cannot carry.
-
-    Raises
-    ------
-    RefusedError : see losses.check_usable.
-    """
-    check_usable(calibration)
-    notes = (
-        *in_float(calibration),
-        *without_gyroscope(calibration),
-        *without_temperature(calibration),
-        *with_hardware(calibration),
-    )
+def text(calibration: Calibration, notes: Sequence[str]) -> str:
+    """The header's text (C99 or C++11), with `notes` in its head."""
     remarks = "\n".join(f" * {line}" for line in (f"{head(calibration)}.", *notes))
-    text = f"""/*
+    return f"""/*
 {remarks}
  */
 #ifndef MPUCAL_CALIBRATION_H
@@ -38,4 +26,3 @@ static const float MPUCAL_D[3][3] = {{
 {in_c(calibration)}
 #endif
 """
-    return text, notes

@@ -8,34 +8,27 @@ addresses (it takes them to lie as the MPU-6050's do), so that nothing may be wr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..chip.families import MPU6050, PARTS
 from ..chip.offsets import moved
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
-from ..report.use import inverse
 from ..result.calibration import Calibration
-from .losses import check_usable, head, mps2, without_gyroscope, without_temperature
+from .losses import head, mps2
 
-ENDING = ".sh"
 AXES = "xyz"
 LSB_PER_G = 2048.0
 STEP_G = 2 / LSB_PER_G
 
 
-def export(calibration: Calibration) -> tuple[str, tuple[str, ...]]:
-    """A script for /bin/sh, whose argument is the device's folder, and what it cannot carry.
-
-    Raises
-    ------
-    RefusedError : see losses.check_usable.
-    """
-    check_usable(calibration)
-    words, why = _words(calibration)
-    gain = inverse(calibration)
+def text(calibration: Calibration, notes: Sequence[str]) -> str:
+    """A script for /bin/sh, whose argument is the device's folder, with `notes` in its head."""
+    words, _ = _words(calibration)
+    gain = calibration.inverse
     scale = np.linalg.norm(gain, axis=0)
-    notes = (*_losses(calibration, why), *without_gyroscope(calibration), *without_temperature(calibration))
     remarks = [f"# {line}" for line in (f"{head(calibration)}.", "usage: sh FILE /sys/bus/iio/devices/iio:deviceN")]
     remarks += [f"# {note}" for note in notes]
     lines = ["#!/bin/sh", *remarks, "set -e", _DEVICE, _PUT]
@@ -45,7 +38,7 @@ def export(calibration: Calibration) -> tuple[str, tuple[str, ...]]:
     lines += [f"if {calibscales}; then"]
     lines += [f'    put "$DEVICE/in_accel_{a}_calibscale" {s:.9f}' for a, s in zip(AXES, scale, strict=True)]
     lines += [f'    MATRIX="{_matrix(gain / scale)}"', "else", f'    MATRIX="{_matrix(gain)}"', "fi", _MATRIX]
-    return "\n".join(lines) + "\n", notes
+    return "\n".join(lines) + "\n"
 
 
 def _words(calibration: Calibration) -> tuple[tuple[int, int, int] | None, str]:
@@ -62,7 +55,9 @@ def _words(calibration: Calibration) -> tuple[tuple[int, int, int] | None, str]:
         return None, f"calibbias is left alone: {error.what}"
 
 
-def _losses(calibration: Calibration, why: str) -> tuple[str, ...]:
+def left(calibration: Calibration) -> tuple[str, ...]:
+    """What error the commands leave, a sentence each."""
+    _, why = _words(calibration)
     if why:
         return (f"It {why}: b_a, ({mps2(calibration.b_a)}) m/s^2, stays to be subtracted by who reads.", _SCALE)
     step = STEP_G * STANDARD_GRAVITY_MPS2 / 2

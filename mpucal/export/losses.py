@@ -1,12 +1,17 @@
-"""What a form leaves out of a calibration, in sentences with the error that this leaves. Knows no form."""
+"""What a form leaves out of a calibration, in sentences with the error that this leaves."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import RefusedError
 from ..result.calibration import REFUSED, Calibration
+
+# of a calibration: what a form cannot carry of it, a sentence each
+Loss = Callable[[Calibration], tuple[str, ...]]
 
 FLOAT_EPS = float(np.finfo(np.float32).eps)
 
@@ -39,7 +44,7 @@ def in_float(calibration: Calibration) -> tuple[str, ...]:
 def float_error_mps2(calibration: Calibration) -> float:
     """Of some ten roundings at full scale [m/s^2]."""
     range_mps2 = (calibration.sensor.accel_range_g or 16.0) * STANDARD_GRAVITY_MPS2
-    gain = float(np.abs(np.linalg.inv(calibration.D)).sum(axis=1).max())
+    gain = float(np.abs(calibration.inverse).sum(axis=1).max())
     return 8 * FLOAT_EPS * gain * (range_mps2 + float(np.abs(calibration.b_a).max()))
 
 

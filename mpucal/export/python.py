@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from ..report.use import in_python, py_matrix
 from ..result.calibration import Calibration
-from .losses import check_usable, head, with_hardware, without_temperature
+from .code import in_python, py_matrix
+from .losses import head
 
-ENDING = ".py"
 
-
-def export(calibration: Calibration) -> tuple[str, tuple[str, ...]]:
-    """The module's text, and what it cannot carry.
-
-    Raises
-    ------
-    RefusedError : see losses.check_usable.
-    """
-    check_usable(calibration)
-    notes = (*without_temperature(calibration), *with_hardware(calibration))
+def text(calibration: Calibration, notes: Sequence[str]) -> str:
+    """The module's text, with `notes` in its head."""
     b_omega = ", ".join(f"{value:.8f}" for value in np.nan_to_num(calibration.b_omega))
-    text = f'''"""{head(calibration)}, rad/s.{"".join(f"{chr(10)}{chr(10)}{note}" for note in notes)}
+    return f'''"""{head(calibration)}, rad/s.{"".join(f"{chr(10)}{chr(10)}{note}" for note in notes)}
 """
 
 {in_python(calibration)}
@@ -36,4 +29,3 @@ def apply_gyro(y):
     """Calibrated rates (..., 3) [rad/s] of measured ones."""
     return (np.asarray(y) - B_OMEGA) @ K.T
 '''
-    return text, notes

@@ -6,31 +6,23 @@ so that SM = inv(D) and bias = inv(D) b_a. It ignores keys that it does not know
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..data import Vector
-from ..report.use import inverse, left_to_subtract
 from ..result.calibration import Calibration
-from .losses import check_usable, head, with_hardware, without_gyroscope, without_temperature
-
-ENDING = ".yaml"
+from .losses import head
 
 
-def export(calibration: Calibration) -> tuple[str, tuple[str, ...]]:
-    """The file's text, and what it cannot carry.
-
-    Raises
-    ------
-    RefusedError : see losses.check_usable.
-    """
-    check_usable(calibration)
-    notes = (*without_gyroscope(calibration), *without_temperature(calibration), *with_hardware(calibration))
-    SM = inverse(calibration)
+def text(calibration: Calibration, notes: Sequence[str]) -> str:
+    """The file's text, with `notes` in its head."""
+    SM = calibration.inverse
     lines = [
         *(f"# {line}" for line in (f"{head(calibration)}.", *notes)),
         "# corrected = SM * raw - bias, as imu_calib's apply_calib does: bias is inv(D) b_a",
         f"SM: {_row(SM.ravel())}",
-        f"bias: {_row(SM @ left_to_subtract(calibration))}",
+        f"bias: {_row(SM @ calibration.b_a_to_subtract)}",
     ]
     for key, noise in (
         ("linear_acceleration_covariance", calibration.noise_std),
@@ -38,7 +30,7 @@ def export(calibration: Calibration) -> tuple[str, tuple[str, ...]]:
     ):
         if np.isfinite(noise).all():
             lines.append(f"{key}: {_row(np.diag(noise**2).ravel(), digits=6)}")
-    return "\n".join(lines) + "\n", notes
+    return "\n".join(lines) + "\n"
 
 
 def _row(values: Vector, digits: int = 12) -> str:

@@ -11,7 +11,6 @@ from ..result.document import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA
 from ..result.orientation import side_down
 from .elements import code, number, paragraph, section, table
 from .units import AXES, Row, accelerometer, gyroscope, with_std
-from .use import formula
 
 NO_FORMULA = "D cannot be inverted: no correction is possible."
 CAPTION = "value ± standard uncertainty (1 sigma)"
@@ -49,7 +48,19 @@ def formula_section(c: Calibration) -> str:
             "The chip's offset registers subtract a part of b_a already; the formula subtracts the rest.",
             note=True,
         )
-    return section("The formula", said, code(formula(c), "formula"), applied)
+    return section("The formula", said, code(_formula(c), "formula"), applied)
+
+
+def _formula(c: Calibration) -> str:
+    """a = inv(D) (y - b_a), one line an axis."""
+    inv_D, bias = c.inverse, c.b_a_to_subtract
+    rows = (
+        " ".join(
+            f"{factor:+.6f} * (y_{of} {-offset:+.6f})" for factor, of, offset in zip(row, "xyz", bias, strict=True)
+        )
+        for row in inv_D
+    )
+    return "\n".join(f"a_{axis} = {row}" for axis, row in zip("xyz", rows, strict=True))
 
 
 def gyroscope_table(c: Calibration) -> str:

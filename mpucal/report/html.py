@@ -12,6 +12,7 @@ import numpy as np
 
 from .. import __version__
 from ..data import Recording
+from ..export.code import in_c, in_python, in_ros
 from ..files.formats import is_of_session
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.session_files import CAPTURE
@@ -28,7 +29,6 @@ from .gallery import gallery
 from .style import CSS
 from .track import Track
 from .units import estimated_error
-from .use import in_c, in_python, in_ros
 from .vehicle import vehicle_section
 
 VERDICTS = {

@@ -85,6 +85,16 @@ class Calibration:
         return np.asarray(self.b_a + away[..., None] * self.b_a_slope)
 
     @property
+    def inverse(self) -> Vector:
+        """inv(D) (3, 3)."""
+        return np.asarray(np.linalg.inv(self.D))
+
+    @property
+    def b_a_to_subtract(self) -> Vector:
+        """(3,) m/s^2, b_a without what the chip's offset registers subtract already."""
+        return np.asarray(self.b_a - self.applied_in_hardware)
+
+    @property
     def verdict(self) -> str:
         """good, usable or refused; refused where nobody judged."""
         return str(self.quality.get("verdict", REFUSED))
@@ -103,7 +113,7 @@ class Calibration:
         """
         # b_a minus what the offset registers subtract: y comes from the chip with that already gone
         y = np.asarray(acc, float) - (self.b_a_at(temperature_c) - self.applied_in_hardware)
-        a: NDArray[np.float64] = y @ np.linalg.inv(self.D).T
+        a: NDArray[np.float64] = y @ self.inverse.T
         if gyr is None:
             return a
         return a, (np.asarray(gyr, float) - np.nan_to_num(self.b_omega)) @ self.K.T

@@ -6,19 +6,22 @@ import math
 import re
 import shutil
 import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
 from mpucal.errors import MpucalError, RefusedError
-from mpucal.export import FORMS, form
+from mpucal.export.forms import FORMS, form
 from mpucal.result.calibration import Calibration
 
+ROOT = Path(__file__).parents[2]
 # what the header says of itself
 FLOAT_MPS2 = 2e-4
-OWN = [name for name in FORMS if name not in ("ardupilot", "px4")]
+USABLE_ONLY = [row.name for row in FORMS if row.only_usable]
 APPLIED = np.array([0.25, -0.2, 1.0])
 
 
@@ -239,7 +242,7 @@ def test_json_and_blob_make_each_other(calibrated, tmp_path):
     np.testing.assert_allclose(document["accelerometer"]["D"], calibrated.D, rtol=1e-7)
 
 
-@pytest.mark.parametrize("name", [name for name in OWN if name != "json"])
+@pytest.mark.parametrize("name", USABLE_ONLY)
 @pytest.mark.parametrize(
     "changes",
     [{"quality": {"verdict": "refused"}}, {"b_a": np.full(3, math.nan)}, {"D": np.ones((3, 3))}],
@@ -256,7 +259,7 @@ def test_a_chips_calibration_is_none_of_a_vehicle(calibration, name):
         form(name).export(calibration)
 
 
-@pytest.mark.parametrize("name", [name for name in OWN if name != "json"])
+@pytest.mark.parametrize("name", USABLE_ONLY)
 def test_each_says_what_temperature_and_registers_leave(calibration, name):
     changed = replace(
         calibration,
@@ -271,14 +274,50 @@ def test_each_says_what_temperature_and_registers_leave(calibration, name):
     assert all(note in text.replace("\n * ", " ") for note in notes)
 
 
-def test_every_form_has_an_ending():
-    assert {name: form(name).ENDING for name in FORMS} == {
-        "c-header": ".h",
-        "arduino": ".ino",
-        "python": ".py",
-        "ros": ".yaml",
-        "linux-iio": ".sh",
-        "ardupilot": ".param",
-        "px4": ".params",
-        "json": ".json",
-    }
+def test_the_pages_have_the_same_rows():
+    page = (ROOT / "docs" / "use.md").read_text(encoding="utf-8")
+    rows = re.search(r"\| form \| read by .*?\n\|[-|]+\n(.*?)\n\n", page, re.DOTALL)[1]
+    assert rows.splitlines() == [f"| `{row.name}` | {row.read_by} | {row.applied} |" for row in FORMS]
+    *others, last = (row.name for row in FORMS)
+    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    assert f"Forms to export to: {', '.join(others)} and {last};" in readme
+
+
+# a form that is made up, then a command
+MADE_UP = """
+import sys
+
+from mpucal.export import forms
+from mpucal.export.losses import without_gyroscope
+
+
+def text(calibration, notes):
+    return f"{calibration.b_a[0]:.2f} {len(notes)}"
+
+
+forms.FORMS += (
+    forms.Form("morse", ".txt", "telegraphists", "by hand", text, (without_gyroscope,)),
+)
+from mpucal.__main__ import run
+
+sys.exit(run(sys.argv[1:]))
+"""
+
+
+def test_a_form_is_one_row(calibration, tmp_path):
+    """One that is made up is known to the choices, the help, the errors and the command."""
+
+    def call(*words):
+        program = [sys.executable, "-c", MADE_UP, "export", *words]
+        return subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    calibration.save(tmp_path / "c.json")
+    replace(calibration, quality={"verdict": "refused"}).save(tmp_path / "refused.json")
+    done = call("c.json", "--to", "morse", "-o", "c.txt")
+    assert (done.returncode, (tmp_path / "c.txt").read_text()) == (0, "0.31 1")
+    assert "does not correct the gyroscope" in done.stderr
+    document = json.loads(call("c.json", "--to", "morse", "--json").stdout)
+    assert (document["to"], document["ending"], document["text"]) == ("morse", ".txt", "0.31 1")
+    assert re.search(r"morse +telegraphists", call("--help").stdout)
+    assert "'morse'" in call("c.json", "--to", "nothing").stderr
+    assert call("refused.json", "--to", "morse").returncode == RefusedError.exit_code

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mpucal.data import Autopilot
-from mpucal.export import form
+from mpucal.export.forms import form
 from mpucal.mavlink.parameters.document import autopilot_document
 from mpucal.result.calibration import Calibration
 

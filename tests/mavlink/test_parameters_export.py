@@ -7,7 +7,7 @@ import pytest
 
 from mpucal.data import Autopilot
 from mpucal.errors import WriteBackError
-from mpucal.export import ardupilot, px4
+from mpucal.export.forms import form
 from mpucal.mavlink.parameters.document import autopilot_document
 from mpucal.mavlink.parameters.text import read_parameters_file
 from mpucal.result.calibration import Calibration
@@ -29,14 +29,14 @@ def calibration(firmware, parameters, D=D, verdict="good"):
 
 
 @pytest.mark.parametrize(
-    ("module", "firmware", "parameters", "first"),
-    [(ardupilot, "ArduPilot", ARDUPILOT, "INS_ACCOFFS_X"), (px4, "PX4", PX4, "CAL_ACC1_XOFF")],
+    ("name", "firmware", "parameters", "first"),
+    [("ardupilot", "ArduPilot", ARDUPILOT, "INS_ACCOFFS_X"), ("px4", "PX4", PX4, "CAL_ACC1_XOFF")],
     ids=["ardupilot", "px4"],
 )
-def test_the_file_holds_the_new_parameters(tmp_path, module, firmware, parameters, first):
+def test_the_file_holds_the_new_parameters(tmp_path, name, firmware, parameters, first):
     made = calibration(firmware, parameters)
-    text, notes = module.export(made)
-    file = tmp_path / f"new{module.ENDING}"
+    text, notes = form(name).export(made)
+    file = tmp_path / f"new{form(name).suffix}"
     file.write_text(text)
     held = read_parameters_file(file)
     assert list(held) == list(made.extra["autopilot"]["params_new"])
@@ -46,12 +46,12 @@ def test_the_file_holds_the_new_parameters(tmp_path, module, firmware, parameter
 
 def test_the_other_firmwares_calibration_is_refused():
     with pytest.raises(WriteBackError, match="PX4"):
-        ardupilot.export(calibration("PX4", PX4))
+        form("ardupilot").export(calibration("PX4", PX4))
 
 
 def test_a_scale_beyond_ardupilots_own_limits_is_refused():
     with pytest.raises(WriteBackError, match="beyond"):
-        ardupilot.export(calibration("ArduPilot", ARDUPILOT, D=np.diag([0.5, 1.0, 1.0])))
+        form("ardupilot").export(calibration("ArduPilot", ARDUPILOT, D=np.diag([0.5, 1.0, 1.0])))
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,14 @@
 import re
 import sys
 from dataclasses import replace
+from html import unescape
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
 from mpucal.data import Recording, Sensor
+from mpucal.export.code import in_c, in_python, in_ros
 from mpucal.report import render
 from mpucal.result.calibration import Calibration
 
@@ -220,3 +222,9 @@ def test_without_matplotlib_the_page_says_what_to_install(calibration, recording
     page = Page(render(calibration, recording))
     assert "pip install 'mpucal[plot]'" in page.texts["no-picture"]
     assert page.tables["parameters"]
+
+
+def test_the_page_shows_them(result):
+    for name, text in (("c", in_c), ("python", in_python), ("ros", in_ros)):
+        shown = re.search(rf'<pre id="{name}">(.*?)</pre>', result.html, re.DOTALL)[1]
+        assert unescape(shown) == text(result.calibration)

@@ -1,4 +1,4 @@
-"""How a calibration is applied: functions in C, Python and ROS with its numbers in them."""
+"""A calibration as functions in C, Python and ROS with its numbers in them."""
 
 from __future__ import annotations
 
@@ -12,33 +12,11 @@ from ..result.calibration import Calibration
 COUNTS = 32768  # full scale of a 16-bit reading
 
 
-def left_to_subtract(c: Calibration) -> Vector:
-    """(3,) m/s^2, b_a without what the chip's offset registers subtract already."""
-    return np.asarray(c.b_a - c.applied_in_hardware)
-
-
-def inverse(c: Calibration) -> Vector:
-    """inv(D) (3, 3)."""
-    return np.asarray(np.linalg.inv(c.D))
-
-
-def formula(c: Calibration) -> str:
-    """a = inv(D) (y - b_a), one line an axis."""
-    inv_D, bias = inverse(c), left_to_subtract(c)
-    rows = (
-        " ".join(
-            f"{factor:+.6f} * (y_{of} {-offset:+.6f})" for factor, of, offset in zip(row, "xyz", bias, strict=True)
-        )
-        for row in inv_D
-    )
-    return "\n".join(f"a_{axis} = {row}" for axis, row in zip("xyz", rows, strict=True))
-
-
 def in_c(c: Calibration) -> str:
     """inv(D) and b_a as constants, and the function for firmware that applies them."""
-    bias = _joined(f"{v:.8e}f" for v in left_to_subtract(c))
+    bias = _joined(f"{v:.8e}f" for v in c.b_a_to_subtract)
     return f"""static const float MPUCAL_INV_D[3][3] = {{
-{c_matrix(inverse(c))}
+{c_matrix(c.inverse)}
 }};
 static const float MPUCAL_B_A[3] = {{{bias}}}; /* m/s^2 */
 
@@ -107,8 +85,8 @@ if __name__ == "__main__":
 
 
 def _matrices(c: Calibration) -> str:
-    rows = py_matrix(inverse(c))
-    bias = _joined(f"{v:.8f}" for v in left_to_subtract(c))
+    rows = py_matrix(c.inverse)
+    bias = _joined(f"{v:.8f}" for v in c.b_a_to_subtract)
     return f"INV_D = np.array([\n{rows},\n])\nB_A = np.array([{bias}])  # m/s^2\n"
 
 

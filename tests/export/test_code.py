@@ -1,6 +1,5 @@
-"""The functions that the page shows, run: they do what the calibration does."""
+"""The functions in other languages, run: they do what the calibration does."""
 
-import html
 import re
 import shutil
 import subprocess
@@ -11,7 +10,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from mpucal.report.use import in_c, in_python, in_ros
+from mpucal.export.code import in_c, in_python, in_ros
 
 Y = np.array([[0.5, -3.0, 9.0], [-9.7, 0.1, 0.4], [4.0, 6.0, -6.5]])
 MAIN = """
@@ -28,35 +27,35 @@ int main(void) {{
 
 
 @pytest.fixture(params=[[0.0, 0.0, 0.0], [0.25, -0.1, 1.0]], ids=["nothing applied", "applied in hardware"])
-def calibration(request, result):
-    return replace(result.calibration, applied_in_hardware=np.array(request.param))
+def calibrated(request, calibration):
+    return replace(calibration, applied_in_hardware=np.array(request.param))
 
 
-def test_c_computes_what_the_calibration_does(calibration, tmp_path):
+def test_c_computes_what_the_calibration_does(calibrated, tmp_path):
     if shutil.which("cc") is None:
         pytest.skip("there is no C compiler here")
     rows = ", ".join("{" + ", ".join(map(str, row)) + "}" for row in Y)
-    (tmp_path / "apply.c").write_text(in_c(calibration) + MAIN.format(rows=rows))
+    (tmp_path / "apply.c").write_text(in_c(calibrated) + MAIN.format(rows=rows))
     words = ["cc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-o", "apply", "apply.c"]
     subprocess.run(words, cwd=tmp_path, check=True)
     printed = subprocess.run([tmp_path / "apply"], capture_output=True, text=True, check=True).stdout
     np.testing.assert_allclose(
-        [list(map(float, line.split())) for line in printed.splitlines()], calibration.apply(Y), atol=1e-5
+        [list(map(float, line.split())) for line in printed.splitlines()], calibrated.apply(Y), atol=1e-5
     )
 
 
-def test_c_says_what_a_count_is(result):
-    scale = float(re.search(r"one count of the chip is (\S+) m/s\^2", in_c(result.calibration))[1])
-    np.testing.assert_allclose(scale * 32768, result.calibration.sensor.accel_range_g * 9.80665)
+def test_c_says_what_a_count_is(calibration):
+    scale = float(re.search(r"one count of the chip is (\S+) m/s\^2", in_c(calibration))[1])
+    np.testing.assert_allclose(scale * 32768, calibration.sensor.accel_range_g * 9.80665)
 
 
-def test_python_computes_what_the_calibration_does(calibration):
+def test_python_computes_what_the_calibration_does(calibrated):
     names = {}
-    exec(in_python(calibration), names)
-    np.testing.assert_allclose(names["apply"](Y), calibration.apply(Y), atol=1e-6)
+    exec(in_python(calibrated), names)
+    np.testing.assert_allclose(names["apply"](Y), calibrated.apply(Y), atol=1e-6)
 
 
-def test_the_node_publishes_what_it_hears_calibrated(calibration, monkeypatch):
+def test_the_node_publishes_what_it_hears_calibrated(calibrated, monkeypatch):
     published = []
 
     class Node:
@@ -80,19 +79,13 @@ def test_the_node_publishes_what_it_hears_calibrated(calibration, monkeypatch):
         vars(module).update(contents)
         monkeypatch.setitem(sys.modules, name, module)
     names = {"__name__": "node"}
-    exec(in_ros(calibration), names)
+    exec(in_ros(calibrated), names)
     node = names["Calibrated"]()
     for y in Y:
         x, y_, z = y.tolist()
         node.hear(SimpleNamespace(linear_acceleration=SimpleNamespace(x=x, y=y_, z=z)))
     heard = [(m.linear_acceleration.x, m.linear_acceleration.y, m.linear_acceleration.z) for m in published]
-    np.testing.assert_allclose(heard, calibration.apply(Y), atol=1e-6)
+    np.testing.assert_allclose(heard, calibrated.apply(Y), atol=1e-6)
     np.testing.assert_allclose(
-        np.reshape(published[0].linear_acceleration_covariance, (3, 3)), np.diag(calibration.noise_std**2), rtol=1e-5
+        np.reshape(published[0].linear_acceleration_covariance, (3, 3)), np.diag(calibrated.noise_std**2), rtol=1e-5
     )
-
-
-def test_the_page_shows_them(result):
-    for name, text in (("c", in_c), ("python", in_python), ("ros", in_ros)):
-        shown = re.search(rf'<pre id="{name}">(.*?)</pre>', result.html, re.DOTALL)[1]
-        assert html.unescape(shown) == text(result.calibration)
