@@ -1,4 +1,4 @@
-"""Legs: the pieces a hand's motion is made of, each between two steps of the fine clock. Knows no prompt."""
+"""Legs: the pieces a hand's motion is made of, each between two steps of the fine clock."""
 
 from __future__ import annotations
 
@@ -126,6 +126,12 @@ def minimum_jerk(share: Vector) -> Vector:
     """0..1 of 0..1 with no speed or acceleration at the ends (Flash and Hogan 1985)."""
     s = np.clip(share, 0.0, 1.0)
     return np.asarray(s * s * s * (10 - 15 * s + 6 * s * s))
+
+
+def minimum_jerk_rate(share: Vector) -> Vector:
+    """Its derivative."""
+    s = np.clip(share, 0.0, 1.0)
+    return np.asarray(30.0 * s * s * (1.0 - s) ** 2)
 
 
 def _window(nodes: Vector, first: int, last: int) -> Vector:

@@ -1,4 +1,4 @@
-"""The board's motion as a hand makes it: finely integrated, averaged over any span. Knows no sensor."""
+"""The board's motion as a hand makes it while it is listened to: finely integrated, averaged over any span."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ..data import Vector
 from . import rotation
+from .habits import JERK_MPS2, JERK_S, SWAY_HZ, TREMBLING, TREMOR_HZ, Habits, swing
 from .hand import REACTION_S, Hand, Prompt, Stance
 from .legs import STEP_HZ, STEP_S, Leg, steps
 from .mishaps import Mishap
@@ -17,7 +18,6 @@ from .mishaps import Mishap
 # Shorter than any reaction: a prompt never reaches what has been computed already.
 AHEAD_S = REACTION_S[0] / 2
 
-JERKS_HZ = 0.3
 SINES = 12
 
 
@@ -61,10 +61,10 @@ class Pulse:
 
     @classmethod
     def draw(cls, rng: np.random.Generator, start_s: float) -> Self:
-        """2 to 6 m/s^2 for 60 to 120 ms, in any direction."""
+        """In any direction."""
         direction = rng.normal(size=3)
-        peak = direction / np.linalg.norm(direction) * rng.uniform(2.0, 6.0)
-        return cls(start_s, rng.uniform(0.06, 0.12), peak)
+        peak = direction / np.linalg.norm(direction) * rng.uniform(*JERK_MPS2)
+        return cls(start_s, rng.uniform(*JERK_S), peak)
 
     @property
     def end_s(self) -> float:
@@ -86,18 +86,26 @@ class Motion:
     Parameters
     ----------
     hand : decides on the legs. rng : the hand's tremor, lever and clumsiness. gravity : m/s^2.
-    mishaps : what befalls the sensor besides the hand's own.
+    mishaps : what befalls the sensor besides the hand's own. habits : how it shakes; of its acceleration's tremor this
+        person has half to all.
     """
 
-    def __init__(self, hand: Hand, rng: np.random.Generator, gravity: float, mishaps: Iterable[Mishap] = ()) -> None:
+    def __init__(
+        self,
+        hand: Hand,
+        rng: np.random.Generator,
+        gravity: float,
+        mishaps: Iterable[Mishap] = (),
+        habits: Habits = TREMBLING,
+    ) -> None:
         self._hand = hand
         self._mishaps = (hand.mishap, *mishaps)
-        self._gravity = gravity
+        self._gravity, self._habits = gravity, habits
         lever = rng.normal(size=3)
-        self._lever_m = lever / np.linalg.norm(lever) * rng.uniform(0.15, 0.3)
-        self._tremble = Wobble(rng, (2.0, 10.0), rng.uniform(0.05, 0.1))
-        self._quiver = Wobble(rng, (2.0, 10.0), np.radians(1.0) / np.sqrt(3))
-        self._push = Wobble(rng, (0.5, 4.0), 0.3)
+        self._lever_m = lever / np.linalg.norm(lever) * rng.uniform(*habits.lever_m)
+        self._tremble = Wobble(rng, TREMOR_HZ, habits.tremor_mps2 * rng.uniform(0.5, 1.0))
+        self._quiver = Wobble(rng, TREMOR_HZ, habits.tremor_rad_s)
+        self._push = Wobble(rng, SWAY_HZ, habits.sway_mps2)
         self._fate = rng.spawn(1)[0]
         self._stance = hand.first_stance()
         self._rate = np.zeros(3)
@@ -177,8 +185,7 @@ class Motion:
             return np.zeros_like(rates)
         alpha = np.diff(rates, axis=0, prepend=self._rate[None]) / STEP_S
         self._rate = rates[-1]
-        r = self._lever_m
-        return np.cross(alpha, r) + np.cross(rates, np.cross(rates, r))
+        return swing(alpha, rates, self._lever_m)
 
     def _clumsiness(self, leg: Leg, nodes: Vector, grip: Vector) -> Vector:
         """The hand's own acceleration (n, 3) in each step: tremor, wandering, jerks."""
@@ -189,7 +196,7 @@ class Motion:
             push += self._tremble.at(first, len(t_s)) * grip[1:, None]
         if effort.any():
             push += self._push.at(first, len(t_s)) * effort
-            for _ in range(self._fate.poisson(JERKS_HZ * len(t_s) * STEP_S)):
+            for _ in range(self._fate.poisson(self._habits.jerks_per_s * len(t_s) * STEP_S)):
                 self._pulses.append(Pulse.draw(self._fate, float(self._fate.uniform(t_s[0], t_s[-1]))))
         for pulse in self._pulses:
             push += pulse.at(t_s)

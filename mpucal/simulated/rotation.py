@@ -1,8 +1,9 @@
-"""Unit quaternions (w, x, y, z), many at once, that take the board's axes to the world's. Knows no motion."""
+"""Unit quaternions (w, x, y, z), many at once, that take the board's axes to the world's."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..data import Vector
 
@@ -23,17 +24,17 @@ def product(p: Vector, q: Vector) -> Vector:
 
 def exp(turn_rad: Vector) -> Vector:
     """The quaternions (..., 4) of rotation vectors (..., 3) [rad]."""
-    angle = np.linalg.norm(turn_rad, axis=-1, keepdims=True)
-    return np.concatenate((np.cos(angle / 2), turn_rad * np.sinc(angle / (2 * np.pi)) / 2), axis=-1)
+    return np.asarray(Rotation.from_rotvec(turn_rad).as_quat()[..., [3, 0, 1, 2]])
 
 
 def log(q: Vector) -> Vector:
     """The shortest rotation vectors (..., 3) [rad] of quaternions (..., 4)."""
-    q = np.where(q[..., :1] < 0, -q, q)
-    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
-    angle = 2 * np.arctan2(sine, q[..., :1])
-    scale = np.where(sine > SMALL_RAD, angle / np.maximum(sine, SMALL_RAD), 2.0)
-    return np.asarray(q[..., 1:] * scale)
+    return np.asarray(Rotation.from_quat(q[..., [1, 2, 3, 0]]).as_rotvec())
+
+
+def board_from_world(q: Vector) -> Vector:
+    """R(x) of equation (3), (..., 3, 3), which takes the world's axes to the board's."""
+    return np.asarray(Rotation.from_quat(q[..., [1, 2, 3, 0]]).inv().as_matrix())
 
 
 def conjugate(q: Vector) -> Vector:

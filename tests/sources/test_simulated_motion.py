@@ -213,6 +213,7 @@ def test_quaternions_against_matrices():
         R = R @ matrix(rotation.exp(step))
         np.testing.assert_allclose(matrix(q), R, atol=1e-9)
         np.testing.assert_allclose(rotation.up_in_board(q), R[2], atol=1e-9)
+        np.testing.assert_allclose(rotation.board_from_world(q), R.T, atol=1e-9)
     np.testing.assert_allclose(rotation.between(running), steps, atol=1e-9)
 
 

@@ -1,4 +1,4 @@
-"""How a simulated hand turns a board: angular rates over time. Knows no sensor, lever or acceleration.
+"""How a simulated hand turns a board: angular rates over time.
 
 A motion gives omega (n, 3) [rad/s] in the body at the times t (n,) [s], and how much the hand moves then (n,), 0 to 1.
 """
@@ -8,18 +8,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...calibration.rotation import rotation
 from ...data import Vector
+from .. import rotation
+from ..legs import minimum_jerk_rate
 
 FLAT_S, MOVING_S = 10.0, 40.0
 SLOPPY_RAD = np.radians(8.0)
-
-
-def minimum_jerk_rate(t: Vector, duration: float) -> Vector:
-    """The rate [1/s] of a movement from 0 to 1 that begins at 0 s, as smooth as an arm's."""
-    tau = np.clip(t / duration, 0.0, 1.0)
-    rate: Vector = 30.0 * tau**2 * (1.0 - tau) ** 2 / duration
-    return rate
 
 
 def plateau(t: Vector, start: float, end: float, ramp: float) -> Vector:
@@ -33,7 +27,7 @@ def moves(t: Vector, turns: Vector, durations: Vector, starts: NDArray[np.floati
     """omega (n, 3) and moving (n,) of separate moves by rotation vectors turns (m, 3) [rad]."""
     omega, moving = np.zeros((len(t), 3)), np.zeros(len(t))
     for turn, duration, start in zip(turns, durations, starts, strict=True):
-        omega += minimum_jerk_rate(t - start, duration)[:, None] * turn
+        omega += minimum_jerk_rate((t - start) / duration)[:, None] / duration * turn
         moving += plateau(t, start, start + duration, ramp=0.2)
     return omega, moving
 
@@ -73,21 +67,10 @@ def continuous(t: Vector, rng: np.random.Generator) -> tuple[Vector, Vector]:
     return omega * np.radians(80.0) / rms, moving
 
 
-def attitude(omega: Vector, step_s: float, initial: Vector) -> Vector:
-    """R(x_t) of equation (3) before each step of step_s with omega (n, 3), and after the last: (n + 1, 3, 3)."""
-    steps = rotation(-step_s * omega)
-    return np.concatenate([initial[None], cumulative_product(steps) @ initial])
+def attitude(omega: Vector, step_s: float, start_rad: Vector | None = None) -> Vector:
+    """R(x_t) of equation (3) before each step of step_s with omega (n, 3), and after the last: (n + 1, 3, 3).
 
-
-def cumulative_product(steps: Vector) -> Vector:
-    """P_k = steps_k ... steps_1 steps_0 of steps (n, 3, 3): within blocks at once, then from block to block."""
-    n = len(steps)
-    size = int(np.ceil(np.sqrt(n)))
-    blocks = np.tile(np.eye(3), (size * size, 1, 1))
-    blocks[:n] = steps
-    blocks = blocks.reshape(size, size, 3, 3)
-    for k in range(1, size):
-        blocks[:, k] = blocks[:, k] @ blocks[:, k - 1]
-    for k in range(1, size):
-        blocks[k] = blocks[k] @ blocks[k - 1, -1]
-    return blocks.reshape(-1, 3, 3)[:n]
+    start_rad : (3,) the turn that took the world's axes to the board's at first; None: none.
+    """
+    start = rotation.exp(np.zeros(3) if start_rad is None else start_rad)
+    return rotation.board_from_world(rotation.running_product(start, rotation.exp(step_s * omega)))

@@ -8,18 +8,18 @@ from functools import partial
 
 import numpy as np
 
-from ...calibration.rotation import rotation
 from ...data import STANDARD_GRAVITY_MPS2, Recording, Sensor, Vector
 from ...errors import UsageError
+from ..habits import Habits
 from ..sensor import InSi, SensorTruth, quantised
-from .hand import Hand
 from .motions import FLAT_S, MOVING_S, attitude, continuous, poses, six_faces, three_turns
 from .sensors import GRAVITY_MPS2, hand_sensor, paper_sensor
+from .shaking import acceleration, tremor
 
 TRUTH_HZ = 2000.0
 # one count of an MPU-6050 at 2 g and 500 deg/s; the paper's sensors are as fine as float64
 STEPS, UNQUANTISED = (2.0 * STANDARD_GRAVITY_MPS2 / 32768, float(np.radians(500.0)) / 32768), (0.0, 0.0)
-TREMOR_MPS2, TREMOR_RAD_S = 0.1, np.radians(1.0)
+TREMOR_MPS2, TREMOR_RAD_S = 0.1, float(np.radians(1.0))
 
 
 @dataclass(frozen=True)
@@ -38,14 +38,14 @@ class Simulated:
     attitude: Vector
 
 
-_USUAL = Hand()
-_CALM = Hand(lever_m=(0.0, 0.0), sway_mps2=0.0, jerks_per_s=3.0)
+_USUAL = Habits()
+_CALM = Habits(lever_m=(0.0, 0.0), sway_mps2=0.0, jerks_per_s=3.0)
 
 
 @dataclass(frozen=True)
 class _Scene:
     motion: Callable[[Vector, np.random.Generator], tuple[Vector, Vector]]
-    hand: Hand = _USUAL
+    habits: Habits = _USUAL
     perfect_gyro: bool = False
 
 
@@ -55,8 +55,8 @@ _SCENES = {
     "pose9": _Scene(partial(poses, n=9)),
     "pose12": _Scene(partial(poses, n=12)),
     "continuous": _Scene(continuous),
-    "wobble30": _Scene(continuous, Hand(wobble=0.3)),
-    "wobble100": _Scene(continuous, Hand(wobble=1.0)),
+    "wobble30": _Scene(continuous, Habits(wobble=0.3)),
+    "wobble100": _Scene(continuous, Habits(wobble=1.0)),
     "turns": _Scene(three_turns),
     "calm jerks": _Scene(continuous, _CALM, perfect_gyro=True),
 }
@@ -74,7 +74,7 @@ def paper_scenario(
     sensor = sensor or paper_sensor(of_sensor, rate_hz)
     n_flat, n_turn = round(FLAT_S * rate_hz), round(turn_s * rate_hz)
     omega = np.concatenate([np.zeros((n_flat, 3)), *(np.tile(e, (n_turn, 1)) for e in 2 * np.pi / turn_s * np.eye(3))])
-    R = attitude(omega, 1.0 / rate_hz, np.eye(3))[:-1]
+    R = attitude(omega, 1.0 / rate_hz)[:-1]
     return _measured(
         f"paper {seed}",
         sensor,
@@ -107,7 +107,9 @@ def hand_scenario(
     if motion not in _SCENES:
         raise UsageError(f"no simulated motion is called {motion!r}", f"choose one of {', '.join(MOTIONS)}")
     scene = _SCENES[motion]
-    hand = replace(scene.hand, tremor_mps2=TREMOR_MPS2, tremor_rad_s=TREMOR_RAD_S) if tremble else scene.hand
+    habits = scene.habits
+    if tremble:
+        habits = replace(habits, tremor_mps2=TREMOR_MPS2, tremor_rad_s=TREMOR_RAD_S)
     of_sensor, of_motion, of_hand, of_tremor, of_noise = np.random.default_rng(seed).spawn(5)
     per_sample = max(round(TRUTH_HZ / rate_hz), 1)
     step_s = 1.0 / (rate_hz * per_sample)
@@ -115,10 +117,10 @@ def hand_scenario(
     t = step_s * np.arange(0.5, n)
     omega, moving = scene.motion(t, of_motion)
     holding = np.where(t >= FLAT_S, 1.0 - moving, 0.0)
-    a = hand.acceleration(omega, moving, holding, step_s, of_hand)
-    omega = omega + hand.tremor(holding, step_s, of_tremor)
+    a = acceleration(habits, omega, moving, holding, step_s, of_hand)
+    omega = omega + tremor(habits, holding, step_s, of_tremor)
     tilt = np.append(np.radians(of_motion.uniform(-2.0, 2.0, 2)), 0.0)
-    R = attitude(omega, step_s, rotation(tilt))
+    R = attitude(omega, step_s, -tilt)
     s = GRAVITY_MPS2 * 0.5 * (R[:-1, :, 2] + R[1:, :, 2])
     # a DLPF reports the mean over a sample
     omega, s, a = (_means(x, per_sample) for x in (omega, s, _delayed(s + a, t, delay_s) - s))

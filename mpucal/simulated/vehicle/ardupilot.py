@@ -57,7 +57,7 @@ class ArduPilot(Firmware):
 
     def start(self) -> None:
         """Filters begin anew."""
-        cutoffs = [[float(self.store["INS_ACCEL_FILTER"])], [float(self.store["INS_GYRO_FILTER"])]]
+        cutoffs = (float(self.store["INS_ACCEL_FILTER"]), float(self.store["INS_GYRO_FILTER"]))
         self._low_pass = LowPass(cutoffs, LOOP_HZ)
         self._taken = -1
 

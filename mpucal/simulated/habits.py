@@ -1,0 +1,46 @@
+"""How any simulated hand shakes what it holds: tremor, sway, jerks and the lever to the pivot it turns about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import Vector
+
+SWAY_HZ, TREMOR_HZ = (0.5, 4.0), (2.0, 10.0)
+# peak and duration of a jerk, half a sine
+JERK_MPS2, JERK_S = (2.0, 6.0), (0.06, 0.12)
+
+
+@dataclass(frozen=True)
+class Habits:
+    """A hand's habits.
+
+    Attributes
+    ----------
+    lever_m : least and most distance of the sensor from the pivot.
+    sway_mps2 : rms an axis of its acceleration while it moves, within SWAY_HZ. jerks_per_s : likewise while it moves.
+    tremor_mps2, tremor_rad_s : rms an axis while it holds a pose, within TREMOR_HZ; the acceleration is all, lever
+        included.
+    wobble : rms of the pivot's travel over the distance, of whole recordings.
+    """
+
+    lever_m: tuple[float, float] = (0.15, 0.3)
+    sway_mps2: float = 0.3
+    jerks_per_s: float = 0.3
+    tremor_mps2: float = 0.0
+    tremor_rad_s: float = 0.0
+    wobble: float = 0.0
+
+
+# 1 deg/s over all axes
+TREMBLING = Habits(tremor_mps2=0.1, tremor_rad_s=float(np.radians(1.0) / np.sqrt(3)))
+
+
+def swing(alpha: Vector, omega: Vector, r: Vector, v: Vector | float = 0.0) -> Vector:
+    """What a board that turns by omega, alpha (n, 3) [rad/s, rad/s^2] does to a point r [m] that moves by v [m/s]:
+
+    alpha x r + omega x (omega x r + 2 v), (n, 3) m/s^2 in the body.
+    """
+    return np.asarray(np.cross(alpha, r) + np.cross(omega, np.cross(omega, r) + 2.0 * v))
