@@ -25,11 +25,11 @@ FAR_TOO_FAR = 20.0  # times as far as gravity: no rates in rad/s, but for turns 
 LONGEST_MOVE_S = 20.0  # over which a gyroscope still says where gravity went
 
 
-class Rests(NamedTuple):
-    """How well the calibrated rests agree with gravity and, by the gyroscope, with each other.
+class Agreement(NamedTuple):
+    """How well the calibrated static intervals agree with gravity and, by the gyroscope, with each other.
 
-    magnitude_rms : m/s^2, of |a| - g. miss_median, miss_max : rad, of gravity carried from rest to rest; NaN where
-        no two rests are near enough in time.
+    magnitude_rms : m/s^2, of |a| - g. miss_median, miss_max : rad, of gravity carried from one to the next; NaN where
+        no two are near enough in time.
     """
 
     number: int
@@ -126,8 +126,8 @@ class Evidence:
         return likeliest_change(self.recording, self.flat, self.fit, self.gravity)
 
     @cached_property
-    def rests(self) -> Rests | None:
-        """The rests, three or more, under the fit."""
+    def agreement(self) -> Agreement | None:
+        """Of the static intervals, three or more, under the fit."""
         fit, flat, r = self.fit, self.flat, self.recording
         if fit is None or flat is None or self.calibrated is None:
             return None
@@ -146,7 +146,7 @@ class Evidence:
             cosine = _units(carried[None])[0] @ _units(poses[k + 1][None])[0]
             misses.append(float(np.arccos(np.clip(cosine, -1.0, 1.0))))
         magnitude = np.linalg.norm(poses, axis=1) - self.gravity
-        return Rests(len(runs), float(np.sqrt(np.mean(magnitude**2))), *_median_and_max(misses))
+        return Agreement(len(runs), float(np.sqrt(np.mean(magnitude**2))), *_median_and_max(misses))
 
 
 def _median_and_max(values: list[float]) -> tuple[float, float]:

@@ -1,12 +1,13 @@
-"""The estimator for a sensor that was tilted and never turned over: the hand's model with what is known beforehand.
+"""The estimator for a board that cannot be turned upside down: the hand's model with priors from the data sheet.
 
-Near level, gains and biases of the vertical look alike. So every parameter begins with its data sheet's tolerance, and
-those that the tilts leave there are named: they are not estimates, and nobody should claim them.
+Near level, the scale factor and the bias of the vertical axis look alike. So every parameter has its data sheet's
+tolerance as prior, and those that the tilts do not observe keep it and are named (`Fit.at_prior`): no claim is made.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import compress
 
 import numpy as np
 
@@ -24,12 +25,13 @@ from .prior import Prior, prior_of
 from .problem import Problem
 from .theta import Theta
 
-# PS-MPU-6000A r3.4, section 6.2: +-3 % of gain, +-2 % across axes; a breakout sits askew by some degrees.
-GAIN_SD, LEAN_SD, BIAS_SD_MPS2 = 0.02, 0.025, 0.5
+# PS-MPU-6000A r3.4, section 6.2: +-3 % of scale factor, +-2 % across axes; a breakout is mounted askew by some degrees.
+SCALE_FACTOR_SD, CROSS_AXIS_SD, BIAS_SD_MPS2 = 0.02, 0.025, 0.5
+D_SD = np.where(np.eye(3) > 0, SCALE_FACTOR_SD, CROSS_AXIS_SD).ravel()
 # as far as tilts may be asked for, and a little more
 CONE_RAD = np.deg2rad(35.0)
 ROUNDS = 2
-# Small angles tell a gain from a bias by second-order effects, which no noise model knows to the last bit.
+# Small angles tell a scale factor from a bias by second-order effects, which no noise model knows to the last bit.
 HONEST = 2.5
 
 
@@ -57,13 +59,11 @@ def _white(prepared: Preprocessed, sigma: float) -> Problem:
 
 
 def _prior(flat: Flat) -> Prior:
-    sd = np.where(np.eye(3) > 0, GAIN_SD, LEAN_SD).ravel()
-    return prior_of(flat, D=(np.eye(3).ravel(), sd), b_a=(0.0, BIAS_SD_MPS2))
+    return prior_of(flat, D=(np.eye(3).ravel(), D_SD), b_a=(0.0, BIAS_SD_MPS2))
 
 
 def _as_fit(minimum: Minimum) -> Fit:
     covariance = HONEST**2 * minimum.covariance()
-    before = np.concatenate([np.where(np.eye(3) > 0, GAIN_SD, LEAN_SD).ravel(), np.full(3, BIAS_SD_MPS2)])
     sd = np.sqrt(np.maximum(np.diag(covariance)[:12], 0.0))
-    left = tuple(name for name, open_ in zip(D_NAMES + B_A_NAMES, sd > KNOWN * before, strict=True) if open_)
-    return minimum.as_fit((*left, *at_prior(covariance)), spread=HONEST)
+    left = sd > KNOWN * np.append(D_SD, np.full(3, BIAS_SD_MPS2))
+    return minimum.as_fit((*compress(D_NAMES + B_A_NAMES, left), *at_prior(covariance)), spread=HONEST)

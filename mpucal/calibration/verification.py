@@ -1,7 +1,8 @@
-"""Rests that a fit has not seen, against what its covariance promises of them. Knows no session.
+"""Orientations that a fit has not seen, against what its covariance predicts of them.
 
-Two things can be wrong with a calibrated rest: its magnitude, which must be g, and its direction, which must be that of
-the rest before it, as the gyroscope carries it there.
+Two things can be wrong where the board was held still: the calibrated magnitude, which must be g, and the direction,
+which must be that of the orientation before, as the gyroscope carries it there. Both errors are compared with their
+predicted standard deviations (1 sigma).
 """
 
 from __future__ import annotations
@@ -16,11 +17,12 @@ from ..data import Recording, Vector
 from .fit import Fit
 from .flat_segment import Flat
 from .gyro_drift import without_drift
-from .parameters import B_A_NAMES, D_NAMES, K_NAMES
+from .parameters import B_A_NAMES, D_NAMES, K_NAMES, Form
 from .rotation import product, rotation
 from .static_intervals import static_intervals
+from .theta import UPPER, from_elements
 
-# What nobody promises: a mounting is not stiffer, and the gyroscope's bias wanders while the board is turned.
+# What no covariance holds: a mounting is not stiffer, and the gyroscope's bias wanders while the board is turned.
 FLOOR_MPS2, FLOOR_RAD, BIAS_RAD_S = 0.003, math.radians(0.05), math.radians(0.02)
 # Beyond so many standard deviations chance is no excuse.
 MOST_STD = 4.0
@@ -28,13 +30,13 @@ LEAST_REST_S, BLOCK_S = 0.75, 0.25
 
 
 @dataclass(frozen=True)
-class Rest:
-    """One rest that the fit has not seen.
+class NewOrientation:
+    """One orientation that the fit has not seen; `_std` are predicted standard deviations.
 
     Attributes
     ----------
-    down : (3,) unit, what pointed down, calibrated. magnitude, magnitude_std : |a| - g and its promise [m/s^2].
-    direction, direction_std : angle of gravity carried here to gravity here, and its promise [rad].
+    down : (3,) unit, what pointed down, calibrated. magnitude, magnitude_std : |a| - g [m/s^2].
+    direction, direction_std : angle of gravity carried here to gravity here [rad].
     turn : (3,) rad, how the board turned on its way here, in its own axes. miss : (3,) rad, that angle about its axis.
     clipped : the gyroscope was at the end of its range on that way: it says nothing of the direction.
     """
@@ -50,17 +52,17 @@ class Rest:
 
     @property
     def magnitude_agrees(self) -> bool:
-        """|a| is g as far as promised."""
+        """|a| is g as far as predicted."""
         return abs(self.magnitude) <= MOST_STD * self.magnitude_std
 
     @property
     def direction_agrees(self) -> bool:
-        """Gravity is where it was carried, as far as promised."""
+        """Gravity is where it was carried, as far as predicted."""
         return self.clipped or self.direction <= MOST_STD * self.direction_std
 
 
-def unseen_rests(recording: Recording, flat: Flat, fit: Fit, gravity: float, since: int) -> list[Rest]:
-    """What the rests that begin after sample `since` say of `fit`, one after the other."""
+def new_orientations(recording: Recording, flat: Flat, fit: Fit, gravity: float, since: int) -> list[NewOrientation]:
+    """What the still intervals that begin after sample `since` say of `fit`, one after the other."""
     runs = static_intervals(recording, flat)
     recording = without_drift(recording, flat, runs)
     long = [(a, b) for a, b in runs.tolist() if b - a >= LEAST_REST_S * recording.rate_hz]
@@ -71,7 +73,7 @@ def unseen_rests(recording: Recording, flat: Flat, fit: Fit, gravity: float, sin
 
 
 class _Move:
-    """From one rest to the next: their means, and the gyroscope's steps between them."""
+    """From one still interval to the next: their means, and the gyroscope's steps between them."""
 
     def __init__(self, recording: Recording, flat: Flat, start: tuple[int, int], end: tuple[int, int]) -> None:
         (a, b), (c, d) = start, end
@@ -84,7 +86,7 @@ class _Move:
         noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
         self.gyro_var = 2.0 * noise
 
-    def judged_by(self, fit: Fit, gravity: float) -> Rest:
+    def judged_by(self, fit: Fit, gravity: float) -> NewOrientation:
         """What its end says of a fit."""
         theta, covariance = _theta(fit)
         s, miss = self._end(theta), self._miss(theta)
@@ -94,7 +96,7 @@ class _Move:
         length_var = float((of_length @ covariance @ of_length.T).item() + along**2 @ self.y_var)
         miss_var = float(np.trace(of_miss @ covariance @ of_miss.T)) + self.gyro_var
         miss_var += float(self.y_var.sum() + self.z_var.sum()) / gravity**2
-        return Rest(
+        return NewOrientation(
             down=-_unit(s),
             magnitude=float(np.linalg.norm(s) - gravity),
             magnitude_std=math.hypot(math.sqrt(length_var), FLOOR_MPS2),
@@ -106,12 +108,12 @@ class _Move:
         )
 
     def _end(self, theta: Vector) -> Vector:
-        """(3,) m/s^2, the rest at its end by theta."""
+        """(3,) m/s^2, the calibrated mean at its end."""
         return _calibrated(theta, self.y)
 
     def _miss(self, theta: Vector) -> Vector:
         """(3,) sine of the angle between gravity carried to its end and gravity there, along the axis of that angle."""
-        turns = rotation(-(self.steps @ _symmetric(theta[12:18]).T))
+        turns = rotation(-(self.steps @ from_elements(Form.SYMMETRIC, theta[12:18]).T))
         return np.cross(_unit(product(turns) @ _calibrated(theta, self.z)), _unit(self._end(theta)))
 
 
@@ -127,27 +129,21 @@ def _theta(fit: Fit) -> tuple[Vector, Vector]:
     known = [i for i, name in enumerate(names) if name in place]
     at = [place[names[i]] for i in known]
     covariance[np.ix_(known, known)] = fit.covariance[np.ix_(at, at)]
-    return np.concatenate([fit.D.ravel(), fit.b_a, fit.K[np.triu_indices(3)]]), covariance
+    return np.concatenate([fit.D.ravel(), fit.b_a, fit.K[UPPER]]), covariance
 
 
 def _slope(function: Callable[[Vector], Vector], theta: Vector) -> Vector:
-    """(m, 18) derivatives by central differences: a promise needs no more digits."""
+    """(m, 18) derivatives by central differences: a prediction needs no more digits."""
     h = 1e-5
     steps = h * np.eye(len(theta))
     return np.stack([(function(theta + step) - function(theta - step)) / (2.0 * h) for step in steps], axis=1)
 
 
 def _mean(part: Vector, rate_hz: float) -> tuple[Vector, Vector]:
-    """(3,) mean of a rest, and its variance by the spread of shorter means: a tremor is not white."""
+    """(3,) mean of a still interval, and its variance by the spread of shorter means: a tremor is not white."""
     n = max(round(BLOCK_S * rate_hz), 1)
     blocks = part[: len(part) // n * n].reshape(-1, n, 3).mean(1)
     return part.mean(0), blocks.var(0, ddof=1) / len(blocks)
-
-
-def _symmetric(six: Vector) -> Vector:
-    K = np.zeros((3, 3))
-    K[np.triu_indices(3)] = six
-    return np.asarray(K + np.triu(K, 1).T)
 
 
 def _unit(v: Vector) -> Vector:

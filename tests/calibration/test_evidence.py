@@ -43,7 +43,7 @@ def test_calibrated_at_the_truth_the_recording_is_gravity_and_noise(ideal):
 
 
 def test_the_rests_of_a_hand_agree_at_the_truth(in_hand):
-    rests = evidence(in_hand.recording, exact_fit(in_hand.truth)).rests
+    rests = evidence(in_hand.recording, exact_fit(in_hand.truth)).agreement
     assert rests.number >= 12
     assert rests.magnitude_rms < 0.01
     assert rests.miss_median < np.deg2rad(0.2)
@@ -61,20 +61,20 @@ def test_the_rests_of_a_hand_agree_at_the_truth(in_hand):
 )
 def test_away_from_the_truth_they_disagree(in_hand, change, grows):
     truth = in_hand.truth
-    right = evidence(in_hand.recording, exact_fit(truth)).rests
-    wrong = evidence(in_hand.recording, exact_fit(replace(truth, **change(truth)))).rests
+    right = evidence(in_hand.recording, exact_fit(truth)).agreement
+    wrong = evidence(in_hand.recording, exact_fit(replace(truth, **change(truth)))).agreement
     assert getattr(wrong, grows) > 5.0 * getattr(right, grows)
 
 
 def test_a_wrong_gain_of_two_percent_is_measured_as_such(in_hand):
     truth = in_hand.truth
-    rests = evidence(in_hand.recording, exact_fit(replace(truth, D=truth.D * 1.02))).rests
+    rests = evidence(in_hand.recording, exact_fit(replace(truth, D=truth.D * 1.02))).agreement
     assert rests.magnitude_rms == pytest.approx(G * 0.02 / 1.02, rel=0.1)
 
 
 def test_without_rests_there_is_nothing_to_compare(hand):
     simulated = hand(0, "continuous")
-    assert evidence(simulated.recording, exact_fit(simulated.truth)).rests is None
+    assert evidence(simulated.recording, exact_fit(simulated.truth)).agreement is None
 
 
 @pytest.mark.parametrize("broken", [{"D": np.zeros((3, 3))}, {"D": np.full((3, 3), np.nan)}], ids=["singular", "nan"])
@@ -83,7 +83,7 @@ def test_a_fit_without_a_usable_matrix_is_sure_of_nothing(in_hand, broken):
     seen = evidence(in_hand.recording, fit)
     assert seen.sure is None
     assert seen.calibrated is None
-    assert seen.rests is None
+    assert seen.agreement is None
 
 
 def test_how_far_gravity_moved(ideal):

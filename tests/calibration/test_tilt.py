@@ -8,7 +8,7 @@ import pytest
 from mpucal.calibration.flat_segment import find_flat, flat_statistics
 from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.calibration.rotation import rotation
-from mpucal.calibration.tilt import BIAS_SD_MPS2, CONE_RAD, GAIN_SD, LEAN_SD, fit_tilt, tilted_directions
+from mpucal.calibration.tilt import BIAS_SD_MPS2, CONE_RAD, CROSS_AXIS_SD, SCALE_FACTOR_SD, fit_tilt, tilted_directions
 from mpucal.data import Recording
 
 GRAVITY_MPS2 = 9.80665
@@ -75,7 +75,7 @@ def test_what_tilts_do_not_show_is_named_and_no_better_known_than_before(found):
     # near level a gain of the vertical looks like its bias, and those of the others are cosines
     left = {name for name in fit.at_prior if name in D_NAMES + B_A_NAMES}
     assert left == {"D_xx", "D_yy", "D_zz", "b_a_z"}
-    assert fit.std("D_zz")[0] > GAIN_SD
+    assert fit.std("D_zz")[0] > SCALE_FACTOR_SD
     assert fit.std("b_a_x")[0] < 0.1 * BIAS_SD_MPS2
 
 
@@ -83,7 +83,7 @@ def test_nothing_is_claimed_beyond_the_data_sheet_of_a_board_that_lay_still():
     recording = tilted(1)[0].part(0, 1200)
     fit = fitted(recording)
     assert set(D_NAMES) <= set(fit.at_prior)
-    np.testing.assert_allclose(fit.D, np.eye(3), atol=3.0 * max(GAIN_SD, LEAN_SD))
+    np.testing.assert_allclose(fit.D, np.eye(3), atol=3.0 * max(SCALE_FACTOR_SD, CROSS_AXIS_SD))
     assert np.abs(fit.b_a).max() < 3.0 * BIAS_SD_MPS2
 
 

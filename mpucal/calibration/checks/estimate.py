@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...reasons import Reason, reason
-from ..evidence import Evidence, Rests
+from ..evidence import Agreement, Evidence
 from ..tilt import CONE_RAD
 
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.1, 0.4
@@ -58,9 +58,9 @@ def inconsistent(e: Evidence) -> Reason | None:
     if e.model != "hand" and e.fit.nis > CONSISTENT_NIS:
         after = float(np.median(np.linalg.norm(e.calibrated, axis=1))) if e.calibrated is not None else np.nan
         return reason("inconsistent", "innovations", not abs(after / e.gravity - 1.0) < 0.05, nis=e.fit.nis)
-    if e.rests is None:
+    if e.agreement is None:
         return None
-    magnitude, miss = e.rests.magnitude_rms, e.rests.miss_median
+    magnitude, miss = e.agreement.magnitude_rms, e.agreement.miss_median
     too_long = magnitude > max(RESTS_MPS2, HONEST_FACTOR * e.sure.magnitude_mps2)
     too_far = miss > max(RESTS_RAD, HONEST_FACTOR * e.sure.direction_rad)
     if not (too_long or too_far):
@@ -81,7 +81,7 @@ def changed_midway(e: Evidence) -> Reason | None:
     r = e.recording
     if r.gyr_clipped.any() or r.acc_clipped.any() or r.gap.any() or e.change is None:
         return None
-    if e.change.rests_often and _agree(e.rests):
+    if e.change.rests_often and _agree(e.agreement):
         return None
     limit = STEADY_BY_RESTS if e.change.rests_often else STEADY
     if e.change.significance <= limit:
@@ -90,5 +90,5 @@ def changed_midway(e: Evidence) -> Reason | None:
     return reason("inconsistent", "change", by_far, seconds=e.change.t_s - r.t[0])
 
 
-def _agree(rests: Rests | None) -> bool:
-    return rests is not None and rests.magnitude_rms < AGREE_MPS2 and rests.miss_median < AGREE_RAD
+def _agree(found: Agreement | None) -> bool:
+    return found is not None and found.magnitude_rms < AGREE_MPS2 and found.miss_median < AGREE_RAD

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...calibration.verification import Rest
+from ...calibration.verification import NewOrientation
 from ...data import Recording
 from ...reasons import Reason, reason
 from ..events import Checked, Direction, Verification
@@ -16,7 +16,7 @@ WARMER_C = 8.0
 MUCH_CLIPPED = 0.002
 
 
-def judged(rests: list[Rest], of: int, recording: Recording, contradiction: Reason | None) -> Checked:
+def judged(rests: list[NewOrientation], of: int, recording: Recording, contradiction: Reason | None) -> Checked:
     """All of them, and what is wrong, if anything is.
 
     contradiction : what the pauses of the turning say against each other; None where they agree.
@@ -26,7 +26,9 @@ def judged(rests: list[Rest], of: int, recording: Recording, contradiction: Reas
     return Checked(found, against is None, against)
 
 
-def _against(rests: list[Rest], agree: bool, recording: Recording, contradiction: Reason | None) -> Reason | None:
+def _against(
+    rests: list[NewOrientation], agree: bool, recording: Recording, contradiction: Reason | None
+) -> Reason | None:
     """The reason that explains most of what is wrong."""
     warmer = _warmer_c(recording)
     if abs(warmer) > WARMER_C:
@@ -54,7 +56,7 @@ def much_clipped(recording: Recording) -> bool:
     return bool(recording.gyr_clipped.mean() > MUCH_CLIPPED)
 
 
-def _why(rests: list[Rest], recording: Recording) -> Reason:
+def _why(rests: list[NewOrientation], recording: Recording) -> Reason:
     """What is most likely wrong with a sensor whose new orientations disagree."""
     lengths = [rest for rest in rests if not rest.magnitude_agrees]
     turns = [rest for rest in rests if not rest.direction_agrees]
@@ -71,7 +73,7 @@ def _why(rests: list[Rest], recording: Recording) -> Reason:
     return reason("verification_failed", "magnitude", error=worst.magnitude, knock=knock, std=worst.magnitude_std)
 
 
-def _scale_off(rests: list[Rest]) -> tuple[str, float] | None:
+def _scale_off(rests: list[NewOrientation]) -> tuple[str, float] | None:
     """The axis, and by which share every turn about it is wrong; None where the turns do not agree on one."""
     long = [rest for rest in rests if np.linalg.norm(rest.turn) > LEAST_TURN_RAD]
     if len(long) < 2:
@@ -92,13 +94,13 @@ def _warmer_c(recording: Recording) -> float:
     return float(np.median(known[-n:]) - np.median(known[:n])) if len(known) > n else 0.0
 
 
-def _found(rest: Rest, number: int, of: int, t_s: float) -> Verification:
+def _found(rest: NewOrientation, number: int, of: int, t_s: float) -> Verification:
     agrees = rest.magnitude_agrees and rest.direction_agrees
     x, y, z = rest.down.tolist()
     down: Direction = (x, y, z)
     text = (
-        f"new orientation {number} of {of}: |a| off by {rest.magnitude:+.3f} m/s² (promised {rest.magnitude_std:.3f}),"
-        f" direction by {np.rad2deg(rest.direction):.2f} deg (promised {np.rad2deg(rest.direction_std):.2f})"
+        f"new orientation {number} of {of}: |a| error {rest.magnitude:+.3f} m/s² (1 sigma {rest.magnitude_std:.3f}),"
+        f" direction error {np.rad2deg(rest.direction):.2f} deg (1 sigma {np.rad2deg(rest.direction_std):.2f})"
     )
     return Verification(
         t_s,

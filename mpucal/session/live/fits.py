@@ -14,7 +14,7 @@ from ...calibration.interim import InterimEstimate, interim_estimate
 from ...calibration.masks import with_masks
 from ...calibration.next_orientation import next_orientation
 from ...calibration.quality import verdict
-from ...calibration.verification import unseen_rests
+from ...calibration.verification import new_orientations
 from ...data import Recording, Samples, Sensor
 from ...reasons import KINDS, Reason, reason
 from ..aims import AIMS, directions
@@ -102,7 +102,7 @@ class Fits:
         if evidence is None or evidence.fit is None or evidence.flat is None:
             return Checked((), False, reason("verification_failed", "nothing"))
         recording: Recording = with_masks(self._store.recording())
-        rests = unseen_rests(recording, evidence.flat, evidence.fit, self._plan.gravity, self._since)
+        rests = new_orientations(recording, evidence.flat, evidence.fit, self._plan.gravity, self._since)
         contradiction = next((against for against in found(evidence) if against.code == CONTRADICTION), None)
         return judged(rests[:of], of, recording, contradiction)
 

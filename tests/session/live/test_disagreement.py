@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpucal.calibration.verification import Rest
+from mpucal.calibration.verification import NewOrientation
 from mpucal.data import Recording
 from mpucal.reasons import Reason
 from mpucal.result.calibration import Calibration
@@ -14,7 +14,7 @@ from mpucal.session.live.verdict import verified
 
 def rest(magnitude=0.0, direction=0.0, turn=(1.2, 0.0, 0.0), miss=(0.0, 0.0, 0.0), clipped=False):
     down = np.array([0.0, 0.6, -0.8])
-    return Rest(down, magnitude, 0.005, direction, np.radians(0.1), np.array(turn), np.array(miss), clipped)
+    return NewOrientation(down, magnitude, 0.005, direction, np.radians(0.1), np.array(turn), np.array(miss), clipped)
 
 
 def recording(warmer_c=0.0, acc_clipped=0, gyr_clipped=0):
