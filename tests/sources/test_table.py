@@ -2,13 +2,14 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pkgutil import resolve_name
 
 import pytest
 
 from mpucal.errors import CaptureError, UsageError
 from mpucal.session.plan import Plan
-from mpucal.sources.kind import Delivers
+from mpucal.sources.kind import Delivers, Option
 from mpucal.sources.opening import check_source, open_again
 from mpucal.sources.table import SOURCES, kinds_meant, source_title, used_by
 
@@ -92,3 +93,27 @@ def test_no_library_of_a_source_is_loaded_before_it_is_opened():
     )
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"
+
+
+@pytest.fixture
+def added():
+    """Adds rows to the table for the length of a test."""
+    before = list(SOURCES)
+    yield SOURCES.append
+    SOURCES[:] = before
+
+
+def test_kinds_of_source_share_an_option(added):
+    """One is meant by a word of its value, another by an option beside it; whatever the order of the rows."""
+    beside = Option("pins")
+    by_word = replace(SOURCES[0], what="an adapter", word="ftdi", forms="ftdi://... for an adapter")
+    by_option = replace(SOURCES[2], what="a board without firmware", options=(beside,), beside="pins")
+    added(by_word)
+    added(by_option)
+    assert kinds_meant({"bus": "ftdi://1", "pins": None}) == [by_word]
+    assert kinds_meant({"bus": "/dev/i2c-1", "pins": None}) == [SOURCES[0]]
+    assert kinds_meant({"serial": "x", "pins": "4,5"}) == [by_option]
+    assert kinds_meant({"serial": "x", "pins": None}) == [SOURCES[2]]
+    assert by_option.spelled == "--serial --pins"
+    with pytest.raises(UsageError, match="--pins was given beside --bus ftdi, which has none"):
+        check_source({"bus": "ftdi://1", "pins": "4,5"}, {"pins": "--pins"}, "session")

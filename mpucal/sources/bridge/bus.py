@@ -1,4 +1,4 @@
-"""A chip behind a serial bridge, as a bus. Knows of the chip what makes its FIFO run, and no frame's meaning.
+"""A chip behind a serial bridge, as a bus.
 
 What the bridge pushes is read-ahead below the bus: FIFO_COUNT and FIFO_R_W are answered from it, each count with
 the time at which the bridge read it, and what was lost on the way shows as an overflow in INT_STATUS. Nothing is

@@ -1,4 +1,4 @@
-"""The bridge's microsecond clock, unwrapped and seen from the host. Knows no message and reads no clock itself."""
+"""The bridge's microsecond clock, unwrapped and seen from the host."""
 
 from __future__ import annotations
 

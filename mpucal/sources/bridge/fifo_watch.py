@@ -1,4 +1,4 @@
-"""What register writes tell about the chip's FIFO: does it run, and will somebody drain it. Writes none itself.
+"""What register writes tell about the chip's FIFO: does it run, and will somebody drain it.
 
 Source: RM-MPU-6000A r4.2, registers 35, 104, 106, 107 and 116.
 """

@@ -1,4 +1,4 @@
-"""Frames of the serial bridge: COBS, CRC-16 and a zero between them. Knows no message and no port.
+"""Frames of the serial bridge: COBS, CRC-16 and a zero between them.
 
 See firmware_protocol.md, "Framing".
 """

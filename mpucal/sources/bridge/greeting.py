@@ -1,4 +1,4 @@
-"""What is heard on a port while nobody answers HELLO, and what that means. Reads no port."""
+"""What is heard on a port while nobody answers HELLO, and what that means."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Requests to a bridge and the replies to them: sequence numbers, timeouts, repeats, the first hello.
 
-Knows no register's meaning. See firmware_protocol.md, "Sequence numbers" and "Timing".
+See firmware_protocol.md, "Sequence numbers" and "Timing".
 """
 
 from __future__ import annotations

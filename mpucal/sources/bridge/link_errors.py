@@ -1,4 +1,4 @@
-"""What a bridge can answer instead of what it was asked for, as (what, remedy). Talks to none."""
+"""What a bridge can answer instead of what it was asked for, as (what, remedy)."""
 
 from __future__ import annotations
 

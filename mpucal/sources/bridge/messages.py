@@ -1,4 +1,4 @@
-"""Messages of the serial bridge: payloads to values and back. Knows no frame's bytes and no port.
+"""Messages of the serial bridge: payloads to values and back.
 
 See firmware_protocol.md, "Messages"; each class is the table of its name there.
 """

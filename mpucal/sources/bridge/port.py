@@ -1,4 +1,4 @@
-"""A serial port on pyserial, read by a thread of its own. Knows no frame.
+"""A serial port on pyserial, read by a thread of its own.
 
 The thread takes bytes as they come, so that a host that computes for a while loses none.
 """

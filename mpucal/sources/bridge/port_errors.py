@@ -1,4 +1,4 @@
-"""What can go wrong with a serial port, as sentences. Opens none."""
+"""What can go wrong with a serial port, as sentences."""
 
 from __future__ import annotations
 

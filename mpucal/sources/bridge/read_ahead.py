@@ -1,4 +1,4 @@
-"""What a bridge has pushed, as the FIFO that the driver reads. Knows no port and asks for nothing.
+"""What a bridge has pushed, as the FIFO that the driver reads.
 
 See firmware_protocol.md, "FRAMES": a look is one reading of FIFO_COUNT and all frames counted then.
 """

@@ -1,4 +1,4 @@
-"""The config blob that a bridge keeps: read it, replace it, ask whether it is valid. Knows no calibration."""
+"""The config blob that a bridge keeps: read it, replace it, ask whether it is valid."""
 
 from __future__ import annotations
 

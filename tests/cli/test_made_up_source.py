@@ -1,0 +1,125 @@
+"""A source that is one module and one row is known to every command that takes a source."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpucal.chip.records import SessionEvent
+from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.result.calibration import Calibration
+
+PROGRAM = Path(__file__).with_name("turntable.py")
+TURNTABLE = ("--turntable", "round", "--arm-length", "0.25")
+COMMANDS = ("session", "record", "stream", "write", "show", "doctor")
+
+
+def call(folder, *words):
+    """The command line of a program that has the row of the turntable, too."""
+    return subprocess.run(
+        [sys.executable, PROGRAM, *map(str, words)], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """A folder in which a session on the turntable has left its results."""
+    folder = tmp_path_factory.mktemp("turntable")
+    done = call(folder, "session", *TURNTABLE, "--rate", "100", "-o", "board", "--yes")
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_a_session_runs_on_it_and_its_capture_names_it(measured):
+    assert Calibration.load(measured / "board" / "calibration.json").quality["verdict"] == "good"
+    meta = read_capture(measured / "board" / "capture.mcap").meta
+    assert meta["source"] == {"turntable": "round", "arm_length": 0.25}
+    assert meta["plan"]["config"]["rate_hz"] == 100
+
+
+def test_the_session_is_replayed(measured, tmp_path):
+    done = call(tmp_path, "session", "--replay", measured / "board" / "capture.mcap", "-o", "again", "--yes")
+    assert done.returncode == 0, done.stderr
+    found = [Calibration.load(folder / "calibration.json").D for folder in (measured / "board", tmp_path / "again")]
+    assert np.array_equal(*found)
+
+
+def test_a_session_that_broke_off_goes_on_with_it(measured, tmp_path):
+    whole = read_capture(measured / "board" / "capture.mcap")
+    (tmp_path / "board").mkdir()
+    with CaptureWriter(tmp_path / "board" / "capture.mcap") as writer:
+        writer.start(whole.meta)
+        for record in whole.records[: len(whole.records) // 4]:
+            if isinstance(record, SessionEvent):
+                writer.event(record.name, record.t_ns, record.data)
+            else:
+                writer.transaction(record)
+    done = call(tmp_path, "session", "--resume", "board", "--yes")
+    assert done.returncode == 0, done.stderr
+    assert read_capture(tmp_path / "board" / "capture-2.mcap").meta["source"] == whole.meta["source"]
+
+
+def test_it_is_recorded(tmp_path):
+    done = call(tmp_path, "record", *TURNTABLE, "--seconds", "3", "-o", "walk.mcap")
+    assert done.returncode == 0, done.stderr
+    assert call(tmp_path, "show", "walk.mcap").stdout.startswith("walk.mcap: a recording.")
+
+
+def test_it_streams(measured, tmp_path):
+    calibration = measured / "board" / "calibration.json"
+    done = call(tmp_path, "stream", *TURNTABLE, "--apply", calibration, "--seconds", "2", "--json")
+    assert done.returncode == 0, done.stderr
+    at_rest = np.array([json.loads(line)["a"] for line in done.stdout.splitlines()])
+    assert np.linalg.norm(at_rest.mean(axis=0)) == pytest.approx(9.80665, abs=0.03)
+
+
+def test_its_chip_is_shown_and_written_to(measured, tmp_path):
+    shown = json.loads(call(tmp_path, "show", *TURNTABLE, "--json").stdout)
+    assert (shown["where"], shown["chip"]) == ("the chip on round", "MPU-6050")
+    written = call(tmp_path, "write", measured / "board" / "calibration.json", "chip", *TURNTABLE, "-o", ".", "--json")
+    assert written.returncode == 0, written.stderr
+    assert json.loads(written.stdout)["written"][0]["where"] == "the chip on round"
+
+
+def test_the_doctor_examines_it(tmp_path):
+    page = json.loads(call(tmp_path, "doctor", *TURNTABLE, "--seconds", "2", "--json").stdout)
+    assert page["source"] == "round"
+    assert {"chip", "self test"} <= {finding["topic"] for finding in page["findings"]}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_names_it(tmp_path, command):
+    said = " ".join(call(tmp_path, command, "--help").stdout.split())
+    assert "--turntable NAME The name of a turntable." in said
+    assert "--arm-length M How far out the chip is [m]." in said
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (["session"], 2, "no source was given: give exactly one of --bus BUS, "),
+        (["session"], 2, " and --turntable NAME."),
+        (["doctor", "--replay", "x.mcap"], 2, "--serial PORT[:BAUD] and --turntable NAME"),
+        (["session", *TURNTABLE, "--bus", "sim"], 2, "--bus and --turntable were given together"),
+        (
+            ["session", "--bus", "sim", "--arm-length", "1"],
+            2,
+            "--arm-length was given beside --bus sim, which has none",
+        ),
+        (["session", *TURNTABLE, "--seed", "1"], 2, "--seed was given beside --turntable, which has none"),
+        (["session", "--replay", "x.mcap", "--arm-length", "1"], 2, "--arm-length was given beside --replay, and the"),
+        (["session", "--resume", "x", *TURNTABLE], 2, "--turntable was given beside --resume"),
+        (["session", *TURNTABLE, "--to", "bridge"], 2, "--turntable has no bridge"),
+        (["show", "x.npz", *TURNTABLE], 2, "a file and --turntable were given together"),
+        (["session", "--turntable", "broken"], 3, "the turntable is broken: mend it."),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_what_is_wrong_is_told_with_its_name(tmp_path, words, code, says):
+    done = call(tmp_path, *words)
+    assert done.returncode == code
+    assert says in done.stderr
+    assert not list(tmp_path.iterdir())

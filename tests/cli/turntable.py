@@ -1,0 +1,39 @@
+"""A made-up source, as a new one would look: a module that opens it, and a row of the table.
+
+Run in place of mpucal, it is the command line with that row: `--turntable NAME` is a chip on a turntable.
+"""
+
+import sys
+
+from mpucal.__main__ import run
+from mpucal.errors import BusError
+from mpucal.simulated.chip import open_simulated
+from mpucal.sources.chip import OpenedChip
+from mpucal.sources.kind import Delivers, Option, SourceKind
+from mpucal.sources.table import OF_A_CHIP, SOURCES
+
+
+def open_turntable(request):
+    if request.value == "broken":
+        raise BusError("the turntable is broken", "mend it")
+    bus = open_simulated("sim:seed=3", request.plan.gravity)
+    return OpenedChip(bus, request.plan, (bus.hear,), words=request.words, real_time=bus.real_time)
+
+
+ROW = SourceKind(
+    what="a chip on a turntable",
+    option=Option("turntable", metavar="NAME"),
+    forms="the name of a turntable",
+    opener="turntable:open_turntable",
+    delivers=Delivers.REGISTERS,
+    options=(Option("arm_length", "How far out the chip is [m].", "M", float),),
+    settings=OF_A_CHIP,
+    title="turntable {}",
+    doctor="mpucal.doctor.sources:examine_chip",
+)
+
+if __name__ == "__main__":
+    # what the row names is this module, and not another copy of it
+    sys.modules["turntable"] = sys.modules["__main__"]
+    SOURCES.append(ROW)
+    sys.exit(run(sys.argv[1:]))

@@ -1,0 +1,21 @@
+"""The page of the sources, made from their table."""
+
+import pytest
+
+from mpucal.sources.table import SOURCES
+
+
+@pytest.fixture
+def made(tool):
+    return tool("make_sources")
+
+
+def test_the_page_is_the_tables(made):
+    assert made.PAGE.read_text(encoding="utf-8") == made.page(), "run tools/make_sources.py"
+
+
+@pytest.mark.parametrize("kind", SOURCES, ids=lambda kind: kind.spelled)
+def test_a_row_says_what_the_table_says(made, kind):
+    (row,) = (line for line in made.page().splitlines() if line.startswith(f"| `{kind.spelled}` |"))
+    assert all(f"`{option.spelled}`" in row for option in (*kind.options, *kind.settings))
+    assert ("`doctor`" in row) == bool(kind.doctor)
