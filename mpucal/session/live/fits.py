@@ -1,4 +1,4 @@
-"""The fits of a session, from the samples so far. Knows no clock, no source and no person."""
+"""The fits of a session, from the samples so far: what is known, a first calibration, and what verifies it."""
 
 from __future__ import annotations
 
