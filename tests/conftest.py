@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
+
+from mpucal.session.threads import ONE_THREAD
+
+os.environ.update(ONE_THREAD)  # as the program does, and before NumPy or SciPy loads
 
 from mpucal.files import open_writer
 from mpucal.files.rows import Rows

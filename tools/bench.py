@@ -19,6 +19,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from mpucal.session.threads import ONE_THREAD
+
+os.environ.update(ONE_THREAD)  # as the program does, and before NumPy or SciPy loads
+
 import numpy as np
 from rich.console import Console
 from rich.table import Table
