@@ -1,0 +1,157 @@
+"""The recipes of CONTRIBUTING.md, followed: the module and the row that stand there, used through the commands."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpucal.result.calibration import Calibration
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+RECIPES = {
+    title: dict(re.findall(r"`(mpucal/[\w/]+\.py)`[^`]*(?:`[^`\n]+`[^`]*)*?:\n\n```python\n(.*?)```", text, re.DOTALL))
+    for title, text in re.findall(r"^### (.+?)\n(.*?)(?=^### |\Z)", PAGE, re.DOTALL | re.MULTILINE)
+}
+
+# what a contributor does by hand: the modules where they are to be, then each row at the end of its table
+PROGRAM = """
+import importlib.util
+import json
+import re
+import sys
+from pathlib import Path
+
+from mpucal.__main__ import run
+
+
+def load(path):
+    name = path.removesuffix(".py").replace("/", ".")
+    spec = importlib.util.spec_from_file_location(name, Path(name.rpartition(".")[2] + ".py"))
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def add(path, row):
+    table = importlib.import_module(path.removesuffix(".py").replace("/", "."))
+    name, made = re.fullmatch(r"(?:(\\w+) = )?(.*)", row.strip(), re.DOTALL).groups()
+    made = eval(made, {**vars(table), **known})
+    known[name] = made
+    if path == "mpucal/sinks/table.py":
+        table.SINKS[made.name] = made
+    elif path == "mpucal/sources/table.py":
+        table.SOURCES.append(made)
+    elif path == "mpucal/export/forms.py":
+        table.FORMS += (made,)
+    elif path == "mpucal/files/formats.py":
+        table.FORMATS += (made,)
+    elif path == "mpucal/chip/families.py":
+        table.FAMILIES += (made,)
+        table.PARTS.update({who_am_i: table.Part(chip, who_am_i, made) for who_am_i, chip in made.parts})
+    elif path == "mpucal/simulated/chip/models.py":
+        table.MODELS[made.name] = made
+    else:
+        raise ValueError(path)
+
+
+blocks = json.loads(Path("recipe.json").read_text())
+known = {Path(path).stem: load(path) for path, text in blocks.items() if text.startswith('\"\"\"')}
+for path, text in blocks.items():
+    if not text.startswith('\"\"\"'):
+        add(path, text)
+sys.exit(run(sys.argv[1:]))
+"""
+
+
+@pytest.fixture
+def follow(tmp_path):
+    """follow(recipe)(words): the command line after the recipe, in a folder with a calibration."""
+    Calibration(np.diag([1.1, 1.0, 0.9]), np.array([0.5, 0.0, -0.5])).save(tmp_path / "c.json")
+
+    def follow(recipe):
+        blocks = RECIPES[recipe]
+        for path, text in blocks.items():
+            if text.startswith('"""'):
+                assert not (ROOT / path).exists()
+                (tmp_path / Path(path).name).write_text(text)
+            else:
+                assert (ROOT / path).exists()
+        (tmp_path / "recipe.json").write_text(json.dumps(blocks))
+        (tmp_path / "program.py").write_text(PROGRAM)
+
+        def call(*words):
+            done = subprocess.run(
+                [sys.executable, "program.py", *words], cwd=tmp_path, capture_output=True, text=True, check=False
+            )
+            assert done.returncode == 0, done.stderr
+            return done.stdout
+
+        return call
+
+    return follow
+
+
+def test_a_sink(follow, tmp_path):
+    call = follow("A sink")
+    assert "notebook.txt has b_a" in call("write", "c.json", "notebook", "--bus", "sim")
+    assert (tmp_path / "notebook.txt").read_text() == "[0.5, 0.0, -0.5] m/s^2\n"
+    assert all("notebook" in call(command, "--help") for command in ("session", "write"))
+
+
+def test_a_source(follow):
+    call = follow("A source")
+    shown = json.loads(call("show", "--shelf", "0x68", "--json"))
+    assert (shown["who_am_i"], shown["chip"]) == (0x68, "MPU-6050")
+    assert all("--shelf WHO_AM_I" in call(command, "--help") for command in ("session", "record", "stream", "write"))
+
+
+def test_an_export_form(follow, tmp_path):
+    call = follow("An export form")
+    call("export", "c.json", "--to", "octave", "-o", "c.m")
+    script = (tmp_path / "c.m").read_text()
+    D, b_a = (re.search(rf"^{name} = \[(.*)\]", script, re.MULTILINE).group(1) for name in ("D", "b_a"))
+    np.testing.assert_array_equal(np.array([row.split() for row in D.split(";")], float), np.diag([1.1, 1.0, 0.9]))
+    assert json.loads(f"[{b_a}]") == [0.5, 0.0, -0.5]
+    assert "octave" in call("export", "--help")
+
+
+def test_a_reader(follow, tmp_path):
+    call = follow("A reader")
+    t = np.arange(400) * 0.01
+    np.savetxt(tmp_path / "walk.words", np.column_stack([t, np.full((400, 3), 5.7), np.zeros((400, 3))]))
+    assert json.loads(call("show", "walk.words", "--json"))["samples"] == 400
+    assert all("a page of words (.words)" in " ".join(call(name, "--help").split()) for name in ("calibrate", "apply"))
+
+
+def test_a_chip(follow):
+    call = follow("A chip")
+    shown = json.loads(call("show", "--bus", "sim:chip=mpu6555,temperature_c=31,hand=still", "--json"))
+    assert (shown["who_am_i"], shown["chip"]) == (0x7C, "MPU-6555")
+    assert shown["temperature_c"] == pytest.approx(31, abs=0.1)
+
+
+def test_a_parameter_of_the_model(tmp_path):
+    """The table with the row, run as CMake does it, and its header compiled."""
+    ((path, row),) = RECIPES["A parameter of the model"].items()
+    source = (ROOT / path).read_text(encoding="utf-8")
+    table = re.search(r"^TABLE = \(\n.*?^\)\n", source, re.DOTALL | re.MULTILINE).group()
+    longer = table.removesuffix(")\n") + f"    {row.strip()},\n)\n"
+    (tmp_path / "parameters.py").write_text(source.replace(table, longer))
+    names = "import parameters as p; print(p.NAMES[p.PLACES['s']], p.lanes_used('hand'), len(p.NAMES) == p.HAND)"
+    done = subprocess.run([sys.executable, "-c", names], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout == "('s_x', 's_y', 's_z') 30 True\n"
+    subprocess.run([sys.executable, "parameters.py", "parameters.hpp"], cwd=tmp_path, check=True)
+    header = (tmp_path / "parameters.hpp").read_text()
+    assert re.search(r"struct HandParameters : Parameters \{[^}]*double s\[3\];", header)
+    if shutil.which("g++") is None:
+        pytest.skip("needs g++")
+    (tmp_path / "uses.cpp").write_text(
+        '#include "parameters.hpp"\nstatic_assert(mpucal::Lanes::s == 27 && mpucal::LanesUsed::hand == 30);\n'
+    )
+    subprocess.run(["g++", "-std=c++17", "-fsyntax-only", "uses.cpp"], cwd=tmp_path, check=True)
