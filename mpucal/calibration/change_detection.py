@@ -6,7 +6,7 @@ parts of the recording then pull it to different sides.
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from .likelihood import evaluate
 from .parameters import ACCELEROMETER, HAND
 from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed, preprocess
 from .prior import prior_of
-from .problem import Problem, Series
+from .problem import Problem
 from .theta import Theta, values
 
 TEST_HZ = 25.0
@@ -66,7 +66,7 @@ def likeliest_change(recording: Recording, flat: Flat, fit: Fit, gravity: float)
     changes = []
     for share in SHARES:
         cut = int(share * n)
-        before = evaluate(_first(problem, cut), theta, HAND)
+        before = evaluate(problem.first(cut), theta, HAND)
         of_after, H_after = whole.gradient - before.gradient, whole.fisher - before.fisher
         d, covariance = _newton(H, gradient, H_after[:, ACCELEROMETER], of_after[ACCELEROMETER])
         changes.append(
@@ -91,13 +91,6 @@ def _with_noise(prepared: Preprocessed, theta: Theta) -> Problem:
         return prepared.white(likeliest(prepared.white, WHITE_MPS2, theta), CORRELATION_S)
     sigma = likeliest(lambda sigma: prepared.pivot(sigma, FLOOR_MPS2), PIVOT_MPS2, theta)
     return prepared.pivot(farther(sigma), FLOOR_MPS2)
-
-
-def _first(problem: Problem, n: int) -> Problem:
-    """The problem of the first n samples."""
-    series = problem.series
-    cut = {f.name: x[:n] for f in fields(Series) if (x := getattr(series, f.name)) is not None}
-    return replace(problem, series=replace(series, **cut))
 
 
 def _newton(H: Vector, gradient: Vector, H_after: Vector, gradient_after: Vector) -> tuple[Vector, Vector]:

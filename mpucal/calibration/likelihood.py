@@ -47,11 +47,41 @@ def evaluate(problem: Problem, theta: Theta, parameters: int) -> Evaluation:
         V, squares, gradient, fisher = _hand(problem, theta, derivatives=True)
     else:
         _refuse_a_hand(problem)
-        V, squares, gradient, fisher = _kernel.evaluate(
-            theta.packed(EXACT), problem.constants(), USED[parameters], **problem.series.arrays(SERIES)
-        )
-    lanes = np.array(LANES[:parameters], np.intp)
-    return Evaluation(V, squares, gradient[lanes], fisher[np.ix_(lanes, lanes)])
+        V, squares, gradient, fisher = _exact(problem, theta, parameters)
+    lanes = _lanes(parameters)
+    return Evaluation(V, squares, gradient[0, lanes], fisher[0][np.ix_(lanes, lanes)])
+
+
+class PartScores(NamedTuple):
+    """What each part of a series adds to gradient (k, p) and Fisher matrix (k, p, p), and the flat mean's (p, p)."""
+
+    gradient: Vector
+    fisher: Vector
+    flat: Vector
+
+
+def part_scores(problem: Problem, theta: Theta, parameters: int, ends: NDArray[np.int64]) -> PartScores:
+    """Gradient and Fisher matrix, part by part, with the filter's memory of the parts before; see evaluate.
+
+    The flat segment's mean, by which the filter begins, belongs to no part.
+
+    Parameters
+    ----------
+    ends : (k,) where each part ends, the last one the number of samples; moved on by less than a block of steps.
+    """
+    if parameters == HAND:
+        _, _, gradient, fisher = _hand(problem, theta, derivatives=True, ends=ends)
+    else:
+        _refuse_a_hand(problem)
+        _, _, gradient, fisher = _exact(problem, theta, parameters, ends)
+    begin = evaluate(problem.first(0), theta, parameters)
+    lanes = _lanes(parameters)
+    gradient, fisher = gradient[:, lanes], fisher[:, lanes[:, None], lanes]
+    return PartScores(
+        np.diff(gradient, axis=0, prepend=begin.gradient[None]),
+        np.diff(fisher, axis=0, prepend=begin.fisher[None]),
+        begin.fisher,
+    )
 
 
 def value(problem: Problem, theta: Theta) -> float:
@@ -76,9 +106,23 @@ def trace(problem: Problem, theta: Theta) -> Trace:
     return Trace(*_kernel.trace_hand(theta.packed(TABLE), problem.constants_of_a_hand(), **series))
 
 
-def _hand(problem: Problem, theta: Theta, derivatives: bool) -> tuple[float, float, Vector, Vector]:
+def _exact(
+    problem: Problem, theta: Theta, parameters: int, ends: NDArray[np.int64] | None = None
+) -> tuple[float, float, Vector, Vector]:
+    series = problem.series.arrays(SERIES)
+    return _kernel.evaluate(theta.packed(EXACT), problem.constants(), USED[parameters], **series, ends=ends)
+
+
+def _hand(
+    problem: Problem, theta: Theta, derivatives: bool, ends: NDArray[np.int64] | None = None
+) -> tuple[float, float, Vector, Vector]:
     series = problem.series.arrays(SERIES + SERIES_OF_A_HAND)
-    return _kernel.evaluate_hand(theta.packed(TABLE), problem.constants_of_a_hand(), derivatives, **series)
+    constants = problem.constants_of_a_hand()
+    return _kernel.evaluate_hand(theta.packed(TABLE), constants, derivatives, **series, ends=ends)
+
+
+def _lanes(parameters: int) -> NDArray[np.intp]:
+    return np.array(LANES[:parameters], np.intp)
 
 
 def _refuse_a_hand(problem: Problem) -> None:

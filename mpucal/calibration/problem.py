@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -84,6 +84,11 @@ class Problem:
     huber: float = np.inf
     tail: float = 1.0
     lam: float = 5.0
+
+    def first(self, n: int) -> Problem:
+        """The problem of the first n samples."""
+        given = {f.name: x[:n] for f in fields(Series) if (x := getattr(self.series, f.name)) is not None}
+        return replace(self, series=Series(**given))
 
     def constants(self) -> Vector:
         """The exact filter's: gravity, Sigma_a, Sigma_omega, the flat mean, its count."""

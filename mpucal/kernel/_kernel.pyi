@@ -1,6 +1,6 @@
 """The kernel's Python face; see filter.hpp for what each array means."""
 
-from numpy import float64
+from numpy import float64, int64
 from numpy.typing import NDArray
 
 _Array = NDArray[float64]
@@ -17,6 +17,7 @@ def evaluate(
     r_scale: _Array | None = None,
     q_scale: _Array | None = None,
     q_extra: _Array | None = None,
+    ends: NDArray[int64] | None = None,
 ) -> tuple[float, float, _Array, _Array]: ...
 def evaluate_hand(
     theta: _Array,
@@ -33,6 +34,7 @@ def evaluate_hand(
     r_extra: _Array | None = None,
     jerk: _Array | None = None,
     reset: _Array | None = None,
+    ends: NDArray[int64] | None = None,
 ) -> tuple[float, float, _Array, _Array]: ...
 def trace_hand(
     theta: _Array,

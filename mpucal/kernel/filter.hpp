@@ -39,12 +39,19 @@ struct Constants {
   double flat_y[3], flat_n;  // the first measurement: the flat segment's mean, with covariance Sigma_a / flat_n
 };
 
+// Samples up to which sums are wanted: ascending, the last one n; each holds for the next whole block of steps.
+struct Ends {
+  const long* at;
+  int count;
+};
+
 // What comes out; gradient and fisher are not written for the value alone.
 struct Result {
   double V;
   double squares;         // sum of e' S^-1 e over the n samples
-  double* gradient;       // (lanes,), filled up to whole groups
-  double* fisher;         // (lanes, lanes), likewise
+  Ends ends;
+  double* gradient;       // (ends, lanes), filled up to whole groups: of the samples before each end
+  double* fisher;         // (ends, lanes, lanes), likewise
 };
 
 // lanes: 0 (value only) or those of a model

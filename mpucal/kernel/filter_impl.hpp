@@ -21,6 +21,7 @@ void run(const Parameters& p, const Series& series, const Constants& c, Result& 
   [[maybe_unused]] Lane rows[kFours * kRowsOfFour][G ? G : 1];
   Derivatives<G> derivatives(p, c);
   Fisher<lanes> fisher;
+  [[maybe_unused]] int end = 0;
   for (long k = 0; k < all_steps; k += kBlock) {
     const int count = static_cast<int>(std::min(kBlock, all_steps - k)), fours = (count + 3) / 4;
     for (int f = 0; f < fours; ++f) steps[f].read(model, series, k + 4 * f);
@@ -29,14 +30,14 @@ void run(const Parameters& p, const Series& series, const Constants& c, Result& 
       for (int f = 0; f < fours; ++f) coefficients[f].template compute<G>(model, steps[f], predicted[f]);
       derivatives.run(coefficients, count, rows);
       fisher.add(rows, 6 * fours + 3 * count);
+      for (; end < result.ends.count && result.ends.at[end] < k + count; ++end) {
+        derivatives.write(result.gradient + end * 4 * G);
+        fisher.write(result.fisher + end * 16 * G * G);
+      }
     }
   }
   result.V = recursion.V();
   result.squares = recursion.squares();
-  if constexpr (G > 0) {
-    derivatives.write(result.gradient);
-    fisher.write(result.fisher);
-  }
 }
 
 }  // namespace

@@ -34,8 +34,9 @@ struct HandConstants : Constants {
 struct HandResult {
   double V;
   double squares;      // sum of e' S^-1 e over the n samples
-  double* gradient;    // (lanes,), filled up to whole groups
-  double* fisher;      // (lanes, lanes), likewise
+  Ends ends;
+  double* gradient;    // (ends, lanes), filled up to whole groups: of the samples before each end
+  double* fisher;      // (ends, lanes, lanes), likewise
   double* innovation;  // (n, 3) whitened, L^-1 e
   double* gravity;     // (n, 3) s before the update
   double* motion;      // (n, 3) a before the update

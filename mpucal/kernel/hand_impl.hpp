@@ -45,6 +45,7 @@ void run(const HandParameters& p, const HandSeries& series, const HandConstants&
   [[maybe_unused]] Lane rows[3 * kBlock][kHandGroups];
   HandDerivatives derivatives(p, c.gravity);
   Fisher<derive ? LanesUsed::hand : 0> fisher;
+  [[maybe_unused]] int end = 0;
   for (long k = 0; k < all_steps; k += kBlock) {
     const int count = static_cast<int>(std::min(kBlock, all_steps - k)), fours = (count + 3) / 4;
     for (int f = 0; f < fours; ++f) steps[f].read(p, series, c, k + 4 * f, C);
@@ -54,14 +55,15 @@ void run(const HandParameters& p, const HandSeries& series, const HandConstants&
       for (int f = 0; f < fours; ++f) coefficients[f].compute(p, c.gravity, steps[f], predicted[f]);
       derivatives.run(steps, predicted, coefficients, count, rows);
       fisher.add(rows, 3 * count);
+      constexpr long lanes = 4 * kHandGroups;
+      for (; end < result.ends.count && result.ends.at[end] < k + count; ++end) {
+        derivatives.write(result.gradient + end * lanes);
+        fisher.write(result.fisher + end * lanes * lanes);
+      }
     }
   }
   result.V = recursion.V();
   result.squares = recursion.squares();
-  if constexpr (derive) {
-    derivatives.write(result.gradient);
-    fisher.write(result.fisher);
-  }
 }
 
 }  // namespace

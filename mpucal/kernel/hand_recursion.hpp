@@ -47,7 +47,7 @@ class HandRecursion {
       multiply(adjugate.m, e, v);
       double reciprocal = 1.0 / adjugate.determinant;
       const double square = dot(e, v) * reciprocal;
-      determinants *= adjugate.determinant;
+      gather(determinants, adjugate.determinant, V_);
       if constexpr (kept) keep(e, S, t, predicted[i / 4]);
       const double w = flat ? plain(square) : weigh(square, outliers);
       if (!flat) squares_ += square;
@@ -119,7 +119,7 @@ class HandRecursion {
     if (!(square > threshold_)) return plain(square);
     if (c_.tail != 0.0) {
       V_ += 0.5 * threshold_;
-      outliers *= square / threshold_;
+      gather(outliers, square / threshold_, V_, threshold_);
       return threshold_ / square;
     }
     const double norm = std::sqrt(square);

@@ -1,5 +1,7 @@
 // Products of 3x3 matrices, of doubles or of Lanes.
 #pragma once
+#include <cmath>
+
 #include "lane.hpp"
 
 namespace mpucal {
@@ -110,6 +112,16 @@ MPUCAL_INLINE T whitener(const T (&S)[6], const Adjugate<T>& adjugate, T (&w)[3]
   w[2][0] = adjugate.m[2] * by_two * w[2][2];
   w[2][1] = adjugate.m[4] * by_two * w[2][2];
   return by_three;
+}
+
+// product *= factor; before it leaves the range of a double, half its logarithm goes to V. The branch is hardly ever taken.
+MPUCAL_INLINE void gather(double& product, double factor, double& V, double weight = 1.0) {
+  constexpr double smallest = 1e-150, largest = 1e150;
+  product *= factor;
+  if (!(product > smallest && product < largest)) {
+    V += 0.5 * weight * std::log(product);
+    product = 1.0;
+  }
 }
 
 // What one step needs as a vector: out[step], from four steps to a lane

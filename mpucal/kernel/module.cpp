@@ -4,7 +4,9 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <optional>
 #include <stdexcept>
@@ -99,6 +101,17 @@ HandConstants make_hand_constants(const Array& array) {
   return constants;
 }
 
+using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+// The samples at which sums are wanted: those given, or the last alone
+std::vector<long> make_ends(const std::optional<Indices>& given, std::size_t n) {
+  std::vector<long> ends{static_cast<long>(n)};
+  if (given) ends.assign(given->data(), given->data() + given->size());
+  if (!std::is_sorted(ends.begin(), ends.end()) || ends.empty() || ends.front() < 0 || ends.back() != static_cast<long>(n))
+    throw std::invalid_argument("ends do not ascend to the number of samples");
+  return ends;
+}
+
 void check(int lanes) {
   if (lanes != 0 && lanes != LanesUsed::accel && lanes != LanesUsed::imu)
     throw std::invalid_argument("lanes is 0 or what a model of the exact filter uses");
@@ -114,40 +127,49 @@ NB_MODULE(_kernel, m) {
       "evaluate",
       [](const Array& theta, const Array& constants, int lanes, const Array& y, const Array& omega, const Array& dt,
          const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
-         const std::optional<Array>& q_extra) {
+         const std::optional<Array>& q_extra, const std::optional<Indices>& ends) {
         const Series series = make_series(y, omega, dt, r_scale, q_scale, q_extra);
         const auto parameters = make<Parameters>(theta, "theta");
         const auto values = make<Constants>(constants, "constants");
         check(lanes);
         const std::size_t p = 4 * groups_of(lanes);
-        std::vector<double> gradient(p), fisher(p * p);
+        const std::vector<long> at = make_ends(ends, series.n);
+        const std::size_t k = at.size();
+        std::vector<double> gradient(k * p), fisher(k * p * p);
         Result result{};
+        result.ends = {at.data(), static_cast<int>(k)};
         result.gradient = gradient.data();
         result.fisher = fisher.data();
         {
           nb::gil_scoped_release release;
           evaluate(parameters, series, values, lanes, result);
         }
-        return nb::make_tuple(result.V, result.squares, give(std::move(gradient), {p}), give(std::move(fisher), {p, p}));
+        return nb::make_tuple(result.V, result.squares, give(std::move(gradient), {k, p}),
+                              give(std::move(fisher), {k, p, p}));
       },
       nb::arg("theta"), nb::arg("constants"), nb::arg("lanes"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
       nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
-      nb::arg("q_extra").none() = nb::none(),
-      "V, sum of e' S^-1 e over the samples, gradient and Fisher matrix (in lane order; empty for lanes = 0).");
+      nb::arg("q_extra").none() = nb::none(), nb::arg("ends").none() = nb::none(),
+      "V, sum of e' S^-1 e over the samples, gradient and Fisher matrix up to each of `ends`, by default the last sample "
+      "(in lane order; empty for lanes = 0).");
 
   m.def(
       "evaluate_hand",
       [](const Array& theta, const Array& constants, bool derivatives, const Array& y, const Array& omega,
          const Array& dt, const std::optional<Array>& r_scale, const std::optional<Array>& q_scale,
          const std::optional<Array>& q_extra, const std::optional<Array>& rate, const std::optional<Array>& alpha,
-         const std::optional<Array>& r_extra, const std::optional<Array>& jerk, const std::optional<Array>& reset) {
+         const std::optional<Array>& r_extra, const std::optional<Array>& jerk, const std::optional<Array>& reset,
+         const std::optional<Indices>& ends) {
         const HandSeries series = make_hand_series(
             make_series(y, omega, dt, r_scale, q_scale, q_extra), rate, alpha, r_extra, jerk, reset);
         const auto parameters = make<HandParameters>(theta, "theta");
         const HandConstants values = make_hand_constants(constants);
         const std::size_t p = derivatives ? 4 * groups_of(LanesUsed::hand) : 0;
-        std::vector<double> gradient(p), fisher(p * p);
+        const std::vector<long> at = make_ends(ends, series.n);
+        const std::size_t k = at.size();
+        std::vector<double> gradient(k * p), fisher(k * p * p);
         HandResult result{};
+        result.ends = {at.data(), static_cast<int>(k)};
         if (derivatives) {
           result.gradient = gradient.data();
           result.fisher = fisher.data();
@@ -156,14 +178,17 @@ NB_MODULE(_kernel, m) {
           nb::gil_scoped_release release;
           evaluate_hand(parameters, series, values, result);
         }
-        return nb::make_tuple(result.V, result.squares, give(std::move(gradient), {p}), give(std::move(fisher), {p, p}));
+        return nb::make_tuple(result.V, result.squares, give(std::move(gradient), {k, p}),
+                              give(std::move(fisher), {k, p, p}));
       },
       nb::arg("theta"), nb::arg("constants"), nb::arg("derivatives"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
       nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
       nb::arg("q_extra").none() = nb::none(), nb::arg("rate").none() = nb::none(),
       nb::arg("alpha").none() = nb::none(), nb::arg("r_extra").none() = nb::none(),
       nb::arg("jerk").none() = nb::none(), nb::arg("reset").none() = nb::none(),
-      "V, sum of squared whitened innovations, gradient and Fisher matrix of the hand's filter (in lane order).");
+      nb::arg("ends").none() = nb::none(),
+      "V, sum of squared whitened innovations, gradient and Fisher matrix of the hand's filter up to each of `ends` (in lane "
+      "order).");
 
   m.def(
       "trace_hand",

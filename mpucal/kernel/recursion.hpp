@@ -47,7 +47,7 @@ class Recursion {
       const double reciprocal = 1.0 / adjugate.determinant;
       multiply(adjugate.m, e, adjugate_e);
       const double square = dot(e, adjugate_e) * reciprocal;
-      determinants *= adjugate.determinant;
+      gather(determinants, adjugate.determinant, V_);
       squares += square;
       if (flat && i == 0) flat_square = square;
       const double stretch = follow(four, t, adjugate, adjugate_e, reciprocal, m, M);
