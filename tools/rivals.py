@@ -1,4 +1,4 @@
-"""Other ways to calibrate the same recording: six positions, an ellipsoid, imucal. Knows no estimator of mpucal's.
+"""Other ways to calibrate the same recording: six positions, an ellipsoid, imucal.
 
 All work on the rests of a recording. Each returns an Estimate, or raises Unfit with the sentence that says why the
 data do not suit it.

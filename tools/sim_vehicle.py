@@ -30,9 +30,9 @@ from mpucal.errors import MpucalError, UsageError
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.signing import read_key
 from mpucal.simulated.faults import OF_VEHICLE, Where, kinds
-from mpucal.simulated.vehicle import Vehicle, VehicleOptions
+from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.line import PacketLine
-from mpucal.simulated.vehicle.ports import Port, PtyPort, TcpPort, UdpPort
+from mpucal.simulated.vehicle.ports import PtyPort, StationPort, TcpPort, UdpPort
 
 STEP_S = 0.002
 STRANGER_US = 20_000
@@ -52,13 +52,15 @@ def main() -> int:
     parser.add_argument("--signing-key", metavar="FILE", type=Path, help="32 bytes to sign with")
     parser.add_argument("--speed", type=float, default=1.0, help="how much faster than real its time runs")
     arguments = parser.parse_args()
-    ports: list[Port] = []
+    ports: list[StationPort] = []
     try:
         options = VehicleOptions.parse(":".join(["sim", ",".join(arguments.words)]).rstrip(":"))
         key = None if arguments.signing_key is None else read_key(arguments.signing_key)
         riders: list[Ride | Stranger] = []
         for number in range(arguments.vehicles):
-            vehicle = Vehicle(replace(options, system=options.system + number, seed=options.seed + number), key=key)
+            vehicle = SimulatedVehicle(
+                replace(options, system=options.system + number, seed=options.seed + number), key=key
+            )
             ports.append(open_port(arguments.port))
             riders.append(Ride(vehicle, ports[-1]))
         if arguments.stranger:
@@ -76,7 +78,7 @@ def main() -> int:
             port.close()
 
 
-def open_port(text: str) -> Port:
+def open_port(text: str) -> StationPort:
     """What `text` names."""
     kind, _, rest = text.partition(":")
     host, _, number = rest.rpartition(":")
@@ -90,7 +92,7 @@ def open_port(text: str) -> Port:
 class Ride:
     """A vehicle on a port."""
 
-    def __init__(self, vehicle: Vehicle, port: Port) -> None:
+    def __init__(self, vehicle: SimulatedVehicle, port: StationPort) -> None:
         self._vehicle, self._port = vehicle, port
         self._line = PacketLine(vehicle.options.fault, vehicle.options.seed)
 
@@ -105,7 +107,7 @@ class Ride:
 class Stranger:
     """Somebody else on the network, who sends what the vehicle's `system` would, and parts of it."""
 
-    def __init__(self, port: Port, system: int) -> None:
+    def __init__(self, port: StationPort, system: int) -> None:
         self._port = port
         self._mav = dialect().MAVLink(None, system, 1)
         self._sent = 0

@@ -1,4 +1,4 @@
-"""What Monte Carlo runs amount to, as documents and as tables for a person. Knows no simulation."""
+"""What Monte Carlo runs amount to, as documents and as tables for a person."""
 
 from __future__ import annotations
 

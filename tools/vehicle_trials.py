@@ -30,7 +30,7 @@ from mpucal.mavlink.stream_parameters import read_stream_parameters
 from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import parse_url
 from mpucal.mavlink.vehicle_source import one_of
-from mpucal.simulated.vehicle import Vehicle, VehicleOptions
+from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 
 HERE = Path(__file__).parent
 MPUCAL = Path(sys.executable).parent / "mpucal"
@@ -160,7 +160,7 @@ def apart(trial: Trial, parameters: Mapping[str, float]) -> list[tuple[int, floa
     """How far they are from what its sensors need: IMU, offset [m/s^2], scale."""
     options = VehicleOptions.parse("sim:" + ",".join(trial.words) if trial.words else "sim")
     second = (trial.system or options.system) - options.system
-    simulated = Vehicle(replace(options, seed=options.seed + second))
+    simulated = SimulatedVehicle(replace(options, seed=options.seed + second))
     firmware = PX4 if simulated.firmware.bytewise else ARDUPILOT
     far = []
     for imu, truth in enumerate(simulated.imus.truths, start=1):

@@ -11,7 +11,7 @@ from . import registers as reg
 from .access import Transaction
 from .families import Part
 from .fifo import FifoDecoder, FifoFault, Run
-from .identity import Evidence
+from .identity import Behaviour
 from .settings import Settings
 
 Words = tuple[int, int, int]
@@ -30,7 +30,7 @@ class Decoder:
     def __init__(self, name: str) -> None:
         self._name = name
         self._held: dict[int, int] = {}
-        self._evidence = Evidence()
+        self._evidence = Behaviour()
         self._settings: Settings | None = None
         self._fifo: FifoDecoder | None = None
         self._before_reset: dict[int, int] = {}

@@ -15,7 +15,7 @@ from ..errors import ChipError
 from . import registers as reg
 
 
-class Group(Enum):
+class WordGroup(Enum):
     """A group of words in a FIFO frame; the value is its number of words."""
 
     ACCEL = "accelerometer", 3
@@ -79,7 +79,7 @@ class Family:
     zero_rate_dps: float
     accel_offset_lsb_per_g: float = 2048.0
     widest_fifo_bytes: int | None = None
-    frame: tuple[Group, ...] = (Group.ACCEL, Group.TEMPERATURE, Group.GYRO)
+    frame: tuple[WordGroup, ...] = (WordGroup.ACCEL, WordGroup.TEMPERATURE, WordGroup.GYRO)
     gyro_range_shift: int = reg.FULL_SCALE_SHIFT
     fifo_reset_needs_stop: bool = False
     half_range_revision: str = ""
@@ -91,7 +91,7 @@ class Family:
         for group in self.frame:
             at[group] = slice(first, first + group.words)
             first += group.words
-        return Columns(at[Group.ACCEL], at[Group.TEMPERATURE].start, at[Group.GYRO])
+        return Columns(at[WordGroup.ACCEL], at[WordGroup.TEMPERATURE].start, at[WordGroup.GYRO])
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ HALF_G = (0.35, 0.65)
 HALF = 0.5
 
 
-class Evidence:
+class Behaviour:
     """What a chip's replies say about it, from its identity on until it starts to measure."""
 
     def __init__(self) -> None:

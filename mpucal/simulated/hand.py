@@ -1,4 +1,4 @@
-"""Hands: what a person who hears prompts does with the board next, leg by leg. Knows no sensor."""
+"""Hands: what a person who hears prompts does with the board next, leg by leg."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from ..data import Vector
 from . import rotation
-from .legs import STEP_HZ, Leg, Move, Pause, Tumble, steps
+from .legs import STEP_HZ, Hold, Leg, Move, Tumble, steps
 from .mishaps import Knock, Mishap, Slip, Warmth
 
 # Faster than this no person reacts; so motion is settled this far ahead.
@@ -27,7 +27,7 @@ ON_THE_TABLE, IN_THE_HAND = 0.0, 1.0
 MISHAP_AFTER_S = 18.0
 
 
-class Prompt(Protocol):
+class HandPrompt(Protocol):
     """What a hand understands of a prompt."""
 
     @property
@@ -68,9 +68,9 @@ class Hand:
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng, self._nerves = rng.spawn(2)
-        self._heard: deque[tuple[int, Prompt]] = deque()
+        self._heard: deque[tuple[int, HandPrompt]] = deque()
         self._last: tuple[str, tuple[float, float, float] | None] | None = None
-        self._leg: Leg = Pause(0, 0, IN_THE_HAND)
+        self._leg: Leg = Hold(0, 0, IN_THE_HAND)
         self._wish = "hold_still"
         self._down: Vector | None = None
         self._moved = False
@@ -81,7 +81,7 @@ class Hand:
         tilt = self._rng.uniform(-0.5, 0.5, 3)
         return Stance(0, rotation.exp(tilt), IN_THE_HAND)
 
-    def hear(self, prompt: Prompt, t_s: float) -> None:
+    def hear(self, prompt: HandPrompt, t_s: float) -> None:
         """Heard at `t_s`, obeyed a reaction time later; said twice, it is the same prompt."""
         said = (str(prompt.kind), prompt.down)
         if said == self._last:
@@ -146,7 +146,7 @@ class Hand:
 
     def pause(self, now: Stance, seconds: float) -> Leg:
         """As still as it is held."""
-        return Pause(now.step, now.step + steps(seconds), now.held)
+        return Hold(now.step, now.step + steps(seconds), now.held)
 
     def move(self, now: Stance, turn_rad: Vector, held: float) -> Leg:
         """A turn about a fixed axis; beyond 130 deg it takes longer."""
@@ -280,7 +280,7 @@ class Random(Hand):
         )
 
 
-class Still(Hand):
+class Motionless(Hand):
     """Lays the board flat, and never moves it when told to rotate."""
 
     def rotate(self, now: Stance) -> Leg:
@@ -304,7 +304,7 @@ KINDS: dict[str, type[Hand]] = {
     "placing": Placing,
     "random": Random,
     "wandering": Wandering,
-    "still": Still,
+    "still": Motionless,
     "restless": Restless,
     "one_axis": OneAxis,
     "hasty": Hasty,

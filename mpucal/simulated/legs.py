@@ -50,7 +50,7 @@ class Leg:
 
 
 @dataclass(frozen=True)
-class Pause(Leg):
+class Hold(Leg):
     """As still as it is held: 1 in the hand, 0 on the table."""
 
     held: float

@@ -1,4 +1,4 @@
-"""What befalls a sensor in a careless hand: a slip, a knock, warmth. Knows no hand and no register."""
+"""What befalls a sensor in a careless hand: a slip, a knock, warmth."""
 
 from __future__ import annotations
 

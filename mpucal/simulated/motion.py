@@ -11,7 +11,7 @@ import numpy as np
 from ..data import Vector
 from . import rotation
 from .habits import JERK_MPS2, JERK_S, SWAY_HZ, TREMBLING, TREMOR_HZ, Habits, swing
-from .hand import REACTION_S, Hand, Prompt, Stance
+from .hand import REACTION_S, Hand, HandPrompt, Stance
 from .legs import STEP_HZ, STEP_S, Leg, steps
 from .mishaps import Mishap
 
@@ -114,7 +114,7 @@ class Motion:
         self._sums = np.zeros((1, 6))
         self._attitudes = self._shaken(self._stance.attitude[None], 0, np.ones(1))
 
-    def hear(self, prompt: Prompt, t_s: float) -> None:
+    def hear(self, prompt: HandPrompt, t_s: float) -> None:
         """The hand hears `prompt` at `t_s`."""
         self._hand.hear(prompt, t_s)
 

@@ -62,7 +62,7 @@ class InSi:
 
 
 @dataclass(frozen=True)
-class Response:
+class SensorResponse:
     """In counts: (f, w) times `matrix` (6, 7), plus `offset` (7,), plus noise of deviation `noise` (7,)."""
 
     matrix: Vector
@@ -144,7 +144,7 @@ class SensorTruth:
             seed=seed,
         )
 
-    def response(self, setting: Setting | InSi) -> Response:
+    def response(self, setting: Setting | InSi) -> SensorResponse:
         """What the sensor makes of a motion, so set.
 
         A mean over one sample passes white noise up to half the sample rate.
@@ -160,7 +160,7 @@ class SensorTruth:
         noise[:3] = self.accel_noise_density * band / setting.mps2_per_lsb
         noise[3] = TEMPERATURE_NOISE_C * setting.lsb_per_c
         noise[4:] = self.gyro_noise_density * band / setting.rad_s_per_lsb
-        return Response(matrix, offset, noise)
+        return SensorResponse(matrix, offset, noise)
 
     def document(self) -> dict[str, Any]:
         """The truth in plain JSON types, in m/s^2, rad/s and the symmetric frame."""

@@ -9,7 +9,7 @@ import pytest
 from mpucal.chip import families
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.chip.families import FAMILIES, MPU6050, MPU6500, Group, Part, part_of
+from mpucal.chip.families import FAMILIES, MPU6050, MPU6500, Part, WordGroup, part_of
 from mpucal.errors import ChipError
 from mpucal.simulated.chip import models, open_simulated
 
@@ -71,7 +71,7 @@ def test_a_relative_is_one_row(monkeypatch):
         fifo_bytes=1536,
         lsb_per_c=100.0,
         zero_c=10.0,
-        frame=(Group.GYRO, Group.TEMPERATURE, Group.ACCEL),
+        frame=(WordGroup.GYRO, WordGroup.TEMPERATURE, WordGroup.ACCEL),
         gyro_range_shift=2,
         asleep=True,
     )

@@ -11,7 +11,7 @@ from mpucal.chip.config import Config
 from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
 from mpucal.chip.families import ICM20689, MPU6050, MPU6500, PARTS
-from mpucal.chip.identity import Evidence, remark
+from mpucal.chip.identity import Behaviour, remark
 from mpucal.data import Sensor
 from mpucal.errors import ChipError
 from mpucal.simulated.chip import open_simulated
@@ -22,7 +22,7 @@ WIDENED = FILLING | {reg.ACCEL_CONFIG2: reg.FIFO_SIZE}
 
 
 def evidence(fifo_bytes, widened_bytes=None, magnitude_g=None):
-    seen = Evidence()
+    seen = Behaviour()
     seen.saw(reg.FIFO_COUNT_H, (fifo_bytes // 2).to_bytes(2, "big"), FILLING)
     seen.saw(reg.FIFO_COUNT_H, fifo_bytes.to_bytes(2, "big"), FILLING)
     if widened_bytes is not None:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from mpucal.errors import LinkError
 from mpucal.mavlink.ftp import MOST_DATA, Payload, Storage
 from mpucal.mavlink.link import Link
-from mpucal.simulated.vehicle import Vehicle, VehicleOptions
+from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 
 
@@ -16,7 +16,7 @@ def stored():
     """stored(words): a vehicle, and its storage over a link."""
 
     def make(words):
-        vehicle = Vehicle(VehicleOptions.parse(words))
+        vehicle = SimulatedVehicle(VehicleOptions.parse(words))
         link = Link(SimulatedTransport(vehicle), lambda t_ns, packet: None)
         link.lock(link.listen()[0])
         return vehicle, Storage(link)

@@ -15,7 +15,7 @@ from mpucal.mavlink.parameters.encoding import name_bytes, of_wire, to_wire
 from mpucal.mavlink.prompts import Heard, to_message
 from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import parse_url
-from mpucal.simulated.vehicle import Vehicle, VehicleOptions
+from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 
 S_US = 1_000_000
 HIGHRES, RAW, SCALED, SCALED2 = 105, 27, 26, 116
@@ -28,7 +28,7 @@ class Station:
     """Speaks with a vehicle, and reads what it sends."""
 
     def __init__(self, words=""):
-        self.vehicle = Vehicle(VehicleOptions.parse("sim" + (":" + words if words else "")))
+        self.vehicle = SimulatedVehicle(VehicleOptions.parse("sim" + (":" + words if words else "")))
         self.mav = dialect().MAVLink(None, 254, 190)
         self._parser = Parser(dialect().MAVLink(None))
 

@@ -11,7 +11,7 @@ from mpucal.mavlink.stream_parameters import read_stream_parameters, stream_para
 from mpucal.mavlink.tlog import Record, Tlog
 from mpucal.mavlink.tlog_replay import Replay
 from mpucal.mavlink.vehicle_source import VehicleSource
-from mpucal.simulated.vehicle import Vehicle, VehicleOptions
+from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 
 
@@ -29,7 +29,7 @@ class Disturbed(SimulatedTransport):
 
 def opened(words="", transport=SimulatedTransport, system=None, **how):
     """A source on a simulated vehicle, what it records, and what it says."""
-    vehicle = Vehicle(VehicleOptions.parse(f"sim:{words}" if words else "sim"))
+    vehicle = SimulatedVehicle(VehicleOptions.parse(f"sim:{words}" if words else "sim"))
     record, said = [], []
     link = Link(transport(vehicle, **how), lambda t_ns, data: record.append(Record(t_ns, data)))
     return VehicleSource(link, 100.0, system, said.append, "test"), record, said
@@ -74,7 +74,7 @@ def test_the_parameters_that_shape_the_stream_are_read_first():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_parameter_is_given_up_where_one_packet_in_five_is_lost(seed):
-    vehicle = Vehicle(VehicleOptions.parse(f"sim:imus=1,fault=loss,seed={seed}"))
+    vehicle = SimulatedVehicle(VehicleOptions.parse(f"sim:imus=1,fault=loss,seed={seed}"))
     link = Link(SimulatedTransport(vehicle), lambda t_ns, data: None)
     link.lock(link.listen()[0])
     assert set(read_stream_parameters(link, ARDUPILOT)) == set(stream_parameter_names(ARDUPILOT))

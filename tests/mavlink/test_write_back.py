@@ -17,7 +17,7 @@ from mpucal.mavlink.parameters.document import autopilot_document
 from mpucal.mavlink.prompts import Heard, to_message
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
-from mpucal.simulated.vehicle import Vehicle, VehicleOptions
+from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 from mpucal.sinks.autopilot import AutopilotSink
 
@@ -45,7 +45,7 @@ class Flying(SimulatedTransport):
 
 def vehicle_of(firmware, words=""):
     """A vehicle that was set down, behind a locked link."""
-    vehicle = Vehicle(VehicleOptions.parse(f"sim:firmware={firmware}{words}"))
+    vehicle = SimulatedVehicle(VehicleOptions.parse(f"sim:firmware={firmware}{words}"))
     transport = Flying(vehicle)
     link = Link(transport, lambda t_ns, packet: None)
     link.lock(link.listen()[0])

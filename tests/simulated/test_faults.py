@@ -11,7 +11,7 @@ from mpucal.errors import UsageError
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.options import ChipOptions
 from mpucal.simulated.faults import KINDS, OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, kinds
-from mpucal.simulated.vehicle import Vehicle, VehicleOptions
+from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 
 DOCS = Path(__file__).parents[2] / "docs"
 WORLDS = {ChipOptions: (*OF_CHIP, Where.HAND), VehicleOptions: (*OF_VEHICLE, Where.HAND)}
@@ -69,7 +69,9 @@ def measured(word):
 @pytest.mark.parametrize(("name", "least"), [("loose", 1.0), ("knock", 0.3), ("warming", 0.01)])
 def test_what_befalls_the_hand_moves_the_sensor_of_chip_and_vehicle(name, least):
     assert np.linalg.norm(measured(f",fault={name}@0") - measured("")) > least
-    plain, struck = (Vehicle(VehicleOptions.parse("sim:imus=1,hand=still" + word)) for word in ("", f",fault={name}@0"))
+    plain, struck = (
+        SimulatedVehicle(VehicleOptions.parse("sim:imus=1,hand=still" + word)) for word in ("", f",fault={name}@0")
+    )
     for vehicle in (plain, struck):
         vehicle.go_on(13_000_000)
     assert np.linalg.norm(struck.firmware.corrected[0, 0] - plain.firmware.corrected[0, 0]) > least / 2

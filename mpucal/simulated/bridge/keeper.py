@@ -5,14 +5,14 @@ from __future__ import annotations
 from ...result.blob import MAX_LENGTH
 from ...sources.bridge import messages as wire
 from ...sources.bridge.messages import Message, Reply, Status
-from .storage import Memory, Storage, acceptable, crc_of
+from .storage import Memory, SlotStorage, acceptable, crc_of
 
 
 class Keeper:
     """The blob messages of firmware_protocol.md, on a memory."""
 
     def __init__(self, memory: Memory) -> None:
-        self._storage = Storage(memory)
+        self._storage = SlotStorage(memory)
         self._length: int | None = None
         self._arrived = 0
 

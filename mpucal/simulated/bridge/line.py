@@ -17,7 +17,7 @@ HOST_AHEAD_NS = 7_000_000_000
 Spoil = Callable[[bytes], bytes]
 
 
-class Device(Protocol):
+class LineEnd(Protocol):
     """What is at the other end."""
 
     def receive(self, data: bytes) -> None:
@@ -54,7 +54,7 @@ class EmulatedLine:
     unplugged : the port is gone while this is set. written : what the host has sent.
     """
 
-    def __init__(self, device: Device, clock: SteppedClock, latency_ns: int = 1_000_000) -> None:
+    def __init__(self, device: LineEnd, clock: SteppedClock, latency_ns: int = 1_000_000) -> None:
         self.name, self.bauds = "the emulated line", BAUDS[:1]
         self.device = device
         self.to_host: Spoil = _unchanged

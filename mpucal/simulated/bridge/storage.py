@@ -33,7 +33,7 @@ class Stored:
     blob: bytes
 
 
-class Storage:
+class SlotStorage:
     """One blob in a memory, old or new whenever the power goes."""
 
     def __init__(self, memory: Memory) -> None:

@@ -15,7 +15,7 @@ from ..motion import Motion
 from ..sensor import SensorTruth
 from .bus import SimulatedBus
 from .chip import Chip
-from .clock import CLOCKS, Clock, FastClock
+from .clock import CLOCKS, FastClock, SimulatedClock
 from .factory import Factory
 from .faults import Faults
 from .feed import Feed, RecordedFeed, SensorFeed
@@ -29,7 +29,7 @@ def open_simulated(
     text: str = "sim",
     gravity: float = STANDARD_GRAVITY_MPS2,
     seed: int | None = None,
-    clock: Clock | None = None,
+    clock: SimulatedClock | None = None,
 ) -> SimulatedBus:
     """The simulated chip that `sim:key=value,...` describes.
 

@@ -1,4 +1,4 @@
-"""The bus to a simulated chip, with the time its transfers take and the faults they meet. Knows no register."""
+"""The bus to a simulated chip, with the time its transfers take and the faults they meet."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import Any
 
 from ...chip.access import Reply
 from ...sources.i2c_errors import transfer_error
-from ..hand import Prompt
+from ..hand import HandPrompt
 from ..motion import Motion
 from ..sensor import SensorTruth
 from .chip import Chip
-from .clock import Clock, RealClock
+from .clock import RealClock, SimulatedClock
 from .faults import Faults
 
 KHZ = 400
@@ -30,7 +30,7 @@ class SimulatedBus:
     def __init__(
         self,
         chip: Chip,
-        clock: Clock,
+        clock: SimulatedClock,
         motion: Motion | None = None,
         truth: SensorTruth | None = None,
         faults: Faults | None = None,
@@ -76,7 +76,7 @@ class SimulatedBus:
     def close(self) -> None:
         """Nothing to let go of."""
 
-    def hear(self, prompt: Prompt) -> None:
+    def hear(self, prompt: HandPrompt) -> None:
         """The hand that holds the board hears `prompt` now; a recording hears nothing."""
         if self._motion is not None:
             self._motion.hear(prompt, self._clock.now() * 1e-9)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...chip import registers as reg
-from ...chip.families import Group
+from ...chip.families import WordGroup
 from ...data import Vector
 from ...errors import EndOfCapture
 from ..sensor import Counts, Setting
@@ -213,14 +213,14 @@ class Chip:
 
 # FIFO_EN's bit of each of a sample's seven words, in register order
 WORD_BITS = {
-    Group.ACCEL: [(word, reg.FIFO_EN_ACCEL) for word in (0, 1, 2)],
-    Group.TEMPERATURE: [(3, reg.FIFO_EN_TEMP)],
-    Group.GYRO: [(4, reg.FIFO_EN_XG), (5, reg.FIFO_EN_YG), (6, reg.FIFO_EN_ZG)],
+    WordGroup.ACCEL: [(word, reg.FIFO_EN_ACCEL) for word in (0, 1, 2)],
+    WordGroup.TEMPERATURE: [(3, reg.FIFO_EN_TEMP)],
+    WordGroup.GYRO: [(4, reg.FIFO_EN_XG), (5, reg.FIFO_EN_YG), (6, reg.FIFO_EN_ZG)],
 }
 GYRO = slice(4, 7)
 
 
-def _columns(sources: int, frame: Sequence[Group]) -> list[int]:
+def _columns(sources: int, frame: Sequence[WordGroup]) -> list[int]:
     """Which of a sample's seven words FIFO_EN asks for, in the frame's order."""
     return [word for group in frame for word, bit in WORD_BITS[group] if sources & bit]
 

@@ -1,4 +1,4 @@
-"""The simulated bus's time: as fast as it can be, or as slow as a person. Knows no bus."""
+"""The simulated bus's time: as fast as it can be, or as slow as a person."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import time
 from typing import Protocol
 
 
-class Clock(Protocol):
+class SimulatedClock(Protocol):
     """Time in ns since the bus was opened."""
 
     def now(self) -> int:

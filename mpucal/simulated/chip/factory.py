@@ -1,4 +1,4 @@
-"""What the factory leaves in one piece of a chip: its trims, its self-test codes. Knows no bus and no motion.
+"""What the factory leaves in one piece of a chip: its trims, its self-test codes.
 
 Source: RM-MPU-6000A r4.2 registers 13 to 16; for the 6500, RM-MPU-9250A r1.4 registers 0 to 15, whose code c
 stands for 2620 * 1.01^(c - 1) counts at the smallest full scale (also in Linux' drivers/iio/imu/inv_mpu6050).

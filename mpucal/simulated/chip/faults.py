@@ -10,7 +10,7 @@ import numpy as np
 
 from ..faults import Fault, FaultKind, Schedule
 from .chip import Chip
-from .clock import Clock
+from .clock import SimulatedClock
 
 
 class Faults:
@@ -21,7 +21,7 @@ class Faults:
     faults : each at its time. chip, clock : what they happen to. rng : decides which bits flip.
     """
 
-    def __init__(self, faults: Sequence[Fault], chip: Chip, clock: Clock, rng: np.random.Generator) -> None:
+    def __init__(self, faults: Sequence[Fault], chip: Chip, clock: SimulatedClock, rng: np.random.Generator) -> None:
         self._faults, self._chip, self._clock, self._rng = faults, chip, clock, rng
         self._schedule = Schedule(faults)
 

@@ -1,4 +1,4 @@
-"""Feeds: where the chip's samples come from, a motion or a recording. Knows no register."""
+"""Where a simulated chip's samples come from: a sensor in motion, or a recording."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ...data import Vector
 from ...errors import RecordingError, UsageError
 from ..motion import Motion
-from ..sensor import FULL_SCALE, Counts, Response, SensorTruth, Setting
+from ..sensor import FULL_SCALE, Counts, SensorResponse, SensorTruth, Setting
 
 RECORDED_C = 25.0
 TEMPERATURE = 3
@@ -31,7 +31,7 @@ class SensorFeed:
 
     def __init__(self, truth: SensorTruth, motion: Motion, rng: np.random.Generator) -> None:
         self._truth, self._motion, self._rng = truth, motion, rng
-        self._set: tuple[Setting, Response] | None = None
+        self._set: tuple[Setting, SensorResponse] | None = None
 
     def samples(self, edges_s: Vector, setting: Setting) -> Counts:
         """The samples between (n + 1,) times [s]; it never ends."""

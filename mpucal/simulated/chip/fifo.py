@@ -1,4 +1,4 @@
-"""The chip's FIFO: bytes in, bytes out, and what happens when it is full. Knows no frame."""
+"""The chip's FIFO: bytes in, bytes out, and what happens when it is full."""
 
 from __future__ import annotations
 

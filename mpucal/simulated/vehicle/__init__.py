@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from .options import VehicleOptions
-from .vehicle import Sent, Vehicle
+from .vehicle import Sent, SimulatedVehicle
 
-__all__ = ["Sent", "Vehicle", "VehicleOptions"]
+__all__ = ["Sent", "SimulatedVehicle", "VehicleOptions"]

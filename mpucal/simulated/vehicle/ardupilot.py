@@ -1,4 +1,4 @@
-"""ArduPilot, as far as its accelerometers go: a 4.7 Copter. Knows no link."""
+"""ArduPilot, as far as its accelerometers go: a 4.7 Copter."""
 
 from __future__ import annotations
 

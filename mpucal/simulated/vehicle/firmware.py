@@ -1,4 +1,4 @@
-"""What ArduPilot and PX4 both have: parameters that correct IMUs, and messages made of them. Knows no link."""
+"""What ArduPilot and PX4 both have: parameters that correct IMUs, and messages made of them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...mavlink.parameters.encoding import Parameter
 from ...mavlink.parameters.names import CUSTOM_ANGLES
 from ...mavlink.rotation import euler, orientation
 from .options import VehicleOptions
-from .store import Store
+from .store import ParameterStore
 
 MILLI_G = STANDARD_GRAVITY_MPS2 / 1000
 # SCALED_IMU, SCALED_IMU2, SCALED_IMU3
@@ -40,7 +40,7 @@ class Firmware(ABC):
 
     def __init__(self, options: VehicleOptions) -> None:
         self.options = options
-        self.store = Store()
+        self.store = ParameterStore()
         self.rotation = mounted(options)
         self.corrected = np.zeros((options.imus, 2, 3))
         self.temperature_c = 0.0

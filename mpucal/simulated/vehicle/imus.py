@@ -1,4 +1,4 @@
-"""The vehicle's IMUs in one hand: what each measures in its own axes. Knows no parameter and no message."""
+"""The vehicle's IMUs in one hand: what each measures in its own axes."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from ...data import Vector
+from ...mavlink.prompts import Direction, Heard
 from ..faults import mishaps
-from ..hand import KINDS, Prompt
+from ..hand import KINDS, HandPrompt
 from ..motion import Motion
-from ..sensor import Response, SensorTruth, Setting
+from ..sensor import SensorResponse, SensorTruth, Setting
 from .options import VehicleOptions
 
 # the hand's axes have z up, a vehicle's have z down
@@ -46,10 +47,10 @@ class Imus:
         """Of their dies."""
         return self.truths[0].temperature_c
 
-    def hear(self, prompt: Prompt, t_s: float) -> None:
+    def hear(self, prompt: HandPrompt, t_s: float) -> None:
         """The hand hears `prompt`, whose `down` is in the vehicle's axes."""
         down = prompt.down
-        self._motion.hear(Heard(str(prompt.kind), None if down is None else tuple(FROM_HAND @ down)), t_s)
+        self._motion.hear(Heard(str(prompt.kind), None if down is None else turned_over(down)), t_s)
 
     def next(self) -> Vector:
         """The next sample: (imus, 2, 3), specific force [m/s^2] and rate [rad/s], in the sensors' axes."""
@@ -79,18 +80,16 @@ class Imus:
         force, rate = (means @ FROM_HAND @ self._rotation for means in self._motion.means(edges))
         return np.stack([self._in_si(response, force, rate) for response in self._responses], axis=1)
 
-    def _in_si(self, response: Response, force: Vector, rate: Vector) -> Vector:
+    def _in_si(self, response: SensorResponse, force: Vector, rate: Vector) -> Vector:
         counts = response.counts(force, rate, self._rng)
         acc, gyr = counts[:, :3] * self._setting.mps2_per_lsb, counts[:, 4:] * self._setting.rad_s_per_lsb
         return np.stack((acc, gyr), axis=1)
 
 
-class Heard:
-    """A prompt as the hand hears it; see bus.simulated.hand.Prompt."""
-
-    def __init__(self, kind: str, down: tuple[float, ...] | None) -> None:
-        self.kind = kind
-        self.down: Any = down
+def turned_over(down: Direction) -> Direction:
+    """The same direction in the hand's axes."""
+    x, y, z = down
+    return x, -y, -z
 
 
 def _truth(seed: int, number: int, gravity: float) -> SensorTruth:

@@ -1,4 +1,4 @@
-"""Real ports that a simulated vehicle speaks over: UDP, TCP, a pseudo-terminal. Knows no packet's meaning."""
+"""Real ports that a simulated vehicle speaks over: UDP, TCP, a pseudo-terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...errors import LinkError
 CHUNK = 65536
 
 
-class Port(Protocol):
+class StationPort(Protocol):
     """Where stations are.
 
     Attributes
@@ -56,12 +56,12 @@ class UdpPort:
         self._socket.setblocking(False)
 
     def send(self, data: bytes) -> None:
-        """See Port."""
+        """See StationPort."""
         with suppress(OSError):
             self._socket.sendto(data, self._station)
 
     def receive(self) -> list[bytes]:
-        """See Port."""
+        """See StationPort."""
         received: list[bytes] = []
         with suppress(OSError):
             while True:
@@ -69,7 +69,7 @@ class UdpPort:
         return received
 
     def close(self) -> None:
-        """See Port."""
+        """See StationPort."""
         self._socket.close()
 
 
@@ -93,13 +93,13 @@ class TcpPort:
         self._stations: list[socket.socket] = []
 
     def send(self, data: bytes) -> None:
-        """See Port."""
+        """See StationPort."""
         for station in self._stations:
             with suppress(OSError):
                 station.sendall(data)
 
     def receive(self) -> list[bytes]:
-        """See Port."""
+        """See StationPort."""
         received: list[bytes] = []
         ready, _, _ = select.select([self._server, *self._stations], [], [], 0)
         for channel in ready:
@@ -117,7 +117,7 @@ class TcpPort:
         return received
 
     def close(self) -> None:
-        """See Port."""
+        """See StationPort."""
         for channel in (*self._stations, self._server):
             channel.close()
 
@@ -134,12 +134,12 @@ class PtyPort:
         self.name = os.ttyname(self._slave)
 
     def send(self, data: bytes) -> None:
-        """See Port; what nobody reads is lost."""
+        """See StationPort; what nobody reads is lost."""
         with suppress(OSError):
             os.write(self._master, data)
 
     def receive(self) -> list[bytes]:
-        """See Port."""
+        """See StationPort."""
         if not select.select([self._master], [], [], 0)[0]:
             return []
         with suppress(OSError):
@@ -147,6 +147,6 @@ class PtyPort:
         return []
 
     def close(self) -> None:
-        """See Port."""
+        """See StationPort."""
         os.close(self._master)
         os.close(self._slave)

@@ -1,4 +1,4 @@
-"""PX4, as far as its accelerometers go: 1.17. Knows no link."""
+"""PX4, as far as its accelerometers go: 1.17."""
 
 from __future__ import annotations
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from ...sources.kind import Request
 from ...sources.vehicle import OpenedVehicle, signing_key
-from . import Vehicle, VehicleOptions
+from . import SimulatedVehicle, VehicleOptions
 from .transport import SimulatedTransport
 
 
 def open_source(request: Request) -> OpenedVehicle:
     """The vehicle that `sim:key=value,...` describes, in the gravity of the plan; see VehicleOptions.parse."""
     key = signing_key(request)
-    vehicle = Vehicle(VehicleOptions.parse(request.value), request.plan.gravity, key)
+    vehicle = SimulatedVehicle(VehicleOptions.parse(request.value), request.plan.gravity, key)
     transport = SimulatedTransport(vehicle)
     system = request.values.get("system")
     return OpenedVehicle(

@@ -1,4 +1,4 @@
-"""A simulated vehicle's card, as MAVLink FTP shows it. Knows no link."""
+"""A simulated vehicle's card, as MAVLink FTP shows it."""
 
 from __future__ import annotations
 

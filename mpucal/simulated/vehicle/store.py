@@ -1,4 +1,4 @@
-"""The parameters that a vehicle holds, in their order. Knows no meaning."""
+"""The parameters that a vehicle holds, in their order, with their types."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ INT8, INT16, INT32 = 2, 4, 6
 AXES = ("X", "Y", "Z")
 
 
-class Store:
+class ParameterStore:
     """Names, values and types; floats are kept as float32.
 
     Attributes

@@ -1,11 +1,11 @@
-"""When each of a vehicle's messages is due. Knows no message."""
+"""When each of a vehicle's messages is due."""
 
 from __future__ import annotations
 
 US = 1_000_000
 
 
-class Streams:
+class StreamTimes:
     """Intervals, and what is due; a stream that comes late skips what it missed."""
 
     def __init__(self) -> None:

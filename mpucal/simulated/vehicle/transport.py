@@ -7,7 +7,7 @@ from collections import deque
 
 from ...mavlink.transport import US, Bytes
 from .line import PacketLine
-from .vehicle import Vehicle
+from .vehicle import SimulatedVehicle
 
 ADDRESS = "the simulated vehicle"
 FAST, REAL = "fast", "real"
@@ -19,7 +19,7 @@ class SimulatedTransport:
     datagrams, outward = True, True
     name = ADDRESS
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: SimulatedVehicle) -> None:
         self._vehicle = vehicle
         self._line = PacketLine(vehicle.options.fault, vehicle.options.seed)
         self._begun_ns = time.time_ns() // US * US

@@ -21,7 +21,7 @@ from .imus import Imus
 from .options import VehicleOptions
 from .px4 import Px4
 from .storage import Card
-from .streams import Streams
+from .streams import StreamTimes
 
 FIRMWARES: dict[str, type[Firmware]] = {"ardupilot": ArduPilot, "px4": Px4}
 
@@ -45,7 +45,7 @@ class Sent(NamedTuple):
     data: bytes
 
 
-class Vehicle:
+class SimulatedVehicle:
     """A vehicle that is switched on at 0 us, in a hand.
 
     Parameters
@@ -106,7 +106,7 @@ class Vehicle:
 
     def _boot(self) -> None:
         self._booted_us = self._now_us
-        self._streams = Streams()
+        self._streams = StreamTimes()
         self._streams.set(HEARTBEAT, S_US, self._now_us)
         for message_id, interval_us in self.firmware.streams:
             self._streams.set(message_id, interval_us, self._now_us)
@@ -243,7 +243,7 @@ class Vehicle:
         reply = self.card.answer(Payload.decode(bytes(message.payload)))
         self._send(dialect().MAVLink_file_transfer_protocol_message(0, 0, 0, bytearray(reply.encode())))
 
-    _HANDLERS: ClassVar[Mapping[str, Callable[[Vehicle, Message], None]]] = {
+    _HANDLERS: ClassVar[Mapping[str, Callable[[SimulatedVehicle, Message], None]]] = {
         "PARAM_REQUEST_READ": _param_request_read,
         "PARAM_REQUEST_LIST": _param_request_list,
         "PARAM_SET": _param_set,

@@ -22,7 +22,7 @@ from umockdev import Testbed
 
 from mpucal.chip.access import Reply
 from mpucal.simulated.chip import Chip, RecordedFeed, SimulatedBus, open_simulated
-from mpucal.simulated.chip.clock import CLOCKS, Clock
+from mpucal.simulated.chip.clock import CLOCKS, SimulatedClock
 from mpucal.simulated.chip.factory import Factory
 from mpucal.simulated.chip.models import MODELS
 
@@ -90,7 +90,7 @@ def open_bus(text: str, clock: Path) -> SimulatedBus | ClockChip:
         feed = RecordedFeed(*counts, rate_hz=200.0, accel_range_g=8.0, gyro_range_dps=500.0)
         return SimulatedBus(Chip(MODELS["mpu6050"], feed, 2500.0, Factory()), SharedClock(clock))
 
-    def shared() -> Clock:
+    def shared() -> SimulatedClock:
         return SharedClock(clock)
 
     CLOCKS["shared"] = shared  # type: ignore[assignment]
