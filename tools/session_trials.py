@@ -66,7 +66,6 @@ class Trial:
     sph_rms: float = math.nan
     z: tuple[float, ...] = ()
     z_verified: tuple[float, ...] = ()
-    cautions: tuple[str, ...] = ()
     why: tuple[str, ...] = field(default=())
 
 

@@ -58,7 +58,6 @@ class Family:
     asleep : it sleeps after power-on and reset.
     fifo_reset_needs_stop : FIFO_RESET acts only while FIFO_EN of USER_CTRL is 0 (RM-MPU-6000A, register 106).
     half_range_revision : letter of a revision whose accelerometer has half the sensitivity; empty where there is none.
-    accel_delay_ms, gyro_delay_ms : group delay of the low-pass filter by DLPF_CFG = 0..6.
     accel_noise_ug, gyro_noise_dps : typical noise densities, ug/sqrt(Hz) and deg/s/sqrt(Hz).
     zero_rate_dps : tolerance of the gyroscope's output at rest, deg/s.
     """
@@ -72,8 +71,6 @@ class Family:
     has_accel_config2: bool
     packed_self_test: bool
     asleep: bool
-    accel_delay_ms: tuple[float, ...]
-    gyro_delay_ms: tuple[float, ...]
     accel_noise_ug: float
     gyro_noise_dps: float
     zero_rate_dps: float
@@ -120,8 +117,6 @@ MPU6050 = Family(
     has_accel_config2=False,
     packed_self_test=True,
     asleep=True,
-    accel_delay_ms=(0.0, 2.0, 3.0, 4.9, 8.5, 13.8, 19.0),
-    gyro_delay_ms=(0.98, 1.9, 2.8, 4.8, 8.3, 13.4, 18.6),
     accel_noise_ug=400.0,
     gyro_noise_dps=0.005,
     zero_rate_dps=20.0,
@@ -139,8 +134,6 @@ MPU6500 = Family(
     has_accel_config2=True,
     packed_self_test=False,
     asleep=False,
-    accel_delay_ms=(1.88, 1.88, 2.88, 4.88, 8.87, 16.83, 32.48),
-    gyro_delay_ms=(0.97, 2.9, 3.9, 5.9, 9.9, 17.85, 33.48),
     accel_noise_ug=300.0,
     gyro_noise_dps=0.01,
     zero_rate_dps=5.0,

@@ -28,8 +28,8 @@ from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 from zstandard import ZstdCompressor
 
-# opcode and length of a record; channel, sequence and two times of a Message
-RECORD_HEAD, MESSAGE_HEAD = 9, 22
+# opcode and length of a record
+RECORD_HEAD = 9
 # 1 MB where a message takes 350 bytes
 MESSAGES = 3072
 

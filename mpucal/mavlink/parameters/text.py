@@ -13,7 +13,6 @@ from pathlib import Path
 from ...errors import RecordingError
 from .encoding import REAL32, as_float32
 
-PARAM, PARAMS = ".param", ".params"
 PARAMS_COLUMNS = 5
 
 
