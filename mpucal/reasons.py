@@ -252,8 +252,8 @@ KINDS: Mapping[str, Kind] = {
                 True,
             ),
             "scale_factors": Sentence(
-                "all three scale factors are near {factor:.3g}, and no accelerometer is off by that: it seems to be in"
-                " another unit than m/s^2",
+                "all three scale factors are near {factor:.3g}, and no accelerometer has such an error: it seems to be"
+                " in another unit than m/s^2",
                 "convert it to m/s^2",
                 True,
             ),
@@ -293,8 +293,8 @@ KINDS: Mapping[str, Kind] = {
                 True,
             ),
             "scale": Sentence(
-                "the gyroscope is off by {scale:.1%} on {axis} and {cross:.1%} across axes, more than its data sheet"
-                " allows",
+                "the gyroscope's scale factor error is {scale:.1%} on {axis} and its cross-axis sensitivity"
+                " {cross:.1%}, more than its data sheet allows",
                 "check its range and the sample rate",
                 False,
             ),
@@ -381,7 +381,7 @@ KINDS: Mapping[str, Kind] = {
             ),
             "nothing": Sentence("there is nothing to verify", "turn the board again", True),
             "gyroscope": Sentence(
-                "the gyroscope's scale factor about {axis} is off by {share:.0%} against the turning before",
+                "the gyroscope's scale factor about {axis} differs by {share:.0%} from the turning before",
                 "give the gyroscope's true range and rate, turn more slowly, and run the session again",
                 True,
             ),

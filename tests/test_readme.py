@@ -24,5 +24,7 @@ def test_the_session_is_a_real_one(tmp_path):
     assert shown[-len(result) :] == result
     # the keys are named, and a line is written over, on a terminal only
     talk = [line for line in shown[: -len(result)] if not line.startswith("(Enter")]
-    assert talk
-    assert [line for line in talk if line not in shape(said.getvalue())] == []
+    assert {"LAY FLAT", "ROTATE", "VERIFY", "REST"} <= set(talk)
+    # in the order in which they are said, with some left out
+    program = iter(shape(said.getvalue()))
+    assert [line for line in talk if line not in program] == []

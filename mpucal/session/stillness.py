@@ -164,14 +164,14 @@ class Stillness:
         if gyr_ratio.max() > acc_ratio.max():
             return _turned(gyr_step)
         axis = int(acc_ratio.argmax())
-        return f"the acceleration along {AXES[axis]} changed by {abs(acc_step[axis]):.2f} m/s²"
+        return f"acceleration along {AXES[axis]} changed by {abs(acc_step[axis]):.2f} m/s²"
 
 
 def _turned(gyr: Vector) -> str:
     axis = int(np.abs(gyr).argmax())
-    return f"it turned at {math.degrees(abs(gyr[axis])):.0f} deg/s about {AXES[axis]}"
+    return f"turning at {math.degrees(abs(gyr[axis])):.0f} deg/s about {AXES[axis]}"
 
 
 def _shook(acc_sd: Vector, ratio: Vector) -> str:
     axis = int(ratio.argmax())
-    return f"it shook by {acc_sd[axis]:.2f} m/s² along {AXES[axis]}"
+    return f"shaking by {acc_sd[axis]:.2f} m/s² along {AXES[axis]}"

@@ -39,9 +39,9 @@ def meter(view: View, glyphs: Glyphs) -> Text:
     cells[_NEEDLE // 2] = glyphs.mark
     style = "green" if m.still else "yellow"
     waiting = view.waiting
-    said = "still" if m.still else f"moving: {m.what}" if m.what else "moving"
+    said = "still" if m.still else m.what or "moving"
     if waiting is not None:
-        said += f", {waiting.remaining_s:.0f} s to go" + (" (paused)" if waiting.paused else "")
+        said = f"{waiting.remaining_s:.0f} s to go{' (paused)' if waiting.paused else ''}, {said}"
     return Text.assemble(f" {'stillness':<{_LABEL}}", ("".join(cells), style), f"  {said}")
 
 

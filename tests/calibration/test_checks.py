@@ -344,7 +344,7 @@ def test_a_gyroscope_beyond_its_data_sheet_is_named(hand, axis):
     assert result.verdict == "usable"
     assert list(result.reasons) == ["gyro_off"]
     assert f"% on {'xyz'[axis]} " in result.reasons["gyro_off"]
-    off = float(result.reasons["gyro_off"].split("off by ")[1].split("%")[0])
+    off = float(result.reasons["gyro_off"].split("scale factor error is ")[1].split("%")[0])
     assert off == pytest.approx(20.0, abs=4.0)
     assert "check its range and the sample rate" in result.reasons["gyro_off"]
 

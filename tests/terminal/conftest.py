@@ -60,7 +60,7 @@ TURNED = [
     Seen(24.5, 1, (0.0, 0.6, -0.8), False),
     knowledge(25.0),
     Caution(25.0, "too_fast", "turned at 480 deg/s, close to the gyroscope's range", "turn it more slowly"),
-    meter(25.25, still=False, down=(0.1, -0.2, 0.97), what="it turned at 30 deg/s about z"),
+    meter(25.25, still=False, down=(0.1, -0.2, 0.97), what="turning at 30 deg/s about z"),
 ]
 CHECKED = [
     *TURNED,

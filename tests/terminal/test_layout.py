@@ -39,7 +39,7 @@ def test_all_that_a_person_needs_is_there(views, size):
         "turn it like this",
         "+Z up",
         "-Z up",
-        "moving: it turned at 30 deg/s about z",
+        "turning at 30 deg/s about z",
         "y ±0.31 %",
         "z not observable",
         "target 0.05",

@@ -39,7 +39,7 @@ def tilted_only(e: Evidence) -> Reason | None:
     if e.model != "tilt" or e.fit is None:
         return None
     left = [name for name in e.fit.at_prior if name.startswith(("D_", "b_a_"))]
-    named = f"; {', '.join(left)} keep their assumed values and are not claimed" if left else ""
+    named = f"; {', '.join(left)} keep their assumed values, as they are not observable" if left else ""
     return reason("few_orientations", "tilted", degrees=np.rad2deg(CONE_RAD), left=named)
 
 

@@ -74,7 +74,7 @@ class Parameters:
         if isinstance(answer, Parameter):
             return answer
         why = answer.why if isinstance(answer, Refused) else "no answer"
-        raise LinkError(f"{vehicle} does not tell {name} ({why})", "check the link and the firmware's version")
+        raise LinkError(f"{vehicle} does not report {name} ({why})", "check the link and the firmware's version")
 
     def _answer(self, received: Message, name: str) -> Parameter | Refused | None:
         kind = received.get_type()

@@ -41,7 +41,7 @@ TURNED = [rest(direction=0.05, turn=(0.0, 0.0, turn), miss=(0.0, 0.0, 0.04 * tur
         ([rest(0.05), rest()], recording(), None, "verification_failed", "|a| is +0.050 m/s² off"),
         ([rest(0.05), rest()], recording(acc_clipped=3), None, "verification_failed", "after a knock"),
         ([rest(direction=0.06), rest()], recording(), None, "verification_failed", "the sensor moved on its mount"),
-        (TURNED, recording(), None, "verification_failed", "scale factor about z is off by 4%"),
+        (TURNED, recording(), None, "verification_failed", "scale factor about z differs by 4%"),
         ([rest(clipped=True)], recording(gyr_clipped=50), None, "gyro_clipped", "every turn went beyond"),
         ([rest(0.05), rest()], recording(gyr_clipped=50), None, "gyro_clipped", "beyond the gyroscope's range"),
         ([rest()], recording(warmer_c=15.0), None, "temperature_moved", "rose by 15 C"),
