@@ -39,7 +39,7 @@ The result is in m/s² and rad/s, in the calibration's body frame. Only {held_wh
     "target",
     metavar="FILE",
     type=click.Path(path_type=Path),
-    help=f"Where it goes: {writable()}, by its suffix; by default a table on stdout.",
+    help=f"Output file: {writable()}, by its suffix; default: a table on stdout.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON; needs -o.")
 def command(calibration: Path, file: Path, target: Path | None, as_json: bool) -> None:

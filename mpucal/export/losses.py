@@ -58,7 +58,7 @@ def without_gyroscope(calibration: Calibration) -> tuple[str, ...]:
 
 
 def without_temperature(calibration: Calibration) -> tuple[str, ...]:
-    """Of a form that knows no temperature."""
+    """Of a form that holds b_a at one temperature."""
     if not calibration.follows_temperature:
         return ()
     worst = float(np.abs(calibration.b_a_slope).max())

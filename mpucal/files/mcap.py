@@ -17,12 +17,12 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from zstandard import ZstdError
 
-from ..chip.access import Failure, Transaction
-from ..chip.records import Record, SessionEvent
+from ..chip.access import Transaction
+from ..chip.records import Record
 from ..errors import CaptureError, OutputError
+from .messages import BUS, SCHEMAS, SESSION, event_message, record_of, transaction_message
 
 FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 1
-BUS, SESSION = "/bus", "/session"
 # the metadata of a file of calibrated samples, which is no capture
 CALIBRATED = "mpucal.imu"
 
@@ -40,29 +40,6 @@ _DAMAGE = (
     OverflowError,
     MemoryError,
 )
-
-_BUS_SCHEMA = {
-    "title": "mpucal.Transaction",
-    "description": "A register access; the message's time is the bus's clock.",
-    "type": "object",
-    "properties": {
-        "op": {"enum": ["read", "write"]},
-        "register": {"type": "integer", "minimum": 0, "maximum": 255},
-        "count": {"type": "integer", "description": "bytes asked for or given"},
-        "data": {"type": "string", "description": "bytes moved, hexadecimal"},
-        "error": {
-            "type": "object",
-            "description": "how the transfer failed",
-            "properties": {key: {"type": "string"} for key in Failure._fields},
-        },
-    },
-}
-_SESSION_SCHEMA = {
-    "title": "mpucal.SessionEvent",
-    "description": "A key press, an option, the end; the message's time is the bus's clock.",
-    "type": "object",
-    "properties": {"name": {"type": "string"}, "data": {"type": "object"}},
-}
 
 
 class CaptureWriter:
@@ -91,7 +68,7 @@ class CaptureWriter:
             self._writer.start(profile="", library=FORMAT)
             texts = {key: json.dumps(value) for key, value in {**meta, VERSION_KEY: VERSION}.items()}
             self._writer.add_metadata(FORMAT, texts)
-            for topic, schema in ((BUS, _BUS_SCHEMA), (SESSION, _SESSION_SCHEMA)):
+            for topic, schema in SCHEMAS.items():
                 id_ = self._writer.register_schema(
                     str(schema["title"]), SchemaEncoding.JSONSchema, json.dumps(schema).encode()
                 )
@@ -102,19 +79,11 @@ class CaptureWriter:
 
     def transaction(self, transaction: Transaction) -> None:
         """Keep a register access."""
-        content: dict[str, Any] = {
-            "op": transaction.op,
-            "register": transaction.register,
-            "count": transaction.count,
-            "data": transaction.data.hex(),
-        }
-        if transaction.error is not None:
-            content["error"] = transaction.error._asdict()
-        self._add(BUS, transaction.t_ns, content)
+        self._add(BUS, transaction.t_ns, transaction_message(transaction))
 
     def event(self, name: str, t_ns: int, data: Mapping[str, Any] | None = None) -> None:
         """Keep a session event; `data` of JSON's own types."""
-        self._add(SESSION, t_ns, {"name": name, "data": dict(data or {})})
+        self._add(SESSION, t_ns, event_message(name, data or {}))
 
     def close(self) -> None:
         """Write the index and close the file."""
@@ -131,8 +100,7 @@ class CaptureWriter:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _add(self, topic: str, t_ns: int, content: dict[str, Any]) -> None:
-        data = json.dumps(content, separators=(",", ":")).encode()
+    def _add(self, topic: str, t_ns: int, data: bytes) -> None:
         try:
             self._writer.add_message(self._channels[topic], t_ns, data, publish_time=t_ns)
             if self._chunk_began_ns is None:
@@ -235,7 +203,7 @@ class CaptureReader:
             elif isinstance(item, Channel):
                 channels[item.id] = item.topic
             elif isinstance(item, Message):
-                record = _record(channels.get(item.channel_id, ""), item, self._path)
+                record = self._record(channels.get(item.channel_id, ""), item)
                 if record is not None:
                     self._counted(record)
                     yield record
@@ -245,6 +213,15 @@ class CaptureReader:
             )
         self.meta = meta
         self.recovered = None if finished else self._why_recovered(size - whole)
+
+    def _record(self, topic: str, message: Message) -> Record | None:
+        try:
+            return record_of(topic, message.log_time, message.data)
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise CaptureError(
+                f"{self._path} holds a message on {topic} that is none of mpucal's ({error})",
+                "give a capture that mpucal recorded",
+            ) from error
 
     def _check(self, magic: bytes) -> None:
         if not magic:
@@ -294,27 +271,3 @@ def _meta(item: Metadata, path: Path) -> dict[str, Any]:
             "update mpucal",
         )
     return meta
-
-
-def _record(topic: str, message: Message, path: Path) -> Record | None:
-    """The record of a message; None for a topic that a newer mpucal added."""
-    if topic not in (BUS, SESSION):
-        return None
-    try:
-        content = json.loads(message.data)
-        if topic == SESSION:
-            return SessionEvent(content["name"], message.log_time, content["data"])
-        error = content.get("error")
-        return Transaction(
-            content["op"],
-            content["register"],
-            content["count"],
-            bytes.fromhex(content["data"]),
-            message.log_time,
-            None if error is None else Failure(**error),
-        )
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise CaptureError(
-            f"{path} holds a message on {topic} that is none of mpucal's ({error})",
-            "give a capture that mpucal recorded",
-        ) from error
