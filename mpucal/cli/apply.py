@@ -18,9 +18,9 @@ from ..files.csv import CsvText
 from ..files.folder import captures_in
 from ..files.formats import held_whole, writable
 from ..files.rows import Rows
+from ..result.atomic import check_not_among
 from ..result.calibration import Calibration
 from ..result.correction import correction
-from .options import check_not_among
 
 EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calibrated.mcap`"
 

@@ -8,9 +8,8 @@ from pathlib import Path
 import click
 
 from ..export.forms import FORMS, form
-from ..result.atomic import write_atomically
+from ..result.atomic import check_not_among, write_atomically
 from ..result.calibration import Calibration
-from .options import check_not_among
 
 EXAMPLE = "Example: `mpucal export board7/calibration.json --to c-header -o calibration.h`"
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
+from ..result.atomic import check_not_among
 from ..result.calibration import Calibration
 from ..result.merge import merge
 from ..result.session_files import BLOB, DOCUMENT
 from ..session.results import make_folder, save
-from .options import check_not_among
 from .summary import slope, summary
 
 EXAMPLE = "Example: `mpucal merge cold/calibration.json warm/calibration.json hot/calibration.json -o merged`"

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import click
@@ -165,9 +164,3 @@ def check_source(context: click.Context) -> SourceKind:
     UsageError : none, several, or options that do not fit the source.
     """
     return opening.check_source(context.params, given(), str(context.command.name))
-
-
-def check_not_among(target: Path, inputs: Iterable[Path]) -> None:
-    """A result never takes the place of what it was made of; UsageError where `target` is one of `inputs`."""
-    if target.exists() and any(read.exists() and target.samefile(read) for read in inputs):
-        raise UsageError(f"{target} is what was given to be read", "choose another name with -o")

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
-from ..errors import OutputError
+from ..errors import OutputError, UsageError
+
+
+def check_not_among(target: Path, inputs: Iterable[Path]) -> None:
+    """A result never takes the place of what it was made of; UsageError where `target` is one of `inputs`."""
+    if target.exists() and any(read.exists() and target.samefile(read) for read in inputs):
+        raise UsageError(f"{target} is what was given to be read", "choose another name with -o")
 
 
 def write_atomically(path: Path, data: bytes) -> None:
