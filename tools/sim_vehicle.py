@@ -26,13 +26,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
+from vehicle_ports import PtyPort, StationPort, TcpPort, UdpPort
+
 from mpucal.errors import MpucalError, UsageError
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.signing import read_key
 from mpucal.simulated.faults import OF_VEHICLE, Where, kinds
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.line import PacketLine
-from mpucal.simulated.vehicle.ports import PtyPort, StationPort, TcpPort, UdpPort
 
 STEP_S = 0.002
 STRANGER_US = 20_000

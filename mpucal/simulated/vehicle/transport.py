@@ -10,7 +10,7 @@ from .line import PacketLine
 from .vehicle import SimulatedVehicle
 
 ADDRESS = "the simulated vehicle"
-FAST, REAL = "fast", "real"
+REAL = "real"
 
 
 class SimulatedTransport:

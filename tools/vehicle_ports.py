@@ -10,7 +10,7 @@ import tty
 from contextlib import suppress
 from typing import Protocol
 
-from ...errors import LinkError
+from mpucal.errors import LinkError
 
 CHUNK = 65536
 
