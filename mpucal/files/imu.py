@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,6 @@ from mcap.records import Channel, Header, Metadata, Schema
 from mcap.well_known import MessageEncoding, SchemaEncoding
 from numpy.typing import NDArray
 
-from .. import __version__
 from ..data import Samples
 from ..errors import RecordingError
 from ..result.atomic import whole_file
@@ -104,7 +104,7 @@ def imu_file(path: Path, _rows: Rows, done: str) -> Iterator[Write]:
         writer = ChunkWriter(
             file,
             MESSAGE,
-            Header(profile="ros2", library=f"{CALIBRATED} {__version__}"),
+            Header(profile="ros2", library=f"{CALIBRATED} {version('mpucal')}"),
             Schema(id=1, data=SCHEMA.encode(), encoding=SchemaEncoding.ROS2, name="sensor_msgs/msg/Imu"),
             Channel(id=1, topic=TOPIC, message_encoding=MessageEncoding.CDR, metadata={}, schema_id=1),
             Metadata(CALIBRATED, {"done": done}),

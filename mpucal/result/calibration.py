@@ -120,7 +120,7 @@ class Calibration:
 
     def document(self) -> dict[str, Any]:
         """The content of calibration.json; NaN becomes None."""
-        return content(self)
+        return content(vars(self), self.follows_temperature)
 
     def json(self) -> str:
         """The document as text."""

@@ -6,14 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..data import Sensor, Vector
-
-if TYPE_CHECKING:
-    from .calibration import Calibration
 
 FORMAT, VERSION = "mpucal.calibration", 1
 # (key, attribute of a Calibration, shape) of the two objects
@@ -43,23 +40,23 @@ GYROSCOPE_FORMULA = "w = K @ (y - b_omega)"
 EXTRA = ("autopilot", "others", "written", "merged")
 
 
-def content(c: Calibration) -> dict[str, Any]:
-    """The content of calibration.json; NaN becomes None."""
+def content(fields: Mapping[str, Any], follows_temperature: bool) -> dict[str, Any]:
+    """The content of calibration.json, of a Calibration's fields by name; NaN becomes None."""
     values = {
         "format": FORMAT,
         "version": VERSION,
-        "created": c.created,
+        "created": fields["created"],
         "accelerometer": {
-            **_written(c, ACCELEROMETER),
+            **_written(fields, ACCELEROMETER),
             "formula": ACCELEROMETER_FORMULA,
-            **_written(c, TEMPERATURE if c.follows_temperature else ()),
+            **_written(fields, TEMPERATURE if follows_temperature else ()),
         },
-        "gyroscope": {**_written(c, GYROSCOPE), "formula": GYROSCOPE_FORMULA},
-        "fit": c.fit,
-        "quality": c.quality,
-        "sensor": asdict(c.sensor),
-        "applied_in_hardware": {"b_a": c.applied_in_hardware},
-        **c.extra,
+        "gyroscope": {**_written(fields, GYROSCOPE), "formula": GYROSCOPE_FORMULA},
+        "fit": fields["fit"],
+        "quality": fields["quality"],
+        "sensor": asdict(fields["sensor"]),
+        "applied_in_hardware": {"b_a": fields["applied_in_hardware"]},
+        **fields["extra"],
     }
     return {key: _plain(value) for key, value in values.items()}
 
@@ -97,8 +94,8 @@ def arguments(document: Mapping[str, Any]) -> dict[str, Any]:
 Rows = tuple[tuple[str, str, tuple[int, ...]], ...]
 
 
-def _written(c: Calibration, rows: Rows) -> dict[str, Vector]:
-    return {key: getattr(c, attribute) for key, attribute, _ in rows}
+def _written(fields: Mapping[str, Any], rows: Rows) -> dict[str, Vector]:
+    return {key: fields[attribute] for key, attribute, _ in rows}
 
 
 def _read(values: Mapping[str, Any], rows: Rows) -> dict[str, Vector]:
