@@ -78,7 +78,7 @@ class Bench:
             if (variance < np.maximum(STILL_STD_G**2, NOISE_SHARE * of_noise)).all():
                 return np.asarray(looks.mean(0))
         moves_mg = 1000 * np.sqrt(variance.max())
-        raise ChipError(f"the board moves (by {moves_mg:.0f} mg)", "lay it on something firm and let go of it")
+        raise ChipError(f"the board moves (by {moves_mg:.0f} mg)", "put it on a firm surface and let go of it")
 
     def _looks(self) -> Vector:
         """(n, 3) g."""

@@ -63,7 +63,7 @@ def measured_response(port: Port, bench: Bench, likely: Place = PLACES[0]) -> Re
         after = bench.rest()
         if (np.abs(after - before) > MOVED_G).any():
             raise ChipError(
-                "the board moved while its offset registers were tried", "lay it on something firm and let go of it"
+                "the board moved while its offset registers were tried", "put it on a firm surface and let go of it"
             )
         shift = during - (before + after) / 2
         if (np.abs(shift) > NOTHING_G).any():

@@ -22,4 +22,4 @@ def ask(question: str, yes: bool) -> None:
     WriteBackError : the person said no.
     """
     if not yes and sys.stdin.isatty() and not click.confirm(question, err=True):
-        raise WriteBackError("nothing was written: you said no", "repeat it when you want it written")
+        raise WriteBackError("nothing was written: you declined", "repeat it when you want it written")

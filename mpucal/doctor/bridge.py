@@ -34,7 +34,7 @@ def examine_bridge(bus: Bus) -> Iterator[Finding]:
         "blob_bytes": hello.blob_bytes if stores else 0,
         "window": hello.window,
     }
-    keeps = f"keeps {hello.blob_bytes} bytes of calibration" if stores else "keeps no calibration"
+    keeps = f"stores {hello.blob_bytes} bytes of calibration" if stores else "stores no calibration"
     what = f"{name or 'unnamed'}, protocol {data['version']}, chip at 0x{hello.address:02x}; it {keeps}"
     if pushes:
         yield Finding("bridge", Mark.OK, f"{what}, and pushes samples", "", data)
@@ -50,6 +50,6 @@ def _line(took_ms: float) -> Finding:
         "serial line",
         Mark.NOTE if slow else Mark.OK,
         f"a read of {LONG_BYTES} bytes takes {took_ms:.1f} ms there and back",
-        "use a shorter way to it than a hub or a network" if slow else "",
+        "connect it directly, without a hub or a network" if slow else "",
         {f"read_{LONG_BYTES}_bytes_ms": took_ms},
     )

@@ -81,7 +81,7 @@ def _awake(port: Port, driver: Driver, config: Config, seconds: float, olds: lis
     driver.stop()
     named = PARTS.get(sensor.who_am_i or 0)
     answers_as_it_is = named is not None and named.family.name == family.name
-    doubts = [] if answers_as_it_is else ["it behaves otherwise than it answers"]
+    doubts = [] if answers_as_it_is else ["WHO_AM_I and behaviour disagree"]
     for step in (_self_test, _offsets):
         finding, doubt = step(port, part)
         doubts += doubt
@@ -106,8 +106,8 @@ def _held(port: Port, family: Family, olds: list[Block]) -> Finding:
     return Finding(
         "factory trim",
         Mark.NOTE,
-        f"{', '.join(map(str, trim))} at 0x{old.place[0]:02x}; somebody had written {', '.join(map(str, old.words))}",
-        "put back after this examination; a session resets the chip, and measures without it",
+        f"{', '.join(map(str, trim))} at 0x{old.place[0]:02x}; replaced by {', '.join(map(str, old.words))}",
+        "restored after this examination; a session resets the chip and measures with the factory trim",
         data,
     )
 
@@ -116,13 +116,13 @@ def _self_test(port: Port, part: Part) -> tuple[Finding, list[str]]:
     test = run_self_test(port, part)
     data = {"accel_shares": _listed(test.accel_shares), "gyro_shares": _listed(test.gyro_shares)}
     if not test.has_codes:
-        what = "the factory left no codes to compare with"
+        what = "the chip has no factory codes to compare with"
         return Finding("self test", Mark.NOTE, what, "", data), ["it has no self-test codes"]
     accel, gyro = (", ".join(f"{100 * share:.0f}" for share in each) for each in (test.accel_shares, test.gyro_shares))
     what = f"accelerometer {accel} %, gyroscope {gyro} % of what the factory measured"
     if test.passed:
         return Finding("self test", Mark.OK, what, "", data), []
-    remedy = "lay the board still and repeat; if it stays so, the chip is damaged or no genuine part"
+    remedy = "keep the board still and repeat; if it fails again, the chip is damaged or not genuine"
     return Finding("self test", Mark.BAD, what, remedy, data), ["its self test fails"]
 
 
@@ -145,12 +145,12 @@ def _offsets(port: Port, part: Part) -> tuple[Finding, list[str]]:
 
 def _verdict(sensor: Sensor, doubts: list[str]) -> Finding:
     if not doubts:
-        return Finding("genuine?", Mark.OK, f"nothing speaks against a genuine {sensor.chip}", "", {"doubts": []})
+        return Finding("genuine?", Mark.OK, f"consistent with a genuine {sensor.chip}", "", {"doubts": []})
     return Finding(
         "genuine?",
         Mark.NOTE,
-        f"hardly a genuine part: {', '.join(doubts)}",
-        "it can be used: mpucal goes by behaviour, other software may not",
+        f"probably not genuine: {', '.join(doubts)}",
+        "it can be used with mpucal; other software may misread it",
         {"doubts": doubts},
     )
 

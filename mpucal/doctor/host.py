@@ -63,10 +63,10 @@ def _device_file(path: Path) -> Finding:
     what = f"{path}, {stat.filemode(about.st_mode)} {owner}:{group}"
     data = {"path": str(path), "mode": stat.filemode(about.st_mode), "owner": owner, "group": group}
     if not stat.S_ISCHR(about.st_mode):
-        return Finding("device file", Mark.BAD, f"{what}: no device", "give /dev/i2c-N", data)
+        return Finding("device file", Mark.BAD, f"{what}: not a device", "give /dev/i2c-N", data)
     if not os.access(path, os.R_OK | os.W_OK):
         remedy = "join the group: `sudo usermod -aG i2c $USER`, then log in again"
-        return Finding("device file", Mark.BAD, f"{what}: you may not use it", remedy, data)
+        return Finding("device file", Mark.BAD, f"{what}: no permission", remedy, data)
     return Finding("device file", Mark.OK, what, "", data)
 
 
@@ -83,7 +83,7 @@ def _adapter(number: str) -> Iterator[Finding]:
     speed = _bytes(folder / "device" / "of_node" / "clock-frequency")
     hz = int.from_bytes(speed, "big") if len(speed) == 4 else None
     if hz is None:
-        yield Finding("adapter", Mark.OK, f"{name}; its configured speed is not told", "", {"name": name})
+        yield Finding("adapter", Mark.OK, f"{name}; configured speed unknown", "", {"name": name})
     elif hz < FAST_HZ:
         yield Finding("adapter", Mark.NOTE, f"{name}, configured for {hz / 1000:g} kHz", DTPARAM, _of(name, hz))
     else:
@@ -128,7 +128,7 @@ def _who_answers(path: str) -> Iterator[Finding]:
     finally:
         bus.close()
     if not can_i2c:
-        yield Finding("adapter", Mark.NOTE, "it speaks SMBus only: 32 bytes at once", "keep to 200 Hz or less")
+        yield Finding("adapter", Mark.NOTE, "SMBus only: 32 bytes per transfer", "keep to 200 Hz or less")
     words = [f"0x{address:02x}{_guess(address, answer)}" for address, answer in found.items()]
     ours = any(address in OURS for address in found)
     yield Finding(

@@ -28,7 +28,7 @@ def examine_stream(recording: Recording, nominal_hz: float, seconds: float, fami
     acc, gyr = recording.acc, np.degrees(recording.gyr)
     hz = float(recording.sensor.rate_hz or nominal_hz)
     if trembles(acc, hz):
-        yield Finding("noise", Mark.UNKNOWN, "the board moved", "lay it on something firm, and ask again")
+        yield Finding("noise", Mark.UNKNOWN, "the board moved", "put it on a firm surface and try again")
         return
     ug = density(acc, hz) / STANDARD_GRAVITY_MPS2 * 1e6
     yield _noise("accelerometer noise", ug, family.accel_noise_ug, "ug_rthz", "µg/√Hz")
@@ -45,8 +45,8 @@ def _rate(recording: Recording, nominal_hz: float) -> Finding:
     return Finding(
         "sample rate",
         Mark.OK if ok else Mark.BAD,
-        f"{hz:.3f} Hz where {nominal_hz:g} were asked for, {100 * off:+.2f} % (data sheet: within 1 %)",
-        "" if ok else "a chip whose clock is this far off is not as specified: measure its rate, never trust it",
+        f"{hz:.3f} Hz instead of {nominal_hz:g} Hz, {100 * off:+.2f} % (data sheet: within 1 %)",
+        "" if ok else "the chip's clock is outside its specification: use the measured rate",
         {"rate_hz": hz, "nominal_hz": nominal_hz},
     )
 
@@ -58,7 +58,7 @@ def _losses(recording: Recording, asked_s: float) -> Finding:
     if not gaps and seconds > asked_s - ENDS_S:
         return Finding("losses", Mark.OK, f"none of {what}", "", data)
     remedy = "shorten the wires, check connectors and supply, or slow the bus down"
-    return Finding("losses", Mark.BAD, f"{gaps} gaps within {what}, where {asked_s:g} s were asked for", remedy, data)
+    return Finding("losses", Mark.BAD, f"{gaps} gaps in {what}; {asked_s:g} s were expected", remedy, data)
 
 
 def _noise(topic: str, measured: np.ndarray, typical: float, key: str, unit: str) -> Finding:
@@ -67,26 +67,28 @@ def _noise(topic: str, measured: np.ndarray, typical: float, key: str, unit: str
     data = {key: measured.tolist(), f"typical_{key}": typical}
     if share <= NOISY:
         return Finding(topic, Mark.OK, what, "", data)
-    remedy = "let nothing shake the board, and give it a clean supply; if that is so, the chip is noisy"
+    remedy = "keep vibration away from the board and check its supply; if that does not help, the chip is noisy"
     return Finding(topic, Mark.NOTE if share <= BROKEN else Mark.BAD, what, remedy, data)
 
 
 def _gravity(recording: Recording) -> Finding:
     g = float(np.linalg.norm(recording.acc.mean(0))) / STANDARD_GRAVITY_MPS2
     near = abs(g - 1) <= FAR_FROM_G
-    remedy = "" if near else "beyond the data sheet's scale and zero: a calibration mends it, if it stays so"
-    return Finding("at rest", Mark.OK if near else Mark.NOTE, f"the accelerometer shows {g:.3f} g", remedy, {"g": g})
+    remedy = (
+        "" if near else "outside the data sheet's scale factor and bias; a calibration corrects it if it is constant"
+    )
+    return Finding("at rest", Mark.OK if near else Mark.NOTE, f"|a| is {g:.3f} g", remedy, {"g": g})
 
 
 def _zero_rate(dps: list[float], limit_dps: float) -> Finding:
     inside = max(map(abs, dps)) <= limit_dps
-    what = f"the gyroscope shows {', '.join(f'{value:+.2f}' for value in dps)} deg/s (data sheet: within {limit_dps:g})"
-    remedy = "" if inside else "a calibration mends it, if it stays so"
+    what = f"gyroscope bias {', '.join(f'{value:+.2f}' for value in dps)} deg/s (data sheet: within {limit_dps:g})"
+    remedy = "" if inside else "a calibration corrects it if it is constant"
     return Finding("zero rate", Mark.OK if inside else Mark.NOTE, what, remedy, {"dps": dps})
 
 
 def _temperature(celsius: float) -> Finding:
     usual = USUAL_C[0] < celsius < USUAL_C[1]
     what = f"{celsius:.1f} °C by the formula of this family"
-    remedy = "" if usual else "the chip is no such part, or too hot"
+    remedy = "" if usual else "the chip is another part, or too hot"
     return Finding("temperature", Mark.OK if usual else Mark.NOTE, what, remedy, {"temperature_c": celsius})

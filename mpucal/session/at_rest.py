@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from .events import Prompt, PromptKind
 
-PUT_DOWN = Prompt(PromptKind.LAY_FLAT, "Lay the board on something firm and let go of it.")
+PUT_DOWN = Prompt(PromptKind.LAY_FLAT, "Put the board on a firm surface and let go of it.")
 
 
 def put_down(listeners: Sequence[Callable[[Prompt], None]], say: Callable[[str], None]) -> None:

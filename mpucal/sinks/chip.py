@@ -177,7 +177,7 @@ class ChipSink:
         if (np.abs(after - before - expected) > SHIFT_G + SHIFT_SHARE * np.abs(expected)).any():
             raise ChipError(
                 f"the samples moved by ({_mg(after - before)}) mg where ({_mg(expected)}) were written",
-                "lay the board on something firm, and try again",
+                "put the board on a firm surface, and try again",
             )
         applied = _subtracted(new.words, reference, response)
         _check_gravity(calibration, after, applied)

@@ -22,7 +22,7 @@ def keep(kind: SinkKind, sink: Sink, folder: Path, say: Say) -> tuple[Path, ...]
     """Save what the sink holds, and tell how to bring it back; see Sink.keep."""
     kept = sink.keep(folder)
     for path in kept:
-        say(f"what it held is kept in {path}: `mpucal write {path} {kind.name} ...` brings it back.")
+        say(f"the previous state is saved in {path}; `mpucal write {path} {kind.name} ...` restores it.")
     return kept
 
 
@@ -31,7 +31,7 @@ def write_to(kind: SinkKind, sink: Sink, calibration: Calibration, folder: Path,
 
     Raises
     ------
-    WriteBackError : see Sink.write; or the record could not be saved, and the sink holds what it held.
+    WriteBackError : see Sink.write; or the record could not be saved, and nothing was changed.
     OutputError : the record could not be saved, and the sink keeps what was written.
     """
     kept = keep(kind, sink, folder, say)
@@ -73,7 +73,7 @@ def write_to_all(
                 applied = write_to(kind, sink, calibration, folder, record, device.say)
         except SourceError as error:
             if isinstance(error, KeepsNothing) and kind.name not in asked:
-                device.say(f"{error.what}: the result is in files alone.")
+                device.say(f"{error.what}: the result is in files only.")
                 continue
             raise WriteBackError(f"nothing was written to {kind.where}: {error.what}", error.remedy) from error
         calibration = applied.calibration

@@ -48,7 +48,7 @@ def test_a_session_writes_to_it_by_default_and_records_its_effect(measured):
     ]
     assert not Calibration.load(folder / "board" / "calibration-on-logbook.json").b_a.any()
     assert (folder / "board" / "logbook-old.txt").read_text() == "b_a: nothing\n"
-    assert "`mpucal write board/logbook-old.txt logbook ...` brings it back" in done.stderr
+    assert "`mpucal write board/logbook-old.txt logbook ...` restores it" in done.stderr
 
 
 def test_a_session_leaves_it_alone_where_told_to(tmp_path):

@@ -18,7 +18,7 @@ def test_a_person_is_asked_and_nobody_else(monkeypatch, answer):
     asked = []
     monkeypatch.setattr("click.confirm", lambda question, err: asked.append(question) or answer == "y\n")
     if answer == "n\n":
-        with pytest.raises(WriteBackError, match="you said no"):
+        with pytest.raises(WriteBackError, match="you declined"):
             person.ask("Write?", yes=False)
     else:
         person.ask("Write?", yes=False)

@@ -26,7 +26,7 @@ def test_a_sound_chip_is_told_on_a_page(sound):
     lines = result.out.splitlines()
     assert len(lines) < 40
     assert max(map(len, lines)) <= 100
-    for words in ("0x68, an MPU", "400 kHz achieved", "MPU-6050", "self test", "at 0x06, 2048 LSB/g", "no faults"):
+    for words in ("0x68, an MPU", "400 kHz measured", "MPU-6050", "self test", "at 0x06, 2048 LSB/g", "no faults"):
         assert words in result.out
 
 

@@ -153,4 +153,4 @@ def test_a_device_that_keeps_nothing_is_a_failure_where_it_was_asked_for(tmp_pat
             write_all(monkeypatch, keeps_nothing, calibration, tmp_path, as_it_is, asked)
     else:
         assert write_all(monkeypatch, keeps_nothing, calibration, tmp_path, as_it_is, said=said.append) == []
-        assert "in files alone" in said[0]
+        assert "in files only" in said[0]
