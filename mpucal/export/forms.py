@@ -82,7 +82,7 @@ FORMS = (
         ".sh",
         "`sh FILE /sys/bus/iio/devices/iio:deviceN`",
         "calibbias (of an MPU-6050 alone: of an MPU-6500 the kernel's driver takes the offset registers to lie two "
-        "addresses apart, and they lie three apart), calibscale, mount_matrix; what a driver has no file for is "
+        "addresses apart, and they lie three apart), calibscale, mount_matrix; values without a file of the driver are "
         "printed for udev and the device tree",
         linux_iio.text,
         (linux_iio.left, without_gyroscope, without_temperature),

@@ -13,6 +13,7 @@ from .elements import code, number, paragraph, section, table
 from .units import AXES, Row, accelerometer, gyroscope, with_std
 
 NO_FORMULA = "D cannot be inverted: no correction is possible."
+UNOBSERVABLE = " ± ?: not observable from this recording."
 CAPTION = "value ± standard uncertainty (1 sigma)"
 
 
@@ -70,7 +71,7 @@ def gyroscope_table(c: Calibration) -> str:
     if not estimated:
         rows = [row for row in rows if row.name == "bias"]
     said = (
-        "Estimated together with the accelerometer. ± ?: not observable from this recording."
+        f"Estimated together with the accelerometer.{'' if np.isfinite(c.K_std).all() else UNOBSERVABLE}"
         if estimated
         else "Scale factor errors and misalignments were taken as zero: the recording agrees with that, or they are not"
         " observable from it."

@@ -280,7 +280,7 @@ def test_the_pages_have_the_same_rows():
     assert rows.splitlines() == [f"| `{row.name}` | {row.read_by} | {row.applied} |" for row in FORMS]
     *others, last = (row.name for row in FORMS)
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
-    assert f"Forms to export to: {', '.join(others)} and {last};" in readme
+    assert f"Formats to export to: {', '.join(others)} and {last};" in readme
 
 
 # a form that is made up, then a command
