@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self
@@ -15,6 +17,8 @@ Vector = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 STANDARD_GRAVITY_MPS2 = 9.80665
+# names reach scripts and source code: these characters end no string and no comment there
+NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .:+()-]{0,63}")
 
 
 @dataclass(frozen=True)
@@ -40,12 +44,35 @@ class Sensor:
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Self:
-        """Of a document's values, JSON's own types; what it holds besides is left out."""
+        """Of a document's values, JSON's own types; what it holds besides is left out.
+
+        Raises
+        ------
+        ValueError : a value is no name, or no finite number, where one belongs.
+        """
         known = {f.name for f in fields(cls)}
-        values: dict[str, Any] = {
-            key: tuple(value) if isinstance(value, list) else value for key, value in document.items() if key in known
-        }
-        return cls(**values)
+        return cls(**{key: _checked(key, value) for key, value in document.items() if key in known})
+
+
+def _checked(key: str, value: Any) -> Any:
+    """A value of a Sensor's document, as the Sensor holds it."""
+    if value is None:
+        return None
+    if key in ("chip", "message"):
+        valid = isinstance(value, str) and NAME.fullmatch(value) is not None
+    elif key in ("accel_offsets", "least_noise"):
+        kind, count = (int, 3) if key == "accel_offsets" else (int | float, 2)
+        valid = isinstance(value, list | tuple) and len(value) == count and all(_is(kind, item) for item in value)
+        value = tuple(value) if valid else value
+    else:
+        valid = _is(int if key == "who_am_i" else int | float, value)
+    if not valid:
+        raise ValueError(f"sensor: {key} is {value!r}")
+    return value
+
+
+def _is(kind: Any, value: Any) -> bool:
+    return isinstance(value, kind) and not isinstance(value, bool) and math.isfinite(value)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -12,6 +13,9 @@ from ..result.calibration import REFUSED, Calibration
 
 # of a calibration: what a form cannot carry of it, a sentence each
 Loss = Callable[[Calibration], tuple[str, ...]]
+
+# what may end a comment or a string in one of the forms' languages
+NOT_HARMLESS = re.compile(r"[^A-Za-z0-9_ .,:+()-]")
 
 FLOAT_EPS = float(np.finfo(np.float32).eps)
 
@@ -32,8 +36,18 @@ def check_usable(calibration: Calibration) -> None:
 
 def head(calibration: Calibration) -> str:
     """What the file is, on one line."""
-    of = calibration.sensor.chip or "a sensor"
-    return f"Calibration of {of} by mpucal, {calibration.created or 'undated'}; m/s^2"
+    of = harmless(calibration.sensor.chip or "a sensor")
+    return f"Calibration of {of} by mpucal, {dated(calibration)}; m/s^2"
+
+
+def dated(calibration: Calibration) -> str:
+    """When it was made, for a remark."""
+    return harmless(calibration.created) or "undated"
+
+
+def harmless(text: str) -> str:
+    """A name or a date as a remark may hold it in any language: on one line, and only a remark."""
+    return NOT_HARMLESS.sub("_", text)
 
 
 def in_float(calibration: Calibration) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from ..mavlink.parameters.encoding import as_float32
 from ..mavlink.parameters.plan import changes, left_out
 from ..mavlink.parameters.text import param_text, params_text
 from ..result.calibration import Calibration
+from .losses import dated
 
 UNNOTICED = "PX4 takes a vector over at once only where it differs by more than 0.01 from the one in use; restart it."
 
@@ -51,9 +52,7 @@ def _values(calibration: Calibration, firmware: str) -> dict[str, float]:
 
 def _head(calibration: Calibration, firmware: str) -> str:
     imus = ", ".join(str(change.imu) for change in changes(calibration, firmware))
-    return (
-        f"Accelerometer calibration of a {firmware} vehicle by mpucal, {calibration.created or 'undated'}: IMU {imus}"
-    )
+    return f"Accelerometer calibration of a {firmware} vehicle by mpucal, {dated(calibration)}: IMU {imus}"
 
 
 def _left_by(calibration: Calibration, firmware: str) -> tuple[str, ...]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import asdict
+from datetime import datetime
 from types import MappingProxyType
 from typing import Any
 
@@ -36,6 +38,8 @@ GYROSCOPE = (
 )
 ACCELEROMETER_FORMULA = "a = inv(D) @ (y - b_a)"
 GYROSCOPE_FORMULA = "w = K @ (y - b_omega)"
+# fromisoformat takes any character between date and time
+DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}([T ][0-9:]{5,8}([.,][0-9]{1,9})?(Z|[+-][0-9:]{2,8})?)?")
 # top-level keys that are kept as they are
 EXTRA = ("autopilot", "others", "written", "merged")
 
@@ -86,7 +90,7 @@ def arguments(document: Mapping[str, Any]) -> dict[str, Any]:
         "fit": MappingProxyType(dict(document.get("fit", {}))),
         "quality": MappingProxyType(dict(document.get("quality", {}))),
         "sensor": Sensor.of(document.get("sensor", {})),
-        "created": str(document.get("created", "")),
+        "created": _date(document.get("created") or ""),
         "extra": MappingProxyType({key: document[key] for key in EXTRA if key in document}),
     }
 
@@ -100,6 +104,16 @@ def _written(fields: Mapping[str, Any], rows: Rows) -> dict[str, Vector]:
 
 def _read(values: Mapping[str, Any], rows: Rows) -> dict[str, Vector]:
     return {attribute: _array(values[key], shape) for key, attribute, shape in rows if values.get(key) is not None}
+
+
+def _date(text: Any) -> str:
+    """A time as ISO 8601 has it; "" where it is unknown."""
+    if text == "":
+        return ""
+    if not isinstance(text, str) or not DATE.fullmatch(text):
+        raise ValueError(f"created is {text!r}, which is no ISO 8601 time")
+    datetime.fromisoformat(text)
+    return text
 
 
 def _array(values: Any, shape: tuple[int, ...]) -> Vector:

@@ -1,0 +1,187 @@
+"""Names and dates that are no names and no dates: refused where they are read, and only remarks where they are written.
+
+Each form's consumer is the judge: what it makes of the file is the same whatever the sensor is called.
+"""
+
+import ast
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from pymavlink.mavparm import MAVParmDict
+
+from mpucal.data import Sensor
+from mpucal.errors import RecordingError
+from mpucal.export.forms import FORMS, form
+from mpucal.result.calibration import Calibration
+
+HOSTILE = (
+    "x\ntouch PWNED",
+    "x\r\ntouch PWNED #",
+    'x"; touch PWNED; "',
+    "$(touch PWNED) `touch PWNED`",
+    '"""\nopen("PWNED", "w")\n"""',
+    "'''\nopen('PWNED', 'w')",
+    "\\",
+    "x */ int pwned; /*",
+    "x ??/\nint pwned;",
+    "x\nSM: [1.0]",
+    "x\nINS_ACCOFFS_X,7",
+    "x\x85int pwned;\u2028int pwned;",
+    "x\0y",
+    "!lambda return 0;",
+)
+hostile = pytest.mark.parametrize("words", HOSTILE)
+
+
+def meaning_to_c(folder, name, text):
+    if shutil.which("gcc") is None:
+        pytest.skip("needs gcc")
+    (folder / name).write_text(text)
+    (folder / "Wire.h").write_text("")
+    words = ["gcc", "-trigraphs", "-w", "-I.", "-E", "-P", "-x", "c++" if name.endswith(".ino") else "c", name]
+    return subprocess.run(words, cwd=folder, capture_output=True, text=True, check=True).stdout
+
+
+def meaning_to_sh(folder, name, text):
+    (folder / name).write_text(text)
+    subprocess.run(["sh", "-n", name], cwd=folder, check=True)
+    (folder / "iio").mkdir(exist_ok=True)
+    run = subprocess.run(["sh", name, "iio"], cwd=folder, capture_output=True, check=False)
+    written = {path.name: path.read_text() for path in (folder / "iio").iterdir()}
+    return run.returncode, run.stdout, written
+
+
+def meaning_to_python(folder, name, text):
+    module = ast.parse(text)
+    return [ast.dump(node) for node in module.body[1:]], isinstance(module.body[0].value.value, str)
+
+
+def meaning_to_yaml(folder, name, text):
+    return yaml.load(text, PlainLoader)
+
+
+def meaning_to_pymavlink(folder, name, text):
+    (folder / name).write_text(text)
+    loaded = MAVParmDict()
+    loaded.load(str(folder / name), check=False)
+    return dict(loaded)
+
+
+def meaning_to_json(folder, name, text):
+    document = json.loads(text)
+    document["sensor"].pop("chip")
+    document.pop("created")
+    return document
+
+
+class PlainLoader(yaml.SafeLoader):
+    """YAML as ESPHome reads it: `!lambda` and the like are tags."""
+
+
+PlainLoader.add_multi_constructor("!", lambda loader, tag, node: (tag, node.value))
+
+CONSUMERS = {
+    ".h": meaning_to_c,
+    ".ino": meaning_to_c,
+    ".sh": meaning_to_sh,
+    ".py": meaning_to_python,
+    ".yaml": meaning_to_yaml,
+    ".param": meaning_to_pymavlink,
+    ".params": meaning_to_pymavlink,
+    ".json": meaning_to_json,
+}
+
+
+def of_vehicle(calibration, name):
+    """The same calibration, of a vehicle where the form is one's."""
+    stem, slots = ("INS_ACC", "{stem}{kind}_{axis}") if name == "ardupilot" else ("CAL_ACC0_", "{stem}{axis}{kind}")
+    kinds = ("OFFS", "SCAL") if name == "ardupilot" else ("OFF", "SCALE")
+    values = {
+        slots.format(stem=stem, kind=kind, axis=axis): float(kind.startswith("SC")) for kind in kinds for axis in "XYZ"
+    }
+    document = {
+        "firmware": {"ardupilot": "ArduPilot", "px4": "PX4"}.get(name, "none"),
+        "imu": 1,
+        "message": "RAW_IMU",
+        "params_old": values,
+        "params_new": values,
+        "residual_mps2": 0.1,
+        "mounting": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    }
+    return replace(calibration, extra={"autopilot": document}) if name in ("ardupilot", "px4") else calibration
+
+
+@hostile
+@pytest.mark.parametrize("row", FORMS, ids=lambda row: row.name)
+def test_a_name_or_a_date_changes_nothing_but_remarks(calibration, row, words, tmp_path):
+    calibration = of_vehicle(calibration, row.name)
+    named = replace(calibration, created=words, sensor=replace(calibration.sensor, chip=words))
+    # what a form makes of a chip it does not know, under a plain name
+    plain = replace(calibration, sensor=replace(calibration.sensor, chip="another"))
+    meaning = CONSUMERS[row.suffix]
+    name = f"calibration{row.suffix}"
+    found = meaning(tmp_path, name, row.export(named)[0])
+    assert found == meaning(tmp_path, name, row.export(plain)[0])
+    assert not list(Path(tmp_path).rglob("PWNED"))
+
+
+@hostile
+@pytest.mark.parametrize("key", ["created", "chip", "message"])
+def test_a_document_with_such_a_name_is_no_calibration(calibration, key, words, tmp_path):
+    document = calibration.document()
+    (document if key == "created" else document["sensor"])[key] = words
+    (tmp_path / "c.json").write_text(json.dumps(document))
+    with pytest.raises(RecordingError, match=f"{key} is"):
+        Calibration.load(tmp_path / "c.json")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("chip", ["MPU-6050"]),
+        ("accel_range_g", "4; touch PWNED"),
+        ("who_am_i", 104.5),
+        ("accel_offsets", [1, 2]),
+        ("accel_offsets", [1, 2, "3"]),
+        ("temperature_c", True),
+        ("rate_hz", float("nan")),
+    ],
+)
+def test_a_sensor_has_names_and_numbers(calibration, key, value):
+    document = calibration.document()
+    document["sensor"][key] = value
+    with pytest.raises(ValueError, match=key):
+        Calibration.from_document(document)
+
+
+@pytest.mark.parametrize(
+    "created", ["", "2024-05-17", "2024-05-17T09:30:00+00:00", "2024-05-17 09:30:00.123456Z", "2024-05-17T09:30:00"]
+)
+def test_a_time_of_iso_8601_is_read(calibration, created):
+    assert Calibration.from_document(calibration.document() | {"created": created}).created == created
+
+
+@pytest.mark.parametrize("created", ["2024-13-17", '2024-05-17"09:30:00', "2024-05-17\n09:30:00", "yesterday", 7])
+def test_another_is_refused(calibration, created):
+    with pytest.raises(ValueError, match=r"created|month"):
+        Calibration.from_document(calibration.document() | {"created": created})
+
+
+@settings(deadline=None)
+@given(st.text())
+@example("MPU-6050")
+def test_whatever_is_read_is_written_as_it_is(words):
+    try:
+        name = Sensor.of({"chip": words}).chip
+    except ValueError:
+        return
+    calibration = Calibration([[1, 0, 0], [0, 1, 0], [0, 0, 1]], [0, 0, 0], sensor=Sensor(chip=name))
+    calibration = Calibration.from_document(calibration.document())
+    assert f"Calibration of {words} by mpucal" in form("python").export(calibration)[0]
