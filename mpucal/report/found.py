@@ -10,7 +10,7 @@ from ..result.calibration import Calibration
 from ..result.document import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA
 from ..result.orientation import side_down
 from .elements import code, number, paragraph, section, table
-from .units import AXES, Row, accelerometer, gyroscope, with_std
+from .units import AXES, ParameterRow, accelerometer, gyroscope, with_std
 
 NO_FORMULA = "D cannot be inverted: no correction is possible."
 UNOBSERVABLE = " ± ?: not observable from this recording."
@@ -117,7 +117,7 @@ def matrices_section(c: Calibration) -> str:
     )
 
 
-def _rows(id_: str, rows: Sequence[Row]) -> str:
+def _rows(id_: str, rows: Sequence[ParameterRow]) -> str:
     """A table with a column for each axis."""
     cells = [[f"{row.name}, {row.unit}", *map(_unbroken, row.cells)] for row in rows]
     return table(id_, CAPTION, ["", *AXES], cells)

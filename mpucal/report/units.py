@@ -15,7 +15,7 @@ AXES = error_model.AXES
 
 
 @dataclass(frozen=True)
-class Row:
+class ParameterRow:
     """Numbers of one kind for the axes x, y and z, NaN where unknown.
 
     Attributes
@@ -38,31 +38,31 @@ class Row:
         ]
 
 
-def accelerometer(c: Calibration) -> list[Row]:
+def accelerometer(c: Calibration) -> list[ParameterRow]:
     """Scale factor error, bias and misalignment of each axis."""
-    bias = Row("bias", "mg", error_model.bias_mg(c.b_a), error_model.bias_mg(c.b_a_std))
+    bias = ParameterRow("bias", "mg", error_model.bias_mg(c.b_a), error_model.bias_mg(c.b_a_std))
     return [_scale_factor_error(c.D, c.D_std), bias, *_misalignments(c.D, c.D_std)]
 
 
-def gyroscope(c: Calibration) -> list[Row]:
+def gyroscope(c: Calibration) -> list[ParameterRow]:
     """The same of the gyroscope, y = inv(K) w + b_omega."""
     known = np.isfinite(c.K).all() and np.linalg.matrix_rank(c.K) == 3
     matrix = np.asarray(np.linalg.inv(c.K)) if known else unknown(3, 3)
     # the deviations of inv(K) are those of K to first order, which is what a K near the identity is good for
-    bias = Row("bias", "deg/s", np.degrees(c.b_omega), np.degrees(c.b_omega_std))
+    bias = ParameterRow("bias", "deg/s", np.degrees(c.b_omega), np.degrees(c.b_omega_std))
     return [_scale_factor_error(matrix, c.K_std), bias, *_misalignments(matrix, c.K_std)]
 
 
-def _scale_factor_error(matrix: Vector, std: Vector) -> Row:
+def _scale_factor_error(matrix: Vector, std: Vector) -> ParameterRow:
     value = error_model.scale_factor_error(matrix)
-    return Row("scale factor error", "%", value, error_model.scale_factor_error_std(std))
+    return ParameterRow("scale factor error", "%", value, error_model.scale_factor_error_std(std))
 
 
-def _misalignments(matrix: Vector, std: Vector) -> list[Row]:
+def _misalignments(matrix: Vector, std: Vector) -> list[ParameterRow]:
     """Six rows, each with one number in the column of the axis that is misaligned."""
     angle, angle_std = error_model.misalignment(matrix), error_model.misalignment_std(matrix, std)
     return [
-        Row(f"misalignment {axis}->{other}", "deg", angle[:, j], angle_std[:, j], axis)
+        ParameterRow(f"misalignment {axis}->{other}", "deg", angle[:, j], angle_std[:, j], axis)
         for axis in AXES
         for j, other in enumerate(AXES)
         if axis != other

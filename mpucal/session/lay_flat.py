@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..data import Samples
 from .events import Caution, Countdown, Output, Progress, Prompt, PromptKind, Rested, Stopped
-from .stillness import ON_A_TABLE, Moved, Still, Stillness
+from .stillness import ON_A_TABLE, Moved, Still, StillnessDetector
 from .windows import Windows
 
 WINDOW_S = 0.5
@@ -31,7 +31,7 @@ class LayFlat:
     def __init__(self, patient: bool = False) -> None:
         self._patient = patient
         self._windows = Windows(WINDOW_S)
-        self._stillness = Stillness(ON_A_TABLE)
+        self._stillness = StillnessDetector(ON_A_TABLE)
         self._still: Still | None = None
         self._begun_s: float | None = None
         self._spoke_s = 0.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..data import Samples, Sensor, Vector
 from .events import Caution, Direction, Meter, Output
-from .stillness import IN_THE_HAND, Moved, Stillness, StillnessLimits
+from .stillness import IN_THE_HAND, Moved, StillnessDetector, StillnessLimits
 from .windows import Window, Windows
 
 WINDOW_S = 0.25
@@ -28,7 +28,7 @@ class MotionWatch:
     def __init__(self, sensor: Sensor, limits: StillnessLimits = IN_THE_HAND) -> None:
         self._sensor = sensor
         self._windows = Windows(WINDOW_S)
-        self._stillness = Stillness(limits)
+        self._stillness = StillnessDetector(limits)
         self._said_s: dict[str, float] = {}
         self._temperature_c: float | None = None
 

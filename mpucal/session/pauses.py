@@ -8,7 +8,7 @@ import numpy as np
 
 from ..data import Samples, Vector
 from .events import Countdown
-from .stillness import IN_THE_HAND, Still, Stillness
+from .stillness import IN_THE_HAND, Still, StillnessDetector
 from .windows import Windows
 
 WINDOW_S = 0.25
@@ -36,7 +36,7 @@ class Pauses:
 
     def __init__(self) -> None:
         self._windows = Windows(WINDOW_S)
-        self._stillness = Stillness(IN_THE_HAND)
+        self._stillness = StillnessDetector(IN_THE_HAND)
         self._left: int | None = None
 
     def leave(self, run: int) -> None:

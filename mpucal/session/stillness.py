@@ -68,7 +68,7 @@ class Moved:
     what: str
 
 
-class Stillness:
+class StillnessDetector:
     """Follows one still run after another, a window at a time.
 
     A bump that leaves the board where it was pauses the run; any other movement ends it.
