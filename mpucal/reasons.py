@@ -319,6 +319,28 @@ KINDS: Mapping[str, Kind] = {
         "mpucal session --bus sim:hand=warming --seed 1",
         "it moved by more than 8 °C between laying flat and the verification",
     ),
+    "gravity_unlikely": Kind(
+        "The gravity that was given is that of no place on Earth, and all scale factors refer to it.",
+        {
+            "beyond_earth": Sentence(
+                "the gravity that was given, {gravity:.4g} m/s^2, is that of no place on Earth ({least:g} to {most:g})",
+                "give the local gravity, or --gravity-anyway (gravity_anyway=True in Python) where it is meant",
+                False,
+            ),
+        },
+        "mpucal session --bus sim --gravity 9.2 --seed 1",
+    ),
+    "same_data": Kind(
+        "Calibrations to be merged were made of the same recording: counted twice, it would seem twice as certain.",
+        {
+            "merged": Sentence(
+                "calibrations {numbers} were made of the same recording, whose data would count twice",
+                "give calibrations of different recordings, each once",
+                True,
+            ),
+        },
+        "mpucal merge board7/calibration.json board7/calibration.json",
+    ),
     "not_converged": Kind(
         "The estimate had not settled when its iterations were over.",
         {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from types import MappingProxyType
 from typing import Any
@@ -21,6 +22,7 @@ from .masks import with_masks
 from .model_selection import METHODS, Choice, choose
 from .parameters import B_A_NAMES, B_OMEGA_NAMES, BY_NAME, D_NAMES
 from .quality import judge
+from .recording_digest import recording_digest
 from .theta import from_elements
 
 __all__ = ["MODELS", "calibrate", "weigh"]
@@ -28,7 +30,9 @@ __all__ = ["MODELS", "calibrate", "weigh"]
 MODELS = ("auto", *METHODS)
 
 
-def calibrate(recording: Recording, model: str = "auto", gravity: float = STANDARD_GRAVITY_MPS2) -> Calibration:
+def calibrate(
+    recording: Recording, model: str = "auto", gravity: float = STANDARD_GRAVITY_MPS2, gravity_anyway: bool = False
+) -> Calibration:
     """Estimate the accelerometer's D and b_a: y = D R(x) g + b_a + e (the paper's equation 3).
 
     A bad recording gives a calibration whose verdict is "refused", with reasons; nothing is raised for it.
@@ -37,12 +41,14 @@ def calibrate(recording: Recording, model: str = "auto", gravity: float = STANDA
     ----------
     recording : what was measured, first lying flat, then turned.
     model : one of MODELS. gravity : m/s^2, the local ||g||.
+    gravity_anyway : a gravity that no place on Earth has is meant, and no reason against the calibration.
 
     Raises
     ------
     UsageError : no such model, or a gravity that is none.
     """
-    return _calibration(*weigh(recording, model, gravity))
+    evidence, chosen = weigh(recording, model, gravity)
+    return _calibration(replace(evidence, gravity_anyway=gravity_anyway), chosen)
 
 
 def weigh(
@@ -83,7 +89,9 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
     about: dict[str, Any] = {
         **chosen,
         "gravity": evidence.gravity,
+        **({"gravity_anyway": True} if evidence.gravity_anyway else {}),
         "samples": len(recording),
+        "recording_digest": recording_digest(recording),
         "seconds": float(recording.t[-1] - recording.t[0]),
     }
     common: dict[str, Any] = {

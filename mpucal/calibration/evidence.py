@@ -40,13 +40,17 @@ class Agreement(NamedTuple):
 
 @dataclass(frozen=True)
 class Evidence:
-    """A recording and what an estimator made of it; flat and fit are None where it did not get so far."""
+    """A recording and what an estimator made of it; flat and fit are None where it did not get so far.
+
+    gravity_anyway : its caller stands by a gravity [m/s^2] that no place on Earth has.
+    """
 
     recording: Recording
     gravity: float
     flat: Flat | None
     fit: Fit | None
     model: str
+    gravity_anyway: bool = False
 
     @cached_property
     def sure(self) -> Uncertainty | None:

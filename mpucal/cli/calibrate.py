@@ -30,12 +30,14 @@ Exit code 5: the calibration was refused, with reasons.
 @click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for the results.")
 @click.option("--json", "as_json", is_flag=True, help="Print only calibration.json.")
 @fit_options
-def command(recording: Path, folder: Path | None, as_json: bool, gravity: float, model: str) -> int:
+def command(
+    recording: Path, folder: Path | None, as_json: bool, gravity: float, gravity_anyway: bool, model: str
+) -> int:
     """Fit a recording, and print or write what comes of it."""
     samples = load(recording)
     if samples.recovered is not None:
         click.echo(f"mpucal: {samples.recovered}", err=True)
-    calibration = calibrate_vehicle(samples, model=model, gravity=gravity)
+    calibration = calibrate_vehicle(samples, model=model, gravity=gravity, gravity_anyway=gravity_anyway)
     paths: tuple[Path, ...] = ()
     if folder is not None:
         make_folder(folder)

@@ -93,7 +93,7 @@ def _sentence(words: str) -> str:
 
 
 def fit_options(command: F) -> F:
-    """--gravity and --model."""
+    """--gravity, --gravity-anyway and --model."""
     for option in (
         click.option("--model", type=click.Choice(MODELS), default="auto", show_default=True, help="What to estimate."),
         click.option(
@@ -104,6 +104,7 @@ def fit_options(command: F) -> F:
             show_default=True,
             help="Local gravity [m/s²].",
         ),
+        click.option("--gravity-anyway", is_flag=True, help="Accept a gravity that no place on Earth has."),
     ):
         command = option(command)
     return command

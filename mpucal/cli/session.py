@@ -99,7 +99,8 @@ def _run(
     source: Opened, folder: SessionFolder, person: Console, announcement: str
 ) -> tuple[Recording, Calibration, tuple[Path, ...]]:
     """Measure, calibrate, write the files; whatever ends it before, the capture is kept, and the person told where."""
-    fit = partial(calibrate_vehicle, model=source.plan.model, gravity=source.plan.gravity)
+    plan = source.plan
+    fit = partial(calibrate_vehicle, model=plan.model, gravity=plan.gravity, gravity_anyway=plan.gravity_anyway)
     try:
         with running(source, folder.capture, person) as runner:
             if announcement:

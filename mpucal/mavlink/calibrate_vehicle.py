@@ -15,22 +15,24 @@ from .parameters.document import autopilot_document
 OTHERS, AUTOPILOT = "others", "autopilot"
 
 
-def calibrate_vehicle(recording: Recording, model: str = "auto", gravity: float = STANDARD_GRAVITY_MPS2) -> Calibration:
+def calibrate_vehicle(
+    recording: Recording, model: str = "auto", gravity: float = STANDARD_GRAVITY_MPS2, gravity_anyway: bool = False
+) -> Calibration:
     """As `calibrate`; of a vehicle, also its other IMUs and each one's parameters, in `extra`.
 
     Raises
     ------
     UsageError : see calibrate.
     """
-    calibration = _one(recording, model, gravity)
+    calibration = _one(recording, model, gravity, gravity_anyway)
     if not recording.others:
         return calibration
-    others = [_one(other, model, gravity).document() for other in recording.others]
+    others = [_one(other, model, gravity, gravity_anyway).document() for other in recording.others]
     return replace(calibration, extra=MappingProxyType({**calibration.extra, OTHERS: others}))
 
 
-def _one(recording: Recording, model: str, gravity: float) -> Calibration:
-    calibration = calibrate(recording, model, gravity)
+def _one(recording: Recording, model: str, gravity: float, gravity_anyway: bool) -> Calibration:
+    calibration = calibrate(recording, model, gravity, gravity_anyway)
     if recording.autopilot is None:
         return calibration
     extra: Mapping[str, Any] = {AUTOPILOT: autopilot_document(recording.autopilot, calibration)}

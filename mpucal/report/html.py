@@ -168,7 +168,8 @@ def _reproduction(calibration: Calibration, recording: Recording | None) -> str:
         return ""
     # one file of a session that was resumed is not all that was recorded: its folder is
     source = "." if CAPTURE.is_one(recording.name) else recording.name
-    lines = [f"mpucal calibrate {source} --model {model} --gravity {gravity:.9g} -o again"]
+    anyway = " --gravity-anyway" if calibration.fit.get("gravity_anyway") else ""
+    lines = [f"mpucal calibrate {source} --model {model} --gravity {gravity:.9g}{anyway} -o again"]
     if is_of_session(recording.name):
         lines.append(f"mpucal session --replay {source} -o replayed")
     said = paragraph(

@@ -8,7 +8,7 @@ independent. D is the weighted mean: a sensor whose D changes, too, is left with
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -17,6 +17,7 @@ import numpy as np
 
 from ..data import Vector
 from ..errors import RefusedError, UsageError
+from ..reasons import reason
 from .calibration import REFUSED, Calibration
 from .comparison import compare, in_body_frame
 
@@ -24,6 +25,7 @@ from .comparison import compare, in_body_frame
 LEAST_SPAN_C = 5.0
 # standard deviations: a slope is one beyond the first, and the line fits within the second
 SLOPED, FITS = 3.0, 4.0
+DIGEST = "recording_digest"
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ def merge(calibrations: Sequence[Calibration]) -> Merged:
     Raises
     ------
     UsageError : fewer than two, of different sensors, or some that do not say at which temperature or how sure.
-    RefusedError : one of them was refused.
+    RefusedError : one of them was refused, or several were made of the same recording.
     """
     _check(calibrations)
     all_ = [in_body_frame(c) for c in calibrations]
@@ -87,6 +89,7 @@ def _check(calibrations: Sequence[Calibration]) -> None:
         raise UsageError("one calibration alone was given", "give two or more, made at different temperatures")
     if any(c.quality.get("verdict") == REFUSED for c in calibrations):
         raise RefusedError("one of the calibrations was refused", "repeat its session as its reasons say")
+    _check_recordings(calibrations)
     if any(c.sensor.temperature_c is None or not _is_sure(c) for c in calibrations):
         raise UsageError(
             "one of the calibrations does not say at which temperature it was made, or how sure it is",
@@ -108,6 +111,23 @@ def _check(calibrations: Sequence[Calibration]) -> None:
         raise UsageError(
             "the calibrations say differently what the offset registers subtract", "give those made before a write"
         )
+
+
+def _check_recordings(calibrations: Sequence[Calibration]) -> None:
+    """That no recording counts twice."""
+    of = [_recordings(c) for c in calibrations]
+    for i, one in enumerate(of):
+        same = [i, *(k for k in range(i + 1, len(of)) if of[k] & one)]
+        if len(same) > 1:
+            against = reason("same_data", "merged", numbers=" and ".join(str(k + 1) for k in same))
+            raise RefusedError(against.what, against.remedy)
+
+
+def _recordings(c: Calibration) -> frozenset[str]:
+    """The digests of what it was made of; without one, its numbers stand for its recording."""
+    parts: Sequence[Mapping[str, Any]] = c.extra.get("merged") or [c.fit]
+    digests = [str(part.get(DIGEST) or "") for part in parts]
+    return frozenset(digests if all(digests) else [f"{c.D.tolist()} {c.b_a.tolist()}"])
 
 
 def _is_sure(c: Calibration) -> bool:
@@ -151,7 +171,8 @@ def _together(all_: Sequence[Calibration], T_0: float, T: Vector) -> Calibration
     weight = np.array([c.D_std for c in all_]) ** -2.0
     D = (weight * np.array([c.D for c in all_])).sum(0) / weight.sum(0)
     made_of: list[dict[str, Any]] = [
-        {"created": c.created, "temperature_c": float(t), "b_a": c.b_a.tolist()} for c, t in zip(all_, T, strict=True)
+        {"created": c.created, "temperature_c": float(t), "b_a": c.b_a.tolist(), DIGEST: c.fit.get(DIGEST)}
+        for c, t in zip(all_, T, strict=True)
     ]
     last = max(all_, key=lambda c: c.created)
     worst = max(all_, key=lambda c: c.verdict != "good")

@@ -24,7 +24,7 @@ class Plan:
     config : how the chip measures. gravity : local gravity [m/s^2]. model : what to estimate.
     until_end : each step takes its time, and turning ends with the source.
     target : how well it is to be known, one of AIMS. tilt_only : the board cannot be turned over.
-    attended : somebody can press keys.
+    attended : somebody can press keys. gravity_anyway : a gravity that no place on Earth has is meant.
     """
 
     config: Config = field(default_factory=Config)
@@ -34,6 +34,7 @@ class Plan:
     target: str = NORMAL
     tilt_only: bool = False
     attended: bool = False
+    gravity_anyway: bool = False
 
     def meta(self) -> dict[str, Any]:
         """For the head of a capture; values of JSON's own types."""

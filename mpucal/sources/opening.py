@@ -14,7 +14,7 @@ from .opened import Opened
 from .table import SOURCES, kinds_meant, unique, used_by
 
 # what a person may choose of a plan; a capture holds it
-OF_THE_PLAN = ("gravity", "model", "target", "tilt_only")
+OF_THE_PLAN = ("gravity", "gravity_anyway", "model", "target", "tilt_only")
 OUTPUT_FOLDER = "folder"
 
 
@@ -150,5 +150,5 @@ def _plan(values: Mapping[str, Any], until_end: bool) -> Plan:
             what = f"--model {model} was given beside --tilt-only, and tilts alone do not determine it"
             raise UsageError(what, "leave it out: tilts are fitted by the model tilt")
         model = "tilt"
-    aim = {name: values[name] for name in ("target", "tilt_only", "attended") if name in values}
+    aim = {name: values[name] for name in ("target", "tilt_only", "attended", "gravity_anyway") if name in values}
     return Plan(config, values.get("gravity", usual.gravity), model, until_end, **aim)

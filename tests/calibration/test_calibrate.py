@@ -187,3 +187,15 @@ def test_whatever_is_recorded_there_is_a_verdict(arrays, model):
         assert np.linalg.det(calibration.D) > 0
     for reason in document["quality"]["reasons"]:
         assert not {"nan", "inf", "-inf"} & set(reason["message"].replace("(", " ").split())
+
+
+def test_a_recording_is_known_again_by_its_digest(ideal, tmp_path):
+    recording = ideal(0).recording
+    digest = calibrate(recording, "accel", G).fit["recording_digest"]
+    assert len(digest) == 64
+    later = replace(recording, t=recording.t + 1.0, name="another name")
+    # what a text file rounds away makes no other recording of it
+    rounded = replace(recording, acc=recording.acc * (1.0 + 1e-15))
+    assert {calibrate(r, "accel", G).fit["recording_digest"] for r in (later, rounded)} == {digest}
+    for other in (recording.part(0, len(recording) - 1), replace(recording, acc=recording.acc + 1e-4)):
+        assert calibrate(other, "accel", G).fit["recording_digest"] != digest

@@ -500,3 +500,17 @@ def test_missing_rates_drawn_as_a_line_are_lost_data(real):
     assert "1 place (11.9" in spoilt.quality["reasons"][0]["message"]
     np.testing.assert_allclose(spoilt.D, plain.D, atol=0.003)
     np.testing.assert_allclose(spoilt.b_a, plain.b_a, atol=0.02)
+
+
+# ---- the gravity that it refers to
+
+
+@pytest.mark.parametrize(
+    ("gravity", "unlikely"), [(9.2, True), (9.755, True), (9.765, False), (9.835, False), (9.845, True)]
+)
+def test_a_gravity_that_no_place_on_earth_has_is_said_unless_it_is_meant(good, gravity, unlikely):
+    said = calibrate(good, "accel", gravity).quality
+    assert [reason["code"] for reason in said["reasons"]] == ["gravity_unlikely"] * unlikely
+    assert said["verdict"] == ("usable" if unlikely else "good")
+    meant = calibrate(good, "accel", gravity, gravity_anyway=True)
+    assert (meant.quality["verdict"], meant.quality["reasons"]) == ("good", [])

@@ -104,3 +104,30 @@ RNG = np.random.default_rng(5)
 def test_what_does_not_belong_together_is_refused(others, error, says):
     with pytest.raises(error, match=says):
         merge([session(10.0, RNG), *others])
+
+
+def digested(T, digest):
+    return session(T, np.random.default_rng(int(T)), fit={"gravity": 9.80665, "recording_digest": digest})
+
+
+def test_a_recording_counts_once():
+    a, b, again = digested(10.0, "a"), digested(11.0, "b"), digested(10.0, "a")
+    merge([a, b])
+    with pytest.raises(RefusedError, match=r"calibrations 1 and 3 were made of the same recording.*each once"):
+        merge([a, b, again])
+
+
+def test_a_recording_that_was_merged_already_counts_no_more():
+    a, b, c = (digested(T, digest) for T, digest in ((10.0, "a"), (11.0, "b"), (12.0, "c")))
+    both = merge([a, b]).calibration
+    assert [part["recording_digest"] for part in both.extra["merged"]] == ["a", "b"]
+    merge([both, c])
+    with pytest.raises(RefusedError, match="calibrations 1 and 2 were made of the same recording"):
+        merge([both, b])
+
+
+def test_a_calibration_that_names_no_recording_is_known_by_its_numbers():
+    one, other = (session(T, np.random.default_rng(0)) for T in (10.0, 30.0))
+    merge([one, other])
+    with pytest.raises(RefusedError, match="the same recording"):
+        merge([one, one])

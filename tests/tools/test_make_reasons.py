@@ -9,6 +9,7 @@ import pytest
 
 import mpucal
 from mpucal.__main__ import run
+from mpucal.errors import RefusedError
 from mpucal.reasons import KINDS
 
 SESSIONS = Path(__file__).parents[2] / "fixtures" / "sessions"
@@ -33,7 +34,15 @@ def test_a_session_shows_its_reasons(command, capsys, tmp_path):
     assert {code for code in SESSION if SESSION[code] == command} <= set(found)
 
 
-@pytest.mark.parametrize("code", [code for code in KINDS if code not in SESSION])
+def test_merging_what_is_merged_already_shows_its_reason(capsys, tmp_path):
+    words = shlex.split(KINDS["same_data"].reproduce)[1:]
+    file = tmp_path / "calibration.json"
+    mpucal.calibrate(mpucal.load(SESSIONS / "mpu6050.mcap")).save(file)
+    assert run([word.replace("board7/calibration.json", str(file)) for word in words]) == RefusedError.exit_code
+    assert "calibrations 1 and 2 were made of the same recording" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("code", [code for code in KINDS if code not in {*SESSION, "same_data"}])
 def test_a_spoilt_recording_shows_its_reason(code):
     r = mpucal.load(SESSIONS / "mpu6050.mcap")
     assert mpucal.calibrate(r).verdict == "good"

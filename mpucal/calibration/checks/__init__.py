@@ -2,6 +2,7 @@
 
 unusable     before there is a fit: wrong units, no rest, no turn, a dead axis
 recording    moved while still, clipped, lost or warming
+gravity      a gravity that no place on Earth has
 sensor       wrong range, units, axes or gyroscope, by a trustworthy fit
 estimate     directions not observable, no convergence, contradictions, a change midway
 """
@@ -12,7 +13,7 @@ from collections.abc import Callable
 
 from ...reasons import Reason
 from ..evidence import Evidence
-from . import estimate, recording, sensor, unusable
+from . import estimate, gravity, recording, sensor, unusable
 
 Check = Callable[[Evidence], Reason | None]
 
@@ -38,6 +39,7 @@ CHECKS: tuple[Check, ...] = (
     sensor.axes,
     sensor.gyro_off,
     recording.temperature_moved,
+    gravity.gravity_unlikely,
     estimate.not_converged,
     estimate.inconsistent,
     estimate.changed_midway,
