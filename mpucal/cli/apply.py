@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -54,12 +55,13 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool) -
     ready = correction(Calibration.load(calibration), rows.sensor, rows.autopilot)
     for remark in (*ready.remarks, *_remarks(rows)):
         click.echo(f"mpucal: {remark}", err=True)
+    noise = np.array([ready.calibration.noise_std, ready.calibration.gyro_noise_std])
     done = f"calibrated with {calibration.name} of {ready.calibration.created or 'an unknown time'}"
     seen = _Seen()
     with (
         nullcontext(CsvText(lambda text: sys.stdout.write(text.decode())).write)
         if target is None
-        else open_writer(target, rows, done) as write
+        else open_writer(target, replace(rows, noise=noise), done) as write
     ):
         for samples in rows.runs:
             after = ready.apply(samples)

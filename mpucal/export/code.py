@@ -57,7 +57,7 @@ def apply(y):
 def in_ros(c: Calibration) -> str:
     """A node for ROS 2 that listens to imu/data_raw and publishes imu/data."""
     noise = np.diag(c.noise_std**2)
-    known = f"COVARIANCE = {[float(f'{v:.6g}') for v in noise.ravel()]}\n" if np.isfinite(noise).all() else ""
+    known = f"COVARIANCE = {noise.ravel().tolist()}\n" if np.isfinite(noise).all() else ""
     told = "        imu.linear_acceleration_covariance = COVARIANCE\n" if known else ""
     return f"""import numpy as np
 import rclpy

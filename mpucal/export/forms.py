@@ -75,15 +75,14 @@ FORMS = (
         "imu_calib's apply node",
         "`SM raw - bias`: its bias is inv(D) b_a; covariances for filters besides",
         ros.text,
-        (without_gyroscope, without_temperature, with_hardware),
+        (ros.left, without_temperature, with_hardware),
     ),
     Form(
         "linux-iio",
         ".sh",
         "`sh FILE /sys/bus/iio/devices/iio:deviceN`",
         "calibbias (of an MPU-6050 alone: of an MPU-6500 the kernel's driver takes the offset registers to lie two "
-        "addresses apart, and they lie three apart), calibscale, mount_matrix; values without a file of the driver are "
-        "printed for udev and the device tree",
+        "addresses apart, and they lie three apart), calibscale; the line for udev's ACCEL_MOUNT_MATRIX is printed",
         linux_iio.text,
         (linux_iio.left, without_gyroscope, without_temperature),
     ),

@@ -1,9 +1,11 @@
-"""A calibration as sysfs commands for Linux's IIO: calibbias, calibscale and mount_matrix.
+"""A calibration as sysfs commands for Linux's IIO, calibbias and calibscale, and the accelerometer's matrix for udev.
 
-A user of IIO sees M diag(calibscale) (y + what calibbias adds), M the mount matrix: M diag(calibscale) = inv(D), with
-columns of length 1 in M. The driver inv_mpu6050 passes calibbias on to the accelerometer's offset registers, has no
-calibscale, and takes its mount matrix from the device tree. Of a chip with the MPU-6500's registers it writes to wrong
-addresses (it takes them to lie as the MPU-6050's do), so that nothing may be written there.
+iio-sensor-proxy shows M diag(calibscale) (y + what calibbias adds), M of udev's ACCEL_MOUNT_MATRIX: M diag(calibscale)
+= inv(D), with columns of length 1 in M where there is a calibscale. The driver inv_mpu6050 passes calibbias on to the
+accelerometer's offset registers and has no calibscale. Its mount matrix, of the device tree, is one for all channels
+(inv_mpu_core.c, inv_ext_info): inv(D) there would distort the gyroscope's rates. Of a chip with the MPU-6500's
+registers it writes calibbias to wrong addresses (it takes them to lie as the MPU-6050's do), so that nothing may be
+written there.
 """
 
 from __future__ import annotations
@@ -70,17 +72,13 @@ def left(calibration: Calibration) -> tuple[str, ...]:
 
 
 _SCALE = (
-    "Where the driver has no calibscale, or a mount_matrix that cannot be written (inv_mpu6050), the script prints the"
-    " line for the device tree and for udev; until that is there, D is not corrected."
+    "The script prints the correction of D as a line for udev, which iio-sensor-proxy applies to the accelerometer"
+    " alone; until that is there, and for programs that read the channels themselves, D is not corrected. It does not"
+    " belong into the device tree: a mount-matrix of inv_mpu6050 is the gyroscope's, too."
 )
 _DEVICE = 'DEVICE="${1:?give the folder of the device}"'
 _PUT = """put() { printf '%s' "$2" > "$1"; [ "$(cat "$1")" = "$2" ] || { echo "$1 does not keep $2" >&2; exit 1; }; }"""
-_MATRIX = """if [ -w "$DEVICE/in_accel_mount_matrix" ]; then
-    put "$DEVICE/in_accel_mount_matrix" "$MATRIX"
-else
-    echo "udev: ACCEL_MOUNT_MATRIX=$MATRIX"
-    echo "device tree: mount-matrix = \\"$(echo "$MATRIX" | sed 's/[,;] */", "/g')\\";"
-fi"""
+_MATRIX = 'echo "udev: ACCEL_MOUNT_MATRIX=$MATRIX"'
 
 
 def _matrix(values: Vector) -> str:

@@ -1,7 +1,8 @@
 """A calibration as YAML for ROS: what imu_calib's apply node reads, with the noise that filters ask for.
 
 imu_calib (dpkoch/imu_calib, AccelCalib::applyCalib) publishes SM raw - bias: its bias is taken away after the matrix,
-so that SM = inv(D) and bias = inv(D) b_a. It ignores keys that it does not know.
+so that SM = inv(D) and bias = inv(D) b_a. Its node subtracts the mean of the gyroscope's first samples itself
+(calibrate_gyros, which is its default). It ignores keys that it does not know.
 """
 
 from __future__ import annotations
@@ -29,10 +30,20 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
         ("angular_velocity_covariance", calibration.gyro_noise_std),
     ):
         if np.isfinite(noise).all():
-            lines.append(f"{key}: {_row(np.diag(noise**2).ravel(), digits=6)}")
+            lines.append(f"{key}: {_row(np.diag(noise**2).ravel())}")
     return "\n".join(lines) + "\n"
 
 
-def _row(values: Vector, digits: int = 12) -> str:
+def left(calibration: Calibration) -> tuple[str, ...]:
+    """What imu_calib does with the gyroscope."""
+    scale = 100.0 * float(np.abs(calibration.K - np.eye(3)).max())
+    stays = f": up to {scale:.2f} % of a rate stay" if scale else ""
+    return (
+        "imu_calib subtracts the gyroscope's bias as it is when its node starts, which takes a sensor that is still;"
+        f" it does not correct scale factor errors and misalignments of the gyroscope{stays}.",
+    )
+
+
+def _row(values: Vector) -> str:
     # YAML takes 1e-05 for a word: a number needs its point
-    return "[" + ", ".join(np.format_float_positional(v, precision=digits, trim="0") for v in values) + "]"
+    return "[" + ", ".join(np.format_float_positional(v, trim="0") for v in values) + "]"

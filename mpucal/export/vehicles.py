@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..mavlink.firmwares import ARDUPILOT, PX4
-from ..mavlink.parameters.encoding import as_float32
+from ..mavlink.parameters.encoding import INT32, as_float32
 from ..mavlink.parameters.plan import changes, left_out
 from ..mavlink.parameters.text import param_text, params_text
 from ..result.calibration import Calibration
@@ -24,12 +24,15 @@ def ardupilot(calibration: Calibration, notes: Sequence[str]) -> str:
     ------
     WriteBackError : a calibration that is refused, of no vehicle or of another firmware, or beyond ArduPilot's limits.
     """
-    return param_text(_values(calibration, ARDUPILOT), (_head(calibration, ARDUPILOT), *notes))
+    values = _values(calibration, ARDUPILOT) | _ids(calibration, ARDUPILOT)
+    return param_text(values, (_head(calibration, ARDUPILOT), *notes))
 
 
 def px4(calibration: Calibration, notes: Sequence[str]) -> str:
     """A .params file's text; see ardupilot."""
-    return params_text(_values(calibration, PX4), (_head(calibration, PX4), *notes))
+    ids = _ids(calibration, PX4)
+    values = _values(calibration, PX4) | ids
+    return params_text(values, (_head(calibration, PX4), *notes), types=dict.fromkeys(ids, INT32))
 
 
 def left_by_ardupilot(calibration: Calibration) -> tuple[str, ...]:
@@ -50,6 +53,12 @@ def _values(calibration: Calibration, firmware: str) -> dict[str, float]:
     return held
 
 
+def _ids(calibration: Calibration, firmware: str) -> dict[str, float]:
+    """The IDs of the sensors that were calibrated, by name; a firmware takes one without its ID for uncalibrated."""
+    of = {change.place.sensor_id: change.sensor_id for change in changes(calibration, firmware)}
+    return {name: as_float32(value) for name, value in of.items() if value}
+
+
 def _head(calibration: Calibration, firmware: str) -> str:
     imus = ", ".join(str(change.imu) for change in changes(calibration, firmware))
     return f"Accelerometer calibration of a {firmware} vehicle by mpucal, {dated(calibration)}: IMU {imus}"
@@ -60,6 +69,13 @@ def _left_by(calibration: Calibration, firmware: str) -> tuple[str, ...]:
         f"IMU {change.imu}: parameters hold no cross-axis terms; |a| stays wrong by up to"
         f" {change.residual_mps2:.3f} m/s^2."
         for change in changes(calibration, firmware)
+    ]
+    named = _ids(calibration, firmware)
+    said += [
+        f"The vehicle did not say what {change.place.sensor_id} is, and {firmware} takes an accelerometer without it"
+        " for uncalibrated: where it is 0, calibrate with the ground station once, and load the file then."
+        for change in changes(calibration, firmware)
+        if change.place.sensor_id not in named
     ]
     out = left_out(calibration)
     if out:

@@ -17,7 +17,7 @@ from mcap.records import Channel, Header, Metadata, Schema
 from mcap.well_known import MessageEncoding, SchemaEncoding
 from numpy.typing import NDArray
 
-from ..data import Samples
+from ..data import Samples, Vector
 from ..errors import RecordingError
 from ..result.atomic import whole_file
 from .chunks import ChunkWriter
@@ -74,8 +74,8 @@ float64 z
 """
 
 
-def messages(samples: Samples) -> tuple[NDArray[np.int64], NDArray[Any]]:
-    """Times (n,) [ns] and messages (n,), each the CDR bytes of a sample.
+def messages(samples: Samples, noise: Vector) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    """Times (n,) [ns] and messages (n,), each the CDR bytes of a sample; `noise` as of Rows.
 
     Raises
     ------
@@ -90,6 +90,10 @@ def messages(samples: Samples) -> tuple[NDArray[np.int64], NDArray[Any]]:
     rows["frame_id"], rows["frame_id_size"] = FRAME_ID.encode(), len(FRAME_ID) + 1
     rows["orientation"][:, 3] = 1.0
     rows["orientation_covariance"][:, 0] = NOT_MEASURED
+    # zeros: not known
+    acc_covariance, gyr_covariance = (np.diag(np.nan_to_num(std**2)).ravel() for std in noise)
+    rows["linear_acceleration_covariance"] = acc_covariance
+    rows["angular_velocity_covariance"] = gyr_covariance
     turned = np.asarray(np.isfinite(samples.gyr).all(axis=1))
     rows["angular_velocity_covariance"][~turned, 0] = NOT_MEASURED
     rows["angular_velocity"] = np.where(turned[:, None], samples.gyr, 0.0)
@@ -98,7 +102,7 @@ def messages(samples: Samples) -> tuple[NDArray[np.int64], NDArray[Any]]:
 
 
 @contextmanager
-def imu_file(path: Path, _rows: Rows, done: str) -> Iterator[Write]:
+def imu_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
     """An MCAP file of Imu messages on TOPIC; `done`, what was done to the samples, is its metadata. See open_writer."""
     with whole_file(path) as file:
         writer = ChunkWriter(
@@ -109,5 +113,5 @@ def imu_file(path: Path, _rows: Rows, done: str) -> Iterator[Write]:
             Channel(id=1, topic=TOPIC, message_encoding=MessageEncoding.CDR, metadata={}, schema_id=1),
             Metadata(CALIBRATED, {"done": done}),
         )
-        yield lambda samples: writer.add(*messages(samples))
+        yield lambda samples: writer.add(*messages(samples, rows.noise))
         writer.finish()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..data import Autopilot, Recording, Samples, Sensor
+from ..data import Autopilot, Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
 
 # 16 Ki samples take 1 MB, which fits a cache; a product of more goes to BLAS's threads, and takes longer
@@ -24,6 +24,7 @@ class Rows:
     runs : each of at most some ROWS samples, to be gone through once.
     sensor, flat, autopilot, recovered, name : as of a Recording. others : how many further IMUs it holds.
     done : the sentence that says that the file is calibrated data already; empty where it is not.
+    noise : (2, 3), standard deviations of a sample's acc [m/s^2] and gyr [rad/s]; NaN: unknown.
     """
 
     runs: Iterator[Samples]
@@ -34,6 +35,7 @@ class Rows:
     name: str = "recording"
     others: int = 0
     done: str = ""
+    noise: Vector = field(default_factory=lambda: np.full((2, 3), np.nan))
 
     @classmethod
     def of(cls, recording: Recording, done: str = "") -> Rows:

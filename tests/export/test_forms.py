@@ -161,7 +161,21 @@ def test_the_yaml_as_imu_calib_applies_it(calibrated, samples):
     SM, bias = np.reshape(found["SM"], (3, 3)), np.array(found["bias"])
     np.testing.assert_allclose(samples @ SM.T - bias, calibrated.apply(samples), atol=1e-9)
     covariance = np.reshape(found["linear_acceleration_covariance"], (3, 3))
-    np.testing.assert_allclose(covariance, np.diag(calibrated.noise_std**2), atol=1e-6)
+    np.testing.assert_array_equal(covariance, np.diag(calibrated.noise_std**2))
+
+
+def test_the_covariance_of_a_quiet_gyroscope_is_not_rounded_to_nothing(calibration):
+    """Zeros would tell ROS that it is unknown."""
+    quiet = replace(calibration, gyro_noise_std=np.array([4.1e-5, 5e-7, 1.2e-3]))
+    found = yaml_of(form("ros").export(quiet)[0])["angular_velocity_covariance"]
+    np.testing.assert_array_equal(np.reshape(found, (3, 3)), np.diag(quiet.gyro_noise_std**2))
+
+
+def test_what_imu_calib_does_with_the_gyroscope(calibration):
+    """Its node starts with calibrate_gyros, and subtracts the mean of the first samples: no bias stays."""
+    text, notes = form("ros").export(calibration)
+    assert "deg/s stay" not in text
+    assert "up to 2.00 % of a rate stay" in notes[0]
 
 
 def test_the_yaml_is_what_a_yaml_parser_reads(calibrated):
@@ -171,35 +185,30 @@ def test_the_yaml_is_what_a_yaml_parser_reads(calibrated):
 
 
 def device(folder, *writable, words=(-1501, 2000, 701)):
-    """An IIO device's folder; the mount matrix that of a driver that has none of its own."""
+    """An IIO device's folder; its mount matrix is one for all channels."""
     folder.mkdir(exist_ok=True)
     for axis, word in zip("xyz", words, strict=True):
         (folder / f"in_accel_{axis}_calibbias").write_text(f"{word}")
         if "calibscale" in writable:
             (folder / f"in_accel_{axis}_calibscale").write_text("1")
-    matrix = folder / "in_accel_mount_matrix"
-    matrix.write_text("1, 0, 0; 0, 1, 0; 0, 0, 1")
-    if "matrix" not in writable:
-        matrix.rename(folder / "in_accel_mount_matrix_of_the_device_tree")
+    (folder / "in_mount_matrix").write_text("1, 0, 0; 0, 1, 0; 0, 0, 1")
     return folder
 
 
 def seen_by_iio(folder, said, y, trim):
-    """M diag(calibscale) (y + what the registers add), as sysfs-bus-iio says; 2048 counts to 1 g, of even words."""
+    """M diag(calibscale) (y + what the registers add), as iio-sensor-proxy has it; 2048 counts to 1 g."""
     words = [int((folder / f"in_accel_{axis}_calibbias").read_text()) for axis in "xyz"]
     assert [word & 1 for word in words] == [word & 1 for word in trim]
     added = (np.array(words) - trim) / 2048 * STANDARD_GRAVITY_MPS2
     scales = [folder / f"in_accel_{axis}_calibscale" for axis in "xyz"]
     scale = np.array([float(path.read_text()) if path.exists() else 1.0 for path in scales])
-    matrix = folder / "in_accel_mount_matrix"
-    text = matrix.read_text() if matrix.exists() else re.search(r"ACCEL_MOUNT_MATRIX=(.*)", said)[1]
+    assert (folder / "in_mount_matrix").read_text() == "1, 0, 0; 0, 1, 0; 0, 0, 1"
+    text = re.search(r"ACCEL_MOUNT_MATRIX=(.*)", said)[1]
     M = np.array([[float(word) for word in row.split(",")] for row in text.split(";")])
     return ((y + added) * scale) @ M.T
 
 
-@pytest.mark.parametrize(
-    "writable", [(), ("calibscale",), ("calibscale", "matrix")], ids=["inv_mpu6050", "scale", "all"]
-)
+@pytest.mark.parametrize("writable", [(), ("calibscale",)], ids=["inv_mpu6050", "scale"])
 def test_the_sysfs_commands_as_iio_means_them(calibrated, samples, tmp_path, writable):
     text, notes = form("linux-iio").export(calibrated)
     (tmp_path / "calibrate.sh").write_text(text)
@@ -211,6 +220,8 @@ def test_the_sysfs_commands_as_iio_means_them(calibrated, samples, tmp_path, wri
     wanted = replace(calibrated, applied_in_hardware=np.zeros(3)).apply(samples)
     a = seen_by_iio(folder, said, samples, trim)
     assert np.abs(a - wanted).max() < 1.1 * np.sqrt(3) * left
+    # which would be the gyroscope's, too
+    assert "mount-matrix =" not in said
     # twice does what once does
     before = {path.name: path.read_text() for path in folder.iterdir()}
     subprocess.run(words, capture_output=True, check=True)

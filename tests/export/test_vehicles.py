@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
+from pymavlink.mavparm import MAVParmDict
 
 from mpucal.data import Autopilot
 from mpucal.export.forms import form
@@ -98,3 +99,35 @@ def test_what_is_left_is_what_it_says(name, rotation):
     loaded = delivered(s, [new[n] for n in offsets], [new[n] for n in scales], MOUNTINGS[rotation])
     worst = np.abs(np.linalg.norm(loaded, axis=1) - 9.80665).max()
     assert worst == pytest.approx(float(re.search(r"up to (\S+) m/s", notes[0])[1]), rel=0.02, abs=1e-3)
+
+
+def test_mavproxy_loads_it_with_the_sensors_id(tmp_path):
+    """Its reader is pymavlink's; without its id an accelerometer counts as uncalibrated."""
+    calibration = of_vehicle("ardupilot", 0, np.diag(GAIN))
+    (tmp_path / "new.param").write_text(form("ardupilot").export(calibration)[0])
+    loaded = MAVParmDict()
+    loaded.load(str(tmp_path / "new.param"), check=False)
+    assert loaded["INS_ACC_ID"] == IDS["ardupilot"]["INS_ACC_ID"]
+    assert set(loaded) == {"INS_ACC_ID", *NAMES["ardupilot"][0], *NAMES["ardupilot"][1]}
+
+
+def test_qgroundcontrol_loads_it_with_the_sensors_id():
+    """It takes lines of five columns, and sets a parameter only with its own type: MAV_PARAM_TYPE_INT32 is 6."""
+    lines = form("px4").export(of_vehicle("px4", 0, np.diag(GAIN)))[0].splitlines()
+    rows = [line.split("\t") for line in lines if not line.startswith("#")]
+    assert all(len(row) == 5 for row in rows)
+    kinds = {row[2]: row[4] for row in rows}
+    assert kinds == {"CAL_ACC0_ID": "6", **dict.fromkeys([*NAMES["px4"][0], *NAMES["px4"][1]], "9")}
+    assert ["1", "1", "CAL_ACC0_ID", "1310988", "6"] in rows
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_id_that_the_vehicle_did_not_say_is_missed(name):
+    calibration = of_vehicle(name, 0, np.diag(GAIN))
+    document = calibration.extra["autopilot"]
+    of = next(key for key in IDS[name] if key.endswith("_ID"))
+    old = {key: value for key, value in document["params_old"].items() if key != of}
+    calibration = replace(calibration, extra={"autopilot": document | {"params_old": old}})
+    text, notes = form(name).export(calibration)
+    assert of not in parsed(text)
+    assert f"did not say what {of} is" in " ".join(notes)

@@ -377,5 +377,5 @@ def test_a_cut_archive_is_refused(archive, tmp_path):
 def test_a_time_that_no_message_holds_is_refused(tmp_path):
     samples = Samples(*(getattr(recording(300), name) for name in Samples.__dataclass_fields__))
     samples.t[0] = -1.0
-    with pytest.raises(RecordingError, match="time"), open_writer(tmp_path / "x.mcap", None, "") as write:
+    with pytest.raises(RecordingError, match="time"), open_writer(tmp_path / "x.mcap", Rows(iter(())), "") as write:
         write(samples)

@@ -23,7 +23,7 @@ BYTEWISE = {
     5: struct.Struct("<I"),
     6: struct.Struct("<i"),
 }
-REAL32 = 9
+INT32, REAL32 = 6, 9
 
 # MAV_PARAM_ERROR, of which pymavlink's enumeration lacks the end
 ERRORS = {
