@@ -33,13 +33,14 @@ def chip_contents(bus: Bus) -> dict[str, Any]:
     gyro, accel = port.read(reg.GYRO_CONFIG, 2)
     asleep = bool(port.read(reg.PWR_MGMT_1, 1)[0] & reg.PWR_MGMT_1_SLEEP)
     part = PARTS.get(who_am_i)
+    shift = reg.FULL_SCALE_SHIFT if part is None else part.family.gyro_range_shift
     scale = (accel & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT
     facts: dict[str, Any] = {
         "who_am_i": who_am_i,
         "chip": None if part is None else part.chip,
         "asleep": asleep,
         "accel_range_g": reg.ACCEL_RANGES_G[scale],
-        "gyro_range_dps": reg.GYRO_RANGES_DPS[(gyro & reg.FULL_SCALE) >> reg.FULL_SCALE_SHIFT],
+        "gyro_range_dps": reg.GYRO_RANGES_DPS[gyro >> shift & reg.FULL_SCALE_CODES],
         "accel_offsets": {f"0x{place[0]:02x}": list(Block.read(port, place).words) for place in PLACES},
     }
     if asleep or part is None:

@@ -93,6 +93,7 @@ class Decoder:
         RecordingError : the FIFO starts with settings that nobody told, or that changed.
         """
         if register == reg.PWR_MGMT_1 and data[0] & reg.PWR_MGMT_1_DEVICE_RESET:
+            self._evidence.reset()
             self._before_reset = self._before_reset or dict(self._held)
             self._held = {reg.WHO_AM_I: self._held[reg.WHO_AM_I]} if reg.WHO_AM_I in self._held else {}
             return

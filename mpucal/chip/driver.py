@@ -27,7 +27,7 @@ from .probe import probe, read_identity
 from .settings import Settings
 from .setup import configure, configured, quiet, reset, restart_fifo, wake
 
-DRIVER_VERSION = 3
+DRIVER_VERSION = 4
 
 # so long without a sample that can be believed, and the driver gives up
 DEAD_NS = 2_000_000_000
@@ -188,7 +188,7 @@ class Driver:
         """Read all whole frames, and say what they need to be believed."""
         count, begun_ns = self._fifo_count(settings.frame_bytes), self._port.now_ns
         self._plan_next_poll()
-        if count >= settings.part.family.fifo_bytes - SPARE_FRAMES * settings.frame_bytes:
+        if count >= settings.part.fifo_bytes - SPARE_FRAMES * settings.frame_bytes:
             self._overflows += 1
             return Need.RESTART
         frames = count // settings.frame_bytes

@@ -2,7 +2,7 @@
 
 A chip with the same registers is one more row, or one more identity in a row. Simulated chips are made of these rows.
 
-Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4, PS-MPU-6000A r3.4, PS-MPU-9250A r1.0.
+Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4, PS-MPU-6000A r3.4, PS-MPU-9250A r1.0; each row names its own.
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ from typing import NamedTuple
 
 from ..errors import ChipError
 from . import registers as reg
+
+# a full FIFO may say a frame less than it holds
+FIFO_SLACK_BYTES = 16
 
 
 class WordGroup(Enum):
@@ -44,9 +47,12 @@ class Family:
     ----------
     name : what a chip of unknown identity is called that behaves so.
     parts : WHO_AM_I and name of each part.
-    fifo_bytes : size of the FIFO as this driver configures it.
+    source : where its differences from the others are written down.
+    fifo_bytes : size of the FIFO after a reset.
     widest_fifo_bytes : its size with both FIFO_SIZE bits of ACCEL_CONFIG2 set; None: they do nothing.
     frame : the order of a FIFO frame.
+    fifo_en_frame : what FIFO_EN holds for a whole frame. fifo_en_with_temperature : its bit of the accelerometer brings
+        the temperature along.
     lsb_per_c, zero_c : temperature is counts / lsb_per_c + zero_c.
     accel_offset_h : addresses of the high bytes of the accelerometer offsets x, y, z; the low byte follows.
     accel_offset_lsb_per_g : nominal scale of such a 16-bit word; bit 0 is reserved.
@@ -63,6 +69,7 @@ class Family:
     """
 
     name: str
+    source: str
     parts: tuple[tuple[int, str], ...]
     fifo_bytes: int
     lsb_per_c: float
@@ -77,6 +84,8 @@ class Family:
     accel_offset_lsb_per_g: float = 2048.0
     widest_fifo_bytes: int | None = None
     frame: tuple[WordGroup, ...] = (WordGroup.ACCEL, WordGroup.TEMPERATURE, WordGroup.GYRO)
+    fifo_en_frame: int = reg.FIFO_EN_FRAME
+    fifo_en_with_temperature: bool = False
     gyro_range_shift: int = reg.FULL_SCALE_SHIFT
     fifo_reset_needs_stop: bool = False
     half_range_revision: str = ""
@@ -99,16 +108,24 @@ class Part:
     ----------
     chip : its name. who_am_i : its answer to WHO_AM_I. family : its row of the table.
     accel_sensitivity : accelerometer counts a g, relative to the nominal; a half-range revision has 0.5.
+    wide_fifo_bytes : what its FIFO holds with both FIFO_SIZE bits set, where that is more.
     """
 
     chip: str
     who_am_i: int
     family: Family
     accel_sensitivity: float = 1.0
+    wide_fifo_bytes: int | None = None
+
+    @property
+    def fifo_bytes(self) -> int:
+        """Size of its FIFO as this driver configures it: the larger one."""
+        return self.wide_fifo_bytes or self.family.fifo_bytes
 
 
 MPU6050 = Family(
     name="MPU-6050",
+    source="RM-MPU-6000A r4.2",
     parts=((0x68, "MPU-6050"),),
     fifo_bytes=1024,
     lsb_per_c=340.0,
@@ -126,11 +143,13 @@ MPU6050 = Family(
 
 MPU6500 = Family(
     name="MPU-6500",
+    source="RM-MPU-9250A r1.4; FIFO_SIZE: InvenSense's MotionDriver 6.12, PX4's MPU-9250 driver",
     parts=((0x70, "MPU-6500"), (0x71, "MPU-9250"), (0x73, "MPU-9255"), (0x74, "MPU-6515")),
     fifo_bytes=512,
     lsb_per_c=333.87,
     zero_c=21.0,
     accel_offset_h=(0x77, 0x7A, 0x7D),
+    widest_fifo_bytes=4096,
     has_accel_config2=True,
     packed_self_test=False,
     asleep=False,
@@ -139,16 +158,22 @@ MPU6500 = Family(
     zero_rate_dps=5.0,
 )
 
-MPU6880 = replace(MPU6500, name="MPU-6880", parts=((0x78, "MPU-6880"),), fifo_bytes=4096)
+MPU6880 = replace(
+    MPU6500,
+    name="MPU-6880",
+    source="Linux 6.1, inv_mpu_core.c",
+    parts=((0x78, "MPU-6880"),),
+    fifo_bytes=4096,
+    widest_fifo_bytes=None,
+)
 
 ICM20689 = replace(
     MPU6500,
     name="ICM-20689",
+    source="DS-000143 (ICM-20689); Linux 6.1, inv_mpu_core.c",
     parts=(
         (0x98, "ICM-20689"),
-        (0x11, "ICM-20600"),
-        (0x12, "ICM-20602"),
-        (0x20, "ICM-20690"),
+        (0xA6, "ICM-20609"),
         (0xA9, "IAM-20680"),
         (0xAE, "ICM-20608D"),
         (0xAF, "ICM-20608"),
@@ -156,10 +181,37 @@ ICM20689 = replace(
     lsb_per_c=326.8,
     zero_c=25.0,
     asleep=True,
-    widest_fifo_bytes=4096,
 )
 
-FAMILIES = (MPU6050, MPU6500, MPU6880, ICM20689)
+ICM20690 = replace(
+    ICM20689,
+    name="ICM-20690",
+    source="Linux 6.1, inv_mpu_core.c: INV_ICM20690_GYRO_CONFIG_FSR_SHIFT, fifo_size",
+    parts=((0x20, "ICM-20690"),),
+    widest_fifo_bytes=1024,
+    gyro_range_shift=2,
+)
+
+ICM20602 = replace(
+    ICM20689,
+    name="ICM-20602",
+    source="DS-000176 (ICM-20602), register 35; PX4's ICM-20602 driver",
+    parts=((0x12, "ICM-20602"), (0x11, "ICM-20600")),
+    fifo_bytes=1008,
+    widest_fifo_bytes=None,
+    fifo_en_frame=reg.FIFO_EN_ZG | reg.FIFO_EN_ACCEL,
+    fifo_en_with_temperature=True,
+)
+
+MPU6886 = replace(
+    ICM20602,
+    name="MPU-6886",
+    source="M5Stack's MPU6886 driver; data sheet DS-000193",
+    parts=((0x19, "MPU-6886"),),
+    fifo_bytes=1024,
+)
+
+FAMILIES = (MPU6050, MPU6500, MPU6880, ICM20689, ICM20690, ICM20602, MPU6886)
 
 PARTS = {who_am_i: Part(chip, who_am_i, family) for family in FAMILIES for who_am_i, chip in family.parts}
 
@@ -186,6 +238,5 @@ def known_parts() -> str:
 
 
 def of_fifo(fifo_bytes: int) -> tuple[Family, ...]:
-    """The families of the smallest FIFO in the table that holds `fifo_bytes`; none where all are smaller."""
-    sizes = [family.fifo_bytes for family in FAMILIES if family.fifo_bytes >= fifo_bytes]
-    return tuple(family for family in FAMILIES if sizes and family.fifo_bytes == min(sizes))
+    """The families whose FIFO holds `fifo_bytes`, or nearly so."""
+    return tuple(family for family in FAMILIES if abs(fifo_bytes - family.fifo_bytes) <= FIFO_SLACK_BYTES)

@@ -64,39 +64,45 @@ def _settled(port: Port) -> int:
 
 
 def probe(port: Port) -> None:
-    """Fill the FIFO of a chip that was reset and is awake, and see what it shows of gravity."""
-    port.write(reg.FIFO_EN, reg.FIFO_EN_FRAME)
-    port.write(reg.USER_CTRL, reg.USER_CTRL_FIFO_EN)
+    """Fill the FIFO of a chip that was reset and is awake, and see what it shows of gravity.
+
+    Raises
+    ------
+    ChipError : its FIFO does not fill.
+    """
     full = _filled(port)
+    if full is None:
+        raise ChipError(
+            "the chip's FIFO does not fill as its register map says",
+            "take its supply away for a moment; if it stays so, the chip is broken or no MPU",
+        )
     if any(family.widest_fifo_bytes for family in of_fifo(full)):
+        # while the FIFO is stopped: what a change of size does to one that runs is nowhere written
         port.write(reg.ACCEL_CONFIG2, reg.FIFO_SIZE)
-        _filled(port)
-    port.write(reg.FIFO_EN, 0)
-    port.write(reg.USER_CTRL, 0)
+        if _filled(port) is None:
+            port.write(reg.ACCEL_CONFIG2, 0)
     if any(family.half_range_revision for family in of_fifo(full)):
         for _ in range(SIGHTS):
             port.sleep(SIGHT_NS)
             port.read(reg.ACCEL_XOUT_H, 6)
 
 
-def _filled(port: Port) -> int:
-    """How many bytes the FIFO holds once they do not get more.
-
-    Raises
-    ------
-    ChipError : they never do.
-    """
-    before = 0
+def _filled(port: Port) -> int | None:
+    """How many bytes the FIFO holds once they do not get more; None where they never do. Stopped before and after."""
+    port.write(reg.FIFO_EN, reg.FIFO_EN_FRAME)
+    port.read(reg.FIFO_EN, 1)
+    port.write(reg.USER_CTRL, reg.USER_CTRL_FIFO_EN)
+    full, before = None, 0
     for _ in range(LOOKS):
         port.sleep(LOOK_NS)
         count = int.from_bytes(port.read(reg.FIFO_COUNT_H, 2), "big")
         if count and count == before:
-            return count
+            full = count
+            break
         before = count
-    raise ChipError(
-        "the chip's FIFO does not fill as its register map says",
-        "take its supply away for a moment; if it stays so, the chip is broken or no MPU",
-    )
+    port.write(reg.FIFO_EN, 0)
+    port.write(reg.USER_CTRL, 0)
+    return full
 
 
 def _shows_a_time(head: bytes) -> bool:

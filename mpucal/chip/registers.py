@@ -49,7 +49,7 @@ FULL_SCALE_CODES: Final = 0x03
 
 # ACCEL_CONFIG2 (6500 only)
 ACCEL_FCHOICE_B: Final = 0x08
-FIFO_SIZE: Final = 0xC0  # ICM-20689 and its like: 512 bytes, doubled so many times
+FIFO_SIZE: Final = 0xC0  # 512 bytes, doubled so many times, in chips whose FIFO grows
 FIFO_SIZE_SHIFT: Final = 6
 
 # FIFO_EN

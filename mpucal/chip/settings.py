@@ -41,12 +41,14 @@ class Settings:
     @property
     def fifo_en(self) -> int:
         """What goes into the FIFO."""
-        return reg.FIFO_EN_ACCEL if self.accel_alone else reg.FIFO_EN_FRAME
+        return reg.FIFO_EN_ACCEL if self.accel_alone else self.part.family.fifo_en_frame
 
     @property
     def frame_words(self) -> int:
         """How many words that makes a sample."""
-        return reg.ACCEL_WORDS if self.accel_alone else reg.FRAME_WORDS
+        if not self.accel_alone:
+            return reg.FRAME_WORDS
+        return reg.ACCEL_WORDS + self.part.family.fifo_en_with_temperature
 
     @property
     def frame_bytes(self) -> int:
@@ -87,7 +89,8 @@ class Settings:
             reg.ACCEL_CONFIG: self.afs_sel << reg.FULL_SCALE_SHIFT,
         }
         if self.part.family.has_accel_config2:
-            values[reg.ACCEL_CONFIG2] = reg.ACCEL_FCHOICE_B if self.accel_alone else self.dlpf_cfg
+            size = reg.FIFO_SIZE if self.part.wide_fifo_bytes else 0
+            values[reg.ACCEL_CONFIG2] = size | (reg.ACCEL_FCHOICE_B if self.accel_alone else self.dlpf_cfg)
         return values
 
     @classmethod

@@ -21,6 +21,8 @@ def reset(port: Port) -> None:
     """All registers as after power-on, the accelerometer's factory trim too."""
     port.write(reg.PWR_MGMT_1, reg.PWR_MGMT_1_DEVICE_RESET)
     port.sleep(RESET_NS)
+    # whether it sleeps now tells families apart
+    port.read(reg.PWR_MGMT_1, 1)
     port.write(reg.SIGNAL_PATH_RESET, reg.SIGNAL_PATH_RESET_ALL)
     port.sleep(RESET_NS)
 

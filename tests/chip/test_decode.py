@@ -15,7 +15,7 @@ def disturbed(bench, stream, model="mpu6050", config=None):
     driver = desk.driver(config)
     driver.start()
     stream(driver, 0.3)
-    desk.stall(0.8)
+    desk.stall(2.0)
     stream(driver, 0.3)
     desk.fail("read", reg.FIFO_R_W, 1)
     stream(driver, 0.3)

@@ -54,7 +54,7 @@ def row(family):
     offsets = ", ".join(f"0x{address:02X}" for address in family.accel_offset_h)
     parts = ", ".join(f"0x{who_am_i:02X} {chip}" for who_am_i, chip in family.parts)
     temperature = f"raw / {family.lsb_per_c:g} + {family.zero_c:g}"
-    return f"| {family.name} | {family.fifo_bytes}{wide} | {offsets} | {temperature} | {parts} |"
+    return f"| {family.name} | {family.fifo_bytes}{wide} | {offsets} | {temperature} | {parts} | {family.source} |"
 
 
 def test_the_page_holds_the_table():

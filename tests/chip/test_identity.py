@@ -10,7 +10,7 @@ from mpucal.chip.access import Reply
 from mpucal.chip.config import Config
 from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
-from mpucal.chip.families import ICM20689, MPU6050, MPU6500, PARTS
+from mpucal.chip.families import ICM20602, ICM20689, ICM20690, MPU6050, MPU6500, MPU6886, PARTS
 from mpucal.chip.identity import Behaviour, remark
 from mpucal.data import Sensor
 from mpucal.errors import ChipError
@@ -21,12 +21,18 @@ FILLING = {reg.FIFO_EN: reg.FIFO_EN_FRAME}
 WIDENED = FILLING | {reg.ACCEL_CONFIG2: reg.FIFO_SIZE}
 
 
-def evidence(fifo_bytes, widened_bytes=None, magnitude_g=None):
+def evidence(fifo_bytes, widened_bytes=None, magnitude_g=None, asleep=None, fifo_en=None):
     seen = Behaviour()
-    seen.saw(reg.FIFO_COUNT_H, (fifo_bytes // 2).to_bytes(2, "big"), FILLING)
-    seen.saw(reg.FIFO_COUNT_H, fifo_bytes.to_bytes(2, "big"), FILLING)
-    if widened_bytes is not None:
-        seen.saw(reg.FIFO_COUNT_H, widened_bytes.to_bytes(2, "big"), WIDENED)
+    seen.saw(reg.PWR_MGMT_1, b"\x01", {})
+    if asleep is not None:
+        seen.reset()
+        seen.saw(reg.PWR_MGMT_1, bytes([0x40 if asleep else 0x01]), {})
+    if fifo_en is not None:
+        seen.saw(reg.FIFO_EN, bytes([fifo_en]), FILLING)
+    for count in (fifo_bytes // 2, fifo_bytes, fifo_bytes):
+        seen.saw(reg.FIFO_COUNT_H, count.to_bytes(2, "big"), FILLING)
+    for count in () if widened_bytes is None else (fifo_bytes, widened_bytes - 1, widened_bytes, widened_bytes):
+        seen.saw(reg.FIFO_COUNT_H, count.to_bytes(2, "big"), WIDENED)
     for _ in range(0 if magnitude_g is None else 5):
         axes = np.rint(np.array([0.6, 0.0, 0.8]) * magnitude_g * 16384).astype(">i2")
         seen.saw(reg.ACCEL_XOUT_H, axes.tobytes(), {})
@@ -45,11 +51,21 @@ def evidence(fifo_bytes, widened_bytes=None, magnitude_g=None):
         pytest.param(0x98, evidence(512, 512), "ICM-20689", ICM20689, id="whose FIFO does not grow"),
         pytest.param(0xAF, evidence(512, 512), "ICM-20608", ICM20689, id="a 20608"),
         pytest.param(0x68, evidence(512, 512), "MPU-6500", MPU6500, id="a 6500 that answers as a 6050"),
-        pytest.param(0x68, evidence(512, 4096), "ICM-20689", ICM20689, id="a 0x98 clone that answers as a 6050"),
-        pytest.param(0x70, evidence(512, 4096), "ICM-20689", ICM20689, id="or as a 6500"),
+        pytest.param(0x70, evidence(512, 4096), "MPU-6500", MPU6500, id="a 6500 with a larger FIFO"),
+        pytest.param(0x71, evidence(512, 4096), "MPU-9250", MPU6500, id="a 9250 with a larger FIFO"),
+        pytest.param(0x71, evidence(512, 4096, asleep=True), "MPU-9250", MPU6500, id="what it answers decides"),
+        pytest.param(
+            0x68, evidence(512, 4096, asleep=True), "ICM-20689", ICM20689, id="a clone98 with a 6050's answer"
+        ),
+        pytest.param(0x68, evidence(512, 4096, asleep=False), "MPU-6500", MPU6500, id="or a 6500"),
+        pytest.param(0x12, evidence(1008, fifo_en=0x18), "ICM-20602", ICM20602, id="a 20602"),
+        pytest.param(0x68, evidence(1008, fifo_en=0x18), "ICM-20602", ICM20602, id="that answers as a 6050"),
+        pytest.param(0x19, evidence(1024, fifo_en=0x18), "MPU-6886", MPU6886, id="a 6886"),
+        pytest.param(0x20, evidence(512, 1024), "ICM-20690", ICM20690, id="a 20690"),
+        pytest.param(0xA6, evidence(512, 4096), "ICM-20609", ICM20689, id="a 20609"),
         pytest.param(0x70, evidence(1024, magnitude_g=1), "MPU-6050", MPU6050, id="a 6050 that answers as a 6500"),
         pytest.param(0x72, evidence(512, 512), "MPU-6500", MPU6500, id="an unknown clone of a 6500"),
-        pytest.param(0x19, evidence(1024, magnitude_g=1), "MPU-6050", MPU6050, id="an unknown clone of a 6050"),
+        pytest.param(0x17, evidence(1024, magnitude_g=1), "MPU-6050", MPU6050, id="an unknown clone of a 6050"),
     ],
 )
 def test_behaviour_decides(who_am_i, seen, chip, family):
@@ -60,8 +76,17 @@ def test_behaviour_decides(who_am_i, seen, chip, family):
 
 
 def test_the_size_of_a_fifo_is_the_one_it_showed():
-    assert evidence(4096).part(0x78).family.fifo_bytes == 4096
-    assert evidence(1008, 1008).part(0x12).family.fifo_bytes == 1008
+    assert evidence(4096).part(0x78).fifo_bytes == 4096
+    assert evidence(1008, 1008).part(0x12).fifo_bytes == 1008
+    assert evidence(512, 512).part(0x70).fifo_bytes == 512
+    assert evidence(512, 4096).part(0x70).fifo_bytes == 4096
+
+
+def test_a_size_that_does_not_settle_is_not_believed():
+    seen = evidence(512)
+    for count in (600, 3000, 1200):
+        seen.saw(reg.FIFO_COUNT_H, count.to_bytes(2, "big"), WIDENED)
+    assert seen.part(0x70).fifo_bytes == 512
 
 
 def test_an_unknown_chip_with_an_unknown_fifo_is_refused():
@@ -97,11 +122,15 @@ class Kept(list):
         ("mpu6050", "MPU-6050"),
         ("mpu6050c", "MPU-6050C"),
         ("mpu6500", "MPU-6500"),
+        ("mpu6500_512", "MPU-6500"),
         ("mpu6880", "MPU-6880"),
         ("clone98", "ICM-20689"),
+        ("icm20690", "ICM-20690"),
+        ("icm20602", "ICM-20602"),
+        ("mpu6886", "MPU-6886"),
     ],
 )
-@pytest.mark.parametrize("who_am_i", [None, 0x68, 0x70, 0x72], ids=["own", "as a 6050", "as a 6500", "unknown"])
+@pytest.mark.parametrize("who_am_i", [None, 0x68, 0x72], ids=["own", "as a 6050", "unknown"])
 def test_a_simulated_chip_is_recognised_whatever_it_answers(chip, behaves, who_am_i, same):
     """And a capture of it tells the same; gravity, temperature and rate come out as they are."""
     said = "" if who_am_i is None else f",who_am_i={who_am_i}"

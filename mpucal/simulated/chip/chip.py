@@ -5,12 +5,10 @@ Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from ...chip import registers as reg
-from ...chip.families import WordGroup
+from ...chip.families import Family, WordGroup
 from ...data import Vector
 from ...errors import EndOfCapture
 from ..sensor import Counts, Setting
@@ -95,11 +93,13 @@ class Chip:
             value = self._user_control(value)
         elif address == reg.SIGNAL_PATH_RESET:
             value = 0
+        elif address == reg.FIFO_EN:
+            value &= self._model.fifo_en_kept
         changed = self._registers[address] != value
         self._registers[address] = value
         self._setting = None
         if address == reg.ACCEL_CONFIG2:
-            self._fifo.size = self._model.fifo_bytes(value)
+            self._resize_fifo(self._model.fifo_bytes(value))
         if (address in SAMPLING and changed) or (address in PACING and self._rate() != self._rate_hz):
             self._start_clock(t_ns)
 
@@ -111,6 +111,12 @@ class Chip:
         if value & reg.USER_CTRL_SIG_COND_RESET:
             self._latest, self._unread = bytes(reg.FRAME_BYTES), None
         return value & ~(reg.USER_CTRL_FIFO_RESET | reg.USER_CTRL_SIG_COND_RESET)
+
+    def _resize_fifo(self, size: int) -> None:
+        """While it runs, what lies in it is lost: no register map says what happens."""
+        if size != self._fifo.size and self._registers[reg.USER_CTRL] & reg.USER_CTRL_FIFO_EN:
+            self._fifo.clear()
+        self._fifo.size = size
 
     def _latch_fifo_count(self) -> None:
         if self._ended and not len(self._fifo):
@@ -183,7 +189,7 @@ class Chip:
         words = counts.astype(">i2")
         self._latest = words[-1].tobytes()
         stop = bool(self._registers[reg.CONFIG] & reg.CONFIG_FIFO_MODE_STOP)
-        if self._fifo.push(words[:, _columns(sources, self._model.family.frame)].tobytes(), stop):
+        if self._fifo.push(words[:, _columns(sources, self._model.family)].tobytes(), stop):
             self._registers[reg.INT_STATUS] |= reg.INT_FIFO_OFLOW
 
     def _latest_sample(self) -> bytes:
@@ -220,9 +226,12 @@ WORD_BITS = {
 GYRO = slice(4, 7)
 
 
-def _columns(sources: int, frame: Sequence[WordGroup]) -> list[int]:
+def _columns(sources: int, family: Family) -> list[int]:
     """Which of a sample's seven words FIFO_EN asks for, in the frame's order."""
-    return [word for group in frame for word, bit in WORD_BITS[group] if sources & bit]
+    if family.fifo_en_with_temperature:
+        sources |= reg.FIFO_EN_TEMP
+        sources |= reg.FIFO_EN_XG | reg.FIFO_EN_YG if sources & reg.FIFO_EN_ZG else 0
+    return [word for group in family.frame for word, bit in WORD_BITS[group] if sources & bit]
 
 
 def _setting(registers: bytearray, rate_hz: float, model: Model, factory: Factory) -> Setting:

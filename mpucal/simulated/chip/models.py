@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ...chip import registers as reg
-from ...chip.families import ICM20689, MPU6050, MPU6500, MPU6880, Family
+from ...chip.families import ICM20602, ICM20689, ICM20690, MPU6050, MPU6500, MPU6880, MPU6886, Family
 from .factory import Factory
 
 AWAKE = 0x01
@@ -22,7 +22,7 @@ class Model:
     who_am_i : another identity than the first part's.
     accel_sensitivity : counts a g, relative to the nominal.
     offset_lsb_per_g : another scale of its accelerometer offsets than the nominal.
-    offsets_kept : its accelerometer offsets can be written.
+    offsets_kept : its accelerometer offsets can be written. fifo_grows : FIFO_SIZE does what its row says.
     """
 
     name: str
@@ -31,6 +31,7 @@ class Model:
     accel_sensitivity: float = 1.0
     offset_lsb_per_g: float | None = None
     offsets_kept: bool = True
+    fifo_grows: bool = True
 
     @property
     def identity(self) -> int:
@@ -51,7 +52,13 @@ class Model:
     def fifo_bytes(self, accel_config2: int) -> int:
         """Size of its FIFO while ACCEL_CONFIG2 holds this; each step of FIFO_SIZE doubles it."""
         steps = (accel_config2 & reg.FIFO_SIZE) >> reg.FIFO_SIZE_SHIFT
-        return min(self.family.fifo_bytes << steps, self.family.widest_fifo_bytes or self.family.fifo_bytes)
+        widest = self.family.widest_fifo_bytes if self.fifo_grows else None
+        return min(self.family.fifo_bytes << steps, widest or self.family.fifo_bytes)
+
+    @property
+    def fifo_en_kept(self) -> int:
+        """The bits of FIFO_EN that it keeps."""
+        return self.family.fifo_en_frame
 
     def reset_values(self, factory: Factory) -> bytearray:
         """All 128 registers after a reset, with what the factory left in this piece."""
@@ -94,7 +101,13 @@ MODELS = {
         _MPU6050,
         replace(_MPU6050, name="mpu6050c", accel_sensitivity=0.5),
         Model("mpu6500", MPU6500),
+        Model("mpu6500_512", MPU6500, fifo_grows=False),
+        Model("mpu9250", MPU6500, who_am_i=0x71),
         Model("mpu6880", MPU6880),
         Model("clone98", ICM20689),
+        Model("icm20609", ICM20689, who_am_i=0xA6),
+        Model("icm20690", ICM20690),
+        Model("icm20602", ICM20602),
+        Model("mpu6886", MPU6886),
     )
 }

@@ -6,6 +6,7 @@ Source: RM-MPU-6000A r4.2, registers 35, 104, 106, 107 and 116.
 from __future__ import annotations
 
 from ...chip import registers as reg
+from ...chip.families import FAMILIES
 
 # What each bit of FIFO_EN adds to a frame; the lowest three are other chips', of unknown size.
 FRAME_PARTS = (
@@ -16,6 +17,8 @@ FRAME_PARTS = (
     (reg.FIFO_EN_ZG, 2),
 )
 OTHER_CHIPS = 0x07
+# of an ICM-20602 and its like, where the temperature and all of the gyroscope come along
+WHOLE_FRAME = {row.fifo_en_frame: reg.FRAME_BYTES for row in FAMILIES if row.fifo_en_with_temperature}
 # A write to one of these may stop the FIFO or move what lies in it.
 CONTROLS = frozenset((reg.FIFO_EN, reg.USER_CTRL, reg.SIGNAL_PATH_RESET, reg.PWR_MGMT_1))
 
@@ -49,4 +52,4 @@ class FifoWatch:
         runs = self._held[reg.USER_CTRL] & reg.USER_CTRL_FIFO_EN and not sources & OTHER_CHIPS
         if not (runs and self._begins_with_a_frame):
             return 0
-        return sum(size for bit, size in FRAME_PARTS if sources & bit)
+        return WHOLE_FRAME.get(sources) or sum(size for bit, size in FRAME_PARTS if sources & bit)
