@@ -1,0 +1,187 @@
+"""How a board is turned after it has lain flat: angular rates on a fine clock.
+
+Each motion is a frozen dataclass whose `course(step_s, rng)` draws one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from mpucal.data import Vector
+from mpucal.simulated import rotation
+from mpucal.simulated.legs import minimum_jerk_rate
+
+FLAT_S = 10.0
+# a hand begins and ends an unbroken motion within this
+FADE_S = 1.0
+# orientations that a person has in mind before choosing the one least like those shown
+CANDIDATES = 4
+
+
+@dataclass(frozen=True)
+class Course:
+    """omega (n, 3) rad/s in the body at the middle of each step of step_s; moving (n,) 0 to 1, how much it is moved."""
+
+    step_s: float
+    omega: Vector
+    moving: Vector
+
+    @property
+    def t(self) -> Vector:
+        """(n,) s, the middle of each step."""
+        return self.step_s * np.arange(0.5, len(self.omega))
+
+    @property
+    def after_flat(self) -> Vector:
+        """(n,) 0 while the board lies flat at first, 1 after."""
+        return (self.t >= FLAT_S).astype(float)
+
+
+class Motion(Protocol):
+    """What a family's boards do."""
+
+    def course(self, step_s: float, rng: np.random.Generator) -> Course:
+        """One of them."""
+        ...
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A turn by the rotation vector turn_rad (3,) in the body within `seconds`, and a rest of `hold_s` after it."""
+
+    turn_rad: Vector
+    seconds: float
+    hold_s: float
+
+
+def along(legs: Sequence[Leg], step_s: float, rate: Callable[[Vector], Vector] = minimum_jerk_rate) -> Course:
+    """The course of legs, one after the other; `rate` is the derivative of the share of a turn (0 to 1) by time's."""
+    seconds = FLAT_S + sum(leg.seconds + leg.hold_s for leg in legs)
+    n = round(seconds / step_s)
+    omega, moving = np.zeros((n, 3)), np.zeros(n)
+    start = FLAT_S
+    for leg in legs:
+        inside = slice(round(start / step_s), min(round((start + leg.seconds) / step_s), n))
+        share = (np.arange(inside.start, inside.stop) + 0.5 - start / step_s) * step_s / leg.seconds
+        omega[inside] = rate(share)[:, None] * (leg.turn_rad / leg.seconds)
+        moving[inside] = np.clip(8.0 * share * (1.0 - share), 0.0, 1.0)
+        start += leg.seconds + leg.hold_s
+    return Course(step_s, omega, moving)
+
+
+def direction(rng: np.random.Generator) -> Vector:
+    """A unit vector (3,) in any direction."""
+    v = rng.standard_normal(3)
+    return np.asarray(v / np.linalg.norm(v))
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Still orientations, the flat one among them, each as unlike those before as a person thinks of.
+
+    turn_deg, move_s, hold_s : least and most of each. back : it is put down at last as it lay at first.
+    """
+
+    count: int = 12
+    turn_deg: tuple[float, float] = (50.0, 140.0)
+    move_s: tuple[float, float] = (1.2, 2.2)
+    hold_s: tuple[float, float] = (1.6, 2.8)
+    back: bool = False
+
+    def course(self, step_s: float, rng: np.random.Generator) -> Course:
+        """See Motion."""
+        attitude, shown, legs = rotation.exp(np.zeros(3)), [np.array([0.0, 0.0, 1.0])], []
+        for _ in range(self.count - 1):
+            turns = [direction(rng) * np.radians(rng.uniform(*self.turn_deg)) for _ in range(CANDIDATES)]
+            after = rotation.product(attitude, rotation.exp(np.array(turns)))
+            up = rotation.up_in_board(after)
+            best = int(np.argmin((up @ np.array(shown).T).max(axis=1)))
+            attitude = after[best]
+            shown.append(up[best])
+            legs.append(Leg(turns[best], rng.uniform(*self.move_s), rng.uniform(*self.hold_s)))
+        if self.back:
+            legs.append(Leg(rotation.log(rotation.conjugate(attitude)), 3.0, 5.0))
+        return along(legs, step_s)
+
+
+@dataclass(frozen=True)
+class Continuous:
+    """Turned all the time about every axis: Gaussian rates within band_hz, rms_dps an axis."""
+
+    seconds: float = 45.0
+    rms_dps: float = 80.0
+    band_hz: tuple[float, float] = (0.08, 0.7)
+
+    def course(self, step_s: float, rng: np.random.Generator) -> Course:
+        """See Motion."""
+        n = round((FLAT_S + self.seconds) / step_s)
+        moving = np.clip((step_s * np.arange(0.5, n) - FLAT_S) / FADE_S, 0.0, 1.0)
+        moving *= moving * (3.0 - 2.0 * moving)
+        return Course(step_s, np.radians(self.rms_dps) * moving[:, None] * within(n, step_s, self.band_hz, rng), moving)
+
+
+@dataclass(frozen=True)
+class Spins:
+    """A turn or more about each of these axes of the board (0, 1, 2), and about `oblique` others."""
+
+    about: tuple[int, ...] = (0, 1, 2, 0, 1, 2)
+    oblique: int = 3
+    turn_deg: tuple[float, float] = (330.0, 520.0)
+    turn_s: tuple[float, float] = (4.0, 7.0)
+    pause_s: float = 1.0
+
+    def course(self, step_s: float, rng: np.random.Generator) -> Course:
+        """See Motion."""
+        axes = [rng.choice([-1.0, 1.0]) * np.eye(3)[axis] for axis in self.about]
+        axes += [direction(rng) for _ in range(self.oblique)]
+        turns = [np.radians(rng.uniform(*self.turn_deg)) * axis + rng.uniform(-0.15, 0.15, 3) for axis in axes]
+        return along([Leg(turn, rng.uniform(*self.turn_s), self.pause_s) for turn in turns], step_s)
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """Turned by a machine at constant rates, about axes with components of -1, 0 and 1.
+
+    rate_dps : least and most of an arc's. arc_deg : likewise of its length. ramp : the share of an arc that it takes
+    to start, and to stop.
+    """
+
+    count: int = 6
+    rate_dps: tuple[float, float] = (3.0, 10.0)
+    arc_deg: tuple[float, float] = (100.0, 180.0)
+    pause_s: float = 0.0
+    ramp: float = 0.02
+
+    def course(self, step_s: float, rng: np.random.Generator) -> Course:
+        """See Motion."""
+        legs, last = [], np.zeros(3)
+        while len(legs) < self.count:
+            axis = rng.integers(-1, 2, 3).astype(float)
+            if not np.any(np.cross(axis, last) if legs else axis):
+                continue
+            last = axis
+            arc, rate = rng.uniform(*self.arc_deg), rng.uniform(*self.rate_dps)
+            legs.append(Leg(np.radians(arc) * axis / np.linalg.norm(axis), arc / rate, self.pause_s))
+        return along(legs, step_s, lambda share: trapezoid(share, self.ramp))
+
+
+def trapezoid(share: Vector, ramp: float) -> Vector:
+    """A rate that rises within `ramp` of the time, stays, and falls; of mean 1 over 0..1."""
+    return np.asarray(np.clip(np.minimum(share, 1.0 - share) / ramp, 0.0, 1.0) / (1.0 - ramp))
+
+
+def within(n: int, step_s: float, band_hz: tuple[float, float], rng: np.random.Generator) -> Vector:
+    """(n, 3) Gaussian noise between two frequencies, of expected rms 1 an axis."""
+    # lengths of few prime factors, a multiple of 1024 steps
+    padded = -(-n // 1024) * 1024
+    frequency = np.arange(padded // 2 + 1) / (padded * step_s)
+    inside = np.flatnonzero((frequency >= band_hz[0]) & (frequency <= band_hz[1]))
+    spectrum = np.zeros((3, len(frequency)), complex)
+    # an irfft takes each line twice, and divides by its length
+    scale = padded / (2.0 * np.sqrt(max(len(inside), 1)))
+    spectrum[:, inside] = scale * (rng.standard_normal((3, len(inside))) + 1j * rng.standard_normal((3, len(inside))))
+    return np.ascontiguousarray(np.fft.irfft(spectrum, padded)[:, :n].T)
