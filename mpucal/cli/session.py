@@ -27,7 +27,7 @@ from ..sources.table import kinds_meant, source_title
 from ..terminal.console import Console, console
 from .destination import device, session_sink_options
 from .options import aim_options, check_gyroscope, check_source, fit_options, given, source_options
-from .person import ask
+from .person import ask, ask_in_doubt
 from .running import running
 from .summary import summary, written
 
@@ -77,8 +77,9 @@ def command(
         click.echo(f"{summary(calibration)}\n\n{written([into.capture, *paths])}")
     record = in_session(into.path, calibration, recording, source.truth)
     sensor = device({**options, "gravity": source.plan.gravity, "model": source.plan.model})
-    confirm = partial(ask, yes=yes)
-    _report(calibration, write_to_all(kinds, calibration, sensor, into.path, record, confirm, sinks), as_json)
+    confirm, in_doubt = partial(ask, yes=yes), partial(ask_in_doubt, yes=yes)
+    writing = write_to_all(kinds, calibration, sensor, into.path, record, confirm, sinks, in_doubt)
+    _report(calibration, writing, as_json)
     return RefusedError.exit_code if calibration.verdict == REFUSED else 0
 
 

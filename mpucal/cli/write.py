@@ -10,6 +10,7 @@ import click
 from ..data import STANDARD_GRAVITY_MPS2
 from ..result.calibration import Calibration
 from ..session.results import make_folder
+from ..sinks.doubt import doubt
 from ..sinks.record import in_file, is_calibration
 from ..sinks.table import SINKS
 from ..sinks.write_back import put_back, write_to
@@ -44,6 +45,9 @@ def command(calibration: Path, to: str, folder: Path | None, yes: bool, as_json:
     # a simulated chip lives in the gravity in which it was calibrated
     gravity = STANDARD_GRAVITY_MPS2 if written is None else written.fit.get("gravity") or STANDARD_GRAVITY_MPS2
     with kind.open(device({**options, "gravity": gravity})) as sink:
+        against = doubt(written, sink) if written is not None and written.quality else None
+        if against is not None:
+            say(f"{against}.")
         ask(f"Write {calibration} to {sink.where}?", yes)
         if written is None:
             click.echo(f"Done: {put_back(kind, sink, calibration, folder, say)}.")

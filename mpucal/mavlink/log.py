@@ -161,7 +161,7 @@ def _no_imu(name: str, firmware: str, gatherer: Gatherer) -> RecordingError:
     if firmware == PX4 and gatherer.streams:
         return RecordingError(
             f"{name} holds only PX4's HIGHRES_IMU, from which the estimator's bias is subtracted already",
-            "record SCALED_IMU, as `mpucal session --mavlink` does, or clear bit 1 of EKF2_IMU_CTRL before",
+            "record SCALED_IMU, as `mpucal session --mavlink` does, or clear bits 0 and 1 of EKF2_IMU_CTRL before",
         )
     return RecordingError(
         f"{name} holds no accelerations and rates",

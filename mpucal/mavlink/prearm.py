@@ -73,10 +73,16 @@ def prearm(link: Link) -> Prearm:
                 link.mav.command_long_encode(vehicle.system, vehicle.component, number, 0, param, 0, 0, 0, 0, 0, 0)
             )
         for message in link.messages(link.now_ns() + COMPLAINTS_NS):
-            if message.get_type() == "SYS_STATUS" and message.onboard_control_sensors_present & PREARM_CHECK:
-                ready = bool(message.onboard_control_sensors_health & PREARM_CHECK)
+            if message.get_type() == "SYS_STATUS":
+                ready = _ready(message, vehicle.is_px4)
             if message.get_type() == "STATUSTEXT" and message.text.startswith(PREFIXES):
                 complaints.append(message.text.partition(": ")[2])
         if ready is not None:
             break
     return Prearm(ready, tuple(dict.fromkeys(complaints)))
+
+
+def _ready(message: Message, is_px4: bool) -> bool | None:
+    """What a SYS_STATUS says; PX4 sets the check in `health` and never in `present`."""
+    known = is_px4 or message.onboard_control_sensors_present & PREARM_CHECK
+    return bool(message.onboard_control_sensors_health & PREARM_CHECK) if known else None

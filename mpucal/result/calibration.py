@@ -99,6 +99,12 @@ class Calibration:
         """good, usable or refused; refused where nobody judged."""
         return str(self.quality.get("verdict", REFUSED))
 
+    @property
+    def magnitude_std(self) -> float:
+        """Standard uncertainty of the calibrated |a| [m/s^2], rms over all directions; 0 where it is unknown."""
+        std = self.quality.get("error_std", {}).get("magnitude")
+        return float(std) if std is not None and math.isfinite(std) else 0.0
+
     def apply(self, acc: ArrayLike, gyr: ArrayLike | None = None, temperature_c: ArrayLike | None = None) -> Any:
         """Calibrated measurements (the paper's equation 4).
 

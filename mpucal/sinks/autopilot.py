@@ -15,7 +15,7 @@ from ..mavlink.link import Link
 from ..mavlink.parameters.applied import applied, of_imu
 from ..mavlink.parameters.client import Parameters
 from ..mavlink.parameters.names import all_places
-from ..mavlink.parameters.plan import NOTHING, Change, changes, left_out, moved
+from ..mavlink.parameters.plan import NOTHING, Change, changes, helping, left_out, moved
 from ..mavlink.parameters.text import param_text, params_text, read_parameters_file
 from ..mavlink.parameters.verify import OtherPlacesError, verify
 from ..mavlink.parameters.write import Writer
@@ -107,6 +107,17 @@ class AutopilotSink:
         writer.write(old, {name: wanted[name] for where in places for name in where.names}, lambda: None)
         return f"{self.where} holds again what {kept.name} says, read back"
 
+    def as_good(self, calibration: Calibration) -> str | None:
+        """See Comparing; cross-axis residue included. One IMU whose new parameters are better is enough."""
+        planned = changes(calibration, self._firmware)
+        if any(change.helps for change in planned):
+            return None
+        old, new = (max(getattr(c, key) or 0.0 for c in planned) for key in ("residual_old_mps2", "residual_mps2"))
+        return (
+            f"the parameters that {self.where} has are predicted to be as good as the new ones (|a| wrong by up to"
+            f" {old:.3f} m/s^2 with the old ones, {new:.3f} with the new ones)"
+        )
+
     def write(self, calibration: Calibration) -> Applied:
         """Set each parameter, read all back, and see their effect in the streams; or put the old ones back.
 
@@ -123,7 +134,8 @@ class AutopilotSink:
         return self._written(moved(calibration, other.order, self._firmware))
 
     def _written(self, calibration: Calibration) -> Applied:
-        planned = changes(calibration, self._firmware)
+        possible = changes(calibration, self._firmware)
+        planned = helping(possible)
         writer = self._writer = Writer(self._link, self._watch, [change.place for change in planned])
         stillness = Stillness(self._link, [change.stream for change in planned])
         with _nothing_written():
@@ -138,7 +150,8 @@ class AutopilotSink:
         with self._stored(now, planned) as paths:
             writer.write(old, new, lambda: verify(planned, old, rest, stillness.wait()))
         after = self._settled(planned)
-        return Applied(now, "; ".join([*self._said(planned, left_out(calibration), before, after), *paths]))
+        said = [*self._said(planned, before, after), *_kept(possible, planned, left_out(calibration)), *self._saves()]
+        return Applied(now, "; ".join([*said, *paths]))
 
     @contextmanager
     def _stored(self, now: Calibration, planned: Sequence[Change]) -> Iterator[list[str]]:
@@ -183,19 +196,30 @@ class AutopilotSink:
         command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, SAVE_IDS)
         return prearm(self._link)
 
-    def _said(self, planned: Sequence[Change], out: Sequence[int], before: Prearm, after: Prearm) -> list[str]:
+    def _said(self, planned: Sequence[Change], before: Prearm, after: Prearm) -> list[str]:
         imus = " and ".join(str(change.imu) for change in planned)
         residuals = ", ".join(f"{change.residual_mps2:.3f}" for change in planned)
-        clauses = [
+        return [
             f"{self.where} has the new parameters of IMU {imus}, read back and seen in its streams; they hold no"
             f" cross-axis terms, without which |a| stays wrong by up to {residuals} m/s^2",
             f"before, it {before}; now it {after}",
         ]
-        if out:
-            clauses.append(f"IMU {', '.join(map(str, out))} keeps its old ones, as its calibration was refused")
-        if self._firmware == PX4:
-            clauses.append("leave it powered for three seconds more, as PX4 saves late")
-        return clauses
+
+    def _saves(self) -> list[str]:
+        return ["leave it powered for three seconds more, as PX4 saves late"] if self._firmware == PX4 else []
+
+
+def _kept(possible: Sequence[Change], planned: Sequence[Change], refused: Sequence[int]) -> list[str]:
+    """Which IMUs keep their old parameters, and why."""
+    said = [
+        f"IMU {change.imu} keeps its old ones, which are predicted to be as good (|a| wrong by up to"
+        f" {change.residual_old_mps2 or 0.0:.3f} m/s^2)"
+        for change in possible
+        if change not in planned
+    ]
+    if refused:
+        said.append(f"IMU {', '.join(map(str, refused))} keeps its old ones, as its calibration was refused")
+    return said
 
 
 @contextmanager

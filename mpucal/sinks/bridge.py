@@ -9,8 +9,9 @@ from pkgutil import resolve_name
 
 from ..errors import BusError, WriteBackError
 from ..result.atomic import write_atomically
-from ..result.blob import BlobError
+from ..result.blob import Blob, BlobError
 from ..result.calibration import REFUSED, Calibration
+from ..result.improvement import is_better, left_wrong
 from ..sources.bridge.store import Held, Store
 from .kind import Device
 from .sink import Applied
@@ -46,6 +47,17 @@ class BridgeSink:
         path = folder / BRIDGE_BLOB.name.replace("N", str(held.generation))
         write_atomically(path, old)
         return (path,)
+
+    def as_good(self, calibration: Calibration) -> str | None:
+        """See Comparing; a memory that holds no calibration, or a damaged one, is never as good."""
+        held = self._store.read()
+        try:
+            old = None if held is None else Calibration.from_blob(Blob.decode(held))
+        except BlobError:
+            return None
+        if old is None or is_better(0.0, left_wrong(calibration, old.D, old.b_a), calibration.magnitude_std):
+            return None
+        return f"the calibration that {self.where} keeps is predicted to be as good"
 
     def write(self, calibration: Calibration) -> Applied:
         """Store the blob, read it back, compare, and ask the firmware whether it is valid; see Sink."""

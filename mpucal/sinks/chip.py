@@ -27,6 +27,7 @@ from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError, RecordingError, SourceError, WriteBackError
 from ..result.atomic import write_atomically
 from ..result.calibration import REFUSED, Calibration
+from ..result.improvement import is_better
 from ..session.at_rest import put_down
 from ..sources.chip import OpenedChip
 from .kind import Device
@@ -37,6 +38,8 @@ FORMAT = "mpucal.chip_offsets"
 
 # a calibration that fits the chip brings gravity out within 20 mg, wherever the board lies
 GRAVITY_MPS2 = 0.2
+# the registers count mg: what half a step is, rms over three axes
+STEP_MPS2 = 0.001 * STANDARD_GRAVITY_MPS2 * 0.5
 # a measured step: the board lay still, and the accelerometer's own scale is within 3 %
 SHIFT_G, SHIFT_SHARE = 0.006, 0.1
 
@@ -92,6 +95,15 @@ class ChipSink:
                 if Block.read(self._port, block.place) != block and not block.write(self._port):
                     raise ChipError(f"the chip does not take {block.data.hex(' ')}", "check that it is the same chip")
         return f"the offset registers of {self.where} hold again what {kept.name} says; {VOLATILE}"
+
+    def as_good(self, calibration: Calibration) -> str | None:
+        """See Comparing: a bias that is less than a step and its uncertainty is as well left where it is."""
+        bias, std = (
+            float(np.linalg.norm(np.nan_to_num(b))) for b in (calibration.b_a_to_subtract, calibration.b_a_std)
+        )
+        if is_better(STEP_MPS2, bias, std):
+            return None
+        return f"b_a is {bias:.3f} m/s^2, which the offset registers of {self.where} cannot make less"
 
     def write(self, calibration: Calibration) -> Applied:
         """Write b_a into the registers, and measure that it is gone from the samples; see Sink."""

@@ -10,11 +10,12 @@ from types import MappingProxyType
 from ..errors import KeepsNothing, OutputError, SourceError, WriteBackError
 from ..result.calibration import REFUSED, Calibration
 from ..result.clock import now
+from .doubt import doubt
 from .kind import Device, Say, SinkKind
 from .record import WRITTEN, Record
 from .sink import Applied, Restorable, Sink
 
-# asks whether to go on; WriteBackError where the person says no
+# asks whether to go on; WriteBackError where the person says no, or where there is a doubt and no person
 Ask = Callable[[str], None]
 
 
@@ -55,12 +56,15 @@ def write_to_all(
     record: Record,
     ask: Ask,
     asked: Sequence[str] = (),
+    in_doubt: Ask | None = None,
 ) -> Iterator[Applied]:
     """Write to each sink in turn, and save what is applied then; nothing of a calibration that was refused.
 
     Parameters
     ----------
     asked : the sinks that --to named: a device that keeps nothing is no failure unless its sink was.
+    in_doubt : asks in place of `ask` where the calibration was not verified, or what the sink holds is predicted to be
+        as good.
 
     Raises
     ------
@@ -69,7 +73,11 @@ def write_to_all(
     for kind in kinds if calibration.verdict != REFUSED else ():
         try:
             with kind.open(device) as sink:
-                ask(f"Write the calibration to {sink.where}?")
+                against = doubt(calibration, sink)
+                if against is None:
+                    ask(f"Write the calibration to {sink.where}?")
+                else:
+                    (in_doubt or ask)(f"{against}. Write it to {sink.where} all the same?")
                 applied = write_to(kind, sink, calibration, folder, record, device.say)
         except SourceError as error:
             if isinstance(error, KeepsNothing) and kind.name not in asked:

@@ -127,7 +127,7 @@ def test_several_vehicles_are_listed_and_one_can_be_chosen(station, tmp_path):
     assert len(read_log(read_tlog(path).records, path.name, system=7)) == 49
 
 
-def test_px4_highres_is_believed_only_without_the_estimators_bias(station, tmp_path):
+def test_px4_highres_is_believed_only_without_the_estimators_biases(station, tmp_path):
     px4 = station(autopilot=12)
 
     def highres(k):
@@ -138,10 +138,12 @@ def test_px4_highres_is_believed_only_without_the_estimators_bias(station, tmp_p
         return px4.message("param_value", b"EKF2_IMU_CTRL", as_float, 6, 1, 0)
 
     stream = [(0.01 * k, highres(k)) for k in range(1, 50)]
-    biased = [(0.0, px4.heartbeat()), (0.0, control(7)), *stream]
-    with pytest.raises(RecordingError, match="estimator's bias is subtracted"):
-        mpucal.load(log_of(tmp_path, biased))
-    unbiased = [(0.0, px4.heartbeat()), (0.0, control(5)), *stream]
+    # bit 0: the gyroscope's, bit 1: the accelerometer's
+    for bits in (7, 6, 5):
+        biased = [(0.0, px4.heartbeat()), (0.0, control(bits)), *stream]
+        with pytest.raises(RecordingError, match="estimator's bias is subtracted"):
+            mpucal.load(log_of(tmp_path, biased))
+    unbiased = [(0.0, px4.heartbeat()), (0.0, control(4)), *stream]
     assert mpucal.load(log_of(tmp_path, unbiased)).sensor.message == "HIGHRES_IMU"
 
 

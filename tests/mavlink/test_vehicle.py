@@ -144,15 +144,21 @@ def test_the_truth_it_tells_is_that_of_its_streams(words):
 
 
 def test_px4s_highres_imu_hides_what_the_estimator_learns_unless_it_is_told_not_to():
-    shift = {}
-    for control in (7, 5):
+    shift, turn = {}, {}
+    for control in (7, 6, 5, 4):
         station = Station(f"firmware=px4,imus=1,EKF2_IMU_CTRL={control}")
         station.rest()
         station.interval(SCALED, 50)
-        last = {m.get_type(): m.zacc for m in station.hear(30.0) if hasattr(m, "zacc")}
-        shift[control] = abs(last["HIGHRES_IMU"] - last["SCALED_IMU"] * 9.80665e-3)
-    assert shift[7] > 0.2
-    assert shift[5] < 0.05
+        last = {m.get_type(): m for m in station.hear(30.0) if hasattr(m, "zacc")}
+        shift[control] = abs(last["HIGHRES_IMU"].zacc - last["SCALED_IMU"].zacc * 9.80665e-3)
+        fields = ("xgyro", "ygyro", "zgyro")
+        felt = station.vehicle.firmware.corrected[0, 1]
+        turn[control] = np.linalg.norm(felt - [getattr(last["HIGHRES_IMU"], field) for field in fields])
+    assert min(shift[7], shift[6]) > 0.2
+    assert max(shift[5], shift[4]) < 0.05
+    # what is left of an estimated gyroscope's bias after 35 s of rest
+    bias = np.linalg.norm(station.vehicle.imus.truths[0].b_omega)
+    assert min(turn[7], turn[5]) > 0.5 * bias > max(turn[6], turn[4])
 
 
 def test_ardupilot_echoes_a_vectors_other_axes_and_is_silent_on_unknown_names():

@@ -14,6 +14,7 @@ from mpucal.errors import RecordingError, WriteBackError
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.document import autopilot_document
+from mpucal.mavlink.prearm import prearm
 from mpucal.mavlink.prompts import Heard, to_message
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
@@ -379,3 +380,40 @@ def test_px4s_slots_in_another_order_are_found_by_their_effect(words):
     truth = vehicle.truth_document()
     np.testing.assert_allclose(applied.calibration.D, truth["D"], atol=1e-6)
     assert "CAL_ACC1_XOFF" in applied.calibration.extra["autopilot"]["params_new"]
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_an_imu_that_would_not_become_better_keeps_its_parameters(firmware):
+    vehicle, _, link = vehicle_of(firmware)
+    sink = AutopilotSink(link)
+    once = sink.write(calibration_of(vehicle)).calibration
+    vehicle.firmware.store[next(name for name in stored(vehicle) if "2" not in name)] = 0.3
+    if firmware == "px4":
+        vehicle.firmware.start()
+    again = calibration_of(vehicle)
+    assert sink.as_good(again) is None
+    old = stored(vehicle)
+    applied = sink.write(again)
+    second = "ACC2" if firmware == "ardupilot" else "ACC1"
+    changed = {name for name, value in stored(vehicle).items() if value != old[name]}
+    assert changed
+    assert not any(second in name for name in changed)
+    assert "IMU 2 keeps its old ones, which are predicted to be as good" in applied.what
+    # and a whole vehicle that is calibrated already is left to a person
+    assert "as good as the new ones" in sink.as_good(once)
+
+
+def test_px4_is_not_said_to_hold_what_lies_in_its_dead_band():
+    vehicle, _, link = vehicle_of("px4")
+    vehicle.imus.truths = (vehicle.imus.truths[0], replace(vehicle.imus.truths[1], D=np.eye(3), b_a=np.full(3, 0.004)))
+    calibration = calibration_of(vehicle)
+    applied = AutopilotSink(link).write(calibration)
+    assert "has the new parameters of IMU 1, read back" in applied.what
+    assert "IMU 2 keeps" in applied.what
+
+
+@pytest.mark.parametrize("words", ["", ",CAL_ACC0_ID=0"], ids=["ready", "a sensor without a slot"])
+def test_px4_says_whether_it_would_arm_though_it_does_not_list_the_check(words):
+    vehicle, _, link = vehicle_of("px4", words)
+    assert not vehicle.firmware.sys_status().onboard_control_sensors_present & 0x10000000
+    assert prearm(link).ready is not bool(words)

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ...result.calibration import Calibration
-from .document import NEW, OLD
+from .document import NEW, OLD, RESIDUAL, RESIDUAL_OLD
 from .names import place_of
 
 
@@ -53,6 +53,6 @@ def _one(calibration: Calibration, imus: Collection[int]) -> Calibration:
     R_b, old = np.array(autopilot["mounting"]), where.used(old)
     A = R_b @ np.diag(new.scale / old.scale) @ R_b.T
     c = R_b @ (new.scale * (old.offset - new.offset))
-    now = {**autopilot, OLD: {**autopilot[OLD], **autopilot[NEW]}}
+    now = {**autopilot, OLD: {**autopilot[OLD], **autopilot[NEW]}, RESIDUAL_OLD: autopilot[RESIDUAL]}
     extra = MappingProxyType({**calibration.extra, "autopilot": now})
     return replace(calibration, D=A @ calibration.D, b_a=A @ calibration.b_a + c, extra=extra)

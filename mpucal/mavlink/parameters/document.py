@@ -12,14 +12,17 @@ from .compose import compose
 from .names import mounting, place
 
 OLD, NEW, RESIDUAL = "params_old", "params_new", "residual_mps2"
+RESIDUAL_OLD, UNCERTAIN = "residual_old_mps2", "uncertainty_mps2"
 
 
 def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[str, Any]:
     """The document's `autopilot` of one IMU.
 
     Its keys: firmware, imu (from 1), message (the stream it was fitted to), params_old and params_new by name,
-    residual_mps2 (by how much |a| stays wrong at worst), turn_deg (the rotation that parameters do not hold), and
-    mounting (R_b by row). Where the vehicle did not tell what is needed, params_new is empty, and `why` says what.
+    residual_mps2 (by how much |a| stays wrong at worst), residual_old_mps2 (the same with the old parameters),
+    uncertainty_mps2 (standard uncertainty of |a| by the calibration), turn_deg (the rotation that parameters do not
+    hold), and mounting (R_b by row). Where the vehicle did not tell what is needed, params_new is empty, and `why`
+    says what.
     """
     document: dict[str, Any] = {
         "firmware": autopilot.firmware,
@@ -47,6 +50,8 @@ def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[s
     return document | {
         NEW: where.values(new),
         RESIDUAL: composed.residual_of(new),
+        RESIDUAL_OLD: composed.residual_of(where.used(old)),
+        UNCERTAIN: calibration.magnitude_std,
         "turn_deg": np.degrees(composed.turn_rad).tolist(),
         "mounting": R_b.tolist(),
     }

@@ -12,9 +12,10 @@ import numpy as np
 from ...data import Vector
 from ...errors import WriteBackError
 from ...result.calibration import REFUSED, Calibration
+from ...result.improvement import is_better
 from ..imu import SCALED, Stream
 from .compose import Correction
-from .document import NEW, OLD, RESIDUAL
+from .document import NEW, OLD, RESIDUAL, RESIDUAL_OLD, UNCERTAIN
 from .names import Place, place_of
 
 NOTHING = "nothing was written"
@@ -29,7 +30,8 @@ class Change:
     place : their names. old : what corrected the stream that was calibrated. new : what is to be written.
     mounting : R_b (3, 3). stream : where its effect shows.
     sensor_id : of the sensor that was calibrated; None where the vehicle did not say.
-    residual_mps2 : what stays wrong.
+    residual_mps2 : by how much |a| stays wrong at worst. residual_old_mps2 : the same as it is now; None where the
+        calibration does not say. uncertainty_mps2 : standard uncertainty of |a| by the calibration.
     """
 
     place: Place
@@ -39,11 +41,20 @@ class Change:
     stream: Stream
     sensor_id: float | None
     residual_mps2: float
+    residual_old_mps2: float | None = None
+    uncertainty_mps2: float = 0.0
 
     @property
     def imu(self) -> int:
         """Counted from 1."""
         return self.place.imu
+
+    @property
+    def helps(self) -> bool:
+        """Whether the new parameters are predicted to be better than the old ones, cross-axis residue included."""
+        if self.residual_old_mps2 is None:
+            return True
+        return is_better(self.residual_mps2, self.residual_old_mps2, self.uncertainty_mps2)
 
 
 def changes(calibration: Calibration, firmware: str) -> tuple[Change, ...]:
@@ -64,6 +75,11 @@ def changes(calibration: Calibration, firmware: str) -> tuple[Change, ...]:
     return tuple(found)
 
 
+def helping(planned: Sequence[Change]) -> tuple[Change, ...]:
+    """Those that help; all of them where none does: that they are written then is what somebody wants."""
+    return tuple(change for change in planned if change.helps) or tuple(planned)
+
+
 def left_out(calibration: Calibration) -> tuple[int, ...]:
     """The IMUs, counted from 1, whose calibration was refused."""
     others = calibration.extra.get("others", [])
@@ -78,9 +94,9 @@ def moved(calibration: Calibration, order: Sequence[int], firmware: str) -> Cali
 
     Parameters
     ----------
-    order : for each of `changes`, the index of the one in whose place its parameters belong.
+    order : for each of those `helping`, the index of the one in whose place its parameters belong.
     """
-    planned = changes(calibration, firmware)
+    planned = helping(changes(calibration, firmware))
     documents: dict[int, dict[str, Any]] = {}
     for change, index in zip(planned, order, strict=True):
         at = planned[index]
@@ -129,4 +145,6 @@ def _change(autopilot: Mapping[str, Any], firmware: str) -> Change:
         Stream(name, SCALED.get(name, imu)),
         autopilot[OLD].get(where.sensor_id),
         float(autopilot[RESIDUAL]),
+        autopilot.get(RESIDUAL_OLD),
+        float(autopilot.get(UNCERTAIN) or 0.0),
     )

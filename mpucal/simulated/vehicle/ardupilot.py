@@ -77,7 +77,7 @@ class ArduPilot(Firmware):
             centi = round(self.temperature_c * 100)
             return dialect().MAVLink_raw_imu_message(t_us, *self.milli(0), 0, 0, 0, 0, centi)
         if message_id == HIGHRES_IMU and self.options.highres:
-            return self.highres_imu(t_us, np.zeros(3))
+            return self.highres_imu(t_us, np.zeros(3), np.zeros(3))
         if message_id in SCALED_IMUS and SCALED_IMUS.index(message_id) < self.options.imus:
             return self.scaled_imu(SCALED_IMUS.index(message_id), t_us)
         return self.sys_status() if message_id == SYS_STATUS else None

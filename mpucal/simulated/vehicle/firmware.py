@@ -29,6 +29,7 @@ class Firmware(ABC):
     ----------
     autopilot : MAV_AUTOPILOT. tick_us : how often it runs. bytewise : how its integers travel.
     folder : of its card. store : its parameters.
+    check_is_present : SYS_STATUS names the check before arming among what is there.
     corrected : (imus, 2, 3) specific force [m/s^2] and rate [rad/s] in the vehicle's axes.
     """
 
@@ -36,6 +37,7 @@ class Firmware(ABC):
     tick_us: int
     bytewise: bool
     folder: str
+    check_is_present = True
     streams: tuple[tuple[int, int], ...] = ()
 
     def __init__(self, options: VehicleOptions) -> None:
@@ -93,15 +95,15 @@ class Firmware(ABC):
         kind = (m.MAVLink_scaled_imu_message, m.MAVLink_scaled_imu2_message, m.MAVLink_scaled_imu3_message)[imu]
         return kind(t_us // 1000, *self.milli(imu), 0, 0, 0, round(self.temperature_c * 100))
 
-    def highres_imu(self, t_us: int, bias: Vector) -> Message:
-        """HIGHRES_IMU of IMU 0, with `bias` (3,) [m/s^2] subtracted."""
+    def highres_imu(self, t_us: int, bias: Vector, gyro_bias: Vector) -> Message:
+        """HIGHRES_IMU of IMU 0, with `bias` (3,) [m/s^2] and `gyro_bias` (3,) [rad/s] subtracted."""
         acc, gyr = self.corrected[0]
-        values = [*(acc - bias).tolist(), *gyr.tolist(), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.temperature_c]
+        values = [*(acc - bias).tolist(), *(gyr - gyro_bias).tolist(), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.temperature_c]
         return dialect().MAVLink_highres_imu_message(t_us, *values, 0x103F, 0)
 
     def sys_status(self) -> Message:
         """SYS_STATUS, whose health says whether it would arm."""
-        sensors = ACCELEROMETER | PREARM_CHECK
+        sensors = ACCELEROMETER | (PREARM_CHECK if self.check_is_present else 0)
         health = ACCELEROMETER | (0 if self.complaints() else PREARM_CHECK)
         return dialect().MAVLink_sys_status_message(sensors, sensors, health, 100, 12000, -1, -1, 0, 0, 0, 0, 0, 0)
 

@@ -19,7 +19,9 @@ UNNOTICED = 0.01  # a change whose norm is less, in m/s^2 or of the scale, is no
 # MAV_PARAM_ERROR
 DOES_NOT_EXIST, PERMISSION_DENIED, TYPE_MISMATCH = 1, 3, 7
 LEARN_S, LARGEST_BIAS_MPS2 = 15.0, 0.4
-LEARN_ACCELEROMETER = 2
+LEARN_GYROSCOPE, LEARN_ACCELEROMETER = 1, 2
+# below which the rate is taken for a bias
+STILL_RAD_S = 0.05
 ALL_OF_THEM = 7
 
 
@@ -30,6 +32,7 @@ class Px4(Firmware):
     tick_us = 1_000_000 // LOOP_HZ
     folder = "/fs/microsd/"
     bytewise = True
+    check_is_present = False
     streams = ((HIGHRES_IMU, 20_000), (SYS_STATUS, 1_000_000))
 
     def __init__(self, options: VehicleOptions) -> None:
@@ -50,7 +53,7 @@ class Px4(Firmware):
     def start(self) -> None:
         """From the identity, what is stored is taken over where it differs enough."""
         self._offset, self._scale = np.zeros((self.options.imus, 3)), np.ones((self.options.imus, 3))
-        self._bias = np.zeros(3)
+        self._bias, self._gyro_bias = np.zeros(3), np.zeros(3)
         self._take_over()
 
     def _take_over(self) -> None:
@@ -72,7 +75,10 @@ class Px4(Firmware):
         """R_b ((raw - OFF) * SCALE), and what the EKF makes of IMU 1."""
         self.corrected[:, 0] = (raw[:, 0] - self._offset) * self._scale @ self.rotation.T
         self.corrected[:, 1] = raw[:, 1] @ self.rotation.T
-        if int(self.store["EKF2_IMU_CTRL"]) & LEARN_ACCELEROMETER:
+        control, rate = int(self.store["EKF2_IMU_CTRL"]), self.corrected[0, 1]
+        if control & LEARN_GYROSCOPE and np.linalg.norm(rate) < STILL_RAD_S:
+            self._gyro_bias = self._gyro_bias + (rate - self._gyro_bias) * self.tick_us * 1e-6 / LEARN_S
+        if control & LEARN_ACCELEROMETER:
             felt = self.corrected[0, 0] - self._bias
             missing = felt * (1 - STANDARD_GRAVITY_MPS2 / np.linalg.norm(felt))
             learnt = self._bias + missing * self.tick_us * 1e-6 / LEARN_S
@@ -81,7 +87,7 @@ class Px4(Firmware):
     def message(self, message_id: int, t_us: int) -> Message | None:
         """No RAW_IMU, ever."""
         if message_id == HIGHRES_IMU:
-            return self.highres_imu(t_us, self._bias)
+            return self.highres_imu(t_us, self._bias, self._gyro_bias)
         if message_id in SCALED_IMUS and SCALED_IMUS.index(message_id) < self.options.imus:
             return self.scaled_imu(SCALED_IMUS.index(message_id), t_us)
         return self.sys_status() if message_id == SYS_STATUS else None
