@@ -319,6 +319,30 @@ KINDS: Mapping[str, Kind] = {
         "mpucal session --bus sim:hand=warming --seed 1",
         "it moved by more than 8 °C between laying flat and the verification",
     ),
+    "bits_stuck": Kind(
+        "Bits of an axis never move: a byte is lost on its way, or the sensor is broken.",
+        {
+            "constant": Sentence(
+                "the accelerometer reads the same on {axes} in every sample, though the board was turned: it is broken"
+                " or was not recorded",
+                "check its wiring and the recording",
+                True,
+            ),
+            "low": Sentence(
+                "the low {bits} bits of the {sensor}'s {axis} never move{when}: it reads in steps of {step:.2g} {unit}",
+                "check its wiring and the program that reads it, or take another sensor",
+            ),
+            "high": Sentence(
+                "bit {bit} of the {sensor}'s {axis} never moves, though it passes values with it and without it",
+                "check its wiring and the program that reads it, or take another sensor",
+                True,
+            ),
+        },
+        "mpucal session --bus sim:fault=low_byte@0 --seed 1",
+        "a high bit never moves, an axis reads the same throughout, or its steps are coarser than the calibration is"
+        " sure",
+        of_the_sensor=True,
+    ),
     "gravity_unlikely": Kind(
         "The gravity that was given is that of no place on Earth, and all scale factors refer to it.",
         {
@@ -356,12 +380,6 @@ KINDS: Mapping[str, Kind] = {
     "inconsistent": Kind(
         "The model does not explain the data: the sensor changed or moved on its board, or was disturbed.",
         {
-            "constant": Sentence(
-                "the accelerometer reads the same on {axes} in every sample, though the board was turned: it is broken"
-                " or was not recorded",
-                "check its wiring and the recording",
-                True,
-            ),
             "innovations": Sentence(
                 "the model does not explain the data (normalised innovations {nis:.0f}, expected 3): a hand's own"
                 " acceleration or the gyroscope's scale factors",

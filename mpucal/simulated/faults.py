@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Self
 
-from .mishaps import Knock, Mishap, Slip, Warmth
+from .mishaps import Knock, Mishap, Slip, Warmth, ZeroStep
 
 
 class Where(StrEnum):
@@ -113,8 +113,29 @@ _ROWS = (
         strike=lambda chip, _, end_ns: chip.freeze(end_ns),
     ),
     FaultKind("slip", Where.CHIP, "the FIFO loses a byte", strike=lambda chip, t_ns, _: chip.slip(t_ns)),
+    FaultKind(
+        "low_byte",
+        Where.CHIP,
+        "the low byte of the accelerometer's x stays 0 from then on",
+        strike=lambda chip, *_: chip.stick(0, 0xFF),
+    ),
+    FaultKind(
+        "high_bit",
+        Where.CHIP,
+        "bit 12 of the accelerometer's y stays 0 from then on",
+        strike=lambda chip, *_: chip.stick(1, 1 << 12),
+    ),
+    FaultKind(
+        "bit_errors",
+        Where.BUS,
+        "from then on one byte in 2,000 arrives with a bit flipped, in either direction",
+        seconds=math.inf,
+        flips=True,
+        share=1 / 2000,
+    ),
     FaultKind("loose", Where.HAND, "the accelerometer turns by 8 deg on its mount", mishap=Slip),
     FaultKind("knock", Where.HAND, "a blow, which leaves the accelerometer's bias changed by 0.4 m/s²", mishap=Knock),
+    FaultKind("zero_step", Where.HAND, "the accelerometer's bias steps by 10 mg on x", mishap=ZeroStep),
     FaultKind("warming", Where.HAND, "the chip warms by 15 °C within 40 s, and its biases follow", mishap=Warmth),
     FaultKind("arm", Where.VEHICLE, "it is armed", strike=lambda vehicle: vehicle.arm()),
     FaultKind("reboot", Where.VEHICLE, "it boots anew, and is silent for 2 s", strike=lambda vehicle: vehicle.reboot()),

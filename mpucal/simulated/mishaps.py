@@ -1,4 +1,4 @@
-"""What befalls a sensor in a careless hand: a slip, a knock, warmth."""
+"""What befalls a sensor in a careless hand: a slip, a knock, a step of its bias, warmth."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ..data import Vector
+from ..result.error_model import MG_PER_MPS2
 from .legs import minimum_jerk
 
 SLIP_RAD = np.radians([5.0, -4.0, 5.0])
@@ -14,6 +15,7 @@ SLIP_S = 0.3
 KNOCK_MPS2, KNOCK_S = 120.0, 0.02
 # A shock may leave a sensor's zero elsewhere.
 ZERO_SHIFT_MPS2 = np.array([0.25, -0.3, 0.2])
+ZERO_STEP_MPS2 = np.array([10.0 / MG_PER_MPS2, 0.0, 0.0])
 WARMER_C, WARMING_S = 15.0, 40.0
 # PS-MPU-6000A r3.4, sections 6.1 and 6.2, in round numbers.
 ACC_MPS2_A_C, GYRO_RAD_S_A_C = 0.005, math.radians(0.1)
@@ -59,6 +61,23 @@ class Knock(Mishap):
         """The blow and what it left."""
         share = self._share(t_s, KNOCK_S)[:, None]
         return force + share * ZERO_SHIFT_MPS2 + 4.0 * share * (1.0 - share) * KNOCK_MPS2, rate
+
+
+class ZeroStep(Mishap):
+    """The accelerometer's bias steps, and nobody notices.
+
+    Parameters
+    ----------
+    step : (3,) m/s^2.
+    """
+
+    def __init__(self, step: Vector = ZERO_STEP_MPS2) -> None:
+        super().__init__()
+        self._step = step
+
+    def felt(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
+        """From one sample to the next."""
+        return force + (t_s >= self._begun_s)[:, None] * self._step, rate
 
 
 class Warmth(Mishap):

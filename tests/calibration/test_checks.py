@@ -153,7 +153,7 @@ def test_times_that_are_no_seconds_speak_against_no_gyroscope(in_hand):
 
 @pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
 def test_an_axis_that_is_stuck(good, axis):
-    for code, sensor, name in (("inconsistent", "accelerometer", "acc"), ("gyro_off", "gyroscope", "gyr")):
+    for code, sensor, name in (("bits_stuck", "accelerometer", "acc"), ("gyro_off", "gyroscope", "gyr")):
         values = getattr(good, name).copy()
         values[:, axis] = values[0, axis]
         refused_for(code, replace(good, **{name: values}), f"the {sensor} reads the same on {'xyz'[axis]} in every")

@@ -135,7 +135,11 @@ def test_what_lasts_is_given_up_with_its_cause(name, says):
     assert len(recording) > 200
 
 
-places = st.builds(Fault, st.sampled_from(sorted(kinds(*OF_CHIP))), st.floats(0, 4).map(lambda t: round(t, 3)))
+# of which no driver can know that they are not what was measured
+UNSEEN = {"low_byte", "high_bit"}
+places = st.builds(
+    Fault, st.sampled_from(sorted({*kinds(*OF_CHIP)} - UNSEEN)), st.floats(0, 4).map(lambda t: round(t, 3))
+)
 
 
 @settings(max_examples=25, deadline=None)
@@ -154,7 +158,7 @@ def test_whatever_happens_what_is_delivered_is_true(faults, model, rate_hz, seed
         return
     gyr = np.rint(np.degrees(recording.gyr) * 65.5).astype(int)
     true = (gyr == TRUE[1:]).all(axis=1) & (np.rint(recording.acc[:, 1] / 9.80665 * 8192) == TRUE[0])
-    if "bitflips" in {fault.name for fault in faults}:
+    if any(fault.kind.flips for fault in faults):
         assert true.mean() > 0.9
         return
     assert true.all()

@@ -2,6 +2,7 @@
 
 unusable     before there is a fit: wrong units, no rest, no turn, a dead axis
 recording    moved while still, clipped, lost or warming
+bits         low or high bits of an axis that never move
 gravity      a gravity that no place on Earth has
 sensor       wrong range, units, axes or gyroscope, by a trustworthy fit
 estimate     directions not observable, no convergence, contradictions, a change midway
@@ -13,7 +14,7 @@ from collections.abc import Callable
 
 from ...reasons import Reason
 from ..evidence import Evidence
-from . import estimate, gravity, recording, sensor, unusable
+from . import bits, estimate, gravity, recording, sensor, unusable
 
 Check = Callable[[Evidence], Reason | None]
 
@@ -40,6 +41,7 @@ CHECKS: tuple[Check, ...] = (
     sensor.gyro_off,
     recording.temperature_moved,
     gravity.gravity_unlikely,
+    bits.bits_stuck,
     estimate.not_converged,
     estimate.inconsistent,
     estimate.changed_midway,

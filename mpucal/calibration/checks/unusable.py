@@ -92,7 +92,7 @@ def dead_accelerometer(e: Evidence) -> Reason | None:
     if e.flat is None:
         return None
     axes = _constant(e, e.recording.acc, e.flat.Sigma_a, QUIETEST_ACC_MPS2)
-    return reason("inconsistent", "constant", axes=axes) if axes else None
+    return reason("bits_stuck", "constant", axes=axes) if axes else None
 
 
 def dead_gyroscope(e: Evidence) -> Reason | None:

@@ -43,6 +43,7 @@ class Chip:
         self._unread: Vector | None = None
         self._frozen_until_ns = 0
         self._frozen: Counts | None = None
+        self._stuck: list[tuple[int, int]] = []
         self.reset(0)
 
     def read(self, register: int, count: int, t_ns: int) -> bytes:
@@ -136,6 +137,10 @@ class Chip:
         """It measures the same again and again, until then."""
         self._frozen_until_ns, self._frozen = until_ns, None
 
+    def stick(self, word: int, bits: int) -> None:
+        """These bits of a sample's word number `word` are 0 from now on."""
+        self._stuck.append((word, bits))
+
     def slip(self, t_ns: int) -> None:
         """Its FIFO loses a byte."""
         self._advance(t_ns)
@@ -205,6 +210,8 @@ class Chip:
         counts = self._feed.samples(edges_s, self._how())
         if self._in_standby():
             counts[:, GYRO] = 0
+        for word, bits in self._stuck:
+            counts[:, word] &= ~bits
         self._ended = len(counts) < len(edges_s) - 1
         if len(counts) and edges_s[0] * 1e9 < self._frozen_until_ns:
             self._frozen = counts[:1] if self._frozen is None else self._frozen

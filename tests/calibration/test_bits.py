@@ -1,0 +1,129 @@
+"""Bits that never move: counts as a chip, a microcontroller or an autopilot delivers them, whole and damaged."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.calibration import calibrate
+from mpucal.calibration.checks.bits import bits_stuck
+from mpucal.calibration.evidence import Evidence
+from mpucal.data import Sensor
+
+G = 9.82
+LSB = 4.0 * 9.80665 / 32768
+GYRO_LSB = np.deg2rad(500.0 / 250.0 / 131.0)
+KNOWN, UNKNOWN = Sensor(accel_range_g=4.0, gyro_range_dps=500.0), Sensor()
+
+
+@pytest.fixture(scope="module")
+def counted(in_hand):
+    """A good recording as counts, with and without a known range; `spoil` changes the counts in place."""
+
+    def make(sensor=KNOWN, spoil=lambda acc, gyr: None):
+        r = in_hand.recording
+        acc, gyr = np.rint(r.acc / LSB).astype(int), np.rint(r.gyr / GYRO_LSB).astype(int)
+        spoil(acc, gyr)
+        return replace(r, acc=acc * LSB, gyr=gyr * GYRO_LSB, sensor=sensor)
+
+    return make
+
+
+def against(recording):
+    return bits_stuck(Evidence(recording, G, None, None, "auto"))
+
+
+def low_byte(acc, gyr):
+    acc[:, 0] &= ~0xFF
+
+
+def low_byte_of_the_gyroscope(acc, gyr):
+    gyr[:, 2] &= ~0xFF
+
+
+def low_byte_later(acc, gyr):
+    acc[len(acc) * 2 // 3 :, 1] &= ~0xFF
+
+
+def low_byte_on_a_bad_bus(acc, gyr):
+    low_byte(acc, gyr)
+    acc[::60] ^= 1
+
+
+def high_bit(acc, gyr):
+    acc[:, 1] &= ~(1 << 12)
+
+
+def high_bit_set(acc, gyr):
+    acc[:, 1] |= 1 << 13
+
+
+def sign(acc, gyr):
+    acc[:, 2] &= 0x7FFF
+
+
+@pytest.mark.parametrize(
+    ("spoil", "what"),
+    [
+        (low_byte, "the low 8 bits of the accelerometer's x never move: it reads in steps of 0.31 m/s^2"),
+        (low_byte_of_the_gyroscope, "the low 8 bits of the gyroscope's z never move: it reads in steps of 0.068 rad/s"),
+        (low_byte_later, "the low 8 bits of the accelerometer's y never move from "),
+        (low_byte_on_a_bad_bus, "the low 8 bits of the accelerometer's x never move"),
+        (high_bit, "bit 12 of the accelerometer's y never moves"),
+        (high_bit_set, "bit 13 of the accelerometer's y never moves"),
+        (sign, "bit 15 of the accelerometer's z never moves"),
+    ],
+    ids=lambda value: getattr(value, "__name__", ""),
+)
+def test_bits_that_never_move_are_named(counted, spoil, what):
+    found = against(counted(spoil=spoil))
+    assert found.code == "bits_stuck"
+    assert found.what.startswith(what)
+
+
+def test_where_the_range_is_not_known_the_other_axes_tell(counted):
+    found = against(counted(UNKNOWN, low_byte))
+    assert found.what.startswith("the low 8 bits of the accelerometer's x never move")
+
+
+def test_a_byte_that_is_lost_of_all_axes_is_no_coarse_sensor(counted):
+    def all_of_them(acc, gyr):
+        acc &= ~0xFF
+
+    assert against(counted(spoil=all_of_them)).code == "bits_stuck"
+
+
+@pytest.mark.parametrize("sensor", [KNOWN, UNKNOWN], ids=["known", "unknown"])
+def test_an_honest_sensor_is_not_accused(counted, sensor):
+    def twelve_bits(acc, gyr):
+        acc &= ~0xF
+
+    assert against(counted(sensor)) is None
+    assert against(counted(sensor, twelve_bits)) is None
+    assert against(counted(sensor).part(0, 400)) is None  # lying flat
+
+
+@pytest.mark.parametrize("step", [9.80665e-3, 1e-2], ids=["an autopilot's mG", "two digits"])
+@pytest.mark.parametrize("sensor", [KNOWN, UNKNOWN], ids=["known", "unknown"])
+def test_a_stream_in_coarse_units_is_not_accused(in_hand, sensor, step):
+    r = in_hand.recording
+    assert (
+        against(replace(r, acc=np.rint(r.acc / step) * step, gyr=np.rint(r.gyr / 1e-3) * 1e-3, sensor=sensor)) is None
+    )
+
+
+def test_nor_is_one_of_single_precision(in_hand):
+    r = in_hand.recording
+    # beside gravity a float32 is coarser than about zero
+    lying = replace(r.part(0, 400), acc=np.float64(np.float32(r.acc[:400])), gyr=np.float64(np.float32(r.gyr[:400])))
+    assert against(lying) is None
+
+
+@pytest.mark.parametrize(("bits", "verdict"), [(3, "usable"), (8, "refused")])
+def test_what_is_coarser_than_the_calibration_is_sure_is_refused(counted, bits, verdict):
+    def dead(acc, gyr):
+        acc[:, 0] &= -(1 << bits)
+
+    quality = calibrate(counted(spoil=dead), "hand", G).quality
+    assert quality["verdict"] == verdict
+    assert quality["reasons"][0]["code"] == "bits_stuck"
