@@ -13,10 +13,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .calibration import calibrate
+    from .api import calibrate, load
     from .data import Recording
     from .errors import MpucalError
-    from .files import load
     from .result.calibration import Calibration
 
 __all__ = ["Calibration", "MpucalError", "Recording", "calibrate", "load"]
@@ -26,8 +25,8 @@ _HOME = {
     "Calibration": ".result.calibration",
     "MpucalError": ".errors",
     "Recording": ".data",
-    "calibrate": ".calibration",
-    "load": ".files",
+    "calibrate": ".api",
+    "load": ".api",
 }
 
 

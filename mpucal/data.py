@@ -6,15 +6,15 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .errors import RecordingError
-
-Vector = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from . import frames
+from .arguments import Mask as Mask  # noqa: PLC0414 - rooms above take them from here
+from .arguments import Vector as Vector  # noqa: PLC0414
+from .arguments import column, mask, rows, seconds, stretch
 
 STANDARD_GRAVITY_MPS2 = 9.80665
 # names reach scripts and source code: these characters end no string and no comment there
@@ -91,9 +91,9 @@ class Autopilot:
     parameters: Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class Samples:
-    """A run of samples, one row an instant.
+@dataclass(frozen=True, eq=False)
+class Samples:  # noqa: PLW1641 - arrays have no hash either
+    """A run of samples, one row an instant; equal where every value is, unknown ones included.
 
     Attributes
     ----------
@@ -116,6 +116,11 @@ class Samples:
     def __len__(self) -> int:
         return len(self.t)
 
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(_same(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+
     @classmethod
     def joined(cls, parts: list[Samples]) -> Samples:
         """All parts, one after the other; no parts give no samples."""
@@ -130,7 +135,7 @@ class Samples:
         return Samples(none, three, three.copy(), none.copy(), no, no.copy(), no.copy())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording(Samples):
     """Samples of one session with one sensor.
 
@@ -170,42 +175,57 @@ class Recording(Samples):
 
         Parameters
         ----------
-        t : (n,) s, strictly increasing. acc : (n, 3) m/s^2. gyr : (n, 3) rad/s.
+        t : (n,) s, strictly increasing, or datetime64, of which the first is 0 s.
+        acc : (n, 3) m/s^2. gyr : (n, 3) rad/s.
         flat : (first, last + 1) samples that lie flat, if known.
         temperature_c : (n,); gap, acc_clipped, gyr_clipped : (n,) bool, see Samples.
 
         Raises
         ------
-        RecordingError : wrong shapes, values that are no numbers, or time that does not increase.
+        ArraysError : wrong shapes, values that are no numbers, or time that does not increase. It is a RecordingError
+            and a ValueError.
         """
-        t = _numbers(t, "t", name)
-        if t.ndim != 1 or len(t) < 2:
-            raise RecordingError(
-                f"{name}: t has shape {t.shape}, not (n,) with n >= 2", "give one time in seconds a sample"
-            )
-        acc, gyr = _rows(acc, "acc", len(t), name), _rows(gyr, "gyr", len(t), name)
-        _check_time(t, name)
-        if flat is not None:
-            first, last = int(flat[0]), int(flat[1])
-            if not 0 <= first < last <= len(t):
-                raise RecordingError(
-                    f"{name}: flat = ({first}, {last}) does not lie within its {len(t)} samples",
-                    "give (first, last + 1) of the samples that lie flat, or leave it out",
-                )
-            flat = (first, last)
+        t = seconds(t, name)
         n = len(t)
+        acc, gyr = rows(acc, "acc", n, name), rows(gyr, "gyr", n, name)
         return cls(
             t,
             acc,
             gyr,
-            np.full(n, np.nan) if temperature_c is None else _column(temperature_c, "temperature_c", n, name),
-            _mask(gap, "gap", n, name),
-            _mask(acc_clipped, "acc_clipped", n, name),
-            _mask(gyr_clipped, "gyr_clipped", n, name),
-            flat=flat,
+            np.full(n, np.nan) if temperature_c is None else column(temperature_c, "temperature_c", n, name),
+            mask(gap, "gap", n, name),
+            mask(acc_clipped, "acc_clipped", n, name),
+            mask(gyr_clipped, "gyr_clipped", n, name),
+            flat=None if flat is None else stretch(flat, n, name),
             sensor=sensor or Sensor(),
             name=name,
         )
+
+    @classmethod
+    def from_dataframe(
+        cls, frame: Any, flat: tuple[int, int] | None = None, *, sensor: Sensor | None = None, name: str = "recording"
+    ) -> Recording:
+        """A recording of the columns t, ax, ay, az [m/s^2], gx, gy, gz [rad/s] of a data frame of pandas or polars.
+
+        The names may end with their units, as `to_dataframe` has them (t_s, ax_mps2, gx_rad_s). Without a column t the
+        index of pandas is the time. The columns temperature_c, gap, acc_clipped and gyr_clipped are taken too.
+
+        Raises
+        ------
+        WrongType : it is no data frame. WrongValue : a column is missing. ArraysError : see from_arrays.
+        """
+        given = frames.arrays(frame)
+        t, acc, gyr = given.pop("t"), given.pop("acc"), given.pop("gyr")
+        return cls.from_arrays(t, acc, gyr, flat, **given, sensor=sensor, name=name)
+
+    def to_dataframe(self, library: Literal["pandas", "polars"] = "pandas") -> Any:
+        """A data frame with the columns t_s, ax_mps2 ... gz_rad_s, temperature_c, gap, acc_clipped and gyr_clipped.
+
+        Raises
+        ------
+        WrongValue : another library. ImportError : the library is not installed.
+        """
+        return frames.made(library, {f.name: getattr(self, f.name) for f in fields(Samples)})
 
     @property
     def rate_hz(self) -> float:
@@ -233,45 +253,7 @@ class Recording(Samples):
         return replace(self, flat=flat, **arrays)
 
 
-def _numbers(values: ArrayLike, key: str, name: str) -> Vector:
-    try:
-        return np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise RecordingError(f"{name}: {key} holds values that are no numbers ({error})", "give numbers") from error
-
-
-def _column(values: ArrayLike, key: str, n: int, name: str) -> Vector:
-    array = _numbers(values, key, name)
-    if array.shape != (n,):
-        raise RecordingError(f"{name}: {key} has shape {array.shape}, not ({n},)", "give one value a sample")
-    return array
-
-
-def _mask(values: ArrayLike | None, key: str, n: int, name: str) -> Mask:
-    return np.zeros(n, bool) if values is None else _column(values, key, n, name).astype(bool)
-
-
-def _rows(values: ArrayLike, key: str, n: int, name: str) -> Vector:
-    array = _numbers(values, key, name)
-    if array.shape != (n, 3):
-        raise RecordingError(f"{name}: {key} has shape {array.shape}, not ({n}, 3)", "give one row of x, y, z a sample")
-    bad = ~np.isfinite(array).all(axis=1)
-    if bad.any():
-        raise RecordingError(
-            f"{name}: {key} is not a finite number in {int(bad.sum())} of {n} samples,"
-            f" first in sample {int(bad.argmax())}",
-            "leave those samples out, and keep the times of the others",
-        )
-    return array
-
-
-def _check_time(t: Vector, name: str) -> None:
-    if not np.isfinite(t).all():
-        raise RecordingError(f"{name}: t is not a finite number everywhere", "give times in seconds")
-    back = np.diff(t) <= 0
-    if back.any():
-        i = int(back.argmax()) + 1
-        raise RecordingError(
-            f"{name}: time does not increase at sample {i} ({t[i - 1]:.6f} s, then {t[i]:.6f} s)",
-            "sort the samples by time and drop repeated ones",
-        )
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, np.ndarray):
+        return np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
+    return bool(one == other)

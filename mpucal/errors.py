@@ -2,8 +2,11 @@
 
 MpucalError
 ├── UsageError            2  the call's words do not fit together
+│   ├── WrongType            an argument is of a type that cannot be used; a TypeError too
+│   └── WrongValue           an argument's value cannot be used; a ValueError too
 ├── SourceError           3  a device, bus or file cannot be read
 │   ├── RecordingError       a file or arrays that are no recording
+│   │   └── ArraysError      so are arrays; a ValueError too
 │   ├── CaptureError         a capture that is damaged, or does not hold what was asked of it
 │   ├── BusError             a transfer failed
 │   │   ├── NoAnswer         nothing acknowledged the address, or sent a heartbeat
@@ -49,6 +52,14 @@ class UsageError(MpucalError):
     exit_code = 2
 
 
+class WrongType(UsageError, TypeError):  # noqa: N818 - reads as the sentence it is
+    """An argument is of a type that cannot be used."""
+
+
+class WrongValue(UsageError, ValueError):  # noqa: N818 - reads as the sentence it is
+    """An argument's value cannot be used."""
+
+
 class SourceError(MpucalError):
     """A device, bus or file cannot be read."""
 
@@ -57,6 +68,10 @@ class SourceError(MpucalError):
 
 class RecordingError(SourceError):
     """A file or arrays that are no recording."""
+
+
+class ArraysError(RecordingError, ValueError):
+    """Arrays that are no recording."""
 
 
 class CaptureError(SourceError):

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
-from ..errors import UsageError
+from ..errors import WrongValue
 from ..result.calibration import Calibration, unknown
 from .checks import unusable_for_a_fit
 from .checks.unusable import no_gyroscope
@@ -45,7 +44,7 @@ def calibrate(
 
     Raises
     ------
-    UsageError : no such model, or a gravity that is none.
+    WrongValue : no such model, or a gravity that is none.
     """
     evidence, chosen = weigh(recording, model, gravity)
     return _calibration(replace(evidence, gravity_anyway=gravity_anyway), chosen)
@@ -58,12 +57,12 @@ def weigh(
 
     Raises
     ------
-    UsageError : no such model, or a gravity that is none.
+    WrongValue : no such model, or a gravity that is none.
     """
     if model not in MODELS:
-        raise UsageError(f"there is no model {model!r}", f"choose one of {', '.join(MODELS)}")
+        raise WrongValue(f"there is no model {model!r}", f"choose one of {', '.join(MODELS)}")
     if not (np.isfinite(gravity) and gravity > 0):
-        raise UsageError(f"gravity is {gravity}", "give the local gravity in m/s^2, about 9.81")
+        raise WrongValue(f"gravity is {gravity}", "give the local gravity in m/s^2, about 9.81")
     before = Evidence(recording, gravity, None, None, model)
     if no_gyroscope(before) is not None:
         return before, {"model": model, "why": "nothing could be estimated"}
@@ -103,7 +102,7 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
     }
     if fit is None:
         nothing = {"parameters": 0, "iterations": 0, "converged": False, "nis": np.nan}
-        return Calibration(D=unknown(3, 3), b_a=unknown(3), fit=MappingProxyType({**about, **nothing}), **common)
+        return Calibration(D=unknown(3, 3), b_a=unknown(3), fit={**about, **nothing}, **common)
     numbers = {
         "parameters": len(fit.names),
         "iterations": fit.iterations,
@@ -120,7 +119,7 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
         K_std=from_elements(BY_NAME["K"].form, _claimed(fit, BY_NAME["K"].names)),
         b_omega=fit.b_omega,
         b_omega_std=fit.std(*B_OMEGA_NAMES),
-        fit=MappingProxyType({**about, **numbers}),
+        fit={**about, **numbers},
         **common,
     )
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -23,19 +22,17 @@ def judge(evidence: Evidence) -> Mapping[str, Any]:
     """
     sure = evidence.sure
     reasons = found(evidence)
-    return MappingProxyType(
-        {
-            "verdict": verdict(reasons),
-            "reasons": [reason.document() for reason in reasons],
-            "magnitude_before": _magnitude(evidence.recording.acc),
-            "magnitude_after": _magnitude(evidence.calibrated),
-            "error_std": {
-                "rms": np.nan if sure is None else sure.rms_mps2,
-                "magnitude": np.nan if sure is None else sure.magnitude_mps2,
-                "direction_deg": np.nan if sure is None else np.rad2deg(sure.direction_rad),
-            },
-        }
-    )
+    return {
+        "verdict": verdict(reasons),
+        "reasons": [reason.document() for reason in reasons],
+        "magnitude_before": _magnitude(evidence.recording.acc),
+        "magnitude_after": _magnitude(evidence.calibrated),
+        "error_std": {
+            "rms": np.nan if sure is None else sure.rms_mps2,
+            "magnitude": np.nan if sure is None else sure.magnitude_mps2,
+            "direction_deg": np.nan if sure is None else np.rad2deg(sure.direction_rad),
+        },
+    }
 
 
 def verdict(reasons: list[Reason]) -> str:

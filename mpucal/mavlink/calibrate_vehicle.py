@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Any
 
 from ..calibration import calibrate
@@ -28,7 +27,7 @@ def calibrate_vehicle(
     if not recording.others:
         return calibration
     others = [_one(other, model, gravity, gravity_anyway).document() for other in recording.others]
-    return replace(calibration, extra=MappingProxyType({**calibration.extra, OTHERS: others}))
+    return replace(calibration, extra={**calibration.extra, OTHERS: others})
 
 
 def _one(recording: Recording, model: str, gravity: float, gravity_anyway: bool) -> Calibration:
@@ -36,4 +35,4 @@ def _one(recording: Recording, model: str, gravity: float, gravity_anyway: bool)
     if recording.autopilot is None:
         return calibration
     extra: Mapping[str, Any] = {AUTOPILOT: autopilot_document(recording.autopilot, calibration)}
-    return replace(calibration, extra=MappingProxyType({**calibration.extra, **extra}))
+    return replace(calibration, extra={**calibration.extra, **extra})

@@ -7,18 +7,21 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from .. import frames
+from ..arguments import a_path, vectors
 from ..data import Sensor, Vector
-from ..errors import RecordingError
+from ..errors import RecordingError, WrongValue
 from .atomic import write_atomically
 from .blob import NO_RANGE, Blob, BlobError
 from .document import arguments, content
+from .frozen import FrozenDict
 
+F = TypeVar("F")  # a data frame
 GOOD, USABLE, REFUSED = "good", "usable", "refused"
 
 
@@ -27,8 +30,8 @@ def unknown(*shape: int) -> Vector:
     return np.full(shape, np.nan)
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, eq=False)
+class Calibration:  # noqa: PLW1641 - arrays have no hash either
     """An accelerometer's D and b_a (the paper's equation 3), how sure they are, and what they rest on.
 
     Attributes
@@ -44,7 +47,8 @@ class Calibration:
     b_a_slope_std : (3,). temperature_range_c : (2,) degrees Celsius, within which that was seen.
     extra : further top-level keys of the document (autopilot, others, written, merged).
 
-    Unknown numbers are NaN (null in the file).
+    Unknown numbers are NaN (null in the file). Calibrations are equal whose calibration.json is the same; they have no
+    hash, as their arrays have none.
     """
 
     D: Vector
@@ -57,15 +61,22 @@ class Calibration:
     K_std: Vector = field(default_factory=lambda: unknown(3, 3))
     b_omega_std: Vector = field(default_factory=lambda: unknown(3))
     gyro_noise_std: Vector = field(default_factory=lambda: unknown(3))
-    fit: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
-    quality: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    fit: Mapping[str, Any] = field(default_factory=FrozenDict)
+    quality: Mapping[str, Any] = field(default_factory=FrozenDict)
     sensor: Sensor = field(default_factory=Sensor)
     created: str = ""
     applied_in_hardware: Vector = field(default_factory=lambda: np.zeros(3))
-    extra: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    extra: Mapping[str, Any] = field(default_factory=FrozenDict)
     b_a_slope: Vector = field(default_factory=lambda: np.zeros(3))
     b_a_slope_std: Vector = field(default_factory=lambda: unknown(3))
     temperature_range_c: Vector = field(default_factory=lambda: unknown(2))
+
+    def __post_init__(self) -> None:
+        for name in ("fit", "quality", "extra"):
+            object.__setattr__(self, name, FrozenDict(getattr(self, name)))
+
+    def __eq__(self, other: object) -> bool:
+        return self.document() == other.document() if isinstance(other, Calibration) else NotImplemented
 
     @property
     def follows_temperature(self) -> bool:
@@ -105,24 +116,51 @@ class Calibration:
         std = self.quality.get("error_std", {}).get("magnitude")
         return float(std) if std is not None and math.isfinite(std) else 0.0
 
-    def apply(self, acc: ArrayLike, gyr: ArrayLike | None = None, temperature_c: ArrayLike | None = None) -> Any:
+    @overload
+    def apply(self, acc: ArrayLike, gyr: None = None, temperature_c: ArrayLike | None = None) -> Vector: ...
+    @overload
+    def apply(
+        self, acc: ArrayLike, gyr: ArrayLike, temperature_c: ArrayLike | None = None
+    ) -> tuple[Vector, Vector]: ...
+    @overload
+    def apply(self, acc: F) -> F: ...
+    def apply(self, acc: Any, gyr: ArrayLike | None = None, temperature_c: ArrayLike | None = None) -> Any:
         """Calibrated measurements (the paper's equation 4).
 
         Parameters
         ----------
-        acc : (..., 3) m/s^2 as measured. gyr : (..., 3) rad/s as measured, or None.
+        acc : (..., 3) m/s^2 as measured, or a data frame of pandas or polars with the columns of
+            Recording.from_dataframe, of which the rates may be missing. gyr : (..., 3) rad/s as measured, or None.
         temperature_c : (...) degrees Celsius of the chip, for b_a(T); None: b_a.
 
         Returns
         -------
-        (..., 3) m/s^2, inv(D) (y - b_a); with gyr the pair of it and K (y - b_omega), (..., 3) rad/s.
+        (..., 3) m/s^2, inv(D) (y - b_a); with gyr the pair of it and K (y - b_omega), (..., 3) rad/s; of a data frame
+        one with the same index and columns.
+
+        Raises
+        ------
+        WrongType, WrongValue : what is given is no such array.
         """
+        if frames.is_frame(acc):
+            return self._applied_to_frame(acc)
+        y = vectors(acc, "acc", "m/s^2")
         # b_a minus what the offset registers subtract: y comes from the chip with that already gone
-        y = np.asarray(acc, float) - (self.b_a_at(temperature_c) - self.applied_in_hardware)
-        a: NDArray[np.float64] = y @ self.inverse.T
+        y = y - (self.b_a_at(temperature_c) - self.applied_in_hardware)
+        a: Vector = y @ self.inverse.T
         if gyr is None:
             return a
-        return a, (np.asarray(gyr, float) - np.nan_to_num(self.b_omega)) @ self.K.T
+        return a, (vectors(gyr, "gyr", "rad/s") - np.nan_to_num(self.b_omega)) @ self.K.T
+
+    def _applied_to_frame(self, frame: Any) -> Any:
+        T = np.asarray(frame["temperature_c"], float) if "temperature_c" in frame.columns else None
+        new: dict[tuple[str, ...], Vector] = {
+            frames.ACC: self.apply(frames.columns(frame, frames.ACC), temperature_c=T)
+        }
+        if frames.places(frame, frames.GYR):
+            omega = vectors(frames.columns(frame, frames.GYR), "gyr", "rad/s")
+            new[frames.GYR] = (omega - np.nan_to_num(self.b_omega)) @ self.K.T
+        return frames.replaced(frame, new)
 
     def document(self) -> dict[str, Any]:
         """The content of calibration.json; NaN becomes None."""
@@ -157,15 +195,15 @@ class Calibration:
         Raises
         ------
         OutputError : the file cannot be written.
-        ValueError : another ending, or a blob of a calibration that holds unknown numbers.
+        WrongValue : another ending. ValueError : a blob of a calibration that holds unknown numbers.
         """
-        path = Path(path)
+        path = a_path(path, "the file of a calibration")
         if path.suffix == ".json":
             write_atomically(path, self.json().encode())
         elif path.suffix == ".bin":
             write_atomically(path, self.blob().encode())
         else:
-            raise ValueError(f"{path.name}: a calibration is saved as .json or .bin")
+            raise WrongValue(f"a calibration is not saved as {path.name}", "end its name with .json or .bin")
 
     @classmethod
     def load(cls, path: str | Path) -> Calibration:
@@ -175,7 +213,7 @@ class Calibration:
         ------
         RecordingError : no such file, or no calibration in it.
         """
-        path = Path(path)
+        path = a_path(path, "a calibration")
         try:
             data = path.read_bytes()
         except OSError as error:
@@ -205,7 +243,7 @@ class Calibration:
             b_a=np.array(blob.b_a),
             K=np.array(blob.K).reshape(3, 3),
             b_omega=np.array(blob.b_omega),
-            fit=MappingProxyType({"gravity": blob.gravity}),
+            fit={"gravity": blob.gravity},
             sensor=Sensor(
                 who_am_i=blob.who_am_i or None,
                 accel_range_g=blob.accel_range_g or None,

@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import datetime
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -87,11 +86,11 @@ def arguments(document: Mapping[str, Any]) -> dict[str, Any]:
         **_read(acc, ACCELEROMETER + TEMPERATURE),
         **_read(document.get("gyroscope", {}), GYROSCOPE),
         **_read(hardware, (("b_a", "applied_in_hardware", (3,)),)),
-        "fit": MappingProxyType(dict(document.get("fit", {}))),
-        "quality": MappingProxyType(dict(document.get("quality", {}))),
+        "fit": dict(document.get("fit", {})),
+        "quality": dict(document.get("quality", {})),
         "sensor": Sensor.of(document.get("sensor", {})),
         "created": _date(document.get("created") or ""),
-        "extra": MappingProxyType({key: document[key] for key in EXTRA if key in document}),
+        "extra": {key: document[key] for key in EXTRA if key in document},
     }
 
 

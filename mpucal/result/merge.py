@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -183,7 +182,7 @@ def _together(all_: Sequence[Calibration], T_0: float, T: Vector) -> Calibration
         K=np.asarray(np.mean([c.K for c in all_], axis=0)),
         quality=worst.quality,
         sensor=replace(last.sensor, temperature_c=T_0),
-        extra=MappingProxyType({"merged": made_of}),
+        extra={"merged": made_of},
     )
 
 

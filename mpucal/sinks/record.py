@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from ..data import Recording
@@ -34,7 +33,7 @@ def in_session(folder: Path, measured: Calibration, recording: Recording, truth:
         files = {}
         if kind.effect is Effect.OTHER_STREAM:
             files[kind.after_write(Path(DOCUMENT.name).stem)] = now.json().encode()
-            held = replace(measured, extra=MappingProxyType({**measured.extra, WRITTEN: now.extra[WRITTEN]}))
+            held = replace(measured, extra={**measured.extra, WRITTEN: now.extra[WRITTEN]})
         save(folder, {**files, DOCUMENT.name: held.json().encode()})
         return held
 

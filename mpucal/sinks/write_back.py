@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 
 from ..errors import KeepsNothing, OutputError, SourceError, WriteBackError
 from ..result.calibration import REFUSED, Calibration
@@ -40,7 +39,7 @@ def write_to(kind: SinkKind, sink: Sink, calibration: Calibration, folder: Path,
     entry = {"to": kind.name, "where": sink.where, "what": applied.what, "at": now().isoformat()}
     extra = {**applied.calibration.extra, WRITTEN: [*applied.calibration.extra.get(WRITTEN, ()), entry]}
     try:
-        return replace(applied, calibration=record(kind, replace(applied.calibration, extra=MappingProxyType(extra))))
+        return replace(applied, calibration=record(kind, replace(applied.calibration, extra=extra)))
     except OutputError as error:
         if not isinstance(sink, Restorable) or not kept:
             raise OutputError(f"{applied.what}, but {error.what}", error.remedy) from error

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -23,7 +22,7 @@ def applied(calibration: Calibration, imus: Collection[int]) -> Calibration:
     extra = dict(calibration.extra)
     if "others" in extra:
         extra["others"] = [_one(Calibration.from_document(o), imus).document() for o in extra["others"]]
-    return _one(replace(calibration, extra=MappingProxyType(extra)), imus)
+    return _one(replace(calibration, extra=extra), imus)
 
 
 def of_imu(calibration: Calibration, imu: int) -> Calibration:
@@ -54,5 +53,5 @@ def _one(calibration: Calibration, imus: Collection[int]) -> Calibration:
     A = R_b @ np.diag(new.scale / old.scale) @ R_b.T
     c = R_b @ (new.scale * (old.offset - new.offset))
     now = {**autopilot, OLD: {**autopilot[OLD], **autopilot[NEW]}, RESIDUAL_OLD: autopilot[RESIDUAL]}
-    extra = MappingProxyType({**calibration.extra, "autopilot": now})
+    extra = {**calibration.extra, "autopilot": now}
     return replace(calibration, D=A @ calibration.D, b_a=A @ calibration.b_a + c, extra=extra)

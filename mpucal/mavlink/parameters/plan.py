@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -109,7 +108,7 @@ def moved(calibration: Calibration, order: Sequence[int], firmware: str) -> Cali
         {**other, "autopilot": {**other["autopilot"], **documents.get(other["autopilot"]["imu"], {})}}
         for other in extra.get("others", [])
     ]
-    return replace(calibration, extra=MappingProxyType(extra))
+    return replace(calibration, extra=extra)
 
 
 def _holds(document: Mapping[str, Any]) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, replace
-from types import MappingProxyType
 from typing import Any
 
 from ...result.calibration import REFUSED, USABLE, Calibration
@@ -30,4 +29,4 @@ def verified(calibration: Calibration, checked: Checked | None) -> Calibration:
         others: list[Mapping[str, Any]] = [r for r in quality.get("reasons", []) if r["code"] != checked.reason.code]
         refused = checked.agrees is not None or quality["verdict"] == REFUSED
         quality |= {"verdict": REFUSED if refused else USABLE, "reasons": [checked.reason.document(), *others]}
-    return replace(calibration, quality=MappingProxyType(quality))
+    return replace(calibration, quality=quality)

@@ -1,0 +1,145 @@
+"""What a caller hands over, checked: arrays, times and paths, with a sentence for what is wrong with them."""
+
+from __future__ import annotations
+
+from operator import index
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import ArraysError, WrongType, WrongValue
+
+Vector = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def numbers(values: ArrayLike, key: str, name: str) -> Vector:
+    """Float64 of anything that is numbers."""
+    return _as_float(_array(values, key, name), key, name)
+
+
+def column(values: ArrayLike, key: str, n: int, name: str) -> Vector:
+    """(n,), one value a sample."""
+    array = numbers(values, key, name)
+    if array.shape != (n,):
+        raise ArraysError(f"{name}: {key} has shape {array.shape}, not ({n},)", "give one value a sample")
+    return array
+
+
+def mask(values: ArrayLike | None, key: str, n: int, name: str) -> Mask:
+    """(n,) bool, False where nothing is given."""
+    return np.zeros(n, bool) if values is None else column(values, key, n, name).astype(bool)
+
+
+def rows(values: ArrayLike, key: str, n: int, name: str) -> Vector:
+    """(n, 3) finite numbers."""
+    array = numbers(values, key, name)
+    if array.shape != (n, 3):
+        raise ArraysError(f"{name}: {key} has shape {array.shape}, not ({n}, 3)", "give one row of x, y, z a sample")
+    bad = ~np.isfinite(array).all(axis=1)
+    if bad.any():
+        raise ArraysError(
+            f"{name}: {key} is not a finite number in {int(bad.sum())} of {n} samples,"
+            f" first in sample {int(bad.argmax())}",
+            "leave those samples out, and keep the times of the others",
+        )
+    return array
+
+
+def seconds(t: ArrayLike, name: str) -> Vector:
+    """(n,) s, increasing: of numbers as they are, of dates since the first of them.
+
+    Raises
+    ------
+    ArraysError : they are no times, or do not increase.
+    """
+    given = _array(t, "t", name)
+    if given.dtype.kind == "M" and given.size:
+        given = given - given.flat[0]
+    t = given / np.timedelta64(1, "s") if given.dtype.kind == "m" else _as_float(given, "t", name)
+    if t.ndim != 1 or len(t) < 2:
+        raise ArraysError(f"{name}: t has shape {t.shape}, not (n,) with n >= 2", "give one time in seconds a sample")
+    _check_time(t, name)
+    return t
+
+
+def stretch(flat: Any, n: int, name: str) -> tuple[int, int]:
+    """(first, last + 1), within n samples.
+
+    Raises
+    ------
+    ArraysError : it is no such pair.
+    """
+    remedy = "give (first, last + 1) of the samples that lie flat, or leave it out"
+    try:
+        first, last = (index(end) for end in flat)
+    except (TypeError, ValueError) as error:
+        raise ArraysError(f"{name}: flat is {flat!r}, not two whole numbers", remedy) from error
+    if not 0 <= first < last <= n:
+        raise ArraysError(f"{name}: flat = ({first}, {last}) does not lie within its {n} samples", remedy)
+    return first, last
+
+
+def vectors(values: ArrayLike, name: str, unit: str) -> Vector:
+    """(..., 3) numbers of x, y, z, for a calibration to be applied to.
+
+    Raises
+    ------
+    WrongType : they are no numbers. WrongValue : the last axis is not x, y, z.
+    """
+    try:
+        array = np.asarray(values, float)
+    except (TypeError, ValueError) as error:
+        raise WrongType(f"{name} is no array of numbers ({error})", f"give (..., 3) {unit}") from error
+    if array.ndim == 0 or array.shape[-1] != 3:
+        turned = f"{name}.T" if array.ndim == 2 and len(array) == 3 else "one row of x, y, z a sample"
+        raise WrongValue(f"{name} has shape {array.shape}, not (..., 3)", f"give {turned}, in {unit}")
+    return array
+
+
+def a_path(path: Any, what: str) -> Path:
+    """The path of `what`.
+
+    Raises
+    ------
+    WrongType : it is none.
+    """
+    if not isinstance(path, str | PathLike):
+        raise WrongType(f"{what} is given as {type(path).__name__}", "give the path of its file")
+    return Path(path)
+
+
+def _array(values: ArrayLike, key: str, name: str) -> NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except ValueError as error:
+        raise _no_numbers(key, name, error) from error
+
+
+def _as_float(array: NDArray[Any], key: str, name: str) -> Vector:
+    """A copy in float64."""
+    try:
+        if array.dtype.kind in "mM":
+            raise TypeError("they are times")
+        return array.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        raise _no_numbers(key, name, error) from error
+
+
+def _no_numbers(key: str, name: str, error: Exception) -> ArraysError:
+    return ArraysError(f"{name}: {key} holds values that are no numbers ({error})", "give numbers")
+
+
+def _check_time(t: Vector, name: str) -> None:
+    if not np.isfinite(t).all():
+        raise ArraysError(f"{name}: t is not a finite number everywhere", "give times in seconds")
+    back = np.diff(t) <= 0
+    if back.any():
+        i = int(back.argmax()) + 1
+        raise ArraysError(
+            f"{name}: time does not increase at sample {i} ({t[i - 1]:.6f} s, then {t[i]:.6f} s)",
+            "sort the samples by time and drop repeated ones",
+        )

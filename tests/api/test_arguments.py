@@ -1,0 +1,80 @@
+"""What the public functions say of arguments that they cannot use, and which they take beside the plain ones."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+
+import mpucal
+from mpucal import Calibration, MpucalError, Recording
+from mpucal.api import ModelName
+from mpucal.calibration import MODELS
+
+CAPTURE = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6500.mcap"
+N = 40
+arrays = Recording.from_arrays
+T, ACC, GYR = np.arange(N) / 100.0, np.tile([0.1, 0.2, 9.8], (N, 1)), np.zeros((N, 3))
+DATES = np.datetime64("2026-03-01T12:00:00") + (1e6 * T).astype("timedelta64[us]")
+A_RECORDING = Recording.from_arrays(T, ACC, GYR)
+A_CALIBRATION = Calibration(np.eye(3), np.zeros(3))
+
+WRONG = {
+    "no recording": (lambda: mpucal.calibrate(ACC), TypeError, "ndarray is no recording: give a mpucal.Recording"),
+    "no such file": (lambda: mpucal.calibrate("no.csv"), MpucalError, "there is no file no.csv"),
+    "no model": (lambda: mpucal.calibrate(A_RECORDING, "autoo"), ValueError, "there is no model 'autoo': choose one"),
+    "no gravity": (lambda: mpucal.calibrate(A_RECORDING, gravity=-1), ValueError, "gravity is -1"),
+    "gravity a word": (lambda: mpucal.calibrate(A_RECORDING, gravity="9.8"), TypeError, "gravity is '9.8': give"),
+    "load no path": (lambda: mpucal.load(5), TypeError, "a recording is given as int: give the path of its file"),
+    "columns": (lambda: A_CALIBRATION.apply(ACC.T), ValueError, r"acc has shape \(3, 40\), not .*: give acc.T, in m/s"),
+    "one number": (lambda: A_CALIBRATION.apply(9.8), ValueError, r"acc has shape \(\), not .*: give one row"),
+    "words": (lambda: A_CALIBRATION.apply(["x", "y", "z"]), TypeError, "acc is no array of numbers"),
+    "rates' columns": (lambda: A_CALIBRATION.apply(ACC, GYR.T), ValueError, r"gyr has shape \(3, 40\)"),
+    "save where": (lambda: A_CALIBRATION.save("c.txt"), ValueError, "not saved as c.txt: end its name with .json"),
+    "save no path": (lambda: A_CALIBRATION.save(None), TypeError, "the file of a calibration is given as NoneType"),
+    "load nothing": (lambda: Calibration.load(None), TypeError, "a calibration is given as NoneType"),
+    "ragged": (
+        lambda: arrays([[1], [1, 2]], ACC, GYR),
+        ValueError,
+        "t holds values that are no numbers",
+    ),
+    "dates as acc": (
+        lambda: arrays(T, np.tile(DATES, (3, 1)).T, GYR),
+        ValueError,
+        "acc .*they are times",
+    ),
+    "no date": (
+        lambda: arrays(np.append(DATES[:-1], np.datetime64("NaT")), ACC, GYR),
+        ValueError,
+        "t is",
+    ),
+    "flat a word": (lambda: arrays(T, ACC, GYR, "flat"), ValueError, "flat is 'flat', not two whole"),
+    "flat of halves": (lambda: arrays(T, ACC, GYR, (0.5, 2)), ValueError, "not two whole numbers"),
+    "no data frame": (lambda: Recording.from_dataframe(ACC), TypeError, "ndarray is no data frame"),
+    "other frames": (lambda: A_RECORDING.to_dataframe("excel"), ValueError, "no data frames of 'excel'"),
+}
+
+
+@pytest.mark.parametrize(("call", "kind", "says"), WRONG.values(), ids=WRONG)
+def test_one_sentence_says_what_is_wrong(call, kind, says):
+    with pytest.raises(MpucalError, match=says) as raised:
+        call()
+    assert isinstance(raised.value, kind)
+    assert str(raised.value).endswith(".") and "\n" not in str(raised.value)
+
+
+def test_a_path_does_for_a_recording():
+    by_path, by_name = (mpucal.calibrate(path, "accel") for path in (CAPTURE, str(CAPTURE)))
+    of_recording = mpucal.calibrate(mpucal.load(CAPTURE), "accel")
+    assert replace(by_path, created="") == replace(by_name, created="") == replace(of_recording, created="")
+
+
+@pytest.mark.parametrize("unit", ["us", "ns", "ms"])
+def test_dates_are_seconds_since_the_first(unit):
+    np.testing.assert_allclose(Recording.from_arrays(DATES.astype(f"datetime64[{unit}]"), ACC, GYR).t, T, atol=1e-9)
+    np.testing.assert_allclose(Recording.from_arrays((DATES - DATES[0]), ACC, GYR).t, T, atol=1e-9)
+
+
+def test_the_names_of_models_that_a_type_checker_knows_are_all():
+    assert set(get_args(ModelName)) == set(MODELS)
