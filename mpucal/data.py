@@ -29,6 +29,8 @@ class Sensor:
     ----------
     accel_offsets : the words that its accelerometer's offset registers x, y, z held meanwhile.
     message : of an IMU of a vehicle, the MAVLink message that carried its samples, filtered and by radio.
+    clock_ppm, clock_std : of a bus with a clock of its own: how fast that ran, which was corrected, and the relative
+        standard deviation that is left of all times' scale; None: the times are the host's.
     least_noise : m/s^2, rad/s: standard deviations that a sample has at least, however still it reads.
     """
 
@@ -41,6 +43,8 @@ class Sensor:
     accel_offsets: tuple[int, int, int] | None = None
     message: str | None = None
     least_noise: tuple[float, float] = (0.0, 0.0)
+    clock_ppm: float | None = None
+    clock_std: float | None = None
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Self:
@@ -145,6 +149,7 @@ class Recording(Samples):
     sensor : what is known of the sensor.
     name : what to call the recording in a message.
     recovered : None, or the sentence that says how much of a damaged file this is.
+    utc_ns : the time of day when t was 0, ns since 1970; None: nobody noted it.
     autopilot : of an IMU of a vehicle, what stands between the sensor and the samples.
     others : further IMUs of that vehicle, turned with it.
     """
@@ -153,6 +158,7 @@ class Recording(Samples):
     sensor: Sensor = Sensor()
     name: str = "recording"
     recovered: str | None = None
+    utc_ns: int | None = None
     autopilot: Autopilot | None = None
     others: tuple[Recording, ...] = ()
 

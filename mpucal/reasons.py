@@ -224,6 +224,31 @@ KINDS: Mapping[str, Kind] = {
         "mpucal session --bus sim:D=0/1/0/1/0/0/0/0/-1 --seed 1",
         of_the_sensor=True,
     ),
+    "clock_off": Kind(
+        "The clock that the samples' times come from, a bridge's, is off against the host's, or its rate is not known.",
+        {
+            "corrected": Sentence(
+                "the bridge's clock runs {ppm:+.0f} ppm against this computer's (1 sigma {std:.0f}), and all times were"
+                " corrected for that",
+                "nothing has to be done; a board with a quartz crystal is within 100 ppm",
+                False,
+            ),
+            "unknown": Sentence(
+                "the rate of the bridge's clock is known to {std:.0f} ppm (1 sigma) only, and the gyroscope's scale"
+                " factors no better",
+                "record for a minute or more, through a port that is not shared",
+                False,
+            ),
+            "trusted": Sentence(
+                "the rate of the bridge's clock is known to {std:.0f} ppm (1 sigma) only, and the model {model} takes"
+                " the gyroscope's scale factors to be exact: D and b_a may have larger errors than their uncertainties"
+                " say",
+                "use --model hand, which estimates them",
+                False,
+            ),
+        },
+        "mpucal.calibrate(replace(r, sensor=replace(r.sensor, clock_ppm=5000.0, clock_std=2e-5)))",
+    ),
     "wrong_range": Kind(
         "The accelerometer was set to another full-scale range than the one that its counts were converted with.",
         {

@@ -116,7 +116,11 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
         D_std=_claimed(fit, D_NAMES).reshape(3, 3),
         b_a_std=_claimed(fit, B_A_NAMES),
         K=fit.K,
-        K_std=from_elements(BY_NAME["K"].form, _claimed(fit, BY_NAME["K"].names)),
+        K_std=np.hypot(
+            from_elements(BY_NAME["K"].form, _claimed(fit, BY_NAME["K"].names)),
+            # a clock that runs fast makes every rate smaller
+            (recording.sensor.clock_std or 0.0) * np.abs(fit.K),
+        ),
         b_omega=fit.b_omega,
         b_omega_std=fit.std(*B_OMEGA_NAMES),
         fit={**about, **numbers},

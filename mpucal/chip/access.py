@@ -7,10 +7,17 @@ from typing import Literal, NamedTuple, Protocol
 
 
 class Reply(NamedTuple):
-    """Bytes read, and when."""
+    """Bytes read, and when.
+
+    Attributes
+    ----------
+    data : what was read. t_ns : the bus's clock.
+    host_ns : the host's clock when it heard of that; None where the bus's clock is the host's.
+    """
 
     data: bytes
     t_ns: int
+    host_ns: int | None = None
 
 
 class Bus(Protocol):
@@ -56,7 +63,7 @@ class Transaction:
     ----------
     op : read or write. register : address. data : bytes moved. t_ns : the bus's clock.
     error : None, or how the transfer failed (then data holds what was to be written).
-    count : bytes asked for (reads) or given (writes).
+    count : bytes asked for (reads) or given (writes). host_ns : of a reply, see Reply.
     """
 
     op: Literal["read", "write"]
@@ -65,3 +72,4 @@ class Transaction:
     data: bytes
     t_ns: int
     error: Failure | None = None
+    host_ns: int | None = None

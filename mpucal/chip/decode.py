@@ -63,21 +63,23 @@ class Decoder:
         if transaction.error is not None:
             return
         if transaction.op == "read":
-            self.saw_read(transaction.register, transaction.data, transaction.t_ns)
+            self.saw_read(transaction.register, transaction.data, transaction.t_ns, transaction.host_ns)
         else:
             self.saw_write(transaction.register, transaction.data)
 
-    def saw_read(self, register: int, data: bytes, t_ns: int) -> None:
-        """`data` was read from `register` on, at `t_ns`."""
+    def saw_read(self, register: int, data: bytes, t_ns: int, host_ns: int | None = None) -> None:
+        """`data` was read from `register` on, at `t_ns`; `host_ns` as in Reply."""
         if self._fifo is None:
             self._hold(register, data)
             self._evidence.saw(register, data, self._held)
         elif register == reg.FIFO_COUNT_H:
             self._fifo.counted(t_ns, int.from_bytes(data, "big"))
+            self._heard("look", t_ns, host_ns)
         elif register == reg.FIFO_R_W:
             self._fifo.data(data)
         elif register in (reg.INT_STATUS, reg.INT_ENABLE) and register + len(data) > reg.INT_STATUS:
             lost = register == reg.INT_ENABLE and not data[0] & reg.INT_FIFO_OFLOW
+            self._heard("status", t_ns, host_ns)
             overflow = bool(data[reg.INT_STATUS - register] & reg.INT_FIFO_OFLOW)
             self.fault = self._fifo.judged(overflow, lost)
         elif register == reg.TEMP_OUT_H:
@@ -100,6 +102,10 @@ class Decoder:
         self._hold(register, data)
         if register == reg.USER_CTRL and data[0] & reg.USER_CTRL_FIFO_RESET:
             self._fifo_was_reset()
+
+    def provisional_ns(self, t_ns: int) -> int:
+        """`t_ns` of the bus's clock as the samples that `take` gives show it."""
+        return t_ns if self._fifo is None else self._fifo.provisional_ns(t_ns)
 
     def take(self) -> Samples:
         """The samples since the last `take`, with the times that are known now."""
@@ -132,6 +138,10 @@ class Decoder:
 
     def _hold(self, register: int, data: bytes) -> None:
         self._held.update(enumerate(data, register))
+
+    def _heard(self, kind: str, t_ns: int, host_ns: int | None) -> None:
+        if self._fifo is not None and host_ns is not None:
+            self._fifo.heard(kind, t_ns, host_ns)
 
     def _fifo_was_reset(self) -> None:
         settings = Settings.from_registers(self._held, self.part, self._name)

@@ -93,8 +93,8 @@ class Driver:
         self._frame_ns = math.inf
 
     def now_ns(self) -> int:
-        """The bus's clock as last seen."""
-        return self._port.now_ns
+        """The bus's clock as last seen, at the host's rate as far as that is known."""
+        return self._decoder.provisional_ns(self._port.now_ns)
 
     @property
     def part(self) -> Part:

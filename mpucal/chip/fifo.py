@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from ..data import Mask, Recording, Samples, Sensor, Vector
 from . import registers as reg
-from .clock import SampleClock, Times, increasing
+from .clock import NS, SampleClock, Times, increasing
+from .host_clock import HostClock
 from .settings import Settings
 
 Counts = NDArray[np.int16]
@@ -64,6 +65,7 @@ class FifoDecoder:
     def __init__(self, settings: Settings) -> None:
         self._settings, self._columns = settings, settings.columns
         self._clock = SampleClock(settings.nominal_rate_hz)
+        self._host = HostClock()
         self._runs: list[Run] = []
         self._taken = 0
         self._begun = False
@@ -80,6 +82,10 @@ class FifoDecoder:
     def temperature(self, count: int) -> None:
         """The temperature register shows `count`: what an aligned frame will show too."""
         self._temperature = count
+
+    def heard(self, kind: str, t_ns: int, host_ns: int) -> None:
+        """What was done at `t_ns` was heard of at `host_ns`, see Reply; by a message of a `kind` that are all alike."""
+        self._host.saw(kind, t_ns, host_ns)
 
     def counted(self, t_ns: int, count_bytes: int) -> None:
         """The FIFO held `count_bytes` at `t_ns`."""
@@ -153,7 +159,7 @@ class FifoDecoder:
         runs, self._taken = self._runs[self._taken :], len(self._runs)
         if not runs:
             return Samples.empty()
-        samples = self._after(self._last_t_s, self._samples(runs, self._clock.times_s))
+        samples = self._after(self._last_t_s, self._samples(runs, self._provisional_s))
         self._last_t_s = float(samples.t[-1])
         return samples
 
@@ -164,7 +170,7 @@ class FifoDecoder:
 
     def final(self, runs: Iterable[Run]) -> Iterator[Samples]:
         """The samples of runs that were released, in the same order, with the best times there are."""
-        times_s = self._clock.final()
+        times_s = self._final()
         last_t_s: float | None = None
         for run in runs:
             samples = self._after(last_t_s, self._samples([run], times_s))
@@ -174,12 +180,13 @@ class FifoDecoder:
     def forget(self) -> None:
         """Let go of all that was taken: `recording` holds what comes from now on."""
         self._runs, self._taken = self._runs[self._taken :], 0
+        self._host.forget()
         if not self._runs:
             self._clock.forget()
 
     def recording(self, name: str) -> Recording:
         """All samples so far with the best times there are, and the sensor with its measured rate."""
-        samples = self._samples(self._runs, self._clock.final())
+        samples = self._samples(self._runs, self._final())
         arrays = {f.name: getattr(samples, f.name) for f in fields(Samples)}
         return Recording(**arrays, sensor=self.sensor, name=name)
 
@@ -189,7 +196,24 @@ class FifoDecoder:
         sensor = self._settings.sensor
         if not self._begun:
             return sensor
-        return replace(sensor, rate_hz=self._clock.rate_hz, temperature_c=self._mean_c)
+        sensor = replace(sensor, rate_hz=self._clock.rate_hz, temperature_c=self._mean_c)
+        if not self._host:
+            return sensor
+        fit = self._host.fit()
+        rate_hz = self._clock.rate_hz / (1.0 + fit.b)
+        return replace(sensor, rate_hz=rate_hz, clock_ppm=fit.ppm, clock_std=fit.b_std)
+
+    def provisional_ns(self, t_ns: int) -> int:
+        """`t_ns` of the bus's clock as the samples that `take` gives show it."""
+        return round(float(self._host.provisional_s(t_ns * NS)) / NS) if self._host else t_ns
+
+    def _provisional_s(self, segment: NDArray[np.int64], index: NDArray[np.int64]) -> Vector:
+        times_s = self._clock.times_s(segment, index)
+        return np.asarray(self._host.provisional_s(times_s)) if self._host else times_s
+
+    def _final(self) -> Times:
+        times_s, host_s = self._clock.final(), self._host.final()
+        return lambda segment, index: host_s(times_s(segment, index))
 
     def _aligned(self, frames: Counts) -> bool:
         if not len(frames) or self._settings.accel_alone:

@@ -39,7 +39,7 @@ class Port:
         """The same where reading takes something away from the chip, so that a second read gives something else."""
         reply = self._bus.read(register, count)
         self._now_ns = max(self._now_ns, reply.t_ns)
-        self._decoder.saw_read(register, reply.data, reply.t_ns)
+        self._decoder.saw_read(register, reply.data, reply.t_ns, reply.host_ns)
         return reply.data
 
     def write(self, register: int, value: int) -> None:

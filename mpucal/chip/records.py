@@ -9,8 +9,8 @@ from typing import Any, Protocol
 from .access import Transaction
 
 # Names of session events. KEY holds the key under its own name; LATE: an answer was late here; FORGET: samples
-# first..last-1 are not to be used; RESUMED: the session was resumed here.
-KEY, LATE, FORGET, RESUMED = "key", "late", "forget", "resumed"
+# first..last-1 are not to be used; RESUMED: the session was resumed here; UTC: the time of day, ns since 1970.
+KEY, LATE, FORGET, RESUMED, UTC = "key", "late", "forget", "resumed", "utc"
 ABORT = "abort"  # the key that ends a session
 
 

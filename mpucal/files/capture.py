@@ -17,7 +17,7 @@ import numpy as np
 from ..chip.access import Transaction
 from ..chip.decode import Decoder, decode
 from ..chip.fifo import Run
-from ..chip.records import FORGET, SessionEvent
+from ..chip.records import FORGET, UTC, SessionEvent
 from ..data import Recording, Samples
 from ..errors import RecordingError
 from .mcap import CaptureReader
@@ -35,7 +35,7 @@ def load_capture(*paths: Path) -> Recording:
     recording = decode(session, session.name)
     for first, last in sorted(session.forgotten.items(), reverse=True):
         recording = recording.without(first, last)
-    return replace(recording, recovered=session.recovered)
+    return replace(recording, recovered=session.recovered, utc_ns=session.utc_ns)
 
 
 def capture_rows(*paths: Path) -> Rows:
@@ -53,7 +53,7 @@ def capture_rows(*paths: Path) -> Rows:
     if spool.frames < 2:
         raise RecordingError(f"{session.name} holds {spool.frames} samples", "record for longer")
     runs = _without(decoder.final(spool.runs()), session.forgotten)
-    return Rows(runs, decoder.sensor, recovered=session.recovered, name=session.name)
+    return Rows(runs, decoder.sensor, recovered=session.recovered, name=session.name, utc_ns=session.utc_ns)
 
 
 class _Accesses:
@@ -62,7 +62,7 @@ class _Accesses:
     Attributes
     ----------
     name : of the first capture. forgotten : first -> last + 1 samples that are to be left out.
-    recovered : see Recording; this and `forgotten` once all accesses were read.
+    recovered, utc_ns : see Recording; these and `forgotten` once all accesses were read.
     """
 
     def __init__(self, paths: Sequence[Path]) -> None:
@@ -70,12 +70,15 @@ class _Accesses:
         self.name = paths[0].name
         self.forgotten: dict[int, int] = {}
         self.recovered: str | None = None
+        self.utc_ns: int | None = None
 
     def __iter__(self) -> Iterator[Transaction]:
         for reader in map(CaptureReader, self._paths):
             for record in reader:
                 if not isinstance(record, SessionEvent):
                     yield record
+                elif record.name == UTC and self.utc_ns is None:
+                    self.utc_ns = int(record.data[UTC]) - record.t_ns
                 elif record.name == FORGET:
                     self.forgotten[int(record.data["first"])] = int(record.data["last"])
             self.recovered = reader.recovered or self.recovered

@@ -74,8 +74,8 @@ float64 z
 """
 
 
-def messages(samples: Samples, noise: Vector) -> tuple[NDArray[np.int64], NDArray[Any]]:
-    """Times (n,) [ns] and messages (n,), each the CDR bytes of a sample; `noise` as of Rows.
+def messages(samples: Samples, noise: Vector, utc_ns: int = 0) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    """Times (n,) [ns] and messages (n,), each the CDR bytes of a sample; `noise` as of Rows, `utc_ns` is t = 0.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def messages(samples: Samples, noise: Vector) -> tuple[NDArray[np.int64], NDArra
     """
     if not (np.isfinite(samples.t) & (samples.t >= 0.0) & (samples.t < 2.0**31)).all():
         raise RecordingError("a time is no number of seconds from 0 to 2^31", "give times in seconds, from any origin")
-    t_ns = np.rint(samples.t * S).astype(np.int64)
+    t_ns = np.rint(samples.t * S).astype(np.int64) + utc_ns
     rows = np.zeros(len(samples), MESSAGE)
     rows["cdr"] = np.void(b"\0\1\0\0")
     rows["sec"], rows["nanosec"] = t_ns // S, t_ns % S
@@ -103,7 +103,11 @@ def messages(samples: Samples, noise: Vector) -> tuple[NDArray[np.int64], NDArra
 
 @contextmanager
 def imu_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
-    """An MCAP file of Imu messages on TOPIC; `done`, what was done to the samples, is its metadata. See open_writer."""
+    """An MCAP file of Imu messages on TOPIC; `done`, what was done to the samples, is its metadata. See open_writer.
+
+    Their stamps are the time of day where it is known, as of every robot's; else the recording's own times.
+    """
+    utc_ns = rows.utc_ns or 0
     with whole_file(path) as file:
         writer = ChunkWriter(
             file,
@@ -113,5 +117,5 @@ def imu_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
             Channel(id=1, topic=TOPIC, message_encoding=MessageEncoding.CDR, metadata={}, schema_id=1),
             Metadata(CALIBRATED, {"done": done}),
         )
-        yield lambda samples: writer.add(*messages(samples, rows.noise))
+        yield lambda samples: writer.add(*messages(samples, rows.noise, utc_ns))
         writer.finish()

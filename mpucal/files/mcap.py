@@ -61,6 +61,7 @@ class CaptureWriter:
         self._writer = Writer(self._file, compression=CompressionType.ZSTD, enable_data_crcs=True, use_chunking=chunked)
         self._channels: dict[str, int] = {}
         self._chunk_began_ns: int | None = None
+        self._ahead_ns = 0
 
     def start(self, meta: Mapping[str, Any]) -> None:
         """Write the head of the file: what is captured, by what and how; values of JSON's own types."""
@@ -78,7 +79,9 @@ class CaptureWriter:
             raise self._cannot_write(error) from error
 
     def transaction(self, transaction: Transaction) -> None:
-        """Keep a register access."""
+        """Keep a register access; the message's publish time is the host's clock."""
+        if transaction.host_ns is not None:
+            self._ahead_ns = transaction.host_ns - transaction.t_ns
         self._add(BUS, transaction.t_ns, transaction_message(transaction))
 
     def event(self, name: str, t_ns: int, data: Mapping[str, Any] | None = None) -> None:
@@ -102,7 +105,7 @@ class CaptureWriter:
 
     def _add(self, topic: str, t_ns: int, data: bytes) -> None:
         try:
-            self._writer.add_message(self._channels[topic], t_ns, data, publish_time=t_ns)
+            self._writer.add_message(self._channels[topic], t_ns, data, publish_time=max(t_ns + self._ahead_ns, 0))
             if self._chunk_began_ns is None:
                 self._chunk_began_ns = t_ns
             elif t_ns - self._chunk_began_ns >= CHUNK_NS:

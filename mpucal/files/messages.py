@@ -20,6 +20,10 @@ _BUS = {
         "register": {"type": "integer", "minimum": 0, "maximum": 255},
         "count": {"type": "integer", "description": "bytes asked for or given"},
         "data": {"type": "string", "description": "bytes moved, hexadecimal"},
+        "host_ns": {
+            "type": "integer",
+            "description": "the host's clock when it heard of that, where the bus's is another",
+        },
         "error": {
             "type": "object",
             "description": "how the transfer failed",
@@ -45,6 +49,8 @@ def transaction_message(transaction: Transaction) -> bytes:
         "count": transaction.count,
         "data": transaction.data.hex(),
     }
+    if transaction.host_ns is not None:
+        content["host_ns"] = transaction.host_ns
     if transaction.error is not None:
         content["error"] = transaction.error._asdict()
     return _compact(content)
@@ -75,6 +81,7 @@ def record_of(topic: str, t_ns: int, message: bytes) -> Record | None:
         bytes.fromhex(content["data"]),
         t_ns,
         None if error is None else Failure(**error),
+        content.get("host_ns"),
     )
 
 

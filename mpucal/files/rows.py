@@ -22,7 +22,7 @@ class Rows:
     Attributes
     ----------
     runs : each of at most some ROWS samples, to be gone through once.
-    sensor, flat, autopilot, recovered, name : as of a Recording. others : how many further IMUs it holds.
+    sensor, flat, autopilot, recovered, name, utc_ns : as of a Recording. others : how many further IMUs it holds.
     done : the sentence that says that the file is calibrated data already; empty where it is not.
     noise : (2, 3), standard deviations of a sample's acc [m/s^2] and gyr [rad/s]; NaN: unknown.
     """
@@ -36,6 +36,7 @@ class Rows:
     others: int = 0
     done: str = ""
     noise: Vector = field(default_factory=lambda: np.full((2, 3), np.nan))
+    utc_ns: int | None = None
 
     @classmethod
     def of(cls, recording: Recording, done: str = "") -> Rows:
@@ -49,13 +50,14 @@ class Rows:
             recording.name,
             len(recording.others),
             done,
+            utc_ns=recording.utc_ns,
         )
 
     def recording(self) -> Recording:
         """All of it in memory, checked; see Recording.from_arrays."""
         whole = Samples.joined(list(self.runs))
         recording = Recording.from_arrays(**vars(whole), flat=self.flat, sensor=self.sensor, name=self.name)
-        return replace(recording, autopilot=self.autopilot, recovered=self.recovered)
+        return replace(recording, autopilot=self.autopilot, recovered=self.recovered, utc_ns=self.utc_ns)
 
 
 Write = Callable[[Samples], None]

@@ -19,6 +19,7 @@ from ..result.session_files import CAPTURE
 from ..session.events import Prompt
 from ..session.plan import Plan
 from ..session.ports import Replayed, Talk
+from .dated import Dated
 from .opened import Measuring, Say
 from .parts import PartsBus
 from .tap import Tap
@@ -70,7 +71,10 @@ class OpenedChip:
         """See Opened."""
         with closing(self.bus), CaptureWriter(capture) as writer:
             writer.start({"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.source_meta()})
-            driver = Driver(Tap(self.bus, writer), self.plan.config, capture.name, lambda text: say(f"  {text}."))
+            pending = None if self.replay is None else self.replay.pending_events
+            driver = Driver(
+                Tap(self.bus, Dated(writer, pending)), self.plan.config, capture.name, lambda text: say(f"  {text}.")
+            )
             if self.replay is None:
                 yield Measuring(driver, writer.event)
             else:

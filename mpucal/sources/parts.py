@@ -82,7 +82,7 @@ class LaterBus:
     def read(self, register: int, count: int) -> Reply:
         """See Bus."""
         reply = self._bus.read(register, count)
-        return Reply(reply.data, self._shown(reply.t_ns))
+        return reply._replace(t_ns=self._shown(reply.t_ns))
 
     def write(self, register: int, data: bytes) -> int:
         """See Bus."""

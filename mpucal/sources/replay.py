@@ -39,7 +39,7 @@ class ReplayBus:
     def read(self, register: int, count: int) -> Reply:
         """See Bus."""
         recorded = self._recorded(Transaction("read", register, count, b"", 0))
-        return Reply(recorded.data, recorded.t_ns)
+        return Reply(recorded.data, recorded.t_ns, recorded.host_ns)
 
     def write(self, register: int, data: bytes) -> int:
         """See Bus."""

@@ -19,6 +19,7 @@ from ..session.events import Key, Output, Prompt
 from ..session.plan import Plan
 from ..session.ports import Talk
 from .chip import SOURCE, OpenedChip
+from .dated import Dated
 from .opened import Measuring, Say
 from .opening import open_again
 from .parts import LaterBus, PartsBus, parts_of
@@ -65,7 +66,7 @@ class ResumedChip:
         """See Opened."""
         with closing(self.bus), CaptureWriter(capture) as writer:
             writer.start({"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.live.source_meta()})
-            recorder = _Recorder(writer, self.bus)
+            recorder = _Recorder(writer, Dated(writer), self.bus)
             driver = Driver(Tap(self.bus, recorder), self.plan.config, capture.name, lambda text: say(f"  {text}."))
             yield Measuring(driver, recorder.event, self.bus.go_on, self._late)
 
@@ -79,13 +80,13 @@ class ResumedChip:
 class _Recorder:
     """Keeps what happens now, and not what was recorded before."""
 
-    def __init__(self, writer: CaptureWriter, bus: PartsBus) -> None:
-        self._writer, self._bus = writer, bus
+    def __init__(self, writer: CaptureWriter, dated: Dated, bus: PartsBus) -> None:
+        self._writer, self._dated, self._bus = writer, dated, bus
 
     def transaction(self, transaction: Any) -> None:
         """See Recorder."""
         if not self._bus.replaying:
-            self._writer.transaction(transaction)
+            self._dated.transaction(transaction)
 
     def event(self, name: str, t_ns: int, data: Mapping[str, Any]) -> None:
         """See Note."""

@@ -26,7 +26,7 @@ class Tap:
             self._recorder.transaction(Transaction("read", register, count, b"", self._latest_ns, _failure(error)))
             raise
         self._latest_ns = max(self._latest_ns, reply.t_ns)
-        self._recorder.transaction(Transaction("read", register, count, reply.data, reply.t_ns))
+        self._recorder.transaction(Transaction("read", register, count, reply.data, reply.t_ns, host_ns=reply.host_ns))
         return reply
 
     def write(self, register: int, data: bytes) -> int:

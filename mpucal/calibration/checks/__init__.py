@@ -5,6 +5,7 @@ recording    moved while still, clipped, lost or warming
 bits         low or high bits of an axis that never move
 gravity      a gravity that no place on Earth has
 sensor       wrong range, units, axes or gyroscope, by a trustworthy fit
+clock        a bus whose clock is off, or not known
 estimate     directions not observable, no convergence, contradictions, a change midway
 """
 
@@ -14,7 +15,7 @@ from collections.abc import Callable
 
 from ...reasons import Reason
 from ..evidence import Evidence
-from . import bits, estimate, gravity, recording, sensor, unusable
+from . import bits, clock, estimate, gravity, recording, sensor, unusable
 
 Check = Callable[[Evidence], Reason | None]
 
@@ -42,6 +43,7 @@ CHECKS: tuple[Check, ...] = (
     recording.temperature_moved,
     gravity.gravity_unlikely,
     bits.bits_stuck,
+    clock.clock_off,
     estimate.not_converged,
     estimate.inconsistent,
     estimate.changed_midway,

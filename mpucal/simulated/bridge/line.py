@@ -46,7 +46,8 @@ class EmulatedLine:
 
     Parameters
     ----------
-    latency_ns : how long an adapter holds back what the device sends.
+    latency_ns : how long an adapter holds back what the device sends. burst_ns : it hands over what came once in
+        so long, as USB does; 0: as it comes.
 
     Attributes
     ----------
@@ -54,14 +55,14 @@ class EmulatedLine:
     unplugged : the port is gone while this is set. written : what the host has sent.
     """
 
-    def __init__(self, device: LineEnd, clock: SteppedClock, latency_ns: int = 1_000_000) -> None:
+    def __init__(self, device: LineEnd, clock: SteppedClock, latency_ns: int = 1_000_000, burst_ns: int = 0) -> None:
         self.name, self.bauds = "the emulated line", BAUDS[:1]
         self.device = device
         self.to_host: Spoil = _unchanged
         self.to_device: Spoil = _unchanged
         self.unplugged = False
         self.written = bytearray()
-        self._clock, self._latency_ns = clock, latency_ns
+        self._clock, self._latency_ns, self._burst_ns = clock, latency_ns, burst_ns or 1
         self._coming: deque[Chunk] = deque()
         self._free_ns = 0
 
@@ -104,7 +105,8 @@ class EmulatedLine:
             data = self.to_host(data)
             sent_ns = max(self._free_ns, self.now_ns()) + len(data) * BITS_A_BYTE * 1_000_000_000 // self.bauds[0]
             self._free_ns = sent_ns
-            self._coming.append(Chunk(data, sent_ns + self._latency_ns))
+            heard_ns = -(-(sent_ns + self._latency_ns) // self._burst_ns) * self._burst_ns
+            self._coming.append(Chunk(data, heard_ns))
 
     def _check(self) -> None:
         if self.unplugged:

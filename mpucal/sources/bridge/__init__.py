@@ -38,5 +38,5 @@ def open_store(text: str) -> Iterator[Store]:
         yield Store(link)
 
 
-def _unheard(seq: int, frames: Frames, t_ns: int) -> None:
+def _unheard(seq: int, frames: Frames, t_ns: int, host_ns: int) -> None:
     """Nobody listens to what is pushed."""

@@ -77,8 +77,8 @@ class BridgeBus:
         """`count` bytes from `register` on; where that is more than MAX_READ, in several transfers."""
         ahead = self._ahead
         if ahead is not None and (register, count) == (reg.FIFO_COUNT_H, 2):
-            held, t_ns = self._count(ahead)
-            return Reply(held.to_bytes(2, "big"), t_ns)
+            held, t_ns, host_ns = self._count(ahead)
+            return Reply(held.to_bytes(2, "big"), t_ns, host_ns)
         if ahead is not None and register == reg.FIFO_R_W:
             return Reply(*ahead.pop(count))
         reply = self._read_now(register, count)
@@ -124,20 +124,20 @@ class BridgeBus:
         if count > MAX_BURST:
             raise BusError(f"a bridge reads at most {MAX_BURST} bytes at once, not {count}", "read less at once")
         answers = [answer for several in self._ask(*_reads(register, count)) for answer in several]
-        return Reply(b"".join(_data(answers)), self._seen_from(answers[0].t_ns))
+        return Reply(b"".join(_data(answers)), self._seen_from(answers[0].t_ns), answers[0].host_ns)
 
     def _judged(self, reply: Reply, at: int) -> Reply:
         """What was read, with INT_STATUS at `at`: it tells what was lost on the way to the host, too."""
         if self._ahead is not None:
             if reply.data[at] & reg.INT_FIFO_OFLOW:
                 # the reading cleared it, and the bridge does not see it any more
-                self._ahead.lose(reply.t_ns)
+                self._ahead.lose(reply.t_ns, reply.host_ns or 0)
             lost = self._ahead.take_overflow()
         else:
             lost, self._lost = self._lost, False
         data = bytearray(reply.data)
         data[at] |= reg.INT_FIFO_OFLOW * lost
-        return Reply(bytes(data), reply.t_ns)
+        return reply._replace(data=bytes(data))
 
     def _seen_from(self, t_ns: int) -> int:
         return t_ns if self._ahead is None else self._ahead.seen_from(t_ns)
@@ -166,7 +166,7 @@ class BridgeBus:
             raise
         return answers[-2][-1].t_ns
 
-    def _count(self, ahead: ReadAhead) -> tuple[int, int]:
+    def _count(self, ahead: ReadAhead) -> tuple[int, int, int]:
         give_up_ns = self._port.now_ns() + GONE_NS
         while not ahead.can_count:
             try:
@@ -178,9 +178,9 @@ class BridgeBus:
                 raise
         return ahead.count()
 
-    def _pushed(self, seq: int, frames: Frames, t_ns: int) -> None:
+    def _pushed(self, seq: int, frames: Frames, t_ns: int, host_ns: int) -> None:
         if self._ahead is not None and seq == self._ahead.seq:
-            self._ahead.push(frames, t_ns)
+            self._ahead.push(frames, t_ns, host_ns)
 
     def _ask(self, *requests: Message) -> list[list[Answer]]:
         """The answers, none of them a failure.

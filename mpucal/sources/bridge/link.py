@@ -50,7 +50,7 @@ GREET_NS = 5000 * MS
 
 STORING = (BlobBegin, BlobData, BlobCommit, BlobErase)
 
-Pushed = Callable[[int, Frames, int], None]
+Pushed = Callable[[int, Frames, int, int], None]
 
 
 class LinkLost(BusError):  # noqa: N818 - reads as the sentence it is
@@ -58,10 +58,11 @@ class LinkLost(BusError):  # noqa: N818 - reads as the sentence it is
 
 
 class Answer(NamedTuple):
-    """A reply, and its bus time."""
+    """A reply, its bus time, and the host's time when it came."""
 
     reply: Reply
     t_ns: int
+    host_ns: int
 
 
 @dataclass
@@ -108,7 +109,7 @@ class Link:
 
     Parameters
     ----------
-    port : open. pushed : is told of each FRAMES: its seq, the message, its bus time [ns].
+    port : open. pushed : is told of each FRAMES: its seq, the message, its bus time and the host's [ns].
 
     Attributes
     ----------
@@ -222,14 +223,14 @@ class Link:
         answered = False
         for frame, reply in self._messages(chunk):
             if isinstance(reply, Frames):
-                self._pushed(frame.seq, reply, self.clock.seen(reply.t_us, chunk.t_ns))
+                self._pushed(frame.seq, reply, self.clock.seen(reply.t_us, chunk.t_ns), chunk.t_ns)
                 continue
             for one in flying:
                 if one.is_answered_by(frame, reply):
                     if reply.status == Status.NO_HELLO:
                         # its clock began anew: the time means nothing here
                         raise LinkLost(*restarted(self.port.name))
-                    one.answers.append(Answer(reply, self.clock.seen(reply.t_us, chunk.t_ns)))
+                    one.answers.append(Answer(reply, self.clock.seen(reply.t_us, chunk.t_ns), chunk.t_ns))
                     answered = True
         return answered
 

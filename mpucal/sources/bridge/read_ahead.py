@@ -15,9 +15,10 @@ INDEX_WRAP = 2**16
 
 @dataclass(frozen=True)
 class Look:
-    """What was found in the FIFO at `t_ns`; where `lost`, nothing that can be believed."""
+    """What was found in the FIFO at `t_ns`, and heard at `host_ns`; where `lost`, nothing that can be believed."""
 
     t_ns: int
+    host_ns: int
     data: bytes
     lost: bool
 
@@ -39,14 +40,14 @@ class ReadAhead:
         self._next_index = 0
         self._drops: int | None = None
         self._shown = bytearray()
-        self._shown_t_ns = 0
+        self._shown_t_ns = self._shown_host_ns = 0
         self._last_byte = 0
         self._overflow = False
 
-    def push(self, frames: Frames, t_ns: int) -> None:
-        """`frames` came; `t_ns` is the bus time of its look."""
+    def push(self, frames: Frames, t_ns: int, host_ns: int) -> None:
+        """`frames` came at `host_ns`; `t_ns` is the bus time of its look."""
         if self._is_lost(frames):
-            self.lose(t_ns)
+            self.lose(t_ns, host_ns)
             return
         self._drops = frames.drops
         self._next_index = (frames.index + len(frames.frames) // self._frame_bytes) % INDEX_WRAP
@@ -54,22 +55,22 @@ class ReadAhead:
         self._begun_t_ns = t_ns
         if frames.left == 0:
             data = b"".join(part.frames for part in self._begun)
-            self._looks.append(Look(t_ns, data, lost=False))
+            self._looks.append(Look(t_ns, host_ns, data, lost=False))
             self._begun.clear()
 
-    def lose(self, t_ns: int) -> None:
+    def lose(self, t_ns: int, host_ns: int) -> None:
         """Frames were lost about `t_ns`."""
         self._begun.clear()
         if not (self._looks and self._looks[-1].lost):
-            self._looks.append(Look(t_ns, b"", lost=True))
+            self._looks.append(Look(t_ns, host_ns, b"", lost=True))
 
     @property
     def can_count(self) -> bool:
         """Whether FIFO_COUNT has something to say without waiting."""
         return bool(self._shown or self._looks)
 
-    def count(self) -> tuple[int, int]:
-        """FIFO_COUNT and its time [ns]: whole looks only, so that the count is what was there at that time.
+    def count(self) -> tuple[int, int, int]:
+        """FIFO_COUNT, its time and when the host heard of it [ns]: of whole looks, as the count was at that time.
 
         Never more than chips hold soundly, however long nobody asked; the rest is for the next time.
         """
@@ -79,11 +80,11 @@ class ReadAhead:
                 break
             self._looks.popleft()
             self._shown += look.data
-            self._shown_t_ns = look.t_ns
+            self._shown_t_ns, self._shown_host_ns = look.t_ns, look.host_ns
             if look.lost:
                 self._overflow = True
                 break
-        return len(self._shown), self._shown_t_ns
+        return len(self._shown), self._shown_t_ns, self._shown_host_ns
 
     def pop(self, count: int) -> tuple[bytes, int]:
         """FIFO_R_W: the oldest `count` bytes of what was counted; where it is empty, the last again."""

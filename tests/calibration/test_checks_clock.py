@@ -1,0 +1,38 @@
+"""A bus whose clock is off, or not known: what is said of it, and K's uncertainty."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.calibration import calibrate
+
+
+@pytest.mark.parametrize(
+    ("ppm", "std", "model", "words"),
+    [
+        (5000.0, 2e-5, "imu", "runs +5000 ppm"),
+        (-501.0, 2e-5, "accel", "corrected"),
+        (0.0, 0.01, "imu", "10000 ppm (1 sigma) only, and the gyroscope's"),
+        (0.0, 0.01, "accel", "the model accel takes"),
+        (499.0, 2e-5, "imu", None),
+        (None, None, "imu", None),
+    ],
+)
+def test_a_clock_that_is_off_is_said(ideal, ppm, std, model, words):
+    recording = ideal(0).recording
+    spoilt = replace(recording, sensor=replace(recording.sensor, clock_ppm=ppm, clock_std=std))
+    found = calibrate(spoilt, model)
+    said = [reason["message"] for reason in found.quality["reasons"] if reason["code"] == "clock_off"]
+    assert len(said) == (words is not None)
+    assert words is None or words in said[0]
+    assert found.verdict == ("good" if words is None else "usable")
+
+
+def test_what_is_not_known_of_the_clock_is_not_known_of_k(ideal):
+    recording = ideal(0).recording
+    plain = calibrate(recording, "imu")
+    found = calibrate(replace(recording, sensor=replace(recording.sensor, clock_ppm=0.0, clock_std=0.01)), "imu")
+    np.testing.assert_array_equal(found.K, plain.K)
+    expected = np.sqrt(np.diag(plain.K_std) ** 2 + (0.01 * np.diag(plain.K)) ** 2)
+    np.testing.assert_allclose(np.diag(found.K_std), expected, rtol=1e-9)

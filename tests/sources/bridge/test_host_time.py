@@ -1,0 +1,78 @@
+"""A bridge whose clock is off: its times are corrected, in a capture too."""
+
+import numpy as np
+import pytest
+
+from mpucal import load
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.chip.records import UTC
+from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip.clock import FastClock
+from mpucal.sources.bridge.bus import BridgeBus
+from mpucal.sources.dated import Dated
+from mpucal.sources.replay import ReplayBus
+from mpucal.sources.tap import Tap
+
+MS = 1_000_000
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """The recording of so many seconds of turns behind a bridge whose clock is off, its capture, and the truth."""
+
+    def run(seconds, ppm, drift_ppm_a_minute=0.0, burst_ms=1, seed=1):
+        clock = FastClock()
+        chip = open_simulated("sim:hand=random,noise=0.3", seed=seed, clock=clock)
+        drift = 0.5 * drift_ppm_a_minute * 1e-6 / 60 * 1e-9
+
+        def shown():
+            t = clock.now()
+            return t + round(ppm * 1e-6 * t + drift * t * t)
+
+        line = EmulatedLine(EmulatedBridge(chip, shown), clock, burst_ns=burst_ms * MS)
+        path = tmp_path / "capture.mcap"
+        bus = BridgeBus(line)
+        with CaptureWriter(path) as writer:
+            writer.start({})
+            driver = Driver(Tap(bus, Dated(writer)), Config())
+            driver.start()
+            while clock.now() < seconds * 1e9:
+                driver.poll()
+        return driver.recording(), path, chip.truth_document()
+
+    return run
+
+
+@pytest.mark.parametrize(("ppm", "drift", "burst_ms"), [(5000, 0, 1), (-10000, 50, 4), (10000, -50, 16)])
+def test_the_rate_is_known_and_corrected(recorded, ppm, drift, burst_ms):
+    recording, _, truth = recorded(40, ppm, drift, burst_ms)
+    sensor = recording.sensor
+    assert sensor.clock_std < 60e-6
+    assert sensor.clock_ppm == pytest.approx(ppm + drift / 3, abs=4e6 * sensor.clock_std + 2)
+    true_hz = 200 * (1 + truth["rate_error_ppm"] * 1e-6)
+    assert sensor.rate_hz == pytest.approx(true_hz, rel=4 * sensor.clock_std + 20e-6)
+    assert recording.rate_hz == pytest.approx(true_hz, rel=100e-6)
+
+
+def test_a_capture_keeps_it(recorded):
+    recording, path, _ = recorded(15, 5000, burst_ms=4)
+    again = load(path)
+    assert np.array_equal(again.t, recording.t)
+    assert again.sensor == recording.sensor
+    records = read_capture(path).records
+    replayed = Driver(ReplayBus(records), Config())
+    replayed.start()
+    while len(replayed.recording()) < len(recording):
+        replayed.poll()
+    assert np.array_equal(replayed.recording().t, recording.t)
+
+
+def test_the_time_of_day_is_in_it_once(recorded):
+    _, path, _ = recorded(2, 0)
+    dates = [record for record in read_capture(path).records if getattr(record, "name", "") == UTC]
+    assert len(dates) == 1
+    assert load(path).utc_ns == dates[0].data[UTC] - dates[0].t_ns
+    assert dates[0].data[UTC] > 1_700_000_000 * 10**9
