@@ -34,6 +34,7 @@ MOST = 0.03
 STEADY_S = 20e-6
 # One of the clocks began anew where host - bus moves by more, beside what the rate may be off.
 LEAP_S = 0.5
+HELD_BACK_S = 0.05
 # pairs that a stream of days keeps, and by how much their number grows until the rate is estimated again
 KEPT, GROWTH = 20_000, 1.1
 
@@ -129,13 +130,11 @@ def fitted(pairs: Mapping[str, Pairs]) -> ClockFit:
     unknown = ClockFit(0.0, 0.0, RATE_STD, first_s, mid_ns * NS, last_s)
     grouped = [_grouped(np.asarray((t - mid_ns) * NS), np.asarray((host - t - ahead_ns) * NS)) for t, host in kinds]
     groups = [each for each in grouped if each is not None]
-    if not groups:
+    if not groups or any(_crude_slope(t, ahead) > MOST for t, ahead in groups):
         return unknown
     x, H = np.zeros(2), np.eye(2)
     for _ in range(ROUNDS):
         x, H = _parabola([_least(t, ahead, x) for t, ahead in groups], x)
-    if abs(x[0]) > MOST:
-        return unknown
     return ClockFit(float(x[0]), float(x[1]), float(np.sqrt(np.linalg.inv(H)[0, 0])), first_s, mid_ns * NS, last_s)
 
 
@@ -151,9 +150,15 @@ def _longest(t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> Pairs:
 def _grouped(t: Vector, ahead: Vector) -> tuple[Vector, Vector] | None:
     """Both as (GROUPS, n), the first few left out; None of too few."""
     n = len(t) // GROUPS
-    return (
-        (t[-n * GROUPS :].reshape(GROUPS, n), ahead[-n * GROUPS :].reshape(GROUPS, n)) if n >= LEAST_IN_GROUP else None
-    )
+    if n < LEAST_IN_GROUP:
+        return None
+    return t[-n * GROUPS :].reshape(GROUPS, n), ahead[-n * GROUPS :].reshape(GROUPS, n)
+
+
+def _crude_slope(t: Vector, ahead: Vector) -> float:
+    """From the first group's median to the last's, beside what adapters hold back."""
+    moved, passed = (float(np.median(each[-1]) - np.median(each[0])) for each in (ahead, t))
+    return max(abs(moved) - HELD_BACK_S, 0.0) / passed
 
 
 def _least(t: Vector, ahead: Vector, x: Vector) -> tuple[Vector, Vector, float]:
