@@ -28,7 +28,7 @@ from mpucal.calibration import calibrate
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import Abandoned
-from mpucal.session.events import Caution, Decision, Key, Knowledge, Meter, Output, Prompt, PromptKind, Verification
+from mpucal.session.events import Decision, Key, Knowledge, Meter, Output, Prompt, PromptKind, Verification
 from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
@@ -127,7 +127,6 @@ def run(bus_words: str, plan: Plan, seed: int) -> Trial:
             for _, v in witness.of(Verification)
             for z in (v.magnitude_mps2 / v.magnitude_std_mps2, v.direction_deg / v.direction_std_deg)
         ),
-        tuple(caution.code for _, caution in witness.of(Caution)),
         tuple(reason["message"] for reason in calibration.quality["reasons"])
         + tuple(decision.why for _, decision in witness.of(Decision)),
     )
