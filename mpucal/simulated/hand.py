@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from itertools import product as combinations
 from typing import Protocol
 
 import numpy as np
 
 from ..data import Vector
 from . import rotation
-from .legs import STEP_HZ, Hold, Leg, Move, Tumble, steps
-from .mishaps import Knock, Mishap, Slip, Warmth
+from .legs import STEP_HZ, Hold, Leg, Move, steps
+from .mishaps import Mishap
 
 # Faster than this no person reacts; so motion is settled this far ahead.
 REACTION_S = (0.5, 1.5)
@@ -167,148 +166,3 @@ class Hand:
         quaternion = rotation.exp(miss)
         vector = np.concatenate(([0.0], down))
         return rotation.product(rotation.product(quaternion, vector), rotation.conjugate(quaternion))[1:]
-
-
-class Guided(Hand):
-    """Goes where it is asked to and waits there; asked for nothing, varies faces, edges and corners."""
-
-    def __init__(self, rng: np.random.Generator) -> None:
-        super().__init__(rng)
-        corners = np.array([c for c in combinations((-1.0, 0.0, 1.0), repeat=3) if any(c)])
-        self._places = corners / np.linalg.norm(corners, axis=1, keepdims=True)
-        self._visited: list[Vector] = []
-
-    def rotate(self, now: Stance) -> Leg:
-        """To the asked direction, or on to another of its own."""
-        if self._down is None or not self._moved:
-            return super().rotate(now)
-        return self.pause(now, PAUSE_S)
-
-    def aim(self, now: Stance) -> Vector:
-        """To the asked direction, else to the one least like those visited."""
-        if self._down is not None:
-            return self.towards(now, self.missed(self._down), self._rng.uniform(-0.5, 0.5))
-        down = -rotation.up_in_board(now.attitude)
-        if not self._visited:
-            self._visited.append(down)
-        angle = np.arccos(np.clip(self._places @ down, -1.0, 1.0))
-        nearest = np.max(self._places @ np.array(self._visited).T, axis=1)
-        reachable = (angle > TURN_RAD[0]) & (angle < TURN_RAD[1] - 0.2)
-        cost = nearest + self._rng.uniform(0.0, 0.2, len(nearest)) + np.where(reachable, 0.0, 10.0)
-        place = self._places[int(np.argmin(cost))]
-        self._visited.append(place)
-        return self._varied(now, self.missed(place))
-
-    def _varied(self, now: Stance, down: Vector) -> Vector:
-        """A turn to `down` with as much twist about the vertical as 50 to 130 deg leave room for."""
-        turn = self.towards(now, down)
-        for twist in self._rng.uniform(-1.5, 1.5, 8):
-            twisted = self.towards(now, down, float(twist))
-            if TURN_RAD[0] <= np.linalg.norm(twisted) <= TURN_RAD[1]:
-                return twisted
-        return turn
-
-
-class Placing(Guided):
-    """Sets the board down on something in each orientation, and lets go of it."""
-
-    HELD = ON_THE_TABLE
-
-
-class Wandering(Guided):
-    """Pauses as others do, but in any orientation, whatever it is asked for."""
-
-    def aim(self, now: Stance) -> Vector:
-        """Anywhere."""
-        axis = self._rng.normal(size=3)
-        return np.asarray(axis / np.linalg.norm(axis) * self._rng.uniform(*TURN_RAD))
-
-    def rotate(self, now: Stance) -> Leg:
-        """Moves and pauses by turns."""
-        return Hand.rotate(self, now)
-
-
-class OneAxis(Wandering):
-    """Turns the board about its x axis alone."""
-
-    def aim(self, now: Stance) -> Vector:
-        """On, by as much as others turn."""
-        return np.array([self._rng.uniform(*TURN_RAD), 0.0, 0.0])
-
-
-class Hasty(Guided):
-    """Follows as others do, four times as fast."""
-
-    HASTE = 4.0
-
-
-class Slipping(Guided):
-    """Holds the board by its sensor, whose accelerometer slips on its mount."""
-
-    MISHAP = Slip
-
-
-class Knocking(Guided):
-    """Knocks the board against something."""
-
-    MISHAP = Knock
-
-
-class Warming(Guided):
-    """Stands in the sun."""
-
-    MISHAP = Warmth
-
-
-class Random(Hand):
-    """Turns the board all the time, about every axis at once, whatever direction it is asked for."""
-
-    SINES = 6
-    RATE_RMS_RAD_S = math.radians(80.0)
-
-    def rotate(self, now: Stance) -> Leg:
-        """Six sines an axis at 0.08 to 0.7 Hz, 80 deg/s rms."""
-        if now.held == ON_THE_TABLE:
-            return self.move(now, self._rng.uniform(-0.3, 0.3, 3), IN_THE_HAND)
-        shape = (3, self.SINES)
-        return Tumble(
-            now.step,
-            now.step + steps(3600.0),
-            np.full(shape, self.RATE_RMS_RAD_S * math.sqrt(2 / self.SINES)),
-            2 * np.pi * self._rng.uniform(0.08, 0.7, shape),
-            self._rng.uniform(0.0, 2 * np.pi, shape),
-        )
-
-
-class Motionless(Hand):
-    """Lays the board flat, and never moves it when told to rotate."""
-
-    def rotate(self, now: Stance) -> Leg:
-        """Does not."""
-        return self.pause(now, PAUSE_S)
-
-
-class Restless(Guided):
-    """Fidgets where others pause: the board never lies still."""
-
-    FIDGET_RAD = math.radians(12.0)
-
-    def pause(self, now: Stance, seconds: float) -> Leg:
-        """A small turn, in the hand."""
-        turn = self._rng.uniform(-self.FIDGET_RAD, self.FIDGET_RAD, 3)
-        return Move(now.step, now.step + steps(self._rng.uniform(0.3, 0.7)), turn, (now.held, IN_THE_HAND))
-
-
-KINDS: dict[str, type[Hand]] = {
-    "guided": Guided,
-    "placing": Placing,
-    "random": Random,
-    "wandering": Wandering,
-    "still": Motionless,
-    "restless": Restless,
-    "one_axis": OneAxis,
-    "hasty": Hasty,
-    "slipping": Slipping,
-    "knocking": Knocking,
-    "warming": Warming,
-}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.hand import KINDS
+from mpucal.simulated.hands import KINDS
 from mpucal.simulated.mishaps import KNOCK_S, WARMER_C, WARMING_S, Knock, Mishap, Slip, Warmth
 
 FORCE, RATE = np.tile([0.0, 3.0, 9.0], (5, 1)), np.zeros((5, 3))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mpucal.simulated import rotation
-from mpucal.simulated.hand import KINDS
+from mpucal.simulated.hands import KINDS
 from mpucal.simulated.motion import AHEAD_S, Motion, Wobble
 
 GRAVITY = 9.81
@@ -178,6 +178,29 @@ def test_the_random_hand_turns_all_the_time():
     np.testing.assert_allclose(rate.std(axis=0), 80, atol=20)
     assert len(run.pauses()) < 60
     assert np.abs(rate).max() < 500
+
+
+def poses_of(run, first_s, last_s):
+    """Where gravity points (k, 3) in each pause between two times, one after the other."""
+    still = np.abs(run.part(run.rate, first_s, last_s)).max(axis=1) < 0.1
+    force = run.part(run.force, first_s, last_s)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], still.astype(int), [0]))))
+    held = [force[a:b].mean(axis=0) for a, b in edges.reshape(-1, 2) if b - a > 1.0 / PERIOD_S]
+    return np.array(held) / np.linalg.norm(held, axis=1, keepdims=True)
+
+
+def test_the_repeating_hand_verifies_by_poses_of_the_turning_and_two_of_them_twice():
+    asked = prompt("verify", (0.6, 0.0, 0.8))
+    # it misses by up to 8 deg each time
+    seen = np.cos(np.radians(16.5))
+    for seed in range(4):
+        run = Run("repeating", (*SESSION, (45.0, asked)), 64.0, seed=seed)
+        turned, verified = poses_of(run, 14.0, 45.0), poses_of(run, 48.0, 64.0)
+        assert len(verified) >= 4
+        assert (verified @ turned.T).max(axis=1).min() > seen
+        first, second, again, once_more = verified[:4]
+        assert first @ again > seen and second @ once_more > seen
+        assert first @ second < seen
 
 
 def test_the_still_hand_does_not_turn():

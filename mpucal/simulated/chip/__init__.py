@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...data import STANDARD_GRAVITY_MPS2
 from ..faults import mishaps
-from ..hand import KINDS
+from ..hands import KINDS
 from ..motion import Motion
 from ..sensor import SensorTruth
 from .bus import SimulatedBus

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...data import Vector
 from ..faults import OF_CHIP, Fault, Where
-from ..hand import KINDS
+from ..hands import KINDS
 from ..words import FAULT, Parser, at_least, faults, number, one_of, parsed, whole
 from .bus import KHZ
 from .clock import CLOCKS

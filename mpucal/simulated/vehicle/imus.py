@@ -10,7 +10,8 @@ import numpy as np
 from ...data import Vector
 from ...mavlink.prompts import Direction, Heard
 from ..faults import mishaps
-from ..hand import KINDS, HandPrompt
+from ..hand import HandPrompt
+from ..hands import KINDS
 from ..motion import Motion
 from ..sensor import SensorResponse, SensorTruth, Setting
 from .options import VehicleOptions

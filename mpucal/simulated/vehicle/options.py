@@ -8,7 +8,7 @@ from typing import Self
 
 from ...mavlink.parameters.names import CUSTOM_ANGLES
 from ..faults import OF_VEHICLE, Fault, Where
-from ..hand import KINDS
+from ..hands import KINDS
 from ..words import FAULT, Parser, at_least, faults, one_of, parsed, whole
 
 FIRMWARES = ("ardupilot", "px4")
