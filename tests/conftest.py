@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ import pytest
 from mpucal.session.threads import ONE_THREAD
 
 os.environ.update(ONE_THREAD)  # as the program does, and before NumPy or SciPy loads
+# notes of writes belong to no home
+os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="mpucal-state-")
 
 from mpucal.files import open_writer
 from mpucal.files.rows import Rows

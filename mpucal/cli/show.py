@@ -18,10 +18,13 @@ from ..files import load
 from ..files.formats import readable, recognised
 from ..result.blob import Blob
 from ..result.calibration import Calibration
+from ..result.journal import AT, Journal
+from ..sinks.table import SINKS
 from ..sources.kind import SourceKind
 from ..sources.opening import contents, one_of
 from ..sources.table import kinds_meant, used_by
 from .options import check_source, source_options
+from .person import say
 from .summary import formula, slope, summary
 
 EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --json`, or `mpucal show --serial PORT`"
@@ -57,6 +60,13 @@ def command(file: Path | None, as_json: bool, **options: Any) -> None:
 
 
 def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) -> None:
+    for sink in SINKS.values():
+        left = Journal.of(sink.name, options[kind.option.name]).left() if sink.behind(kind) else None
+        if left is not None:
+            say(
+                f"a write to {sink.where} was cut off at {left[AT]}: it may hold some old and some new values;"
+                f" the next `mpucal write CALIBRATION {sink.name} {kind.option.spelled} ...` begins with that"
+            )
     if kind.store:
         with resolve_name(kind.store)(options[kind.option.name]) as store:
             number, blob = store.take()

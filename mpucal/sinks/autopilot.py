@@ -18,18 +18,20 @@ from ..mavlink.parameters.names import all_places
 from ..mavlink.parameters.plan import NOTHING, Change, changes, helping, left_out, moved
 from ..mavlink.parameters.text import param_text, params_text, read_parameters_file
 from ..mavlink.parameters.verify import OtherPlacesError, verify
-from ..mavlink.parameters.write import Writer
+from ..mavlink.parameters.write import NEW, OLD, Writer, is_between
 from ..mavlink.prearm import Prearm, Watch, prearm
 from ..mavlink.request import command
 from ..mavlink.stillness import Stillness
 from ..mavlink.stream_parameters import read_stream_parameters
 from ..result.atomic import write_atomically
 from ..result.calibration import Calibration
+from ..result.journal import AT, Journal
 from ..session.at_rest import put_down
 from ..sources.vehicle import OpenedVehicle
 from .kind import Device
+from .signals import interrupting
 from .sink import Applied
-from .table import OLD_PARAM, OLD_PARAMS
+from .table import AUTOPILOT, OLD_PARAM, OLD_PARAMS
 
 FILE, FOLDERS = "{}mpucal-imu{}.bin", {ARDUPILOT: "/APM/", PX4: "/fs/microsd/"}
 CORRECTION = re.compile(r"(OFFS|SCAL)_[XYZ]$|[XYZ](OFF|SCALE)$")
@@ -47,7 +49,11 @@ def open_autopilot(device: Device) -> Iterator[AutopilotSink]:
     source: OpenedVehicle = device.open()
     with source.connected(device.say) as link:
         put_down(source.listeners, device.say)
-        yield AutopilotSink(link, "store" in device.flags)
+        sink = AutopilotSink(link, "store" in device.flags, Journal.of(AUTOPILOT, device.name))
+        said = sink.recover()
+        if said is not None:
+            device.say(said)
+        yield sink
 
 
 class AutopilotSink:
@@ -57,10 +63,12 @@ class AutopilotSink:
     ----------
     link : locked to the vehicle; the sink leaves it open.
     store : keep D and b_a, which parameters do not hold in full, as files in the vehicle's storage too.
+    journal : where a write is noted while it lasts.
     """
 
-    def __init__(self, link: Link, store: bool = False) -> None:
+    def __init__(self, link: Link, store: bool = False, journal: Journal | None = None) -> None:
         self._link = link
+        self._journal = journal or Journal()
         self._store = store
         self._firmware = PX4 if link.vehicle.is_px4 else ARDUPILOT
         self._watch = Watch(link)
@@ -69,6 +77,31 @@ class AutopilotSink:
     def where(self) -> str:
         """The vehicle, in words."""
         return str(self._link.vehicle)
+
+    def recover(self) -> str | None:
+        """Put back what an earlier write that was cut off noted, and say so; None where there was none.
+
+        Raises
+        ------
+        LinkError : the vehicle does not say what it holds. WriteBackError : see Sink.
+        """
+        left = self._journal.left()
+        if left is None:
+            return None
+        old, new = left[OLD], left[NEW]
+        writer = Writer(self._link, self._watch, [w for w in all_places(self._firmware) if set(w.names) <= set(old)])
+        held = writer.held()
+        cut_off = f"a write to this vehicle was cut off at {left[AT]}"
+        if held == old:
+            self._journal.done()
+            return None
+        if set(held) != set(old) or not is_between(held, old, new):
+            self._journal.done()
+            return f"{cut_off}, and {self.where} holds neither the parameters of before nor those: they are left alone"
+        with interrupting():
+            writer.write(held, old, lambda: None)
+        self._journal.done()
+        return f"{cut_off}: the parameters of before are back, read back as they were"
 
     def keep(self, folder: Path) -> tuple[Path, ...]:
         """Save all accelerometer parameters of the vehicle to a file that its ground stations load.
@@ -101,7 +134,7 @@ class AutopilotSink:
             raise RecordingError(
                 f"{kept} holds no accelerometer parameters of {self._firmware}", "give a file that a write kept"
             )
-        writer = Writer(self._link, self._watch, places)
+        writer = Writer(self._link, self._watch, places, self._journal)
         with _nothing_written():
             old = writer.held()
         writer.write(old, {name: wanted[name] for where in places for name in where.names}, lambda: None)
@@ -136,7 +169,8 @@ class AutopilotSink:
     def _written(self, calibration: Calibration) -> Applied:
         possible = changes(calibration, self._firmware)
         planned = helping(possible)
-        writer = self._writer = Writer(self._link, self._watch, [change.place for change in planned])
+        places = [change.place for change in planned]
+        writer = self._writer = Writer(self._link, self._watch, places, self._journal)
         stillness = Stillness(self._link, [change.stream for change in planned])
         with _nothing_written():
             self._check(planned)

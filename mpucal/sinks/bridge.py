@@ -70,8 +70,9 @@ class BridgeSink:
         try:
             self._store.write(new)
             read_back, held = self._store.read(), self._store.state()
-        except BusError as error:
-            read_back, held = self._after(error, old, new)
+        except (BusError, KeyboardInterrupt) as error:
+            failure = error if isinstance(error, BusError) else BusError("the write was interrupted", "start again")
+            read_back, held = self._after(failure, old, new)
         if read_back != new or held is None:
             raise self._restored(old)
         return Applied(

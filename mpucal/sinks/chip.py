@@ -28,13 +28,14 @@ from ..errors import ChipError, RecordingError, SourceError, WriteBackError
 from ..result.atomic import write_atomically
 from ..result.calibration import REFUSED, Calibration
 from ..result.improvement import is_better
+from ..result.journal import AT, Journal
 from ..session.at_rest import put_down
 from ..sources.chip import OpenedChip
 from .kind import Device
 from .sink import Applied
-from .table import CHIP_OFFSETS
+from .table import CHIP, CHIP_OFFSETS
 
-FORMAT = "mpucal.chip_offsets"
+FORMAT, REGISTERS = "mpucal.chip_offsets", "registers"
 
 # a calibration that fits the chip brings gravity out within 20 mg, wherever the board lies
 GRAVITY_MPS2 = 0.2
@@ -60,20 +61,42 @@ def open_chip(device: Device) -> Iterator[ChipSink]:
     source: OpenedChip = device.open()
     with closing(source.bus):
         put_down(source.listeners, device.say)
-        yield ChipSink(source.bus, f"the chip on {device.name}")
+        sink = ChipSink(source.bus, f"the chip on {device.name}", Journal.of(CHIP, device.name))
+        said = sink.cut_off()
+        if said is not None:
+            device.say(said)
+        yield sink
 
 
 class ChipSink:
-    """The offset registers of the chip on `bus`; `where` says which one, in words."""
+    """The offset registers of the chip on `bus`; `where` says which one, in words, `journal` notes a write."""
 
-    def __init__(self, bus: Bus, where: str) -> None:
+    def __init__(self, bus: Bus, where: str, journal: Journal | None = None) -> None:
+        self._journal = journal or Journal()
         self._port = Port(bus, Decoder(where))
         self.where = where
 
+    def cut_off(self) -> str | None:
+        """What an earlier write that was cut off may have left, in a sentence; None where there was none.
+
+        Raises
+        ------
+        SourceError : the chip cannot be read.
+        """
+        left = self._journal.left()
+        if left is None:
+            return None
+        if left[REGISTERS] == _hex(self._blocks()):
+            self._journal.done()
+            return None
+        return (
+            f"a write to the offset registers of {self.where} was cut off at {left[AT]}, and they hold something else"
+            " than before it: a reset, as with the supply off, brings the factory's trim back"
+        )
+
     def keep(self, folder: Path) -> tuple[Path, ...]:
         """Save what the registers hold to chip-offsets.json; see Sink."""
-        registers = {f"0x{block.place[0]:02x}": block.data.hex() for block in self._blocks()}
-        document = {"format": FORMAT, "version": 1, "where": self.where, "registers": registers}
+        document = {"format": FORMAT, "version": 1, "where": self.where, REGISTERS: _hex(self._blocks())}
         # an earlier file holds an earlier state: it stays
         path = CHIP_OFFSETS.free_in(folder)
         write_atomically(path, (json.dumps(document, indent=2) + "\n").encode())
@@ -130,6 +153,7 @@ class ChipSink:
     @contextmanager
     def _old_or_new(self, olds: Sequence[Block]) -> Iterator[None]:
         """What fails within leaves the registers as they were."""
+        self._journal.begin({REGISTERS: _hex(olds)})
         try:
             yield
         except BaseException as error:
@@ -138,9 +162,11 @@ class ChipSink:
                     restore(self._port, old)
             except SourceError as worse:
                 raise WriteBackError(f"{_what(error)}, and then {worse.what}", worse.remedy) from error
+            self._journal.done()
             if isinstance(error, SourceError):
                 raise WriteBackError(f"{error.what}; the offset registers are as before", error.remedy) from error
             raise
+        self._journal.done()
 
     def _identified(self, calibration: Calibration) -> Place:
         """Where the offset registers are by the chip's name; ChipError where it is another chip than was calibrated."""
@@ -219,13 +245,18 @@ def _subtracted(words: Words, reference: Words, response: Response) -> Vector:
     return -np.array(difference(words, reference)) / response.lsb_per_g * STANDARD_GRAVITY_MPS2
 
 
+def _hex(blocks: Sequence[Block]) -> dict[str, str]:
+    """Registers by their first address, in hexadecimal digits."""
+    return {f"0x{block.place[0]:02x}": block.data.hex() for block in blocks}
+
+
 def _kept(path: Path) -> list[Block]:
     """What `keep` saved."""
     try:
         document = json.loads(path.read_bytes())
         if document["format"] != FORMAT:
             raise ValueError(f'"format" is {document["format"]!r}')
-        registers = {int(first, 0): bytes.fromhex(data) for first, data in document["registers"].items()}
+        registers = {int(first, 0): bytes.fromhex(data) for first, data in document[REGISTERS].items()}
         blocks = [Block(place, registers[place[0]]) for place in PLACES if place[0] in registers]
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise RecordingError(f"{path} holds no offset registers ({error})", f"give a {CHIP_OFFSETS.name}") from error

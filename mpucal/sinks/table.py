@@ -17,12 +17,14 @@ BRIDGE_BLOB = SessionFile("bridge-blob-N.bin", "the calibration that a bridge's 
 OLD_PARAM = SessionFile("autopilot_old.param", "what an ArduPilot's parameters were before a write")
 OLD_PARAMS = SessionFile("autopilot_old.params", "what a PX4's parameters were before a write")
 
+CHIP, BRIDGE, AUTOPILOT = "chip", "bridge", "autopilot"
+
 # by name; a session writes to them in this order, so that what is written later says what an earlier one applies
 SINKS = {
     kind.name: kind
     for kind in (
         SinkKind(
-            "chip",
+            CHIP,
             behind=lambda source: source.delivers is Delivers.REGISTERS,
             where="the chip's offset registers",
             holds="b_a alone, in steps of 1 mg, until the chip's supply goes",
@@ -31,7 +33,7 @@ SINKS = {
             kept=(CHIP_OFFSETS,),
         ),
         SinkKind(
-            "bridge",
+            BRIDGE,
             behind=lambda source: bool(source.store),
             default=True,
             where="the bridge's memory",
@@ -40,7 +42,7 @@ SINKS = {
             kept=(BRIDGE_BLOB,),
         ),
         SinkKind(
-            "autopilot",
+            AUTOPILOT,
             behind=lambda source: source.option is MAVLINK,
             default=True,
             where="the autopilot",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from ..result.clock import now
 from .doubt import doubt
 from .kind import Device, Say, SinkKind
 from .record import WRITTEN, Record
+from .signals import interrupting
 from .sink import Applied, Restorable, Sink
 
 # asks whether to go on; WriteBackError where the person says no, or where there is a doubt and no person
@@ -35,7 +37,8 @@ def write_to(kind: SinkKind, sink: Sink, calibration: Calibration, folder: Path,
     OutputError : the record could not be saved, and the sink keeps what was written.
     """
     kept = keep(kind, sink, folder, say)
-    applied = sink.write(calibration)
+    with _interrupted_as_refused(sink):
+        applied = sink.write(calibration)
     entry = {"to": kind.name, "where": sink.where, "what": applied.what, "at": now().isoformat()}
     extra = {**applied.calibration.extra, WRITTEN: [*applied.calibration.extra.get(WRITTEN, ()), entry]}
     try:
@@ -97,4 +100,15 @@ def put_back(kind: SinkKind, sink: Sink, kept: Path, folder: Path, say: Say) -> 
     if not isinstance(sink, Restorable):
         raise WriteBackError(f"nothing was written: {kept} is no calibration", "give a calibration.json")
     keep(kind, sink, folder, say)
-    return sink.put_back(kept)
+    with _interrupted_as_refused(sink):
+        return sink.put_back(kept)
+
+
+@contextmanager
+def _interrupted_as_refused(sink: Sink) -> Iterator[None]:
+    """By Ctrl-C, SIGTERM or SIGHUP a sink puts back what was there; then this is a write-back that failed."""
+    with interrupting():
+        try:
+            yield
+        except KeyboardInterrupt as error:
+            raise WriteBackError(f"the write was interrupted, and {sink.where} is as before", "start again") from error

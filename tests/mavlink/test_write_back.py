@@ -1,6 +1,8 @@
 """A calibration written into simulated vehicles: the new parameters or the old ones, and the exit code says which."""
 
+import os
 import re
+import signal
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -18,9 +20,12 @@ from mpucal.mavlink.prearm import prearm
 from mpucal.mavlink.prompts import Heard, to_message
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
+from mpucal.result.journal import Journal
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 from mpucal.sinks.autopilot import AutopilotSink
+from mpucal.sinks.table import SINKS
+from mpucal.sinks.write_back import write_to
 
 FIRMWARES = ("ardupilot", "px4")
 SCALED = ("SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
@@ -417,3 +422,76 @@ def test_px4_says_whether_it_would_arm_though_it_does_not_list_the_check(words):
     vehicle, _, link = vehicle_of("px4", words)
     assert not vehicle.firmware.sys_status().onboard_control_sensors_present & 0x10000000
     assert prearm(link).ready is not bool(words)
+
+
+class Killed(BaseException):
+    """As kill -9: nothing of the program runs any more."""
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGINT"])
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_a_signal_in_the_middle_of_a_write_restores(firmware, name, tmp_path):
+    vehicle, transport, link = vehicle_of(firmware, ",imus=1")
+    old, numbers = stored(vehicle), []
+
+    def befall(count, message):
+        numbers.append(count)
+        # the second one comes while the old parameters are put back
+        if (count in (4, 6) and name != "SIGINT") or count == 4:
+            os.kill(os.getpid(), getattr(signal, name))
+        return True
+
+    transport.befall = befall
+    journal = Journal(tmp_path / "note.json")
+    sink = AutopilotSink(link, journal=journal)
+    before = signal.getsignal(getattr(signal, name))
+    with pytest.raises(WriteBackError, match="interrupted; the old parameters are back") as raised:
+        write_to(SINKS["autopilot"], sink, calibration_of(vehicle), tmp_path, lambda kind, now: now, print)
+    assert raised.value.exit_code == 6
+    assert len(numbers) > 6
+    assert stored(vehicle) == old
+    assert journal.left() is None
+    assert signal.getsignal(getattr(signal, name)) == before
+
+
+@pytest.mark.parametrize("number", [1, 3, 5, 6])
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_after_a_kill_the_next_write_finds_what_was_there(firmware, number, tmp_path):
+    vehicle, transport, link = vehicle_of(firmware, ",imus=1")
+    old, journal = stored(vehicle), Journal(tmp_path / "note.json")
+    calibration = calibration_of(vehicle)
+
+    def befall(count, message):
+        if count == number:
+            raise Killed
+        return True
+
+    transport.befall = befall
+    with pytest.raises(Killed):
+        AutopilotSink(link, journal=journal).write(calibration)
+    assert journal.left() is not None
+    transport.befall = lambda count, message: True
+    assert (stored(vehicle) == old) is (number == 1)
+    said = AutopilotSink(link, journal=journal).recover()
+    assert stored(vehicle) == old
+    assert journal.left() is None
+    assert said is None if number == 1 else "the parameters of before are back" in said
+    assert AutopilotSink(link, journal=journal).recover() is None
+
+
+def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_off(tmp_path):
+    vehicle, transport, link = vehicle_of("ardupilot", ",imus=1")
+    journal = Journal(tmp_path / "note.json")
+
+    def befall(count, message):
+        if count == 3:
+            raise Killed
+        return True
+
+    transport.befall = befall
+    with pytest.raises(Killed):
+        AutopilotSink(link, journal=journal).write(calibration_of(vehicle))
+    other, sets, link = vehicle_of("ardupilot", ",imus=1,seed=9,INS_ACCOFFS_X=0.7")
+    assert "left alone" in AutopilotSink(link, journal=journal).recover()
+    assert sets.sets == 0
+    assert other.firmware.store["INS_ACCOFFS_X"] == pytest.approx(0.7)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from ...errors import EndOfCapture, MpucalError, WriteBackError
+from ...result.journal import Journal
 from ..link import Link, S
 from ..prearm import Watch
 from .client import Parameters
@@ -15,6 +16,8 @@ from .names import Place
 # PX4 takes a vector over where it differs by more than 0.01 from the one in use: the last axis goes by a detour
 DETOUR = 0.05
 TAKEN_OVER_NS = S // 4
+# of the journal
+OLD, NEW = "old", "new"
 
 FAILURES = (MpucalError, EndOfCapture, KeyboardInterrupt)
 
@@ -32,16 +35,17 @@ class Writer:
 
     Parameters
     ----------
-    watch : hears its heartbeats. places : whose parameters are written.
+    watch : hears its heartbeats. places : whose parameters are written. journal : notes old and new meanwhile.
 
     Attributes
     ----------
     restored : a write failed, and the old parameters are back.
     """
 
-    def __init__(self, link: Link, watch: Watch, places: Sequence[Place]) -> None:
+    def __init__(self, link: Link, watch: Watch, places: Sequence[Place], journal: Journal | None = None) -> None:
         self._link, self._watch, self._places = link, watch, tuple(places)
         self._parameters = Parameters(link)
+        self._journal = journal or Journal()
         self._touched: set[str] = set()
         self.restored = False
 
@@ -64,6 +68,7 @@ class Writer:
         """
         if self._watch.armed:
             raise WriteBackError("the vehicle is armed, so nothing was written", "disarm it, then write again")
+        self._journal.begin({OLD: dict(old), NEW: dict(new)})
         try:
             for where, names in self._vectors():
                 if any(as_float32(new[name]) != old[name] for name in names):
@@ -75,6 +80,7 @@ class Writer:
             self._disarmed()
         except FAILURES as failure:
             self._restore(old, failure)
+        self._journal.done()
 
     def _vectors(self) -> Iterator[tuple[Place, tuple[str, ...]]]:
         for where in self._places:
@@ -115,7 +121,14 @@ class Writer:
                 "load the file of old parameters with your ground station before the next flight",
             ) from failure
         self.restored = True
+        self._journal.done()
         raise WriteBackError(f"{what}; the old parameters are back, and read back as they were", remedy) from failure
+
+
+def is_between(held: Mapping[str, float], old: Mapping[str, float], new: Mapping[str, float]) -> bool:
+    """Whether a write from `old` to `new` that was cut off can have left this: each is one of both, or a detour."""
+    reach = DETOUR * 1.01
+    return all(min(abs(held[name] - old[name]), abs(held[name] - new.get(name, old[name]))) <= reach for name in old)
 
 
 def _steps(where: Place, names: Sequence[str], values: Mapping[str, float]) -> Iterator[Step]:
