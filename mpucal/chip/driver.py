@@ -26,6 +26,7 @@ from .port import Port
 from .probe import probe, read_identity
 from .settings import Settings
 from .setup import configure, configured, quiet, reset, restart_fifo, wake
+from .tally import REMEDY, Tally
 
 DRIVER_VERSION = 4
 
@@ -70,7 +71,8 @@ class Driver:
     Parameters
     ----------
     bus : where the chip is. config : how it is to measure. name : what to call its recording.
-    say : is told, once it was started, what a person should know of this chip: one sentence, no full stop.
+    say : is told what a person should know of this chip as it starts, and of its bus as it stops: one sentence, no full
+        stop. tally : counts the transfers.
     """
 
     def __init__(
@@ -79,10 +81,11 @@ class Driver:
         config: Config | None = None,
         name: str = "recording",
         say: Callable[[str], None] = lambda _sentence: None,
+        tally: Tally | None = None,
     ) -> None:
         self._say = say
         self._decoder = Decoder(name)
-        self._port = Port(bus, self._decoder)
+        self._port = Port(bus, self._decoder, tally)
         self._config = config or Config()
         self._settings: Settings | None = None
         self._polls = 0
@@ -162,6 +165,8 @@ class Driver:
         """Quiet the FIFO, if the bus still works; the chip stays awake."""
         with suppress(BusError, EndOfCapture):
             quiet(self._port)
+        if self._port.tally.errors:
+            self._say(f"{self._port.tally}: {REMEDY}")
 
     def _look_before_reset(self) -> None:
         # the reset reloads the factory's trim: what somebody wrote before is kept in the capture, wherever it is

@@ -8,6 +8,7 @@ from typing import TypeVar
 from ..errors import BusError
 from .access import Bus
 from .decode import Decoder
+from .tally import Tally
 
 TRIES = 3
 RETRY_NS = 1_000_000
@@ -19,9 +20,14 @@ class Port:
     """Reads and writes, each of them followed by `decoder` where it succeeded.
 
     Every method raises BusError where a transfer failed, EndOfCapture where a replay has ended.
+
+    Attributes
+    ----------
+    tally : counts the transfers.
     """
 
-    def __init__(self, bus: Bus, decoder: Decoder) -> None:
+    def __init__(self, bus: Bus, decoder: Decoder, tally: Tally | None = None) -> None:
+        self.tally = Tally() if tally is None else tally
         self._bus = bus
         self._decoder = decoder
         self._now_ns = 0
@@ -37,7 +43,7 @@ class Port:
 
     def read_once(self, register: int, count: int) -> bytes:
         """The same where reading takes something away from the chip, so that a second read gives something else."""
-        reply = self._bus.read(register, count)
+        reply = self._counted(lambda: self._bus.read(register, count))
         self._now_ns = max(self._now_ns, reply.t_ns)
         self._decoder.saw_read(register, reply.data, reply.t_ns, reply.host_ns)
         return reply.data
@@ -48,7 +54,7 @@ class Port:
 
     def write_block(self, register: int, data: bytes) -> None:
         """Write `data` from `register` on, in one transfer; up to three tries."""
-        t_ns = self._retried(lambda: self._bus.write(register, data))
+        t_ns = self._retried(lambda: self._counted(lambda: self._bus.write(register, data)))
         self._now_ns = max(self._now_ns, t_ns)
         self._decoder.saw_write(register, data)
 
@@ -61,10 +67,19 @@ class Port:
         """Wait for so long."""
         self.sleep_until(self._now_ns + ns)
 
+    def _counted(self, access: Callable[[], T]) -> T:
+        self.tally.transfers += 1
+        try:
+            return access()
+        except BusError as error:
+            self.tally.failed(error)
+            raise
+
     def _retried(self, access: Callable[[], T]) -> T:
         for _ in range(TRIES - 1):
             try:
                 return access()
             except BusError:
                 self.sleep(RETRY_NS)
+                self.tally.retries += 1
         return access()

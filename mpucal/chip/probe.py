@@ -41,6 +41,12 @@ def read_identity(port: Port) -> int:
             "the chip at this address is a real-time clock (a DS1307 or DS3231), not an MPU",
             "tie the MPU's AD0 to VCC and give --address 0x69",
         )
+    if who_am_i in (0x00, 0xFF) and set(head) == {who_am_i}:
+        cause = "nothing drives SDA while it is read" if who_am_i else "SDA stays low while it is read"
+        raise ChipError(
+            f"every register reads 0x{who_am_i:02x}: {cause}",
+            "check SDA, SCL and GND, the connectors and the pull-ups, and that the chip has its supply",
+        )
     if who_am_i in (0x00, 0xFF) or power & POWER_UNUSED or count > FIFO_COUNT_MAX:
         raise ChipError(
             f"the chip answers 0x{who_am_i:02x} to WHO_AM_I and has no MPU's registers",

@@ -40,6 +40,11 @@ def wake(port: Port) -> None:
         held = port.read(reg.PWR_MGMT_1, 1)[0]
         if held == reg.CLKSEL_PLL:
             return
+    if not held & reg.PWR_MGMT_1_SLEEP:
+        raise ChipError(
+            f"bits change on the bus (PWR_MGMT_1 reads 0x{held:02x} after 0x{reg.CLKSEL_PLL:02x} was written)",
+            "shorten the wires, check SDA for shorts and its pull-up, or slow the bus down",
+        )
     raise ChipError(
         f"the chip does not wake up (its PWR_MGMT_1 stays at 0x{held:02x})",
         "take its supply away for a moment, and check that it gets 3.3 V",

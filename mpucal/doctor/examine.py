@@ -22,12 +22,20 @@ from ..chip.offsets import PLACES, Block, restore
 from ..chip.port import Port
 from ..chip.probe import read_identity
 from ..chip.response import measured_response
-from ..chip.self_test import run_self_test
+from ..chip.self_test import SelfTest, run_self_test
+from ..chip.tally import REMEDY, Tally
 from ..data import Sensor
 from ..errors import ChipError, OddOffsets, SourceError
+from .dead import DEAD_AXIS, REPLACE, named
 from .finding import Finding, Mark, failed
 from .measure import examine_stream
 from .speed import examine_speed
+
+# of the transfers: a session bears some, and none when most fail
+MANY, MOST = 0.05, 0.5
+
+# of what the factory measured: an axis that moves by less is dead
+UNMOVED = 0.05
 
 Look = Callable[[Bus], Iterable[Finding]]
 
@@ -39,7 +47,8 @@ def examine(bus: Bus, config: Config, seconds: float, way: Look = examine_speed)
     ----------
     seconds : how long to watch its stream; the board is to lie still. way : examines what leads to the chip.
     """
-    port = Port(bus, Decoder("doctor"))
+    tally = Tally()
+    port = Port(bus, Decoder("doctor"), tally)
     try:
         # a stranger is not written to
         read_identity(port)
@@ -49,18 +58,33 @@ def examine(bus: Bus, config: Config, seconds: float, way: Look = examine_speed)
             # until the board is put down; one that is not is told of later
             bench.rest()
     except SourceError as error:
+        yield from _transfers(tally)
         yield failed("chip", error)
         return
-    driver = Driver(bus, config, "doctor")
+    driver = Driver(bus, config, "doctor", tally=tally)
     try:
         yield from _awake(port, driver, config, seconds, olds)
     except SourceError as error:
+        yield from _transfers(tally)
         yield failed("broken off", error)
+    else:
+        yield from _transfers(tally, always=True)
     finally:
         driver.stop()
         with suppress(SourceError):
             for old in olds:
                 restore(port, old)
+
+
+def _transfers(tally: Tally, always: bool = False) -> Iterator[Finding]:
+    """How many failed; not of a bus on which nothing worked."""
+    data = {"transfers": tally.transfers, "retries": tally.retries, "errors": dict(tally.errors)}
+    if not tally.errors:
+        if always:
+            yield Finding("transfers", Mark.OK, str(tally), "", data)
+        return
+    if always or tally.share < MOST:
+        yield Finding("transfers", Mark.BAD if tally.share > MANY else Mark.NOTE, str(tally), REMEDY, data)
 
 
 def _awake(port: Port, driver: Driver, config: Config, seconds: float, olds: list[Block]) -> Iterator[Finding]:
@@ -122,8 +146,18 @@ def _self_test(port: Port, part: Part) -> tuple[Finding, list[str]]:
     what = f"accelerometer {accel} %, gyroscope {gyro} % of what the factory measured"
     if test.passed:
         return Finding("self test", Mark.OK, what, "", data), []
+    if dead := _unmoved(test):
+        what = f"{dead} did not move by the self test's force ({what})"
+        return Finding(DEAD_AXIS, Mark.BAD, what, REPLACE, data), [DEAD_AXIS]
     remedy = "keep the board still and repeat; if it fails again, the chip is damaged or not genuine"
     return Finding("self test", Mark.BAD, what, remedy, data), ["its self test fails"]
+
+
+def _unmoved(test: SelfTest) -> str:
+    """The axes that answered with about nothing, in words."""
+    return named(
+        {"accelerometer": test.accel_shares, "gyroscope": test.gyro_shares}, lambda share: abs(share) < UNMOVED
+    )
 
 
 def _offsets(port: Port, part: Part) -> tuple[Finding, list[str]]:
@@ -144,6 +178,8 @@ def _offsets(port: Port, part: Part) -> tuple[Finding, list[str]]:
 
 
 def _verdict(sensor: Sensor, doubts: list[str]) -> Finding:
+    if DEAD_AXIS in doubts:
+        return Finding("genuine?", Mark.UNKNOWN, f"undecided: the chip has a {DEAD_AXIS}", REPLACE)
     if not doubts:
         return Finding("genuine?", Mark.OK, f"consistent with a genuine {sensor.chip}", "", {"doubts": []})
     return Finding(

@@ -11,8 +11,11 @@ import os
 import pwd
 import stat
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
+from ..chip.families import PARTS
+from ..chip.registers import WHO_AM_I
 from ..sources.i2c_errors import transfer_error
 from .finding import Finding, Mark, failed
 
@@ -101,6 +104,12 @@ def _kernel_drivers(number: str) -> Iterator[Finding]:
             driver = link.readlink().name
         except OSError:
             continue
+        # a clock's own driver: to unbind it would take the computer's time away
+        if driver.startswith("rtc-"):
+            what = f"{driver} holds 0x{address:02x}: a real-time clock is there"
+            data = {"driver": driver, "address": address}
+            yield Finding("kernel driver", Mark.NOTE, what, "tie the MPU's AD0 to VCC and give --address 0x69", data)
+            continue
         yield Finding(
             "kernel driver",
             Mark.BAD,
@@ -131,13 +140,32 @@ def _who_answers(path: str) -> Iterator[Finding]:
         yield Finding("adapter", Mark.NOTE, "SMBus only: 32 bytes per transfer", "keep to 200 Hz or less")
     words = [f"0x{address:02x}{_guess(address, answer)}" for address, answer in found.items()]
     ours = any(address in OURS for address in found)
+    elsewhere = [] if ours else _elsewhere(path)
+    remedy = f"it is on another bus: give --bus {elsewhere[0]}" if elsewhere else "check VCC, GND, SDA, SCL and AD0"
     yield Finding(
         "on the bus",
         Mark.OK if ours else Mark.BAD,
         "; ".join(words) or "nothing answers",
-        "" if ours else "check VCC, GND, SDA, SCL and AD0",
-        {"addresses": sorted(found), "smbus_only": not can_i2c},
+        "" if ours else remedy,
+        {"addresses": sorted(found), "smbus_only": not can_i2c, "elsewhere": elsewhere},
     )
+
+
+def _elsewhere(path: str) -> list[str]:
+    """The other adapters beside `path` on which an MPU's identity is read at one of our addresses."""
+    import smbus2  # noqa: PLC0415
+
+    found = []
+    for other in sorted(Path(path).parent.glob("i2c-*")):
+        if other == Path(path):
+            continue
+        for address in OURS:
+            # nothing is written to a bus that nobody named; one that is not ours to open, or does not answer, is not it
+            with suppress(OSError), smbus2.SMBus(str(other)) as bus:
+                if bus.read_byte_data(address, WHO_AM_I) in PARTS:
+                    found.append(str(other))
+                    break
+    return found
 
 
 def _answers(bus: object) -> dict[int, str]:

@@ -9,6 +9,7 @@ import numpy as np
 from ..chip.clock import RATE_TOLERANCE
 from ..chip.families import Family
 from ..data import STANDARD_GRAVITY_MPS2, Recording
+from .dead import dead_axes, live_axes
 from .finding import Finding, Mark
 from .noise import density, trembles
 
@@ -27,13 +28,22 @@ def examine_stream(recording: Recording, nominal_hz: float, seconds: float, fami
     yield _losses(recording, seconds)
     acc, gyr = recording.acc, np.degrees(recording.gyr)
     hz = float(recording.sensor.rate_hz or nominal_hz)
-    if trembles(acc, hz):
+    dead = dead_axes(recording)
+    if dead is not None:
+        yield dead
+    # what stands still has no noise, and rounding would be taken for a hand's
+    acc_lives, gyr_lives = live_axes(acc), live_axes(gyr)
+    if acc_lives.any() and trembles(acc[:, acc_lives], hz):
         yield Finding("noise", Mark.UNKNOWN, "the board moved", "put it on a firm surface and try again")
         return
-    ug = density(acc, hz) / STANDARD_GRAVITY_MPS2 * 1e6
-    yield _noise("accelerometer noise", ug, family.accel_noise_ug, "ug_rthz", "µg/√Hz")
-    yield _noise("gyroscope noise", density(gyr, hz), family.gyro_noise_dps, "dps_rthz", "deg/s/√Hz")
-    yield _gravity(recording)
+    if acc_lives.any():
+        ug = density(acc[:, acc_lives], hz) / STANDARD_GRAVITY_MPS2 * 1e6
+        yield _noise("accelerometer noise", ug, family.accel_noise_ug, "ug_rthz", "µg/√Hz")
+    if gyr_lives.any():
+        noise_dps = density(gyr[:, gyr_lives], hz)
+        yield _noise("gyroscope noise", noise_dps, family.gyro_noise_dps, "dps_rthz", "deg/s/√Hz")
+    if acc_lives.all():
+        yield _gravity(recording)
     yield _zero_rate(gyr.mean(0).tolist(), family.zero_rate_dps)
     yield _temperature(float(recording.temperature_c.mean()))
 

@@ -24,6 +24,7 @@ class Where(StrEnum):
     VEHICLE = "vehicle"
     LINK = "link"
     SERIAL = "serial"
+    DEFECT = "defect"
 
 
 OF_CHIP = (Where.BUS, Where.CHIP)
@@ -45,6 +46,7 @@ class FaultKind:
     share : of the packets, or of the bytes, that it befalls.
     spoils : what a serial line makes of a byte, with a number from 1 to 255 to vary it.
     mishap : what befalls the sensor.
+    pins : words of a sample, by number, that stay at this count. alters : what a read at a register gives instead.
     """
 
     name: str
@@ -61,6 +63,19 @@ class FaultKind:
     share: float = 0.0
     spoils: Callable[[int, int], bytes] | None = None
     mishap: type[Mishap] | None = None
+    pins: tuple[tuple[int, ...], int] | None = None
+    alters: Callable[[int, bytes], bytes] | None = None
+
+
+ACC, GYR, TEMPERATURE = (0, 1, 2), (4, 5, 6), (3,)
+# 12:00:07 on a Saturday, as a DS3231 tells it
+TIME = bytes([0x07, 0x00, 0x12, 0x07, 0x21, 0x11, 0x26])
+
+
+def _of_a_clock(register: int, data: bytes) -> bytes:
+    """What a DS3231 gives: its 19 registers, again and again."""
+    held = TIME + bytes(12)
+    return bytes(held[(register + i) % len(held)] for i in range(len(data)))
 
 
 _ROWS = (
@@ -133,6 +148,44 @@ _ROWS = (
         flips=True,
         share=1 / 2000,
     ),
+    FaultKind(
+        "nacks",
+        Where.DEFECT,
+        "one transfer in fifty is not acknowledged",
+        timed=False,
+        seconds=math.inf,
+        errno=errno.EREMOTEIO,
+        share=1 / 50,
+    ),
+    FaultKind(
+        "stuckbit",
+        Where.DEFECT,
+        "bit 4 of every byte that is read is 1",
+        timed=False,
+        alters=lambda _, data: bytes(byte | 0x10 for byte in data),
+    ),
+    FaultKind(
+        "ones",
+        Where.DEFECT,
+        "every byte that is read is 0xff: SDA is not connected",
+        timed=False,
+        alters=lambda _, data: b"\xff" * len(data),
+    ),
+    FaultKind(
+        "zeros",
+        Where.DEFECT,
+        "every byte that is read is 0",
+        timed=False,
+        alters=lambda _, data: bytes(len(data)),
+    ),
+    FaultKind("rtc", Where.DEFECT, "a DS3231 clock answers in its place", timed=False, alters=_of_a_clock),
+    FaultKind("low_x", Where.DEFECT, "accelerometer x stays at -32768", timed=False, pins=((0,), -32768)),
+    FaultKind("zero_z", Where.DEFECT, "accelerometer z stays at 0", timed=False, pins=((2,), 0)),
+    FaultKind("zero_acc", Where.DEFECT, "the accelerometer stays at 0", timed=False, pins=(ACC, 0)),
+    FaultKind("full_acc", Where.DEFECT, "the accelerometer stays at 32767", timed=False, pins=(ACC, 32767)),
+    FaultKind("zero_gyro", Where.DEFECT, "the gyroscope stays at 0", timed=False, pins=(GYR, 0)),
+    FaultKind("stuck_gy", Where.DEFECT, "gyroscope y stays at -15", timed=False, pins=((5,), -15)),
+    FaultKind("stuck_temp", Where.DEFECT, "the thermometer stays at 0", timed=False, pins=(TEMPERATURE, 0)),
     FaultKind("loose", Where.HAND, "the accelerometer turns by 8 deg on its mount", mishap=Slip),
     FaultKind("knock", Where.HAND, "a blow, which leaves the accelerometer's bias changed by 0.4 m/s²", mishap=Knock),
     FaultKind("zero_step", Where.HAND, "the accelerometer's bias steps by 10 mg on x", mishap=ZeroStep),

@@ -11,7 +11,7 @@ from __future__ import annotations
 import errno
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from ..chip.access import Reply
 from ..chip.families import PARTS
@@ -23,6 +23,8 @@ from .kind import Request
 
 # AD0 low, AD0 high
 ADDRESSES = (0x68, 0x69)
+
+TRIES = 3
 
 # i2c-dev refuses longer messages
 MAX_MESSAGE_BYTES = 8192
@@ -115,8 +117,7 @@ class I2cBus:
         strangers: list[int] = []
         for address in addresses:
             try:
-                with self._told(transfer_error, address):
-                    answer = self._identity(address)
+                answer = self._asked(address)
             except BusError as error:
                 failures.append(error)
             else:
@@ -129,6 +130,14 @@ class I2cBus:
             if not isinstance(failure, NoAnswer):
                 raise failure
         raise nobody(self._path, addresses)
+
+    def _asked(self, address: int) -> int:
+        """What answers there; one that is not acknowledged is asked again, since one in a hundred may be lost."""
+        for _ in range(TRIES - 1):
+            with suppress(NoAnswer), self._told(transfer_error, address):
+                return self._identity(address)
+        with self._told(transfer_error, address):
+            return self._identity(address)
 
     def _identity(self, address: int) -> int:
         """What answers there; smbus2 asks for the address itself, which a driver of the kernel may hold."""

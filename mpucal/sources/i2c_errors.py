@@ -22,7 +22,8 @@ _TRANSFER = {
     errno.EAGAIN: ("another master took the I2C bus", "let no other master use this bus"),
     errno.EBUSY: (
         "a driver of the kernel holds the chip",
-        "remove its overlay, or: echo {chip} | sudo tee /sys/bus/i2c/devices/{chip}/driver/unbind",
+        "remove its overlay, or: echo {chip} | sudo tee /sys/bus/i2c/devices/{chip}/driver/unbind; but leave a clock's"
+        " driver (rtc-ds1307), tie AD0 to VCC and give --address 0x69",
     ),
     errno.EOPNOTSUPP: (
         "the adapter cannot move this transfer",

@@ -182,8 +182,10 @@ def clock_chip(wrap, identity=0x25):
             {reg.WHO_AM_I: 0x61, reg.PWR_MGMT_1: 0xA5}, "0x61 to WHO_AM_I and has no MPU's", id="another chip"
         ),
         pytest.param({reg.WHO_AM_I: 0x61, reg.FIFO_COUNT_H: 0x80}, "0x61 to WHO_AM_I and has no MPU's", id="no FIFO"),
-        pytest.param({}, "0x00 to WHO_AM_I", id="nothing but zeros"),
-        pytest.param(dict.fromkeys(range(128), 0xFF), "0xff to WHO_AM_I", id="nothing but ones"),
+        pytest.param({}, "every register reads 0x00: SDA stays low", id="nothing but zeros"),
+        pytest.param(
+            dict.fromkeys(range(128), 0xFF), "every register reads 0xff: nothing drives SDA", id="nothing but ones"
+        ),
     ],
 )
 def test_a_stranger_is_refused_by_reading_alone(registers, says):

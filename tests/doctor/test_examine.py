@@ -56,12 +56,64 @@ def test_the_true_rate_is_measured():
         ("temperature_c=90", "temperature", Mark.NOTE),
         ("hand=restless", "noise", Mark.UNKNOWN),
         ("fault=brownout@5", "losses", Mark.BAD),
+        ("fault=nacks", "transfers", Mark.NOTE),
+        ("fault=low_x", "dead axis", Mark.BAD),
+        ("fault=zero_z", "dead axis", Mark.BAD),
+        ("fault=zero_acc", "dead axis", Mark.BAD),
+        ("fault=full_acc", "dead axis", Mark.BAD),
+        ("fault=zero_gyro", "dead axis", Mark.BAD),
+        ("fault=stuck_gy", "dead axis", Mark.BAD),
+        ("fault=stuck_temp", "dead axis", Mark.BAD),
     ],
 )
 def test_what_is_amiss_is_found(keys, topic, mark):
     told = findings(open_simulated(f"sim:{keys}"))
     assert told[topic].mark is mark
     assert told[topic].remedy
+
+
+def test_transfers_that_fail_now_and_then_are_counted_and_stop_nothing():
+    told = findings(open_simulated("sim:fault=nacks"))
+    counted = told["transfers"].data
+    assert counted["errors"] == {"not acknowledged": pytest.approx(counted["transfers"] / 50, rel=0.5)}
+    assert 0 < counted["retries"] <= counted["errors"]["not acknowledged"]
+    assert "genuine?" in told
+    assert "100 kHz" in told["transfers"].remedy
+
+
+@pytest.mark.parametrize(
+    ("fault", "says"),
+    [
+        ("ones", "every register reads 0xff: nothing drives SDA"),
+        ("zeros", "every register reads 0x00: SDA stays low"),
+        ("rtc", "is a real-time clock"),
+        ("stuckbit", "bits change on the bus"),
+    ],
+)
+def test_what_is_no_chip_or_no_wire_is_named(fault, says):
+    *_, last = findings(open_simulated(f"sim:fault={fault}")).values()
+    assert last.mark is Mark.BAD
+    assert says in last.what
+
+
+@pytest.mark.parametrize(
+    ("fault", "axes"),
+    [
+        ("low_x", ["accelerometer x"]),
+        ("zero_gyro", ["gyroscope x", "gyroscope y", "gyroscope z"]),
+        ("stuck_temp", ["the thermometer"]),
+    ],
+)
+def test_a_dead_axis_is_named(fault, axes):
+    dead = [f for f in examine(still(f"sim:fault={fault}"), Config(), 3.0) if f.topic == "dead axis"]
+    assert dead[0].data["dead"] == axes
+    assert "replace the chip" in dead[0].remedy
+
+
+def still(words):
+    bus = open_simulated(words)
+    bus.hear(Prompt(PromptKind.LAY_FLAT, ""))
+    return bus
 
 
 @pytest.mark.parametrize("at_s", [0, 1, 3, 5, 6, 8])

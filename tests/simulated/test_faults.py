@@ -14,15 +14,16 @@ from mpucal.simulated.faults import KINDS, OF_CHIP, OF_VEHICLE, Fault, Schedule,
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 
 DOCS = Path(__file__).parents[2] / "docs"
-WORLDS = {ChipOptions: (*OF_CHIP, Where.HAND), VehicleOptions: (*OF_VEHICLE, Where.HAND)}
+WORLDS = {ChipOptions: (*OF_CHIP, Where.DEFECT, Where.HAND), VehicleOptions: (*OF_VEHICLE, Where.HAND)}
 
 
-def table(page):
-    return (DOCS / page).read_text().split("| name | what happens |\n|---|---|\n")[1].split("\n\n")[0].splitlines()
+def table(page, number=1):
+    return (DOCS / page).read_text().split("| name | what happens |\n|---|---|\n")[number].split("\n\n")[0].splitlines()
 
 
 def test_the_pages_hold_the_table():
     assert table("chips.md") == [f"| {kind.name} | {kind.what} |" for kind in kinds(*OF_CHIP, Where.HAND).values()]
+    assert table("chips.md", 2) == [f"| {kind.name} | {kind.what} |" for kind in kinds(Where.DEFECT).values()]
     vehicles = kinds(*OF_VEHICLE).values()
     assert table("mavlink.md") == [f"| {kind.name}{'@' * kind.timed} | {kind.what} |" for kind in vehicles]
 

@@ -53,6 +53,8 @@ class SimulatedBus:
         """
         t_ns = self._begun()
         data = self._arriving(self._chip.read(register, count, t_ns))
+        if self._faults is not None:
+            data = self._faults.answered(register, data)
         # two addresses and the register, start, repeated start and stop, then the data
         self._clock.spend((27 + 3 + 9 * count) * self._bit_ns)
         return Reply(data, t_ns)

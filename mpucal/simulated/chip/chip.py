@@ -44,6 +44,7 @@ class Chip:
         self._frozen_until_ns = 0
         self._frozen: Counts | None = None
         self._stuck: list[tuple[int, int]] = []
+        self._pinned: list[tuple[tuple[int, ...], int]] = []
         self.reset(0)
 
     def read(self, register: int, count: int, t_ns: int) -> bytes:
@@ -141,6 +142,10 @@ class Chip:
         """These bits of a sample's word number `word` are 0 from now on."""
         self._stuck.append((word, bits))
 
+    def pin(self, words: tuple[int, ...], count: int) -> None:
+        """These words of a sample stay at `count`, whatever it measures."""
+        self._pinned.append((words, count))
+
     def slip(self, t_ns: int) -> None:
         """Its FIFO loses a byte."""
         self._advance(t_ns)
@@ -212,6 +217,8 @@ class Chip:
             counts[:, GYRO] = 0
         for word, bits in self._stuck:
             counts[:, word] &= ~bits
+        for words, count in self._pinned:
+            counts[:, words] = count
         self._ended = len(counts) < len(edges_s) - 1
         if len(counts) and edges_s[0] * 1e9 < self._frozen_until_ns:
             self._frozen = counts[:1] if self._frozen is None else self._frozen

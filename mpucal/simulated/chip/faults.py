@@ -24,6 +24,9 @@ class Faults:
     def __init__(self, faults: Sequence[Fault], chip: Chip, clock: SimulatedClock, rng: np.random.Generator) -> None:
         self._faults, self._chip, self._clock, self._rng = faults, chip, clock, rng
         self._schedule = Schedule(faults)
+        for fault in faults:
+            if fault.kind.pins is not None:
+                chip.pin(*fault.kind.pins)
 
     def before_transfer(self) -> None:
         """What happens now, before a transfer.
@@ -36,7 +39,7 @@ class Faults:
             for fault in due:
                 self._strike(fault)
         for kind in self._going_on():
-            if kind.errno is not None:
+            if kind.errno is not None and (not kind.share or self._rng.random() < kind.share):
                 self._clock.spend(round(kind.takes_s * 1e9))
                 raise OSError(kind.errno, os.strerror(kind.errno))
 
@@ -48,6 +51,13 @@ class Faults:
         hit = self._rng.random(len(data)) < share
         flipped = np.frombuffer(data, np.uint8) ^ np.where(hit, 1 << self._rng.integers(0, 8, len(data)), 0)
         return flipped.astype(np.uint8).tobytes()
+
+    def answered(self, register: int, data: bytes) -> bytes:
+        """What is read instead of `data` from `register` on."""
+        for fault in self._faults:
+            if fault.kind.alters is not None:
+                data = fault.kind.alters(register, data)
+        return data
 
     def words(self) -> list[str]:
         """Each as in an option."""

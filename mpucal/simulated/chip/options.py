@@ -91,7 +91,7 @@ PARSERS: dict[str, Parser] = {
     "seed": whole(0),
     "hand": one_of(KINDS),
     "pace": one_of(CLOCKS),
-    FAULT: faults(*OF_CHIP, Where.HAND),
+    FAULT: faults(*OF_CHIP, Where.DEFECT, Where.HAND),
     "rate_error_ppm": (number, "a number"),
     "D": (_matrix, "nine numbers with / between them, by row, that can be inverted"),
     "b_a": (_vector, "three numbers with / between them, in m/s^2"),
