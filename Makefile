@@ -1,7 +1,9 @@
 # Two commands are all that a newcomer types: `make session` and `make test`. Each sets up what it needs.
 VENV := .venv
 BIN := $(VENV)/bin
+# what runs mpucal, and what tests it
 READY := $(VENV)/.ready
+TESTED := $(VENV)/.tested
 export PYTHON
 
 .PHONY: session test lint bench firmware clean
@@ -12,7 +14,7 @@ session: $(READY)
 test: lint
 	$(BIN)/pytest --numprocesses auto --dist loadfile
 
-lint: $(READY)
+lint: $(TESTED)
 	$(BIN)/ruff check --quiet .
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
@@ -22,9 +24,15 @@ bench: $(READY)
 	@$(BIN)/python tools/bench.py
 
 # what is compiled here is what a rebuild hangs on
-$(READY): tools/set_up pyproject.toml CMakeLists.txt mpucal/calibration/parameters.py $(shell find mpucal -name '*.[ch]pp')
-	@tools/set_up $(VENV)
+BUILT_OF := tools/set_up pyproject.toml CMakeLists.txt mpucal/calibration/parameters.py $(shell find mpucal -name '*.[ch]pp')
+
+$(READY): $(BUILT_OF)
+	@tools/set_up $(VENV) mavlink,plot
 	@touch $@
+
+$(TESTED): $(BUILT_OF)
+	@tools/set_up $(VENV) dev
+	@touch $(READY) $@
 
 # needs avr-gcc and avr-libc; says how much flash and RAM the bridge takes
 firmware:

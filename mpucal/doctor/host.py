@@ -6,9 +6,7 @@ Source: Linux Documentation/i2c/dev-interface.rst and sysfs; i2c-tools' i2cdetec
 from __future__ import annotations
 
 import errno
-import grp
 import os
-import pwd
 import stat
 from collections.abc import Iterator
 from contextlib import suppress
@@ -62,6 +60,10 @@ def _device_file(path: Path) -> Finding:
         return Finding(
             "device file", Mark.BAD, f"{path}: {error.strerror}", f"enable I2C (buses there are: {others}); {DTPARAM}"
         )
+    # not everywhere: a machine without them has no such device file
+    import grp  # noqa: PLC0415
+    import pwd  # noqa: PLC0415
+
     owner, group = _name(pwd.getpwuid, about.st_uid), _name(grp.getgrgid, about.st_gid)
     what = f"{path}, {stat.filemode(about.st_mode)} {owner}:{group}"
     data = {"path": str(path), "mode": stat.filemode(about.st_mode), "owner": owner, "group": group}

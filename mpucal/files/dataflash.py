@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import struct
 from contextlib import closing, redirect_stderr, redirect_stdout, suppress
-from importlib import import_module
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from ..data import Recording
 from ..errors import RecordingError
+from ..mavlink.dialect import pymavlink
 from ..mavlink.firmwares import ARDUPILOT
 from ..mavlink.imu import DATAFLASH, Reading, Stream
 from ..mavlink.log import Log
@@ -57,7 +57,7 @@ def load_dataflash(path: Path) -> Recording:
 
 def _fill(log: Log, path: Path) -> None:
     """Take the IMU and parameter messages, up to where the file is damaged."""
-    DFReader = import_module("pymavlink.DFReader")
+    DFReader = pymavlink("DFReader")
     with suppress(*_DAMAGE), closing(DFReader.DFReader_binary(str(path))) as reader:
         while (message := reader.recv_match(type=[PARAMETER, *IMUS])) is not None:
             if message.get_type() == PARAMETER:

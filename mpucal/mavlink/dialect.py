@@ -6,6 +6,9 @@ from functools import cache
 from importlib import import_module
 from typing import Any, NamedTuple
 
+from ..errors import UsageError
+
+INSTALL = "pip install 'mpucal[mavlink]'"
 # pymavlink has no types: a message is any object with get_type() and the fields of its definition
 Message = Any
 
@@ -19,8 +22,28 @@ LONGEST = 10 + 255 + CHECKSUM + SIGNATURE
 
 @cache
 def dialect() -> Any:
-    """The module of all messages that ArduPilot and PX4 send (MAVLink 2)."""
-    return import_module("pymavlink.dialects.v20.ardupilotmega")
+    """The module of all messages that ArduPilot and PX4 send (MAVLink 2).
+
+    Raises
+    ------
+    UsageError : pymavlink is not installed.
+    """
+    return pymavlink("dialects.v20.ardupilotmega")
+
+
+def pymavlink(name: str) -> Any:
+    """A module of pymavlink, which only those install who have a vehicle: half of what mpucal would weigh with it.
+
+    Raises
+    ------
+    UsageError : it is not installed.
+    """
+    try:
+        return import_module(f"pymavlink.{name}")
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.partition(".")[0] != "pymavlink":
+            raise
+        raise UsageError("pymavlink, which reads MAVLink, is not installed", INSTALL) from error
 
 
 class Packet(NamedTuple):

@@ -151,12 +151,16 @@ class Serial:
     def receive(self, until_ns: int) -> Bytes | None:
         """See Transport."""
         try:
-            if not _readable(self._port, until_ns - self.now_ns()):
-                return None
-            data = self._port.read(CHUNK)
+            data = self._read(until_ns - self.now_ns())
         except self._failure as error:
             raise _broken(self.name, error) from error
         return Bytes(data, self.name, self.now_ns()) if data else None
+
+    def _read(self, wait_ns: int) -> bytes:
+        if not hasattr(self._port, "fileno"):  # Windows has no file to wait for
+            self._port.timeout = max(wait_ns, 0) * 1e-9
+            return bytes(self._port.read(max(1, self._port.in_waiting)))
+        return bytes(self._port.read(CHUNK)) if _readable(self._port, wait_ns) else b""
 
     def send(self, data: bytes, address: str | None) -> None:
         """See Transport."""

@@ -7,8 +7,9 @@ import select
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from importlib import import_module
 from types import FrameType
-from typing import TextIO
+from typing import Any, TextIO
 
 from ..session.events import Key
 
@@ -45,7 +46,7 @@ class Keys:
         """What was pressed since the last call; never waits."""
         keys = [Key.ABORT] if self._interrupted else []
         self._interrupted = False
-        while self._keyboard is not None and select.select([self._keyboard], [], [], 0.0)[0]:
+        while self._keyboard is not None and _waits(self._keyboard):
             words = self._typed(self._keyboard)
             if words is None:
                 self._keyboard = None
@@ -60,13 +61,13 @@ class Keys:
             for number in _ENDING:
                 stack.callback(signal.signal, number, signal.signal(number, self._interrupt))
             if self._single and self._keyboard is not None:
-                # who is stopped by Ctrl-Z loses samples, and leaves a screen behind
-                stack.callback(signal.signal, signal.SIGTSTP, signal.signal(signal.SIGTSTP, signal.SIG_IGN))
                 stack.enter_context(_without_lines(self._keyboard))
             yield
 
     def _typed(self, keyboard: TextIO) -> list[str] | None:
         """The words or keys that are there; None where there will never be any more."""
+        if (console := _windows()) is not None:
+            return _words(console.getwch())
         if not self._single:
             line = keyboard.readline()
             return [line.strip().lower()] if line else None
@@ -74,7 +75,7 @@ class Keys:
             data = os.read(keyboard.fileno(), _AT_ONCE)
         except OSError:
             return None
-        return [chr(key).strip().lower() for key in data if chr(key) in "\r\n" or chr(key).isalpha()] if data else None
+        return _words(data.decode("latin-1")) if data else None
 
     def _interrupt(self, _number: int, _frame: FrameType | None) -> None:
         if self._interrupted:
@@ -82,17 +83,41 @@ class Keys:
         self._interrupted = True
 
 
+def _windows() -> Any:
+    """Windows' module for its console, which gives single keys and never lines; None elsewhere."""
+    try:
+        return import_module("msvcrt")
+    except ImportError:
+        return None
+
+
+def _waits(keyboard: TextIO) -> bool:
+    """Whether a key or line is there."""
+    console = _windows()
+    return bool(console.kbhit() if console is not None else select.select([keyboard], [], [], 0.0)[0])
+
+
+def _words(keys: str) -> list[str]:
+    return [key.strip().lower() for key in keys if key in "\r\n" or key.isalpha()]
+
+
 @contextmanager
 def _without_lines(keyboard: TextIO) -> Iterator[None]:
     """Keys come one by one and unseen; whatever happens, lines come again afterwards."""
+    if _windows() is not None:
+        yield
+        return
     import termios  # noqa: PLC0415 - not everywhere is there a terminal
     import tty  # noqa: PLC0415
 
     handle = keyboard.fileno()
     before = termios.tcgetattr(handle)
+    # who is stopped by Ctrl-Z loses samples, and leaves a screen behind
+    stop = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
     tty.setcbreak(handle)
     try:
         yield
     finally:
+        signal.signal(signal.SIGTSTP, stop)
         # what was typed for the session is not meant for the shell
         termios.tcsetattr(handle, termios.TCSAFLUSH, before)

@@ -1,0 +1,49 @@
+"""What differs on a machine that is no Linux: modules that are missing there, and a console with keys of its own."""
+
+import io
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from mpucal.session.events import Key
+from mpucal.terminal.keys import Keys
+
+# of which Windows has none, and macOS not all as Linux has them
+LINUX = ("fcntl", "grp", "pwd", "pty", "resource", "termios", "tty")
+IMPORT_ALL = f"""
+import importlib, pkgutil, sys
+sys.modules |= dict.fromkeys({LINUX!r})
+import mpucal
+for module in pkgutil.walk_packages(mpucal.__path__, "mpucal."):
+    importlib.import_module(module.name)
+print("all")
+"""
+# installed where somebody has a vehicle, or wants pictures
+EXTRAS = ("pymavlink", "matplotlib", "pandas", "polars")
+
+
+@pytest.mark.parametrize("missing", [LINUX, EXTRAS], ids=["Linux alone", "extras"])
+def test_every_module_can_be_imported_without(missing):
+    program = IMPORT_ALL.replace(repr(LINUX), repr(missing))
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "all", done.stderr
+
+
+def test_without_pymavlink_a_sentence_says_what_to_install():
+    program = "import sys; sys.modules['pymavlink'] = None\nfrom mpucal.__main__ import run; sys.exit(run())"
+    words = [sys.executable, "-c", program, "session", "--mavlink", "sim", "--no-write"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "pymavlink, which reads MAVLink, is not installed: pip install 'mpucal[mavlink]'." in done.stderr
+
+
+def test_keys_come_from_a_windows_console(monkeypatch):
+    typed = list("x\rR\x00q")
+    console = SimpleNamespace(kbhit=lambda: bool(typed), getwch=lambda: typed.pop(0))
+    monkeypatch.setitem(sys.modules, "msvcrt", console)
+    keys = Keys(io.StringIO(), single=True)
+    with keys.listening():
+        assert keys.pressed() == [Key.ENOUGH, Key.REDO, Key.ABORT]
+        assert keys.pressed() == []
