@@ -439,6 +439,12 @@ KINDS: Mapping[str, Kind] = {
                 "run the session again, and hold the board still for 2 s in each",
                 False,
             ),
+            "too_few": Sentence(
+                "the board was held still in {number} of {of} orientations that the calibration has not seen, so it is"
+                " not verified",
+                "run the session again, and hold the board still in each orientation that is asked for",
+                False,
+            ),
             "never_still": Sentence(
                 "the board was never still in a new orientation, so the calibration is not verified",
                 "run the session again, and hold the board still",
@@ -464,7 +470,7 @@ KINDS: Mapping[str, Kind] = {
             ),
         },
         "mpucal session --bus sim:hand=slipping --seed 1",
-        "a new orientation disagrees; where none was shown the calibration is usable",
+        "a new orientation disagrees; where too few were shown the calibration is usable",
         turn_again=True,
     ),
 }

@@ -17,7 +17,7 @@ import multiprocessing
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -66,7 +66,8 @@ class Trial:
     sph_rms: float = math.nan
     z: tuple[float, ...] = ()
     z_verified: tuple[float, ...] = ()
-    why: tuple[str, ...] = field(default=())
+    cautions: tuple[str, ...] = ()
+    why: tuple[str, ...] = ()
 
 
 class Witness:

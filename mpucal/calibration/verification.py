@@ -56,6 +56,11 @@ class NewOrientation:
         return abs(self.magnitude) <= MOST_STD * self.magnitude_std
 
     @property
+    def agrees(self) -> bool:
+        """Both."""
+        return self.magnitude_agrees and self.direction_agrees
+
+    @property
     def direction_agrees(self) -> bool:
         """Gravity is where it was carried, as far as predicted."""
         return self.clipped or self.direction <= MOST_STD * self.direction_std

@@ -17,6 +17,8 @@ _corners = np.array([c for c in choices((-1.0, 0.0, 1.0), repeat=3) if any(c)])
 # (26, 3) unit vectors: the faces, edges and corners of a cube, which a person can name and find
 ALL_AROUND: Vector = _corners / np.linalg.norm(_corners, axis=1, keepdims=True)
 TILT_RAD = math.radians(30.0)
+# A verification counts orientations so far from all that the fit has seen; for tilts there is no more room.
+UNSEEN_RAD, UNSEEN_TILT_RAD = math.radians(20.0), math.radians(10.0)
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,11 @@ AIMS: Mapping[str, Aim] = MappingProxyType(
     }
 )
 NORMAL = "normal"
+
+
+def unseen_rad(tilt_only: bool) -> float:
+    """How far an orientation is from all that were seen, at least, if it is to verify anything."""
+    return UNSEEN_TILT_RAD if tilt_only else UNSEEN_RAD
 
 
 def directions(flat_down: Direction, tilt_only: bool) -> Vector:

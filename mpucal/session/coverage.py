@@ -17,6 +17,9 @@ DISTINCT_RAD = math.radians(20.0)
 # Without a pause a direction is seen only in passing, among the hand's accelerations: so many make up for a pause.
 PASSES_OF_A_PAUSE = 4
 
+# Rests so near one another are one.
+SAME_RAD = math.radians(2.0)
+
 # How evenly directions must be spread, against 1.0 for evenly over the whole sphere: what varied orientations
 # exceed several times, while the six faces or tilts about one axis stay below by orders of magnitude.
 SPREAD = 0.05
@@ -24,20 +27,25 @@ _UNIFORM = 2.0 / 15.0
 
 
 class Directions:
-    """Directions that differ from one another: `units`, (n, 3)."""
+    """Directions that differ from one another by `apart_rad`: `units`, (n, 3)."""
 
-    def __init__(self) -> None:
+    def __init__(self, apart_rad: float = DISTINCT_RAD) -> None:
         self.units = np.zeros((0, 3))
+        self._apart_rad = apart_rad
 
     def __len__(self) -> int:
         return len(self.units)
 
     def add(self, unit: Vector) -> bool:
         """Keep a unit vector (3,) unless one near it is there already; True where it was new."""
-        if len(self) and float((self.units @ unit).max()) > math.cos(DISTINCT_RAD):
+        if self.near(unit, self._apart_rad):
             return False
         self.units = np.vstack([self.units, unit])
         return True
+
+    def near(self, unit: Vector, apart_rad: float) -> bool:
+        """Whether one of them is less than `apart_rad` from a unit vector (3,)."""
+        return bool(len(self)) and float((self.units @ unit).max()) > math.cos(apart_rad)
 
     def spread(self) -> float:
         """How well the directions alone would determine an ellipsoid, from 0 to 1 (as all directions).
@@ -58,6 +66,7 @@ class Coverage:
     def __init__(self) -> None:
         self.paused = Directions()
         self.passed = Directions()
+        self.rested = Directions(SAME_RAD)
 
     def passes(self, acc: Vector) -> bool:
         """The mean acceleration (3,) [m/s^2] of a short time; True where its direction is new."""
@@ -67,6 +76,14 @@ class Coverage:
         """The mean acceleration (3,) [m/s^2] of a pause; True where its direction is new."""
         return self.paused.add(_unit(acc))
 
+    def rests(self, acc: Vector) -> None:
+        """The mean acceleration (3,) [m/s^2] of a rest, long or short, in a new orientation or near another."""
+        self.rested.add(_unit(acc))
+
+    def was_near(self, acc: Vector, apart_rad: float) -> bool:
+        """Whether the board has rested less than `apart_rad` from where its mean acceleration (3,) is this."""
+        return self.rested.near(_unit(acc), apart_rad)
+
     @property
     def number(self) -> int:
         """How many orientations there are, by pauses or by passes, whichever is more."""
@@ -74,13 +91,20 @@ class Coverage:
 
     def farthest_down(self, candidates: Vector) -> Vector:
         """(3,) that of the unit vectors (k, 3) which, pointing down, is least like any pause."""
-        ups = self.paused.units
-        return np.asarray(candidates[int((-candidates @ ups.T).max(1).argmin())])
+        return _farthest(candidates, self.paused)
+
+    def farthest_from_rests(self, candidates: Vector) -> Vector:
+        """(3,) likewise of all rests."""
+        return _farthest(candidates, self.rested)
 
     @property
     def varied(self) -> bool:
         """Whether they are spread over the sphere."""
         return max(self.paused.spread(), self.passed.spread()) >= SPREAD
+
+
+def _farthest(candidates: Vector, ups: Directions) -> Vector:
+    return np.asarray(candidates[int((-candidates @ ups.units.T).max(1).argmin())])
 
 
 def _unit(acc: Vector) -> Vector:

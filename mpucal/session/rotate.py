@@ -30,6 +30,8 @@ from .windows import Window, Windows
 PASS_WINDOW_S = 0.1
 # So long in one orientation is a pause.
 PAUSE_S = 1.0
+# A fit uses shorter ones, too.
+REST_S = 0.5
 PATIENCE_S = 60.0
 # Of nine that may be asked for, a sloppy hand makes so many different ones.
 TILTS = 6
@@ -63,6 +65,7 @@ class Rotate:
         self.coverage = Coverage()
         self.coverage.pauses(np.array(flat))
         self.coverage.passes(np.array(flat))
+        self.coverage.rests(np.array(flat))
         x, y, z = (-np.array(flat) / np.linalg.norm(flat)).tolist()
         self.directions = directions((x, y, z), tilt_only)
         self._knowledge: Knowledge | None = None
@@ -122,6 +125,8 @@ class Rotate:
 
     def _hold(self, held: Pause) -> list[Output | Turned]:
         found: list[Output | Turned] = []
+        if held.seconds >= REST_S - 1e-6:
+            self.coverage.rests(held.acc)
         if held.seconds >= PAUSE_S - 1e-6 and self.coverage.pauses(held.acc):
             self._new_s = held.t_s
             found.append(Seen(held.t_s, len(self.coverage.paused), _down(held.acc), paused=True))

@@ -9,13 +9,17 @@ import numpy as np
 from ..data import Samples, Vector
 from ..reasons import KINDS, Reason, reason
 from ..result.orientation import side_down, tilt_down
-from .aims import Aim
+from .aims import Aim, unseen_rad
 from .coverage import DISTINCT_RAD, Coverage
 from .events import Ask, Caution, Checked, Countdown, Finished, Output, Progress, Prompt, PromptKind, Tried, Wish
 from .pauses import HOLD_S, Pause, Pauses
 
 PATIENCE_S = 40.0
 SAY_AGAIN_S = 8.0
+# A bias and scale factor errors bend directions by this much of them: raw ones are to be farther apart.
+BENT = 1.1
+# So near to what is asked for a hand meant to be there.
+ASKED_FOR_RAD = math.radians(25.0)
 # A whole calibration is computed while the first orientations are asked for ...
 TRY_WAIT_S = 3.0
 # ... and what the last one says of it is soon told.
@@ -117,21 +121,37 @@ class Verify:
         if self._asked or held.seconds < HOLD_S - 1e-6:
             return []
         self._pauses.leave(held.run)
-        self._coverage.pauses(held.acc)
-        self._number += 1
         self._said_s = held.t_s
-        progress = Progress(held.t_s, self._number, self._aim.verify, f"held {self._number} of {self._aim.verify}")
+        down = -held.acc / max(float(np.linalg.norm(held.acc)), 1e-9)
+        asked_for = float(down @ np.array(self.prompt.down)) >= math.cos(ASKED_FOR_RAD)
+        if self._coverage.was_near(held.acc, BENT * unseen_rad(self._tilt_only)):
+            return self._seen_already(held.t_s, asked_for)
+        self._coverage.pauses(held.acc)
+        self._coverage.rests(held.acc)
+        self._number += 1
+        self._begun_s = held.t_s
+        useful = "" if asked_for else ": not the one asked for, but useful"
+        text = f"held {self._number} of {self._aim.verify}{useful}"
+        progress = Progress(held.t_s, self._number, self._aim.verify, text)
         if self._number == self._aim.verify:
             self._asked = True
             return [progress, Ask(Wish.CHECK, CHECK_WAIT_S)]
-        self.prompt = self._next()
+        self.prompt = self._next(self.prompt)
         return [progress, self.prompt]
 
-    def _next(self) -> Prompt:
+    def _seen_already(self, t_s: float, asked_for: bool) -> list[Output | Finished]:
+        """Who was where the board was asked to be is asked for another orientation."""
+        if asked_for:
+            self.prompt = self._next(self.prompt)
+        caution = Caution(t_s, "seen_already", "the calibration has seen this orientation already", self.prompt.text)
+        return [caution, self.prompt] if asked_for else [caution]
+
+    def _next(self, last: Prompt | None = None) -> Prompt:
+        """What is least like all that was shown, and not what was asked for `last`."""
         asked = self._directions
-        if self._number:
-            asked = asked[asked @ np.array(self.prompt.down) < math.cos(DISTINCT_RAD)]
-        down = self._coverage.farthest_down(asked)
+        if last is not None:
+            asked = asked[asked @ np.array(last.down) < math.cos(DISTINCT_RAD)]
+        down = self._coverage.farthest_from_rests(asked)
         x, y, z = np.asarray(down).tolist()
         side = tilt_down(down) if self._tilt_only else f"{side_down(down)} down"
         number = f"{self._number + 1} of {self._aim.verify}"

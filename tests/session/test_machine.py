@@ -295,6 +295,45 @@ def test_verifies_in_three_orientations_that_were_not_seen(board, verifying, var
     assert verifying.machine.checked.agrees
 
 
+def test_an_orientation_that_was_seen_already_does_not_count(board, verifying, varied):
+    asked = verifying.of(Prompt)[-1]
+    # 15 deg from one that was seen, and far from what is asked for
+    near = np.array(varied[2]) / np.linalg.norm(varied[2])
+    aside = near + np.tan(np.radians(15.0)) * np.array([0.0, 1.0, 0.0])
+    show(verifying, board, [aside, *varied[3:6]])
+    assert verifying.state is State.VERIFY
+    cautions = [caution for caution in verifying.of(Caution) if caution.code == "seen_already"]
+    assert len(cautions) == 4
+    assert all((c.what, c.do) == ("the calibration has seen this orientation already", asked.text) for c in cautions)
+    assert verifying.of(Prompt)[-1] == asked
+    verifying.feed(board.still(40.0))
+    assert verifying.machine.checked.agrees is None
+
+
+def test_nor_does_the_same_one_twice(board, verifying):
+    up = [-v for v in verifying.of(Prompt)[-1].down]
+    show(verifying, board, [up, (0, 0, 1)] * 4)
+    assert verifying.state is State.VERIFY
+    assert verifying.count() == 1
+
+
+def test_who_is_where_asked_but_near_what_was_seen_is_asked_for_another(board, verifying):
+    asked = verifying.of(Prompt)[-1]
+    verifying.machine._step._coverage.rests(-np.array(asked.down))
+    show(verifying, board, [[-v for v in asked.down]])
+    assert verifying.of(Caution)[-1].code == "seen_already"
+    another = verifying.of(Prompt)[-1]
+    assert np.dot(another.down, asked.down) < np.cos(np.radians(20.0))
+    assert verifying.of(Caution)[-1].do == another.text
+    assert "1 of 3" in another.text
+
+
+def test_another_new_orientation_than_the_one_asked_for_is_useful(board, verifying, varied):
+    show(verifying, board, varied[10:11])
+    assert verifying.of(Progress)[-1].text == "held 1 of 3: not the one asked for, but useful"
+    assert "2 of 3" in verifying.of(Prompt)[-1].text
+
+
 def test_a_disagreement_is_told_and_kept(board, verifying, varied):
     verifying.checked = Checked((), False, MOVED)
     show(verifying, board, varied[9:12])

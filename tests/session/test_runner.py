@@ -4,6 +4,9 @@ from functools import partial
 import numpy as np
 import pytest
 
+from mpucal.calibration import calibrate
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
 from mpucal.chip.records import SessionEvent
 from mpucal.data import Recording, Samples, Sensor
 from mpucal.errors import Abandoned, BusError, CaptureError, ChipError, EndOfCapture, NoAnswer, OutputError
@@ -14,6 +17,7 @@ from mpucal.session.live.questions import Here
 from mpucal.session.plan import Plan
 from mpucal.session.ports import Replayed
 from mpucal.session.runner import Runner
+from mpucal.simulated.chip import open_simulated
 
 RATE_HZ, POLL = 100.0, 10
 FLAT_POLLS = 110
@@ -313,3 +317,14 @@ def test_recording_ends_when_asked_and_leaves_the_key_that_replays_it(person, se
 def test_recording_ends_with_the_source():
     source = Source({300: EndOfCapture()})
     assert runner_of(source, plan=Plan(until_end=True)).record(None) == 299 * POLL
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_poses_of_the_turning_shown_again_verify_nothing(seed):
+    bus = open_simulated("sim:hand=repeating", seed=seed)
+    plan = Plan(Config(rate_hz=50))
+    runner = Runner(Driver(bus, plan.config), Person(), lambda *_: None, plan, (bus.hear,))
+    calibration = runner.calibrate(runner.measure(), calibrate)
+    assert calibration.quality["verification"]["agrees"] is None
+    assert calibration.verdict == "usable"
+    assert [reason["code"] for reason in calibration.quality["reasons"]] == ["verification_failed"]

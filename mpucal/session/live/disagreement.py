@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...calibration.verification import NewOrientation
@@ -16,20 +18,34 @@ WARMER_C = 8.0
 MUCH_CLIPPED = 0.002
 
 
-def judged(rests: list[NewOrientation], of: int, recording: Recording, contradiction: Reason | None) -> Checked:
-    """All of them, and what is wrong, if anything is.
+def judged(
+    rests: Sequence[NewOrientation],
+    new: Sequence[NewOrientation],
+    of: int,
+    recording: Recording,
+    contradiction: Reason | None,
+) -> Checked:
+    """What is wrong, if anything is; where nothing is, but fewer than `of` are new, nothing is verified either.
 
-    contradiction : what the pauses of the turning say against each other; None where they agree.
+    Parameters
+    ----------
+    rests : all since the fit. new : those of them that count. contradiction : what the pauses of the turning say
+        against each other; None where they agree.
     """
-    found = tuple(_found(rest, i + 1, max(of, len(rests)), float(recording.t[-1])) for i, rest in enumerate(rests))
-    against = _against(rests, all(result.agrees for result in found), recording, contradiction)
+    # one that was seen already verifies nothing, and may refute
+    shown = [rest for rest in rests if any(rest is other for other in new) or not rest.agrees]
+    found = tuple(_found(rest, i + 1, max(of, len(shown)), float(recording.t[-1])) for i, rest in enumerate(shown))
+    against = _against(rests, shown, recording, contradiction)
+    if against is None and len(new) < of:
+        return Checked(found, None, reason("verification_failed", "too_few", number=len(new), of=of))
     return Checked(found, against is None, against)
 
 
 def _against(
-    rests: list[NewOrientation], agree: bool, recording: Recording, contradiction: Reason | None
+    rests: Sequence[NewOrientation], shown: Sequence[NewOrientation], recording: Recording, contradiction: Reason | None
 ) -> Reason | None:
     """The reason that explains most of what is wrong."""
+    agree = all(rest.agrees for rest in shown)
     warmer = _warmer_c(recording)
     if abs(warmer) > WARMER_C:
         return reason("temperature_moved", "since_flat", how="rose" if warmer > 0 else "fell", change=abs(warmer))
@@ -41,7 +57,7 @@ def _against(
         return reason("verification_failed", "never_still")
     if contradiction is not None:
         return explained(contradiction, recording)
-    return None if agree else _why(rests, recording)
+    return None if agree else _why(shown, recording)
 
 
 def explained(contradiction: Reason, recording: Recording) -> Reason:
@@ -56,7 +72,7 @@ def much_clipped(recording: Recording) -> bool:
     return bool(recording.gyr_clipped.mean() > MUCH_CLIPPED)
 
 
-def _why(rests: list[NewOrientation], recording: Recording) -> Reason:
+def _why(rests: Sequence[NewOrientation], recording: Recording) -> Reason:
     """What is most likely wrong with a sensor whose new orientations disagree."""
     lengths = [rest for rest in rests if not rest.magnitude_agrees]
     turns = [rest for rest in rests if not rest.direction_agrees]
@@ -73,7 +89,7 @@ def _why(rests: list[NewOrientation], recording: Recording) -> Reason:
     return reason("verification_failed", "magnitude", error=worst.magnitude, knock=knock, std=worst.magnitude_std)
 
 
-def _scale_off(rests: list[NewOrientation]) -> tuple[str, float] | None:
+def _scale_off(rests: Sequence[NewOrientation]) -> tuple[str, float] | None:
     """The axis, and by which share every turn about it is wrong; None where the turns do not agree on one."""
     long = [rest for rest in rests if np.linalg.norm(rest.turn) > LEAST_TURN_RAD]
     if len(long) < 2:
@@ -95,7 +111,6 @@ def _warmer_c(recording: Recording) -> float:
 
 
 def _found(rest: NewOrientation, number: int, of: int, t_s: float) -> Verification:
-    agrees = rest.magnitude_agrees and rest.direction_agrees
     x, y, z = rest.down.tolist()
     down: Direction = (x, y, z)
     text = (
@@ -111,6 +126,6 @@ def _found(rest: NewOrientation, number: int, of: int, t_s: float) -> Verificati
         rest.magnitude_std,
         float(np.rad2deg(rest.direction)),
         float(np.rad2deg(rest.direction_std)),
-        agrees,
+        rest.agrees,
         text,
     )

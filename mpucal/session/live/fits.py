@@ -17,12 +17,13 @@ from ...calibration.quality import verdict
 from ...calibration.verification import new_orientations
 from ...data import Recording, Samples, Sensor
 from ...reasons import KINDS, Reason, reason
-from ..aims import AIMS, directions
+from ..aims import AIMS, directions, unseen_rad
 from ..events import Checked, Event, Learnt, Tried, Wish
 from ..plan import Plan
 from .disagreement import explained, judged, much_clipped
 from .knowledge import knowledge, wanted
 from .store import SampleStore
+from .unseen import unseen
 
 CONTRADICTION, CLIPPED = "inconsistent", "gyro_clipped"
 
@@ -103,8 +104,9 @@ class Fits:
             return Checked((), False, reason("verification_failed", "nothing"))
         recording: Recording = with_masks(self._store.recording())
         rests = new_orientations(recording, evidence.flat, evidence.fit, self._plan.gravity, self._since)
+        new = unseen(rests, evidence, unseen_rad(self._plan.tilt_only))
         contradiction = next((against for against in found(evidence) if against.code == CONTRADICTION), None)
-        return judged(rests[:of], of, recording, contradiction)
+        return judged(rests, new[:of], of, recording, contradiction)
 
 
 def _likeliest(reasons: list[Reason], recording: Recording) -> Reason | None:

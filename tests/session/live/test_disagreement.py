@@ -66,7 +66,7 @@ TURNED = [rest(direction=0.05, turn=(0.0, 0.0, turn), miss=(0.0, 0.0, 0.04 * tur
     ],
 )
 def test_says_what_is_wrong(rests, data, contradiction, code, words):
-    checked = judged(rests, 3, data, contradiction)
+    checked = judged(rests, rests, 3, data, contradiction)
     assert checked.agrees == (code == "")
     if code:
         assert checked.reason.code == code

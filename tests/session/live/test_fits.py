@@ -62,13 +62,32 @@ def test_the_advised_orientation_is_a_turn_away(fits, poses):
 
 
 def test_a_try_and_its_check_agree_on_good_data(fits, poses):
-    tried = fits.do(Task(part(poses, 0, 40), Wish.TRY))
+    tried = fits.do(Task(part(poses, 0, 32), Wish.TRY))
     assert isinstance(tried, Tried)
     assert tried.verdict in ("good", "usable")
-    checked = fits.do(Task(part(poses, 40), Wish.CHECK))
+    checked = fits.do(Task(part(poses, 32), Wish.CHECK))
     assert isinstance(checked, Checked)
     assert checked.agrees, checked
     assert all(v.direction_deg < 1.0 and abs(v.magnitude_mps2) < 0.1 for v in checked.found)
+
+
+def test_what_the_fit_has_seen_verifies_nothing(fits, poses):
+    fits.do(Task(part(poses, 0, 44), Wish.TRY))
+    seen = part(poses, 18, 44)
+    again = replace(seen, t=seen.t + 44.0 - 18.0 + 1 / 200, gap=np.arange(len(seen)) == 0)
+    checked = fits.do(Task(again, Wish.CHECK))
+    assert (checked.found, checked.agrees) == ((), None)
+    assert checked.reason.what.startswith("the board was held still in 0 of 3 orientations that the calibration has")
+    assert not checked.reason.refuse
+
+
+def test_what_the_fit_has_seen_may_refute_it(fits, poses):
+    fits.do(Task(part(poses, 0, 44), Wish.TRY))
+    seen = part(poses, 18, 44)
+    again = replace(seen, t=seen.t + 44.0 - 18.0 + 1 / 200, gap=np.arange(len(seen)) == 0, acc=1.03 * seen.acc)
+    checked = fits.do(Task(again, Wish.CHECK))
+    assert checked.agrees is False
+    assert "|a| is +0.3" in checked.reason.what
 
 
 def test_nothing_is_known_of_a_board_that_never_lay_still(fits, poses):
