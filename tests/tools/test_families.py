@@ -211,6 +211,13 @@ def test_limits_that_are_broken_are_told_by_name(worlds):
         assert words in told
 
 
+def test_a_gravity_that_is_named_unlikely_is_the_unit_of_the_gains(worlds):
+    told = worlds.table.FAMILIES["gravity told 9.2"]
+    run = worlds.judge.judged(told, 100)
+    assert run.verdict == "usable" and "gravity_unlikely" in run.reasons
+    assert run.error < 0.02
+
+
 # families that a release is not to judge falsely, and that take no more than some seconds together
 SMALL = (
     *("poses", "poses of a session", "poses filtered", "continuous", "phone poses", "bench"),

@@ -11,7 +11,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,8 @@ from .family import GRAVITY_MPS2, Family, Wanted, simulate
 
 GOOD_Z, GOOD_MPS2, USABLE_Z = 3.0, 0.1, 5.0
 CRASHED = "crashed"
+# who is told of an unlikely gravity knows that all gains are in units of it, and the truth is compared so
+GRAVITY_NAMED = "gravity_unlikely"
 # limits over all families, and over one of those whose recordings nothing is wrong with
 FALSE_SHARE, GOOD_SHARE, SHARP_MPS2 = 0.003, 0.98, 1e-3
 
@@ -70,12 +72,15 @@ def judged(family: Family, seed: int, model: str = "auto") -> Run:
         return Run(family.name, seed, CRASHED, (type(error).__name__,), why=repr(error))
     claim = result.quality["error_std"]["rms"]
     reasons = result.quality["reasons"]
+    codes, truth = tuple(reason["code"] for reason in reasons), simulated.truth
+    if GRAVITY_NAMED in codes and result.verdict != GOOD:
+        truth = replace(truth, D=truth.D * (truth.gravity / gravity), gravity=gravity)
     return Run(
         family.name,
         seed,
         result.verdict,
-        tuple(reason["code"] for reason in reasons),
-        sph_rms(simulated.truth, result.D, result.b_a),
+        codes,
+        sph_rms(truth, result.D, result.b_a),
         math.nan if claim is None else float(claim),
         str(result.fit["model"]),
         time.perf_counter() - began,

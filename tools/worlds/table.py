@@ -2,7 +2,8 @@
 
 What is compared as the truth is D and b_a as drawn, in the body frame in which K is symmetric. Where b_a or D moves
 (steps, slips, warmth, stress), it is the mean over the recording after the flat segment; of a nonlinear sensor, the
-slope at zero. What befalls words and times was reported by owners of such chips; sources stand beside those rows.
+slope at zero; where a calibration names an unlikely gravity, D in units of it. What befalls words and times was
+reported by owners of such chips; sources stand beside those rows.
 """
 
 from __future__ import annotations
