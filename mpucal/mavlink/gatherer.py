@@ -41,9 +41,9 @@ NUMBERS = 7
 class Gathered:
     """What one stream delivered: 64 bytes a reading."""
 
-    def __init__(self, stream: Stream) -> None:
+    def __init__(self, stream: Stream, clock: VehicleClock | None = None) -> None:
         self.stream = stream
-        self._clock = VehicleClock(stream.unit_us)
+        self.clock = clock or VehicleClock(stream.unit_us)
         self._times_us, self._numbers = array("q"), array("d")
         self._in_order = 0
         self._newest_us: int | None = None
@@ -54,14 +54,24 @@ class Gathered:
 
     def add(self, reading: Reading, received_ns: int) -> tuple[Row | None, Jump]:
         """Keep a reading; the row where it is newer than all before it, and what the clock did before it."""
-        t_us, jump = self._clock.us(reading.time, received_ns)
+        t_us, jump = self.clock.us(reading.time, received_ns)
+        return self.keep(t_us, reading), jump
+
+    def keep(self, t_us: int, reading: Reading) -> Row | None:
+        """Keep a reading of that time; the row where it is newer than all before it."""
         self._times_us.append(t_us)
         self._numbers.extend(_numbers(reading))
         if self._newest_us is not None and t_us <= self._newest_us:
-            return None, jump
+            return None
         self._newest_us = t_us
         self._in_order += 1
-        return Row(t_us, reading), jump
+        return Row(t_us, reading)
+
+    def extend(self, times_us: Vector, numbers: Vector) -> None:
+        """Keep (n,) times and (n, NUMBERS) as `rows` gives them."""
+        self._times_us.extend(times_us.astype(np.int64).tolist())
+        self._numbers.extend(numbers.ravel().tolist())
+        self._in_order += len(times_us)
 
     def forget(self) -> None:
         """Let go of all that was kept."""
@@ -74,10 +84,14 @@ class Gathered:
 
     def samples(self, t_us: Vector | None = None) -> Samples:
         """All readings in the order of their times, or of those given instead."""
+        times_us, numbers = self.rows()
+        return _samples(numbers, times_us if t_us is None else t_us)
+
+    def rows(self) -> tuple[Vector, Vector]:
+        """(n,) us, increasing, and (n, NUMBERS): acceleration, rate, temperature."""
         # of two readings of one time the first is kept: the other is the same packet once more
-        times_us, first = np.unique(self._times_us, return_index=True)
-        numbers = np.array(self._numbers).reshape(-1, NUMBERS)[first]
-        return _samples(numbers, times_us.astype(np.float64) if t_us is None else t_us)
+        times_us, first = np.unique(np.array(self._times_us, np.int64), return_index=True)
+        return times_us.astype(np.float64), np.array(self._numbers).reshape(-1, NUMBERS)[first]
 
 
 def samples_of(rows: Sequence[Row], before_us: float | None) -> Samples:
@@ -117,8 +131,21 @@ class Gatherer:
 
     def add(self, reading: Reading, received_ns: int) -> tuple[Row | None, Jump]:
         """See Gathered.add."""
-        gathered = self.streams.setdefault(reading.stream, Gathered(reading.stream))
-        return gathered.add(reading, received_ns)
+        return self.of(reading.stream).add(reading, received_ns)
+
+    def of(self, stream: Stream) -> Gathered:
+        """What `stream` delivered."""
+        return self.streams.setdefault(stream, Gathered(stream))
+
+    def extend(self, stream: Stream, times_us: Vector, numbers: Vector) -> None:
+        """See Gathered.extend."""
+        self.streams.setdefault(stream, Gathered(stream)).extend(times_us, numbers)
+
+    def following(self) -> Gatherer:
+        """An empty one, whose clocks go on."""
+        after = Gatherer()
+        after.streams = {stream: Gathered(stream, gathered.clock) for stream, gathered in self.streams.items()}
+        return after
 
     def forget(self) -> None:
         """Let go of all that was kept."""

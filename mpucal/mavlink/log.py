@@ -1,47 +1,52 @@
 """A whole log of a vehicle, a .tlog of any ground station among them, made into a recording of each IMU.
 
-What was measured before a reboot, and under other accelerometer parameters, belongs to another recording: the longest
-is taken.
+What was measured under other corrections that are known is joined with what follows, in a session also what was
+measured before a reboot; of stretches that cannot be joined the longest is taken.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+
+import numpy as np
 
 from ..calibration.flat_segment import find_flat
 from ..data import Recording
 from ..errors import RecordingError
-from .clock import Jump
+from .clock import US, Jump
 from .dialect import Message, Parser, dialect
 from .firmwares import ARDUPILOT, PX4, preferred_messages
 from .gatherer import Gatherer, Row
 from .imu import Reading, reading
+from .join import BEYOND, CORRECTIONS, SETTLED_US, Segment, joined, through
 from .parameters.encoding import is_parameter, of_wire
 from .tlog import Record
 
 # whose change alters the streams
-MOUNTED = ("AHRS_ORIENTATION", "AHRS_CUSTOM", "CUST_ROT", "SENS_BOARD")
-SHAPING = ("INS_ACC", "CAL_ACC", "INS_GYR", "CAL_GYRO", *MOUNTED, "EKF2_IMU_CTRL")
-
-
-@dataclass
-class Segment:
-    """A stretch under one set of parameters, between reboots."""
-
-    parameters: dict[str, float]
-    gatherer: Gatherer = field(default_factory=Gatherer)
-
-    def __len__(self) -> int:
-        return max((len(g) for g in self.gatherer.streams.values()), default=0)
+SHAPING = (*CORRECTIONS, *BEYOND)
 
 
 class Log:
-    """Segments from the messages of one vehicle, as they come."""
+    """Segments from the messages of one vehicle, as they come.
 
-    def __init__(self, firmware: str) -> None:
+    Parameters
+    ----------
+    over_reboots : join what was measured before and after one; else the longest is taken, as an autopilot takes its
+        gyroscope's bias anew at each start.
+
+    Attributes
+    ----------
+    changed : the names of the parameters that were changed while it streamed.
+    """
+
+    def __init__(self, firmware: str, over_reboots: bool = False) -> None:
         self.firmware = firmware
+        self._over_reboots = over_reboots
         self.segments = [Segment({})]
+        self.changed: list[str] = []
+        self._changed_ns: int | None = None
+        self._now_ns = 0
 
     def add(self, message: Message, received_ns: int) -> None:
         """Take one message: an IMU's, or a parameter's."""
@@ -60,21 +65,45 @@ class Log:
         """A parameter as the vehicle holds it from now on."""
         now = self.segments[-1]
         if len(now) and name.startswith(SHAPING) and now.parameters.get(name, value) != value:
-            now = Segment(dict(now.parameters))
+            now = Segment(dict(now.parameters), now.gatherer.following())
             self.segments.append(now)
+            self.changed.append(name)
+            self._changed_ns = self._now_ns
         now.parameters[name] = value
 
     def reading(self, content: Reading, received_ns: int) -> tuple[Row | None, Jump]:
-        """An IMU's reading; see Gathered.add."""
-        row, jump = self.segments[-1].gatherer.add(content, received_ns)
-        if jump is Jump.REBOOT:
-            self.segments.append(Segment(dict(self.segments[-1].parameters)))
-            self.segments[-1].gatherer.add(content, received_ns)
-        return row, jump
+        """An IMU's reading, as it would be under the first parameters; and what the clock did. See Gathered.add."""
+        self._now_ns = received_ns
+        now = self.segments[-1]
+        gathered = now.gatherer.of(content.stream)
+        t_us, jump = gathered.clock.us(content.time, received_ns)
+        # each stream's clock tells of the same reboot
+        if jump is Jump.REBOOT and len(gathered):
+            after = now.gatherer.following() if self._over_reboots else Gatherer()
+            now = Segment(dict(now.parameters), after, rebooted=True)
+            self.segments.append(now)
+            gathered = after.of(content.stream)
+            t_us = t_us if self._over_reboots else gathered.clock.us(content.time, received_ns)[0]
+        row = gathered.keep(t_us, content)
+        return (None if row is None else self._as_at_first(row)), jump
+
+    def _as_at_first(self, row: Row) -> Row | None:
+        """A row whose correction was changed meanwhile; None while it changes."""
+        if self._changed_ns is None:
+            return row
+        if self._now_ns - self._changed_ns < SETTLED_US * US:
+            return None
+        content = row.reading
+        back = through(self.firmware, content.stream.imu, self.segments[-1].parameters, self.segments[0].parameters)
+        if back is None:
+            return row
+        x, y, z = back(np.array(content.acc)).tolist()
+        return Row(row.t_us, replace(content, acc=(x, y, z)))
 
     def forget(self) -> None:
         """Let go of all readings so far, and go on under the same parameters."""
         self.segments = self.segments[-1:]
+        self._changed_ns = None
         self.segments[0].gatherer.forget()
 
     def recording(self, name: str) -> Recording:
@@ -84,7 +113,7 @@ class Log:
         ------
         RecordingError : it holds no IMU messages that tell the truth.
         """
-        longest = max(self.segments, key=len)
+        longest = joined(self.segments, self.firmware, self._over_reboots)
         order = preferred_messages(self.firmware, longest.parameters)
         recordings = longest.gatherer.recordings(order, name, self.firmware, longest.parameters)
         if not recordings:

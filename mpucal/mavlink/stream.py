@@ -77,6 +77,15 @@ class Streams:
         for stream, rate_hz in rates.items():
             self._best_hz[stream] = max(rate_hz, self._best_hz.get(stream, 0.0))
 
+    def ask_again(self) -> None:
+        """Ask for all of them without waiting for answers: of a vehicle that was away."""
+        for name in self._wanted:
+            self._request(name)
+        # nobody slowed what was away
+        self._fallen = []
+        self._counts.clear()
+        self._window_ns = self._link.now_ns()
+
     def _hear(self, message: Message) -> None:
         content = reading(message)
         if content is not None:
@@ -126,12 +135,15 @@ class Streams:
         self._link.send(request)
 
     def _again(self, stream: Stream) -> None:
-        vehicle, interval_us = self._link.vehicle, round(US_PER_S / self._wanted[stream.name])
-        params = (MESSAGE_ID[stream.name], interval_us, 0, 0, 0, 0, 0)
-        number = dialect().MAV_CMD_SET_MESSAGE_INTERVAL
         # its answer is not waited for: whether the rate is back shows in the next window
-        self._link.send(self._link.mav.command_long_encode(vehicle.system, vehicle.component, number, 0, *params))
+        self._request(stream.name)
         self._fallen.append(stream)
+
+    def _request(self, name: str) -> None:
+        vehicle, interval_us = self._link.vehicle, round(US_PER_S / self._wanted[name])
+        params = (MESSAGE_ID[name], interval_us, 0, 0, 0, 0, 0)
+        number = dialect().MAV_CMD_SET_MESSAGE_INTERVAL
+        self._link.send(self._link.mav.command_long_encode(vehicle.system, vehicle.component, number, 0, *params))
 
     def _tell(self, rates: Mapping[Stream, float]) -> None:
         """Say what had fallen, where it still comes: a vehicle that fell silent was slowed by nobody."""

@@ -20,6 +20,9 @@ from .vehicle import Vehicle
 
 POLL_NS = S // 20
 SILENT_NS = 4 * S
+# how long a vehicle that fell silent is waited for: a reboot takes so long, and a link that was lost
+BACK_NS = 30 * S
+LOOK_NS = S
 US_PER_S = 1e6
 # packets after which their loss is weighed, and the share of it that a person should know of
 WEIGHED, WORTH_SAYING = 2000, 0.05
@@ -49,6 +52,8 @@ class VehicleSource:
         self._last_us: float | None = None
         self._heard_ns = self._sampled_ns = 0
         self._rebooted = False
+        self._firmware = ARDUPILOT
+        self._told = 0
         self._received = self._lost = 0
         self._said_lost = self._said_armed = False
 
@@ -63,8 +68,8 @@ class VehicleSource:
         # nothing is sent before the person has seen to whom
         self._say(f"This is {vehicle}; what is asked and written goes there alone.")
         self._link.lock(vehicle)
-        firmware = PX4 if vehicle.is_px4 else ARDUPILOT
-        self._log = Log(firmware)
+        firmware = self._firmware = PX4 if vehicle.is_px4 else ARDUPILOT
+        self._log = Log(firmware, over_reboots=True)
         self._link.subscribe(self._hear)
         parameters = read_stream_parameters(self._link, firmware)
         self._streams = Streams(self._link, firmware, parameters, self._rate_hz, self._say)
@@ -84,14 +89,16 @@ class VehicleSource:
 
         Raises
         ------
-        EndOfCapture : a replay holds no more. LinkError : the vehicle fell silent or rebooted, or the link broke.
+        EndOfCapture : a replay holds no more. LinkError : the vehicle fell silent for good, or the link broke.
         """
         for _ in self._link.messages(self._link.now_ns() + POLL_NS):
             self._heard_ns = self._link.now_ns()
             self._received += 1
         if self._streams is not None:
             self._streams.watch()
-        self._check()
+        if self._rebooted or self._link.now_ns() - self._sampled_ns >= SILENT_NS:
+            self._wait_until_back()
+        self._tell_changes()
         self._weigh()
         rows, self._rows = self._rows, []
         samples = samples_of(rows, self._last_us)
@@ -149,22 +156,45 @@ class VehicleSource:
             f"The link loses {100 * self._link.lost / sent:.0f} % of the packets; a nearer or faster one is better."
         )
 
-    def _check(self) -> None:
-        now_ns = self._link.now_ns()
+    def _wait_until_back(self) -> None:
+        """After a reboot, or a silence, have it stream again, and read its parameters anew."""
+        self._say(f"{self._link.vehicle} {self._trouble()}: wait until it is back, and hold it still meanwhile.")
+        end_ns = self._link.now_ns() + BACK_NS
+        while not self._streams_again():
+            if self._link.now_ns() >= end_ns:
+                raise LinkError(
+                    f"{self._link.vehicle} {self._trouble()}",
+                    "check its power and the link, and that no other ground station stops its IMU messages",
+                )
+        read_stream_parameters(self._link, self._firmware)
+        self._rebooted = False
+        self._say(f"{self._link.vehicle} is back, its parameters are read again: go on.")
+
+    def _trouble(self) -> str:
         if self._rebooted:
-            raise LinkError(
-                f"{self._link.vehicle} rebooted (its clock started again)", "check its power, then start again"
-            )
-        if now_ns - self._heard_ns >= SILENT_NS:
-            raise LinkError(
-                f"{self._link.vehicle} has sent nothing for {SILENT_NS // S} s",
-                "check its power and the link, then start again",
-            )
-        if now_ns - self._sampled_ns >= SILENT_NS:
-            raise LinkError(
-                f"{self._link.vehicle} has sent no IMU messages for {SILENT_NS // S} s",
-                "check that no other ground station stops them, then start again",
-            )
+            return "rebooted (its clock started again)"
+        now_ns = self._link.now_ns()
+        heard = now_ns - self._heard_ns < SILENT_NS
+        what, since_ns = ("no IMU messages", self._sampled_ns) if heard else ("nothing", self._heard_ns)
+        return f"has sent {what} for {(now_ns - since_ns) // S} s"
+
+    def _streams_again(self) -> bool:
+        """Ask for the streams, and listen for a second; whether samples came."""
+        if self._streams is not None:
+            self._streams.ask_again()
+        begun_ns = self._link.now_ns()
+        for _ in self._link.messages(begun_ns + LOOK_NS):
+            self._heard_ns = self._link.now_ns()
+        return self._sampled_ns > begun_ns
+
+    def _tell_changes(self) -> None:
+        """Say once a change that parameters were changed while it streamed."""
+        names = self._log.changed[self._told :]
+        if not names:
+            return
+        self._told = len(self._log.changed)
+        by = " (PX4 does that itself while SENS_IMU_AUTOCAL is 1; set it to 0)" if self._firmware == PX4 else ""
+        self._say(f"{names[0]} was changed while it was measured{by}: what came before counts as far as it can.")
 
 
 def one_of(vehicles: tuple[Vehicle, ...], system: int | None) -> Vehicle:

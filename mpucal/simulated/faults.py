@@ -202,6 +202,12 @@ _ROWS = (
         again_s=15.0,
         strike=lambda vehicle: vehicle.obey_second_station(),
     ),
+    FaultKind(
+        "autocal",
+        Where.VEHICLE,
+        "a PX4 with SENS_IMU_AUTOCAL commits the accelerometer offsets that it learnt",
+        strike=lambda vehicle: vehicle.learn_offsets(),
+    ),
     FaultKind("no_storage", Where.VEHICLE, "it has no card", timed=False),
     FaultKind("loss", Where.LINK, "one packet in five is lost", timed=False, share=0.2),
     FaultKind("reorder", Where.LINK, "one packet in ten is overtaken by three others", timed=False, share=0.1),

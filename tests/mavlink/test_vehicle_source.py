@@ -127,11 +127,12 @@ def test_a_replay_gives_the_same_samples_poll_by_poll():
     np.testing.assert_array_equal(again.recording().acc, source.recording().acc)
 
 
-def test_a_vehicle_that_falls_silent_is_one_sentence():
-    source, _, _ = opened(transport=Disturbed, silent_from=12.0)
+def test_a_vehicle_that_falls_silent_is_waited_for_and_then_one_sentence():
+    source, _, said = opened(transport=Disturbed, silent_from=12.0)
     source.start()
-    with pytest.raises(LinkError, match=r"system 1 \(ArduPilot\) at the simulated vehicle has sent nothing for 4 s"):
-        polled(source, 30)
+    with pytest.raises(LinkError, match=r"system 1 \(ArduPilot\) at the simulated vehicle has sent nothing for 3\d s"):
+        polled(source, 60)
+    assert [text for text in said if "has sent nothing for 4 s: wait until it is back" in text]
 
 
 def test_arming_is_said_at_once_and_does_not_end_it():
@@ -142,17 +143,42 @@ def test_arming_is_said_at_once_and_does_not_end_it():
     assert len(said) == 2
 
 
-def test_a_reboot_is_noticed(script, station):
-    vehicle, home = station(), "10.0.0.2:14555"
-    packets = [(0.5, home, vehicle.heartbeat())]
-    packets += [(1 + 0.01 * k, home, vehicle.raw(900_000_000 + 10_000 * k)) for k in range(4000)]
-    packets += [(42 + 0.01 * k, home, vehicle.raw(3_000_000 + 10_000 * k)) for k in range(100)]
-    link = Link(script(packets), lambda t_ns, data: None)
-    source = VehicleSource(link, 100.0, None, lambda text: None, "test")
+@pytest.mark.parametrize("words", ["imus=2,fault=reboot@12", "firmware=px4,fault=reboot@12"])
+def test_after_a_reboot_its_streams_are_asked_for_again_and_join(words):
+    source, record, said = opened(words)
     source.start()
-    with pytest.raises(LinkError, match=r"rebooted \(its clock started again\): check its power"):
-        polled(source, 60)
-    assert len(source.recording()) > 1000
+    t = polled(source, 25)
+    assert [text.partition(": ")[2] for text in said if "rebooted" in text] == [
+        "wait until it is back, and hold it still meanwhile."
+    ]
+    assert "is back, its parameters are read again" in said[-1]
+    assert (np.diff(t) > 0).all()
+    recording = source.recording()
+    for one in (recording, *recording.others):
+        assert one.gap.sum() == 1
+        before = int(np.flatnonzero(one.gap)[0])
+        # as long as the silence, and what it took to notice that the streams had ended
+        assert 2.0 < one.t[before] - one.t[before - 1] < 6.0
+        assert len(one) - before > 500
+    link = Link(Replay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)
+    again = VehicleSource(link, 100.0, None, lambda text: None, "test")
+    again.start()
+    repeated = polled(again, 20)
+    assert repeated == t[: len(repeated)]
+
+
+@pytest.mark.parametrize("words", ["firmware=px4,fault=autocal@9"])
+def test_offsets_that_px4_commits_meanwhile_are_composed(words):
+    source, _, said = opened(words + ",hand=still")
+    source.start()
+    polled(source, 15)
+    assert [text for text in said if "was changed while it was measured" in text and "SENS_IMU_AUTOCAL" in text]
+    recording = source.recording()
+    new = recording.autopilot.parameters
+    assert abs(new["CAL_ACC0_XOFF"]) + abs(new["CAL_ACC0_YOFF"]) + abs(new["CAL_ACC0_ZOFF"]) > 0.02
+    (cut,) = np.flatnonzero(recording.gap)
+    # before the change as after it: as if the new offsets had been there all the time
+    np.testing.assert_allclose(recording.acc[:cut].mean(0), recording.acc[cut:].mean(0), atol=0.01)
 
 
 def test_another_system_is_not_locked_to():

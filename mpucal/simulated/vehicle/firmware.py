@@ -80,6 +80,10 @@ class Firmware(ABC):
     def save_ids(self) -> None:
         """Take the present sensors for the calibrated ones (MAV_CMD_PREFLIGHT_CALIBRATION, param5 = 76)."""
 
+    def learn_offsets(self) -> list[str]:
+        """Change the accelerometers' offsets by what it learnt meanwhile; the names of what was changed."""
+        return []
+
     def group(self, rate_hz: int) -> list[tuple[int, int]]:
         """What REQUEST_DATA_STREAM of everything at `rate_hz` sets: message, interval [us]."""
         return []

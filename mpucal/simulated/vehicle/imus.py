@@ -23,6 +23,7 @@ ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 2000.0
 BLOCK = 40
 # autopilots take the gyroscope's bias at each start, but for what then warms up
 GYRO_BIAS_LEFT = 0.03
+GYRO_BIAS_ANEW_RAD_S = 5e-4
 
 
 class Imus:
@@ -39,7 +40,7 @@ class Imus:
         self._rotation, self._rate_hz = rotation, rate_hz
         self.truths = tuple(_truth(options.seed, number, gravity) for number in range(options.imus))
         self._setting = Setting(rate_hz, ACCEL_RANGE_G, GYRO_RANGE_DPS, lsb_per_c=333.87, zero_c=21.0)
-        self._responses = tuple(truth.response(self._setting) for truth in self.truths)
+        self._responses = [truth.response(self._setting) for truth in self.truths]
         self._sample = 0
         self._block = np.empty((0, options.imus, 2, 3))
 
@@ -52,6 +53,12 @@ class Imus:
         """The hand hears `prompt`, whose `down` is in the vehicle's axes."""
         down = prompt.down
         self._motion.hear(Heard(str(prompt.kind), None if down is None else turned_over(down)), t_s)
+
+    def restart(self) -> None:
+        """The autopilot takes the gyroscopes' biases anew, and leaves a little of each."""
+        for imu, true in enumerate(self.truths):
+            left = self._rng.normal(0.0, GYRO_BIAS_ANEW_RAD_S, 3)
+            self._responses[imu] = replace(true, b_omega=true.b_omega + left).response(self._setting)
 
     def next(self) -> Vector:
         """The next sample: (imus, 2, 3), specific force [m/s^2] and rate [rad/s], in the sensors' axes."""

@@ -9,7 +9,7 @@ from ...mavlink.dialect import Message, dialect
 from ...mavlink.parameters.encoding import Parameter
 from .firmware import HIGHRES_IMU, RAW_IMU, SCALED_IMUS, SYS_STATUS, Firmware
 from .options import VehicleOptions
-from .store import INT32
+from .store import AXES, INT32
 
 LOOP_HZ = 250
 SHORTEST_US = 8000
@@ -42,6 +42,7 @@ class Px4(Firmware):
         store.add("SENS_BOARD_ROT", options.rotation, INT32)
         store.add_vector("SENS_BOARD_", 0.0, "_OFF")
         store.add("EKF2_IMU_CTRL", ALL_OF_THEM, INT32)
+        store.add("SENS_IMU_AUTOCAL", 1, INT32)
         for slot in range(SLOTS):
             there = slot < options.imus
             store.add(f"CAL_ACC{slot}_ID", DEVICE_IDS[slot] if there else 0, INT32)
@@ -110,6 +111,17 @@ class Px4(Firmware):
         self.store[wanted.name] = wanted.value
         self._take_over()
         return [self.store.parameter(wanted.name)]
+
+    def learn_offsets(self) -> list[str]:
+        """SENS_IMU_AUTOCAL: the estimator's bias of IMU 1 joins its offsets, in a slot that names it."""
+        if not self.store["SENS_IMU_AUTOCAL"]:
+            return []
+        slot = self._slot(0) or 0
+        self.store[f"CAL_ACC{slot}_ID"] = DEVICE_IDS[0]
+        for axis, value in zip(AXES, self._offset[0] + self.rotation.T @ self._bias, strict=True):
+            self.store[f"CAL_ACC{slot}_{axis}OFF"] = float(value)
+        self._take_over()
+        return [f"CAL_ACC{slot}_ID", *(f"CAL_ACC{slot}_{axis}OFF" for axis in AXES)]
 
     def correction(self, imu: int) -> tuple[Vector, Vector]:
         """As it was taken over."""

@@ -228,7 +228,13 @@ class SimulatedVehicle:
     def reboot(self) -> None:
         """It boots anew, silent meanwhile."""
         self._silent_until_us = self._now_us + REBOOT_US
+        self.imus.restart()
         self._boot()
+
+    def learn_offsets(self) -> None:
+        """It changes its own accelerometer offsets, and tells of it."""
+        for name in self.firmware.learn_offsets():
+            self._send(self._value(self.firmware.store.parameter(name)))
 
     def fall_silent(self) -> None:
         """It sends and hears nothing any more."""

@@ -1,0 +1,120 @@
+"""Stretches of one vehicle's log joined into one: over a reboot, and over a change of the parameters that correct.
+
+With known corrections, what an IMU delivered under one is turned into what it would have delivered under another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..data import Vector
+from .firmwares import PX4
+from .gatherer import Gatherer
+from .parameters.compose import Correction
+from .parameters.names import mounting, place
+
+Values = Mapping[str, float]
+
+# whose change alters the streams: beyond what is composed, or by a correction
+MOUNTED = ("AHRS_ORIENTATION", "AHRS_CUSTOM", "CUST_ROT", "SENS_BOARD")
+BEYOND = ("INS_GYR", "CAL_GYRO", *MOUNTED, "EKF2_IMU_CTRL")
+CORRECTIONS = ("INS_ACC", "CAL_ACC")
+# PX4 tells of a change up to a second after it is in use; the parameters of one change come one after the other
+LATE_US = {PX4: 1_500_000}
+SETTLED_US = 500_000
+
+
+@dataclass
+class Segment:
+    """A stretch under one set of parameters, between reboots; `rebooted`: it began with one."""
+
+    parameters: dict[str, float]
+    gatherer: Gatherer = field(default_factory=Gatherer)
+    rebooted: bool = False
+
+    def __len__(self) -> int:
+        return max((len(g) for g in self.gatherer.streams.values()), default=0)
+
+
+@dataclass(frozen=True)
+class Through:
+    """What an IMU delivers, seen through another correction of the same mounting R_b."""
+
+    now: Correction
+    then: Correction
+    R_b: Vector
+
+    def __call__(self, acc: Vector) -> Vector:
+        """(..., 3) m/s^2."""
+        return self.now.seen_through(self.then, self.R_b, acc)
+
+
+def through(firmware: str, imu: int, now: Values, then: Values) -> Through | None:
+    """From the stream of an IMU under `now` to the one under `then`; None where that is not known."""
+    if any(now.get(name, value) != value for name, value in then.items() if name.startswith(BEYOND)):
+        return None
+    if _ids(now) != _ids(then):
+        return None
+    where = place(firmware, imu, now)
+    if where is None:
+        return None
+    corrections, R_b = (where.correction(now), where.correction(then)), mounting(firmware, where, now)
+    if corrections[0] is None or corrections[1] is None or R_b is None or not np.all(corrections[0].scale):
+        return None
+    return Through(where.used(corrections[0]), where.used(corrections[1]), R_b)
+
+
+def joined(segments: Sequence[Segment], firmware: str, over_reboots: bool) -> Segment:
+    """The largest part of `segments` that can be joined, as one under the parameters of its last one."""
+    runs = [[segments[0]]]
+    for segment in segments[1:]:
+        apart = segment.rebooted and not over_reboots
+        runs += [[segment]] if apart or not _joins(runs[-1][-1], segment, firmware) else []
+        if runs[-1][-1] is not segment:
+            runs[-1].append(segment)
+    run = max(runs, key=lambda run: sum(map(len, run)))
+    follows = segments.index(run[-1]) + 1
+    cut = follows < len(segments) and not segments[follows].rebooted
+    if len(run) == 1 and not (cut and firmware in LATE_US):
+        return run[0]
+    made = Gatherer()
+    for k, segment in enumerate(run):
+        before = None if k == 0 or segment.rebooted else SETTLED_US
+        next_cuts = cut if segment is run[-1] else not run[k + 1].rebooted
+        _add(made, segment, run[-1].parameters, firmware, before, LATE_US.get(firmware) if next_cuts else None)
+    return Segment(dict(run[-1].parameters), made)
+
+
+def _joins(one: Segment, other: Segment, firmware: str) -> bool:
+    imus = {stream.imu for segment in (one, other) for stream in segment.gatherer.streams}
+    if _shaping(one.parameters) == _shaping(other.parameters):
+        return True
+    return all(through(firmware, imu, one.parameters, other.parameters) is not None for imu in imus)
+
+
+def _add(
+    made: Gatherer, segment: Segment, then: Values, firmware: str, skip_us: int | None, drop_us: int | None
+) -> None:
+    same = _shaping(segment.parameters) == _shaping(then)
+    for stream, gathered in segment.gatherer.streams.items():
+        times_us, numbers = gathered.rows()
+        if not len(times_us):
+            continue
+        first_us = times_us[0] + (skip_us or 0)
+        kept = (times_us >= first_us) & (times_us <= times_us[-1] - (drop_us or 0))
+        numbers = numbers[kept]
+        turned = None if same else through(firmware, stream.imu, segment.parameters, then)
+        if turned is not None:
+            numbers[:, :3] = turned(numbers[:, :3])
+        made.extend(stream, times_us[kept], numbers)
+
+
+def _shaping(values: Values) -> dict[str, float]:
+    return {name: value for name, value in values.items() if name.startswith((*BEYOND, *CORRECTIONS))}
+
+
+def _ids(values: Values) -> dict[str, float]:
+    return {name: value for name, value in values.items() if name.endswith("_ID") and name.startswith(CORRECTIONS)}
