@@ -107,6 +107,16 @@ class Decoder:
         """`t_ns` of the bus's clock as the samples that `take` gives show it."""
         return t_ns if self._fifo is None else self._fifo.provisional_ns(t_ns)
 
+    @property
+    def flipped(self) -> int:
+        """How many words of frames had a bit flipped on their way, and were set right."""
+        return 0 if self._fifo is None else self._fifo.flipped
+
+    @property
+    def believed(self) -> int:
+        """How many frames came since the start."""
+        return 0 if self._fifo is None else self._fifo.believed
+
     def take(self) -> Samples:
         """The samples since the last `take`, with the times that are known now."""
         return self._fifo.take() if self._fifo is not None else Samples.empty()

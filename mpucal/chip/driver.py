@@ -28,7 +28,7 @@ from .settings import Settings
 from .setup import configure, configured, quiet, reset, restart_fifo, wake
 from .tally import REMEDY, Tally
 
-DRIVER_VERSION = 4
+DRIVER_VERSION = 5
 
 # so long without a sample that can be believed, and the driver gives up
 DEAD_NS = 2_000_000_000
@@ -42,6 +42,8 @@ FRAME_WRITTEN_NS = 300_000
 
 # An overflow drops the oldest bytes, so a FIFO so many frames short of full may have lost its frames' alignment.
 SPARE_FRAMES = 3
+# of the samples; jerks of a hand are taken for flipped bits four times in ten thousand
+MANY_FLIPPED = 0.001
 # a host that was late once or twice says nothing about the bus
 OVERFLOWS = 3
 
@@ -104,6 +106,11 @@ class Driver:
         """Which part it turned out to be; once it was started."""
         return self._running.part
 
+    @property
+    def flipped(self) -> int:
+        """How many samples had a bit flipped on the bus, and were set right."""
+        return self._decoder.flipped
+
     def start(self) -> Sensor:
         """Identify, reset, wake and configure the chip, and start its FIFO.
 
@@ -165,6 +172,8 @@ class Driver:
         """Quiet the FIFO, if the bus still works; the chip stays awake."""
         with suppress(BusError, EndOfCapture):
             quiet(self._port)
+        if self.flipped > MANY_FLIPPED * self._decoder.believed:
+            self._say(f"{self.flipped} samples had a bit flipped on the bus and were set right: {REMEDY}")
         if self._port.tally.errors:
             self._say(f"{self._port.tally}: {REMEDY}")
 

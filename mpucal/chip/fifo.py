@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..data import Mask, Recording, Samples, Sensor, Vector
 from . import registers as reg
 from .clock import NS, SampleClock, Times, increasing
+from .flips import Flips
 from .host_clock import HostClock
 from .settings import Settings
 
@@ -78,6 +79,17 @@ class FifoDecoder:
         self._last_t_s: float | None = None
         self._stuck_frames = max(STUCK_FRAMES, math.ceil(STUCK_S * settings.nominal_rate_hz))
         self._alike = np.zeros((0, settings.frame_words), np.int16)
+        self._flips = Flips(settings.frame_words)
+
+    @property
+    def believed(self) -> int:
+        """How many frames were believed."""
+        return self._believed
+
+    @property
+    def flipped(self) -> int:
+        """How many words had a bit flipped on their way, and were set right."""
+        return self._flips.found
 
     def temperature(self, count: int) -> None:
         """The temperature register shows `count`: what an aligned frame will show too."""
@@ -112,7 +124,9 @@ class FifoDecoder:
         if self._odd_bytes or len(data) % self._settings.frame_bytes:
             return FifoFault.MISALIGNED
         frames = np.frombuffer(data, ">i2").reshape(-1, self._settings.frame_words).astype(np.int16)
-        kept = frames[max(DROPPED_FRAMES - self._read, 0) :]
+        # frames that wait for others, all alike, have nothing flipped
+        last = self._runs[-1].frames if self._runs and not len(self._alike) else self._alike
+        kept = self._flips.mended(frames[max(DROPPED_FRAMES - self._read, 0) :], last)
         if not self._aligned(kept):
             return FifoFault.MISALIGNED
         self._read += len(frames)
@@ -134,8 +148,8 @@ class FifoDecoder:
             first = self._read - len(kept)
             self._runs.append(Run(self._clock.segment, first, kept[:believed], gap=self._gap_before(first)))
             self._begun = True
+            self._believed += believed
             if not self._settings.accel_alone:
-                self._believed += believed
                 self._warmth += int(kept[:believed, self._columns.temperature].sum(dtype=np.int64))
 
     def _stuck(self, kept: Counts) -> bool:
@@ -151,6 +165,7 @@ class FifoDecoder:
         self._pending.clear()
         self._look = None
         self._alike = self._alike[:0]
+        self._flips.forget()
         self._clock.begin_segment()
         self._read = self._odd_bytes = 0
 

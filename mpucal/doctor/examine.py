@@ -102,6 +102,9 @@ def _awake(port: Port, driver: Driver, config: Config, seconds: float, olds: lis
         yield Finding(
             "stream", Mark.BAD, f"{len(recording)} samples in {seconds:g} s", "check the wires and the supply"
         )
+    if driver.flipped:
+        what = f"{driver.flipped} of {len(recording)} samples had a bit flipped on the bus, and were set right"
+        yield Finding("bit errors", Mark.BAD, what, REMEDY, {"flipped": driver.flipped, "samples": len(recording)})
     driver.stop()
     named = PARTS.get(sensor.who_am_i or 0)
     answers_as_it_is = named is not None and named.family.name == family.name

@@ -56,6 +56,7 @@ def test_the_true_rate_is_measured():
         ("temperature_c=90", "temperature", Mark.NOTE),
         ("hand=restless", "noise", Mark.UNKNOWN),
         ("fault=brownout@5", "losses", Mark.BAD),
+        ("fault=bit_errors@0", "bit errors", Mark.BAD),
         ("fault=nacks", "transfers", Mark.NOTE),
         ("fault=low_x", "dead axis", Mark.BAD),
         ("fault=zero_z", "dead axis", Mark.BAD),
