@@ -19,6 +19,7 @@ COMMANDS = {
     "export": "Convert a calibration to the format of another program.",
     "diff": "Compare two calibrations, and say whether the difference is significant.",
     "merge": "Combine calibrations at different temperatures.",
+    "firmware": "Write the serial bridge's firmware: a library, or onto a board.",
     "doctor": "Examine a chip and its bus.",
     "show": "Show a calibration, a config blob, a recording or a device.",
 }

@@ -71,6 +71,23 @@ def sketches(make):
 
 
 @pytest.fixture(scope="session")
+def fast_build(make, tmp_path_factory):
+    """The folder with the firmware for the ATmega328P at 500000 baud."""
+    folder = tmp_path_factory.mktemp("fast")
+    make("BAUD=500000", f"BUILD={folder}")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def stock_sketches(make):
+    """The folder with the sketches as a stock Arduino IDE builds them for each board, and what the compiler said."""
+    if not ARDUINO.exists():
+        pytest.skip("needs arduino-core-avr, of the packages in tools/ci_packages.txt")
+    _need("arduino-builder", "arduino-ctags")
+    return make("arduino")[0] / "stock"
+
+
+@pytest.fixture(scope="session")
 def emulator(tmp_path_factory):
     """The modules of the emulated board and of a line to it, and the board's library between them."""
     _need("gcc")

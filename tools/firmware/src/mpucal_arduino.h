@@ -1,4 +1,5 @@
-/* Where an Arduino board keeps its blob: in the EEPROM of an AVR, elsewhere in a file of LittleFS.
+/* Where an Arduino board keeps its blob: in the EEPROM of an AVR from MPUCAL_EEPROM_AT on, elsewhere in a file of
+ * LittleFS; where the core has neither, nowhere, and a host that stores a blob is told so.
  *
  * For sketches, once each. The flash behind other boards' EEPROM library is erased whole before it is written, which
  * would lose both slots; LittleFS renames a file at once or not at all.
@@ -14,12 +15,16 @@
 
 #include <EEPROM.h>
 
-static uint8_t mpucalRead(uint16_t address) { return EEPROM.read(address); }
-static void mpucalWrite(uint16_t address, uint8_t value) { EEPROM.update(address, value); }
+#ifndef MPUCAL_EEPROM_AT
+#define MPUCAL_EEPROM_AT 0
+#endif
+
+static uint8_t mpucalRead(uint16_t address) { return EEPROM.read((int)address + MPUCAL_EEPROM_AT); }
+static void mpucalWrite(uint16_t address, uint8_t value) { EEPROM.update((int)address + MPUCAL_EEPROM_AT, value); }
 static const struct mpucal_memory mpucalMemory = {mpucalRead, mpucalWrite, NULL};
 static inline void mpucalMemoryBegin() {}
 
-#else
+#elif __has_include(<LittleFS.h>)
 
 #include <LittleFS.h>
 
@@ -65,6 +70,19 @@ static inline void mpucalMemoryBegin() {
 #endif
     mpucalReload();
 }
+
+#else
+
+static uint8_t mpucalRead(uint16_t address) {
+    (void)address;
+    return 0;
+}
+static void mpucalWrite(uint16_t address, uint8_t value) {
+    (void)address;
+    (void)value;
+}
+static const struct mpucal_memory mpucalMemory = {mpucalRead, mpucalWrite, NULL};
+static inline void mpucalMemoryBegin() {}
 
 #endif
 

@@ -6,28 +6,53 @@
 #include <mpucal_arduino.h>
 #include <mpucal_bridge.h>
 
-#if defined(SERIAL_RX_BUFFER_SIZE) && !defined(USBCON)
-#if SERIAL_RX_BUFFER_SIZE < 256
-#error "Two requests do not fit the serial buffer: build with -DSERIAL_RX_BUFFER_SIZE=256, or use tools/firmware/avr."
-#endif
+// The buffer of 64 bytes that an Arduino core has holds one request while another is carried out, which at this rate is
+// done before it is full. With -DSERIAL_RX_BUFFER_SIZE=256 it may be 500000, and then 1000 samples a second fit.
+#ifndef MPUCAL_BAUD
+#define MPUCAL_BAUD 115200
 #endif
 
-const uint32_t BAUD_RATE = 500000;
+const uint32_t BAUD_RATE = MPUCAL_BAUD;
 const uint32_t I2C_HZ = 400000;
-const uint32_t I2C_TIMEOUT_US = 25000;
+const uint32_t I2C_TIMEOUT_MS = 25;
 const uint8_t WIRE_BYTES = 32;  // what the smallest Wire library takes at once
 const uint8_t WIRE_NO_ADDRESS = 2;
-const uint8_t FIFO_R_W = 0x74;
+const uint8_t FIFO_R_W = 0x74, MEM_R_W = 0x6F;  // these do not auto-increment
 
 static uint8_t codeOf(uint8_t wire) {
     return wire == 0 ? MPUCAL_CODE_OK : wire == WIRE_NO_ADDRESS ? MPUCAL_CODE_NO_ANSWER : MPUCAL_CODE_BUS_FAILED;
 }
 
-static uint8_t writeRegisters(uint8_t address, uint8_t first, const uint8_t *data, uint8_t count) {
+static uint8_t registerAfter(uint8_t first, uint8_t done) {
+    return first == FIFO_R_W || first == MEM_R_W ? first : (uint8_t)(first + done);
+}
+
+// An AVR's Wire says that it took all of several bytes, and drops those for which it has no room: one byte at a time.
+static uint8_t writePiece(uint8_t address, uint8_t first, const uint8_t *data, uint8_t count) {
     Wire.beginTransmission(address);
-    bool fits = Wire.write(first) == 1 && (count == 0 || Wire.write(data, count) == count);
+    bool fits = Wire.write(first) == 1;
+    for (uint8_t i = 0; i < count; i++) {
+        fits = Wire.write(data[i]) == 1 && fits;
+    }
     uint8_t code = codeOf(Wire.endTransmission());
     return code == MPUCAL_CODE_OK && !fits ? (uint8_t)MPUCAL_CODE_BUS_FAILED : code;
+}
+
+// The register takes one of Wire's bytes.
+static uint8_t writeRegisters(uint8_t address, uint8_t first, const uint8_t *data, uint8_t count) {
+    uint8_t done = 0, code;
+    do {
+        uint8_t left = (uint8_t)(count - done), piece = left < WIRE_BYTES ? left : (uint8_t)(WIRE_BYTES - 1);
+        code = writePiece(address, registerAfter(first, done), data + done, piece);
+        done = (uint8_t)(done + piece);
+    } while (code == MPUCAL_CODE_OK && done < count);
+    return code;
+}
+
+// Some cores send the register only with the read behind it, and cannot say then that nobody answered.
+static uint8_t whyNothing(uint8_t address) {
+    Wire.beginTransmission(address);
+    return Wire.endTransmission() == WIRE_NO_ADDRESS ? MPUCAL_CODE_NO_ANSWER : MPUCAL_CODE_BUS_FAILED;
 }
 
 static uint8_t readPiece(uint8_t address, uint8_t first, uint8_t *data, uint8_t count) {
@@ -38,7 +63,7 @@ static uint8_t readPiece(uint8_t address, uint8_t first, uint8_t *data, uint8_t 
         return code;
     }
     if (Wire.requestFrom(address, count) != count) {
-        return MPUCAL_CODE_BUS_FAILED;
+        return whyNothing(address);
     }
     for (uint8_t i = 0; i < count; i++) {
         data[i] = (uint8_t)Wire.read();
@@ -48,10 +73,9 @@ static uint8_t readPiece(uint8_t address, uint8_t first, uint8_t *data, uint8_t 
 
 // More than one piece is one transfer only for the FIFO: a host reads no more than 14 other registers at once.
 static uint8_t readRegisters(uint8_t address, uint8_t first, uint8_t *data, uint8_t count) {
-    for (uint8_t done = 0; done < count; done += WIRE_BYTES) {
-        uint8_t left = count - done, piece = left < WIRE_BYTES ? left : WIRE_BYTES;
-        uint8_t from = first == FIFO_R_W ? first : (uint8_t)(first + done);
-        uint8_t code = readPiece(address, from, data + done, piece);
+    for (uint8_t done = 0; done < count; done = (uint8_t)(done + WIRE_BYTES)) {
+        uint8_t left = (uint8_t)(count - done), piece = left < WIRE_BYTES ? left : WIRE_BYTES;
+        uint8_t code = readPiece(address, registerAfter(first, done), data + done, piece);
         if (code != MPUCAL_CODE_OK) {
             return code;
         }
@@ -75,7 +99,9 @@ void setup() {
     Wire.begin();
     Wire.setClock(I2C_HZ);
 #if defined(WIRE_HAS_TIMEOUT)
-    Wire.setWireTimeout(I2C_TIMEOUT_US, true);
+    Wire.setWireTimeout(I2C_TIMEOUT_MS * 1000, true);
+#elif defined(ESP32)
+    Wire.setTimeOut(I2C_TIMEOUT_MS);
 #endif
     mpucalMemoryBegin();
     mpucal_bridge_begin(&bridge, &port);

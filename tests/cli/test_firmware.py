@@ -1,0 +1,77 @@
+"""`mpucal firmware`: the library in a folder, and the board by avrdude."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mpucal.__main__ import run
+from mpucal.cli import firmware
+
+FIRMWARE = Path(__file__).parents[2] / "tools" / "firmware"
+
+
+@pytest.fixture
+def programs(tmp_path, monkeypatch):
+    """A folder that is all of PATH."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    monkeypatch.setenv("PATH", str(folder))
+    return folder
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """An installation with an image."""
+    folder = tmp_path / "installed"
+    folder.mkdir()
+    (folder / "library.properties").write_text("name=mpucal\n")
+    (folder / firmware.HEX).write_text(":00000001FF\n")
+    monkeypatch.setattr(firmware, "FOLDERS", (folder,))
+    return folder
+
+
+def avrdude(folder, code):
+    path = folder / "avrdude"
+    path.write_text(f'#!/bin/sh\necho "$@" > {folder}/said\nexit {code}\n')
+    path.chmod(0o755)
+
+
+def test_the_library_is_written_whole(tmp_path, capsys):
+    folder = tmp_path / "libraries" / "mpucal"
+    assert run(["firmware", "-o", str(folder)]) == 0
+    for name in firmware.LIBRARY:
+        assert (folder / name).exists()
+    for path in FIRMWARE.glob("src/*"):
+        assert (folder / "src" / path.name).read_bytes() == path.read_bytes()
+    assert run(["firmware", "-o", str(folder)]) == 3
+    assert "is there already" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("board", "baud"), [("uno", "115200"), ("nano-old", "57600")])
+def test_avrdude_is_told_what_to_write(installed, programs, board, baud):
+    avrdude(programs, 0)
+    assert run(["firmware", "--flash", "/dev/ttyX", "--board", board]) == 0
+    said = (programs / "said").read_text().split()
+    assert said[said.index("-b") + 1] == baud
+    assert said[said.index("-P") + 1] == "/dev/ttyX"
+    assert said[-1] == f"flash:w:{installed / firmware.HEX}:i"
+
+
+def test_a_board_that_was_not_written_is_said(installed, programs, capsys):
+    avrdude(programs, 1)
+    assert run(["firmware", "--flash", "/dev/ttyX"]) == 6
+    assert "could not write to the board on /dev/ttyX" in capsys.readouterr().err
+
+
+def test_without_avrdude_the_command_is_given(installed, programs, capsys):
+    assert run(["firmware", "--flash", "/dev/ttyX"]) == 3
+    assert (
+        f"avrdude -p atmega328p -c arduino -b 115200 -P /dev/ttyX -D -U flash:w:{installed}" in capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize("words", [[], ["-o", "x", "--flash", "y"]])
+def test_one_of_both_is_asked_for(words, capsys):
+    assert run(["firmware", *words]) == 2

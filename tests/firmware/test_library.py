@@ -1,0 +1,41 @@
+"""The Arduino library: it compiles with the stock options of each board, and says what Arduino's rules ask."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+FIRMWARE = Path(__file__).parents[2] / "tools" / "firmware"
+BOARDS = ("uno", "nano-cpu=atmega328old", "mega-cpu=atmega2560", "leonardo")
+SKETCHES = ("mpucal_bridge", "mpucal_corrected")
+
+
+@pytest.mark.parametrize("board", BOARDS)
+@pytest.mark.parametrize("sketch", SKETCHES)
+def test_a_stock_ide_compiles_it_without_a_warning(stock_sketches, board, sketch):
+    folder = stock_sketches / board
+    assert (folder / sketch / f"{sketch}.ino.hex").is_file()
+    said = (folder / f"{sketch}.log").read_text().splitlines()
+    # the core's own are not ours
+    assert [line for line in said if "warning" in line and "/usr/share/arduino" not in line] == []
+
+
+def test_both_package_managers_read_the_same():
+    properties = dict(line.split("=", 1) for line in (FIRMWARE / "library.properties").read_text().splitlines())
+    package = json.loads((FIRMWARE / "library.json").read_text())
+    assert (properties["name"], properties["version"]) == (package["name"], package["version"])
+    assert properties["category"] == "Sensors"
+    assert (FIRMWARE / "src" / properties["includes"]).is_file()
+
+
+def test_the_keywords_are_in_the_headers():
+    headers = "\n".join(path.read_text() for path in (FIRMWARE / "src").glob("*.h"))
+    lines = (FIRMWARE / "keywords.txt").read_text().splitlines()
+    assert lines
+    for line in lines:
+        word, kind = line.split("\t")
+        assert re.fullmatch(r"KEYWORD[12]|LITERAL1", kind)
+        assert re.search(rf"\b{word}\b", headers)
