@@ -30,7 +30,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 from worlds.family import Family, Wanted
-from worlds.judge import Count, Run, broken, count, judged
+from worlds.judge import RMS_Z, Count, Run, beside, broken, count, judged
 from worlds.table import FAMILIES
 
 
@@ -116,6 +116,8 @@ def main() -> int:
     # as wide as its content, whatever the terminal
     console = Console(width=170)
     console.print(table(families, runs))
+    odd = ", ".join(f"{name} {number(z)}" for name, z in beside(families, runs).items())
+    console.print(f"rms z outside {RMS_Z[0]}..{RMS_Z[1]}: {odd or 'none'}", highlight=False)
     limits = broken(families, runs)
     console.print("\n".join(f"BROKEN {limit}" for limit in limits) or "every limit is kept", highlight=False)
     if options.json:

@@ -218,6 +218,15 @@ def test_a_gravity_that_is_named_unlikely_is_the_unit_of_the_gains(worlds):
     assert run.error < 0.02
 
 
+def test_claims_that_are_too_wide_or_too_narrow_are_told(worlds):
+    families = [worlds.table.FAMILIES[name] for name in ("poses", "bench", "spins", "one axis")]
+    runs = [
+        *(verdict(worlds), verdict(worlds, family="bench", error=0.02), verdict(worlds, family="spins", error=0.004)),
+        verdict(worlds, family="one axis", verdict="refused"),
+    ]
+    assert worlds.judge.beside(families, runs) == pytest.approx({"bench": 2.0, "spins": 0.4})
+
+
 # families that a release is not to judge falsely, and that take no more than some seconds together
 SMALL = (
     *("poses", "poses of a session", "poses filtered", "continuous", "phone poses", "bench"),

@@ -28,6 +28,8 @@ CRASHED = "crashed"
 GRAVITY_NAMED = "gravity_unlikely"
 # limits over all families, and over one of those whose recordings nothing is wrong with
 FALSE_SHARE, GOOD_SHARE, SHARP_MPS2 = 0.003, 0.98, 1e-3
+# of a family's rms z: below, its claims are too wide, and above, too narrow
+RMS_Z = (0.5, 1.5)
 
 
 @dataclass(frozen=True)
@@ -148,3 +150,9 @@ def broken(families: Sequence[Family], runs: Sequence[Run]) -> list[str]:
         if family.wanted is Wanted.SHARP and not of.error <= SHARP_MPS2:
             found.append(f"{family.name}: median error {of.error:.2g} m/s², more than {SHARP_MPS2:g}")
     return found
+
+
+def beside(families: Sequence[Family], runs: Sequence[Run]) -> dict[str, float]:
+    """The rms z by name of those families in which it lies outside RMS_Z."""
+    z = {family.name: count([run for run in runs if run.family == family.name]).rms_z for family in families}
+    return {name: rms for name, rms in z.items() if not RMS_Z[0] <= rms <= RMS_Z[1] and not math.isnan(rms)}
