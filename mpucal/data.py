@@ -152,6 +152,7 @@ class Recording(Samples):
     utc_ns : the time of day when t was 0, ns since 1970; None: nobody noted it.
     autopilot : of an IMU of a vehicle, what stands between the sensor and the samples.
     others : further IMUs of that vehicle, turned with it.
+    taken : None, or the sentence that says as what a file's columns and units were taken.
     """
 
     flat: tuple[int, int] | None = None
@@ -161,6 +162,7 @@ class Recording(Samples):
     utc_ns: int | None = None
     autopilot: Autopilot | None = None
     others: tuple[Recording, ...] = ()
+    taken: str | None = None
 
     @classmethod
     def from_arrays(
@@ -176,6 +178,7 @@ class Recording(Samples):
         gyr_clipped: ArrayLike | None = None,
         sensor: Sensor | None = None,
         name: str = "recording",
+        taken: str | None = None,
     ) -> Recording:
         """A recording of plain arrays, checked.
 
@@ -205,6 +208,7 @@ class Recording(Samples):
             flat=None if flat is None else stretch(flat, n, name),
             sensor=sensor or Sensor(),
             name=name,
+            taken=taken,
         )
 
     @classmethod

@@ -22,6 +22,7 @@ from ..files.rows import Rows
 from ..result.atomic import check_not_among
 from ..result.calibration import Calibration
 from ..result.correction import correction
+from .recording_options import hint_options, hints_of, say_taken
 
 EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calibrated.mcap`"
 
@@ -43,13 +44,15 @@ The result is in m/s² and rad/s, in the calibration's body frame. Only {held_wh
     help=f"Output file: {writable()}, by its suffix; default: a table on stdout.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON; needs -o.")
-def command(calibration: Path, file: Path, target: Path | None, as_json: bool) -> None:
+@hint_options()
+def command(calibration: Path, file: Path, target: Path | None, as_json: bool, **hints: Any) -> None:
     """Pass the samples through, a run at a time."""
     if as_json and target is None:
         raise UsageError("--json was given without -o, and the samples go to stdout", "name a file with -o")
     if target is not None:
         check_not_among(target, (calibration, file, *captures_in(file)))
-    rows = open_rows(file)
+    rows = open_rows(file, hints_of(hints))
+    say_taken(rows.taken)
     if rows.done:
         raise UsageError(f"{file} is calibrated already ({rows.done})", "give the uncalibrated recording")
     ready = correction(Calibration.load(calibration), rows.sensor, rows.autopilot)

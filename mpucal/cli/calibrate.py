@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -14,6 +15,7 @@ from ..result.calibration import REFUSED
 from ..result.session_files import BLOB
 from ..session.results import make_folder, result_files, save
 from .options import fit_options
+from .recording_options import hint_options, hints_of, say_taken
 from .summary import summary, written
 
 EXAMPLE = "Example: `mpucal calibrate capture.mcap -o results` or `mpucal calibrate walk.npz --json`"
@@ -30,11 +32,19 @@ Exit code 5: the calibration was refused, with reasons.
 @click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for the results.")
 @click.option("--json", "as_json", is_flag=True, help="Print only calibration.json.")
 @fit_options
+@hint_options()
 def command(
-    recording: Path, folder: Path | None, as_json: bool, gravity: float, gravity_anyway: bool, model: str
+    recording: Path,
+    folder: Path | None,
+    as_json: bool,
+    gravity: float,
+    gravity_anyway: bool,
+    model: str,
+    **hints: Any,
 ) -> int:
     """Fit a recording, and print or write what comes of it."""
-    samples = load(recording)
+    samples = load(recording, hints_of(hints))
+    say_taken(samples.taken)
     if samples.recovered is not None:
         click.echo(f"mpucal: {samples.recovered}", err=True)
     calibration = calibrate_vehicle(samples, model=model, gravity=gravity, gravity_anyway=gravity_anyway)

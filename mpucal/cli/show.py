@@ -25,6 +25,7 @@ from ..sources.opening import contents, one_of
 from ..sources.table import kinds_meant, used_by
 from .options import check_source, source_options
 from .person import say
+from .recording_options import say_taken
 from .summary import formula, slope, summary
 
 EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --json`, or `mpucal show --serial PORT`"
@@ -85,6 +86,7 @@ def _show_calibration(where: str, calibration: Calibration, as_json: bool) -> No
 
 def _show_recording(file: Path, as_json: bool) -> None:
     recording = load(file)
+    say_taken(recording.taken)
     if recording.recovered is not None:
         click.echo(f"mpucal: {recording.recovered}", err=True)
     facts = _facts(recording)

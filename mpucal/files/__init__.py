@@ -7,24 +7,27 @@ from pathlib import Path
 
 from ..data import Recording
 from .formats import format_of, written_format
+from .hints import NO_HINTS, Hints
 from .rows import Rows, Write
 
 
-def load(path: str | Path) -> Recording:
+def load(path: str | Path, hints: Hints = NO_HINTS) -> Recording:
     """The recording in a file of any format in `formats.FORMATS` (.mcap, .npz, .csv ...), or in a session's folder.
 
-    A capture that was cut short gives what is whole of it, and says so in `recovered`.
+    A capture that was cut short gives what is whole of it, and says so in `recovered`. What a file of another program
+    was taken for is said in `taken`; `hints` say what it does not.
 
     Raises
     ------
-    RecordingError : no such file, one of another kind, or no recording in it.
+    RecordingError : no such file, one of another kind, no recording in it, or doubtful units or columns.
+    UsageError : hints for a file that needs none.
     CaptureError : a capture that cannot be read.
     ChipError : the capture of a chip that is not known.
     """
-    return format_of(Path(path)).read(Path(path))
+    return format_of(Path(path), hints).read(Path(path), hints=hints)
 
 
-def open_rows(path: Path) -> Rows:
+def open_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
     """The samples of any recording that `load` reads, a run at a time.
 
     A table and an archive are read as they are gone through. A capture is gone through before, since the times of its
@@ -34,7 +37,7 @@ def open_rows(path: Path) -> Rows:
     ------
     RecordingError, CaptureError, ChipError : see load; a table's bad line and an odd sample when they are come to.
     """
-    return format_of(path).read_rows(path)
+    return format_of(path, hints).read_rows(path, hints=hints)
 
 
 def open_writer(path: Path, rows: Rows, done: str) -> AbstractContextManager[Write]:

@@ -22,7 +22,8 @@ class Rows:
     Attributes
     ----------
     runs : each of at most some ROWS samples, to be gone through once.
-    sensor, flat, autopilot, recovered, name, utc_ns : as of a Recording. others : how many further IMUs it holds.
+    sensor, flat, autopilot, recovered, name, utc_ns, taken : as of a Recording.
+    others : how many further IMUs it holds.
     done : the sentence that says that the file is calibrated data already; empty where it is not.
     noise : (2, 3), standard deviations of a sample's acc [m/s^2] and gyr [rad/s]; NaN: unknown.
     """
@@ -37,6 +38,7 @@ class Rows:
     done: str = ""
     noise: Vector = field(default_factory=lambda: np.full((2, 3), np.nan))
     utc_ns: int | None = None
+    taken: str | None = None
 
     @classmethod
     def of(cls, recording: Recording, done: str = "") -> Rows:
@@ -51,13 +53,16 @@ class Rows:
             len(recording.others),
             done,
             utc_ns=recording.utc_ns,
+            taken=recording.taken,
         )
 
     def recording(self) -> Recording:
         """All of it in memory, checked; see Recording.from_arrays."""
         whole = Samples.joined(list(self.runs))
         recording = Recording.from_arrays(**vars(whole), flat=self.flat, sensor=self.sensor, name=self.name)
-        return replace(recording, autopilot=self.autopilot, recovered=self.recovered, utc_ns=self.utc_ns)
+        return replace(
+            recording, autopilot=self.autopilot, recovered=self.recovered, utc_ns=self.utc_ns, taken=self.taken
+        )
 
 
 Write = Callable[[Samples], None]

@@ -1,0 +1,79 @@
+"""What a person says of a recording that does not say it itself: topic, columns, units, ranges and rate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+
+from .tables.units import QUANTITIES, unit_named
+
+ROLES = ("t", "ax", "ay", "az", "gx", "gy", "gz")
+SKIPPED = ("-", "_", "")
+
+
+@dataclass(frozen=True)
+class Hints:
+    """What is said; None and empty where nothing is.
+
+    Attributes
+    ----------
+    topic : of a bag or a log with more than one IMU.
+    columns : role (t, ax ... gz) -> a column's name, or its place from 0.
+    units : quantity (t, acc, gyr) -> unit, as tables.units names it.
+    accel_range_g, gyro_range_dps : full scale, of counts. rate_hz : of samples without times.
+    """
+
+    topic: str | None = None
+    columns: Mapping[str, str | int] = field(default_factory=lambda: MappingProxyType({}))
+    units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    accel_range_g: float | None = None
+    gyro_range_dps: float | None = None
+    rate_hz: float | None = None
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """The names of what is said."""
+        return tuple(f.name for f in fields(self) if getattr(self, f.name))
+
+
+NO_HINTS = Hints()
+
+
+def parse_columns(text: str) -> Mapping[str, str | int]:
+    """`t=time_us,ax=AccX,...` by name or number from 1, or `t,ax,ay,az,gx,gy,gz` in the order of the columns.
+
+    Raises
+    ------
+    ValueError : it is neither.
+    """
+    items = [item.strip() for item in text.split(",")]
+    found: dict[str, str | int] = {}
+    for place, item in enumerate(items):
+        role, equals, name = (word.strip() for word in item.partition("="))
+        if not equals and role in SKIPPED:
+            continue
+        if role not in ROLES or role in found or (equals and not name):
+            raise ValueError(
+                f"{item!r} is no column: give t=NAME,ax=NAME,... or the columns' order, such as t,ax,ay,az,gx,gy,gz"
+            )
+        found[role] = (int(name) - 1 if name.isdecimal() and int(name) else name) if equals else place
+    return MappingProxyType(found)
+
+
+def parse_units(text: str) -> Mapping[str, str]:
+    """`t=ms,acc=g,gyr=deg/s`, or some of it.
+
+    Raises
+    ------
+    ValueError : another quantity or unit.
+    """
+    found = {}
+    for item in text.split(","):
+        quantity, _, said = (word.strip() for word in item.partition("="))
+        unit = unit_named(said)
+        if quantity not in QUANTITIES or unit not in QUANTITIES[quantity]:
+            known = "; ".join(f"{name} in {', '.join(units)}" for name, units in QUANTITIES.items())
+            raise ValueError(f"{item!r} is no unit: {known}")
+        found[quantity] = unit
+    return MappingProxyType(found)

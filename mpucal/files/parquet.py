@@ -1,0 +1,69 @@
+"""Parquet files, by pyarrow: a table with the columns that a table of text has."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data import Recording, Vector
+from ..errors import RecordingError
+from .extras import library
+from .hints import NO_HINTS, Hints
+from .tables.names import ACC, GYR, TEMPERATURE, TIME, Column, columns_of, three
+from .tables.streams import Stream, recording_of
+from .tables.table import chosen, remarks
+
+
+def load_parquet(path: Path, hints: Hints = NO_HINTS) -> Recording:
+    """The recording in a Parquet file.
+
+    Raises
+    ------
+    RecordingError : it cannot be read, or does not say all that is needed; what is missing is named.
+    """
+    arrow, parquet = library("pyarrow", "parquet", path), library("pyarrow.parquet", "parquet", path)
+    try:
+        table = parquet.read_table(path)
+        arrays = {name: _array(table.column(place)) for place, name in enumerate(table.column_names)}
+    except (arrow.ArrowException, OSError, ValueError, TypeError) as error:
+        raise RecordingError(f"{path} is no whole Parquet file ({error})", "write it again") from error
+    names = list(table.column_names)
+    columns = chosen(names, hints) if hints.columns else columns_of(names)
+    acc, gyr = three(columns, ACC), three(columns, GYR)
+    if not acc or not gyr:
+        raise RecordingError(
+            f"{path.name} holds no columns of {'a gyroscope' if acc else 'an accelerometer'}; its columns are"
+            f" {', '.join(names)}",
+            "name them with --columns t=NAME,ax=NAME,...",
+        )
+    clocks = [column for column in columns if column.quantity == TIME and arrays[column.name].dtype.kind in "iufM"]
+    a, w = (_stream(arrays, of, clocks) for of in (acc, gyr))
+    warm = [c for c in columns if c.quantity == TEMPERATURE and arrays[c.name].dtype.kind in "iuf"]
+    temperature_c = arrays[warm[0].name].astype(float) if warm and len(a.values) == table.num_rows else None
+    return recording_of(a, w, hints, path.name, temperature_c, remarks(acc))
+
+
+def _array(column: Any) -> NDArray[Any]:
+    return np.asarray(column.to_numpy())
+
+
+def _stream(arrays: dict[str, NDArray[Any]], of: tuple[Column, ...], clocks: list[Column]) -> Stream:
+    try:
+        values: Vector = np.column_stack([arrays[column.name].astype(float) for column in of])
+    except (TypeError, ValueError) as error:
+        raise RecordingError(f"{of[0].name} and the like hold no numbers ({error})", "write numbers") from error
+    values = -values if of[0].turned_around else values
+    there = ~np.isnan(values).all(axis=1)
+    unit = of[0].unit if len({column.unit for column in of}) == 1 else ""
+    clock = min((c for c in clocks if c.of in ("", of[0].quantity)), key=lambda c: (not c.of, c.rank), default=None)
+    if clock is None:
+        return Stream(None, values[there], unit=unit)
+    times, time_unit = arrays[clock.name][there], clock.unit
+    if times.dtype.kind == "M":
+        times, time_unit = times.astype("datetime64[ns]").astype(np.int64), "ns"
+    elif times.dtype.kind == "u":
+        times = times.astype(np.int64)
+    return Stream(times, values[there], time_unit, unit)

@@ -1,0 +1,182 @@
+"""sensor_msgs/Imu in bags of ROS, by rosbags: rosbag2 as .mcap, .db3 or a folder of them, and ROS 1's .bag.
+
+A driver that publishes the accelerometer and the gyroscope apart (RealSense: .../accel/sample, .../gyro/sample) gives
+two topics, which are joined by time. Some drivers publish g where the message's definition asks for m/s^2: |a| tells.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from mcap.records import Metadata
+
+from ..data import Recording
+from ..errors import CaptureError, MpucalError, RecordingError
+from .extras import library
+from .hints import NO_HINTS, Hints
+from .mcap import CALIBRATED, FORMAT
+from .rows import Rows
+from .tables.streams import Stream, recording_of
+from .tables.units import COUNTS, acceleration_unit
+
+IMU = "sensor_msgs/msg/Imu"
+SNIFFED = 1 << 16
+_HEADER = struct.Struct("<8xBQI")
+S = 1_000_000_000
+# a first covariance of -1 says that there is no such measurement
+NOT_MEASURED = -1.0
+REMEDY = "give a bag with sensor_msgs/Imu"
+
+
+def is_mcap_of_ros(path: Path) -> bool:
+    """Whether an MCAP file begins as one of ROS, and not as a capture."""
+    try:
+        with path.open("rb") as file:
+            begun = file.read(SNIFFED)
+    except OSError:
+        return False
+    if len(begun) < _HEADER.size or FORMAT.encode() in begun[: _HEADER.size + 100]:
+        return False
+    profile = begun[_HEADER.size :][: _HEADER.unpack_from(begun)[2]]
+    return profile in (b"ros2", b"ros1") or IMU.encode() in begun
+
+
+def is_folder_of_ros(path: Path) -> bool:
+    """Whether a folder is a bag of rosbag2."""
+    try:
+        return "rosbag2_bagfile_information" in (path / "metadata.yaml").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return False
+
+
+def bag_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
+    """The samples in a bag, to be calibrated.
+
+    Raises
+    ------
+    CaptureError : they are calibrated already. RecordingError : see load_bag.
+    """
+    done = _done(path)
+    if done:
+        raise CaptureError(
+            f"{path} holds samples that are calibrated already ({done})", "give the recording that they were made of"
+        )
+    return Rows.of(load_bag(path, hints))
+
+
+def load_bag(path: Path, hints: Hints = NO_HINTS) -> Recording:
+    """The recording in a bag.
+
+    Raises
+    ------
+    RecordingError : rosbags is not installed, the bag cannot be read, holds no Imu or more than one that may be meant.
+    """
+    highlevel, typesys = library("rosbags.highlevel", "ros", path), library("rosbags.typesys", "ros", path)
+    try:
+        with highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)) as bag:
+            topics = _chosen(path.name, [c for c in bag.connections if c.msgtype == IMU], bag.topics, hints)
+            found = {topic: _Messages() for topic in topics}
+            for connection, t_ns, data in bag.messages(c for c in bag.connections if c.topic in topics):
+                found[connection.topic].add(bag.deserialize(data, connection.msgtype), t_ns)
+    except MpucalError:
+        raise
+    except Exception as error:
+        # of sqlite, yaml, lz4 and what else reads it
+        raise RecordingError(f"{path} is no whole bag ({type(error).__name__}: {error})", REMEDY) from error
+    acc, gyr = found[topics[0]], found[topics[-1]]
+    remarks = [f"from {' and '.join(dict.fromkeys(topics))}", *acc.remarks, _calibrated(path)]
+    return recording_of(acc.stream("acc"), gyr.stream("gyr"), hints, path.name, remarks=list(filter(None, remarks)))
+
+
+def _chosen(name: str, connections: Iterable[Any], all_topics: Iterable[str], hints: Hints) -> list[str]:
+    """The topic of both sensors, or that of the accelerometer and that of the gyroscope."""
+    there = list(dict.fromkeys(connection.topic for connection in connections))
+    if hints.topic:
+        asked = hints.topic.split(",")
+        missing = [topic for topic in asked if topic not in there]
+        if missing or len(asked) > 2:
+            raise RecordingError(
+                f"{name} has no Imu on {', '.join(missing or asked)}; it has some on {', '.join(there) or 'no topic'}",
+                "name one with --topic, or two with a comma: the accelerometer's, the gyroscope's",
+            )
+        return asked
+    if not there:
+        raise RecordingError(f"{name} holds no {IMU}; its topics are {', '.join(all_topics) or 'none'}", REMEDY)
+    apart = [[topic for topic in there if word in topic and other not in topic] for word, other in _WORDS]
+    if len(there) == 2 and all(len(of) == 1 for of in apart):
+        return [apart[0][0], apart[1][0]]
+    if len(there) > 1:
+        raise RecordingError(f"{name} holds Imu on {', '.join(there)}", "say which with --topic")
+    return there
+
+
+_WORDS = (("accel", "gyro"), ("gyro", "accel"))
+
+
+@dataclass
+class _Messages:
+    """The messages of a topic."""
+
+    stamps: list[int] = field(default_factory=list)
+    received: list[int] = field(default_factory=list)
+    acc: list[tuple[float, float, float]] = field(default_factory=list)
+    gyr: list[tuple[float, float, float]] = field(default_factory=list)
+    measured: dict[str, bool] = field(default_factory=lambda: {"acc": True, "gyr": True})
+
+    def add(self, message: Any, t_ns: int) -> None:
+        stamp, a, w = message.header.stamp, message.linear_acceleration, message.angular_velocity
+        self.stamps.append(stamp.sec * S + stamp.nanosec)
+        self.received.append(t_ns)
+        self.acc.append((a.x, a.y, a.z))
+        self.gyr.append((w.x, w.y, w.z))
+        self.measured["acc"] &= message.linear_acceleration_covariance[0] != NOT_MEASURED
+        self.measured["gyr"] &= message.angular_velocity_covariance[0] != NOT_MEASURED
+
+    @property
+    def stamped(self) -> bool:
+        return any(self.stamps)
+
+    @property
+    def remarks(self) -> list[str]:
+        return [] if self.stamped else ["times are those of receipt, as the headers hold none"]
+
+    def stream(self, quantity: str) -> Stream:
+        """What it says of the quantity."""
+        values = np.array(getattr(self, quantity), float).reshape(-1, 3)
+        if not self.measured[quantity]:
+            raise RecordingError(
+                f"the messages say by their covariances that there is no {_NAMES[quantity]}",
+                "name the topics of the accelerometer and of the gyroscope with --topic ONE,OTHER",
+            )
+        unit = "rad/s"
+        if quantity == "acc":
+            seen = acceleration_unit(values) if len(values) else ""
+            unit = seen if seen and seen != COUNTS else "m/s^2"
+        return Stream(np.array(self.stamps if self.stamped else self.received, np.int64), values, "ns", unit)
+
+
+_NAMES = {"acc": "acceleration", "gyr": "rate"}
+
+
+def _done(path: Path) -> str:
+    """What was done to the samples of a file that `mpucal apply` wrote; empty of others."""
+    if path.suffix.lower() != ".mcap" or not path.is_file():
+        return ""
+    try:
+        with path.open("rb") as file:
+            found: list[Metadata] = [m for m in make_reader(file).iter_metadata() if m.name == CALIBRATED]
+    except (McapError, OSError, struct.error, ValueError):
+        return ""
+    return found[0].metadata.get("done", "") if found else ""
+
+
+def _calibrated(path: Path) -> str:
+    done = _done(path)
+    return f"its samples are {done} already" if done else ""

@@ -1,0 +1,56 @@
+"""What i2cdevlib's example MPU6050_raw prints: `a/g:` and six counts a line, with tabs between.
+
+Its MPU6050::initialize() sets +-2 g and +-250 deg/s, and the example prints no times.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..data import Recording
+from ..errors import RecordingError
+from .hints import NO_HINTS, Hints
+from .rows import cannot_read
+from .tables.streams import Stream, recording_of
+from .tables.units import COUNTS
+
+LINE = re.compile(rb"^[^\n]{0,40}?a/g:((?:[ \t]+-?[0-9]{1,6}){6})[ \t\r]*$", re.MULTILINE)
+ACCEL_RANGE_G, GYRO_RANGE_DPS = 2.0, 250.0
+SNIFFED = 1 << 14
+
+
+def is_serial_log(path: Path) -> bool:
+    """Whether a file begins with such lines."""
+    try:
+        with path.open("rb") as file:
+            return LINE.search(file.read(SNIFFED)) is not None
+    except OSError:
+        return False
+
+
+def load_serial_log(path: Path, hints: Hints = NO_HINTS) -> Recording:
+    """The recording in such lines; what stands between them is left out, and so is a last line that was cut.
+
+    Raises
+    ------
+    RecordingError : it cannot be read, holds no such lines, or nothing says the rate.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    whole = data if data.endswith(b"\n") else data[: data.rfind(b"\n") + 1]
+    rows = [line.split() for line in LINE.findall(whole)]
+    if not rows:
+        raise RecordingError(f"{path} holds no lines of MPU6050_raw", "give what the sketch printed")
+    counts = np.array(rows, float)
+    remarks = []
+    if hints.accel_range_g is None and hints.gyro_range_dps is None:
+        hints = replace(hints, accel_range_g=ACCEL_RANGE_G, gyro_range_dps=GYRO_RANGE_DPS)
+        remarks.append("the ranges are those that MPU6050::initialize() sets")
+    acc, gyr = (Stream(None, values, unit=COUNTS) for values in (counts[:, :3], counts[:, 3:]))
+    return recording_of(acc, gyr, hints, path.name, remarks=remarks)

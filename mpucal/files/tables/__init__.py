@@ -1,0 +1,1 @@
+"""Tables of other programs: which column is what, in which unit, and how two tables become one recording."""

@@ -1,0 +1,118 @@
+"""A table of another program as a recording: both sensors in one table, or in one each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ...data import Recording
+from ...errors import RecordingError
+from ..csv import COLUMNS
+from ..hints import NO_HINTS, Hints
+from ..rows import cannot_read
+from .names import ACC, GYR, TEMPERATURE, TIME, Column, columns_of, three
+from .streams import Stream, recording_of
+from .text import PREAMBLE, TextTable, table_of, text_of
+
+SNIFFED = 1 << 16
+
+
+def is_table(path: Path) -> bool:
+    """Whether a file begins as a table of both sensors that is not mpucal's own."""
+    try:
+        with path.open("rb") as file:
+            table = table_of(text_of(file.read(SNIFFED), path.name), path.name)
+    except (OSError, RecordingError):
+        return False
+    return table is not None and len(table.rows) > 1 and not _is_own(path)
+
+
+def _is_own(path: Path) -> bool:
+    with path.open("rb") as file:
+        first = file.readline().decode("utf-8-sig", "replace").lower()
+    return set(COLUMNS) <= {cell.strip().strip('"') for cell in first.split(",")}
+
+
+def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
+    """The recording in a table.
+
+    Raises
+    ------
+    RecordingError : it cannot be read, or does not say all that is needed; what is missing is named.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    text = text_of(data, path.name)
+    table = table_of(text, path.name, headless=bool(hints.columns))
+    if table is None or not table.rows:
+        raise RecordingError(
+            f"{path.name} names no columns of an accelerometer and a gyroscope in its first {PREAMBLE} lines",
+            "name them with --columns t=NAME,ax=NAME,... or --columns t,ax,ay,az,gx,gy,gz, and --units",
+        )
+    return recording_of_table(table, hints)
+
+
+def recording_of_table(table: TextTable, hints: Hints) -> Recording:
+    """The recording in a table that holds both sensors."""
+    columns = chosen(table.header, hints) if hints.columns else table.columns
+    acc, gyr = three(columns, ACC), three(columns, GYR)
+    if not acc or not gyr:
+        lacks = "a gyroscope" if acc else "an accelerometer"
+        has = ", ".join(name.strip() for name in table.header) or "unnamed"
+        raise RecordingError(
+            f"{table.name} holds no columns of {lacks}; its columns are {has}",
+            "give the folder with the tables of both, or name them with --columns t=NAME,ax=NAME,...",
+        )
+    warm = [column for column in columns if column.quantity == TEMPERATURE]
+    a, w = stream_of(table, columns, acc), stream_of(table, columns, gyr)
+    temperature_c = table.numbers(warm[:1])[:, 0] if warm and len(a.values) == len(table.rows) else None
+    return recording_of(a, w, hints, table.name, temperature_c, remarks(acc))
+
+
+def remarks(acc: Sequence[Column]) -> list[str]:
+    """What is to be said of how a stream's columns were taken."""
+    return ["accelerations with the other sign, as iOS has them"] if acc[0].turned_around else []
+
+
+def stream_of(table: TextTable, columns: Sequence[Column], of: Sequence[Column]) -> Stream:
+    """What one sensor's columns hold, without the lines in which they are empty."""
+    values = table.numbers(of)
+    if of[0].turned_around:
+        values = -values
+    there = np.asarray(~np.isnan(values).all(axis=1))
+    clocks = [c for c in columns if c.quantity == TIME and c.of in ("", of[0].quantity) and table.has(c)]
+    clock = min(clocks, key=lambda c: (not c.of, c.rank), default=None)
+    unit = of[0].unit if len({column.unit for column in of}) == 1 else ""
+    if clock is None:
+        return Stream(None, values[there], unit=unit)
+    times = table.times(clock)
+    kept = [time for time, is_there in zip(times, there, strict=True) if is_there]
+    return Stream(kept, values[there], "ns" if table.is_dated(clock) else clock.unit, unit)
+
+
+def chosen(header: Sequence[str], hints: Hints) -> list[Column]:
+    """The columns that a person names.
+
+    Raises
+    ------
+    RecordingError : the table has no such column.
+    """
+    named = {name.strip(): place for place, name in enumerate(header)}
+    found = []
+    for role, where in hints.columns.items():
+        place = where if isinstance(where, int) else named.get(where, -1)
+        if place < 0 or (header and place >= len(header)):
+            raise RecordingError(
+                f"there is no column {where + 1 if isinstance(where, int) else where} for {role}",
+                f"name one of {', '.join(named) or 'its columns by their number from 1'} with --columns",
+            )
+        name = header[place] if header else role
+        known = columns_of([name])
+        quantity = TIME if role == "t" else ACC if role[0] == "a" else GYR
+        unit = known[0].unit if known and known[0].quantity == quantity else ""
+        found.append(Column(name, place, quantity, "xyz".find(role[-1]) if role != "t" else 0, unit))
+    return found

@@ -1,0 +1,127 @@
+"""Units: their names, what the samples themselves say of them, and whether both agree.
+
+Times are told by their steps, since a rate lies between 10 Hz and 8 kHz; accelerations by |a|, which is gravity in the
+median of a recording that was turned by hand; rates by how fast gravity turns: d(a)/dt = -w x a of a vector that
+stands still.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...data import STANDARD_GRAVITY_MPS2, Vector
+from ...errors import RecordingError
+
+COUNTS = "counts"
+# quantity -> unit -> SI
+QUANTITIES = {
+    "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "acc": {"m/s^2": 1.0, "g": STANDARD_GRAVITY_MPS2, "mg": STANDARD_GRAVITY_MPS2 / 1000, COUNTS: math.nan},
+    "gyr": {"rad/s": 1.0, "deg/s": math.radians(1), "mdeg/s": math.radians(1e-3), COUNTS: math.nan},
+}
+_SPELLED = {
+    "s": "s sec secs second seconds",
+    "ms": "ms msec millis millisecond milliseconds",
+    "us": "us usec micros microsecond microseconds",
+    "ns": "ns nsec nanos nanosecond nanoseconds",
+    "m/s^2": "m/s2 ms-2 m/s/s mps2 ms2 m/s**2 meters/second2 m/sec2",
+    "g": "g gs g-force gforce gee g0",
+    "mg": "mg milli-g millig",
+    "rad/s": "rad/s rads-1 radps rads rad/sec radians/s rps rad",
+    "deg/s": "deg/s degs-1 degps degs dps deg/sec degrees/s degree/s deg",
+    "mdeg/s": "mdeg/s mdps",
+    COUNTS: "counts count lsb raw adc",
+}
+_NAMES = {spelled: unit for unit, words in _SPELLED.items() for spelled in words.split()}
+_PLAIN = str.maketrans(
+    {"²": "2", "µ": "u", "μ": "u", "°": "deg", "^": "", " ": "", "·": "", "*": "", "_": "", "⁻": "-", "¹": "1"}
+)
+
+SLOWEST_HZ, FASTEST_HZ = 10.0, 8000.0
+# gains of 0.5 to 1.5 are a sensor's own
+LEAST_OF_G, MOST_OF_G = 0.45, 2.0
+LEAST_TURNED, MOST_TURNED = 0.5, 2.0
+SCATTER = 0.45
+# s over which gravity is seen to turn, and how much of what is seen the rates have to explain
+TURN_S, EXPLAINED = 0.2, 0.5
+
+
+def unit_named(text: str) -> str:
+    """The unit that a text names; empty of none."""
+    return _NAMES.get(text.strip().lower().translate(_PLAIN), "")
+
+
+def time_unit(step: float) -> str:
+    """The unit in which times lie `step` apart; empty where there is none."""
+    units = QUANTITIES["t"].items()
+    return next((unit for unit, s in units if 1 / FASTEST_HZ <= step * s <= 1 / SLOWEST_HZ), "")
+
+
+def acceleration_unit(acc: Vector) -> str:
+    """The unit of (n, 3) accelerations of which the median is gravity; empty where there is none.
+
+    Without gravity, |a| of a hand scatters by more than half of its median.
+    """
+    low, size, high = np.percentile(np.linalg.norm(acc, axis=1), [25, 50, 75]).tolist()
+    if high - low > SCATTER * size:
+        return ""
+    units = QUANTITIES["acc"].items()
+    return next((unit for unit, si in units if LEAST_OF_G <= size * si / STANDARD_GRAVITY_MPS2 <= MOST_OF_G), "")
+
+
+def turned(t: Vector, acc: Vector, gyr: Vector) -> float | None:
+    """By what (n, 3) rates have to be multiplied to turn (n, 3) accelerations as they turn; None: it cannot be told.
+
+    Parameters
+    ----------
+    t : (n,) s. acc : in any unit. gyr : in rad/s, if the factor is 1.
+    """
+    dt = float(np.median(np.diff(t)))
+    width = max(1, round(TURN_S / 2 / dt))
+    if len(t) < 10 * width:
+        return None
+    kernel = np.full(width, 1.0 / width)
+    smooth = np.column_stack([np.convolve(column, kernel, "same") for column in acc.T])
+    rates = np.column_stack([np.convolve(column, kernel, "same") for column in gyr.T])
+    steps = np.cross(rates, smooth) * -np.gradient(t)[:, None]
+    path = np.cumsum(steps, axis=0)
+    inner = slice(width, len(t) - width)
+    lag = 2 * width
+    seen, predicted = (values[inner][lag:] - values[inner][:-lag] for values in (smooth, path))
+    power = float((predicted**2).sum())
+    both = float((seen * predicted).sum())
+    if power == 0.0 or abs(both) < EXPLAINED * math.sqrt(power * float((seen**2).sum())):
+        return None
+    return both / power
+
+
+def rate_unit(t: Vector, acc: Vector, gyr: Vector) -> str:
+    """The unit of (n, 3) rates that turn the accelerations as they turn; empty where that cannot be told."""
+    factor = turned(t, acc, gyr)
+    if factor is None:
+        return ""
+    units = {unit: si for unit, si in QUANTITIES["gyr"].items() if unit != COUNTS}
+    return next((unit for unit, si in units.items() if LEAST_TURNED <= abs(factor / si) <= MOST_TURNED), "")
+
+
+def check_agrees(name: str, quantity: str, said: str, seen: str, how: str) -> str:
+    """The unit that was said, or else the one that was seen.
+
+    Raises
+    ------
+    RecordingError : none was, or they differ.
+    """
+    if said and seen and said != seen:
+        raise RecordingError(
+            f"{name}: {quantity} is said to be in {said}, and {how} as of {seen}",
+            f"say which with --units {quantity}={said} or --units {quantity}={seen}",
+        )
+    if not said and not seen:
+        known = ", ".join(unit for unit in QUANTITIES[quantity])
+        raise RecordingError(
+            f"{name}: nothing says in which unit {quantity} is, and {how} as of none",
+            f"say it with --units {quantity}=UNIT, one of {known}",
+        )
+    return said or seen

@@ -1,0 +1,94 @@
+"""PX4's logs (.ulg), by pyulog: sensor_accel and sensor_gyro where they are logged, else sensor_combined.
+
+sensor_accel and sensor_gyro are as the driver delivers them; sensor_combined is the primary sensors' by PX4's
+parameters, CAL_ACC0_XOFF and the like. Both in m/s^2, rad/s and us.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data import Recording, Vector
+from ..errors import RecordingError
+from .extras import library
+from .hints import NO_HINTS, Hints
+from .tables.streams import Stream, recording_of
+
+COMBINED, ACCEL, GYRO = "sensor_combined", "sensor_accel", "sensor_gyro"
+# RELATIVE_TIMESTAMP_INVALID
+INVALID = 0x7FFFFFFF
+_DAMAGE = (
+    ValueError,
+    TypeError,
+    KeyError,
+    IndexError,
+    AttributeError,
+    struct.error,
+    EOFError,
+    MemoryError,
+    OverflowError,
+)
+
+
+def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
+    """The recording of the first IMU of a PX4's log, or of sensor_combined where `hints.topic` names that.
+
+    Raises
+    ------
+    RecordingError : it cannot be read, or holds no such topics.
+    """
+    reader = library("pyulog", "px4", path)
+    try:
+        with path.open("rb") as file:
+            log = reader.ULog(file, [COMBINED, ACCEL, GYRO])
+    except OSError as error:
+        raise RecordingError(f"cannot read {path} ({error.strerror or error})", "check the path") from error
+    except Exception as error:
+        # it raises bare Exceptions, too
+        raise RecordingError(f"{path} is no whole log of PX4 ({error})", "fetch it from the vehicle again") from error
+    topics = {(data.name, data.multi_id): data.data for data in log.data_list}
+    if hints.topic not in (None, COMBINED, ACCEL):
+        raise RecordingError(f"{path.name} is read by {ACCEL} or {COMBINED}", f"give --topic {ACCEL} or {COMBINED}")
+    raw = (ACCEL, 0) in topics and (GYRO, 0) in topics
+    try:
+        if raw and hints.topic != COMBINED:
+            acc, gyr = (_stream(topics[n, 0], "xyz", unit) for n, unit in ((ACCEL, "m/s^2"), (GYRO, "rad/s")))
+            others = sum(name == ACCEL for name, _ in topics) - 1
+            more = [f"{others} more accelerometers are in it"] if others else []
+            return recording_of(
+                acc, gyr, hints, path.name, remarks=[f"from {ACCEL} and {GYRO}, the first of each", *more]
+            )
+        if (COMBINED, 0) in topics and hints.topic != ACCEL:
+            combined = topics[COMBINED, 0]
+            acc = _stream(combined, [f"accelerometer_m_s2[{axis}]" for axis in range(3)], "m/s^2")
+            gyr = _stream(combined, [f"gyro_rad[{axis}]" for axis in range(3)], "rad/s")
+            acc = replace(acc, times=np.asarray(acc.times) + _later_us(combined))
+            remark = f"from {COMBINED}, which PX4 has corrected by its parameters already"
+            return recording_of(acc, gyr, hints, path.name, remarks=[remark])
+    except _DAMAGE as error:
+        raise RecordingError(f"{path} is no whole log of PX4 ({error})", "fetch it from the vehicle again") from error
+    has = ", ".join(sorted({name for name, _ in topics})) or "none of them"
+    raise RecordingError(
+        f"{path.name} holds no {hints.topic or f'{ACCEL} with {GYRO}, and no {COMBINED}'}: it has {has}",
+        "log them, with SDLOG_PROFILE",
+    )
+
+
+def _stream(data: Any, names: Iterable[str], unit: str) -> Stream:
+    values: Vector = np.column_stack([np.asarray(data[name], float) for name in names])
+    # a driver that does not say when a sample was taken says 0; sensor_combined has no such field
+    times = data.get("timestamp_sample", data["timestamp"])
+    return Stream(np.asarray(times if np.all(times) else data["timestamp"], np.int64), values, "us", unit)
+
+
+def _later_us(combined: Any) -> NDArray[np.int64]:
+    """(n,) us by which sensor_combined's accelerations are later than its rates."""
+    later = np.asarray(combined.get("accelerometer_timestamp_relative", 0), np.int64)
+    return np.where(later == INVALID, 0, later)

@@ -1,0 +1,404 @@
+"""Tables in the dialects of loggers, data sets and sketches, written by pandas, and read."""
+
+import zipfile
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mpucal.data import STANDARD_GRAVITY_MPS2 as G
+from mpucal.errors import RecordingError, UsageError
+from mpucal.files import load
+from mpucal.files.hints import Hints, parse_columns, parse_units
+from mpucal.files.tables.names import column_named
+from mpucal.files.tables.units import turned, unit_named
+
+COUNTS_A, COUNTS_G = 32768 / (4 * G), 32768 / np.radians(500)
+
+
+def frame(names, *columns):
+    table = np.column_stack(columns)
+    return pd.DataFrame({name: table[:, i] for i, name in enumerate(names.split("|"))})
+
+
+def timed(name, times, names, *columns):
+    made = frame(names, *columns)
+    made.insert(0, name, times)
+    return made
+
+
+DIALECTS = {
+    "EuRoC": lambda w, ns: timed(
+        "#timestamp [ns]",
+        ns,
+        "w_RS_S_x [rad s^-1]|w_RS_S_y [rad s^-1]|w_RS_S_z [rad s^-1]"
+        "|a_RS_S_x [m s^-2]|a_RS_S_y [m s^-2]|a_RS_S_z [m s^-2]",
+        w.gyr,
+        w.acc,
+    ),
+    "Kalibr": lambda w, ns: timed("timestamp", ns, "omega_x|omega_y|omega_z|alpha_x|alpha_y|alpha_z", w.gyr, w.acc),
+    "rostopic echo -p": lambda w, ns: timed(
+        "%time",
+        ns + 1000,
+        "field.header.stamp|field.orientation.x|field.angular_velocity.x|field.angular_velocity.y"
+        "|field.angular_velocity.z|field.linear_acceleration.x|field.linear_acceleration.y|field.linear_acceleration.z",
+        w.t * 0,
+        w.t * 0,
+        w.gyr,
+        w.acc,
+    ).assign(**{"field.header.stamp": ns}),
+    "ulog2csv": lambda w, ns: timed(
+        "timestamp",
+        (ns - ns[0]) // 1000,
+        "gyro_rad[0]|gyro_rad[1]|gyro_rad[2]|gyro_integral_dt"
+        "|accelerometer_m_s2[0]|accelerometer_m_s2[1]|accelerometer_m_s2[2]",
+        w.gyr,
+        w.t,
+        w.acc,
+    ),
+    "AndroSensor": lambda w, ns: frame(
+        "ACCELEROMETER X (m/s²)|ACCELEROMETER Y (m/s²)|ACCELEROMETER Z (m/s²)|GRAVITY X (m/s²)"
+        "|LINEAR ACCELERATION X (m/s²)|LINEAR ACCELERATION Y (m/s²)|LINEAR ACCELERATION Z (m/s²)"
+        "|GYROSCOPE X (rad/s)|GYROSCOPE Y (rad/s)|GYROSCOPE Z (rad/s)|Time since start in ms ",
+        w.acc,
+        w.t,
+        w.acc * 0,
+        w.gyr,
+        w.t * 1000,
+    ),
+    "Physics Toolbox": lambda w, ns: frame("time|gFx|gFy|gFz|wx|wy|wz", w.t, w.acc / G, w.gyr),
+    "SensorLog": lambda w, ns: frame(
+        "accelerometerTimestamp_sinceReboot(s)|accelerometerAccelerationX(G)|accelerometerAccelerationY(G)"
+        "|accelerometerAccelerationZ(G)|gyroTimestamp_sinceReboot(s)|gyroRotationX(rad/s)|gyroRotationY(rad/s)"
+        "|gyroRotationZ(rad/s)|motionUserAccelerationX(G)|motionUserAccelerationY(G)|motionUserAccelerationZ(G)",
+        w.t,
+        -w.acc / G,
+        w.t,
+        w.gyr,
+        w.acc * 0,
+    ),
+    "a sketch in g and deg/s": lambda w, ns: frame(
+        "millis|AccX|AccY|AccZ|GyroX|GyroY|GyroZ", w.t * 1000, w.acc / G, np.degrees(w.gyr)
+    ),
+    "units in names": lambda w, ns: frame(
+        "time_us|acc_x_mg|acc_y_mg|acc_z_mg|gyro_x_dps|gyro_y_dps|gyro_z_dps",
+        w.t * 1e6,
+        w.acc / G * 1000,
+        np.degrees(w.gyr),
+    ),
+    "axes first": lambda w, ns: frame("t|xacc|yacc|zacc|xgyro|ygyro|zgyro", w.t, w.acc, w.gyr),
+}
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_dialects_give_the_samples_that_were_written(dialect, separator, walk, walk_ns, assert_same, tmp_path):
+    path = tmp_path / "walk.csv"
+    DIALECTS[dialect](walk, walk_ns).to_csv(path, sep=separator, index=False)
+    read = load(path)
+    assert_same(read, walk, 1e-9, 1e-9, 1e-6 if dialect == "ulog2csv" else 1e-9)
+    assert read.taken.startswith("Of walk.csv times in ")
+
+
+@pytest.mark.parametrize("ending", [".txt", ".tsv", ".log"])
+def test_other_endings(ending, walk, walk_ns, assert_same, tmp_path):
+    DIALECTS["axes first"](walk, walk_ns).to_csv(tmp_path / f"walk{ending}", sep="\t", index=False)
+    assert_same(load(tmp_path / f"walk{ending}"), walk, 1e-9, 1e-9, 1e-9)
+
+
+def test_decimal_commas(walk, walk_ns, assert_same, tmp_path):
+    path = tmp_path / "walk.csv"
+    DIALECTS["AndroSensor"](walk, walk_ns).to_csv(path, sep=";", decimal=",", index=False)
+    assert_same(load(path), walk, 1e-9, 1e-9, 1e-9)
+
+
+def test_an_encoding_of_windows(walk, walk_ns, assert_same, tmp_path):
+    path = tmp_path / "walk.csv"
+    DIALECTS["AndroSensor"](walk, walk_ns).to_csv(path, index=False, encoding="cp1252")
+    assert_same(load(path), walk, 1e-9, 1e-9, 1e-9)
+
+
+def test_lines_before_the_header(walk, walk_ns, assert_same, tmp_path):
+    table = DIALECTS["a sketch in g and deg/s"](walk, walk_ns).to_csv(index=False)
+    (tmp_path / "walk.csv").write_text(f"sep=,\nMPU6050 found!\n\n{table}")
+    assert_same(load(tmp_path / "walk.csv"), walk, 1e-9, 1e-9, 1e-9)
+
+
+def test_dates_are_times(walk, walk_ns, assert_same, tmp_path):
+    made = DIALECTS["axes first"](walk, walk_ns)
+    made["t"] = pd.to_datetime(walk_ns, utc=True)
+    made.to_csv(tmp_path / "walk.csv", index=False)
+    read = load(tmp_path / "walk.csv")
+    assert_same(read, walk, 1e-9, 1e-9, 1e-6)
+    assert abs(read.utc_ns - walk_ns[0]) < 1000
+
+
+def test_ios_counts_gravity_the_other_way(walk, walk_ns, tmp_path):
+    DIALECTS["SensorLog"](walk, walk_ns).to_csv(tmp_path / "walk.csv", index=False)
+    assert "the other sign, as iOS" in load(tmp_path / "walk.csv").taken
+
+
+def test_doubtful_units_are_refused_and_can_be_said(walk, walk_ns, assert_same, tmp_path):
+    path = tmp_path / "walk.csv"
+    made = DIALECTS["EuRoC"](walk, walk_ns)
+    made.iloc[:, 4:] /= G
+    made.to_csv(path, index=False)
+    with pytest.raises(RecordingError, match=r"acc is said to be in m/s\^2, and .* reads as of g"):
+        load(path)
+    assert_same(load(path, Hints(units=parse_units("acc=g"))), walk)
+
+
+def test_degrees_that_are_called_radians_are_refused(walk, walk_ns, assert_same, tmp_path):
+    path = tmp_path / "walk.csv"
+    made = DIALECTS["Kalibr"](walk, walk_ns)
+    made.iloc[:, 1:4] = np.degrees(made.iloc[:, 1:4])
+    made.to_csv(path, index=False)
+    with pytest.raises(RecordingError, match="gyr is said to be in rad/s, and gravity turns as of deg/s"):
+        load(path)
+    assert_same(load(path, Hints(units=parse_units("gyr=deg/s"))), walk)
+
+
+def test_milliseconds_that_are_called_seconds_are_refused(walk, walk_ns, assert_same, tmp_path):
+    path = tmp_path / "walk.csv"
+    timed("time [s]", walk.t * 1000, "ax|ay|az|gx|gy|gz", walk.acc, walk.gyr).to_csv(path, index=False)
+    with pytest.raises(RecordingError, match=r"t is said to be in s, and their step of .* reads as of ms"):
+        load(path)
+
+
+def test_rates_of_a_sensor_at_rest_need_a_unit(tmp_path):
+    rng = np.random.default_rng(3)
+    acc, gyr = rng.normal([0, 0, G], 0.02, (500, 3)), rng.normal(0, 0.3, (500, 3))
+    timed("time", np.arange(500) * 5, "accX|accY|accZ|gyroX|gyroY|gyroZ", acc, gyr).to_csv(
+        tmp_path / "a.csv", index=False
+    )
+    with pytest.raises(RecordingError, match="nothing says in which unit gyr is"):
+        load(tmp_path / "a.csv")
+    assert len(load(tmp_path / "a.csv", Hints(units=parse_units("gyr=deg/s")))) == 500
+
+
+def test_linear_acceleration_is_none_that_can_be_calibrated(walk, walk_ns, tmp_path):
+    made = DIALECTS["Kalibr"](walk, walk_ns)
+    made.iloc[:, 4:] = np.random.default_rng(1).normal(0, 0.3, (len(walk), 3))
+    made.to_csv(tmp_path / "walk.csv", index=False)
+    with pytest.raises(RecordingError, match="gravity is not in it"):
+        load(tmp_path / "walk.csv")
+
+
+def counts(walk):
+    return np.rint(np.column_stack([walk.acc * COUNTS_A, walk.gyr * COUNTS_G])).astype(int)
+
+
+def even(walk):
+    """The walk at a steady rate, as a sketch without times has it."""
+    rate = 1 / np.median(np.diff(walk.t))
+    return type(walk).from_arrays(np.arange(len(walk)) / rate, walk.acc, walk.gyr), rate
+
+
+def test_counts_need_their_ranges_and_a_rate(walk, assert_same, tmp_path):
+    path, (steady, rate) = tmp_path / "walk.csv", even(walk)
+    pd.DataFrame(counts(walk), columns=["ax", "ay", "az", "gx", "gy", "gz"]).to_csv(path, index=False)
+    with pytest.raises(RecordingError, match="give the rate of its samples with --rate HZ"):
+        load(path)
+    with pytest.raises(RecordingError, match=r"reads as of ±4 g\): give --accel-range 4"):
+        load(path, Hints(rate_hz=rate))
+    with pytest.raises(RecordingError, match="give --gyro-range"):
+        load(path, Hints(rate_hz=rate, accel_range_g=4))
+    read = load(path, Hints(rate_hz=rate, accel_range_g=4, gyro_range_dps=500))
+    assert_same(read, steady, 0.5 / COUNTS_A, 0.5 / COUNTS_G)
+    assert (read.sensor.accel_range_g, read.sensor.gyro_range_dps) == (4, 500)
+    with pytest.raises(RecordingError, match="which is no gravity"):
+        load(path, Hints(rate_hz=rate, accel_range_g=2, gyro_range_dps=500))
+    with pytest.raises(RecordingError, match=r"gravity turns .* as fast"):
+        load(path, Hints(rate_hz=rate, accel_range_g=4, gyro_range_dps=2000))
+
+
+def test_counts_at_the_end_of_the_range_are_clipped(walk, tmp_path):
+    path, made = tmp_path / "walk.csv", counts(walk)
+    made[7, 1], made[9, 5] = 32767, -32768
+    pd.DataFrame(made, columns=["ax", "ay", "az", "gx", "gy", "gz"]).to_csv(path, index=False)
+    read = load(path, Hints(rate_hz=even(walk)[1], accel_range_g=4, gyro_range_dps=500))
+    assert np.flatnonzero(read.acc_clipped).tolist() == [7]
+    assert np.flatnonzero(read.gyr_clipped).tolist() == [9]
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ("a|b|c|d|e|f|g", "t,ax,ay,az,gx,gy,gz"),
+        ("a|b|c|d|e|f|g", "t=a,ax=b,ay=c,az=d,gx=e,gy=f,gz=g"),
+        ("a|b|c|d|e|f|g", "gx=5,gy=6,gz=7,t=1,ax=2,ay=3,az=4"),
+        ("", "t,ax,ay,az,gx,gy,gz"),
+    ],
+)
+def test_columns_are_named(names, said, walk, assert_same, tmp_path):
+    path = tmp_path / "walk.csv"
+    frame(names or "0|1|2|3|4|5|6", walk.t * 1000, walk.acc, walk.gyr).to_csv(path, index=False, header=bool(names))
+    with pytest.raises(RecordingError):
+        load(path)
+    assert_same(load(path, Hints(columns=parse_columns(said))), walk, 1e-9, 1e-9, 1e-9)
+
+
+def test_a_column_that_is_not_there(walk, tmp_path):
+    frame("a|b|c|d|e|f|g", walk.t, walk.acc, walk.gyr).to_csv(tmp_path / "walk.csv", index=False)
+    with pytest.raises(RecordingError, match="there is no column h for t: name one of a, b, c, d, e, f, g"):
+        load(tmp_path / "walk.csv", Hints(columns=parse_columns("t=h,ax=b,ay=c,az=d,gx=e,gy=f,gz=g")))
+
+
+@pytest.mark.parametrize("text", ["t=a,t=b", "velocity=a", "t,ax,ax", "ax="])
+def test_columns_that_say_nothing(text):
+    with pytest.raises(ValueError, match="is no column"):
+        parse_columns(text)
+
+
+@pytest.mark.parametrize("text", ["acc=rad/s", "speed=m/s", "g", "acc="])
+def test_units_that_are_none(text):
+    with pytest.raises(ValueError, match="is no unit"):
+        parse_units(text)
+
+
+def test_hints_for_a_file_that_needs_none(walk, save, tmp_path):
+    save(walk, tmp_path / "walk.npz")
+    with pytest.raises(UsageError, match="nothing has to be said"):
+        load(tmp_path / "walk.npz", Hints(rate_hz=100))
+
+
+def test_a_bad_line_is_named(walk, walk_ns, tmp_path):
+    lines = DIALECTS["Kalibr"](walk, walk_ns).to_csv(index=False).splitlines()
+    lines[40] = lines[40].replace(",", ",x", 1)
+    (tmp_path / "walk.csv").write_text("\n".join(lines))
+    with pytest.raises(RecordingError, match=r"line 41: omega_x is 'x.*', which is no number"):
+        load(tmp_path / "walk.csv")
+
+
+def phyphox(walk, walk_ns, folder, later=0.0, sep=",", decimal="."):
+    timed("Time (s)", walk.t, "Acceleration x (m/s^2)|Acceleration y (m/s^2)|Acceleration z (m/s^2)", walk.acc).to_csv(
+        folder / "Accelerometer.csv", index=False, quoting=1, sep=sep, decimal=decimal
+    )
+    timed("Time (s)", walk.t + later, "Gyroscope x (rad/s)|Gyroscope y (rad/s)|Gyroscope z (rad/s)", walk.gyr).to_csv(
+        folder / "Gyroscope.csv", index=False, quoting=1, sep=sep, decimal=decimal
+    )
+
+
+def sensor_logger(walk, walk_ns, folder):
+    for name, values in (
+        ("Accelerometer", walk.acc * 0.001),
+        ("TotalAcceleration", walk.acc),
+        ("AccelerometerUncalibrated", walk.acc / G),
+        ("Gyroscope", walk.gyr + 0.1),
+        ("GyroscopeUncalibrated", walk.gyr),
+    ):
+        made = timed("time", walk_ns, "seconds_elapsed|z|y|x", walk.t, values[:, ::-1])
+        made.to_csv(folder / f"{name}.csv", index=False)
+
+
+@pytest.mark.parametrize("written", [phyphox, sensor_logger])
+@pytest.mark.parametrize("archived", [False, True])
+def test_a_phones_tables(written, archived, walk, walk_ns, assert_same, tmp_path):
+    folder = tmp_path / "phone"
+    folder.mkdir()
+    written(walk, walk_ns, folder)
+    path = folder
+    if archived:
+        (folder / "meta").mkdir()
+        (folder / "meta" / "device.csv").write_text("property,value\n")
+        path = tmp_path / "phone.zip"
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            for child in sorted(folder.rglob("*.csv")):
+                archive.write(child, child.relative_to(folder))
+    read = load(path)
+    assert_same(read, walk)
+    of = "Uncalibrated" if written is sensor_logger else ""
+    assert f"from Accelerometer{of}.csv and Gyroscope{of}.csv" in read.taken
+
+
+def test_two_tables_are_joined_by_time(walk, walk_ns, tmp_path):
+    phyphox(walk, walk_ns, tmp_path, later=0.0123, sep=";", decimal=",")
+    read = load(tmp_path)
+    assert "the gyroscope begins +12.30 ms after the accelerometer" in read.taken
+    wanted = np.column_stack([np.interp(read.t, walk.t + 0.0123, rate) for rate in walk.gyr.T])
+    np.testing.assert_allclose(read.gyr, wanted, atol=1e-9)
+
+
+def test_two_tables_of_different_times_are_none(walk, walk_ns, tmp_path):
+    phyphox(walk, walk_ns, tmp_path, later=1e4)
+    with pytest.raises(RecordingError, match="not recorded at the same time"):
+        load(tmp_path)
+
+
+def test_one_table_of_two_asks_for_the_other(walk, walk_ns, tmp_path):
+    phyphox(walk, walk_ns, tmp_path)
+    with pytest.raises(RecordingError, match=r"no columns of a gyroscope.*give the folder"):
+        load(tmp_path / "Accelerometer.csv")
+
+
+def test_lines_that_hold_one_sensor_each(walk, assert_same, tmp_path):
+    """As loggers write that have one line for each event."""
+    nothing = np.full((len(walk), 3), np.nan)
+    of_acc = timed("time", walk.t, "ax|ay|az|wx|wy|wz", walk.acc, nothing)
+    of_gyr = timed("time", walk.t + 0.002, "ax|ay|az|wx|wy|wz", nothing, walk.gyr)
+    pd.concat([of_acc, of_gyr]).sort_values("time").to_csv(tmp_path / "walk.csv", index=False)
+    read = load(tmp_path / "walk.csv")
+    np.testing.assert_allclose(read.acc, walk.acc[1:], atol=1e-9)
+    assert "+2.00 ms after" in read.taken
+
+
+def a_g(walk):
+    scale = 16384 / G, 32768 / np.radians(250)
+    rows = np.rint(np.column_stack([walk.acc * scale[0], walk.gyr * scale[1]])).clip(-32768, 32767).astype(int)
+    return "".join("a/g:\t" + "\t".join(map(str, row)) + "\r\n" for row in rows.tolist())
+
+
+@pytest.mark.parametrize("ending", [".txt", ".log", ".csv"])
+def test_what_i2cdevlibs_example_prints(ending, walk, assert_same, tmp_path):
+    steady, rate = even(walk)
+    text = "Initializing I2C devices...\r\nMPU6050 connection successful\r\n" + a_g(walk) + "a/g:\t1\t2"
+    (tmp_path / f"walk{ending}").write_text(text)
+    read = load(tmp_path / f"walk{ending}", Hints(rate_hz=rate))
+    kept = ~read.gyr_clipped & ~read.acc_clipped
+    np.testing.assert_allclose(read.acc[kept], steady.acc[kept], atol=0.5 * G / 16384 * 1.001)
+    np.testing.assert_allclose(read.gyr[kept], steady.gyr[kept], atol=0.5 * np.radians(250) / 32768 * 1.001)
+    assert kept.mean() > 0.5
+    assert "MPU6050::initialize()" in read.taken
+    with pytest.raises(RecordingError, match="--rate HZ"):
+        load(tmp_path / f"walk{ending}")
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "axis", "unit"),
+    [
+        ("Gyroscope z (rad/s)", "gyr", 2, "rad/s"),
+        ("AcX", "acc", 0, ""),
+        ("gx_raw", "gyr", 0, ""),
+        ("ax (LSB)", "acc", 0, "counts"),
+        ("imu0.gyro.y", "gyr", 1, ""),
+        ("GyroY[°/s]", "gyr", 1, "deg/s"),
+        ("acceleration_z_m_s2", "acc", 2, "m/s^2"),
+        ("timestamp_ms", "t", 0, "ms"),
+        ("Timestamp (µs)", "t", 0, "us"),
+        ("temperature_c", "temperature_c", 0, ""),
+    ],
+)
+def test_names(name, quantity, axis, unit):
+    found = column_named(name, 3)
+    assert (found.quantity, found.axis, found.unit, found.place) == (quantity, axis, unit, 3)
+
+
+@pytest.mark.parametrize("name", ["x", "roll", "GRAVITY X (m/s²)", "motionUserAccelerationX(G)", "mag_x", "w", "q_w"])
+def test_names_of_something_else(name):
+    assert column_named(name, 0) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"), [("m/s²", "m/s^2"), ("m s^-2", "m/s^2"), ("°/s", "deg/s"), ("µs", "us"), ("G", "g"), ("Hz", "")]
+)
+def test_units_as_people_spell_them(text, unit):
+    assert unit_named(text) == unit
+
+
+def test_gravity_turns_as_the_rates_say():
+    """A vector that stands still, seen by a body that turns at a known rate: Rodrigues' formula."""
+    t = np.arange(0, 20, 0.005)
+    axis = np.array([0.6, -0.48, 0.64])
+    angle, g = 2 * np.sin(t)[:, None], np.array([0.0, 0.0, G])
+    acc = g * np.cos(angle) - np.cross(axis, g) * np.sin(angle) + axis * (axis @ g) * (1 - np.cos(angle))
+    assert turned(t, acc, 2 * np.cos(t)[:, None] * axis) == pytest.approx(1.0, rel=0.02)
