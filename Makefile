@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 TESTED := $(VENV)/.tested
 export PYTHON
 
-.PHONY: session test lint bench firmware clean
+.PHONY: session test lint bench wheel docs firmware clean
 
 session: $(READY)
 	@$(BIN)/mpucal session --bus sim
@@ -22,6 +22,10 @@ lint: $(TESTED)
 
 bench: $(READY)
 	@$(BIN)/python tools/bench.py
+
+# sdist and wheel, tried in environments of their own
+wheel:
+	@tools/try_wheel dist
 
 # what is compiled here is what a rebuild hangs on
 BUILT_OF := tools/set_up pyproject.toml CMakeLists.txt mpucal/calibration/parameters.py $(shell find mpucal -name '*.[ch]pp')
