@@ -30,6 +30,9 @@ def command(file: Path | None, seconds: float | None, **options: Any) -> None:
     check_source(click.get_current_context())
     source = open_source(options, given(), until_end=True)
     file = file or Path(f"record-{stamp()}").with_suffix(Path(source.capture_name).suffix)
+    suffix = Path(source.capture_name).suffix
+    if file.suffix.lower() != suffix:
+        raise OutputError(f"{file} does not end with {suffix}, by which other commands know a capture", f"add {suffix}")
     if file.exists():
         raise OutputError(f"{file} is there already", "choose another file with -o")
     with running(source, file, console(quiet=False)) as runner:

@@ -56,7 +56,7 @@ class EmulatedBridge:
 
     def receive(self, data: bytes) -> None:
         """Bytes came in."""
-        self._inbox += self._deframer.feed(data)
+        self._inbox += [frame for frame in self._deframer.feed(data) if not frame.type & wire.REPLY_BIT]
 
     def work(self) -> bytes:
         """Do what there is to do, and return what goes out; to be called once a millisecond."""

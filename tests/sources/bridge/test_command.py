@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from mpucal.__main__ import run
-from mpucal.errors import BusError
+from mpucal.errors import BusError, OutputError
 from mpucal.result.calibration import Calibration
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.bridge import EmulatedBridge, Memory
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.clock import FastClock
+from mpucal.sources.bridge.frame import Frame
+from mpucal.sources.bridge.messages import REPLY_BIT, Hello
 
 BLOB = Path(__file__).parents[3] / "fixtures" / "vectors" / "blob_measured.bin"
 
@@ -48,6 +50,21 @@ def test_a_recording(board, mpucal):
     shown = json.loads(mpucal("show", "board.mcap", "--json").out)
     # how much of the two seconds the start takes, the load of the machine decides
     assert (shown["gaps"], shown["samples"] > 1000) == (0, True)
+
+
+def test_a_capture_without_its_suffix_is_refused_at_once(board, mpucal, tmp_path):
+    refused = mpucal("record", "--serial", board.name, "-o", "plain", "--seconds", "1")
+    assert refused.code == OutputError.exit_code
+    assert "plain does not end with .mcap" in refused.err
+    assert not (tmp_path / "plain").exists()
+
+
+def test_what_only_hosts_are_sent_a_bridge_ignores(board):
+    bridge = EmulatedBridge(board.chip, board.clock.now)
+    bridge.receive(Frame(Hello.TYPE | REPLY_BIT, 1, Hello().payload()).encode())
+    assert bridge.work() == b""
+    bridge.receive(Frame(Hello.TYPE, 1, Hello().payload()).encode())
+    assert bridge.work() != b""
 
 
 def test_into_the_memory_and_back(board, mpucal, tmp_path):
