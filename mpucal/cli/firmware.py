@@ -11,7 +11,7 @@ import click
 
 from ..errors import OutputError, SourceError, UsageError, WriteBackError
 
-EXAMPLE = "Example: `mpucal firmware --flash /dev/ttyUSB0 --board nano`"
+EXAMPLE = "Example: `mpucal firmware -o libraries/mpucal` writes the library into a sketchbook."
 PACKAGE = Path(__file__).parents[1]
 # where an installation keeps it, and where a checkout does
 FOLDERS = (PACKAGE / "firmware", PACKAGE.parent / "tools" / "firmware")
