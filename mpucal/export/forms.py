@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..result.calibration import Calibration
-from . import arduino, c_header, linux_iio, python, ros, vehicles
+from . import arduino, c_header, esphome, i2cdevlib, linux_iio, micropython, python, ros, vehicles, vio
 from .losses import Loss, check_usable, in_float, with_hardware, without_gyroscope, without_temperature
 
 
@@ -103,6 +103,48 @@ FORMS = (
         vehicles.px4,
         (vehicles.left_by_px4,),
         only_usable=False,
+    ),
+    Form(
+        "kalibr",
+        ".yaml",
+        "Kalibr",
+        "imu.yaml: noise densities; the samples are corrected before",
+        vio.kalibr,
+        (vio.left_by_kalibr,),
+        only_usable=False,
+    ),
+    Form(
+        "openvins",
+        ".yaml",
+        "OpenVINS",
+        "kalibr_imu_chain.yaml: `Ta`, `R_IMUtoACC` of inv(D), `Tw`, `R_IMUtoGYRO` of K; it estimates the biases",
+        vio.openvins,
+        (vio.left_by_openvins,),
+        only_usable=False,
+    ),
+    Form(
+        "i2cdevlib",
+        ".h",
+        "sketches with i2cdevlib's MPU6050",
+        "`setOffsets(mpu)`: setXAccelOffset and the like, biases alone",
+        i2cdevlib.text,
+        (i2cdevlib.left, without_temperature),
+    ),
+    Form(
+        "micropython",
+        ".py",
+        "MicroPython, CircuitPython",
+        "`apply(y)`, `apply_gyro(y)` of one sample, without NumPy",
+        micropython.text,
+        (in_float, without_temperature, with_hardware),
+    ),
+    Form(
+        "esphome",
+        ".yaml",
+        "ESPHome",
+        "template sensors of the calibrated axes, beside its mpu6050 sensor",
+        esphome.text,
+        (in_float, esphome.left, without_gyroscope, without_temperature, with_hardware),
     ),
     Form(
         "json",
