@@ -11,7 +11,7 @@ export PYTHON
 session: $(READY)
 	@$(BIN)/mpucal session --bus sim
 
-test: lint
+test: lint docs
 	$(BIN)/pytest --numprocesses auto --dist loadfile
 
 lint: $(TESTED)
@@ -26,6 +26,10 @@ bench: $(READY)
 # sdist and wheel, tried in environments of their own
 wheel:
 	@tools/try_wheel dist
+
+# the documentation site, in build/site; a warning is an error
+docs: $(TESTED)
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
 # what is compiled here is what a rebuild hangs on
 BUILT_OF := tools/set_up pyproject.toml CMakeLists.txt mpucal/calibration/parameters.py $(shell find mpucal -name '*.[ch]pp')
