@@ -390,6 +390,29 @@ KINDS: Mapping[str, Kind] = {
         },
         "mpucal merge board7/calibration.json board7/calibration.json",
     ),
+    "vibrating": Kind(
+        "A motor or machine shook the sensor, faster than a hand does: its noise was larger than at rest.",
+        {
+            "noise": Sentence(
+                "the accelerometer's noise is {std:.2g} m/s^2 rms while it is turned, by vibration in {share:.0%} of"
+                " the samples",
+                "switch motors off while you calibrate, or expect no better than what is claimed",
+                False,
+            ),
+        },
+        "mpucal.calibrate(replace(r, acc=r.acc + numpy.random.default_rng(1).normal(0.0, 1.0, (len(r), 3))))",
+    ),
+    "zero_moved": Kind(
+        "The accelerometer's bias stepped or drifted while the board was turned, by a knock or by warming.",
+        {
+            "walk": Sentence(
+                "the accelerometer's bias moved by {size:.1f} mg, most of it from {begin:.0f} to {end:.0f} s",
+                "let the board warm up first, keep knocks and pressure away from the sensor, and record again",
+            ),
+        },
+        "mpucal.calibrate(replace(r, acc=r.acc + 0.05 * (r.t > 35.0)[:, None]))",
+        "the error of a calibrated reading is above 0.4 m/s² (1 sigma)",
+    ),
     "not_converged": Kind(
         "The estimate had not settled when its iterations were over.",
         {
@@ -417,9 +440,19 @@ KINDS: Mapping[str, Kind] = {
                 " slowly",
             ),
             "change": Sentence(
-                "the sensor was not the same before and after about {seconds:.0f} s: what each part of the recording"
-                " says of it differs by more than noise",
+                "the sensor was not the same before {begin:.0f} s and after {end:.0f} s: what parts of the recording"
+                " say of it differs by more than noise",
                 "check whether its mount slipped or something knocked it, fasten it, and record again",
+            ),
+            "part": Sentence(
+                "what was recorded from {begin:.0f} to {end:.0f} s contradicts the rest, and a calibrated reading is"
+                " known to {rms:.2g} m/s^2 (1 sigma) only",
+                "hold the board more calmly, and keep knocks and vibration away from it",
+            ),
+            "sides": Sentence(
+                "readings with different sides down contradict each other, and a calibrated reading is known to"
+                " {rms:.2g} m/s^2 (1 sigma) only",
+                "hold the board still in more orientations, turn it more calmly, and check the sensor's range",
             ),
             "knock": Sentence(
                 "something knocked the board (the accelerometer was at the end of its range), and {contradiction}",

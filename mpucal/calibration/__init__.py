@@ -14,6 +14,7 @@ from ..errors import WrongValue
 from ..result.calibration import Calibration, unknown
 from .checks import unusable_for_a_fit
 from .checks.unusable import no_gyroscope
+from .claim import claim_of, claimed
 from .evidence import Evidence
 from .fit import Fit
 from .flat_segment import Flat, find_flat, flat_statistics, tells
@@ -23,10 +24,13 @@ from .parameters import B_A_NAMES, B_OMEGA_NAMES, BY_NAME, D_NAMES
 from .quality import judge
 from .recording_digest import recording_digest
 from .theta import from_elements
+from .walks import likeliest_walk
 
 __all__ = ["MODELS", "calibrate", "weigh"]
 
 MODELS = ("auto", *METHODS)
+# Each walk is what is left of a drift after the one before; it must make the recording as much likelier.
+MOST_WALKS, LEAST_GAIN = 3, 10.0
 
 
 def calibrate(
@@ -73,11 +77,28 @@ def weigh(
     if flat is None or unusable_for_a_fit(before):
         return before, {"model": model, "why": "nothing could be estimated"}
     choice = _fit(recording, flat, gravity, model)
-    evidence = Evidence(recording, gravity, flat, choice.fit.right_handed(), choice.model)
+    claim = claim_of(choice.fit, gravity)
+    evidence = Evidence(recording, gravity, flat, claimed(choice.fit, claim).right_handed(), choice.model, claim)
     return evidence, {"model": choice.model, "why": choice.why}
 
 
 def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> Choice:
+    """The fit, with a gyroscope's bias that walked while the board was turned taken away."""
+    choice = _fit_once(recording, flat, gravity, model)
+    for _ in range(MOST_WALKS):
+        walk = None if choice.fit.parts is None else likeliest_walk(choice.fit.parts, choice.fit.D)
+        if walk is None or walk.what != "gyroscope" or not choice.fit.converged:
+            break
+        walked = walk.at(np.maximum(recording.t - recording.t[flat.last - 1], 0.0))
+        recording = replace(recording, gyr=recording.gyr - walked)
+        without = _fit_once(recording, flat, gravity, model)
+        if not without.fit.V < choice.fit.V - LEAST_GAIN:
+            break
+        choice = without
+    return choice
+
+
+def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> Choice:
     if model == "auto":
         return choose(recording, flat, gravity)
     return Choice(METHODS[model](recording, flat, gravity), model, "asked for")

@@ -16,7 +16,7 @@ def downsampled(recording: Recording, flat: Flat, rate_hz: float) -> tuple[Recor
     Blocks are aligned to the end of the flat segment; what does not fill a block at either end is left out. A block
     with a gap or a clipped sample carries the mark.
     """
-    size = int(recording.rate_hz / rate_hz * (1.0 + 1e-6))
+    size = _size(recording, rate_hz)
     if size < 2:
         return recording, (flat.first, flat.last)
     start = flat.last % size
@@ -24,7 +24,7 @@ def downsampled(recording: Recording, flat: Flat, rate_hz: float) -> tuple[Recor
     used = slice(start, start + m * size)
 
     def mean(x: Vector) -> Vector:
-        return np.asarray(x[used].reshape(m, size, *x.shape[1:]).mean(1))
+        return means(x, recording, flat, rate_hz)
 
     def marked(x: Mask) -> Mask:
         return np.asarray(x[used].reshape(m, size).any(1))
@@ -41,3 +41,18 @@ def downsampled(recording: Recording, flat: Flat, rate_hz: float) -> tuple[Recor
         flat=None,
     )
     return thin, (-((start - flat.first) // size), (flat.last - start) // size)
+
+
+def means(x: Vector, recording: Recording, flat: Flat, rate_hz: float) -> Vector:
+    """(m, ...) means of x (n, ...), a row a sample of the recording, over the same blocks."""
+    size = _size(recording, rate_hz)
+    if size < 2:
+        return x
+    start = flat.last % size
+    m = (len(x) - start) // size
+    return np.asarray(x[start : start + m * size].reshape(m, size, *x.shape[1:]).mean(1))
+
+
+def _size(recording: Recording, rate_hz: float) -> int:
+    """Samples in a block."""
+    return int(recording.rate_hz / rate_hz * (1.0 + 1e-6))

@@ -1,4 +1,4 @@
-"""The facts that a verdict rests on, each computed once: uncertainties, pauses, how gravity turned, a change midway."""
+"""The facts that a verdict rests on, each computed once: uncertainties, pauses, how gravity turned."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Recording, Vector
-from .change_detection import Change, likeliest_change
+from .claim import Claim
 from .fit import Fit
 from .flat_segment import Flat, find_flat, flat_statistics
 from .rotation import product, rotation
@@ -50,6 +50,7 @@ class Evidence:
     flat: Flat | None
     fit: Fit | None
     model: str
+    claim: Claim | None = None
     gravity_anyway: bool = False
 
     @cached_property
@@ -121,13 +122,6 @@ class Evidence:
             for unit in (1.0, np.deg2rad(1.0))
         )
         return bool(miss > 3.0 * miss_in_degrees)
-
-    @cached_property
-    def change(self) -> Change | None:
-        """The likeliest change of the sensor midway; None where nothing can tell."""
-        if self.fit is None or self.flat is None or self.sure is None:
-            return None
-        return likeliest_change(self.recording, self.flat, self.fit, self.gravity)
 
     @cached_property
     def agreement(self) -> Agreement | None:

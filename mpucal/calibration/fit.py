@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..data import Vector
 from .parameters import D_NAMES
+
+if TYPE_CHECKING:
+    from .parts import Parts
 
 
 @dataclass(frozen=True)
@@ -22,6 +26,7 @@ class Fit:
     iterations : of the minimiser. converged : whether it met its stopping rule.
     nis : mean of ||e_t||^2 weighted by the inverse of S_t, over all samples; 3 where the model holds.
     V : the cost function (8) at the estimate.
+    parts : what each part of the recording says against the estimate; None where that is not known.
     at_prior : names of those parameters of which the data say little: they are what was known beforehand.
     """
 
@@ -36,6 +41,7 @@ class Fit:
     nis: float
     V: float
     at_prior: tuple[str, ...] = ()
+    parts: Parts | None = None
 
     def std(self, *names: str) -> Vector:
         """Standard deviations of the named parameters, NaN for those that were not estimated."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data import Recording, Vector
+from .local_noise import VIBRATION, noise_variance
 
 WINDOW_S = 0.5
 SHORTEST_FLAT_S = 1.0
@@ -54,7 +55,8 @@ def find_flat(recording: Recording) -> tuple[int, int] | None:
     """(first, last + 1) of the segment that lies flat, or None where the board never lies still.
 
     It is the earliest still run of five seconds, or else of half the length of the longest. A run is still where the
-    windows' spread is small and their means agree: a turn at a constant rate has no variance, only a mean that moves.
+    windows' spread is small, or is vibration alone, and their means agree: a turn at a constant rate has no variance,
+    only a mean that moves.
     """
     n = max(round(WINDOW_S * recording.rate_hz), 4)
     acc, gyr = _windows(recording.acc, n), _windows(recording.gyr, n)
@@ -62,7 +64,8 @@ def find_flat(recording: Recording) -> tuple[int, int] | None:
         return None
     acc_mean, gyr_mean = acc.mean(1), gyr.mean(1)
     acc_sd, gyr_sd = acc.std(1), gyr.std(1)
-    quiet = (acc_sd <= _limit(acc_sd, ACC_SD_MIN_MPS2, ACC_SD_MAX_MPS2)).all(1)
+    vibration2 = VIBRATION * _windows(noise_variance(recording), n).mean(1)
+    quiet = ((acc_sd <= _limit(acc_sd, ACC_SD_MIN_MPS2, ACC_SD_MAX_MPS2)) | (acc_sd**2 <= vibration2)).all(1)
     quiet &= (gyr_sd <= _limit(gyr_sd, GYRO_SD_MIN_RAD_S, GYRO_SD_MAX_RAD_S)).all(1)
     whole = ~(_windows(recording.gap[:, None], n)[:, 1:, 0].any(1))
     quiet &= whole

@@ -15,7 +15,7 @@ from .static_intervals import Intervals
 
 LONG_ENOUGH_FOR_BIAS_S = 0.5
 TREMOR_S = 0.05  # correlation time of a hand's tremor
-RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # (rad/s)^2 a second
+RANDOM_WALKS = 10.0 ** np.arange(-13.0, -5.9, 0.5)  # (rad/s)^2 a second
 
 
 def without_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recording:
@@ -32,9 +32,19 @@ def without_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recordin
     rests = [recording.gyr[a:b].T for a, b in runs]
     tremor = np.maximum([[axis.var() for axis in rest] for rest in rests] - 1.2 * flat.Sigma_omega, 0.0)
     variance = flat.Sigma_omega / n + tremor * np.minimum(1.0, 2.0 * TREMOR_S * recording.rate_hz / n)
+    variance = variance + np.array([_turning(recording, a, b) for a, b in runs])[:, None]
     walk = _smoothed(t, np.array([[axis.mean() for axis in rest] for rest in rests]), variance)
     bias = np.stack([np.interp(recording.t, t, column) for column in walk.T], axis=1)
     return replace(recording, gyr=recording.gyr - bias + flat.b_omega)
+
+
+def _turning(recording: Recording, first: int, last: int) -> float:
+    """(rad/s)^2 by which gravity turns in a run, beyond noise: so far its mean rate may be a turn and no bias."""
+    n = max((last - first) // 3, 1)
+    one, other = recording.acc[first : first + n], recording.acc[last - n : last]
+    moved = other.mean(0) - one.mean(0)
+    angle2 = float(np.sum(moved**2 - 3.0 * (one.var(0) + other.var(0)) / n)) / float(np.sum(one.mean(0) ** 2))
+    return max(angle2, 0.0) / float(recording.t[last - n] - recording.t[first]) ** 2
 
 
 def _smoothed(t: Vector, mean: Vector, variance: Vector) -> Vector:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import Recording, Vector
-from .downsampling import downsampled
+from .downsampling import downsampled, means
 from .fit import Fit
 from .flat_segment import Flat
 from .gyro_matrix import WALD_99, at_prior, wald
@@ -29,7 +29,9 @@ from .hand_noise import (
 )
 from .initial_estimate import initialise
 from .levenberg_marquardt import Minimum, information, minimise
+from .local_noise import louder
 from .parameters import HAND
+from .parts import parts_of
 from .preprocessing import Preprocessed, preprocess
 from .prior import Prior, prior_of
 from .problem import Problem
@@ -43,8 +45,10 @@ PASSES = 3
 
 def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     """D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves."""
-    fine = preprocess(recording, (flat.first, flat.last), gravity)
-    search = _Search(preprocess(*downsampled(recording, flat, SEARCH_HZ), gravity))
+    noise_factor = louder(recording, flat)
+    fine = preprocess(recording, (flat.first, flat.last), gravity, noise_factor)
+    rough = means(noise_factor, recording, flat, SEARCH_HZ)
+    search = _Search(preprocess(*downsampled(recording, flat, SEARCH_HZ), gravity, rough))
     theta, noise = search.run(initialise(fine.problem, fine.flat.b_omega))
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
         noise = Noise("white", likeliest(fine.white, near(noise.sigma), theta))
@@ -56,9 +60,10 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
         perfect = replace(minimum.theta, K=np.eye(3))
         minimum = minimise(problem, perfect, HAND, prior, fixed=("K",), frozen=True)
         iterations += minimum.iterations
+    parts = parts_of(problem, minimum, prior)
     minimum = _doubted(minimum, noise, search.prepared, fine)
     known = at_prior(minimum.covariance()) if minimum.free.all() else ()
-    return replace(minimum, iterations=iterations).as_fit(known)
+    return replace(minimum, iterations=iterations).as_fit(known, parts)
 
 
 def _doubted(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preprocessed) -> Minimum:

@@ -6,6 +6,7 @@ Source: Nocedal, Wright, "Numerical Optimization" (2006), section 10.3; Marquard
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from .parameters import HAND, NAMES, PLACES
 from .prior import Prior
 from .problem import Problem
 from .theta import Theta, values
+
+if TYPE_CHECKING:
+    from .parts import Parts
 
 DECREMENT = 1e-3  # g' H^-1 g / 2: 0.04 standard deviations from the optimum, whatever the units
 LAST = 30.0  # so near, a whole step leaves a thousandth of the decrement: nobody need look back
@@ -52,7 +56,7 @@ class Minimum:
         covariance[free] = inverse(self.H[free])
         return covariance
 
-    def as_fit(self, at_prior: tuple[str, ...] = (), spread: float = 1.0) -> Fit:
+    def as_fit(self, at_prior: tuple[str, ...] = (), parts: Parts | None = None, spread: float = 1.0) -> Fit:
         """The estimate of the free parameters, with `spread` times the standard deviations of H [1]."""
         theta, covariance = self.theta, spread**2 * self.covariance()
         return Fit(
@@ -67,6 +71,7 @@ class Minimum:
             nis=self.nis,
             V=self.V,
             at_prior=at_prior,
+            parts=parts,
         )
 
 

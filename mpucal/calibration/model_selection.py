@@ -9,6 +9,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from ..data import Recording
 from .downsampling import downsampled
 from .fit import Fit
@@ -17,11 +19,14 @@ from .gyro_matrix import WALD_99, at_prior, wald
 from .hand import fit_hand
 from .initial_estimate import initialise
 from .levenberg_marquardt import Minimum, minimise
+from .likelihood import evaluate
 from .masks import mask
 from .paper import fit_paper
 from .parameters import ACCEL, IMU
+from .parts import parts_of
 from .prior import prior_of
 from .problem import Problem, Series
+from .theta import Theta
 from .tilt import fit_tilt
 
 # The mean ||e||^2 of white noise is 3; a hand, or a gyroscope's scale, makes it tens to thousands.
@@ -29,6 +34,22 @@ EXPLAINED_NIS = 4.0
 HOPELESS_NIS = 10.0  # of means over blocks, in which white noise is less and a hand's is not
 
 SEARCH_HZ, ROUGHLY = 50.0, 0.05
+
+
+class Errors(NamedTuple):
+    """What a sensor errs by beyond the noise that it has at rest.
+
+    kappa : rad a root of rad, by which a turn is off for each rad turned (nonlinearity, steps too long for a turn).
+    floor : m/s^2 of white noise beside the accelerometer's own.
+    """
+
+    kappa: float = 0.0
+    floor: float = 0.0
+
+
+NO_ERRORS = Errors()
+ERRORS = tuple(Errors(kappa, floor) for kappa in (0.0, 1e-4, 3e-4, 1e-3) for floor in (0.0, 1e-3, 3e-3, 1e-2))
+ERROR_PASSES, ERRING_NIS = 2, 30.0
 
 
 class Choice(NamedTuple):
@@ -41,12 +62,12 @@ class Choice(NamedTuple):
 
 def fit_accel(recording: Recording, flat: Flat, gravity: float) -> Fit:
     """D, b_a, b_omega and the first tilts, with the gyroscope's scale trusted: the paper's model, made efficient."""
-    return _as_fit(_minimum(recording, flat, gravity, ACCEL, _rough(recording, flat, gravity, ACCEL)))
+    return _InPlace(recording, flat, gravity).fit(ACCEL)
 
 
 def fit_imu(recording: Recording, flat: Flat, gravity: float) -> Fit:
     """As `accel`, with the gyroscope's matrix K."""
-    return _as_fit(_minimum(recording, flat, gravity, IMU, _rough(recording, flat, gravity, IMU)))
+    return _InPlace(recording, flat, gravity).fit(IMU)
 
 
 METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
@@ -61,44 +82,91 @@ METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
 def choose(recording: Recording, flat: Flat, gravity: float) -> Choice:
     """The simplest model that explains the data.
 
-    White noise and a trusted gyroscope first, then its matrix K, kept where a Wald test tells it from the identity.
-    Data that neither explains were measured in a hand.
+    White noise and a trusted gyroscope first, then its matrix K; the same with small errors of both sensors. K is kept
+    where a Wald test tells it from the identity. Data that none of them explains were measured in a hand.
     """
-    rough = _rough(recording, flat, gravity, ACCEL)
-    nis = rough.nis
-    if nis < HOPELESS_NIS:
-        accel = _minimum(recording, flat, gravity, ACCEL, rough)
-        nis = accel.nis
-    if nis < EXPLAINED_NIS:
-        imu = _minimum(recording, flat, gravity, IMU, accel)
-        if imu.converged and wald(imu) > WALD_99:
-            why = f"white noise explains the data (innovations {nis:.1f}, expected 3), and the gyroscope is not perfect"
-            return Choice(_as_fit(imu), "imu", why)
-        why = f"white noise and a perfect gyroscope explain the data (innovations {nis:.1f}, expected 3)"
-        return Choice(_as_fit(accel), "accel", why)
+    in_place, least = _InPlace(recording, flat, gravity), np.inf
+    for erring in (False, True):
+        for parameters in (ACCEL, IMU):
+            minimum, errors = in_place.explained(parameters, erring)
+            least = min(least, minimum.nis)
+            if minimum.nis >= EXPLAINED_NIS:
+                continue
+            if parameters == ACCEL:
+                imu = in_place.minimum(IMU, minimum, errors)
+                minimum = imu if imu.converged and wald(imu) > WALD_99 else minimum
+            return _chosen(in_place, minimum, errors)
     hand = fit_hand(recording, flat, gravity)
     kept = "K" if "K_xx" in hand.names else "no K (it is not told from the identity)"
-    why = f"white noise does not explain the data (innovations {nis:.0f}, expected 3): a hand's model, with {kept}"
+    why = f"white noise does not explain the data (innovations {least:.0f}, expected 3): a hand's model, with {kept}"
     return Choice(hand, "hand", why)
 
 
-def _rough(recording: Recording, flat: Flat, gravity: float, parameters: int) -> Minimum:
-    """On means over blocks: white noise leaves little in a block beside its mean."""
-    thin, at = downsampled(recording, flat, SEARCH_HZ)
-    problem = _problem(thin, flat_statistics(thin, at), gravity)
-    theta = initialise(problem, flat.b_omega)
-    return minimise(problem, theta, parameters, prior_of(flat), until=ROUGHLY)
+def _chosen(in_place: _InPlace, minimum: Minimum, errors: Errors) -> Choice:
+    perfect = len(minimum.free) == ACCEL
+    noise = "white noise" if errors == NO_ERRORS else "white noise with small errors of the sensors"
+    gyroscope = "a perfect gyroscope explain" if perfect else "a gyroscope that is not perfect explain"
+    why = f"{noise} and {gyroscope} the data (innovations {minimum.nis:.1f}, expected 3)"
+    return Choice(in_place.as_fit(minimum, errors), "accel" if perfect else "imu", why)
 
 
-def _minimum(recording: Recording, flat: Flat, gravity: float, parameters: int, near: Minimum) -> Minimum:
-    """On all samples, from where another search ended."""
-    minimum = minimise(_problem(recording, flat, gravity), near.theta, parameters, prior_of(flat))
-    return replace(minimum, iterations=near.iterations + minimum.iterations)
+class _InPlace:
+    """The exact filter's fits of a recording of a sensor that turns in place."""
+
+    def __init__(self, recording: Recording, flat: Flat, gravity: float) -> None:
+        self._recording, self._flat, self._gravity = recording, flat, gravity
+        self._prior = prior_of(flat)
+        # means over blocks: white noise leaves little in a block beside its mean
+        thin, at = downsampled(recording, flat, SEARCH_HZ)
+        self._thin, self._thin_flat = thin, flat_statistics(thin, at)
+
+    def fit(self, parameters: int) -> Fit:
+        """With white noise alone, whether it explains the data or not."""
+        return self.as_fit(self.minimum(parameters, self._rough(parameters)), NO_ERRORS)
+
+    def explained(self, parameters: int, erring: bool) -> tuple[Minimum, Errors]:
+        """The minimum, rough where it is hopeless, and the errors that make it likeliest."""
+        errors = NO_ERRORS
+        minimum = self._rough(parameters)
+        for _ in range(ERROR_PASSES if erring and self._erring(minimum.theta) else 0):
+            theta = minimum.theta
+            errors = min(ERRORS, key=lambda these: evaluate(self._thin_problem(these), theta, 0).V)
+            minimum = minimise(self._thin_problem(errors), theta, parameters, self._prior, until=ROUGHLY)
+        if minimum.nis < HOPELESS_NIS:
+            minimum = self.minimum(parameters, minimum, errors)
+        return minimum, errors
+
+    def minimum(self, parameters: int, near: Minimum, errors: Errors = NO_ERRORS) -> Minimum:
+        """On all samples, from where another search ended."""
+        minimum = minimise(self._problem(errors), near.theta, parameters, self._prior)
+        return replace(minimum, iterations=near.iterations + minimum.iterations)
+
+    def as_fit(self, minimum: Minimum, errors: Errors) -> Fit:
+        """With what the parts of the recording say."""
+        known = at_prior(minimum.covariance()) if len(minimum.free) > ACCEL else ()
+        return minimum.as_fit(known, parts_of(self._problem(errors), minimum, self._prior))
+
+    def _erring(self, theta: Theta) -> bool:
+        """Whether errors of the largest size could explain the data."""
+        squares = evaluate(self._thin_problem(ERRORS[-1]), theta, 0).squares
+        return squares < ERRING_NIS * len(self._thin)
+
+    def _rough(self, parameters: int) -> Minimum:
+        problem = self._thin_problem(NO_ERRORS)
+        theta = initialise(problem, self._flat.b_omega)
+        return minimise(problem, theta, parameters, self._prior, until=ROUGHLY)
+
+    def _problem(self, errors: Errors) -> Problem:
+        return _problem(self._recording, self._flat, self._gravity, errors)
+
+    def _thin_problem(self, errors: Errors) -> Problem:
+        return _problem(self._thin, self._thin_flat, self._gravity, errors)
 
 
-def _problem(recording: Recording, flat: Flat, gravity: float) -> Problem:
-    return Problem(mask(Series.after(recording, flat), recording, flat), flat, gravity)
-
-
-def _as_fit(minimum: Minimum) -> Fit:
-    return minimum.as_fit(at_prior(minimum.covariance()) if len(minimum.H) > ACCEL else ())
+def _problem(recording: Recording, flat: Flat, gravity: float, errors: Errors) -> Problem:
+    series = mask(Series.after(recording, flat), recording, flat)
+    if errors.kappa > 0.0:
+        turned = series.dt * np.linalg.norm(series.omega - flat.b_omega, axis=1)
+        q_extra = 0.0 if series.q_extra is None else series.q_extra
+        series = replace(series, q_extra=q_extra + errors.kappa**2 * turned)
+    return Problem(series, replace(flat, Sigma_a=flat.Sigma_a + errors.floor**2), gravity)

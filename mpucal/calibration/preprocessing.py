@@ -10,12 +10,14 @@ import numpy as np
 from ..data import Recording, Vector
 from .flat_segment import Flat, flat_statistics
 from .gyro_drift import without_drift
+from .local_noise import louder, noise_variance
 from .masks import mask
 from .problem import Problem, Series
 from .static_intervals import Intervals, static_intervals
 
 HUBER = 2.0
 MOVING_RAD_S = 0.3  # the rate at which a hand's acceleration is half of what it grows to
+SHAKEN_S, SHAKEN_MPS2 = 0.5, 0.3  # likewise of |y| by its standard deviation, at any rate: who walks, shakes
 SMOOTH_S = 0.02  # of the rates whose derivative is the angular acceleration
 TREMOR_PER_S, MOTION_PER_S = 20.0, 5.0  # lambda: 4.5 Hz of a tremor at rest, 1.1 Hz of a pivot
 TREMOR_OF_NOISE = 0.2  # a tremor below this share of the sensor's noise is none
@@ -72,13 +74,18 @@ class Preprocessed:
         return replace(self.problem, series=replace(self.problem.series, **series))
 
 
-def preprocess(recording: Recording, at: tuple[int, int], gravity: float) -> Preprocessed:
-    """The prepared of a recording whose flat segment is at[0]..at[1]-1."""
+def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise: Vector | None = None) -> Preprocessed:
+    """A recording whose flat segment is at[0]..at[1]-1, prepared.
+
+    noise : (n,) factors of Sigma_a, where a recording before downsampling gave them.
+    """
     flat = flat_statistics(recording, at)
     runs = static_intervals(recording, flat)
     recording = without_drift(recording, flat, runs)
     flat = flat_statistics(recording, at)
+    loud = (louder(recording, flat) if noise is None else noise)[flat.last :]
     series = mask(Series.after(recording, flat), recording, flat)
+    series = replace(series, r_scale=loud if series.r_scale is None else np.maximum(series.r_scale, loud))
     after = [(max(a - flat.last, 0), b - flat.last) for a, b in runs.tolist() if b > flat.last]
     rest = np.zeros(len(series), bool)
     for a, b in after:
@@ -88,14 +95,17 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float) -> Pre
     lam = TREMOR_PER_S if len(after) >= MANY_RESTS else MOTION_PER_S
     reset, jerk, pose = np.full(len(series), -1.0), np.zeros(len(series)), np.zeros(len(series))
     for a, b in after:
-        tremor = _tremor(series.y[a:b], flat)
+        tremor = _tremor(series.y[a:b], float(loud[a:b].mean()) * flat.Sigma_a)
         reset[a], jerk[a:b], pose[a:b] = tremor, jerk_density(tremor, lam), POSE_MPS2**2 * (b - a)
         if b < len(series):
             reset[b] = 0.0
     series = replace(series, rate=rate, alpha=alpha, reset=reset, jerk=jerk, r_extra=pose)
     problem = Problem(series, flat, gravity, huber=HUBER, tail=1.0, lam=lam)
     # between rests nothing is trusted to be at rest: the ends of a move are slow, and yet the hand's
-    motion = np.where(rest, 0.0, 1.0) if len(after) >= MANY_RESTS else speed2 / (speed2 + MOVING_RAD_S**2)
+    if len(after) >= MANY_RESTS:
+        motion = np.where(rest, 0.0, 1.0)
+    else:
+        motion = np.maximum(speed2 / (speed2 + MOVING_RAD_S**2), _shaken(recording, flat))
     return Preprocessed(recording, flat, problem, runs, len(after), motion, pose)
 
 
@@ -116,12 +126,27 @@ def _rates(recording: Recording, flat: Flat, rest: Vector) -> tuple[Vector, Vect
     sums = np.cumsum(np.vstack([np.zeros((1, 3)), recording.gyr - flat.b_omega]), axis=0)
     low, high = np.maximum(np.arange(n) - k, 0), np.minimum(np.arange(n) + k + 1, n)
     rate = (sums[high] - sums[low]) / (high - low)[:, None]
-    alpha = np.gradient(rate, recording.t, axis=0)
+    # the times are smoothed as the rates are: those of a computer jitter
+    times = np.cumsum(np.concatenate([[0.0], recording.t - recording.t[0]]))
+    alpha = np.gradient(rate, (times[high] - times[low]) / (high - low), axis=0)
     moving = np.where(rest, 0.0, 1.0)[:, None]
     return rate[flat.last :] * moving, alpha[flat.last :] * moving
 
 
-def _tremor(y: Vector, flat: Flat) -> float:
-    """m/s^2 by which a rest trembles beyond the sensor's own noise; 0 for a board that lies on something."""
-    tremor = float(np.sqrt(max(np.mean(y.var(0) - 1.05 * flat.Sigma_a), 0.0)))
-    return tremor if tremor > TREMOR_OF_NOISE * np.sqrt(flat.Sigma_a.mean()) else 0.0
+def _tremor(y: Vector, noise: Vector) -> float:
+    """m/s^2 by which a rest trembles beyond noise of variance (3,); 0 for a board that lies on something."""
+    tremor = float(np.sqrt(max(np.mean(y.var(0) - 1.05 * noise), 0.0)))
+    return tremor if tremor > TREMOR_OF_NOISE * np.sqrt(noise.mean()) else 0.0
+
+
+def _shaken(recording: Recording, flat: Flat) -> Vector:
+    """(n,) 0 to 1 after the flat segment: by how much |y| varies within half a second, which no turn makes it do."""
+    size = np.linalg.norm(recording.acc, axis=1)
+    n, half = len(size), max(round(0.5 * SHAKEN_S * recording.rate_hz), 2)
+    sums = np.cumsum(
+        np.vstack([np.zeros((1, 2)), np.stack([size - size.mean(), (size - size.mean()) ** 2], axis=1)]), 0
+    )
+    low, high = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half + 1, n)
+    mean, square = ((sums[high] - sums[low]) / (high - low)[:, None]).T
+    variance = np.maximum(square - mean**2 - 1.3 * noise_variance(recording).mean(1), 0.0)[flat.last :]
+    return np.asarray(variance / (variance + SHAKEN_MPS2**2))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..data import Mask, Recording, Vector
 from .flat_segment import Flat
+from .local_noise import VIBRATION, noise_variance
 
 WINDOW_S, SHORTEST_S = 0.5, 0.3
 TRIM, LEAST_TRIM_S, MOST_TRIM_S = 0.125, 0.1, 0.25  # of a rest at either end: a hand settles, and leaves early
@@ -24,8 +25,9 @@ Intervals = NDArray[np.intp]
 def static_intervals(recording: Recording, flat: Flat) -> Intervals:
     """(k, 2) first and last + 1 of the runs of samples in which the board rests, the flat segment's among them.
 
-    A half-second window is still where its spread is near the flat segment's, or below what a braced hand gives, and
-    its mean rate is the bias; a sample is still where a still window covers it; runs are trimmed at both ends.
+    A half-second window is still where its spread is near the flat segment's, or below what a braced hand gives, or
+    where the accelerometer's is vibration alone, and its mean rate is the bias; a sample is still where a still window
+    covers it; runs are trimmed at both ends.
     """
     n = max(round(WINDOW_S * recording.rate_hz), 4)
     if len(recording) < n:
@@ -33,10 +35,11 @@ def static_intervals(recording: Recording, flat: Flat) -> Intervals:
     gyr_limit = np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_omega), GYRO_SD_RAD_S)
     acc_limit = np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_a), ACC_SD_MPS2)
     windows = np.ones(len(recording) - n + 1, bool)
+    vibration = np.sqrt(VIBRATION * noise_variance(recording)[n // 2 : n // 2 + len(windows)])
     for i in range(3):  # an axis at a time: what it takes in between is several times the recording
         mean, sd = _moving(recording.gyr[:, i], n)
         windows &= (sd < gyr_limit[i]) & (np.abs(mean - flat.b_omega[i]) < GYRO_MEAN_RAD_S)
-        windows &= _moving(recording.acc[:, i], n)[1] < acc_limit[i]
+        windows &= _moving(recording.acc[:, i], n)[1] < np.maximum(acc_limit[i], vibration[:, i])
     covered = np.zeros(len(recording) + 1, np.intp)
     at = np.flatnonzero(windows)
     np.add.at(covered, at, 1)

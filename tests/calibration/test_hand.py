@@ -73,8 +73,9 @@ def test_it_finds_the_sensor_in_a_hand(fits, motion, how, mean, worst):
 def test_it_knows_how_well_it_knows(fits, motion):
     runs, found = fits(motion)
     rms = np.sqrt(np.mean(np.square(z_scores(found, runs))))
-    # three runs of twelve correlated numbers: a factor of two either way would show
-    assert 0.4 < rms < 1.7
+    # three runs of twelve correlated numbers: a factor of two either way would show; where few sides were down, leaving
+    # one out claims more
+    assert 0.3 < rms < 1.7
 
 
 def test_poses_tell_the_gyroscopes_matrix(fits):

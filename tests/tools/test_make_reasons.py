@@ -5,6 +5,7 @@ import shlex
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import mpucal
@@ -46,5 +47,5 @@ def test_merging_what_is_merged_already_shows_its_reason(capsys, tmp_path):
 def test_a_spoilt_recording_shows_its_reason(code):
     r = mpucal.load(SESSIONS / "mpu6050.mcap")
     assert mpucal.calibrate(r).verdict == "good"
-    found = eval(KINDS[code].reproduce, {"mpucal": mpucal, "replace": replace, "r": r})
+    found = eval(KINDS[code].reproduce, {"mpucal": mpucal, "numpy": np, "replace": replace, "r": r})
     assert code in codes(found.quality)

@@ -1,7 +1,7 @@
 """What speaks against an estimate: one function a check, which gives a Reason of mpucal/reasons.py or None.
 
 unusable     before there is a fit: wrong units, no rest, no turn, a dead axis
-recording    moved while still, clipped, lost or warming
+recording    moved while still, clipped, lost, warming or vibrating
 bits         low or high bits of an axis that never move
 gravity      a gravity that no place on Earth has
 sensor       wrong range, units, axes or gyroscope, by a trustworthy fit
@@ -41,12 +41,15 @@ CHECKS: tuple[Check, ...] = (
     sensor.axes,
     sensor.gyro_off,
     recording.temperature_moved,
+    recording.vibrating,
     gravity.gravity_unlikely,
     bits.bits_stuck,
     clock.clock_off,
     estimate.not_converged,
     estimate.inconsistent,
     estimate.changed_midway,
+    estimate.zero_moved,
+    estimate.parts_disagree,
 )
 
 

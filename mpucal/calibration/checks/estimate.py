@@ -4,34 +4,44 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...data import STANDARD_GRAVITY_MPS2
 from ...reasons import Reason, reason
-from ..evidence import Agreement, Evidence
+from ..evidence import Evidence
 from ..tilt import CONE_RAD
+from ..walks import Walk
 
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.1, 0.4
+AGREE_RMS_MPS2 = 0.08  # where it is the disagreement of parts that says so
 CONSISTENT_NIS = 5.0
 RESTS_MPS2, RESTS_RAD = 0.08, np.deg2rad(1.5)
 HONEST_FACTOR = 5.0
 REFUSED_FACTOR = 5.0
-# Of a change's significance. Hands whose pivot wobbles reach 4.5 without one. A gyroscope's non-linearity, which pauses
-# show most, makes it 10 with a real sensor.
-STEADY, STEADY_BY_RESTS = 5.0, 12.0
-UNSTEADY_BY_FAR = 4.0
-# So well agree no pauses of a sensor that changed.
-AGREE_MPS2, AGREE_RAD = 0.015, np.deg2rad(0.1)
+# by which readings are off because of a change of the bias or the mount: less is no news, and more is refused
+LEAST_CHANGE_MPS2, CHANGED_MPS2 = {"accelerometer": 0.004, "mount": 0.02}, 0.2
+# times the model's claim, and m/s^2, that leaving a part out says
+DISAGREE, DISAGREE_MPS2 = 4.0, 0.02
 
 
 def few_orientations(e: Evidence) -> Reason | None:
-    """A direction that the data leave open."""
-    if e.fit is None or (e.sure is not None and e.sure.rms_mps2 <= GOOD_RMS_MPS2):
+    """A direction that the data leave open, where the model holds."""
+    rms = _model_rms(e)
+    if e.fit is None or (rms is not None and rms <= GOOD_RMS_MPS2):
         return None
-    if e.sure is None:
+    if e.sure is None or rms is None:
         return reason("few_orientations", "nothing_known")
-    worst, rms = e.sure.worst, e.sure.rms_mps2
-    side = " ".join(f"{'+' if w > 0 else '-'}{axis}" for axis, w in zip("xyz", worst, strict=True) if abs(w) > 0.4)
+    side = " ".join(
+        f"{'+' if w > 0 else '-'}{axis}" for axis, w in zip("xyz", e.sure.worst, strict=True) if abs(w) > 0.4
+    )
     if rms < e.gravity:
         return reason("few_orientations", "uncertain", rms > USABLE_RMS_MPS2, rms=rms, side=side)
     return reason("few_orientations", "not_observable", side=side)
+
+
+def _model_rms(e: Evidence) -> float | None:
+    """m/s^2 that the model's noise leaves open; None where nothing is known."""
+    if e.sure is None:
+        return None
+    return e.sure.rms_mps2 if e.claim is None else e.claim.model
 
 
 def tilted_only(e: Evidence) -> Reason | None:
@@ -57,7 +67,9 @@ def inconsistent(e: Evidence) -> Reason | None:
     # a robust model leaves outliers in its innovations: only the others are judged by them
     if e.model != "hand" and e.fit.nis > CONSISTENT_NIS:
         after = float(np.median(np.linalg.norm(e.calibrated, axis=1))) if e.calibrated is not None else np.nan
-        return reason("inconsistent", "innovations", not abs(after / e.gravity - 1.0) < 0.05, nis=e.fit.nis)
+        return reason(
+            "inconsistent", "innovations", _useless(e) or not abs(after / e.gravity - 1.0) < 0.05, nis=e.fit.nis
+        )
     if e.agreement is None:
         return None
     magnitude, miss = e.agreement.magnitude_rms, e.agreement.miss_median
@@ -70,25 +82,70 @@ def inconsistent(e: Evidence) -> Reason | None:
 
 
 def changed_midway(e: Evidence) -> Reason | None:
-    """A mount that slipped or a bias that stepped, where nothing else speaks against the estimate.
+    """A mount that slipped, where nothing else speaks against the estimate."""
+    change = _change_of(e, "mount")
+    if change is None:
+        return None
+    begin, end = _since_the_start(e, change.steepest)
+    return reason("inconsistent", "change", change.error(e.gravity) > CHANGED_MPS2, begin=begin, end=end)
+
+
+def zero_moved(e: Evidence) -> Reason | None:
+    """An accelerometer whose bias stepped or drifted while the board was turned."""
+    change = _change_of(e, "accelerometer")
+    if change is None:
+        return None
+    begin, end = _since_the_start(e, change.steepest)
+    size = 1e3 * change.size / STANDARD_GRAVITY_MPS2
+    return reason("zero_moved", "walk", _useless(e), size=size, begin=begin, end=end)
+
+
+def _change_of(e: Evidence, what: str) -> Walk | None:
+    """That change, where it is more than is no news.
 
     Lost and clipped samples pull at an estimate too, and have reasons of their own.
     """
-    if e.model == "tilt" or e.fit is None or not e.fit.converged or inconsistent(e) is not None:
+    if e.claim is None or e.claim.change is None or e.claim.change.what != what or _excused(e):
         return None
-    if few_orientations(e) is not None:
+    known = e.claim.model <= USABLE_RMS_MPS2
+    return e.claim.change if known and e.claim.of_change > LEAST_CHANGE_MPS2[what] else None
+
+
+def parts_disagree(e: Evidence) -> Reason | None:
+    """Times or sides of the recording that say something else than the others, by more than the model's noise."""
+    claim = e.claim
+    if (
+        claim is None
+        or e.sure is None
+        or inconsistent(e) is not None
+        or any(_change_of(e, what) for what in LEAST_CHANGE_MPS2)
+    ):
         return None
+    if _excused(e) and not _useless(e):
+        return None
+    too_large = e.sure.rms_mps2 > AGREE_RMS_MPS2 and claim.model <= GOOD_RMS_MPS2 and claim.by != "model"
+    much = claim.inflation > DISAGREE and claim.left_out.claim() > DISAGREE_MPS2
+    if too_large and claim.left_out.decides() == "side":
+        return reason("inconsistent", "sides", _useless(e), rms=e.sure.rms_mps2)
+    if not too_large and not (much and claim.by == "time"):
+        return None
+    begin, end = _since_the_start(e, claim.left_out.worst)
+    return reason("inconsistent", "part", _useless(e), begin=begin, end=end, rms=e.sure.rms_mps2)
+
+
+def _useless(e: Evidence) -> bool:
+    return e.sure is None or e.sure.rms_mps2 > USABLE_RMS_MPS2
+
+
+def _excused(e: Evidence) -> bool:
+    """Whether something else explains that the parts disagree."""
+    if e.fit is None or not e.fit.converged or inconsistent(e) is not None:
+        return True
     r = e.recording
-    if r.gyr_clipped.any() or r.acc_clipped.any() or r.gap.any() or e.change is None:
-        return None
-    if e.change.rests_often and _agree(e.agreement):
-        return None
-    limit = STEADY_BY_RESTS if e.change.rests_often else STEADY
-    if e.change.significance <= limit:
-        return None
-    by_far = e.change.significance > UNSTEADY_BY_FAR * limit
-    return reason("inconsistent", "change", by_far, seconds=e.change.t_s - r.t[0])
+    return bool(r.gyr_clipped.any() or r.acc_clipped.any() or r.gap.any())
 
 
-def _agree(found: Agreement | None) -> bool:
-    return found is not None and found.magnitude_rms < AGREE_MPS2 and found.miss_median < AGREE_RAD
+def _since_the_start(e: Evidence, span: tuple[float, float]) -> tuple[float, float]:
+    """s since the recording's start, of times after the flat segment."""
+    begin = 0.0 if e.flat is None else float(e.recording.t[e.flat.last - 1] - e.recording.t[0])
+    return begin + span[0], begin + span[1]

@@ -7,9 +7,13 @@ import numpy as np
 from ...data import Mask
 from ...reasons import Reason, reason
 from ..evidence import Evidence
+from ..local_noise import noise_variance
 
 WARMER_C = 5.0
 MOST_CLIPPED = 0.2
+# of the accelerometer's noise: more than at rest for a share of the time, or at rest more than any sensor has
+VIBRATING_MPS2, LOUDER_THAN_FLAT, VIBRATING_SHARE = 0.2, 2.5, 0.2
+SHAKING_MPS2 = 0.5
 
 
 def moved_while_still(e: Evidence) -> Reason | None:
@@ -54,6 +58,20 @@ def data_lost(e: Evidence) -> Reason | None:
         lost > 0.5 * float(t[-1] - t[0]),
         places=f"{places} place{'s' if places > 1 else ''}",
         seconds=lost,
+    )
+
+
+def vibrating(e: Evidence) -> Reason | None:
+    """A motor that runs, from the start or from later on."""
+    if e.flat is None or e.fit is None:
+        return None
+    std = np.sqrt(noise_variance(e.recording).mean(1))
+    share = float(np.mean(std > np.maximum(VIBRATING_MPS2, LOUDER_THAN_FLAT * np.sqrt(e.flat.Sigma_a.mean()))))
+    at_rest = float(np.median(std[e.flat.first : e.flat.last]))
+    if share < VIBRATING_SHARE and at_rest < SHAKING_MPS2:
+        return None
+    return reason(
+        "vibrating", "noise", std=float(np.median(std[e.flat.last :])), share=max(share, float(at_rest > SHAKING_MPS2))
     )
 
 

@@ -1,0 +1,43 @@
+"""The accelerometer's noise as it is around each sample: a motor that starts makes it louder than it was at rest.
+
+Fourth differences leave noise and vibration, and next to nothing of a hand below 10 Hz at 100 samples a second or more.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..data import Recording, Vector
+
+if TYPE_CHECKING:
+    from .flat_segment import Flat
+
+WINDOW_S = 0.5
+DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+# where a window's variance is less than so many times that of its noise, the board is not moved but vibrates
+VIBRATION = 2.0
+# variances: below this a window is as loud as the flat segment, but for chance and a hand
+LOUDER = 2.0
+
+
+def noise_variance(recording: Recording) -> Vector:
+    """(n, 3) (m/s^2)^2, as if white, in a window of half a second around each sample."""
+    acc, n = recording.acc, len(recording)
+    if n < len(DIFFERENCE):
+        return np.zeros((n, 3))
+    squares = np.zeros((n + 1, 3))
+    difference = sum(c * acc[i : n - len(DIFFERENCE) + 1 + i] for i, c in enumerate(DIFFERENCE))
+    squares[3 : n - 1] = np.square(difference) / np.sum(DIFFERENCE**2)
+    sums = np.cumsum(squares, axis=0)
+    half = max(round(WINDOW_S * recording.rate_hz) // 2, 2)
+    at = np.arange(n)
+    low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, n)
+    return np.asarray((sums[high] - sums[low]) / (high - low)[:, None])
+
+
+def louder(recording: Recording, flat: Flat) -> Vector:
+    """(n,) the noise around each sample, as a factor of Sigma_a; 1 where it is as at rest."""
+    ratio = (noise_variance(recording) / flat.Sigma_a).mean(1)
+    return np.asarray(np.where(ratio > LOUDER, ratio, 1.0))

@@ -1,0 +1,75 @@
+"""A series cut into parts: what each of them says against the estimate, by its score.
+
+Where the model holds, the parts differ by chance. Where it does not (a sensor that drifts, a nonlinear one, vibration),
+the covariance of the estimate knows nothing of it, and only the parts show it: see jackknife.py and bias_walk.py.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data import Vector
+from .levenberg_marquardt import Minimum
+from .likelihood import part_scores
+from .prior import Prior
+from .problem import Problem
+
+MOST_PARTS, FEWEST_SAMPLES = 96, 16
+
+
+@dataclass(frozen=True)
+class Parts:
+    """k parts of about equal length, and what each says at the estimate.
+
+    Attributes
+    ----------
+    gradient : (k, p) and fisher : (k, p, p) what each part adds to those of V, by the parameters that were estimated.
+    H : (p, p) Fisher matrix of all with the prior's and the flat mean's.
+    start, end : (k,) s after the flat segment. side : (k,) 0 to 5, the body's axis nearest to gravity, with its sign.
+    """
+
+    gradient: Vector
+    fisher: Vector
+    H: Vector
+    start: Vector
+    end: Vector
+    side: NDArray[np.intp]
+
+    def __len__(self) -> int:
+        return len(self.side)
+
+    def grouped(self, groups: NDArray[np.intp]) -> tuple[Vector, Vector]:
+        """Gradients (m, p) and Fisher matrices (m, p, p) of groups of parts, by (k,) which group each part is in."""
+        member = groups == np.unique(groups)[:, None]
+        return member @ self.gradient, np.tensordot(member, self.fisher, 1)
+
+    def by_time(self, groups: int) -> NDArray[np.intp]:
+        """(k,) the group of each part, in so many stretches of time."""
+        return np.arange(len(self)) * groups // len(self)
+
+
+def parts_of(problem: Problem, minimum: Minimum, prior: Prior) -> Parts | None:
+    """The parts of a problem at its minimum; None for a series too short to be cut."""
+    series, theta, free = problem.series, minimum.theta, minimum.free
+    k = min(MOST_PARTS, len(series) // FEWEST_SAMPLES)
+    if k < 2:
+        return None
+    ends = np.arange(1, k + 1, dtype=np.int64) * len(series) // k
+    scores = part_scores(problem, theta, len(free), ends)
+    t = np.concatenate([[0.0], np.cumsum(series.dt)])
+    starts = np.concatenate([[0], ends[:-1]])
+    mean = np.add.reduceat(series.y, starts) / np.diff(ends, prepend=0)[:, None]
+    s = (mean - theta.b_a) @ np.linalg.pinv(theta.D).T
+    axis = np.abs(s).argmax(1)
+    H = scores.fisher.sum(0) + scores.flat + np.diag(prior.precision[: len(free)])
+    return Parts(
+        scores.gradient[:, free],
+        scores.fisher[:, free][:, :, free],
+        H[np.ix_(free, free)],
+        t[starts],
+        t[ends],
+        2 * axis + (s[np.arange(k), axis] > 0.0),
+    )

@@ -1,0 +1,86 @@
+"""Leaving a part out by one step, against really leaving it out, and claims where the model is wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpucal.calibration import calibrate, weigh
+from mpucal.calibration.flat_segment import find_flat, flat_statistics
+from mpucal.calibration.initial_estimate import initialise
+from mpucal.calibration.jackknife import jackknife
+from mpucal.calibration.likelihood import evaluate, part_scores
+from mpucal.calibration.parameters import ACCEL, HAND
+from mpucal.calibration.parts import Parts
+from mpucal.calibration.preprocessing import preprocess
+from mpucal.calibration.problem import Problem, Series
+from mpucal.simulated.study.metrics import sph_rms
+from mpucal.simulated.study.scenarios import hand_scenario, paper_scenario
+
+G = 9.82
+
+
+def in_hand():
+    recording = hand_scenario(1, "continuous").recording
+    prepared = preprocess(recording, find_flat(recording), G)
+    return prepared.white(0.3), initialise(prepared.problem, prepared.flat.b_omega)
+
+
+def in_place():
+    recording = paper_scenario(1, rate_hz=50).recording
+    flat = flat_statistics(recording, find_flat(recording))
+    problem = Problem(Series.after(recording, flat), flat, G)
+    return problem, initialise(problem, flat.b_omega)
+
+
+@pytest.mark.parametrize(("made", "parameters", "block"), [(in_place, ACCEL, 8), (in_hand, HAND, 16)])
+def test_the_parts_scores_sum_to_the_whole(made, parameters, block):
+    problem, theta = made()
+    n = len(problem.series)
+    scores = part_scores(problem, theta, parameters, np.array([n // 3, n // 2, n]))
+    begin, whole = evaluate(problem.first(0), theta, parameters), evaluate(problem, theta, parameters)
+    np.testing.assert_allclose(scores.gradient.sum(0) + begin.gradient, whole.gradient, rtol=1e-9)
+    np.testing.assert_allclose(scores.fisher.sum(0) + scores.flat, whole.fisher, rtol=1e-9, atol=1e-6)
+    # the kernel sums up to whole blocks of steps, the first of which is the flat mean's
+    end = (n // 3 // block + 1) * block - 1
+    first = evaluate(problem.first(end), theta, parameters)
+    np.testing.assert_allclose(scores.gradient[0] + begin.gradient, first.gradient, rtol=1e-9)
+
+
+@pytest.mark.parametrize("motion", ["continuous", "pose12"])
+def test_where_the_model_holds_it_claims_no_more_than_the_model(motion):
+    inflations = [weigh(hand_scenario(seed, motion).recording, "auto", G)[0].claim.inflation for seed in range(4)]
+    assert np.median(inflations) < 1.3
+
+
+def test_linear_measurements_without_a_part_are_fitted_exactly():
+    """One Newton step from the fit of all is the fit of the others, where the problem is quadratic."""
+    rng = np.random.default_rng(0)
+    k, m, p = 16, 20, 12
+    A, y = rng.standard_normal((k, m, p)), rng.standard_normal((k, m))
+    H = np.einsum("kmp,kmq->pq", A, A)
+    theta = np.linalg.solve(H, np.einsum("kmp,km->p", A, y))
+    gradient = -np.einsum("kmp,km->kp", A, y - A @ theta)
+    parts = Parts(gradient, np.einsum("kmp,kmq->kpq", A, A), H, np.arange(k), np.arange(1, k + 1), np.arange(k) % 6)
+    groups = parts.by_time(8)
+    left_out = [np.linalg.lstsq(A[groups != g].reshape(-1, p), y[groups != g].ravel(), rcond=None)[0] for g in range(8)]
+    moved = np.array(left_out) - np.median(left_out, axis=0)
+    d = np.sqrt(G**2 / 3.0 * np.sum(moved[:, :9] ** 2, axis=1) + np.sum(moved[:, 9:] ** 2, axis=1))
+    assert jackknife(parts, np.eye(3), G).time == pytest.approx(1.2 * np.sqrt(7.0) * np.median(d), rel=1e-9)
+
+
+def test_a_nonlinear_sensor_is_claimed_by_its_sides():
+    made = hand_scenario(3, "continuous")
+    s = made.recording.acc
+    bent = replace(made.recording, acc=s + 0.005 * s**2 / (2.0 * G))
+    fit = calibrate(bent, gravity=G)
+    assert sph_rms(made.truth, fit.D, fit.b_a) < 3.0 * fit.quality["error_std"]["rms"]
+
+
+def test_what_decided_is_in_the_document():
+    made = hand_scenario(1, "pose12")
+    error = calibrate(made.recording, gravity=G).quality["error_std"]
+    assert error["decided_by"] in ("model", "time", "side")
+    assert error["rms"] == pytest.approx(
+        max(error["model"], error["without_a_time"], error["without_a_side"]), rel=1e-6
+    )
