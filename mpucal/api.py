@@ -9,25 +9,54 @@ from typing import Literal
 from .arguments import a_path
 from .calibration import calibrate as _calibrate
 from .data import STANDARD_GRAVITY_MPS2, Recording
-from .errors import WrongType
+from .errors import WrongType, WrongValue
 from .files import load as _load
+from .files.hints import Hints, parse_columns, parse_units
 from .result.calibration import Calibration
 
 ModelName = Literal["auto", "hand", "imu", "accel", "paper", "tilt"]
 
 
-def load(path: str | PathLike[str]) -> Recording:
+def load(
+    path: str | PathLike[str],
+    *,
+    topic: str | None = None,
+    columns: str = "",
+    units: str = "",
+    accel_range: float | None = None,
+    gyro_range: float | None = None,
+    rate: float | None = None,
+) -> Recording:
     """The recording in a file (.mcap, .tlog, .bin of ArduPilot, .npz, .csv), or in the folder of a session.
 
-    A capture that was cut short gives what is whole of it, and says so in `recovered`.
+    A capture that was cut short gives what is whole of it, and says so in `recovered`. As what the columns and units of
+    another program's file were taken is said in `taken`.
+
+    Parameters
+    ----------
+    topic : of a bag. columns : of a table, "t=NAME,ax=NAME,..." or "t,ax,ay,az,gx,gy,gz".
+    units : "t=ms,acc=g,gyr=deg/s".
+    accel_range : g, gyro_range : deg/s, full scale of counts. rate : Hz, of samples without times.
 
     Raises
     ------
-    RecordingError : no such file, one of another kind, or no recording in it.
+    RecordingError : no such file, one of another kind, no recording in it, or doubtful columns or units.
     CaptureError : a capture that cannot be read. ChipError : the capture of a chip that is not known.
-    WrongType : `path` is no path.
+    UsageError : something is said of a file of which nothing has to be said.
+    WrongType : `path` is no path. WrongValue : no such columns or units.
     """
-    return _load(a_path(path, "a recording"))
+    try:
+        hints = Hints(
+            topic,
+            parse_columns(columns) if columns else {},
+            parse_units(units) if units else {},
+            accel_range,
+            gyro_range,
+            rate,
+        )
+    except ValueError as error:
+        raise WrongValue(str(error), "see docs/recordings.md") from error
+    return _load(a_path(path, "a recording"), hints)
 
 
 def calibrate(

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import mpucal
 from mpucal.data import STANDARD_GRAVITY_MPS2 as G
 from mpucal.errors import RecordingError, UsageError
 from mpucal.files import load
@@ -242,6 +243,14 @@ def test_a_column_that_is_not_there(walk, tmp_path):
     frame("a|b|c|d|e|f|g", walk.t, walk.acc, walk.gyr).to_csv(tmp_path / "walk.csv", index=False)
     with pytest.raises(RecordingError, match="there is no column h for t: name one of a, b, c, d, e, f, g"):
         load(tmp_path / "walk.csv", Hints(columns=parse_columns("t=h,ax=b,ay=c,az=d,gx=e,gy=f,gz=g")))
+
+
+def test_the_public_name_takes_words(walk, assert_same, tmp_path):
+    path = tmp_path / "walk.csv"
+    frame("a|b|c|d|e|f|g", walk.t * 1000, walk.acc / G, walk.gyr).to_csv(path, index=False)
+    assert_same(mpucal.load(path, columns="t,ax,ay,az,gx,gy,gz", units="t=ms,acc=g,gyr=rad/s"), walk, 1e-9, 1e-9, 1e-9)
+    with pytest.raises(mpucal.MpucalError, match="is no unit"):
+        mpucal.load(path, units="acc=feet")
 
 
 @pytest.mark.parametrize("text", ["t=a,t=b", "velocity=a", "t,ax,ax", "ax="])
