@@ -6,7 +6,8 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any, Literal, Self
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,9 @@ from . import frames
 from .arguments import Mask as Mask  # noqa: PLC0414 - rooms above take them from here
 from .arguments import Vector as Vector  # noqa: PLC0414
 from .arguments import column, mask, rows, seconds, stretch
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 STANDARD_GRAVITY_MPS2 = 9.80665
 # names reach scripts and source code: these characters end no string and no comment there
@@ -139,7 +143,7 @@ class Samples:  # noqa: PLW1641 - arrays have no hash either
         return Samples(none, three, three.copy(), none.copy(), no, no.copy(), no.copy())
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording(Samples):
     """Samples of one session with one sensor.
 
@@ -236,6 +240,21 @@ class Recording(Samples):
         WrongValue : another library. ImportError : the library is not installed.
         """
         return frames.made(library, {f.name: getattr(self, f.name) for f in fields(Samples)})
+
+    def __repr__(self) -> str:
+        seconds = float(self.t[-1] - self.t[0]) if len(self) else 0.0
+        rate = f" at {self.rate_hz:.4g} Hz" if len(self) > 1 else ""
+        return f"<Recording {self.name}: {len(self)} samples, {seconds:.1f} s{rate}>"
+
+    def plot(self) -> Figure:
+        """A figure of accelerations and rates over time; needs mpucal[plot].
+
+        Raises
+        ------
+        ImportError : matplotlib is not installed.
+        """
+        figure: Figure = resolve_name("mpucal.report.notebook:plot_recording")(self)
+        return figure
 
     @property
     def rate_hz(self) -> float:

@@ -7,19 +7,24 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar, overload
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import frames
 from ..arguments import a_path, vectors
-from ..data import Sensor, Vector
+from ..data import Recording, Sensor, Vector
 from ..errors import RecordingError, WrongValue
 from .atomic import write_atomically
 from .blob import NO_RANGE, Blob, BlobError
 from .document import arguments, content
+from .error_model import bias_mg, scale_factor_error
 from .frozen import FrozenDict
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 F = TypeVar("F")  # a data frame
 GOOD, USABLE, REFUSED = "good", "usable", "refused"
@@ -30,7 +35,7 @@ def unknown(*shape: int) -> Vector:
     return np.full(shape, np.nan)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Calibration:  # noqa: PLW1641 - arrays have no hash either
     """An accelerometer's D and b_a (the paper's equation 3), how sure they are, and what they rest on.
 
@@ -77,6 +82,25 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
 
     def __eq__(self, other: object) -> bool:
         return self.document() == other.document() if isinstance(other, Calibration) else NotImplemented
+
+    def __repr__(self) -> str:
+        gain, bias = scale_factor_error(self.D), bias_mg(self.b_a)
+        numbers = [" ".join(f"{value:+.4g}" for value in values) for values in (gain, bias)]
+        said = f"scale factor error {numbers[0]} %, bias {numbers[1]} mg"
+        return f"<Calibration of {self.sensor.chip or 'an accelerometer'}: {self.verdict}; {said}>"
+
+    def _repr_html_(self) -> str:
+        return str(resolve_name("mpucal.report.notebook:html")(self))
+
+    def plot(self, recording: Recording) -> Figure:
+        """A figure of |a| over time, before and after; needs mpucal[plot].
+
+        Raises
+        ------
+        ImportError : matplotlib is not installed.
+        """
+        figure: Figure = resolve_name("mpucal.report.notebook:plot_calibration")(self, recording)
+        return figure
 
     @property
     def follows_temperature(self) -> bool:
