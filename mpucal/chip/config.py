@@ -96,6 +96,24 @@ class Config:
             raise ChipError(what, "take 1 to 6")
 
 
+class RateAlone(Config):
+    """Of a source that is no chip of ours: what is asked for is a rate, and what comes is its answer.
+
+    Raises
+    ------
+    UsageError : a rate that is none.
+    """
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.rate_hz <= reg.MAX_RATE_HZ:
+            raise UsageError(f"{self.rate_hz:g} Hz is no rate to ask for", f"take 1 to {reg.MAX_RATE_HZ:g} Hz")
+
+    @property
+    def accel_alone(self) -> bool:
+        """Never."""
+        return False
+
+
 def _check(what: str, value: float, unit: str, allowed: Sequence[int]) -> None:
     if value not in allowed:
         choices = ", ".join(str(choice) for choice in allowed)

@@ -89,7 +89,8 @@ def _opened(
     """The source, the sinks that the result goes to, and the options that name the source."""
     if resume is None:
         kinds = chosen(sinks, no_write, check_source(click.get_current_context()))
-        return open_source({**options, "attended": attended}, given()), kinds, options
+        opening = {**options, "attended": attended, "writes": bool(kinds)}
+        return open_source(opening, given()), kinds, options
     check_resumed(given())
     source = open_resumed(resume)
     options = {**options, **source.live.words}

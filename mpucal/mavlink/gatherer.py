@@ -17,7 +17,7 @@ US_PER_S = 1e6
 MS_US = 1000
 
 # Single lost packets are as good as a lower rate; a longer time without one is a gap.
-GAP_S, GAP_INTERVALS = 0.05, 6.0
+GAP_S, GAP_INTERVALS = 0.08, 6.0
 # a stream that is truer is taken where it has at least this share of the packets of the busiest
 SHARE = 0.5
 PAIRED = 0.9

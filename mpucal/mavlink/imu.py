@@ -65,7 +65,9 @@ class Reading:
 def reading(message: Message) -> Reading | None:
     """The content of an IMU message; None of another one, or where it has no new accelerations and rates."""
     read = _READ.get(message.get_type())
-    return None if read is None else read(message)
+    content = None if read is None else read(message)
+    # an instance that is not there is sent as zeros, which no sensor feels
+    return content if content is not None and any(content.acc + content.gyr) else None
 
 
 def _highres(m: Message) -> Reading | None:

@@ -42,13 +42,16 @@ class Link:
     ----------
     transport : where the packets come from; `close` closes it.
     record : keeps each packet of the vehicle and of us, with its time [ns since 1970].
-    key : 32 bytes with which both sides sign, or None.
+    key : 32 bytes with which both sides sign, or None. own_system : our MAVLink id.
     """
 
-    def __init__(self, transport: Transport, record: Recorder, key: bytes | None = None) -> None:
+    def __init__(
+        self, transport: Transport, record: Recorder, key: bytes | None = None, own_system: int = OWN_SYSTEM
+    ) -> None:
         self._transport = transport
         self._record = record
-        self._mav = dialect().MAVLink(None, OWN_SYSTEM, OWN_COMPONENT)
+        self._mav = dialect().MAVLink(None, own_system, OWN_COMPONENT)
+        self.own_system = own_system
         self._now_ns = transport.now_ns()
         self._key = key
         if key is not None:
@@ -153,8 +156,10 @@ class Link:
             yield message
 
     def note(self, message: Message) -> None:
-        """Keep a message of ours in the record, and send it to nobody."""
+        """Keep a message in the record, under the id by which a replay knows it, and send it to nobody."""
+        own, self._mav.srcSystem = self._mav.srcSystem, OWN_SYSTEM
         self._keep(self._packed(message))
+        self._mav.srcSystem = own
 
     def close(self) -> None:
         """Close the transport."""

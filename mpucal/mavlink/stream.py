@@ -37,6 +37,7 @@ class Streams:
         self._link = link
         self._firmware = firmware
         self._order = [name for name in preferred_messages(firmware, parameters) if name in MESSAGE_ID]
+        self._parameters = parameters
         self._rate_hz = rate_hz
         self._say = say
         self._counts: Counter[Stream] = Counter()
@@ -72,10 +73,15 @@ class Streams:
         self._window_ns = now_ns
         self._tell(rates)
         for stream, best_hz in self._best_hz.items():
-            if stream.name in self._wanted and rates.get(stream, 0.0) < FALLEN * best_hz:
+            if stream.name in self._wanted and rates.get(stream, 0.0) < FALLEN * self._expected_hz(stream, best_hz):
                 self._again(stream)
         for stream, rate_hz in rates.items():
             self._best_hz[stream] = max(rate_hz, self._best_hz.get(stream, 0.0))
+
+    def _expected_hz(self, stream: Stream, best_hz: float) -> float:
+        """The rate to hold a stream to: its best, or, where it was slow from the beginning, what the fastest shows."""
+        fastest_hz = max(self._best_hz.values())
+        return best_hz if best_hz >= FALLEN * fastest_hz else min(self._wanted[stream.name], fastest_hz)
 
     def ask_again(self) -> None:
         """Ask for all of them without waiting for answers: of a vehicle that was away."""
@@ -154,15 +160,28 @@ class Streams:
             return
         self._quiet_until_ns = now_ns + SAY_AGAIN_NS
         self._say(
-            f"{alive[0].name} was slowed down from {self._best_hz[alive[0]]:.0f} Hz, and has been asked for again: "
+            f"{alive[0].name} was slowed down {self._slowed(alive[0], rates)}, and has been asked for again: "
             "another ground station lowers it (start MAVProxy with --streamrate=-1)."
         )
+
+    def _slowed(self, stream: Stream, rates: Mapping[Stream, float]) -> str:
+        best_hz = self._best_hz[stream]
+        if best_hz == self._expected_hz(stream, best_hz):
+            return f"from {best_hz:.0f} Hz"
+        return f"to {rates[stream]:.0f} Hz, where {self._wanted[stream.name]:.0f} were asked for"
 
     def _nothing(self) -> LinkError:
         names = HIGHRES if self._firmware == PX4 else f"{HIGHRES} and {RAW}"
         signed = self._link.signed_only
         remedy = "give the vehicle's --signing-key: it signs, and hears nobody who does not"
+        check = "check that the link goes both ways, then start again"
+        if not self._parameters:
+            check = (
+                f"check that the link goes both ways, as it answers nothing to system {self._link.own_system}; an"
+                " ArduPilot with MAV_OPTIONS 1 hears one ground station alone: give that one's id (MAV_GCS_SYSID or"
+                " SYSID_MYGCS, usually 255) with --source-system"
+            )
         return LinkError(
             f"{self._link.vehicle} sends no IMU messages, though {names if not signed else 'they'} were asked for",
-            remedy if signed else "check that the link goes both ways, then start again",
+            remedy if signed else check,
         )

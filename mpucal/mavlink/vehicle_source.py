@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from ..data import Recording, Samples, Sensor
-from ..errors import LinkError, UsageError
+from ..errors import LinkError, UsageError, WriteBackError
 from .clock import Jump
 from .dialect import Message
 from .firmwares import ARDUPILOT, PX4
@@ -13,6 +13,7 @@ from .gatherer import Row, chip, least_noise, samples_of
 from .imu import Stream, reading
 from .link import Link, S
 from .log import Log
+from .parameters.names import place
 from .prearm import ARMED
 from .stream import Streams
 from .stream_parameters import read_stream_parameters
@@ -37,14 +38,24 @@ class VehicleSource:
     ----------
     link : not locked yet. rate_hz : to ask for. system : whom to lock to, where there are several.
     say : tells the person a sentence. name : what to call the recording.
+    writes : the result will be written to it: then its parameters must name its sensors.
     """
 
-    def __init__(self, link: Link, rate_hz: float, system: int | None, say: Callable[[str], None], name: str) -> None:
+    def __init__(
+        self,
+        link: Link,
+        rate_hz: float,
+        system: int | None,
+        say: Callable[[str], None],
+        name: str,
+        writes: bool = False,
+    ) -> None:
         self._link = link
         self._rate_hz = rate_hz
         self._system = system
         self._say = say
         self._name = name
+        self._writes = writes
         self._log = Log(ARDUPILOT)
         self._streams: Streams | None = None
         self._stream: Stream | None = None
@@ -72,6 +83,7 @@ class VehicleSource:
         self._log = Log(firmware, over_reboots=True)
         self._link.subscribe(self._hear)
         parameters = read_stream_parameters(self._link, firmware)
+        self._check_named(parameters)
         self._streams = Streams(self._link, firmware, parameters, self._rate_hz, self._say)
         self._stream = self._streams.start()
         self._rows = []
@@ -155,6 +167,18 @@ class VehicleSource:
         self._say(
             f"The link loses {100 * self._link.lost / sent:.0f} % of the packets; a nearer or faster one is better."
         )
+
+    def _check_named(self, parameters: Mapping[str, float]) -> None:
+        """Before anything is turned: a PX4 that names no sensor has no place for the result."""
+        if self._firmware != PX4 or not parameters or place(PX4, 1, parameters) is not None:
+            return
+        what = f"{self._link.vehicle} names none of its accelerometers (all CAL_ACCn_ID are 0)"
+        if self._writes:
+            raise WriteBackError(
+                f"{what}, so that nothing can be written to it, and nothing was measured",
+                "let QGroundControl calibrate them once, which names them, then start again; or take --no-write",
+            )
+        self._say(f"{what}: the result is for files only.")
 
     def _wait_until_back(self) -> None:
         """After a reboot, or a silence, have it stream again, and read its parameters anew."""

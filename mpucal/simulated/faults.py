@@ -208,6 +208,7 @@ _ROWS = (
         "a PX4 with SENS_IMU_AUTOCAL commits the accelerometer offsets that it learnt",
         strike=lambda vehicle: vehicle.learn_offsets(),
     ),
+    FaultKind("phantom", Where.VEHICLE, "IMUs that an ArduPilot does not have are sent as zeros", timed=False),
     FaultKind("no_storage", Where.VEHICLE, "it has no card", timed=False),
     FaultKind("loss", Where.LINK, "one packet in five is lost", timed=False, share=0.2),
     FaultKind("reorder", Where.LINK, "one packet in ten is overtaken by three others", timed=False, share=0.1),

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 from pkgutil import resolve_name
 from typing import Any
 
-from ..chip.config import Config
+from ..chip.config import Config, RateAlone
 from ..errors import CaptureError, UsageError
 from ..session.plan import Plan
 from .kind import Delivers, Option, Request, SourceKind
 from .opened import Opened
-from .table import SOURCES, kinds_meant, unique, used_by
+from .table import DLPF, SOURCES, kinds_meant, unique, used_by
 
 # what a person may choose of a plan; a capture holds it
 OF_THE_PLAN = ("gravity", "gravity_anyway", "model", "target", "tilt_only")
@@ -82,7 +82,9 @@ def open_source(values: Mapping[str, Any], given: Mapping[str, str] | None = Non
     UsageError : values that name no such source. SourceError : it cannot be opened.
     """
     kind = kinds_meant(values)[0]
-    opened: Opened = resolve_name(kind.opener)(Request(kind, values, _plan(values, until_end), given or {}))
+    opened: Opened = resolve_name(kind.opener)(
+        Request(kind, values, _plan(values, until_end, _of_a_chip(kind)), given or {})
+    )
     return opened
 
 
@@ -130,7 +132,12 @@ def _fixed_by_capture() -> tuple[str, ...]:
     return (*(option.name for option in _beside(SOURCES)), *OF_THE_PLAN)
 
 
-def _plan(values: Mapping[str, Any], until_end: bool) -> Plan:
+def _of_a_chip(kind: SourceKind) -> bool:
+    """Whether more than its rate can be set."""
+    return DLPF in kind.settings or kind.delivers is Delivers.CAPTURE
+
+
+def _plan(values: Mapping[str, Any], until_end: bool, of_a_chip: bool) -> Plan:
     """What the options' values ask for; what they leave out is as usual.
 
     Raises
@@ -138,7 +145,7 @@ def _plan(values: Mapping[str, Any], until_end: bool) -> Plan:
     UsageError : values that a chip does not have, or that contradict each other.
     """
     usual = Plan(Config())
-    config = Config(
+    config = (Config if of_a_chip else RateAlone)(
         int(values.get("accel_range", usual.config.accel_range_g)),
         int(values.get("gyro_range", usual.config.gyro_range_dps)),
         values.get("rate", usual.config.rate_hz),

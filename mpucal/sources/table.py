@@ -53,6 +53,7 @@ REPLAY = Option("replay", metavar="FILE", parse=Path)
 ADDRESS = Option("address", "I2C address; by default 0x68, then 0x69.", "ADDRESS", whole_number(0, 0x7F))
 SEED = Option("seed", "Which simulated sensor and hand.", "N", whole_number(0))
 SYSTEM = Option("system", "Which vehicle, if several.", "N", whole_number(1, 255))
+SOURCE_SYSTEM = Option("source_system", "MAVLink id of mpucal itself; by default 254.", "N", whole_number(1, 255))
 SIGNING_KEY = Option(
     "signing_key", "MAVLink 2 key: 32 bytes, 64 hexadecimal digits, or a passphrase.", "FILE", parse=Path
 )
@@ -116,7 +117,7 @@ SOURCES = [
         forms="udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, or /dev/ttyX[:BAUD]",
         opener="mpucal.sources.vehicle:open_source",
         delivers=Delivers.SAMPLES,
-        options=(SYSTEM, SIGNING_KEY),
+        options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY),
         settings=(RATE,),
     ),
     SourceKind(
@@ -126,7 +127,7 @@ SOURCES = [
         forms="sim[:key=value,...] for the simulated vehicle",
         opener="mpucal.simulated.vehicle.source:open_source",
         delivers=Delivers.SAMPLES,
-        options=(SYSTEM, SIGNING_KEY),
+        options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY),
         settings=(RATE,),
         title="simulated vehicle",
     ),

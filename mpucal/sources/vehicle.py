@@ -6,15 +6,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from .. import __version__
-from ..chip.config import Config
+from ..chip.config import RateAlone
 from ..chip.records import LATE, SessionEvent
 from ..data import Recording
 from ..errors import CaptureError, LinkError, UsageError
 from ..mavlink.firmwares import ARDUPILOT, PX4
-from ..mavlink.link import Link
+from ..mavlink.link import OWN_SYSTEM, Link
 from ..mavlink.log import read_log
 from ..mavlink.prompts import to_message
 from ..mavlink.recorded_source import RecordedSource
@@ -48,6 +48,7 @@ class OpenedVehicle:
     ----------
     transport : open. plan : what to do; of its `config` the rate matters. system : whom to lock to.
     key : to sign with, or None. listeners : hear the prompts, besides the vehicle.
+    own_system : under which MAVLink id we speak. writes : whether the result will be written to it.
     truth : of a simulated vehicle. replay : the same transport where it is a replay. real_time : see Opened.
 
     Attributes
@@ -69,6 +70,8 @@ class OpenedVehicle:
         replay: Replay | None = None,
         recovered: str | None = None,
         real_time: bool = True,
+        own_system: int = OWN_SYSTEM,
+        writes: bool = False,
     ) -> None:
         self.plan = plan
         self.listeners = (self._prompt, *listeners)
@@ -80,6 +83,8 @@ class OpenedVehicle:
         self._system = system
         self._key = key
         self._replay = replay
+        self._own_system = own_system
+        self._writes = writes
 
     def talk(self, person: Talk) -> Talk:
         """See Opened."""
@@ -89,11 +94,11 @@ class OpenedVehicle:
     def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[Measuring]:
         """See Opened."""
         with closing(self._transport), TlogWriter(capture) as writer:
-            link = self.link = Link(self._transport, writer.packet, self._key)
+            link = self.link = Link(self._transport, writer.packet, self._key, self._own_system)
             notes = _Noting(link)
             plan = {SOURCE: SOURCE_VERSION, PLAN: asdict(self.plan), SYSTEM: self._system}
             notes.keep(SESSION, 0, {MPUCAL: __version__, RECORDED: recorded, **plan})
-            source = VehicleSource(link, self.plan.config.rate_hz, self._system, say, capture.name)
+            source = VehicleSource(link, self.plan.config.rate_hz, self._system, say, capture.name, self._writes)
             try:
                 yield Measuring(source, notes.keep, late=self._was_late)
             finally:
@@ -111,7 +116,7 @@ class OpenedVehicle:
         if self._replay is not None:
             raise UsageError("a .tlog has no vehicle to write to", "give the vehicle's --mavlink URL")
         with closing(self._transport):
-            link = self.link = Link(self._transport, lambda _t_ns, _packet: None, self._key)
+            link = self.link = Link(self._transport, lambda _t_ns, _packet: None, self._key, self._own_system)
             vehicle = one_of(link.listen(), self._system)
             say(f"This is {vehicle}; what is asked and written goes there alone.")
             link.lock(vehicle)
@@ -195,7 +200,21 @@ def open_source(request: Request) -> OpenedVehicle:
     UsageError : words that are no URL, or no key. LinkError : it cannot be opened.
     """
     key = signing_key(request)
-    return OpenedVehicle(open_transport(parse_url(request.value)), request.plan, request.values.get("system"), key)
+    transport = open_transport(parse_url(request.value))
+    return OpenedVehicle(transport, request.plan, request.values.get("system"), key, **said_of_us(request))
+
+
+class OfUs(TypedDict):
+    """Under which system id we speak, and whether the result will be written to the vehicle."""
+
+    own_system: int
+    writes: bool
+
+
+def said_of_us(request: Request) -> OfUs:
+    """What the options say of us."""
+    own = request.values.get("source_system")
+    return {"own_system": OWN_SYSTEM if own is None else int(own), "writes": bool(request.values.get("writes"))}
 
 
 def signing_key(request: Request) -> bytes | None:
@@ -232,7 +251,7 @@ def open_tlog(file: Path, asked: Plan, system: int | None) -> OpenedVehicle | Op
         )
     try:
         plan = dict(head.data[PLAN])
-        made = Plan(**{**plan, "config": Config(**plan["config"])})
+        made = Plan(**{**plan, "config": RateAlone(**plan["config"])})
         return OpenedVehicle(replay, made, head.data[SYSTEM], replay=replay, recovered=tlog.recovered)
     except (KeyError, TypeError, ValueError) as error:
         raise CaptureError(

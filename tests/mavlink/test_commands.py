@@ -1,6 +1,7 @@
 """The words of the command line that name vehicles, and what contradicts them."""
 
 import hashlib
+import re
 
 import pytest
 from click.testing import CliRunner
@@ -74,3 +75,12 @@ def test_an_empty_key_is_refused(tmp_path):
     (tmp_path / "key").write_bytes(b" \n")
     with pytest.raises(UsageError, match="is empty"):
         read_key(tmp_path / "key")
+
+
+def test_a_rate_is_asked_of_a_vehicle_whatever_a_chip_has(tmp_path):
+    path = tmp_path / "capture.tlog"
+    result = run("record", "--mavlink", "sim:imus=1", "--rate", 300, "--seconds", 4, "-o", path)
+    assert result.exception is None, result.output
+    assert float(re.search(r"at ([\d.]+) Hz", run("show", path).output).group(1)) > 299
+    result = run("record", "--mavlink", "sim:imus=1", "--rate", 5000, "--seconds", 4, "-o", tmp_path / "x.tlog")
+    assert isinstance(result.exception, UsageError)

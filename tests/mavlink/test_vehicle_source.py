@@ -3,7 +3,7 @@ from itertools import chain
 import numpy as np
 import pytest
 
-from mpucal.errors import EndOfCapture, LinkError, UsageError
+from mpucal.errors import EndOfCapture, LinkError, UsageError, WriteBackError
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.names import ardupilot_place, mounting
@@ -185,3 +185,47 @@ def test_another_system_is_not_locked_to():
     source, _, _ = opened(system=9)
     with pytest.raises(UsageError, match="no vehicle is system 9"):
         source.start()
+
+
+def test_a_stream_of_zeros_is_no_imu():
+    source, _, _ = opened("imus=2,fault=phantom")
+    source.start()
+    polled(source, 2)
+    recording = source.recording()
+    assert [one.autopilot.imu for one in (recording, *recording.others)] == [1, 2]
+
+
+@pytest.mark.parametrize("writes", [True, False])
+def test_a_px4_that_names_no_sensor_is_told_before_anything_is_turned(writes):
+    vehicle = SimulatedVehicle(VehicleOptions.parse("sim:firmware=px4,imus=1,CAL_ACC0_ID=0"))
+    said = []
+    link = Link(SimulatedTransport(vehicle), lambda t_ns, data: None)
+    source = VehicleSource(link, 100.0, None, said.append, "test", writes)
+    if writes:
+        with pytest.raises(WriteBackError, match=r"all CAL_ACCn_ID are 0.*nothing was measured"):
+            source.start()
+    else:
+        source.start()
+        assert "the result is for files only" in said[-1]
+
+
+@pytest.mark.parametrize("own", [254, 255])
+def test_an_ardupilot_that_hears_one_station_alone(own):
+    vehicle = SimulatedVehicle(VehicleOptions.parse("sim:imus=1,MAV_OPTIONS=1"))
+    link = Link(SimulatedTransport(vehicle), lambda t_ns, data: None, None, own)
+    source = VehicleSource(link, 100.0, None, lambda text: None, "test")
+    if own == 255:
+        assert source.start().message == "HIGHRES_IMU"
+    else:
+        with pytest.raises(LinkError, match=r"answers nothing to system 254.*MAV_OPTIONS 1.*--source-system"):
+            source.start()
+
+
+def test_what_was_slow_from_the_beginning_is_asked_for_again():
+    source, _, said = opened("imus=2,fault=second_station@0.5")
+    vehicle_at_4_hz = "SCALED_IMU2 was slowed down"
+    source.start()
+    polled(source, 40)
+    assert [text for text in said if vehicle_at_4_hz in text]
+    second = source.recording().others[0]
+    assert second.rate_hz > 60

@@ -22,6 +22,8 @@ DEVICE_IDS = (2753028, 2753036, 2753044)
 # what a SITL's parameters are, which is not the identity
 OFFSET, SCALE = 0.001, 1.001
 INCONSISTENT_MPS2 = 0.75
+# of MAV_OPTIONS
+ONLY_ITS_OWN = 1
 
 
 def stem(imu: int) -> str:
@@ -41,6 +43,8 @@ class ArduPilot(Firmware):
         super().__init__(options)
         store = self.store
         store.add("SYSID_THISMAV", options.system, INT16)
+        store.add("MAV_OPTIONS", 0, INT16)
+        store.add("MAV_GCS_SYSID", 255, INT16)
         store.add("AHRS_ORIENTATION", options.rotation, INT8)
         for name in chain(*CUSTOM_ANGLES.values()):
             store.add(name, 0.0)
@@ -80,6 +84,11 @@ class ArduPilot(Firmware):
             return self.highres_imu(t_us, np.zeros(3), np.zeros(3))
         if message_id in SCALED_IMUS and SCALED_IMUS.index(message_id) < self.options.imus:
             return self.scaled_imu(SCALED_IMUS.index(message_id), t_us)
+        if message_id in SCALED_IMUS[1:] and self.options.suffers("phantom"):
+            number = SCALED_IMUS.index(message_id)
+            m = dialect()
+            kind = (m.MAVLink_scaled_imu2_message, m.MAVLink_scaled_imu3_message)[number - 1]
+            return kind(t_us // 1000, *[0] * 10)
         return self.sys_status() if message_id == SYS_STATUS else None
 
     def interval(self, message_id: int, interval_us: int) -> tuple[int, int]:
@@ -113,6 +122,10 @@ class ArduPilot(Firmware):
         """Every IMU that is there."""
         for imu in range(self.options.imus):
             self.store[stem(imu) + "_ID"] = DEVICE_IDS[imu]
+
+    def hears(self, system: int) -> bool:
+        """Everybody, or with MAV_OPTIONS' bit 0 its own ground station alone."""
+        return not int(self.store["MAV_OPTIONS"]) & ONLY_ITS_OWN or system == self.store["MAV_GCS_SYSID"]
 
     def complaints(self) -> list[str]:
         """Of AP_Arming's: every IMU calibrated, and all of one opinion."""

@@ -80,6 +80,10 @@ class Firmware(ABC):
     def save_ids(self) -> None:
         """Take the present sensors for the calibrated ones (MAV_CMD_PREFLIGHT_CALIBRATION, param5 = 76)."""
 
+    def hears(self, system: int) -> bool:
+        """Whether it takes messages of a ground station with this id."""
+        return True
+
     def learn_offsets(self) -> list[str]:
         """Change the accelerometers' offsets by what it learnt meanwhile; the names of what was changed."""
         return []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...sources.kind import Request
-from ...sources.vehicle import OpenedVehicle, signing_key
+from ...sources.vehicle import OpenedVehicle, said_of_us, signing_key
 from . import SimulatedVehicle, VehicleOptions
 from .transport import SimulatedTransport
 
@@ -15,5 +15,11 @@ def open_source(request: Request) -> OpenedVehicle:
     transport = SimulatedTransport(vehicle)
     system = request.values.get("system")
     return OpenedVehicle(
-        transport, request.plan, system, key, truth=vehicle.truth_document(), real_time=transport.real_time
+        transport,
+        request.plan,
+        system,
+        key,
+        truth=vehicle.truth_document(),
+        real_time=transport.real_time,
+        **said_of_us(request),
     )

@@ -86,7 +86,10 @@ class SimulatedVehicle:
         if self._now_us < self._silent_until_us:
             return
         for packet in self._parser.datagram(data) if datagram else self._parser.stream(data):
-            answer = self._HANDLERS.get(packet.message.get_type())
+            # a prompt goes to the hand, not to the firmware
+            kind = packet.message.get_type()
+            heard = kind == "STATUSTEXT" or self.firmware.hears(packet.message.get_srcSystem())
+            answer = self._HANDLERS.get(kind) if heard else None
             if answer is not None and getattr(packet.message, "target_system", 0) in (0, self.options.system):
                 answer(self, packet.message)
 
