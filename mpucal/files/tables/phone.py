@@ -29,6 +29,8 @@ NAMES = {
 }
 UNITS = {ACC: "", GYR: "rad/s"}
 SUFFIXES = (".csv", ".txt", ".tsv")
+# NotImplementedError is a RuntimeError: another way to compress
+_DAMAGE = (zipfile.BadZipFile, RuntimeError, EOFError, ValueError, zlib.error, lzma.LZMAError)
 # members of an archive are read whole
 MOST_BYTES = 1 << 30
 
@@ -43,7 +45,7 @@ def is_archive_of_tables(path: Path) -> bool:
     try:
         with zipfile.ZipFile(path) as archive:
             return _has_both(archive.namelist())
-    except (OSError, zipfile.BadZipFile):
+    except (OSError, *_DAMAGE):
         return False
 
 
@@ -73,7 +75,7 @@ def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
             texts = {member.filename: archive.read(member) for member in members}
     except OSError as error:
         raise cannot_read(path, error) from error
-    except (zipfile.BadZipFile, RuntimeError, EOFError, ValueError, zlib.error, lzma.LZMAError) as error:
+    except _DAMAGE as error:
         raise RecordingError(f"{path} is no whole archive ({error})", "export the recording again") from error
     return _recording(path.name, texts, hints)
 

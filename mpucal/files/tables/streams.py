@@ -65,9 +65,9 @@ def recording_of(
     RecordingError : units that nothing says or that do not fit, times that do not overlap, no recording.
     """
     for stream, what in ((acc, "accelerations"), (gyr, "rates")):
-        if len(stream.values) < 2 or not np.isfinite(stream.values).all():
+        if len(stream.values) < 2 or not (np.abs(stream.values) < units.BEYOND).all():
             raise RecordingError(
-                f"{name} holds {len(stream.values)} {what}, or some that are no finite numbers",
+                f"{name} holds {len(stream.values)} {what}, or some that no sensor reads",
                 "record for longer, or leave those lines out",
             )
     (t, of_t), (t_gyr, of_t_gyr) = _seconds(acc, acc, hints, name), _seconds(gyr, acc, hints, name)
@@ -113,6 +113,8 @@ def _seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Ve
             raise RecordingError(f"{name} holds no times", "give the rate of its samples with --rate HZ")
         return np.arange(len(stream.values)) / hints.rate_hz, f"a rate of {hints.rate_hz:g} Hz"
     ticks = _since(stream.times, first.times[0])
+    if not (np.abs(ticks) < units.BEYOND**2).all():
+        raise RecordingError(f"{name} holds times that are none", "leave those lines out")
     steps = np.diff(ticks)
     # a burst of samples may come with one time
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0

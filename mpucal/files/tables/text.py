@@ -19,6 +19,8 @@ SEPARATORS = (",", ";", "\t", None)
 # lines before the header: what a sketch says at its start, `sep=;`
 PREAMBLE = 40
 NS = 1_000_000_000
+# of a time, as nobody has more
+DIGITS = 40
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,7 @@ def _exact(text: str) -> Decimal:
     text = text.strip()
     try:
         number = Decimal(_point(text))
-        if number.is_finite():
+        if number.is_finite() and abs(number.adjusted()) < DIGITS:
             return number
     except InvalidOperation:
         date = datetime.fromisoformat(text)

@@ -44,6 +44,8 @@ SLOWEST_HZ, FASTEST_HZ = 10.0, 8000.0
 LEAST_OF_G, MOST_OF_G = 0.45, 2.0
 LEAST_TURNED, MOST_TURNED = 0.5, 2.0
 SCATTER = 0.45
+# no unit makes such numbers of what a sensor reads, and their squares are finite
+BEYOND = 1e12
 # s over which gravity is seen to turn, and how much of what is seen the rates have to explain
 TURN_S, EXPLAINED = 0.2, 0.5
 
@@ -64,6 +66,8 @@ def acceleration_unit(acc: Vector) -> str:
 
     Without gravity, |a| of a hand scatters by more than half of its median.
     """
+    if not (np.abs(acc) < BEYOND).all():
+        return ""
     low, size, high = np.percentile(np.linalg.norm(acc, axis=1), [25, 50, 75]).tolist()
     if high - low > SCATTER * size:
         return ""
