@@ -84,6 +84,10 @@ class Coverage:
         """Whether the board has rested less than `apart_rad` from where its mean acceleration (3,) is this."""
         return self.rested.near(_unit(acc), apart_rad)
 
+    def is_new(self, acc: Vector) -> bool:
+        """Whether a pause with the mean acceleration (3,) would be a new one."""
+        return not self.paused.near(_unit(acc), DISTINCT_RAD)
+
     @property
     def number(self) -> int:
         """How many orientations there are, by pauses or by passes, whichever is more."""

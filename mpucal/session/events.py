@@ -9,6 +9,7 @@ from ..data import Samples, Sensor
 from ..reasons import Reason
 
 Direction = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 
 
 class Key(StrEnum):
@@ -216,6 +217,11 @@ class Meter:
     what : what moves it most, in words; empty where it is still.
     down : unit vector in the board's axes that points down now. turning_dps : how fast it turns [deg/s].
     rate_hz : samples a second as they come. temperature_c : of the chip; None where it says none.
+    attitude : unit quaternion (w, x, y, z) that takes the board's axes to the room's: x right, y away, z up, as the
+        board lay flat before whoever holds it.
+    missing_deg : what is missing to the wanted orientation [deg]. turn : the shortest turn there in words, such as
+        "roll left 60 deg"; empty where nothing is missing. wanted : the attitude that it leads to. None, empty and None
+        where no orientation is wanted.
     """
 
     t_s: float
@@ -226,19 +232,48 @@ class Meter:
     turning_dps: float
     rate_hz: float
     temperature_c: float | None
+    attitude: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    missing_deg: float | None = None
+    turn: str = ""
+    wanted: Quaternion | None = None
 
 
 @dataclass(frozen=True)
 class Countdown:
     """How long the board must stay still yet, while something waits for that; `paused` by a bump.
 
-    It starts over (`remaining_s` is `of_s` again) only where the board was moved.
+    It starts over (`remaining_s` is `of_s` again) only where the board was moved. `elsewhere`: not in the wanted
+    orientation, but in another one that is new and useful.
     """
 
     t_s: float
     remaining_s: float
     of_s: float
     paused: bool
+    elsewhere: bool = False
+
+
+class Use(StrEnum):
+    """Of what use an orientation was that was held."""
+
+    TAKEN = "taken"
+    USEFUL = "useful"
+    SEEN = "seen"
+
+
+@dataclass(frozen=True)
+class Held:
+    """The board was held for long enough: in the wanted orientation, in another new one, or in one seen before.
+
+    Attributes
+    ----------
+    down : unit vector in the board's axes that pointed down. text : the use in words.
+    """
+
+    t_s: float
+    use: Use
+    down: Direction
+    text: str
 
 
 @dataclass(frozen=True)
@@ -372,4 +407,4 @@ class Forget:
 
 
 Command = Ask | Forget
-Output = Prompt | Progress | Meter | Countdown | Caution | Seen | Knowledge | Verification | Decision | Command
+Output = Prompt | Progress | Meter | Countdown | Held | Caution | Seen | Knowledge | Verification | Decision | Command

@@ -14,6 +14,7 @@ from .events import (
     Checked,
     Connected,
     Decision,
+    Direction,
     Enough,
     Event,
     Finished,
@@ -97,6 +98,8 @@ class Machine:
                 return [lay_flat.PROMPT]
             case Rested(still_s):
                 self._flat, self._flat_samples = event, self._samples
+                if self._watch is not None:
+                    self._watch.flat()
                 return [Decision(f"flat and still for {still_s:.0f} s: done"), *self._turn(event)]
             case Turned(why):
                 return [Decision(why), *self._verify()]
@@ -125,8 +128,13 @@ class Machine:
         samples = event.samples
         self._sampled_s = float(samples.t[-1])
         self._samples += len(samples)
-        seen = self._watch.add(samples) if self._watch else []
+        seen = self._watch.add(samples, self._wanted) if self._watch else []
         return [*seen, *self._follow(self._step.add(samples))]
+
+    @property
+    def _wanted(self) -> Direction | None:
+        """What is to point down now."""
+        return self._step.wanted if isinstance(self._step, Rotate | Verify) else None
 
     def _turn(self, flat: Rested) -> list[Output]:
         rotate = Rotate(flat.acc, self._aim, self._until_end, self._tilt_only)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ..data import Samples, Sensor, Vector
+from .attitude import Attitude
 from .events import Caution, Direction, Meter, Output
 from .stillness import IN_THE_HAND, Moved, StillnessDetector, StillnessLimits
 from .windows import Window, Windows
@@ -29,21 +30,30 @@ class MotionWatch:
         self._sensor = sensor
         self._windows = Windows(WINDOW_S)
         self._stillness = StillnessDetector(limits)
+        self._attitude = Attitude()
+        self._still = False
         self._said_s: dict[str, float] = {}
         self._temperature_c: float | None = None
 
-    def add(self, samples: Samples) -> list[Output]:
-        """What `samples` show."""
+    def flat(self) -> None:
+        """The board has lain flat for long enough."""
+        self._attitude.flat(self._stillness.rest_rad_s)
+
+    def add(self, samples: Samples, wanted: Direction | None = None) -> list[Output]:
+        """What `samples` show, where the unit vector `wanted` of the board's axes is to point down."""
+        self._attitude.add(samples, self._still, self._stillness.rest_rad_s)
         t_s = float(samples.t[-1])
         said = [caution for caution in self._cautions(samples, t_s) if self._news(caution)]
         known = samples.temperature_c[np.isfinite(samples.temperature_c)]
         if len(known):
             self._temperature_c = float(known[-1])
-        return [*said, *(self._meter(window) for window in self._windows.add(samples))]
+        return [*said, *(self._meter(window, wanted) for window in self._windows.add(samples))]
 
-    def _meter(self, window: Window) -> Meter:
+    def _meter(self, window: Window, wanted: Direction | None) -> Meter:
         sight = self._stillness.add(window)
         moving = isinstance(sight, Moved)
+        self._still = not moving
+        turn = None if wanted is None else self._attitude.turn_to(wanted)
         # against the mean of the last stillness: a gyroscope at rest reads its bias
         turning = float(np.linalg.norm(window.gyr - self._stillness.rest_rad_s))
         return Meter(
@@ -55,6 +65,10 @@ class MotionWatch:
             math.degrees(turning),
             window.count / (window.end_s - window.start_s),
             self._temperature_c,
+            self._attitude.quaternion(),
+            turn.missing_deg if turn else None,
+            turn.words if turn else "",
+            turn.attitude if turn else None,
         )
 
     def _cautions(self, samples: Samples, t_s: float) -> list[Caution]:

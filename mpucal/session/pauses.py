@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..data import Samples, Vector
-from .events import Countdown
+from .events import Countdown, Direction, Held, Use
 from .stillness import IN_THE_HAND, Still, StillnessDetector
 from .windows import Windows
 
 WINDOW_S = 0.25
 # From the prompt for the next orientation until a person moves there is another second of stillness.
 HOLD_S = 1.25
+# So near to the wanted orientation the board is in it.
+WANTED_RAD = math.radians(15.0)
+SAID = {
+    Use.TAKEN: "taken",
+    Use.USEFUL: "not that one, but new and useful",
+    Use.SEEN: "seen already",
+}
 
 
 @dataclass(frozen=True)
@@ -22,13 +30,39 @@ class Pause:
 
     Attributes
     ----------
-    acc : (3,) its mean acceleration [m/s^2].
+    acc : (3,) its mean acceleration [m/s^2]. countdown : to the end of the hold; None once that is past.
     """
 
     t_s: float
     seconds: float
     acc: Vector
     run: int
+    countdown: Countdown | None = None
+
+
+def use_of(acc: Vector, wanted: Direction | None, new: bool, near_rad: float = WANTED_RAD) -> Use:
+    """Of what use a pause with the mean acceleration `acc` (3,) is, in an orientation that is `new` or not.
+
+    It is the wanted one where it is no farther from it than `near_rad`.
+    """
+    if wanted is not None:
+        share = float(-acc @ np.asarray(wanted)) / max(float(np.linalg.norm(acc)), 1e-9)
+        if share >= math.cos(near_rad):
+            return Use.TAKEN
+    return Use.USEFUL if new else Use.SEEN
+
+
+def held(pause: Pause, use: Use) -> Held:
+    """What is said of it."""
+    x, y, z = (-pause.acc / max(float(np.linalg.norm(pause.acc)), 1e-9)).tolist()
+    return Held(pause.t_s, use, (x, y, z), SAID[use])
+
+
+def counted(pause: Pause, use: Use) -> list[Countdown]:
+    """The countdown of a pause, where its orientation is of use."""
+    if pause.countdown is None or use is Use.SEEN:
+        return []
+    return [replace(pause.countdown, elsewhere=use is Use.USEFUL)]
 
 
 class Pauses:
@@ -47,17 +81,18 @@ class Pauses:
         """What comes next has nothing to do with what was."""
         self._stillness.forget()
 
-    def add(self, samples: Samples) -> list[Pause | Countdown]:
+    def add(self, samples: Samples) -> list[Pause]:
         """What `samples` show, a window at a time."""
-        found: list[Pause | Countdown] = []
+        found: list[Pause] = []
         for window in self._windows.add(samples):
             sight = self._stillness.add(window)
             if self._left is None:
                 self._left = sight.run if isinstance(sight, Still) else -1
             if not isinstance(sight, Still) or sight.run <= self._left:
                 continue
+            countdown = None
             if sight.seconds < HOLD_S + WINDOW_S - 1e-6:
                 remaining = max(HOLD_S - sight.seconds, 0.0)
-                found.append(Countdown(window.end_s, remaining, HOLD_S, paused=False))
-            found.append(Pause(window.end_s, sight.seconds, np.asarray(sight.acc), sight.run))
+                countdown = Countdown(window.end_s, remaining, HOLD_S, paused=False)
+            found.append(Pause(window.end_s, sight.seconds, np.asarray(sight.acc), sight.run, countdown))
         return found

@@ -13,7 +13,6 @@ from .coverage import DISTINCT_RAD, Coverage
 from .events import (
     Ask,
     Caution,
-    Countdown,
     Direction,
     Knowledge,
     Output,
@@ -22,9 +21,10 @@ from .events import (
     PromptKind,
     Seen,
     Turned,
+    Use,
     Wish,
 )
-from .pauses import HOLD_S, Pause, Pauses
+from .pauses import HOLD_S, Pause, Pauses, counted, held, use_of
 from .windows import Window, Windows
 
 PASS_WINDOW_S = 0.1
@@ -71,6 +71,7 @@ class Rotate:
         self._knowledge: Knowledge | None = None
         self._asked = False
         self._advised_run = -1
+        self._held: tuple[Pause, Use] | None = None
         self._begun_s: float | None = None
         self._new_s = self._known_s = self._told_s = self._said_s = 0.0
         self.prompt = self._prompt_for(self.coverage.farthest_down(self.directions))
@@ -82,8 +83,8 @@ class Rotate:
         for window in self._passes.add(samples):
             self._pass(window)
         found: list[Output | Turned] = []
-        for sight in self._pauses.add(samples):
-            found += [sight] if isinstance(sight, Countdown) else self._hold(sight)
+        for pause in self._pauses.add(samples):
+            found += self._hold(pause)
         t_s = float(samples.t[-1])
         found += self._at(t_s)
         turned = None if self._until_end else self._turned(t_s)
@@ -99,6 +100,8 @@ class Rotate:
             # tilts leave some parameters at their prior: the target does not apply to them
             what = "enough tilts seen" if self._tilt_only else "target reached"
             return [*found, Turned(f"{what}: {knowledge.words}")]
+        if advice and self._held is not None:
+            found.append(held(*self._held))
         if advice and knowledge.down is not None:
             self._said_s = knowledge.t_s
             # near level every tilt teaches: all of them are asked for. And nobody is asked twice for the same one, even
@@ -107,6 +110,13 @@ class Rotate:
             self.prompt = self._prompt_for(self._elsewhere() if elsewhere else np.array(knowledge.down))
             found.append(self.prompt)
         return found
+
+    @property
+    def wanted(self) -> Direction | None:
+        """What is to point down; where nothing is asked for, what would teach most."""
+        if self.prompt.down is not None or self._knowledge is None:
+            return self.prompt.down
+        return self._knowledge.down
 
     def _elsewhere(self) -> Vector:
         """(3,) what is least like all that was shown, and not what was asked for last."""
@@ -123,17 +133,20 @@ class Rotate:
         if window.whole and LEAST_MPS2 < np.linalg.norm(window.acc) < MOST_MPS2 and self.coverage.passes(window.acc):
             self._new_s = window.end_s
 
-    def _hold(self, held: Pause) -> list[Output | Turned]:
-        found: list[Output | Turned] = []
-        if held.seconds >= REST_S - 1e-6:
-            self.coverage.rests(held.acc)
-        if held.seconds >= PAUSE_S - 1e-6 and self.coverage.pauses(held.acc):
-            self._new_s = held.t_s
-            found.append(Seen(held.t_s, len(self.coverage.paused), _down(held.acc), paused=True))
-        if self._until_end or self._asked or held.run <= self._advised_run:
+    def _hold(self, pause: Pause) -> list[Output | Turned]:
+        # what has been counted is not new any more
+        if self._held is None or self._held[0].run != pause.run or pause.seconds < PAUSE_S - 1e-6:
+            self._held = pause, use_of(pause.acc, self.prompt.down, self.coverage.is_new(pause.acc))
+        found: list[Output | Turned] = [*counted(pause, self._held[1])]
+        if pause.seconds >= REST_S - 1e-6:
+            self.coverage.rests(pause.acc)
+        if pause.seconds >= PAUSE_S - 1e-6 and self.coverage.pauses(pause.acc):
+            self._new_s = pause.t_s
+            found.append(Seen(pause.t_s, len(self.coverage.paused), _down(pause.acc), paused=True))
+        if self._until_end or self._asked or pause.run <= self._advised_run:
             return found
-        if held.seconds >= HOLD_S - WAIT_S - 1e-6:
-            self._asked, self._advised_run, self._known_s = True, held.run, held.t_s
+        if pause.seconds >= HOLD_S - WAIT_S - 1e-6:
+            self._asked, self._advised_run, self._known_s = True, pause.run, pause.t_s
             found.append(Ask(Wish.ADVISE, WAIT_S))
         return found
 
@@ -147,7 +160,10 @@ class Rotate:
         if t_s - self._told_s >= TELL_EVERY_S:
             self._told_s = t_s
             number = self.coverage.number
-            found.append(Progress(t_s, number, self._least, f"orientation {number} of {self._least}"))
+            more = f"orientation {number} of {self._least}"
+            enough = f"{number} orientations, of at least {self._least}"
+            said = more if number <= self._least else enough
+            found.append(Progress(t_s, min(number, self._least), self._least, said))
         if not self._until_end and t_s - max(self._new_s, self._said_s) >= SAY_AGAIN_S:
             self._said_s = t_s
             found.append(Caution(t_s, "not_turned", "no new orientation for a while", self.prompt.text))

@@ -11,8 +11,8 @@ from ..reasons import KINDS, Reason, reason
 from ..result.orientation import side_down, tilt_down
 from .aims import Aim, unseen_rad
 from .coverage import DISTINCT_RAD, Coverage
-from .events import Ask, Caution, Checked, Countdown, Finished, Output, Progress, Prompt, PromptKind, Tried, Wish
-from .pauses import HOLD_S, Pause, Pauses
+from .events import Ask, Caution, Checked, Direction, Finished, Output, Progress, Prompt, PromptKind, Tried, Use, Wish
+from .pauses import HOLD_S, Pause, Pauses, counted, held, use_of
 
 PATIENCE_S = 40.0
 SAY_AGAIN_S = 8.0
@@ -55,6 +55,11 @@ class Verify:
         self.checked: Checked | None = None
         self.prompt = self._next()
 
+    @property
+    def wanted(self) -> Direction | None:
+        """What is to point down."""
+        return self.prompt.down
+
     def begin(self) -> list[Output]:
         """The first words."""
         return [Ask(Wish.TRY, TRY_WAIT_S), self.prompt]
@@ -67,8 +72,10 @@ class Verify:
         if self._refusal is not None:
             return [self._refusal] if t_s - self._begun_s >= OFFERED_S else []
         found: list[Output | Finished] = []
-        for sight in self._pauses.add(samples):
-            found += [sight] if isinstance(sight, Countdown) else self._hold(sight)
+        for pause in self._pauses.add(samples):
+            use = self._use(pause)
+            found += [] if self._asked else counted(pause, use)
+            found += self._hold(pause, use)
         if self._asked:
             return found
         if t_s - self._said_s >= SAY_AGAIN_S:
@@ -117,27 +124,32 @@ class Verify:
         )
         return [self.prompt, Caution(self._now_s, "refused", against.what, against.remedy)]
 
-    def _hold(self, held: Pause) -> list[Output | Finished]:
-        if self._asked or held.seconds < HOLD_S - 1e-6:
+    def _hold(self, pause: Pause, use: Use) -> list[Output | Finished]:
+        if self._asked or pause.seconds < HOLD_S - 1e-6:
             return []
-        self._pauses.leave(held.run)
-        self._said_s = held.t_s
-        down = -held.acc / max(float(np.linalg.norm(held.acc)), 1e-9)
-        asked_for = float(down @ np.array(self.prompt.down)) >= math.cos(ASKED_FOR_RAD)
-        if self._coverage.was_near(held.acc, BENT * unseen_rad(self._tilt_only)):
-            return self._seen_already(held.t_s, asked_for)
-        self._coverage.pauses(held.acc)
-        self._coverage.rests(held.acc)
+        self._pauses.leave(pause.run)
+        self._said_s = pause.t_s
+        if use is Use.SEEN:
+            asked_for = use_of(pause.acc, self.prompt.down, new=True, near_rad=ASKED_FOR_RAD) is Use.TAKEN
+            return [held(pause, use), *self._seen_already(pause.t_s, asked_for)]
+        self._coverage.pauses(pause.acc)
+        self._coverage.rests(pause.acc)
         self._number += 1
-        self._begun_s = held.t_s
-        useful = "" if asked_for else ": not the one asked for, but useful"
+        self._begun_s = pause.t_s
+        useful = "" if use is Use.TAKEN else ": not the one asked for, but useful"
         text = f"held {self._number} of {self._aim.verify}{useful}"
-        progress = Progress(held.t_s, self._number, self._aim.verify, text)
+        progress = Progress(pause.t_s, self._number, self._aim.verify, text)
         if self._number == self._aim.verify:
             self._asked = True
-            return [progress, Ask(Wish.CHECK, CHECK_WAIT_S)]
+            return [held(pause, use), progress, Ask(Wish.CHECK, CHECK_WAIT_S)]
         self.prompt = self._next(self.prompt)
-        return [progress, self.prompt]
+        return [held(pause, use), progress, self.prompt]
+
+    def _use(self, pause: Pause) -> Use:
+        """Of what use it is: what the calibration has seen is of none, even where it was asked for."""
+        if self._coverage.was_near(pause.acc, BENT * unseen_rad(self._tilt_only)):
+            return Use.SEEN
+        return use_of(pause.acc, self.prompt.down, new=True, near_rad=ASKED_FOR_RAD)
 
     def _seen_already(self, t_s: float, asked_for: bool) -> list[Output | Finished]:
         """Who was where the board was asked to be is asked for another orientation."""

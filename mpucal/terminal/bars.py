@@ -18,6 +18,9 @@ _WIDE = 110
 NARROWEST = 12
 # a warning is loud for so long, and then remembered quietly
 LOUD_S = 6.0
+# on a narrow screen, bars are left out and what they show is said
+NARROW = 60
+KEYS_NARROW, KEYS_REDO_NARROW = "Enter: on  q: stop", "Enter: on  r: again  q: stop"
 KEYS = "Enter: go on now    q or Ctrl-C: stop"
 KEYS_REDO = "Enter: go on now    r: turn it again from the start    q or Ctrl-C: stop"
 
@@ -28,7 +31,7 @@ def bar(share: float, columns: int, glyphs: Glyphs) -> str:
     return glyphs.full * full + glyphs.empty * (columns - full)
 
 
-def meter(view: View, glyphs: Glyphs) -> Text:
+def meter(view: View, columns: int, glyphs: Glyphs) -> Text:
     """The needle between still and moving, and what moves the board or what is waited for."""
     m = view.meter
     if m is None:
@@ -42,6 +45,8 @@ def meter(view: View, glyphs: Glyphs) -> Text:
     said = "still" if m.still else m.what or "moving"
     if waiting is not None:
         said = f"{waiting.remaining_s:.0f} s to go{' (paused)' if waiting.paused else ''}, {said}"
+    if columns < NARROW:
+        return Text(f" {said}", style=style)
     return Text.assemble(f" {'stillness':<{_LABEL}}", ("".join(cells), style), f"  {said}")
 
 
@@ -74,11 +79,12 @@ def caution_rows(view: View, columns: int, glyphs: Glyphs) -> list[Text]:
     ]
 
 
-def keys(view: View) -> Text:
+def keys(view: View, columns: int) -> Text:
     """What can be pressed."""
     kind = view.prompt.kind if view.prompt is not None else None
     turning = kind in (PromptKind.ROTATE, PromptKind.VERIFY, PromptKind.AGAIN)
-    return Text(f" {KEYS_REDO if turning else KEYS}", style="dim")
+    wide, narrow = (KEYS_REDO, KEYS_REDO_NARROW) if turning else (KEYS, KEYS_NARROW)
+    return Text(f" {narrow if columns < NARROW else wide}", style="dim")
 
 
 def _progress(view: View, glyphs: Glyphs) -> list[Text]:
@@ -91,6 +97,8 @@ def _progress(view: View, glyphs: Glyphs) -> list[Text]:
 def _group(group: Group, columns: int, glyphs: Glyphs) -> Text:
     """The least certain axis of a group; all three where there is space."""
     least = group.progress[group.worst]
+    if columns < NARROW:
+        return Text(f" {group.name:<{_LABEL}}{'xyz'[group.worst]} {group.said(group.worst)}")
     shown = range(3) if columns >= _WIDE else (group.worst,)
     values = "  ".join(f"{'xyz'[i]} {group.said(i)}" for i in shown)
     style = "green" if least >= 1.0 else "cyan"

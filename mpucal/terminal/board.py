@@ -1,15 +1,17 @@
-"""The picture of the board: a plate with its chip and its axes, turned as a down direction says."""
+"""The picture of the board: a plate with its chip, its pins and its axes, in the attitude that a Meter carries."""
 
 from __future__ import annotations
 
 import math
 
-from ..session.events import Direction
+from ..session.events import Direction, Quaternion
 from .canvas import Canvas, Point
 
-# half a plate: length along x, width along y, thickness along z
+# half a breakout: length along x, width along y, thickness along z
 HALF = (1.0, 0.7, 0.09)
 _CHIP = 0.28
+# a row of pins along the edge at -y, which is nearest to whoever laid it flat
+_PINS, _PIN_AT, _PIN_DOWN = 8, -0.6, -0.3
 _AXES: tuple[tuple[str, Direction, str], ...] = (
     ("X", (1.0, 0.0, 0.0), "bold red"),
     ("Y", (0.0, 1.0, 0.0), "bold green"),
@@ -17,23 +19,27 @@ _AXES: tuple[tuple[str, Direction, str], ...] = (
 )
 # where axes end and where their letters stand, seen from the middle
 _TIPS, _LETTERS = (1.35, 1.1, 0.75), (1.62, 1.38, 1.05)
-# the eye looks at the plate from the front, a little from the right and from above
-_TURN, _TILT = math.radians(-28.0), math.radians(24.0)
+# the eye looks from the front, from above and a little from the right
+_TURN_DEG, _TILT_DEG = -28.0, 30.0
+# ... or from where the plate is no thinner than this, as a share of its area
+_LEAST_FACE = 0.35
+_VIEWS_DEG = (_TURN_DEG, 28.0), (_TILT_DEG, 52.0, 12.0, 70.0)
 _REACH = 1.75
 _LARGE = 14
 
 Matrix = tuple[Direction, Direction, Direction]
 
 
-def picture(down: Direction, columns: int, rows: int) -> Canvas:
-    """The board with the unit vector `down` of its own axes pointing down."""
+def picture(attitude: Quaternion, columns: int, rows: int) -> Canvas:
+    """The board with the given attitude."""
     canvas = Canvas(columns, rows)
-    attitude = held(down)
+    board = matrix(attitude)
+    across, up, eye = view_of(board)
     scale = min(canvas.centre[0], canvas.centre[1] * 1.15) / _REACH
 
     def seen(point: Direction) -> Point:
-        across, up = _projected(_times(attitude, point))
-        return (canvas.centre[0] + scale * across, canvas.centre[1] - scale * up)
+        room = _times(board, point)
+        return (canvas.centre[0] + scale * _dot(across, room), canvas.centre[1] - scale * _dot(up, room))
 
     def rectangle(x: float, y: float, z: float) -> None:
         corners = [seen((i * x, j * y, z)) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
@@ -41,10 +47,13 @@ def picture(down: Direction, columns: int, rows: int) -> Canvas:
             canvas.line(corners[k - 1], corners[k])
 
     x, y, z = HALF
-    front = _towards_the_eye(_times(attitude, (0.0, 0.0, 1.0))) > 0.0
+    front = _dot(eye, _times(board, (0.0, 0.0, 1.0))) > 0.0
     rectangle(x, y, z if front else -z)
     if rows >= _LARGE:  # where both edges of the plate do not run into each other
         rectangle(x, y, -z if front else z)
+        for k in range(_PINS):
+            pin = 0.8 * x * (2 * k / (_PINS - 1) - 1.0)
+            canvas.line(seen((pin, _PIN_AT, z if front else -z)), seen((pin, _PIN_AT, _PIN_DOWN)))
     if front:
         rectangle(_CHIP, _CHIP, z)
     for (letter, axis, style), tip, end in zip(_AXES, _TIPS, _LETTERS, strict=True):
@@ -53,35 +62,42 @@ def picture(down: Direction, columns: int, rows: int) -> Canvas:
     return canvas
 
 
-def held(down: Direction) -> Matrix:
-    """The rotation from the board's axes to the room's (x right, y away, z up) that takes `down` downwards.
-
-    Of all of them the one nearest to the board lying flat; upside down, it was turned over about its x axis.
-    """
-    size = math.sqrt(sum(value * value for value in down)) or 1.0
-    a, b, c = (value / size for value in down)
-    if c > 1.0 - 1e-6:
-        return ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))
-    # Rodrigues' formula for the turn from (a, b, c) to (0, 0, -1)
-    k = 1.0 / (1.0 - c)
-    return ((1.0 - a * a * k, -a * b * k, a), (-a * b * k, 1.0 - b * b * k, b), (-a, -b, -c))
+def matrix(attitude: Quaternion) -> Matrix:
+    """The rotation (3, 3) of a unit quaternion (w, x, y, z)."""
+    w, x, y, z = attitude
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
 
 
-def _projected(point: Direction) -> Point:
-    """Across and up, as the eye sees a point of the room."""
-    x, y, z = point
-    x, y = x * math.cos(_TURN) - y * math.sin(_TURN), x * math.sin(_TURN) + y * math.cos(_TURN)
-    return x, y * math.sin(_TILT) + z * math.cos(_TILT)
+def view_of(board: Matrix) -> Matrix:
+    """Unit vectors of the room that are seen across, up and toward the eye: the usual view, unless it shows an edge."""
+    face = (board[0][2], board[1][2], board[2][2])
+    views = [_view(turn, tilt) for tilt in _VIEWS_DEG[1] for turn in _VIEWS_DEG[0]]
+    for view in views:
+        if abs(_dot(view[2], face)) >= _LEAST_FACE:
+            return view
+    return max(views, key=lambda view: abs(_dot(view[2], face)))
 
 
-def _towards_the_eye(point: Direction) -> float:
-    x, y, z = point
-    return -(x * math.sin(_TURN) + y * math.cos(_TURN)) * math.cos(_TILT) + z * math.sin(_TILT)
+def _view(turn_deg: float, tilt_deg: float) -> Matrix:
+    turn, tilt = math.radians(turn_deg), math.radians(tilt_deg)
+    across = (math.cos(turn), -math.sin(turn), 0.0)
+    away = (math.sin(turn), math.cos(turn), 0.0)
+    up = (away[0] * math.sin(tilt), away[1] * math.sin(tilt), math.cos(tilt))
+    eye = (-away[0] * math.cos(tilt), -away[1] * math.cos(tilt), math.sin(tilt))
+    return across, up, eye
 
 
 def _times(matrix: Matrix, v: Direction) -> Direction:
-    x, y, z = (row[0] * v[0] + row[1] * v[1] + row[2] * v[2] for row in matrix)
+    x, y, z = (_dot(row, v) for row in matrix)
     return (x, y, z)
+
+
+def _dot(a: Direction, b: Direction) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _scaled(v: Direction, factor: float) -> Direction:

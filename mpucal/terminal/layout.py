@@ -25,10 +25,10 @@ def lines(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
     air = [_BLANK] if rows >= AIRY_ROWS else []
     above = [_status(view, columns), *air, *_headline(view, columns, rows, glyphs), *_prompt(view, columns)]
     below = [
-        meter(view, glyphs),
+        meter(view, columns, glyphs),
         *knowledge_rows(view, columns, glyphs),
         *caution_rows(view, columns, glyphs),
-        keys(view),
+        keys(view, columns),
     ]
     space = rows - len(above) - len(below)
     between = _pictures(view, columns, space, glyphs) if roomy and space > 4 else []
@@ -47,8 +47,10 @@ def _status(view: View, columns: int) -> Text:
         facts.insert(0, f"{view.meter.rate_hz:.1f} Hz")
         if view.meter.temperature_c is not None:
             facts.insert(1, f"{view.meter.temperature_c:.1f} °C")
-    right = "   ".join(facts)
-    return Text(f" {view.title:<{max(columns - len(right) - 3, 1)}} {right} ", style="reverse")
+    # the clock stays, whatever else is cut
+    right = "   ".join(facts) if columns >= LEAST_COLUMNS else facts[-1]
+    space = max(columns - len(right) - 3, 1)
+    return Text(f" {view.title[:space]:<{space}} {right} ", style="reverse")
 
 
 def _headline(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
@@ -80,9 +82,9 @@ def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]
     wide, round_ = min(quarter + 2, 4 * height), min(quarter - 2, 2 * height)
     parts: list[tuple[str, list[Text], int]] = []
     if view.meter is not None:
-        parts.append(("now", board.picture(view.meter.down, wide, height).lines("", glyphs.unicode), wide))
-    if view.wanted is not None:
-        canvas = board.picture(view.wanted, wide, height)
+        parts.append(("now", board.picture(view.meter.attitude, wide, height).lines("", glyphs.unicode), wide))
+    if view.meter is not None and view.meter.wanted is not None:
+        canvas = board.picture(view.meter.wanted, wide, height)
         parts.append(("turn it like this", canvas.lines("yellow", glyphs.unicode), wide))
     marks = _marks(view)
     if marks:

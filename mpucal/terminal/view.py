@@ -10,6 +10,7 @@ from ..session.events import (
     Countdown,
     Decision,
     Direction,
+    Held,
     Knowledge,
     Meter,
     Output,
@@ -17,9 +18,15 @@ from ..session.events import (
     Prompt,
     PromptKind,
     Seen,
+    Use,
     Verification,
 )
 
+# so long it is said what became of the last orientation
+TOLD_S = 1.2
+TOLD = {Use.TAKEN: "TAKEN", Use.USEFUL: "NEW, TAKEN", Use.SEEN: "SEEN BEFORE"}
+# nearer than this the board is held still, and turned no more
+NEAR_DEG = 15.0
 # a countdown that is not renewed for so long waits for nothing any more
 COUNTDOWN_HOLDS_S = 1.0
 # the part of gravity that an axis must carry to be named: a tilt by 30 degrees towards a corner is named by both axes
@@ -51,6 +58,7 @@ class View:
     progress: Progress | None = None
     knowledge: Knowledge | None = None
     caution: Caution | None = None
+    held: Held | None = None
     seen: tuple[Seen, ...] = ()
     verified: tuple[Verification, ...] = ()
     notes: tuple[str, ...] = ()
@@ -68,6 +76,8 @@ class View:
                 view = replace(self, meter=output)
             case Countdown():
                 view = replace(self, countdown=output)
+            case Held():
+                view = replace(self, held=output)
             case Progress():
                 view = replace(self, progress=output)
             case Knowledge():
@@ -118,7 +128,25 @@ class View:
         if waiting is not None and self.prompt.kind is not PromptKind.REST and self._counts(waiting):
             word = "STILL" if self.prompt.kind is PromptKind.LAY_FLAT else "HOLD"
             return f"{word} {math.ceil(waiting.remaining_s)}"
-        return HEADLINES[self.prompt.kind] if self.wanted is None else f"{axes(self.wanted)} DOWN"
+        if self.held is not None and self.now_s is not None and self.now_s - self.held.t_s < TOLD_S:
+            return TOLD[self.held.use]
+        if self.wanted is None:
+            return HEADLINES[self.prompt.kind]
+        return self._way or f"{axes(self.wanted)} DOWN"
+
+    @property
+    def _way(self) -> str:
+        """What is missing to the wanted orientation: "ROLL LEFT 60"; empty where nobody knows."""
+        if self.meter is None or self.meter.missing_deg is None:
+            return ""
+        if self.meter.missing_deg <= NEAR_DEG:
+            return "HOLD STILL"
+        return (
+            self.meter.turn.removesuffix(" deg")
+            .replace("tip away and roll", "away")
+            .replace("tip toward you and roll", "near")
+            .upper()
+        )
 
     def _counts(self, waiting: Countdown) -> bool:
         """Whether the countdown has begun; until then what it waits for is said."""
@@ -128,7 +156,7 @@ class View:
         goes_on = self.prompt is not None and self.prompt.kind is prompt.kind
         if goes_on:
             return replace(self, prompt=prompt)
-        return replace(self, prompt=prompt, countdown=None, progress=None, caution=None, verified=())
+        return replace(self, prompt=prompt, countdown=None, progress=None, caution=None, held=None, verified=())
 
     def _at(self, t_s: float) -> View:
         return replace(self, now_s=t_s, begun_s=t_s if self.begun_s is None else self.begun_s)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import os
 
+import numpy as np
 import pytest
 
+from mpucal.session.attitude import quaternion, straight
 from mpucal.session.events import (
     Caution,
     Countdown,
@@ -25,8 +27,10 @@ from mpucal.terminal.view import View
 CORNER = (0.58, -0.57, 0.58)
 
 
-def meter(t_s, still=True, down=(0.0, 0.0, -1.0), what=""):
-    return Meter(t_s, 0.4 if still else 1.6, still, what, down, 2.0, 199.97, 31.25)
+def meter(t_s, still=True, down=(0.0, 0.0, -1.0), what="", wanted=None):
+    attitude, there = (quaternion(straight(-np.array(d) / np.linalg.norm(d))) for d in (down, wanted or down))
+    missing = {} if wanted is None else {"missing_deg": 61.0, "turn": "roll left 60 deg", "wanted": there}
+    return Meter(t_s, 0.4 if still else 1.6, still, what, down, 2.0, 199.97, 31.25, attitude, **missing)
 
 
 def knowledge(t_s, down=CORNER, doubt=""):
@@ -60,7 +64,7 @@ TURNED = [
     Seen(24.5, 1, (0.0, 0.6, -0.8), False),
     knowledge(25.0),
     Caution(25.0, "too_fast", "turned at 480 deg/s, close to the gyroscope's range", "turn it more slowly"),
-    meter(25.25, still=False, down=(0.1, -0.2, 0.97), what="turning at 30 deg/s about z"),
+    meter(25.25, still=False, down=(0.1, -0.2, 0.97), what="turning at 30 deg/s about z", wanted=CORNER),
 ]
 CHECKED = [
     *TURNED,

@@ -61,7 +61,7 @@ def test_the_prompt_is_large_and_larger_on_a_large_screen(views):
 def test_on_a_low_screen_the_words_are_left(views):
     drawn = text_of(views["turned"], 40, 12)
     assert not BRAILLE.search("".join(drawn))
-    assert "+X -Y +Z DOWN" in drawn[1]
+    assert "ROLL LEFT 60" in drawn[1]
     assert "Turn the board: corner" in drawn[2]
 
 
@@ -90,3 +90,9 @@ def test_no_picture_is_cut_off(views, size):
     drawn = text_of(views["turned"], *size)
     pictures = [line for line in drawn if BRAILLE.search(line)]
     assert max(len(line.rstrip()) for line in pictures) < size[0]
+
+
+def test_a_small_screen_keeps_clock_values_and_keys(views):
+    drawn = "\n".join(text_of(views["turned"], 40, 15))
+    for words in ("0:15", "y ±0.31 %", "z not observable", "q: stop", "ROLL LEFT 60"):
+        assert words in drawn

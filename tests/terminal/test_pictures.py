@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from mpucal.session.attitude import quaternion, straight
 from mpucal.terminal import board, globe, letters
 from mpucal.terminal.canvas import Canvas
 from mpucal.terminal.view import HEADLINES
@@ -32,12 +34,22 @@ def test_large_letters_differ():
     assert len(drawn) == 39
 
 
-@pytest.mark.parametrize("down", DIRECTIONS, ids=str)
-def test_the_board_is_held_so_that_the_side_is_down(down):
-    rotation = np.array(board.held(down))
-    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)
-    np.testing.assert_allclose(np.linalg.det(rotation), 1.0)
-    np.testing.assert_allclose(rotation @ (np.array(down) / np.linalg.norm(down)), [0, 0, -1], atol=1e-6)
+def held(down):
+    return quaternion(straight(-np.array(down, float) / np.linalg.norm(down)))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_matrix_is_that_of_the_quaternion(seed):
+    turn = Rotation.random(random_state=seed)
+    np.testing.assert_allclose(board.matrix(turn.as_quat(scalar_first=True)), turn.as_matrix(), atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_the_board_is_never_seen_edge_on(seed):
+    attitude = Rotation.random(random_state=seed).as_matrix()
+    view = np.array(board.view_of(attitude.tolist()))
+    np.testing.assert_allclose(view @ view.T, np.eye(3), atol=1e-12)
+    assert abs(view[2] @ attitude[:, 2]) >= 0.3
 
 
 def where(canvas, letter):
@@ -50,7 +62,7 @@ def where(canvas, letter):
 def test_the_letter_of_the_axis_that_is_down_is_below_the_others(axis, letter, size):
     for sign in (1.0, -1.0):
         down = tuple(sign if i == axis else 0.0 for i in range(3))
-        canvas = board.picture(down, *size)
+        canvas = board.picture(held(down), *size)
         rows = {other: where(canvas, other)[0] for other in "XYZ"}
         others = [row for other, row in rows.items() if other != letter]
         assert (rows[letter] > max(others)) if sign > 0 else (rows[letter] < min(others))
@@ -59,7 +71,7 @@ def test_the_letter_of_the_axis_that_is_down_is_below_the_others(axis, letter, s
 @pytest.mark.parametrize("down", DIRECTIONS, ids=str)
 def test_the_board_differs_from_any_other_way_to_hold_it(down):
     drawn = [
-        "\n".join(line.plain for line in board.picture(other, 22, 9).lines("", unicode=unicode))
+        "\n".join(line.plain for line in board.picture(held(other), 22, 9).lines("", unicode=unicode))
         for unicode in (True, False)
         for other in DIRECTIONS
     ]

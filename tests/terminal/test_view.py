@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from mpucal.session.events import Countdown, Prompt, PromptKind, Seen
+from mpucal.session.events import Countdown, Held, Prompt, PromptKind, Seen, Use
 from mpucal.terminal.view import View, axes
 
 
@@ -13,7 +13,7 @@ def test_nothing_is_known_at_first():
 
 def test_the_headline_says_what_to_do(views):
     assert views["laid"].headline == "STILL 7"
-    assert views["turned"].headline == "+X -Y +Z DOWN"
+    assert views["turned"].headline == "ROLL LEFT 60"
     assert views["checked"].headline == "+Y DOWN"
     assert views["ended"].headline == "PUT IT DOWN"
 
@@ -21,11 +21,11 @@ def test_the_headline_says_what_to_do(views):
 @pytest.mark.parametrize(
     ("countdown", "headline"),
     [
-        (Countdown(26.0, 2.0, 2.0, False), "+X -Y +Z DOWN"),
+        (Countdown(26.0, 2.0, 2.0, False), "ROLL LEFT 60"),
         (Countdown(26.0, 1.3, 2.0, False), "HOLD 2"),
-        (Countdown(26.0, 1.3, 2.0, True), "+X -Y +Z DOWN"),
-        (Countdown(26.0, 0.0, 2.0, False), "+X -Y +Z DOWN"),
-        (Countdown(20.0, 1.3, 2.0, False), "+X -Y +Z DOWN"),
+        (Countdown(26.0, 1.3, 2.0, True), "ROLL LEFT 60"),
+        (Countdown(26.0, 0.0, 2.0, False), "ROLL LEFT 60"),
+        (Countdown(20.0, 1.3, 2.0, False), "ROLL LEFT 60"),
     ],
     ids=["not begun", "runs", "paused", "over", "forgotten"],
 )
@@ -74,3 +74,18 @@ def test_another_step_forgets_the_warnings_of_the_last(views):
 )
 def test_axes_that_carry_much_of_gravity_are_named(down, words):
     assert axes(down) == words
+
+
+@pytest.mark.parametrize(
+    ("use", "headline"), [(Use.TAKEN, "TAKEN"), (Use.USEFUL, "NEW, TAKEN"), (Use.SEEN, "SEEN BEFORE")]
+)
+def test_what_became_of_an_orientation_is_said_for_a_moment(views, use, headline):
+    held = Held(26.0, use, (1.0, 0.0, 0.0), "")
+    view = views["turned"].after(held)
+    assert view.headline == headline
+    assert replace(view, now_s=28.0).headline == "ROLL LEFT 60"
+
+
+def test_near_the_wanted_orientation_nothing_is_turned(views):
+    view = views["turned"]
+    assert replace(view, meter=replace(view.meter, missing_deg=10.0)).headline == "HOLD STILL"
