@@ -17,6 +17,12 @@ def examine_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
         yield from examine(source.bus, source.plan.config, seconds)
 
 
+def examine_spi_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
+    """A chip on an SPI bus, whose clock is as it was set; see examine."""
+    with closing(source.bus):
+        yield from examine(source.bus, source.plan.config, seconds, lambda _bus: ())
+
+
 def examine_bridge_and_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
     """A bridge's firmware, its serial line, and the chip behind it; see examine."""
     with closing(source.bus):

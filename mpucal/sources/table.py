@@ -46,6 +46,7 @@ def number(text: str) -> float:
 
 
 BUS = Option("bus", metavar="BUS", parse=bus_name)
+SPI = Option("spi", metavar="DEVICE")
 SERIAL = Option("serial", metavar="PORT[:BAUD]", bare="")
 MAVLINK = Option("mavlink", metavar="URL")
 REPLAY = Option("replay", metavar="FILE", parse=Path)
@@ -110,6 +111,15 @@ SOURCES = [
         settings=OF_A_CHIP,
         store="mpucal.sources.bridge:open_store",
         doctor="mpucal.doctor.sources:examine_bridge_and_chip",
+    ),
+    SourceKind(
+        what="a chip on an SPI bus of this computer",
+        option=SPI,
+        forms="/dev/spidevB.C; needs the extra spi",
+        opener="mpucal.sources.spi:open_source",
+        delivers=Delivers.REGISTERS,
+        settings=OF_A_CHIP,
+        doctor="mpucal.doctor.sources:examine_spi_chip",
     ),
     SourceKind(
         what="a vehicle over MAVLink",

@@ -74,8 +74,8 @@ def test_each_option_is_refused_beside_the_sources_that_have_it_not():
 
 
 def test_a_capture_of_an_unknown_source_says_so():
-    with pytest.raises(CaptureError, match=r"does not know \(spi\)"):
-        open_again({"spi": "/dev/spidev0.0"}, Plan())
+    with pytest.raises(CaptureError, match=r"does not know \(usb\)"):
+        open_again({"usb": "/dev/usb0"}, Plan())
 
 
 def test_only_text_with_meaning_parses():

@@ -1,0 +1,156 @@
+"""A chip behind spidev's interface: mode, speeds and messages, and the driver over it."""
+
+import builtins
+import errno
+import os
+import sys
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mpucal.chip import registers as reg
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.doctor.finding import Mark
+from mpucal.doctor.sources import examine_spi_chip
+from mpucal.errors import BusError
+from mpucal.session.events import Prompt, PromptKind
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip.clock import FastClock
+from mpucal.sources import spi
+from mpucal.sources.spi import SpiBus
+
+
+class SpiDev:
+    """spidev 3.8 as far as it is used, with a simulated chip behind; a setting that the hardware refuses raises."""
+
+    chip, opens, mode, bits_per_word, max_speed_hz = None, None, 0, 8, 500_000
+
+    def __init__(self):
+        self.messages, self.closed = [], False
+        type(self).made = self
+
+    def open_path(self, path):
+        if self.opens:
+            raise OSError(self.opens, os.strerror(self.opens))
+        self.path = path
+
+    def xfer2(self, values, speed_hz=0, delay_usecs=0, bits_per_word=0):
+        assert isinstance(values, list)
+        assert len(values) <= 4096
+        self.messages.append((bytes(values), speed_hz or self.max_speed_hz))
+        address, count = values[0] & 0x7F, len(values) - 1
+        if values[0] & 0x80:
+            return [0, *self.chip.read(address, count).data]
+        self.chip.write(address, bytes(values[1:]))
+        return [0] * len(values)
+
+    def close(self):
+        self.closed = True
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """A bus with a simulated chip behind it, and the device that it opened."""
+
+    def make(words="chip=mpu6500,hand=still"):
+        clock = FastClock()
+        chip = open_simulated(f"sim:seed=4,{words}", clock=clock)
+        chip.hear(Prompt(PromptKind.LAY_FLAT, ""))
+        library = ModuleType("spidev")
+        library.SpiDev = type("SpiDev", (SpiDev,), {"chip": chip})
+        monkeypatch.setitem(sys.modules, "spidev", library)
+        stopped = SimpleNamespace(
+            monotonic_ns=clock.now, sleep=lambda s: clock.sleep_until(clock.now() + round(s * 1e9))
+        )
+        monkeypatch.setattr(spi, "time", stopped)
+        bus = SpiBus("/dev/spidev0.0")
+        return bus, library.SpiDev.made
+
+    return make
+
+
+def test_mode_speed_and_messages(opened):
+    bus, device = opened()
+    assert (device.path, device.mode, device.bits_per_word) == ("/dev/spidev0.0", 3, 8)
+    assert bus.read(reg.WHO_AM_I, 1).data == b"\x70"
+    bus.write(reg.SMPLRT_DIV, b"\x04\x03")
+    bus.read(reg.ACCEL_XOUT_H, 14)
+    bus.read(reg.FIFO_R_W, 28)
+    assert device.messages == [
+        (b"\xf5\x00", 1_000_000),
+        (b"\x19\x04\x03", 1_000_000),
+        (b"\xbb" + bytes(14), 8_000_000),
+        (b"\xf4" + bytes(28), 8_000_000),
+    ]
+    bus.close()
+    assert device.closed
+
+
+def test_a_long_read_of_the_fifo_is_cut_and_goes_on_at_the_same_register(opened):
+    bus, device = opened()
+    assert len(bus.read(reg.FIFO_R_W, 5000).data) == 5000
+    assert [(message[0], len(message)) for message, _ in device.messages] == [(0xF4, 4096), (0xF4, 906)]
+
+
+@pytest.mark.parametrize("chip", ["mpu6050", "mpu6500", "clone98", "icm20602"])
+def test_the_driver_measures_and_i2c_stays_off(opened, chip):
+    """In every write to USER_CTRL; what the driver reads back is what it wrote."""
+    bus, device = opened(f"chip={chip},hand=still,temperature_c=30")
+    driver = Driver(bus, Config(rate_hz=1000))
+    driver.start()
+    while driver.now_ns() < 4e9:
+        driver.poll()
+    recording = driver.recording()
+    driver.stop()
+    assert not recording.gap.any()
+    assert np.linalg.norm(recording.acc, axis=1).mean() == pytest.approx(9.8, abs=1)
+    assert recording.temperature_c.mean() == pytest.approx(30, abs=0.2)
+    controls = [message[1] for message, _ in device.messages if message[0] == reg.USER_CTRL]
+    own = [message for message, _ in device.messages if message[0] == 0x70]
+    assert controls
+    if chip == "icm20602":
+        assert set(own) == {b"\x70\x40"}
+        assert not any(value & 0x10 for value in controls)
+    else:
+        assert own == []
+        assert all(value & 0x10 for value in controls)
+
+
+def test_the_doctor_examines_it(opened):
+    bus, _ = opened()
+    source = SimpleNamespace(bus=bus, plan=SimpleNamespace(config=Config()))
+    told = {finding.topic: finding for finding in examine_spi_chip(source, 3.0)}
+    assert [topic for topic, finding in told.items() if finding.mark is Mark.BAD] == []
+    assert told["genuine?"].mark is Mark.OK
+
+
+@pytest.mark.parametrize(
+    ("number", "says"),
+    [
+        (errno.ENOENT, "there is no SPI device /dev/spidev0.0: enable SPI"),
+        (errno.EACCES, "no permission to use /dev/spidev0.0: join the group"),
+        (errno.ENOTTY, "is no SPI device"),
+        (errno.ENODEV, "is gone"),
+        (errno.EIO, "a transfer with /dev/spidev0.0 failed"),
+    ],
+)
+def test_why_it_cannot_be_opened(opened, monkeypatch, number, says):
+    _, device = opened()
+    monkeypatch.setattr(type(device), "opens", number)
+    with pytest.raises(BusError, match=says):
+        SpiBus("/dev/spidev0.0")
+
+
+def test_without_the_library_it_says_what_to_install(monkeypatch):
+    usual = builtins.__import__
+
+    def without(name, *rest):
+        if name == "spidev":
+            raise ImportError(name)
+        return usual(name, *rest)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(BusError, match=r"pip install mpucal\[spi\]"):
+        SpiBus("/dev/spidev0.0")
