@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 WINDOW_S = 0.5
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 # where a window's variance is less than so many times that of its noise, the board is not moved but vibrates
-VIBRATION = 2.0
+VIBRATION = 5.0
 # variances: below this a window is as loud as the flat segment, but for chance and a hand
 LOUDER = 2.0
 
