@@ -396,7 +396,7 @@ KINDS: Mapping[str, Kind] = {
             "noise": Sentence(
                 "the accelerometer's noise is {std:.2g} m/s^2 rms while it is turned, by vibration in {share:.0%} of"
                 " the samples",
-                "switch motors off while you calibrate, or expect no better than what is claimed",
+                "switch motors off while you calibrate, or expect no better than the stated uncertainty",
                 False,
             ),
         },

@@ -14,8 +14,9 @@ from .flat_segment import Flat
 from .static_intervals import Intervals
 
 LONG_ENOUGH_FOR_BIAS_S = 0.5
+TURNING_RAD_S = 0.005  # slower, gravity wanders by a hand that settles and by noise
 TREMOR_S = 0.05  # correlation time of a hand's tremor
-RANDOM_WALKS = 10.0 ** np.arange(-13.0, -5.9, 0.5)  # (rad/s)^2 a second
+RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # (rad/s)^2 a second
 
 
 def without_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recording:
@@ -44,7 +45,8 @@ def _turning(recording: Recording, first: int, last: int) -> float:
     one, other = recording.acc[first : first + n], recording.acc[last - n : last]
     moved = other.mean(0) - one.mean(0)
     angle2 = float(np.sum(moved**2 - 3.0 * (one.var(0) + other.var(0)) / n)) / float(np.sum(one.mean(0) ** 2))
-    return max(angle2, 0.0) / float(recording.t[last - n] - recording.t[first]) ** 2
+    rate = np.sqrt(max(angle2, 0.0)) / float(recording.t[last - n] - recording.t[first])
+    return float(max(rate - TURNING_RAD_S, 0.0) ** 2)
 
 
 def _smoothed(t: Vector, mean: Vector, variance: Vector) -> Vector:
