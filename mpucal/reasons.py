@@ -502,7 +502,7 @@ KINDS: Mapping[str, Kind] = {
                 True,
             ),
         },
-        "mpucal session --bus sim:hand=slipping --seed 1",
+        "mpucal session --bus sim:hand=repeating --seed 1",
         "a new orientation disagrees; where too few were shown the calibration is usable",
         turn_again=True,
     ),

@@ -41,7 +41,7 @@ def session(bus, seconds, rotate_s=None, config=None):
     [
         pytest.param("sim:colour=red", "does not know 'colour=red'", id="unknown key"),
         pytest.param("sim:chip", "does not know 'chip'", id="no value"),
-        pytest.param("sim:chip=mpu9999", "one of mpu6050, mpu6050c, mpu6500, mpu6880, clone98", id="unknown chip"),
+        pytest.param("sim:chip=mpu9999", "one of mpu6050, mpu6050c, mpu6500, ", id="unknown chip"),
         pytest.param("sim:hand=robot", "hand=robot is not one of guided, ", id="unknown hand"),
         pytest.param("sim:pace=slow", "one of fast, real", id="unknown pace"),
         pytest.param("sim:seed=-1", "a whole number from 0 on", id="negative seed"),
