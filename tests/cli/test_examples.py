@@ -34,7 +34,9 @@ def belongings(session, save, tmp_path):
         folder = tmp_path / name
         folder.mkdir()
         sensor = replace(made.sensor, temperature_c=10.0 + 10.0 * number)
-        replace(made, sensor=sensor, b_a=made.b_a + 0.01 * number).save(folder / "calibration.json")
+        replace(
+            made, sensor=sensor, b_a=made.b_a + 0.01 * number, fit={**made.fit, "recording_digest": f"{number:064x}"}
+        ).save(folder / "calibration.json")
     made.save(tmp_path / "calibration.json")
     shutil.copy(session.folder / "capture.mcap", tmp_path)
     save(load(session.folder), tmp_path / "walk.npz")

@@ -99,7 +99,7 @@ def test_the_readme_gives_the_cycles_that_are_counted(make):
     counted = re.findall(r"\d+ cycles", make("cycles")[1])
     readme = (ROOT / "tools" / "firmware" / "README.md").read_text()
     # the compiler's version decides the last per cents
-    for cycles, stated in zip(counted, re.findall(r"\d+ cycles", readme), strict=True):
+    for cycles, stated in zip(counted, re.findall(r"\d+\s+cycles", readme), strict=True):
         assert int(cycles.split()[0]) == pytest.approx(int(stated.split()[0]), rel=0.15)
 
 
