@@ -449,11 +449,6 @@ KINDS: Mapping[str, Kind] = {
                 " known to {rms:.2g} m/s^2 (1 sigma) only",
                 "hold the board more calmly, and keep knocks and vibration away from it",
             ),
-            "sides": Sentence(
-                "readings with different sides down contradict each other, and a calibrated reading is known to"
-                " {rms:.2g} m/s^2 (1 sigma) only",
-                "hold the board still in more orientations, turn it more calmly, and check the sensor's range",
-            ),
             "knock": Sentence(
                 "something knocked the board (the accelerometer was at the end of its range), and {contradiction}",
                 "let nothing knock it, fasten the sensor, and run the session again",

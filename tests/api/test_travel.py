@@ -49,7 +49,7 @@ def test_they_differ_by_a_single_value(recording, calibration):
     assert recording != replace(recording, acc=acc)
     assert recording != replace(recording, name="another")
     assert calibration != replace(calibration, b_a=np.nextafter(calibration.b_a, 99.0))
-    assert calibration != replace(calibration, quality={**calibration.quality, "verdict": "refused"})
+    assert calibration != replace(calibration, quality={**calibration.quality, "verdict": "usable"})
     assert calibration != "calibration"
 
 

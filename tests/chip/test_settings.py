@@ -31,7 +31,8 @@ def test_registers_and_back(chosen):
 def test_other_bits_of_the_registers_do_not_matter(chosen, noise):
     held = chosen.registers()
     held[reg.CONFIG] |= noise & 0x78
-    held[reg.GYRO_CONFIG] |= noise & 0xE7
+    # a wider range field, as the ICM-20690 has, is set by its own bits
+    held[reg.GYRO_CONFIG] |= noise & 0xE3
     held[reg.ACCEL_CONFIG] |= noise & 0xE7
     assert Settings.from_registers(held, chosen.part) == chosen
 

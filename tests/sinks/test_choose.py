@@ -40,7 +40,7 @@ def test_a_session_chooses_the_sink_that_fits_its_source(asked, no_write, name, 
         (("chip",), True, "bus", "leave one of them out"),
         (("bridge",), False, "bus", "--bus has no bridge: give --serial PORT[:BAUD], or leave it out"),
         (("autopilot",), False, "bus", "give --mavlink"),
-        (("chip",), False, "mavlink", "--mavlink has no chip: give exactly one of --bus BUS and --serial"),
+        (("chip",), False, "mavlink", "--mavlink has no chip: give exactly one of --bus BUS"),
         (("chip",), False, "replay", "--replay has no sensor to write to"),
     ],
 )

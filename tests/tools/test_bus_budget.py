@@ -20,7 +20,7 @@ def test_the_bus_suffices_and_no_sample_is_lost(budget, number):
     assert len(recording) > 20 * rate_hz
 
 
-@pytest.mark.parametrize(("model", "late_s"), [("mpu6050", 0.020), ("mpu6500", 0.010)])
+@pytest.mark.parametrize(("model", "late_s"), [("mpu6050", 0.020), ("mpu6500_512", 0.010)])
 def test_a_host_that_is_too_late_loses_samples_and_the_tool_sees_it(budget, model, late_s):
     recording, _, _ = budget.run(model, 1000, 5.0, 5 * late_s)
     assert budget.lost(recording) > 0

@@ -41,7 +41,7 @@ def _model_rms(e: Evidence) -> float | None:
     """m/s^2 that the model's noise leaves open; None where nothing is known."""
     if e.sure is None:
         return None
-    return e.sure.rms_mps2 if e.claim is None else e.claim.model
+    return e.sure.rms_mps2 if e.claim is None or e.claim.by == "side" else e.claim.model
 
 
 def tilted_only(e: Evidence) -> Reason | None:
@@ -125,8 +125,8 @@ def parts_disagree(e: Evidence) -> Reason | None:
         return None
     too_large = e.sure.rms_mps2 > AGREE_RMS_MPS2 and claim.model <= GOOD_RMS_MPS2 and claim.by != "model"
     much = claim.inflation > DISAGREE and claim.left_out.claim() > DISAGREE_MPS2
-    if too_large and claim.left_out.decides() == "side":
-        return reason("inconsistent", "sides", _useless(e), rms=e.sure.rms_mps2)
+    if claim.by == "side":
+        return None  # more orientations help, which few_orientations says
     if not too_large and not (much and claim.by == "time"):
         return None
     begin, end = _since_the_start(e, claim.left_out.worst)
