@@ -449,6 +449,12 @@ KINDS: Mapping[str, Kind] = {
                 " known to {rms:.2g} m/s^2 (1 sigma) only",
                 "hold the board more calmly, and keep knocks and vibration away from it",
             ),
+            "sides": Sentence(
+                "the orientations contradict each other, and a calibrated reading is known to {rms:.2g} m/s^2 (1 sigma)"
+                " only: the sensor's mount slipped, or the sensor is damaged",
+                "fasten the sensor, and record again",
+                True,
+            ),
             "knock": Sentence(
                 "something knocked the board (the accelerometer was at the end of its range), and {contradiction}",
                 "let nothing knock it, fasten the sensor, and run the session again",

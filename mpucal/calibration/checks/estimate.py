@@ -38,10 +38,15 @@ def few_orientations(e: Evidence) -> Reason | None:
 
 
 def _model_rms(e: Evidence) -> float | None:
-    """m/s^2 that the model's noise leaves open; None where nothing is known."""
+    """m/s^2 that more orientations make less; None where nothing is known."""
     if e.sure is None:
         return None
-    return e.sure.rms_mps2 if e.claim is None or e.claim.by == "side" else e.claim.model
+    return e.sure.rms_mps2 if e.claim is None or (e.claim.by == "side" and not _sides_contradict(e)) else e.claim.model
+
+
+def _sides_contradict(e: Evidence) -> bool:
+    """Whether the orientations disagree so much that more of them would not help."""
+    return e.claim is not None and e.claim.by == "side" and e.claim.inflation > DISAGREE and _useless(e)
 
 
 def tilted_only(e: Evidence) -> Reason | None:
@@ -125,6 +130,8 @@ def parts_disagree(e: Evidence) -> Reason | None:
         return None
     too_large = e.sure.rms_mps2 > AGREE_RMS_MPS2 and claim.model <= GOOD_RMS_MPS2 and claim.by != "model"
     much = claim.inflation > DISAGREE and claim.left_out.claim() > DISAGREE_MPS2
+    if _sides_contradict(e):
+        return reason("inconsistent", "sides", rms=e.sure.rms_mps2)
     if claim.by == "side":
         return None  # more orientations help, which few_orientations says
     if not too_large and not (much and claim.by == "time"):
