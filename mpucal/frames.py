@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,14 @@ WITH_UNIT = {
     **{name: f"{name}_mps2" for name in ACC},
     **{name: f"{name}_rad_s" for name in GYR},
 }
+
+
+class Frame(Protocol):
+    """What a type checker knows a data frame by."""
+
+    @property
+    def columns(self) -> Any:
+        """Its columns' names."""
 
 
 def is_frame(value: object) -> bool:

@@ -9,6 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypedDict
+
+if TYPE_CHECKING:
+    from typing_extensions import ReadOnly
+
+
+class ReasonFound(TypedDict):
+    """A reason as calibration.json has it in quality.reasons: its code, what was found, and what to do."""
+
+    code: ReadOnly[str]
+    message: ReadOnly[str]
+    remedy: ReadOnly[str]
 
 
 @dataclass(frozen=True)
@@ -34,7 +46,7 @@ class Reason:
         """Both as one sentence, without its full stop."""
         return f"{self.what}; {self.remedy}"
 
-    def document(self) -> dict[str, str]:
+    def document(self) -> ReasonFound:
         """As calibration.json has it in quality.reasons."""
         return {"code": self.code, "message": self.message, "remedy": self.remedy}
 

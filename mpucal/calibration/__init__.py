@@ -11,6 +11,7 @@ import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import WrongValue
+from ..result import keys
 from ..result.calibration import Calibration, unknown
 from .checks import unusable_for_a_fit
 from .checks.unusable import no_gyroscope
@@ -106,15 +107,8 @@ def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> C
 
 def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
     recording, flat, fit = evidence.recording, evidence.flat, evidence.fit
-    about: dict[str, Any] = {
-        **chosen,
-        "gravity": evidence.gravity,
-        **({"gravity_anyway": True} if evidence.gravity_anyway else {}),
-        "samples": len(recording),
-        "recording_digest": recording_digest(recording),
-        "seconds": float(recording.t[-1] - recording.t[0]),
-    }
     common: dict[str, Any] = {
+        "fit": _about(evidence, chosen),
         "quality": judge(evidence),
         "sensor": recording.sensor,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -122,15 +116,7 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
         "gyro_noise_std": unknown(3) if flat is None else np.sqrt(flat.Sigma_omega),
     }
     if fit is None:
-        nothing = {"parameters": 0, "iterations": 0, "converged": False, "nis": np.nan}
-        return Calibration(D=unknown(3, 3), b_a=unknown(3), fit={**about, **nothing}, **common)
-    numbers = {
-        "parameters": len(fit.names),
-        "iterations": fit.iterations,
-        "converged": fit.converged,
-        "nis": fit.nis,
-        "at_prior": list(fit.at_prior),
-    }
+        return Calibration(D=unknown(3, 3), b_a=unknown(3), **common)
     return Calibration(
         D=fit.D,
         b_a=fit.b_a,
@@ -144,9 +130,27 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
         ),
         b_omega=fit.b_omega,
         b_omega_std=fit.std(*B_OMEGA_NAMES),
-        fit={**about, **numbers},
         **common,
     )
+
+
+def _about(evidence: Evidence, chosen: Mapping[str, str]) -> keys.Fit:
+    recording, fit = evidence.recording, evidence.fit
+    about: keys.Fit = {
+        "model": chosen["model"],
+        "why": chosen["why"],
+        "gravity": evidence.gravity,
+        "samples": len(recording),
+        "recording_digest": recording_digest(recording),
+        "seconds": float(recording.t[-1] - recording.t[0]),
+        "parameters": 0 if fit is None else len(fit.names),
+        "iterations": 0 if fit is None else fit.iterations,
+        "converged": fit is not None and fit.converged,
+        "nis": np.nan if fit is None else fit.nis,
+    }
+    if fit is not None:
+        about = {**about, "at_prior": list(fit.at_prior)}
+    return {**about, "gravity_anyway": True} if evidence.gravity_anyway else about
 
 
 def _claimed(fit: Fit, names: Sequence[str]) -> Vector:

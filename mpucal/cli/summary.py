@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..data import STANDARD_GRAVITY_MPS2
 from ..report.units import AXES, accelerometer, estimated_error
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.document import ACCELEROMETER_FORMULA
+from ..result.keys import Magnitude
 from ..result.session_files import BLOB, DOCUMENT, REPORT
 
 # what fits a terminal of 80 columns
@@ -80,15 +81,15 @@ def _parameters(c: Calibration) -> list[str]:
 
 def _accuracy(calibration: Calibration) -> list[str]:
     """The estimated error, and |a| of all samples."""
-    before, after = (calibration.quality.get(f"magnitude_{when}") for when in ("before", "after"))
+    before, after = calibration.quality.get("magnitude_before"), calibration.quality.get("magnitude_after")
     rows = [("before", before), ("after", after)] if before and after else []
     magnitudes = [f"|a| {when}, all samples: {_statistics(row)}" for when, row in rows]
     said = [textwrap.fill(estimated_error(calibration), WIDTH)] if estimated_error(calibration) else []
     return ["", *said, *magnitudes] if said or magnitudes else []
 
 
-def _statistics(row: Mapping[str, float | None]) -> str:
-    median, std = (_number(row.get(key)) for key in ("median", "std"))
+def _statistics(row: Magnitude) -> str:
+    median, std = _number(row.get("median")), _number(row.get("std"))
     return f"median {median:.3f} m/s², standard deviation {std:.3f} m/s²"
 
 

@@ -81,7 +81,8 @@ def gyroscope_table(c: Calibration) -> str:
 
 def verification_section(c: Calibration) -> str:
     """The errors in orientations that the calibration had not seen; empty without verification."""
-    found = (c.quality.get("verification") or {}).get("orientations") or ()
+    verification = c.quality.get("verification")
+    found = verification.get("orientations") or () if verification else ()
     rows = [
         [
             f"{side_down(one['down'])} down",

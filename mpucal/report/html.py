@@ -99,8 +99,9 @@ def _magnitudes(calibration: Calibration, track: Track | None) -> str:
         for name, acc in (("before", track.recording.acc), ("after", track.calibrated)):
             of_rests = np.linalg.norm(track.at_rest(acc), axis=1)
             rows.append([f"at rest, {name}", *(number(f(of_rests), 4) for f in (np.median, np.mean, np.std))])
+    magnitudes: Mapping[str, Any] = calibration.quality
     for name in ("before", "after"):
-        values: Mapping[str, Any] = calibration.quality.get(f"magnitude_{name}") or {}
+        values = magnitudes.get(f"magnitude_{name}") or {}
         rows.append([f"all samples, {name}", *(number(values.get(key), 4) for key in ("median", "mean", "std"))])
     return table("magnitudes", "|a|, m/s²", ["", "median", "mean", "standard deviation"], rows)
 

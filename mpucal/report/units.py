@@ -82,7 +82,8 @@ def with_std(value: float, std: float, most_digits: int = 5) -> str:
 def estimated_error(c: Calibration) -> str:
     """The estimated error of a calibrated acceleration in a sentence; empty where unknown or refused."""
     error = c.quality.get("error_std") or {}
-    rms, direction = (math.nan if error.get(key) is None else float(error[key]) for key in ("rms", "direction_deg"))
+    known = (error.get("rms"), error.get("direction_deg"))
+    rms, direction = (math.nan if value is None else float(value) for value in known)
     if c.verdict == REFUSED or not (math.isfinite(rms) and math.isfinite(direction)):
         return ""
     where = "the tilts that it holds for" if c.fit.get("model") == "tilt" else "all orientations"

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,12 +22,15 @@ from .blob import NO_RANGE, Blob, BlobError
 from .document import arguments, content
 from .error_model import bias_mg, scale_factor_error
 from .frozen import FrozenDict
+from .keys import Fit, Quality, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-F = TypeVar("F")  # a data frame
-GOOD, USABLE, REFUSED = "good", "usable", "refused"
+F = TypeVar("F", bound=frames.Frame)
+GOOD: Verdict = "good"
+USABLE: Verdict = "usable"
+REFUSED: Verdict = "refused"
 
 
 def unknown(*shape: int) -> Vector:
@@ -44,7 +47,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     D : (3, 3), b_a : (3,) m/s^2: y = D s + b_a; D_std, b_a_std : their standard deviations.
     noise_std : (3,) m/s^2, the accelerometer's noise a sample.
     K : (3, 3), b_omega : (3,) rad/s: w = K (y - b_omega); K_std, b_omega_std, gyro_noise_std : likewise.
-    fit, quality : mappings with the keys of calibration.json.
+    fit, quality : mappings with the keys of calibration.json, see result/keys.py.
     sensor : what was calibrated.
     created : ISO 8601 time.
     applied_in_hardware : (3,) m/s^2 that offset registers subtract already; a consumer uses b_a minus this.
@@ -66,8 +69,8 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     K_std: Vector = field(default_factory=lambda: unknown(3, 3))
     b_omega_std: Vector = field(default_factory=lambda: unknown(3))
     gyro_noise_std: Vector = field(default_factory=lambda: unknown(3))
-    fit: Mapping[str, Any] = field(default_factory=FrozenDict)
-    quality: Mapping[str, Any] = field(default_factory=FrozenDict)
+    fit: Fit = field(default_factory=cast("type[Fit]", FrozenDict))
+    quality: Quality = field(default_factory=cast("type[Quality]", FrozenDict))
     sensor: Sensor = field(default_factory=Sensor)
     created: str = ""
     applied_in_hardware: Vector = field(default_factory=lambda: np.zeros(3))
@@ -130,9 +133,9 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         return np.asarray(self.b_a - self.applied_in_hardware)
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Verdict:
         """good, usable or refused; refused where nobody judged."""
-        return str(self.quality.get("verdict", REFUSED))
+        return self.quality.get("verdict", REFUSED)
 
     @property
     def magnitude_std(self) -> float:
@@ -141,13 +144,13 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         return float(std) if std is not None and math.isfinite(std) else 0.0
 
     @overload
+    def apply(self, acc: F) -> F: ...
+    @overload
     def apply(self, acc: ArrayLike, gyr: None = None, temperature_c: ArrayLike | None = None) -> Vector: ...
     @overload
     def apply(
         self, acc: ArrayLike, gyr: ArrayLike, temperature_c: ArrayLike | None = None
     ) -> tuple[Vector, Vector]: ...
-    @overload
-    def apply(self, acc: F) -> F: ...
     def apply(self, acc: Any, gyr: ArrayLike | None = None, temperature_c: ArrayLike | None = None) -> Any:
         """Calibrated measurements (the paper's equation 4).
 
@@ -267,7 +270,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
             b_a=np.array(blob.b_a),
             K=np.array(blob.K).reshape(3, 3),
             b_omega=np.array(blob.b_omega),
-            fit={"gravity": blob.gravity},
+            fit=cast(Fit, {"gravity": blob.gravity}),
             sensor=Sensor(
                 who_am_i=blob.who_am_i or None,
                 accel_range_g=blob.accel_range_g or None,

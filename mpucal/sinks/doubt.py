@@ -29,7 +29,7 @@ def doubt(calibration: Calibration, sink: Sink) -> str | None:
     ------
     SourceError : what the sink holds cannot be read.
     """
-    verification = calibration.quality.get("verification") or {}
-    if verification.get("agrees") is not True:
+    verification = calibration.quality.get("verification")
+    if not verification or verification.get("agrees") is not True:
         return "the calibration was not verified in new orientations"
     return sink.as_good(calibration) if isinstance(sink, Comparing) else None

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, replace
-from typing import Any
 
 from ...result.calibration import REFUSED, USABLE, Calibration
+from ...result.keys import Quality
 from ..events import Checked
 
 _FOUND = "agrees", "magnitude_mps2", "magnitude_std_mps2", "direction_deg", "direction_std_deg", "down"
@@ -21,12 +20,13 @@ def verified(calibration: Calibration, checked: Checked | None) -> Calibration:
     if checked is None:
         return calibration
     found = [{key: value for key, value in asdict(rest).items() if key in _FOUND} for rest in checked.found]
-    quality: dict[str, Any] = {
+    quality: Quality = {
         **calibration.quality,
         "verification": {"agrees": checked.agrees, "orientations": found},
     }
     if checked.reason is not None:
-        others: list[Mapping[str, Any]] = [r for r in quality.get("reasons", []) if r["code"] != checked.reason.code]
+        others = [r for r in quality["reasons"] if r["code"] != checked.reason.code]
         refused = checked.agrees is not None or quality["verdict"] == REFUSED
-        quality |= {"verdict": REFUSED if refused else USABLE, "reasons": [checked.reason.document(), *others]}
+        reasons = [checked.reason.document(), *others]
+        quality = {**quality, "verdict": REFUSED if refused else USABLE, "reasons": reasons}
     return replace(calibration, quality=quality)

@@ -1,0 +1,36 @@
+"""What two type checkers, mypy and pyright in its build basedpyright, both strict, say of programs that use mpucal."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PROJECT = Path(__file__).parents[2]
+PROGRAMS = Path(__file__).parent / "typed"
+WRONG = PROGRAMS / "wrong.py"
+MARKED = {i for i, line in enumerate(WRONG.read_text().splitlines(), 1) if line.endswith("# wrong")}
+
+
+def mypy(tmp_path):
+    words = [sys.executable, "-m", "mypy", "--strict", *map(str, sorted(PROGRAMS.glob("*.py")))]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=PROJECT)
+    return {
+        (Path(name).name, int(line)) for name, line in re.findall(r"^(.*?):(\d+): error", done.stdout, re.MULTILINE)
+    }
+
+
+def pyright(tmp_path):
+    settings = tmp_path / "pyrightconfig.json"
+    settings.write_text(json.dumps({"include": [str(PROGRAMS)], "typeCheckingMode": "strict"}))
+    words = [sys.executable, "-m", "basedpyright", "-p", str(settings), "--pythonpath", sys.executable, "--outputjson"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    found = json.loads(done.stdout)["generalDiagnostics"]
+    return {(Path(each["file"]).name, each["range"]["start"]["line"] + 1) for each in found}
+
+
+@pytest.mark.parametrize("checker", [mypy, pyright])
+def test_the_api_is_typed_and_each_wrong_line_is_told(checker, tmp_path):
+    assert checker(tmp_path) == {(WRONG.name, line) for line in MARKED}
