@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from importlib import import_module
 from typing import Any, NamedTuple
@@ -14,6 +15,8 @@ Message = Any
 
 V1, V2 = 0xFE, 0xFD
 HEADER = {V1: 6, V2: 10}
+MAGIC = (bytes([V1]), bytes([V2]))
+BEGINNING = re.compile(b"[" + b"".join(MAGIC) + b"]")
 CHECKSUM, SIGNATURE = 2, 13
 SIGNED = 0x01
 FLAGS_AT = 2
@@ -94,10 +97,8 @@ class Parser:
         self._buffer += data
         packets: list[Packet] = []
         at = 0
-        while at < len(self._buffer):
-            if self._buffer[at] not in HEADER:
-                at += 1
-                continue
+        while (begun := BEGINNING.search(self._buffer, at)) is not None:
+            at = begun.start()
             length = packet_length(self._buffer[at : at + HEADER[V2]])
             if length is None or at + length > len(self._buffer):
                 break
@@ -105,6 +106,8 @@ class Parser:
             # a byte that only looks like a beginning: the packet may begin within what it claimed
             at += length if packet else 1
             packets += [packet] if packet else []
+        else:
+            at = len(self._buffer)
         del self._buffer[:at]
         return packets
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from ..errors import BusError, LinkError, NoAnswer
-from .dialect import SIGNED, Message, Packet, Parser, dialect
+from .dialect import MAGIC, SIGNED, Message, Packet, Parser, dialect
 from .transport import Bytes, Transport
 from .vehicle import Vehicle, vehicle_of
 
@@ -22,6 +22,8 @@ S = 1_000_000_000
 LISTEN_NS, PATIENCE_NS = 2 * S, 6 * S
 HEARTBEAT_NS = S
 SEQUENCE = 256
+# more senders than a network of vehicles has, and more pieces without a packet than a bad link brings in six seconds
+MOST_SENDERS, FLOOD = 64, 2000
 # signatures count 10 us since 2015-01-01
 SIGNING_EPOCH_NS, SIGNING_UNIT_NS = 1_420_070_400 * S, 10_000
 
@@ -66,6 +68,7 @@ class Link:
         self._sequence: int | None = None
         self.lost = 0
         self._signed = self._unsigned = 0
+        self._junk = 0
 
     @property
     def signed_only(self) -> bool:
@@ -121,6 +124,7 @@ class Link:
     def lock(self, vehicle: Vehicle) -> None:
         """Hear `vehicle` alone from now on, and send to it."""
         self._vehicle = vehicle
+        self._transport.settle(vehicle.address)
         for t_ns, address, data in self._heard:
             if address in (vehicle.address, None):
                 self._record(t_ns, data)
@@ -177,18 +181,27 @@ class Link:
             received = self._transport.receive(min(until_ns, self._next_heartbeat_ns))
             if received is not None:
                 self._queue.extend(self._parsed(received))
-            elif self._transport.now_ns() >= until_ns:
+            # strangers' bytes are no reason to stay longer
+            if (self._transport.now_ns() if received is None else received.t_ns) >= until_ns and not self._queue:
                 break
         self._now_ns = max(self._now_ns, until_ns)
 
     def _parsed(self, received: Bytes) -> list[_Arrived]:
         if self._vehicle is not None and received.address != self._vehicle.address:
             return []
-        if received.address not in self._parsers:
-            self._parsers[received.address] = Parser(self._receiver())
-        parser = self._parsers[received.address]
+        if self._transport.datagrams and received.data[:1] not in MAGIC:
+            self._junk += 1
+            return []
+        parser = self._parsers.get(received.address)
+        if parser is None:
+            if len(self._parsers) >= MOST_SENDERS:
+                self._junk += 1
+                return []
+            parser = self._parsers[received.address] = Parser(self._receiver())
         parse = parser.datagram if self._transport.datagrams else parser.stream
-        return [_Arrived(received.t_ns, received.address, packet) for packet in parse(received.data)]
+        packets = [_Arrived(received.t_ns, received.address, packet) for packet in parse(received.data)]
+        self._junk += not packets
+        return packets
 
     def _beat(self) -> None:
         """A ground station's HEARTBEAT each second, to whom we may speak."""
@@ -254,6 +267,11 @@ class Link:
             return LinkError(
                 f"packets arrive on {where}, and none is signed with the key of --signing-key",
                 "give the vehicle's key, or leave it out where the vehicle does not sign",
+            )
+        if self._junk > FLOOD:
+            return LinkError(
+                f"{where} is flooded: {self._junk} pieces came within {PATIENCE_NS // S} s that are no vehicle's",
+                "stop what sends them, or have the vehicle's telemetry sent to another port",
             )
         return NoAnswer(
             f"no autopilot's heartbeat came over {where} within {PATIENCE_NS // S} s",

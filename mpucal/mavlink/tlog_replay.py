@@ -65,6 +65,9 @@ class Replay:
     def send(self, data: bytes, address: str | None) -> None:
         """See Transport: nobody hears it."""
 
+    def settle(self, address: str) -> None:
+        """See Transport: it holds one vehicle's packets."""
+
     def close(self) -> None:
         """See Transport."""
 

@@ -42,6 +42,10 @@ class Transport(Protocol):
         """Send to `address`, as `receive` gave it; None: to the partner of an outward transport. LinkError."""
         ...
 
+    def settle(self, address: str) -> None:
+        """From now on hear that address alone, where the transport can see to it."""
+        ...
+
     def close(self) -> None:
         """Let go of it."""
         ...

@@ -67,6 +67,13 @@ class Udp:
         with suppress(OSError):
             self._socket.sendto(data, (host, int(port)) if address else self._partner)
 
+    def settle(self, address: str) -> None:
+        """See Transport: a connected socket's strangers are turned away by the kernel, before they fill its buffer."""
+        host, _, port = address.rpartition(":")
+        with suppress(OSError):
+            self._socket.connect((host, int(port)))
+            self._partner = (host, int(port))
+
     def close(self) -> None:
         """See Transport."""
         self._socket.close()
@@ -118,6 +125,9 @@ class Tcp:
         except OSError as error:
             raise _broken(self.name, error) from error
 
+    def settle(self, address: str) -> None:
+        """See Transport: it has one partner."""
+
     def close(self) -> None:
         """See Transport."""
         self._socket.close()
@@ -168,6 +178,9 @@ class Serial:
             self._port.write(data)
         except self._failure as error:
             raise _broken(self.name, error) from error
+
+    def settle(self, address: str) -> None:
+        """See Transport: it has one partner."""
 
     def close(self) -> None:
         """See Transport."""

@@ -27,6 +27,8 @@ LOOK_NS = S
 US_PER_S = 1e6
 # packets after which their loss is weighed, and the share of it that a person should know of
 WEIGHED, WORTH_SAYING = 2000, 0.05
+# vehicles in one sentence
+MOST_LISTED = 8
 
 
 class VehicleSource:
@@ -229,7 +231,8 @@ def one_of(vehicles: tuple[Vehicle, ...], system: int | None) -> Vehicle:
     UsageError : several, with their list, or none of that system.
     """
     asked = [vehicle for vehicle in vehicles if system in (None, vehicle.system)]
-    listed = ", ".join(str(vehicle) for vehicle in sorted(vehicles, key=lambda v: (v.system, v.address)))
+    shown = sorted(vehicles, key=lambda v: (v.system, v.address))[:MOST_LISTED]
+    listed = ", ".join(map(str, shown)) + (f" and {more} more" if (more := len(vehicles) - len(shown)) else "")
     if len(asked) == 1:
         return asked[0]
     if not asked:

@@ -22,6 +22,8 @@ _WORDS = {
 }
 _ENDING = (signal.SIGINT, signal.SIGTERM)
 _AT_ONCE = 64
+# so long a Ctrl-C waits for who reads the sensor, who may hang on a device
+PATIENCE_S = 0.4
 
 
 class Keys:
@@ -45,7 +47,7 @@ class Keys:
     def pressed(self) -> Sequence[Key]:
         """What was pressed since the last call; never waits."""
         keys = [Key.ABORT] if self._interrupted else []
-        self._interrupted = False
+        self._heard()
         while self._keyboard is not None and _waits(self._keyboard):
             words = self._typed(self._keyboard)
             if words is None:
@@ -56,8 +58,11 @@ class Keys:
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Meanwhile the first Ctrl-C is a key press, and the second one interrupts at once."""
+        """Meanwhile the first Ctrl-C is a key press; the second one, or nobody who takes the first, interrupts."""
         with ExitStack() as stack:
+            if hasattr(signal, "SIGALRM"):
+                stack.callback(signal.signal, signal.SIGALRM, signal.signal(signal.SIGALRM, self._interrupt))
+            stack.callback(self._heard)
             for number in _ENDING:
                 stack.callback(signal.signal, number, signal.signal(number, self._interrupt))
             if self._single and self._keyboard is not None:
@@ -81,6 +86,17 @@ class Keys:
         if self._interrupted:
             raise KeyboardInterrupt
         self._interrupted = True
+        _alarm(PATIENCE_S)
+
+    def _heard(self) -> None:
+        _alarm(0.0)
+        self._interrupted = False
+
+
+def _alarm(seconds: float) -> None:
+    """A signal after so long, on systems that have it; 0: none."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_REAL, seconds)
 
 
 def _windows() -> Any:

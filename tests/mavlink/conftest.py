@@ -49,6 +49,9 @@ class Script:
         self._now_ns = max(self._now_ns, until_ns)
         return None
 
+    def settle(self, address: str) -> None:
+        pass
+
     def send(self, data: bytes, address: str | None) -> None:
         self.sent.append((self._now_ns / S, address, data))
         answers = [Bytes(answer, address or "vehicle:1", self._now_ns) for answer in self.answer(data)]

@@ -44,6 +44,17 @@ def test_a_partner_that_was_named_is_spoken_to_at_once(script, station):
     assert [(t, address) for t, address, _ in transport.sent] == [(0.0, None), (1.0, None)]
 
 
+def test_a_flood_of_strangers_is_named_and_ends_no_later(script, station):
+    junk = [(k / 1000, f"10.0.{k % 200}.1:{k}", b"no packet") for k in range(60_000)]
+    link = Link(script(junk), lambda t_ns, data: None)
+    with pytest.raises(LinkError, match=r"a script is flooded: \d+ pieces came within 6 s that are no vehicle's"):
+        link.listen()
+    assert link.now_ns() == 6 * S
+    link, _ = locked(script(in_order(heartbeats(station(), HOME), junk)))
+    heard = list(link.messages(4 * S))
+    assert (len(heard), link.now_ns()) == (2, 4 * S)
+
+
 def test_several_vehicles_end_with_their_list(script, station):
     transport = script(in_order(heartbeats(station(1), HOME), heartbeats(station(7, autopilot=12), STRANGER)))
     vehicles = Link(transport, lambda t_ns, data: None).listen()
@@ -56,6 +67,8 @@ def test_several_vehicles_end_with_their_list(script, station):
     assert one_of(vehicles, 7).address == STRANGER
     with pytest.raises(UsageError, match="no vehicle is system 9"):
         one_of(vehicles, 9)
+    with pytest.raises(UsageError, match=f"at {HOME} and 92 more: choose one"):
+        one_of(vehicles[:1] * 100, None)
 
 
 def test_one_system_at_two_addresses_is_not_guessed_at(script, station):

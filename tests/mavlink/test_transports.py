@@ -46,6 +46,19 @@ def test_udp_listens_and_answers_who_sent(other):
         assert not transport.outward
 
 
+def test_the_kernel_turns_strangers_away_once_the_vehicle_is_known(other):
+    port = free_udp()
+    with closing(open_transport(Url(Kind.UDP, "127.0.0.1", port))) as transport:
+        other.sendto(b"vehicle", ("127.0.0.1", port))
+        transport.settle(soon(transport).address)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.sendto(b"stranger", ("127.0.0.1", port))
+        other.sendto(b"again", ("127.0.0.1", port))
+        assert soon(transport).data == b"again"
+        transport.send(b"answer", None)
+        assert other.recv(99) == b"answer"
+
+
 def test_udpout_speaks_first(other):
     with closing(open_transport(Url(Kind.UDPOUT, "127.0.0.1", other.getsockname()[1]))) as transport:
         transport.send(b"hello", None)

@@ -60,6 +60,15 @@ def test_the_first_signal_is_a_key_and_the_second_interrupts(number):
     assert signal.getsignal(number) is before
 
 
+def test_a_signal_that_nobody_takes_interrupts():
+    keys = Keys()
+    with keys.listening():
+        signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            signal.pause()
+    assert keys.pressed() == []
+
+
 @pytest.fixture
 def terminal():
     """A terminal's two ends: what the person does, and what the program has."""

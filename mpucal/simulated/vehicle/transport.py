@@ -48,6 +48,9 @@ class SimulatedTransport:
         """See Transport."""
         self._vehicle.hear(data)
 
+    def settle(self, address: str) -> None:
+        """See Transport: it is the only one."""
+
     def close(self) -> None:
         """See Transport."""
 

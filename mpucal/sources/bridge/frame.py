@@ -6,11 +6,13 @@ See firmware_protocol.md, "Framing".
 from __future__ import annotations
 
 import binascii
+import re
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 DELIMITER = b"\0"
+DELIMITERS = re.compile(rb"\0+")
 MAX_PAYLOAD = 66
 MAX_CONTENT = 70
 MAX_ENCODED = 71
@@ -78,7 +80,7 @@ class Deframer:
 
     def feed(self, data: bytes) -> Iterator[Frame]:
         """The frames that end within `data`; to be used up before the next call."""
-        *ends, rest = data.split(DELIMITER)
+        *ends, rest = DELIMITERS.split(data)
         for end in ends:
             self._take(end)
             piece = bytes(self._piece)

@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 from ...errors import BusError
+from .link_errors import flooded
 from .port_errors import another
 
 KEPT_BYTES = 400
@@ -15,9 +16,15 @@ PRINTABLE = 0.9
 
 
 class Heard:
-    """The bytes that came instead of a bridge's reply."""
+    """The bytes that came instead of a bridge's reply.
+
+    Attributes
+    ----------
+    floods : how often they were more than any bridge sends.
+    """
 
     def __init__(self) -> None:
+        self.floods = 0
         self._bytes: defaultdict[int, bytearray] = defaultdict(bytearray)
 
     def take(self, data: bytes, baud: int) -> None:
@@ -32,6 +39,8 @@ class Heard:
                 f"nothing answers on {port}",
                 f"check that the board there runs the bridge's firmware (tools/firmware), or {another()}",
             )
+        if self.floods:
+            return BusError(*flooded(port))
         text = max(map(_text, self._bytes.values()), key=len)
         if text:
             return BusError(

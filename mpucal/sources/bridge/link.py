@@ -17,7 +17,7 @@ from ...errors import BusError
 from .clock import BridgeClock
 from .frame import DELIMITER, Deframer, Frame
 from .greeting import Heard
-from .link_errors import no_reply, other_version, restarted
+from .link_errors import flooded, no_reply, other_version, restarted
 from .messages import (
     MAJOR,
     MIN_WINDOW,
@@ -47,6 +47,10 @@ STORE_NS = 2500 * MS
 TRIES = 3
 HELLO_NS = 300 * MS
 GREET_NS = 5000 * MS
+# what a bridge sends while one reply is on its way is a tenth of it; more is a line that is flooded
+LOOK_BYTES = 1 << 18
+# the first may be what a line had kept for who opens it
+FLOODS = 2
 
 STORING = (BlobBegin, BlobData, BlobCommit, BlobErase)
 
@@ -139,7 +143,7 @@ class Link:
         heard = Heard()
         give_up_ns = self.port.now_ns() + within_ns
         for baud in cycle(self.port.bauds):
-            if self.port.now_ns() >= give_up_ns:
+            if self.port.now_ns() >= give_up_ns or heard.floods == FLOODS:
                 break
             if len(self.port.bauds) > 1:
                 self.port.set_baud(baud)
@@ -159,20 +163,22 @@ class Link:
         waiting, flying = deque(self._numbered(requests)), list[_Asked]()
         asked = list(waiting)
         patience_ns = STORE_NS if any(isinstance(request, STORING) for request in requests) else REPLY_NS
-        tries, deadline_ns = 1, self.port.now_ns() + patience_ns
+        tries, deadline_ns, budget = 1, self.port.now_ns() + patience_ns, LOOK_BYTES
         while waiting or flying:
             while waiting and len(flying) < self._window:
                 flying.append(waiting.popleft())
                 self.port.write(flying[-1].encoded())
             chunk = self.port.read(deadline_ns)
-            if chunk is None:
+            budget -= 0 if chunk is None else len(chunk.data)
+            if chunk is None or not self._handle(chunk, flying):
+                # by when the bytes came: a host that was busy, or asleep, has not read yet what came in time
+                if chunk is not None and chunk.t_ns < deadline_ns and budget > 0:
+                    continue
                 if tries == TRIES or not all(one.repeatable for one in flying):
-                    raise LinkLost(*no_reply(self.port.name))
+                    raise LinkLost(*(no_reply if budget > 0 else flooded)(self.port.name))
                 tries += 1
                 self.port.write(DELIMITER + b"".join(one.encoded() for one in flying))
-            elif not self._handle(chunk, flying):
-                continue
-            deadline_ns = self.port.now_ns() + patience_ns
+            deadline_ns, budget = self.port.now_ns() + patience_ns, LOOK_BYTES
             flying = [one for one in flying if not one.done]
         return [one.answers for one in asked]
 
@@ -204,11 +210,8 @@ class Link:
     def _hello(self, address: int, heard: Heard, baud: int) -> HelloReply | None:
         (asked,) = self._numbered([Hello(address=address)])
         self.port.write(DELIMITER + asked.encoded())
-        until_ns = self.port.now_ns() + HELLO_NS
-        while True:
-            chunk = self.port.read(until_ns)
-            if chunk is None:
-                return None
+        until_ns, budget = self.port.now_ns() + HELLO_NS, LOOK_BYTES
+        while (chunk := self.port.read(until_ns)) is not None:
             heard.take(chunk.data, baud)
             for frame, reply in self._messages(chunk):
                 if not asked.is_answered_by(frame, reply):
@@ -217,6 +220,11 @@ class Link:
                     raise BusError(*other_version(self.port.name, reply))
                 self.clock.greeted(reply.t_us, chunk.t_ns)
                 return reply
+            budget -= len(chunk.data)
+            if chunk.t_ns >= until_ns or budget <= 0:
+                heard.floods += budget <= 0
+                break
+        return None
 
     def _handle(self, chunk: Chunk, flying: Sequence[_Asked]) -> bool:
         """Give each message to whom it is for; whether a request was answered."""

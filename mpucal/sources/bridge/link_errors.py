@@ -47,6 +47,14 @@ def no_reply(port: str) -> tuple[str, str]:
     return f"the bridge on {port} no longer answers", "check its cable and supply, then start again"
 
 
+def flooded(port: str) -> tuple[str, str]:
+    """More comes than any bridge sends, and no answer among it."""
+    return (
+        f"{port} is flooded: far more bytes come than a bridge sends, and no answer among them",
+        "check that the bridge, and nothing else, is on that port, and plug it in again",
+    )
+
+
 def restarted(port: str) -> tuple[str, str]:
     """It has forgotten that it was greeted."""
     return f"the bridge on {port} was reset", "check its cable and supply"

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 BAUDS = (500_000, 115_200)
 WAKE_S = 0.05
 CHUNK_BYTES = 4096
+# minutes of a bridge's: who leaves more than that unread is flooded
+UNREAD_CHUNKS = 1 << 14
 REOPEN_S = 0.25
 
 
@@ -168,6 +170,9 @@ def _take(serial: Serial, chunks: queue.SimpleQueue[Chunk | BusError], closing: 
     """Read until the port is closed or gone."""
     try:
         while not closing.is_set():
+            if chunks.qsize() >= UNREAD_CHUNKS:
+                closing.wait(WAKE_S)
+                continue
             data = _wait(serial)
             if data:
                 chunks.put(Chunk(data, time.monotonic_ns()))

@@ -17,6 +17,7 @@ from mpucal.simulated.faults import Where, kinds
 from mpucal.sinks.bridge import BridgeSink
 from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.bridge.link import Link
+from mpucal.sources.bridge.port import Chunk
 from mpucal.sources.bridge.store import Store
 
 MS = 1_000_000
@@ -158,6 +159,34 @@ def test_another_device(text, sentence):
         BridgeBus(line)
     assert str(caught.value).count("\n") == 0
     assert 5e9 <= clock.now() - began < 6e9
+
+
+class Flooding:
+    """A line that sends zeros without end, as fast as they are read, from its `sound_reads`th read on."""
+
+    def __init__(self, line, sound_reads):
+        self.line, self.left, self.ahead_ns = line, sound_reads, 0
+
+    def __getattr__(self, name):
+        return getattr(self.line, name)
+
+    def now_ns(self):
+        return self.line.now_ns() + self.ahead_ns
+
+    def read(self, until_ns):
+        self.left -= 1
+        if self.left >= 0:
+            return self.line.read(until_ns)
+        self.ahead_ns += 100_000
+        return Chunk(bytes(4096), self.now_ns())
+
+
+@pytest.mark.parametrize("sound_reads", [0, 40])
+def test_a_flood_is_named(rig, stream, sound_reads):
+    with pytest.raises(BusError, match=r"^the emulated line is flooded: far more bytes come than a bridge sends"):
+        driver = Driver(BridgeBus(Flooding(rig().line, sound_reads)), Config(rate_hz=200))
+        driver.start()
+        stream(driver, 60)
 
 
 @settings(max_examples=50, deadline=None)
