@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 
 class Reply(NamedTuple):
@@ -44,6 +44,29 @@ class Bus(Protocol):
         ...
 
 
+class Files(Protocol):
+    """The same of what a driver of the kernel tells in files: instead of a register the name of one.
+
+    `iio:device0/in_accel_scale` is an attribute, `iio:device0` its buffer, `iio:device0/` the list of its attributes.
+    """
+
+    def read(self, register: str, count: int) -> Reply:
+        """Up to `count` bytes of a file, without waiting for any."""
+        ...
+
+    def write(self, register: str, data: bytes) -> int:
+        """Write an attribute, and return the time."""
+        ...
+
+    def sleep_until(self, t_ns: int) -> None:
+        """See Bus."""
+        ...
+
+    def close(self) -> None:
+        """See Bus."""
+        ...
+
+
 class Failure(NamedTuple):
     """The error with which a transfer failed, as plain words; `str` is its sentence."""
 
@@ -61,13 +84,13 @@ class Transaction:
 
     Attributes
     ----------
-    op : read or write. register : address. data : bytes moved. t_ns : the bus's clock.
+    op : read or write. register : address, or of Files the name. data : bytes moved. t_ns : the bus's clock.
     error : None, or how the transfer failed (then data holds what was to be written).
     count : bytes asked for (reads) or given (writes). host_ns : of a reply, see Reply.
     """
 
     op: Literal["read", "write"]
-    register: int
+    register: Any
     count: int
     data: bytes
     t_ns: int

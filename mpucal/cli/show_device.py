@@ -11,7 +11,11 @@ import numpy as np
 def page(facts: Mapping[str, Any]) -> str:
     """The facts as a person reads them; see Opened.contents."""
     rows = _vehicle_rows(facts) if "parameters" in facts else _chip_rows(facts) if "who_am_i" in facts else dict(facts)
-    return "\n".join([f"{facts['where']}, as it is now.", "", *(f"  {key:<18}{value}" for key, value in rows.items())])
+    rows.pop("where", None)
+    wide = max(18, *(len(key) + 2 for key in rows))
+    return "\n".join(
+        [f"{facts['where']}, as it is now.", "", *(f"  {key:<{wide}}{value}" for key, value in rows.items())]
+    )
 
 
 def _vehicle_rows(facts: Mapping[str, Any]) -> dict[str, str]:

@@ -22,8 +22,8 @@ ENDS_S = 0.1
 USUAL_C = (-10.0, 70.0)
 
 
-def examine_stream(recording: Recording, nominal_hz: float, seconds: float, family: Family) -> Iterator[Finding]:
-    """Rate, losses, noise and what rest shows, of so many `seconds` of samples."""
+def examine_stream(recording: Recording, nominal_hz: float, seconds: float, family: Family | None) -> Iterator[Finding]:
+    """Rate, losses, noise and what rest shows, of so many `seconds` of samples; None: its data sheet is not known."""
     yield _rate(recording, nominal_hz)
     yield _losses(recording, seconds)
     acc, gyr = recording.acc, np.degrees(recording.gyr)
@@ -36,16 +36,18 @@ def examine_stream(recording: Recording, nominal_hz: float, seconds: float, fami
     if acc_lives.any() and trembles(acc[:, acc_lives], hz):
         yield Finding("noise", Mark.UNKNOWN, "the board moved", "put it on a firm surface and try again")
         return
-    if acc_lives.any():
+    if acc_lives.any() and family is not None:
         ug = density(acc[:, acc_lives], hz) / STANDARD_GRAVITY_MPS2 * 1e6
         yield _noise("accelerometer noise", ug, family.accel_noise_ug, "ug_rthz", "µg/√Hz")
-    if gyr_lives.any():
+    if gyr_lives.any() and family is not None:
         noise_dps = density(gyr[:, gyr_lives], hz)
         yield _noise("gyroscope noise", noise_dps, family.gyro_noise_dps, "dps_rthz", "deg/s/√Hz")
     if acc_lives.all():
         yield _gravity(recording)
-    yield _zero_rate(gyr.mean(0).tolist(), family.zero_rate_dps)
-    yield _temperature(float(recording.temperature_c.mean()))
+    if family is not None:
+        yield _zero_rate(gyr.mean(0).tolist(), family.zero_rate_dps)
+    if np.isfinite(recording.temperature_c).any():
+        yield _temperature(float(np.nanmean(recording.temperature_c)))
 
 
 def _rate(recording: Recording, nominal_hz: float) -> Finding:

@@ -6,7 +6,8 @@ to a temporary file meanwhile, 14 bytes a sample. Of the looks 16 bytes each sta
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -20,6 +21,7 @@ from ..chip.fifo import Run
 from ..chip.records import FORGET, UTC, SessionEvent
 from ..data import Recording, Samples
 from ..errors import RecordingError
+from ..iio.decode import decode as decode_iio
 from .mcap import CaptureReader
 from .rows import ROWS, Rows
 
@@ -32,7 +34,7 @@ def load_capture(*paths: Path) -> Recording:
     CaptureError, RecordingError, ChipError : see load.
     """
     session = _Accesses(paths)
-    recording = decode(session, session.name)
+    recording = (decode_iio if _of_kernel(paths) else decode)(session, session.name)
     for first, last in sorted(session.forgotten.items(), reverse=True):
         recording = recording.without(first, last)
     return replace(recording, recovered=session.recovered, utc_ns=session.utc_ns)
@@ -45,6 +47,8 @@ def capture_rows(*paths: Path) -> Rows:
     ------
     CaptureError, RecordingError, ChipError : see load.
     """
+    if _of_kernel(paths):
+        return Rows.of(load_capture(*paths))
     session = _Accesses(paths)
     decoder, spool = Decoder(session.name), Spool()
     for access in session:
@@ -72,7 +76,7 @@ class _Accesses:
         self.recovered: str | None = None
         self.utc_ns: int | None = None
 
-    def __iter__(self) -> Iterator[Transaction]:
+    def __iter__(self) -> Generator[Transaction]:
         for reader in map(CaptureReader, self._paths):
             for record in reader:
                 if not isinstance(record, SessionEvent):
@@ -82,6 +86,13 @@ class _Accesses:
                 elif record.name == FORGET:
                     self.forgotten[int(record.data["first"])] = int(record.data["last"])
             self.recovered = reader.recovered or self.recovered
+
+
+def _of_kernel(paths: Sequence[Path]) -> bool:
+    """Whether a driver of the kernel was read, whose samples have their times at once."""
+    with closing(iter(_Accesses(paths))) as accesses:
+        first = next(accesses, None)
+    return first is not None and isinstance(first.register, str)
 
 
 @dataclass

@@ -17,7 +17,12 @@ _BUS = {
     "type": "object",
     "properties": {
         "op": {"enum": ["read", "write"]},
-        "register": {"type": "integer", "minimum": 0, "maximum": 255},
+        "register": {
+            "type": ["integer", "string"],
+            "minimum": 0,
+            "maximum": 255,
+            "description": "of a chip; or the file of a driver of the kernel, such as iio:device0/in_accel_scale",
+        },
         "count": {"type": "integer", "description": "bytes asked for or given"},
         "data": {"type": "string", "description": "bytes moved, hexadecimal"},
         "host_ns": {

@@ -6,13 +6,16 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Self
 
-from ..chip.config import Config
+from ..chip.config import Config, RateAlone
 from ..chip.driver import DRIVER_VERSION
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import CaptureError
+from ..iio.driver import IIO_VERSION
 from .aims import NORMAL
 
 DRIVER, PLAN = "driver", "plan"
+# by the version of the driver of a capture
+CONFIGS: Mapping[Any, type[Config]] = {DRIVER_VERSION: Config, IIO_VERSION: RateAlone}
 
 
 @dataclass(frozen=True)
@@ -49,14 +52,14 @@ class Plan:
         CaptureError : another driver made it, or its head does not say how.
         """
         version = meta.get(DRIVER)
-        if version != DRIVER_VERSION:
+        if version not in CONFIGS:
             raise CaptureError(
                 f"{name} was recorded by version {version} of the driver, and this is {DRIVER_VERSION}",
                 "use `mpucal calibrate` on it, which reads captures of every version",
             )
         try:
             plan = dict(meta[PLAN])
-            return cls(**{**plan, "config": Config(**plan["config"])})
+            return cls(**{**plan, "config": CONFIGS[version](**plan["config"])})
         except (KeyError, TypeError, ValueError) as error:
             raise CaptureError(
                 f"the head of {name} does not say how it was made ({error})", "use `mpucal calibrate` on it"

@@ -18,7 +18,7 @@ from ..files.mcap import CaptureWriter
 from ..result.session_files import CAPTURE
 from ..session.events import Prompt
 from ..session.plan import Plan
-from ..session.ports import Replayed, Talk
+from ..session.ports import Replayed, Source, Talk
 from .dated import Dated
 from .opened import Measuring, Say
 from .parts import PartsBus
@@ -62,6 +62,10 @@ class OpenedChip:
         with closing(self.bus):
             return {"where": self.where, **chip_contents(self.bus)}
 
+    def driver(self, bus: Any, name: str, say: Say) -> Source:
+        """What measures, over `bus`; see Driver."""
+        return Driver(bus, self.plan.config, name, say)
+
     def talk(self, person: Talk) -> Talk:
         """See Opened."""
         return person if self.replay is None else Replayed(person, self.replay.pending_events)
@@ -72,9 +76,7 @@ class OpenedChip:
         with closing(self.bus), CaptureWriter(capture) as writer:
             writer.start({"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.source_meta()})
             pending = None if self.replay is None else self.replay.pending_events
-            driver = Driver(
-                Tap(self.bus, Dated(writer, pending)), self.plan.config, capture.name, lambda text: say(f"  {text}.")
-            )
+            driver = self.driver(Tap(self.bus, Dated(writer, pending)), capture.name, lambda text: say(f"  {text}."))
             if self.replay is None:
                 yield Measuring(driver, writer.event)
             else:

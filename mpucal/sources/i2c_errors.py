@@ -11,6 +11,7 @@ from pathlib import Path
 from ..errors import BusError, BusHeld, NoAnswer
 
 DEVICES = Path("/dev")
+HELD = Path("/sys/bus/i2c/devices")
 
 WIRES = "check VCC, GND, SDA and SCL, and that AD0 is tied to GND (0x68) or to VCC (0x69)"
 
@@ -63,6 +64,8 @@ def transfer_error(error: OSError, path: str, address: int) -> BusError:
         (f"a transfer failed ({error.strerror})", "check the wires, and start again"),
     )
     chip = f"{_number(path) or 'N'}-{address:04x}"
+    if error.errno == errno.EBUSY and (iio := _of_kernel(chip)):
+        remedy = f"give --iio {iio} in place of --bus; or {remedy}"
     return BusError(f"{what} (0x{address:02x} on {path})", remedy.format(chip=chip))
 
 
@@ -72,6 +75,11 @@ def nobody(path: str, addresses: tuple[int, ...]) -> NoAnswer:
     number = _number(path)
     who = f"; `i2cdetect -y {number}` shows who answers" if number else ""
     return NoAnswer(f"nothing answers at {places} on {path}", WIRES + who)
+
+
+def _of_kernel(chip: str) -> str:
+    """The IIO device that a driver of the kernel made of `chip`; empty where there is none."""
+    return next((path.name for path in sorted((HELD / chip).glob("iio:device*"))), "")
 
 
 def _number(path: str) -> str:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
-from ..chip.access import Bus, Reply
+from ..chip.access import Bus, Files, Reply
 from ..chip.records import ABORT, KEY, RESUMED, Record, SessionEvent
 from .replay import ReplayBus
 
@@ -20,7 +21,7 @@ class PartsBus:
     parts : in their order; only the last one may be something else than a replay.
     """
 
-    def __init__(self, parts: Sequence[Bus]) -> None:
+    def __init__(self, parts: Sequence[Bus | Files]) -> None:
         self._parts = list(parts)
         self._at = 0
 
@@ -36,11 +37,11 @@ class PartsBus:
         self._at += 1
         return True
 
-    def read(self, register: int, count: int) -> Reply:
+    def read(self, register: Any, count: int) -> Reply:
         """See Bus."""
         return self._part.read(register, count)
 
-    def write(self, register: int, data: bytes) -> int:
+    def write(self, register: Any, data: bytes) -> int:
         """See Bus."""
         return self._part.write(register, data)
 
@@ -63,7 +64,7 @@ class PartsBus:
         return last.unread() if isinstance(last, ReplayBus) else 0
 
     @property
-    def _part(self) -> Bus:
+    def _part(self) -> Bus | Files:
         return self._parts[self._at]
 
 
@@ -75,16 +76,16 @@ class LaterBus:
     bus : its first access happens a second after `last_ns`, unless its own clock shows more.
     """
 
-    def __init__(self, bus: Bus, last_ns: int) -> None:
+    def __init__(self, bus: Bus | Files, last_ns: int) -> None:
         self._bus, self._last_ns = bus, last_ns
         self._later_ns: int | None = None
 
-    def read(self, register: int, count: int) -> Reply:
+    def read(self, register: Any, count: int) -> Reply:
         """See Bus."""
         reply = self._bus.read(register, count)
         return reply._replace(t_ns=self._shown(reply.t_ns))
 
-    def write(self, register: int, data: bytes) -> int:
+    def write(self, register: Any, data: bytes) -> int:
         """See Bus."""
         return self._shown(self._bus.write(register, data))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from ..chip.access import Reply, Transaction
 from ..chip.records import Record, SessionEvent
@@ -36,12 +37,12 @@ class ReplayBus:
         self._next = 0
         self._pending = list(self._events[0])
 
-    def read(self, register: int, count: int) -> Reply:
+    def read(self, register: Any, count: int) -> Reply:
         """See Bus."""
         recorded = self._recorded(Transaction("read", register, count, b"", 0))
         return Reply(recorded.data, recorded.t_ns, recorded.host_ns)
 
-    def write(self, register: int, data: bytes) -> int:
+    def write(self, register: Any, data: bytes) -> int:
         """See Bus."""
         return self._recorded(Transaction("write", register, len(data), data, 0)).t_ns
 
@@ -84,5 +85,9 @@ class ReplayBus:
 def _words(access: Transaction) -> str:
     """An access as words; two accesses are the same where these are."""
     if access.op == "read":
-        return f"a read of {access.count} bytes from 0x{access.register:02x}"
-    return f"a write of {access.data.hex(' ') or 'nothing'} to 0x{access.register:02x}"
+        return f"a read of {access.count} bytes from {_place(access)}"
+    return f"a write of {access.data.hex(' ') or 'nothing'} to {_place(access)}"
+
+
+def _place(access: Transaction) -> str:
+    return access.register if isinstance(access.register, str) else f"0x{access.register:02x}"

@@ -7,8 +7,10 @@ from pathlib import Path
 
 from ..files.folder import captures_in
 from ..files.mcap import read_capture
-from ..session.plan import Plan
+from ..iio.driver import IIO_VERSION
+from ..session.plan import DRIVER, Plan
 from .chip import OpenedChip
+from .iio import of_iio
 from .kind import Request
 from .opened import Opened
 from .opening import refuse_fixed
@@ -45,10 +47,6 @@ def _open_mcap(file: Path) -> OpenedChip:
     name = captures[0].name
     bus = PartsBus([ReplayBus(part, name) for part in parts_of(capture.records for capture in captures)])
     recovered = [capture.recovered for capture in captures if capture.recovered]
-    return OpenedChip(
-        bus,
-        Plan.of_capture(captures[0].meta, name),
-        replay=bus,
-        recovered=recovered[-1] if recovered else None,
-        real_time=False,
-    )
+    plan = Plan.of_capture(captures[0].meta, name)
+    opened = OpenedChip(bus, plan, replay=bus, recovered=recovered[-1] if recovered else None, real_time=False)
+    return of_iio(opened, captures[0]) if captures[0].meta[DRIVER] == IIO_VERSION else opened

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..chip.driver import Driver
 from ..chip.records import KEY, LATE
 from ..errors import UsageError
 from ..files.folder import captures_in
@@ -67,7 +66,7 @@ class ResumedChip:
         with closing(self.bus), CaptureWriter(capture) as writer:
             writer.start({"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.live.source_meta()})
             recorder = _Recorder(writer, Dated(writer), self.bus)
-            driver = Driver(Tap(self.bus, recorder), self.plan.config, capture.name, lambda text: say(f"  {text}."))
+            driver = self.live.driver(Tap(self.bus, recorder), capture.name, lambda text: say(f"  {text}."))
             yield Measuring(driver, recorder.event, self.bus.go_on, self._late)
 
     def _late(self, late: bool) -> bool:

@@ -47,11 +47,13 @@ def number(text: str) -> float:
 
 BUS = Option("bus", metavar="BUS", parse=bus_name)
 SPI = Option("spi", metavar="DEVICE")
+IIO = Option("iio", metavar="DEVICE")
 SERIAL = Option("serial", metavar="PORT[:BAUD]", bare="")
 MAVLINK = Option("mavlink", metavar="URL")
 REPLAY = Option("replay", metavar="FILE", parse=Path)
 
 ADDRESS = Option("address", "I2C address; by default 0x68, then 0x69.", "ADDRESS", whole_number(0, 0x7F))
+TRIGGER = Option("trigger", "Trigger of the buffer, by default its own; none polls instead.", "NAME")
 SEED = Option("seed", "Which simulated sensor and hand.", "N", whole_number(0))
 SYSTEM = Option("system", "Which vehicle, if several.", "N", whole_number(1, 255))
 SOURCE_SYSTEM = Option("source_system", "MAVLink id of mpucal itself; by default 254.", "N", whole_number(1, 255))
@@ -120,6 +122,28 @@ SOURCES = [
         delivers=Delivers.REGISTERS,
         settings=OF_A_CHIP,
         doctor="mpucal.doctor.sources:examine_spi_chip",
+    ),
+    SourceKind(
+        what="a sensor that a driver of the Linux kernel holds",
+        option=IIO,
+        forms="iio:deviceN, or accel=iio:deviceN,gyro=iio:deviceM",
+        opener="mpucal.sources.iio:open_source",
+        delivers=Delivers.SAMPLES,
+        options=(TRIGGER,),
+        settings=(RATE, ACCEL_RANGE, GYRO_RANGE),
+        doctor="mpucal.doctor.iio:examine_iio",
+    ),
+    SourceKind(
+        what="the same, simulated",
+        option=IIO,
+        word="sim",
+        forms="sim[:key=value,...] for the simulated chip behind a simulated driver",
+        opener="mpucal.simulated.iio:open_source",
+        delivers=Delivers.SAMPLES,
+        options=(TRIGGER, SEED),
+        settings=(RATE, ACCEL_RANGE, GYRO_RANGE),
+        title="simulated sensor of the kernel",
+        doctor="mpucal.doctor.iio:examine_iio",
     ),
     SourceKind(
         what="a vehicle over MAVLink",

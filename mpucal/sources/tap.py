@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ..chip.access import Bus, Failure, Reply, Transaction
+from typing import Any
+
+from ..chip.access import Bus, Failure, Files, Reply, Transaction
 from ..chip.records import Recorder
 from ..errors import BusError
 
@@ -13,12 +15,12 @@ class Tap:
     A failed access has no time of its own: it is recorded with the latest time that is known.
     """
 
-    def __init__(self, bus: Bus, recorder: Recorder) -> None:
+    def __init__(self, bus: Bus | Files, recorder: Recorder) -> None:
         self._bus = bus
         self._recorder = recorder
         self._latest_ns = 0
 
-    def read(self, register: int, count: int) -> Reply:
+    def read(self, register: Any, count: int) -> Reply:
         """See Bus."""
         try:
             reply = self._bus.read(register, count)
@@ -29,7 +31,7 @@ class Tap:
         self._recorder.transaction(Transaction("read", register, count, reply.data, reply.t_ns, host_ns=reply.host_ns))
         return reply
 
-    def write(self, register: int, data: bytes) -> int:
+    def write(self, register: Any, data: bytes) -> int:
         """See Bus."""
         try:
             t_ns = self._bus.write(register, data)

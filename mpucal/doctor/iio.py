@@ -1,0 +1,73 @@
+"""A sensor that a driver of the kernel holds: what the driver says of it, and what its samples show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+
+from ..chip.families import PARTS
+from ..errors import SourceError
+from ..iio.attributes import ACCEL, GYRO
+from ..iio.decode import ENABLE
+from ..iio.driver import IioDriver
+from ..iio.setup import POLLED, TRIGGER
+from ..sources.iio import OpenedIio
+from .finding import Finding, Mark, failed
+from .measure import examine_stream
+
+# until a buffer runs steadily, and the board is put down
+SETTLED_S = 3.0
+NO_BUFFER = "connect the chip's INT wire and name it in the device tree; without, the channels are polled"
+
+
+def examine_iio(source: OpenedIio, seconds: float) -> Iterator[Finding]:
+    """The attributes of one or two devices, then `seconds` of their samples; the board is to lie still."""
+    driver = source.driver(source.bus, "doctor", lambda _sentence: None)
+    with closing(source.bus):
+        try:
+            sensor = driver.start()
+        except SourceError as error:
+            yield failed("kernel driver", error)
+            return
+        for device in source.devices.each:
+            yield from _device(device, driver.texts(device), source.trigger)
+        ranges = f"±{sensor.accel_range_g or 0:g} g, ±{sensor.gyro_range_dps or 0:g} deg/s"
+        yield Finding("ranges", Mark.OK, ranges if sensor.accel_range_g else "unknown: nobody says a count's bits")
+        try:
+            _watch(driver, SETTLED_S)
+            driver.forget()
+            _watch(driver, seconds)
+        except SourceError as error:
+            yield failed("stream", error)
+            return
+        finally:
+            driver.stop()
+    recording = driver.recording()
+    rate_hz = sensor.rate_hz or source.plan.config.rate_hz
+    if len(recording) > rate_hz / 2:
+        part = PARTS.get(sensor.who_am_i or 0)
+        # what is polled has no rate of its own
+        nominal_hz = rate_hz if driver.buffered else recording.rate_hz
+        yield from examine_stream(recording, nominal_hz, seconds, None if part is None else part.family)
+    else:
+        what = f"{len(recording)} samples in {seconds:g} s"
+        yield Finding("stream", Mark.BAD, what, "see what `dmesg` says of the driver and its interrupts")
+
+
+def _watch(driver: IioDriver, seconds: float) -> None:
+    end_ns = driver.now_ns() + round(seconds * 1e9)
+    while driver.now_ns() < end_ns:
+        driver.poll()
+
+
+def _device(device: str, texts: dict[str, str], trigger: str | None) -> Iterator[Finding]:
+    matrix = next((texts[name] for name in texts if name.endswith("mount_matrix")), None)
+    scales = ", ".join(f"{kind}_scale {texts[f'{kind}_scale']}" for kind in (ACCEL, GYRO) if f"{kind}_scale" in texts)
+    what = f"{texts.get('name', 'unnamed')}; {scales}; mount matrix {matrix or 'not given'}"
+    yield Finding(device, Mark.OK, what, "", {name: text for name, text in texts.items() if name})
+    if trigger == POLLED:
+        return
+    if ENABLE in texts:
+        yield Finding("buffer", Mark.OK, f"of {device}, filled by {texts.get(TRIGGER) or 'the sensor'}")
+    else:
+        yield Finding("buffer", Mark.NOTE, f"{device} has none", NO_BUFFER)

@@ -1,0 +1,63 @@
+"""Streams whose samples fall at times of their own, brought to the times of the first one by linear interpolation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data import Vector
+
+Times = NDArray[np.int64]
+
+
+class Aligned:
+    """Takes each stream's samples as they come, and gives the rows that are complete.
+
+    What comes out depends on the samples alone, and not on how many came at once.
+
+    Parameters
+    ----------
+    widths : how many columns each stream has.
+    """
+
+    def __init__(self, widths: Sequence[int]) -> None:
+        self._t = [np.zeros(0, np.int64) for _ in widths]
+        self._values = [np.zeros((0, width)) for width in widths]
+        self._last = [np.iinfo(np.int64).min] * len(widths)
+
+    def add(self, stream: int, t_ns: Times, values: Vector) -> None:
+        """Samples (n, width) of a stream at `t_ns` (n,); one that is not later than those before it is left out."""
+        latest = np.maximum.accumulate(np.concatenate(([self._last[stream]], t_ns)))
+        later = t_ns > latest[:-1]
+        self._last[stream] = int(latest[-1])
+        self._t[stream] = np.concatenate((self._t[stream], t_ns[later]))
+        self._values[stream] = np.concatenate((self._values[stream], values[later]))
+
+    def take(self) -> tuple[Times, Vector]:
+        """Times (n,) of the first stream and all streams' columns there, each once, where all streams have some."""
+        t_ns, values = self._t[0], self._values[0]
+        others = list(zip(self._t[1:], self._values[1:], strict=True))
+        if not all(len(t) for t, _ in others):
+            return t_ns[:0], np.zeros((0, sum(value.shape[1] for value in self._values)))
+        due = len(t_ns) if not others else int(np.searchsorted(t_ns, min(t[-1] for t, _ in others), "right"))
+        first = 0 if not others else int(np.searchsorted(t_ns, max(t[0] for t, _ in others)))
+        asked = t_ns[first:due]
+        parts = [values[first:due]]
+        for i, (t, held) in enumerate(others, 1):
+            parts.append(_at(asked, t, held))
+            if due:
+                # the last one at or before what was asked brackets what comes next
+                kept = max(int(np.searchsorted(t, t_ns[due - 1], "right")) - 1, 0)
+                self._t[i], self._values[i] = t[kept:], held[kept:]
+        self._t[0], self._values[0] = t_ns[max(due, first) :], values[max(due, first) :]
+        return asked, np.concatenate(parts, axis=1)
+
+
+def _at(asked: Times, t: Times, values: Vector) -> Vector:
+    """(n, width) `values` (m, width) of the times `t` (m,), at `asked` (n,) between them."""
+    if len(asked) == 0:
+        return np.zeros((0, values.shape[1]))
+    x, known = (asked - t[0]).astype(np.float64), (t - t[0]).astype(np.float64)
+    return np.stack([np.interp(x, known, column) for column in values.T], axis=1)

@@ -1,0 +1,125 @@
+"""Frames of an IIO buffer: which channels they hold, and how each is stored.
+
+Source: Linux Documentation/ABI/testing/sysfs-bus-iio (scan_elements: index, type); drivers/iio/industrialio-buffer.c,
+iio_compute_scan_bytes: each element is aligned to its own size, a frame to its largest.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ChipError
+
+TYPE = re.compile(r"(be|le):([su])(\d+)/(8|16|32|64)(?:X(\d+))?>>(\d+)")
+
+
+@dataclass(frozen=True)
+class Element:
+    """One channel of a frame.
+
+    Attributes
+    ----------
+    name : in_accel_x. index : its place among the others. order : < or >, as NumPy has it.
+    signed, bits, shift : the value is `bits` wide, `shift` bits above the lowest of what is stored.
+    stored_bytes : of one value. repeat : how many values follow each other.
+    """
+
+    name: str
+    index: int
+    order: str
+    signed: bool
+    bits: int
+    stored_bytes: int
+    shift: int
+    repeat: int = 1
+
+    @classmethod
+    def parse(cls, name: str, index: str, text: str) -> Self:
+        """Of the texts of its attributes `index` and `type`, such as le:s16/16>>0.
+
+        Raises
+        ------
+        ChipError : no such text.
+        """
+        found = TYPE.fullmatch(text.strip())
+        if found is None or not index.strip().isdecimal():
+            raise ChipError(
+                f"the driver says {text.strip()!r} of how {name} is stored", "report it with the kernel's version"
+            )
+        order, sign, bits, stored, repeat, shift = found.groups()
+        return cls(
+            name,
+            int(index),
+            "<" if order == "le" else ">",
+            sign == "s",
+            int(bits),
+            int(stored) // 8,
+            int(shift),
+            int(repeat or 1),
+        )
+
+    @property
+    def bytes(self) -> int:
+        """How long it is; it lies at a multiple of this."""
+        return self.stored_bytes * self.repeat
+
+    def values(self, stored: NDArray[np.unsignedinteger]) -> NDArray[np.int64]:
+        """(n,) of what is stored; of several values that follow each other the first."""
+        one = stored.astype(np.uint64) if self.repeat == 1 else stored[:, 0].astype(np.uint64)
+        held = (one >> np.uint64(self.shift)) & np.uint64((1 << self.bits) - 1)
+        if not self.signed:
+            return held.astype(np.int64)
+        up = np.uint64(64 - self.bits)
+        return np.asarray((held << up).view(np.int64) >> np.int64(up))
+
+
+class Layout:
+    """Where the elements of a frame lie."""
+
+    def __init__(self, elements: Iterable[Element]) -> None:
+        self.elements = sorted(elements, key=lambda element: element.index)
+        at, places = 0, []
+        for element in self.elements:
+            at += -at % element.bytes
+            places.append(at)
+            at += element.bytes
+        self.frame_bytes = at + -at % max(element.bytes for element in self.elements)
+        self._dtype = np.dtype(
+            {
+                "names": [element.name for element in self.elements],
+                "formats": [
+                    (f"{e.order}u{e.stored_bytes}", (e.repeat,)) if e.repeat > 1 else f"{e.order}u{e.stored_bytes}"
+                    for e in self.elements
+                ],
+                "offsets": places,
+                "itemsize": self.frame_bytes,
+            }
+        )
+
+    def columns(self, data: bytes) -> Mapping[str, NDArray[np.int64]]:
+        """(n,) counts of each channel, of n whole frames.
+
+        Raises
+        ------
+        ChipError : the bytes are no whole number of frames.
+        """
+        if len(data) % self.frame_bytes:
+            raise ChipError(
+                f"the kernel's buffer gave {len(data)} bytes, and a frame has {self.frame_bytes}",
+                "report it with the kernel's version",
+            )
+        frames = np.frombuffer(data, self._dtype)
+        return {element.name: element.values(frames[element.name]) for element in self.elements}
+
+    def packed(self, columns: Mapping[str, NDArray[np.int64]]) -> bytes:
+        """The frames of whole counts (n,) of each channel, of which none is shifted or repeated."""
+        frames = np.zeros(len(next(iter(columns.values()))), self._dtype)
+        for element in self.elements:
+            frames[element.name] = np.asarray(columns[element.name]).astype(np.int64).astype(f"u{element.stored_bytes}")
+        return frames.tobytes()

@@ -1,0 +1,217 @@
+"""An IIO device made to measure: what it has read, what is wanted written, and all put back afterwards."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+
+from ..chip.access import Files, Transaction
+from ..chip.config import Config
+from ..errors import BusError, ChipError
+from .attributes import ACCEL, AXES, GYRO, KINDS, TEMP, TIMESTAMP, available, full_scale
+from .decode import ENABLE, FREQUENCY, IioDecoder
+
+TEXT_BYTES, LIST_BYTES, FIRST_BYTES = 4096, 65536, 65536
+TRIGGER, CLOCK, LENGTH, WATERMARK = (
+    "trigger/current_trigger",
+    "current_timestamp_clock",
+    "buffer/length",
+    "buffer/watermark",
+)
+TRIGGERS = "triggers"
+# of --trigger: no buffer at all
+POLLED = "none"
+HELD_S = 2.0
+READ = (
+    "name",
+    "mount_matrix",
+    "_matrix",
+    "_scale",
+    "_offset",
+    "_calibbias",
+    FREQUENCY,
+    "_available",
+    "_type",
+    "_index",
+    "_en",
+)
+WITHIN = 1.01
+
+
+class Attributes:
+    """The files of one device, each access followed by `decoder`.
+
+    Attributes
+    ----------
+    names : of all its attributes. now_ns : the clock as last seen.
+    """
+
+    def __init__(self, files: Files, decoder: IioDecoder, device: str) -> None:
+        self._files, self._decoder, self.device = files, decoder, device
+        self._old: list[tuple[str, str]] = []
+        self.names: frozenset[str] = frozenset()
+        self.now_ns = 0
+
+    def look(self, kinds: Sequence[str]) -> None:
+        """Read what it has of `kinds`, ACCEL and GYRO.
+
+        Raises
+        ------
+        BusError : it is not there. ChipError : it has no such sensor.
+        """
+        self.names = frozenset(self.read("", LIST_BYTES).split("\n"))
+        for kind in kinds:
+            if not {f"{kind}_{axis}_raw" for axis in AXES} <= self.names:
+                raise ChipError(
+                    f"{self.device} has no {KINDS[kind]}",
+                    "give the devices of both: --iio accel=iio:deviceN,gyro=iio:deviceM"
+                    " (`mpucal doctor --iio iio:device0` names them)",
+                )
+        foreign = tuple(f"{kind}_" for kind in (ACCEL, GYRO) if kind not in kinds)
+        for name in sorted(self.names):
+            if name.endswith(READ) and not name.startswith(foreign):
+                self.read(name)
+
+    def read(self, name: str, count: int = TEXT_BYTES) -> str:
+        """The text of an attribute; "": the list of their names."""
+        return self._bytes(f"{self.device}/{name}", count).decode(errors="replace").strip()
+
+    def frames(self, count: int) -> int:
+        """Read what the buffer holds, up to `count` bytes, and say how many that were."""
+        return len(self._bytes(self.device, count))
+
+    def triggers(self) -> list[str]:
+        """The names of all there are."""
+        reply = self._files.read(TRIGGERS, LIST_BYTES)
+        self.now_ns = max(self.now_ns, reply.t_ns)
+        return reply.data.decode(errors="replace").split()
+
+    def set(self, name: str, text: str) -> str:
+        """Write an attribute that holds something else, and give what it holds then."""
+        held = self.read(name)
+        if held == text or _equal(held, text):
+            return held
+        self._write(name, text)
+        self._old.append((name, held))
+        return self.read(name)
+
+    def put_back(self) -> None:
+        """Write what was there before, the last one first; BusError where that fails."""
+        while self._old:
+            self._write(*self._old.pop())
+
+    def _write(self, name: str, text: str) -> None:
+        place, data = f"{self.device}/{name}", text.encode()
+        t_ns = self._files.write(place, data)
+        self.now_ns = max(self.now_ns, t_ns)
+        self._decoder.saw(Transaction("write", place, len(data), data, t_ns))
+
+    def _bytes(self, place: str, count: int) -> bytes:
+        reply = self._files.read(place, count)
+        self.now_ns = max(self.now_ns, reply.t_ns)
+        self._decoder.saw(Transaction("read", place, count, reply.data, reply.t_ns))
+        return reply.data
+
+
+def set_up(
+    attributes: Attributes, kinds: Sequence[str], config: Config, decoder: IioDecoder, trigger: str | None
+) -> bool:
+    """Rate, ranges, and a buffer that runs where it has one; whether it does.
+
+    Raises
+    ------
+    BusError : an attribute cannot be written, or somebody else reads the buffer. ChipError : no trigger.
+    """
+    names = attributes.names
+    buffered = ENABLE in names and trigger != POLLED
+    if buffered and attributes.read(ENABLE) == "1":
+        raise BusError(
+            f"another program reads the buffer of {attributes.device}",
+            f"stop it (`sudo fuser -v /dev/{attributes.device}` names it), or if none is left:"
+            f" echo 0 | sudo tee /sys/bus/iio/devices/{attributes.device}/{ENABLE}",
+        )
+    if not buffered:
+        # to poll needs no permission to write: then what was set before holds
+        with suppress(BusError):
+            _set_scales(attributes, kinds, config, decoder)
+            _set_rate(attributes, kinds, config)
+        return False
+    _set_scales(attributes, kinds, config, decoder)
+    _set_rate(attributes, kinds, config)
+    if TRIGGER in names:
+        _choose_trigger(attributes, trigger)
+    if CLOCK in names:
+        attributes.set(CLOCK, "monotonic")
+    _enable_channels(attributes, kinds)
+    rate_hz = decoder.rate_hz(attributes.device) or config.rate_hz
+    attributes.set(LENGTH, str(round(HELD_S * rate_hz)))
+    if WATERMARK in names:
+        attributes.set(WATERMARK, str(max(1, round(config.period_s * rate_hz))))
+    attributes.set(ENABLE, "1")
+    # who else has it open is told of now
+    attributes.frames(FIRST_BYTES)
+    return True
+
+
+def _set_rate(attributes: Attributes, kinds: Sequence[str], config: Config) -> None:
+    """The slowest that is as fast as wanted, else the fastest."""
+    for name in (FREQUENCY, *(f"{kind}_{FREQUENCY}" for kind in kinds)):
+        if name in attributes.names:
+            offered = available(attributes.read(f"{name}_available")) if f"{name}_available" in attributes.names else []
+            wanted = min((hz for hz in offered if hz >= config.rate_hz), default=max(offered, default=config.rate_hz))
+            attributes.set(name, f"{wanted:g}")
+
+
+def _set_scales(attributes: Attributes, kinds: Sequence[str], config: Config, decoder: IioDecoder) -> None:
+    """The smallest range that is as large as wanted, of a sensor that has several."""
+    wanted = {ACCEL: config.accel_range_g, GYRO: config.gyro_range_dps}
+    for kind in kinds:
+        name, bits = f"{kind}_scale", decoder.bits(attributes.device, kind)
+        if bits is None or not {name, f"{name}_available"} <= attributes.names:
+            continue
+        texts = attributes.read(f"{name}_available").split()
+        ranges = {text: full_scale(kind, scale, bits) for text in texts for scale in available(text)}
+        enough = {text: value for text, value in ranges.items() if value * WITHIN >= wanted[kind]}
+        if ranges:
+            attributes.set(name, min(enough, key=enough.__getitem__) if enough else max(ranges, key=ranges.__getitem__))
+
+
+def _choose_trigger(attributes: Attributes, trigger: str | None) -> None:
+    """The one that was named, or that is set, or the device's own."""
+    held = attributes.read(TRIGGER)
+    if trigger is None and held:
+        return
+    there = attributes.triggers()
+    own = f"{attributes.read('name')}-dev{attributes.device.removeprefix('iio:device')}"
+    wanted = trigger or (own if own in there else "")
+    if wanted not in there:
+        named = f"no trigger {wanted}" if wanted else f"no trigger for the buffer of {attributes.device}"
+        listed = f"there are {', '.join(there)}" if there else "there is none: load iio-trig-hrtimer and make one"
+        raise ChipError(f"there is {named}", f"give --trigger NAME ({listed}), or --trigger {POLLED}, which polls")
+    attributes.set(TRIGGER, wanted)
+
+
+def _enable_channels(attributes: Attributes, kinds: Sequence[str]) -> None:
+    """Those that are wanted, and no others.
+
+    Raises
+    ------
+    ChipError : the buffer has no time stamps.
+    """
+    wanted = {f"scan_elements/{kind}_{axis}_en" for kind in kinds for axis in AXES}
+    stamp = f"scan_elements/{TIMESTAMP}_en"
+    if not wanted | {stamp} <= attributes.names:
+        raise ChipError(
+            f"the buffer of {attributes.device} has no time stamps", f"give --trigger {POLLED}, which polls"
+        )
+    wanted |= {stamp, f"scan_elements/{TEMP}_en"}
+    for name in sorted(attributes.names):
+        if name.startswith("scan_elements/") and name.endswith("_en"):
+            attributes.set(name, "1" if name in wanted else "0")
+
+
+def _equal(one: str, other: str) -> bool:
+    try:
+        return float(one) == float(other)
+    except ValueError:
+        return False

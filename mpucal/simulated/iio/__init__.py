@@ -1,0 +1,30 @@
+"""The simulated chip behind a simulated driver of the kernel: what `--iio sim` opens."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...iio.devices import Devices
+from ...sources.iio import OpenedIio
+from ...sources.kind import Request
+from ..chip import open_simulated
+from .files import SimulatedFiles
+
+__all__ = ["SimulatedFiles", "open_source"]
+DEVICE = "iio:device0"
+
+
+def open_source(request: Request) -> OpenedIio:
+    """The chip that `sim:key=value,...` describes, in the gravity of the plan; see open_simulated."""
+    bus = open_simulated(request.value, request.plan.gravity, request.values.get("seed"))
+    files: Any = SimulatedFiles(bus)
+    return OpenedIio(
+        files,
+        request.plan,
+        (bus.hear,),
+        bus.truth_document(),
+        words=request.words,
+        real_time=bus.real_time,
+        devices=Devices(DEVICE, DEVICE),
+        trigger=request.values.get("trigger"),
+    )

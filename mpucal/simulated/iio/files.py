@@ -1,0 +1,224 @@
+"""The files of a simulated IIO device: attributes as texts, and a buffer that the simulated chip fills.
+
+mpucal's own driver plays the kernel's: it reads the chip, and its samples become frames as inv_mpu6050 has them.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...chip import registers as reg
+from ...chip.access import Files, Reply
+from ...chip.config import Config
+from ...chip.decode import Decoder
+from ...chip.driver import Driver
+from ...chip.families import PARTS, Part
+from ...chip.offsets import Block
+from ...chip.port import Port
+from ...chip.probe import read_identity
+from ...chip.registers import ACCEL_LSB_PER_G, ACCEL_RANGES_G, GYRO_LSB_PER_DPS, GYRO_RANGES_DPS
+from ...data import STANDARD_GRAVITY_MPS2, Samples
+from ...iio.attributes import ACCEL, AXES, GYRO, TEMP, TIMESTAMP
+from ...iio.elements import Element, Layout
+from ...iio.setup import TRIGGERS
+from ...sources.iio_errors import attribute_error, buffer_error
+from ..chip import SimulatedBus
+
+RATES_HZ = (10, 20, 50, 100, 200, 500)
+SCALES = {
+    ACCEL: [STANDARD_GRAVITY_MPS2 / lsb for lsb in ACCEL_LSB_PER_G],
+    GYRO: [float(np.radians(1 / lsb)) for lsb in GYRO_LSB_PER_DPS],
+}
+RANGES = {ACCEL: ACCEL_RANGES_G, GYRO: GYRO_RANGES_DPS}
+SETTINGS = ("buffer/enable", "sampling_frequency", *(f"{kind}_scale" for kind in SCALES))
+CHANNELS = [f"{kind}_{axis}" for kind in (ACCEL, GYRO) for axis in AXES]
+REGISTERS = {channel: reg.ACCEL_XOUT_H + 2 * i for i, channel in enumerate([*CHANNELS[:3], TEMP, *CHANNELS[3:]])}
+IDENTITY = "1, 0, 0; 0, 1, 0; 0, 0, 1"
+
+
+class SimulatedFiles(Files):
+    """One device with both sensors, or two with one each.
+
+    Parameters
+    ----------
+    bus : to the chip. apart : two devices, the accelerometer's first. buffered : whether there are buffers.
+    """
+
+    def __init__(self, bus: SimulatedBus, *, apart: bool = False, buffered: bool = True) -> None:
+        self._bus = bus
+        self._port = Port(bus, Decoder("the simulated kernel"))
+        part = PARTS[read_identity(self._port)]
+        self._place = part.family.accel_offset_h
+        kinds = [[ACCEL], [GYRO]] if apart else [[ACCEL, GYRO]]
+        self._devices = {f"iio:device{i}": _Device(each, part, buffered) for i, each in enumerate(kinds)}
+        self._driver: Driver | None = None
+        self._now_ns = 0
+
+    def read(self, register: str, count: int) -> Reply:
+        """See Files."""
+        if register == TRIGGERS:
+            return Reply(b"hrtimer-0", self._now_ns)
+        device, _, name = register.partition("/")
+        held = self._found(device, name)
+        if register.endswith("/"):
+            return Reply("\n".join(sorted(held.texts)).encode(), self._now_ns)
+        if not name:
+            if not held.running:
+                raise buffer_error(_error(errno.EINVAL), device)
+            take = count - count % held.layout.frame_bytes
+            data, held.frames = bytes(held.frames[:take]), held.frames[take:]
+            return Reply(data, self._now_ns)
+        if name.endswith("_raw"):
+            return Reply(f"{self._polled(name.removesuffix('_raw'))}\n".encode(), self._now_ns)
+        if name.endswith("_calibbias"):
+            return Reply(f"{self._words()[AXES.index(name[-len('_calibbias') - 1])]}\n".encode(), self._now_ns)
+        return Reply(f"{held.texts[name]}\n".encode(), self._now_ns)
+
+    def write(self, register: str, data: bytes) -> int:
+        """See Files."""
+        device, _, name = register.partition("/")
+        held, text = self._found(device, name), data.decode()
+        if held.running and name != "buffer/enable":
+            raise attribute_error(_error(errno.EBUSY), device, name, text)
+        if name.endswith("_calibbias"):
+            words = list(self._words())
+            words[AXES.index(name[-len("_calibbias") - 1])] = int(text)
+            Block.read(self._port, self._place).with_words(words).write(self._port)
+            return self._now_ns
+        held.texts[name] = text
+        if name in SETTINGS:
+            self._driver = None
+        if name == "buffer/enable":
+            held.begin()
+        return self._now_ns
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Wait, while the chip fills the buffers."""
+        while self._running and self._now_ns < t_ns:
+            self._pump()
+        self._bus.sleep_until(t_ns)
+        self._now_ns = max(self._now_ns, t_ns)
+
+    def close(self) -> None:
+        """See Files."""
+        self._bus.close()
+
+    @property
+    def _running(self) -> bool:
+        return any(device.running for device in self._devices.values())
+
+    def _found(self, device: str, name: str) -> _Device:
+        held = self._devices.get(device)
+        if held is None or (name and name not in held.texts):
+            raise attribute_error(_error(errno.ENOENT), device, name, None)
+        return held
+
+    def _pump(self) -> Samples:
+        """What the chip measured since the last time, into the buffers."""
+        driver = self._started()
+        samples = driver.poll()
+        self._now_ns = max(self._now_ns, driver.now_ns())
+        for device in self._devices.values():
+            device.fill(samples)
+        return samples
+
+    def _started(self) -> Driver:
+        """What plays the kernel's driver, with the attributes' settings."""
+        if self._driver is None:
+            first = next(iter(self._devices.values()))
+            ranges = {kind: device.range(kind) for device in self._devices.values() for kind in device.kinds}
+            config = Config(ranges[ACCEL], ranges[GYRO], float(first.texts["sampling_frequency"]))
+            self._driver = Driver(self._bus, config, "the simulated kernel")
+            self._driver.start()
+        return self._driver
+
+    def _polled(self, channel: str) -> int:
+        """The count of one channel now."""
+        if self._running:
+            raise attribute_error(_error(errno.EBUSY), "iio:device0", f"{channel}_raw", None)
+        self._started()
+        reply = self._bus.read(REGISTERS[channel], 2)
+        self._now_ns = max(self._now_ns, reply.t_ns)
+        return int.from_bytes(reply.data, "big", signed=True)
+
+    def _words(self) -> tuple[int, int, int]:
+        return Block.read(self._port, self._place).words
+
+
+class _Device:
+    """The attributes of one device, and its buffer."""
+
+    def __init__(self, kinds: Sequence[str], part: Part, buffered: bool) -> None:
+        self.kinds = kinds
+        # as inv_mpu6050 has it: thousandths of a degree
+        self._temp_scale, self._temp_offset = 1000 / part.family.lsb_per_c, part.family.zero_c * part.family.lsb_per_c
+        self.frames = b""
+        self._last_ns = -1
+        self.texts = {"name": part.chip.replace("-", "").lower(), "in_mount_matrix": IDENTITY}
+        self.texts |= {"sampling_frequency": "50", "sampling_frequency_available": " ".join(map(str, RATES_HZ))}
+        for kind in kinds:
+            self.texts[f"{kind}_scale"] = f"{SCALES[kind][0]:.9f}"
+            self.texts[f"{kind}_scale_available"] = " ".join(f"{scale:.9f}" for scale in SCALES[kind])
+            self.texts |= {f"{kind}_{axis}_raw": "" for axis in AXES}
+        if ACCEL in kinds:
+            self.texts |= {f"{ACCEL}_{axis}_calibbias": "" for axis in AXES}
+            self.texts |= {f"{TEMP}_raw": "", f"{TEMP}_scale": f"{self._temp_scale:.6f}"}
+            self.texts |= {f"{TEMP}_offset": f"{self._temp_offset:.0f}"}
+        self._elements = {
+            channel: Element(channel, i, ">", True, 16, 2, 0)
+            for i, channel in enumerate(
+                [*(c for c in CHANNELS if c.startswith(tuple(kinds))), *([TEMP] if ACCEL in kinds else [])]
+            )
+        } | {TIMESTAMP: Element(TIMESTAMP, 9, "<", True, 64, 8, 0)}
+        if buffered:
+            for channel, element in self._elements.items():
+                stored = 8 * element.stored_bytes
+                order = "be" if element.order == ">" else "le"
+                self.texts[f"scan_elements/{channel}_type"] = f"{order}:s{element.bits}/{stored}>>{element.shift}"
+                self.texts[f"scan_elements/{channel}_index"] = str(element.index)
+                self.texts[f"scan_elements/{channel}_en"] = "0"
+            self.texts |= {"buffer/enable": "0", "buffer/length": "2", "buffer/watermark": "1"}
+            self.texts |= {"trigger/current_trigger": "hrtimer-0", "current_timestamp_clock": "realtime"}
+
+    @property
+    def running(self) -> bool:
+        """Whether the buffer is enabled."""
+        return self.texts.get("buffer/enable") == "1"
+
+    def range(self, kind: str) -> int:
+        """In g or deg/s."""
+        scale = float(self.texts[f"{kind}_scale"])
+        return RANGES[kind][int(np.argmin(np.abs(np.array(SCALES[kind]) - scale)))]
+
+    def begin(self) -> None:
+        """Empty the buffer, which has just been enabled or disabled."""
+        enabled = [e for e in self._elements.values() if self.texts.get(f"scan_elements/{e.name}_en") == "1"]
+        self.layout = Layout(enabled)
+        self.frames, self._last_ns = b"", -1
+
+    def columns(self, samples: Samples) -> dict[str, np.ndarray]:
+        """(n,) counts of each channel."""
+        warm = samples.temperature_c * 1000 / self._temp_scale - self._temp_offset
+        found = {TIMESTAMP: np.round(samples.t * 1e9).astype(np.int64), TEMP: np.round(warm)}
+        for kind, values in ((ACCEL, samples.acc), (GYRO, samples.gyr)):
+            if kind in self.kinds:
+                scale = SCALES[kind][RANGES[kind].index(self.range(kind))]
+                counts = np.round(values / scale)
+                found |= {f"{kind}_{axis}": counts[:, i] for i, axis in enumerate(AXES)}
+        return found
+
+    def fill(self, samples: Samples) -> None:
+        """Put samples into the buffer that runs; what it has no room for is lost."""
+        if not self.running or len(samples) == 0:
+            return
+        columns = self.columns(samples)
+        room = int(self.texts["buffer/length"]) - len(self.frames) // self.layout.frame_bytes
+        self.frames += self.layout.packed(columns)[: max(room, 0) * self.layout.frame_bytes]
+
+
+def _error(number: int) -> OSError:
+    return OSError(number, os.strerror(number))
