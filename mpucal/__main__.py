@@ -16,6 +16,8 @@ BUG = 1
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 # the commands whose capture is written as it happens
 RECORDING = ("session", "record")
+# errors are events then, too
+EVENTS = "--json-events"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -30,8 +32,10 @@ def run(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(arguments)
     except KeyboardInterrupt:
-        words = sys.argv[1:] if arguments is None else arguments
+        words = _words(arguments)
         kept = "; what was recorded until then is kept" if words and words[0] in RECORDING else ""
+        if EVENTS in words:
+            return _event(Abandoned.exit_code, f"interrupted{kept}", "")
         print(f"mpucal: interrupted{kept}.", file=sys.stderr)
         return Abandoned.exit_code
 
@@ -44,11 +48,15 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         return int(commands.main(args=arguments, prog_name="mpucal", standalone_mode=False) or 0)
     except click.ClickException as error:
-        error.show()
-        return error.exit_code
+        if EVENTS not in _words(arguments):
+            error.show()
+            return error.exit_code
+        return _event(error.exit_code, error.format_message(), "see `mpucal session --help`")
     except click.Abort:
         raise KeyboardInterrupt from None
     except MpucalError as error:
+        if EVENTS in _words(arguments):
+            return _event(error.exit_code, error.what, error.remedy)
         click.echo(f"mpucal: {error}", err=True)
         return error.exit_code
     except SystemExit:
@@ -56,19 +64,34 @@ def _run(arguments: Sequence[str] | None) -> int:
         return 0
     except OSError as error:
         if error.errno not in NO_ROOM:
-            return _bug()
+            return _bug(arguments)
         # Python would complain again while it flushes
         sys.stdout = None
         print(f"mpucal: the output cannot be written ({error.strerror}): make room where it goes.", file=sys.stderr)
         return OutputError.exit_code
     except Exception:
-        return _bug()
+        return _bug(arguments)
 
 
-def _bug() -> int:
+def _words(arguments: Sequence[str] | None) -> Sequence[str]:
+    return sys.argv[1:] if arguments is None else arguments
+
+
+def _event(exit_code: int, what: str, remedy: str) -> int:
+    """An error as one more event; its exit code."""
+    import json  # noqa: PLC0415
+
+    said = {"event": "error", "exit_code": exit_code, "what": what, "remedy": remedy}
+    print(json.dumps(said), file=sys.stderr)
+    return exit_code
+
+
+def _bug(arguments: Sequence[str] | None) -> int:
     import traceback  # noqa: PLC0415
 
     traceback.print_exc()
+    if EVENTS in _words(arguments):
+        return _event(BUG, "this is a bug in mpucal", "please report it with the lines above")
     print("mpucal: this is a bug in mpucal: please report it with the lines above.", file=sys.stderr)
     return BUG
 

@@ -25,6 +25,8 @@ EndOfCapture is no error: with it a source says that its recording has ended.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class MpucalError(Exception):
     """Root of the tree: what happened, on what, and what to do next.
@@ -43,7 +45,7 @@ class MpucalError(Exception):
         self.remedy = remedy
 
     def __str__(self) -> str:
-        return f"{self.what}: {self.remedy}."
+        return f"{self.what}: {self.remedy}{'' if self.remedy.endswith('?') else '.'}"
 
 
 class UsageError(MpucalError):
@@ -132,3 +134,11 @@ class WriteBackError(MpucalError):
 
 class EndOfCapture(Exception):  # noqa: N818 - no error, and of no exit code: the recording behind a source has ended
     """The source holds no more."""
+
+
+def meant(word: str, names: Iterable[str]) -> str:
+    """What a message ends with where one of `names` is nearly `word`: "; did you mean session?", else nothing."""
+    from difflib import get_close_matches  # noqa: PLC0415 - only who mistypes waits for it
+
+    near = get_close_matches(word, names, 1)
+    return f"; did you mean {near[0]}?" if near and near[0] != word else ""

@@ -89,6 +89,10 @@ def test_a_bus_that_fails_says_why_and_leaves_nothing(mpucal, tmp_path, monkeypa
         (["record", "--bus", "sim", "--seconds", "0"], "--seconds"),
         (["record"], "no source was given"),
         (["doctor", "--bus", ""], "no bus is named"),
+        (["sesion", "--bus", "sim"], "did you mean session?"),
+        (["session", "--bus", "simm"], "did you mean sim?"),
+        (["session", "--bus", "sim:hnd=guided"], "did you mean hand?"),
+        (["session", "--mavlink", "sim:hand=gided"], "did you mean guided?"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
@@ -145,7 +149,7 @@ def test_a_full_disk_is_3_and_keeps_what_was_recorded(mpucal, tmp_path, monkeypa
     monkeypatch.setattr(sink, "write_together", full)
     code, said = mpucal("session", "--replay", FIXTURE, "-o", "board")
     assert code == 3
-    assert "What was recorded is kept in board/capture.mcap; go on with --resume board." in said
+    assert "What was recorded is kept in board/capture.mcap.\n" in said
     assert "No space left on device" in said.splitlines()[-1]
     assert read_capture(tmp_path / "board" / "capture.mcap").recovered is None
 

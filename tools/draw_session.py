@@ -12,6 +12,7 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
+from mpucal.session.events import Abort
 from mpucal.session.table import TRANSITIONS, State
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "session.md"
@@ -29,7 +30,7 @@ def diagram() -> str:
             if following is not state:
                 events[following].append(event.__name__)
         lines += [f"{INDENT}{_id(state)} --> {_id(to)}: {', '.join(names)}" for to, names in events.items()]
-        if not row:
+        if Abort not in row:  # an end
             lines.append(f"{INDENT}{_id(state)} --> [*]")
     return "\n".join(lines) + "\n"
 

@@ -7,6 +7,7 @@ from importlib import import_module
 import click
 
 from .. import __version__
+from ..errors import meant
 
 # name: what --help says of it; the command stands in the module of that name
 COMMANDS = {
@@ -38,6 +39,14 @@ class Commands(click.Group):
             return None
         command: click.Command = import_module(f".{cmd_name}", __name__).command
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that is called; one that is nearly called is named."""
+        if nearly := meant(args[0], COMMANDS):
+            ctx.fail(f"there is no command {args[0]}{nearly}")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The names with what they do."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from ..errors import OutputError
 from ..result.clock import stamp
 from ..sources.opening import open_source
 from ..terminal.console import console
+from ..terminal.hangup import outliving
 from .options import check_source, fit_options, given, source_options
 from .running import running
 
@@ -35,10 +37,12 @@ def command(file: Path | None, seconds: float | None, **options: Any) -> None:
         raise OutputError(f"{file} does not end with {suffix}, by which other commands know a capture", f"add {suffix}")
     if file.exists():
         raise OutputError(f"{file} is there already", "choose another file with -o")
-    with running(source, file, console(quiet=False)) as runner:
-        try:
-            samples = runner.record(seconds)
-        finally:
-            if runner.sensor is None:  # it never answered: nothing may stand in the way of the next try
-                file.unlink(missing_ok=True)
-    click.echo(f"{file}: {samples} samples.")
+    person = console(quiet=False)
+    with outliving(lambda: file.with_suffix(".log"), partial(person.hung_up, stop=True)):
+        with running(source, file, person) as runner:
+            try:
+                samples = runner.record(seconds)
+            finally:
+                if runner.sensor is None:  # it never answered: nothing may stand in the way of the next try
+                    file.unlink(missing_ok=True)
+        click.echo(f"{file}: {samples} samples.")

@@ -11,9 +11,10 @@ from typing import Any
 import click
 
 from ..data import Recording
-from ..errors import RefusedError
+from ..errors import MpucalError, RefusedError
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
 from ..result.calibration import REFUSED, Calibration
+from ..result.session_files import LOG
 from ..session.folder import SessionFolder
 from ..sinks.choose import announced, chosen
 from ..sinks.kind import SinkKind
@@ -25,12 +26,15 @@ from ..sources.opening import check_resumed, open_source
 from ..sources.resumed import open_resumed
 from ..sources.table import kinds_meant, source_title
 from ..terminal.console import Console, console
+from ..terminal.hangup import outliving
 from .destination import device, session_sink_options
 from .options import aim_options, check_gyroscope, check_source, fit_options, given, source_options
 from .person import ask, ask_in_doubt
 from .running import running
 from .summary import summary, written
 
+# as remedies say it
+AGAIN = "start again"
 EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board, `mpucal session --bus sim`"
 
 
@@ -47,12 +51,14 @@ EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board
 @click.option("--json", "as_json", is_flag=True, help="Print only calibration.json.")
 @click.option("--json-events", is_flag=True, help="Print each event as a line of JSON on stderr.")
 @click.option("--beep/--no-beep", default=None, help="Ring the bell at each new prompt; default: on a terminal.")
+@click.option("--keep-going", is_flag=True, help="Go on when the terminal goes away, as a dropped ssh connection does.")
 def command(
     folder: Path | None,
     yes: bool,
     as_json: bool,
     json_events: bool,
     beep: bool | None,
+    keep_going: bool,
     sinks: tuple[str, ...],
     no_write: bool,
     **options: Any,
@@ -69,17 +75,18 @@ def command(
     check_gyroscope(source.plan.config)
     person = console(quiet=yes, as_json=json_events, beep=beep, title=source_title(options))
     into = SessionFolder(resume or folder, source.capture_name, again=resume is not None)
-    # a program that reads the events finds it in calibration.json
-    recording, calibration, paths = _run(source, into, person, "" if json_events else announced(kinds, no_write))
-    if not as_json:
-        if not json_events:
-            click.echo(err=True)
-        click.echo(f"{summary(calibration)}\n\n{written([into.capture, *paths])}")
-    record = in_session(into.path, calibration, recording, source.truth)
-    sensor = device({**options, "gravity": source.plan.gravity, "model": source.plan.model})
-    confirm, in_doubt = partial(ask, yes=yes), partial(ask_in_doubt, yes=yes)
-    writing = write_to_all(kinds, calibration, sensor, into.path, record, confirm, sinks, in_doubt)
-    _report(calibration, writing, as_json)
+    with outliving(lambda: into.path / LOG.name, partial(person.hung_up, stop=not keep_going)):
+        # a program that reads the events finds it in calibration.json
+        recording, calibration, paths = _run(source, into, person, "" if json_events else announced(kinds, no_write))
+        if not as_json:
+            if not json_events:
+                click.echo(err=True)
+            click.echo(f"{summary(calibration)}\n\n{written([into.capture, *paths])}")
+        record = in_session(into.path, calibration, recording, source.truth)
+        sensor = device({**options, "gravity": source.plan.gravity, "model": source.plan.model})
+        confirm, in_doubt = partial(ask, yes=yes), partial(ask_in_doubt, yes=yes)
+        writing = write_to_all(kinds, calibration, sensor, into.path, record, confirm, sinks, in_doubt)
+        _report(calibration, writing, as_json)
     return RefusedError.exit_code if calibration.verdict == REFUSED else 0
 
 
@@ -113,10 +120,20 @@ def _run(
                 folder.settle(runner.sensor)
             calibration = runner.calibrate(recording, fit)
             return recording, calibration, runner.write(folder.path, calibration, recording, source.truth)
-    except BaseException:
+    except BaseException as error:
         if folder.capture.exists():
-            person.say(f"  What was recorded is kept in {folder.capture}; go on with --resume {folder.path}.")
+            person.say(f"  What was recorded is kept in {folder.capture}{_how_to_go_on(source, folder.path, error)}.")
         raise
+
+
+def _how_to_go_on(source: Opened, folder: Path, error: BaseException) -> str:
+    """Who can resume is not told to start again: one advice, in the error where that has one."""
+    if not source.resumable:
+        return ""
+    if not isinstance(error, MpucalError) or AGAIN not in error.remedy:
+        return f"; go on with --resume {folder}"
+    error.remedy = error.remedy.replace(AGAIN, f"go on with `mpucal session --resume {folder}`")
+    return ""
 
 
 def _report(calibration: Calibration, writing: Iterator[Applied], as_json: bool) -> None:

@@ -60,7 +60,8 @@ def _places(header: list[str], path: Path) -> dict[str, int]:
     """Column name -> its place, for the columns that are read."""
     missing = [name for name in COLUMNS if name not in header]
     if missing:
-        raise RecordingError(f"{path}: its first line names no {', '.join(missing)}", _REMEDY)
+        whole = f" (it is {header[0]!r}, without a comma)" if len(header) == 1 else ""
+        raise RecordingError(f"{path}: its first line names no {', '.join(missing)}{whole}", _REMEDY)
     wanted = ALL if TEMPERATURE in header else COLUMNS
     twice = [name for name in wanted if header.count(name) > 1]
     if twice:

@@ -63,4 +63,6 @@ BLOB = SessionFile(
 REPORT = SessionFile("report.html", "the same for a person, on one page", "mpucal.session.results:report")
 TRUTH = SessionFile("truth.json", "of a simulated chip: what it really is", "mpucal.session.results:simulated_truth")
 
-SESSION_FILES = (CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT, BLOB, REPORT, TRUTH)
+LOG = SessionFile("session.log", "what a session said after its terminal had gone")
+
+SESSION_FILES = (CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT, BLOB, REPORT, TRUTH, LOG)

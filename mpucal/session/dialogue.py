@@ -45,6 +45,7 @@ class Dialogue:
     Attributes
     ----------
     questions : to the live fits; None until the sensor is known.
+    interrupted : somebody stopped the session.
     """
 
     def __init__(
@@ -59,6 +60,7 @@ class Dialogue:
         self._machine, self._talk, self._listeners = machine, talk, listeners
         self._note, self._now_ns, self._late = note, now_ns, late
         self.questions: Questions | None = None
+        self.interrupted = False
         # what must not reach the machine before an answer that is late
         self._arrived: deque[Event] = deque()
         self._forgotten: list[Forget] = []
@@ -82,6 +84,7 @@ class Dialogue:
     def press(self, key: Key) -> None:
         """A key was pressed; a replay presses it in the same place."""
         self._note(KEY, self._now_ns(), {KEY: key.value})
+        self.interrupted |= key is Key.ABORT
         if self._arrived and key is not Key.ABORT:
             self._arrived.append(_PRESSED[key])
         else:

@@ -110,7 +110,7 @@ class Machine:
             case Redo():
                 return self._redo(before)
             case Resumed():
-                return self._resumed()
+                return self._resumed(before)
             case Learnt() | Tried() | Checked():
                 return self._answered(event)
             case Stopped(why, remedy):
@@ -199,8 +199,10 @@ class Machine:
             *self._turn(self._flat),
         ]
 
-    def _resumed(self) -> list[Output]:
+    def _resumed(self, state: State) -> list[Output]:
         self._sampled_s = None
+        if state is State.ABORTED:
+            self._step = lay_flat.LayFlat(patient=self._until_end)
         return [Decision("the session resumes where it stopped"), *self._step.resumed()]
 
     def _ended(self, state: State, why: str | None) -> list[Output]:

@@ -72,9 +72,7 @@ class Runner:
             if self.sensor is not None:
                 self._dialogue.questions = Questions(self._plan, self.sensor, self._hire)
             while self._dialogue.measuring:
-                self._dialogue.ask()
-                if self._dialogue.measuring:
-                    self._poll()
+                self._step()
         except Abandoned:
             # a replay that is stopped by who watches it went on when it was recorded
             with suppress(CaptureError):
@@ -160,6 +158,16 @@ class Runner:
             self._ends(SourceEnded())
         else:
             self._dialogue.feed(Connected(self.sensor))
+
+    def _step(self) -> None:
+        """Take what came; where a session ended early, and was resumed, it goes on there."""
+        try:
+            self._dialogue.ask()
+            if self._dialogue.measuring:
+                self._poll()
+        except Abandoned:
+            if self._dialogue.interrupted or not self._next_part():
+                raise
 
     def _poll(self) -> None:
         try:

@@ -100,7 +100,8 @@ TRANSITIONS: Mapping[State, Mapping[type[Event], State]] = MappingProxyType(
             Abort: State.ABORTED,
         },
         State.DONE: {},
-        State.ABORTED: {},
+        # by a board that was never still, say: there is no flat rest yet
+        State.ABORTED: {Resumed: State.LAY_FLAT},
     }
 )
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import UsageError, meant
 from .faults import Fault, Where, kinds
 
 FAULT = "fault"
@@ -32,7 +33,8 @@ def parsed(text: str, parsers: Mapping[str, Parser], seed: int | None, others: s
         named = others is not None and key.isupper()
         if not equals or not (named or key in parsers):
             more = "" if others is None else ", or a parameter's name"
-            raise UsageError(f"sim: does not know {word!r}", f"its keys are {', '.join(parsers)}{more}")
+            keys = f"its keys are {', '.join(parsers)}{more}{meant(key, parsers)}"
+            raise UsageError(f"sim: does not know {word!r}", keys)
         made = _value(key, value, (number, "a number") if named else parsers[key])
         if named:
             values[str(others)][key] = made
@@ -50,7 +52,8 @@ def _value(key: str, text: str, parser: Parser) -> Any:
     try:
         return parse(text)
     except (ValueError, KeyError):
-        raise UsageError(f"sim: {key}={text} is not {expected}", "correct it, or leave it out") from None
+        nearly = meant(text.partition("@")[0], re.findall(r"[a-z]\w\w+", expected))
+        raise UsageError(f"sim: {key}={text} is not {expected}", f"correct it, or leave it out{nearly}") from None
 
 
 def number(text: str) -> float:

@@ -25,11 +25,16 @@ def interrupting() -> Iterator[None]:
             ended = True
             raise KeyboardInterrupt
 
-    # Windows has no SIGHUP
-    numbers = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
+    # Windows has no SIGHUP; and what somebody sees to already is left to them
+    numbers = [number for name in NAMES if (number := getattr(signal, name, None)) and _ends(number)]
     before = {number: signal.signal(number, interrupt) for number in numbers}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _ends(number: int) -> bool:
+    """Whether the signal would end the program now."""
+    return signal.getsignal(number) is signal.SIG_DFL

@@ -53,6 +53,11 @@ class OpenedChip:
         return {SOURCE: dict(self.words)} if self.words else {}
 
     @property
+    def resumable(self) -> bool:
+        """See Opened."""
+        return bool(self.words)
+
+    @property
     def where(self) -> str:
         """The very chip, in words."""
         return f"the chip on {next(iter(self.words.values()), 'its bus')}"

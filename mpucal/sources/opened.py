@@ -43,6 +43,7 @@ class Opened(Protocol):
     truth : of a simulated sensor. recovered : how much of a damaged capture it holds.
     capture_name : of the file that its kind is recorded into.
     real_time : its time passes by itself, and waits for nobody.
+    resumable : what is recorded of it can be gone on with.
     """
 
     @property
@@ -62,6 +63,9 @@ class Opened(Protocol):
 
     @property
     def real_time(self) -> bool: ...  # noqa: D102
+
+    @property
+    def resumable(self) -> bool: ...  # noqa: D102
 
     def talk(self, person: Talk) -> Talk:
         """Who presses the keys: the person, or the person in the capture."""

@@ -7,7 +7,7 @@ from pkgutil import resolve_name
 from typing import Any
 
 from ..chip.config import Config, RateAlone
-from ..errors import CaptureError, UsageError
+from ..errors import CaptureError, UsageError, meant
 from ..session.plan import Plan
 from .kind import Delivers, Option, Request, SourceKind
 from .opened import Opened
@@ -38,6 +38,9 @@ def check_source(values: Mapping[str, Any], given: Mapping[str, str], command: s
     if command not in kind.commands:
         remedy = "; ".join(filter(None, (one_of(used_by(command)), kind.instead)))
         raise UsageError(f"{kind.spelled} was given, and `mpucal {command}` does not take it", remedy)
+    word = str(values[kind.option.name]).partition(":")[0]
+    if nearly := meant(word, [other.word for other in SOURCES if other.option is kind.option and other.word]):
+        raise UsageError(f"{kind.option.spelled} {word} names no source", f"{kind.forms}{nearly}")
     if kind.delivers is not Delivers.CAPTURE:
         for option in _beside(SOURCES):
             if option.name in given and option not in _beside([kind]):

@@ -52,6 +52,11 @@ class ResumedChip:
         return self.live.real_time
 
     @property
+    def resumable(self) -> bool:
+        """See Opened."""
+        return True
+
+    @property
     def listeners(self) -> Sequence[Callable[[Prompt], None]]:
         """See Opened; what was said before is not said again."""
         return [self._now(listener) for listener in self.live.listeners]

@@ -57,6 +57,7 @@ class OpenedVehicle:
     """
 
     capture_name = CAPTURE_OF_VEHICLE.name
+    resumable = False
 
     def __init__(
         self,
@@ -158,6 +159,7 @@ class OpenedLog:
     listeners: Sequence[Callable[[Prompt], None]] = ()
     truth: Mapping[str, Any] | None = None
     capture_name: str = CAPTURE_OF_VEHICLE.name
+    resumable: bool = False
     real_time: bool = False
 
     @property

@@ -32,6 +32,10 @@ class Console(Protocol):
         """Meanwhile the person is shown the session and may press keys, Ctrl-C among them."""
         ...
 
+    def hung_up(self, stop: bool) -> None:
+        """The terminal went away; `stop` the session for it."""
+        ...
+
 
 def console(quiet: bool, as_json: bool = False, beep: bool | None = None, title: str = "") -> Console:
     """The console on stderr and stdin.

@@ -6,7 +6,7 @@ import os
 import select
 import signal
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
 from types import FrameType
 from typing import Any, TextIO
@@ -49,7 +49,10 @@ class Keys:
         keys = [Key.ABORT] if self._interrupted else []
         self._heard()
         while self._keyboard is not None and _waits(self._keyboard):
-            words = self._typed(self._keyboard)
+            try:
+                words = self._typed(self._keyboard)
+            except OSError:  # the terminal went away
+                words = None
             if words is None:
                 self._keyboard = None
             else:
@@ -69,6 +72,10 @@ class Keys:
                 stack.enter_context(_without_lines(self._keyboard))
             yield
 
+    def abort(self) -> None:
+        """As Ctrl-C does the first time."""
+        self._interrupted = True
+
     def _typed(self, keyboard: TextIO) -> list[str] | None:
         """The words or keys that are there; None where there will never be any more."""
         if (console := _windows()) is not None:
@@ -76,10 +83,7 @@ class Keys:
         if not self._single:
             line = keyboard.readline()
             return [line.strip().lower()] if line else None
-        try:
-            data = os.read(keyboard.fileno(), _AT_ONCE)
-        except OSError:
-            return None
+        data = os.read(keyboard.fileno(), _AT_ONCE)
         return _words(data.decode("latin-1")) if data else None
 
     def _interrupt(self, _number: int, _frame: FrameType | None) -> None:
@@ -135,5 +139,6 @@ def _without_lines(keyboard: TextIO) -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTSTP, stop)
-        # what was typed for the session is not meant for the shell
-        termios.tcsetattr(handle, termios.TCSAFLUSH, before)
+        # what was typed for the session is not meant for the shell; a terminal that went away has neither
+        with suppress(termios.error):
+            termios.tcsetattr(handle, termios.TCSAFLUSH, before)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any, TextIO
@@ -66,7 +66,7 @@ class Lines:
         if self._heard:
             try:
                 print(text, file=self._out, flush=True)
-            except BrokenPipeError:
+            except OSError:
                 self._heard = False
 
     def pressed(self) -> Sequence[Key]:
@@ -78,6 +78,12 @@ class Lines:
         """Meanwhile the first Ctrl-C is a key press; the second one interrupts at once."""
         with self._keys.listening():
             yield
+
+    def hung_up(self, stop: bool) -> None:
+        """What follows is heard elsewhere; `stop`: as by Ctrl-C."""
+        self._heard = True
+        if stop:
+            self._keys.abort()
 
     def _say_prompt(self, prompt: Prompt) -> None:
         """A heading where something else is to be done; else the new words alone."""
@@ -103,7 +109,14 @@ class JsonLines(Lines):
 
     def hear(self, output: Output) -> None:
         """Say it."""
-        self.say(json.dumps({"event": type(output).__name__.lower(), **_plain(asdict(output))}, allow_nan=False))
+        self._event(type(output).__name__.lower(), asdict(output))
+
+    def say(self, text: str) -> None:
+        """A line of talk as an event of its own."""
+        self._event("note", {"text": text.strip()})
+
+    def _event(self, name: str, fields: Mapping[str, Any]) -> None:
+        super().say(json.dumps({"event": name, **_plain(fields)}, allow_nan=False))
 
 
 def _plain(value: Any) -> Any:

@@ -42,6 +42,8 @@ class Screen:
         self._changed = threading.Event()
         self._closed = threading.Event()
         self._open = False
+        self._painter = Painter(out)
+        self._drawing: threading.Thread | None = None
 
     def hear(self, output: Output) -> None:
         """Change the view."""
@@ -64,37 +66,47 @@ class Screen:
         """What was pressed since the last call."""
         return self._keys.pressed()
 
+    def hung_up(self, stop: bool) -> None:
+        """Nothing is drawn any more; what was decided is told elsewhere in the end. `stop`: as by Ctrl-C."""
+        self._close()
+        if stop:
+            self._keys.abort()
+
     @contextmanager
     def listening(self) -> Iterator[None]:
         """Meanwhile the screen is shown; whatever happens, the terminal is as it was afterwards."""
-        painter = Painter(self._out)
-        drawing = threading.Thread(target=self._draw, args=(painter,), name="screen", daemon=True)
+        self._drawing = threading.Thread(target=self._draw, name="screen", daemon=True)
         gave_way_s = sys.getswitchinterval()
         with self._keys.listening():
             try:
                 sys.setswitchinterval(GIVE_WAY_S)
-                painter.show()
+                self._painter.show()
                 self._open = True
-                drawing.start()
+                self._drawing.start()
                 yield
             finally:
-                self._closed.set()
-                self._changed.set()
-                drawing.join(LAST_WORD_S)
-                painter.give_back()
+                self._close()
                 sys.setswitchinterval(gave_way_s)
                 self._open = False
                 for note in self._view.notes:
                     self.say(f"  {note}")
 
-    def _draw(self, painter: Painter) -> None:
+    def _close(self) -> None:
+        """Draw no more, and give the terminal back; once is enough."""
+        self._closed.set()
+        self._changed.set()
+        if self._drawing is not None and self._open:
+            self._drawing.join(LAST_WORD_S)
+        self._painter.give_back()
+
+    def _draw(self) -> None:
         self._changed.set()
         while not self._closed.is_set():
             self._changed.wait()
             self._changed.clear()
             ring, self._ring = self._ring, False
-            size = painter.size()
-            painter.paint(lines(self._view, *size, self._glyphs), size, ring)
+            size = self._painter.size()
+            self._painter.paint(lines(self._view, *size, self._glyphs), size, ring)
             self._closed.wait(LEAST_INTERVAL_S)
 
 

@@ -109,3 +109,49 @@ def test_a_capture_without_a_source_cannot_be_resumed(mpucal, tmp_path):
     result = mpucal("session", "--resume", "old")
     assert result.code == 2
     assert "does not name a source to go on with" in result.err
+
+
+def of_another_hand(capture, hand, folder):
+    """The capture of a simulated session, as if a board in another hand were to go on with it."""
+    recorded = read_capture(capture)
+    folder.mkdir()
+    with CaptureWriter(folder / "capture.mcap") as writer:
+        writer.start({**recorded.meta, "source": {**recorded.meta["source"], "bus": f"sim:hand={hand}"}})
+        for record in recorded.records:
+            if isinstance(record, SessionEvent):
+                writer.event(record.name, record.t_ns, record.data)
+            else:
+                writer.transaction(record)
+
+
+def test_a_board_that_was_never_still_is_laid_flat_again(mpucal, tmp_path):
+    first = mpucal("session", "--bus", "sim:hand=restless", "--rate", "50", "-o", "restless")
+    assert first.code == 4
+    assert "start again" not in first.err
+    assert first.err.count("--resume restless") == 1
+
+    of_another_hand(tmp_path / "restless" / "capture.mcap", "guided", tmp_path / "calm")
+    resumed = mpucal("session", "--resume", "calm")
+    assert resumed.code == 0, resumed.err
+    assert resumed.err.count("LAY FLAT") == 1
+    found = Calibration.load(tmp_path / "calm" / "calibration.json")
+    again = mpucal("session", "--replay", "calm", "-o", "again")
+    assert again.code == 0, again.err
+    assert np.array_equal(Calibration.load(tmp_path / "again" / "calibration.json").D, found.D)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "what"),
+    [
+        (["--bus", "sim:hand=restless", "--rate", "50"], 4, "the board was not still for 10 s within 60 s"),
+        (["--bus", "/dev/i2c-99"], 3, "there is no I2C bus /dev/i2c-99"),
+        (["--bos", "sim"], 2, "No such option '--bos'"),
+    ],
+    ids=["abandoned", "no bus", "wrong usage"],
+)
+def test_errors_are_events_too(mpucal, words, code, what):
+    result = mpucal("session", "--json-events", *words)
+    *_, error = [json.loads(line) for line in result.err.splitlines()]
+    assert (result.code, error["event"], error["exit_code"]) == (code, "error", code)
+    assert what in error["what"]
+    assert error["remedy"]

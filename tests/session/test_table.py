@@ -59,7 +59,7 @@ EXPECTED = {
     "Enough": ("connect", "lay flat", "rotate", "verify", "calibrate", "write"),
     "Redo": ("connect", "lay flat", "rotate", "rotate", "calibrate", "write"),
     "Abort": ("aborted", "aborted", "aborted", "aborted", "aborted", "aborted"),
-    "Resumed": ("", "lay flat", "rotate", "verify", "", ""),
+    "Resumed": ("", "lay flat", "rotate", "verify", "", "", "", "lay flat"),
     "Learnt": ("", "", "rotate", "verify", "", ""),
     "Tried": ("", "", "", "verify", "", ""),
     "Checked": ("", "", "", "verify", "", ""),
@@ -74,7 +74,7 @@ EXPECTED = {
 CASES = [
     pytest.param(state, EVENTS[name], following, id=f"{state}-{name}")
     for name, row in EXPECTED.items()
-    for state, following in zip(State, (*row, "", ""), strict=True)
+    for state, following in zip(State, (*row, *[""] * (len(State) - len(row))), strict=True)
 ]
 
 

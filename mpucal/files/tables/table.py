@@ -14,7 +14,7 @@ from ..hints import NO_HINTS, Hints
 from ..rows import cannot_read
 from .names import ACC, GYR, TEMPERATURE, TIME, Column, columns_of, three
 from .streams import Stream, recording_of
-from .text import PREAMBLE, TextTable, table_of, text_of
+from .text import PREAMBLE, SEPARATORS, TextTable, table_of, text_of
 
 SNIFFED = 1 << 16
 
@@ -70,7 +70,8 @@ def recording_of_table(table: TextTable, hints: Hints) -> Recording:
     warm = [column for column in columns if column.quantity == TEMPERATURE]
     a, w = stream_of(table, columns, acc), stream_of(table, columns, gyr)
     temperature_c = table.numbers(warm[:1])[:, 0] if warm and len(a.values) == len(table.rows) else None
-    return recording_of(a, w, hints, table.name, temperature_c, remarks(acc))
+    separated = [] if table.separator == "," else [f"its cells are separated by {SEPARATORS[table.separator]}"]
+    return recording_of(a, w, hints, table.name, temperature_c, [*remarks(acc), *separated])
 
 
 def remarks(acc: Sequence[Column]) -> list[str]:

@@ -15,7 +15,8 @@ from ...data import Vector
 from ...errors import RecordingError
 from .names import Column, columns_of
 
-SEPARATORS = (",", ";", "\t", None)
+# and what they are called; None: any blanks
+SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
 # lines before the header: what a sketch says at its start, `sep=;`
 PREAMBLE = 40
 NS = 1_000_000_000
@@ -30,13 +31,14 @@ class TextTable:
     Attributes
     ----------
     header : the columns' names; empty where there are none. rows : the cells of each line that has some.
-    lines : the number of each, from 1.
+    lines : the number of each, from 1. separator : one of SEPARATORS, between cells.
     """
 
     name: str
     header: list[str]
     rows: list[list[str]]
     lines: list[int]
+    separator: str | None = ","
 
     @property
     def columns(self) -> list[Column]:
@@ -202,4 +204,4 @@ def _read(text: str, name: str, header: list[str], first: int, separator: str | 
                 lines.append(line)
     except csv.Error as error:
         raise RecordingError(f"{name} is no table ({error})", "give a table as text") from error
-    return TextTable(name, header, rows, lines)
+    return TextTable(name, header, rows, lines, separator)
