@@ -17,6 +17,7 @@ import math
 from array import array
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from operator import mul
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,17 +63,16 @@ class _Segment:
     looks_ns: array[int] = field(default_factory=lambda: array("q"))
     looked: array[int] = field(default_factory=lambda: array("q"))
 
-    def look(self, t_ns: int, taken: int) -> None:
-        if self.n == 0:
-            self.origin_ns = t_ns
-        t = t_ns - self.origin_ns
-        self.looks_ns.append(t_ns)
-        self.looked.append(taken)
-        self.n += 1
-        self.t += t
-        self.taken += taken
-        self.tt += t * t
-        self.t_taken += t * taken
+    def looks(self, t_ns: list[int], taken: list[int]) -> None:
+        self.origin_ns = self.origin_ns if self.n else t_ns[0]
+        t = [each - self.origin_ns for each in t_ns]
+        self.looks_ns.extend(t_ns)
+        self.looked.extend(taken)
+        self.n += len(t)
+        self.t += sum(t)
+        self.taken += sum(taken)
+        self.tt += sum(map(mul, t, t))
+        self.t_taken += sum(map(mul, t, taken))
 
     @property
     def t_mean_s(self) -> float:
@@ -131,7 +131,11 @@ class SampleClock:
 
     def look(self, t_ns: int, taken: int) -> None:
         """At `t_ns` the chip had taken `taken` samples of this segment."""
-        self._segments[-1].look(t_ns, taken)
+        self._segments[-1].looks([t_ns], [taken])
+
+    def looks(self, t_ns: NDArray[np.int64], taken: NDArray[np.int64]) -> None:
+        """The same of (n,) looks, one at least."""
+        self._segments[-1].looks(t_ns.tolist(), taken.tolist())
 
     @property
     def rate_hz(self) -> float:

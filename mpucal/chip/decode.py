@@ -5,16 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from ..data import Recording, Samples, Sensor
 from ..errors import RecordingError
 from . import registers as reg
 from .access import Transaction
+from .accesses import Accesses
 from .families import Part
 from .fifo import FifoDecoder, FifoFault, Run
 from .identity import Behaviour
 from .settings import Settings
 
 Words = tuple[int, int, int]
+
+# A poll is three accesses: count, bytes, flags. So many are looked at together: those after one that has something
+# about it are looked at again.
+POLL, AT_ONCE = 3, 512
 
 
 class Decoder:
@@ -58,14 +65,30 @@ class Decoder:
             )
         return self._evidence.part(self._held[reg.WHO_AM_I])
 
-    def saw(self, transaction: Transaction) -> None:
-        """An access was made, or failed."""
+    def saw(self, transaction: Transaction | Accesses) -> None:
+        """An access was made, or failed; or many were."""
+        if isinstance(transaction, Accesses):
+            self._saw_many(transaction)
+            return
         if transaction.error is not None:
             return
         if transaction.op == "read":
             self.saw_read(transaction.register, transaction.data, transaction.t_ns, transaction.host_ns)
         else:
             self.saw_write(transaction.register, transaction.data)
+
+    def _saw_many(self, accesses: Accesses) -> None:
+        """The same of many: whole polls with nothing about them are decoded at once, the others one by one."""
+        at = 0
+        for first, last in stretches(accesses):
+            self._saw_each(accesses, at, first)
+            at = first
+            while at < last:
+                at += self._saw_polls(accesses, at, min(last, at + AT_ONCE * POLL))
+                # the one that had something about it
+                self._saw_each(accesses, at, min(last, at + POLL))
+                at = min(last, at + POLL)
+        self._saw_each(accesses, at, len(accesses))
 
     def saw_read(self, register: int, data: bytes, t_ns: int, host_ns: int | None = None) -> None:
         """`data` was read from `register` on, at `t_ns`; `host_ns` as in Reply."""
@@ -121,9 +144,12 @@ class Decoder:
         """The samples since the last `take`, with the times that are known now."""
         return self._fifo.take() if self._fifo is not None else Samples.empty()
 
-    def release(self) -> list[Run]:
-        """The frames since the last time, let go of: `final` makes samples of them once there are no more."""
-        return self._fifo.release() if self._fifo is not None else []
+    def release(self, last: bool = False) -> list[Run]:
+        """The frames since the last time, let go of: `final` makes samples of them once there are no more.
+
+        Without those of the `last` run, whose end may yet be set right by what follows.
+        """
+        return self._fifo.release(last) if self._fifo is not None else []
 
     def final(self, runs: Iterable[Run]) -> Iterator[Samples]:
         """The samples of runs that were released, in the same order, with the best times there are."""
@@ -145,6 +171,26 @@ class Decoder:
             empty = Samples.empty()
             return Recording(**vars(empty), name=self._name)
         return replace(self._fifo.recording(self._name), sensor=self.sensor)
+
+    def _saw_each(self, accesses: Accesses, first: int, last: int) -> None:
+        for transaction in accesses.part(first, last):
+            self.saw(transaction)
+
+    def _saw_polls(self, accesses: Accesses, first: int, last: int) -> int:
+        """How many of the accesses of whole polls first..last-1 were taken at once."""
+        if self._fifo is None or accesses.frames.shape[1] != self._fifo.frame_words:
+            return 0
+        looks, reads, checks = (np.arange(first + i, last, POLL) for i in range(POLL))
+        frames = accesses.frames[accesses.first[reads[0]] : accesses.behind[reads[-1]]]
+        lengths = accesses.behind[reads] - accesses.first[reads]
+        polls = self._fifo.plain_polls(accesses.t_ns[looks], frames, lengths)
+        for kind, each in (("look", looks[:polls]), ("status", checks[:polls])):
+            heard = each[accesses.heard[each]]
+            if len(heard):
+                self._fifo.heard_many(kind, accesses.t_ns[heard], accesses.host_ns[heard])
+        if polls:
+            self.fault = None
+        return POLL * polls
 
     def _hold(self, register: int, data: bytes) -> None:
         self._held.update(enumerate(data, register))
@@ -171,8 +217,27 @@ class Decoder:
         return x, y, z
 
 
-def decode(transactions: Iterable[Transaction], name: str = "recording") -> Recording:
-    """The samples that `transactions` carried; what was cut off at their end does no harm.
+def stretches(accesses: Accesses) -> list[tuple[int, int]]:
+    """first, last + 1 of accesses that are polls one after the other: count, as many bytes, no overflow, none lost."""
+    n = len(accesses) - POLL + 1
+    if n < 1 or accesses.failures:
+        return []
+    look, read, check = (slice(i, n + i) for i in range(POLL))
+    register, moved = accesses.register, accesses.moved
+    whole = (register[look] == reg.FIFO_COUNT_H) & (moved[look] == 2) & (register[read] == reg.FIFO_R_W)
+    whole &= (register[check] == reg.INT_ENABLE) & (moved[check] == reg.INT_STATUS - reg.INT_ENABLE + 1)
+    whole &= accesses.framed[read] & ~accesses.write[look] & ~accesses.write[check]
+    at = np.flatnonzero(whole)
+    counts, checks = accesses.first[at], accesses.first[at + 2]
+    counted = accesses.data[counts].astype(np.int64) << 8 | accesses.data[counts + 1]
+    flags = (accesses.data[checks] & ~accesses.data[checks + 2]) & reg.INT_FIFO_OFLOW
+    at = at[(counted == moved[at + 1]) & (flags > 0)]
+    cuts = np.flatnonzero(np.diff(at) != POLL) + 1
+    return [(int(part[0]), int(part[-1]) + POLL) for part in np.split(at, cuts) if len(part)]
+
+
+def decode(accesses: Iterable[Transaction | Accesses], name: str = "recording") -> Recording:
+    """The samples that `accesses` carried; what was cut off at their end does no harm.
 
     Raises
     ------
@@ -180,8 +245,8 @@ def decode(transactions: Iterable[Transaction], name: str = "recording") -> Reco
     ChipError : a chip that is not known.
     """
     decoder = Decoder(name)
-    for transaction in transactions:
-        decoder.saw(transaction)
+    for each in accesses:
+        decoder.saw(each)
     recording = decoder.recording()
     if len(recording) < 2:
         raise RecordingError(f"{name} holds {len(recording)} samples", "record for longer")

@@ -24,6 +24,7 @@ from .host_clock import HostClock
 from .settings import Settings
 
 Counts = NDArray[np.int16]
+Whole = NDArray[np.int64]
 
 FULL_SCALE_COUNT = 32767
 
@@ -87,6 +88,11 @@ class FifoDecoder:
         return self._believed
 
     @property
+    def frame_words(self) -> int:
+        """How many words a frame has."""
+        return self._settings.frame_words
+
+    @property
     def flipped(self) -> int:
         """How many words had a bit flipped on their way, and were set right."""
         return self._flips.found
@@ -98,6 +104,10 @@ class FifoDecoder:
     def heard(self, kind: str, t_ns: int, host_ns: int) -> None:
         """What was done at `t_ns` was heard of at `host_ns`, see Reply; by a message of a `kind` that are all alike."""
         self._host.saw(kind, t_ns, host_ns)
+
+    def heard_many(self, kind: str, t_ns: Whole, host_ns: Whole) -> None:
+        """The same of (n,) messages."""
+        self._host.saw_many(kind, t_ns, host_ns)
 
     def counted(self, t_ns: int, count_bytes: int) -> None:
         """The FIFO held `count_bytes` at `t_ns`."""
@@ -137,6 +147,34 @@ class FifoDecoder:
             self._clock.look(*look)
         self._believe(kept)
         return None
+
+    def plain_polls(self, looks_ns: Whole, frames: Counts, lengths: Whole) -> int:
+        """How many of the next polls had nothing about them, and were believed at once; the others are still to come.
+
+        Of each poll, `looks_ns` (k,) when it counted what it read, `lengths` (k,) the frames of that, one at least, of
+        all `frames` (n, words): the FIFO did not overflow.
+        """
+        if self._read <= DROPPED_FRAMES or len(self._alike) or self._odd_bytes:
+            return 0
+        ends = np.cumsum(lengths)
+        odd = (frames[1:] == frames[:-1]).all(axis=1)
+        if not self._settings.accel_alone:
+            warmth = frames[:, self._columns.temperature].astype(np.int64)
+            before = warmth[0] if self._temperature is None else self._temperature
+            odd = np.concatenate((odd, [False])) | (np.abs(np.diff(warmth, prepend=before)) > MAX_TEMPERATURE_STEP)
+        plain = int(np.searchsorted(ends, np.argmax(odd), side="right")) if odd.any() else len(lengths)
+        plain = self._flips.untouched(frames[: ends[plain - 1]], lengths[:plain]) if plain else 0
+        if not plain:
+            return 0
+        kept = frames[: ends[plain - 1]]
+        self._clock.looks(looks_ns[:plain], self._read + ends[:plain])
+        self._runs.append(Run(self._clock.segment, self._read, kept, gap=False))
+        self._read += len(kept)
+        self._believed += len(kept)
+        if not self._settings.accel_alone:
+            self._temperature = int(warmth[len(kept) - 1])
+            self._warmth += int(warmth[: len(kept)].sum())
+        return plain
 
     def _believe(self, kept: Counts) -> None:
         """Keep all but the run of frames alike at the end, which the next poll decides on."""
@@ -178,10 +216,13 @@ class FifoDecoder:
         self._last_t_s = float(samples.t[-1])
         return samples
 
-    def release(self) -> list[Run]:
-        """The frames since the last time, let go of: `final` makes samples of them once there are no more."""
-        runs, self._runs, self._taken = self._runs, [], 0
-        return runs
+    def release(self, last: bool = False) -> list[Run]:
+        """The frames since the last time, let go of: `final` makes samples of them once there are no more.
+
+        Without those of the `last` run, whose end may yet be set right by what follows.
+        """
+        runs, self._runs, self._taken = self._runs, [] if last else self._runs[-1:], 0
+        return runs if last else runs[:-1]
 
     def final(self, runs: Iterable[Run]) -> Iterator[Samples]:
         """The samples of runs that were released, in the same order, with the best times there are."""

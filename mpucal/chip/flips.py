@@ -4,7 +4,8 @@ A flipped bit changes one word of one frame by a power of two, and the next fram
 several words, and lasts for more than one frame behind the low-pass filter. So a word is taken for flipped where it
 jumps by T or more from the mean of its neighbours, these agree within R or a quarter of the jump, no other word of its
 frame jumps, and one bit turned back brings it within R of that mean. R is six times the median of such differences so
-far, and T six times R: smaller flips are left, since they are within what noise and motion do.
+far, and T six times R: smaller flips are left, since they are within what noise and motion do. `flips.cpp` finds the
+jumps and follows the median.
 """
 
 from __future__ import annotations
@@ -12,13 +13,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ._flips import until_jumps
+
 Counts = NDArray[np.int16]
 
-WITHIN, BEYOND = 6.0, 6.0
-# counts: of a sensor without noise, and the least jump
-FLOOR, LEAST_JUMP = 8.0, 128.0
-# the median goes by so much of itself towards each frame, however far that is
-STEP, START, LEAST_MEDIAN = 0.05, 30.0, 1.0
+WITHIN, FLOOR = 6.0, 8.0
+# of the differences of a sensor in the hand [counts]
+START = 30.0
 BITS = (1 << np.arange(16)).astype(np.uint16)
 
 
@@ -47,24 +48,30 @@ class Flips:
         n = len(self._before)
         run = np.concatenate((self._before, frames))
         if len(run) > 2:
-            for at, word in self._jumps(run):
+            _, jumps = until_jumps(run, np.array([len(run)]), self._median)
+            for at, word in jumps:
                 run[at, word] = self._turned_back(run, at, word)
                 if at == n - 1 and len(last):
                     last[-1, word] = run[at, word]
         self._before = run[-2:].copy()
         return run[n:]
 
-    def _jumps(self, run: Counts) -> list[tuple[int, int]]:
-        """Frame and word of each jump that returns, where no other word of the frame jumps."""
-        wide = run.astype(np.float64)
-        off = np.abs(wide[1:-1] - (wide[:-2] + wide[2:]) / 2)
-        near = WITHIN * self._median + FLOOR
-        jump = off >= np.maximum(LEAST_JUMP, BEYOND * near)
-        back = np.abs(wide[2:] - wide[:-2]) <= np.maximum(near, off / 4)
-        steps = np.sign(off - self._median).sum(axis=0)
-        self._median = np.maximum(self._median * np.exp(STEP * steps), LEAST_MEDIAN)
-        alone = jump & back & (jump.sum(axis=1) == 1)[:, None]
-        return [(int(at) + 1, int(word)) for at, word in np.argwhere(alone)]
+    def untouched(self, frames: Counts, lengths: NDArray[np.int64]) -> int:
+        """How many polls, of `lengths` (k,) frames each, `mended` would leave as they are; they were followed.
+
+        None where it has not seen two frames yet.
+        """
+        n = len(self._before)
+        if n < 2:
+            return 0
+        run, ends = np.concatenate((self._before, frames)), n + np.cumsum(lengths)
+        polls, _ = until_jumps(run, ends, trial := self._median.copy())
+        if polls < len(ends):
+            # the median has moved on with the poll that has jumps
+            until_jumps(run, ends[:polls], trial := self._median.copy())
+        self._median, end = trial, int(ends[polls - 1]) if polls else n
+        self._before = run[end - 2 : end].copy()
+        return polls
 
     def _turned_back(self, run: Counts, at: int, word: int) -> np.int16:
         """The word with one bit turned back, where that makes it as its neighbours; else as it is."""

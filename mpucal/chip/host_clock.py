@@ -91,10 +91,24 @@ class HostClock:
         heard.append(host_ns)
         self._number += 1
         if self._number >= self._next:
-            self._next = int(GROWTH * self._number) + 1
-            at_s = t_ns * NS
-            self._shown_s = float(self.provisional_s(at_s))
-            self._since_s, self._slope = at_s, float(self.fit().slope(at_s))
+            self._estimate(t_ns)
+
+    def saw_many(self, kind: str, t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> None:
+        """The same of (n,) messages, of which one estimate is made at most."""
+        times, heard = self._pairs.setdefault(kind, (array("q"), array("q")))
+        latest = np.concatenate(([times[-1] if times else t_ns[0] - 1], t_ns))
+        later = t_ns > np.maximum.accumulate(latest)[:-1]
+        times.extend(t_ns[later].tolist())
+        heard.extend(host_ns[later].tolist())
+        self._number += int(later.sum())
+        if self._number >= self._next:
+            self._estimate(times[-1])
+
+    def _estimate(self, t_ns: int) -> None:
+        self._next = int(GROWTH * self._number) + 1
+        at_s = t_ns * NS
+        self._shown_s = float(self.provisional_s(at_s))
+        self._since_s, self._slope = at_s, float(self.fit().slope(at_s))
 
     def provisional_s(self, t_s: Vector | float) -> Vector | float:
         """`t_s` at the host's rate, as known now; each estimate counts from when it was made."""

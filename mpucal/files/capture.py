@@ -16,6 +16,7 @@ from weakref import finalize
 import numpy as np
 
 from ..chip.access import Transaction
+from ..chip.accesses import Accesses
 from ..chip.decode import Decoder, decode
 from ..chip.fifo import Run
 from ..chip.records import FORGET, UTC, SessionEvent
@@ -34,7 +35,7 @@ def load_capture(*paths: Path) -> Recording:
     CaptureError, RecordingError, ChipError : see load.
     """
     session = _Accesses(paths)
-    recording = (decode_iio if _of_kernel(paths) else decode)(session, session.name)
+    recording = decode_iio(session.one_by_one(), session.name) if _of_kernel(paths) else decode(session, session.name)
     for first, last in sorted(session.forgotten.items(), reverse=True):
         recording = recording.without(first, last)
     return replace(recording, recovered=session.recovered, utc_ns=session.utc_ns)
@@ -54,6 +55,7 @@ def capture_rows(*paths: Path) -> Rows:
     for access in session:
         decoder.saw(access)
         spool.add(decoder.release())
+    spool.add(decoder.release(last=True))
     if spool.frames < 2:
         raise RecordingError(f"{session.name} holds {spool.frames} samples", "record for longer")
     runs = _without(decoder.final(spool.runs()), session.forgotten)
@@ -76,9 +78,9 @@ class _Accesses:
         self.recovered: str | None = None
         self.utc_ns: int | None = None
 
-    def __iter__(self) -> Generator[Transaction]:
+    def __iter__(self) -> Generator[Transaction | Accesses]:
         for reader in map(CaptureReader, self._paths):
-            for record in reader:
+            for record in reader.blocks():
                 if not isinstance(record, SessionEvent):
                     yield record
                 elif record.name == UTC and self.utc_ns is None:
@@ -87,10 +89,18 @@ class _Accesses:
                     self.forgotten[int(record.data["first"])] = int(record.data["last"])
             self.recovered = reader.recovered or self.recovered
 
+    def one_by_one(self) -> Generator[Transaction]:
+        """The same, each on its own."""
+        for each in self:
+            if isinstance(each, Accesses):
+                yield from each
+            else:
+                yield each
+
 
 def _of_kernel(paths: Sequence[Path]) -> bool:
     """Whether a driver of the kernel was read, whose samples have their times at once."""
-    with closing(iter(_Accesses(paths))) as accesses:
+    with closing(_Accesses(paths).one_by_one()) as accesses:
         first = next(accesses, None)
     return first is not None and isinstance(first.register, str)
 

@@ -1,4 +1,9 @@
-"""Captures as MCAP files: every register access and session event as it happened."""
+"""Captures as MCAP files: every register access and session event as it happened.
+
+While a capture is written, half a second is a chunk with one message of register accesses. One that is closed is
+written anew with longer chunks, which take half the room and are read several times as fast: each a tenth of what
+precedes it, so that little is lost where a file is cut.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +11,7 @@ import json
 import os
 import struct
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Self, cast
@@ -18,16 +24,20 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from zstandard import ZstdError
 
 from ..chip.access import Transaction
-from ..chip.records import Record
+from ..chip.accesses import Accesses
+from ..chip.records import Record, SessionEvent
 from ..errors import CaptureError, OutputError
-from .messages import BUS, SCHEMAS, SESSION, event_message, record_of, transaction_message
+from ..result.atomic import whole_file
+from .messages import BUS, SESSION, accesses_message, accesses_schema, event_message, event_schema, records_of
 
-FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 1
+FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 2
 # the metadata of a file of calibrated samples, which is no capture
 CALIBRATED = "mpucal.imu"
 
 # half of the second that a killed program may lose: the other half is for the wait between two records
 CHUNK_NS = 500_000_000
+# of a closed capture: the longest, and the part of what precedes it
+CLOSED_CHUNK_NS, CLOSED_CHUNK_PART = 10_000_000_000, 10
 
 # the last two: a length that no memory holds
 _DAMAGE = (
@@ -52,50 +62,38 @@ class CaptureWriter:
 
     def __init__(self, path: str | Path) -> None:
         self._path = Path(path)
+        self._meta: Mapping[str, Any] = {}
         try:
             self._file = self._path.open("wb")
         except OSError as error:
             raise self._cannot_write(error) from error
-        # the chunks' index grows by 4 MB an hour: in vain where nothing is kept
-        chunked = self._path != Path(os.devnull)
-        self._writer = Writer(self._file, compression=CompressionType.ZSTD, enable_data_crcs=True, use_chunking=chunked)
-        self._channels: dict[str, int] = {}
-        self._chunk_began_ns: int | None = None
-        self._ahead_ns = 0
+        # the chunks' index grows by 1 MB an hour: in vain where nothing is kept
+        self._stream = _Stream(self._file, CHUNK_NS, chunked=self._path != Path(os.devnull))
 
     def start(self, meta: Mapping[str, Any]) -> None:
         """Write the head of the file: what is captured, by what and how; values of JSON's own types."""
-        try:
-            self._writer.start(profile="", library=FORMAT)
-            texts = {key: json.dumps(value) for key, value in {**meta, VERSION_KEY: VERSION}.items()}
-            self._writer.add_metadata(FORMAT, texts)
-            for topic, schema in SCHEMAS.items():
-                id_ = self._writer.register_schema(
-                    str(schema["title"]), SchemaEncoding.JSONSchema, json.dumps(schema).encode()
-                )
-                self._channels[topic] = self._writer.register_channel(topic, MessageEncoding.JSON, id_)
-            self._writer.flush()
-        except OSError as error:
-            raise self._cannot_write(error) from error
+        self._meta = dict(meta)
+        with self._writing():
+            self._stream.start(meta)
 
     def transaction(self, transaction: Transaction) -> None:
         """Keep a register access; the message's publish time is the host's clock."""
-        if transaction.host_ns is not None:
-            self._ahead_ns = transaction.host_ns - transaction.t_ns
-        self._add(BUS, transaction.t_ns, transaction_message(transaction))
+        with self._writing():
+            self._stream.add(transaction)
 
     def event(self, name: str, t_ns: int, data: Mapping[str, Any] | None = None) -> None:
         """Keep a session event; `data` of JSON's own types."""
-        self._add(SESSION, t_ns, event_message(name, data or {}))
+        with self._writing():
+            self._stream.add(SessionEvent(name, t_ns, data or {}))
 
     def close(self) -> None:
-        """Write the index and close the file."""
-        try:
-            with self._file:
-                if self._channels:
-                    self._writer.finish()
-        except OSError as error:
-            raise self._cannot_write(error) from error
+        """Write the index, close the file, and write it anew with longer chunks where there is room for that."""
+        with self._writing(), self._file:
+            self._stream.finish()
+        if self._stream.started and self._path.is_file():
+            # without it the file is as whole, and longer
+            with suppress(OutputError, CaptureError):
+                self._with_longer_chunks()
 
     def __enter__(self) -> Self:
         return self
@@ -103,14 +101,20 @@ class CaptureWriter:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _add(self, topic: str, t_ns: int, data: bytes) -> None:
+    def _with_longer_chunks(self) -> None:
+        with whole_file(self._path) as file:
+            stream, written = _Stream(file, CLOSED_CHUNK_NS), CaptureReader(self._path)
+            stream.start(self._meta)
+            for record in written:
+                stream.add(record)
+            stream.finish()
+            if written.recovered:
+                raise CaptureError(written.recovered, "keep it as it is")
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
         try:
-            self._writer.add_message(self._channels[topic], t_ns, data, publish_time=max(t_ns + self._ahead_ns, 0))
-            if self._chunk_began_ns is None:
-                self._chunk_began_ns = t_ns
-            elif t_ns - self._chunk_began_ns >= CHUNK_NS:
-                self._writer.flush()
-                self._chunk_began_ns = None
+            yield
         except OSError as error:
             raise self._cannot_write(error) from error
 
@@ -119,6 +123,71 @@ class CaptureWriter:
             f"cannot write the capture {self._path} ({error.strerror or error})",
             "choose a place that you may write to, with room on it, with -o",
         )
+
+
+class _Stream:
+    """A capture into an open file: accesses wait until there are enough of them for a message, then a chunk ends.
+
+    Parameters
+    ----------
+    longest_ns : of a chunk. chunked : whether there are any.
+    """
+
+    def __init__(self, file: IO[bytes], longest_ns: int, chunked: bool = True) -> None:
+        self._writer = Writer(file, compression=CompressionType.ZSTD, enable_data_crcs=True, use_chunking=chunked)
+        self._longest_ns = longest_ns
+        self._channels: dict[str, int] = {}
+        self._waiting: list[Transaction] = []
+        self._began_ns: int | None = None
+        self._chunk_began_ns: int | None = None
+        self._ahead_ns = 0
+
+    @property
+    def started(self) -> bool:
+        return bool(self._channels)
+
+    def start(self, meta: Mapping[str, Any]) -> None:
+        self._writer.start(profile="", library=FORMAT)
+        texts = {key: json.dumps(value) for key, value in {**meta, VERSION_KEY: VERSION}.items()}
+        self._writer.add_metadata(FORMAT, texts)
+        for topic, name, schema, encoding, content in (
+            (BUS, "mpucal.Accesses", SchemaEncoding.Protobuf, MessageEncoding.Protobuf, accesses_schema()),
+            (SESSION, "mpucal.SessionEvent", SchemaEncoding.JSONSchema, MessageEncoding.JSON, event_schema()),
+        ):
+            id_ = self._writer.register_schema(name, schema, content)
+            self._channels[topic] = self._writer.register_channel(topic, encoding, id_)
+        self._writer.flush()
+
+    def add(self, record: Record) -> None:
+        if isinstance(record, SessionEvent):
+            self._put_waiting()
+            self._put(SESSION, record.t_ns, event_message(record.name, record.data))
+        else:
+            self._waiting.append(record)
+        if self._began_ns is None:
+            self._began_ns = record.t_ns
+        chunk_ns = min(max(CHUNK_NS, (record.t_ns - self._began_ns) // CLOSED_CHUNK_PART), self._longest_ns)
+        if self._chunk_began_ns is None:
+            self._chunk_began_ns = record.t_ns
+        elif record.t_ns - self._chunk_began_ns >= chunk_ns:
+            self._put_waiting()
+            self._writer.flush()
+            self._chunk_began_ns = None
+
+    def finish(self) -> None:
+        if self.started:
+            self._put_waiting()
+            self._writer.finish()
+
+    def _put_waiting(self) -> None:
+        waiting, self._waiting = self._waiting, []
+        if waiting:
+            ahead_ns = (each.host_ns - each.t_ns for each in waiting if each.host_ns is not None)
+            self._ahead_ns = next(ahead_ns, self._ahead_ns)
+            self._put(BUS, waiting[0].t_ns, accesses_message(waiting))
+
+    def _put(self, topic: str, t_ns: int, data: bytes) -> None:
+        self._writer.add_message(self._channels[topic], t_ns, data, publish_time=max(t_ns + self._ahead_ns, 0))
 
 
 @dataclass(frozen=True)
@@ -172,19 +241,27 @@ class CaptureReader:
         self._count = self._first_ns = self._last_ns = 0
 
     def __iter__(self) -> Iterator[Record]:
+        for block in self.blocks():
+            if isinstance(block, Accesses):
+                yield from block
+            else:
+                yield block
+
+    def blocks(self) -> Iterator[Accesses | Record]:
+        """The same, register accesses as many at a time as the file has them."""
         try:
             with self._path.open("rb") as file:
-                yield from self._records(file)
+                yield from self._blocks(file)
         except OSError as error:
             raise CaptureError(
                 f"cannot read {self._path} ({error.strerror})", "check the path and its permissions"
             ) from error
 
-    def _records(self, file: IO[bytes]) -> Iterator[Record]:
+    def _blocks(self, file: IO[bytes]) -> Iterator[Accesses | Record]:
         size = os.fstat(file.fileno()).st_size
         self._check(file.read(len(MCAP0_MAGIC)))
         file.seek(0)
-        channels: dict[int, str] = {}
+        channels: dict[int, Channel] = {}
         meta: Mapping[str, Any] | None = None
         whole, finished = 0, False
         stream = _Bounded(file, size)
@@ -204,12 +281,12 @@ class CaptureReader:
                     "give the recording that they were made of",
                 )
             elif isinstance(item, Channel):
-                channels[item.id] = item.topic
+                channels[item.id] = item
             elif isinstance(item, Message):
-                record = self._record(channels.get(item.channel_id, ""), item)
-                if record is not None:
-                    self._counted(record)
-                    yield record
+                block = self._block(channels.get(item.channel_id), item)
+                if block is not None:
+                    self._counted(block)
+                    yield block
         if meta is None:
             raise CaptureError(
                 f"{self._path} does not hold the head of a capture of mpucal", "give a capture that mpucal recorded"
@@ -217,12 +294,14 @@ class CaptureReader:
         self.meta = meta
         self.recovered = None if finished else self._why_recovered(size - whole)
 
-    def _record(self, topic: str, message: Message) -> Record | None:
+    def _block(self, channel: Channel | None, message: Message) -> Accesses | Record | None:
+        if channel is None:
+            return None
         try:
-            return record_of(topic, message.log_time, message.data)
+            return records_of(channel.topic, channel.message_encoding, message.log_time, message.data)
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise CaptureError(
-                f"{self._path} holds a message on {topic} that is none of mpucal's ({error})",
+                f"{self._path} holds a message on {channel.topic} that is none of mpucal's ({error})",
                 "give a capture that mpucal recorded",
             ) from error
 
@@ -232,10 +311,13 @@ class CaptureReader:
         if magic != MCAP0_MAGIC:
             raise CaptureError(f"{self._path} is no MCAP file", "give a capture that mpucal recorded")
 
-    def _counted(self, record: Record) -> None:
-        self._first_ns = self._first_ns if self._count else record.t_ns
-        self._last_ns = record.t_ns
-        self._count += 1
+    def _counted(self, block: Accesses | Record) -> None:
+        if isinstance(block, Accesses):
+            first_ns, self._last_ns, count = int(block.t_ns[0]), int(block.t_ns[-1]), len(block)
+        else:
+            first_ns, self._last_ns, count = block.t_ns, block.t_ns, 1
+        self._first_ns = self._first_ns if self._count else first_ns
+        self._count += count
 
     def _why_recovered(self, lost: int) -> str:
         held = f"{self._count} records over {(self._last_ns - self._first_ns) / 1e9:.1f} s are whole"

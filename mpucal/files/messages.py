@@ -1,83 +1,168 @@
-"""The messages of a capture, JSON on two topics: register accesses on BUS, session events on SESSION."""
+"""The messages of a capture: register accesses on BUS, many to a message, and session events on SESSION.
+
+Accesses are columns, one entry an access, in Protocol Buffers' encoding; the file holds their schema too:
+
+    kind         a sum of WRITE, HEARD and FRAMED
+    register     its address; from 256 on a file of a driver of the kernel: files[register - 256]
+    count        bytes asked for or given
+    moved        bytes moved
+    step_ns      the bus's clock, less that of the access before; the first as it is
+    heard_ns     of those HEARD: the host's clock less the bus's, less the same of the one before; the first as it is
+    data         the bytes moved, but of those FRAMED
+    frame_words  how many words a frame has
+    words        the frames of those FRAMED: int16, each less the same word of the frame before, modulo 2^16
+    failures     of those that failed: which (from 0), and how
+    files        names, such as iio:device0/in_accel_scale
+
+Events are JSON. So were accesses in captures of version 1, a message each.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from mcap.well_known import MessageEncoding
+
 from ..chip.access import Failure, Transaction
-from ..chip.records import Record, SessionEvent
+from ..chip.accesses import Accesses
+from ..chip.records import SessionEvent
+from . import protobuf
 
 BUS, SESSION = "/bus", "/session"
+WRITE, HEARD, FRAMED = 1, 2, 4
 
-_BUS = {
-    "title": "mpucal.Transaction",
-    "description": "A register access; the message's time is the bus's clock.",
-    "type": "object",
-    "properties": {
-        "op": {"enum": ["read", "write"]},
-        "register": {
-            "type": ["integer", "string"],
-            "minimum": 0,
-            "maximum": 255,
-            "description": "of a chip; or the file of a driver of the kernel, such as iio:device0/in_accel_scale",
-        },
-        "count": {"type": "integer", "description": "bytes asked for or given"},
-        "data": {"type": "string", "description": "bytes moved, hexadecimal"},
-        "host_ns": {
-            "type": "integer",
-            "description": "the host's clock when it heard of that, where the bus's is another",
-        },
-        "error": {
-            "type": "object",
-            "description": "how the transfer failed",
-            "properties": {key: {"type": "string"} for key in Failure._fields},
-        },
-    },
-}
-_SESSION = {
+# name, type, whether repeated; numbered from 1
+_FAILURE = (("access", "uint32", False), *((name, "string", False) for name in Failure._fields))
+_ACCESSES = (
+    ("kind", "uint32", True),
+    ("register", "uint32", True),
+    ("count", "uint32", True),
+    ("moved", "uint32", True),
+    ("step_ns", "sint64", True),
+    ("heard_ns", "sint64", True),
+    ("data", "bytes", False),
+    ("frame_words", "uint32", False),
+    ("words", "sint32", True),
+    ("failures", "Failure", True),
+    ("files", "string", True),
+)
+_NAMES = dict(enumerate((name for name, *_ in _ACCESSES), 1))
+_NUMBERS = {name: number for number, name in _NAMES.items()}
+_EVENT = {
     "title": "mpucal.SessionEvent",
     "description": "A key press, an option, the end; the message's time is the bus's clock.",
     "type": "object",
     "properties": {"name": {"type": "string"}, "data": {"type": "object"}},
 }
-# topic -> JSON schema of its messages
-SCHEMAS: Mapping[str, Mapping[str, Any]] = {BUS: _BUS, SESSION: _SESSION}
 
 
-def transaction_message(transaction: Transaction) -> bytes:
-    """A register access, without its time, which is the message's."""
-    content: dict[str, Any] = {
-        "op": transaction.op,
-        "register": transaction.register,
-        "count": transaction.count,
-        "data": transaction.data.hex(),
+def accesses_schema() -> bytes:
+    """The schema of the messages on BUS, a FileDescriptorSet."""
+    return protobuf.schema("mpucal", {"Accesses": _ACCESSES, "Failure": _FAILURE})
+
+
+def event_schema() -> bytes:
+    """The schema of the messages on SESSION, a JSON Schema."""
+    return json.dumps(_EVENT).encode()
+
+
+def accesses_message(transactions: Sequence[Transaction]) -> bytes:
+    """Register accesses, one at least."""
+    a = Accesses.of(transactions)
+    ahead = (a.host_ns - a.t_ns)[a.heard]
+    columns: dict[str, bytes | int] = {
+        "kind": protobuf.packed(WRITE * a.write + HEARD * a.heard + FRAMED * a.framed),
+        "register": protobuf.packed(a.register),
+        "count": protobuf.packed(a.count),
+        "moved": protobuf.packed(a.moved),
+        "step_ns": protobuf.packed(protobuf.zigzag(np.diff(a.t_ns, prepend=0))),
+        "heard_ns": protobuf.packed(protobuf.zigzag(np.diff(ahead, prepend=0))),
+        "data": a.data.tobytes(),
+        "frame_words": a.frames.shape[1],
+        "words": protobuf.packed(protobuf.zigzag(np.diff(a.frames, axis=0, prepend=np.int16(0)).ravel())),
     }
-    if transaction.host_ns is not None:
-        content["host_ns"] = transaction.host_ns
-    if transaction.error is not None:
-        content["error"] = transaction.error._asdict()
-    return _compact(content)
+    message = b"".join(protobuf.field(number, columns[name]) for number, name in _NAMES.items() if columns.get(name))
+    for number, failure in a.failures.items():
+        words = enumerate((each.encode() for each in failure), 2)
+        content = protobuf.field(1, number) + b"".join(protobuf.field(i, word) for i, word in words)
+        message += protobuf.field(_NUMBERS["failures"], content)
+    return message + b"".join(protobuf.field(_NUMBERS["files"], name.encode()) for name in a.files)
+
+
+def accesses_of(message: bytes) -> Accesses:
+    """The accesses of a message.
+
+    Raises
+    ------
+    ValueError, KeyError, TypeError, AttributeError : no message on BUS.
+    """
+    columns: dict[str, Any] = {"data": b"", "frame_words": 1}
+    failures: dict[int, Failure] = {}
+    files: list[str] = []
+    for number, value in protobuf.fields(message):
+        if number == _NUMBERS["failures"]:
+            which, failure = _failure(value)
+            failures[which] = failure
+        elif number == _NUMBERS["files"] and isinstance(value, bytes):
+            files.append(value.decode())
+        elif number in _NAMES:
+            columns[_NAMES[number]] = value
+    kind, register, count, moved, words, steps, heard = (
+        protobuf.unpacked(columns.get(name, b""))
+        for name in ("kind", "register", "count", "moved", "words", "step_ns", "heard_ns")
+    )
+    if not len(kind):
+        raise ValueError("no access")
+    t_ns, is_heard = np.cumsum(protobuf.unzigzag(steps)), (kind & np.uint64(HEARD)) > 0
+    host_ns = np.zeros(len(t_ns), np.int64)
+    host_ns[is_heard] = t_ns[is_heard] + np.cumsum(protobuf.unzigzag(heard))
+    return Accesses(
+        (kind & np.uint64(WRITE)) > 0,
+        is_heard,
+        (kind & np.uint64(FRAMED)) > 0,
+        register.view(np.int64),
+        count.view(np.int64),
+        moved.view(np.int64),
+        t_ns,
+        host_ns,
+        np.frombuffer(columns["data"], np.uint8),
+        np.cumsum(protobuf.unzigzag(words).reshape(-1, columns["frame_words"]), axis=0, dtype=np.int16),
+        failures,
+        tuple(files),
+    )
+
+
+def _failure(message: bytes | int) -> tuple[int, Failure]:
+    values = dict(protobuf.fields(message)) if isinstance(message, bytes) else {}
+    names = (values.get(i, b"") for i in range(2, 2 + len(Failure._fields)))
+    return int(values.get(1, 0)), Failure(*(name.decode() for name in names if isinstance(name, bytes)))
 
 
 def event_message(name: str, data: Mapping[str, Any]) -> bytes:
     """A session event; `data` of JSON's own types."""
-    return _compact({"name": name, "data": dict(data)})
+    return json.dumps({"name": name, "data": dict(data)}, separators=(",", ":")).encode()
 
 
-def record_of(topic: str, t_ns: int, message: bytes) -> Record | None:
-    """The record of a message; None for a topic that a newer mpucal added.
+def records_of(topic: str, encoding: str, t_ns: int, message: bytes) -> Accesses | Transaction | SessionEvent | None:
+    """What a message holds; None for a topic that a newer mpucal added.
 
     Raises
     ------
     ValueError, KeyError, TypeError, AttributeError : no message of that topic.
     """
-    if topic not in SCHEMAS:
-        return None
-    content = json.loads(message)
+    if topic == BUS:
+        return accesses_of(message) if encoding == MessageEncoding.Protobuf else _transaction(t_ns, message)
     if topic == SESSION:
+        content = json.loads(message)
         return SessionEvent(content["name"], t_ns, content["data"])
+    return None
+
+
+def _transaction(t_ns: int, message: bytes) -> Transaction:
+    content = json.loads(message)
     error = content.get("error")
     return Transaction(
         content["op"],
@@ -88,7 +173,3 @@ def record_of(topic: str, t_ns: int, message: bytes) -> Record | None:
         None if error is None else Failure(**error),
         content.get("host_ns"),
     )
-
-
-def _compact(content: Mapping[str, Any]) -> bytes:
-    return json.dumps(content, separators=(",", ":")).encode()

@@ -3,23 +3,31 @@ import re
 import signal
 import subprocess
 import sys
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
+from itertools import accumulate
+from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
 
 from mpucal.chip.access import Failure, Transaction
-from mpucal.chip.records import SessionEvent
+from mpucal.chip.decode import decode
+from mpucal.chip.records import FORGET, SessionEvent
 from mpucal.errors import CaptureError, OutputError
 from mpucal.files import mcap
+from mpucal.files.capture import capture_rows, load_capture
 from mpucal.files.mcap import CaptureWriter, read_capture
 
 META = {"mpucal": "0.1.0", "chip": "MPU-6050", "options": {"gravity": 9.81, "seed": None}}
 
-times = st.integers(0, 2**63)
+times = st.integers(0, 2**63 - 1)
 words = st.text(max_size=30)
-registers = st.integers(0, 255)
+registers = st.integers(0, 255) | st.sampled_from(["iio:device0", "iio:device0/in_accel_scale"])
 data = st.binary(max_size=40)
 failures = st.none() | st.builds(Failure, words, words, words)
 reads = st.builds(lambda r, d, t, f: Transaction("read", r, len(d), d, t, f), registers, data, times, failures)
@@ -38,9 +46,17 @@ def write(path, records, meta=META):
                 writer.transaction(record)
 
 
-def polls(count, period_ns=20_000_000):
+def polls(count, period_ns=20_000_000, fifo=4):
     """Reads of a FIFO, every one different."""
-    return [Transaction("read", 0x74, 4, i.to_bytes(4, "big"), i * period_ns) for i in range(count)]
+    return [Transaction("read", 0x74, fifo, (7919 * i).to_bytes(fifo, "big"), i * period_ns) for i in range(count)]
+
+
+@contextmanager
+def killed_at_the_end(monkeypatch):
+    """A capture's chunks as they are while it is written."""
+    with monkeypatch.context() as as_killed:
+        as_killed.setattr(mcap, "CLOSED_CHUNK_NS", mcap.CHUNK_NS)
+        yield
 
 
 @pytest.fixture
@@ -61,23 +77,33 @@ def test_reads_what_was_written_in_the_order_in_which_it_happened(path, records,
     assert capture.recovered is None
 
 
-def test_other_programs_read_it(path):
-    """The library's own reader, by index: what a viewer of MCAP files does."""
-    write(path, [*polls(200), SessionEvent("key", 5_000_000_000, {"key": "enough"})])
+def test_other_programs_read_it(path, monkeypatch):
+    """The library's own reader, by index, and Protocol Buffers' own: what a viewer of MCAP files does."""
+    failed = Transaction("read", 0x38, 3, b"", 2_000_000_001, Failure("NoAnswer", "no answer of 0x68", "wire it"))
+    heard = [replace(each, host_ns=each.t_ns + 7_000_000_000 - i) for i, each in enumerate(polls(200, fifo=14))]
+    records = [*heard[:101], failed, *heard[101:], SessionEvent("key", 5_000_000_000, {"key": "enough"})]
+    monkeypatch.setattr(mcap, "CHUNK_NS", 5_000_000_000)
+    write(path, records)
     with path.open("rb") as file:
-        reader = make_reader(file, validate_crcs=True)
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
         summary = reader.get_summary()
-        assert summary.statistics.message_count == 201
-        assert summary.statistics.chunk_count > 1
+        assert summary.statistics.channel_message_counts == {1: 1, 2: 1}
         assert {channel.topic for channel in summary.channels.values()} == {"/bus", "/session"}
-        for schema in summary.schemas.values():
-            assert schema.encoding == "jsonschema"
-            assert json.loads(schema.data)["type"] == "object"
-        messages = [(c.topic, json.loads(m.data)) for _, c, m in reader.iter_messages(starting_at=3_900_000_000)]
-        assert messages[0] == ("/bus", {"op": "read", "register": 0x74, "count": 4, "data": "000000c3"})
-        assert messages[-1] == ("/session", {"name": "key", "data": {"key": "enough"}})
+        assert {schema.encoding for schema in summary.schemas.values()} == {"protobuf", "jsonschema"}
+        ((_, _, message, accesses),) = reader.iter_decoded_messages("/bus")
+        ((_, _, event),) = reader.iter_messages("/session")
         (metadata,) = reader.iter_metadata()
-        assert json.loads(metadata.metadata["chip"]) == "MPU-6050"
+    assert json.loads(metadata.metadata["chip"]) == "MPU-6050"
+    assert message.publish_time == 7_000_000_000
+    assert list(accumulate(accesses.step_ns)) == [record.t_ns for record in records[:-1]]
+    ahead = list(accumulate(accesses.heard_ns))
+    assert ahead == [each.host_ns - each.t_ns for each in heard]
+    assert [each & 2 > 0 for each in accesses.kind] == [record.error is None for record in records[:-1]]
+    words = np.array(accesses.words).reshape(-1, accesses.frame_words).cumsum(axis=0).astype(np.int16)
+    assert words.astype(">i2").tobytes() == b"".join(each.data for each in heard)
+    (failure,) = accesses.failures
+    assert (failure.access, failure.name, failure.what, failure.remedy) == (101, *failed.error)
+    assert json.loads(event.data) == {"name": "key", "data": {"key": "enough"}}
 
 
 KILLED = """
@@ -87,7 +113,7 @@ from mpucal.chip.access import Transaction
 writer = CaptureWriter(sys.argv[1])
 writer.start({"chip": "MPU-6050"})
 for i in range(int(sys.argv[2])):
-    writer.transaction(Transaction("read", 0x74, 4, i.to_bytes(4, "big"), i * 20_000_000))
+    writer.transaction(Transaction("read", 0x74, 4, (7919 * i).to_bytes(4, "big"), i * 20_000_000))
 print("written", flush=True)
 sys.stdin.read()
 """
@@ -110,9 +136,10 @@ def test_a_killed_program_loses_its_last_second_at_most(path, count):
     assert f"{kept} records" in capture.recovered
 
 
-def test_of_a_file_cut_anywhere_all_whole_chunks_are_read(path):
+def test_of_a_file_cut_anywhere_all_whole_chunks_are_read(path, monkeypatch):
     records = polls(120)
-    write(path, records)
+    with killed_at_the_end(monkeypatch):
+        write(path, records)
     whole = path.read_bytes()
     held, kept = [], 0
     for size in [*range(1, len(whole), 37), len(whole) - 1]:
@@ -189,9 +216,9 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path):
 
 def test_a_capture_of_a_newer_version_is_refused(path, monkeypatch):
     with monkeypatch.context() as newer:
-        newer.setattr(mcap, "VERSION", 2)
+        newer.setattr(mcap, "VERSION", 3)
         write(path, polls(3))
-    with pytest.raises(CaptureError, match="version 2"):
+    with pytest.raises(CaptureError, match="version 3"):
         read_capture(path)
 
 
@@ -220,3 +247,31 @@ def test_closing_before_the_start_leaves_an_empty_file(path):
     with CaptureWriter(path):
         pass
     assert path.read_bytes() == b""
+
+
+VERSION_1 = Path(__file__).with_name("version-1.mcap")
+CAPTURES = [VERSION_1, *sorted((Path(__file__).parents[2] / "fixtures").glob("*/*.mcap"))]
+
+
+@pytest.mark.parametrize("closed", [True, False], ids=["closed", "as while it was written"])
+@pytest.mark.parametrize("capture", CAPTURES, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_many_accesses_at_once_are_decoded_as_one_by_one(capture, closed, path, monkeypatch):
+    """Stored captures, those of faults and of version 1 among them, against this version's file of the same records."""
+    read = read_capture(capture)
+    with nullcontext() if closed else killed_at_the_end(monkeypatch):
+        write(path, read.records, read.meta)
+    again = read_capture(path)
+    assert (again.records, again.meta, again.recovered) == (read.records, read.meta, None)
+    one_by_one = decode([each for each in read.records if isinstance(each, Transaction)], path.name)
+    forgotten = [each.data for each in read.records if isinstance(each, SessionEvent) and each.name == FORGET]
+    for span in sorted(forgotten, key=lambda span: -int(span["first"])):
+        one_by_one = one_by_one.without(int(span["first"]), int(span["last"]))
+    whole = load_capture(path)
+    assert replace(whole, utc_ns=None) == one_by_one
+    assert capture_rows(path).recording() == replace(whole, name=capture_rows(path).name)
+
+
+def test_captures_of_version_1_are_read():
+    """JSON, a message an access, as mpucal wrote it until it was given columns."""
+    assert b"mpucal.Transaction" in VERSION_1.read_bytes()
+    assert len(load_capture(VERSION_1)) > 200

@@ -1,0 +1,137 @@
+"""Protocol Buffers' wire format, as far as a capture's columns need it: packed integers to arrays and back at once.
+
+A field is a key, `number << 3 | wire type`, and a varint (type 0) or a length with so many bytes (type 2). A varint is
+seven bits a byte, the lowest first, the eighth set in all but its last. Signed integers (sint) are zigzag: 0, -1, 1,
+-2. Source: https://protobuf.dev/programming-guides/encoding, and descriptor.proto for the schema.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Columns = NDArray[np.uint64]
+
+VARINT, BYTES = 0, 2
+LONGEST = 10
+# descriptor.proto: types and labels of fields
+TYPES = {"uint64": 4, "string": 9, "message": 11, "bytes": 12, "uint32": 13, "sint32": 17, "sint64": 18}
+OPTIONAL, REPEATED = 1, 3
+
+
+def field(number: int, value: int | bytes) -> bytes:
+    """A field of a whole number from 0 on, or of bytes."""
+    if isinstance(value, int):
+        return _varint(number << 3 | VARINT) + _varint(value)
+    return _varint(number << 3 | BYTES) + _varint(len(value)) + value
+
+
+def fields(message: bytes) -> Iterator[tuple[int, int | bytes]]:
+    """Number and value of each field, in their order.
+
+    Raises
+    ------
+    ValueError : it is no message, or has a field of another wire type.
+    """
+    at = 0
+    while at < len(message):
+        key, at = _read(message, at)
+        value, at = _read(message, at)
+        if key & 7 == VARINT:
+            yield key >> 3, value
+        elif key & 7 == BYTES and at + value <= len(message):
+            yield key >> 3, message[at : at + value]
+            at += value
+        else:
+            raise ValueError(f"a field of wire type {key & 7} at byte {at}")
+
+
+def packed(values: ArrayLike) -> bytes:
+    """(n,) whole numbers from 0 on, as varints one after the other."""
+    value = np.asarray(values, np.uint64)[:, None]
+    # how many bytes there are, without a logarithm that rounds
+    widths = 1 + np.sum(value >= (np.uint64(1) << (np.uint64(7) * np.arange(1, LONGEST, dtype=np.uint64))), axis=1)
+    widest = int(widths.max(initial=1))
+    column = np.arange(widest)
+    shown = column < widths[:, None]
+    digits = (value >> (np.uint64(7) * column.astype(np.uint64)) & np.uint64(127)).astype(np.uint8)
+    digits[column < widths[:, None] - 1] |= 128
+    return bytes(digits[shown])
+
+
+def unpacked(data: bytes) -> Columns:
+    """(n,) what `packed` was given.
+
+    Raises
+    ------
+    ValueError : the last number is cut, or one is too long.
+    """
+    digits = np.frombuffer(data, np.uint8)
+    last = np.flatnonzero(digits < 128)
+    if not len(digits):
+        return np.zeros(0, np.uint64)
+    if not len(last) or last[-1] != len(digits) - 1:
+        raise ValueError("a number is cut")
+    if len(last) == len(digits):
+        return digits.astype(np.uint64)
+    first = np.concatenate(([0], last[:-1] + 1))
+    width = last - first + 1
+    widest = int(width.max())
+    if widest > LONGEST:
+        raise ValueError("a number is longer than 64 bits")
+    value = (digits[first] & 127).astype(np.uint64)
+    for place in range(1, widest):
+        # of ever fewer numbers: most are short
+        longer = np.flatnonzero(width > place)
+        value[longer] |= (digits[first[longer] + place] & np.uint64(127)).astype(np.uint64) << np.uint64(7 * place)
+    return value
+
+
+def zigzag(values: ArrayLike) -> Columns:
+    """(n,) signed numbers as unsigned ones, small where they are."""
+    value = np.asarray(values, np.int64)
+    return ((value << 1) ^ (value >> 63)).view(np.uint64)
+
+
+def unzigzag(values: Columns) -> NDArray[np.int64]:
+    """(n,) what `zigzag` was given."""
+    return (values >> np.uint64(1)).view(np.int64) ^ -(values & np.uint64(1)).view(np.int64)
+
+
+def schema(package: str, messages: Mapping[str, Sequence[tuple[str, str, bool]]]) -> bytes:
+    """A FileDescriptorSet of messages, whose fields (name, type, whether repeated) are numbered from 1.
+
+    A type is one of TYPES, or the name of a message.
+    """
+    file = field(1, f"{package}.proto".encode()) + field(2, package.encode())
+    for name, columns in messages.items():
+        message = field(1, name.encode())
+        for number, (column, kind, repeated) in enumerate(columns, 1):
+            what = field(1, column.encode()) + field(3, number) + field(4, REPEATED if repeated else OPTIONAL)
+            what += field(5, TYPES.get(kind, TYPES["message"]))
+            message += field(2, what if kind in TYPES else what + field(6, f".{package}.{kind}".encode()))
+        file += field(4, message)
+    return field(1, file + field(12, b"proto3"))
+
+
+def _varint(value: int) -> bytes:
+    digits = bytearray()
+    while value > 127:
+        digits.append(value & 127 | 128)
+        value >>= 7
+    return bytes([*digits, value])
+
+
+def _read(message: bytes, at: int) -> tuple[int, int]:
+    """A varint, and where it ends."""
+    value = 0
+    for place in range(LONGEST):
+        if at + place >= len(message):
+            break
+        digit = message[at + place]
+        value |= (digit & 127) << 7 * place
+        if digit < 128:
+            return value, at + place + 1
+    raise ValueError("a number is cut")
