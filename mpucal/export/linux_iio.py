@@ -28,7 +28,7 @@ STEP_G = 2 / LSB_PER_G
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
     """A script for /bin/sh, whose argument is the device's folder, with `notes` in its head."""
-    words, _ = _words(calibration)
+    words, _ = offset_words(calibration)
     gain = calibration.inverse
     scale = np.linalg.norm(gain, axis=0)
     remarks = [f"# {line}" for line in (f"{head(calibration)}.", "usage: sh FILE /sys/bus/iio/devices/iio:deviceN")]
@@ -39,11 +39,11 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
     calibscales = " && ".join(f'[ -w "$DEVICE/in_accel_{axis}_calibscale" ]' for axis in AXES)
     lines += [f"if {calibscales}; then"]
     lines += [f'    put "$DEVICE/in_accel_{a}_calibscale" {s:.9f}' for a, s in zip(AXES, scale, strict=True)]
-    lines += [f'    MATRIX="{_matrix(gain / scale)}"', "else", f'    MATRIX="{_matrix(gain)}"', "fi", _MATRIX]
+    lines += [f'    MATRIX="{matrix_text(gain / scale)}"', "else", f'    MATRIX="{matrix_text(gain)}"', "fi", _MATRIX]
     return "\n".join(lines) + "\n"
 
 
-def _words(calibration: Calibration) -> tuple[tuple[int, int, int] | None, str]:
+def offset_words(calibration: Calibration) -> tuple[tuple[int, int, int] | None, str]:
     """What the offset registers should hold, or why nobody can say; absolute, so that running it twice does no harm."""
     sensor = calibration.sensor
     families = {part.family for part in PARTS.values() if part.chip == sensor.chip}
@@ -59,7 +59,7 @@ def _words(calibration: Calibration) -> tuple[tuple[int, int, int] | None, str]:
 
 def left(calibration: Calibration) -> tuple[str, ...]:
     """What error the commands leave, a sentence each."""
-    _, why = _words(calibration)
+    _, why = offset_words(calibration)
     if why:
         return (f"It {why}: b_a, ({mps2(calibration.b_a)}) m/s^2, stays to be subtracted by who reads.", _SCALE)
     step = STEP_G * STANDARD_GRAVITY_MPS2 / 2
@@ -81,5 +81,6 @@ _PUT = """put() { printf '%s' "$2" > "$1"; [ "$(cat "$1")" = "$2" ] || { echo "$
 _MATRIX = 'echo "udev: ACCEL_MOUNT_MATRIX=$MATRIX"'
 
 
-def _matrix(values: Vector) -> str:
+def matrix_text(values: Vector) -> str:
+    """(3, 3) as udev and sysfs have it."""
     return "; ".join(", ".join(f"{value:.9f}" for value in row) for row in values)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ..result.session_files import SessionFile
 from ..sources.kind import Delivers
-from ..sources.table import MAVLINK
+from ..sources.table import IIO, MAVLINK
 from .kind import Effect, Flag, SinkKind
 
 CHIP_OFFSETS = SessionFile("chip-offsets.json", "what a chip's offset registers held before a write")
@@ -16,8 +16,9 @@ CHIP_OFFSETS = SessionFile("chip-offsets.json", "what a chip's offset registers 
 BRIDGE_BLOB = SessionFile("bridge-blob-N.bin", "the calibration that a bridge's memory held before a write")
 OLD_PARAM = SessionFile("autopilot_old.param", "what an ArduPilot's parameters were before a write")
 OLD_PARAMS = SessionFile("autopilot_old.params", "what a PX4's parameters were before a write")
+IIO_STATE = SessionFile("iio-state.json", "what calibbias and the rule of udev were before a write")
 
-CHIP, BRIDGE, AUTOPILOT = "chip", "bridge", "autopilot"
+CHIP, KERNEL, BRIDGE, AUTOPILOT = "chip", "kernel", "bridge", "autopilot"
 
 # by name; a session writes to them in this order, so that what is written later says what an earlier one applies
 SINKS = {
@@ -31,6 +32,15 @@ SINKS = {
             opener="mpucal.sinks.chip:open_chip",
             effect=Effect.LESS_BIAS,
             kept=(CHIP_OFFSETS,),
+        ),
+        SinkKind(
+            KERNEL,
+            behind=lambda source: source.option is IIO,
+            where="the kernel's driver",
+            holds="D as ACCEL_MOUNT_MATRIX of udev; b_a in calibbias of an MPU-6050, until its supply goes",
+            opener="mpucal.sinks.iio:open_kernel",
+            effect=Effect.LESS_BIAS,
+            kept=(IIO_STATE,),
         ),
         SinkKind(
             BRIDGE,

@@ -26,6 +26,7 @@ from .kind import Request
 from .opened import Say
 
 SYSFS, DEVICES = Path("/sys/bus/iio/devices"), Path("/dev")
+RULES = Path("/etc/udev/rules.d")
 GROUPS = ("buffer", "scan_elements", "trigger")
 # of a capture's head: which devices, and the trigger
 OF_IIO = "iio"
@@ -39,11 +40,12 @@ class OpenedIio(OpenedChip):
 
     Attributes
     ----------
-    devices : which ones. trigger : see IioDriver.
+    devices : which ones. trigger : see IioDriver. rules : the folder of udev's rules; None: no udev knows them.
     """
 
     devices: Devices = NOWHERE
     trigger: str | None = None
+    rules: Path | None = None
 
     def source_meta(self) -> dict[str, Any]:
         """For the head of a capture."""
@@ -96,7 +98,9 @@ def open_source(request: Request) -> OpenedIio:
     for device in devices.each:
         files.check(device)
     bus: Any = files
-    return OpenedIio(bus, request.plan, words=request.words, devices=devices, trigger=request.values.get("trigger"))
+    return OpenedIio(
+        bus, request.plan, words=request.words, devices=devices, trigger=request.values.get("trigger"), rules=RULES
+    )
 
 
 class IioFiles(Files):

@@ -17,7 +17,7 @@ from ...chip.config import Config
 from ...chip.decode import Decoder
 from ...chip.driver import Driver
 from ...chip.families import PARTS, Part
-from ...chip.offsets import Block
+from ...chip.offsets import Block, Words
 from ...chip.port import Port
 from ...chip.probe import read_identity
 from ...chip.registers import ACCEL_LSB_PER_G, ACCEL_RANGES_G, GYRO_LSB_PER_DPS, GYRO_RANGES_DPS
@@ -56,6 +56,7 @@ class SimulatedFiles(Files):
         kinds = [[ACCEL], [GYRO]] if apart else [[ACCEL, GYRO]]
         self._devices = {f"iio:device{i}": _Device(each, part, buffered) for i, each in enumerate(kinds)}
         self._driver: Driver | None = None
+        self._written: Words | None = None
         self._now_ns = 0
 
     def read(self, register: str, count: int) -> Reply:
@@ -85,9 +86,11 @@ class SimulatedFiles(Files):
         if held.running and name != "buffer/enable":
             raise attribute_error(_error(errno.EBUSY), device, name, text)
         if name.endswith("_calibbias"):
-            words = list(self._words())
-            words[AXES.index(name[-len("_calibbias") - 1])] = int(text)
-            Block.read(self._port, self._place).with_words(words).write(self._port)
+            x, y, z = (
+                int(text) if name == f"{ACCEL}_{a}_calibbias" else w for a, w in zip(AXES, self._words(), strict=True)
+            )
+            self._written = (x, y, z)
+            self._write_words(self._written)
             return self._now_ns
         held.texts[name] = text
         if name in SETTINGS:
@@ -134,6 +137,9 @@ class SimulatedFiles(Files):
             config = Config(ranges[ACCEL], ranges[GYRO], float(first.texts["sampling_frequency"]))
             self._driver = Driver(self._bus, config, "the simulated kernel")
             self._driver.start()
+            if self._written is not None:
+                # mpucal's driver resets the chip, the kernel's does not
+                self._write_words(self._written)
         return self._driver
 
     def _polled(self, channel: str) -> int:
@@ -145,7 +151,10 @@ class SimulatedFiles(Files):
         self._now_ns = max(self._now_ns, reply.t_ns)
         return int.from_bytes(reply.data, "big", signed=True)
 
-    def _words(self) -> tuple[int, int, int]:
+    def _write_words(self, words: Words) -> None:
+        Block.read(self._port, self._place).with_words(words).write(self._port)
+
+    def _words(self) -> Words:
         return Block.read(self._port, self._place).words
 
 
