@@ -13,19 +13,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .api import calibrate, load
+    from .api import CheckResult, calibrate, check, load
     from .data import Recording
     from .errors import MpucalError
     from .result.calibration import Calibration
 
-__all__ = ["Calibration", "MpucalError", "Recording", "calibrate", "load"]
+__all__ = ["Calibration", "CheckResult", "MpucalError", "Recording", "calibrate", "check", "load"]
 __version__ = "0.1.0"
 
 _HOME = {
     "Calibration": ".result.calibration",
+    "CheckResult": ".recheck.outcome",
     "MpucalError": ".errors",
     "Recording": ".data",
     "calibrate": ".api",
+    "check": ".api",
     "load": ".api",
 }
 

@@ -1,9 +1,10 @@
-"""mpucal.load and mpucal.calibrate: their arguments checked, and a path taken where a recording is meant."""
+"""mpucal.load, calibrate and check: their arguments checked, and a path taken where a file is meant."""
 
 from __future__ import annotations
 
 from numbers import Real
 from os import PathLike
+from pathlib import Path
 from typing import Literal
 
 from .arguments import a_path
@@ -12,6 +13,8 @@ from .data import STANDARD_GRAVITY_MPS2, Recording
 from .errors import WrongType, WrongValue
 from .files import load as _load
 from .files.hints import Hints, parse_columns, parse_units
+from .recheck import check as _check
+from .recheck.outcome import CheckResult as CheckResult  # noqa: PLC0414 - mpucal takes it from here
 from .result.calibration import Calibration
 
 ModelName = Literal["auto", "hand", "imu", "accel", "paper", "tilt"]
@@ -80,11 +83,49 @@ def calibrate(
     WrongType : an argument of another type. WrongValue : no such model, or a gravity that is none.
     SourceError : the file holds no recording, see load.
     """
-    if isinstance(recording, str | PathLike):
-        recording = load(recording)
-    if not isinstance(recording, Recording):
-        what = "give a mpucal.Recording, as of mpucal.load or Recording.from_arrays, or the path of one"
-        raise WrongType(f"{type(recording).__name__} is no recording", what)
+    recording = _recording(recording)
     if not isinstance(gravity, Real) or isinstance(gravity, bool):
         raise WrongType(f"gravity is {gravity!r}", "give the local gravity in m/s^2, about 9.81")
     return _calibrate(recording, model, float(gravity), gravity_anyway)
+
+
+def check(
+    calibration: Calibration | str | PathLike[str],
+    recording: Recording | str | PathLike[str],
+    days: float | None = None,
+) -> CheckResult:
+    """Whether a calibration is still right for the sensor that made a recording.
+
+    A sensor to which nothing happened is called changed in 1 of 100 checks, see docs/check.md.
+
+    Parameters
+    ----------
+    calibration : the one to check, or the path of its file. recording : first lying flat, then still in three other
+        orientations or more, 20 deg apart; or the path of its file.
+    days : from the calibration to the recording; None: by their dates.
+
+    Returns
+    -------
+    CheckResult : `verdict` is still good, drifted, remounted, another sensor, or cannot be told; `changes` holds what
+        changed, with standard deviations.
+
+    Raises
+    ------
+    WrongType : an argument of another type. UsageError : a calibration that was refused, or of another kind of samples.
+    SourceError : a file holds no calibration, or no recording.
+    """
+    if isinstance(calibration, str | PathLike):
+        calibration = Calibration.load(Path(calibration))
+    if not isinstance(calibration, Calibration):
+        what = "give a mpucal.Calibration, as of mpucal.calibrate, or the path of one"
+        raise WrongType(f"{type(calibration).__name__} is no calibration", what)
+    return _check(calibration, _recording(recording), days)
+
+
+def _recording(given: Recording | str | PathLike[str]) -> Recording:
+    if isinstance(given, str | PathLike):
+        given = load(given)
+    if not isinstance(given, Recording):
+        what = "give a mpucal.Recording, as of mpucal.load or Recording.from_arrays, or the path of one"
+        raise WrongType(f"{type(given).__name__} is no recording", what)
+    return given

@@ -15,6 +15,7 @@ COMMANDS = {
     "record": "Record a sensor to a capture file, without calibrating.",
     "calibrate": "Calibrate from a capture or another recording.",
     "write": "Write a calibration to the device, or restore its previous state.",
+    "check": "Check whether a calibration is still right.",
     "apply": "Apply a calibration to a recording.",
     "stream": "Print calibrated samples live.",
     "export": "Convert a calibration to the format of another program.",

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import click
 
 from ..files.hints import Hints, parse_columns, parse_units
-from .options import Parsed
+from .options import Parsed, given
 
 F = TypeVar("F", bound=Callable[..., Any])
 NAMES = {
@@ -59,6 +59,15 @@ def hints_of(options: Mapping[str, Any]) -> Hints:
     """What was said, of a command's options."""
     said = {attribute: options[name] for name, attribute in NAMES.items() if options.get(name) is not None}
     return Hints(**said)
+
+
+def given_hints(options: Mapping[str, Any]) -> Hints:
+    """The same of a command that also takes sources: how their sensor is set says of a file how counts were made."""
+    said = given()
+    values = {name: options[name] for name in NAMES if name in said}
+    # a range is a number, which a source's option has as text
+    ranges = {name: float(value) for name, value in values.items() if name in ("accel_range", "gyro_range")}
+    return hints_of({**values, **ranges})
 
 
 def say_taken(taken: str | None) -> None:

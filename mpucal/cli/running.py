@@ -15,8 +15,8 @@ from ..terminal.console import Console
 
 
 @contextmanager
-def running(source: Opened, capture: Path, person: Console) -> Iterator[Runner]:
-    """A runner on `source` that records into `capture`; whatever happens, both are closed.
+def running(source: Opened, capture: Path, person: Console, checking: bool = False) -> Iterator[Runner]:
+    """A runner on `source` that records into `capture`; whatever happens, both are closed; checking : see Runner.
 
     Raises
     ------
@@ -34,4 +34,5 @@ def running(source: Opened, capture: Path, person: Console) -> Iterator[Runner]:
             measuring.go_on,
             measuring.late,
             Apart if source.real_time else Here,
+            checking,
         )

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from . import lay_flat
 from .aims import AIMS, NORMAL
+from .choose import Choose
 from .events import (
     Abort,
     Checked,
@@ -56,7 +57,7 @@ class Machine:
     ----------
     until_end : each step takes its time, and turning ends with the source.
     target : one of AIMS. tilt_only : ask for tilts alone, of a board that cannot be turned over.
-    attended : somebody can press keys.
+    attended : somebody can press keys. checking : a calibration that is there is checked, and none is made.
 
     Attributes
     ----------
@@ -64,12 +65,17 @@ class Machine:
     """
 
     def __init__(
-        self, until_end: bool = False, target: str = NORMAL, tilt_only: bool = False, attended: bool = False
+        self,
+        until_end: bool = False,
+        target: str = NORMAL,
+        tilt_only: bool = False,
+        attended: bool = False,
+        checking: bool = False,
     ) -> None:
         self.state = State.CONNECT
         self._until_end, self._aim, self._tilt_only = until_end, AIMS[target], tilt_only
-        self._attended = attended
-        self._step: lay_flat.LayFlat | Rotate | Verify = lay_flat.LayFlat(patient=until_end)
+        self._attended, self._checking = attended, checking
+        self._step: lay_flat.LayFlat | Rotate | Choose | Verify = lay_flat.LayFlat(patient=until_end)
         self._watch: MotionWatch | None = None
         self._flat: Rested | None = None
         self._samples = self._flat_samples = 0
@@ -104,7 +110,7 @@ class Machine:
             case Turned(why):
                 return [Decision(why), *self._verify()]
             case Finished(why):
-                return [Decision(why), COMPUTING]
+                return [Decision(why), REST if self._checking else COMPUTING]
             case Enough():
                 return self._enough(before)
             case Redo():
@@ -134,12 +140,12 @@ class Machine:
     @property
     def _wanted(self) -> Direction | None:
         """What is to point down now."""
-        return self._step.wanted if isinstance(self._step, Rotate | Verify) else None
+        return self._step.wanted if isinstance(self._step, Rotate | Choose | Verify) else None
 
     def _turn(self, flat: Rested) -> list[Output]:
-        rotate = Rotate(flat.acc, self._aim, self._until_end, self._tilt_only)
-        self._step = rotate
-        return [rotate.prompt]
+        turning = Choose(flat.acc) if self._checking else Rotate(flat.acc, self._aim, self._until_end, self._tilt_only)
+        self._step = turning
+        return [turning.prompt]
 
     def _verify(self) -> list[Output]:
         if not isinstance(self._step, Rotate):
@@ -180,7 +186,7 @@ class Machine:
 
     def _enough(self, state: State) -> list[Output]:
         if state is State.ROTATE:
-            return self.handle(Finished(ENOUGH) if self._until_end else Turned(ENOUGH))
+            return self.handle(Finished(ENOUGH) if self._until_end or self._checking else Turned(ENOUGH))
         if state is State.VERIFY and isinstance(self._step, Verify):
             return self.handle(self._step.enough())
         if state is State.LAY_FLAT and isinstance(self._step, lay_flat.LayFlat):
@@ -208,6 +214,8 @@ class Machine:
     def _ended(self, state: State, why: str | None) -> list[Output]:
         if state in (State.ROTATE, State.VERIFY):
             what = f"the source failed while the board was turned ({why})" if why else "the source ended"
+            if self._checking:
+                return [Decision(f"{what}; checking with the data so far"), REST]
             return [Decision(f"{what}; calibrating with the data so far"), COMPUTING]
         if why:
             return [Decision(why), REST]

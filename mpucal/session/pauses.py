@@ -66,9 +66,10 @@ def counted(pause: Pause, use: Use) -> list[Countdown]:
 
 
 class Pauses:
-    """Follows the stillnesses of a board in a hand; the one that it begins in is left out."""
+    """Follows the stillnesses of a board in a hand, each held for `hold_s`; the one that it begins in is left out."""
 
-    def __init__(self) -> None:
+    def __init__(self, hold_s: float = HOLD_S) -> None:
+        self._hold_s = hold_s
         self._windows = Windows(WINDOW_S)
         self._stillness = StillnessDetector(IN_THE_HAND)
         self._left: int | None = None
@@ -91,8 +92,8 @@ class Pauses:
             if not isinstance(sight, Still) or sight.run <= self._left:
                 continue
             countdown = None
-            if sight.seconds < HOLD_S + WINDOW_S - 1e-6:
-                remaining = max(HOLD_S - sight.seconds, 0.0)
-                countdown = Countdown(window.end_s, remaining, HOLD_S, paused=False)
+            if sight.seconds < self._hold_s + WINDOW_S - 1e-6:
+                remaining = max(self._hold_s - sight.seconds, 0.0)
+                countdown = Countdown(window.end_s, remaining, self._hold_s, paused=False)
             found.append(Pause(window.end_s, sight.seconds, np.asarray(sight.acc), sight.run, countdown))
         return found

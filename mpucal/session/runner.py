@@ -36,7 +36,8 @@ class Runner:
     go_on : after the source has ended, lets it go on with the next part of what was recorded in parts: True where
         there is one. The last part of a resumed session is the sensor itself.
     late : whether to wait for an answer that is late now, or is not; in a replay, where its session waited.
-    hire : begins who computes the answers.
+    hire : begins who computes the answers. checking : a calibration that is there is checked; nothing is computed
+        meanwhile.
     """
 
     def __init__(
@@ -49,11 +50,12 @@ class Runner:
         go_on: Callable[[], bool] = lambda: False,
         late: Callable[[bool], bool] = bool,
         hire: Callable[[Plan, Sensor], Worker] = Here,
+        checking: bool = False,
     ) -> None:
         self._source, self._talk, self._note = source, talk, note
-        self._plan = plan or Plan()
-        self._go_on, self._hire = go_on, hire
-        self._machine = Machine(self._plan.until_end, self._plan.target, self._plan.tilt_only, self._plan.attended)
+        self._plan = plan = plan or Plan()
+        self._go_on, self._hire, self._checking = go_on, hire, checking
+        self._machine = Machine(plan.until_end, plan.target, plan.tilt_only, plan.attended, checking)
         self._dialogue = Dialogue(self._machine, talk, listeners, note, source.now_ns, late)
         self._ended = False
         self.sensor: Sensor | None = None
@@ -69,7 +71,7 @@ class Runner:
         try:
             self._dialogue.ask()
             self._connect()
-            if self.sensor is not None:
+            if self.sensor is not None and not self._checking:
                 self._dialogue.questions = Questions(self._plan, self.sensor, self._hire)
             while self._dialogue.measuring:
                 self._step()

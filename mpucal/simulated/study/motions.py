@@ -13,6 +13,8 @@ from .. import rotation
 from ..legs import minimum_jerk_rate
 
 FLAT_S, MOVING_S = 10.0, 40.0
+CHECK_S = 15.0
+APART_RAD = np.radians(25.0)
 SLOPPY_RAD = np.radians(8.0)
 
 
@@ -38,6 +40,18 @@ def poses(t: Vector, rng: np.random.Generator, n: int) -> tuple[Vector, Vector]:
     about = np.eye(3)[np.arange(m) % 3] * rng.choice([-1.0, 1.0], m)[:, None]
     turns = about * np.radians(rng.uniform(50, 130, m))[:, None] + rng.uniform(-SLOPPY_RAD, SLOPPY_RAD, (m, 3))
     return moves(t, turns, np.full(m, 1.6), FLAT_S + MOVING_S / m * np.arange(m))
+
+
+def three_orientations(t: Vector, rng: np.random.Generator) -> tuple[Vector, Vector]:
+    """Three still orientations in 15 s, each 25 deg or more from the others and from flat, as a check takes them."""
+    while True:
+        axis = rng.standard_normal((3, 3))
+        axis[0, 2] = 0.0  # a turn about the vertical is none
+        turns = np.radians(rng.uniform(40, 110, 3))[:, None] * axis / np.linalg.norm(axis, axis=1, keepdims=True)
+        board = rotation.board_from_world(rotation.running_product(np.array([1.0, 0, 0, 0]), rotation.exp(turns)))
+        up = board[..., 2]
+        if (up @ up.T - 2.0 * np.eye(4)).max() < np.cos(APART_RAD):
+            return moves(t, turns, np.full(3, 1.6), FLAT_S + CHECK_S / 3 * np.arange(3))
 
 
 def six_faces(t: Vector, rng: np.random.Generator) -> tuple[Vector, Vector]:

@@ -12,7 +12,17 @@ from ...data import STANDARD_GRAVITY_MPS2, Recording, Sensor, Vector
 from ...errors import UsageError
 from ..habits import Habits
 from ..sensor import InSi, SensorTruth, quantised
-from .motions import FLAT_S, MOVING_S, attitude, continuous, poses, six_faces, three_turns
+from .motions import (
+    CHECK_S,
+    FLAT_S,
+    MOVING_S,
+    attitude,
+    continuous,
+    poses,
+    six_faces,
+    three_orientations,
+    three_turns,
+)
 from .sensors import GRAVITY_MPS2, hand_sensor, paper_sensor
 from .shaking import acceleration, tremor
 
@@ -47,6 +57,7 @@ class _Scene:
     motion: Callable[[Vector, np.random.Generator], tuple[Vector, Vector]]
     habits: Habits = _USUAL
     perfect_gyro: bool = False
+    moving_s: float = MOVING_S
 
 
 _SCENES = {
@@ -54,13 +65,14 @@ _SCENES = {
     "pose7": _Scene(partial(poses, n=7)),
     "pose9": _Scene(partial(poses, n=9)),
     "pose12": _Scene(partial(poses, n=12)),
+    "check": _Scene(three_orientations, moving_s=CHECK_S),
     "continuous": _Scene(continuous),
     "wobble30": _Scene(continuous, Habits(wobble=0.3)),
     "wobble100": _Scene(continuous, Habits(wobble=1.0)),
     "turns": _Scene(three_turns),
     "calm jerks": _Scene(continuous, _CALM, perfect_gyro=True),
 }
-MOTIONS = tuple(_SCENES)
+MOTIONS = tuple(name for name in _SCENES if name != "check")
 
 
 def paper_scenario(
@@ -90,15 +102,22 @@ def paper_scenario(
 
 
 def hand_scenario(
-    seed: int, motion: str, *, tremble: bool = False, delay_s: float = 0.0, rate_hz: float = 200.0
+    seed: int,
+    motion: str,
+    *,
+    tremble: bool = False,
+    delay_s: float = 0.0,
+    rate_hz: float = 200.0,
+    sensor: SensorTruth | None = None,
 ) -> Simulated:
-    """An MPU-6050 that a hand moves after 10 s flat, for 40 s.
+    """An MPU-6050 that a hand moves after 10 s flat, for 40 s; for 15 s in the motion "check".
 
     Parameters
     ----------
     seed : draws the sensor, the motion, the hand and the noise; each is the same whatever the other arguments.
-    motion : one of MOTIONS. tremble : the hand trembles in the poses.
+    motion : one of MOTIONS, or check. tremble : the hand trembles in the poses.
     delay_s : how much later the accelerometer reports than the gyroscope.
+    sensor : drawn from the seed unless given.
 
     Raises
     ------
@@ -113,7 +132,7 @@ def hand_scenario(
     of_sensor, of_motion, of_hand, of_tremor, of_noise = np.random.default_rng(seed).spawn(5)
     per_sample = max(round(TRUTH_HZ / rate_hz), 1)
     step_s = 1.0 / (rate_hz * per_sample)
-    n = round((FLAT_S + MOVING_S) * rate_hz) * per_sample
+    n = round((FLAT_S + scene.moving_s) * rate_hz) * per_sample
     t = step_s * np.arange(0.5, n)
     omega, moving = scene.motion(t, of_motion)
     holding = np.where(t >= FLAT_S, 1.0 - moving, 0.0)
@@ -126,7 +145,7 @@ def hand_scenario(
     omega, s, a = (_means(x, per_sample) for x in (omega, s, _delayed(s + a, t, delay_s) - s))
     return _measured(
         f"simulated {motion} {seed}",
-        hand_sensor(of_sensor, scene.perfect_gyro),
+        sensor or hand_sensor(of_sensor, scene.perfect_gyro),
         STEPS,
         rate_hz,
         round(FLAT_S * rate_hz),

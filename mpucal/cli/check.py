@@ -1,0 +1,129 @@
+"""`mpucal check`: whether a calibration is still right for its sensor, in half a minute or from a recording."""
+
+from __future__ import annotations
+
+import json
+import os
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..data import Recording
+from ..errors import UsageError
+from ..files import load
+from ..recheck import check
+from ..recheck.outcome import CheckResult
+from ..recheck.update import updated
+from ..result.calibration import Calibration
+from ..result.clock import now
+from ..result.session_files import BLOB, DOCUMENT
+from ..session.folder import SessionFolder
+from ..session.results import make_folder, save
+from ..sinks.choose import chosen
+from ..sinks.record import in_file
+from ..sinks.table import SINKS
+from ..sinks.write_back import write_to_all
+from ..sources.opening import one_of, open_source
+from ..sources.table import kinds_meant, source_title, used_by
+from ..terminal.console import console
+from .destination import device
+from .options import check_gyroscope, check_source, given, source_options
+from .person import ask, ask_in_doubt
+from .recording_options import given_hints, hint_options, say_taken
+from .running import running
+
+EXAMPLE = (
+    "Example: `mpucal check board7/calibration.json walk.npz`, or `mpucal check board7/calibration.json --bus sim`"
+)
+CHECK_FILE = "check.json"
+
+
+@click.command("check", epilog=EXAMPLE)
+@click.argument("calibration", metavar="CALIBRATION", type=click.Path(path_type=Path))
+@click.argument("file", metavar="[FILE|DIR]", type=click.Path(path_type=Path), required=False)
+@source_options("check")
+@hint_options("accel_range", "gyro_range", "rate")
+@click.option(
+    "-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for the updated calibration."
+)
+@click.option(
+    "--to", "sinks", type=click.Choice(list(SINKS)), multiple=True, help="Write the updated calibration there, too."
+)
+@click.option("--yes", is_flag=True, help="Ask no questions.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def command(
+    calibration: Path,
+    file: Path | None,
+    folder: Path | None,
+    sinks: tuple[str, ...],
+    yes: bool,
+    as_json: bool,
+    **options: Any,
+) -> int:
+    """Say whether CALIBRATION is still right for its sensor: still good, drifted, remounted, or another sensor.
+
+    From a sensor it takes half a minute: lay the board flat, then hold it in three orientations. From a recording, it
+    takes the rests that are there. -o writes an updated calibration where only the biases moved. Exit code 0: still
+    good; 5: drifted, remounted or another sensor; 4: it cannot be told, and why.
+    """
+    kinds = kinds_meant(options)
+    if (file is None) == (not kinds):
+        what = "a file and a source were given together" if kinds else "nothing to check it by was given"
+        raise UsageError(what, f"give a recording, or {one_of(used_by('check'))}")
+    if sinks and (folder is None or file is not None):
+        raise UsageError(
+            "--to was given without -o and a source", "name the folder and the source, which is written to"
+        )
+    of = Calibration.load(calibration)
+    if file is not None:
+        recording = load(file, given_hints(options))
+        say_taken(recording.taken)
+    else:
+        recording = _measured(of, folder, yes, options)
+    result = check(of, recording)
+    click.echo(json.dumps(result.document(), indent=2) if as_json else result.page())
+    if folder is not None:
+        _leave(folder, of, result, recording, as_json)
+        if sinks and result.only_biases:
+            _write_back(sinks, folder, options, yes, as_json)
+    return result.exit_code
+
+
+def _measured(of: Calibration, folder: Path | None, yes: bool, options: dict[str, Any]) -> Recording:
+    """What the person showed; its capture is kept with -o."""
+    check_source(click.get_current_context())
+    # a simulated chip lives in the gravity in which it was calibrated
+    options = {**options, **({"gravity": of.fit["gravity"]} if of.fit.get("gravity") else {})}
+    source = open_source(options, given())
+    check_gyroscope(source.plan.config)
+    person = console(quiet=yes, title=source_title(options))
+    into = None if folder is None else SessionFolder(folder, source.capture_name)
+    with running(source, Path(os.devnull) if into is None else into.capture, person, checking=True) as runner:
+        try:
+            return runner.measure()
+        finally:
+            if into is not None:
+                into.settle(runner.sensor)
+
+
+def _leave(folder: Path, of: Calibration, result: CheckResult, recording: Recording, as_json: bool) -> None:
+    """check.json, and where only the biases moved calibration.json and calibration.bin."""
+    make_folder(folder)
+    files = {CHECK_FILE: (json.dumps(result.document(), indent=2) + "\n").encode()}
+    if result.only_biases:
+        after = updated(of, result, recording, now().isoformat())
+        files |= {BLOB.name: after.blob().encode(), DOCUMENT.name: after.json().encode()}
+    save(folder, files)
+    click.echo(f"\nWritten to {folder}:\n  {', '.join(files)}", err=as_json)
+
+
+def _write_back(sinks: tuple[str, ...], folder: Path, options: dict[str, Any], yes: bool, as_json: bool) -> None:
+    """Write the updated calibration to the source's own sinks."""
+    path = folder / DOCUMENT.name
+    kinds = chosen(sinks, False, kinds_meant(options)[0])
+    confirm, in_doubt = partial(ask, yes=yes), partial(ask_in_doubt, yes=yes)
+    sensor, record = device(options), in_file(path)
+    for applied in write_to_all(kinds, Calibration.load(path), sensor, folder, record, confirm, sinks, in_doubt):
+        click.echo(f"Done: {applied.what}.", err=as_json)

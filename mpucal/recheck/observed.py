@@ -1,0 +1,209 @@
+"""What the rests of a recording, and the turns between them, say against a calibration, to first order.
+
+A calibration is off by theta, 21 numbers in the body frame:
+
+    E (9)       the accelerometer's matrix is D (I + E), row-major
+    beta (3)    its bias is b_a + D beta [m/s^2]
+    G (6)       the gyroscope's matrix is (I + G) K, symmetric: xx, xy, xz, yy, yz, zz
+    delta (3)   its bias is b_omega + delta [rad/s]
+
+A rest's calibrated mean is then a = s + E s + beta + noise, with s gravity's reaction. Three things are observed of it:
+|a| - g; the angle by which gravity of the rest before, carried here by the gyroscope, misses a; and of the first rest
+the mean rate. They are r = J theta + noise.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..calibration.flat_segment import Flat, find_flat, flat_statistics
+from ..calibration.gyro_drift import without_drift
+from ..calibration.masks import with_masks
+from ..calibration.rotation import cross, product, rotation
+from ..calibration.static_intervals import Intervals, static_intervals
+from ..calibration.verification import BIAS_RAD_S, BLOCK_S, FLOOR_MPS2, FLOOR_RAD, LEAST_REST_S
+from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
+from ..result.calibration import Calibration
+
+PARAMETERS = 21
+E, BETA, G, DELTA = slice(0, 9), slice(9, 12), slice(12, 18), slice(18, 21)
+UPPER = np.triu_indices(3)
+# of a turn: a gyroscope's scale is not linear (PS-MPU-6000A r3.4, section 6.1: 0.2 % of full scale)
+NONLINEAR = 0.001
+# a rest's own blocks are few: so many degrees of freedom of the others' mean stand beside them
+POOLED = 6.0
+# orientations nearer to one another are one
+APART_RAD = math.radians(20.0)
+
+
+@dataclass(frozen=True)
+class Observed:
+    """What was observed: r = J theta + noise of covariance R.
+
+    Attributes
+    ----------
+    r : (m,) m/s^2 of magnitudes, rad of angles, rad/s of the rate. J : (m, 21). R : (m, m).
+    down : (k, 3) unit vectors, calibrated: what pointed down in each rest.
+    temperature_c : of the chip meanwhile, None where it said none. seconds : how long the recording is.
+    """
+
+    r: Vector
+    J: Vector
+    R: Vector
+    down: Vector
+    temperature_c: float | None
+    seconds: float
+
+    @property
+    def orientations(self) -> int:
+        """How many differ by 20 deg from each other."""
+        apart: list[Vector] = []
+        for down in self.down:
+            if all(float(down @ other) <= math.cos(APART_RAD) for other in apart):
+                apart.append(down)
+        return len(apart)
+
+
+def changed(calibration: Calibration, theta: Vector) -> Calibration:
+    """The calibration of a sensor that is off by theta (21,)."""
+    twist = np.zeros((3, 3))
+    twist[UPPER] = theta[G]
+    twist += np.triu(twist, 1).T
+    return replace(
+        calibration,
+        D=calibration.D @ (np.eye(3) + theta[E].reshape(3, 3)),
+        b_a=calibration.b_a + calibration.D @ theta[BETA],
+        K=(np.eye(3) + twist) @ calibration.K,
+        b_omega=calibration.b_omega + theta[DELTA],
+    )
+
+
+def observe(recording: Recording, calibration: Calibration) -> Observed | None:
+    """What a recording says against a calibration; None where the board never rests."""
+    gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
+    recording = with_masks(recording)
+    segment = recording.flat or find_flat(recording)
+    if segment is None:
+        return None
+    flat = flat_statistics(recording, segment)
+    runs = static_intervals(recording, flat)
+    runs = runs[runs[:, 1] - runs[:, 0] >= LEAST_REST_S * recording.rate_hz]
+    if not len(runs):
+        return None
+    T = recording.temperature_c
+    known = bool(np.isfinite(T).any())
+    rests = _Rests(without_drift(recording, flat, runs), runs, calibration, float(np.nanmean(T)) if known else None)
+    blocks = [_Block.magnitude(rests, k, gravity) for k in range(len(runs))]
+    for k in range(1, len(runs)):
+        block = _Block.miss(rests, k, flat, calibration)
+        blocks += [block] if block is not None else []
+    blocks.append(_Block.rate(recording, runs[0].tolist(), flat, calibration, len(runs)))
+    of_rests = np.vstack([block.of_rests for block in blocks])
+    J = np.vstack([block.of_theta for block in blocks])
+    J[:, : BETA.stop] += of_rests @ np.vstack([_of_accelerometer(a) for a in rests.a])
+    R = of_rests @ rests.covariance @ of_rests.T + np.diag(np.concatenate([block.variance for block in blocks]))
+    return Observed(
+        np.concatenate([block.r for block in blocks]),
+        J,
+        R,
+        -rests.unit,
+        rests.temperature_c,
+        float(recording.t[-1] - recording.t[0]),
+    )
+
+
+class _Rests:
+    """The calibrated means (k, 3) of the rests, their covariance, and the gyroscope's steps from one to the next."""
+
+    def __init__(self, recording: Recording, runs: Intervals, calibration: Calibration, temperature_c: float | None):
+        self.recording, self.runs, self.temperature_c = recording, runs, temperature_c
+        A = calibration.inverse
+        means = np.array([recording.acc[a:b].mean(0) for a, b in runs])
+        self.a = calibration.apply(means, temperature_c=temperature_c)
+        self.norm = np.linalg.norm(self.a, axis=1)
+        self.unit = self.a / self.norm[:, None]
+        n = max(round(BLOCK_S * recording.rate_hz), 1)
+        own = [recording.acc[a : a + (b - a) // n * n].reshape(-1, n, 3).mean(1) for a, b in runs]
+        counts = np.array([len(block) for block in own])
+        variances = np.array([block.var(0, ddof=1).mean() for block in own])
+        others = variances[1:].mean() if len(runs) > 1 else variances[0]
+        pooled = ((counts - 1) * 3 * variances + POOLED * others) / ((counts - 1) * 3 + POOLED)
+        self.covariance = np.zeros((3 * len(runs), 3 * len(runs)))
+        for k, variance in enumerate(pooled / counts):
+            self.covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = variance * A @ A.T
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Some of the observations: (q,), (q, 3 k) by the rests' means, (q, 21) by theta besides, (q,) further variance."""
+
+    r: Vector
+    of_rests: Vector
+    of_theta: Vector
+    variance: Vector
+
+    @classmethod
+    def magnitude(cls, rests: _Rests, k: int, gravity: float) -> _Block:
+        of_rests = np.zeros((1, rests.a.size))
+        of_rests[0, 3 * k : 3 * k + 3] = rests.unit[k]
+        r = np.array([rests.norm[k] - gravity])
+        return cls(r, of_rests, np.zeros((1, PARAMETERS)), np.array([FLOOR_MPS2**2]))
+
+    @classmethod
+    def miss(cls, rests: _Rests, k: int, flat: Flat, calibration: Calibration) -> _Block | None:
+        """Of the turn to rest k from the one before; None where the gyroscope did not see all of it."""
+        recording = rests.recording
+        (a, b), (c, d) = rests.runs[k - 1 : k + 1].tolist()
+        first, last = (a + b) // 2, (c + d) // 2
+        between = slice(first, last + 1)
+        if recording.gyr_clipped[between].any() or recording.gap[first + 1 : last + 1].any():
+            return None
+        dt = np.diff(recording.t[between])
+        rates = 0.5 * (recording.gyr[first:last] + recording.gyr[first + 1 : last + 1]) - flat.b_omega
+        steps = dt[:, None] * (rates @ calibration.K.T)
+        T = product(rotation(-steps))
+        here, there = rests.unit[k], T @ rests.unit[k - 1]
+        across = np.linalg.svd(here[None])[2][1:]  # (2, 3) unit vectors at right angles to gravity
+        of_rests = np.zeros((2, rests.a.size))
+        for at, matrix in ((k - 1, -cross(here) @ T), (k, cross(there))):
+            unit = rests.unit[at]
+            of_unit = (np.eye(3) - np.outer(unit, unit)) / rests.norm[at]
+            of_rests[:, 3 * at : 3 * at + 3] = across @ matrix @ of_unit
+        of_theta = np.zeros((2, PARAMETERS))
+        of_theta[:, G] = -across @ _by_gyroscope(steps, rests.unit[k - 1], here)
+        noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
+        noise += FLOOR_RAD**2 + (NONLINEAR * float(np.linalg.norm(steps, axis=1).sum())) ** 2
+        return cls(across @ np.cross(there, here), of_rests, of_theta, np.full(2, noise))
+
+    @classmethod
+    def rate(cls, recording: Recording, run: list[int], flat: Flat, calibration: Calibration, rests: int) -> _Block:
+        """Of the first rest."""
+        gyr = recording.gyr[run[0] : run[1]]
+        of_theta = np.zeros((3, PARAMETERS))
+        of_theta[:, DELTA] = np.eye(3)
+        variance = flat.Sigma_omega / len(gyr) + BIAS_RAD_S**2
+        # a calibration without b_omega (a config blob of old) says nothing against a rate
+        r = gyr.mean(0) - calibration.b_omega
+        known = np.isfinite(r)
+        return cls(r[known], np.zeros((int(known.sum()), 3 * rests)), of_theta[known], variance[known])
+
+
+def _of_accelerometer(a: Vector) -> Vector:
+    """(3, 12) of E s + beta by E, row-major, and beta."""
+    return np.hstack([np.kron(np.eye(3), a), np.eye(3)])
+
+
+def _by_gyroscope(steps: Vector, before: Vector, here: Vector) -> Vector:
+    """(3, 6) derivatives of the miss by G, by central differences."""
+    columns, h = [], 1e-4
+    for i, j in zip(*UPPER, strict=True):
+        change = np.zeros((3, 3))
+        change[i, j] = change[j, i] = h
+        plus, minus = (
+            np.cross(product(rotation(-(steps @ (np.eye(3) + sign * change)))) @ before, here) for sign in (1.0, -1.0)
+        )
+        columns.append((plus - minus) / (2.0 * h))
+    return np.stack(columns, axis=1)

@@ -1,0 +1,130 @@
+"""What a check found, as numbers, as a document and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..result.calibration import Calibration
+from .observed import BETA, DELTA, UPPER, E, G
+
+FORMAT, VERSION = "mpucal.check", 1
+STILL_GOOD, DRIFTED, REMOUNTED = "still good", "drifted", "remounted"
+ANOTHER_SENSOR, CANNOT_BE_TOLD = "another sensor", "cannot be told"
+EXIT_CODES: Mapping[str, int] = {STILL_GOOD: 0, DRIFTED: 5, REMOUNTED: 5, ANOTHER_SENSOR: 5, CANNOT_BE_TOLD: 4}
+MENDED_BY_BIASES = ("nothing", "bias", "gyroscope's bias", "temperature")
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Change:
+    """By how much something changed: (3,) values of x, y, z with standard deviations, in `unit`."""
+
+    unit: str
+    value: tuple[float, ...]
+    std: tuple[float, ...]
+
+    @classmethod
+    def of(cls, unit: str, value: Vector, covariance: Vector, scale: float) -> Change:
+        """Of (3,) and (3, 3), times `scale`."""
+        std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        return cls(unit, tuple((scale * value).tolist()), tuple((scale * std).tolist()))
+
+    @property
+    def worst(self) -> int:
+        """The axis that changed most, in standard deviations."""
+        return int(np.argmax(np.abs(self.value) / np.maximum(self.std, 1e-12)))
+
+    def said(self) -> str:
+        """In words."""
+        return ", ".join(
+            f"{axis} {value:+.2g} ± {std:.1g}" for axis, value, std in zip(AXES, self.value, self.std, strict=True)
+        )
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """Whether a calibration is still right for its sensor.
+
+    Attributes
+    ----------
+    verdict : still good, drifted, remounted, another sensor, or cannot be told.
+    what : nothing, bias, scale, mount, gyroscope's bias, gyroscope's scale, temperature or another sensor.
+    message : the verdict in a sentence; remedy : what to do next, empty where nothing is.
+    changes : by name (bias, scale, mount, gyroscope's bias), what changed since, if that is what happened.
+    or_also : what else explains it nearly as well.
+    probability : how often a sensor to which nothing happened shows as much; None where it was not computed.
+    log_odds : logarithm of the evidence of each hypothesis against nothing.
+    temperature_change_c : since the calibration; None: not known. temperature_explains : whether that, by b_a(T) or
+        the data sheet, accounts for what was seen; None where it is not known or nothing happened.
+    orientations : how many were seen, 20 deg apart. seconds : how long the recording is.
+    theta : (21,), covariance : (21, 21), the estimate behind it, see `mpucal.recheck.observed`; None: there is none.
+    """
+
+    verdict: str
+    what: str
+    message: str
+    remedy: str = ""
+    changes: Mapping[str, Change] | None = None
+    or_also: tuple[str, ...] = ()
+    probability: float | None = None
+    log_odds: Mapping[str, float] | None = None
+    temperature_change_c: float | None = None
+    temperature_explains: bool | None = None
+    orientations: int = 0
+    seconds: float = 0.0
+    theta: Vector | None = None
+    covariance: Vector | None = None
+
+    @property
+    def exit_code(self) -> int:
+        """Of `mpucal check`: 0 still good, 5 changed, 4 cannot be told."""
+        return EXIT_CODES[self.verdict]
+
+    @property
+    def only_biases(self) -> bool:
+        """Whether new biases mend what happened, or nothing did."""
+        return self.verdict in (STILL_GOOD, DRIFTED) and self.what in MENDED_BY_BIASES
+
+    def document(self) -> dict[str, Any]:
+        """The content of check.json, in JSON's own types."""
+        left_out = ("theta", "covariance", "changes")
+        values = {key: value for key, value in vars(self).items() if key not in left_out}
+        changes = {name: asdict(change) for name, change in (self.changes or {}).items()}
+        return {"format": FORMAT, "version": VERSION, **values, "or_also": list(self.or_also), "changes": changes}
+
+    def page(self) -> str:
+        """What `mpucal check` prints."""
+        lines = [f"{self.verdict[0].upper()}{self.verdict[1:]}: {self.message}."]
+        lines += [f"To do: {self.remedy}."] if self.remedy else []
+        lines += ["", *(_row(name, change) for name, change in self.changes.items())] if self.changes else []
+        if self.probability is not None:
+            lines += ["", f"An unchanged sensor shows as much in {100.0 * self.probability:.2g} % of checks."]
+        lines += [f"{self.orientations} orientations in {self.seconds:.0f} s."] if self.seconds else []
+        return "\n".join(lines)
+
+
+def changes_of(calibration: Calibration, theta: Vector, covariance: Vector) -> dict[str, Change]:
+    """Bias [mg], scale factor [%], mount [deg] and the gyroscope's bias [deg/s], of theta (21,) and its covariance."""
+    D, degrees = calibration.D, float(np.degrees(1.0))
+    to_turn = np.zeros((3, 9))
+    for axis, (i, j) in enumerate(((2, 1), (0, 2), (1, 0))):
+        to_turn[axis, 3 * i + j], to_turn[axis, 3 * j + i] = 0.5, -0.5
+    diagonal = [0, 4, 8]
+    of_E, on_G = covariance[E, E], np.flatnonzero(UPPER[0] == UPPER[1])
+    of_G = covariance[G, G][np.ix_(on_G, on_G)]
+    return {
+        "bias": Change.of("mg", D @ theta[BETA], D @ covariance[BETA, BETA] @ D.T, 1e3 / STANDARD_GRAVITY_MPS2),
+        "scale": Change.of("%", theta[E][diagonal], of_E[np.ix_(diagonal, diagonal)], 100.0),
+        "mount": Change.of("deg", to_turn @ theta[E], to_turn @ of_E @ to_turn.T, degrees),
+        "gyroscope's bias": Change.of("deg/s", theta[DELTA], covariance[DELTA, DELTA], degrees),
+        "gyroscope's scale": Change.of("%", theta[G][on_G], of_G, 100.0),
+    }
+
+
+def _row(name: str, change: Change) -> str:
+    return f"  {f'{name}, {change.unit}':<26}{change.said()}"

@@ -1,0 +1,63 @@
+"""A calibration whose biases moved: D and K kept, b_a and b_omega by what was known and what a check saw, together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..data import Recording
+from ..errors import RefusedError
+from ..result.calibration import Calibration
+from ..result.correction import correction
+from .observed import BETA, DELTA, changed
+from .outcome import CheckResult
+
+HISTORY = "updated_from"
+
+
+def updated(calibration: Calibration, result: CheckResult, recording: Recording, created: str) -> Calibration:
+    """The same calibration with the biases that a check found.
+
+    Parameters
+    ----------
+    result : of a check of it by `recording`. created : the time of the check, ISO 8601.
+
+    Returns
+    -------
+    Calibration : `extra["updated_from"]` holds what each earlier one said of the biases, the oldest first. Unless
+        b_a(T) is known, it is one of the check's temperature.
+
+    Raises
+    ------
+    RefusedError : more than the biases has changed, or it could not be told.
+    """
+    if result.theta is None or result.covariance is None or not result.only_biases:
+        raise RefusedError(f"no calibration was updated: {result.message}", result.remedy)
+    ready = correction(calibration, recording.sensor, recording.autopilot).calibration
+    after = changed(ready, result.theta)
+    T_0, change_c = ready.sensor.temperature_c, result.temperature_change_c
+    T = T_0 if T_0 is None or change_c is None or ready.follows_temperature else T_0 + change_c
+    return replace(
+        ready,
+        b_a=after.b_a,
+        b_a_std=np.sqrt(np.diag(ready.D @ result.covariance[BETA, BETA] @ ready.D.T)),
+        b_omega=np.where(np.isfinite(after.b_omega), after.b_omega, result.theta[DELTA]),
+        b_omega_std=np.sqrt(np.diag(result.covariance[DELTA, DELTA])),
+        created=created,
+        sensor=replace(ready.sensor, temperature_c=T),
+        extra={**ready.extra, HISTORY: [*ready.extra.get(HISTORY, ()), _said(calibration, result)]},
+    )
+
+
+def _said(calibration: Calibration, result: CheckResult) -> dict[str, Any]:
+    return {
+        "created": calibration.created,
+        "temperature_c": calibration.sensor.temperature_c,
+        "b_a": calibration.b_a,
+        "b_a_std": calibration.b_a_std,
+        "b_omega": calibration.b_omega,
+        "found": result.verdict,
+        "what": result.what,
+    }

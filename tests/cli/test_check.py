@@ -1,0 +1,56 @@
+"""`mpucal check`: from a sensor, from a recording, and what it leaves."""
+
+import json
+from pathlib import Path
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from mpucal import result
+from mpucal.recheck.outcome import FORMAT
+from mpucal.result.calibration import Calibration
+
+
+@pytest.fixture
+def calibration(session):
+    return session.folder / "calibration.json"
+
+
+def test_of_a_recording(mpucal, session, calibration):
+    told = mpucal("check", calibration, session.folder)
+    assert (told.code, told.out.split(":")[0]) == (0, "Still good")
+    document = json.loads(mpucal("check", calibration, session.folder, "--json").out)
+    assert (document["format"], document["verdict"], document["what"]) == (FORMAT, "still good", "nothing")
+
+
+def test_of_a_sensor_in_half_a_minute_with_its_biases_updated(mpucal, calibration, tmp_path):
+    told = mpucal(
+        "check", calibration, "--bus", "sim", "--seed", "3", "--rate", "100", "-o", "today", "--to", "chip", "--yes"
+    )
+    assert told.code == 0, told.err
+    assert "held 3 of 3" in told.err
+    assert "Done: the offset registers" in told.out
+    written = {path.name for path in (tmp_path / "today").iterdir()}
+    assert {"capture.mcap", "check.json", "calibration.json", "calibration.bin"} <= written
+    seconds = json.loads((tmp_path / "today" / "check.json").read_text())["seconds"]
+    assert seconds < 35.0
+    document = json.loads((tmp_path / "today" / "calibration.json").read_text())
+    schema = json.loads((Path(result.__file__).parent / "calibration.schema.json").read_text())
+    Draft202012Validator(schema).validate(document)
+    assert document["updated_from"][0]["b_a"] == Calibration.load(calibration).b_a.tolist()
+    # its capture is a recording, and replays
+    for words in (("today/capture.mcap",), ("--replay", "today/capture.mcap")):
+        assert mpucal("check", calibration, *words).out.splitlines()[0] == told.out.splitlines()[0]
+
+
+def test_of_another_sensor(mpucal, calibration, tmp_path):
+    told = mpucal("check", calibration, "--bus", "sim", "--seed", "4", "--rate", "100", "-o", "other", "--yes")
+    assert told.code == 5
+    assert told.out.startswith("Another sensor: its offset registers hold")
+    assert not (tmp_path / "other" / "calibration.json").exists()
+
+
+def test_what_it_is_checked_by_is_one_thing(mpucal, calibration):
+    assert mpucal("check", calibration).code == 2
+    assert mpucal("check", calibration, "walk.npz", "--bus", "sim").code == 2
+    assert mpucal("check", calibration, "walk.npz", "--to", "chip").code == 2

@@ -1,0 +1,137 @@
+"""The hypothesis test against simulated truth, and its parts against finite differences and chance."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mpucal
+from mpucal.calibration.rotation import rotation
+from mpucal.data import Sensor
+from mpucal.errors import RefusedError
+from mpucal.recheck import drift
+from mpucal.recheck.hypotheses import NOTHING, weigh
+from mpucal.recheck.observed import changed, observe
+from mpucal.recheck.update import updated
+from mpucal.simulated.study.scenarios import GRAVITY_MPS2, hand_scenario
+from mpucal.simulated.study.sensors import hand_sensor
+
+TRUTH = hand_sensor(np.random.default_rng(3)).symmetric()[0]
+CALIBRATION = mpucal.Calibration(
+    D=TRUTH.D,
+    b_a=TRUTH.b_a,
+    D_std=np.full((3, 3), 2e-4),
+    b_a_std=np.full(3, 2e-3),
+    K=TRUTH.K,
+    K_std=np.full((3, 3), 5e-4),
+    b_omega=TRUTH.b_omega,
+    b_omega_std=np.full(3, 1e-4),
+    fit={"gravity": GRAVITY_MPS2, "model": "hand"},
+    quality={"verdict": "good"},
+    sensor=Sensor(chip="MPU-6050", temperature_c=25.0),
+)
+TEN_MG = np.array([0.0, 10.0, 0.0]) * drift.MG
+
+
+def shown(truth, seed=7, temperature_c=25.0):
+    recording = hand_scenario(seed, "check", tremble=True, sensor=truth).recording
+    return replace(recording, flat=None, temperature_c=np.full(len(recording), temperature_c))
+
+
+HAPPENED = {
+    "nothing": (TRUTH, "still good", "nothing"),
+    "bias": (replace(TRUTH, b_a=TRUTH.b_a + TEN_MG), "drifted", "bias"),
+    "scale": (replace(TRUTH, D=TRUTH.D @ np.diag([1.0, 1.0, 1.02])), "drifted", "scale"),
+    "mount": (replace(TRUTH, D=TRUTH.D @ rotation(np.radians([0.8, 0.6, 0.0]))), "remounted", "mount"),
+    "gyroscope": (replace(TRUTH, b_omega=TRUTH.b_omega + np.radians([0, 6, 0])), "drifted", "gyroscope's bias"),
+    "another": (hand_sensor(np.random.default_rng(9)), "another sensor", "another sensor"),
+}
+
+
+@pytest.mark.parametrize("name", HAPPENED)
+def test_it_tells_what_happened(name):
+    truth, verdict, what = HAPPENED[name]
+    told = mpucal.check(CALIBRATION, shown(truth), days=1.0)
+    assert (told.verdict, told.what) == (verdict, what)
+    assert verdict in told.page().lower()
+
+
+def test_a_new_bias_is_estimated_and_its_history_kept():
+    truth = HAPPENED["bias"][0]
+    recording = shown(truth)
+    told = mpucal.check(CALIBRATION, recording, days=1.0)
+    bias = told.changes["bias"]
+    assert np.all(np.abs(np.array(bias.value) - [0, 10, 0]) < 4 * np.array(bias.std))
+    after = updated(CALIBRATION, told, recording, "2026-01-02T00:00:00+00:00")
+    np.testing.assert_array_equal(after.D, CALIBRATION.D)
+    np.testing.assert_allclose(after.b_a, truth.b_a, atol=4 * after.b_a_std.max())
+    assert mpucal.check(after, shown(truth, seed=8), days=0.0).verdict == "still good"
+    again = updated(after, mpucal.check(after, recording), recording, "2026-01-03T00:00:00+00:00")
+    history = mpucal.Calibration.from_document(again.document()).extra["updated_from"]
+    assert [entry["found"] for entry in history] == ["drifted", "still good"]
+    np.testing.assert_array_equal(history[0]["b_a"], CALIBRATION.b_a)
+
+
+def test_a_turned_mount_is_not_mended_by_biases():
+    recording = shown(HAPPENED["mount"][0])
+    with pytest.raises(RefusedError):
+        updated(CALIBRATION, mpucal.check(CALIBRATION, recording, days=1.0), recording, "")
+
+
+def test_a_change_of_temperature_explains_what_the_data_sheet_allows_and_no_more():
+    warm = replace(TRUTH, b_a=TRUTH.b_a + 0.8 * TEN_MG)
+    explained = mpucal.check(CALIBRATION, shown(warm, temperature_c=45.0), days=1.0)
+    assert explained.verdict == "drifted"
+    assert explained.temperature_explains
+    hot = replace(TRUTH, b_a=TRUTH.b_a + 8.0 * TEN_MG)
+    assert mpucal.check(CALIBRATION, shown(hot, temperature_c=30.0), days=1.0).temperature_explains is False
+
+
+def test_where_b_a_of_the_temperature_is_known_it_has_not_drifted():
+    slope = 0.05 * TEN_MG
+    known = replace(CALIBRATION, b_a_slope=slope, b_a_slope_std=np.zeros(3), temperature_range_c=np.array([0.0, 60.0]))
+    warm = replace(TRUTH, b_a=TRUTH.b_a + 20.0 * slope)
+    assert mpucal.check(known, shown(warm, temperature_c=45.0), days=1.0).verdict == "still good"
+
+
+def test_too_little_to_tell_says_what_was_missing():
+    recording = shown(TRUTH)
+    still = recording.part(0, round(9.0 * recording.rate_hz))
+    told = mpucal.check(CALIBRATION, still, days=1.0)
+    assert (told.verdict, told.exit_code) == ("cannot be told", 4)
+    assert "1 orientations were seen" in told.message
+    moving = recording.part(len(recording) - 50, len(recording))
+    assert mpucal.check(CALIBRATION, moving).verdict == "cannot be told"
+
+
+def test_another_chip_is_told_by_what_it_says_of_itself():
+    known = replace(CALIBRATION, sensor=replace(CALIBRATION.sensor, who_am_i=0x68, accel_offsets=(2, 4, 6)))
+    recording = shown(TRUTH)
+    for sensor in (Sensor(who_am_i=0x70), Sensor(who_am_i=0x68, accel_offsets=(2, 4, 9000))):
+        assert mpucal.check(known, replace(recording, sensor=sensor)).verdict == "another sensor"
+
+
+def test_the_observations_are_linear_in_what_is_wrong():
+    rng = np.random.default_rng(0)
+    recording = shown(TRUTH)
+    before = observe(recording, CALIBRATION)
+    for i in range(21):
+        theta = np.zeros(21)
+        theta[i] = 1e-4 * rng.choice([-1.0, 1.0])
+        # a calibration that is wrong by theta sees a sensor that is right the other way round
+        after = observe(recording, changed(CALIBRATION, -theta))
+        np.testing.assert_allclose(after.r - before.r, before.J @ theta, atol=2e-6, err_msg=str(i))
+
+
+def test_an_unchanged_sensor_is_called_changed_as_often_as_designed():
+    recording = shown(TRUTH)
+    observed = observe(recording, CALIBRATION)
+    nothing = drift.own_uncertainty(CALIBRATION) + drift.ageing(CALIBRATION, 1.0, 0.0)
+    happenings = drift.happenings(CALIBRATION, 0.0)
+    S = observed.J @ nothing @ observed.J.T + observed.R
+    draws = np.random.default_rng(5).multivariate_normal(np.zeros(len(S)), S, 100)
+    found = [weigh(replace(observed, r=r), nothing, happenings) for r in draws]
+    assert sum(w.told != NOTHING for w in found) <= 5
+    p = np.sort([w.probability for w in found])
+    # Kolmogorov and Smirnov's statistic, 1.63 at 1 %
+    assert np.sqrt(100) * np.abs(p - (np.arange(100) + 0.5) / 100).max() < 1.63
