@@ -13,8 +13,10 @@ import click
 from ..data import Recording
 from ..errors import MpucalError, RefusedError
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
+from ..page.address import Address
+from ..page.console import on_page
 from ..result.calibration import REFUSED, Calibration
-from ..result.session_files import LOG
+from ..result.session_files import CAPTURE_OF_VEHICLE, LOG
 from ..session.folder import SessionFolder
 from ..sinks.choose import announced, chosen
 from ..sinks.kind import SinkKind
@@ -29,12 +31,15 @@ from ..terminal.console import Console, console
 from ..terminal.hangup import outliving
 from .destination import device, session_sink_options
 from .options import aim_options, check_gyroscope, check_source, fit_options, given, source_options
+from .page import BOARD, page_options
 from .person import ask, ask_in_doubt
 from .running import running
 from .summary import summary, written
 
 # as remedies say it
 AGAIN = "start again"
+# a simulated chip that is to run as fast as it can does so on a page, too
+UNPACED = "pace=fast"
 EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board, `mpucal session --bus sim`"
 
 
@@ -50,6 +55,8 @@ EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board
 @click.option("--yes", is_flag=True, help="Ask no questions.")
 @click.option("--json", "as_json", is_flag=True, help="Print only calibration.json.")
 @click.option("--json-events", is_flag=True, help="Print each event as a line of JSON on stderr.")
+@page_options
+@click.option("--page-keys", is_flag=True, help="The page may press Enter, r and q as well.")
 @click.option("--beep/--no-beep", default=None, help="Ring the bell at each new prompt; default: on a terminal.")
 @click.option("--keep-going", is_flag=True, help="Go on when the terminal goes away, as a dropped ssh connection does.")
 def command(
@@ -61,6 +68,9 @@ def command(
     keep_going: bool,
     sinks: tuple[str, ...],
     no_write: bool,
+    page: Address | None,
+    page_keys: bool,
+    board: str | None,
     **options: Any,
 ) -> int:
     """Guide a person through laying flat, turning and verifying; calibrate; write the results.
@@ -73,15 +83,25 @@ def command(
     attended = not yes and sys.stdin.isatty()
     source, kinds, options = _opened(resume, options, sinks, no_write, attended)
     check_gyroscope(source.plan.config)
-    person = console(quiet=yes, as_json=json_events, beep=beep, title=source_title(options))
+    title = source_title(options)
+    terminal = console(quiet=yes, as_json=json_events, beep=beep, title=title)
     into = SessionFolder(resume or folder, source.capture_name, again=resume is not None)
-    with outliving(lambda: into.path / LOG.name, partial(person.hung_up, stop=not keep_going)):
+    about = {"title": title, "board": board or ("vehicle" if into.capture.name == CAPTURE_OF_VEHICLE.name else BOARD)}
+    paced = not source.real_time and UNPACED not in str(options.get("bus"))
+    seen = attended and sys.stderr.isatty() and not json_events
+    hung_up = partial(terminal.hung_up, stop=page is None and not keep_going)
+    with (
+        outliving(lambda: into.path / LOG.name, hung_up),
+        on_page(terminal, page, about, page_keys, paced, json_events, seen) as (person, tell),
+    ):
         # a program that reads the events finds it in calibration.json
         recording, calibration, paths = _run(source, into, person, "" if json_events else announced(kinds, no_write))
+        files = [into.capture, *paths]
+        tell(calibration, summary(calibration), files)
         if not as_json:
             if not json_events:
                 click.echo(err=True)
-            click.echo(f"{summary(calibration)}\n\n{written([into.capture, *paths])}")
+            click.echo(f"{summary(calibration)}\n\n{written(files)}")
         record = in_session(into.path, calibration, recording, source.truth)
         sensor = device({**options, "gravity": source.plan.gravity, "model": source.plan.model})
         confirm, in_doubt = partial(ask, yes=yes), partial(ask_in_doubt, yes=yes)

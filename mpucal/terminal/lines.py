@@ -116,13 +116,13 @@ class JsonLines(Lines):
         self._event("note", {"text": text.strip()})
 
     def _event(self, name: str, fields: Mapping[str, Any]) -> None:
-        super().say(json.dumps({"event": name, **_plain(fields)}, allow_nan=False))
+        super().say(json.dumps({"event": name, **plain(fields)}, allow_nan=False))
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """JSON's own types: what is no finite number becomes null."""
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

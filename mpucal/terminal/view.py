@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 from ..session.events import (
     Caution,
@@ -39,6 +40,18 @@ HEADLINES = {
     PromptKind.REST: "PUT IT DOWN",
 }
 CONNECTING = "WAIT"
+
+
+class Moment(StrEnum):
+    """What matters this moment: it takes the large letters."""
+
+    CONNECTING = "connecting"
+    COUNTING = "counting"
+    TOLD = "told"
+    STEP = "step"
+    POINT = "point"
+    TURN = "turn"
+    NEAR = "near"
 
 
 @dataclass(frozen=True)
@@ -120,33 +133,33 @@ class View:
         return self.knowledge.down
 
     @property
+    def moment(self) -> Moment:
+        """What matters now."""
+        return self._now[0]
+
+    @property
     def headline(self) -> str:
         """What to do this moment, in a word or two."""
+        return self._now[1]
+
+    @property
+    def _now(self) -> tuple[Moment, str]:
+        """A countdown, what became of an orientation, the step, or the way to the wanted orientation; and its words."""
         if self.prompt is None:
-            return CONNECTING
+            return Moment.CONNECTING, CONNECTING
         waiting = self.waiting
         if waiting is not None and self.prompt.kind is not PromptKind.REST and self._counts(waiting):
             word = "STILL" if self.prompt.kind is PromptKind.LAY_FLAT else "HOLD"
-            return f"{word} {math.ceil(waiting.remaining_s)}"
+            return Moment.COUNTING, f"{word} {math.ceil(waiting.remaining_s)}"
         if self.held is not None and self.now_s is not None and self.now_s - self.held.t_s < TOLD_S:
-            return TOLD[self.held.use]
+            return Moment.TOLD, TOLD[self.held.use]
         if self.wanted is None:
-            return HEADLINES[self.prompt.kind]
-        return self._way or f"{axes(self.wanted)} DOWN"
-
-    @property
-    def _way(self) -> str:
-        """What is missing to the wanted orientation: "ROLL LEFT 60"; empty where nobody knows."""
+            return Moment.STEP, HEADLINES[self.prompt.kind]
         if self.meter is None or self.meter.missing_deg is None:
-            return ""
+            return Moment.POINT, f"{axes(self.wanted)} DOWN"
         if self.meter.missing_deg <= NEAR_DEG:
-            return "HOLD STILL"
-        return (
-            self.meter.turn.removesuffix(" deg")
-            .replace("tip away and roll", "away")
-            .replace("tip toward you and roll", "near")
-            .upper()
-        )
+            return Moment.NEAR, "HOLD STILL"
+        return Moment.TURN, _way(self.meter.turn)
 
     def _counts(self, waiting: Countdown) -> bool:
         """Whether the countdown has begun; until then what it waits for is said."""
@@ -160,6 +173,12 @@ class View:
 
     def _at(self, t_s: float) -> View:
         return replace(self, now_s=t_s, begun_s=t_s if self.begun_s is None else self.begun_s)
+
+
+def _way(turn: str) -> str:
+    """What is missing to the wanted orientation, in large letters: "ROLL LEFT 60"."""
+    short = turn.removesuffix(" deg").replace("tip away and roll", "away").replace("tip toward you and roll", "near")
+    return short.upper()
 
 
 def axes(down: Direction) -> str:

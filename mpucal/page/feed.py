@@ -1,0 +1,164 @@
+"""The session's end of the page: what it says goes to the page's process, which it never waits for."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ..errors import OutputError
+from ..session.events import Key, Output
+from ..terminal.view import View
+from .address import Address
+from .state import changes, state
+
+# a page is told no more often than this
+LEAST_INTERVAL_S = 0.03
+TOKEN_BYTES = 16
+# after the end, clients have so long to fetch the results
+LINGER_S = 5.0
+
+
+class Feed:
+    """A page: its process, and a thread that tells that the latest view of the session.
+
+    What is heard only changes the view. Where the process or its clients are slow, views between are left out.
+
+    Parameters
+    ----------
+    about : what does not change: title, board. keys : whether the page may send keys.
+
+    Attributes
+    ----------
+    url : where the page is, with its token. clients : how many follow it now.
+
+    Raises
+    ------
+    OutputError : nobody can listen at `where`.
+    """
+
+    def __init__(self, where: Address, about: Mapping[str, Any], keys: bool = False) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "mpucal.page.process"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            # what this program imports is imported from the same places
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            # Ctrl-C is for the session, which ends this process too
+            process_group=0,
+        )
+        token = secrets.token_urlsafe(TOKEN_BYTES)
+        # not as an argument: those are for everybody on the computer to read
+        self._tell({"host": where.host, "port": where.port, "name": where.name, "token": token, "keys": keys})
+        said, _, rest = self._line().partition(" ")
+        if said != "port":
+            self.close()
+            raise OutputError(
+                f"no page can be served at {where.host}:{where.port} ({rest or 'its process ended'})",
+                "choose another place with --page=HOST:PORT, or leave --page away",
+            )
+        self.url = f"http://{where.name}:{rest}/{token}/"
+        self.clients = 0
+        self._view = View()
+        self._fixed: dict[str, Any] = {**about, "keys": keys}
+        self._offered: deque[dict[str, str]] = deque()
+        self._pressed: deque[Key] = deque()
+        self._changed, self._closed = threading.Event(), threading.Event()
+        self._changed.set()
+        self._threads = [
+            threading.Thread(target=job, name="page", daemon=True) for job in (self._keep_telling, self._listen)
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def hear(self, output: Output) -> None:
+        """Change the view."""
+        self._view = self._view.after(output)
+        self._changed.set()
+
+    def say(self, text: str) -> None:
+        """A line of talk more."""
+        self._view = self._view.noted(text.strip())
+        self._changed.set()
+
+    def show(self, **values: Any) -> None:
+        """Show these besides, as they are: JSON's own types."""
+        self._fixed = {**self._fixed, **values}
+        self._changed.set()
+
+    def offer(self, paths: Sequence[Path]) -> None:
+        """Let these files be fetched."""
+        self._offered.append({path.name: str(path.resolve()) for path in paths})
+        self.show(results=[{"name": path.name, "bytes": path.stat().st_size} for path in paths])
+
+    def pressed(self) -> Sequence[Key]:
+        """The keys that came from the page since the last call."""
+        return [self._pressed.popleft() for _ in range(len(self._pressed))]
+
+    def end(self) -> None:
+        """Say the last, leave the clients a moment to fetch the results, and end the process."""
+        self.show(ended=True)
+        self._closed.set()
+        self._changed.set()
+        self._threads[0].join(LINGER_S)
+        with suppress(OSError):
+            self._stdin.close()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(2.0 * LINGER_S)
+        self.close()
+
+    def close(self) -> None:
+        """End the process at once."""
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                with suppress(OSError):
+                    pipe.close()
+
+    @property
+    def _stdin(self) -> Any:
+        return self._process.stdin
+
+    def _tell(self, message: Mapping[str, Any]) -> None:
+        with suppress(OSError, ValueError):
+            self._stdin.write(json.dumps(message, allow_nan=False) + "\n")
+            self._stdin.flush()
+
+    def _line(self) -> str:
+        return self._process.stdout.readline().strip() if self._process.stdout else ""
+
+    def _keep_telling(self) -> None:
+        old: dict[str, Any] = {}
+        while True:
+            self._changed.wait()
+            self._changed.clear()
+            last = self._closed.is_set()
+            new = {**state(self._view), **self._fixed}
+            while self._offered:
+                self._tell({"results": self._offered.popleft()})
+            if changed := changes(new, old):
+                self._tell({"show": changed})
+            old = new
+            if last:
+                self._tell({"end": LINGER_S})
+                return
+            self._closed.wait(LEAST_INTERVAL_S)
+
+    def _listen(self) -> None:
+        while line := self._line():
+            said, _, rest = line.partition(" ")
+            if said == "clients":
+                self.clients = int(rest)
+            elif said == "key":
+                self._pressed.append(Key(rest))

@@ -1,0 +1,82 @@
+"""What the page shows, as JSON: the terminal's view of the session, with each event as `--json-events` has it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, is_dataclass
+from typing import Any
+
+from ..session.events import Knowledge, Use
+from ..terminal.lines import plain
+from ..terminal.view import HEADLINES, Moment, View
+from ..terminal.words import groups
+
+CONNECTING = "Connecting"
+HOLD = "Hold still"
+TOLD = {Use.TAKEN: "Taken", Use.USEFUL: "New, taken", Use.SEEN: "Seen before"}
+# so many lines of talk are kept
+NOTES = 30
+
+
+def state(view: View) -> dict[str, Any]:
+    """The view's values by name, not yet JSON; see `changes`."""
+    return {
+        "moment": view.moment,
+        "headline": headline(view),
+        "prompt": view.prompt,
+        "meter": view.meter,
+        "countdown": view.waiting,
+        "progress": view.progress,
+        "knowledge": view.knowledge,
+        "known": None if view.knowledge is None else known(view.knowledge),
+        "caution": view.caution,
+        "held": view.held,
+        "seen": view.seen,
+        "verified": view.verified,
+        "notes": view.notes[-NOTES:],
+        "begun_s": view.begun_s,
+    }
+
+
+def known(knowledge: Knowledge) -> tuple[dict[str, Any], ...]:
+    """Each kind of parameter with its target, and its standard uncertainties of x, y and z in words as well."""
+    return tuple(
+        {
+            "name": group.name,
+            "target": f"{group.target:g} {group.unit}",
+            "worst": group.worst,
+            "axes": [
+                {"times": group.std[axis] / group.target, "said": group.said(axis), "reached": group.progress[axis] >= 1}
+                for axis in range(3)
+            ],
+        }
+        for group in groups(knowledge)
+    )
+
+
+def headline(view: View) -> str:
+    """What to do this moment, without the numbers, which the page draws."""
+    match view.moment:
+        case Moment.COUNTING | Moment.NEAR:
+            return HOLD
+        case Moment.TOLD if view.held is not None:
+            return TOLD[view.held.use]
+        case Moment.TURN if view.meter is not None:
+            way = view.meter.turn.rsplit(" ", 2)[0]
+            return way[:1].upper() + way[1:]
+        case Moment.STEP if view.prompt is not None:
+            return HEADLINES[view.prompt.kind].capitalize()
+        case Moment.POINT:
+            return view.headline.capitalize()
+    return CONNECTING
+
+
+def changes(new: Mapping[str, Any], old: Mapping[str, Any]) -> dict[str, Any]:
+    """What is new, as JSON's own types."""
+    return {name: _json(value) for name, value in new.items() if name not in old or value != old[name]}
+
+
+def _json(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_json(item) for item in value]
+    return plain(asdict(value)) if is_dataclass(value) and not isinstance(value, type) else plain(value)

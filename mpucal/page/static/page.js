@@ -1,0 +1,354 @@
+// The page: the server tells what changed, and it is shown at once; the board moves on to its new attitude by itself.
+
+import { FLAT, TURNED_OVER, Picture, between, drawBall, drawBoard, turn, viewOf } from "./board.js";
+import * as sound from "./sound.js";
+
+const $ = (id) => document.getElementById(id);
+// the session tells the attitude four times a second
+const MOVE_MS = 230;
+// so long without a word, the connection is lost; the server says something every two seconds
+const SILENCE_MS = 5000, REOPEN_MS = 1500, REPEAT_MS = 5000;
+const VERDICTS = {
+  good: "The calibration is good.",
+  usable: "The calibration is usable.",
+  refused: "The calibration was refused.",
+};
+const REPORT = "report.html";
+const SAVE_AT_ONCE_BYTES = 2e7;
+let state = {}, source = null, heardAt = 0, fresh = false;
+
+// The connection
+
+function open() {
+  source?.close();
+  fresh = true;
+  source = new EventSource("events");
+  source.onmessage = (event) => hear(JSON.parse(event.data));
+  source.onerror = () => {
+    if (!state.ended) lost("Connection lost. Trying again …");
+    if (source.readyState === EventSource.CLOSED && !state.ended) setTimeout(open, REOPEN_MS);
+  };
+  heardAt = performance.now();
+}
+
+function lost(words) {
+  if ($("lost").hidden) announce(words, "wrong");
+  $("lost").textContent = words;
+  $("lost").hidden = false;
+}
+
+function watch() {
+  if (state.ended || performance.now() - heardAt < SILENCE_MS) return;
+  lost("Connection lost. Trying again …");
+  open();
+}
+
+function hear(changed) {
+  heardAt = performance.now();
+  if (!$("lost").hidden) $("lost").hidden = true;
+  const old = state;
+  // what comes first is everything
+  state = fresh ? changed : { ...state, ...changed };
+  const begins = fresh;
+  fresh = false;
+  if (Object.keys(changed).length === 0) return;
+  show(changed);
+  if (!begins || Object.keys(old).length) tellChanges(old, begins);
+  if (state.ended) end();
+}
+
+// What is shown
+
+function show(changed) {
+  document.title = state.title ? `${state.headline ?? "mpucal"} – ${state.title}` : "mpucal";
+  put("title", state.title ?? "mpucal");
+  put("facts", facts());
+  $("keys").hidden = !state.keys || Boolean(state.verdict || state.stopped || state.ended);
+  task();
+  caution();
+  if (changed.known !== undefined) known();
+  if (changed.notes !== undefined) notes();
+  if (changed.live !== undefined) live();
+  if (changed.verdict || changed.results) result();
+  pictures(changed);
+}
+
+function put(id, text) {
+  if ($(id).textContent !== text) $(id).textContent = text;
+}
+
+function facts() {
+  const { meter } = state;
+  if (!meter) return "";
+  const s = Math.max(0, Math.floor(meter.t_s - (state.begun_s ?? 0)));
+  const warm = meter.temperature_c === null ? "" : `${meter.temperature_c.toFixed(1)} °C · `;
+  return `${meter.rate_hz.toFixed(1)} Hz · ${warm}${Math.floor(s / 60)}:${String(s % 60).padStart(2, "0")}`;
+}
+
+function task() {
+  const done = state.verdict ?? (state.stopped || state.ended ? "stopped" : "");
+  document.body.dataset.verdict = done;
+  const { look, share, number } = done ? { look: done === "good" || done === "usable" ? "yes" : "no", share: 1 } : dial();
+  document.body.dataset.look = look;
+  put("headline", VERDICTS[done] ?? (done ? "Stopped" : state.headline ?? "Connecting"));
+  put("prompt", done ? state.stopped ?? "" : promptWords());
+  put("step", done || !state.progress ? "" : state.progress.text);
+  put("number", number ?? "");
+  $("arc").setAttribute("stroke-dasharray", `${Math.max(0, Math.min(100, 100 * share))} 100`);
+  if (look === "turn") $("way").setAttribute("transform", `rotate(${wayDegrees()})`);
+}
+
+// the form of the dial, how much of its ring is drawn, and its number
+function dial() {
+  const { moment, meter, countdown, held, progress } = state;
+  switch (moment) {
+    case "counting":
+      return { look: "hold", share: countdown.remaining_s / countdown.of_s, number: String(Math.ceil(countdown.remaining_s)) };
+    case "told":
+      return held.use === "seen" ? { look: "again", share: 1 } : { look: "yes", share: 1 };
+    case "turn":
+      return { look: "turn", share: meter.missing_deg / 180, number: `${5 * Math.round(meter.missing_deg / 5)}°` };
+    case "near":
+      return { look: "hold", share: 1, number: `${Math.round(meter.missing_deg)}°` };
+    case "step":
+      if (progress?.of) return { look: "step", share: progress.done / progress.of };
+  }
+  return { look: "wait", share: 1 };
+}
+
+function promptWords() {
+  const { countdown, moment, prompt } = state;
+  if (moment === "counting" && countdown?.elsewhere) return "Not the wanted orientation, but a new and useful one.";
+  return prompt?.text ?? "";
+}
+
+// where the top goes, from "away from you" clockwise
+function wayDegrees() {
+  const [x, y] = turn(state.meter.attitude, state.meter.wanted);
+  return Math.atan2(y, -x) * 180 / Math.PI;
+}
+
+function caution() {
+  const { caution: now, meter } = state;
+  const shown = now && meter && meter.t_s - now.t_s < 6 && !state.verdict;
+  $("caution").hidden = !shown;
+  if (shown) {
+    put("what", `${now.what}:`);
+    put("do", now.do);
+  }
+}
+
+function element(name, words = "", kind = "") {
+  const made = document.createElement(name);
+  made.textContent = words;
+  if (kind) made.className = kind;
+  return made;
+}
+
+// Standard uncertainties on a scale of factors: the bar begins at a thousand times the target, and is full at it.
+function known() {
+  $("known").hidden = !state.known;
+  $("known").replaceChildren(...(state.known ?? []).map((group) => {
+    const made = element("div", "", "group"), name = element("div", "", "group-name");
+    name.append(element("span", group.name), element("b", group.axes[group.worst].said));
+    made.append(name);
+    group.axes.forEach(({ times, said, reached }, i) => {
+      const row = element("div", "", reached ? "axis reached" : "axis"), bar = element("div", "", "bar"), full = element("span");
+      full.style.width = `${100 * Math.max(0.02, Math.min(1, 1 - Math.log10(times) / 3))}%`;
+      bar.setAttribute("role", "img");
+      bar.setAttribute("aria-label", `${group.name} ${"xyz"[i]} ${said}, target ${group.target}`);
+      bar.append(full);
+      row.append(element("i", "xyz"[i]), bar, element("u", reached ? "✓" : ""));
+      made.append(row);
+    });
+    made.append(element("div", `target ${group.target} (1 sigma)`, "target"));
+    return made;
+  }));
+}
+
+function notes() {
+  $("talk").hidden = !state.notes.length;
+  $("notes").replaceChildren(...state.notes.map((note) => element("li", note)));
+}
+
+function live() {
+  const { acc, magnitude, gyr } = state.live;
+  $("live").hidden = false;
+  const rows = [`|a| ${magnitude.toFixed(3)} m/s²`, `a ${acc.map((v) => v.toFixed(3)).join("  ")} m/s²`];
+  if (gyr) rows.push(`ω ${gyr.map((v) => (v * 180 / Math.PI).toFixed(2)).join("  ")} deg/s`);
+  $("live").replaceChildren(...rows.map((row, k) => element(k ? "div" : "strong", row)));
+}
+
+// The pictures
+
+const now = new Picture($("now")), goal = new Picture($("goal")), ball = new Picture($("ball"));
+const still = matchMedia("(prefers-reduced-motion: reduce)");
+let from = FLAT, to = FLAT, movedAt = 0, view = viewOf([FLAT]), seenFrom = { ...view }, drawing = false;
+
+const flat = () => (state.board === "vehicle" ? TURNED_OVER : FLAT);
+const laying = () => state.prompt?.kind === "lay_flat";
+const wanted = () => state.meter?.wanted ?? (laying() ? flat() : null);
+
+function pictures(changed) {
+  const { meter, prompt } = state;
+  const ended = state.verdict || state.stopped;
+  $("pictures").hidden = !meter || Boolean(ended);
+  const goes = wanted();
+  $("goal-figure").hidden = !goes;
+  $("pictures").classList.toggle("alone", !goes);
+  document.body.toggleAttribute("data-early", !state.known && !state.live);
+  put("goal-caption", laying() ? flatWords() : "turn it like this");
+  const taken = (state.seen ?? []).filter((seen) => seen.paused).length;
+  $("ball-figure").hidden = !meter || !state.seen?.length;
+  put("ball-caption", ended ? "orientations taken" : `orientations taken: ${taken}; ring: the next`);
+  $("ball").setAttribute("aria-label", `${taken} orientations taken`);
+  $("now").setAttribute("aria-label", meter?.turn ? `the board now; missing: ${meter.turn}` : "the board now");
+  $("goal").setAttribute("aria-label", prompt?.text ?? "");
+  if (changed.meter?.attitude) {
+    from = still.matches || document.hidden ? changed.meter.attitude : shownAttitude(performance.now());
+    to = changed.meter.attitude;
+    movedAt = performance.now();
+  }
+  view = viewOf([to, ...(goes ? [goes] : [])], view);
+  draw();
+}
+
+function flatWords() {
+  if (state.board === "gy-521") return "flat: the chip up, the pins toward you";
+  return state.board === "vehicle" ? "level, on its feet" : "flat: the chip up";
+}
+
+const shownAttitude = (t) => between(from, to, Math.min(1, (t - movedAt) / MOVE_MS));
+
+function draw() {
+  if (drawing) return;
+  drawing = true;
+  requestAnimationFrame(frame);
+}
+
+function frame(t) {
+  drawing = false;
+  const attitude = shownAttitude(performance.now()), goes = wanted();
+  const k = still.matches ? 1 : 0.14;
+  seenFrom.turn += k * (view.turn - seenFrom.turn);
+  seenFrom.tilt += k * (view.tilt - seenFrom.tilt);
+  if (!$("pictures").hidden) {
+    drawBoard(now, state.board, attitude, seenFrom, goes && state.meter?.wanted ? turn(attitude, goes) : null);
+    if (goes) drawBoard(goal, state.board, goes, seenFrom);
+  }
+  if (!$("ball-figure").hidden) drawBall(ball, attitude, state.seen ?? [], state.verdict ? null : target());
+  const moving = performance.now() - movedAt < MOVE_MS || Math.abs(view.turn - seenFrom.turn) + Math.abs(view.tilt - seenFrom.tilt) > 0.2;
+  if (moving && !document.hidden) draw();
+}
+
+const target = () => (state.meter?.wanted ? state.prompt?.down ?? state.knowledge?.down ?? null : null);
+
+// The result
+
+function result() {
+  $("result").hidden = !state.verdict;
+  $("reasons").replaceChildren(...(state.reasons ?? []).map(({ message, remedy }) => element("li", `${message}. ${remedy}.`)));
+  put("summary", state.summary ?? "");
+  $("summary").parentElement.hidden = !state.summary;
+  if (state.results && !$("results").childElementCount) $("results").append(...reportFirst(state.results).flatMap(file));
+}
+
+const reportFirst = (files) => [...files].sort((a, b) => (b.name === REPORT) - (a.name === REPORT));
+const size = (bytes) => (bytes > 1e6 ? `${(bytes / 1e6).toFixed(1)} MB` : `${Math.ceil(bytes / 1e3)} kB`);
+
+// A result is fetched at once where it is not large, so that it can be saved after the session's end as well.
+function file({ name, bytes }) {
+  const path = `results/${name}`, items = [];
+  if (name === REPORT) items.push(link("Open the report", path, "first live", { target: "_blank", rel: "noopener" }));
+  const save = link(name, path, "", { download: name });
+  save.firstChild.append(" ", element("small", size(bytes)));
+  items.push(save);
+  if (bytes <= SAVE_AT_ONCE_BYTES) {
+    fetching.push(fetch(path).then((reply) => reply.blob()).then((blob) => {
+      save.firstChild.href = URL.createObjectURL(blob);
+    }).catch(() => {}));
+  }
+  return items;
+}
+
+function link(words, href, kind, more) {
+  const item = element("li"), a = element("a", words, kind);
+  Object.assign(a, { href }, more);
+  item.append(a);
+  return item;
+}
+
+const fetching = [];
+
+async function end() {
+  await Promise.allSettled(fetching);
+  source.close();
+  for (const gone of document.querySelectorAll("a.live")) gone.parentElement.remove();
+}
+
+// What is said: aloud where sound is on, and to a screen reader
+
+let saidAt = 0;
+
+function announce(words, tone = null) {
+  if (tone) sound.tone(tone);
+  if (!words) return;
+  saidAt = performance.now();
+  put("spoken", words);
+  sound.say(words);
+}
+
+const turnWords = () => (state.meter?.turn ? state.meter.turn.replace(/ deg$/, " degrees") : "");
+
+function tellChanges(old, begins) {
+  if (state.verdict !== old.verdict && state.verdict) return announce(VERDICTS[state.verdict], state.verdict === "refused" ? "wrong" : "done");
+  if (state.stopped !== old.stopped && state.stopped) return announce(state.stopped, "wrong");
+  if (state.verdict || state.stopped) return;
+  if (state.held && state.held.t_s !== old.held?.t_s && !begins) {
+    return announce(state.held.use === "seen" ? "Seen before" : state.held.text, state.held.use === "seen" ? "wrong" : "taken");
+  }
+  if (state.caution && state.caution.t_s !== old.caution?.t_s && !begins) {
+    return announce(`${state.caution.what}. ${state.caution.do}`, "wrong");
+  }
+  if (state.moment === "counting" && old.moment !== "counting") return announce("Hold", "hold");
+  if (old.moment === "counting" && (state.moment === "turn" || state.moment === "near")) return announce(turnWords(), "wrong");
+  const prompted = state.prompt?.text !== old.prompt?.text;
+  if (state.moment === "turn" && (prompted || old.moment !== "turn" || performance.now() - saidAt > REPEAT_MS)) return announce(turnWords());
+  if (state.moment === "near" && old.moment === "turn") return announce("Hold it still");
+  if (prompted && state.prompt && state.moment !== "turn") announce(state.prompt.text);
+}
+
+// What is pressed
+
+$("sound").addEventListener("click", () => {
+  const on = sound.toggle();
+  $("sound").setAttribute("aria-pressed", on);
+  put("sound", on ? "Sound is on" : "Sound is off");
+});
+
+for (const button of $("keys").children) {
+  const words = button.textContent;
+  button.addEventListener("click", () => {
+    const { key, sure } = button.dataset;
+    if (sure && button.textContent !== sure) {
+      button.textContent = sure;
+      setTimeout(() => (button.textContent = words), 3000);
+      return;
+    }
+    button.textContent = words;
+    fetch(`keys/${key}`, { method: "POST" }).catch(() => lost("The key was not heard. Trying again …"));
+  });
+}
+
+for (const woken of ["visibilitychange", "pageshow", "online", "focus"]) {
+  addEventListener(woken, () => {
+    if (!document.hidden) {
+      watch();
+      draw();
+    }
+  }, true);
+}
+addEventListener("resize", draw);
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+setInterval(watch, 1000);
+open();
