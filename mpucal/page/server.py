@@ -21,6 +21,7 @@ from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
 from shutil import copyfileobj
+from socketserver import TCPServer
 from typing import Any
 
 from .latest import Latest
@@ -119,8 +120,7 @@ class Server(ThreadingHTTPServer):
 
     def server_bind(self) -> None:
         """Without asking a name server who this is."""
-        socket.socket.bind(self.socket, self.server_address)
-        self.server_address = self.socket.getsockname()
+        TCPServer.server_bind(self)
         self.server_name, self.server_port = str(self.server_address[0]), self.server_address[1]
 
     def handle_error(self, request: Any, client_address: Any) -> None:

@@ -46,8 +46,8 @@ def known(knowledge: Knowledge) -> tuple[dict[str, Any], ...]:
             "target": f"{group.target:g} {group.unit}",
             "worst": group.worst,
             "axes": [
-                {"times": group.std[axis] / group.target, "said": group.said(axis), "reached": group.progress[axis] >= 1}
-                for axis in range(3)
+                {"times": std / group.target, "said": group.said(axis), "reached": progress >= 1.0}
+                for axis, (std, progress) in enumerate(zip(group.std, group.progress, strict=True))
             ],
         }
         for group in groups(knowledge)
@@ -67,7 +67,7 @@ def headline(view: View) -> str:
         case Moment.STEP if view.prompt is not None:
             return HEADLINES[view.prompt.kind].capitalize()
         case Moment.POINT:
-            return view.headline.capitalize()
+            return view.headline.replace("DOWN", "down")
     return CONNECTING
 
 

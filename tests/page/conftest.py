@@ -1,0 +1,110 @@
+"""A page's server in this process, and a browser that opens the page."""
+
+import shutil
+import socket
+import sys
+import threading
+from contextlib import closing, suppress
+
+import pytest
+
+from mpucal.page.server import Server
+
+TOKEN = "c2VjcmV0LXRva2VuLTEyOA"
+BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
+
+
+class Watched(Server):
+    """A server whose errors are kept, and a client of it."""
+
+    def __init__(self, port=0, **more):
+        self.errors, self.lines = [], []
+        super().__init__(("127.0.0.1", port), "127.0.0.1", TOKEN, **more)
+        self.url = f"http://{self.door.host}/{TOKEN}/"
+        threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
+
+    def process_request(self, request, client_address):
+        self.lines.append(request)
+        super().process_request(request, client_address)
+
+    def handle_error(self, request, client_address):
+        if not isinstance(sys.exception(), OSError):
+            self.errors.append(sys.exception())
+
+    def request(self, name, method="GET", *headers):
+        """A request that is let in."""
+        return "\r\n".join([f"{method} /{TOKEN}/{name} HTTP/1.1", f"Host: {self.door.host}", *headers, "", ""]).encode()
+
+    def connect(self):
+        return socket.create_connection(("127.0.0.1", self.server_port), 10.0)
+
+    def answer(self, request):
+        """What comes back to these bytes, until the connection is closed."""
+        answer = b""
+        with closing(self.connect()) as line, suppress(ConnectionError):
+            line.sendall(request)
+            line.shutdown(socket.SHUT_WR)
+            while piece := line.recv(65536):
+                answer += piece
+        return answer
+
+    def follow(self):
+        """A connection that follows the session, and its first event or what refuses it."""
+        line, head = self.connect(), b""
+        line.sendall(self.request("events"))
+        while b"data:" not in head and b" 503 " not in head:
+            head += line.recv(4096)
+        return line, head
+
+    def stop(self):
+        for line in self.lines:
+            with suppress(OSError):
+                line.shutdown(socket.SHUT_RDWR)
+        self.shutdown()
+        self.server_close()
+
+
+@pytest.fixture
+def serve():
+    """Begin to serve."""
+    servers = []
+
+    def call(*words, **more):
+        servers.append(Watched(*words, **more))
+        return servers[-1]
+
+    yield call
+    for server in servers:
+        server.stop()
+    assert [server.errors for server in servers] == [[]] * len(servers)
+
+
+@pytest.fixture
+def server(serve):
+    return serve()
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    """A browser."""
+    if BROWSER is None:
+        pytest.skip("there is no Chromium here")
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with api.sync_playwright() as p:
+        browser = p.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def tab(chromium):
+    """A tab in which nothing may go wrong: no script fails, and the policy stops nothing."""
+    context = chromium.new_context(viewport={"width": 390, "height": 844})
+    tab = context.new_page()
+    wrong = []
+    tab.on("pageerror", lambda error: wrong.append(str(error)))
+    tab.on("console", lambda line: wrong.append(line.text) if "Content Security Policy" in line.text else None)
+    tab.set_default_timeout(15000)
+    yield tab
+    context.close()
+    assert wrong == []

@@ -1,0 +1,121 @@
+"""The page in a real browser, beside a session on the simulated chip."""
+
+import json
+import re
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from mpucal.page.state import changes, state
+from mpucal.session.events import Countdown, Held, Meter, Prompt, PromptKind, Use
+from mpucal.terminal.view import View
+
+# what the page showed, each time that it changed
+WATCH = """() => {
+  window.shown = [];
+  const look = () => shown.push(Object.fromEntries(
+    ['headline', 'prompt', 'number', 'spoken'].map((id) => [id, document.getElementById(id).textContent])));
+  new MutationObserver(look).observe(document.body, {subtree: true, childList: true, characterData: true});
+  look();
+}"""
+FLAT, ON_ITS_SIDE = (1.0, 0.0, 0.0, 0.0), (0.5**0.5, 0.0, -(0.5**0.5), 0.0)
+TURN = Prompt(PromptKind.ROTATE, "Turn the board: side +X down, then hold it still.", (-1.0, 0.0, 0.0))
+
+
+def meter(t_s, missing_deg, turn, wanted=ON_ITS_SIDE):
+    return Meter(t_s, 0.3, False, "", (0.0, 0.0, -1.0), 5.0, 200.0, None, FLAT, missing_deg, turn, wanted)
+
+
+PHASES = {
+    "lay flat": ([Prompt(PromptKind.LAY_FLAT, "Lay it flat.")], "Lay flat", "", "wait"),
+    "turn": ([TURN, meter(1.0, 91.0, "roll left 90 deg")], "Roll left", "90°", "turn"),
+    "near": ([meter(2.0, 9.0, "roll left 10 deg")], "Hold still", "9°", "hold"),
+    "hold": ([meter(3.0, 4.0, ""), Countdown(3.0, 1.2, 2.0, False)], "Hold still", "2", "hold"),
+    "taken": ([Held(4.2, Use.TAKEN, (1.0, 0.0, 0.0), "taken"), meter(4.25, 4.0, "")], "Taken", "", "yes"),
+    "seen": ([Held(6.0, Use.SEEN, (1.0, 0.0, 0.0), "seen already"), meter(6.1, 4.0, "")], "Seen before", "", "again"),
+}
+
+
+def test_each_phase_has_its_words_its_angle_and_its_form(tab, server):
+    view, old = View(), {}
+
+    def show(**more):
+        nonlocal old
+        new = {**state(view), "title": "a chip", "board": "gy-521", **more}
+        server.latest.update(changes(new, old))
+        old = new
+
+    tab.goto(server.url)
+    for outputs, headline, number, look in PHASES.values():
+        for output in outputs:
+            view = view.after(output)
+        show()
+        tab.wait_for_function("look => document.body.dataset.look === look", arg=look)
+        assert (tab.inner_text("#headline"), tab.text_content("#number")) == (headline, number)
+    show(verdict="refused", reasons=[{"code": "x", "message": "too few orientations", "remedy": "turn it more"}])
+    tab.wait_for_selector("text=too few orientations. turn it more.")
+    assert tab.inner_text("#headline") == "The calibration was refused."
+    assert tab.get_attribute("body", "data-look") == "no"
+
+
+def test_a_lost_connection_is_said_and_mends_itself(tab, serve):
+    server = serve()
+    server.latest.update({"title": "a chip", "headline": "Before"})
+    tab.goto(server.url)
+    tab.wait_for_selector("text=Before")
+    port = server.server_port
+    server.stop()
+    tab.wait_for_selector("#lost:visible")
+    assert "Connection lost" in tab.inner_text("#lost")
+    again = serve(port)
+    again.latest.update({"title": "a chip", "headline": "After"})
+    tab.wait_for_selector("text=After")
+    assert tab.is_hidden("#lost")
+
+
+def test_keys_are_shown_only_where_they_can_be_pressed(tab, serve):
+    pressed = threading.Event()
+    server = serve(keys=True, pressed=lambda key: pressed.set() if key == "redo" else None)
+    server.latest.update({"title": "a chip", "keys": False, "headline": "One"})
+    tab.goto(server.url)
+    tab.wait_for_selector("text=One")
+    assert tab.is_hidden("#keys")
+    server.latest.update({"keys": True})
+    tab.click("text=Again")
+    assert pressed.wait(10.0)
+
+
+@pytest.fixture
+def session(tmp_path):
+    """A session with a page, as fast as it can: its process, the page's address, and the other events."""
+    words = ["session", "--bus", "sim:pace=fast", "--seed", "3", "--page", "--yes", "--json-events", "-o", "board"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "mpucal", *words], cwd=tmp_path, stdout=-1, stderr=-1, text=True
+    ) as process:
+        yield process, json.loads(process.stderr.readline())["address"], tmp_path / "board"
+        process.kill()
+
+
+def test_two_browsers_follow_a_session_to_its_results(chromium, tab, session):
+    process, address, folder = session
+    tab.goto(address)
+    tab.evaluate(WATCH)
+    other = chromium.new_page(color_scheme="dark")
+    other.goto(address)
+    events = [json.loads(line) for line in process.stderr]
+    for page in (tab, other):
+        page.wait_for_selector("text=The calibration is good.")
+    assert process.wait() == 0
+    shown = tab.evaluate("shown")
+    prompts = {event["text"] for event in events if event["event"] == "prompt"}
+    turns = {re.sub(r" \d+ deg$", "", event["turn"]).capitalize() for event in events if event["event"] == "meter"}
+    assert {one["prompt"] for one in shown} - {""} <= prompts
+    assert {one["headline"] for one in shown} & turns
+    # the results outlive the session
+    with other.expect_download() as download:
+        other.click("text=calibration.json")
+    assert download.value.path().read_bytes() == (folder / "calibration.json").read_bytes()
+    assert other.is_hidden("#lost")
+    other.close()

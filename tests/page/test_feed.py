@@ -1,0 +1,94 @@
+"""The session's end of the page: what reaches the process, and how both end."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+from contextlib import closing
+
+import pytest
+
+from mpucal.errors import OutputError
+from mpucal.page.address import Address
+from mpucal.page.feed import Feed
+from mpucal.session.events import Key, Prompt, PromptKind
+
+PROMPT = Prompt(PromptKind.ROTATE, "Turn the board: side +X down.", (1.0, 0.0, 0.0))
+
+
+@pytest.fixture
+def feed():
+    feed = Feed(Address(), {"title": "a chip", "board": "plain"}, keys=True)
+    yield feed
+    feed.close()
+
+
+def followed(url, until):
+    """What the page shows once `until` is true of it."""
+    shown = {}
+    with closing(urllib.request.urlopen(f"{url}events", timeout=10.0)) as events:
+        for line in events:
+            if line.startswith(b"data:"):
+                shown |= json.loads(line[5:])
+            if until(shown):
+                return shown
+    return shown
+
+
+def test_who_comes_late_is_told_everything(feed):
+    feed.hear(PROMPT)
+    feed.say("  a line of talk")
+    shown = followed(feed.url, lambda shown: shown.get("notes"))
+    assert shown["title"] == "a chip"
+    assert shown["prompt"] == {"kind": "rotate", "text": PROMPT.text, "down": [1.0, 0.0, 0.0]}
+    assert shown["headline"] == "+X down"
+    assert shown["notes"] == ["a line of talk"]
+
+
+def test_keys_and_results_go_through(feed, tmp_path):
+    (tmp_path / "calibration.json").write_text("{}")
+    feed.offer([tmp_path / "calibration.json"])
+    assert followed(feed.url, lambda shown: "results" in shown)["results"] == [{"name": "calibration.json", "bytes": 2}]
+    assert urllib.request.urlopen(f"{feed.url}results/calibration.json").read() == b"{}"
+    urllib.request.urlopen(urllib.request.Request(f"{feed.url}keys/redo", method="POST"))
+    until, keys = time.monotonic() + 10.0, []
+    while not keys and time.monotonic() < until:
+        keys = list(feed.pressed())
+    assert keys == [Key.REDO]
+    assert feed.pressed() == []
+
+
+def test_a_process_that_is_stopped_or_killed_holds_up_nobody(feed):
+    pid = feed._process.pid
+    os.kill(pid, signal.SIGSTOP)
+    for number in range(20000):
+        feed.hear(Prompt(PromptKind.ROTATE, "x" * 100 + str(number)))
+    os.kill(pid, signal.SIGKILL)
+    feed.hear(PROMPT)
+    feed.end()
+    assert feed._process.poll() is not None
+
+
+def test_it_ends_with_a_session_that_is_killed():
+    program = (
+        "import sys; from mpucal.page.feed import Feed; from mpucal.page.address import Address\n"
+        "print(Feed(Address(), {}).url, flush=True); sys.stdin.read()"
+    )
+    with subprocess.Popen([sys.executable, "-c", program], stdin=-1, stdout=-1, text=True) as session:
+        url = session.stdout.readline()
+        urllib.request.urlopen(url).close()
+        session.kill()
+    until = time.monotonic() + 10.0
+    with pytest.raises(OSError):
+        while time.monotonic() < until:
+            urllib.request.urlopen(url, timeout=1.0).close()
+            time.sleep(0.02)
+
+
+def test_a_place_that_is_taken_is_a_sentence(feed):
+    port = int(feed.url.split(":")[2].split("/")[0])
+    with pytest.raises(OutputError, match=f"no page can be served at 127.0.0.1:{port}"):
+        Feed(Address(port=port), {})

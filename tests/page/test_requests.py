@@ -1,0 +1,34 @@
+"""Who is let in: only who names the host and knows the token, and only to what the page is made of."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mpucal.page.requests import KEYS, PAGE_FILES, Asked, Door
+
+HOST, TOKEN = "127.0.0.1:8000", "c2VjcmV0LXRva2VuLTEyOA"
+RESULTS = {"report.html", "calibration.json"}
+LOOKS = {*PAGE_FILES, "events", *(f"results/{name}" for name in RESULTS)}
+OTHERS = ["", "..", ".", "%2e%2e", "results", "capture.mcap", "keys", "etc/passwd", "é", "\0", "?", "#"]
+PARTS = st.sampled_from(
+    [*OTHERS, TOKEN, TOKEN[:-1], TOKEN.swapcase(), f"{TOKEN}x", "events", "page.js", *RESULTS, *KEYS]
+)
+TARGETS = st.one_of(
+    st.lists(PARTS, max_size=6).map("/".join),
+    st.lists(PARTS, max_size=4).map(lambda parts: f"/{TOKEN}/" + "/".join(parts)),
+    st.text(max_size=60),
+)
+HOSTS = st.one_of(
+    st.just([HOST]),
+    st.lists(st.sampled_from([HOST, "localhost:8000", "evil.example:8000", "127.0.0.1", f" {HOST}", ""]), max_size=3),
+)
+METHODS = st.sampled_from(["GET", "POST", "HEAD", "PUT", "DELETE", "get", "OPTIONS", ""])
+ORIGINS = st.lists(st.sampled_from([f"http://{HOST}", "http://evil.example", "null"]), max_size=2)
+
+
+@given(METHODS, TARGETS, HOSTS, ORIGINS, st.booleans())
+def test_only_who_knows_all_of_it_is_let_in(method, target, hosts, origins, keys):
+    asked = Door(HOST, TOKEN, keys).asked(method, target, hosts, origins, RESULTS)
+    looks = method == "GET" and target in {f"/{TOKEN}/{name}" for name in LOOKS}
+    presses = keys and method == "POST" and target in {f"/{TOKEN}/keys/{key}" for key in KEYS}
+    own = all(origin == f"http://{HOST}" for origin in origins)
+    assert isinstance(asked, Asked) == (hosts == [HOST] and (looks or (presses and own)))
