@@ -34,7 +34,7 @@ def test_nobody_else_is_let_in_and_nothing_breaks(server, data):
     token, host = server.door.token.encode(), server.door.host.encode()
     method = data.draw(st.sampled_from(METHODS)).encode("latin-1")
     near = st.sampled_from(
-        [b"/", b"/" + token, b"/" + token[:-1] + b"/", b"//" + token + b"/", b"/" + token + b"/../x"]
+        [b"/", b"/" + token, b"/" + token[:-1] + b"/", b"/x" + token + b"/", b"/" + token + b"/../x"]
     )
     target = data.draw(st.one_of(near, JUNK))
     named = data.draw(
