@@ -1,17 +1,18 @@
-"""How much of a 400 kHz bus the driver takes, whether it keeps up, and how well it knows the sample rate.
+"""How much of a bus the driver takes, 400 kHz I2C or SPI, whether it keeps up, and how well it knows the sample rate.
 
     python tools/bus_budget.py [CAPTURE.mcap] [--seconds 3600] [--seeds 100]
 
 The share is counted from the transactions, as the simulated chip's driver makes them or as a capture holds them: a
-transfer takes 27 bits of addresses and register, 3 of start, repeated start and stop, and 9 a byte. Samples are
-numbered, so that a lost one is seen.
+transfer over I2C takes 27 bits of addresses and register, 3 of start, repeated start and stop, and 9 a byte; over SPI a
+byte of address and 8 bits a byte, registers at 1 MHz and what is measured at 8 MHz. Samples are numbered, so that a
+lost one is seen.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ from mpucal.simulated.chip.clock import FastClock
 from mpucal.simulated.chip.factory import Factory
 from mpucal.simulated.chip.models import MODELS
 from mpucal.simulated.sensor import Counts, Setting
+from mpucal.sources.spi import DATA, DATA_HZ, REGISTER_HZ
 from mpucal.sources.tap import Tap
 
 BUS_HZ = 400_000
@@ -83,8 +85,20 @@ def share(transactions: Sequence[Transaction]) -> float:
     return bits / BUS_HZ / ((transactions[-1].t_ns - transactions[0].t_ns) * 1e-9)
 
 
+def spi_share(transactions: Sequence[Transaction]) -> float:
+    """The same of an SPI bus, as mpucal/sources/spi.py moves them."""
+    busy_s = sum(8 * (t.count + 1) / (DATA_HZ if t.register in DATA else REGISTER_HZ) for t in transactions)
+    return busy_s / ((transactions[-1].t_ns - transactions[0].t_ns) * 1e-9)
+
+
 def run(
-    model: str, rate_hz: float, seconds: float, late_s: float, ppm: float = FASTEST_PPM, seed: int = 0
+    model: str,
+    rate_hz: float,
+    seconds: float,
+    late_s: float,
+    ppm: float = FASTEST_PPM,
+    seed: int = 0,
+    share: Callable[[Sequence[Transaction]], float] = share,
 ) -> tuple[Recording, float, float]:
     """What was recorded on a host that is late, the share of the bus, and processor seconds a second."""
     kept = Kept()
@@ -132,6 +146,9 @@ def main() -> None:
             f"{model} at {rate_hz} Hz, host up to {late_s * 1e3:.0f} ms late: {of_bus:.1%} of the bus,"
             f" {lost(recording)} of {len(recording)} samples lost, {of_processor:.1%} of a processor"
         )
+    for rate_hz in (1000, 4000):
+        _, of_bus, _ = run("mpu6500", rate_hz, 60.0, 0.010, share=spi_share)
+        print(f"mpu6500 at {rate_hz} Hz over SPI: {of_bus:.1%} of the bus")
     for model, late_s in (("mpu6050", 0.020), ("mpu6500", 0.010)):
         recording, _, _ = run(model, 1000, options.seconds, late_s)
         missing = f"{lost(recording)} of {len(recording)} samples lost"

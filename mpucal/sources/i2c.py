@@ -12,6 +12,7 @@ import errno
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
 from ..chip.access import Reply
 from ..chip.families import PARTS
@@ -144,6 +145,9 @@ class I2cBus:
         try:
             return int(self._smbus.read_byte_data(address, WHO_AM_I))
         except OSError as error:
+            # i2c-stub has no other number for an address where nothing is
+            if error.errno == errno.ENODEV and Path(self._path).exists():
+                raise nobody(self._path, (address,)) from error
             if error.errno != errno.EOPNOTSUPP:
                 raise
         # made of two messages, where the adapter moves one at a time

@@ -80,6 +80,14 @@ def test_a_failed_transfer_is_a_sentence_and_not_repeated(adapter, op, number, k
     assert kernel.requests == [smbus2.I2C_RDWR]
 
 
+def test_where_a_stub_has_no_chip_nothing_answers(adapter):
+    """i2c-stub says ENODEV of an empty address; of an adapter that was unplugged the file is gone besides."""
+    kernel = adapter()
+    kernel.failures[smbus2.I2C_SMBUS] = errno.ENODEV
+    with pytest.raises(NoAnswer, match="nothing answers at 0x68"):
+        I2cBus(str(kernel.path))
+
+
 def test_no_such_bus_names_those_there_are(tmp_path, monkeypatch):
     monkeypatch.setattr(mpucal.sources.i2c_errors, "DEVICES", tmp_path)
     with pytest.raises(BusError, match=r"there is no I2C bus .*i2c-7: enable I2C"):

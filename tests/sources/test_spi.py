@@ -2,6 +2,7 @@
 
 import builtins
 import errno
+import json
 import os
 import sys
 from types import ModuleType, SimpleNamespace
@@ -9,6 +10,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
+from mpucal.__main__ import run
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
@@ -19,6 +21,7 @@ from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.clock import FastClock
 from mpucal.sources import spi
+from mpucal.sources.chip import OpenedChip
 from mpucal.sources.spi import SpiBus
 
 
@@ -116,6 +119,24 @@ def test_the_driver_measures_and_i2c_stays_off(opened, chip):
     else:
         assert own == []
         assert all(value & 0x10 for value in controls)
+
+
+def test_a_session_ends_good_and_replays_to_the_bit(opened, monkeypatch, tmp_path, capsys):
+    bus, _ = opened("chip=mpu6500,hand=guided")
+
+    def open_source(request):
+        return OpenedChip(bus, request.plan, (bus._device.chip.hear,), words=request.words, real_time=False)
+
+    monkeypatch.setattr(spi, "open_source", open_source)
+
+    def session(*words):
+        code = run(["session", *words, "--yes", "--json", "--json-events"])
+        return code, {key: value for key, value in json.loads(capsys.readouterr().out).items() if key != "created"}
+
+    made = tmp_path / "made"
+    code, found = session("--spi", "/dev/spidev0.0", "--rate", "50", "--model", "hand", "-o", str(made))
+    assert (code, found["quality"]["verdict"], found["sensor"]["chip"]) == (0, "good", "MPU-6500")
+    assert session("--replay", str(made), "-o", str(tmp_path / "again")) == (code, found)
 
 
 def test_the_doctor_examines_it(opened):

@@ -20,6 +20,12 @@ def test_the_bus_suffices_and_no_sample_is_lost(budget, number):
     assert len(recording) > 20 * rate_hz
 
 
+def test_spi_takes_a_small_part_of_its_bus(budget):
+    """1000 frames of 14 bytes at 8 MHz are 1.4 %; registers at 1 MHz take about as much again."""
+    _, of_bus, _ = budget.run("mpu6500", 1000, 10.0, 0.010, share=budget.spi_share)
+    assert 0.014 < of_bus < 0.05
+
+
 @pytest.mark.parametrize(("model", "late_s"), [("mpu6050", 0.020), ("mpu6500_512", 0.010)])
 def test_a_host_that_is_too_late_loses_samples_and_the_tool_sees_it(budget, model, late_s):
     recording, _, _ = budget.run(model, 1000, 5.0, 5 * late_s)
