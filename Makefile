@@ -39,7 +39,7 @@ $(READY): $(BUILT_OF)
 	@touch $@
 
 $(TESTED): $(BUILT_OF)
-	@tools/set_up $(VENV) dev
+	@tools/set_up $(VENV) mavlink,plot,dev
 	@touch $(READY) $@
 
 # needs avr-gcc and avr-libc; says how much flash and RAM the bridge takes

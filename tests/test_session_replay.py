@@ -28,7 +28,7 @@ class Outcome:
 
 
 @pytest.fixture
-def session(capsys, tmp_path):
+def session(capsys, tmp_path, no_pictures):
     def call(name, *words):
         run(["session", *map(str, words), "-o", str(tmp_path / name), "--yes", "--json", "--json-events"])
         captured = capsys.readouterr()
@@ -51,11 +51,6 @@ def test_a_stored_session_replays(session, name):
     assert (replayed.verdict, replayed.samples) == (stored["verdict"], stored["samples"])
     np.testing.assert_allclose(replayed.D, stored["D"], rtol=0, atol=1e-9)
     np.testing.assert_allclose(replayed.b_a, stored["b_a"], rtol=0, atol=1e-9)
-
-    again = session("twice", "--replay", SESSIONS / f"{name}.mcap")
-    assert again.said == replayed.said
-    assert np.array_equal(again.D, replayed.D)
-    assert np.array_equal(again.b_a, replayed.b_a)
 
 
 @pytest.mark.parametrize(("chip", "model"), [("mpu6050", "auto"), ("mpu6500", "accel"), ("clone98", "accel")])

@@ -20,13 +20,9 @@ class Result:
 
 
 @pytest.fixture
-def mpucal(capsys, tmp_path, monkeypatch):
-    """Call it in this process, in an empty folder.
-
-    A report's pictures would take as long as a replay: its own tests draw them, and each session in its own process.
-    """
+def mpucal(capsys, tmp_path, monkeypatch, no_pictures):
+    """Call it in this process, in an empty folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
 
     def call(*words):
         capsys.readouterr()
