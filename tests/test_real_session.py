@@ -1,13 +1,17 @@
 """The main job on what a real MPU-6050 measured: counts to registers, registers to a session, that to D and b_a."""
 
+import io
 import json
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from mpucal.__main__ import run
 
 PROJECT = Path(__file__).parents[1]
 SHARED = PROJECT.parent / "shared"
@@ -37,8 +41,11 @@ def call(*words):
 
 
 def outcome(folder, *words):
-    done = call("-m", "mpucal", *words, "-o", folder, "--json")
-    return Outcome(done.returncode, json.loads(done.stdout), folder / "calibration.json")
+    printed = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(printed), redirect_stderr(io.StringIO()):
+        patch.setitem(sys.modules, "matplotlib", None)  # the pictures have tests of their own
+        code = run([*map(str, words), "-o", str(folder), "--json"])
+    return Outcome(code, json.loads(printed.getvalue()), folder / "calibration.json")
 
 
 @pytest.fixture(scope="module")
