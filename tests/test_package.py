@@ -50,12 +50,16 @@ def test_the_calls_of_the_readme_are_understood(call):
     assert command.make_context(name, words).command.name == name
 
 
-@pytest.mark.parametrize("text", ["README.md", "fixtures/README.md", "docs/session.md", "firmware_protocol.md"])
+@pytest.mark.parametrize(
+    "text", ["README.md", "fixtures/README.md", "docs/session.md", "docs/comparison.md", "firmware_protocol.md"]
+)
 def test_links_lead_somewhere(text):
     page = PROJECT / text
     links = re.findall(r"\]\(([^):#]+)(?:#[^)]*)?\)", page.read_text())
     assert [link for link in links if not (page.parent / link).exists()] == []
 
 
-def test_the_readme_names_every_model_and_every_key_of_the_simulated_chip():
-    assert [name for name in (*MODELS, *PARSERS) if f"`{name}`" not in README] == []
+@pytest.mark.parametrize(("page", "names"), [("method.md", MODELS), ("simulated-chip.md", PARSERS)])
+def test_a_page_names_each(page, names):
+    text = (PROJECT / "docs" / page).read_text(encoding="utf-8")
+    assert [name for name in names if f"`{name}`" not in text] == []

@@ -89,7 +89,7 @@ def main() -> int:
                 time.sleep(max(begun + at - time.monotonic(), 0.0))
                 name = f"{arguments.size}{'-plain' if arguments.plain else ''}-{at:g}s"
                 svg = folder / f"{name}.svg"
-                svg.write_text(drawing(tmux.text(colours=True), columns, name), encoding="utf-8")
+                svg.write_text(drawing(tmux.text(colours=True), columns, "mpucal session"), encoding="utf-8")
                 svg.with_suffix(".txt").write_text(tmux.text(colours=False), encoding="utf-8")
                 picture(svg, columns, rows)
                 print(svg)

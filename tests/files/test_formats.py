@@ -159,6 +159,6 @@ def test_what_no_dialect_recognises_is_told_by_the_last_of_its_suffix(tmp_path, 
         mpucal.load(tmp_path / "a.csv")
 
 
-def test_the_readme_names_each():
-    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+def test_the_page_names_each():
+    text = " ".join((ROOT / "docs" / "recordings.md").read_text(encoding="utf-8").split())
     assert f"`mpucal calibrate`, `show` and `apply` read {readable()}; `apply -o` writes {writable()}." in text
