@@ -131,7 +131,7 @@ def test_the_help_names_it(call, command):
     assert ("a table in ms (.csv)" in said) == (command != "apply")
 
 
-def test_errors_name_it(call, folder):
+def test_errors_name_it(calibrated, call, folder):
     (folder / "notes.txt").write_text("hello")
     assert re.search(r"give a [^:]*\.words file or the folder", call("show", "notes.txt").stderr)
     done = call("apply", "results/calibration.json", "walk.words", "-o", "out.txt")
