@@ -4,6 +4,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from importlib.metadata import version
 from pathlib import Path
 
@@ -37,6 +38,16 @@ def test_importing_it_loads_nothing_heavy():
 
 def test_the_version_is_that_of_the_installed_package():
     assert mpucal.__version__ == version("mpucal")
+
+
+def test_each_extra_that_is_named_can_be_installed():
+    texts = [
+        p for folder, ending in (("mpucal", "py"), ("docs", "md")) for p in (PROJECT / folder).rglob(f"*.{ending}")
+    ]
+    named = re.findall(r"mpucal\[(\w+)\]", README + "".join(path.read_text(encoding="utf-8") for path in texts))
+    there = tomllib.loads((PROJECT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert "mavlink" in named
+    assert set(named) - there.keys() == set()
 
 
 def test_the_readme_shows_calls():
