@@ -9,6 +9,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 import mpucal
 from mpucal.calibration import MODELS
@@ -16,6 +18,7 @@ from mpucal.cli import commands
 from mpucal.simulated.chip.options import PARSERS
 
 PROJECT = Path(__file__).parents[1]
+DECLARED = tomllib.loads((PROJECT / "pyproject.toml").read_text())["project"]
 README = (PROJECT / "README.md").read_text()
 CALLS = sorted(set(re.findall(r"^ {4}mpucal (.*?)(?: +#.*)?$", README, re.MULTILINE)))
 
@@ -41,13 +44,19 @@ def test_the_version_is_that_of_the_installed_package():
 
 
 def test_each_extra_that_is_named_can_be_installed():
-    texts = [
-        p for folder, ending in (("mpucal", "py"), ("docs", "md")) for p in (PROJECT / folder).rglob(f"*.{ending}")
-    ]
+    texts = [*(PROJECT / "mpucal").rglob("*.py"), *(PROJECT / "docs").rglob("*.md")]
     named = re.findall(r"mpucal\[(\w+)\]", README + "".join(path.read_text(encoding="utf-8") for path in texts))
-    there = tomllib.loads((PROJECT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     assert "mavlink" in named
-    assert set(named) - there.keys() == set()
+    assert set(named) - DECLARED["optional-dependencies"].keys() == set()
+
+
+def test_the_lock_file_has_what_is_asked_for():
+    lines = re.findall(r"^([\w.-]+)==(\S+)", (PROJECT / "tools" / "lock.txt").read_text(), re.MULTILINE)
+    locked = {canonicalize_name(name): version for name, version in lines}
+    extras = DECLARED["optional-dependencies"]
+    wanted = map(Requirement, [*DECLARED["dependencies"], *extras["mavlink"], *extras["plot"], *extras["dev"]])
+    missing = [str(each) for each in wanted if locked.get(canonicalize_name(each.name), "0") not in each.specifier]
+    assert missing == [], "run tools/lock"
 
 
 def test_the_readme_shows_calls():
