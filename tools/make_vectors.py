@@ -141,6 +141,8 @@ OTHERS: dict[str, tuple[int, wire.Message]] = {
     "burst_reply_first": (254, wire.BurstReply(0, 0xFFFFFF00, 0, FIFO_FRAME * 4)),
     "burst_reply_last": (254, wire.BurstReply(0, 0x00000010, 56, FIFO_FRAME)),
     "stream_stop": (255, wire.Stream(0, 0)),
+    "leave": (12, wire.Leave()),
+    "leave_reply": (12, wire.LeaveReply(0, 70700)),
     "blob_state_reply": (5, wire.BlobStateReply(0, 70000, 3, 188, 0x5D9B9255)),
     "blob_read": (6, wire.BlobRead(168, 20)),
     "blob_read_reply": (6, wire.BlobReadReply(0, 70100, MEASURED.encode()[168:])),

@@ -49,7 +49,7 @@ def device(options: Mapping[str, Any]) -> Device:
     kind = kinds_meant(options)[0]
     flags = {flag.name for kind in SINKS.values() for flag in kind.flags}
     given = frozenset(name for name in flags if options.get(name))
-    return Device(kind, str(options[kind.option.name]), partial(open_source, options), say, given)
+    return Device(kind, str(options[kind.option.name]), partial(open_source, options), say, given, options)
 
 
 def check_sink(kind: SinkKind, source: SourceKind, options: Mapping[str, Any]) -> None:

@@ -69,7 +69,7 @@ def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) ->
                 f" the next `mpucal write CALIBRATION {sink.name} {kind.option.spelled} ...` begins with that"
             )
     if kind.store:
-        with resolve_name(kind.store)(options[kind.option.name]) as store:
+        with resolve_name(kind.store)(options) as store:
             number, blob = store.take()
             where = f"blob number {number} of the bridge on {store.name}"
             _show_calibration(where, Calibration.from_blob(Blob.decode(blob)), as_json)

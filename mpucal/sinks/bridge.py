@@ -28,7 +28,7 @@ def open_bridge(device: Device) -> Iterator[BridgeSink]:
     ------
     BusError : no such port, no bridge on it, or one that keeps nothing.
     """
-    with resolve_name(device.kind.store)(device.name) as store:
+    with resolve_name(device.kind.store)(device.values) as store:
         yield BridgeSink(store)
 
 

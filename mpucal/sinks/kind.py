@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from pkgutil import resolve_name
@@ -42,7 +42,7 @@ class Device:
     Attributes
     ----------
     kind : of the source. name : as the source's option says it, such as /dev/i2c-1. open : opens the source.
-    say : tells the person a sentence. flags : the names of those that were given.
+    say : tells the person a sentence. flags : the names of those that were given. values : of the source's options.
     """
 
     kind: SourceKind
@@ -50,6 +50,7 @@ class Device:
     open: Callable[[], Any]
     say: Say
     flags: frozenset[str] = frozenset()
+    values: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,7 @@ class SourceKind:
     beside : it is meant where this one of its `options` is given.
     instead : which commands read it that take no source.
     title : of a session on it; {} is the option's value.
-    store : "module:attribute" of a context manager from the value to a memory that keeps a calibration, as
+    store : "module:attribute" of a context manager from the options' values to a memory that keeps a calibration, as
         mpucal.sources.bridge has it; empty where there is none.
     doctor : "module:attribute" of what examines it, from an Opened and seconds to findings; empty: nothing does.
     host : the same of what examines this computer's side of it before it is opened, from the option's value.

@@ -45,6 +45,14 @@ def number(text: str) -> float:
         raise ValueError(f"{text!r} is no number.") from None
 
 
+def pins(text: str) -> tuple[int | str, ...]:
+    """SDA,SCL as numbers or names of pins; empty where none are named."""
+    named = tuple(int(pin) if pin.isdecimal() else pin for pin in text.split(",") if pin)
+    if len(named) not in (0, 2):
+        raise ValueError(f"{text!r} are not two pins, SDA,SCL.")
+    return named
+
+
 BUS = Option("bus", metavar="BUS", parse=bus_name)
 SPI = Option("spi", metavar="DEVICE")
 IIO = Option("iio", metavar="DEVICE")
@@ -54,6 +62,13 @@ REPLAY = Option("replay", metavar="FILE", parse=Path)
 
 ADDRESS = Option("address", "I2C address; by default 0x68, then 0x69.", "ADDRESS", whole_number(0, 0x7F))
 TRIGGER = Option("trigger", "Trigger of the buffer, by default its own; none polls instead.", "NAME")
+MICROPYTHON = Option(
+    "micropython",
+    "The board runs MicroPython: let it run the bridge from its memory, with the chip on its own I2C pins or on these.",
+    "SDA,SCL",
+    pins,
+    bare="",
+)
 SEED = Option("seed", "Which simulated sensor and hand.", "N", whole_number(0))
 SYSTEM = Option("system", "Which vehicle, if several.", "N", whole_number(1, 255))
 SOURCE_SYSTEM = Option("source_system", "MAVLink id of mpucal itself; by default 254.", "N", whole_number(1, 255))
@@ -109,7 +124,7 @@ SOURCES = [
         forms="a board with the bridge's firmware: /dev/ttyX or COMn, or a URL such as socket://HOST:PORT",
         opener="mpucal.sources.bridge.source:open_source",
         delivers=Delivers.REGISTERS,
-        options=(ADDRESS,),
+        options=(ADDRESS, MICROPYTHON),
         settings=OF_A_CHIP,
         store="mpucal.sources.bridge:open_store",
         doctor="mpucal.doctor.sources:examine_bridge_and_chip",

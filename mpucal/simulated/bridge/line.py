@@ -95,6 +95,9 @@ class EmulatedLine:
             self._step()
         self._check()
 
+    def revive(self, until_ns: int) -> None:
+        """See Port; the device starts by itself."""
+
     def close(self) -> None:
         """Nothing to let go of."""
 

@@ -2,40 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
+from typing import Any
 
 from .bus import BridgeBus
 from .link import Link
 from .messages import Frames
-from .port import SerialPort
+from .micropython import MicroPythonPort
+from .port import Port, SerialPort
 from .store import Store
 
 __all__ = ["BridgeBus", "Store", "open_bridge", "open_store"]
 
 
-def open_bridge(text: str, address: int | None = None) -> BridgeBus:
+def open_bridge(text: str, address: int | None = None, pins: tuple[int | str, ...] | None = None) -> BridgeBus:
     """The chip behind the bridge on PORT[:BAUD], or on a URL as pyserial knows them, such as socket://host:port.
+
+    Parameters
+    ----------
+    pins : SDA and SCL of a board that runs MicroPython, which is given the bridge to run; empty: its own; None: the
+        board has the bridge's firmware.
 
     Raises
     ------
     UsageError : no port is named. BusError : no such port, or no bridge on it. NoAnswer : the bridge finds no chip.
     """
-    return BridgeBus(SerialPort(text), address)
+    return BridgeBus(_port(text, pins), address)
 
 
 @contextmanager
-def open_store(text: str) -> Iterator[Store]:
-    """The memory of the bridge on the same, whether or not it finds a chip.
+def open_store(values: Mapping[str, Any]) -> Iterator[Store]:
+    """The memory of the bridge that the options' values name, whether or not it finds a chip.
 
     Raises
     ------
     UsageError : no port is named. BusError : no such port, or no bridge on it.
     """
-    with closing(SerialPort(text)) as port:
+    with closing(_port(values["serial"], values.get("micropython"))) as port:
         link = Link(port, _unheard)
         link.greet()
         yield Store(link)
+
+
+def _port(text: str, pins: tuple[int | str, ...] | None) -> Port:
+    return SerialPort(text) if pins is None else MicroPythonPort(text, pins)
 
 
 def _unheard(seq: int, frames: Frames, t_ns: int, host_ns: int) -> None:

@@ -213,7 +213,9 @@ class BridgeBus:
         self._ahead, self._lost = None, True
         until_ns = self._port.now_ns() + RECOVER_NS
         try:
-            if not isinstance(error, LinkLost):
+            if isinstance(error, LinkLost):
+                self._port.revive(until_ns)
+            else:
                 self._port.reopen(until_ns)
             self.link.greet(self._address, until_ns - self._port.now_ns())
         except BusError as still:

@@ -13,6 +13,9 @@ KEPT_BYTES = 400
 WORDS = 40
 # Text at the right rate is all printable; at a wrong one hardly more than a third of all bytes are.
 PRINTABLE = 0.9
+# what MicroPython says to the bytes of a HELLO, among which are those that enter its raw REPL
+REPLS = (b"raw REPL; CTRL-B", b"MicroPython v", b">>> ")
+CIRCUIT = b"CircuitPython"
 
 
 class Heard:
@@ -32,6 +35,11 @@ class Heard:
         kept = self._bytes[baud]
         kept += data[: KEPT_BYTES - len(kept)]
 
+    @property
+    def is_repl(self) -> bool:
+        """Whether MicroPython said them, or CircuitPython."""
+        return self._holds(*REPLS)
+
     def why_nobody(self, port: str, bauds: Sequence[int]) -> BusError:
         """The sentence for a port without a bridge."""
         if not self._bytes:
@@ -41,6 +49,17 @@ class Heard:
             )
         if self.floods:
             return BusError(*flooded(port))
+        if self._holds(CIRCUIT):
+            return BusError(
+                f"CircuitPython answers on {port}, and no bridge",
+                "put MicroPython on the board, or the bridge's firmware (tools/firmware): CircuitPython takes every "
+                "byte 3 on its console for Ctrl-C",
+            )
+        if self.is_repl:
+            return BusError(
+                f"MicroPython answers on {port}, and no bridge",
+                "add --micropython, or --micropython=SDA,SCL with the chip's pins, and mpucal runs the bridge there",
+            )
         text = max(map(_text, self._bytes.values()), key=len)
         if text:
             return BusError(
@@ -52,6 +71,9 @@ class Heard:
             f"bytes come from {port}, but none that a bridge sends at {rates} baud",
             f"give the rate of its firmware behind a colon, as in {port}:57600, or {another()}",
         )
+
+    def _holds(self, *words: bytes) -> bool:
+        return any(word in kept for kept in self._bytes.values() for word in words)
 
 
 def _text(data: bytearray) -> str:

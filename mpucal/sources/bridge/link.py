@@ -51,6 +51,8 @@ GREET_NS = 5000 * MS
 LOOK_BYTES = 1 << 18
 # the first may be what a line had kept for who opens it
 FLOODS = 2
+# Ctrl-B: the bytes of a HELLO have led a REPL into its raw mode
+NORMAL_REPL = b"\x02"
 
 STORING = (BlobBegin, BlobData, BlobCommit, BlobErase)
 
@@ -143,7 +145,7 @@ class Link:
         heard = Heard()
         give_up_ns = self.port.now_ns() + within_ns
         for baud in cycle(self.port.bauds):
-            if self.port.now_ns() >= give_up_ns or heard.floods == FLOODS:
+            if self.port.now_ns() >= give_up_ns or heard.floods == FLOODS or heard.is_repl:
                 break
             if len(self.port.bauds) > 1:
                 self.port.set_baud(baud)
@@ -151,6 +153,8 @@ class Link:
             if reply is not None:
                 self.bridge, self._window = reply, max(MIN_WINDOW, reply.window)
                 return reply
+        if heard.is_repl:
+            self.port.write(NORMAL_REPL)
         raise heard.why_nobody(self.port.name, self.port.bauds)
 
     def ask(self, *requests: Message) -> list[list[Answer]]:

@@ -50,6 +50,7 @@ class Feature(IntFlag):
 
     STREAM = 1
     BLOB = 2
+    LEAVE = 4
 
 
 class Message:
@@ -139,6 +140,14 @@ class Stream(Message):
     FORMAT: ClassVar[struct.Struct] = struct.Struct("<B B")
     frame_bytes: int
     batch: int
+
+
+@dataclass(frozen=True)
+class Leave(Message):
+    """End the program, which somebody started from a REPL."""
+
+    TYPE: ClassVar[int] = 0x06
+    FORMAT: ClassVar[struct.Struct] = struct.Struct("<")
 
 
 @dataclass(frozen=True)
@@ -260,6 +269,13 @@ class StreamReply(Reply):
 
 
 @dataclass(frozen=True)
+class LeaveReply(Reply):
+    """The program ends."""
+
+    TYPE: ClassVar[int] = Leave.TYPE | REPLY_BIT
+
+
+@dataclass(frozen=True)
 class BlobStateReply(Reply):
     """The stored blob, which the bridge has just checked."""
 
@@ -330,6 +346,7 @@ REQUESTS: dict[int, type[Message]] = {
         Burst,
         Write,
         Stream,
+        Leave,
         BlobState,
         BlobRead,
         BlobBegin,
@@ -346,6 +363,7 @@ ANSWERS: dict[int, type[Reply]] = {
         BurstReply,
         WriteReply,
         StreamReply,
+        LeaveReply,
         BlobStateReply,
         BlobReadReply,
         BlobBeginReply,

@@ -65,6 +65,10 @@ class Port(Protocol):
         """Open it anew, after it was gone; tries until the host's clock shows `until_ns`."""
         ...
 
+    def revive(self, until_ns: int) -> None:
+        """Start again what answers there no longer, where that is the port's to start."""
+        ...
+
     def close(self) -> None:
         """Let go of it."""
         ...
@@ -75,17 +79,17 @@ class SerialPort:
 
     Parameters
     ----------
-    text : PORT[:BAUD], or a URL.
+    text : PORT[:BAUD], or a URL. bauds : the rates to try where it names none.
 
     Raises
     ------
     UsageError : no port is named. BusError : no such port, no permission, or taken.
     """
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, bauds: tuple[int, ...] = BAUDS) -> None:
         if not text:
             raise UsageError("no serial port was named", another())
-        self.name, self.bauds = split(text)
+        self.name, self.bauds = split(text, bauds)
         self._chunks: queue.SimpleQueue[Chunk | BusError] = queue.SimpleQueue()
         self._closing = Event()
         self._thread: Thread | None = None
@@ -132,6 +136,9 @@ class SerialPort:
                     raise
                 time.sleep(REOPEN_S)
 
+    def revive(self, until_ns: int) -> None:
+        """See Port; what is there starts by itself."""
+
     def close(self) -> None:
         """See Port."""
         self._closing.set()
@@ -158,12 +165,12 @@ class SerialPort:
         self._thread.start()
 
 
-def split(text: str) -> tuple[str, tuple[int, ...]]:
+def split(text: str, bauds: tuple[int, ...] = BAUDS) -> tuple[str, tuple[int, ...]]:
     """PORT[:BAUD] as the port's name and the rates to try; a URL has no rate."""
     name, colon, baud = text.rpartition(":")
     if colon and "://" not in text and baud.isdecimal() and int(baud) > 0:
         return name, (int(baud),)
-    return text, BAUDS[:1] if "://" in text else BAUDS
+    return text, bauds[:1] if "://" in text else bauds
 
 
 def _take(serial: Serial, chunks: queue.SimpleQueue[Chunk | BusError], closing: Event, name: str) -> None:

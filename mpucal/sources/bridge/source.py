@@ -21,4 +21,5 @@ def open_source(request: Request) -> OpenedChip:
             f"a bridge does not move {config.rate_hz:g} samples a second",
             "take --rate 1000 or less, or connect the chip to an I2C bus of this computer",
         )
-    return OpenedChip(open_bridge(request.value, request.values.get("address")), request.plan, words=request.words)
+    bridge = open_bridge(request.value, request.values.get("address"), request.values.get("micropython"))
+    return OpenedChip(bridge, request.plan, words=request.words)

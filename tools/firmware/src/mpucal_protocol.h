@@ -22,6 +22,7 @@ enum mpucal_type {
     MPUCAL_BURST = 0x03,
     MPUCAL_WRITE = 0x04,
     MPUCAL_STREAM = 0x05,
+    MPUCAL_LEAVE = 0x06,
     MPUCAL_BLOB_STATE = 0x10,
     MPUCAL_BLOB_READ = 0x11,
     MPUCAL_BLOB_BEGIN = 0x12,
