@@ -144,8 +144,9 @@ class Link:
         """
         heard = Heard()
         give_up_ns = self.port.now_ns() + within_ns
-        for baud in cycle(self.port.bauds):
-            if self.port.now_ns() >= give_up_ns or heard.floods == FLOODS or heard.is_repl:
+        for tried, baud in enumerate(cycle(self.port.bauds)):
+            is_repl = heard.is_repl and tried >= TRIES
+            if self.port.now_ns() >= give_up_ns or heard.floods == FLOODS or is_repl:
                 break
             if len(self.port.bauds) > 1:
                 self.port.set_baud(baud)

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.calibration import calibrate
+from mpucal.chip.access import Reply
 from mpucal.chip.config import Config
 from mpucal.cli.running import running
 from mpucal.session.plan import Plan
@@ -92,10 +93,20 @@ requests = st.lists(
 )
 
 
+class Registers:
+    """A chip of which every register reads as its number, and FIFO_COUNT as 28."""
+
+    def read(self, register, count):
+        return Reply(b"\0\x1c" if (register, count) == (0x72, 2) else bytes([register]) * count, 0)
+
+    def write(self, register, data):
+        return 0
+
+
 @settings(max_examples=60, deadline=None)
 @given(told=requests)
 def test_it_answers_as_the_emulated_bridge_does(told, tmp_path_factory):
-    chip, _ = simulated()
+    chip = Registers()
     folder = tmp_path_factory.mktemp("flash")
     other = EmulatedBridge(chip, lambda: 0, window=2)
     bridge = program.Bridge([I2c(chip)], lambda: 0, f"{folder}/")

@@ -1,4 +1,4 @@
-"""The real pyserial and a simulated REPL on a pty: what runs is interrupted, the bridge pasted, the board left as before."""
+"""The real pyserial, and a simulated REPL on a pty: what runs is interrupted, and begins anew at the end."""
 
 import importlib.util
 import time
