@@ -56,9 +56,10 @@ def test_a_program_that_runs_gives_way_and_begins_anew(raw_paste, repl):
     assert board.boots == 3
 
 
-def test_its_flash_keeps_a_calibration(repl, capsys):
-    board = repl()
-    assert run(["write", str(BLOB), "bridge", "--serial", board.name, "--micropython", "--yes"]) == 0
+def test_its_flash_keeps_a_calibration(repl, capsys, tmp_path):
+    board, path = repl(), tmp_path / "calibration.bin"
+    path.write_bytes(BLOB.read_bytes())
+    assert run(["write", str(path), "bridge", "--serial", board.name, "--micropython", "--yes"]) == 0
     assert run(["show", "--serial", board.name, "--micropython"]) == 0
     assert "blob number 1 of the bridge on" in capsys.readouterr().out
 
