@@ -65,7 +65,8 @@ class Family:
     fifo_reset_needs_stop : FIFO_RESET acts only while FIFO_EN of USER_CTRL is 0 (RM-MPU-6000A, register 106).
     half_range_revision : letter of a revision whose accelerometer has half the sensitivity; empty where there is none.
     accel_noise_ug, gyro_noise_dps : typical noise densities, ug/sqrt(Hz) and deg/s/sqrt(Hz).
-    zero_rate_dps : tolerance of the gyroscope's output at rest, deg/s.
+    zero_rate_dps : tolerance of the gyroscope's output at rest, deg/s. zero_g_mg : of the accelerometer's x, y, z, mg.
+    scale_percent, cross_axis_percent : tolerances of the scale factors and cross-axis sensitivities of both.
     """
 
     name: str
@@ -89,6 +90,9 @@ class Family:
     gyro_range_shift: int = reg.FULL_SCALE_SHIFT
     fifo_reset_needs_stop: bool = False
     half_range_revision: str = ""
+    zero_g_mg: tuple[float, float, float] = (60.0, 60.0, 80.0)
+    scale_percent: float = 3.0
+    cross_axis_percent: float = 2.0
 
     @property
     def columns(self) -> Columns:
@@ -137,6 +141,7 @@ MPU6050 = Family(
     accel_noise_ug=400.0,
     gyro_noise_dps=0.005,
     zero_rate_dps=20.0,
+    zero_g_mg=(50.0, 50.0, 80.0),
     fifo_reset_needs_stop=True,
     half_range_revision="C",
 )

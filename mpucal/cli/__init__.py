@@ -14,6 +14,7 @@ COMMANDS = {
     "session": "Guide a person through a calibration, and write the result.",
     "record": "Record a sensor to a capture file, without calibrating.",
     "calibrate": "Calibrate from a capture or another recording.",
+    "batch": "Calibrate many recordings at once, and show the fleet.",
     "write": "Write a calibration to the device, or restore its previous state.",
     "check": "Check whether a calibration is still right.",
     "apply": "Apply a calibration to a recording.",

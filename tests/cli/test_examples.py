@@ -39,6 +39,8 @@ def belongings(session, save, tmp_path):
         ).save(folder / "calibration.json")
     made.save(tmp_path / "calibration.json")
     shutil.copy(session.folder / "capture.mcap", tmp_path)
+    (tmp_path / "line3").mkdir()
+    shutil.copy(session.folder / "capture.mcap", tmp_path / "line3")
     save(load(session.folder), tmp_path / "walk.npz")
 
 

@@ -1,0 +1,125 @@
+"""What a fleet has in common: all rows' parameters in common units, by statistics that a few bad boards do not move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ..chip.families import PARTS
+from ..data import Vector
+from ..result.calibration import REFUSED
+from ..result.error_model import bias_mg, misalignment, scale_factor_error
+from .row import AXES
+
+# a value is an outlier where it lies so many robust standard deviations from the fleet's median
+FAR = 5.0
+MAD_OF_NORMAL = 0.6745
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of each board that has one.
+
+    Attributes
+    ----------
+    name, unit : in words. value : (n,) NaN where it is not known. limit : (n,) of the chip's data sheet, NaN without.
+    """
+
+    name: str
+    unit: str
+    value: Vector
+    limit: Vector
+
+    @property
+    def known(self) -> Vector:
+        """(k,) the values that are."""
+        return np.asarray(self.value[np.isfinite(self.value)])
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Median and robust standard deviation; NaN without values."""
+        if not len(self.known):
+            return np.nan, np.nan
+        median = float(np.median(self.known))
+        return median, float(np.median(np.abs(self.known - median))) / MAD_OF_NORMAL
+
+    @property
+    def beyond(self) -> int:
+        """How many exceed the data sheet's limit."""
+        with np.errstate(invalid="ignore"):
+            return int(np.sum(np.abs(self.value) > self.limit))
+
+    def outliers(self) -> Iterator[tuple[int, float]]:
+        """Row and distance, in robust standard deviations."""
+        median, spread = self.middle
+        if spread > 0.0:
+            away = np.abs(self.value - median) / spread
+            for i in np.flatnonzero(np.nan_to_num(away) > FAR):
+                yield int(i), float(away[i])
+
+
+def parameters(columns: Mapping[str, Sequence[Any]]) -> list[Parameter]:
+    """Scale factor error, bias and largest misalignment of the accelerometer, and the gyroscope's biases.
+
+    Of what was refused nothing is taken.
+    """
+    refused = np.array([verdict in (None, REFUSED) for verdict in columns["verdict"]], bool)
+    D = _numbers(columns, [f"D_{i}{j}" for i in AXES for j in AXES]).reshape(-1, 3, 3)
+    b_a, b_omega = (_numbers(columns, [f"{name}_{i}" for i in AXES]) for name in ("b_a", "b_omega"))
+    for values in (D, b_a, b_omega):
+        values[refused] = np.nan
+    families = [_family(number) for number in columns["who_am_i"]]
+    n, made = len(refused), []
+    known = np.isfinite(D).all(axis=(1, 2))
+    scale, angle = np.full((n, 3), np.nan), np.full(n, np.nan)
+    for i in np.flatnonzero(known):
+        scale[i] = scale_factor_error(D[i])
+        off = misalignment(D[i])
+        angle[i] = np.max(np.abs(off[~np.eye(3, dtype=bool)]))
+    for k, axis in enumerate(AXES):
+        limit = np.array([np.nan if family is None else family.scale_percent for family in families])
+        made.append(Parameter(f"scale factor error {axis}", "%", scale[:, k], limit))
+    for k, axis in enumerate(AXES):
+        limit = np.array([np.nan if family is None else family.zero_g_mg[k] for family in families])
+        made.append(Parameter(f"bias {axis}", "mg", bias_mg(b_a[:, k]), limit))
+    percent = np.array([np.nan if family is None else family.cross_axis_percent for family in families])
+    made.append(Parameter("largest misalignment", "deg", angle, np.degrees(np.arctan(percent / 100.0))))
+    limit = np.array([np.nan if family is None else family.zero_rate_dps for family in families])
+    made += [
+        Parameter(f"gyroscope's bias {axis}", "deg/s", np.degrees(b_omega[:, k]), limit) for k, axis in enumerate(AXES)
+    ]
+    return made
+
+
+def twice(columns: Mapping[str, Sequence[Any]]) -> list[tuple[int, int]]:
+    """Pairs of rows of the same sensor, by its factory's trim: each with the next, of other files."""
+    seen: dict[str, list[int]] = {}
+    for i, (sensor, verdict) in enumerate(zip(columns["sensor"], columns["verdict"], strict=True)):
+        if sensor is not None and verdict not in (None, REFUSED):
+            seen.setdefault(sensor, []).append(i)
+    pairs = (pair for rows in seen.values() for pair in pairwise(rows))
+    return [(i, j) for i, j in pairs if columns["digest"][i] != columns["digest"][j]]
+
+
+def repeatability(columns: Mapping[str, Sequence[Any]], pairs: Sequence[tuple[int, int]]) -> list[tuple[str, Vector]]:
+    """Of D and of b_a, (pairs, elements) by how many standard deviations of their difference two rows differ."""
+    first, second = np.array(pairs, int).reshape(-1, 2).T
+    found = []
+    for name, places in (("D", [f"{i}{j}" for i in AXES for j in AXES]), ("b_a", list(AXES))):
+        value, std = (_numbers(columns, [f"{what}_{place}" for place in places]) for what in (name, f"{name}_std"))
+        found.append((name, np.asarray((value[second] - value[first]) / np.hypot(std[first], std[second]))))
+    return found
+
+
+def _family(who_am_i: int | None) -> Any:
+    part = None if who_am_i is None else PARTS.get(who_am_i)
+    return None if part is None else part.family
+
+
+def _numbers(columns: Mapping[str, Sequence[Any]], names: Sequence[str]) -> Vector:
+    """(n, names)"""
+    return np.array([columns[name] for name in names], float).T

@@ -1,0 +1,176 @@
+"""The batch itself: recordings to dask's workers, a few hundred under way at a time, and rows back as they come."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from ..data import STANDARD_GRAVITY_MPS2
+from ..errors import SourceError, UsageError
+from .journal import Journal
+from .row import Settings, row_of
+
+# recordings that the scheduler knows of at once: more are no faster, and take memory
+UNDER_WAY = 256
+JOURNAL = "rows.jsonl"
+INSTALL = "pip install 'mpucal[batch]'"
+WAIT_S = 60
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a batch is: rows done of so many, of which so many were there already or could not be read; s."""
+
+    done: int
+    of: int
+    kept: int
+    failed: int
+    seconds: float
+
+    @property
+    def left_s(self) -> float | None:
+        """How long it still takes at the pace so far."""
+        made = self.done - self.kept
+        return (self.of - self.done) * self.seconds / made if made else None
+
+
+def calibrate_many(
+    paths: Sequence[str | Path],
+    client: Any = None,
+    *,
+    model: str = "auto",
+    gravity: float = STANDARD_GRAVITY_MPS2,
+    folder: str | Path | None = None,
+) -> Any:
+    """Calibrate many recordings; a pyarrow.Table with a row for each, in their order.
+
+    Parameters
+    ----------
+    paths : files, folders of sessions, or URLs of fsspec, read where the worker is.
+    client : a distributed.Client; None: workers of this machine, one for each processor.
+    model, gravity : see mpucal.calibrate.
+    folder : where what is done is kept, so that the next call goes on there.
+
+    Raises
+    ------
+    SourceError : the scheduler was lost. UsageError : dask.distributed or pyarrow is not installed.
+    """
+    from .table import table_of  # noqa: PLC0415
+
+    names, settings = [str(path) for path in paths], Settings(model, gravity)
+    with TemporaryDirectory() as temporary, local_client() if client is None else _as_is(client) as workers:
+        place = Path(folder or temporary)
+        place.mkdir(parents=True, exist_ok=True)
+        journal = Journal(place / JOURNAL, settings.key)
+        try:
+            for _ in run(names, workers, journal, settings):
+                pass
+            return table_of(journal.rows(names))
+        finally:
+            journal.close()
+
+
+def run(paths: Sequence[str], client: Any, journal: Journal, settings: Settings) -> Iterator[Progress]:
+    """Fill the journal; what it holds already of the same file is only compared by digest.
+
+    Raises
+    ------
+    SourceError : the scheduler was lost; what is done stays in the journal.
+    """
+    from distributed import as_completed  # noqa: PLC0415
+
+    begun, done, kept, failed = time.monotonic(), 0, 0, 0
+    todo, under_way = iter(dict.fromkeys(paths)), {}
+    of = len(set(paths))
+    results = as_completed(loop=client.loop, with_results=True, raise_errors=False)
+
+    def send(count: int) -> None:
+        for _, path in zip(range(count), todo, strict=False):
+            future = client.submit(row_of, path, settings, journal.digest(path), pure=False)
+            under_way[future.key] = path
+            results.add(future)
+
+    send(UNDER_WAY)
+    for future, result in results:
+        path = under_way.pop(future.key)
+        if future.status in ("cancelled", "lost"):
+            raise SourceError("the scheduler was lost", "start it, and run the same again: what is done stays done")
+        row = result if future.status == "finished" else _died(path, result)
+        if "batch" in row:
+            journal.add(row)
+        else:
+            kept += 1
+        done, failed = done + 1, failed + ("error" in row)
+        send(1)
+        yield Progress(done, of, kept, failed, time.monotonic() - begun)
+
+
+def _died(path: str, result: Any) -> dict[str, Any]:
+    error = result[1] if isinstance(result, tuple) else result
+    return {"path": path, "batch": Path(path).parent.name, "error": f"its workers died or could not run it: {error}"}
+
+
+@contextmanager
+def local_client(workers: int | None = None, dashboard: bool = False) -> Iterator[Any]:
+    """Workers of this machine, processes of one thread each.
+
+    Raises
+    ------
+    UsageError : dask.distributed or pyarrow is not installed.
+    """
+    distributed = _distributed()
+    with (
+        TemporaryDirectory(prefix="mpucal-") as scratch,
+        distributed.LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            local_directory=scratch,
+            dashboard_address=":8787" if dashboard else None,
+            silence_logs="ERROR",
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+
+
+@contextmanager
+def remote_client(scheduler: str) -> Iterator[Any]:
+    """The workers of a scheduler that runs already.
+
+    Raises
+    ------
+    SourceError : it does not answer, or has no workers. UsageError : dask.distributed or pyarrow is not installed.
+    """
+    distributed = _distributed()
+    try:
+        client = distributed.Client(scheduler, timeout=10, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise SourceError(f"no scheduler answers at {scheduler} ({error})", "start `dask scheduler`") from error
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=WAIT_S)
+        except TimeoutError as error:
+            raise SourceError(
+                f"the scheduler at {scheduler} has no workers", f"start `dask worker {scheduler} --nthreads 1`"
+            ) from error
+        yield client
+
+
+@contextmanager
+def _as_is(client: Any) -> Iterator[Any]:
+    yield client
+
+
+def _distributed() -> Any:
+    try:
+        import distributed  # noqa: PLC0415
+        import pyarrow  # noqa: F401, PLC0415 - for the table, which comes last
+    except ImportError as error:
+        raise UsageError(f"{error.name} is not installed", INSTALL) from error
+    return distributed

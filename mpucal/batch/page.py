@@ -1,0 +1,213 @@
+"""The fleet's page: how its parameters are distributed, which boards are odd, and how well sensors repeat."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from ..data import Vector
+from ..report.elements import figure, paragraph, section, table
+from ..report.figure import AFTER, BEFORE, svg
+from ..report.style import CSS
+from .fleet import FAR, Parameter, parameters, repeatability, twice
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAGE = "fleet.html"
+# rows of the longest tables: the others are in results.csv
+MOST = 200
+BINS = 40
+VERDICTS = ("good", "usable", "refused")
+Columns = Mapping[str, Sequence[Any]]
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """The page, and its first sentence."""
+
+    html: str
+    sentence: str
+
+
+def page(results: Path) -> Fleet:
+    """The page of results.parquet."""
+    columns: Columns = pq.read_table(results).to_pydict()
+    found = parameters(columns)
+    sentence = _sentence(columns)
+    body = (
+        paragraph(sentence),
+        _yield(columns),
+        _distributions(found),
+        _outliers(columns, found),
+        _groups("By batch", "batch", columns["batch"], columns, found),
+        _groups("By date", "date", [each and each[:10] for each in columns["recorded"]], columns, found),
+        _temperature(columns, found),
+        _repeats(columns),
+        _errors(columns),
+        _reports(columns),
+    )
+    html = (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>Fleet of {len(columns['path'])}</title>\n<style>{CSS}</style>\n</head>\n<body>\n"
+        f"<h1>{len(columns['path'])} recordings</h1>\n{''.join(body)}</body>\n</html>\n"
+    )
+    return Fleet(html, sentence)
+
+
+def _sentence(columns: Columns) -> str:
+    counts = Counter(columns["verdict"])
+    unread = sum(error is not None for error in columns["error"])
+    told = [f"{counts[verdict]} {verdict}" for verdict in VERDICTS]
+    return f"Of {len(columns['path'])} recordings, {', '.join(told)}, {unread} could not be read."
+
+
+def _yield(columns: Columns) -> str:
+    n = max(len(columns["path"]), 1)
+    by_verdict = Counter(verdict or "not read" for verdict in columns["verdict"])
+    verdicts = [(name, str(count), f"{100 * count / n:.1f} %") for name, count in by_verdict.most_common()]
+    by_reason = Counter(
+        (code, verdict or "")
+        for codes, verdict in zip(columns["reasons"], columns["verdict"], strict=True)
+        for code in (codes or "").split()
+    )
+    reasons = [
+        (code, verdict, str(count), f"{100 * count / n:.1f} %") for (code, verdict), count in by_reason.most_common()
+    ]
+    return section(
+        "Yield",
+        table("verdicts", "", ("verdict", "recordings", "share"), verdicts),
+        table("reasons", "Reasons against them", ("reason", "verdict", "recordings", "share"), reasons)
+        if reasons
+        else "",
+    )
+
+
+def _distributions(found: Iterable[Parameter]) -> str:
+    rows = []
+    for each in found:
+        if len(each.known):
+            low, high = np.percentile(each.known, (5, 95))
+            median, spread = each.middle
+            limits = each.limit[np.isfinite(each.limit)]
+            limit = f"±{limits.max():.3g}" if len(limits) else "unknown"
+            numbers = [f"{x:+.3f}" for x in (low, median, high)]
+            rows.append((f"{each.name}, {each.unit}", *numbers, f"{spread:.3f}", limit, str(each.beyond)))
+    if not rows:
+        return ""
+    head = ("parameter", "5 %", "median", "95 %", "spread", "data sheet", "beyond it")
+    note = "Spread: standard deviation by the median absolute deviation. Refused calibrations are left out."
+    pictures = [figure(_histograms(found, prefix), f"{prefix} of all boards") for prefix in ("scale factor", "bias")]
+    return section("Parameters", table("parameters", note, head, rows), *pictures)
+
+
+def _histograms(found: Iterable[Parameter], prefix: str) -> str:
+    some = [each for each in found if each.name.startswith(prefix) and len(each.known) > 1]
+
+    def draw(page: Figure) -> None:
+        for axes, each in zip(np.ravel(page.subplots(1, len(some), sharey=True)), some, strict=True):
+            axes.hist(each.known, BINS, color=AFTER)
+            for limit in np.unique(each.limit[np.isfinite(each.limit)]):
+                axes.axvline(limit, color=BEFORE, lw=0.8)
+                axes.axvline(-limit, color=BEFORE, lw=0.8)
+            axes.set(xlabel=f"{each.name[-1]} [{each.unit}]")
+            axes.spines[["top", "right"]].set_visible(False)
+
+    try:
+        return svg(draw, prefix.replace(" ", "-"), f"histograms: {prefix} of x, y and z", 1.8) if some else ""
+    except ImportError:
+        return ""
+
+
+def _outliers(columns: Columns, found: Iterable[Parameter]) -> str:
+    far = [
+        (away, (columns["path"][i], each.name, f"{each.value[i]:+.3f} {each.unit}", f"{away:.1f}"))
+        for each in found
+        for i, away in each.outliers()
+    ]
+    rows = [row for _, row in sorted(far, key=lambda item: -item[0])]
+    caption = f"More than {FAR:g} spreads from the median"
+    if len(rows) > MOST:
+        caption += f"; the farthest {MOST} of {len(rows)}"
+    head = ("recording", "parameter", "value", "spreads away")
+    return section("Outliers", table("outliers", caption, head, rows[:MOST])) if rows else ""
+
+
+def _groups(title: str, what: str, names: Sequence[str | None], columns: Columns, found: Sequence[Parameter]) -> str:
+    """The medians of each group, of those that have a name."""
+    groups = sorted({name for name in names if name})
+    if len(groups) < 2:
+        return ""
+    key, verdict = np.array([name or "" for name in names]), np.array([each or "" for each in columns["verdict"]])
+    rows = []
+    for group in groups[:MOST]:
+        inside = key == group
+        good = f"{100 * np.mean(verdict[inside] == 'good'):.0f} %"
+        medians = (_median(each.value[inside]) for each in found)
+        rows.append((group, str(int(inside.sum())), good, *medians))
+    head = (what, "recordings", "good", *(f"{each.name}, {each.unit}" for each in found))
+    return section(title, table(f"by-{what}", "Medians", head, rows))
+
+
+def _median(values: Vector) -> str:
+    known = values[np.isfinite(values)]
+    return f"{np.median(known):+.3f}" if len(known) else ""
+
+
+def _temperature(columns: Columns, found: Iterable[Parameter]) -> str:
+    """How the biases of different boards go with their temperatures."""
+    T = np.array(columns["temperature_c"], float)
+    rows = []
+    for each in found:
+        known = np.isfinite(T) & np.isfinite(each.value)
+        if each.name.startswith("bias") and known.sum() > 10 and np.ptp(T[known]) > 1.0:
+            A = np.stack((T[known] - T[known].mean(), np.ones(known.sum())), axis=1)
+            fit, residual, *_ = np.linalg.lstsq(A, each.value[known])
+            std = float(np.sqrt(residual[0] / (known.sum() - 2) / np.sum(A[:, 0] ** 2)))
+            rows.append((each.name, f"{fit[0]:+.3f} ± {std:.3f}"))
+    warm = T[np.isfinite(T)]
+    if not len(warm):
+        return ""
+    told = paragraph(f"Recorded at {warm.min():.1f} to {warm.max():.1f} °C, median {np.median(warm):.1f} °C.")
+    caption = "Bias against temperature over all boards, mg a degree ± 1 sigma"
+    return section("Temperature", told, table("temperature", caption, ("parameter", "slope"), rows) if rows else "")
+
+
+def _repeats(columns: Columns) -> str:
+    pairs = twice(columns)
+    if not pairs:
+        return ""
+    rows = []
+    for name, far in repeatability(columns, pairs):
+        known = far[np.isfinite(far)]
+        if len(known):
+            rows.append(
+                (name, str(len(known)), f"{np.sqrt(np.mean(known**2)):.2f}", f"{100 * np.mean(abs(known) > 2):.1f} %")
+            )
+    told = f"{len(pairs)} pairs of recordings are of one sensor, by the factory's trim in its offset registers."
+    head = ("elements of", "differences", "rms, in standard deviations", "beyond 2")
+    note = "Where nothing changed, the rms is 1, and 4.6 % lie beyond 2."
+    return section("Repeatability", paragraph(told), table("repeats", note, head, rows))
+
+
+def _errors(columns: Columns) -> str:
+    rows = [(path, error) for path, error in zip(columns["path"], columns["error"], strict=True) if error]
+    caption = f"The first {MOST} of {len(rows)}" if len(rows) > MOST else ""
+    return section("Not read", table("errors", caption, ("recording", "why"), rows[:MOST], words=True)) if rows else ""
+
+
+def _reports(columns: Columns) -> str:
+    links = [
+        f'<li><a href="reports/{escape(report)}">{escape(path)}</a>: {escape(verdict or "")}</li>\n'
+        for path, report, verdict in zip(columns["path"], columns["report"], columns["verdict"], strict=True)
+        if report
+    ]
+    return section("Reports", f"<ul>{''.join(links)}</ul>\n") if links else ""

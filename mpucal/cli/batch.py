@@ -1,0 +1,100 @@
+"""`mpucal batch`: calibrate many recordings at once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+
+from ..batch.journal import Journal
+from ..batch.many import JOURNAL, Progress, local_client, remote_client, run
+from ..batch.paths import found
+from ..batch.row import Settings
+from ..errors import UsageError
+from ..session.results import make_folder
+from .options import fit_options
+from .person import say
+
+EXAMPLE = "Example: `mpucal batch 'line3/*.mcap' -o fleet --workers 1`"
+EVERY_S = 2.0
+REPORTS = "reports"
+
+
+@click.command("batch", epilog=EXAMPLE)
+@click.argument("files", metavar="FILE|GLOB|URL...", nargs=-1, required=True)
+@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), required=True, help="For the results.")
+@click.option("--workers", metavar="N", type=click.IntRange(1), help="Processes on this machine; one a processor.")
+@click.option("--scheduler", metavar="ADDRESS", help="A dask scheduler that runs already, tcp://HOST:PORT.")
+@click.option("--dashboard", is_flag=True, help="Say where dask's dashboard is.")
+@click.option("--reports", is_flag=True, help="Write a report of each, which the page links to.")
+@fit_options
+def command(
+    files: tuple[str, ...],
+    folder: Path,
+    workers: int | None,
+    scheduler: str | None,
+    dashboard: bool,
+    reports: bool,
+    gravity: float,
+    gravity_anyway: bool,
+    model: str,
+) -> int:
+    """Calibrate many recordings: a table with a row for each, and a page about all of them.
+
+    The same command again goes on where it was stopped; what is done is not done again.
+    """
+    if scheduler and workers:
+        raise UsageError("--workers is for this machine, and --scheduler names another's", "give one of them")
+    paths = found(files)
+    make_folder(folder / REPORTS if reports else folder)
+    settings = Settings(model, gravity, gravity_anyway, str((folder / REPORTS).resolve()) if reports else "")
+    journal = Journal(folder / JOURNAL, settings.key)
+    try:
+        with remote_client(scheduler) if scheduler else local_client(workers, dashboard) as client:
+            if dashboard:
+                say(f"mpucal: the dashboard is at {client.dashboard_link}")
+            _follow(run(paths, client, journal, settings))
+        _tell(folder, paths, journal)
+    finally:
+        journal.close()
+    return 0
+
+
+def _follow(progress: Iterator[Progress]) -> None:
+    """Say how far it is, every two seconds and at the end."""
+    said = time.monotonic()
+    for each in progress:
+        if time.monotonic() - said > EVERY_S or each.done == each.of:
+            said = time.monotonic()
+            say(f"  {_words(each)}")
+
+
+def _words(progress: Progress) -> str:
+    words = f"{progress.done} of {progress.of}"
+    if made := progress.done - progress.kept:
+        words += f", {made / progress.seconds:.3g} a second"
+    if progress.left_s:
+        words += f", {_duration(progress.left_s)} left"
+    if progress.kept:
+        words += f", {progress.kept} were there already"
+    return words + (f", {progress.failed} unreadable" if progress.failed else "")
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
+
+
+def _tell(folder: Path, paths: list[str], journal: Journal) -> None:
+    # pyarrow is slow to load
+    from ..batch.page import PAGE, page  # noqa: PLC0415
+    from ..batch.table import write  # noqa: PLC0415
+    from ..result.atomic import write_atomically  # noqa: PLC0415
+
+    parquet, text = write(folder, journal.rows(paths))
+    fleet = page(parquet)
+    write_atomically(folder / PAGE, fleet.html.encode())
+    click.echo(f"{fleet.sentence}\n\nWritten to {folder}: {parquet.name}, {text.name}, {PAGE}")

@@ -1,0 +1,184 @@
+"""A batch on workers that are processes of their own, against the same rows made here one by one."""
+
+import csv
+import json
+import re
+import shutil
+import subprocess
+import sys
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic, sleep
+
+import distributed
+import fsspec
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import mpucal.batch
+from mpucal.__main__ import run as call
+from mpucal.batch.journal import Journal
+from mpucal.batch.many import run
+from mpucal.batch.page import page
+from mpucal.batch.row import COLUMNS, Settings, row_of
+from mpucal.batch.table import table_of, write
+from mpucal.result.calibration import Calibration
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+SETTINGS = Settings("accel", 9.80665)
+LONG_S = 60
+
+
+@dataclass
+class Cluster:
+    address: str
+    workers: list[subprocess.Popen]
+
+
+@contextmanager
+def process(*words):
+    child = subprocess.Popen([sys.executable, "-m", *map(str, words)], stderr=subprocess.DEVNULL)
+    try:
+        yield child
+    finally:
+        child.kill()
+        child.wait()
+
+
+@contextmanager
+def started(folder, count=2):
+    """A scheduler and workers, each a process."""
+    file = folder / "scheduler.json"
+    with ExitStack() as stack:
+        here = ("--scheduler-file", file)
+        stack.enter_context(process("distributed.cli.dask_scheduler", "--port", 0, "--no-dashboard", *here))
+        options = ("--nthreads", 1, "--no-nanny", "--no-dashboard", "--local-directory", folder)
+        workers = [stack.enter_context(process("distributed.cli.dask_worker", *here, *options)) for _ in range(count)]
+        begun = monotonic()
+        while not file.exists() and monotonic() - begun < LONG_S:
+            sleep(0.05)
+        yield Cluster(json.loads(file.read_text())["address"], workers)
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """One that lives on."""
+    with started(tmp_path_factory.mktemp("cluster")) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def captures(tmp_path):
+    """A line's folder: two sessions of one sensor, short captures, one of junk, one that is cut and one not there."""
+    folder = tmp_path / "line-3"
+    folder.mkdir()
+    for name in ("mpu6050", "mpu6500"):
+        shutil.copy(FIXTURES / "sessions" / f"{name}.mcap", folder)
+    shutil.copytree(FIXTURES / "faults", folder / "more")
+    (folder / "junk.mcap").write_bytes(b"\x89MCAP0\r\n" + bytes(range(256)))
+    (folder / "cut.mcap").write_bytes((FIXTURES / "sessions" / "mpu6050.mcap").read_bytes()[:50_000])
+    return [*map(str, sorted(folder.rglob("*.mcap"))), str(folder / "none.mcap")]
+
+
+def test_a_worker_is_killed_and_then_the_scheduler(cluster, captures, tmp_path):
+    expected = table_of(row_of(path, SETTINGS) for path in captures)
+    errors = [error for error in expected["error"].to_pylist() if error]
+    assert len(errors) >= 2
+    assert not any("bug" in error for error in errors)
+    journal = Journal(tmp_path / "rows.jsonl", SETTINGS.key)
+    (tmp_path / "first").mkdir()
+    with started(tmp_path / "first") as first, distributed.Client(first.address, set_as_default=False) as client:
+        client.wait_for_workers(2, timeout=LONG_S)
+        for progress in run(captures, client, journal, SETTINGS):
+            if progress.done == 2:
+                first.workers[0].kill()
+    assert (progress.done, progress.kept) == (len(captures), 0)
+    assert table_of(journal.rows(captures)).equals(expected)
+    journal.close()
+    # another scheduler, and a line that a kill of the program has cut
+    with (tmp_path / "rows.jsonl").open("ab") as file:
+        file.write(b'{"settings": "')
+    journal = Journal(tmp_path / "rows.jsonl", SETTINGS.key)
+    Path(captures[0]).write_bytes(Path(captures[1]).read_bytes())
+    with distributed.Client(cluster.address, set_as_default=False) as client:
+        *_, progress = run(captures, client, journal, SETTINGS)
+    # what changed and what could not be read is done again
+    assert progress.kept == len(captures) - 1 - errors.count(expected["error"][-1].as_py())
+    again = table_of(journal.rows(captures))
+    assert again.slice(1).equals(expected.slice(1))
+    assert again["digest"][0] == again["digest"][1]
+    journal.close()
+
+
+def test_the_command_writes_a_table_and_a_page(cluster, captures, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ["batch", str(tmp_path / "line-3" / "*.mcap"), "-o", "fleet", "--model", "accel", "--reports"]
+    assert call([*words, "--scheduler", cluster.address]) == 0
+    told = capsys.readouterr()
+    assert re.search(r"4 of 4, .* a second, 1 unreadable", told.err)
+    columns = pq.read_table("fleet/results.parquet").to_pydict()
+    with Path("fleet/results.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["path"] for row in rows] == columns["path"] == sorted(columns["path"])
+    assert tuple(rows[0]) == tuple(columns) == COLUMNS
+    assert set(columns["batch"]) == {"line-3"}
+    assert call(["calibrate", columns["path"][2], "--model", "accel", "-o", "one"]) in (0, 5)
+    one = Calibration.load("one/calibration.json")
+    assert [columns[f"b_a_{axis}"][2] for axis in "xyz"] == one.b_a.tolist()
+    assert [float(rows[2][f"D_x{axis}"]) for axis in "xyz"] == one.D[0].tolist()
+    html = Path("fleet/fleet.html").read_text()
+    links = re.findall(r'href="(reports/[^"]*)"', html)
+    assert len(links) == sum(report is not None for report in columns["report"])
+    assert all((Path("fleet") / link).exists() for link in links)
+
+
+def test_urls_are_read_where_the_worker_is(captures):
+    there = fsspec.filesystem("memory")
+    path = next(path for path in captures if "mpu6050" in path)
+    there.pipe("/line/mpu6050.mcap", Path(path).read_bytes())
+    here, far = row_of(path, SETTINGS), row_of("memory://line/mpu6050.mcap", SETTINGS)
+    assert far["batch"] == "line"
+    assert {**far, "path": "", "batch": ""} == {**here, "path": "", "batch": ""}
+    assert "cannot fetch memory://line/none.mcap" in row_of("memory://line/none.mcap", SETTINGS)["error"]
+
+
+def test_the_page_names_what_is_odd(tmp_path):
+    """Made-up boards: one far off, one refused, all seen twice with the differences that their deviations promise."""
+    rng, rows = np.random.default_rng(3), []
+    for board in range(200):
+        b_a = rng.normal(0.0, 0.1, 3) + (2.0 if board == 77 else 0.0)
+        for again in range(2):
+            row = {
+                "path": f"b{board}-{again}.mcap",
+                "batch": f"day-{again}",
+                "digest": f"{board}-{again}",
+                "sensor": f"{board}",
+            }
+            row |= {
+                "verdict": "refused" if board == 3 else "good",
+                "who_am_i": 0x68,
+                "temperature_c": 20.0 + 10 * again,
+            }
+            row |= {f"D_{i}{j}": float(i == j) for i in "xyz" for j in "xyz"} | {
+                "reasons": "never_still" if board == 3 else ""
+            }
+            row |= {f"b_a_{axis}": b_a[k] + rng.normal(0.0, 0.01) for k, axis in enumerate("xyz")}
+            row |= {f"b_a_std_{axis}": 0.01 for axis in "xyz"}
+            rows.append(row)
+    parquet, _ = write(tmp_path, iter(rows))
+    html = page(parquet).html
+    outliers = html[html.index('id="outliers"') : html.index("By batch")]
+    assert set(re.findall(r"b\d+-\d\.mcap", outliers)) == {"b77-0.mcap", "b77-1.mcap"}
+    assert "never_still" in html[html.index('id="reasons"') : html.index('id="parameters"')]
+    ((number, rms),) = re.findall(r">b_a</th><td>(\d+)</td><td>([\d.]+)</td>", html)
+    assert int(number) == 3 * 199
+    assert 0.9 < float(rms) < 1.1
+
+
+def test_in_python(cluster, captures):
+    with distributed.Client(cluster.address, set_as_default=False) as client:
+        table = mpucal.batch.calibrate_many(captures[-3:], client, model="accel")
+    assert table["path"].to_pylist() == captures[-3:]
+    assert table.equals(table_of(row_of(path, SETTINGS) for path in captures[-3:]))
