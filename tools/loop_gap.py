@@ -5,20 +5,25 @@ python tools/loop_gap.py --rate 200 --seconds 70
 
 A session on the simulated chip at a person's pace, recorded into a capture: the gap is the time between two looks into
 the FIFO, which at 1 kHz overflows 36 ms after it was emptied. Compared are a session without fits, with fits in the
-loop, and with fits in a process of their own, as a session has them. The simulation itself takes a part of the time.
+loop, with fits in a process of their own, as a session has them, and that with a page which one client reads, and
+another one has stopped reading. The simulation itself takes a part of the time.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import socket
+import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 
@@ -29,6 +34,8 @@ from mpucal.chip.driver import Driver
 from mpucal.data import Sensor
 from mpucal.errors import EndOfCapture
 from mpucal.files.mcap import CaptureWriter
+from mpucal.page.address import Address
+from mpucal.page.feed import Feed
 from mpucal.session.events import Event, Key, Output
 from mpucal.session.live.apart import Apart
 from mpucal.session.live.fits import Task
@@ -59,7 +66,13 @@ class Idle:
         """See Worker."""
 
 
-HIRED: dict[str, Hire] = {"without fits": Idle, "with fits in the loop": Here, "with fits apart": Apart}
+HIRED: dict[str, tuple[Hire, bool]] = {
+    "without fits": (Idle, False),
+    "with fits in the loop": (Here, False),
+    "with fits apart": (Apart, False),
+    "with fits apart, and a page": (Apart, True),
+}
+READS = "import sys, urllib.request; urllib.request.urlopen(sys.argv[1] + 'events').read()"
 
 
 class Timed:
@@ -91,13 +104,16 @@ class Timed:
 
 
 class Nobody:
-    """Says nothing; at the first prompt, when the chip is set up, the count of looks begins."""
+    """Says nothing; at the first prompt, when the chip is set up, the count of looks begins. A page may be told."""
 
-    def __init__(self, bus: Timed) -> None:
+    def __init__(self, bus: Timed, feed: Feed | None) -> None:
         self._bus: Timed | None = bus
+        self._feed = feed
 
-    def hear(self, _output: Output) -> None:
+    def hear(self, output: Output) -> None:
         """Begin to count."""
+        if self._feed is not None:
+            self._feed.hear(output)
         if self._bus is not None:
             self._bus.looks_ns.clear()
         self._bus = None
@@ -115,15 +131,38 @@ class Measured:
     share: float
 
 
-def measure(rate_hz: float, seconds: float, hire: Hire) -> Measured:
+@contextmanager
+def followed(page: bool) -> Iterator[Feed | None]:
+    """A page with its two clients, if there is to be one."""
+    if not page:
+        yield None
+        return
+    feed = Feed(Address(), {"title": "trial", "board": "gy-521"})
+    where = urlsplit(feed.url)
+    with (
+        socket.create_connection((where.hostname, where.port)) as stalled,
+        subprocess.Popen([sys.executable, "-c", READS, feed.url]) as reading,
+    ):
+        stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
+        stalled.sendall(f"GET {where.path}events HTTP/1.1\r\nHost: {where.netloc}\r\n\r\n".encode())
+        yield feed
+        reading.kill()
+        feed.close()
+
+
+def measure(rate_hz: float, seconds: float, hire: Hire, page: bool) -> Measured:
     """One session of so long."""
     chip = open_simulated("sim:pace=real", seed=1)
     bus = Timed(chip, seconds)
     plan = Plan(Config(rate_hz=rate_hz), target="best")
-    with tempfile.TemporaryDirectory() as folder, CaptureWriter(Path(folder) / "capture.mcap") as writer:
+    with (
+        followed(page) as feed,
+        tempfile.TemporaryDirectory() as folder,
+        CaptureWriter(Path(folder) / "capture.mcap") as writer,
+    ):
         writer.start({})
         driver = Driver(Tap(bus, writer), plan.config)
-        runner = Runner(driver, Nobody(bus), writer.event, plan, (chip.hear,), hire=hire)
+        runner = Runner(driver, Nobody(bus, feed), writer.event, plan, (chip.hear,), hire=hire)
         begun, used_s = time.monotonic(), _used_s()
         runner.measure()
         share = (_used_s() - used_s) / (time.monotonic() - begun)
@@ -144,8 +183,8 @@ def main() -> int:
     arguments = parser.parse_args()
     print(f"{arguments.rate:g} Hz, {arguments.seconds:g} s; a 512-byte FIFO holds", end=" ")
     print(f"{1000.0 * FIFO_FRAMES / arguments.rate:.0f} ms")
-    for name, hire in HIRED.items():
-        found = measure(arguments.rate, arguments.seconds, hire)
+    for name, (hire, page) in HIRED.items():
+        found = measure(arguments.rate, arguments.seconds, hire, page)
         gaps = found.gaps_ms
         print(
             f"{name}: gaps {np.median(gaps):.1f} ms in the median, "

@@ -108,7 +108,7 @@ def on_page(
     try:
         _invite(feed, as_json, attended)
         yield Beside(console, feed, paced), tell
-        if attended and feed.clients:
+        if attended and feed.visited:
             _wait("The page stays open; press Enter to end it.", lambda: False)
     except MpucalError as error:
         feed.show(stopped=str(error))
@@ -126,7 +126,7 @@ def _invite(feed: Feed, as_json: bool, attended: bool) -> None:
         print(f"  Page: {feed.url}", file=sys.stderr, flush=True)
         return
     print(f"{qr_code(feed.url)}\n  {feed.url}\n", file=sys.stderr)
-    _wait("Open the page: the session begins when it is open, or with Enter.", lambda: feed.clients > 0)
+    _wait("Open the page: the session begins when it is open, or with Enter.", lambda: feed.visited)
 
 
 def _wait(what_for: str, enough: Callable[[], bool]) -> None:

@@ -38,7 +38,7 @@ class Feed:
 
     Attributes
     ----------
-    url : where the page is, with its token. clients : how many follow it now.
+    url : where the page is, with its token. visited : somebody has followed the session on it.
 
     Raises
     ------
@@ -68,7 +68,7 @@ class Feed:
                 "choose another place with --page=HOST:PORT, or leave --page away",
             )
         self.url = f"http://{where.name}:{rest}/{token}/"
-        self.clients = 0
+        self.visited = False
         self._view = View()
         self._fixed: dict[str, Any] = {**about, "keys": keys}
         self._offered: deque[dict[str, str]] = deque()
@@ -159,6 +159,6 @@ class Feed:
         while line := self._line():
             said, _, rest = line.partition(" ")
             if said == "clients":
-                self.clients = int(rest)
+                self.visited = True
             elif said == "key":
                 self._pressed.append(Key(rest))
