@@ -12,7 +12,8 @@ from .options import Parsed
 
 F = TypeVar("F", bound=Callable[..., Any])
 # which picture of the board the page draws
-BOARD, *_ = BOARDS = ("gy-521", "plain", "vehicle")
+BOARD, VEHICLE = "gy-521", "vehicle"
+BOARDS = (BOARD, "plain", VEHICLE)
 
 
 def page_options(command: F) -> F:

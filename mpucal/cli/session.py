@@ -31,7 +31,7 @@ from ..terminal.console import Console, console
 from ..terminal.hangup import outliving
 from .destination import device, session_sink_options
 from .options import aim_options, check_gyroscope, check_source, fit_options, given, source_options
-from .page import BOARD, page_options
+from .page import BOARD, VEHICLE, page_options
 from .person import ask, ask_in_doubt
 from .running import running
 from .summary import summary, written
@@ -86,7 +86,7 @@ def command(
     title = source_title(options)
     terminal = console(quiet=yes, as_json=json_events, beep=beep, title=title)
     into = SessionFolder(resume or folder, source.capture_name, again=resume is not None)
-    about = {"title": title, "board": board or ("vehicle" if into.capture.name == CAPTURE_OF_VEHICLE.name else BOARD)}
+    about = {"title": title, "board": board or (VEHICLE if into.capture.name == CAPTURE_OF_VEHICLE.name else BOARD)}
     paced = not source.real_time and UNPACED not in str(options.get("bus"))
     seen = attended and sys.stderr.isatty() and not json_events
     hung_up = partial(terminal.hung_up, stop=page is None and not keep_going)

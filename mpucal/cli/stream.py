@@ -15,12 +15,16 @@ import click
 from ..data import STANDARD_GRAVITY_MPS2, Samples
 from ..errors import EndOfCapture, OutputError
 from ..files.csv import CsvText
+from ..page.address import Address
+from ..page.live import live
 from ..result.calibration import Calibration
 from ..result.clock import now
 from ..result.correction import Correction, correction
 from ..session.ports import Source
 from ..sources.opening import open_source
-from .options import check_source, source_options
+from ..sources.table import source_title
+from .options import check_gyroscope, check_source, source_options
+from .page import BOARD, VEHICLE, page_options
 
 EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.json --seconds 10`"
 
@@ -31,7 +35,16 @@ EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.j
 @click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Record a capture as well.")
 @click.option("--seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop after this time [s].")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line instead of a table.")
-def command(calibration: Path, file: Path | None, seconds: float | None, as_json: bool, **options: Any) -> None:
+@page_options
+def command(
+    calibration: Path,
+    file: Path | None,
+    seconds: float | None,
+    as_json: bool,
+    page: Address | None,
+    board: str | None,
+    **options: Any,
+) -> None:
     """Print calibrated samples, m/s² and rad/s, until Ctrl-C or --seconds; `mpucal apply` does it to recorded ones.
 
     Memory use is constant, so it may run for days. Timestamps are provisional; record a capture for final ones.
@@ -43,13 +56,20 @@ def command(calibration: Path, file: Path | None, seconds: float | None, as_json
     # a simulated chip lives in the gravity in which it was calibrated
     gravity = applied.fit.get("gravity") or STANDARD_GRAVITY_MPS2
     source = open_source({**options, "gravity": gravity}, until_end=True)
+    if page is not None:
+        check_gyroscope(source.plan.config)
     write = _json_lines if as_json else CsvText(lambda text: sys.stdout.write(text.decode())).write
-    with source.measuring(file or Path(os.devnull), _say, now().isoformat()) as measuring, suppress(KeyboardInterrupt):
+    shown = live(page, source_title(options), board or (VEHICLE if options.get("mavlink") else BOARD))
+    capture = source.measuring(file or Path(os.devnull), _say, now().isoformat())
+    with capture as measuring, shown as screen, suppress(KeyboardInterrupt):
         ready: Correction | None = None
         for samples in _polled(measuring.source, seconds):
             if ready is None:
+                sensor = measuring.source.recording().sensor
                 ready = _correction(applied, measuring.source)
-            write(ready.apply(samples))
+            calibrated = ready.apply(samples)
+            write(calibrated)
+            screen.add(samples, calibrated, sensor)
             sys.stdout.flush()
             measuring.source.forget()
 

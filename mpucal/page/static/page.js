@@ -86,6 +86,12 @@ function facts() {
 }
 
 function task() {
+  if (state.live) {
+    document.body.dataset.look = "live";
+    put("headline", `${state.live.magnitude.toFixed(3)} m/s²`);
+    put("prompt", state.ended ? "The stream has ended." : "|a|, calibrated");
+    return;
+  }
   const done = state.verdict ?? (state.stopped || state.ended ? "stopped" : "");
   document.body.dataset.verdict = done;
   const { look, share, number } = done ? { look: done === "good" || done === "usable" ? "yes" : "no", share: 1 } : dial();
@@ -111,7 +117,7 @@ function dial() {
     case "near":
       return { look: "hold", share: 1, number: `${Math.round(meter.missing_deg)}°` };
     case "step":
-      if (progress?.of) return { look: "step", share: progress.done / progress.of };
+      if (progress?.of) return { look: "step", share: progress.done / progress.of, number: laying() ? String(Math.ceil(progress.of - progress.done)) : "" };
   }
   return { look: "wait", share: 1 };
 }
@@ -172,11 +178,11 @@ function notes() {
 }
 
 function live() {
-  const { acc, magnitude, gyr } = state.live;
+  const { acc, gyr } = state.live, rows = [["a", acc, "m/s²", 3]];
+  if (gyr) rows.push(["ω", gyr.map((v) => v * 180 / Math.PI), "deg/s", 2]);
   $("live").hidden = false;
-  const rows = [`|a| ${magnitude.toFixed(3)} m/s²`, `a ${acc.map((v) => v.toFixed(3)).join("  ")} m/s²`];
-  if (gyr) rows.push(`ω ${gyr.map((v) => (v * 180 / Math.PI).toFixed(2)).join("  ")} deg/s`);
-  $("live").replaceChildren(...rows.map((row, k) => element(k ? "div" : "strong", row)));
+  $("live").replaceChildren(...rows.flatMap(([name, values, unit, digits]) => values.map((value, i) =>
+    element("div", `${name} ${"xyz"[i]}  ${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(digits)} ${unit}`))));
 }
 
 // The pictures
@@ -303,7 +309,7 @@ const turnWords = () => (state.meter?.turn ? state.meter.turn.replace(/ deg$/, "
 function tellChanges(old, begins) {
   if (state.verdict !== old.verdict && state.verdict) return announce(VERDICTS[state.verdict], state.verdict === "refused" ? "wrong" : "done");
   if (state.stopped !== old.stopped && state.stopped) return announce(state.stopped, "wrong");
-  if (state.verdict || state.stopped) return;
+  if (state.verdict || state.stopped || state.live) return;
   if (state.held && state.held.t_s !== old.held?.t_s && !begins) {
     return announce(state.held.use === "seen" ? "Seen before" : state.held.text, state.held.use === "seen" ? "wrong" : "taken");
   }
