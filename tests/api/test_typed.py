@@ -8,13 +8,15 @@ from pathlib import Path
 
 import pytest
 
+import mpucal
+
 PROJECT = Path(__file__).parents[2]
 PROGRAMS = Path(__file__).parent / "typed"
 WRONG = PROGRAMS / "wrong.py"
 MARKED = {i for i, line in enumerate(WRONG.read_text().splitlines(), 1) if line.endswith("# wrong")}
 
 
-def mypy(tmp_path):
+def by_mypy(tmp_path):
     words = [sys.executable, "-m", "mypy", "--strict", *map(str, sorted(PROGRAMS.glob("*.py")))]
     done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=PROJECT)
     return {
@@ -22,7 +24,7 @@ def mypy(tmp_path):
     }
 
 
-def pyright(tmp_path):
+def by_pyright(tmp_path):
     settings = tmp_path / "pyrightconfig.json"
     settings.write_text(json.dumps({"include": [str(PROGRAMS)], "typeCheckingMode": "strict"}))
     words = [sys.executable, "-m", "basedpyright", "-p", str(settings), "--pythonpath", sys.executable, "--outputjson"]
@@ -31,6 +33,11 @@ def pyright(tmp_path):
     return {(Path(each["file"]).name, each["range"]["start"]["line"] + 1) for each in found}
 
 
-@pytest.mark.parametrize("checker", [mypy, pyright])
+def test_each_public_name_is_used():
+    text = (PROGRAMS / "whole_api.py").read_text()
+    assert [name for name in mpucal.__all__ if not re.search(rf"\b{name}\b", text)] == []
+
+
+@pytest.mark.parametrize("checker", [by_mypy, by_pyright])
 def test_the_api_is_typed_and_each_wrong_line_is_told(checker, tmp_path):
     assert checker(tmp_path) == {(WRONG.name, line) for line in MARKED}

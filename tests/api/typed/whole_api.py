@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import mpucal
-from mpucal import Calibration, MpucalError, Recording
+from mpucal import Calibration, CheckResult, MpucalError, Recording
 
 Vector = NDArray[np.float64]
 
@@ -42,6 +42,7 @@ assert_type(calibration.apply([0.0, 0.0, 9.8], temperature_c=25.0), Vector)
 assert_type(calibration.apply(acc, gyr), tuple[Vector, Vector])
 assert_type(calibration.apply(pl.DataFrame()), pl.DataFrame)
 assert_type(calibration.plot(recording), Figure)
+assert_type(mpucal.check(calibration, "today.mcap", days=30.0), CheckResult)
 calibration.save("calibration.json")
 try:
     assert_type(Calibration.load(Path("calibration.bin")), Calibration)
