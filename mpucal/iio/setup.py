@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from ..chip.access import Files, Transaction
 from ..chip.config import Config
-from ..errors import BusError, ChipError
+from ..errors import BusError, ChipError, NoAnswer
 from .attributes import ACCEL, AXES, GYRO, KINDS, TEMP, TIMESTAMP, available, full_scale
 from .decode import ENABLE, FREQUENCY, IioDecoder
 
@@ -70,7 +70,16 @@ class Attributes:
         foreign = tuple(f"{kind}_" for kind in (ACCEL, GYRO) if kind not in kinds)
         for name in sorted(self.names):
             if name.endswith(READ) and not name.startswith(foreign):
-                self.read(name)
+                self._try(name)
+
+    def _try(self, name: str) -> None:
+        """Read an attribute that a driver may show and not answer."""
+        try:
+            self.read(name)
+        except NoAnswer:
+            raise
+        except BusError:
+            return
 
     def read(self, name: str, count: int = TEXT_BYTES) -> str:
         """The text of an attribute; "": the list of their names."""

@@ -188,6 +188,22 @@ def test_what_goes_wrong_before_is_one_sentence(spoil, kind, says):
         run(files, BOTH, **kind)
 
 
+def test_an_attribute_that_a_driver_does_not_answer_is_left_out(monkeypatch):
+    files, read = simulated(), SimulatedFiles.read
+
+    def refuse(self, register, count):
+        if register.endswith("in_accel_x_calibbias"):
+            raise attribute_error(
+                OSError(errno.EINVAL, "Invalid argument"), "iio:device0", "in_accel_x_calibbias", None
+            )
+        return read(self, register, count)
+
+    monkeypatch.setattr(SimulatedFiles, "read", refuse)
+    recording = run(files, BOTH, 1.0)
+    assert len(recording) > 50
+    assert recording.sensor.accel_offsets is None
+
+
 def test_a_device_that_vanishes_ends_it():
     files = simulated()
     driver = IioDriver(files, BOTH, SETTINGS)
