@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 TESTED := $(VENV)/.tested
 export PYTHON
 
-.PHONY: session test lint bench wheel docs firmware clean
+.PHONY: session test kernel lint bench wheel docs firmware clean
 
 session: $(READY)
 	@$(BIN)/mpucal session --bus sim
@@ -41,6 +41,14 @@ $(READY): $(BUILT_OF)
 $(TESTED): $(BUILT_OF)
 	@tools/set_up $(VENV) mavlink,plot,dev
 	@touch $(READY) $@
+
+# a Debian kernel in QEMU, over the host's files: its own I2C and IIO drivers; needs root to see all of these
+KERNEL := build/kernel
+kernel: $(TESTED)
+	@mkdir -p $(KERNEL)
+	@ls $(KERNEL)/linux-image-*.deb >/dev/null 2>&1 || [ -n "$$MPUCAL_KERNEL" ] || (cd $(KERNEL) && \
+		apt-get -qq download $$(apt-cache depends linux-image-amd64 | sed -n 's/.*Depends: //p'))
+	@$(BIN)/pytest -m kernel tests/linux
 
 # needs avr-gcc and avr-libc; says how much flash and RAM the bridge takes
 firmware:

@@ -124,9 +124,7 @@ def mount_matrix(texts: Texts, kind: str) -> Vector:
     ------
     ChipError : a text that is no matrix.
     """
-    name = next(
-        (n for n in (f"{kind}_mount_matrix", "in_mount_matrix", "mount_matrix") if n in texts), None
-    )
+    name = next((n for n in (f"{kind}_mount_matrix", "in_mount_matrix", "mount_matrix") if n in texts), None)
     if name is None:
         return np.eye(3)
     try:

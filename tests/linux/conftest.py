@@ -119,9 +119,8 @@ def boot(package: Path, command: str, table: Path, folder: Path, seconds: float)
 def _unpacked(package: Path, folder: Path) -> dict[str, Path]:
     """The kernel and its modules, by name."""
     wanted = ["./boot/vmlinuz-*", *(f"*/{module}.ko" for module in MODULES)]
-    data = subprocess.Popen(["dpkg-deb", "--fsys-tarfile", package], stdout=subprocess.PIPE)
-    subprocess.run(["tar", "-x", "-C", folder, "--wildcards", *wanted], stdin=data.stdout, check=True)
-    data.wait()
+    with subprocess.Popen(["dpkg-deb", "--fsys-tarfile", package], stdout=subprocess.PIPE) as data:
+        subprocess.run(["tar", "-x", "-C", folder, "--wildcards", *wanted], stdin=data.stdout, check=True)
     return {path.stem: path for path in folder.glob("lib/modules/**/*.ko")}
 
 
