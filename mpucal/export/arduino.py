@@ -63,7 +63,7 @@ void setup() {{
 void loop() {{
     float y[3], a[3];
     if (measure(y)) {{
-        mpucal_apply(y, a);
+        mpucal_correct(y, a);
         for (uint8_t i = 0; i < 3; i++) {{
             Serial.print(a[i], 4);
             Serial.print(i < 2 ? '\\t' : '\\n');

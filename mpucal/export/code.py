@@ -13,20 +13,38 @@ COUNTS = 32768  # full scale of a 16-bit reading
 
 
 def in_c(c: Calibration) -> str:
-    """inv(D) and b_a as constants, and the function for firmware that applies them."""
+    """inv(D), b_a, K and b_omega as constants, and the functions for firmware that apply them.
+
+    Their names differ from those of mpucal_apply.h: a file may include both.
+    """
     bias = _joined(f"{v:.8e}f" for v in c.b_a_to_subtract)
+    rate_bias = _joined(f"{v:.8e}f" for v in np.nan_to_num(c.b_omega))
     return f"""static const float MPUCAL_INV_D[3][3] = {{
 {c_matrix(c.inverse)}
 }};
 static const float MPUCAL_B_A[3] = {{{bias}}}; /* m/s^2 */
+static const float MPUCAL_K[3][3] = {{
+{c_matrix(c.K)}
+}};
+static const float MPUCAL_B_OMEGA[3] = {{{rate_bias}}}; /* rad/s */
 
 {_about_counts(c, "/* ", " */")}
-static inline void mpucal_apply(const float y[3], float a[3])
+static inline void mpucal_correct(const float y[3], float a[3])
 {{
     for (int i = 0; i < 3; i++) {{
         a[i] = 0.0f;
         for (int j = 0; j < 3; j++)
             a[i] += MPUCAL_INV_D[i][j] * (y[j] - MPUCAL_B_A[j]);
+    }}
+}}
+
+/* The rate w [rad/s] of a measured one. */
+static inline void mpucal_correct_gyro(const float y[3], float w[3])
+{{
+    for (int i = 0; i < 3; i++) {{
+        w[i] = 0.0f;
+        for (int j = 0; j < 3; j++)
+            w[i] += MPUCAL_K[i][j] * (y[j] - MPUCAL_B_OMEGA[j]);
     }}
 }}
 """

@@ -49,9 +49,9 @@ FORMS = (
         "c-header",
         ".h",
         "C99, C++11",
-        "`mpucal_apply(y, a)`, in float32",
+        "`mpucal_correct(y, a)` and `mpucal_correct_gyro(y, w)`, in float32",
         c_header.text,
-        (in_float, without_gyroscope, without_temperature, with_hardware),
+        (in_float, without_temperature, with_hardware),
     ),
     Form(
         "arduino",

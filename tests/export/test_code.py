@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
@@ -13,14 +14,17 @@ import pytest
 from mpucal.export.code import in_c, in_python, in_ros
 
 Y = np.array([[0.5, -3.0, 9.0], [-9.7, 0.1, 0.4], [4.0, 6.0, -6.5]])
+LIBRARY = Path(__file__).parents[2] / "tools" / "firmware" / "src"
 MAIN = """
 #include <stdio.h>
 int main(void) {{
     const float y[][3] = {{{rows}}};
     for (int k = 0; k < 3; k++) {{
         float a[3];
-        mpucal_apply(y[k], a);
-        printf("%.9g %.9g %.9g\\n", a[0], a[1], a[2]);
+        float w[3];
+        mpucal_correct(y[k], a);
+        mpucal_correct_gyro(y[k], w);
+        printf("%.9g %.9g %.9g %.9g %.9g %.9g\\n", a[0], a[1], a[2], w[0], w[1], w[2]);
     }}
 }}
 """
@@ -35,12 +39,12 @@ def test_c_computes_what_the_calibration_does(calibrated, tmp_path):
     if shutil.which("cc") is None:
         pytest.skip("there is no C compiler here")
     rows = ", ".join("{" + ", ".join(map(str, row)) + "}" for row in Y)
-    (tmp_path / "apply.c").write_text(in_c(calibrated) + MAIN.format(rows=rows))
-    words = ["cc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-o", "apply", "apply.c"]
+    (tmp_path / "apply.c").write_text(f'#include "mpucal_apply.h"\n{in_c(calibrated)}{MAIN.format(rows=rows)}')
+    words = ["cc", "-std=c99", "-Wall", "-Wextra", "-Werror", f"-I{LIBRARY}", "-o", "apply", "apply.c"]
     subprocess.run(words, cwd=tmp_path, check=True)
     printed = subprocess.run([tmp_path / "apply"], capture_output=True, text=True, check=True).stdout
     np.testing.assert_allclose(
-        [list(map(float, line.split())) for line in printed.splitlines()], calibrated.apply(Y), atol=1e-5
+        [list(map(float, line.split())) for line in printed.splitlines()], np.hstack(calibrated.apply(Y, Y)), atol=1e-5
     )
 
 

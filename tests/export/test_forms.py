@@ -55,7 +55,7 @@ C = """
 int main(void) {
     float y[3], a[3];
     while (scanf("%f %f %f", &y[0], &y[1], &y[2]) == 3) {
-        mpucal_apply(y, a);
+        mpucal_correct(y, a);
         printf("%.9g %.9g %.9g %.9g\\n", (double)a[0], (double)a[1], (double)a[2], (double)MPUCAL_D[0][1]);
     }
     return 0;

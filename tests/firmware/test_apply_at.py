@@ -24,6 +24,13 @@ unsigned char host_apply_at(const void *blob, unsigned size, const int16_t *coun
     if (status == MPUCAL_OK) mpucal_apply_at(&sensor, &drift, counts, temperature_c, a);
     return (unsigned char)status;
 }
+unsigned char host_apply_gyro(const void *blob, unsigned size, float range_dps, const int16_t *counts, float *w) {
+    struct mpucal_gyro gyro;
+    struct mpucal_source source = {mpucal_read_memory, blob, size};
+    enum mpucal_status status = mpucal_load_gyro(&gyro, &source, range_dps);
+    if (status == MPUCAL_OK) mpucal_apply_gyro(&gyro, counts, w);
+    return (unsigned char)status;
+}
 """
 ACCEPTED = [
     path for path in sorted(VECTORS.glob("blob_*.bin")) if "blob" in json.loads(path.with_suffix(".json").read_text())
@@ -31,7 +38,7 @@ ACCEPTED = [
 
 
 @pytest.fixture(scope="module")
-def apply_at(tmp_path_factory):
+def library(tmp_path_factory):
     if shutil.which("gcc") is None:
         pytest.skip("needs gcc")
     folder = tmp_path_factory.mktemp("apply_at")
@@ -39,8 +46,11 @@ def apply_at(tmp_path_factory):
     flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-shared", "-fPIC"]
     words = ["gcc", *flags, f"-I{ROOT / 'tools/firmware/src'}", "-o", "host.so", "host.c"]
     subprocess.run(words, cwd=folder, check=True)
-    library = ctypes.CDLL(str(folder / "host.so"))
+    return ctypes.CDLL(str(folder / "host.so"))
 
+
+@pytest.fixture(scope="module")
+def apply_at(library):
     def call(data, counts, temperature_c):
         a = np.full(3, np.nan, np.float32)
         counts = np.asarray(counts, np.int16)
@@ -69,3 +79,34 @@ def test_agrees_with_every_golden_vector(path, apply_at):
     temperatures = wanted.get("at_c", [-40.0, 25.0, 85.0])
     for temperature_c, a in zip(temperatures, wanted.get("a_at", [wanted["a"]] * 3), strict=True):
         assert apply_at(data, counts, temperature_c) == pytest.approx(np.array(a) + rounded, abs=1e-5)
+
+
+def test_at_a_temperature_that_is_not_known_b_a_is_the_blobs(apply_at):
+    path = VECTORS / "blob_sloped.bin"
+    at_c = Blob.decode(path.read_bytes()).temperature_c
+    counts = (100, -200, 8000)
+    np.testing.assert_array_equal(
+        apply_at(path.read_bytes(), counts, np.nan), apply_at(path.read_bytes(), counts, at_c)
+    )
+
+
+def _rate(library, data, range_dps, counts):
+    w = np.full(3, np.nan, np.float32)
+    counts = np.asarray(counts, np.int16)
+    pointers = [array.ctypes.data_as(ctypes.c_void_p) for array in (counts, w)]
+    return library.host_apply_gyro(data, len(data), ctypes.c_float(range_dps), *pointers), w
+
+
+@pytest.mark.parametrize("path", ACCEPTED, ids=lambda path: path.stem)
+def test_the_gyroscope_is_corrected_by_k_and_b_omega(path, library):
+    data, counts = path.read_bytes(), np.array([3000, -20000, 32767])
+    blob = Blob.decode(data)
+    K, b_omega = np.array(blob.K, float).reshape(3, 3), np.nan_to_num(np.array(blob.b_omega, float))
+    K = K if np.isfinite(K).all() else np.eye(3)
+    status, w = _rate(library, data, 500.0, counts)
+    assert status == 0
+    np.testing.assert_allclose(w, K @ (counts * np.radians(500 / 32768) - b_omega), atol=1e-5)
+
+
+def test_a_gyroscope_at_another_range_is_refused(library):
+    assert _rate(library, (VECTORS / "blob_measured.bin").read_bytes(), 250.0, (1, 2, 3))[0] == 8

@@ -30,16 +30,20 @@ extern "C" {
 #define MPUCAL_LENGTH_AT 6
 #define MPUCAL_WHO_AM_I_AT 48
 #define MPUCAL_ACCEL_RANGE_G_AT 52
+#define MPUCAL_GYRO_RANGE_DPS_AT 56
 #define MPUCAL_D_AT 60
 #define MPUCAL_B_A_AT 96
 #define MPUCAL_TEMPERATURE_C_AT 120
 #define MPUCAL_APPLIED_B_A_AT 124
+#define MPUCAL_K_AT 136
+#define MPUCAL_B_OMEGA_AT 172
 #define MPUCAL_B_A_SLOPE_AT 184
 #define MPUCAL_RANGE_C_AT 196
 #define MPUCAL_LENGTH_WITH_SLOPE 208
 
 #define MPUCAL_STANDARD_GRAVITY_MPS2 9.80665f
 #define MPUCAL_FULL_SCALE 32768.0f
+#define MPUCAL_RAD 0.01745329252f /* a degree */
 
 /* Why a blob is not used; the first five in the order in which firmware_protocol.md, "Reading", has them checked. */
 enum mpucal_status {
@@ -64,6 +68,12 @@ struct mpucal {
 struct mpucal_drift {
     float slope[3]; /* inv(D) b_a_slope, m/s^2 per degree Celsius; zeros where the blob has no b_a(T) */
     float at_c, from_c, to_c;
+};
+
+/* The gyroscope's part, 48 bytes more: w = gain * counts - bias, in rad/s. */
+struct mpucal_gyro {
+    float gain[3][3]; /* K * (pi / 180) * gyro_range_dps / 32768 */
+    float bias[3];    /* K b_omega; zeros where the blob has none */
 };
 
 /* Where a blob is read from, byte by byte: plain memory, or what has to be asked, such as an EEPROM. */
@@ -227,6 +237,43 @@ static inline void mpucal_apply(const struct mpucal *sensor, const int16_t count
     }
 }
 
+/* The gyroscope's K and b_omega of a blob; on any status but MPUCAL_OK, `gyro` is left as it was.
+ *
+ * gyro_range_dps: the full scale that the chip is set to, deg/s; 0: the blob's.
+ */
+static inline enum mpucal_status mpucal_load_gyro(struct mpucal_gyro *gyro, const struct mpucal_source *blob,
+                                                  float gyro_range_dps) {
+    enum mpucal_status status = mpucal_check(blob);
+    if (status != MPUCAL_OK) {
+        return status;
+    }
+    float measured_at_dps = mpucal_f32(blob, MPUCAL_GYRO_RANGE_DPS_AT);
+    float range_dps = gyro_range_dps > 0.0f ? gyro_range_dps : measured_at_dps;
+    if (!(range_dps > 0.0f) || (measured_at_dps > 0.0f && measured_at_dps != range_dps)) {
+        return MPUCAL_OTHER_RANGE;
+    }
+    float rad_s_per_count = MPUCAL_RAD * range_dps / MPUCAL_FULL_SCALE;
+    int has_K = mpucal_all_finite(blob, MPUCAL_K_AT, 9), has_bias = mpucal_all_finite(blob, MPUCAL_B_OMEGA_AT, 3);
+    for (uint8_t i = 0; i < 3; i++) {
+        gyro->bias[i] = 0.0f;
+        for (uint8_t j = 0; j < 3; j++) {
+            float K = has_K ? mpucal_f32(blob, (uint16_t)(MPUCAL_K_AT + 4 * (3 * i + j))) : (i == j ? 1.0f : 0.0f);
+            gyro->gain[i][j] = K * rad_s_per_count;
+            gyro->bias[i] += has_bias ? K * mpucal_f32(blob, (uint16_t)(MPUCAL_B_OMEGA_AT + 4 * j)) : 0.0f;
+        }
+    }
+    return MPUCAL_OK;
+}
+
+/* The rate w_rad_s (rad/s) of one sample's gyroscope `counts` (x, y, z). */
+static inline void mpucal_apply_gyro(const struct mpucal_gyro *gyro, const int16_t counts[3], float w_rad_s[3]) {
+    float x = counts[0], y = counts[1], z = counts[2];
+    for (uint8_t i = 0; i < 3; i++) {
+        const float *gain = gyro->gain[i];
+        w_rad_s[i] = gain[0] * x + gain[1] * y + gain[2] * z - gyro->bias[i];
+    }
+}
+
 /* b_a(T) of a blob, beside what mpucal_load makes of it; on any status but MPUCAL_OK, `drift` is left as it was. */
 static inline enum mpucal_status mpucal_load_drift(struct mpucal_drift *drift, const struct mpucal_source *blob) {
     enum mpucal_status status = mpucal_check(blob);
@@ -266,7 +313,9 @@ static inline enum mpucal_status mpucal_load_drift(struct mpucal_drift *drift, c
 /* The specific force with b_a(T) at the chip's temperature_c; beyond the temperatures that were seen, as at their end. */
 static inline void mpucal_apply_at(const struct mpucal *sensor, const struct mpucal_drift *drift,
                                    const int16_t counts[3], float temperature_c, float a_mps2[3]) {
-    float within = temperature_c < drift->from_c ? drift->from_c : temperature_c;
+    /* a temperature that is not known, NaN, is the one at which it was measured: then b_a is the blob's */
+    float known = mpucal_is_finite(temperature_c) ? temperature_c : drift->at_c;
+    float within = known < drift->from_c ? drift->from_c : known;
     float away = (within > drift->to_c ? drift->to_c : within) - drift->at_c;
     mpucal_apply(sensor, counts, a_mps2);
     for (uint8_t i = 0; i < 3; i++) {
