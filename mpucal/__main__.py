@@ -4,9 +4,11 @@ from __future__ import annotations
 
 # next to nothing here: what takes a while to load does so where Ctrl-C finds its sentence
 import errno
+import io
 import os
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 from .errors import Abandoned, MpucalError, OutputError
 from .session.threads import ONE_THREAD
@@ -24,7 +26,31 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command, and leave with its exit code."""
     for variable, one in ONE_THREAD.items():
         os.environ.setdefault(variable, one)
+    _keep_streams()
     sys.exit(run(arguments))
+
+
+def _keep_streams() -> None:
+    """Whatever becomes of stderr, what was measured is worth more than what is said of it."""
+    for handle in (0, 1, 2):
+        try:
+            os.fstat(handle)
+        except OSError:
+            # a file that is opened later would take its place, and receive what is said
+            os.open(os.devnull, os.O_RDWR)
+    if sys.stderr is None or not sys.stderr.isatty():
+        raw = io.BufferedWriter(_Unfailing(2, "wb", closefd=False))
+        sys.stderr = io.TextIOWrapper(raw, "utf-8", "backslashreplace", line_buffering=True)
+
+
+class _Unfailing(io.FileIO):
+    """What cannot be written is left out."""
+
+    def write(self, data: Any) -> int:
+        try:
+            return super().write(data) or 0
+        except OSError:
+            return len(data)
 
 
 def run(arguments: Sequence[str] | None = None) -> int:

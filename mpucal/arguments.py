@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from operator import index
 from os import PathLike
 from pathlib import Path
@@ -10,7 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import ArraysError, WrongType, WrongValue
+from .errors import ArraysError, RecordingError, WrongType, WrongValue
+
+# of the times of any sensor's samples: no product of them overflows
+SHORTEST_S, LONGEST_S = 1e-12, 1e18
 
 Vector = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -63,6 +67,9 @@ def seconds(t: ArrayLike, name: str) -> Vector:
     if t.ndim != 1 or len(t) < 2:
         raise ArraysError(f"{name}: t has shape {t.shape}, not (n,) with n >= 2", "give one time in seconds a sample")
     _check_time(t, name)
+    least, most = np.diff(t).min(), t[-1] - t[0]
+    if least < SHORTEST_S or not most < LONGEST_S:
+        raise ArraysError(f"{name}: t has steps of {least:g} s within {most:g} s", "give times in seconds")
     return t
 
 
@@ -110,6 +117,39 @@ def a_path(path: Any, what: str) -> Path:
     if not isinstance(path, str | PathLike):
         raise WrongType(f"{what} is given as {type(path).__name__}", "give the path of its file")
     return Path(path)
+
+
+def regular(path: Path) -> Path:
+    """`path`, which is a file, a folder, or not there.
+
+    Raises
+    ------
+    RecordingError : it is a pipe, a socket or a device, which may never end.
+    """
+    try:
+        mode = path.stat().st_mode
+    except OSError:
+        return path
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise RecordingError(f"{path} is a pipe or device, and no file", "write what it gives to a file, and give that")
+    return path
+
+
+def content(path: Path, most: int) -> bytes:
+    """The bytes of a file that is not longer than `most`.
+
+    Raises
+    ------
+    RecordingError : it cannot be read, is no file, or is longer.
+    """
+    try:
+        with regular(path).open("rb") as file:
+            data = file.read(most + 1)
+    except OSError as error:
+        raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path") from error
+    if len(data) > most:
+        raise RecordingError(f"{path} is longer than {most >> 20} MB", "give a file that mpucal wrote")
+    return data
 
 
 def _array(values: ArrayLike, key: str, name: str) -> NDArray[Any]:

@@ -39,3 +39,9 @@ def interrupted(module, words):
     """A command that is interrupted where it first imports a module."""
     program = PROGRAM.format(module=module, words=words)
     return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("stderr", ["2>/dev/full", "2>&-"])
+def test_what_cannot_be_said_changes_no_exit_code(stderr):
+    words = f"{sys.executable} -m mpucal show nothing.json {stderr}"
+    assert subprocess.run(words, shell=True, check=False).returncode == 3

@@ -20,8 +20,8 @@ from ..files.folder import captures_in
 from ..files.formats import held_whole, writable
 from ..files.rows import Rows
 from ..result.atomic import check_not_among
-from ..result.calibration import Calibration
 from ..result.correction import correction
+from .loading import loaded
 from .recording_options import hint_options, hints_of, say_taken
 
 EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calibrated.mcap`"
@@ -55,7 +55,7 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool, *
     say_taken(rows.taken)
     if rows.done:
         raise UsageError(f"{file} is calibrated already ({rows.done})", "give the uncalibrated recording")
-    ready = correction(Calibration.load(calibration), rows.sensor, rows.autopilot)
+    ready = correction(loaded(calibration), rows.sensor, rows.autopilot)
     for remark in (*ready.remarks, *_remarks(rows)):
         click.echo(f"mpucal: {remark}", err=True)
     noise = np.array([ready.calibration.noise_std, ready.calibration.gyro_noise_std])

@@ -10,8 +10,8 @@ from typing import Any
 import click
 
 from ..report.units import with_std
-from ..result.calibration import Calibration
 from ..result.comparison import CONFIDENCE, Comparison, Difference, compare
+from .loading import loaded
 
 EXAMPLE = "Example: `mpucal diff board7/calibration.json board7-today/calibration.json`"
 
@@ -26,7 +26,7 @@ def command(a: Path, b: Path, as_json: bool) -> None:
     Two good calibrations of one unchanged sensor are called different in 1 of 100 cases. If one of them is usable with
     reservations, its uncertainties may be too small, and a small difference is reported as undecided.
     """
-    found = compare(Calibration.load(a), Calibration.load(b))
+    found = compare(loaded(a), loaded(b))
     click.echo(json.dumps(_document(found), indent=2) if as_json else _page(found))
 
 

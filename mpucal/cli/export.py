@@ -9,7 +9,7 @@ import click
 
 from ..export.forms import FORMS, form
 from ..result.atomic import check_not_among, write_atomically
-from ..result.calibration import Calibration
+from .loading import loaded
 
 EXAMPLE = "Example: `mpucal export board7/calibration.json --to c-header -o calibration.h`"
 
@@ -35,7 +35,7 @@ def command(calibration: Path, name: str, file: Path | None, as_json: bool) -> N
     if file is not None:
         check_not_among(file, [calibration])
     chosen = form(name)
-    text, notes = chosen.export(Calibration.load(calibration))
+    text, notes = chosen.export(loaded(calibration))
     if file is not None:
         write_atomically(file, text.encode())
     for note in notes:

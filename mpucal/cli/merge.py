@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 
 from ..result.atomic import check_not_among
-from ..result.calibration import Calibration
 from ..result.merge import merge
 from ..result.session_files import BLOB, DOCUMENT
 from ..session.results import make_folder, save
+from .loading import loaded
 from .summary import slope, summary
 
 EXAMPLE = "Example: `mpucal merge cold/calibration.json warm/calibration.json hot/calibration.json -o merged`"
@@ -29,7 +29,7 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, as_json: bool) 
     if folder is not None:
         for file in (BLOB, DOCUMENT):
             check_not_among(folder / file.name, calibrations)
-    made = merge([Calibration.load(path) for path in calibrations])
+    made = merge([loaded(path) for path in calibrations])
     if folder is not None:
         make_folder(folder)
         save(folder, {BLOB.name: made.calibration.blob().encode(), DOCUMENT.name: made.calibration.json().encode()})

@@ -23,6 +23,7 @@ from ..sinks.table import SINKS
 from ..sources.kind import SourceKind
 from ..sources.opening import contents, one_of
 from ..sources.table import kinds_meant, used_by
+from .loading import loaded
 from .options import check_source, source_options
 from .person import say
 from .recording_options import say_taken
@@ -55,7 +56,7 @@ def command(file: Path | None, as_json: bool, **options: Any) -> None:
     if file is None:
         _show_device(check_source(click.get_current_context()), options, as_json)
     elif file.suffix in CALIBRATIONS and recognised(file) is None:
-        _show_calibration(str(file), Calibration.load(file), as_json)
+        _show_calibration(str(file), loaded(file), as_json)
     else:
         _show_recording(file, as_json)
 

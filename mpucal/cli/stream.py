@@ -23,6 +23,7 @@ from ..result.correction import Correction, correction
 from ..session.ports import Source
 from ..sources.opening import open_source
 from ..sources.table import source_title
+from .loading import loaded
 from .options import check_gyroscope, check_source, source_options
 from .page import BOARD, VEHICLE, page_options
 
@@ -50,7 +51,7 @@ def command(
     Memory use is constant, so it may run for days. Timestamps are provisional; record a capture for final ones.
     """
     check_source(click.get_current_context())
-    applied = Calibration.load(calibration)
+    applied = loaded(calibration)
     if file is not None and file.exists():
         raise OutputError(f"{file} is there already", "choose another file with -o")
     # a simulated chip lives in the gravity in which it was calibrated

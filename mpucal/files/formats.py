@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from pkgutil import resolve_name
 
+from ..arguments import regular
 from ..data import Recording
 from ..errors import OutputError, RecordingError, UsageError
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, SessionFile
@@ -133,7 +134,13 @@ FORMATS = (
 
 
 def recognised(path: Path) -> Format | None:
-    """The format of a recording; None of what is none."""
+    """The format of a recording; None of what is none.
+
+    Raises
+    ------
+    RecordingError : it is a pipe or device, whose bytes can be read once at best.
+    """
+    regular(path)
     return next((row for row in FORMATS if row.is_read and row.is_of(path)), None)
 
 

@@ -11,7 +11,7 @@ import json
 import os
 import struct
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Self, cast
@@ -26,8 +26,10 @@ from zstandard import ZstdError
 from ..chip.access import Transaction
 from ..chip.accesses import Accesses
 from ..chip.records import Record, SessionEvent
+from ..durable import Durable
 from ..errors import CaptureError, OutputError
 from ..result.atomic import whole_file
+from ..strict_json import parsed_own
 from .messages import BUS, SESSION, accesses_message, accesses_schema, event_message, event_schema, records_of
 
 FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 2
@@ -69,6 +71,7 @@ class CaptureWriter:
             raise self._cannot_write(error) from error
         # the chunks' index grows by 1 MB an hour: in vain where nothing is kept
         self._stream = _Stream(self._file, CHUNK_NS, chunked=self._path != Path(os.devnull))
+        self._durable = Durable(self._file)
 
     def start(self, meta: Mapping[str, Any]) -> None:
         """Write the head of the file: what is captured, by what and how; values of JSON's own types."""
@@ -88,8 +91,9 @@ class CaptureWriter:
 
     def close(self) -> None:
         """Write the index, close the file, and write it anew with longer chunks where there is room for that."""
-        with self._writing(), self._file:
+        with self._writing(), self._file, closing(self._durable):
             self._stream.finish()
+            self._file.flush()
         if self._stream.started and self._path.is_file():
             # without it the file is as whole, and longer
             with suppress(OutputError, CaptureError):
@@ -346,7 +350,7 @@ class _Bounded:
 
 def _meta(item: Metadata, path: Path) -> dict[str, Any]:
     try:
-        meta = {key: json.loads(value) for key, value in item.metadata.items()}
+        meta = {key: parsed_own(value) for key, value in item.metadata.items()}
         version = int(meta.pop(VERSION_KEY))
     except (ValueError, KeyError, TypeError) as error:
         raise CaptureError(f"the head of {path} is damaged ({error})", "record it again") from error

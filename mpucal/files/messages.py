@@ -29,6 +29,7 @@ from mcap.well_known import MessageEncoding
 from ..chip.access import Failure, Transaction
 from ..chip.accesses import Accesses
 from ..chip.records import SessionEvent
+from ..strict_json import parsed_own
 from . import protobuf
 
 BUS, SESSION = "/bus", "/session"
@@ -156,13 +157,13 @@ def records_of(topic: str, encoding: str, t_ns: int, message: bytes) -> Accesses
     if topic == BUS:
         return accesses_of(message) if encoding == MessageEncoding.Protobuf else _transaction(t_ns, message)
     if topic == SESSION:
-        content = json.loads(message)
+        content = parsed_own(message)
         return SessionEvent(content["name"], t_ns, content["data"])
     return None
 
 
 def _transaction(t_ns: int, message: bytes) -> Transaction:
-    content = json.loads(message)
+    content = parsed_own(message)
     error = content.get("error")
     return Transaction(
         content["op"],

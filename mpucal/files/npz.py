@@ -11,6 +11,7 @@ their own first.
 from __future__ import annotations
 
 import json
+import lzma
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -28,6 +29,7 @@ from numpy.typing import NDArray
 from ..data import Recording, Samples, Sensor
 from ..errors import RecordingError
 from ..result.atomic import whole_file
+from ..strict_json import parsed
 from .rows import ROWS, Rows, Write, cannot_read, checked
 
 NEEDED = ("t", "acc", "gyr")
@@ -36,6 +38,11 @@ MASKS = ("gap", "acc_clipped", "gyr_clipped")
 DONE = "done"
 SMALL = ("flat", "flat_samples", "sensor", DONE)
 COPIED = 1 << 20
+# as zipfile, its decompressors and numpy put it: encrypted, of an unknown method, longer than any memory
+DAMAGED = (
+    *(ValueError, TypeError, AttributeError, ArithmeticError, LookupError, EOFError, RuntimeError, MemoryError),
+    *(SyntaxError, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
+)
 _REMEDY = "give an .npz with t [s] (n,), acc [m/s^2] (n, 3) and gyr [rad/s] (n, 3)"
 
 
@@ -93,7 +100,7 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
             yield file
     except OSError as error:
         raise cannot_read(path, error) from error
-    except (ValueError, TypeError, AttributeError, RuntimeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+    except DAMAGED as error:
         raise RecordingError(f"{path} is no whole NumPy archive ({error})", _REMEDY) from error
 
 
@@ -116,7 +123,7 @@ def _sensor(arrays: Mapping[str, Any], path: Path) -> Sensor:
     if "sensor" not in arrays:
         return Sensor()
     try:
-        return Sensor.of(json.loads(str(arrays["sensor"])))
+        return Sensor.of(parsed(str(arrays["sensor"])))
     except (ValueError, AttributeError) as error:
         raise RecordingError(
             f"{path}: sensor is no JSON object ({error})", "leave sensor out, or write it with mpucal"

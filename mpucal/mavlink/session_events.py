@@ -10,6 +10,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from ..strict_json import parsed_own
 from .dialect import Message, dialect
 from .link import OWN_COMPONENT, OWN_SYSTEM
 
@@ -74,7 +75,7 @@ def _note(text: bytes) -> Note | None:
     if not text.startswith(PREFIX):
         return None
     try:
-        content = json.loads(text.removeprefix(PREFIX))
+        content = parsed_own(text.removeprefix(PREFIX))
         return Note(str(content["name"]), dict(content["data"]))
     except (ValueError, KeyError, TypeError):
         return None

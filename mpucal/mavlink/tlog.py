@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Iterator
+from contextlib import closing
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import NamedTuple, Self
 
+from ..durable import Durable
 from ..errors import CaptureError, OutputError
 from .dialect import HEADER, LONGEST, packet_length
 
@@ -41,6 +43,7 @@ class TlogWriter:
             self._file = path.open("wb")
         except OSError as error:
             raise self._cannot_write(error) from error
+        self._durable = Durable(self._file)
 
     def packet(self, t_ns: int, data: bytes) -> None:
         """Keep a packet."""
@@ -55,7 +58,8 @@ class TlogWriter:
     def close(self) -> None:
         """Write what is left."""
         try:
-            self._file.close()
+            with self._file, closing(self._durable):
+                self._file.flush()
         except OSError as error:
             raise self._cannot_write(error) from error
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, TypeVar, cast, overload
@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import frames
-from ..arguments import a_path, vectors
+from ..arguments import a_path, content, vectors
 from ..data import Recording, Sensor, Vector
 from ..errors import RecordingError, WrongValue
+from ..strict_json import MOST_BYTES, parsed
 from .atomic import write_atomically
 from .blob import NO_RANGE, Blob, BlobError
-from .document import arguments, content
+from .digest import DIGEST, digest, doubt
+from .document import arguments, checked, written
 from .error_model import bias_mg, scale_factor_error
 from .frozen import FrozenDict
 from .keys import Fit, Quality, Verdict
@@ -54,6 +56,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     b_a_slope : (3,) m/s^2 a degree Celsius, of which b_a grows away from sensor.temperature_c; zeros: not known to.
     b_a_slope_std : (3,). temperature_range_c : (2,) degrees Celsius, within which that was seen.
     extra : further top-level keys of the document (autopilot, others, written, merged).
+    doubt : why the numbers of the file that it was read from may not be those that were saved; empty where they are.
 
     Unknown numbers are NaN (null in the file). Calibrations are equal whose calibration.json is the same; they have no
     hash, as their arrays have none.
@@ -78,6 +81,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     b_a_slope: Vector = field(default_factory=lambda: np.zeros(3))
     b_a_slope_std: Vector = field(default_factory=lambda: unknown(3))
     temperature_range_c: Vector = field(default_factory=lambda: unknown(2))
+    doubt: str = ""
 
     def __post_init__(self) -> None:
         for name in ("fit", "quality", "extra"):
@@ -191,11 +195,12 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
 
     def document(self) -> dict[str, Any]:
         """The content of calibration.json; NaN becomes None."""
-        return content(vars(self), self.follows_temperature)
+        return written(vars(self), self.follows_temperature)
 
     def json(self) -> str:
-        """The document as text."""
-        return json.dumps(self.document(), indent=2, allow_nan=False) + "\n"
+        """The document as text, with its digest."""
+        document = self.document()
+        return json.dumps({**document, DIGEST: digest(document)}, indent=2, allow_nan=False) + "\n"
 
     def blob(self) -> Blob:
         """The config blob of this calibration, see firmware_protocol.md."""
@@ -241,21 +246,17 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         RecordingError : no such file, or no calibration in it.
         """
         path = a_path(path, "a calibration")
-        try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path") from error
+        data = content(path, MOST_BYTES)
         if path.suffix == ".bin":
             try:
                 return cls.from_blob(Blob.decode(data))
             except BlobError as error:
                 raise RecordingError(f"{path} is no config blob: {error}", "give an undamaged blob") from error
         try:
-            return cls.from_document(json.loads(data))
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise RecordingError(
-                f"{path} holds no calibration ({type(error).__name__}: {error})", "give a calibration.json"
-            ) from error
+            document = checked(parsed(data))
+            return replace(cls.from_document(document), doubt=doubt(document))
+        except ValueError as error:
+            raise RecordingError(f"{path} holds no calibration ({error})", "give a calibration.json") from error
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Calibration:

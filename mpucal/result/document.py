@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..data import Sensor, Vector
+from .schema import check_document
 
 FORMAT, VERSION = "mpucal.calibration", 1
 # (key, attribute of a Calibration, shape) of the two objects
@@ -35,6 +36,8 @@ GYROSCOPE = (
     ("b_omega_std", "b_omega_std", (3,)),
     ("noise_std", "gyro_noise_std", (3,)),
 )
+# of a number in SI units, and of a matrix near the identity
+LARGEST, WORST_CONDITION = 1e9, 1e9
 ACCELEROMETER_FORMULA = "a = inv(D) @ (y - b_a)"
 GYROSCOPE_FORMULA = "w = K @ (y - b_omega)"
 # fromisoformat takes any character between date and time
@@ -43,7 +46,7 @@ DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}([T ][0-9:]{5,8}([.,][0-9]{1,9})?(
 EXTRA = ("autopilot", "others", "written", "merged", "updated_from")
 
 
-def content(fields: Mapping[str, Any], follows_temperature: bool) -> dict[str, Any]:
+def written(fields: Mapping[str, Any], follows_temperature: bool) -> dict[str, Any]:
     """The content of calibration.json, of a Calibration's fields by name; NaN becomes None."""
     values = {
         "format": FORMAT,
@@ -92,6 +95,43 @@ def arguments(document: Mapping[str, Any]) -> dict[str, Any]:
         "created": _date(document.get("created") or ""),
         "extra": {key: document[key] for key in EXTRA if key in document},
     }
+
+
+def checked(document: Any) -> dict[str, Any]:
+    """A document that was read from a file, if it is as its schema says and its D can be inverted; others' likewise.
+
+    Raises
+    ------
+    ValueError : what is wrong.
+    """
+    if not isinstance(document, dict):
+        raise ValueError(f"it is a {type(document).__name__}, not an object")
+    if document.get("format") != FORMAT:
+        raise ValueError(f'"format" is {document.get("format")!r}, not {FORMAT!r}')
+    version = document.setdefault("version", VERSION)
+    if isinstance(version, int) and version > VERSION:
+        raise ValueError(f"version {version} is newer than {VERSION}")
+    check_document(document)
+    for one in (document, *document.get("others", ())):
+        _check_numbers(one)
+    return document
+
+
+def _check_numbers(document: Mapping[str, Any]) -> None:
+    for key, rows in (("accelerometer", ACCELEROMETER), ("gyroscope", GYROSCOPE)):
+        values = _read(document.get(key, {}), rows)
+        # farther from a sensor than anything that was ever measured: their products stay finite
+        if any(np.nanmax(np.abs(array), initial=0.0) > LARGEST for array in values.values()):
+            raise ValueError(f"{key} holds a number beyond {LARGEST:g}")
+        if any(
+            np.nanmin(values[name], initial=0.0) < 0.0
+            for _, name, _ in rows
+            if name.endswith("_std") and name in values
+        ):
+            raise ValueError(f"{key} holds a standard deviation below 0")
+        for name in ("D", "K"):
+            if np.isfinite(matrix := values.get(name, np.eye(3))).all() and np.linalg.cond(matrix) > WORST_CONDITION:
+                raise ValueError(f"{name} cannot be inverted")
 
 
 Rows = tuple[tuple[str, str, tuple[int, ...]], ...]

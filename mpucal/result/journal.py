@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import OutputError
+from ..strict_json import parsed
 from .atomic import write_atomically
 from .clock import now
 
@@ -52,7 +53,7 @@ class Journal:
         if self._path is None:
             return None
         try:
-            content = json.loads(self._path.read_bytes())
+            content = parsed(self._path.read_bytes())
         except (OSError, ValueError):
             return None
         return content if isinstance(content, dict) and AT in content else None

@@ -130,7 +130,10 @@ def _recordings(c: Calibration) -> frozenset[str]:
 
 
 def _is_sure(c: Calibration) -> bool:
-    return bool(np.isfinite(c.b_a_std).all() and np.isfinite(c.D_std).all() and c.b_a_std.all() and c.D_std.all())
+    known = np.isfinite(c.D).all() and np.isfinite(c.b_a).all()
+    return bool(
+        known and np.isfinite(c.b_a_std).all() and np.isfinite(c.D_std).all() and c.b_a_std.all() and c.D_std.all()
+    )
 
 
 def _line(away: Vector, b_a: Vector, weight: Vector) -> tuple[Vector, Vector, Vector, Vector]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from pkgutil import resolve_name
@@ -14,9 +15,9 @@ import numpy as np
 from ..data import Recording
 from ..errors import OutputError
 from ..report import render
-from ..result.atomic import write_together
+from ..result.atomic import write_atomically, write_together
 from ..result.calibration import REFUSED, Calibration
-from ..result.session_files import DOCUMENT, SESSION_FILES
+from ..result.session_files import DOCUMENT, REPORT, SESSION_FILES
 
 
 @dataclass(frozen=True)
@@ -68,13 +69,25 @@ def simulated_truth(result: Result) -> bytes | None:
 
 
 def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
-    """Write files by their names, all or none; calibration.json last, as it says that the others hold.
+    """Write files by their names, all or none, calibration.json last; then the report, which is not worth the others.
 
     Raises
     ------
-    OutputError : the folder or one of them cannot be written.
+    OutputError : the folder or one of them cannot be written; without room for the report the others are kept.
     """
-    write_together({folder / name: files[name] for name in sorted(files, key=lambda name: name == DOCUMENT.name)})
+    first = sorted(files.keys() - {REPORT.name}, key=lambda name: (name == DOCUMENT.name, name))
+    write_together({folder / name: files[name] for name in first})
+    if REPORT.name in files:
+        try:
+            write_atomically(folder / REPORT.name, files[REPORT.name])
+        except OutputError as error:
+            with suppress(OSError):
+                # one that is there is of another calibration
+                (folder / REPORT.name).unlink(missing_ok=True)
+            raise OutputError(
+                f"{error.what}; {' and '.join(first)} are kept in {folder}",
+                f"make the report with `mpucal calibrate {folder} -o ELSEWHERE`",
+            ) from error
     return tuple(folder / name for name in files)
 
 

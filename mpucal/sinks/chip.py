@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import content
 from ..chip.access import Bus
 from ..chip.bench import Bench
 from ..chip.decode import Decoder
@@ -31,6 +32,7 @@ from ..result.improvement import is_better
 from ..result.journal import AT, Journal
 from ..session.at_rest import put_down
 from ..sources.chip import OpenedChip
+from ..strict_json import MOST_BYTES, parsed
 from .kind import Device
 from .sink import Applied
 from .table import CHIP, CHIP_OFFSETS
@@ -253,7 +255,7 @@ def _hex(blocks: Sequence[Block]) -> dict[str, str]:
 def _kept(path: Path) -> list[Block]:
     """What `keep` saved."""
     try:
-        document = json.loads(path.read_bytes())
+        document = parsed(content(path, MOST_BYTES))
         if document["format"] != FORMAT:
             raise ValueError(f'"format" is {document["format"]!r}')
         registers = {int(first, 0): bytes.fromhex(data) for first, data in document[REGISTERS].items()}

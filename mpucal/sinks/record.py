@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ..arguments import content
 from ..data import Recording
+from ..errors import RecordingError
 from ..result.calibration import Calibration
 from ..result.document import FORMAT
 from ..result.session_files import DOCUMENT
 from ..session.results import result_files, save
+from ..strict_json import MOST_BYTES, parsed
 from .kind import Effect, SinkKind
 
 # of calibration.json: the writes, one entry each
@@ -55,6 +57,6 @@ def is_calibration(path: Path) -> bool:
     if path.suffix != ".json":
         return path.suffix == ".bin" or not path.exists()
     try:
-        return bool(json.loads(path.read_bytes()).get("format") == FORMAT)
-    except (OSError, ValueError, AttributeError):
+        return bool(parsed(content(path, MOST_BYTES)).get("format") == FORMAT)
+    except (RecordingError, ValueError, AttributeError):
         return True

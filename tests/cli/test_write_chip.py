@@ -20,6 +20,20 @@ def test_what_is_written_says_what_the_chip_subtracts(mpucal, calibrated, tmp_pa
     assert json.loads((tmp_path / "calibration-on-chip.json").read_text()) == json.loads(written.out)
 
 
+def test_numbers_that_changed_since_are_written_only_by_force(mpucal, calibrated, tmp_path):
+    spoilt = tmp_path / "calibration.json"
+    document = json.loads(calibrated.read_text())
+    document["accelerometer"]["b_a"][0] += 1e-9
+    spoilt.write_text(json.dumps(document))
+    words = ("write", spoilt, "chip", "--bus", "sim:seed=3", "-o", tmp_path / "out")
+    refused = mpucal(*words)
+    assert (refused.code, "its digest does not match" in refused.err) == (6, True)
+    assert not (tmp_path / "out").exists()
+    assert mpucal(*words, "--force").code == 0
+    shown = mpucal("show", spoilt)
+    assert (shown.code, "its digest does not match" in shown.err) == (0, True)
+
+
 def test_it_is_said_that_it_does_not_last(mpucal, calibrated, tmp_path):
     result = mpucal("write", calibrated, "chip", "--bus", "sim:seed=3", "-o", tmp_path)
     assert "volatile" in result.out

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from mpucal.errors import OutputError
 from mpucal.result.session_files import CAPTURE, SESSION_FILES
+from mpucal.session.results import save
 from mpucal.sinks.table import SINKS
 
 README = Path(__file__).parents[2] / "README.md"
@@ -32,3 +34,12 @@ def test_each_one_is_free_until_it_is_there(tmp_path):
 @pytest.mark.parametrize("name", ["capture.tlog", "capture-.mcap", "capture-x.mcap", "my-capture.mcap", "captureXmcap"])
 def test_another_file_is_none(name):
     assert not CAPTURE.is_one(name)
+
+
+def test_a_report_that_does_not_fit_costs_nothing_else(tmp_path):
+    (tmp_path / "report.html").mkdir()
+    files = {"calibration.json": b"{}", "calibration.bin": b"blob", "report.html": b"page"}
+    with pytest.raises(OutputError, match=r"calibration.bin and calibration.json are kept in .* -o ELSEWHERE"):
+        save(tmp_path, files)
+    assert (tmp_path / "calibration.json").read_bytes() == b"{}"
+    assert (tmp_path / "calibration.bin").read_bytes() == b"blob"

@@ -1,0 +1,84 @@
+"""calibration.json against its published schema (calibration.schema.json), by the keywords that it uses.
+
+Those are $ref within the file, type, const, enum, pattern, required, properties, additionalProperties, items, minItems
+and maxItems, as JSON Schema 2020-12 defines them; unknown keys of a document are accepted.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+_IS: Mapping[str, Callable[[Any], bool]] = {
+    "object": lambda value: isinstance(value, Mapping),
+    "array": lambda value: isinstance(value, list),
+    "string": lambda value: isinstance(value, str),
+    "boolean": lambda value: isinstance(value, bool),
+    "null": lambda value: value is None,
+    "number": lambda value: isinstance(value, int | float) and not isinstance(value, bool),
+    "integer": lambda value: isinstance(value, int) and not isinstance(value, bool),
+}
+SHOWN = 40
+
+
+def check_document(document: Any) -> None:
+    """That a document, and those of a vehicle's further IMUs in it, are as the schema says.
+
+    Raises
+    ------
+    ValueError : the first thing that is not, by its path.
+    """
+    schema = _schema()
+    _check(document, schema, schema, "it")
+    for number, other in enumerate(document.get("others", ())):
+        _check(other, schema, schema, f"others[{number}]")
+
+
+@cache
+def _schema() -> Any:
+    return json.loads(files(__package__).joinpath("calibration.schema.json").read_bytes())
+
+
+def _check(value: Any, schema: Mapping[str, Any], root: Mapping[str, Any], where: str) -> None:
+    if "$ref" in schema:
+        _check(value, root["$defs"][schema["$ref"].rpartition("/")[2]], root, where)
+    kinds = schema.get("type", ())
+    kinds = [kinds] if isinstance(kinds, str) else kinds
+    if kinds and not any(_IS[kind](value) for kind in kinds):
+        raise _wrong(where, value, f"no {' or '.join(kinds)}")
+    if "const" in schema and value != schema["const"]:
+        raise _wrong(where, value, f"not {schema['const']!r}")
+    if value not in schema.get("enum", [value]):
+        raise _wrong(where, value, f"none of {', '.join(schema['enum'])}")
+    if isinstance(value, str) and not re.search(schema.get("pattern", ""), value):
+        raise _wrong(where, value, f"not of the form {schema['pattern']}")
+    if isinstance(value, Mapping):
+        _check_object(value, schema, root, where)
+    elif isinstance(value, list):
+        if not schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", len(value)):
+            raise _wrong(where, value, f"{len(value)} values long, not {schema['minItems']}")
+        for at, item in enumerate(value):
+            _check(item, schema.get("items", {}), root, f"{where}[{at}]")
+
+
+def _check_object(value: Mapping[str, Any], schema: Mapping[str, Any], root: Mapping[str, Any], where: str) -> None:
+    known = schema.get("properties", {})
+    for key in schema.get("required", ()):
+        if key not in value:
+            raise ValueError(f"{where} has no {key!r}")
+    for key, item in value.items():
+        _check(
+            item,
+            known.get(key, schema.get("additionalProperties", {})),
+            root,
+            key if where == "it" else f"{where}.{key}",
+        )
+
+
+def _wrong(where: str, value: Any, what: str) -> ValueError:
+    shown = repr(value)
+    return ValueError(f"{where} is {shown if len(shown) <= SHOWN else shown[:SHOWN] + '...'}, {what}")

@@ -1,0 +1,104 @@
+"""JSON of unknown origin: RFC 8259 without its liberties, within limits that no file of mpucal comes near.
+
+Refused are numbers that are not finite or of more digits than a double or a 64-bit integer has, keys that occur twice,
+strings with control characters or halves of surrogate pairs, deep nesting, and long documents.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+MOST_BYTES = 16 << 20
+DEEPEST = 32
+LONGEST_STRING = 1 << 16
+MOST_DIGITS = 40
+LARGEST_INTEGER = 1 << 64
+# what a terminal obeys, and what no encoding writes
+FORBIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def parsed(data: bytes | str) -> Any:
+    """The document.
+
+    Raises
+    ------
+    ValueError : it is none, or beyond a limit; says which.
+    """
+    parse = partial(
+        json.loads, parse_constant=_not_finite, parse_int=_integer, parse_float=_number, object_pairs_hook=_object
+    )
+    return _checked(data, parse, _check_string)
+
+
+def parsed_own(data: bytes | str) -> Any:
+    """A document within a capture: as Python's json writes it, not finite numbers and any string included.
+
+    Raises
+    ------
+    ValueError : it is none, too long or too deep.
+    """
+    return _checked(data, json.loads, lambda text: None)
+
+
+def _checked(data: bytes | str, parse: Callable[[bytes | str], Any], check_string: Callable[[str], None]) -> Any:
+    if len(data) > MOST_BYTES:
+        raise ValueError(f"{len(data)} bytes are more than {MOST_BYTES}")
+    try:
+        document = parse(data)
+    except RecursionError:
+        raise _too_deep() from None
+    level = [document]
+    # a level at a time, without recursion
+    for _ in range(DEEPEST):
+        inner: list[Any] = []
+        for value in level:
+            if isinstance(value, dict):
+                inner += [*value, *value.values()]
+            elif isinstance(value, list):
+                inner += value
+            elif isinstance(value, str):
+                check_string(value)
+        level = inner
+        if not level:
+            return document
+    raise _too_deep()
+
+
+def _check_string(text: str) -> None:
+    if len(text) > LONGEST_STRING:
+        raise ValueError(f"a string of {len(text)} characters is longer than {LONGEST_STRING}")
+    if (found := FORBIDDEN.search(text)) is not None:
+        raise ValueError(f"a string holds {found[0]!a}, which no text does")
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    document = dict(pairs)
+    if len(document) != len(pairs):
+        raise ValueError("a key occurs twice in one object")
+    return document
+
+
+def _integer(digits: str) -> int:
+    if len(digits) > MOST_DIGITS or abs(int(digits)) > LARGEST_INTEGER:
+        raise ValueError(f"an integer of {len(digits)} digits is too large")
+    return int(digits)
+
+
+def _number(digits: str) -> float:
+    value = float(digits) if len(digits) <= LONGEST_STRING else math.inf
+    if not math.isfinite(value):
+        raise ValueError("a number is too large")
+    return value
+
+
+def _not_finite(name: str) -> float:
+    raise ValueError(f"{name} is no number")
+
+
+def _too_deep() -> ValueError:
+    return ValueError(f"it is nested deeper than {DEEPEST} levels")

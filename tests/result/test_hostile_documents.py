@@ -1,0 +1,135 @@
+"""calibration.json as an attacker or a bad disk leaves it: one sentence, or the numbers that were saved."""
+
+import json
+from dataclasses import replace
+from functools import reduce
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mpucal.errors import RecordingError
+from mpucal.result.calibration import Calibration
+from mpucal.strict_json import parsed
+
+ONE = Calibration(
+    np.eye(3) * 1.01,
+    np.array([0.1, -0.2, 0.3]),
+    *(np.full(shape, 1e-3) for shape in ((3, 3), 3, 3)),
+    fit={"model": "imu", "gravity": 9.81},
+    quality={"verdict": "good", "reasons": []},
+    created="2024-05-17T09:30:00+00:00",
+)
+ONE = replace(ONE, extra={"others": [ONE.document()], "autopilot": {"params_old": {"INS_ACCOFFS_X": 0.0}, "imu": 1}})
+
+
+def loaded(folder, text):
+    path = folder / "calibration.json"
+    path.write_bytes(text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text)
+    return Calibration.load(path)
+
+
+@pytest.mark.parametrize(
+    ("where", "wrong"),
+    [
+        ("accelerometer D", [[1, 1, 1], [1, 1, 1], [1, 1, 1]]),
+        ("accelerometer D", "identity"),
+        ("accelerometer D", None),
+        ("accelerometer b_a 0", True),
+        ("accelerometer b_a 0", "0"),
+        ("accelerometer b_a 0", 1e300),
+        ("accelerometer b_a 0", 10**400),
+        ("accelerometer D_std 0 0", -1e-3),
+        ("gyroscope K", [[0, 0, 0]] * 3),
+        ("quality reasons", 5),
+        ("quality reasons", [{"code": "\x1b[2J", "message": ""}]),
+        ("quality reasons", [{"code": "x'; DROP", "message": ""}]),
+        ("quality verdict", "excellent"),
+        ("fit gravity", "9.81"),
+        ("fit", []),
+        ("sensor accel_range_g", "four"),
+        ("sensor chip", "'''); import os; ('''"),
+        ("sensor chip", "\ud800"),
+        ("created", "yesterday"),
+        ("created", 5),
+        ("autopilot", [1]),
+        ("autopilot params_old INS_ACCOFFS_X", "1"),
+        ("others 0 accelerometer D", [[0, 0, 0]] * 3),
+        ("others 0 autopilot", "none"),
+        ("others", {}),
+        ("written", [5]),
+        ("version", "1"),
+        ("later", reduce(lambda inner, _: [inner], range(100), 0)),
+        ("later", "x" * 70_000),
+        ("later", "\u202eevil"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(tmp_path, where, wrong):
+    document = json.loads(ONE.json())
+    *path, last = [int(key) if key.isdecimal() else key for key in where.split()]
+    inner = reduce(lambda value, key: value[key], path, document)
+    inner[last] = wrong
+    with pytest.raises(RecordingError) as raised:
+        loaded(tmp_path, json.dumps(document, ensure_ascii=False))
+    assert "holds no calibration" in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 100_000,
+        '{"a":' * 100_000,
+        '{"a": 1' + "0" * 5000 + "}",
+        '{"a": 1e999}',
+        '{"a": NaN}',
+        '{"a": -Infinity}',
+        '{"a": 1, "a": 2}',
+        b'"\xff"',
+        b"\x00",
+    ],
+    ids=["arrays", "objects", "digits", "1e999", "NaN", "Infinity", "twice", "no UTF-8", "a zero"],
+)
+def test_no_json_is_one_sentence(tmp_path, text):
+    with pytest.raises(RecordingError, match="holds no calibration"):
+        loaded(tmp_path, text)
+
+
+def test_keys_that_are_not_known_are_no_reason(tmp_path):
+    document = json.loads(ONE.json())
+    document["later"] = {"a": [1, "two", None, True]}
+    assert parsed(json.dumps(document)) == document
+    assert loaded(tmp_path, json.dumps(document)) == ONE
+
+
+def test_a_file_without_digest_is_read_and_doubted_and_one_whose_numbers_read_the_same_is_not(tmp_path):
+    document = json.loads(ONE.json())
+    assert not loaded(tmp_path, ONE.json()).doubt
+    # as a language writes it whose numbers are all doubles
+    as_others = ONE.json().replace("0.0,", "0,").replace('": 1.0', '": 1')
+    assert as_others != ONE.json()
+    assert not loaded(tmp_path, as_others).doubt
+    del document["digest"]
+    assert "no digest" in loaded(tmp_path, json.dumps(document)).doubt
+    assert loaded(tmp_path, json.dumps(document)) == ONE
+
+
+@settings(max_examples=200, deadline=None)
+@given(at=st.integers(0, 8 * len(ONE.json()) - 1))
+def test_no_bit_that_flips_changes_a_number_without_a_word(tmp_path_factory, at):
+    data = bytearray(ONE.json().encode())
+    data[at // 8] ^= 1 << at % 8
+    try:
+        read = loaded(tmp_path_factory.getbasetemp(), bytes(data))
+    except RecordingError:
+        return
+    assert read.doubt or read == ONE
+
+
+def test_a_pipe_or_device_is_no_file(tmp_path):
+    for name in ("calibration.json", "capture.mcap", "calibration.bin"):
+        (tmp_path / name).symlink_to("/dev/zero")
+    for name in ("calibration.json", "calibration.bin"):
+        with pytest.raises(RecordingError, match="is a pipe or device, and no file"):
+            Calibration.load(tmp_path / name)
