@@ -29,6 +29,7 @@ from ..sources.opening import one_of, open_source
 from ..sources.table import kinds_meant, source_title, used_by
 from ..terminal.console import console
 from .destination import device
+from .loading import loaded
 from .options import check_gyroscope, check_source, given, source_options
 from .person import ask, ask_in_doubt
 from .recording_options import given_hints, hint_options, say_taken
@@ -76,7 +77,7 @@ def command(
         raise UsageError(
             "--to was given without -o and a source", "name the folder and the source, which is written to"
         )
-    of = Calibration.load(calibration)
+    of = loaded(calibration)
     if file is not None:
         recording = load(file, given_hints(options))
         say_taken(recording.taken)
