@@ -2,6 +2,8 @@
 
 import errno
 import os
+import subprocess
+import sys
 
 import pytest
 from smbus2 import smbus2
@@ -11,7 +13,7 @@ from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, BusHeld, NoAnswer
-from mpucal.sources.i2c import I2cBus
+from mpucal.sources.i2c import I2cBus, claim
 
 
 def test_registers_are_read_in_one_burst(adapter):
@@ -248,3 +250,20 @@ def test_the_driver_runs_through_it(adapter, model, rate_hz):
     assert len(recording) > 4 * rate_hz
     assert not recording.gap.any()
     assert recording.acc[-1] == pytest.approx([12 * 9.80665 / 8192, -34 * 9.80665 / 8192, 9.80665])
+
+
+def test_a_chip_that_another_process_uses_is_not_shared(tmp_path):
+    device = tmp_path / "i2c-1"
+    device.touch()
+    holder = (
+        "import sys; from mpucal.sources.i2c import claim; file = open(sys.argv[1], 'r+b');"
+        " claim(file.fileno(), 0x68, ''); print(flush=True); input()"
+    )
+    command = [sys.executable, "-c", holder, device]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other, device.open("r+b") as file:
+        other.stdout.readline()
+        claim(file.fileno(), 0x69, "/dev/i2c-1")
+        with pytest.raises(BusError, match="another mpucal uses the chip at 0x68 on /dev/i2c-1"):
+            claim(file.fileno(), 0x68, "/dev/i2c-1")
+        other.communicate(b"\n")
+        claim(file.fileno(), 0x68, "/dev/i2c-1")
