@@ -131,7 +131,7 @@ def local_client(workers: int | None = None, dashboard: bool = False) -> Iterato
             threads_per_worker=1,
             processes=True,
             local_directory=scratch,
-            dashboard_address=":8787" if dashboard else None,
+            dashboard_address=":8787" if dashboard else ":0",
             silence_logs="ERROR",
         ) as cluster,
         distributed.Client(cluster) as client,
