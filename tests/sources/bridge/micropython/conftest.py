@@ -1,5 +1,6 @@
 """MicroPython itself, in node, on a port whose time runs only while the host waits."""
 
+import fcntl
 import shutil
 import subprocess
 from pathlib import Path
@@ -24,14 +25,21 @@ def micropython():
         pytest.skip("needs node and npm, to run MicroPython")
     folder = ROOT / "build" / "node"
     package = folder / "node_modules" / PACKAGE
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / ".lock").open("w") as lock:
+        # one of several workers installs it
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        _install(folder, package)
+    return package
+
+
+def _install(folder, package):
     if not (package / "micropython.wasm").is_file():
-        folder.mkdir(parents=True, exist_ok=True)
         words = ["npm", "install", "--no-audit", "--no-fund", "--prefix", str(folder), f"{PACKAGE}@{VERSION}"]
         try:
             subprocess.run(words, capture_output=True, check=True, timeout=120, cwd=folder)
         except (subprocess.CalledProcessError, subprocess.TimeoutExpired):
             pytest.skip(f"needs {PACKAGE} from npm")
-    return package
 
 
 class NodeBoard:
