@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 import tempfile
 from pathlib import Path
 
@@ -17,12 +16,6 @@ os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="mpucal-state-")
 
 from mpucal.files import open_writer
 from mpucal.files.rows import Rows
-
-
-@pytest.fixture
-def no_pictures(monkeypatch):
-    """Sessions without their reports' pictures, which take as long as a replay: their own tests draw them."""
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
 
 
 @pytest.fixture(scope="session")

@@ -21,7 +21,7 @@ CHIPS = {
 
 
 @pytest.mark.parametrize("chip", CHIPS)
-def test_a_session_on_each_chip_ends_good(chip, tmp_path, capsys, no_pictures):
+def test_a_session_on_each_chip_ends_good(chip, tmp_path, capsys):
     words = ["session", "--bus", f"sim:chip={chip},temperature_c=27", "--seed", "4", "--rate", "50"]
     run([*words, "--model", "hand", "-o", str(tmp_path / "s"), "--yes", "--json", "--json-events"])
     found = json.loads(capsys.readouterr().out)

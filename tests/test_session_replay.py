@@ -28,7 +28,7 @@ class Outcome:
 
 
 @pytest.fixture
-def session(capsys, tmp_path, no_pictures):
+def session(capsys, tmp_path):
     def call(name, *words):
         run(["session", *map(str, words), "-o", str(tmp_path / name), "--yes", "--json", "--json-events"])
         captured = capsys.readouterr()

@@ -7,24 +7,22 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
 
 from ..data import Vector
 from ..report.elements import figure, paragraph, section, table
-from ..report.figure import AFTER, BEFORE, svg
+from ..report.figure import BEFORE, Axes, X, Y, Z, legend, svg
 from ..report.style import CSS
 from .fleet import FAR, Parameter, parameters, repeatability, twice
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PAGE = "fleet.html"
 # rows of the longest tables: the others are in results.csv
 MOST = 200
 BINS = 40
+_HEIGHT = 190.0
 VERDICTS = ("good", "usable", "refused")
 Columns = Mapping[str, Sequence[Any]]
 
@@ -111,20 +109,21 @@ def _distributions(found: Iterable[Parameter]) -> str:
 
 def _histograms(found: Iterable[Parameter], prefix: str) -> str:
     some = [each for each in found if each.name.startswith(prefix) and len(each.known) > 1]
-
-    def draw(page: Figure) -> None:
-        for axes, each in zip(np.ravel(page.subplots(1, len(some), sharey=True)), some, strict=True):
-            axes.hist(each.known, BINS, color=AFTER)
-            for limit in np.unique(each.limit[np.isfinite(each.limit)]):
-                axes.axvline(limit, color=BEFORE, lw=0.8)
-                axes.axvline(-limit, color=BEFORE, lw=0.8)
-            axes.set(xlabel=f"{each.name[-1]} [{each.unit}]")
-            axes.spines[["top", "right"]].set_visible(False)
-
-    try:
-        return svg(draw, prefix.replace(" ", "-"), f"histograms: {prefix} of x, y and z", 1.8) if some else ""
-    except ImportError:
+    if not some:
         return ""
+    limits = np.unique(np.concatenate([each.limit[np.isfinite(each.limit)] for each in some]))
+    values = np.concatenate([*(each.known for each in some), limits, -limits])
+    edges = np.linspace(values.min() - 1e-6, values.max() + 1e-6, BINS + 1)
+    counts = [np.histogram(each.known, edges)[0] for each in some]
+    most = 1.05 * float(np.max(counts))
+    axes = Axes(_HEIGHT, (float(edges[0]), float(edges[-1])), (0.0, most), f"[{some[0].unit}]", "boards")
+    at = np.repeat(edges, 2)[1:-1]
+    lines = [axes.line(at, np.repeat(count, 2), colour) for count, colour in zip(counts, (X, Y, Z), strict=False)]
+    for limit in (*limits, *-limits):
+        lines.append(axes.line(np.array([limit, limit]), np.array([0.0, most]), BEFORE))
+    named = legend(*((each.name[-1], colour) for each, colour in zip(some, (X, Y, Z), strict=False)))
+    label = f"histograms: {prefix} of x, y and z"
+    return svg(prefix.replace(" ", "-"), label, _HEIGHT, *lines, axes.frame(), named)
 
 
 def _outliers(columns: Columns, found: Iterable[Parameter]) -> str:

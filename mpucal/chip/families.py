@@ -67,6 +67,8 @@ class Family:
     accel_noise_ug, gyro_noise_dps : typical noise densities, ug/sqrt(Hz) and deg/s/sqrt(Hz).
     zero_rate_dps : tolerance of the gyroscope's output at rest, deg/s. zero_g_mg : of the accelerometer's x, y, z, mg.
     scale_percent, cross_axis_percent : tolerances of the scale factors and cross-axis sensitivities of both.
+    data_sheet : where the accelerometer's tolerances stand; empty: not at hand. nonlinearity_percent : of its range.
+    zero_g_drift : how far its output at 0 g moves with temperature, in words.
     """
 
     name: str
@@ -93,6 +95,9 @@ class Family:
     zero_g_mg: tuple[float, float, float] = (60.0, 60.0, 80.0)
     scale_percent: float = 3.0
     cross_axis_percent: float = 2.0
+    data_sheet: str = ""
+    nonlinearity_percent: float = 0.5
+    zero_g_drift: str = ""
 
     @property
     def columns(self) -> Columns:
@@ -144,6 +149,8 @@ MPU6050 = Family(
     zero_g_mg=(50.0, 50.0, 80.0),
     fifo_reset_needs_stop=True,
     half_range_revision="C",
+    data_sheet="PS-MPU-6000A r3.4",
+    zero_g_drift="±35 mg (x, y) and ±60 mg (z) from 0 to 70 °C",
 )
 
 MPU6500 = Family(
@@ -161,6 +168,8 @@ MPU6500 = Family(
     accel_noise_ug=300.0,
     gyro_noise_dps=0.01,
     zero_rate_dps=5.0,
+    data_sheet="PS-MPU-9250A r1.0",
+    zero_g_drift="±1.5 mg/°C",
 )
 
 MPU6880 = replace(
@@ -170,6 +179,8 @@ MPU6880 = replace(
     parts=((0x78, "MPU-6880"),),
     fifo_bytes=4096,
     widest_fifo_bytes=None,
+    data_sheet="",
+    zero_g_drift="",
 )
 
 ICM20689 = replace(
@@ -186,6 +197,8 @@ ICM20689 = replace(
     lsb_per_c=326.8,
     zero_c=25.0,
     asleep=True,
+    data_sheet="",
+    zero_g_drift="",
 )
 
 ICM20690 = replace(
@@ -235,6 +248,12 @@ def part_of(who_am_i: int) -> Part:
             f"the chip answers 0x{who_am_i:02x} to WHO_AM_I, which is no part that is known here",
             f"check which chip is at this address (known are {known_parts()})",
         ) from None
+
+
+def family_of(chip: str | None) -> Family | None:
+    """The family of the chip of that name; None where its data sheet is not at hand."""
+    families = (part.family for part in PARTS.values() if part.chip == chip)
+    return next((family for family in families if family.data_sheet), None)
 
 
 def known_parts() -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -52,6 +53,7 @@ EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board
 @click.option(
     "--resume", metavar="DIR", type=click.Path(path_type=Path), help="Continue the interrupted session in DIR."
 )
+@click.option("--name", metavar="BOARD", help="What the board is called, for the report.")
 @click.option("--yes", is_flag=True, help="Ask no questions.")
 @click.option("--json", "as_json", is_flag=True, help="Print only calibration.json.")
 @click.option("--json-events", is_flag=True, help="Print each event as a line of JSON on stderr.")
@@ -61,6 +63,7 @@ EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board
 @click.option("--keep-going", is_flag=True, help="Go on when the terminal goes away, as a dropped ssh connection does.")
 def command(
     folder: Path | None,
+    name: str | None,
     yes: bool,
     as_json: bool,
     json_events: bool,
@@ -95,7 +98,8 @@ def command(
         on_page(terminal, page, about, page_keys, paced, json_events, seen) as (person, tell),
     ):
         # a program that reads the events finds it in calibration.json
-        recording, calibration, paths = _run(source, into, person, "" if json_events else announced(kinds, no_write))
+        announcement = "" if json_events else announced(kinds, no_write)
+        recording, calibration, paths = _run(source, into, person, announcement, name)
         files = [into.capture, *paths]
         tell(calibration, summary(calibration), files)
         if not as_json:
@@ -125,7 +129,7 @@ def _opened(
 
 
 def _run(
-    source: Opened, folder: SessionFolder, person: Console, announcement: str
+    source: Opened, folder: SessionFolder, person: Console, announcement: str, name: str | None
 ) -> tuple[Recording, Calibration, tuple[Path, ...]]:
     """Measure, calibrate, write the files; whatever ends it before, the capture is kept, and the person told where."""
     plan = source.plan
@@ -139,6 +143,8 @@ def _run(
             finally:
                 folder.settle(runner.sensor)
             calibration = runner.calibrate(recording, fit)
+            if name:
+                calibration = replace(calibration, extra={**calibration.extra, "name": name})
             return recording, calibration, runner.write(folder.path, calibration, recording, source.truth)
     except BaseException as error:
         if folder.capture.exists():

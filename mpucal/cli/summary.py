@@ -1,4 +1,4 @@
-"""The summary of a calibration on the terminal: verdict, parameters in %, mg and deg, |a|, files."""
+"""The summary of a calibration on the terminal: verdict, parameters in %, mg and deg, estimated error, files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from ..data import STANDARD_GRAVITY_MPS2
 from ..report.units import AXES, accelerometer, estimated_error
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.document import ACCELEROMETER_FORMULA
-from ..result.keys import Magnitude
 from ..result.session_files import BLOB, DOCUMENT, REPORT
 
 # what fits a terminal of 80 columns
@@ -80,17 +79,9 @@ def _parameters(c: Calibration) -> list[str]:
 
 
 def _accuracy(calibration: Calibration) -> list[str]:
-    """The estimated error, and |a| of all samples."""
-    before, after = calibration.quality.get("magnitude_before"), calibration.quality.get("magnitude_after")
-    rows = [("before", before), ("after", after)] if before and after else []
-    magnitudes = [f"|a| {when}, all samples: {_statistics(row)}" for when, row in rows]
-    said = [textwrap.fill(estimated_error(calibration), WIDTH)] if estimated_error(calibration) else []
-    return ["", *said, *magnitudes] if said or magnitudes else []
-
-
-def _statistics(row: Magnitude) -> str:
-    median, std = _number(row.get("median")), _number(row.get("std"))
-    return f"median {median:.3f} m/s², standard deviation {std:.3f} m/s²"
+    """The estimated error."""
+    said = estimated_error(calibration)
+    return ["", textwrap.fill(said, WIDTH)] if said else []
 
 
 def _fit(calibration: Calibration) -> list[str]:

@@ -14,6 +14,12 @@ def section(title: str, *content: str) -> str:
     return f"<section>\n<h2>{escape(title)}</h2>\n{text}</section>\n" if text else ""
 
 
+def details(title: str, *content: str) -> str:
+    """A part of the page that is folded away, and not printed while it is; empty without content."""
+    text = "".join(content)
+    return f"<details>\n<summary>{escape(title)}</summary>\n{text}</details>\n" if text else ""
+
+
 def heading(text: str) -> str:
     """A heading within a section."""
     return f"<h3>{escape(text)}</h3>\n"
@@ -35,9 +41,14 @@ def figure(svg: str, caption: str) -> str:
     return f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>\n" if svg else ""
 
 
-def table(id_: str, caption: str, head: Iterable[str], rows: Iterable[Iterable[str]], words: bool = False) -> str:
-    """A table whose rows begin with their names; `words`: the cells are text rather than numbers."""
-    cell = '<td class="words">' if words else "<td>"
+def pair(*figures: str) -> str:
+    """Figures or sections beside each other where there is room; empty without any."""
+    text = "".join(figures)
+    return f'<div class="pair">\n{text}</div>\n' if text else ""
+
+
+def table(id_: str, caption: str, head: Iterable[str], rows: Iterable[Iterable[str]], words: int = 99) -> str:
+    """A table whose rows begin with their names; from cell number `words` on they are text rather than numbers."""
     lines = [f'<div class="wide"><table id="{id_}">']
     if caption:
         lines.append(f"<caption>{escape(caption)}</caption>")
@@ -45,7 +56,8 @@ def table(id_: str, caption: str, head: Iterable[str], rows: Iterable[Iterable[s
     if columns:
         lines.append(f"<tr>{columns}</tr>")
     for name, *values in rows:
-        cells = "".join(f"{cell}{escape(value)}</td>" for value in values)
+        kinds = ['<td class="words">' if k >= words else "<td>" for k in range(len(values))]
+        cells = "".join(f"{kind}{escape(value)}</td>" for kind, value in zip(kinds, values, strict=True))
         lines.append(f'<tr><th scope="row">{escape(name)}</th>{cells}</tr>')
     return "\n".join([*lines, "</table></div>\n"])
 
@@ -56,10 +68,10 @@ def number(value: Any, decimals: int = 6) -> str:
     return f"{known:.{decimals}f}" if math.isfinite(known) else "unknown"
 
 
-def quantity(value: Any, unit: str, sign: str = "") -> str | None:
+def quantity(value: Any, unit: str, sign: str = "", digits: int = 6) -> str | None:
     """A number with its unit; None where it is not known."""
     known = as_float(value)
-    return f"{sign}{known:.6g} {unit}".rstrip() if math.isfinite(known) else None
+    return f"{sign}{known:.{digits}g} {unit}".rstrip() if math.isfinite(known) else None
 
 
 def as_float(value: Any) -> float:

@@ -1,78 +1,129 @@
-"""Figures of matplotlib as SVG elements that take their colours from the page."""
+"""Pictures as SVG elements that take their colours from the page: marks, and axes for values over time."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
+import math
 from html import escape
-from io import StringIO
-from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ..data import Vector
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-# as wide as it can be read at on a phone, where the page shrinks it by a fifth
-WIDTH_IN = 4.4
-# colours nobody else draws with -> the page's own, which change with the reader's light
-_PAGE = {f"#0000{k:02x}": name for k, name in enumerate(("ink", "before", "after", "faint", "line", "x", "y", "z"), 1)}
-INK, BEFORE, AFTER, FAINT, LINE, X, Y, Z = _PAGE
-_SETTINGS: Any = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "mpucal",
-    "font.size": 8.5,
-    "axes.labelcolor": INK,
-    "axes.edgecolor": INK,
-    "text.color": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-}
+# in px; the page scales a picture to its column
+WIDTH = 420.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 48.0, 6.0, 24.0, 32.0
+# what may stand at an axis, times a power of ten
+_STEPS, _FEWEST_TICKS = (10.0, 5.0, 2.0, 1.0), 4
+# the page's own colours, which change with the reader's light
+INK, BEFORE, AFTER, FAINT, LINE, X, Y, Z = (
+    f"var(--{name})" for name in ("ink", "before", "after", "faint", "line", "x", "y", "z")
+)
 
 
-def svg(draw: Callable[[Figure], None], name: str, label: str, height_in: float) -> str:
-    """What `draw` draws, as an `svg` element.
+def svg(name: str, label: str, height: float, *marks: str) -> str:
+    """An `svg` element; `name` is unlike any other on the page, `label` for who cannot see it."""
+    head = f'<svg id="{name}" role="img" aria-label="{escape(label)}" viewBox="0 0 {WIDTH:g} {height:g}"'
+    return f'{head} font-size="11" fill="{INK}">{"".join(marks)}</svg>'
+
+
+def line(x: Vector, y: Vector, colour: str, width: float = 1.0, dashed: bool = False) -> str:
+    """A line through the points [px]; it is broken where they are NaN."""
+    pen, steps = "M", []
+    for at_x, at_y in zip(x.tolist(), y.tolist(), strict=True):
+        if math.isnan(at_x) or math.isnan(at_y):
+            pen = "M"
+            continue
+        steps.append(f"{pen}{at_x:.1f} {at_y:.1f}")
+        pen = "L"
+    dashes = ' stroke-dasharray="4 3"' if dashed else ""
+    return f'<path d="{"".join(steps)}" style="fill: none; stroke: {colour}" stroke-width="{width:g}"{dashes}/>'
+
+
+def dots(x: Vector, y: Vector, radius: float, colour: str, hollow: bool = False) -> str:
+    """A dot at each of the points [px]."""
+    style = f"fill: none; stroke: {colour}" if hollow else f"fill: {colour}"
+    circles = "".join(f'<circle cx="{i:.1f}" cy="{j:.1f}" r="{radius:g}"/>' for i, j in zip(x, y, strict=True))
+    return f'<g style="{style}">{circles}</g>'
+
+
+def text(x: float, y: float, words: str, anchor: str = "middle", colour: str = INK) -> str:
+    """Words at a point [px]; `anchor`: start, middle or end."""
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" style="fill: {colour}">{escape(words)}</text>'
+
+
+def legend(*entries: tuple[str, str]) -> str:
+    """What the marks are: words and colours, from the right."""
+    marks, right = [], WIDTH - _RIGHT
+    for words, colour in reversed(entries):
+        marks.append(text(right, 12.0, words, "end"))
+        right -= 6.2 * len(words) + 6.0
+        marks.append(line(np.array([right - 14.0, right]), np.array([8.0, 8.0]), colour, 3.0))
+        right -= 26.0
+    return "".join(marks)
+
+
+class Axes:
+    """Axes for what lies in `x` and `y` (least, greatest); what is beyond `y` is drawn at its edge.
 
     Parameters
     ----------
-    name : of the picture, unlike any other on the page. label : what it shows, for who cannot see it.
-
-    Raises
-    ------
-    ImportError : matplotlib is not installed.
+    height : of the picture [px]. whole : of x only whole numbers are written.
     """
-    # Figure and not pyplot: no window, no state that outlives this call
-    from matplotlib import rc_context  # noqa: PLC0415
-    from matplotlib.figure import Figure  # noqa: PLC0415
 
-    with rc_context(_SETTINGS):
-        figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
-        draw(figure)
-        text = StringIO()
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
-    return _for_the_page(text.getvalue(), name, label)
+    def __init__(
+        self, height: float, x: tuple[float, float], y: tuple[float, float], x_label: str, y_label: str
+    ) -> None:
+        self._height, self._x, self._y = height, x, y
+        self._labels = x_label, y_label
+
+    def place(self, x: Vector, y: Vector) -> tuple[Vector, Vector]:
+        """Where on the picture [px]."""
+        (left, right), (low, high) = self._x, self._y
+        across, up = (x - left) / (right - left), (np.clip(y, low, high) - low) / (high - low)
+        return _LEFT + across * (WIDTH - _LEFT - _RIGHT), self._bottom - up * (self._bottom - _TOP)
+
+    def line(self, x: Vector, y: Vector, colour: str, width: float = 1.0) -> str:
+        """A line through values."""
+        return line(*self.place(x, y), colour, width)
+
+    def level(self, y: float, colour: str = INK) -> str:
+        """A dashed line at a value, all the way across."""
+        return line(*self.place(np.array(self._x), np.array([y, y])), colour, dashed=True)
+
+    def band(self, first: float, last: float) -> str:
+        """A stretch of x, shaded."""
+        (left, right), _ = self.place(np.array([first, last]), np.array(self._y))
+        size = f'width="{right - left:.1f}" height="{self._bottom - _TOP:g}"'
+        return f'<rect x="{left:.1f}" y="{_TOP:g}" {size} style="fill: {LINE}"/>'
+
+    def frame(self) -> str:
+        """The axes themselves, with their numbers and names."""
+        (left, right), (bottom, top) = self.place(np.array(self._x), np.array(self._y))
+        marks = [line(np.array([left, left, right]), np.array([top, bottom, bottom]), INK)]
+        for value, said in ticks(*self._x):
+            (x, *_), _y = self.place(np.array([value]), np.array([0.0]))
+            marks.append(text(x, bottom + 13.0, said))
+        for value, said in ticks(*self._y):
+            _x, (y, *_) = self.place(np.array([0.0]), np.array([value]))
+            marks.append(text(left - 5.0, y + 4.0, said, "end"))
+            marks.append(line(np.array([left - 3.0, left]), np.array([y, y]), INK))
+        x_label, y_label = self._labels
+        return "".join(marks) + text(right, self._height - 4.0, x_label, "end") + text(2.0, 12.0, y_label, "start")
+
+    @property
+    def _bottom(self) -> float:
+        return self._height - _BOTTOM
 
 
-def over_time(figure: Figure, t: Vector, y_label: str) -> Axes:
-    """Axes for values over the time t (n,) [s]."""
-    axes = figure.subplots()
-    axes.set(xlabel="time [s]", ylabel=y_label, xlim=(float(t[0]), float(t[-1])))
-    axes.spines[["top", "right"]].set_visible(False)
-    return axes
-
-
-def legend(figure: Figure) -> None:
-    """What the lines are, in a row above them."""
-    figure.legend(frameon=False, ncols=4, loc="outside upper right", handlelength=1.2, columnspacing=1.2)
-
-
-def _for_the_page(text: str, name: str, label: str) -> str:
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    # matplotlib counts anew in each picture, and speaks in its style sheet of the whole page
-    text = re.sub(r"<style[^>]*>.*?</style>", "", text, flags=re.DOTALL)
-    text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{name}-", text)
-    for colour, variable in _PAGE.items():
-        text = text.replace(colour, f"var(--{variable})")
-    return text.replace("<svg", f'<svg id="{name}" role="img" aria-label="{escape(label)}"', 1)
+def ticks(low: float, high: float) -> list[tuple[float, str]]:
+    """Round numbers within (low, high), with their words."""
+    power = math.floor(math.log10(high - low))
+    step = next(
+        step
+        for exponent in (power, power - 1)
+        for step in (k * 10.0**exponent for k in _STEPS)
+        if (high - low) / step >= _FEWEST_TICKS
+    )
+    digits = max(0, -math.floor(math.log10(step)))
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [(k * step, f"{k * step:.{digits}f}".replace("-", "−")) for k in range(first, last + 1)]

@@ -10,11 +10,11 @@ from ..result.calibration import Calibration
 from ..result.document import ACCELEROMETER_FORMULA, GYROSCOPE_FORMULA
 from ..result.orientation import side_down
 from .elements import code, number, paragraph, section, table
-from .units import AXES, ParameterRow, accelerometer, gyroscope, with_std
+from .units import AXES, ParameterRow, gyroscope, with_std
+from .usual import CAPTION, about, accelerometer_table, compared
 
 NO_FORMULA = "D cannot be inverted: no correction is possible."
 UNOBSERVABLE = " ± ?: not observable from this recording."
-CAPTION = "value ± standard uncertainty (1 sigma)"
 
 
 def is_regular(c: Calibration) -> bool:
@@ -25,23 +25,13 @@ def is_regular(c: Calibration) -> bool:
 
 def accelerometer_section(c: Calibration) -> str:
     """The errors of the accelerometer, with their uncertainties."""
-    explained = paragraph(
-        "Misalignment x->y is the angle from the sensitive axis x towards the board's axis y (cross-axis sensitivity);"
-        " 1 mg is 0.00981 m/s².",
-        note=True,
-    )
-    return section("The accelerometer", accelerometer_table(c, "accelerometer"), explained)
+    return section("The accelerometer", compared(c), accelerometer_table(c, "accelerometer"), about(c))
 
 
-def accelerometer_table(c: Calibration, id_: str) -> str:
-    """Its scale factor errors, biases and misalignments."""
-    return _rows(id_, accelerometer(c))
-
-
-def formula_section(c: Calibration) -> str:
+def formula(c: Calibration) -> str:
     """The formula that corrects it."""
     if not is_regular(c):
-        return section("The formula", paragraph(NO_FORMULA, "formula", note=True))
+        return paragraph(NO_FORMULA, "formula", note=True)
     said = paragraph(f"{ACCELEROMETER_FORMULA}, in m/s², with y the output of the sensor at its nominal scale factor:")
     applied = ""
     if np.any(c.applied_in_hardware):
@@ -49,7 +39,7 @@ def formula_section(c: Calibration) -> str:
             "The chip's offset registers subtract a part of b_a already; the formula subtracts the rest.",
             note=True,
         )
-    return section("The formula", said, code(_formula(c), "formula"), applied)
+    return said + code(_formula(c), "formula") + applied
 
 
 def _formula(c: Calibration) -> str:
@@ -102,7 +92,7 @@ def verification_section(c: Calibration) -> str:
     )
 
 
-def matrices_section(c: Calibration) -> str:
+def matrices(c: Calibration) -> str:
     """The parameters as calibration.json has them."""
     rows = [[f"D {axis}", *map(_pair, c.D[i], c.D_std[i])] for i, axis in enumerate(AXES)]
     rows.append(["b_a, m/s²", *map(_pair, c.b_a, c.b_a_std)])
@@ -111,10 +101,8 @@ def matrices_section(c: Calibration) -> str:
     turned.append(["b_omega, rad/s", *map(_pair, c.b_omega, c.b_omega_std)])
     turned.append(["noise, rad/s", *(number(value) for value in c.gyro_noise_std)])
     caption = "{}; " + CAPTION
-    return section(
-        "Parameters in calibration.json",
-        table("parameters", caption.format(ACCELEROMETER_FORMULA), ["", *AXES], rows),
-        table("gyro-parameters", caption.format(GYROSCOPE_FORMULA), ["", *AXES], turned),
+    return table("parameters", caption.format(ACCELEROMETER_FORMULA), ["", *AXES], rows) + table(
+        "gyro-parameters", caption.format(GYROSCOPE_FORMULA), ["", *AXES], turned
     )
 
 

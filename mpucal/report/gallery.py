@@ -10,6 +10,7 @@ from . import pictures, spheres
 from .elements import figure
 from .track import Track
 
+RESIDUALS = "|a| of each rest minus gravity. Calibrated, all of them lie at zero, but for the hand's tremor."
 MAGNITUDE = "|a| over time. At rest it should equal gravity in every orientation; while the board moves it does not."
 SPHERE = (
     "Each dot is the mean of a rest. Calibrated, they lie on the sphere of gravity; hollow ones are on its far side. "
@@ -22,13 +23,9 @@ COVERAGE = (
 
 
 def gallery(track: Track) -> Mapping[str, str]:
-    """The figures by name, empty where the recording does not have what they show.
-
-    Raises
-    ------
-    ImportError : matplotlib is not installed.
-    """
+    """The figures by name, empty where the recording does not have what they show."""
     return {
+        "residuals": figure(pictures.residuals(track), RESIDUALS),
         "magnitude": figure(pictures.magnitude(track), MAGNITUDE),
         "sphere": figure(spheres.sphere(track), SPHERE),
         "innovations": figure(pictures.innovations(track), _about_innovations(track)),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from datetime import datetime
 from html import escape
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
@@ -16,15 +16,9 @@ from ..export.code import in_c, in_python, in_ros
 from ..files.formats import is_of_session
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.session_files import CAPTURE
-from .elements import as_float, code, heading, number, paragraph, quantity, section, table
-from .found import (
-    accelerometer_section,
-    formula_section,
-    gyroscope_table,
-    is_regular,
-    matrices_section,
-    verification_section,
-)
+from .decision import what_now
+from .elements import as_float, code, details, heading, number, pair, paragraph, quantity, section, table
+from .found import accelerometer_section, formula, gyroscope_table, is_regular, matrices, verification_section
 from .gallery import gallery
 from .style import CSS
 from .track import Track
@@ -36,39 +30,58 @@ VERDICTS = {
     USABLE: "Usable, with the reservations below.",
     REFUSED: "Refused: do not use these parameters.",
 }
-INSTALL = "pip install 'mpucal[plot]'"
 _NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
 def render(calibration: Calibration, recording: Recording | None = None) -> str:
-    """The page of a calibration; with its recording, also the pictures of that."""
+    """The page of a calibration; with its recording, also the pictures of that. What is folded away is not printed."""
     track = _track(calibration, recording)
-    drawn, why_not = _pictures(recording, track)
+    drawn = _NOTHING if track is None else gallery(track)
+    no_pictures = recording is not None and track is None
     body = (
         _verdict(calibration, recording),
+        what_now(calibration),
         accelerometer_section(calibration),
-        formula_section(calibration),
-        section(
-            "|a| before and after", _magnitudes(calibration, track), why_not, *_those(drawn, "magnitude", "sphere")
-        ),
         verification_section(calibration),
-        section("Innovations", *_those(drawn, "innovations")),
-        section("Coverage of orientations", *_those(drawn, "coverage")),
-        section("The gyroscope", gyroscope_table(calibration), *_those(drawn, "rates")),
-        section("Temperature", *_those(drawn, "temperature")),
+        section(
+            "At rest, before and after",
+            _magnitudes(track),
+            paragraph("D cannot be inverted, so there are no pictures.", note=True) if no_pictures else "",
+            pair(*_those(drawn, "sphere", "residuals")),
+        ),
+        section("Turned and held", pair(*_those(drawn, "coverage", "innovations"))),
         vehicle_section(calibration),
-        _application(calibration),
-        _settings(calibration, recording),
-        matrices_section(calibration),
-        _reproduction(calibration, recording),
+        details("The formula", formula(calibration)),
+        details("The gyroscope", gyroscope_table(calibration), *_those(drawn, "rates")),
+        details("Over time", *_those(drawn, "magnitude", "temperature")),
+        details("How to apply it", _application(calibration)),
+        details("Sensor and settings", _settings(calibration, recording)),
+        details("Parameters in calibration.json", matrices(calibration)),
+        details("How to reproduce it", _reproduction(calibration, recording)),
+        paragraph(f"Made by mpucal {__version__}.", note=True),
     )
-    title = f"Calibration of {_article(calibration.sensor.chip)}"
+    chip, name = calibration.sensor.chip, calibration.extra.get("name")
+    title = f"Calibration of {name or _article(chip)}"
+    facts = filter(None, [chip if name else "", _date(calibration.created), _warmth(calibration)])
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n"
-        f"<h1>{escape(title)}</h1>\n{''.join(body)}</body>\n</html>\n"
+        f"<h1>{escape(title)}</h1>\n{paragraph(', '.join(facts), 'facts', note=True)}{''.join(body)}</body>\n</html>\n"
     )
+
+
+def _date(created: str) -> str:
+    """22 November 2026, 03:23 UTC; as it is where it is no date."""
+    try:
+        date = datetime.fromisoformat(created)
+    except ValueError:
+        return created
+    return f"{date.day} {date:%B %Y, %H:%M} {date.tzname() or ''}".strip()
+
+
+def _warmth(calibration: Calibration) -> str:
+    return f"{quantity(calibration.sensor.temperature_c, '°C', digits=3) or ''}"
 
 
 def _article(chip: str | None) -> str:
@@ -92,31 +105,16 @@ def _track(calibration: Calibration, recording: Recording | None) -> Track | Non
     return None if recording is None or not is_regular(calibration) else Track(recording, calibration)
 
 
-def _magnitudes(calibration: Calibration, track: Track | None) -> str:
-    """|a| before and after: of the rests' means, where the recording has rests, and of all samples."""
+def _magnitudes(track: Track | None) -> str:
+    """|a| before and after of the rests' means; empty where there are no rests."""
+    if track is None or not len(track.runs):
+        return ""
     rows = []
-    if track is not None and len(track.runs):
-        for name, acc in (("before", track.recording.acc), ("after", track.calibrated)):
-            of_rests = np.linalg.norm(track.at_rest(acc), axis=1)
-            rows.append([f"at rest, {name}", *(number(f(of_rests), 4) for f in (np.median, np.mean, np.std))])
-    magnitudes: Mapping[str, Any] = calibration.quality
-    for name in ("before", "after"):
-        values = magnitudes.get(f"magnitude_{name}") or {}
-        rows.append([f"all samples, {name}", *(number(values.get(key), 4) for key in ("median", "mean", "std"))])
-    return table("magnitudes", "|a|, m/s²", ["", "median", "mean", "standard deviation"], rows)
-
-
-def _pictures(recording: Recording | None, track: Track | None) -> tuple[Mapping[str, str], str]:
-    """The pictures by name, and why there are none."""
-    if recording is None:
-        return _NOTHING, ""
-    if track is None:
-        return _NOTHING, paragraph("D cannot be inverted, so there are no pictures.", note=True)
-    try:
-        return gallery(track), ""
-    except ImportError:
-        said = f"For pictures install matplotlib ({INSTALL}), then run mpucal calibrate on the recording."
-        return _NOTHING, paragraph(said, "no-picture", note=True)
+    for name, acc in (("before", track.recording.acc), ("after", track.calibrated)):
+        of_rests = np.linalg.norm(track.at_rest(acc), axis=1)
+        rows.append([name, *(number(f(of_rests), 4) for f in (np.median, np.mean, np.std))])
+    caption = f"|a| of {len(track.runs)} rests, m/s²; gravity is {track.gravity:.4f}"
+    return table("magnitudes", caption, ["", "median", "mean", "standard deviation"], rows)
 
 
 def _those(drawn: Mapping[str, str], *names: str) -> list[str]:
@@ -126,16 +124,17 @@ def _those(drawn: Mapping[str, str], *names: str) -> list[str]:
 def _application(calibration: Calibration) -> str:
     if not is_regular(calibration) or calibration.verdict == REFUSED:
         return ""
-    return section(
-        "How to apply it",
-        heading("C"),
-        code(in_c(calibration), "c"),
-        paragraph("Or read calibration.bin, whose layout firmware_protocol.md describes.", note=True),
-        heading("Python"),
-        code(in_python(calibration), "python"),
-        paragraph('Or, with mpucal: a = mpucal.Calibration.load("calibration.json").apply(y).', note=True),
-        heading("ROS 2"),
-        code(in_ros(calibration), "ros"),
+    return "".join(
+        (
+            heading("C"),
+            code(in_c(calibration), "c"),
+            paragraph("Or read calibration.bin, whose layout firmware_protocol.md describes.", note=True),
+            heading("Python"),
+            code(in_python(calibration), "python"),
+            paragraph('Or, with mpucal: a = mpucal.Calibration.load("calibration.json").apply(y).', note=True),
+            heading("ROS 2"),
+            code(in_ros(calibration), "ros"),
+        )
     )
 
 
@@ -159,7 +158,7 @@ def _settings(calibration: Calibration, recording: Recording | None) -> str:
         ("made", calibration.created or None),
     ]
     known = [[name, str(value)] for name, value in rows if value is not None]
-    return section("Sensor and settings", table("settings", "", [], known, words=True))
+    return table("settings", "", [], known, words=0)
 
 
 def _reproduction(calibration: Calibration, recording: Recording | None) -> str:
@@ -179,5 +178,4 @@ def _reproduction(calibration: Calibration, recording: Recording | None) -> str:
         if len(lines) > 1
         else "In the folder of the recording:"
     )
-    made = paragraph(f"Made by mpucal {__version__}.", note=True)
-    return section("How to reproduce it", said, code("\n".join(lines), "reproduce"), made)
+    return said + code("\n".join(lines), "reproduce")

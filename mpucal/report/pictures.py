@@ -1,36 +1,49 @@
-"""The pictures over time: magnitudes, innovations, rates, temperature."""
+"""The pictures over time: the rests before and after, magnitudes, innovations, rates, temperature."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..data import Vector
-from .figure import AFTER, BEFORE, INK, LINE, X, Y, Z, legend, over_time, svg
+from ..result.error_model import MG_PER_MPS2
+from .figure import AFTER, BEFORE, INK, LINE, Axes, X, Y, Z, dots, legend, svg
 from .track import Track
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 BINS = 500
+HEIGHT = 210.0
 # innovations beyond this share of them are jerks, which may lie outside the picture
 _MOST = 0.995
 _LEAST_SPAN_C = 1.0
+_TIME = "time [s]"
+_XYZ = (("x", X), ("y", Y), ("z", Z))
+
+
+def residuals(track: Track) -> str:
+    """|a| - g of each rest before and after; empty where there are none."""
+    if not len(track.runs):
+        return ""
+    both = [
+        MG_PER_MPS2 * (np.linalg.norm(track.at_rest(acc), axis=1) - track.gravity)
+        for acc in (track.recording.acc, track.calibrated)
+    ]
+    most = 1.1 * max(float(np.abs(values).max()) for values in both) + 1e-3
+    number = np.arange(1.0, len(track.runs) + 1.0)
+    axes = Axes(HEIGHT, (0.5, len(number) + 0.5), (-most, most), "rest", "|a| − gravity [mg]")
+    marks = [dots(*axes.place(number, v), 3.0, colour) for v, colour in zip(both, (BEFORE, AFTER), strict=True)]
+    named = legend(("before", BEFORE), ("after", AFTER))
+    return svg("residuals", "|a| minus gravity at each rest", HEIGHT, axes.level(0.0), *marks, axes.frame(), named)
 
 
 def magnitude(track: Track) -> str:
     """|a| over time before and after: the paper's Fig. 2."""
-
-    def draw(figure: Figure) -> None:
-        axes = over_time(figure, track.t, "|a| [m/s²]")
-        for acc, colour, name in ((track.recording.acc, BEFORE, "before"), (track.calibrated, AFTER, "after")):
-            values = np.linalg.norm(acc, axis=1)
-            axes.plot(*envelope(track.t, values), color=colour, linewidth=0.8, label=name)
-        axes.axhline(track.gravity, color=INK, linewidth=0.8, linestyle="--", label="gravity")
-        legend(figure)
-
-    return svg(draw, "magnitude-over-time", "Magnitude of the acceleration over time, before and after", 2.4)
+    both = [np.linalg.norm(acc, axis=1) for acc in (track.recording.acc, track.calibrated)]
+    axes = _over_time(track, _span(np.concatenate(both)), "|a| [m/s²]")
+    lines = [
+        axes.line(*envelope(track.t, values), colour) for values, colour in zip(both, (BEFORE, AFTER), strict=True)
+    ]
+    named = legend(("before", BEFORE), ("after", AFTER), ("gravity", INK))
+    label = "Magnitude of the acceleration over time, before and after"
+    return svg("magnitude-over-time", label, HEIGHT, *lines, axes.level(track.gravity), axes.frame(), named)
 
 
 def innovations(track: Track) -> str:
@@ -38,34 +51,22 @@ def innovations(track: Track) -> str:
     e = track.innovations
     if e is None:
         return ""
-
-    def draw(figure: Figure) -> None:
-        axes = over_time(figure, track.t, "innovation [m/s²]")
-        for k, (first, last) in enumerate(track.runs):
-            axes.axvspan(track.t[first], track.t[last - 1], color=LINE, linewidth=0, label=None if k else "at rest")
-        for i, colour in enumerate((X, Y, Z)):
-            axes.plot(*envelope(track.t[-len(e) :], e[:, i]), color=colour, linewidth=0.7, label="xyz"[i])
-        most = 1.1 * float(np.quantile(np.abs(e), _MOST))
-        axes.set_ylim(-most, most)
-        legend(figure)
-
-    return svg(draw, "innovations", "Innovations of the three axes over time", 2.4)
+    most = 1.1 * float(np.quantile(np.abs(e), _MOST)) + 1e-6
+    axes = _over_time(track, (-most, most), "innovation [m/s²]")
+    bands = [axes.band(track.t[first], track.t[last - 1]) for first, last in track.runs]
+    lines = [axes.line(*envelope(track.t[-len(e) :], e[:, i]), colour) for i, (_, colour) in enumerate(_XYZ)]
+    named = legend(*_XYZ, ("at rest", LINE))
+    return svg("innovations", "Innovations of the three axes over time", HEIGHT, *bands, *lines, axes.frame(), named)
 
 
 def rates(track: Track) -> str:
     """How fast the board was turned, and how fast the gyroscope can follow."""
     gyr, limit = np.degrees(track.recording.gyr), track.calibration.sensor.gyro_range_dps
-
-    def draw(figure: Figure) -> None:
-        axes = over_time(figure, track.t, "rate [deg/s]")
-        for i, colour in enumerate((X, Y, Z)):
-            axes.plot(*envelope(track.t, gyr[:, i]), color=colour, linewidth=0.7, label="xyz"[i])
-        if limit is not None:
-            axes.axhline(limit, color=INK, linewidth=0.8, linestyle="--", label="range")
-            axes.axhline(-limit, color=INK, linewidth=0.8, linestyle="--")
-        legend(figure)
-
-    return svg(draw, "rates", "Rates of turn over time", 2.2)
+    most = 1.1 * max(float(np.abs(gyr).max()), limit or 0.0) + 1e-6
+    axes = _over_time(track, (-most, most), "rate [deg/s]")
+    lines = [axes.line(*envelope(track.t, gyr[:, i]), colour) for i, (_, colour) in enumerate(_XYZ)]
+    lines += [] if limit is None else [axes.level(limit), axes.level(-limit)]
+    return svg("rates", "Rates of turn over time", HEIGHT, *lines, axes.frame(), legend(*_XYZ, ("range", INK)))
 
 
 def temperature(track: Track) -> str:
@@ -74,15 +75,10 @@ def temperature(track: Track) -> str:
     if known.sum() < 2:
         return ""
     t, values = envelope(track.t[known], track.recording.temperature_c[known])
-
-    def draw(figure: Figure) -> None:
-        axes = over_time(figure, track.t, "temperature [°C]")
-        axes.plot(t, values, color=AFTER, linewidth=0.8)
-        # a tenth of a degree shall not look like a change
-        middle, half = 0.5 * (values.min() + values.max()), max(0.55 * float(np.ptp(values)), _LEAST_SPAN_C)
-        axes.set_ylim(middle - half, middle + half)
-
-    return svg(draw, "temperature", "Temperature over time", 1.8)
+    # a tenth of a degree shall not look like a change
+    middle, half = 0.5 * (values.min() + values.max()), max(0.55 * float(np.ptp(values)), _LEAST_SPAN_C)
+    axes = _over_time(track, (middle - half, middle + half), "temperature [°C]")
+    return svg("temperature", "Temperature over time", HEIGHT, axes.line(t, values, AFTER), axes.frame())
 
 
 def envelope(t: Vector, values: Vector) -> tuple[Vector, Vector]:
@@ -92,3 +88,14 @@ def envelope(t: Vector, values: Vector) -> tuple[Vector, Vector]:
     edges = np.linspace(0, len(t), BINS + 1).astype(int)[:-1]
     low, high = np.minimum.reduceat(values, edges), np.maximum.reduceat(values, edges)
     return np.repeat(t[edges], 2), np.column_stack([low, high]).ravel()
+
+
+def _over_time(track: Track, y: tuple[float, float], y_label: str) -> Axes:
+    return Axes(HEIGHT, (float(track.t[0]), float(track.t[-1])), y, _TIME, y_label)
+
+
+def _span(values: Vector) -> tuple[float, float]:
+    """A little more than from the least to the greatest."""
+    low, high = float(values.min()), float(values.max())
+    margin = 0.04 * (high - low) + 1e-6
+    return low - margin, high + margin

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..data import Vector
-from .figure import AFTER, BEFORE, FAINT, INK, LINE, legend, svg
+from .figure import AFTER, BEFORE, FAINT, INK, LINE, WIDTH, dots, legend, line, svg, text
 from .track import Track
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 # where the sphere is looked at from; deviations are enlarged as long as they stay below this share of it
 _FROM = (0.76, -0.54, 0.36)
@@ -20,6 +14,20 @@ _TIMES, _SHOWN = (20, 10, 5, 2, 1), 0.5
 _FEWEST_RESTS, _MOST_LINES = 3, 60
 _POINTS, _SPECKS = 300, 500
 _CIRCLE = np.linspace(0.0, 2.0 * np.pi, 121)
+_ROUND = np.column_stack([np.cos(_CIRCLE), np.sin(_CIRCLE)])
+_HEIGHT, _LOW = 340.0, 230.0
+
+
+class _Disc:
+    """A part of the picture about a centre [px], in which 1 is `unit` px long, and y goes up."""
+
+    def __init__(self, x: float, y: float, unit: float) -> None:
+        self._centre, self._unit = np.array([x, y]), unit
+
+    def place(self, points: Vector) -> tuple[Vector, Vector]:
+        """Where on the picture [px], of (n, 2) or more columns."""
+        x, y = (self._centre + self._unit * points[:, :2] * (1.0, -1.0)).T
+        return x, y
 
 
 def sphere(track: Track) -> str:
@@ -27,50 +35,46 @@ def sphere(track: Track) -> str:
     both = [_points(track, acc) / track.gravity for acc in (track.recording.acc, track.calibrated)]
     farthest = max(float(np.abs(np.linalg.norm(points, axis=1) - 1.0).max()) for points in both)
     times = next((k for k in _TIMES if k * farthest <= _SHOWN), 1)
-
-    def draw(figure: Figure) -> None:
-        axes = _round(figure.subplots(), 1.0 + min(times * farthest, _SHOWN) + 0.05)
-        view = _view()
-        drawn: list[Vector] = []
-        for k in range(3):
-            circle = np.roll(np.column_stack([np.cos(_CIRCLE), np.sin(_CIRCLE), 0.0 * _CIRCLE]), k, axis=1) @ view.T
-            axes.plot(*np.where(circle[:, 2:] >= 0.0, circle, np.nan)[:, :2].T, color=LINE, linewidth=0.8)
-        axes.plot(np.cos(_CIRCLE), np.sin(_CIRCLE), color=INK, linewidth=0.8)
-        for points, colour, name in zip(both, (BEFORE, AFTER), ("before", "after"), strict=True):
-            size = np.linalg.norm(points, axis=1, keepdims=True)
-            seen = points / size * (1.0 + times * (size - 1.0)) @ view.T
-            drawn.append(seen)
-            front = seen[:, 2] >= 0.0
-            near, far = seen[front], seen[~front]
-            axes.scatter(near[:, 0], near[:, 1], s=16, color=colour, linewidths=0, label=name)
-            axes.scatter(far[:, 0], far[:, 1], s=12, facecolors="none", edgecolors=colour, linewidths=0.7)
-        for pair in np.stack(drawn, axis=1) if len(drawn[0]) <= _MOST_LINES else ():
-            axes.plot(*pair[:, :2].T, color=FAINT, linewidth=0.5, zorder=0)
-        axes.plot([], [], color=INK, linewidth=0.8, label="gravity")
-        legend(figure)
-        if times > 1:
-            figure.supxlabel(f"distances from the sphere are drawn {times} times as large", color=FAINT, fontsize=7.5)
-
-    return svg(draw, "sphere", f"Measurements before and after beside the sphere, deviations times {times}", 3.8)
+    disc = _Disc(WIDTH / 2.0, _HEIGHT / 2.0 + 4.0, 145.0 / (1.0 + min(times * farthest, _SHOWN)))
+    view = _view()
+    marks = []
+    for k in range(3):
+        circle = np.roll(np.column_stack([_ROUND, 0.0 * _CIRCLE]), k, axis=1) @ view.T
+        marks.append(line(*disc.place(np.where(circle[:, 2:] >= 0.0, circle, np.nan)), LINE))
+    marks.append(line(*disc.place(_ROUND), INK))
+    drawn = []
+    for points in both:
+        size = np.linalg.norm(points, axis=1, keepdims=True)
+        drawn.append(points / size * (1.0 + times * (size - 1.0)) @ view.T)
+    if len(drawn[0]) <= _MOST_LINES:
+        marks += [line(*disc.place(pair), FAINT, 0.5) for pair in np.stack(drawn, axis=1)]
+    for seen, colour in zip(drawn, (BEFORE, AFTER), strict=True):
+        front = seen[:, 2] >= 0.0
+        marks.append(dots(*disc.place(seen[front]), 3.0, colour))
+        marks.append(dots(*disc.place(seen[~front]), 2.6, colour, hollow=True))
+    marks.append(legend(("before", BEFORE), ("after", AFTER), ("gravity", INK)))
+    if times > 1:
+        said = f"distances from the sphere are drawn {times} times as large"
+        marks.append(text(WIDTH / 2.0, _HEIGHT - 4.0, said, colour=FAINT))
+    return svg("sphere", f"Measurements before and after beside the sphere, deviations times {times}", _HEIGHT, *marks)
 
 
 def coverage(track: Track) -> str:
     """Which way was up in the board's axes: both halves of the sphere, in equal areas."""
     moving = _units(track.calibrated[:: max(len(track.calibrated) // _SPECKS, 1)])
     rests = _units(track.at_rest(track.calibrated))
-
-    def draw(figure: Figure) -> None:
-        for axes, sign, name in zip(figure.subplots(1, 2), (1.0, -1.0), ("z up", "z down"), strict=True):
-            _round(axes, 1.25).set_title(name, fontsize=8.5)
-            for radius, colour in ((1.0, INK), (float(np.sqrt(0.5)), LINE)):
-                axes.plot(radius * np.cos(_CIRCLE), radius * np.sin(_CIRCLE), color=colour, linewidth=0.7)
-            for at_x, at_y, text in ((1.12, 0.0, "x"), (-1.14, 0.0, "−x"), (0.0, 1.12, "y"), (0.0, -1.12, "−y")):
-                axes.text(at_x, at_y, text, ha="center", va="center", color=FAINT)
-            for units, colour, size in ((moving, FAINT, 1.5), (rests, AFTER, 22)):
-                x, y = _flattened(units[sign * units[:, 2] >= 0.0]).T
-                axes.scatter(x, y, s=size, color=colour, linewidths=0)
-
-    return svg(draw, "coverage", "Which way was up in the board's axes: dots are rests, specks are turns", 2.5)
+    marks = []
+    for centre, sign, name in ((0.25, 1.0, "z up"), (0.75, -1.0, "z down")):
+        disc = _Disc(centre * WIDTH, _LOW / 2.0 + 8.0, 84.0)
+        marks += [line(*disc.place(radius * _ROUND), colour) for radius, colour in ((1.0, INK), (0.5**0.5, LINE))]
+        marks.append(text(centre * WIDTH, 12.0, name))
+        for at_x, at_y, letter in ((1.1, -0.04, "x"), (-1.13, -0.04, "−x"), (0.0, 1.05, "y"), (0.0, -1.14, "−y")):
+            (x,), (y,) = disc.place(np.array([[at_x, at_y]]))
+            marks.append(text(float(x), float(y), letter, colour=FAINT))
+        for units, colour, radius in ((moving, FAINT, 0.8), (rests, AFTER, 3.2)):
+            marks.append(dots(*disc.place(_flattened(units[sign * units[:, 2] >= 0.0])), radius, colour))
+    label = "Which way was up in the board's axes: dots are rests, specks are turns"
+    return svg("coverage", label, _LOW, *marks)
 
 
 def _points(track: Track, acc: Vector) -> Vector:
@@ -94,9 +98,3 @@ def _flattened(units: Vector) -> Vector:
 
 def _units(acc: Vector) -> Vector:
     return np.asarray(acc / np.maximum(np.linalg.norm(acc, axis=1, keepdims=True), 1e-9))
-
-
-def _round(axes: Axes, most: float) -> Axes:
-    axes.set_axis_off()
-    axes.set(aspect="equal", xlim=(-most, most), ylim=(-most, most))
-    return axes

@@ -11,7 +11,7 @@ CSS = """
   --good: #4cc38a; --usable: #e2b447; --refused: #ff8f86; } }
 * { box-sizing: border-box; }
 html { -webkit-text-size-adjust: 100%; }
-body { margin: 0 auto; padding: 1.5rem 1rem 4rem; max-width: 52rem; background: var(--paper);
+body { margin: 0 auto; padding: 1.5rem 1rem 4rem; max-width: 58rem; background: var(--paper);
   color: var(--ink); font: 16px/1.5 system-ui, sans-serif; overflow-wrap: break-word; }
 h1 { font-size: 1.4rem; line-height: 1.25; margin: 0 0 1rem; }
 h2 { font-size: 1.1rem; margin: 2.4rem 0 .6rem; }
@@ -27,12 +27,19 @@ caption { text-align: left; padding-bottom: .3rem; }
 th, td { padding: .25rem 1.2rem .25rem 0; border-bottom: 1px solid var(--line); text-align: right;
   white-space: nowrap; }
 th { font-weight: normal; } th[scope=row], td.words { text-align: left; }
-td.words { white-space: normal; }
+td.words { white-space: normal; min-width: 7rem; }
 pre { background: var(--raised); padding: .8rem 1rem; overflow-x: auto; font-size: .85rem; }
 figure { margin: 1.2rem 0 0; max-width: 40rem; }
 figcaption { font-size: .9rem; }
 svg { display: block; width: 100%; height: auto; }
 @media (max-width: 34rem) { pre { font-size: .78rem; } #formula, #reproduce { white-space: pre-wrap; }
   th, td { padding-right: .7rem; font-size: .9rem; white-space: normal; } }
-@media print { body { max-width: none; } pre { white-space: pre-wrap; } figure { break-inside: avoid; } }
+.pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(21rem, 100%), 1fr)); gap: 0 1.5rem; }
+details { margin: .8rem 0; } summary { cursor: pointer; font-weight: bold; }
+@page { margin: 13mm; }
+@media print { html { font-size: 9.5pt; } pre { white-space: pre-wrap; }
+  body { max-width: none; padding: 0; font-size: 1rem; line-height: 1.35; }
+  h1, h2, h3 { break-after: avoid; } h2 { margin: 1rem 0 .3rem; } table, figure, li { break-inside: avoid; }
+  th, td { padding: .1rem .9rem .1rem 0; } .pair { grid-template-columns: 1fr 1fr; } figure { margin-top: .4rem; }
+  details:not([open]) { display: none; } }
 """

@@ -88,6 +88,15 @@ def estimated_error(c: Calibration) -> str:
         return ""
     where = "the tilts that it holds for" if c.fit.get("model") == "tilt" else "all orientations"
     return (
-        f"Estimated error after calibration: {error_model.MG_PER_MPS2 * rms:.2g} mg rms (1 sigma) over {where},"
-        f" {direction:.2g} deg in direction."
+        f"Estimated error at rest: {_before(c)}{error_model.MG_PER_MPS2 * rms:.2g} mg rms (1 sigma) over {where} after"
+        f" calibration, {direction:.2g} deg in direction."
     )
+
+
+def _before(c: Calibration) -> str:
+    """What the error was, where all orientations are known."""
+    gravity = c.fit.get("gravity")
+    if c.fit.get("model") == "tilt" or gravity is None:
+        return ""
+    before = error_model.error_before(c.D, c.b_a_to_subtract, gravity)
+    return f"{error_model.MG_PER_MPS2 * before:.3g} mg before, "

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..result.calibration import Calibration
 from .elements import as_float, heading, paragraph, section, table
-from .found import accelerometer_table
+from .usual import accelerometer_table
 
 
 def vehicle_section(c: Calibration) -> str:

@@ -55,7 +55,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     applied_in_hardware : (3,) m/s^2 that offset registers subtract already; a consumer uses b_a minus this.
     b_a_slope : (3,) m/s^2 a degree Celsius, of which b_a grows away from sensor.temperature_c; zeros: not known to.
     b_a_slope_std : (3,). temperature_range_c : (2,) degrees Celsius, within which that was seen.
-    extra : further top-level keys of the document (autopilot, others, written, merged).
+    extra : further top-level keys of the document (name, autopilot, others, written, merged).
     doubt : why the numbers of the file that it was read from may not be those that were saved; empty where they are.
 
     Unknown numbers are NaN (null in the file). Calibrations are equal whose calibration.json is the same; they have no

@@ -54,6 +54,14 @@ def bias_mg(b: Vector) -> Vector:
     return np.asarray(MG_PER_MPS2 * b)
 
 
+def error_before(D: Vector, b: Vector, gravity: float) -> float:
+    """rms over all orientations at rest of what D (3, 3) and b (3,) [m/s^2] leave wrong uncorrected [m/s^2].
+
+    The mean of |(D - I) s + b|^2 over the sphere |s| = g is g^2 / 3 |D - I|_F^2 + |b|^2.
+    """
+    return float(np.sqrt(gravity**2 / 3.0 * np.sum((D - np.eye(3)) ** 2) + np.sum(b**2)))
+
+
 def sensor_axes(M: Vector) -> Vector:
     """(3, 3) M as seen along the sensor's own axes: M Q^T, with Q the rotation nearest to M.
 

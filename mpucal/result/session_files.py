@@ -60,7 +60,11 @@ BLOB = SessionFile(
     "the same for firmware, as [firmware_protocol.md](firmware_protocol.md) describes it; not of a refused calibration",
     "mpucal.session.results:blob",
 )
-REPORT = SessionFile("report.html", "the same for a person, on one page", "mpucal.session.results:report")
+REPORT = SessionFile(
+    "report.html",
+    "the same for a person: what was found beside the data sheet, what to do now; two pages in print",
+    "mpucal.session.results:report",
+)
 TRUTH = SessionFile("truth.json", "of a simulated chip: what it really is", "mpucal.session.results:simulated_truth")
 
 LOG = SessionFile("session.log", "what a session said after its terminal had gone")

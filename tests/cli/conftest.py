@@ -20,7 +20,7 @@ class Result:
 
 
 @pytest.fixture
-def mpucal(capsys, tmp_path, monkeypatch, no_pictures):
+def mpucal(capsys, tmp_path, monkeypatch):
     """Call it in this process, in an empty folder."""
     monkeypatch.chdir(tmp_path)
 

@@ -29,7 +29,7 @@ SESSION = {code: kind.reproduce for code, kind in KINDS.items() if kind.reproduc
 
 
 @pytest.mark.parametrize("command", dict.fromkeys(SESSION.values()), ids=lambda words: words.split()[3])
-def test_a_session_shows_its_reasons(command, capsys, tmp_path, no_pictures):
+def test_a_session_shows_its_reasons(command, capsys, tmp_path):
     run([*shlex.split(command)[1:], "-o", str(tmp_path / "s"), "--no-write", "--yes", "--json"])
     found = codes(json.loads(capsys.readouterr().out)["quality"])
     assert {code for code in SESSION if SESSION[code] == command} <= set(found)
