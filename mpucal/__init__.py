@@ -13,22 +13,24 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .api import CheckResult, calibrate, check, load
+    from .api import CheckResult, Noise, calibrate, check, load, noise
     from .data import Recording
     from .errors import MpucalError
     from .result.calibration import Calibration
 
-__all__ = ["Calibration", "CheckResult", "MpucalError", "Recording", "calibrate", "check", "load"]
+__all__ = ["Calibration", "CheckResult", "MpucalError", "Noise", "Recording", "calibrate", "check", "load", "noise"]
 __version__ = "0.1.0"
 
 _HOME = {
     "Calibration": ".result.calibration",
     "CheckResult": ".recheck.outcome",
     "MpucalError": ".errors",
+    "Noise": ".result.noise",
     "Recording": ".data",
     "calibrate": ".api",
     "check": ".api",
     "load": ".api",
+    "noise": ".api",
 }
 
 

@@ -1,4 +1,4 @@
-"""mpucal.load, calibrate and check: their arguments checked, and a path taken where a file is meant."""
+"""mpucal.load, calibrate, check and noise: their arguments checked, and a path taken where a file is meant."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal
 
+from .allan import noise_of
 from .arguments import a_path
 from .calibration import calibrate as _calibrate
 from .data import STANDARD_GRAVITY_MPS2, Recording
@@ -16,6 +17,8 @@ from .files.hints import Hints, parse_columns, parse_units
 from .recheck import check as _check
 from .recheck.outcome import CheckResult as CheckResult  # noqa: PLC0414 - mpucal takes it from here
 from .result.calibration import Calibration
+from .result.clock import now
+from .result.noise import Noise as Noise  # noqa: PLC0414
 
 ModelName = Literal["auto", "hand", "imu", "accel", "paper", "tilt"]
 
@@ -120,6 +123,24 @@ def check(
         what = "give a mpucal.Calibration, as of mpucal.calibrate, or the path of one"
         raise WrongType(f"{type(calibration).__name__} is no calibration", what)
     return _check(calibration, _recording(recording), days)
+
+
+def noise(recording: Recording | str | PathLike[str]) -> Noise:
+    """The noise of a sensor that lies still, by its overlapping Allan deviation, see docs/noise.md.
+
+    Parameters
+    ----------
+    recording : a rest of minutes to hours, or the path of its file.
+
+    Returns
+    -------
+    Noise : white noise, bias instability, random walk and quantisation of the six axes, with 95 % intervals.
+
+    Raises
+    ------
+    WrongType : an argument of another type. RecordingError : too few samples.
+    """
+    return noise_of(_recording(recording), now().isoformat())
 
 
 def _recording(given: Recording | str | PathLike[str]) -> Recording:

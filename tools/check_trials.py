@@ -5,7 +5,9 @@ python tools/check_trials.py --only nothing --runs 2000      false alarms
 python tools/check_trials.py recordings/*.npz                halves of real recordings: nothing happened
 
 A pair is an MPU-6050 in a trembling hand: twelve poses make the calibration, a flat rest and three orientations the
-check. Beside what happens to it, every sensor ages by five days, as `mpucal.recheck.drift` says of an unchanged one.
+check. Beside what happens to it, every sensor ages by five days, as `mpucal.recheck.drift` says of an unchanged one,
+and its rests and turns err by what `mpucal.recheck.observed` says that no mounting and no gyroscope is better than;
+`--perfect` leaves that out.
 """
 
 from __future__ import annotations
@@ -26,15 +28,19 @@ from rich.table import Table
 
 import mpucal
 from mpucal.calibration.rotation import rotation
+from mpucal.calibration.verification import BIAS_RAD_S, FLOOR_MPS2, FLOOR_RAD
 from mpucal.data import Sensor, Vector
 from mpucal.recheck import check, drift
-from mpucal.recheck.observed import BETA, changed
+from mpucal.recheck.observed import BETA, NONLINEAR, changed
 from mpucal.simulated.sensor import SensorTruth
+from mpucal.simulated.study.motions import CHECK_S, FLAT_S
 from mpucal.simulated.study.scenarios import GRAVITY_MPS2, hand_scenario
 from mpucal.simulated.study.sensors import hand_sensor
 
 DAYS = 5.0
 TEMPERATURE_C = 25.0
+# of a turn in that motion
+MOVE_S = 1.6
 BIAS_MG = (2.0, 5.0, 10.0, 30.0)
 EVENTS = ("nothing", *(f"bias {mg:g} mg" for mg in BIAS_MG), "scale 0.3 %", "mount 1 deg", "15 degC", "another sensor")
 
@@ -77,10 +83,25 @@ def aged_by(truth: SensorTruth, theta: Vector) -> SensorTruth:
     return replace(truth, D=after.D, b_a=after.b_a, K=after.K, b_omega=after.b_omega)
 
 
-def of_pair(item: tuple[str, int]) -> Trial | None:
+def imperfect(recording: mpucal.Recording, rng: np.random.Generator) -> mpucal.Recording:
+    """With a mounting that gives in each orientation, and a gyroscope that errs in each turn."""
+    acc, gyr, step_s = recording.acc.copy(), recording.gyr.copy(), 1.0 / recording.rate_hz
+    every_s = CHECK_S / 3
+    for k in range(3):
+        rest, move = (recording.t >= FLAT_S + every_s * k + begun for begun in (MOVE_S, 0.0))
+        move &= ~rest
+        angle = float(np.linalg.norm(gyr[move] - gyr[recording.t < FLAT_S].mean(0), axis=1).sum()) * step_s
+        std = np.sqrt(FLOOR_RAD**2 + (NONLINEAR * angle) ** 2 + (BIAS_RAD_S * every_s) ** 2)
+        gyr[move] += rng.normal(0.0, std, 3) / MOVE_S
+        rest &= recording.t < FLAT_S + every_s * (k + 1) + MOVE_S
+        acc[rest] += rng.normal(0.0, FLOOR_MPS2, 3)
+    return replace(recording, acc=acc, gyr=gyr)
+
+
+def of_pair(item: tuple[str, int], perfect: bool = False) -> Trial | None:
     """Calibrate, let something happen, and check; None where the calibration was refused."""
     event, seed = item
-    of_sensor, of_event, of_age = np.random.default_rng([seed, 21]).spawn(3)
+    of_sensor, of_event, of_age, of_errors = np.random.default_rng([seed, 21]).spawn(4)
     sensor = hand_sensor(of_sensor)
     before = hand_scenario(2 * seed, "pose12", tremble=True, sensor=sensor)
     calibration = mpucal.calibrate(at(before.recording, TEMPERATURE_C), gravity=GRAVITY_MPS2)
@@ -90,6 +111,7 @@ def of_pair(item: tuple[str, int]) -> Trial | None:
     aged = aged_by(before.truth, of_age.multivariate_normal(np.zeros(len(age)), age))
     after, temperature_c = happened(aged, event, of_event)
     recording = at(hand_scenario(2 * seed + 1, "check", tremble=True, sensor=after).recording, temperature_c)
+    recording = recording if perfect else imperfect(recording, of_errors)
     told = check(calibration, recording, days=DAYS)
     error = None
     if told.theta is not None:
@@ -149,6 +171,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--only", action="append", choices=EVENTS, help="may be given more than once; none: all")
     parser.add_argument("--runs", type=int, default=500, help="pairs, shared by the events")
     parser.add_argument("--seed", type=int, default=0, help="the first of the seeds")
+    parser.add_argument("--perfect", action="store_true", help="neither the mounting nor the gyroscope errs besides")
     parser.add_argument("--gravity", type=float, default=9.81, help="m/s^2, of the recordings")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
     parser.add_argument("--json", type=Path, help="write the trials to this file")
@@ -165,7 +188,8 @@ def main() -> None:
     else:
         events = tuple(options.only or EVENTS)
         items = [(events[number % len(events)], options.seed + number) for number in range(options.runs)]
-        trials = [trial for trial in in_parallel(of_pair, items, options.jobs, "pairs") if trial is not None]
+        one = partial(of_pair, perfect=options.perfect)
+        trials = [trial for trial in in_parallel(one, items, options.jobs, "pairs") if trial is not None]
     console.print(table("what was told, %", trials))
     if options.json:
         options.json.write_text(json.dumps([asdict(trial) for trial in trials], indent=1) + "\n")

@@ -17,6 +17,7 @@ COMMANDS = {
     "batch": "Calibrate many recordings at once, and show the fleet.",
     "write": "Write a calibration to the device, or restore its previous state.",
     "check": "Check whether a calibration is still right.",
+    "noise": "Measure a sensor's noise at rest.",
     "apply": "Apply a calibration to a recording.",
     "stream": "Print calibrated samples live.",
     "export": "Convert a calibration to the format of another program.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from ..files import load
 from ..files.formats import readable
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
 from ..result.calibration import REFUSED
+from ..result.noise import Noise, with_noise
 from ..result.session_files import BLOB
 from ..session.results import make_folder, result_files, save
 from .options import fit_options
@@ -31,12 +33,14 @@ Exit code 5: the calibration was refused, with reasons.
 @click.argument("recording", metavar="FILE|DIR", type=click.Path(path_type=Path))
 @click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for the results.")
 @click.option("--json", "as_json", is_flag=True, help="Print only calibration.json.")
+@click.option("--noise", metavar="FILE", type=click.Path(path_type=Path), help="noise.json of `mpucal noise`.")
 @fit_options
 @hint_options()
 def command(
     recording: Path,
     folder: Path | None,
     as_json: bool,
+    noise: Path | None,
     gravity: float,
     gravity_anyway: bool,
     model: str,
@@ -47,7 +51,11 @@ def command(
     say_taken(samples.taken)
     if samples.recovered is not None:
         click.echo(f"mpucal: {samples.recovered}", err=True)
+    known = None if noise is None else Noise.load(noise)
+    if known is not None:
+        samples = replace(samples, sensor=known.at_least(samples.sensor, samples.rate_hz))
     calibration = calibrate_vehicle(samples, model=model, gravity=gravity, gravity_anyway=gravity_anyway)
+    calibration = calibration if known is None else with_noise(calibration, known)
     paths: tuple[Path, ...] = ()
     if folder is not None:
         make_folder(folder)

@@ -9,6 +9,7 @@ import click
 
 from ..export.forms import FORMS, form
 from ..result.atomic import check_not_among, write_atomically
+from ..result.noise import Noise, with_noise
 from .loading import loaded
 
 EXAMPLE = "Example: `mpucal export board7/calibration.json --to c-header -o calibration.h`"
@@ -29,13 +30,15 @@ Exit code 5: the calibration was refused; 6: the format cannot represent it.
 @click.argument("calibration", metavar="CALIBRATION", type=click.Path(path_type=Path))
 @click.option("--to", "name", type=click.Choice([row.name for row in FORMS]), required=True, help="Output format.")
 @click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Output file; default: stdout.")
+@click.option("--noise", metavar="FILE", type=click.Path(path_type=Path), help="noise.json of `mpucal noise`.")
 @click.option("--json", "as_json", is_flag=True, help="Print format, text and what is lost as JSON.")
-def command(calibration: Path, name: str, file: Path | None, as_json: bool) -> None:
+def command(calibration: Path, name: str, file: Path | None, noise: Path | None, as_json: bool) -> None:
     """Make the file's text, and put it where it is asked to go."""
     if file is not None:
         check_not_among(file, [calibration])
     chosen = form(name)
-    text, notes = chosen.export(loaded(calibration))
+    read = loaded(calibration)
+    text, notes = chosen.export(read if noise is None else with_noise(read, Noise.load(noise)))
     if file is not None:
         write_atomically(file, text.encode())
     for note in notes:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..data import Vector
 from ..result.calibration import Calibration
+from ..result.noise import ACCELEROMETER, GYROSCOPE, KEY, WHITE
 from .losses import head
 
 
@@ -25,10 +26,14 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
         f"SM: {_row(SM.ravel())}",
         f"bias: {_row(SM @ calibration.b_a_to_subtract)}",
     ]
-    for key, noise in (
-        ("linear_acceleration_covariance", calibration.noise_std),
-        ("angular_velocity_covariance", calibration.gyro_noise_std),
+    known, rate_hz = calibration.extra.get(KEY), calibration.sensor.rate_hz
+    for key, sensor, noise in (
+        ("linear_acceleration_covariance", ACCELEROMETER, calibration.noise_std),
+        ("angular_velocity_covariance", GYROSCOPE, calibration.gyro_noise_std),
     ):
+        if known is not None:
+            # of one sample
+            noise = np.full(3, known[sensor][WHITE] * np.sqrt(rate_hz or known["rate_hz"]))  # noqa: PLW2901
         if np.isfinite(noise).all():
             lines.append(f"{key}: {_row(np.diag(noise**2).ravel())}")
     return "\n".join(lines) + "\n"

@@ -18,13 +18,15 @@ import numpy as np
 from ..data import Vector
 from ..errors import WriteBackError
 from ..result.calibration import Calibration
+from ..result.noise import ACCELEROMETER, GYROSCOPE, KEY, WHITE
+from ..result.noise import WALK as RANDOM_WALK
 from .losses import check_usable, head
 
 # of the densities, for the random walks that a calibration does not measure
 WALK = 0.1
 UNMEASURED = (
-    "A calibration measures no random walks: a tenth of the noise densities stands for them, to be replaced by what an"
-    " Allan deviation of hours at rest shows."
+    "A calibration measures no random walks: a tenth of the noise densities stands for them. `mpucal noise` measures"
+    " them in a rest of hours; give its noise.json with --noise."
 )
 
 
@@ -61,15 +63,26 @@ def openvins(calibration: Calibration, notes: Sequence[str]) -> str:
 def left_by_kalibr(calibration: Calibration) -> tuple[str, ...]:
     """Kalibr takes corrected samples."""
     said = "It holds the noise alone: give Kalibr the samples that `mpucal apply` has corrected."
-    return (said, UNMEASURED)
+    return (said, *_of_noise(calibration))
 
 
 def left_by_openvins(calibration: Calibration) -> tuple[str, ...]:
     """OpenVINS estimates biases."""
     return (
         "It holds no biases: OpenVINS estimates b_a and b_omega itself. Give it the samples as measured.",
-        UNMEASURED,
+        *_of_noise(calibration),
     )
+
+
+def _of_noise(calibration: Calibration) -> tuple[str, ...]:
+    known = calibration.extra.get(KEY)
+    if known is None:
+        return (UNMEASURED,)
+    unsure = [
+        f"{sensor}_random_walk" for sensor in (ACCELEROMETER, GYROSCOPE) if RANDOM_WALK in known[sensor]["at_most"]
+    ]
+    said = f"Its noise is that of a rest of {known['seconds'] / 3600.0:.2f} h."
+    return (f"{said} Not told from zero, and given as at most: {', '.join(unsure)}." if unsure else said,)
 
 
 def rotation_and_lower(M: Vector) -> tuple[Vector, Vector]:
@@ -83,18 +96,25 @@ def rotation_and_lower(M: Vector) -> tuple[Vector, Vector]:
 def _noise(calibration: Calibration) -> list[str]:
     check_usable(calibration)
     rate_hz = calibration.sensor.rate_hz
+    known = calibration.extra.get(KEY)
     stds = calibration.noise_std, calibration.gyro_noise_std
-    if not rate_hz or not all(np.isfinite(std).all() and std.any() for std in stds):
+    if known is not None:
+        rate_hz = rate_hz or known["rate_hz"]
+        densities = [(known[sensor][WHITE], known[sensor][RANDOM_WALK]) for sensor in (ACCELEROMETER, GYROSCOPE)]
+    elif not rate_hz or not all(np.isfinite(std).all() and std.any() for std in stds):
         raise WriteBackError(
             "nothing was exported: the calibration does not say the noise of a sample and its rate",
             "calibrate with mpucal from a recording in which the board lies still",
         )
-    a, w = (float(np.sqrt(np.mean(std**2) / rate_hz)) for std in stds)
+    else:
+        whites = [float(np.sqrt(np.mean(std**2) / rate_hz)) for std in stds]
+        densities = [(white, WALK * white) for white in whites]
     return [
-        f"accelerometer_noise_density: {_number(a)}",
-        f"accelerometer_random_walk: {_number(WALK * a)}",
-        f"gyroscope_noise_density: {_number(w)}",
-        f"gyroscope_random_walk: {_number(WALK * w)}",
+        *(
+            line
+            for sensor, (white, walk) in zip((ACCELEROMETER, GYROSCOPE), densities, strict=True)
+            for line in (f"{sensor}_noise_density: {_number(white)}", f"{sensor}_random_walk: {_number(walk)}")
+        ),
         "rostopic: /imu/data",
         f"update_rate: {_number(rate_hz)}",
     ]

@@ -43,7 +43,7 @@ GYROSCOPE_FORMULA = "w = K @ (y - b_omega)"
 # fromisoformat takes any character between date and time
 DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}([T ][0-9:]{5,8}([.,][0-9]{1,9})?(Z|[+-][0-9:]{2,8})?)?")
 # top-level keys that are kept as they are
-EXTRA = ("name", "autopilot", "others", "written", "merged", "updated_from")
+EXTRA = ("name", "autopilot", "others", "written", "merged", "updated_from", "noise")
 
 
 def written(fields: Mapping[str, Any], follows_temperature: bool) -> dict[str, Any]:

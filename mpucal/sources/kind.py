@@ -91,7 +91,7 @@ class SourceKind:
     def commands(self) -> tuple[str, ...]:
         """Which take it."""
         live = () if self.delivers is Delivers.CAPTURE else ("stream", "write", "show")
-        return ("session", "record", "check", *live, *(("doctor",) if self.doctor else ()))
+        return ("session", "record", "check", "noise", *live, *(("doctor",) if self.doctor else ()))
 
     def is_meant(self, values: Mapping[str, Any]) -> bool:
         """Whether the options' values name a source of this kind."""

@@ -1,0 +1,171 @@
+"""The noise of a sensor that lies still, from samples as they come, for minutes or days, in constant memory."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from ..chip.families import PARTS, Part
+from ..data import STANDARD_GRAVITY_MPS2, Recording, Samples, Sensor, Vector
+from ..errors import RecordingError
+from ..result.noise import ACCELEROMETER, COEFFICIENTS, GYROSCOPE, INSTABILITY, WHITE, Noise
+from .model import fitted
+from .octaves import Octaves
+from .spectrum import Spectrum
+from .trace import Trace, steps
+
+__all__ = ["NoiseMeter", "noise_of"]
+
+AXES = tuple(f"{sensor} {axis}" for sensor in (ACCELEROMETER, GYROSCOPE) for axis in "xyz")
+UNITS = ("m/s²",) * 3 + ("rad/s",) * 3
+# samples at a time
+RUN = 16384
+LEAST_SAMPLES = 256
+WARMED_C, CORRELATED = 2.0, 0.7
+# of the white noise of a sample: a weaker tone hides in it
+LEAST_TONE = 0.05
+
+
+class NoiseMeter:
+    """Gathers what comes; `result` may be asked for at any time.
+
+    Parameters
+    ----------
+    rate_hz : samples a second; None: by the times of the first of them.
+    """
+
+    def __init__(self, sensor: Sensor, rate_hz: float | None = None) -> None:
+        self._sensor, self._rate_hz = sensor, rate_hz
+        self._octaves, self._spectrum = Octaves(6), Spectrum(6)
+        self._trace: Trace | None = None
+        self._first_s = self._last_s = self._gaps_s = 0.0
+
+    @property
+    def seconds(self) -> float:
+        """How long it has been, without gaps."""
+        return self._last_s - self._first_s - self._gaps_s
+
+    def add(self, samples: Samples) -> None:
+        """Add what came; a sample after a gap begins anew."""
+        if not len(samples):
+            return
+        if self._rate_hz is None and len(samples) > 1:
+            self._rate_hz = float(1.0 / np.median(np.diff(samples.t)))
+        if self._trace is None:
+            self._trace = Trace(7, self._rate_hz or 200.0)
+            self._first_s = self._last_s = float(samples.t[0])
+        cuts = [0, *np.flatnonzero(samples.gap).tolist(), len(samples)]
+        for a, b in pairwise(cuts):
+            if a == b:
+                continue
+            follows = not samples.gap[a]
+            values = np.hstack([samples.acc[a:b], samples.gyr[a:b]])
+            self._octaves.add(values, follows)
+            self._spectrum.add(values, follows)
+            self._trace.add(np.hstack([values, samples.temperature_c[a:b, None]]))
+            self._gaps_s += 0.0 if follows else float(samples.t[a]) - self._last_s
+            self._last_s = float(samples.t[b - 1])
+
+    def result(self, created: str = "") -> Noise:
+        """The noise so far.
+
+        Raises
+        ------
+        RecordingError : too little to say anything.
+        """
+        n = self._octaves.samples
+        if n < LEAST_SAMPLES or self._trace is None or self.seconds <= 0.0:
+            raise RecordingError(f"{n} samples say nothing of noise", "let the board rest for minutes, or hours")
+        rate_hz = (n - 1) / self.seconds
+        sizes, variances, _ = self._octaves.variances()
+        of = [fitted(sizes, variances[:, axis], n, 1.0 / rate_hz) for axis in range(6)]
+        values, low, high = (
+            {
+                name: np.array([math.nan if one is None else getattr(one, end)[i] for one in of])
+                for i, name in enumerate(COEFFICIENTS)
+            }
+            for end in ("value", "low", "high")
+        )
+        course = self._trace.means
+        return Noise(
+            values,
+            low,
+            high,
+            sizes / rate_hz,
+            np.sqrt(variances),
+            n / sizes,
+            n,
+            self.seconds,
+            rate_hz,
+            self._sensor,
+            created,
+            data_sheet(self._sensor),
+            tuple(self._suspicious(values[WHITE], course, rate_hz)),
+            np.asarray(self._trace.seconds * (np.arange(len(course)) + 0.5)),
+            course,
+        )
+
+    def needed_s(self, wanted: float) -> float | None:
+        """How much longer until bias instability is known to a `wanted` share (1 sigma); None: not known yet.
+
+        The deviation of a share falls with the root of time.
+        """
+        try:
+            noise = self.result()
+        except RecordingError:
+            return None
+        value, high = noise.values[INSTABILITY], noise.high[INSTABILITY]
+        share = float(np.nanmax((high - value) / np.where(value > 0.0, value, np.nan) / 1.96, initial=-1.0))
+        return None if share < 0.0 else max(self.seconds * ((share / wanted) ** 2 - 1.0), 0.0)
+
+    def _suspicious(self, white: Vector, course: Vector, rate_hz: float) -> list[dict[str, str]]:
+        found = []
+        for tone in self._spectrum.tones(rate_hz):
+            if tone.rms > LEAST_TONE * white[tone.axis] * math.sqrt(rate_hz):
+                said = (
+                    f"{AXES[tone.axis]}: a tone at {tone.frequency_hz:.2f} Hz of {tone.rms:.2g} {UNITS[tone.axis]} rms"
+                )
+                found.append({"code": "tone", "message": f"{said}, as of a fan or a pump"})
+        seconds = self._trace.seconds if self._trace is not None else 0.0
+        for block, axis, size in steps(course[:, :6]):
+            said = f"{AXES[axis]}: a step of {size:+.2g} {UNITS[axis]} after {block * seconds:.0f} s"
+            found.append({"code": "step", "message": f"{said}: the board was moved, or its bias jumped"})
+        T = course[:, 6]
+        if np.isfinite(T).sum() > 8 and np.nanmax(T) - np.nanmin(T) > WARMED_C:
+            found.append({"code": "temperature", "message": _warmed(course[np.isfinite(T)])})
+        return found
+
+
+def noise_of(recording: Recording, created: str = "") -> Noise:
+    """The noise of a recording of a sensor that lies still.
+
+    Raises
+    ------
+    RecordingError : too few samples.
+    """
+    meter = NoiseMeter(recording.sensor, recording.rate_hz if len(recording) > 1 else None)
+    for first in range(0, len(recording), RUN):
+        meter.add(recording.part(first, first + RUN))
+    return meter.result(created)
+
+
+def data_sheet(sensor: Sensor) -> dict[str, float]:
+    """Typical white noise of the kind of chip, two-sided; empty where it is not known."""
+    part: Part | None = next((part for part in PARTS.values() if part.chip == sensor.chip), None)
+    if part is None:
+        return {}
+    # a data sheet's densities are one-sided
+    return {
+        ACCELEROMETER: part.family.accel_noise_ug * 1e-6 * STANDARD_GRAVITY_MPS2 / math.sqrt(2.0),
+        GYROSCOPE: math.radians(part.family.gyro_noise_dps) / math.sqrt(2.0),
+    }
+
+
+def _warmed(course: Vector) -> str:
+    T = course[:, 6]
+    r = np.asarray(np.corrcoef(course, rowvar=False))[6, :6]
+    moved = [f"{AXES[i]} ({r[i]:+.2f})" for i in range(6) if abs(r[i]) > CORRELATED]
+    said = f"the temperature moved by {T.max() - T.min():.1f} °C"
+    return f"{said}, and with it {', '.join(moved)}" if moved else said

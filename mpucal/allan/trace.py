@@ -1,0 +1,66 @@
+"""The slow course of a long rest, in constant memory: means over blocks that double as it grows, steps, temperature."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..data import Vector
+
+BLOCKS = 2048
+FIRST_S = 0.5
+# a step is seen between means of so many blocks, beyond so many of their robust standard deviations
+BESIDE, STEP_STD = 8, 10.0
+LEAST_BLOCKS = 64
+
+
+class Trace:
+    """Means of columns over blocks of `seconds`; a merge in pairs makes room for more."""
+
+    def __init__(self, columns: int, rate_hz: float) -> None:
+        self._size = max(round(FIRST_S * rate_hz), 1)
+        self._rate_hz = rate_hz
+        self._means: list[Vector] = []
+        self._held = np.zeros((0, columns))
+
+    def add(self, values: Vector) -> None:
+        """Add (n, columns) samples."""
+        self._held = np.concatenate([self._held, values])
+        whole = len(self._held) // self._size
+        if not whole:
+            return
+        used = whole * self._size
+        self._means += list(self._held[:used].reshape(whole, self._size, -1).mean(1))
+        self._held = self._held[used:]
+        while len(self._means) >= BLOCKS:
+            pairs = np.array(self._means[: len(self._means) // 2 * 2]).reshape(-1, 2, self._held.shape[1])
+            odd = self._means[len(pairs) * 2 :]
+            self._means = list(pairs.mean(1))
+            # a block that lost its partner is half a new one: it is left out
+            del odd
+            self._size *= 2
+
+    @property
+    def seconds(self) -> float:
+        """Of a block."""
+        return self._size / self._rate_hz
+
+    @property
+    def means(self) -> Vector:
+        """(k, columns)."""
+        return np.array(self._means).reshape(-1, self._held.shape[1])
+
+
+def steps(means: Vector) -> list[tuple[int, int, float]]:
+    """(block, column, size) of the largest step of each column of means (k, columns), where one is beyond chance."""
+    if len(means) < LEAST_BLOCKS:
+        return []
+    total = np.concatenate([np.zeros((1, means.shape[1])), np.cumsum(means - means[0], axis=0)])
+    of = (total[BESIDE:] - total[:-BESIDE]) / BESIDE
+    jumps = of[BESIDE:] - of[:-BESIDE]
+    spread = 1.4826 * np.median(np.abs(jumps - np.median(jumps, axis=0)), axis=0)
+    found = []
+    for column, (jump, std) in enumerate(zip(jumps.T, spread, strict=True)):
+        at = int(np.abs(jump).argmax())
+        if std > 0.0 and abs(jump[at]) > STEP_STD * std:
+            found.append((at + BESIDE, column, float(jump[at])))
+    return found

@@ -1,0 +1,134 @@
+"""The noise of a sensor as text and as one HTML page: its coefficients, the Allan deviation, the slow course."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from html import escape
+
+import numpy as np
+
+from .. import __version__
+from ..data import STANDARD_GRAVITY_MPS2
+from ..result.noise import ACCELEROMETER, GYROSCOPE, INSTABILITY, QUANTISATION, WALK, WHITE, Noise
+from .elements import figure, paragraph, section, table
+from .figure import INK, Axes, X, Y, Z, legend, svg
+from .style import CSS
+
+HEIGHT = 240.0
+SENSORS = (ACCELEROMETER, GYROSCOPE)
+_UG, _DPS = 1e6 / STANDARD_GRAVITY_MPS2, math.degrees(1.0)
+# of each sensor: (factor, unit) in which a coefficient is said
+UNITS = {
+    ACCELEROMETER: {
+        WHITE: (_UG, "ug/√Hz"),
+        INSTABILITY: (_UG, "ug"),
+        WALK: (_UG, "ug/√s"),
+        QUANTISATION: (_UG, "ug s"),
+    },
+    GYROSCOPE: {
+        WHITE: (_DPS, "deg/s/√Hz"),
+        INSTABILITY: (3600.0 * _DPS, "deg/h"),
+        WALK: (3600.0 * _DPS, "deg/h/√s"),
+        QUANTISATION: (3600.0 * _DPS, "deg/h s"),
+    },
+}
+
+
+def rows(noise: Noise, sensor: str) -> Iterator[tuple[str, list[str]]]:
+    """Name with unit, and the values of x, y, z with their 95 % intervals, of each coefficient of a sensor."""
+    part = slice(0, 3) if sensor == ACCELEROMETER else slice(3, 6)
+    for name, (factor, unit) in UNITS[sensor].items():
+        cells = [
+            _cell(*(float(factor * end[name][part][axis]) for end in (noise.values, noise.low, noise.high)))
+            for axis in range(3)
+        ]
+        yield f"{name.replace('_', ' ')}, {unit}", cells
+
+
+def summary(noise: Noise) -> str:
+    """What `mpucal noise` prints."""
+    lines = []
+    for sensor in SENSORS:
+        lines += [f"{sensor:<32}" + "".join(f"{axis:>29}" for axis in "xyz")]
+        lines += [f"  {name:<30}" + "".join(f"{cell:>29}" for cell in cells) for name, cells in rows(noise, sensor)]
+        said = _data_sheet(noise, sensor)
+        lines += [f"  {said}", ""] if said else [""]
+    lines += [f"! {row['message']}." for row in noise.suspicious]
+    lines.append(
+        f"{noise.samples} samples at {noise.rate_hz:.1f} Hz in {noise.seconds / 60.0:.1f} min. In brackets 95 %."
+    )
+    return "\n".join(lines)
+
+
+def render(noise: Noise) -> str:
+    """The page."""
+    head = ("", *"xyz")
+    tables = [
+        table(sensor, sensor, head, [(name, *cells) for name, cells in rows(noise, sensor)])
+        + (paragraph(said, note=True) if (said := _data_sheet(noise, sensor)) else "")
+        for sensor in SENSORS
+    ]
+    pictures = [_allan(noise, sensor) for sensor in SENSORS]
+    course = _course(noise) if len(noise.course) > 1 else ""
+    caption = "Overlapping Allan deviation, thin lines its 95 % interval, and the data sheet's white noise."
+    suspicious = "".join(paragraph(f"{row['message']}.") for row in noise.suspicious)
+    about = f"{noise.samples} samples at {noise.rate_hz:.1f} Hz in {noise.seconds / 3600.0:.2f} h."
+    name = noise.sensor.chip or "a sensor"
+    body = (
+        section("Coefficients", *tables, paragraph("In brackets: 95 % intervals.", note=True)),
+        section("Suspicious", suspicious),
+        section("Allan deviation", *(figure(picture, caption) for picture in pictures)),
+        section("Over time", figure(course, "Means over blocks, each axis less its own mean, in its deviations.")),
+    )
+    return (
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>Noise of {escape(name)}</title><style>{CSS}</style></head><body>\n"
+        f"<h1>Noise of {escape(name)}</h1>\n{paragraph(about)}{''.join(body)}"
+        f"{paragraph(f'mpucal {__version__}, {noise.created}', note=True)}</body></html>\n"
+    )
+
+
+def _allan(noise: Noise, sensor: str) -> str:
+    part = slice(0, 3) if sensor == ACCELEROMETER else slice(3, 6)
+    factor, unit = UNITS[sensor][INSTABILITY]
+    tau, deviations = np.log10(noise.tau_s), np.log10(np.maximum(factor * noise.deviations[:, part], 1e-300))
+    share = np.log10(1.0 + 1.96 / np.sqrt(2.0 * np.maximum(noise.clusters, 1.0)))
+    low, high = float((deviations.min(1) - share).min()), float((deviations.max(1) + share).max())
+    labels = "log10 τ [s]", f"log10 of {sensor} [{unit}]"
+    axes = Axes(HEIGHT, (float(tau[0]), float(tau[-1])), (low, high), *labels)
+    marks = []
+    for deviation, colour in zip(deviations.T, (X, Y, Z), strict=True):
+        marks += [axes.line(tau, deviation, colour, 1.6)]
+        marks += [axes.line(tau, deviation + sign * share, colour, 0.5) for sign in (-1.0, 1.0)]
+    if sensor in noise.data_sheet:
+        marks.append(axes.line(tau, np.log10(factor * noise.data_sheet[sensor]) - 0.5 * tau, INK, 0.8))
+    named = legend(("x", X), ("y", Y), ("z", Z), ("data sheet", INK))
+    return svg(f"allan-{sensor}", f"Allan deviation of the {sensor}", HEIGHT, *marks, axes.frame(), named)
+
+
+def _course(noise: Noise) -> str:
+    spread = np.maximum(noise.course[:, :6].std(0), 1e-300)
+    scaled = (noise.course[:, :6] - noise.course[:, :6].mean(0)) / spread - 8.0 * np.arange(6)
+    axes = Axes(HEIGHT, (0.0, float(noise.course_s[-1])), (-45.0, 5.0), "time [s]", "six axes")
+    lines = [axes.line(noise.course_s, of, colour) for of, colour in zip(scaled.T, (X, Y, Z) * 2, strict=True)]
+    named = legend(("x", X), ("y", Y), ("z", Z))
+    return svg("course", "Slow course of the six axes", HEIGHT, *lines, axes.frame(), named)
+
+
+def _cell(value: float, low: float, high: float) -> str:
+    if not math.isfinite(value):
+        return "not observable"
+    return f"{value:.3g} [{low:.3g}, {high:.3g}]" if low > 0.0 else f"below {high:.3g}"
+
+
+def _data_sheet(noise: Noise, sensor: str) -> str:
+    if sensor not in noise.data_sheet:
+        return ""
+    factor, unit = UNITS[sensor][WHITE]
+    typical, found = noise.data_sheet[sensor], noise.of(sensor, WHITE)
+    return (
+        f"data sheet: {factor * typical:.3g} {unit} ({factor * typical * math.sqrt(2.0):.3g} one-sided, as printed); "
+        f"{found / typical:.2f} times that"
+    )

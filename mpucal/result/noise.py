@@ -1,0 +1,185 @@
+"""noise.json: what a long rest showed of a sensor's noise."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from ..data import Sensor, Vector
+from ..errors import RecordingError
+from .atomic import write_atomically
+from .calibration import Calibration
+
+FORMAT, VERSION = "mpucal.noise", 1
+# of calibration.json
+KEY = "noise"
+ACCELEROMETER, GYROSCOPE = "accelerometer", "gyroscope"
+WHITE, INSTABILITY, WALK, QUANTISATION = "white_noise", "bias_instability", "random_walk", "quantisation"
+COEFFICIENTS = (WHITE, INSTABILITY, WALK, QUANTISATION)
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The noise of six axes: accelerometer x, y, z [m/s^2], gyroscope x, y, z [rad/s].
+
+    Attributes
+    ----------
+    values, low, high : of each of COEFFICIENTS (6,), with the ends of its 95 % interval: white_noise N
+        [units/sqrt(Hz), two-sided], bias_instability B [units], random_walk K [units/sqrt(s)], quantisation Q
+        [units s]. NaN: not observable.
+    tau_s : (k,) s. deviations : (k, 6) overlapping Allan deviation. clusters : (k,) how many tau fit into the rest.
+    sensor, samples, seconds, rate_hz : of the rest. created : ISO 8601.
+    data_sheet : white noise of the kind of chip, by sensor [units/sqrt(Hz), two-sided]; empty: no known chip.
+    suspicious : what was, a code and a sentence each.
+    course_s, course : (m,) s, (m, 7) slow means, the temperature last; not in the file.
+    """
+
+    values: Mapping[str, Vector]
+    low: Mapping[str, Vector]
+    high: Mapping[str, Vector]
+    tau_s: Vector
+    deviations: Vector
+    clusters: Vector
+    samples: int
+    seconds: float
+    rate_hz: float
+    sensor: Sensor = field(default_factory=Sensor)
+    created: str = ""
+    data_sheet: Mapping[str, float] = field(default_factory=dict)
+    suspicious: tuple[Mapping[str, str], ...] = ()
+    course_s: Vector = field(default_factory=lambda: np.zeros(0))
+    course: Vector = field(default_factory=lambda: np.zeros((0, 7)))
+
+    def of(self, sensor: str, coefficient: str) -> float:
+        """One number of three axes: the root of the mean of their squares; NaN where none is known."""
+        values = self.values[coefficient][_part(sensor)]
+        return float(np.sqrt(np.nanmean(values**2))) if np.isfinite(values).any() else math.nan
+
+    def at_least(self, sensor: Sensor, rate_hz: float) -> Sensor:
+        """The sensor, of which a sample at `rate_hz` has this white noise at least, however still it reads."""
+        acc, gyr = (self.of(name, WHITE) * math.sqrt(rate_hz) for name in (ACCELEROMETER, GYROSCOPE))
+        least_acc, least_gyr = sensor.least_noise
+        return replace(sensor, least_noise=(max(acc, least_acc), max(gyr, least_gyr)))
+
+    def document(self) -> dict[str, Any]:
+        """The content of noise.json, in JSON's own types; NaN becomes None."""
+
+        def of(sensor: str) -> dict[str, Any]:
+            part = _part(sensor)
+            found: dict[str, Any] = {
+                name: {
+                    "value": _plain(self.values[name][part]),
+                    "low": _plain(self.low[name][part]),
+                    "high": _plain(self.high[name][part]),
+                }
+                for name in COEFFICIENTS
+            }
+            found["allan_deviation"] = _plain(self.deviations[:, part])
+            if sensor in self.data_sheet:
+                found["data_sheet"] = {WHITE: self.data_sheet[sensor]}
+            return found
+
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "created": self.created,
+            "sensor": {key: value for key, value in vars(self.sensor).items() if value is not None},
+            "rate_hz": self.rate_hz,
+            "samples": self.samples,
+            "seconds": self.seconds,
+            "tau_s": _plain(self.tau_s),
+            "clusters": _plain(self.clusters),
+            ACCELEROMETER: of(ACCELEROMETER),
+            GYROSCOPE: of(GYROSCOPE),
+            "suspicious": [dict(row) for row in self.suspicious],
+        }
+
+    def json(self) -> str:
+        """The document as text."""
+        return json.dumps(self.document(), indent=2, allow_nan=False) + "\n"
+
+    def save(self, path: str | Path) -> None:
+        """Write noise.json, atomically.
+
+        Raises
+        ------
+        OutputError : it cannot be written.
+        """
+        write_atomically(Path(path), self.json().encode())
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a noise.json.
+
+        Raises
+        ------
+        RecordingError : no such file, or no noise in it.
+        """
+        try:
+            return cls._of(json.loads(Path(path).read_bytes()))
+        except OSError as error:
+            raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path") from error
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            what = f"{path} holds no noise ({type(error).__name__}: {error})"
+            raise RecordingError(what, "give a noise.json, as `mpucal noise -o DIR` writes it") from error
+
+    @classmethod
+    def _of(cls, document: Mapping[str, Any]) -> Self:
+        if document.get("format") != FORMAT:
+            raise ValueError(f'"format" is {document.get("format")!r}, not {FORMAT!r}')
+        both = document[ACCELEROMETER], document[GYROSCOPE]
+
+        def of(end: str) -> dict[str, Vector]:
+            return {name: np.array([*both[0][name][end], *both[1][name][end]], float) for name in COEFFICIENTS}
+
+        return cls(
+            of("value"),
+            of("low"),
+            of("high"),
+            np.array(document["tau_s"], float),
+            np.hstack([np.array(one["allan_deviation"], float).reshape(-1, 3) for one in both]),
+            np.array(document["clusters"], float),
+            int(document["samples"]),
+            float(document["seconds"]),
+            float(document["rate_hz"]),
+            Sensor.of(document.get("sensor", {})),
+            str(document.get("created", "")),
+            {
+                name: one["data_sheet"][WHITE]
+                for name, one in zip((ACCELEROMETER, GYROSCOPE), both, strict=True)
+                if "data_sheet" in one
+            },
+            tuple(document.get("suspicious", ())),
+        )
+
+
+def with_noise(calibration: Calibration, noise: Noise) -> Calibration:
+    """The calibration that says of its sensor's noise what a long rest showed: `extra["noise"]`, three axes as one.
+
+    Of a coefficient that is not told from zero, the end of its interval stands there, and its name among `at_most`.
+    """
+    said: dict[str, Any] = {"created": noise.created, "seconds": noise.seconds, "rate_hz": noise.rate_hz}
+    for sensor in (ACCELEROMETER, GYROSCOPE):
+        part, of = _part(sensor), {}
+        unsure = [
+            name for name in (WHITE, INSTABILITY, WALK) if not np.nanmin(noise.low[name][part], initial=1.0) > 0.0
+        ]
+        for name in (WHITE, INSTABILITY, WALK):
+            values = (noise.high if name in unsure else noise.values)[name][part]
+            of[name] = float(np.sqrt(np.mean(values**2)))
+        said[sensor] = {**of, "at_most": unsure}
+    return replace(calibration, extra={**calibration.extra, KEY: said})
+
+
+def _part(sensor: str) -> slice:
+    return slice(0, 3) if sensor == ACCELEROMETER else slice(3, 6)
+
+
+def _plain(values: Vector) -> Any:
+    return [_plain(row) for row in values] if values.ndim else float(values) if np.isfinite(values) else None

@@ -1,0 +1,157 @@
+"""The Allan deviation held to allantools, the coefficients to simulated noise, and what is suspicious found."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mpucal
+from mpucal.allan import NoiseMeter, noise_of
+from mpucal.allan.octaves import Octaves
+from mpucal.data import Recording, Sensor
+from mpucal.export.forms import form
+from mpucal.result.noise import Noise, with_noise
+from mpucal.simulated.noise import noise
+
+RATE_HZ = 100.0
+TRUE = {"white_noise": 2.8e-3, "bias_instability": 1.0e-3, "random_walk": 1e-4}
+SENSOR = Sensor(chip="MPU-6050", rate_hz=RATE_HZ)
+
+
+def rest(n=2**17, seed=0, **coefficients):
+    drawn = {**TRUE, **coefficients}
+    rng = np.random.default_rng(seed)
+    six = np.stack([noise(rng, n, RATE_HZ, *drawn.values()) for _ in range(6)], axis=1)
+    temperature_c = 25.0 + 0.01 * rng.standard_normal(n)
+    return Recording.from_arrays(
+        np.arange(n) / RATE_HZ, six[:, :3] + [0, 0, 9.8], six[:, 3:], temperature_c=temperature_c, sensor=SENSOR
+    )
+
+
+@pytest.fixture(scope="module")
+def lying():
+    return rest()
+
+
+@pytest.fixture(scope="module")
+def found(lying):
+    return noise_of(lying)
+
+
+def test_the_deviation_is_that_of_allantools(lying):
+    allantools = pytest.importorskip("allantools")
+    values = lying.acc[:20_000]
+    octaves = Octaves(3)
+    for part in np.array_split(values, 37):
+        octaves.add(part)
+    sizes, variances, counts = octaves.variances()
+    for axis in range(3):
+        _, theirs, _, n = allantools.oadev(
+            values[:, axis], rate=1.0, data_type="freq", taus=sizes[sizes <= 4096].astype(int)
+        )
+        ours = np.sqrt(variances[: len(theirs), axis])
+        every = sizes[: len(theirs)] <= 16
+        np.testing.assert_allclose(ours[every], theirs[every], rtol=1e-9)
+        np.testing.assert_array_equal(counts[: len(theirs)][every], n[every])
+        # beyond, a 16th of tau lies between one difference and the next
+        np.testing.assert_allclose(ours, theirs, rtol=0.03)
+
+
+def test_it_does_not_depend_on_how_the_samples_come_nor_take_memory(lying):
+    values = lying.gyr[:50_000]
+    at_once, in_parts = Octaves(3), Octaves(3)
+    at_once.add(values)
+    for part in np.array_split(values, 1001):
+        in_parts.add(part)
+    # the first part's mean is taken away, which only digits see
+    for one, other in zip(at_once.variances(), in_parts.variances(), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-7)
+    assert sum(len(level._tail) for level in in_parts._levels) <= 32 * len(in_parts._levels)
+
+
+def test_a_gap_is_not_bridged():
+    octaves, jump = Octaves(1), np.concatenate([np.zeros(100), np.full(100, 1e3)])[:, None]
+    octaves.add(jump[:100])
+    octaves.add(jump[100:], follows=False)
+    assert not octaves.variances()[1].any()
+
+
+def test_the_coefficients_are_those_that_were_simulated(found):
+    for name, within in (("white_noise", 0.02), ("bias_instability", 0.35)):
+        ratio = found.values[name] / TRUE[name]
+        assert np.all(np.abs(ratio - 1.0) < within), (name, ratio)
+    assert abs(float(np.mean(found.values["bias_instability"])) / TRUE["bias_instability"] - 1.0) < 0.15
+    inside = [(found.low[name] <= value) & (value <= found.high[name] * (1 + 1e-12)) for name, value in TRUE.items()]
+    # 18 intervals of 95 %: fewer than 15 of them would be chance in 1 of 1000
+    assert np.sum(inside) >= 15
+
+
+def test_beside_the_data_sheet(found):
+    # 400 ug/sqrt(Hz), one-sided
+    assert found.data_sheet["accelerometer"] == pytest.approx(2.774e-3, rel=1e-3)
+    assert found.suspicious == ()
+
+
+def test_what_is_suspicious(lying):
+    t = lying.t
+    tone = 2e-2 * np.sin(2 * np.pi * 11.7 * t)
+    acc, gyr = lying.acc.copy(), lying.gyr.copy()
+    acc[:, 0] += tone
+    gyr[len(t) // 2 :, 1] += 0.05
+    warm = 25.0 + 6.0 * t / t[-1]
+    gyr[:, 2] += 0.01 * warm
+    noise_ = noise_of(replace(lying, acc=acc, gyr=gyr, temperature_c=warm))
+    said = {row["code"]: row["message"] for row in noise_.suspicious}
+    assert set(said) == {"tone", "step", "temperature"}
+    assert "accelerometer x: a tone at 11.69 Hz" in said["tone"]
+    assert "gyroscope y: a step of +0.04" in said["step"]
+    assert "moved by 6.0 °C" in said["temperature"]
+    assert "gyroscope z" in said["temperature"]
+
+
+def test_the_time_still_needed_falls_as_it_goes_on(lying):
+    meter, needed = NoiseMeter(SENSOR, RATE_HZ), []
+    for first in range(0, len(lying), 2**15):
+        meter.add(lying.part(first, first + 2**15))
+        needed.append(meter.needed_s(0.01))
+    known = [s for s in needed if s is not None]
+    assert known
+    assert known[-1] > 0.0
+
+
+def test_it_is_read_as_it_was_written(found, tmp_path):
+    found.save(tmp_path / "noise.json")
+    again = Noise.load(tmp_path / "noise.json")
+    assert again.document() == found.document()
+    json.dumps(again.document(), allow_nan=False)
+
+
+def test_too_little_is_refused(lying):
+    with pytest.raises(mpucal.MpucalError, match="say nothing of noise"):
+        mpucal.noise(lying.part(0, 100))
+
+
+def test_exports_take_it(found):
+    calibration = with_noise(
+        mpucal.Calibration(
+            np.eye(3),
+            np.zeros(3),
+            noise_std=np.full(3, 0.5),
+            gyro_noise_std=np.full(3, 0.5),
+            b_omega=np.zeros(3),
+            quality={"verdict": "good"},
+            sensor=SENSOR,
+        ),
+        found,
+    )
+    for name in ("kalibr", "openvins"):
+        text, notes = form(name).export(calibration)
+        values = dict(
+            line.strip().split(": ") for line in text.splitlines() if "noise_density" in line and "#" not in line
+        )
+        assert float(values["accelerometer_noise_density"]) == pytest.approx(TRUE["white_noise"], rel=0.02)
+        assert any("a rest of 0.36 h" in note for note in notes)
+    text, _ = form("ros").export(calibration)
+    row = next(line for line in text.splitlines() if line.startswith("angular_velocity_covariance"))
+    assert json.loads(row.split(": ")[1])[0] == pytest.approx(TRUE["white_noise"] ** 2 * RATE_HZ, rel=0.05)

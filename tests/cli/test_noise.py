@@ -1,0 +1,72 @@
+"""`mpucal noise`: from a recording and from a sensor, and what other commands take of it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mpucal.data import Recording, Sensor
+from mpucal.result.noise import FORMAT
+from mpucal.simulated.noise import noise
+
+
+@pytest.fixture
+def lying(save, tmp_path):
+    """A file of three minutes at rest, its white noise 2e-3 m/s^2/sqrt(Hz) and 1e-4 rad/s/sqrt(Hz)."""
+    rng = np.random.default_rng(0)
+    six = [noise(rng, 18_000, 100.0, white, 0.0, 0.0) for white in 3 * (2e-3,) + 3 * (1e-4,)]
+    acc, gyr = np.stack(six[:3], axis=1) + np.array([0.0, 0.0, 9.8]), np.stack(six[3:], axis=1)
+    sensor = Sensor(chip="MPU-6050", rate_hz=100.0)
+    return save(Recording.from_arrays(np.arange(18_000) / 100.0, acc, gyr, sensor=sensor), tmp_path / "lying.npz")
+
+
+def test_of_a_recording_and_taken_by_other_commands(mpucal, session, lying, tmp_path):
+    told = mpucal("noise", "lying.npz", "-o", "noise")
+    assert told.code == 0, told.err
+    assert "white noise, ug/√Hz" in told.out
+    assert "data sheet:" in told.out
+    page = (tmp_path / "noise" / "noise.html").read_text()
+    assert "<h1>Noise of MPU-6050</h1>" in page
+    document = json.loads((tmp_path / "noise" / "noise.json").read_text())
+    assert document["format"] == FORMAT
+    assert document["accelerometer"]["white_noise"]["value"] == pytest.approx([2e-3] * 3, rel=0.05)
+
+    calibration = session.folder / "calibration.json"
+    exported = mpucal("export", calibration, "--to", "kalibr", "--noise", "noise/noise.json")
+    assert exported.code == 0, exported.err
+    density = next(line for line in exported.out.splitlines() if line.startswith("gyroscope_noise_density"))
+    assert float(density.split(": ")[1]) == pytest.approx(1e-4, rel=0.05)
+
+    fitted = json.loads(mpucal("calibrate", session.folder, "--noise", "noise/noise.json", "--json").out)
+    assert fitted["noise"]["accelerometer"]["white_noise"] == pytest.approx(2e-3, rel=0.05)
+    assert fitted["quality"]["verdict"] == "good"
+
+
+def test_of_a_sensor_for_some_hours(mpucal):
+    told = mpucal("noise", "--bus", "sim:hand=still", "--rate", "100", "--hours", "0.01", "--json")
+    assert told.code == 0, told.err
+    document = json.loads(told.out)
+    assert 36.0 <= document["seconds"] < 38.0
+    assert document["accelerometer"]["data_sheet"]["white_noise"] == pytest.approx(2.77e-3, rel=0.01)
+
+
+def test_ctrl_c_keeps_what_there_is(mpucal, monkeypatch):
+    from mpucal.allan import NoiseMeter
+
+    add, calls = NoiseMeter.add, []
+
+    def interrupted(meter, samples):
+        add(meter, samples)
+        calls.append(len(samples))
+        if len(calls) == 10:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(NoiseMeter, "add", interrupted)
+    told = mpucal("noise", "--bus", "sim:hand=still", "--rate", "100", "--json")
+    assert told.code == 0, told.err
+    assert json.loads(told.out)["samples"] == sum(calls)
+
+
+def test_one_thing_is_measured(mpucal):
+    assert mpucal("noise").code == 2
+    assert mpucal("noise", "lying.npz", "--bus", "sim").code == 2
