@@ -1,6 +1,5 @@
 """A session that writes to the chip it calibrated, and the question before it writes."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +44,7 @@ def test_a_session_writes_to_the_chip_and_says_so(mpucal):
     result = mpucal(*words)
     assert result.code == 0, result.err
     made = Calibration.load("board/calibration.json")
-    assert json.loads(result.out) == made.document()
+    assert result.out == made.json()
     (entry,) = made.extra["written"]
     assert (entry["to"], entry["where"]) == ("chip", "the chip on sim")
     # one word is 0.5 mg, an even one 1 mg
