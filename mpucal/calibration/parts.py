@@ -60,7 +60,7 @@ def parts_of(problem: Problem, minimum: Minimum, prior: Prior) -> Parts | None:
     ends = np.arange(1, k + 1, dtype=np.int64) * len(series) // k
     scores = part_scores(problem, theta, len(free), ends)
     t = np.concatenate([[0.0], np.cumsum(series.dt)])
-    starts = np.concatenate([[0], ends[:-1]])
+    starts = np.concatenate([[0], ends[:-1]]).astype(np.intp)  # 32 bits on some ARMs
     mean = np.add.reduceat(series.y, starts) / np.diff(ends, prepend=0)[:, None]
     s = (mean - theta.b_a) @ np.linalg.pinv(theta.D).T
     axis = np.abs(s).argmax(1)
