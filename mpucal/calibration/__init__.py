@@ -19,13 +19,13 @@ from .claim import claim_of, claimed
 from .evidence import Evidence
 from .fit import Fit
 from .flat_segment import Flat, find_flat, flat_statistics, tells
-from .masks import with_masks
+from .masks import jump, with_masks
 from .model_selection import METHODS, Choice, choose
 from .parameters import B_A_NAMES, B_OMEGA_NAMES, BY_NAME, D_NAMES
 from .quality import judge
 from .recording_digest import recording_digest
 from .theta import from_elements
-from .walks import likeliest_walk
+from .walks import likeliest_walk, without_walk
 
 __all__ = ["MODELS", "calibrate", "weigh"]
 
@@ -74,13 +74,17 @@ def weigh(
     recording = with_masks(recording)
     segment = recording.flat or find_flat(recording)
     flat = flat_statistics(recording, segment) if segment is not None and tells(recording, segment) else None
+    jumped = None if flat is None else jump(recording, flat)
+    if jumped is not None:
+        recording = recording.part(0, jumped)
     before = Evidence(recording, gravity, flat, None, model)
     if flat is None or unusable_for_a_fit(before):
         return before, {"model": model, "why": "nothing could be estimated"}
     choice = _fit(recording, flat, gravity, model)
-    claim = claim_of(choice.fit, gravity)
+    claim = claim_of(choice.fit, gravity, choice.walked)
     evidence = Evidence(recording, gravity, flat, claimed(choice.fit, claim).right_handed(), choice.model, claim)
-    return evidence, {"model": choice.model, "why": choice.why}
+    left_out = f"; the board was elsewhere at once at {recording.t[-1]:.1f} s, and what follows is left out"
+    return evidence, {"model": choice.model, "why": choice.why + (left_out if jumped is not None else "")}
 
 
 def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> Choice:
@@ -90,19 +94,17 @@ def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> Choice
         walk = None if choice.fit.parts is None else likeliest_walk(choice.fit.parts, choice.fit.D)
         if walk is None or walk.what != "gyroscope" or not choice.fit.converged:
             break
-        walked = walk.at(np.maximum(recording.t - recording.t[flat.last - 1], 0.0))
-        recording = replace(recording, gyr=recording.gyr - walked)
-        without = _fit_once(recording, flat, gravity, model)
+        without = _fit_once(without_walk(choice.recording, flat, walk), flat, gravity, model)
         if not without.fit.V < choice.fit.V - LEAST_GAIN:
             break
-        choice = without
+        choice = without._replace(walked=without.walked + choice.walked + walk.q)
     return choice
 
 
 def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> Choice:
     if model == "auto":
         return choose(recording, flat, gravity)
-    return Choice(METHODS[model](recording, flat, gravity), model, "asked for")
+    return Choice(METHODS[model](recording, flat, gravity), model, "asked for", recording)
 
 
 def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:

@@ -139,10 +139,11 @@ class Evidence:
             a, b = runs[k][1] - 1, runs[k + 1][0]
             if r.t[b] - r.t[a] > LONGEST_MOVE_S:
                 continue
-            rate = r.gyr[a:b] - 0.5 * (bias[k] + bias[k + 1])
-            carried = product(rotation(-np.diff(r.t[a : b + 1])[:, None] * (rate @ fit.K.T))) @ poses[k]
-            cosine = _units(carried[None])[0] @ _units(poses[k + 1][None])[0]
-            misses.append(float(np.arccos(np.clip(cosine, -1.0, 1.0))))
+            dt, there = np.diff(r.t[a : b + 1])[:, None], _units(poses[k + 1][None])[0]
+            # by the two rests' own rates, which know a drift, or by the estimate: a turn about the vertical looks still
+            rates = [r.gyr[a:b] - b_omega for b_omega in (0.5 * (bias[k] + bias[k + 1]), fit.b_omega)]
+            carried = [product(rotation(-dt * (rate @ fit.K.T))) @ poses[k] for rate in rates]
+            misses.append(float(np.arccos(np.clip(_units(np.array(carried)) @ there, -1.0, 1.0)).min()))
         magnitude = np.linalg.norm(poses, axis=1) - self.gravity
         return Agreement(len(runs), float(np.sqrt(np.mean(magnitude**2))), *_median_and_max(misses))
 

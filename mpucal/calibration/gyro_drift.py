@@ -11,7 +11,7 @@ import numpy as np
 
 from ..data import Recording, Vector
 from .flat_segment import Flat
-from .static_intervals import Intervals
+from .static_intervals import Intervals, gravity_turns
 
 LONG_ENOUGH_FOR_BIAS_S = 0.5
 TURNING_RAD_S = 0.005  # slower, gravity wanders by a hand that settles and by noise
@@ -33,20 +33,12 @@ def without_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recordin
     rests = [recording.gyr[a:b].T for a, b in runs]
     tremor = np.maximum([[axis.var() for axis in rest] for rest in rests] - 1.2 * flat.Sigma_omega, 0.0)
     variance = flat.Sigma_omega / n + tremor * np.minimum(1.0, 2.0 * TREMOR_S * recording.rate_hz / n)
-    variance = variance + np.array([_turning(recording, a, b) for a, b in runs])[:, None]
+    # so far a run's mean rate may be a turn and no bias
+    turns = np.array([gravity_turns(recording, a, b) for a, b in runs])
+    variance = variance + np.maximum(turns - TURNING_RAD_S, 0.0)[:, None] ** 2
     walk = _smoothed(t, np.array([[axis.mean() for axis in rest] for rest in rests]), variance)
     bias = np.stack([np.interp(recording.t, t, column) for column in walk.T], axis=1)
     return replace(recording, gyr=recording.gyr - bias + flat.b_omega)
-
-
-def _turning(recording: Recording, first: int, last: int) -> float:
-    """(rad/s)^2 by which gravity turns in a run, beyond noise: so far its mean rate may be a turn and no bias."""
-    n = max((last - first) // 3, 1)
-    one, other = recording.acc[first : first + n], recording.acc[last - n : last]
-    moved = other.mean(0) - one.mean(0)
-    angle2 = float(np.sum(moved**2 - 3.0 * (one.var(0) + other.var(0)) / n)) / float(np.sum(one.mean(0) ** 2))
-    rate = np.sqrt(max(angle2, 0.0)) / float(recording.t[last - n] - recording.t[first])
-    return float(max(rate - TURNING_RAD_S, 0.0) ** 2)
 
 
 def _smoothed(t: Vector, mean: Vector, variance: Vector) -> Vector:

@@ -53,11 +53,11 @@ def evaluate(problem: Problem, theta: Theta, parameters: int) -> Evaluation:
 
 
 class PartScores(NamedTuple):
-    """What each part of a series adds to gradient (k, p) and Fisher matrix (k, p, p), and the flat mean's (p, p)."""
+    """What each part of a series adds to gradient (k, p) and Fisher matrix (k, p, p), and what the flat mean does."""
 
     gradient: Vector
     fisher: Vector
-    flat: Vector
+    flat: Evaluation
 
 
 def part_scores(problem: Problem, theta: Theta, parameters: int, ends: NDArray[np.int64]) -> PartScores:
@@ -80,7 +80,7 @@ def part_scores(problem: Problem, theta: Theta, parameters: int, ends: NDArray[n
     return PartScores(
         np.diff(gradient, axis=0, prepend=begin.gradient[None]),
         np.diff(fisher, axis=0, prepend=begin.fisher[None]),
-        begin.fisher,
+        begin,
     )
 
 

@@ -26,6 +26,10 @@ LINE_TOLERANCE, SHORTEST_LINE = 1e-6, 8
 
 GAP_INTERVALS = 2.5  # a longer time between samples than so many intervals is a gap
 
+# Of a board that is suddenly elsewhere: the least turn of gravity within one step beyond what the gyroscope tells, and
+# how much of that the steps before and after it may miss.
+JUMP_RAD, BESIDE, NEIGHBOURS = np.deg2rad(5.0), 0.2, 4
+
 
 def with_masks(recording: Recording) -> Recording:
     """The recording with its gaps and clipped samples marked, where its source did not already."""
@@ -44,6 +48,22 @@ def with_masks(recording: Recording) -> Recording:
         acc_clipped=recording.acc_clipped | (of_a_chip & _at_the_rail(recording.acc, acc_ranges)),
         gyr_clipped=recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, gyro_ranges)),
     )
+
+
+def jump(recording: Recording, flat: Flat) -> int | None:
+    """The first sample after a jump: gravity turned at once, and no rate told of it; None where there is none.
+
+    A simulator that is reset does so. What comes before it and after it has no known turn between.
+    """
+    acc, rate = recording.acc[flat.last :], recording.gyr[flat.last :] - flat.b_omega
+    turned = -np.cross(rate[1:], acc[:-1]) * np.diff(recording.t[flat.last :])[:, None]
+    missed = np.linalg.norm(np.diff(acc, axis=0) - turned, axis=1) / np.linalg.norm(flat.y)
+    for i in np.flatnonzero(missed > JUMP_RAD):
+        around = np.concatenate([missed[max(i - NEIGHBOURS, 0) : i], missed[i + 1 : i + 1 + NEIGHBOURS]])
+        of_gravity = abs(np.linalg.norm(acc[i + 1]) / np.linalg.norm(acc[i]) - 1.0) < BESIDE
+        if of_gravity and len(around) == 2 * NEIGHBOURS and around.max() < BESIDE * missed[i]:
+            return flat.last + int(i) + 1
+    return None
 
 
 def mask(series: Series, recording: Recording, flat: Flat) -> Series:

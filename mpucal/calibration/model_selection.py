@@ -5,7 +5,7 @@ The simplest model is chosen that explains the data: by the mean squared innovat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -26,11 +26,12 @@ from .parameters import ACCEL, IMU
 from .parts import parts_of
 from .prior import prior_of
 from .problem import Problem, Series
-from .theta import Theta
 from .tilt import fit_tilt
+from .walks import likeliest_walk, without_walk
 
 # The mean ||e||^2 of white noise is 3; a hand, or a gyroscope's scale, makes it tens to thousands.
 EXPLAINED_NIS = 4.0
+EXPLAINED_BY_ERRORS_NIS = 3.3  # whose sizes are the likeliest, and leave 3 where they are what the sensors err by
 HOPELESS_NIS = 10.0  # of means over blocks, in which white noise is less and a hand's is not
 
 SEARCH_HZ, ROUGHLY = 50.0, 0.05
@@ -52,12 +53,20 @@ ERRORS = tuple(Errors(kappa, floor) for kappa in (0.0, 1e-4, 3e-4, 1e-3) for flo
 ERROR_PASSES, ERRING_NIS = 2, 30.0
 
 
+MOST_WALKS = 2
+
+
 class Choice(NamedTuple):
-    """A fit, the model that made it, and why it was chosen."""
+    """A fit, the model that made it, and why it was chosen.
+
+    recording : what it was fitted to, without a walk of its gyroscope's bias of `walked` [(rad/s)^2] from part to part.
+    """
 
     fit: Fit
     model: str
     why: str
+    recording: Recording
+    walked: float = 0.0
 
 
 def fit_accel(recording: Recording, flat: Flat, gravity: float) -> Fit:
@@ -82,15 +91,16 @@ METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
 def choose(recording: Recording, flat: Flat, gravity: float) -> Choice:
     """The simplest model that explains the data.
 
-    White noise and a trusted gyroscope first, then its matrix K; the same with small errors of both sensors. K is kept
-    where a Wald test tells it from the identity. Data that none of them explains were measured in a hand.
+    White noise and a trusted gyroscope first, then its matrix K; the same with a steadied gyroscope, and with small
+    errors of both sensors. K is kept where a Wald test tells it from the identity. Data that none of them explains were
+    measured in a hand.
     """
-    in_place, least = _InPlace(recording, flat, gravity), np.inf
-    for erring in (False, True):
+    least = np.inf
+    for in_place, erring in _InPlace(recording, flat, gravity).attempts():
         for parameters in (ACCEL, IMU):
             minimum, errors = in_place.explained(parameters, erring)
             least = min(least, minimum.nis)
-            if minimum.nis >= EXPLAINED_NIS:
+            if minimum.nis >= (EXPLAINED_BY_ERRORS_NIS if erring else EXPLAINED_NIS):
                 continue
             if parameters == ACCEL:
                 imu = in_place.minimum(IMU, minimum, errors)
@@ -99,7 +109,7 @@ def choose(recording: Recording, flat: Flat, gravity: float) -> Choice:
     hand = fit_hand(recording, flat, gravity)
     kept = "K" if "K_xx" in hand.names else "no K (it is not told from the identity)"
     why = f"white noise does not explain the data (innovations {least:.0f}, expected 3): a hand's model, with {kept}"
-    return Choice(hand, "hand", why)
+    return Choice(hand, "hand", why, recording)
 
 
 def _chosen(in_place: _InPlace, minimum: Minimum, errors: Errors) -> Choice:
@@ -107,18 +117,45 @@ def _chosen(in_place: _InPlace, minimum: Minimum, errors: Errors) -> Choice:
     noise = "white noise" if errors == NO_ERRORS else "white noise with small errors of the sensors"
     gyroscope = "a perfect gyroscope explain" if perfect else "a gyroscope that is not perfect explain"
     why = f"{noise} and {gyroscope} the data (innovations {minimum.nis:.1f}, expected 3)"
-    return Choice(in_place.as_fit(minimum, errors), "accel" if perfect else "imu", why)
+    model = "accel" if perfect else "imu"
+    return Choice(in_place.as_fit(minimum, errors), model, why, in_place.recording, in_place.walked)
 
 
 class _InPlace:
     """The exact filter's fits of a recording of a sensor that turns in place."""
 
-    def __init__(self, recording: Recording, flat: Flat, gravity: float) -> None:
-        self._recording, self._flat, self._gravity = recording, flat, gravity
+    def __init__(self, recording: Recording, flat: Flat, gravity: float, walked: float = 0.0) -> None:
+        self.recording, self._flat, self._gravity, self.walked = recording, flat, gravity, walked
         self._prior = prior_of(flat)
         # means over blocks: white noise leaves little in a block beside its mean
         thin, at = downsampled(recording, flat, SEARCH_HZ)
         self._thin, self._thin_flat = thin, flat_statistics(thin, at)
+        self._roughly: dict[int, Minimum] = {}
+
+    def attempts(self) -> Iterator[tuple[_InPlace, bool]]:
+        """Recordings to explain, and whether with errors of the sensors: the simplest first."""
+        yield self, False
+        if self._errs():
+            yield self._steadied(), False
+            yield self, True
+
+    def _errs(self) -> bool:
+        """Whether errors of the largest size could explain the data."""
+        squares = evaluate(self._thin_problem(ERRORS[-1]), self._rough(IMU).theta, 0).squares
+        return squares < ERRING_NIS * len(self._thin)
+
+    def _steadied(self) -> _InPlace:
+        """Without the walk of the gyroscope's bias that the parts show; small errors would explain that as well."""
+        steady = self
+        for _ in range(MOST_WALKS):
+            rough = steady._rough(IMU)
+            parts = parts_of(steady._thin_problem(NO_ERRORS), rough, self._prior)
+            walk = None if parts is None else likeliest_walk(parts, rough.theta.D)
+            if walk is None or walk.what != "gyroscope":
+                break
+            recording, walked = without_walk(steady.recording, self._flat, walk), steady.walked + walk.q
+            steady = _InPlace(recording, self._flat, self._gravity, walked)
+        return steady
 
     def fit(self, parameters: int) -> Fit:
         """With white noise alone, whether it explains the data or not."""
@@ -128,7 +165,7 @@ class _InPlace:
         """The minimum, rough where it is hopeless, and the errors that make it likeliest."""
         errors = NO_ERRORS
         minimum = self._rough(parameters)
-        for _ in range(ERROR_PASSES if erring and self._erring(minimum.theta) else 0):
+        for _ in range(ERROR_PASSES if erring else 0):
             theta = minimum.theta
             errors = min(ERRORS, key=lambda these: evaluate(self._thin_problem(these), theta, 0).V)
             minimum = minimise(self._thin_problem(errors), theta, parameters, self._prior, until=ROUGHLY)
@@ -146,18 +183,15 @@ class _InPlace:
         known = at_prior(minimum.covariance()) if len(minimum.free) > ACCEL else ()
         return minimum.as_fit(known, parts_of(self._problem(errors), minimum, self._prior))
 
-    def _erring(self, theta: Theta) -> bool:
-        """Whether errors of the largest size could explain the data."""
-        squares = evaluate(self._thin_problem(ERRORS[-1]), theta, 0).squares
-        return squares < ERRING_NIS * len(self._thin)
-
     def _rough(self, parameters: int) -> Minimum:
-        problem = self._thin_problem(NO_ERRORS)
-        theta = initialise(problem, self._flat.b_omega)
-        return minimise(problem, theta, parameters, self._prior, until=ROUGHLY)
+        if parameters not in self._roughly:
+            problem = self._thin_problem(NO_ERRORS)
+            theta = initialise(problem, self._flat.b_omega)
+            self._roughly[parameters] = minimise(problem, theta, parameters, self._prior, until=ROUGHLY)
+        return self._roughly[parameters]
 
     def _problem(self, errors: Errors) -> Problem:
-        return _problem(self._recording, self._flat, self._gravity, errors)
+        return _problem(self.recording, self._flat, self._gravity, errors)
 
     def _thin_problem(self, errors: Errors) -> Problem:
         return _problem(self._thin, self._thin_flat, self._gravity, errors)

@@ -16,6 +16,7 @@ from .levenberg_marquardt import Minimum
 from .likelihood import part_scores
 from .prior import Prior
 from .problem import Problem
+from .theta import values
 
 MOST_PARTS, FEWEST_SAMPLES = 96, 16
 
@@ -27,13 +28,15 @@ class Parts:
     Attributes
     ----------
     gradient : (k, p) and fisher : (k, p, p) what each part adds to those of V, by the parameters that were estimated.
-    H : (p, p) Fisher matrix of all with the prior's and the flat mean's.
+    H : (p, p) Fisher matrix of all with the prior's and the flat mean's. left : (p,) gradient of all likewise, which a
+        minimiser leaves at nearly 0.
     start, end : (k,) s after the flat segment. side : (k,) 0 to 5, the body's axis nearest to gravity, with its sign.
     """
 
     gradient: Vector
     fisher: Vector
     H: Vector
+    left: Vector
     start: Vector
     end: Vector
     side: NDArray[np.intp]
@@ -64,11 +67,14 @@ def parts_of(problem: Problem, minimum: Minimum, prior: Prior) -> Parts | None:
     mean = np.add.reduceat(series.y, starts) / np.diff(ends, prepend=0)[:, None]
     s = (mean - theta.b_a) @ np.linalg.pinv(theta.D).T
     axis = np.abs(s).argmax(1)
-    H = scores.fisher.sum(0) + scores.flat + np.diag(prior.precision[: len(free)])
+    away, precision = values(theta)[: len(free)] - prior.mean[: len(free)], prior.precision[: len(free)]
+    left = scores.gradient.sum(0) + scores.flat.gradient + precision * away
+    H = scores.fisher.sum(0) + scores.flat.fisher + np.diag(precision)
     return Parts(
         scores.gradient[:, free],
         scores.fisher[:, free][:, :, free],
         H[np.ix_(free, free)],
+        left[free],
         t[starts],
         t[ends],
         2 * axis + (s[np.arange(k), axis] > 0.0),

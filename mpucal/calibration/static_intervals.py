@@ -18,6 +18,7 @@ TRIM, LEAST_TRIM_S, MOST_TRIM_S = 0.125, 0.1, 0.25  # of a rest at either end: a
 TIMES_QUIET = 2.5
 GYRO_SD_RAD_S, ACC_SD_MPS2 = 0.03, 0.15
 GYRO_MEAN_RAD_S = 0.05
+TURNS_RAD_S = 0.02  # faster, the accelerometer says, it turns: neither a rest nor a bias of the gyroscope
 
 Intervals = NDArray[np.intp]
 
@@ -48,7 +49,17 @@ def static_intervals(recording: Recording, flat: Flat) -> Intervals:
     runs, rate = _runs(still), recording.rate_hz
     trim = np.clip(TRIM * (runs[:, 1] - runs[:, 0]), LEAST_TRIM_S * rate, MOST_TRIM_S * rate).astype(np.intp)
     runs = runs + np.stack([trim, -trim], axis=1)
-    return np.asarray(runs[runs[:, 1] - runs[:, 0] >= SHORTEST_S * rate])
+    runs = runs[runs[:, 1] - runs[:, 0] >= SHORTEST_S * rate]
+    return np.asarray(runs[[gravity_turns(recording, a, b) < TURNS_RAD_S for a, b in runs]].reshape(-1, 2))
+
+
+def gravity_turns(recording: Recording, first: int, last: int) -> float:
+    """rad/s by which gravity turns in a run of samples, as far as it is beyond noise."""
+    n = max((last - first) // 3, 1)
+    one, other = recording.acc[first : first + n], recording.acc[last - n : last]
+    moved = other.mean(0) - one.mean(0)
+    angle2 = float(np.sum(moved**2 - 3.0 * (one.var(0) + other.var(0)) / n)) / float(np.sum(one.mean(0) ** 2))
+    return float(np.sqrt(max(angle2, 0.0)) / (recording.t[last - n] - recording.t[first]))
 
 
 def _moving(values: Vector, n: int) -> tuple[Vector, Vector]:

@@ -13,12 +13,16 @@ quadratic form is S + I/q, and by the eigenvalues of S the marginal likelihood o
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
-from ..data import Vector
+from ..data import Recording, Vector
+from .flat_segment import Flat
+from .levenberg_marquardt import inverse
 from .parameters import PLACES
 from .parts import Parts
 from .rotation import cross
@@ -42,13 +46,14 @@ class Walk(NamedTuple):
 
     Attributes
     ----------
-    what : changed. gain : 2 log of how much likelier it is than none.
+    what : changed. gain : 2 log of how much likelier it is than none. q : variance of a step from part to part.
     delta : (k, 3) from the estimate, m/s^2, rad/s or rad. t : (k,) s after the flat segment, the middles of the parts;
     of sides none.
     """
 
     what: What
     gain: float
+    q: float
     delta: Vector
     t: Vector
 
@@ -84,6 +89,21 @@ def likeliest_walk(parts: Parts, D: Vector) -> Walk | None:
     return walk if walk.gain > SIGNIFICANT else None
 
 
+def without_walk(recording: Recording, flat: Flat, walk: Walk) -> Recording:
+    """With a walk of the gyroscope's bias taken from its rates."""
+    return replace(recording, gyr=recording.gyr - walk.at(np.maximum(recording.t - recording.t[flat.last - 1], 0.0)))
+
+
+def walked_covariance(parts: Parts, D: Vector, q: float) -> Vector:
+    """(p, p) covariance of theta where the gyroscope's bias walks by q [(rad/s)^2] from part to part."""
+    gradient, fisher = parts.grouped(parts.by_time(min(TIMES, len(parts))))
+    k, B = len(gradient), _directions("gyroscope", D, len(parts.H))
+    back = np.kron(np.eye(k) - np.eye(k, k=-1), np.eye(3))
+    M = block_diag(*(B.T @ fisher @ B)) + back.T @ back / q
+    across = (fisher @ B).transpose(1, 0, 2).reshape(-1, 3 * k)
+    return inverse(parts.H - across @ np.linalg.solve(M, across.T))
+
+
 def _directions(what: What, D: Vector, p: int) -> Vector:
     """(p, 3) by which the three numbers move the parameters."""
     B = np.zeros((p, 3))
@@ -98,20 +118,20 @@ def _walk(what: What, parts: Parts, D: Vector, groups: NDArray[np.intp], t: Vect
     gradient, fisher = parts.grouped(groups)
     k, B = len(gradient), _directions(what, D, len(parts.H))
     to_theta = fisher @ B  # (k, p, 3)
-    S = np.zeros((3 * k, 3 * k))
-    for i in range(k):
-        S[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = B.T @ to_theta[i]
+    S = block_diag(*(B.T @ to_theta))
     across = to_theta.transpose(1, 0, 2).reshape(-1, 3 * k)
     scale = 1.0 / np.sqrt(np.diag(parts.H))
     H = parts.H * np.outer(scale, scale)
-    S -= across.T @ (np.linalg.solve(H, across * scale[:, None]) * scale[:, None])
+    # how theta follows a delta
+    follow = (np.linalg.solve(H, across * scale[:, None]) * scale[:, None]).T
+    S -= follow @ across
     # the deltas of a walk are sums of x
     sums = np.kron(np.eye(k) if what == "side" else np.tri(k), np.eye(3))
     eigenvalues, U = np.linalg.eigh(sums.T @ S @ sums)
     eigenvalues = np.maximum(eigenvalues, 0.0)
-    c = U.T @ (sums.T @ -(gradient @ B).ravel())
+    c = U.T @ (sums.T @ (follow @ parts.left - (gradient @ B).ravel()))
     q = STEPS[what][:, None]
     gain = np.sum(c**2 / (eigenvalues + 1.0 / q) - np.log1p(q * eigenvalues), axis=1)
     best = int(gain.argmax())
     delta = (sums @ (U @ (c / (eigenvalues + 1.0 / q[best])))).reshape(k, 3)
-    return Walk(what, float(gain[best]), delta, t)
+    return Walk(what, float(gain[best]), float(q[best, 0]), delta, t)

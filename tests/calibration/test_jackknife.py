@@ -40,7 +40,7 @@ def test_the_parts_scores_sum_to_the_whole(made, parameters, block):
     scores = part_scores(problem, theta, parameters, np.array([n // 3, n // 2, n]))
     begin, whole = evaluate(problem.first(0), theta, parameters), evaluate(problem, theta, parameters)
     np.testing.assert_allclose(scores.gradient.sum(0) + begin.gradient, whole.gradient, rtol=1e-9)
-    np.testing.assert_allclose(scores.fisher.sum(0) + scores.flat, whole.fisher, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(scores.fisher.sum(0) + scores.flat.fisher, whole.fisher, rtol=1e-9, atol=1e-6)
     # the kernel sums up to whole blocks of steps, the first of which is the flat mean's
     end = (n // 3 // block + 1) * block - 1
     first = evaluate(problem.first(end), theta, parameters)
@@ -61,7 +61,8 @@ def test_linear_measurements_without_a_part_are_fitted_exactly():
     H = np.einsum("kmp,kmq->pq", A, A)
     theta = np.linalg.solve(H, np.einsum("kmp,km->p", A, y))
     gradient = -np.einsum("kmp,km->kp", A, y - A @ theta)
-    parts = Parts(gradient, np.einsum("kmp,kmq->kpq", A, A), H, np.arange(k), np.arange(1, k + 1), np.arange(k) % 6)
+    fisher, left = np.einsum("kmp,kmq->kpq", A, A), gradient.sum(0)
+    parts = Parts(gradient, fisher, H, left, np.arange(k), np.arange(1, k + 1), np.arange(k) % 6)
     groups = parts.by_time(8)
     left_out = [np.linalg.lstsq(A[groups != g].reshape(-1, p), y[groups != g].ravel(), rcond=None)[0] for g in range(8)]
     moved = np.array(left_out) - np.median(left_out, axis=0)

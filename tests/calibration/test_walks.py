@@ -58,12 +58,14 @@ def test_the_likelihood_is_that_of_the_joint_gaussian():
     # a prior on theta, so that the density of y exists: H has it beside the parts'
     prior = np.eye(p)
     H = prior + np.einsum("kmp,kmq->pq", A, A)
-    theta = np.linalg.solve(H, np.einsum("kmp,km->p", A, y))
-    residual = y - A @ theta
+    # a minimiser may stop short of the minimum
+    theta = np.linalg.solve(H, np.einsum("kmp,km->p", A, y)) + 0.1 * rng.standard_normal(p)
+    gradient = -np.einsum("kmp,km->kp", A, y - A @ theta)
     parts = Parts(
-        -np.einsum("kmp,km->kp", A, residual),
+        gradient,
         np.einsum("kmp,kmq->kpq", A, A),
         H,
+        gradient.sum(0) + prior @ theta,
         np.arange(k, dtype=float),
         np.arange(1, k + 1, dtype=float),
         np.zeros(k, np.intp),

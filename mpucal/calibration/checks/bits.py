@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...reasons import Reason, reason
 from ..evidence import Evidence
-from .estimate import GOOD_RMS_MPS2
 from .unusable import dead_accelerometer, dead_gyroscope
 
 # PS-MPU-6000A r3.4, section 6: sensitivities at 16 bits
@@ -30,7 +29,7 @@ ODD_STEPS, EXACTLY, FEWEST_VALUES, MOST_SAMPLES = 8.0, 0.02, 6, 20_000
 # Below this a step [m/s^2, rad/s] may be that of a float32, which is coarser the larger a value is.
 LEAST_ODD_STEP = 1e-3
 # beyond these an axis' rounding is no calibration's noise any more
-HONEST_STD, USABLE_RAD_S = 4.0, np.deg2rad(0.5)
+HONEST_STD, MOST_MPS2, USABLE_RAD_S = 4.0, 0.1, np.deg2rad(0.5)
 
 Counts = NDArray[np.int64]
 
@@ -51,7 +50,7 @@ def bits_stuck(e: Evidence) -> Reason | None:
     acc_range, gyro_range = e.recording.sensor.accel_range_g, e.recording.sensor.gyro_range_dps
     acc_lsb = None if acc_range is None else acc_range * STANDARD_GRAVITY_MPS2 / FULL_SCALE
     gyr_lsb = None if gyro_range is None else np.deg2rad(gyro_range / GYRO_DPS / GYRO_LSB_PER_DPS)
-    most = GOOD_RMS_MPS2 if e.sure is None else min(GOOD_RMS_MPS2, HONEST_STD * e.sure.rms_mps2)
+    most = MOST_MPS2 if e.sure is None else min(MOST_MPS2, HONEST_STD * e.sure.rms_mps2)
     return _stuck(e, e.recording.acc, acc_lsb, "accelerometer", "m/s^2", most) or _stuck(
         e, e.recording.gyr, gyr_lsb, "gyroscope", "rad/s", USABLE_RAD_S
     )

@@ -10,8 +10,9 @@ from ..evidence import Evidence
 from ..tilt import CONE_RAD
 from ..walks import Walk
 
-GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.1, 0.4
-AGREE_RMS_MPS2 = 0.08  # where it is the disagreement of parts that says so
+# of a claim, 1 sigma: errors of 0.1 m/s^2 are then rare
+GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.075, 0.4
+CHANCE = 1.5  # times the model's claim: so much parts differ by chance
 CONSISTENT_NIS = 5.0
 RESTS_MPS2, RESTS_RAD = 0.08, np.deg2rad(1.5)
 HONEST_FACTOR = 5.0
@@ -41,7 +42,9 @@ def _model_rms(e: Evidence) -> float | None:
     """m/s^2 that more orientations make less; None where nothing is known."""
     if e.sure is None:
         return None
-    return e.sure.rms_mps2 if e.claim is None or (e.claim.by == "side" and not _sides_contradict(e)) else e.claim.model
+    if e.claim is None or e.claim.inflation < CHANCE or (e.claim.by == "side" and not _sides_contradict(e)):
+        return e.sure.rms_mps2
+    return e.claim.model
 
 
 def _sides_contradict(e: Evidence) -> bool:
@@ -75,7 +78,8 @@ def inconsistent(e: Evidence) -> Reason | None:
         return reason(
             "inconsistent", "innovations", _useless(e) or not abs(after / e.gravity - 1.0) < 0.05, nis=e.fit.nis
         )
-    if e.agreement is None:
+    # where every sample is explained, so are the pauses
+    if e.model in ("accel", "imu") or e.agreement is None:
         return None
     magnitude, miss = e.agreement.magnitude_rms, e.agreement.miss_median
     too_long = magnitude > max(RESTS_MPS2, HONEST_FACTOR * e.sure.magnitude_mps2)
@@ -128,7 +132,7 @@ def parts_disagree(e: Evidence) -> Reason | None:
         return None
     if _excused(e) and not _useless(e):
         return None
-    too_large = e.sure.rms_mps2 > AGREE_RMS_MPS2 and claim.model <= GOOD_RMS_MPS2 and claim.by != "model"
+    too_large = claim.inflation >= CHANCE and e.sure.rms_mps2 > GOOD_RMS_MPS2 >= claim.model
     much = claim.inflation > DISAGREE and claim.left_out.claim() > DISAGREE_MPS2
     if _sides_contradict(e):
         return reason("inconsistent", "sides", rms=e.sure.rms_mps2)
