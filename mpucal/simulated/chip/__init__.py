@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...data import STANDARD_GRAVITY_MPS2
-from ..faults import mishaps
+from ..faults import mishaps as begun
 from ..hands import KINDS
+from ..mishaps import Mishap
 from ..motion import Motion
 from ..sensor import SensorTruth
 from .bus import SimulatedBus
@@ -30,6 +32,7 @@ def open_simulated(
     gravity: float = STANDARD_GRAVITY_MPS2,
     seed: int | None = None,
     clock: SimulatedClock | None = None,
+    mishaps: Sequence[Mishap] = (),
 ) -> SimulatedBus:
     """The simulated chip that `sim:key=value,...` describes.
 
@@ -37,6 +40,7 @@ def open_simulated(
     ----------
     text : `sim`, or with keys: chip, who_am_i, offsets, seed, hand, pace, fault, rate_error_ppm, D, b_a, K,
         b_omega, noise, temperature_c, khz. gravity : m/s^2, where the board is. seed : beside the text.
+    mishaps : what befalls the sensor, besides the faults of the text.
     clock : time in place of `pace`'s, where something else moves the bus.
 
     Raises
@@ -46,7 +50,7 @@ def open_simulated(
     options = ChipOptions.parse(text, seed)
     truth = _truth(options, gravity)
     of_hand, of_motion, of_noise, of_trim, of_faults = np.random.default_rng([options.seed, 2]).spawn(5)
-    motion = Motion(KINDS[options.hand](of_hand), of_motion, gravity, mishaps(options.fault))
+    motion = Motion(KINDS[options.hand](of_hand), of_motion, gravity, (*begun(options.fault), *mishaps))
     model = replace(MODELS[options.chip], **OFFSETS[options.offsets])
     if options.who_am_i is not None:
         model = replace(model, who_am_i=options.who_am_i)
