@@ -19,7 +19,7 @@ from .claim import claim_of, claimed
 from .evidence import Evidence
 from .fit import Fit
 from .flat_segment import Flat, find_flat, flat_statistics, tells
-from .masks import jump, with_masks
+from .masks import reset, with_masks
 from .model_selection import METHODS, Choice, choose
 from .parameters import B_A_NAMES, B_OMEGA_NAMES, BY_NAME, D_NAMES
 from .quality import judge
@@ -74,17 +74,17 @@ def weigh(
     recording = with_masks(recording)
     segment = recording.flat or find_flat(recording)
     flat = flat_statistics(recording, segment) if segment is not None and tells(recording, segment) else None
-    jumped = None if flat is None else jump(recording, flat)
-    if jumped is not None:
-        recording = recording.part(0, jumped)
+    over = None if flat is None else reset(recording, flat)
+    if over is not None:
+        recording = recording.part(0, over)
     before = Evidence(recording, gravity, flat, None, model)
     if flat is None or unusable_for_a_fit(before):
         return before, {"model": model, "why": "nothing could be estimated"}
     choice = _fit(recording, flat, gravity, model)
     claim = claim_of(choice.fit, gravity, choice.walked)
     evidence = Evidence(recording, gravity, flat, claimed(choice.fit, claim).right_handed(), choice.model, claim)
-    left_out = f"; the board was elsewhere at once at {recording.t[-1]:.1f} s, and what follows is left out"
-    return evidence, {"model": choice.model, "why": choice.why + (left_out if jumped is not None else "")}
+    left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
+    return evidence, {"model": choice.model, "why": choice.why + (left_out if over is not None else "")}
 
 
 def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> Choice:

@@ -26,9 +26,9 @@ LINE_TOLERANCE, SHORTEST_LINE = 1e-6, 8
 
 GAP_INTERVALS = 2.5  # a longer time between samples than so many intervals is a gap
 
-# Of a board that is suddenly elsewhere: the least turn of gravity within one step beyond what the gyroscope tells, and
-# how much of that the steps before and after it may miss.
-JUMP_RAD, BESIDE, NEIGHBOURS = np.deg2rad(5.0), 0.2, 4
+# Of a board that is back at once: how far gravity turns within a step beyond what the gyroscope tells, how much of that
+# the steps before and after it may miss, and how near it is then to where it lay.
+JUMP_RAD, BESIDE, NEIGHBOURS, BACK = np.deg2rad(5.0), 0.2, 4, 0.02
 
 
 def with_masks(recording: Recording) -> Recording:
@@ -50,19 +50,22 @@ def with_masks(recording: Recording) -> Recording:
     )
 
 
-def jump(recording: Recording, flat: Flat) -> int | None:
-    """The first sample after a jump: gravity turned at once, and no rate told of it; None where there is none.
+def reset(recording: Recording, flat: Flat) -> int | None:
+    """The first sample after a simulator was reset; None where it was not.
 
-    A simulator that is reset does so. What comes before it and after it has no known turn between.
+    The board lies flat again at once, and no rate tells of the way.
     """
     acc, rate = recording.acc[flat.last :], recording.gyr[flat.last :] - flat.b_omega
-    turned = -np.cross(rate[1:], acc[:-1]) * np.diff(recording.t[flat.last :])[:, None]
-    missed = np.linalg.norm(np.diff(acc, axis=0) - turned, axis=1) / np.linalg.norm(flat.y)
-    for i in np.flatnonzero(missed > JUMP_RAD):
-        around = np.concatenate([missed[max(i - NEIGHBOURS, 0) : i], missed[i + 1 : i + 1 + NEIGHBOURS]])
-        of_gravity = abs(np.linalg.norm(acc[i + 1]) / np.linalg.norm(acc[i]) - 1.0) < BESIDE
-        if of_gravity and len(around) == 2 * NEIGHBOURS and around.max() < BESIDE * missed[i]:
-            return flat.last + int(i) + 1
+    dt = np.diff(recording.t[flat.last :])[:, None]
+    with np.errstate(all="ignore"):
+        missed = np.linalg.norm(np.diff(acc, axis=0) + np.cross(rate[1:], acc[:-1]) * dt, axis=1)
+        missed /= np.linalg.norm(flat.y)
+        for i in np.flatnonzero((missed > JUMP_RAD) & ~recording.gap[flat.last + 1 :]):
+            around = np.concatenate([missed[max(i - NEIGHBOURS, 0) : i], missed[i + 1 : i + 1 + NEIGHBOURS]])
+            after = acc[i + 1 : i + 1 + NEIGHBOURS].mean(0)
+            back = np.linalg.norm(after - flat.y) < BACK * np.linalg.norm(flat.y)
+            if back and len(around) == 2 * NEIGHBOURS and around.max() < BESIDE * missed[i]:
+                return flat.last + int(i) + 1
     return None
 
 

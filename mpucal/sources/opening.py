@@ -161,4 +161,4 @@ def _plan(values: Mapping[str, Any], until_end: bool, of_a_chip: bool) -> Plan:
             raise UsageError(what, "leave it out: tilts are fitted by the model tilt")
         model = "tilt"
     aim = {name: values[name] for name in ("target", "tilt_only", "attended", "gravity_anyway") if name in values}
-    return Plan(config, values.get("gravity", usual.gravity), model, until_end, lay_back=not until_end, **aim)
+    return Plan(config, values.get("gravity", usual.gravity), model, until_end, **aim)

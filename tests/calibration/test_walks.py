@@ -86,5 +86,5 @@ def test_the_likelihood_is_that_of_the_joint_gaussian():
 
 
 def test_a_walk_is_drawn_straight_from_where_the_turning_begins():
-    walk = Walk("gyroscope", 30.0, np.array([[0.0, 0.0, 0.2], [0.0, 0.0, 0.4]]), np.array([1.0, 3.0]))
+    walk = Walk("gyroscope", 30.0, 1e-8, np.array([[0.0, 0.0, 0.2], [0.0, 0.0, 0.4]]), np.array([1.0, 3.0]))
     np.testing.assert_allclose(walk.at(np.array([0.0, 0.5, 1.0, 2.0, 9.0]))[:, 2], [0.0, 0.1, 0.2, 0.3, 0.4])
