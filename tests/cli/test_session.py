@@ -147,7 +147,7 @@ def test_a_changed_access_stops(mpucal, session, tmp_path):
 
 def test_a_capture_cut_short_while_rotating_is_refused_with_reasons_and_without_a_blob(mpucal, session, tmp_path):
     data = (session.folder / "capture.mcap").read_bytes()
-    (tmp_path / "cut.mcap").write_bytes(data[: int(0.22 * len(data))])
+    (tmp_path / "cut.mcap").write_bytes(data[: int(0.3 * len(data))])
     result = mpucal("session", "--replay", "cut.mcap", "-o", "board")
     assert result.code == 5
     assert "cut.mcap" in result.err

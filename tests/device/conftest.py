@@ -31,7 +31,9 @@ class Result:
 
     @property
     def sentences(self) -> list[str]:
-        return [line for line in self.err.splitlines() if line.startswith("mpucal: ")]
+        events = [json.loads(line) for line in self.err.splitlines() if line.startswith("{")]
+        said = [f"mpucal: {event['what']}: {event['remedy']}" for event in events if event["event"] == "error"]
+        return said + [line for line in self.err.splitlines() if line.startswith("mpucal: ")]
 
 
 class Device:

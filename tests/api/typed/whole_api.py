@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import mpucal
-from mpucal import Calibration, CheckResult, MpucalError, Recording
+from mpucal import Calibration, CheckResult, MpucalError, Noise, Recording
 
 Vector = NDArray[np.float64]
 
@@ -43,6 +43,7 @@ assert_type(calibration.apply(acc, gyr), tuple[Vector, Vector])
 assert_type(calibration.apply(pl.DataFrame()), pl.DataFrame)
 assert_type(calibration.plot(recording), Figure)
 assert_type(mpucal.check(calibration, "today.mcap", days=30.0), CheckResult)
+assert_type(mpucal.noise("rest.csv"), Noise)
 calibration.save("calibration.json")
 try:
     assert_type(Calibration.load(Path("calibration.bin")), Calibration)
