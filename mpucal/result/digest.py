@@ -1,7 +1,8 @@
 """The digest in calibration.json, by which a number that was changed since is noticed.
 
-"sha256:" and the hexadecimal SHA-256 of the document without its `digest`, written as JSON with sorted keys, no
-blanks, ASCII alone, and every number as Python's repr of the double: the shortest decimal digits that give it again.
+"sha256:" and the hexadecimal SHA-256 of the document without its `digest` and `created`, written as JSON with sorted
+keys, no blanks, ASCII alone, and every number as Python's repr of the double: the shortest decimal digits that give it
+again. Without `created`, a session that is replayed has the digest of the first one.
 """
 
 from __future__ import annotations
@@ -11,13 +12,13 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-DIGEST = "digest"
+DIGEST, CREATED = "digest", "created"
 
 
 def digest(document: Mapping[str, Any]) -> str:
     """That of a document, whatever its `digest` says."""
     text = json.dumps(
-        _doubles({key: value for key, value in document.items() if key != DIGEST}),
+        _doubles({key: value for key, value in document.items() if key not in (DIGEST, CREATED)}),
         sort_keys=True,
         separators=(",", ":"),
     )
