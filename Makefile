@@ -12,7 +12,7 @@ session: $(READY)
 	@$(BIN)/mpucal session --bus sim
 
 test: lint docs
-	$(BIN)/pytest --numprocesses auto --dist loadfile
+	$(BIN)/pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 lint: $(TESTED)
 	$(BIN)/ruff check --quiet .

@@ -17,6 +17,24 @@ os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="mpucal-state-")
 from mpucal.files import open_writer
 from mpucal.files.rows import Rows
 
+# Files that take longest go first: a process that takes one last would work alone.
+SLOW = (
+    "test_real_session.py",
+    "test_installed.py",
+    "test_make_reasons.py",
+    "test_library.py",
+    "test_board.py",
+    "test_browser.py",
+    "test_emulated.py",
+    "test_resume.py",
+    "test_fixtures.py",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Order the files; those of a file stay as they are."""
+    items.sort(key=lambda item: SLOW.index(item.path.name) if item.path.name in SLOW else len(SLOW))
+
 
 @pytest.fixture(scope="session")
 def save():

@@ -25,6 +25,7 @@ class Painter:
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
+        self._on_terminal = out.isatty()
         self._console = Console(file=out)
         self._painted: list[str] = []
         self._size = (0, 0)
@@ -85,7 +86,9 @@ class Painter:
         return "".join(parts)
 
     def _send(self, text: str) -> None:
-        # a terminal that is gone needs no painting, and nobody is there to be told
+        # a terminal that is gone needs no painting, nor does the log in its place, and nobody is there to be told
+        if self._on_terminal and not self._out.isatty():
+            return
         with suppress(OSError):
             self._out.write(text)
             self._out.flush()
