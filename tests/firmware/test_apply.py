@@ -1,4 +1,4 @@
-"""mpucal_apply.h against the Python codec and NumPy: golden vectors, a million random blobs, float32 rounding."""
+"""mpucal_apply.h against the Python codec and NumPy: golden vectors, random blobs, float32 rounding."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MEASURED = Blob.decode((VECTORS / "blob_measured.bin").read_bytes())
 OK, NO_BLOB, OTHER_MAJOR, BAD_LENGTH, BAD_CRC, NOT_FINITE, NOT_INVERTIBLE, OTHER_CHIP, OTHER_RANGE = range(9)
 EPS = np.finfo(np.float32).eps
 STANDARD_GRAVITY_MPS2 = 9.80665
-BLOBS, CHUNK = 1_000_000, 100_000
+BLOBS, CHUNK = 200_000, 100_000
 # the calendar ends in the year 9999
 LAST_SECOND = 253_402_300_799
 
@@ -189,8 +189,8 @@ def read_by_python(data, sizes):
     return accepted, np.array(fields, np.float32)
 
 
-@pytest.mark.skipif("MPUCAL_SANITIZE" in os.environ, reason="a million of them take a minute under the sanitizers")
-def test_reads_a_million_random_blobs_as_python_does(core):
+@pytest.mark.skipif("MPUCAL_SANITIZE" in os.environ, reason="so many of them take a minute under the sanitizers")
+def test_reads_random_blobs_as_python_does(core):
     rng = np.random.default_rng(6)
     accepted_of_all = refused = computed = 0
     for _ in range(BLOBS // CHUNK):
