@@ -6,13 +6,17 @@ READY := $(VENV)/.ready
 TESTED := $(VENV)/.tested
 export PYTHON
 
-.PHONY: session test kernel lint bench wheel docs firmware clean
+.PHONY: session test slow kernel lint bench wheel docs firmware clean
 
 session: $(READY)
 	@$(BIN)/mpucal session --bus sim
 
 test: lint docs
 	$(BIN)/pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
+
+# what `make test` leaves out for its time
+slow: $(TESTED)
+	$(BIN)/pytest --numprocesses auto -m slow
 
 lint: $(TESTED)
 	$(BIN)/ruff check --quiet .

@@ -122,6 +122,7 @@ def test_a_recording_whose_person_was_told_nothing_is_calibrated(tmp_path, name,
     assert transported_deg(found.file, "--trim", 0.5, "--gravity", 9.81, recording=recording) <= most_deg
 
 
+@pytest.mark.slow
 def test_one_that_never_rests_between_is_calibrated_and_known_less_well(tmp_path):
     """Continuous rotation, 285.7 Hz, drawn through to a rate that the chip has."""
     broad = np.load(RECORDINGS / "broad_01.npz")
@@ -135,6 +136,7 @@ def test_one_that_never_rests_between_is_calibrated_and_known_less_well(tmp_path
     assert 0.005 < max(found.document["accelerometer"]["b_a_std"]) < 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "words"), [("mpu6050_turn90", "known to"), ("mpu6050_static", "hardly turned")])
 def test_one_that_was_hardly_turned_is_refused_for_that(tmp_path, name, words):
     found = session_of(tmp_path, RECORDINGS / f"{name}.npz")

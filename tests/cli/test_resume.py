@@ -124,6 +124,7 @@ def of_another_hand(capture, hand, folder):
                 writer.transaction(record)
 
 
+@pytest.mark.slow
 def test_a_board_that_was_never_still_is_laid_flat_again(mpucal, tmp_path):
     first = mpucal("session", "--bus", "sim:hand=restless", "--rate", "50", "-o", "restless")
     assert first.code == 4

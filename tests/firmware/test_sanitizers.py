@@ -29,6 +29,7 @@ def run(sanitized, *words):
     return subprocess.run([sys.executable, *words], env=sanitized, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_the_core_passes_its_tests_under_sanitizers(sanitized):
     paths = [str(HERE / name) for name in TESTS]
     done = run(sanitized, "-m", "pytest", "-p", "no:cacheprovider", "-p", "no:xdist", *paths)

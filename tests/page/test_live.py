@@ -7,12 +7,14 @@ import urllib.request
 from contextlib import closing
 
 import numpy as np
+import pytest
 
 from mpucal.result.calibration import Calibration
 
 B_A = np.array([0.3, -0.2, 1.0])
 
 
+@pytest.mark.slow
 def test_the_values_are_those_that_are_printed(tmp_path, tab):
     Calibration(np.eye(3), B_A).save(tmp_path / "c.json")
     words = ["stream", "--bus", "sim:pace=real,hand=still", "--seconds", "4", "--apply", "c.json", "--json", "--page"]

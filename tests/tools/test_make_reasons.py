@@ -28,6 +28,7 @@ def codes(quality):
 SESSION = {code: kind.reproduce for code, kind in KINDS.items() if kind.reproduce.startswith("mpucal session ")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", dict.fromkeys(SESSION.values()), ids=lambda words: words.split()[3])
 def test_a_session_shows_its_reasons(command, capsys, tmp_path):
     run([*shlex.split(command)[1:], "-o", str(tmp_path / "s"), "--no-write", "--yes", "--json"])

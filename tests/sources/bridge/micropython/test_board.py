@@ -160,6 +160,7 @@ def session(bus, chip, folder):
         return runner.calibrate(recording, calibrate)
 
 
+@pytest.mark.slow
 def test_a_whole_session_is_good(pasted, tmp_path):
     chip, clock = simulated()
     found = session(BridgeBus(EmulatedLine(pasted(chip, clock.now), clock)), chip, tmp_path)
