@@ -80,9 +80,10 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
         first, last = min(inner.tolist(), key=lambda run: abs(sum(run) // 2 - middle))
         cut = (first + last) // 2
         return replace(recording.part(0, cut), flat=flat), replace(recording.part(cut, n), flat=(0, last - cut))
-    if not len(runs) or runs[-1, 1] < 0.9 * n:
+    # a rest that began before the cut is cut, too
+    first, last = np.maximum(runs[-1], middle).tolist() if len(runs) else (n, n)
+    if last < 0.9 * n or last - first < LEAST_REST_S * recording.rate_hz:
         raise RecordingError(f"{recording.name}: no second rest", "give a recording that ends at rest")
-    first, last = runs[-1].tolist()
     backwards = reversed_in_time(recording.part(middle, n))
     return replace(recording.part(0, middle), flat=flat), replace(backwards, flat=(n - last, n - first))
 

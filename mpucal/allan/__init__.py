@@ -14,7 +14,7 @@ from ..result.noise import ACCELEROMETER, COEFFICIENTS, GYROSCOPE, INSTABILITY, 
 from .model import fitted
 from .octaves import Octaves
 from .spectrum import Spectrum
-from .trace import Trace, steps
+from .trace import Trace, steps, turned
 
 __all__ = ["NoiseMeter", "noise_of"]
 
@@ -121,6 +121,11 @@ class NoiseMeter:
         return None if share < 0.0 else max(self.seconds * ((share / wanted) ** 2 - 1.0), 0.0)
 
     def _suspicious(self, white: Vector, course: Vector, rate_hz: float) -> list[dict[str, str]]:
+        seconds = self._trace.seconds if self._trace is not None else 0.0
+        blocks, angle = turned(course[:, :6]) if len(course) else (0, 0.0)
+        if blocks:
+            said = f"the board was turned, gravity by {math.degrees(angle):.0f} deg, for {blocks * seconds:.0f} s"
+            return [{"code": "moved", "message": f"{said}: these numbers are of the motion, not of the sensor"}]
         found = []
         for tone in self._spectrum.tones(rate_hz):
             if tone.rms > LEAST_TONE * white[tone.axis] * math.sqrt(rate_hz):
@@ -128,7 +133,6 @@ class NoiseMeter:
                     f"{AXES[tone.axis]}: a tone at {tone.frequency_hz:.2f} Hz of {tone.rms:.2g} {UNITS[tone.axis]} rms"
                 )
                 found.append({"code": "tone", "message": f"{said}, as of a fan or a pump"})
-        seconds = self._trace.seconds if self._trace is not None else 0.0
         for block, axis, size in steps(course[:, :6]):
             said = f"{AXES[axis]}: a step of {size:+.2g} {UNITS[axis]} after {block * seconds:.0f} s"
             found.append({"code": "step", "message": f"{said}: the board was moved, or its bias jumped"})

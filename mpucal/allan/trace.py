@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..data import Vector
@@ -11,6 +13,8 @@ FIRST_S = 0.5
 # a step is seen between means of so many blocks, beyond so many of their robust standard deviations
 BESIDE, STEP_STD = 8, 10.0
 LEAST_BLOCKS = 64
+# neither a bias's drift nor noise turns gravity by so much, or a rate
+TURNED_RAD, TURNED_RAD_S = math.radians(2.0), math.radians(3.0)
 
 
 class Trace:
@@ -32,11 +36,9 @@ class Trace:
         self._means += list(self._held[:used].reshape(whole, self._size, -1).mean(1))
         self._held = self._held[used:]
         while len(self._means) >= BLOCKS:
+            # a block without a partner is half a new one: it is left out
             pairs = np.array(self._means[: len(self._means) // 2 * 2]).reshape(-1, 2, self._held.shape[1])
-            odd = self._means[len(pairs) * 2 :]
             self._means = list(pairs.mean(1))
-            # a block that lost its partner is half a new one: it is left out
-            del odd
             self._size *= 2
 
     @property
@@ -64,3 +66,11 @@ def steps(means: Vector) -> list[tuple[int, int, float]]:
         if std > 0.0 and abs(jump[at]) > STEP_STD * std:
             found.append((at + BESIDE, column, float(jump[at])))
     return found
+
+
+def turned(means: Vector) -> tuple[int, float]:
+    """(blocks, rad) of means (k, 6) of accelerations and rates: in how many it was turned, and how far gravity was."""
+    acc, rate = means[:, :3], np.linalg.norm(means[:, 3:6] - np.median(means[:, 3:6], axis=0), axis=1)
+    usual = np.median(acc, axis=0)
+    away = np.arctan2(np.linalg.norm(np.cross(acc, usual), axis=1), acc @ usual)
+    return int(np.sum((away > TURNED_RAD) | (rate > TURNED_RAD_S))), float(away.max())

@@ -48,13 +48,13 @@ def rows(noise: Noise, sensor: str) -> Iterator[tuple[str, list[str]]]:
 
 def summary(noise: Noise) -> str:
     """What `mpucal noise` prints."""
-    lines = []
+    lines = [f"! {row['message']}." for row in noise.suspicious]
+    lines += [""] if lines else []
     for sensor in SENSORS:
-        lines += [f"{sensor:<32}" + "".join(f"{axis:>29}" for axis in "xyz")]
-        lines += [f"  {name:<30}" + "".join(f"{cell:>29}" for cell in cells) for name, cells in rows(noise, sensor)]
+        lines += [f"{sensor:<32}" + "".join(f"{axis:>31}" for axis in "xyz")]
+        lines += [f"  {name:<30}" + "".join(f"{cell:>31}" for cell in cells) for name, cells in rows(noise, sensor)]
         said = _data_sheet(noise, sensor)
         lines += [f"  {said}", ""] if said else [""]
-    lines += [f"! {row['message']}." for row in noise.suspicious]
     lines.append(
         f"{noise.samples} samples at {noise.rate_hz:.1f} Hz in {noise.seconds / 60.0:.1f} min. In brackets 95 %."
     )
@@ -76,8 +76,8 @@ def render(noise: Noise) -> str:
     about = f"{noise.samples} samples at {noise.rate_hz:.1f} Hz in {noise.seconds / 3600.0:.2f} h."
     name = noise.sensor.chip or "a sensor"
     body = (
-        section("Coefficients", *tables, paragraph("In brackets: 95 % intervals.", note=True)),
         section("Suspicious", suspicious),
+        section("Coefficients", *tables, paragraph("In brackets: 95 % intervals.", note=True)),
         section("Allan deviation", *(figure(picture, caption) for picture in pictures)),
         section("Over time", figure(course, "Means over blocks, each axis less its own mean, in its deviations.")),
     )
@@ -128,7 +128,5 @@ def _data_sheet(noise: Noise, sensor: str) -> str:
         return ""
     factor, unit = UNITS[sensor][WHITE]
     typical, found = noise.data_sheet[sensor], noise.of(sensor, WHITE)
-    return (
-        f"data sheet: {factor * typical:.3g} {unit} ({factor * typical * math.sqrt(2.0):.3g} one-sided, as printed); "
-        f"{found / typical:.2f} times that"
-    )
+    said = f"data sheet: {factor * typical:.3g} {unit} ({factor * typical * math.sqrt(2.0):.3g} one-sided, as printed)"
+    return f"{said}; {found / typical:.2f} times that" if noise.told(sensor, WHITE) else said

@@ -61,6 +61,10 @@ class Noise:
         values = self.values[coefficient][_part(sensor)]
         return float(np.sqrt(np.nanmean(values**2))) if np.isfinite(values).any() else math.nan
 
+    def told(self, sensor: str, coefficient: str) -> bool:
+        """Whether it is told from zero on all three axes."""
+        return bool(np.all(self.low[coefficient][_part(sensor)] > 0.0))
+
     def at_least(self, sensor: Sensor, rate_hz: float) -> Sensor:
         """The sensor, of which a sample at `rate_hz` has this white noise at least, however still it reads."""
         acc, gyr = (self.of(name, WHITE) * math.sqrt(rate_hz) for name in (ACCELEROMETER, GYROSCOPE))
@@ -167,9 +171,7 @@ def with_noise(calibration: Calibration, noise: Noise) -> Calibration:
     said: dict[str, Any] = {"created": noise.created, "seconds": noise.seconds, "rate_hz": noise.rate_hz}
     for sensor in (ACCELEROMETER, GYROSCOPE):
         part, of = _part(sensor), {}
-        unsure = [
-            name for name in (WHITE, INSTABILITY, WALK) if not np.nanmin(noise.low[name][part], initial=1.0) > 0.0
-        ]
+        unsure = [name for name in (WHITE, INSTABILITY, WALK) if not noise.told(sensor, name)]
         for name in (WHITE, INSTABILITY, WALK):
             values = (noise.high if name in unsure else noise.values)[name][part]
             of[name] = float(np.sqrt(np.mean(values**2)))

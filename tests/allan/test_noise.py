@@ -110,6 +110,25 @@ def test_what_is_suspicious(lying):
     assert "gyroscope z" in said["temperature"]
 
 
+def test_a_board_that_was_turned_has_no_tones(lying):
+    t, about_x = lying.t, np.radians(8.0)
+    turned = (t > 300.0) & (t < 420.0)
+    acc = lying.acc + 0.05 * np.sin(2 * np.pi * 11.7 * t)[:, None]
+    acc[turned] = acc[turned] @ [
+        [1, 0, 0],
+        [0, np.cos(about_x), -np.sin(about_x)],
+        [0, np.sin(about_x), np.cos(about_x)],
+    ]
+    (moved,) = noise_of(replace(lying, acc=acc)).suspicious
+    assert moved["code"] == "moved"
+    assert "gravity by 8 deg, for 12" in moved["message"]
+    # about the vertical, which gravity does not see
+    gyr = lying.gyr.copy()
+    gyr[turned, 2] += 0.1
+    (moved,) = noise_of(replace(lying, gyr=gyr)).suspicious
+    assert moved["code"] == "moved"
+
+
 def test_the_time_still_needed_falls_as_it_goes_on(lying):
     meter, needed = NoiseMeter(SENSOR, RATE_HZ), []
     for first in range(0, len(lying), 2**15):

@@ -55,6 +55,12 @@ def test_a_recording_that_ends_in_motion_has_no_halves(halves):
         halves.halves(hand_scenario(0, "continuous", rate_hz=50.0).recording)
 
 
+def test_a_rest_alone_has_no_halves(halves):
+    recording = hand_scenario(0, "pose12", rate_hz=50.0).recording
+    with pytest.raises(RecordingError, match="no second rest"):
+        halves.halves(replace(recording.part(0, recording.flat[1]), flat=None))
+
+
 def test_backwards_the_same_sensor_is_found(halves):
     simulated = paper_scenario(0, rate_hz=50.0)
     recording = simulated.recording
