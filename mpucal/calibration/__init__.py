@@ -25,7 +25,7 @@ from .parameters import B_A_NAMES, B_OMEGA_NAMES, BY_NAME, D_NAMES
 from .quality import judge
 from .recording_digest import recording_digest
 from .theta import from_elements
-from .walks import likeliest_walk, without_walk
+from .walks import Walk, likeliest_walk, without_walk
 
 __all__ = ["MODELS", "calibrate", "weigh"]
 
@@ -80,31 +80,33 @@ def weigh(
     before = Evidence(recording, gravity, flat, None, model)
     if flat is None or unusable_for_a_fit(before):
         return before, {"model": model, "why": "nothing could be estimated"}
-    choice = _fit(recording, flat, gravity, model)
-    claim = claim_of(choice.fit, gravity, choice.walked)
+    choice, walk = _fit(recording, flat, gravity, model)
+    claim = claim_of(choice.fit, gravity, walk, choice.walked)
     evidence = Evidence(recording, gravity, flat, claimed(choice.fit, claim).right_handed(), choice.model, claim)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
     return evidence, {"model": choice.model, "why": choice.why + (left_out if over is not None else "")}
 
 
-def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> Choice:
-    """The fit, with a gyroscope's bias that walked while the board was turned taken away."""
-    choice = _fit_once(recording, flat, gravity, model)
+def _fit(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[Choice, Walk | None]:
+    """The fit, with a gyroscope's bias that walked while the board was turned taken away, and the walk that is left."""
+    choice, walk = _fit_once(recording, flat, gravity, model)
     for _ in range(MOST_WALKS):
-        walk = None if choice.fit.parts is None else likeliest_walk(choice.fit.parts, choice.fit.D)
         if walk is None or walk.what != "gyroscope" or not choice.fit.converged:
             break
-        without = _fit_once(without_walk(choice.recording, flat, walk), flat, gravity, model)
+        without, left = _fit_once(without_walk(choice.recording, flat, walk), flat, gravity, model)
         if not without.fit.V < choice.fit.V - LEAST_GAIN:
             break
-        choice = without._replace(walked=without.walked + choice.walked + walk.q)
-    return choice
+        choice, walk = without._replace(walked=without.walked + choice.walked + walk.q), left
+    return choice, walk
 
 
-def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> Choice:
+def _fit_once(recording: Recording, flat: Flat, gravity: float, model: str) -> tuple[Choice, Walk | None]:
     if model == "auto":
-        return choose(recording, flat, gravity)
-    return Choice(METHODS[model](recording, flat, gravity), model, "asked for", recording)
+        choice = choose(recording, flat, gravity)
+    else:
+        choice = Choice(METHODS[model](recording, flat, gravity), model, "asked for", recording)
+    fit = choice.fit
+    return choice, None if fit.parts is None else likeliest_walk(fit.parts, fit.D)
 
 
 def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:

@@ -14,7 +14,7 @@ from .jackknife import Jackknife, jackknife
 from .levenberg_marquardt import inverse
 from .parameters import ACCELEROMETER
 from .uncertainty import uncertainty
-from .walks import SIGNIFICANT, Walk, likeliest_walk, walked_covariance
+from .walks import SIGNIFICANT, Walk, walked_covariance
 
 SINGULAR, TINY_MPS2 = 1e-6, 1e-9
 FLOOR_MPS2 = 5e-5  # nothing is known better where a walk was taken away, drawn straight from part to part
@@ -51,10 +51,11 @@ class Claim:
         return "change" if self.of_change > self.left_out.claim() else self.left_out.decides()
 
 
-def claim_of(fit: Fit, gravity: float, walked: float = 0.0) -> Claim | None:
+def claim_of(fit: Fit, gravity: float, change: Walk | None, walked: float) -> Claim | None:
     """Of a fit by the filter; None for one whose parts are not known, or that has no usable D or covariance.
 
-    walked : (rad/s)^2 from part to part, of a walk of the gyroscope's bias that was taken away.
+    change : the likeliest walk that the fit's parts show. walked : (rad/s)^2 from part to part, of a walk of the
+        gyroscope's bias that was taken away.
     """
     if fit.parts is None or not np.isfinite(fit.covariance).all() or abs(np.linalg.det(fit.D)) < SINGULAR:
         return None
@@ -64,7 +65,7 @@ def claim_of(fit: Fit, gravity: float, walked: float = 0.0) -> Claim | None:
     if walked:
         wider = max(1.0, rms(walked_covariance(fit.parts, fit.D, walked)) / scores)
         floored = float(np.hypot(wider * model, FLOOR_MPS2))
-    left_out, change = jackknife(fit.parts, fit.D, gravity), likeliest_walk(fit.parts, fit.D)
+    left_out = jackknife(fit.parts, fit.D, gravity)
     # where parts that stayed the same differ by more than their scores' noise, a change must stand out the more
     louder = min(max(left_out.claim(), model) / scores, MOST_LOUDER)
     if change is None or not fit.converged or change.gain < SIGNIFICANT * louder**2:
