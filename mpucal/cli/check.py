@@ -29,7 +29,7 @@ from ..sources.opening import one_of, open_source
 from ..sources.table import kinds_meant, source_title, used_by
 from ..terminal.console import console
 from .destination import device
-from .loading import loaded
+from .loading import force_option, loaded, trusted
 from .options import check_gyroscope, check_source, given, source_options
 from .person import ask, ask_in_doubt
 from .recording_options import given_hints, hint_options, say_taken
@@ -53,6 +53,7 @@ CHECK_FILE = "check.json"
     "--to", "sinks", type=click.Choice(list(SINKS)), multiple=True, help="Write the updated calibration there, too."
 )
 @click.option("--yes", is_flag=True, help="Ask no questions.")
+@force_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def command(
     calibration: Path,
@@ -60,6 +61,7 @@ def command(
     folder: Path | None,
     sinks: tuple[str, ...],
     yes: bool,
+    force: bool,
     as_json: bool,
     **options: Any,
 ) -> int:
@@ -67,7 +69,8 @@ def command(
 
     From a sensor it takes half a minute: lay the board flat, then hold it in three orientations. From a recording, it
     takes the rests that are there. -o writes an updated calibration where only the biases moved. Exit code 0: still
-    good; 5: drifted, remounted or another sensor; 4: it cannot be told, and why.
+    good; 5: drifted, remounted or another sensor; 4: it cannot be told, and why; 6: with -o, CALIBRATION was damaged or
+    changed after it was saved.
     """
     kinds = kinds_meant(options)
     if (file is None) == (not kinds):
@@ -77,7 +80,7 @@ def command(
         raise UsageError(
             "--to was given without -o and a source", "name the folder and the source, which is written to"
         )
-    of = loaded(calibration)
+    of = loaded(calibration) if folder is None else trusted(calibration, force)
     if file is not None:
         recording = load(file, given_hints(options))
         say_taken(recording.taken)

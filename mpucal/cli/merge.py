@@ -10,7 +10,7 @@ from ..result.atomic import check_not_among
 from ..result.merge import merge
 from ..result.session_files import BLOB, DOCUMENT
 from ..session.results import make_folder, save
-from .loading import loaded
+from .loading import force_option, trusted
 from .summary import slope, summary
 
 EXAMPLE = "Example: `mpucal merge cold/calibration.json warm/calibration.json hot/calibration.json -o merged`"
@@ -19,8 +19,9 @@ EXAMPLE = "Example: `mpucal merge cold/calibration.json warm/calibration.json ho
 @click.command("merge", epilog=EXAMPLE)
 @click.argument("calibrations", metavar="A B ...", nargs=-1, type=click.Path(path_type=Path))
 @click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for the result.")
+@force_option
 @click.option("--json", "as_json", is_flag=True, help="Print only calibration.json.")
-def command(calibrations: tuple[Path, ...], folder: Path | None, as_json: bool) -> None:
+def command(calibrations: tuple[Path, ...], folder: Path | None, force: bool, as_json: bool) -> None:
     """Combine calibrations of one chip at different temperatures into one with b_a(T).
 
     If the data do not support b_a(T), b_a is their mean, and the reason is printed. `mpucal apply`, the blob and
@@ -29,7 +30,7 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, as_json: bool) 
     if folder is not None:
         for file in (BLOB, DOCUMENT):
             check_not_among(folder / file.name, calibrations)
-    made = merge([loaded(path) for path in calibrations])
+    made = merge([trusted(path, force) for path in calibrations])
     if folder is not None:
         make_folder(folder)
         save(folder, {BLOB.name: made.calibration.blob().encode(), DOCUMENT.name: made.calibration.json().encode()})

@@ -8,14 +8,13 @@ from typing import Any
 import click
 
 from ..data import STANDARD_GRAVITY_MPS2
-from ..errors import WriteBackError
 from ..session.results import make_folder
 from ..sinks.doubt import doubt
 from ..sinks.record import in_file, is_calibration
 from ..sinks.table import SINKS
 from ..sinks.write_back import put_back, write_to
 from .destination import check_sink, device, sink_flags
-from .loading import loaded
+from .loading import force_option, trusted
 from .options import check_source, source_options
 from .person import ask, say
 
@@ -31,7 +30,7 @@ EXAMPLE = "Example: `mpucal write board7/calibration.json chip --bus /dev/i2c-1`
     "-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for the saved previous state."
 )
 @click.option("--yes", is_flag=True, help="Ask no questions.")
-@click.option("--force", is_flag=True, help="Write a calibration whose digest is missing or wrong.")
+@force_option
 @click.option("--json", "as_json", is_flag=True, help="Print only the calibration as it is applied now.")
 def command(
     calibration: Path, to: str, folder: Path | None, yes: bool, force: bool, as_json: bool, **options: Any
@@ -43,9 +42,7 @@ def command(
     """
     kind = SINKS[to]
     check_sink(kind, check_source(click.get_current_context()), options)
-    written = loaded(calibration) if is_calibration(calibration) else None
-    if written is not None and written.doubt and not force:
-        raise WriteBackError(f"nothing was written: of {calibration}, {written.doubt}", "look at it, then give --force")
+    written = trusted(calibration, force) if is_calibration(calibration) else None
     folder = folder or calibration.parent
     make_folder(folder)
     # a simulated chip lives in the gravity in which it was calibrated

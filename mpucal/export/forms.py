@@ -41,6 +41,8 @@ class Form:
         if self.only_usable:
             check_usable(calibration)
         notes = tuple(sentence for loss in self.losses for sentence in loss(calibration))
+        if calibration.doubt:
+            notes += (f"Of the calibration, {calibration.doubt}.",)
         return self.text(calibration, notes), notes
 
 

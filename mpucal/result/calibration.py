@@ -198,9 +198,10 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         return written(vars(self), self.follows_temperature)
 
     def json(self) -> str:
-        """The document as text, with its digest."""
+        """The document as text, with its digest; without one where its numbers are in doubt."""
         document = self.document()
-        return json.dumps({**document, DIGEST: digest(document)}, indent=2, allow_nan=False) + "\n"
+        signed = document if self.doubt else {**document, DIGEST: digest(document)}
+        return json.dumps(signed, indent=2, allow_nan=False) + "\n"
 
     def blob(self) -> Blob:
         """The config blob of this calibration, see firmware_protocol.md."""

@@ -186,6 +186,7 @@ def _together(all_: Sequence[Calibration], T_0: float, T: Vector) -> Calibration
         quality=worst.quality,
         sensor=replace(last.sensor, temperature_c=T_0),
         extra={"merged": made_of},
+        doubt=next((c.doubt for c in all_ if c.doubt), ""),
     )
 
 

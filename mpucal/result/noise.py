@@ -11,8 +11,10 @@ from typing import Any, Self
 
 import numpy as np
 
+from ..arguments import content
 from ..data import Sensor, Vector
 from ..errors import RecordingError
+from ..strict_json import MOST_BYTES, parsed
 from .atomic import write_atomically
 from .calibration import Calibration
 
@@ -126,9 +128,7 @@ class Noise:
         RecordingError : no such file, or no noise in it.
         """
         try:
-            return cls._of(json.loads(Path(path).read_bytes()))
-        except OSError as error:
-            raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path") from error
+            return cls._of(parsed(content(Path(path), MOST_BYTES)))
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             what = f"{path} holds no noise ({type(error).__name__}: {error})"
             raise RecordingError(what, "give a noise.json, as `mpucal noise -o DIR` writes it") from error

@@ -6,7 +6,6 @@ and with the reset that a session begins with.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
@@ -14,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arguments import content
 from ..chip.access import Bus
 from ..chip.bench import Bench
 from ..chip.decode import Decoder
@@ -25,14 +23,13 @@ from ..chip.probe import read_identity
 from ..chip.response import Response, measured_response
 from ..chip.setup import reset
 from ..data import STANDARD_GRAVITY_MPS2, Vector
-from ..errors import ChipError, RecordingError, SourceError, WriteBackError
-from ..result.atomic import write_atomically
+from ..errors import ChipError, SourceError, WriteBackError
 from ..result.calibration import REFUSED, Calibration
 from ..result.improvement import is_better
 from ..result.journal import AT, Journal
 from ..session.at_rest import put_down
 from ..sources.chip import OpenedChip
-from ..strict_json import MOST_BYTES, parsed
+from .kept import keep, kept, not_kept
 from .kind import Device
 from .sink import Applied
 from .table import CHIP, CHIP_OFFSETS
@@ -98,20 +95,16 @@ class ChipSink:
 
     def keep(self, folder: Path) -> tuple[Path, ...]:
         """Save what the registers hold to chip-offsets.json; see Sink."""
-        document = {"format": FORMAT, "version": 1, "where": self.where, REGISTERS: _hex(self._blocks())}
-        # an earlier file holds an earlier state: it stays
-        path = CHIP_OFFSETS.free_in(folder)
-        write_atomically(path, (json.dumps(document, indent=2) + "\n").encode())
-        return (path,)
+        return keep(CHIP_OFFSETS, folder, FORMAT, self.where, {REGISTERS: _hex(self._blocks())})
 
-    def put_back(self, kept: Path) -> str:
+    def put_back(self, path: Path) -> str:
         """Write what an earlier `keep` saved, and say so in a sentence.
 
         Raises
         ------
-        RecordingError : `kept` is no such file. WriteBackError : see Sink.
+        RecordingError : `path` is no such file. WriteBackError : see Sink.
         """
-        wanted = _kept(kept)
+        wanted = _blocks(path)
         with _refusing():
             read_identity(self._port)
             olds = self._blocks()
@@ -119,7 +112,7 @@ class ChipSink:
             for block in wanted:
                 if Block.read(self._port, block.place) != block and not block.write(self._port):
                     raise ChipError(f"the chip does not take {block.data.hex(' ')}", "check that it is the same chip")
-        return f"the offset registers of {self.where} hold again what {kept.name} says; {VOLATILE}"
+        return f"the offset registers of {self.where} hold again what {path.name} says; {VOLATILE}"
 
     def as_good(self, calibration: Calibration) -> str | None:
         """See Comparing: a bias that is less than a step and its uncertainty is as well left where it is."""
@@ -252,18 +245,16 @@ def _hex(blocks: Sequence[Block]) -> dict[str, str]:
     return {f"0x{block.place[0]:02x}": block.data.hex() for block in blocks}
 
 
-def _kept(path: Path) -> list[Block]:
+def _blocks(path: Path) -> list[Block]:
     """What `keep` saved."""
+    held = kept(CHIP_OFFSETS, path, FORMAT, REGISTERS)[REGISTERS]
     try:
-        document = parsed(content(path, MOST_BYTES))
-        if document["format"] != FORMAT:
-            raise ValueError(f'"format" is {document["format"]!r}')
-        registers = {int(first, 0): bytes.fromhex(data) for first, data in document[REGISTERS].items()}
-        blocks = [Block(place, registers[place[0]]) for place in PLACES if place[0] in registers]
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise RecordingError(f"{path} holds no offset registers ({error})", f"give a {CHIP_OFFSETS.name}") from error
+        registers = {int(first, 0): bytes.fromhex(data) for first, data in held.items()}
+    except (ValueError, TypeError, AttributeError) as error:
+        raise not_kept(CHIP_OFFSETS, path, str(error)) from error
+    blocks = [Block(place, registers[place[0]]) for place in PLACES if place[0] in registers]
     if not blocks or any(len(block.data) != block.place[2] + 2 - block.place[0] for block in blocks):
-        raise RecordingError(f"{path} does not hold the offset registers of a chip", f"give a {CHIP_OFFSETS.name}")
+        raise not_kept(CHIP_OFFSETS, path, "some are missing, or too long")
     return blocks
 
 

@@ -7,7 +7,6 @@ ACCEL_MOUNT_MATRIX, in place of the device tree's matrix M: it becomes M inv(D).
 
 from __future__ import annotations
 
-import json
 import shutil
 import subprocess
 from collections.abc import Iterator, Mapping
@@ -22,7 +21,7 @@ from ..chip.access import Files
 from ..chip.config import Config
 from ..chip.offsets import Words, difference
 from ..data import STANDARD_GRAVITY_MPS2, Vector
-from ..errors import ChipError, OutputError, RecordingError, SourceError, WriteBackError
+from ..errors import ChipError, OutputError, SourceError, WriteBackError
 from ..export.linux_iio import LSB_PER_G, matrix_text, offset_words
 from ..iio.attributes import ACCEL, AXES, mount_matrix
 from ..iio.decode import IioDecoder
@@ -33,6 +32,7 @@ from ..result.calibration import REFUSED, Calibration
 from ..result.journal import Journal
 from ..session.at_rest import put_down
 from ..sources.iio import OpenedIio
+from .kept import keep, kept, not_kept
 from .kind import Device
 from .sink import Applied
 from .table import IIO_STATE, KERNEL
@@ -84,27 +84,21 @@ class KernelSink:
 
     def keep(self, folder: Path) -> tuple[Path, ...]:
         """Save calibbias and the rule to iio-state.json; see Sink."""
-        path = IIO_STATE.free_in(folder)
-        document = {"format": FORMAT, "version": 1, "where": self.where, **self._held()}
-        write_atomically(path, (json.dumps(document, indent=2) + "\n").encode())
-        return (path,)
+        return keep(IIO_STATE, folder, FORMAT, self.where, self._held())
 
-    def put_back(self, kept: Path) -> str:
+    def put_back(self, path: Path) -> str:
         """Write what an earlier `keep` saved, and say so in a sentence.
 
         Raises
         ------
-        RecordingError : `kept` is no such file. WriteBackError : see Sink.
+        RecordingError : `path` is no such file. WriteBackError : see Sink.
         """
-        try:
-            document = json.loads(kept.read_bytes())
-            if document["format"] != FORMAT or not {WORDS, RULE} <= set(document):
-                raise ValueError(f'"format" is {document["format"]!r}')
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise RecordingError(f"{kept} holds no state of a driver ({error})", f"give a {IIO_STATE.name}") from error
+        document = kept(IIO_STATE, path, FORMAT, WORDS, RULE)
+        if not (_are_words(document[WORDS]) and isinstance(document[RULE], str | None)):
+            raise not_kept(IIO_STATE, path, f"{WORDS} or {RULE} is of another kind")
         with self._old_or_new():
             self._restore(document)
-        return f"{self.where} holds again what {kept.name} says"
+        return f"{self.where} holds again what {path.name} says"
 
     def write(self, calibration: Calibration) -> Applied:
         """Write calibbias and udev's matrix, read both back, and see calibbias in the samples; see Sink."""
@@ -231,6 +225,11 @@ class KernelSink:
                 raise WriteBackError(f"{error.what}; {self.where} is as before", error.remedy) from error
             raise
         self._journal.done()
+
+
+def _are_words(held: Any) -> bool:
+    """Whether `_words` can have given it: None, or three integers."""
+    return held is None or (isinstance(held, list) and [type(word) for word in held] == [int] * 3)
 
 
 def _udev(device: str, matrix: str) -> str:

@@ -151,6 +151,13 @@ def test_too_little_is_refused(lying):
         mpucal.noise(lying.part(0, 100))
 
 
+@pytest.mark.parametrize("text", ["[" * 10**5, '{"format": NaN}', '{"format": "mpucal.noise"}', "5"])
+def test_what_is_no_noise_is_a_sentence(tmp_path, text):
+    (tmp_path / "noise.json").write_text(text)
+    with pytest.raises(mpucal.MpucalError, match="holds no noise"):
+        Noise.load(tmp_path / "noise.json")
+
+
 def test_exports_take_it(found):
     calibration = with_noise(
         mpucal.Calibration(

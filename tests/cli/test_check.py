@@ -43,6 +43,27 @@ def test_of_a_sensor_in_half_a_minute_with_its_biases_updated(mpucal, calibratio
         assert mpucal("check", calibration, *words).out.splitlines()[0] == told.out.splitlines()[0]
 
 
+def test_a_changed_one_is_updated_or_merged_only_by_force_and_what_is_made_of_it_says_so(
+    mpucal, session, calibration, tmp_path
+):
+    spoilt = tmp_path / "spoilt.json"
+    document = json.loads(calibration.read_text())
+    document["accelerometer"]["b_a"][0] += 1e-9
+    spoilt.write_text(json.dumps(document))
+    assert mpucal("check", spoilt, session.folder).code == 0
+    words = ("check", spoilt, session.folder, "-o", "today")
+    refused = mpucal(*words)
+    assert (refused.code, "nothing was written" in refused.err) == (6, True)
+    assert not (tmp_path / "today").exists()
+    assert mpucal(*words, "--force").code == 0
+    assert mpucal("merge", spoilt, spoilt).code == 6
+    assert mpucal("merge", spoilt, spoilt, "--force").code == 5  # the same data twice
+    exported = mpucal("export", spoilt, "--to", "c-header")
+    assert "its digest does not match" in exported.out
+    Calibration.load(spoilt).save(tmp_path / "again.json")
+    assert "no digest" in Calibration.load(tmp_path / "again.json").doubt
+
+
 def test_of_another_sensor(mpucal, calibration, tmp_path):
     told = mpucal("check", calibration, "--bus", "sim", "--seed", "4", "--rate", "100", "-o", "other", "--yes")
     assert told.code == 5

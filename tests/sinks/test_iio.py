@@ -1,5 +1,6 @@
 """A driver of the kernel as a sink: calibbias seen in the samples, the rule of udev, and all put back on failure."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -111,6 +112,8 @@ def test_what_is_refused_or_no_state_is_not_written(made, tmp_path):
     sink, _, found = made()
     with pytest.raises(WriteBackError, match="nothing was written: the calibration was refused"):
         sink.write(replace(found, quality={"verdict": REFUSED}))
-    (tmp_path / "x.json").write_text("{}")
-    with pytest.raises(RecordingError, match="holds no state of a driver"):
-        sink.put_back(tmp_path / "x.json")
+    state = {"format": "mpucal.iio_state", "calibbias": [1, 2, 3], "rule": None}
+    for document in ({}, 5, {**state, "calibbias": ["1", 2, 3]}, {**state, "rule": 5}):
+        (tmp_path / "x.json").write_text(json.dumps(document))
+        with pytest.raises(RecordingError, match="does not hold what calibbias"):
+            sink.put_back(tmp_path / "x.json")
