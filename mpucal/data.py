@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -256,7 +257,7 @@ class Recording(Samples):
         figure: Figure = resolve_name("mpucal.report.notebook:plot_recording")(self)
         return figure
 
-    @property
+    @cached_property
     def rate_hz(self) -> float:
         """Median sample rate [Hz]."""
         return float(1.0 / np.median(np.diff(self.t)))

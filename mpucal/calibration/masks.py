@@ -9,6 +9,7 @@ import numpy as np
 from ..data import STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
 from .flat_segment import Flat
 from .problem import Series
+from .rotation import lengths
 
 ACC_RANGES = STANDARD_GRAVITY_MPS2 * np.array([2.0, 4.0, 8.0, 16.0])
 GYRO_RANGES = np.deg2rad([125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0])
@@ -29,6 +30,7 @@ GAP_INTERVALS = 2.5  # a longer time between samples than so many intervals is a
 # Of a board that is back at once: how far gravity turns within a step beyond what the gyroscope tells, how much of that
 # the steps before and after it may miss, and how near it is then to where it lay.
 JUMP_RAD, BESIDE, NEIGHBOURS, BACK = np.deg2rad(5.0), 0.2, 4, 0.02
+AROUND = np.array([step for step in range(-NEIGHBOURS, NEIGHBOURS + 1) if step])
 
 
 def with_masks(recording: Recording) -> Recording:
@@ -58,13 +60,12 @@ def reset(recording: Recording, flat: Flat) -> int | None:
     acc, rate = recording.acc[flat.last :], recording.gyr[flat.last :] - flat.b_omega
     dt = np.diff(recording.t[flat.last :])[:, None]
     with np.errstate(all="ignore"):
-        missed = np.linalg.norm(np.diff(acc, axis=0) + np.cross(rate[1:], acc[:-1]) * dt, axis=1)
-        missed /= np.linalg.norm(flat.y)
-        for i in np.flatnonzero((missed > JUMP_RAD) & ~recording.gap[flat.last + 1 :]):
-            around = np.concatenate([missed[max(i - NEIGHBOURS, 0) : i], missed[i + 1 : i + 1 + NEIGHBOURS]])
+        missed = lengths(np.diff(acc, axis=0) + np.cross(rate[1:], acc[:-1]) * dt) / np.linalg.norm(flat.y)
+        at = np.flatnonzero((missed > JUMP_RAD) & ~recording.gap[flat.last + 1 :])
+        at = at[(at >= NEIGHBOURS) & (at < len(missed) - NEIGHBOURS)]
+        for i in at[(missed[at[:, None] + AROUND] < BESIDE * missed[at, None]).all(1)]:
             after = acc[i + 1 : i + 1 + NEIGHBOURS].mean(0)
-            back = np.linalg.norm(after - flat.y) < BACK * np.linalg.norm(flat.y)
-            if back and len(around) == 2 * NEIGHBOURS and around.max() < BESIDE * missed[i]:
+            if np.linalg.norm(after - flat.y) < BACK * np.linalg.norm(flat.y):
                 return flat.last + int(i) + 1
     return None
 
@@ -94,12 +95,12 @@ def _run_lengths(mask: Mask) -> Vector:
 
 def _on_a_line(values: Vector, t: Vector) -> Mask:
     """(n,) True within straight lines that all axes follow exactly, and not at rest: somebody drew them."""
-    slope = np.diff(values, axis=0) / np.diff(t)[:, None]
-    bend, steep = np.abs(np.diff(slope, axis=0)), np.abs(slope[1:])
-    straight: Mask = np.all(bend <= LINE_TOLERANCE * steep, axis=1)
+    slopes = np.diff(values.T) / np.diff(t)
+    bend, steep = np.abs(np.diff(slopes)), np.abs(slopes[:, 1:])
+    straight: Mask = np.all(bend <= LINE_TOLERANCE * steep, axis=0)
     if 2 * np.count_nonzero(straight) > len(straight):  # computed data: nothing in them has noise
         return np.zeros(len(values), bool)
-    straight &= (steep > 0).any(1)
+    straight &= (steep > 0).any(0)
     edges = np.diff(np.concatenate([[False], straight, [False]]).astype(np.int8))
     drawn = np.zeros(len(values), bool)
     for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,8 @@ from .parameters import ACCEL, IMU
 from .parts import parts_of
 from .prior import prior_of
 from .problem import Problem, Series
+from .rotation import lengths
+from .theta import Theta
 from .tilt import fit_tilt
 from .walks import likeliest_walk, without_walk
 
@@ -127,9 +130,6 @@ class _InPlace:
     def __init__(self, recording: Recording, flat: Flat, gravity: float, walked: float = 0.0) -> None:
         self.recording, self._flat, self._gravity, self.walked = recording, flat, gravity, walked
         self._prior = prior_of(flat)
-        # means over blocks: white noise leaves little in a block beside its mean
-        thin, at = downsampled(recording, flat, SEARCH_HZ)
-        self._thin, self._thin_flat = thin, flat_statistics(thin, at)
         self._roughly: dict[int, Minimum] = {}
 
     def attempts(self) -> Iterator[tuple[_InPlace, bool]]:
@@ -141,15 +141,15 @@ class _InPlace:
 
     def _errs(self) -> bool:
         """Whether errors of the largest size could explain the data."""
-        squares = evaluate(self._thin_problem(ERRORS[-1]), self._rough(IMU).theta, 0).squares
-        return squares < ERRING_NIS * len(self._thin)
+        squares = evaluate(_erring(self._thin, ERRORS[-1]), self._rough(IMU).theta, 0).squares
+        return squares < ERRING_NIS * (self._thin.flat.last + len(self._thin.series))
 
     def _steadied(self) -> _InPlace:
         """Without the walk of the gyroscope's bias that the parts show; small errors would explain that as well."""
         steady = self
         for _ in range(MOST_WALKS):
             rough = steady._rough(IMU)
-            parts = parts_of(steady._thin_problem(NO_ERRORS), rough, self._prior)
+            parts = parts_of(steady._thin, rough, self._prior)
             walk = None if parts is None else likeliest_walk(parts, rough.theta.D)
             if walk is None or walk.what != "gyroscope":
                 break
@@ -167,40 +167,51 @@ class _InPlace:
         minimum = self._rough(parameters)
         for _ in range(ERROR_PASSES if erring else 0):
             theta = minimum.theta
-            errors = min(ERRORS, key=lambda these: evaluate(self._thin_problem(these), theta, 0).V)
-            minimum = minimise(self._thin_problem(errors), theta, parameters, self._prior, until=ROUGHLY)
+            errors = min(ERRORS, key=lambda these: evaluate(_erring(self._thin, these), theta, 0).V)
+            minimum = minimise(_erring(self._thin, errors), theta, parameters, self._prior, until=ROUGHLY)
         if minimum.nis < HOPELESS_NIS:
             minimum = self.minimum(parameters, minimum, errors)
         return minimum, errors
 
     def minimum(self, parameters: int, near: Minimum, errors: Errors = NO_ERRORS) -> Minimum:
         """On all samples, from where another search ended."""
-        minimum = minimise(self._problem(errors), near.theta, parameters, self._prior)
+        minimum = minimise(_erring(self._problem, errors), near.theta, parameters, self._prior)
         return replace(minimum, iterations=near.iterations + minimum.iterations)
 
     def as_fit(self, minimum: Minimum, errors: Errors) -> Fit:
         """With what the parts of the recording say."""
         known = at_prior(minimum.covariance()) if len(minimum.free) > ACCEL else ()
-        return minimum.as_fit(known, parts_of(self._problem(errors), minimum, self._prior))
+        return minimum.as_fit(known, parts_of(_erring(self._problem, errors), minimum, self._prior))
 
     def _rough(self, parameters: int) -> Minimum:
         if parameters not in self._roughly:
-            problem = self._thin_problem(NO_ERRORS)
-            theta = initialise(problem, self._flat.b_omega)
-            self._roughly[parameters] = minimise(problem, theta, parameters, self._prior, until=ROUGHLY)
+            self._roughly[parameters] = minimise(self._thin, self._first, parameters, self._prior, until=ROUGHLY)
         return self._roughly[parameters]
 
-    def _problem(self, errors: Errors) -> Problem:
-        return _problem(self.recording, self._flat, self._gravity, errors)
+    @cached_property
+    def _first(self) -> Theta:
+        return initialise(self._thin, self._flat.b_omega)
 
-    def _thin_problem(self, errors: Errors) -> Problem:
-        return _problem(self._thin, self._thin_flat, self._gravity, errors)
+    @cached_property
+    def _problem(self) -> Problem:
+        return _problem(self.recording, self._flat, self._gravity)
+
+    @cached_property
+    def _thin(self) -> Problem:
+        """Means over blocks: white noise leaves little in a block beside its mean."""
+        thin, at = downsampled(self.recording, self._flat, SEARCH_HZ)
+        return _problem(thin, flat_statistics(thin, at), self._gravity)
 
 
-def _problem(recording: Recording, flat: Flat, gravity: float, errors: Errors) -> Problem:
-    series = mask(Series.after(recording, flat), recording, flat)
+def _problem(recording: Recording, flat: Flat, gravity: float) -> Problem:
+    return Problem(mask(Series.after(recording, flat), recording, flat), flat, gravity)
+
+
+def _erring(problem: Problem, errors: Errors) -> Problem:
+    """With errors of the sensors."""
+    series, flat = problem.series, problem.flat
     if errors.kappa > 0.0:
-        turned = series.dt * np.linalg.norm(series.omega - flat.b_omega, axis=1)
+        turned = series.dt * lengths(series.omega - flat.b_omega)
         q_extra = 0.0 if series.q_extra is None else series.q_extra
         series = replace(series, q_extra=q_extra + errors.kappa**2 * turned)
-    return Problem(series, replace(flat, Sigma_a=flat.Sigma_a + errors.floor**2), gravity)
+    return replace(problem, series=series, flat=replace(flat, Sigma_a=flat.Sigma_a + errors.floor**2))

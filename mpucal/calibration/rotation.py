@@ -13,6 +13,11 @@ from numpy.typing import NDArray
 from ..data import Vector
 
 
+def lengths(v: Vector) -> NDArray[np.float64]:
+    """(n,) of the vectors (n, 3)."""
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", v, v)))
+
+
 def cross(v: Vector) -> NDArray[np.float64]:
     """[v]x, the matrix of the cross product: (..., 3) -> (..., 3, 3)."""
     matrix = np.zeros((*v.shape[:-1], 3, 3))

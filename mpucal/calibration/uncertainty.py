@@ -35,15 +35,15 @@ def uncertainty(D: Vector, covariance: Vector, gravity: float, unit: Vector | No
     unit : (n, 3) directions of s; None: all over the sphere.
     """
     unit = fibonacci_sphere(DIRECTIONS) if unit is None else unit
-    s = gravity * unit
-    # the error is -inv(D) (dD s + db): linear in the twelve parameters
-    J = np.zeros((len(unit), 3, 12))
+    # the error is -inv(D) (dD s + db): linear in the twelve parameters, and in (s, 1)
+    s = np.column_stack([gravity * unit, np.ones(len(unit))])
+    J = np.zeros((4, 3, 12))
     for i in range(3):
-        J[:, i, 3 * i : 3 * i + 3] = s
-        J[:, i, 9 + i] = 1.0
-    J = np.linalg.inv(D) @ J
-    C = J @ covariance @ np.swapaxes(J, 1, 2)
-    total = np.maximum(np.trace(C, axis1=1, axis2=2), 0.0)
+        J[[0, 1, 2, 3], i, [3 * i, 3 * i + 1, 3 * i + 2, 9 + i]] = 1.0
+    errors = (np.linalg.inv(D) @ J).reshape(12, 12)
+    by_products = (errors @ covariance @ errors.T).reshape(4, 3, 4, 3).swapaxes(1, 2).reshape(16, 9)
+    C = ((s[:, :, None] * s[:, None, :]).reshape(-1, 16) @ by_products).reshape(-1, 3, 3)
+    total = np.maximum(np.einsum("nii->n", C), 0.0)
     along = np.maximum(np.einsum("ni,nij,nj->n", unit, C, unit), 0.0)
     worst = int(np.argmax(total))
     return Uncertainty(

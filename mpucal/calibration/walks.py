@@ -17,8 +17,6 @@ from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from ..data import Recording, Vector
 from .flat_segment import Flat
@@ -84,8 +82,9 @@ def likeliest_walk(parts: Parts, D: Vector) -> Walk | None:
     first = np.searchsorted(times, np.arange(times[-1] + 1))
     last = np.append(first[1:], len(parts)) - 1
     middles = 0.5 * (parts.start[first] + parts.end[last])
-    walks = [_walk(what, parts, D, times, middles) for what in STEPS if what != "side"]
-    walk = max(*walks, _walk("side", parts, D, parts.side, middles[:0]), key=lambda walk: walk.gain)
+    by_time = parts.grouped(times)
+    walks = [_walk(what, parts, D, *by_time, middles) for what in STEPS if what != "side"]
+    walk = max(*walks, _walk("side", parts, D, *parts.grouped(parts.side), middles[:0]), key=lambda walk: walk.gain)
     return walk if walk.gain > SIGNIFICANT else None
 
 
@@ -99,7 +98,7 @@ def walked_covariance(parts: Parts, D: Vector, q: float) -> Vector:
     gradient, fisher = parts.grouped(parts.by_time(min(TIMES, len(parts))))
     k, B = len(gradient), _directions("gyroscope", D, len(parts.H))
     back = np.kron(np.eye(k) - np.eye(k, k=-1), np.eye(3))
-    M = block_diag(*(B.T @ fisher @ B)) + back.T @ back / q
+    M = _block_diagonal(B.T @ fisher @ B) + back.T @ back / q
     across = (fisher @ B).transpose(1, 0, 2).reshape(-1, 3 * k)
     return inverse(parts.H - across @ np.linalg.solve(M, across.T))
 
@@ -114,11 +113,18 @@ def _directions(what: What, D: Vector, p: int) -> Vector:
     return B
 
 
-def _walk(what: What, parts: Parts, D: Vector, groups: NDArray[np.intp], t: Vector) -> Walk:
-    gradient, fisher = parts.grouped(groups)
+def _block_diagonal(blocks: Vector) -> Vector:
+    """(3 k, 3 k) with the blocks (k, 3, 3) along its diagonal."""
+    k = len(blocks)
+    M, at = np.zeros((k, 3, k, 3)), np.arange(k)
+    M[at, :, at] = blocks
+    return M.reshape(3 * k, 3 * k)
+
+
+def _walk(what: What, parts: Parts, D: Vector, gradient: Vector, fisher: Vector, t: Vector) -> Walk:
     k, B = len(gradient), _directions(what, D, len(parts.H))
     to_theta = fisher @ B  # (k, p, 3)
-    S = block_diag(*(B.T @ to_theta))
+    S = _block_diagonal(B.T @ to_theta)
     across = to_theta.transpose(1, 0, 2).reshape(-1, 3 * k)
     scale = 1.0 / np.sqrt(np.diag(parts.H))
     H = parts.H * np.outer(scale, scale)

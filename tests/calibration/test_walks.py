@@ -70,7 +70,7 @@ def test_the_likelihood_is_that_of_the_joint_gaussian():
         np.arange(1, k + 1, dtype=float),
         np.zeros(k, np.intp),
     )
-    walk = _walk("accelerometer", parts, np.eye(3), np.arange(k), np.arange(k) + 0.5)
+    walk = _walk("accelerometer", parts, np.eye(3), *parts.grouped(np.arange(k)), np.arange(k) + 0.5)
 
     def density(q):
         B = np.zeros((p, 3))

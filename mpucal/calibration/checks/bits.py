@@ -137,6 +137,9 @@ def _stuck_high(counts: Counts, gap: NDArray[np.bool_]) -> tuple[int, int] | Non
 def _odd_steps(values: Vector) -> Low | None:
     """The axis whose every value is a multiple of a step that is many times the step of another axis."""
     part = values[:: max(len(values) // MOST_SAMPLES, 1)]
+    changes = np.abs(np.diff(part, axis=0))
+    if not (changes.min(0, where=changes > 0.0, initial=np.inf) >= LEAST_ODD_STEP).any():
+        return None  # without a value sorted: this is nearly every recording
     unique = [np.unique(column) for column in part.T]
     if min(map(len, unique)) < FEWEST_VALUES:
         return None

@@ -15,7 +15,7 @@ SLOWEST_HZ = 5.0
 LONGEST_TO_LAY_DOWN_S = 10.0
 # from this many seconds between samples on, times are rather in microseconds, and in nanoseconds
 STEP_OF_MICROSECONDS, STEP_OF_NANOSECONDS = 60.0, 1e5
-FASTEST_GYRO_DPS = 4100.0
+FASTEST_GYRO_DPS, SELDOM = 4100.0, 0.01
 
 
 def no_gyroscope(e: Evidence) -> Reason | None:
@@ -47,9 +47,10 @@ def gyroscope_unit(e: Evidence) -> Reason | None:
     """Rates in deg/s or counts."""
     if time_unit(e) is not None:  # by wrong times no rate fits how gravity turned
         return None
-    rate = float(np.quantile(np.abs(e.recording.gyr), 0.99))
-    if rate <= np.deg2rad(FASTEST_GYRO_DPS) and not e.turned_in_degrees:
+    rates = np.abs(e.recording.gyr)
+    if np.mean(rates > np.deg2rad(FASTEST_GYRO_DPS)) <= SELDOM and not e.turned_in_degrees:
         return None
+    rate = float(np.quantile(rates, 1.0 - SELDOM))
     guess = "deg/s" if rate <= FASTEST_GYRO_DPS else "raw counts"
     return reason("units_suspect", "gyroscope", rate=rate, degrees=np.rad2deg(rate), unit=guess)
 
