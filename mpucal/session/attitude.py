@@ -59,7 +59,7 @@ class Attitude:
     def __init__(self) -> None:
         self.matrix: Vector = np.eye(3)
         self._begun = self._levelled = False
-        self._windows = Windows(STEP_S)
+        self._windows = Windows(STEP_S, spread=False)
         self._bias_rad_s: Vector = np.zeros(3)
 
     def flat(self, rest_rad_s: Vector) -> None:

@@ -9,6 +9,8 @@ import numpy as np
 
 from ..data import Samples, Vector
 
+UNKNOWN = np.full(3, np.nan)
+
 
 @dataclass(frozen=True)
 class Window:
@@ -32,10 +34,13 @@ class Window:
 
 
 class Windows:
-    """Cuts samples, however they arrive, into windows of `length_s` by their own time."""
+    """Cuts samples, however they arrive, into windows of `length_s` by their own time.
 
-    def __init__(self, length_s: float) -> None:
-        self._length_s = length_s
+    Without `spread`, their standard deviations, which take longest, are NaN.
+    """
+
+    def __init__(self, length_s: float, spread: bool = True) -> None:
+        self._length_s, self._spread = length_s, spread
         self._parts: list[Samples] = []
         self._full_s = -math.inf
 
@@ -54,21 +59,21 @@ class Windows:
             last = int(np.searchsorted(pending.t, self._full_s))
             if last == len(pending):
                 break
-            windows.append(_window(pending, first, last))
+            windows.append(_window(pending, first, last, self._spread))
             first = last
         self._parts = [_tail(pending, first)]
         return windows
 
 
-def _window(samples: Samples, first: int, last: int) -> Window:
+def _window(samples: Samples, first: int, last: int, spread: bool) -> Window:
     acc, gyr = samples.acc[first:last], samples.gyr[first:last]
     return Window(
         float(samples.t[first]),
         float(samples.t[last]),
         acc.mean(0),
         gyr.mean(0),
-        acc.std(0),
-        gyr.std(0),
+        acc.std(0) if spread else UNKNOWN,
+        gyr.std(0) if spread else UNKNOWN,
         not bool(samples.gap[first:last].any()),
         last - first,
     )
