@@ -117,3 +117,21 @@ def test_faster_samples_are_averaged(rate_hz, size):
     assert len(recording) == n // size
     np.testing.assert_allclose(recording.acc[:, 0], recording.t)
     assert np.flatnonzero(recording.gap).tolist() == [501 // size]
+
+
+def test_a_flip_that_is_set_right_too_late_is_taken_away_and_no_blow(poses):
+    """Of the gyroscope's sign it would be a turn by some degrees; a blow moves more than one word."""
+    at = len(poses) - 100
+    flipped, blow = poses.gyr.copy(), poses.acc.copy()
+    flipped[at, 1] += 8.7
+    blow[at] += 3.0
+    store = SampleStore(SENSOR)
+    store.add(part(replace(poses, gyr=flipped), 0))
+    found = store.recording()
+    np.testing.assert_allclose(found.gyr[at], poses.gyr[at], atol=0.05)
+    flipped[at], found.gyr[at] = 0.0, 0.0
+    np.testing.assert_array_equal(found.gyr, flipped)
+    np.testing.assert_array_equal(found.acc, poses.acc)
+    store = SampleStore(SENSOR)
+    store.add(part(replace(poses, acc=blow), 0))
+    np.testing.assert_array_equal(store.recording().acc, blow)
