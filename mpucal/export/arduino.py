@@ -1,74 +1,85 @@
-"""A calibration as an Arduino sketch that reads the chip over Wire and prints calibrated accelerations."""
+"""A calibration as an Arduino sketch that reads the chip over Wire and prints calibrated accelerations and rates."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..chip.families import MPU6050, family_of
 from ..result.calibration import Calibration
+from .c_code import INCLUDES, at_temperature
 from .code import in_c
 from .losses import head
 
 ACCEL_CONFIG = {2.0: 0x00, 4.0: 0x08, 8.0: 0x10, 16.0: 0x18}
-DEFAULT_RANGE_G = 4.0
+GYRO_CONFIG = {250.0: 0x00, 500.0: 0x08, 1000.0: 0x10, 2000.0: 0x18}
+DEFAULT_RANGE_G, DEFAULT_RANGE_DPS = 4.0, 500.0
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
     """The sketch's text, with `notes` in its head."""
-    range_g = calibration.sensor.accel_range_g
-    if range_g not in ACCEL_CONFIG:
-        range_g = DEFAULT_RANGE_G
-    remarks = "\n".join(f"// {line}" for line in (f"{head(calibration)}.", *notes))
-    return f"{remarks}\n{_SKETCH_HEAD}{in_c(calibration)}{_body(range_g)}"
+    remarks = "\n".join(f"// {line}" for line in (f"{head(calibration)}, rad/s.", *notes))
+    functions = f"{in_c(calibration)}{at_temperature(calibration)}"
+    return f"{remarks}\n#include <Wire.h>\n{INCLUDES}\n{functions}{_constants(calibration)}{_BODY}"
 
 
-_SKETCH_HEAD = """
-#include <Wire.h>
-
+def _constants(calibration: Calibration) -> str:
+    sensor = calibration.sensor
+    range_g = sensor.accel_range_g if sensor.accel_range_g in ACCEL_CONFIG else DEFAULT_RANGE_G
+    range_dps = sensor.gyro_range_dps if sensor.gyro_range_dps in GYRO_CONFIG else DEFAULT_RANGE_DPS
+    family = family_of(sensor.chip) or MPU6050
+    return f"""
+static const uint8_t CHIP = 0x68;
+static const uint8_t ACCEL_CONFIG = 0x{ACCEL_CONFIG[range_g]:02x}, GYRO_CONFIG = 0x{GYRO_CONFIG[range_dps]:02x};
+static const float MPS2_PER_COUNT = {range_g:g} * 9.80665f / 32768;            // +-{range_g:g} g
+static const float RAD_S_PER_COUNT = {range_dps:g} * 0.01745329252f / 32768;  // +-{range_dps:g} deg/s
+static const float LSB_PER_C = {family.lsb_per_c:g}, ZERO_C = {family.zero_c:g};
 """
 
 
-def _body(range_g: float) -> str:
-    return f"""
-static const uint8_t CHIP = 0x68;
-static const float MPS2_PER_COUNT = {range_g:g} * 9.80665f / 32768;
-
-static void set(uint8_t reg, uint8_t value) {{
+_BODY = """
+static void set(uint8_t reg, uint8_t value) {
     Wire.beginTransmission(CHIP);
     Wire.write(reg);
     Wire.write(value);
     Wire.endTransmission();
-}}
+}
 
-// One sample as measured, m/s^2; false where the chip does not answer.
-static bool measure(float y[3]) {{
+// One sample's counts: accelerometer x, y, z, temperature, gyroscope x, y, z; false where the chip does not answer.
+static bool measure(int16_t counts[7]) {
     Wire.beginTransmission(CHIP);
     Wire.write((uint8_t)0x3B);
-    if (Wire.endTransmission(false) != 0 || Wire.requestFrom(CHIP, (uint8_t)6) != 6)
+    if (Wire.endTransmission(false) != 0 || Wire.requestFrom(CHIP, (uint8_t)14) != 14)
         return false;
-    for (uint8_t i = 0; i < 3; i++) {{
-        uint8_t high = Wire.read();
-        uint8_t low = Wire.read();
-        y[i] = (int16_t)((uint16_t)high << 8 | low) * MPS2_PER_COUNT;
-    }}
+    for (uint8_t i = 0; i < 7; i++) {
+        uint8_t high = (uint8_t)Wire.read();
+        counts[i] = (int16_t)((uint16_t)high << 8 | (uint8_t)Wire.read());
+    }
     return true;
-}}
+}
 
-void setup() {{
+void setup() {
     Serial.begin(115200);
     Wire.begin();
     set(0x6B, 0x01);  // awake, on the gyroscope's clock
-    set(0x1C, 0x{ACCEL_CONFIG[range_g]:02x});  // +-{range_g:g} g
-}}
+    set(0x1B, GYRO_CONFIG);
+    set(0x1C, ACCEL_CONFIG);
+}
 
-void loop() {{
-    float y[3], a[3];
-    if (measure(y)) {{
-        mpucal_correct(y, a);
-        for (uint8_t i = 0; i < 3; i++) {{
-            Serial.print(a[i], 4);
-            Serial.print(i < 2 ? '\\t' : '\\n');
-        }}
-    }}
+void loop() {
+    int16_t counts[7];
+    float y_a[3], y_w[3], a[3], w[3];
+    if (measure(counts)) {
+        for (uint8_t i = 0; i < 3; i++) {
+            y_a[i] = counts[i] * MPS2_PER_COUNT;
+            y_w[i] = counts[4 + i] * RAD_S_PER_COUNT;
+        }
+        mpucal_correct_at(y_a, counts[3] / LSB_PER_C + ZERO_C, a);
+        mpucal_correct_gyro(y_w, w);
+        for (uint8_t i = 0; i < 6; i++) {
+            Serial.print(i < 3 ? a[i] : w[i - 3], 4);
+            Serial.print(i < 5 ? '\\t' : '\\n');
+        }
+    }
     delay(10);
-}}
+}
 """

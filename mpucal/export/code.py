@@ -60,15 +60,27 @@ def py_matrix(matrix: Vector) -> str:
     return ",\n".join(f"    [{_joined(f'{v:.8f}' for v in row)}]" for row in matrix)
 
 
+def temperatures(c: Calibration) -> tuple[float, float, float]:
+    """Where b_a is b_a, and from where to where it follows the temperature [deg C]; zeros: it does not."""
+    if not c.follows_temperature or c.sensor.temperature_c is None:
+        return 0.0, 0.0, 0.0
+    start, end = c.temperature_range_c.tolist()
+    return c.sensor.temperature_c, start, end
+
+
 def in_python(c: Calibration) -> str:
     """A function for NumPy."""
+    at, start, end = temperatures(c)
     return f"""import numpy as np
 
-{_matrices(c)}
+{_matrices(c)}B_A_SLOPE = np.array([{_joined(f"{v:.8f}" for v in c.b_a_slope)}])  # m/s^2 per degree Celsius
+AT_C, RANGE_C = {at:.6g}, ({start:.6g}, {end:.6g})
 
-def apply(y):
-    \"\"\"Calibrated accelerations (..., 3) [m/s^2] of measured ones.\"\"\"
-    return (np.asarray(y) - B_A) @ INV_D.T
+
+def apply(y, temperature_c=np.nan):
+    \"\"\"Calibrated accelerations (..., 3) [m/s^2] of measured ones, at the chip's (...) deg C if known.\"\"\"
+    away = np.nan_to_num(np.clip(temperature_c, *RANGE_C) - AT_C)
+    return (np.asarray(y) - B_A - np.multiply.outer(away, B_A_SLOPE)) @ INV_D.T
 """
 
 

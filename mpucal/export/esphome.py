@@ -1,17 +1,22 @@
 """A calibration as YAML for ESPHome: its mpu6050 sensor, and a template sensor of each calibrated axis.
 
-ESPHome publishes counts * 0.000061 * 9.80665 m/s^2 at +-2 g (mpu6050.cpp), where 1 g is 16384 counts: its numbers are
-made the nominal ones first.
+ESPHome sets +-2 g and +-2000 deg/s, and publishes counts * 0.000061 * 9.80665 m/s^2 and counts * 0.060975 deg/s
+(mpu6050.cpp), where one count is 1/16384 g and 2000/32768 deg/s: its numbers are made the nominal ones first.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from ..data import Vector
 from ..result.calibration import Calibration
+from .code import temperatures
 from .losses import head
 
-G_PER_COUNT, NOMINAL = 0.000061, 1 / 16384
+G_PER_COUNT, NOMINAL_G = 0.000061, 1 / 16384
+DPS_PER_COUNT, NOMINAL_DPS = 0.060975, 2000 / 32768
 RANGE_G = 2.0
 
 
@@ -19,22 +24,13 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
     """The `sensor:` part of a configuration, with `notes` in its head."""
     lines = [f"# {line}" for line in (f"{head(calibration)}.", *notes)]
     lines += ["sensor:", "  - platform: mpu6050", "    update_interval: 1s"]
-    for axis in "xyz":
-        lines += [f"    accel_{axis}:", f"      id: measured_{axis}", "      internal: true"]
-    inverse, bias = calibration.inverse * (NOMINAL / G_PER_COUNT), calibration.b_a_to_subtract * (G_PER_COUNT / NOMINAL)
-    for i, axis in enumerate("xyz"):
-        terms = " + ".join(
-            f"{inverse[i, j]:.9e}f * (id(measured_{of}).state - {bias[j]:.9e}f)" for j, of in enumerate("xyz")
-        )
-        lines += [
-            "  - platform: template",
-            f'    name: "Acceleration {axis}"',
-            f"    id: acceleration_{axis}",
-            '    unit_of_measurement: "m/s²"',
-            "    accuracy_decimals: 4",
-            "    update_interval: 1s",
-            f'    lambda: "return {terms.replace("- -", "+ ")};"',
-        ]
+    for name in (*(f"{kind}_{axis}" for kind in ("accel", "gyro") for axis in "xyz"), "temperature"):
+        lines += [f"    {name}:", f"      id: measured_{name}", "      internal: true"]
+    g, dps = NOMINAL_G / G_PER_COUNT, NOMINAL_DPS / DPS_PER_COUNT
+    b_a, b_omega = calibration.b_a_to_subtract / g, np.degrees(np.nan_to_num(calibration.b_omega)) / dps
+    follows = _away(calibration), calibration.b_a_slope / g
+    lines += _axes("Acceleration", "m/s²", "accel", calibration.inverse * g, b_a, *follows)
+    lines += _axes("Rate", "°/s", "gyro", calibration.K * dps, b_omega)
     return "\n".join(lines) + "\n"
 
 
@@ -46,3 +42,32 @@ def left(calibration: Calibration) -> tuple[str, ...]:
     return (
         f"ESPHome sets +-2 g, and the calibration is of +-{range_g:g} g: what its scale differs between both is left.",
     )
+
+
+def _axes(
+    name: str, unit: str, kind: str, gain: Vector, bias: Vector, away: str = "", slope: Vector | None = None
+) -> list[str]:
+    """A template sensor of each axis: gain (state - bias - slope away)."""
+    lines: list[str] = []
+    for i, axis in enumerate("xyz"):
+        terms = [f"{gain[i, j]:.9e}f * (id(measured_{kind}_{of}).state - {bias[j]:.9e}f)" for j, of in enumerate("xyz")]
+        terms += [f"{-(gain @ slope)[i]:.9e}f * {away}"] if away and slope is not None else []
+        lines += [
+            "  - platform: template",
+            f'    name: "{name} {axis}"',
+            f"    id: {name.lower()}_{axis}",
+            f'    unit_of_measurement: "{unit}"',
+            "    accuracy_decimals: 4",
+            "    update_interval: 1s",
+            f'    lambda: "return {" + ".join(terms).replace("- -", "+ ")};"',
+        ]
+    return lines
+
+
+def _away(calibration: Calibration) -> str:
+    """How far the temperature is from that of b_a, as C++; 0 where it is not known. Empty without b_a(T)."""
+    if not calibration.follows_temperature:
+        return ""
+    at, start, end = temperatures(calibration)
+    T = "id(measured_temperature).state"
+    return f"(std::isnan({T}) ? 0.0f : std::min(std::max({T}, {start:.6e}f), {end:.6e}f) - {at:.6e}f)"

@@ -7,7 +7,15 @@ from dataclasses import dataclass
 
 from ..result.calibration import Calibration
 from . import arduino, c_header, esphome, i2cdevlib, linux_iio, micropython, python, ros, vehicles, vio
-from .losses import Loss, check_usable, in_float, with_hardware, without_gyroscope, without_temperature
+from .losses import (
+    Loss,
+    check_usable,
+    in_float,
+    where_temperature_is_not_given,
+    with_hardware,
+    without_gyroscope,
+    without_temperature,
+)
 
 
 @dataclass(frozen=True)
@@ -51,25 +59,25 @@ FORMS = (
         "c-header",
         ".h",
         "C99, C++11",
-        "`mpucal_correct(y, a)` and `mpucal_correct_gyro(y, w)`, in float32",
+        "`mpucal_correct_at(y, temperature_c, a)`, `mpucal_correct_gyro(y, w)`, and of counts, which check the range",
         c_header.text,
-        (in_float, without_temperature, with_hardware),
+        (in_float, where_temperature_is_not_given, with_hardware),
     ),
     Form(
         "arduino",
         ".ino",
         "the Arduino IDE",
-        "a sketch that reads the chip over Wire, and prints",
+        "a sketch that reads the chip over Wire, and prints accelerations and rates",
         arduino.text,
-        (in_float, without_gyroscope, without_temperature, with_hardware),
+        (in_float, with_hardware),
     ),
     Form(
         "python",
         ".py",
         "NumPy",
-        "`apply(y)`, `apply_gyro(y)`",
+        "`apply(y, temperature_c)`, `apply_gyro(y)`",
         python.text,
-        (without_temperature, with_hardware),
+        (where_temperature_is_not_given, with_hardware),
     ),
     Form(
         "ros",
@@ -136,9 +144,9 @@ FORMS = (
         "micropython",
         ".py",
         "MicroPython, CircuitPython",
-        "`apply(y)`, `apply_gyro(y)` of one sample, without NumPy",
+        "`apply(y, temperature_c)`, `apply_gyro(y)` of one sample, without NumPy, and of counts, which check the range",
         micropython.text,
-        (in_float, without_temperature, with_hardware),
+        (in_float, where_temperature_is_not_given, with_hardware),
     ),
     Form(
         "esphome",
@@ -146,7 +154,7 @@ FORMS = (
         "ESPHome",
         "template sensors of the calibrated axes, beside its mpu6050 sensor",
         esphome.text,
-        (in_float, esphome.left, without_gyroscope, without_temperature, with_hardware),
+        (in_float, esphome.left, with_hardware),
     ),
     Form(
         "json",

@@ -80,6 +80,13 @@ def without_temperature(calibration: Calibration) -> tuple[str, ...]:
     return (f"It holds b_a at {at:.1f} deg C: each degree away from that leaves up to {worst:.2g} m/s^2.",)
 
 
+def where_temperature_is_not_given(calibration: Calibration) -> tuple[str, ...]:
+    """Of a form that follows the temperature where it is told it."""
+    if not calibration.follows_temperature:
+        return ()
+    return (f"Where it is not given the temperature: {without_temperature(calibration)[0]}",)
+
+
 def with_hardware(calibration: Calibration) -> tuple[str, ...]:
     """Of a calibration whose bias the chip's registers subtract in part."""
     applied = calibration.applied_in_hardware

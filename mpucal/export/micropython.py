@@ -6,20 +6,26 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..data import Vector
+from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..result.calibration import Calibration
+from .code import COUNTS, temperatures
 from .losses import head
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
     """The module's text, with `notes` in its head."""
     remarks = "\n".join(f"# {line}" for line in (f"{head(calibration)}, rad/s.", *notes))
+    at, start, end = temperatures(calibration)
+    range_g, range_dps = calibration.sensor.accel_range_g, calibration.sensor.gyro_range_dps
     return f"""{remarks}
 
 INV_D = {_rows(calibration.inverse)}
 B_A = {_row(calibration.b_a_to_subtract)}
 K = {_rows(calibration.K)}
 B_OMEGA = {_row(np.nan_to_num(calibration.b_omega))}
+B_A_SLOPE = {_row(calibration.b_a_slope)}  # m/s^2 per degree Celsius
+AT_C, FROM_C, TO_C = {at:.9g}, {start:.9g}, {end:.9g}
+RANGE_G, RANGE_DPS = {range_g}, {range_dps}
 
 
 def _corrected(M, y, b):
@@ -27,14 +33,32 @@ def _corrected(M, y, b):
     return tuple(row[0] * x + row[1] * y + row[2] * z for row in M)
 
 
-def apply(y):
-    # calibrated acceleration (x, y, z) [m/s^2] of a measured one
-    return _corrected(INV_D, y, B_A)
+def apply(y, temperature_c=None):
+    # calibrated acceleration (x, y, z) [m/s^2] of a measured one, at the chip's deg C where that is known
+    if temperature_c is None or temperature_c != temperature_c:
+        temperature_c = AT_C
+    away = min(max(temperature_c, FROM_C), TO_C) - AT_C
+    return _corrected(INV_D, y, [b + s * away for b, s in zip(B_A, B_A_SLOPE)])
 
 
 def apply_gyro(y):
     # calibrated rate (x, y, z) [rad/s] of a measured one
     return _corrected(K, y, B_OMEGA)
+
+
+def _measured(counts, used, calibrated, unit):
+    if calibrated not in (None, used):
+        raise ValueError("calibrated at a range of %s, not %s" % (calibrated, used))
+    return [count * used * unit for count in counts]
+
+
+def apply_counts(counts, range_g, temperature_c=None):
+    # the same of the chip's counts at +-range_g, to which it is set
+    return apply(_measured(counts, range_g, RANGE_G, {STANDARD_GRAVITY_MPS2 / COUNTS:.9g}), temperature_c)
+
+
+def apply_gyro_counts(counts, range_dps):
+    return apply_gyro(_measured(counts, range_dps, RANGE_DPS, {np.radians(1) / COUNTS:.9g}))
 """
 
 

@@ -23,6 +23,8 @@ ROOT = Path(__file__).parents[2]
 FLOAT_MPS2 = 2e-4
 USABLE_ONLY = [row.name for row in FORMS if row.only_usable]
 APPLIED = np.array([0.25, -0.2, 1.0])
+FOLLOWING = {"b_a_slope": np.array([0.001, -0.02, 0.003]), "temperature_range_c": np.array([5.0, 40.0])}
+TEMPERATURES_C = np.array([-20.0, 5.0, 12.5, 27.5, 33.0, 60.0, np.nan])
 
 
 @pytest.fixture(params=[np.zeros(3), APPLIED], ids=["nothing applied", "applied in hardware"])
@@ -51,28 +53,64 @@ def table(values):
 
 C = """
 #include <stdio.h>
+#define MPUCAL_USED_RANGE_G 4
 #include "calibration.h"
 int main(void) {
-    float y[3], a[3];
-    while (scanf("%f %f %f", &y[0], &y[1], &y[2]) == 3) {
-        mpucal_correct(y, a);
+    float y[3], T, a[3];
+    while (scanf("%f %f %f %f", &y[0], &y[1], &y[2], &T) == 4) {
+        mpucal_correct_at(y, T, a);
         printf("%.9g %.9g %.9g %.9g\\n", (double)a[0], (double)a[1], (double)a[2], (double)MPUCAL_D[0][1]);
     }
     return 0;
 }
 """
+C_COUNTS = """
+#include <stdio.h>
+#include "calibration.h"
+int main(void) {
+    short x, y, z;
+    while (scanf("%hd %hd %hd", &x, &y, &z) == 3) {
+        int16_t counts[3] = {x, y, z};
+        float a[3], w[3], none[3];
+        int done = mpucal_correct_counts(counts, 4.0f, a) + mpucal_correct_gyro_counts(counts, 500.0f, w);
+        int refused = mpucal_correct_counts(counts, 2.0f, none) + mpucal_correct_gyro_counts(counts, 250.0f, none);
+        printf("%d %d %.9g %.9g %.9g %.9g %.9g %.9g\\n", done, refused, (double)a[0], (double)a[1], (double)a[2],
+               (double)w[0], (double)w[1], (double)w[2]);
+    }
+    return 0;
+}
+"""
+FAST = ("-std=c99", "-O2", "-ffast-math")
 
 
-@pytest.mark.parametrize("flags", [("-std=c99",), ("-x", "c++", "-std=c++11")], ids=["C99", "C++11"])
+@pytest.mark.parametrize("flags", [FAST, ("-x", "c++", "-std=c++11")], ids=["C99", "C++11"])
 def test_the_c_header_compiled_and_run(calibrated, samples, tmp_path, flags):
+    calibrated = replace(calibrated, **FOLLOWING)
     text, notes = form("c-header").export(calibrated)
     (tmp_path / "calibration.h").write_text(text)
-    out = compiled(tmp_path, "main.c" if flags[0] == "-std=c99" else "main.cpp", C, *flags)(table(samples))
-    error = np.abs(out[:, :3] - calibrated.apply(samples)).max()
+    T = np.resize(TEMPERATURES_C, len(samples))
+    run = compiled(tmp_path, "main.c" if flags == FAST else "main.cpp", C, "-Wconversion", *flags)
+    out = run(table(np.column_stack([samples, T])))
+    error = np.abs(out[:, :3] - calibrated.apply(samples, temperature_c=T)).max()
     assert error < FLOAT_MPS2
     stated = next(float(re.search(r"up to (\S+) m/s", note)[1]) for note in notes if "float32" in note)
     assert error < 2 * stated < 1e-3
     assert out[0, 3] == pytest.approx(calibrated.D[0, 1], rel=1e-6)
+
+
+COUNTS = np.random.default_rng(3).integers(-32768, 32768, (100, 3))
+MEASURED_A, MEASURED_W = COUNTS * (4 * STANDARD_GRAVITY_MPS2 / 32768), COUNTS * np.radians(500 / 32768)
+
+
+def test_the_c_header_takes_counts_of_its_range_alone(calibrated, tmp_path):
+    (tmp_path / "calibration.h").write_text(form("c-header").export(calibrated)[0])
+    out = compiled(tmp_path, "main.c", C_COUNTS, "-std=c99", "-Wconversion")(table(COUNTS))
+    assert (out[:, :2] == (2, 0)).all()
+    np.testing.assert_allclose(out[:, 2:], np.hstack(calibrated.apply(MEASURED_A, MEASURED_W)), atol=FLOAT_MPS2)
+    refused = subprocess.run(
+        ["gcc", "-DMPUCAL_USED_RANGE_G=2", "-c", "main.c"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert "this calibration is of +-4 g, and MPUCAL_USED_RANGE_G is another range" in refused.stderr
 
 
 # what a sketch needs of Arduino: a chip at 0x68 that answers with the counts on stdin, and a port that is stdout
@@ -81,7 +119,7 @@ ARDUINO = """
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
-static int16_t counts[3];
+static int16_t given[7];
 static uint8_t registers[128], at, sent[2], length, taken;
 struct Port {
     void begin(long) {}
@@ -101,8 +139,9 @@ struct Bus {
     int endTransmission(bool = true) { at = sent[0]; if (length == 2) registers[at] = sent[1]; return 0; }
     int requestFrom(uint8_t, uint8_t count) { taken = 0; return count; }
     int read() {
-        if (at != 0x3B || registers[0x6B] != 0x01 || registers[0x1C] != RANGE_BITS) abort();
-        uint16_t value = (uint16_t)counts[taken / 2];
+        if (at != 0x3B || registers[0x6B] != 0x01 || registers[0x1C] != RANGE_BITS || registers[0x1B] != 0x08)
+            abort();
+        uint16_t value = (uint16_t)given[taken / 2];
         return taken++ % 2 ? value & 0xFF : value >> 8;
     }
 };
@@ -113,23 +152,25 @@ HOST = """
 #include "sketch.ino"
 int main() {
     setup();
-    while (scanf("%hd %hd %hd", &counts[0], &counts[1], &counts[2]) == 3) loop();
+    for (int i = 0; scanf("%hd", &given[i]) == 1; i = (i + 1) % 7) if (i == 6) loop();
 }
 """
 
 
 @pytest.mark.parametrize(("range_g", "bits"), [(2.0, 0x00), (4.0, 0x08), (8.0, 0x10), (16.0, 0x18)])
 def test_the_sketch_compiled_and_run_on_a_stand_in_for_arduino(calibrated, tmp_path, range_g, bits):
-    calibrated = replace(calibrated, sensor=replace(calibrated.sensor, accel_range_g=range_g))
+    calibrated = replace(calibrated, sensor=replace(calibrated.sensor, accel_range_g=range_g), **FOLLOWING)
     (tmp_path / "sketch.ino").write_text(form("arduino").export(calibrated)[0])
     (tmp_path / "Arduino.h").write_text(ARDUINO)
     (tmp_path / "Wire.h").write_text(WIRE)
-    counts = np.random.default_rng(1).integers(-32768, 32768, (100, 3))
+    counts = np.random.default_rng(1).integers(-32768, 32768, (100, 7))
     run = compiled(tmp_path, "host.cpp", HOST, "-std=c++11", f"-DRANGE_BITS={bits}")
-    a = run("".join(f"{x} {y} {z}\n" for x, y, z in counts))
-    y = counts * range_g * STANDARD_GRAVITY_MPS2 / 32768
+    out = run("".join(" ".join(map(str, row)) + "\n" for row in counts))
+    y = counts[:, :3] * range_g * STANDARD_GRAVITY_MPS2 / 32768
+    a, w = calibrated.apply(y, counts[:, 4:] * np.radians(500 / 32768), counts[:, 3] / 340 + 36.53)
     # it prints four digits
-    assert np.abs(a - calibrated.apply(y)).max() < 6e-5 + range_g * 1e-5
+    assert np.abs(out[:, :3] - a).max() < 6e-5 + range_g * 1e-5
+    np.testing.assert_allclose(out[:, 3:], w, atol=6e-5)
 
 
 def test_the_python_module_needs_numpy_alone(calibrated, samples):
@@ -141,6 +182,11 @@ def test_the_python_module_needs_numpy_alone(calibrated, samples):
     a, w = calibrated.apply(samples, samples)
     np.testing.assert_allclose(module["apply"](samples), a, atol=1e-6)
     np.testing.assert_allclose(module["apply_gyro"](samples), w, atol=1e-6)
+    following, T = replace(calibrated, **FOLLOWING), np.resize(TEMPERATURES_C, len(samples))
+    exec(form("python").export(following)[0], module)
+    a = following.apply(samples, temperature_c=T)
+    np.testing.assert_allclose(module["apply"](samples, T), a, atol=1e-6)
+    np.testing.assert_allclose(module["apply"](samples[0], T[0]), a[0], atol=1e-6)
 
 
 def yaml_of(text):
@@ -272,15 +318,10 @@ def test_a_chips_calibration_is_none_of_a_vehicle(calibration, name):
 
 @pytest.mark.parametrize("name", USABLE_ONLY)
 def test_each_says_what_temperature_and_registers_leave(calibration, name):
-    changed = replace(
-        calibration,
-        b_a_slope=np.array([0.001, -0.02, 0.003]),
-        temperature_range_c=np.array([5.0, 40.0]),
-        applied_in_hardware=APPLIED,
-    )
-    text, notes = form(name).export(changed)
+    text, notes = form(name).export(replace(calibration, applied_in_hardware=APPLIED, **FOLLOWING))
     said = " ".join(notes)
-    assert "each degree away from that leaves up to 0.02 m/s^2" in said
+    # these measure the temperature themselves
+    assert name in ("arduino", "esphome") or "each degree away from that leaves up to 0.02 m/s^2" in said
     assert name == "linux-iio" or "after a reset" in said
     assert all(note in text.replace("\n * ", " ") for note in notes)
 

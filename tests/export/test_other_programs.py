@@ -105,7 +105,11 @@ def test_offsets_without_the_factorys_trim_are_not_made_up(calibration):
         form("i2cdevlib").export(replace(calibration, sensor=replace(calibration.sensor, accel_offsets=None)))
 
 
+FOLLOWING = {"b_a_slope": np.array([0.001, -0.02, 0.003]), "temperature_range_c": np.array([5.0, 40.0])}
+
+
 def test_the_micropython_module_needs_nothing(calibration, samples):
+    calibration = replace(calibration, **FOLLOWING)
     text, _ = form("micropython").export(calibration)
     assert not [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import | ast.ImportFrom)]
     module = {}
@@ -113,28 +117,56 @@ def test_the_micropython_module_needs_nothing(calibration, samples):
     a, w = calibration.apply(samples, RATES)
     np.testing.assert_allclose([module["apply"](y) for y in samples.tolist()], a, atol=1e-6)
     np.testing.assert_allclose([module["apply_gyro"](y) for y in RATES.tolist()], w, atol=1e-6)
+    counts = [100, -20000, 32767]
+    y_a, y_w = np.array(counts) * (4 * G / 32768), np.array(counts) * np.radians(500 / 32768)
+    for T in (-20.0, 12.5, 60.0, math.nan):
+        np.testing.assert_allclose(module["apply_counts"](counts, 4, T), calibration.apply(y_a, None, T), atol=1e-6)
+    np.testing.assert_allclose(module["apply_gyro_counts"](counts, 500), calibration.apply(y_a, y_w)[1], atol=1e-6)
+    with pytest.raises(ValueError, match="calibrated at a range of 4"):
+        module["apply_counts"](counts, 2)
+
+
+# ESPHome makes id(name) an access to the component, and the lambda a function that returns optional<float>
+ESPHOME = """#include <algorithm>
+#include <cmath>
+#include <cstdio>
+struct { float state; } %s;
+%s
+int main() {
+    int v[7];
+    for (int i = 0; scanf("%%d", &v[i]) == 1; i = (i + 1) %% 7) {
+        if (i < 6) continue;
+        measured_accel_x.state = (short)v[0] * 0.000061f * 9.80665f;
+        measured_accel_y.state = (short)v[1] * 0.000061f * 9.80665f;
+        measured_accel_z.state = (short)v[2] * 0.000061f * 9.80665f;
+        measured_temperature.state = v[3] ? v[3] / 340.0f + 36.53f : NAN;
+        measured_gyro_x.state = v[4] * 0.060975f;
+        measured_gyro_y.state = v[5] * 0.060975f;
+        measured_gyro_z.state = v[6] * 0.060975f;
+        printf("%%.9g %%.9g %%.9g %%.9g %%.9g %%.9g\\n", f0(), f1(), f2(), f3(), f4(), f5());
+    }
+}
+"""
 
 
 def test_esphomes_lambdas_compiled_and_fed_with_counts(calibration, tmp_path):
     if shutil.which("g++") is None:
         pytest.skip("needs g++")
+    calibration = replace(calibration, **FOLLOWING)
     measured, *made = yaml.safe_load(form("esphome").export(calibration)[0])["sensor"]
     assert measured["platform"] == "mpu6050"
-    assert [measured[f"accel_{axis}"]["id"] for axis in "xyz"] == ["measured_x", "measured_y", "measured_z"]
-    assert [sensor["platform"] for sensor in made] == ["template"] * 3
-    # ESPHome makes id(name) an access to the component, and the lambda a function that returns optional<float>
+    assert [sensor["platform"] for sensor in made] == ["template"] * 6
+    ids = [part["id"] for part in measured.values() if isinstance(part, dict)]
     bodies = [re.sub(r"id\((\w+)\)", r"\1", sensor["lambda"]) for sensor in made]
     functions = "".join(f"float f{i}() {{ {body} }}\n" for i, body in enumerate(bodies))
-    (tmp_path / "main.cpp").write_text(
-        "#include <cstdio>\nstruct { float state; } measured_x, measured_y, measured_z;\n"
-        + functions
-        + 'int main() { int x, y, z; while (scanf("%d %d %d", &x, &y, &z) == 3) {\n'
-        "measured_x.state = (short)x * 0.000061f * 9.80665f; measured_y.state = (short)y * 0.000061f * 9.80665f;\n"
-        'measured_z.state = (short)z * 0.000061f * 9.80665f; printf("%.9g %.9g %.9g\\n", f0(), f1(), f2()); } }\n'
-    )
+    (tmp_path / "main.cpp").write_text(ESPHOME % (", ".join(ids), functions))
     subprocess.run(["g++", "-Wall", "-Werror", "-o", "program", "main.cpp"], cwd=tmp_path, check=True)
-    counts = np.random.default_rng(7).integers(-32768, 32768, (100, 3))
-    fed = "".join(f"{x} {y} {z}\n" for x, y, z in counts)
+    counts = np.random.default_rng(7).integers(-32768, 32768, (100, 7))
+    counts[::5, 3] = 0
+    fed = "".join(" ".join(map(str, row)) + "\n" for row in counts)
     said = subprocess.run([tmp_path / "program"], input=fed, capture_output=True, text=True, check=True).stdout
-    a = np.array([line.split() for line in said.splitlines()], float)
-    np.testing.assert_allclose(a, calibration.apply(counts * G / 16384), atol=2e-5)
+    out = np.array([line.split() for line in said.splitlines()], float)
+    T = np.where(counts[:, 3] == 0, np.nan, counts[:, 3] / 340 + 36.53)
+    a, w = calibration.apply(counts[:, :3] * G / 16384, counts[:, 4:] * np.radians(2000 / 32768), T)
+    np.testing.assert_allclose(out[:, :3], a, atol=2e-5)
+    np.testing.assert_allclose(out[:, 3:], np.degrees(w), atol=2e-3)

@@ -4,6 +4,7 @@ import ctypes
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,14 @@ unsigned char host_apply_gyro(const void *blob, unsigned size, float range_dps, 
     struct mpucal_source source = {mpucal_read_memory, blob, size};
     enum mpucal_status status = mpucal_load_gyro(&gyro, &source, range_dps);
     if (status == MPUCAL_OK) mpucal_apply_gyro(&gyro, counts, w);
+    return (unsigned char)status;
+}
+unsigned char host_apply_fixed(const void *blob, unsigned size, const int16_t *counts, unsigned n, int32_t *corrected) {
+    struct mpucal sensor;
+    struct mpucal_fixed fixed;
+    enum mpucal_status status = mpucal_load(&sensor, blob, size, 0, 4.0f);
+    if (status == MPUCAL_OK) status = mpucal_fix_accel(&fixed, &sensor, 4.0f);
+    if (status == MPUCAL_OK) for (; n--; counts += 3, corrected += 3) mpucal_apply_fixed(&fixed, counts, corrected);
     return (unsigned char)status;
 }
 """
@@ -110,3 +119,31 @@ def test_the_gyroscope_is_corrected_by_k_and_b_omega(path, library):
 
 def test_a_gyroscope_at_another_range_is_refused(library):
     assert _rate(library, (VECTORS / "blob_measured.bin").read_bytes(), 250.0, (1, 2, 3))[0] == 8
+
+
+MEASURED = Blob.decode((VECTORS / "blob_measured.bin").read_bytes())
+ENDS = np.array(np.meshgrid(*[[-32768, -32767, -1, 0, 1, 32767]] * 3)).reshape(3, -1).T
+
+
+def _fixed(library, blob, counts):
+    counts, data = np.ascontiguousarray(counts, np.int16), blob.encode()
+    corrected = np.zeros(counts.shape, np.int32)
+    pointers = [array.ctypes.data_as(ctypes.c_void_p) for array in (counts, corrected)]
+    return library.host_apply_fixed(data, len(data), pointers[0], len(counts), pointers[1]), corrected
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_fixed_point_is_within_a_count_over_the_whole_range(seed, library):
+    rng = np.random.default_rng(seed)
+    D = np.eye(3) * rng.uniform(0.7, 1.4, 3) + rng.uniform(-0.15, 0.15, (3, 3))
+    b_a = rng.uniform(-5, 5, 3)
+    counts = np.vstack([ENDS, rng.integers(-32768, 32768, (20_000, 3))])
+    status, corrected = _fixed(library, replace(MEASURED, D=tuple(D.ravel()), b_a=tuple(b_a)), counts)
+    exact = np.linalg.solve(D, (counts - b_a * 32768 / (4 * 9.80665)).T).T
+    assert status == 0
+    assert np.abs(corrected - exact).max() < 0.55
+
+
+@pytest.mark.parametrize("changes", [{"D": (0.5, 0, 0, 0, 1, 0, 0, 0, 1)}, {"b_a": (5000.0, 0, 0)}], ids=["D", "b_a"])
+def test_what_has_no_room_in_fixed_point_is_refused(changes, library):
+    assert _fixed(library, replace(MEASURED, **changes), [[1, 2, 3]])[0] == 9

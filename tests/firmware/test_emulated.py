@@ -17,6 +17,7 @@ from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, NoAnswer
 from mpucal.result.blob import Blob
+from mpucal.result.calibration import Calibration
 from mpucal.simulated.chip import Chip, SimulatedBus, open_simulated
 from mpucal.simulated.chip.factory import Factory
 from mpucal.simulated.chip.models import MODELS
@@ -29,6 +30,7 @@ OLD = (ROOT / "fixtures" / "vectors" / "blob_measured.bin").read_bytes()
 NEW = replace(Blob.decode(OLD), b_a=(1.0, 2.0, 3.0)).encode()
 
 FLASH_LIMIT, RAM_LIMIT = 8192, 1024
+FIXED_LIMIT = 1000
 RATE_HZ, SECONDS = 1000, 60
 
 
@@ -96,11 +98,15 @@ def test_the_bridges_ram_is_as_stated(avr_build):
 def test_the_readme_gives_the_cycles_that_are_counted(make):
     if shutil.which("simavr") is None:
         pytest.skip("needs simavr, of the packages in tools/ci_packages.txt")
-    counted = re.findall(r"\d+ cycles", make("cycles")[1])
+    said = make("cycles")[1]
+    counted = re.findall(r"\d+ cycles", said)
     readme = (ROOT / "tools" / "firmware" / "README.md").read_text()
     # the compiler's version decides the last per cents
     for cycles, stated in zip(counted, re.findall(r"\d+\s+cycles", readme), strict=True):
         assert int(cycles.split()[0]) == pytest.approx(int(stated.split()[0]), rel=0.15)
+    assert int(counted[1].split()[0]) < FIXED_LIMIT
+    # rounding takes half a count
+    assert 0.4 < float(re.search(r"at most (\S+) counts off", said)[1]) < 0.6
 
 
 def test_the_sketch_is_the_same_bridge(switch_on, sketches):
@@ -127,13 +133,30 @@ def test_the_sketch_writes_as_many_bytes_as_the_protocol_allows(switch_on, sketc
         assert bus.read(reg.PWR_MGMT_1, 2).data == bytes([0, count])
 
 
+class Still:
+    """A feed that does not change: accelerometer, temperature, gyroscope."""
+
+    WORDS = (1000, -2000, 8000, -700, 300, -200, 30000)
+
+    def samples(self, edges_s, _setting):
+        return np.tile(np.int16(self.WORDS), (len(edges_s) - 1, 1))
+
+
+def _still(clock):
+    return SimulatedBus(Chip(MODELS["mpu6050"], Still(), 0.0, Factory()), clock)
+
+
 def test_the_corrected_sketch_prints_what_is_stored(switch_on, sketches):
+    sloped = (ROOT / "fixtures" / "vectors" / "blob_sloped.bin").read_bytes()
     _, port = switch_on()
-    open_store(port).write(OLD)
-    board, _ = switch_on(elf=sketches / "mpucal_corrected_sketch.elf")
+    open_store(port).write(sloped)
+    board, _ = switch_on(_still, sketches / "mpucal_corrected_sketch.elf")
     board.run(0.5)
     *_, line, _ = board.receive().decode().splitlines()
-    assert 5 < np.linalg.norm([float(number) for number in line.split()]) < 15
+    words = np.array(Still.WORDS, float)
+    y, T, w = words[:3] * (4 * 9.80665 / 32768), words[3] / 340 + 36.53, words[4:] * np.radians(500 / 32768)
+    wanted = np.concatenate(Calibration.from_blob(Blob.decode(sloped)).apply(y, w, T))
+    np.testing.assert_allclose([float(number) for number in line.split()], wanted, atol=2e-4)
 
 
 def test_reads_and_writes_registers_in_the_bridges_time(switch_on):

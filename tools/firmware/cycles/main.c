@@ -24,6 +24,15 @@ static void __attribute__((noinline)) apply(const struct mpucal *sensor, const i
     mpucal_apply(sensor, counts, a_mps2);
 }
 
+static struct mpucal_fixed fixed;
+
+static void __attribute__((noinline)) apply_fixed(const struct mpucal *sensor, const int16_t counts[3], float a[3]) {
+    (void)sensor;
+    int32_t corrected[3];
+    mpucal_apply_fixed(&fixed, counts, corrected);
+    __asm__ __volatile__("" : : "r"(corrected), "r"(a) : "memory");
+}
+
 static void __attribute__((noinline)) nothing(const struct mpucal *sensor, const int16_t counts[3], float a_mps2[3]) {
     __asm__ __volatile__("" : : "r"(sensor), "r"(counts), "r"(a_mps2) : "memory");
 }
@@ -39,6 +48,24 @@ static uint32_t cycles_of(void (*call)(const struct mpucal *, const int16_t *, f
     return (uint32_t)(uint16_t)(TCNT1 - began) * TIMER_CYCLES;
 }
 
+/* How far apart both are at most, in thousandths of a count; from one end of the range to the other. */
+static uint16_t apart(const struct mpucal *sensor, float mps2_per_count) {
+    static const int16_t ENDS[] = {INT16_MIN, INT16_MIN + 1, -12345, -1, 0, 1, 12345, INT16_MAX};
+    float worst = 0.0f;
+    for (uint16_t i = 0; i < 512; i++) {
+        int16_t counts[3] = {ENDS[i & 7], ENDS[i >> 3 & 7], ENDS[i >> 6]};
+        float a_mps2[3];
+        int32_t corrected[3];
+        mpucal_apply(sensor, counts, a_mps2);
+        mpucal_apply_fixed(&fixed, counts, corrected);
+        for (uint8_t j = 0; j < 3; j++) {
+            float off = (float)corrected[j] - a_mps2[j] / mps2_per_count;
+            worst = off > worst ? off : -off > worst ? -off : worst;
+        }
+    }
+    return (uint16_t)(worst * 1000.0f);
+}
+
 int main(void) {
     struct mpucal sensor;
     stdout = &out;
@@ -47,8 +74,11 @@ int main(void) {
     uint16_t began = TCNT1;
     enum mpucal_status status = mpucal_load(&sensor, BLOB, sizeof BLOB, 0x68, 4.0f);
     uint32_t load = (uint32_t)(uint16_t)(TCNT1 - began) * TIMER_CYCLES;
-    uint32_t calls = cycles_of(apply, &sensor) - cycles_of(nothing, &sensor);
-    printf("status %u, apply %lu cycles, load %lu cycles\n", status, calls / RUNS, load);
+    status |= mpucal_fix_accel(&fixed, &sensor, 4.0f);
+    uint32_t none = cycles_of(nothing, &sensor), calls = cycles_of(apply, &sensor) - none;
+    uint32_t fixed_calls = cycles_of(apply_fixed, &sensor) - none;
+    printf("status %u, apply %lu cycles, apply_fixed %lu cycles, load %lu cycles, apart %u\n", status, calls / RUNS,
+           fixed_calls / RUNS, load, apart(&sensor, 4.0f * 9.80665f / 32768.0f));
     cli();
     sleep_enable();
     sleep_cpu(); /* without interrupts: the emulator ends */

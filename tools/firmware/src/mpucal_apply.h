@@ -55,7 +55,8 @@ enum mpucal_status {
     MPUCAL_NOT_FINITE,    /* D, b_a or applied_b_a holds infinity or NaN */
     MPUCAL_NOT_INVERTIBLE, /* no more than rounding is left of D's determinant */
     MPUCAL_OTHER_CHIP,    /* it was measured on a chip of another WHO_AM_I */
-    MPUCAL_OTHER_RANGE    /* it was measured at another full scale, or nobody knows at which */
+    MPUCAL_OTHER_RANGE,   /* it was measured at another full scale, or nobody knows at which */
+    MPUCAL_NOT_FIXED      /* it has no room in struct mpucal_fixed */
 };
 
 /* A calibration, ready to be applied: a = gain * counts - bias, in m/s^2. */
@@ -74,6 +75,13 @@ struct mpucal_drift {
 struct mpucal_gyro {
     float gain[3][3]; /* K * (pi / 180) * gyro_range_dps / 32768 */
     float bias[3];    /* K b_omega; zeros where the blob has none */
+};
+
+/* Either of both for a processor without floating point, 39 bytes: out = (gain * counts + offset) >> 14, in counts. */
+struct mpucal_fixed {
+    int16_t gain[3][3];    /* whole units of 2^-14 */
+    uint8_t fraction[3][3]; /* and what is left of them, of 2^-22 */
+    int32_t offset[3];     /* what is subtracted, of 2^-14 counts, and half a count to round */
 };
 
 /* Where a blob is read from, byte by byte: plain memory, or what has to be asked, such as an EEPROM. */
@@ -116,7 +124,7 @@ static inline int mpucal_is_finite(float value) {
 
 static inline int mpucal_all_finite(const struct mpucal_source *blob, uint16_t offset, uint8_t count) {
     for (uint8_t i = 0; i < count; i++) {
-        if (!mpucal_is_finite(mpucal_f32(blob, (uint16_t)(offset + 4 * i)))) {
+        if (!mpucal_is_finite(mpucal_f32(blob, (uint16_t)(offset + 4u * i)))) {
             return 0;
         }
     }
@@ -310,16 +318,115 @@ static inline enum mpucal_status mpucal_load_drift(struct mpucal_drift *drift, c
     return MPUCAL_OK;
 }
 
+/* How far a temperature is from that of b_a, deg C; one that is not known, NaN, is that of b_a. */
+static inline float mpucal_away_c(const struct mpucal_drift *drift, float temperature_c) {
+    float known = mpucal_is_finite(temperature_c) ? temperature_c : drift->at_c;
+    float within = known < drift->from_c ? drift->from_c : known;
+    return (within > drift->to_c ? drift->to_c : within) - drift->at_c;
+}
+
 /* The specific force with b_a(T) at the chip's temperature_c; beyond the temperatures that were seen, as at their end. */
 static inline void mpucal_apply_at(const struct mpucal *sensor, const struct mpucal_drift *drift,
                                    const int16_t counts[3], float temperature_c, float a_mps2[3]) {
-    /* a temperature that is not known, NaN, is the one at which it was measured: then b_a is the blob's */
-    float known = mpucal_is_finite(temperature_c) ? temperature_c : drift->at_c;
-    float within = known < drift->from_c ? drift->from_c : known;
-    float away = (within > drift->to_c ? drift->to_c : within) - drift->at_c;
+    float away_c = mpucal_away_c(drift, temperature_c);
     mpucal_apply(sensor, counts, a_mps2);
     for (uint8_t i = 0; i < 3; i++) {
-        a_mps2[i] -= drift->slope[i] * away;
+        a_mps2[i] -= drift->slope[i] * away_c;
+    }
+}
+
+/* A calibration at that temperature, to be applied many times until it has changed. */
+static inline struct mpucal mpucal_at(const struct mpucal *sensor, const struct mpucal_drift *drift,
+                                      float temperature_c) {
+    struct mpucal at = *sensor;
+    float away_c = mpucal_away_c(drift, temperature_c);
+    for (uint8_t i = 0; i < 3; i++) {
+        at.bias[i] += drift->slope[i] * away_c;
+    }
+    return at;
+}
+
+#define MPUCAL_FIXED_ONE 16384.0f /* 2^14 */
+#define MPUCAL_FIXED_LIMIT 131064.0f /* counts that 32 bits hold in these units, and 8 to round */
+
+/* gain * counts - bias as fixed point; `unit` is what a count is worth. On any status but MPUCAL_OK, `fixed` stays. */
+static inline enum mpucal_status mpucal_fix(struct mpucal_fixed *fixed, const float gain[3][3], const float bias[3],
+                                            float unit) {
+    struct mpucal_fixed made;
+    for (uint8_t i = 0; i < 3; i++) {
+        float offset = bias[i] / unit, most = offset < 0.0f ? -offset : offset;
+        for (uint8_t j = 0; j < 3; j++) {
+            float ratio = gain[i][j] / unit, size = ratio < 0.0f ? -ratio : ratio;
+            if (!(size < 1.999f)) {
+                return MPUCAL_NOT_FIXED;
+            }
+            most += size * MPUCAL_FULL_SCALE;
+            int32_t units = (int32_t)(ratio * MPUCAL_FIXED_ONE * 256.0f + (ratio < 0.0f ? -0.5f : 0.5f));
+            made.gain[i][j] = (int16_t)(units >> 8);
+            made.fraction[i][j] = (uint8_t)(units & 0xFF);
+        }
+        if (!(most < MPUCAL_FIXED_LIMIT)) {
+            return MPUCAL_NOT_FIXED;
+        }
+        made.offset[i] = (int32_t)((0.5f - offset) * MPUCAL_FIXED_ONE);
+    }
+    *fixed = made;
+    return MPUCAL_OK;
+}
+
+/* A calibration at +-range_g, for mpucal_apply_fixed. */
+static inline enum mpucal_status mpucal_fix_accel(struct mpucal_fixed *fixed, const struct mpucal *sensor,
+                                                  float range_g) {
+    return mpucal_fix(fixed, sensor->gain, sensor->bias, MPUCAL_STANDARD_GRAVITY_MPS2 * range_g / MPUCAL_FULL_SCALE);
+}
+
+/* The gyroscope's at +-range_dps. */
+static inline enum mpucal_status mpucal_fix_gyro(struct mpucal_fixed *fixed, const struct mpucal_gyro *gyro,
+                                                 float range_dps) {
+    return mpucal_fix(fixed, gyro->gain, gyro->bias, MPUCAL_RAD * range_dps / MPUCAL_FULL_SCALE);
+}
+
+#ifdef __AVR_HAVE_MUL__
+/* Of what is below, avr-gcc makes three times as many cycles: sum + (256 gain + fraction) count / 256, byte by byte. */
+static inline int32_t mpucal_plus(int32_t sum, int16_t gain, uint8_t fraction, int16_t count) {
+    __asm__("mul %[f], %A[c]\n\tadd %A[s], r1\n\tadc %B[s], %[o]\n\tadc %C[s], %[o]\n\tadc %D[s], %[o]\n\t"
+            "mulsu %B[c], %[f]\n\tsbc %C[s], %[o]\n\tsbc %D[s], %[o]\n\t" /* the carry is the product's sign */
+            "add %A[s], r0\n\tadc %B[s], r1\n\tadc %C[s], %[o]\n\tadc %D[s], %[o]\n\t"
+            "mul %A[g], %A[c]\n\tadd %A[s], r0\n\tadc %B[s], r1\n\tadc %C[s], %[o]\n\tadc %D[s], %[o]\n\t"
+            "mulsu %B[c], %A[g]\n\tsbc %D[s], %[o]\n\tadd %B[s], r0\n\tadc %C[s], r1\n\tadc %D[s], %[o]\n\t"
+            "mulsu %B[g], %A[c]\n\tsbc %D[s], %[o]\n\tadd %B[s], r0\n\tadc %C[s], r1\n\tadc %D[s], %[o]\n\t"
+            "muls %B[g], %B[c]\n\tadd %C[s], r0\n\tadc %D[s], r1\n\tclr r1"
+            : [s] "+r"(sum)
+            : [g] "a"(gain), [f] "a"(fraction), [c] "a"(count), [o] "r"((uint8_t)0));
+    return sum;
+}
+
+/* sum / 2^14 by two bytes and two bits: an AVR shifts by one bit at a time. */
+static inline int32_t mpucal_shifted(int32_t sum) {
+    int32_t above = sum >> 8;
+    __asm__("" : "+r"(above));
+    return (int32_t)((uint32_t)above << 2) >> 8;
+}
+#else
+static inline int32_t mpucal_plus(int32_t sum, int16_t gain, uint8_t fraction, int16_t count) {
+    return sum + (int32_t)gain * count + ((int32_t)fraction * count >> 8);
+}
+
+static inline int32_t mpucal_shifted(int32_t sum) {
+    return sum >> 14;
+}
+#endif
+
+/* What mpucal_apply or mpucal_apply_gyro makes of one sample, in counts at the nominal scale, without floating point;
+ * within 1 of it over the whole range of the counts. */
+static inline void mpucal_apply_fixed(const struct mpucal_fixed *fixed, const int16_t counts[3], int32_t corrected[3]) {
+    int16_t x = counts[0], y = counts[1], z = counts[2];
+    for (uint8_t i = 0; i < 3; i++) {
+        const int16_t *gain = fixed->gain[i];
+        const uint8_t *fraction = fixed->fraction[i];
+        int32_t sum = mpucal_plus(fixed->offset[i], gain[0], fraction[0], x);
+        sum = mpucal_plus(sum, gain[1], fraction[1], y);
+        corrected[i] = mpucal_shifted(mpucal_plus(sum, gain[2], fraction[2], z));
     }
 }
 

@@ -103,13 +103,31 @@ int mpucal_slots_erase(const struct mpucal_memory *memory) {
     return !mpucal_slots_stored(memory).generation;
 }
 
+/* The stored blob as a source, which reads `place`; one of no bytes where none is stored. */
+static struct mpucal_source stored_blob(const struct mpucal_memory *memory, struct place *place) {
+    struct mpucal_stored stored = mpucal_slots_stored(memory);
+    place->memory = memory;
+    place->at = stored.at;
+    struct mpucal_source blob = {read_place, place, stored.generation ? stored.length : 0};
+    return blob;
+}
+
 enum mpucal_status mpucal_slots_load(const struct mpucal_memory *memory, struct mpucal *sensor, uint8_t who_am_i,
                                      float accel_range_g) {
-    struct mpucal_stored stored = mpucal_slots_stored(memory);
-    if (!stored.generation) {
-        return MPUCAL_NO_BLOB;
-    }
-    struct place place = {memory, stored.at};
-    struct mpucal_source blob = {read_place, &place, stored.length};
+    struct place place;
+    struct mpucal_source blob = stored_blob(memory, &place);
     return mpucal_load_from(sensor, &blob, who_am_i, accel_range_g);
+}
+
+enum mpucal_status mpucal_slots_load_gyro(const struct mpucal_memory *memory, struct mpucal_gyro *gyro,
+                                          float gyro_range_dps) {
+    struct place place;
+    struct mpucal_source blob = stored_blob(memory, &place);
+    return mpucal_load_gyro(gyro, &blob, gyro_range_dps);
+}
+
+enum mpucal_status mpucal_slots_load_drift(const struct mpucal_memory *memory, struct mpucal_drift *drift) {
+    struct place place;
+    struct mpucal_source blob = stored_blob(memory, &place);
+    return mpucal_load_drift(drift, &blob);
 }

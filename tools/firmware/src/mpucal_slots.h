@@ -47,6 +47,11 @@ int mpucal_slots_erase(const struct mpucal_memory *memory);
 enum mpucal_status mpucal_slots_load(const struct mpucal_memory *memory, struct mpucal *sensor, uint8_t who_am_i,
                                      float accel_range_g);
 
+/* The same of its K and b_omega, and of its b_a(T). */
+enum mpucal_status mpucal_slots_load_gyro(const struct mpucal_memory *memory, struct mpucal_gyro *gyro,
+                                          float gyro_range_dps);
+enum mpucal_status mpucal_slots_load_drift(const struct mpucal_memory *memory, struct mpucal_drift *drift);
+
 #ifdef __cplusplus
 }
 #endif
