@@ -14,7 +14,7 @@ import numpy as np
 
 from mpucal.calibration.flat_segment import Flat, find_flat, flat_statistics
 from mpucal.calibration.masks import with_masks
-from mpucal.calibration.rotation import cross, product, rotation
+from mpucal.calibration.rotation import cross, rotation, turned
 from mpucal.calibration.static_intervals import Intervals, static_intervals
 from mpucal.data import Recording, Vector
 
@@ -88,7 +88,7 @@ class Rests:
         for k, ((_, a), (b, _)) in enumerate(pairwise(self.runs.tolist())):
             if r.t[b] - r.t[a - 1] <= LONGEST_MOVE_S:
                 rate = (r.gyr[a - 1 : b] - self.b_omega[k : k + 2].mean(0)) @ K.T
-                moves.append((k, product(rotation(-np.diff(r.t[a - 1 : b + 1])[:, None] * rate))))
+                moves.append((k, turned(-np.diff(r.t[a - 1 : b + 1])[:, None] * rate)))
         return moves
 
     def misses_rad(self, D: Vector, b_a: Vector, K: Vector) -> Vector:

@@ -12,9 +12,9 @@ from ..data import Recording, Vector
 from .claim import Claim
 from .fit import Fit
 from .flat_segment import Flat, find_flat, flat_statistics
-from .rotation import product, rotation
+from .rotation import turned
 from .sphere import fibonacci_sphere
-from .static_intervals import static_intervals
+from .static_intervals import static_intervals, statistics
 from .tilt import tilted_directions
 from .uncertainty import DIRECTIONS, Uncertainty, uncertainty
 
@@ -118,7 +118,7 @@ class Evidence:
         if np.linalg.norm(turns, axis=2).sum() < FAR_TOO_FAR * _angles(u[at + 1], u[at]).sum():
             return False
         miss, miss_in_degrees = (
-            np.median(_angles((product(rotation(-unit * turns)) @ u[at, :, None])[..., 0], u[at + 1]))
+            np.median(_angles(np.array([turned(-unit * turns[:, k]) @ u[i] for k, i in enumerate(at)]), u[at + 1]))
             for unit in (1.0, np.deg2rad(1.0))
         )
         return bool(miss > 3.0 * miss_in_degrees)
@@ -132,8 +132,7 @@ class Evidence:
         runs = static_intervals(r, flat)
         if len(runs) < 3:
             return None
-        poses = np.array([self.calibrated[a:b].mean(0) for a, b in runs])
-        bias = np.array([r.gyr[a:b].mean(0) for a, b in runs])
+        poses, bias = statistics(self.calibrated, runs)[0], statistics(r.gyr, runs)[0]
         misses = []
         for k in range(len(runs) - 1):
             a, b = runs[k][1] - 1, runs[k + 1][0]
@@ -142,7 +141,7 @@ class Evidence:
             dt, there = np.diff(r.t[a : b + 1])[:, None], _units(poses[k + 1][None])[0]
             # by the two rests' own rates, which know a drift, or by the estimate: a turn about the vertical looks still
             rates = [r.gyr[a:b] - b_omega for b_omega in (0.5 * (bias[k] + bias[k + 1]), fit.b_omega)]
-            carried = [product(rotation(-dt * (rate @ fit.K.T))) @ poses[k] for rate in rates]
+            carried = [turned(-dt * (rate @ fit.K.T)) @ poses[k] for rate in rates]
             misses.append(float(np.arccos(np.clip(_units(np.array(carried)) @ there, -1.0, 1.0)).min()))
         magnitude = np.linalg.norm(poses, axis=1) - self.gravity
         return Agreement(len(runs), float(np.sqrt(np.mean(magnitude**2))), *_median_and_max(misses))

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..data import Recording, Vector
 from .flat_segment import Flat
-from .static_intervals import Intervals, gravity_turns
+from .static_intervals import Intervals, gravity_turns, statistics
 
 LONG_ENOUGH_FOR_BIAS_S = 0.5
 TURNING_RAD_S = 0.005  # slower, gravity wanders by a hand that settles and by noise
@@ -28,15 +28,14 @@ def without_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recordin
     runs = runs[runs[:, 1] - runs[:, 0] >= LONG_ENOUGH_FOR_BIAS_S * recording.rate_hz]
     if len(runs) < 2:
         return recording
-    t = np.array([0.5 * (recording.t[a] + recording.t[b - 1]) for a, b in runs])
-    n = (runs[:, 1] - runs[:, 0])[:, None]
-    rests = [recording.gyr[a:b].T for a, b in runs]
-    tremor = np.maximum([[axis.var() for axis in rest] for rest in rests] - 1.2 * flat.Sigma_omega, 0.0)
+    first, last = runs.T
+    t, n = 0.5 * (recording.t[first] + recording.t[last - 1]), (last - first)[:, None]
+    mean, spread = statistics(recording.gyr, runs)
+    tremor = np.maximum(spread - 1.2 * flat.Sigma_omega, 0.0)
     variance = flat.Sigma_omega / n + tremor * np.minimum(1.0, 2.0 * TREMOR_S * recording.rate_hz / n)
     # so far a run's mean rate may be a turn and no bias
-    turns = np.array([gravity_turns(recording, a, b) for a, b in runs])
-    variance = variance + np.maximum(turns - TURNING_RAD_S, 0.0)[:, None] ** 2
-    walk = _smoothed(t, np.array([[axis.mean() for axis in rest] for rest in rests]), variance)
+    variance = variance + np.maximum(gravity_turns(recording, runs) - TURNING_RAD_S, 0.0)[:, None] ** 2
+    walk = _smoothed(t, mean, variance)
     bias = np.stack([np.interp(recording.t, t, column) for column in walk.T], axis=1)
     return replace(recording, gyr=recording.gyr - bias + flat.b_omega)
 

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..data import Recording, Vector
+from ..kernel import _kernel
 
 if TYPE_CHECKING:
     from .flat_segment import Flat
 
 WINDOW_S = 0.5
-DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+ORDER, SQUARES = 4, 70.0  # of the differences: sum of the squares of 1, -4, 6, -4, 1
 # where a window's variance is less than so many times that of its noise, the board is not moved but vibrates
 VIBRATION = 5.0
 # variances: below this a window is as loud as the flat segment, but for chance and a hand
@@ -25,16 +26,10 @@ LOUDER = 2.0
 def noise_variance(recording: Recording) -> Vector:
     """(n, 3) (m/s^2)^2, as if white, in a window of half a second around each sample."""
     acc, n = recording.acc, len(recording)
-    if n < len(DIFFERENCE):
-        return np.zeros((n, 3))
-    squares = np.zeros((n + 1, 3))
-    difference = sum(c * acc[i : n - len(DIFFERENCE) + 1 + i] for i, c in enumerate(DIFFERENCE))
-    squares[3 : n - 1] = np.square(difference) / np.sum(DIFFERENCE**2)
-    sums = np.cumsum(squares, axis=0)
-    half = max(round(WINDOW_S * recording.rate_hz) // 2, 2)
-    at = np.arange(n)
-    low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, n)
-    return np.asarray((sums[high] - sums[low]) / (high - low)[:, None])
+    squares = np.zeros((n, 3))
+    if n > ORDER:
+        squares[ORDER // 2 : -ORDER // 2] = np.square(np.diff(acc, ORDER, axis=0)) / SQUARES
+    return _kernel.moving_mean(squares, max(round(WINDOW_S * recording.rate_hz) // 2, 2))
 
 
 def louder(recording: Recording, flat: Flat) -> Vector:

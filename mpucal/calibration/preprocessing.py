@@ -8,12 +8,14 @@ from functools import cached_property
 import numpy as np
 
 from ..data import Recording, Vector
+from ..kernel import _kernel
 from .flat_segment import Flat, flat_statistics
 from .gyro_drift import without_drift
 from .local_noise import louder, noise_variance
 from .masks import mask
 from .problem import Problem, Series
-from .static_intervals import Intervals, static_intervals
+from .rotation import lengths
+from .static_intervals import Intervals, static_intervals, statistics
 
 HUBER = 2.0
 MOVING_RAD_S = 0.3  # the rate at which a hand's acceleration is half of what it grows to
@@ -86,7 +88,7 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     loud = (louder(recording, flat) if noise is None else noise)[flat.last :]
     series = mask(Series.after(recording, flat), recording, flat)
     series = replace(series, r_scale=loud if series.r_scale is None else np.maximum(series.r_scale, loud))
-    after = [(max(a - flat.last, 0), b - flat.last) for a, b in runs.tolist() if b > flat.last]
+    after = np.maximum(runs[runs[:, 1] > flat.last] - flat.last, 0)
     rest = np.zeros(len(series), bool)
     for a, b in after:
         rest[a:b] = True
@@ -94,8 +96,8 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     speed2 = np.sum(rate * rate, axis=1)
     lam = TREMOR_PER_S if len(after) >= MANY_RESTS else MOTION_PER_S
     reset, jerk, pose = np.full(len(series), -1.0), np.zeros(len(series)), np.zeros(len(series))
-    for a, b in after:
-        tremor = _tremor(series.y[a:b], float(loud[a:b].mean()) * flat.Sigma_a)
+    for (a, b), variance in zip(after.tolist(), statistics(series.y, after)[1], strict=True):
+        tremor = _tremor(variance, float(loud[a:b].mean()) * flat.Sigma_a)
         reset[a], jerk[a:b], pose[a:b] = tremor, jerk_density(tremor, lam), POSE_MPS2**2 * (b - a)
         if b < len(series):
             reset[b] = 0.0
@@ -122,31 +124,26 @@ def _rates(recording: Recording, flat: Flat, rest: Vector) -> tuple[Vector, Vect
 
     Noise in a regressor pulls the lever arm to zero.
     """
-    n, k = len(recording), int(SMOOTH_S * recording.rate_hz)
-    sums = np.cumsum(np.vstack([np.zeros((1, 3)), recording.gyr - flat.b_omega]), axis=0)
-    low, high = np.maximum(np.arange(n) - k, 0), np.minimum(np.arange(n) + k + 1, n)
-    rate = (sums[high] - sums[low]) / (high - low)[:, None]
+    k = int(SMOOTH_S * recording.rate_hz)
+    rate = _kernel.moving_mean(recording.gyr - flat.b_omega, k)
     # the times are smoothed as the rates are: those of a computer jitter
-    times = np.cumsum(np.concatenate([[0.0], recording.t - recording.t[0]]))
-    alpha = np.gradient(rate, (times[high] - times[low]) / (high - low), axis=0)
+    times = _kernel.moving_mean((recording.t - recording.t[0])[:, None], k)[:, 0]
+    alpha = np.gradient(rate, times, axis=0)
     moving = np.where(rest, 0.0, 1.0)[:, None]
     return rate[flat.last :] * moving, alpha[flat.last :] * moving
 
 
-def _tremor(y: Vector, noise: Vector) -> float:
-    """m/s^2 by which a rest trembles beyond noise of variance (3,); 0 for a board that lies on something."""
-    tremor = float(np.sqrt(max(np.mean(y.var(0) - 1.05 * noise), 0.0)))
+def _tremor(variance: Vector, noise: Vector) -> float:
+    """m/s^2 by which a rest of that variance (3,) trembles beyond noise (3,); 0 for a board that lies on something."""
+    tremor = float(np.sqrt(np.maximum(np.mean(variance - 1.05 * noise), 0.0)))
     return tremor if tremor > TREMOR_OF_NOISE * np.sqrt(noise.mean()) else 0.0
 
 
 def _shaken(recording: Recording, flat: Flat) -> Vector:
     """(n,) 0 to 1 after the flat segment: by how much |y| varies within half a second, which no turn makes it do."""
-    size = np.linalg.norm(recording.acc, axis=1)
-    n, half = len(size), max(round(0.5 * SHAKEN_S * recording.rate_hz), 2)
-    sums = np.cumsum(
-        np.vstack([np.zeros((1, 2)), np.stack([size - size.mean(), (size - size.mean()) ** 2], axis=1)]), 0
-    )
-    low, high = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half + 1, n)
-    mean, square = ((sums[high] - sums[low]) / (high - low)[:, None]).T
+    size = lengths(recording.acc)
+    away = size - size.mean()
+    half = max(round(0.5 * SHAKEN_S * recording.rate_hz), 2)
+    mean, square = _kernel.moving_mean(np.stack([away, away**2], axis=1), half).T
     variance = np.maximum(square - mean**2 - 1.3 * noise_variance(recording).mean(1), 0.0)[flat.last :]
     return np.asarray(variance / (variance + SHAKEN_MPS2**2))

@@ -1,4 +1,4 @@
-"""Rotations: exp of a rotation vector as a matrix, its left Jacobian, products of many, and the shortest turn.
+"""Rotations: exp of a rotation vector as a matrix, its left Jacobian, one turn after the other, and the shortest turn.
 
 Source: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics" (2018), appendix B.
 """
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data import Vector
+from ..kernel import _kernel
 
 _EYE = np.eye(3)
 
@@ -57,15 +58,9 @@ def _sinc(angle: float) -> float:
     return float(np.sin(argument)) / argument if argument else 1.0
 
 
-def product(F: Vector) -> Vector:
-    """F[n-1] ... F[1] F[0] of matrices (n, 3, 3), by halves; the identity of none."""
-    if len(F) == 0:
-        return np.eye(3)
-    while len(F) > 1:
-        odd = F[-1:] if len(F) % 2 else F[:0]
-        pairs = F[: len(F) - len(odd)]
-        F = np.concatenate([pairs[1::2] @ pairs[::2], odd])
-    return np.asarray(F[0])
+def turned(phi: Vector) -> Vector:
+    """(3, 3) exp([phi_n]x) ... exp([phi_1]x) of rotation vectors phi (n, 3) [rad]; the identity of none."""
+    return _kernel.turn(np.ascontiguousarray(phi))[0]
 
 
 def left_jacobian(phi: Vector) -> Vector:

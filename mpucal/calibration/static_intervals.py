@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data import Mask, Recording, Vector
+from ..kernel import _kernel
 from .flat_segment import Flat
 from .local_noise import VIBRATION, noise_variance
 
@@ -43,23 +44,29 @@ def static_intervals(recording: Recording, flat: Flat) -> Intervals:
         windows &= _moving(recording.acc[:, i], n)[1] < np.maximum(acc_limit[i], vibration[:, i])
     covered = np.zeros(len(recording) + 1, np.intp)
     at = np.flatnonzero(windows)
-    np.add.at(covered, at, 1)
-    np.add.at(covered, at + n, -1)
+    covered[at] += 1
+    covered[at + n] -= 1
     still = (np.cumsum(covered)[:-1] > 0) & ~recording.gap
     runs, rate = _runs(still), recording.rate_hz
     trim = np.clip(TRIM * (runs[:, 1] - runs[:, 0]), LEAST_TRIM_S * rate, MOST_TRIM_S * rate).astype(np.intp)
     runs = runs + np.stack([trim, -trim], axis=1)
     runs = runs[runs[:, 1] - runs[:, 0] >= SHORTEST_S * rate]
-    return np.asarray(runs[[gravity_turns(recording, a, b) < TURNS_RAD_S for a, b in runs]].reshape(-1, 2))
+    return np.asarray(runs[gravity_turns(recording, runs) < TURNS_RAD_S])
 
 
-def gravity_turns(recording: Recording, first: int, last: int) -> float:
-    """rad/s by which gravity turns in a run of samples, as far as it is beyond noise."""
-    n = max((last - first) // 3, 1)
-    one, other = recording.acc[first : first + n], recording.acc[last - n : last]
-    moved = other.mean(0) - one.mean(0)
-    angle2 = float(np.sum(moved**2 - 3.0 * (one.var(0) + other.var(0)) / n)) / float(np.sum(one.mean(0) ** 2))
-    return float(np.sqrt(max(angle2, 0.0)) / (recording.t[last - n] - recording.t[first]))
+def gravity_turns(recording: Recording, runs: Intervals) -> Vector:
+    """(k,) rad/s by which gravity turns in runs of samples, as far as it is beyond noise: from first third to last."""
+    first, last = runs.T
+    n = np.maximum((last - first) // 3, 1)
+    one, of_one = statistics(recording.acc, np.stack([first, first + n], axis=1))
+    other, of_other = statistics(recording.acc, np.stack([last - n, last], axis=1))
+    angle2 = np.sum((other - one) ** 2 - 3.0 * (of_one + of_other) / n[:, None], axis=1) / np.sum(one**2, axis=1)
+    return np.asarray(np.sqrt(np.maximum(angle2, 0.0)) / (recording.t[last - n] - recording.t[first]))
+
+
+def statistics(values: Vector, runs: Intervals) -> tuple[Vector, Vector]:
+    """Means and variances (k, 3) of values (n, 3) over runs of samples."""
+    return _kernel.statistics(np.ascontiguousarray(values), np.ascontiguousarray(runs, np.int64))
 
 
 def _moving(values: Vector, n: int) -> tuple[Vector, Vector]:

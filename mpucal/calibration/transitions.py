@@ -12,9 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Vector
+from ..kernel import _kernel
 from .parameters import NAMES, PLACES
 from .preprocessing import POSE_MPS2, Preprocessed
-from .rotation import cross, product, rotation
+from .rotation import cross, turned
+from .static_intervals import statistics
 from .theta import Theta
 
 SPEED_OF_TREMOR_S = 0.04  # what a tremor's speed is to its acceleration
@@ -43,7 +45,7 @@ class StaticPose(NamedTuple):
 class Transition(NamedTuple):
     """From one rest to the next.
 
-    span : its steps of the series. F : (m, 3, 3) what each of them does to gravity in the body frame.
+    span : its steps of the series. F : (3, 3) what they do to gravity in the body frame.
     leaving, coming : (3,) m/s^2, gravity at its start and its end. miss : (3,) rad, from where the gyroscope carries
     the one to where the other is. variance : rad^2 an axis, of the miss by noise; of_gyro : the gyroscope's share.
     """
@@ -64,15 +66,15 @@ def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
     rests = _rests(prepared, turns, theta)
     if len(rests) <= FEWEST_TRANSITIONS:
         return []
-    F = rotation(turns)
     transitions = []
     for one, other in pairwise(rests):
         span = slice(one.last - flat.last, other.first + 1 - flat.last)
-        miss = _miss(product(F[span]) @ one.leaving, other.coming)
+        F = turned(turns[span])
+        miss = _miss(F @ one.leaving, other.coming)
         of_gyro = float(np.sum(series.dt[span] ** 2) * flat.Sigma_omega.mean())
         known = of_gyro + (0.0 if series.q_extra is None else float(series.q_extra[span].sum()))
         variance = known + one.variance + other.variance
-        transitions.append(Transition(span, F[span], one.leaving, other.coming, miss, variance, of_gyro))
+        transitions.append(Transition(span, F, one.leaving, other.coming, miss, variance, of_gyro))
     return transitions
 
 
@@ -89,8 +91,10 @@ def miss_variances(transitions: list[Transition], leverage: Vector | float = 0.0
     left = max(float(np.sum(2.0 - np.broadcast_to(leverage, len(transitions)))), LEAST_LEFT)
     nu, c = DEGREES_OF_FREEDOM, 1.0
     for _ in range(50):
-        w = (nu + 2.0) / (nu + 2.0 * z / c)
+        w, before = (nu + 2.0) / (nu + 2.0 * z / c), c
         c = max(1.0, 2.0 * float(np.sum(w * z)) / left)
+        if c == before:
+            break
     weight = (nu + 2.0) / (nu + 2.0 * z / c)
     return c / np.where(weight < WORTHLESS, weight, 1.0) * [transition.variance for transition in transitions]
 
@@ -112,22 +116,21 @@ def leverages(
     """
     inverse = np.asarray(np.linalg.pinv(theta.D))
     J = np.array([_jacobian(transition, prepared, theta, inverse) for transition in transitions])
-    taken = np.einsum("kip,pq,kiq->k", J, covariance, J, optimize=True)
+    taken = np.sum((J @ covariance) * J, axis=(1, 2))
     return np.asarray(np.clip(taken / variance, 0.0, 2.0))
 
 
 def _jacobian(transition: Transition, prepared: Preprocessed, theta: Theta, inverse: Vector) -> Vector:
     """(3, p) of the miss u x v by the parameters in the order of NAMES, with u and v near each other."""
     series = prepared.problem.series
-    R = _to_the_end(transition.F) * series.dt[transition.span, None, None]
+    steps = series.dt[transition.span, None] * (series.omega[transition.span] - theta.b_omega)
     # phi, the error of the turn in the axes of its end: a step's is -dt dK (omega - b_omega); b_omega the rests tell
     phi = np.zeros((3, len(NAMES)))
-    by_K = -np.einsum("mij,mk->ijk", R, series.omega[transition.span] - theta.b_omega)
-    by_K += np.swapaxes(by_K, 1, 2) * (1.0 - np.eye(3))
+    whole, arrived = _kernel.turn(-steps @ theta.K.T, steps)
+    by_K = -arrived - np.swapaxes(arrived, 1, 2) * (1.0 - np.eye(3))
     i, j = np.triu_indices(3)
     phi[:, PLACES["K"]] = by_K[:, i, j]
     # s = inv(D) (y - b_a): ds = -inv(D) (dD s + db_a)
-    whole = product(transition.F)
     u, v = whole @ transition.leaving, transition.coming
     du, dv = whole @ _by_accelerometer(inverse, transition.leaving), _by_accelerometer(inverse, transition.coming)
     du -= cross(u) @ phi
@@ -142,36 +145,22 @@ def _by_accelerometer(inverse: Vector, s: Vector) -> Vector:
     return ds
 
 
-def _to_the_end(F: Vector) -> Vector:
-    """(m, 3, 3) F[m-1] ... F[i], for every i."""
-    R, step = F.copy(), 1
-    while step < len(R):
-        R[:-step] = R[step:] @ R[:-step]
-        step *= 2
-    return R
-
-
 def _rests(prepared: Preprocessed, turns: Vector, theta: Theta) -> list[StaticPose]:
     """The flat segment and the rests after it; `turns` (n, 3) rad are the steps of the series."""
     recording, flat = prepared.recording, prepared.flat
     inverse = np.linalg.pinv(theta.D)  # a search may pass through a singular D: that is no reason to stop it
-    dt = 1.0 / recording.rate_hz
-    turns = np.vstack([np.zeros((flat.last, 3)), turns])
-    rests = []
-    for first, last in prepared.runs.tolist():
-        if last <= flat.last + 1:
-            continue
-        acc = recording.acc[first:last]
-        s = (acc.mean(0) - theta.b_a) @ inverse.T
-        # a board in a hand turns a little as it rests: each sample counts in the axes of either end
-        turned = np.cumsum(turns[first:last], axis=0)
-        across = _mean_cross(turned, (acc - theta.b_a) @ inverse.T)
-        coming, leaving = s - across + cross(turned[0]) @ s, s + cross(turned[-1]) @ s - across
-        tremor = max(float(np.mean(acc.var(0) - flat.Sigma_a)), 0.0)
-        of_tremor = 2.0 * tremor * (SPEED_OF_TREMOR_S / ((last - first) * dt)) ** 2
-        variance = (POSE_MPS2**2 + flat.Sigma_a.mean() / (last - first) + of_tremor) / prepared.problem.gravity**2
-        rests.append(StaticPose(first, last, coming, leaving, variance))
-    return rests
+    runs = prepared.runs[prepared.runs[:, 1] > flat.last + 1]
+    mean, spread = statistics(recording.acc, runs)
+    s, n = (mean - theta.b_a) @ inverse.T, runs[:, 1] - runs[:, 0]
+    # a board in a hand turns a little as it rests: each sample counts in the axes of either end
+    path = np.cumsum(np.vstack([np.zeros((flat.last + 1, 3)), turns]), axis=0)
+    acc = (recording.acc - theta.b_a) @ inverse.T
+    across = np.array([_mean_cross(path[a + 1 : b + 1] - path[a], acc[a:b]) for a, b in runs]).reshape(-1, 3)
+    coming, leaving = (s + np.cross(path[at] - path[runs[:, 0]], s) - across for at in (runs[:, 0] + 1, runs[:, 1]))
+    tremor = np.maximum(np.mean(spread - flat.Sigma_a, axis=1), 0.0)
+    of_tremor = 2.0 * tremor * (SPEED_OF_TREMOR_S * recording.rate_hz / n) ** 2
+    variance = (POSE_MPS2**2 + flat.Sigma_a.mean() / n + of_tremor) / prepared.problem.gravity**2
+    return [StaticPose(*pose) for pose in zip(*runs.T.tolist(), coming, leaving, variance.tolist(), strict=True)]
 
 
 def _mean_cross(a: Vector, b: Vector) -> Vector:

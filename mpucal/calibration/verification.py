@@ -18,7 +18,7 @@ from .fit import Fit
 from .flat_segment import Flat
 from .gyro_drift import without_drift
 from .parameters import B_A_NAMES, D_NAMES, K_NAMES, Form
-from .rotation import product, rotation
+from .rotation import turned
 from .static_intervals import static_intervals
 from .theta import UPPER, from_elements
 
@@ -118,8 +118,8 @@ class _Move:
 
     def _miss(self, theta: Vector) -> Vector:
         """(3,) sine of the angle between gravity carried to its end and gravity there, along the axis of that angle."""
-        turns = rotation(-(self.steps @ from_elements(Form.SYMMETRIC, theta[12:18]).T))
-        return np.cross(_unit(product(turns) @ _calibrated(theta, self.z)), _unit(self._end(theta)))
+        F = turned(-(self.steps @ from_elements(Form.SYMMETRIC, theta[12:18]).T))
+        return np.cross(_unit(F @ _calibrated(theta, self.z)), _unit(self._end(theta)))
 
 
 def _calibrated(theta: Vector, y: Vector) -> Vector:

@@ -15,6 +15,7 @@
 
 #include "filter.hpp"
 #include "hand.hpp"
+#include "runs.hpp"
 
 namespace nb = nanobind;
 using namespace mpucal;
@@ -237,6 +238,40 @@ NB_MODULE(_kernel, m) {
       },
       nb::arg("b_omega"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"), nb::arg("r_scale").none() = nb::none(),
       "Sums of C C', y C', C, y, y y and the count, C_t the turn since the start.");
+
+  m.def(
+      "turn",
+      [](const Array& phi, const std::optional<Array>& x) {
+        const std::size_t n = phi.size() / 3;
+        Turned turned;
+        turn(pointer(phi, 3 * n, "phi"), pointer(x, 3 * n, "x"), n, turned);
+        const double *F = &turned.F[0][0], *sums = &turned.sums[0][0][0];
+        return nb::make_tuple(give({F, F + 9}, {3, 3}), give({sums, sums + 27}, {3, 3, 3}));
+      },
+      nb::arg("phi"), nb::arg("x").none() = nb::none(),
+      "The turn of steps phi (n, 3), and what unit vectors times x (n, 3) that enter before each step become by its end.");
+
+  m.def(
+      "statistics",
+      [](const Array& x, const nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>& runs) {
+        const std::size_t k = runs.size() / 2;
+        for (std::size_t r = 0; r < k; ++r)
+          if (runs(r, 0) < 0 || runs(r, 1) <= runs(r, 0) || 3 * static_cast<std::size_t>(runs(r, 1)) > x.size())
+            throw std::invalid_argument("a run is empty, or not within the samples");
+        std::vector<double> mean(3 * k), variance(3 * k);
+        statistics(x.data(), runs.data(), k, mean.data(), variance.data());
+        return nb::make_tuple(give(std::move(mean), {k, 3}), give(std::move(variance), {k, 3}));
+      },
+      nb::arg("x"), nb::arg("runs"), "Means and variances (k, 3) of x (n, 3) over runs (k, 2), first and last + 1.");
+
+  m.def(
+      "moving_mean",
+      [](const nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>& x, std::size_t half) {
+        std::vector<double> mean(x.size());
+        moving_mean(x.data(), x.shape(0), x.shape(1), half, mean.data());
+        return give(std::move(mean), {x.shape(0), x.shape(1)});
+      },
+      nb::arg("x"), nb::arg("half"), "Means of x (n, m) over up to `half` samples on both sides of each.");
 
   m.def("instruction_set", []() -> std::string { return evaluate == evaluate_portable ? "portable" : "avx2"; },
         "Which build of the filter runs.");

@@ -22,7 +22,7 @@ import numpy as np
 from ..calibration.flat_segment import Flat, find_flat, flat_statistics
 from ..calibration.gyro_drift import without_drift
 from ..calibration.masks import with_masks
-from ..calibration.rotation import cross, product, rotation
+from ..calibration.rotation import cross, turned
 from ..calibration.static_intervals import Intervals, static_intervals
 from ..calibration.verification import BIAS_RAD_S, BLOCK_S, FLOOR_MPS2, FLOOR_RAD, LEAST_REST_S
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
@@ -164,7 +164,7 @@ class _Block:
         dt = np.diff(recording.t[between])
         rates = 0.5 * (recording.gyr[first:last] + recording.gyr[first + 1 : last + 1]) - flat.b_omega
         steps = dt[:, None] * (rates @ calibration.K.T)
-        T = product(rotation(-steps))
+        T = turned(-steps)
         here, there = rests.unit[k], T @ rests.unit[k - 1]
         across = np.linalg.svd(here[None])[2][1:]  # (2, 3) unit vectors at right angles to gravity
         of_rests = np.zeros((2, rests.a.size))
@@ -202,8 +202,6 @@ def _by_gyroscope(steps: Vector, before: Vector, here: Vector) -> Vector:
     for i, j in zip(*UPPER, strict=True):
         change = np.zeros((3, 3))
         change[i, j] = change[j, i] = h
-        plus, minus = (
-            np.cross(product(rotation(-(steps @ (np.eye(3) + sign * change)))) @ before, here) for sign in (1.0, -1.0)
-        )
+        plus, minus = (np.cross(turned(-(steps @ (np.eye(3) + sign * change))) @ before, here) for sign in (1.0, -1.0))
         columns.append((plus - minus) / (2.0 * h))
     return np.stack(columns, axis=1)

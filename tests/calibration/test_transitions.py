@@ -101,7 +101,7 @@ def test_a_miss_depends_on_the_parameters_as_its_jacobian_says(in_hand):
 def test_misses_that_an_estimate_took_up_leave_more_noise():
     """Misses of twice the variance that noise explains, and an estimate that took half of them."""
     rng = np.random.default_rng(0)
-    still = np.eye(3)[None]
+    still = np.eye(3)
     moves = [
         Transition(
             slice(0, 1), still, np.eye(3)[2], np.eye(3)[2], np.append(rng.normal(0.0, np.sqrt(2.0), 2), 0.0), 1.0, 1.0

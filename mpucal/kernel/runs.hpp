@@ -1,0 +1,21 @@
+// Passes over runs of samples that have no filter: what their steps turn, their means and variances, moving means.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+namespace mpucal {
+
+// F = exp([phi_n]x) ... exp([phi_1]x) of steps phi (n, 3) [rad]. Where x (n, 3) is given, sums[j][k] (3,) is the sum of
+// F_n ... F_i e_j x_i[k]: vectors that enter along the way, as they arrive. Else it is 0.
+struct Turned {
+  double F[3][3], sums[3][3][3];  // sums: row, then j and k
+};
+void turn(const double* phi, const double* x, std::size_t n, Turned&);
+
+// Means and variances (runs, 3) of x (n, 3) over samples first..last-1 of each run.
+void statistics(const double* x, const std::int64_t* runs, std::size_t count, double* mean, double* variance);
+
+// Means (n, columns) of x (n, columns) over samples i - half..i + half, as far as there are any.
+void moving_mean(const double* x, std::size_t n, std::size_t columns, std::size_t half, double* mean);
+
+}  // namespace mpucal
