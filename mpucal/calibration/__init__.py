@@ -13,6 +13,7 @@ from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import WrongValue
 from ..result import keys
 from ..result.calibration import Calibration, unknown
+from ..result.correlation import correlation_of, standard_deviations
 from .checks import unusable_for_a_fit
 from .checks.unusable import no_gyroscope
 from .claim import claim_of, claimed
@@ -121,7 +122,7 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
     }
     if fit is None:
         return Calibration(D=unknown(3, 3), b_a=unknown(3), **common)
-    return Calibration(
+    calibration = Calibration(
         D=fit.D,
         b_a=fit.b_a,
         D_std=_claimed(fit, D_NAMES).reshape(3, 3),
@@ -136,6 +137,8 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
         b_omega_std=fit.std(*B_OMEGA_NAMES),
         **common,
     )
+    std = standard_deviations(vars(calibration))
+    return replace(calibration, correlation=correlation_of(fit.names, fit.covariance, std))
 
 
 def _about(evidence: Evidence, chosen: Mapping[str, str]) -> keys.Fit:

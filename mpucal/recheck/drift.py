@@ -17,6 +17,7 @@ import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..result.calibration import Calibration
+from ..result.correlation import standard_deviations
 from .observed import BETA, DELTA, PARAMETERS, UPPER, E, G
 
 MG = 1e-3 * STANDARD_GRAVITY_MPS2
@@ -89,20 +90,26 @@ TEMPERATURE, OFTEN_BY_TEMPERATURE = "temperature", 0.5
 
 
 def own_uncertainty(calibration: Calibration) -> Vector:
-    """(21, 21) of theta, from the standard deviations that a calibration states."""
-    unknown = TOLERANCE.covariance()
-    on_diagonal = np.eye(3, dtype=bool)
-    D_std = _known(calibration.D_std, np.where(on_diagonal, TOLERANCE.scale, TOLERANCE.skew))
-    b_std = _known(calibration.b_a_std, np.full(3, TOLERANCE.bias))
-    of_gyro = unknown[G, G] if calibration.fit.get("model") not in ("accel", "paper") else PERFECT_GYRO**2 * np.eye(6)
-    A = calibration.inverse
-    P = np.zeros_like(unknown)
-    by_D = np.kron(A, np.eye(3))
-    P[E, E] = by_D @ np.diag(D_std.ravel() ** 2) @ by_D.T
-    P[BETA, BETA] = A @ np.diag(b_std**2) @ A.T
-    P[G, G] = np.diag(_known(calibration.K_std[UPPER], np.sqrt(np.diag(of_gyro))) ** 2)
-    P[DELTA, DELTA] = np.diag(_known(calibration.b_omega_std, np.full(3, TOLERANCE.gyro_bias)) ** 2)
-    return P
+    """(21, 21) of theta, from the standard deviations that a calibration states, and their correlation."""
+    spread = np.sqrt(np.diag(TOLERANCE.covariance()))
+    # it has no spread of D, row-major, but of its symmetric and antisymmetric parts
+    spread[E] = np.where(np.eye(3, dtype=bool), TOLERANCE.scale, TOLERANCE.skew).ravel()
+    if calibration.fit.get("model") in ("accel", "paper"):
+        spread[G] = PERFECT_GYRO
+    std = standard_deviations(vars(calibration))
+    known = np.isfinite(std)
+    rho = np.where(np.outer(known, known), calibration.correlation, np.eye(PARAMETERS))
+    # rounded, or of unknown origin: without what no errors have
+    values, vectors = np.linalg.eigh(rho)
+    root = to_theta(calibration) @ (np.where(known, std, spread)[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+    return np.asarray(root @ root.T)
+
+
+def to_theta(calibration: Calibration) -> Vector:
+    """(21, 21) by which small errors of D, b_a, K and b_omega, as in `mpucal.result.correlation`, make theta."""
+    A, M = calibration.inverse, np.eye(PARAMETERS)
+    M[E, E], M[BETA, BETA] = np.kron(A, np.eye(3)), A
+    return M
 
 
 def ageing(calibration: Calibration, days: float, change_c: float | None) -> Vector:
@@ -133,7 +140,3 @@ def happenings(calibration: Calibration, change_c: float | None) -> dict[str, tu
     if change_c is not None and abs(change_c) >= LEAST_C:
         all_[TEMPERATURE] = OFTEN_BY_TEMPERATURE, by_temperature(calibration, change_c)
     return all_
-
-
-def _known(std: Vector, otherwise: Vector) -> Vector:
-    return np.where(np.isfinite(std), std, otherwise)

@@ -33,6 +33,8 @@ E, BETA, G, DELTA = slice(0, 9), slice(9, 12), slice(12, 18), slice(18, 21)
 UPPER = np.triu_indices(3)
 # of a turn: a gyroscope's scale is not linear (PS-MPU-6000A r3.4, section 6.1: 0.2 % of full scale)
 NONLINEAR = 0.001
+# a rest in so many blocks: a tremor comes and goes within them, a sway does not
+BLOCKS = 4
 # a rest's own blocks are few: so many degrees of freedom of the others' mean stand beside them
 POOLED = 6.0
 # orientations nearer to one another are one
@@ -125,8 +127,12 @@ class _Rests:
         self.a = calibration.apply(means, temperature_c=temperature_c)
         self.norm = np.linalg.norm(self.a, axis=1)
         self.unit = self.a / self.norm[:, None]
-        n = max(round(BLOCK_S * recording.rate_hz), 1)
-        own = [recording.acc[a : a + (b - a) // n * n].reshape(-1, n, 3).mean(1) for a, b in runs]
+        shortest = max(round(BLOCK_S * recording.rate_hz), 1)
+        sizes = np.maximum((runs[:, 1] - runs[:, 0]) // BLOCKS, shortest).tolist()
+        own = [
+            recording.acc[a : a + (b - a) // n * n].reshape(-1, n, 3).mean(1)
+            for (a, b), n in zip(runs, sizes, strict=True)
+        ]
         counts = np.array([len(block) for block in own])
         variances = np.array([block.var(0, ddof=1).mean() for block in own])
         others = variances[1:].mean() if len(runs) > 1 else variances[0]

@@ -11,6 +11,8 @@ from ..data import Recording
 from ..errors import RefusedError
 from ..result.calibration import Calibration
 from ..result.correction import correction
+from ..result.correlation import NAMES, correlation_of, standard_deviations
+from .drift import to_theta
 from .observed import BETA, DELTA, changed
 from .outcome import CheckResult
 
@@ -39,16 +41,19 @@ def updated(calibration: Calibration, result: CheckResult, recording: Recording,
     after = changed(ready, result.theta)
     T_0, change_c = ready.sensor.temperature_c, result.temperature_change_c
     T = T_0 if T_0 is None or change_c is None or ready.follows_temperature else T_0 + change_c
-    return replace(
+    errors = np.linalg.inv(to_theta(ready))
+    covariance = errors @ result.covariance @ errors.T
+    new = replace(
         ready,
         b_a=after.b_a,
-        b_a_std=np.sqrt(np.diag(ready.D @ result.covariance[BETA, BETA] @ ready.D.T)),
         b_omega=np.where(np.isfinite(after.b_omega), after.b_omega, result.theta[DELTA]),
-        b_omega_std=np.sqrt(np.diag(result.covariance[DELTA, DELTA])),
+        b_a_std=np.sqrt(np.diag(covariance)[BETA]),
+        b_omega_std=np.sqrt(np.diag(covariance)[DELTA]),
         created=created,
         sensor=replace(ready.sensor, temperature_c=T),
         extra={**ready.extra, HISTORY: [*ready.extra.get(HISTORY, ()), _said(calibration, result)]},
     )
+    return replace(new, correlation=correlation_of(NAMES, covariance, standard_deviations(vars(new))))
 
 
 def _said(calibration: Calibration, result: CheckResult) -> dict[str, Any]:

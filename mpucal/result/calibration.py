@@ -20,6 +20,7 @@ from ..errors import RecordingError, WrongValue
 from ..strict_json import MOST_BYTES, parsed
 from .atomic import write_atomically
 from .blob import NO_RANGE, Blob, BlobError
+from .correlation import UNCORRELATED
 from .digest import DIGEST, digest, doubt
 from .document import arguments, checked, written
 from .error_model import bias_mg, scale_factor_error
@@ -56,6 +57,8 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     b_a_slope : (3,) m/s^2 a degree Celsius, of which b_a grows away from sensor.temperature_c; zeros: not known to.
     b_a_slope_std : (3,). temperature_range_c : (2,) degrees Celsius, within which that was seen.
     extra : further top-level keys of the document (name, autopilot, others, written, merged).
+    correlation : (21, 21) of the errors of D row-major, b_a, K's upper triangle and b_omega, in this order; the
+        identity where it is not known.
     doubt : why the numbers of the file that it was read from may not be those that were saved; empty where they are.
 
     Unknown numbers are NaN (null in the file). Calibrations are equal whose calibration.json is the same; they have no
@@ -81,6 +84,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     b_a_slope: Vector = field(default_factory=lambda: np.zeros(3))
     b_a_slope_std: Vector = field(default_factory=lambda: unknown(3))
     temperature_range_c: Vector = field(default_factory=lambda: unknown(2))
+    correlation: Vector = field(default_factory=UNCORRELATED.copy)
     doubt: str = ""
 
     def __post_init__(self) -> None:

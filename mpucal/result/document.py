@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..data import Sensor, Vector
+from .correlation import KEY, LOWER, from_lower
 from .schema import check_document
 
 FORMAT, VERSION = "mpucal.calibration", 1
@@ -62,6 +63,7 @@ def written(fields: Mapping[str, Any], follows_temperature: bool) -> dict[str, A
         "quality": fields["quality"],
         "sensor": asdict(fields["sensor"]),
         "applied_in_hardware": {"b_a": fields["applied_in_hardware"]},
+        **({KEY: below} if (below := fields[KEY][LOWER]).any() else {}),
         **fields["extra"],
     }
     return {key: _plain(value) for key, value in values.items()}
@@ -89,6 +91,7 @@ def arguments(document: Mapping[str, Any]) -> dict[str, Any]:
         **_read(acc, ACCELEROMETER + TEMPERATURE),
         **_read(document.get("gyroscope", {}), GYROSCOPE),
         **_read(hardware, (("b_a", "applied_in_hardware", (3,)),)),
+        **({KEY: from_lower(_array(document[KEY], LOWER[0].shape))} if KEY in document else {}),
         "fit": dict(document.get("fit", {})),
         "quality": dict(document.get("quality", {})),
         "sensor": Sensor.of(document.get("sensor", {})),
@@ -118,6 +121,8 @@ def checked(document: Any) -> dict[str, Any]:
 
 
 def _check_numbers(document: Mapping[str, Any]) -> None:
+    if np.nanmax(np.abs(np.array(document.get(KEY, ()), float)), initial=0.0) > 1.0:
+        raise ValueError(f"{KEY} holds a number beyond 1")
     for key, rows in (("accelerometer", ACCELEROMETER), ("gyroscope", GYROSCOPE)):
         values = _read(document.get(key, {}), rows)
         # farther from a sensor than anything that was ever measured: their products stay finite

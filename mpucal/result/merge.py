@@ -19,6 +19,7 @@ from ..errors import RefusedError, UsageError
 from ..reasons import reason
 from .calibration import REFUSED, Calibration
 from .comparison import compare, in_body_frame
+from .correlation import UNCORRELATED
 
 # so far apart at least: a chip's thermometer is good to a degree, and a day's own drift looks like a slope
 LEAST_SPAN_C = 5.0
@@ -183,6 +184,7 @@ def _together(all_: Sequence[Calibration], T_0: float, T: Vector) -> Calibration
         D=np.asarray(D),
         D_std=np.asarray(weight.sum(0) ** -0.5),
         K=np.asarray(np.mean([c.K for c in all_], axis=0)),
+        correlation=UNCORRELATED,
         quality=worst.quality,
         sensor=replace(last.sensor, temperature_c=T_0),
         extra={"merged": made_of},

@@ -13,6 +13,7 @@ from mpucal.recheck import drift
 from mpucal.recheck.hypotheses import NOTHING, weigh
 from mpucal.recheck.observed import changed, observe
 from mpucal.recheck.update import updated
+from mpucal.result.correlation import NAMES
 from mpucal.simulated.study.scenarios import GRAVITY_MPS2, hand_scenario
 from mpucal.simulated.study.sensors import hand_sensor
 
@@ -109,6 +110,19 @@ def test_another_chip_is_told_by_what_it_says_of_itself():
     recording = shown(TRUTH)
     for sensor in (Sensor(who_am_i=0x70), Sensor(who_am_i=0x68, accel_offsets=(2, 4, 9000))):
         assert mpucal.check(known, replace(recording, sensor=sensor)).verdict == "another sensor"
+
+
+def test_the_prior_is_the_covariance_of_the_fit():
+    recording = replace(hand_scenario(4, "pose9", rate_hz=50.0).recording, flat=None)
+    fit = mpucal.calibration.weigh(recording, "hand", GRAVITY_MPS2)[0].fit
+    calibration = mpucal.calibrate(recording, "hand", GRAVITY_MPS2)
+    stored = mpucal.Calibration.from_document(calibration.document())
+    names = [fit.names.index(name) for name in NAMES]
+    covariance, to_errors = fit.covariance[np.ix_(names, names)], np.linalg.inv(drift.to_theta(stored))
+    prior = to_errors @ drift.own_uncertainty(stored) @ to_errors.T
+    std = np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose(prior / np.outer(std, std), covariance / np.outer(std, std), atol=1e-4)
+    assert np.abs(stored.correlation - np.eye(21)).max() > 0.1
 
 
 def test_the_observations_are_linear_in_what_is_wrong():

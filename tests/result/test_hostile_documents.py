@@ -20,6 +20,7 @@ ONE = Calibration(
     fit={"model": "imu", "gravity": 9.81},
     quality={"verdict": "good", "reasons": []},
     created="2024-05-17T09:30:00+00:00",
+    correlation=np.eye(21) + 0.5 * (np.eye(21, k=1) + np.eye(21, k=-1)),
 )
 ONE = replace(ONE, extra={"others": [ONE.document()], "autopilot": {"params_old": {"INS_ACCOFFS_X": 0.0}, "imu": 1}})
 
@@ -42,6 +43,8 @@ def loaded(folder, text):
         ("accelerometer b_a 0", 10**400),
         ("accelerometer D_std 0 0", -1e-3),
         ("gyroscope K", [[0, 0, 0]] * 3),
+        ("correlation", [0.0] * 209),
+        ("correlation 7", 1.5),
         ("quality reasons", 5),
         ("quality reasons", [{"code": "\x1b[2J", "message": ""}]),
         ("quality reasons", [{"code": "x'; DROP", "message": ""}]),

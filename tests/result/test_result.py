@@ -11,6 +11,7 @@ from hypothesis.extra.numpy import arrays
 from mpucal.data import Sensor
 from mpucal.errors import OutputError, RecordingError
 from mpucal.result.calibration import Calibration
+from mpucal.result.correlation import from_lower
 
 some = st.floats(-1e6, 1e6) | st.just(math.nan)
 
@@ -32,6 +33,7 @@ def calibration():
         created="2024-05-17T09:30:00+00:00",
         applied_in_hardware=np.array([0.1, 0.0, -0.1]),
         extra={"others": [Calibration(np.eye(3), np.ones(3)).document()]},
+        correlation=from_lower(random.uniform(-1.0, 1.0, 210)),
     )
 
 

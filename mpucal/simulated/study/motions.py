@@ -5,6 +5,8 @@ A motion gives omega (n, 3) [rad/s] in the body at the times t (n,) [s], and how
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,6 +54,14 @@ def three_orientations(t: Vector, rng: np.random.Generator) -> tuple[Vector, Vec
         up = board[..., 2]
         if (up @ up.T - 2.0 * np.eye(4)).max() < np.cos(APART_RAD):
             return moves(t, turns, np.full(3, 1.6), FLAT_S + CHECK_S / 3 * np.arange(3))
+
+
+def as_asked(t: Vector, rng: np.random.Generator) -> tuple[Vector, Vector]:
+    """The three that a check asks for, each missed by some degrees: two edges of a box, and one across both."""
+    up = np.array([[0, 0, 1], [1, 1, 0], [-1, 1, 0], [0, -1, -1]]) / np.sqrt([[1], [2], [2], [2]])
+    turns = np.array([rotation.shortest_turn(after, before) for before, after in pairwise(up)])
+    turns += rng.uniform(-SLOPPY_RAD, SLOPPY_RAD, (3, 3))
+    return moves(t, turns, np.full(3, 1.6), FLAT_S + CHECK_S / 3 * np.arange(3))
 
 
 def six_faces(t: Vector, rng: np.random.Generator) -> tuple[Vector, Vector]:

@@ -16,6 +16,7 @@ from .motions import (
     CHECK_S,
     FLAT_S,
     MOVING_S,
+    as_asked,
     attitude,
     continuous,
     poses,
@@ -66,13 +67,14 @@ _SCENES = {
     "pose9": _Scene(partial(poses, n=9)),
     "pose12": _Scene(partial(poses, n=12)),
     "check": _Scene(three_orientations, moving_s=CHECK_S),
+    "check as asked": _Scene(as_asked, moving_s=CHECK_S),
     "continuous": _Scene(continuous),
     "wobble30": _Scene(continuous, Habits(wobble=0.3)),
     "wobble100": _Scene(continuous, Habits(wobble=1.0)),
     "turns": _Scene(three_turns),
     "calm jerks": _Scene(continuous, _CALM, perfect_gyro=True),
 }
-MOTIONS = tuple(name for name in _SCENES if name != "check")
+MOTIONS = tuple(name for name in _SCENES if not name.startswith("check"))
 
 
 def paper_scenario(
@@ -110,12 +112,12 @@ def hand_scenario(
     rate_hz: float = 200.0,
     sensor: SensorTruth | None = None,
 ) -> Simulated:
-    """An MPU-6050 that a hand moves after 10 s flat, for 40 s; for 15 s in the motion "check".
+    """An MPU-6050 that a hand moves after 10 s flat, for 40 s; for 15 s in the motions "check", "check as asked".
 
     Parameters
     ----------
     seed : draws the sensor, the motion, the hand and the noise; each is the same whatever the other arguments.
-    motion : one of MOTIONS, or check. tremble : the hand trembles in the poses.
+    motion : one of MOTIONS, or of these two. tremble : the hand trembles in the poses.
     delay_s : how much later the accelerometer reports than the gyroscope.
     sensor : drawn from the seed unless given.
 
