@@ -23,7 +23,10 @@ TEMPERATURE = "temperature_c"
 ALL = (*COLUMNS, TEMPERATURE)
 # some 16000 lines
 BLOCK = 1 << 21
-_REMEDY = f"name the columns in the first line, in any order: {','.join(COLUMNS)} (s, m/s^2, rad/s)"
+_REMEDY = (
+    f"name the columns in the first line, in any order: {','.join(COLUMNS)} (s, m/s^2, rad/s), or say with --columns"
+    " t=NAME,ax=NAME,... which is what"
+)
 
 
 def csv_rows(path: Path) -> Rows:

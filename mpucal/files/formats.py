@@ -80,6 +80,7 @@ class Format:
 
 _HERE = "mpucal.files"
 _TABLES = f"{_HERE}.tables"
+_TABLE = "another program's table"
 _BAG = (f"{_HERE}.ros:load_bag", f"{_HERE}.ros:bag_rows")
 FORMATS = (
     Format(".mcap", "a bag of ROS 2", *_BAG, recognises=f"{_HERE}.ros:is_mcap_of_ros", hinted=True),
@@ -103,12 +104,12 @@ FORMATS = (
             f"{_HERE}.{load}",
             recognises=f"{_HERE}.{recognises}",
             hinted=True,
-            only_recognised=suffix != ".csv",
+            only_recognised=what != _TABLE,
         )
         for suffix in (".csv", ".txt", ".log", ".tsv")
         for what, load, recognises in (
             ("MPU6050_raw's output", "serial_log:load_serial_log", "serial_log:is_serial_log"),
-            ("another program's table", "tables.table:load_table", "tables.table:is_table"),
+            (_TABLE, "tables.table:load_table", "tables.table:is_table"),
         )
     ),
     Format(".csv", "a table", rows=f"{_HERE}.csv:csv_rows", writer=f"{_HERE}.csv:csv_file"),

@@ -12,9 +12,10 @@ from ..data import Recording, Vector
 from ..errors import RecordingError
 from .extras import library
 from .hints import NO_HINTS, Hints
-from .tables.names import ACC, GYR, TEMPERATURE, TIME, Column, columns_of, three
-from .tables.streams import Stream, recording_of
+from .tables.names import ACC, GYR, TEMPERATURE, TIME, Column, columns_of, three, threes
+from .tables.streams import recording_of, with_gravity
 from .tables.table import chosen, remarks
+from .tables.times import Stream
 
 
 def load_parquet(path: Path, hints: Hints = NO_HINTS) -> Recording:
@@ -27,27 +28,33 @@ def load_parquet(path: Path, hints: Hints = NO_HINTS) -> Recording:
     arrow, parquet = library("pyarrow", "parquet", path), library("pyarrow.parquet", "parquet", path)
     try:
         table = parquet.read_table(path)
-        arrays = {name: _array(table.column(place)) for place, name in enumerate(table.column_names)}
+        arrays = {field.name: _array(table.column(place), field.type) for place, field in enumerate(table.schema)}
     except (arrow.ArrowException, OSError, ValueError, TypeError) as error:
         raise RecordingError(f"{path} is no whole Parquet file ({error})", "write it again") from error
     names = list(table.column_names)
     columns = chosen(names, hints) if hints.columns else columns_of(names)
-    acc, gyr = three(columns, ACC), three(columns, GYR)
-    if not acc or not gyr:
+    all_acc, gyr = threes(columns, ACC), three(columns, GYR)
+    if not all_acc or not gyr:
         raise RecordingError(
-            f"{path.name} holds no columns of {'a gyroscope' if acc else 'an accelerometer'}; its columns are"
+            f"{path.name} holds no columns of {'a gyroscope' if all_acc else 'an accelerometer'}; its columns are"
             f" {', '.join(names)}",
             "name them with --columns t=NAME,ax=NAME,...",
         )
-    clocks = [column for column in columns if column.quantity == TIME and arrays[column.name].dtype.kind in "iufM"]
-    a, w = (_stream(arrays, of, clocks) for of in (acc, gyr))
+    clocks = [column for column in columns if column.quantity == TIME and arrays[column.name].dtype.kind in "iufMm"]
+    accelerometers, w = [_stream(arrays, of, clocks) for of in all_acc], _stream(arrays, gyr, clocks)
+    place = with_gravity(accelerometers)
+    acc, a = all_acc[place], accelerometers[place]
     warm = [c for c in columns if c.quantity == TEMPERATURE and arrays[c.name].dtype.kind in "iuf"]
     temperature_c = arrays[warm[0].name].astype(float) if warm and len(a.values) == table.num_rows else None
-    return recording_of(a, w, hints, path.name, temperature_c, remarks(acc))
+    return recording_of(a, w, hints, path.name, temperature_c, remarks(columns, acc))
 
 
-def _array(column: Any) -> NDArray[Any]:
-    return np.asarray(column.to_numpy())
+def _array(column: Any, kind: Any) -> NDArray[Any]:
+    values = np.asarray(column.to_numpy())
+    if values.dtype.kind == "M" and not getattr(kind, "tz", None):
+        # nothing says the zone: since the first of them, and no time of day
+        return np.asarray((values - values[:1]).astype("timedelta64[ns]"))
+    return values
 
 
 def _stream(arrays: dict[str, NDArray[Any]], of: tuple[Column, ...], clocks: list[Column]) -> Stream:
@@ -62,8 +69,8 @@ def _stream(arrays: dict[str, NDArray[Any]], of: tuple[Column, ...], clocks: lis
     if clock is None:
         return Stream(None, values[there], unit=unit)
     times, time_unit = arrays[clock.name][there], clock.unit
-    if times.dtype.kind == "M":
-        times, time_unit = times.astype("datetime64[ns]").astype(np.int64), "ns"
+    if times.dtype.kind in "Mm":
+        times, time_unit = times.astype(f"{times.dtype.kind}8[ns]").astype(np.int64), "ns"
     elif times.dtype.kind == "u":
         times = times.astype(np.int64)
     return Stream(times, values[there], time_unit, unit)

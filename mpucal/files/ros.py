@@ -23,7 +23,8 @@ from .extras import library
 from .hints import NO_HINTS, Hints
 from .mcap import CALIBRATED, FORMAT
 from .rows import Rows
-from .tables.streams import Stream, recording_of
+from .tables.streams import recording_of
+from .tables.times import Stream
 from .tables.units import COUNTS, acceleration_unit
 
 IMU = "sensor_msgs/msg/Imu"

@@ -1,4 +1,4 @@
-"""What i2cdevlib's example MPU6050_raw prints: `a/g:` and six counts a line, with tabs between.
+"""What i2cdevlib's example MPU6050_raw prints: `a/g:` and six counts a line, with tabs between (MPU9150_raw: nine).
 
 Its MPU6050::initialize() sets +-2 g and +-250 deg/s, and the example prints no times.
 """
@@ -15,10 +15,13 @@ from ..data import Recording
 from ..errors import RecordingError
 from .hints import NO_HINTS, Hints
 from .rows import cannot_read
-from .tables.streams import Stream, recording_of
+from .tables.streams import recording_of
+from .tables.times import Stream
 from .tables.units import COUNTS
 
-LINE = re.compile(rb"^[^\n]{0,40}?a/g:((?:[ \t]+-?[0-9]{1,6}){6})[ \t\r]*$", re.MULTILINE)
+LINE = re.compile(
+    rb"^[^\n]{0,40}?a/g(?:/m)?:((?:[ \t]+-?[0-9]{1,6}){6})(?:[ \t]+-?[0-9]{1,6}){0,3}[ \t\r]*$", re.MULTILINE
+)
 ACCEL_RANGE_G, GYRO_RANGE_DPS = 2.0, 250.0
 SNIFFED = 1 << 14
 

@@ -1,5 +1,6 @@
-"""PX4's logs (.ulg), by pyulog: sensor_accel and sensor_gyro where they are logged, else sensor_combined.
+"""PX4's logs (.ulg), by pyulog: sensor_accel and sensor_gyro where they are logged fast enough, else sensor_combined.
 
+Unless SDLOG_PROFILE asks for more, PX4 logs the former once a second (logged_topics.cpp) and the latter in full.
 sensor_accel and sensor_gyro are as the driver delivers them; sensor_combined is the primary sensors' by PX4's
 parameters, CAL_ACC0_XOFF and the like. Both in m/s^2, rad/s and us.
 """
@@ -19,7 +20,9 @@ from ..data import Recording, Vector
 from ..errors import RecordingError
 from .extras import library
 from .hints import NO_HINTS, Hints
-from .tables.streams import Stream, recording_of
+from .tables.streams import recording_of
+from .tables.times import Stream
+from .tables.units import SLOWEST_HZ
 
 COMBINED, ACCEL, GYRO = "sensor_combined", "sensor_accel", "sensor_gyro"
 # RELATIVE_TIMESTAMP_INVALID
@@ -58,7 +61,8 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
         raise RecordingError(f"{path.name} is read by {ACCEL} or {COMBINED}", f"give --topic {ACCEL} or {COMBINED}")
     raw = (ACCEL, 0) in topics and (GYRO, 0) in topics
     try:
-        if raw and hints.topic != COMBINED:
+        fast = raw and all(_is_fast(topics[name, 0]) for name in (ACCEL, GYRO))
+        if raw and (hints.topic == ACCEL or (hints.topic is None and (fast or (COMBINED, 0) not in topics))):
             acc, gyr = (_stream(topics[n, 0], "xyz", unit) for n, unit in ((ACCEL, "m/s^2"), (GYRO, "rad/s")))
             others = sum(name == ACCEL for name, _ in topics) - 1
             more = [f"{others} more accelerometers are in it"] if others else []
@@ -70,8 +74,9 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
             acc = _stream(combined, [f"accelerometer_m_s2[{axis}]" for axis in range(3)], "m/s^2")
             gyr = _stream(combined, [f"gyro_rad[{axis}]" for axis in range(3)], "rad/s")
             acc = replace(acc, times=np.asarray(acc.times) + _later_us(combined))
+            slow = [f"{ACCEL} is logged too slowly"] if raw and not fast else []
             remark = f"from {COMBINED}, which PX4 has corrected by its parameters already"
-            return recording_of(acc, gyr, hints, path.name, remarks=[remark])
+            return recording_of(acc, gyr, hints, path.name, remarks=[remark, *slow])
     except _DAMAGE as error:
         raise RecordingError(f"{path} is no whole log of PX4 ({error})", "fetch it from the vehicle again") from error
     has = ", ".join(sorted({name for name, _ in topics})) or "none of them"
@@ -79,6 +84,11 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
         f"{path.name} holds no {hints.topic or f'{ACCEL} with {GYRO}, and no {COMBINED}'}: it has {has}",
         "log them, with SDLOG_PROFILE",
     )
+
+
+def _is_fast(data: Any) -> bool:
+    steps = np.diff(np.asarray(data["timestamp"], np.int64))
+    return len(steps) > 0 and float(np.median(steps)) * 1e-6 <= 1 / SLOWEST_HZ
 
 
 def _stream(data: Any, names: Iterable[str], unit: str) -> Stream:

@@ -132,8 +132,8 @@ def test_the_help_names_it(call, command):
 
 
 def test_errors_name_it(calibrated, call, folder):
-    (folder / "notes.txt").write_text("hello")
-    assert re.search(r"give a [^:]*\.words file or the folder", call("show", "notes.txt").stderr)
+    (folder / "notes.odt").write_text("hello")
+    assert re.search(r"give a [^:]*\.words file or the folder", call("show", "notes.odt").stderr)
     done = call("apply", "results/calibration.json", "walk.words", "-o", "out.txt")
     assert done.returncode == 3
     assert re.search(r"end it with .*\.words", done.stderr)

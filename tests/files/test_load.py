@@ -85,14 +85,14 @@ def test_the_suffix_says_how_to_read(measured, save, tmp_path):
     [
         ("none.npz", "there is no file"),
         ("none.mcap", "there is no file"),
-        ("notes.txt", r"give a \.mcap, \.tlog, \.bin, \.npz, \.csv file or the folder"),
+        ("notes.odt", r"give a \.mcap, \.tlog, \.bin, \.npz, \.csv file or the folder"),
         ("none", "there is no file"),
         ("no_ending", "no kind of recording"),
         ("folder", r"holds no capture\.mcap"),
     ],
 )
 def test_what_is_no_recording(tmp_path, name, says):
-    (tmp_path / "notes.txt").write_text("hello")
+    (tmp_path / "notes.odt").write_text("hello")
     (tmp_path / "no_ending").write_text("hello")
     (tmp_path / "folder").mkdir()
     with pytest.raises(RecordingError, match=says) as raised:

@@ -79,6 +79,19 @@ def test_a_log_with_sensor_combined_alone(walk, t_us, assert_same, tmp_path):
     assert "which PX4 has corrected by its parameters already" in read.taken
 
 
+def test_a_log_whose_raw_topics_are_slow(walk, t_us, assert_same, tmp_path):
+    """As PX4 logs by default: sensor_accel and sensor_gyro once a second."""
+    path = ulog(
+        tmp_path / "log.ulg",
+        ("sensor_accel", 0, imu(t_us[::100], walk.acc[::100])),
+        ("sensor_gyro", 0, imu(t_us[::100], walk.gyr[::100])),
+        ("sensor_combined", 0, combined(t_us, walk)),
+    )
+    read = load(path)
+    assert_same(read, walk, 2e-6, 1e-6, 1e-6)
+    assert "sensor_accel is logged too slowly" in read.taken
+
+
 def test_accelerations_that_are_later_than_rates(walk, t_us, tmp_path):
     read = load(ulog(tmp_path / "log.ulg", ("sensor_combined", 0, combined(t_us, walk, -1500))))
     assert "the gyroscope begins +1.50 ms after" in read.taken
@@ -110,14 +123,19 @@ def parquet_of(walk, **more):
     )
 
 
-@pytest.mark.parametrize("kind", ["integers", "dates", "seconds"])
+@pytest.mark.parametrize("kind", ["integers", "dates", "dates of no zone", "seconds"])
 def test_a_parquet_file(kind, walk, walk_ns, assert_same, tmp_path):
-    times = {"integers": walk_ns, "dates": pd.to_datetime(walk_ns), "seconds": walk.t}[kind]
+    times = {
+        "integers": walk_ns,
+        "dates": pd.to_datetime(walk_ns, utc=True),
+        "dates of no zone": pd.to_datetime(walk_ns),
+        "seconds": walk.t,
+    }[kind]
     parquet_of(walk, timestamp=times).to_parquet(tmp_path / "walk.parquet")
     read = load(tmp_path / "walk.parquet")
     assert_same(read, walk)
     assert "accelerations in g and rates in rad/s" in read.taken
-    assert read.utc_ns == (None if kind == "seconds" else walk_ns[0])
+    assert read.utc_ns == (walk_ns[0] if kind in ("integers", "dates") else None)
 
 
 def test_its_columns_are_named(walk, assert_same, tmp_path):

@@ -87,6 +87,24 @@ DIALECTS = {
         w.acc / G * 1000,
         np.degrees(w.gyr),
     ),
+    "MARS logger": lambda w, ns: timed(
+        "Timestamp[nanosec]", ns, " gx[rad/s]| gy[rad/s]| gz[rad/s]| ax[m/s^2]| ay[m/s^2]| az[m/s^2]", w.gyr, w.acc
+    ),
+    "Physics Toolbox with linear accelerations": lambda w, ns: frame(
+        "time|gFx|gFy|gFz|ax|ay|az|wx|wy|wz",
+        w.t,
+        w.acc / G,
+        w.gyr * 0.3,
+        w.gyr,
+    ),
+    "WitMotion": lambda w, ns: timed(
+        "Time(s)",
+        pd.to_datetime(ns).strftime("%H:%M:%S.%f"),
+        "ax(g)|ay(g)|az(g)|wx(deg/s)|wy(deg/s)|wz(deg/s)|T(°)",
+        w.acc / G,
+        np.degrees(w.gyr),
+        w.t * 0 + 25,
+    ),
     "axes first": lambda w, ns: frame("t|xacc|yacc|zacc|xgyro|ygyro|zgyro", w.t, w.acc, w.gyr),
 }
 
@@ -97,7 +115,7 @@ def test_dialects_give_the_samples_that_were_written(dialect, separator, called,
     path = tmp_path / "walk.csv"
     DIALECTS[dialect](walk, walk_ns).to_csv(path, sep=separator, index=False)
     read = load(path)
-    assert_same(read, walk, 1e-9, 1e-9, 1e-6 if dialect == "ulog2csv" else 1e-9)
+    assert_same(read, walk, 1e-9, 1e-9, 1e-6 if dialect in ("ulog2csv", "WitMotion") else 1e-9)
     assert read.taken.startswith("Of walk.csv times in ")
     assert called in read.taken
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from .units import COUNTS, unit_named
+from .units import COUNTS, QUANTITIES, unit_named
 
 TIME, ACC, GYR, TEMPERATURE = "t", "acc", "gyr", "temperature_c"
 # stem -> the unit that its program writes, empty where that differs; the first known is taken where there are several
@@ -21,6 +21,8 @@ ACC_STEMS = {
     "totalacceleration": "",
     "acceleration": "",
     "accel": "",
+    "accl": "",
+    "acce": "",
     "acc": "",
     "accs": "",
     "ac": "",
@@ -39,6 +41,7 @@ GYR_STEMS = {
     "gyr": "",
     "gy": "",
     "g": "",
+    "as": "",
     "wrss": "rad/s",
     "omega": "rad/s",
     "w": "rad/s",
@@ -51,6 +54,7 @@ GYR_STEMS = {
 TIME_STEMS = {
     "headerstamp": "ns",
     "stamp": "",
+    "epoch": "",
     "timestampsample": "us",
     "timestamp": "",
     "timestamps": "",
@@ -67,13 +71,16 @@ TIME_STEMS = {
     "sec": "s",
     "millis": "ms",
     "micros": "us",
+    "rtctime": "",
 }
 # each sensor's own clock: SensorLog
 OWN_TIMES = {"accelerometertimestampsincereboot": ACC, "gyrotimestampsincereboot": GYR}
 TEMPERATURE_STEMS = ("temperature", "temp")
 # iOS counts the acceleration of gravity as a body's own: at rest it reads -1 g along what points upwards
 TURNED_AROUND = ("accelerometeracceleration",)
+_OF_TIME = ("", *QUANTITIES[TIME])
 _PREFIXES = ("field", "imu0", "imu1", "imu", "sensors", "sensor", "raw", "data", "phone", "body")
+_AXIS = re.compile(r"([xyz])(?:[-_ ]?axis)?\s*(?:[\[(](.*)[\])])?")
 _BRACKETS = re.compile(r"(.*?)[\s_.]*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
 _UNIT_TAIL = re.compile(
     r"(.*?[a-z\]0-9])[_ ](ns|us|ms|s|sec|g|mg|dps|mdps|mps2|m_s2|m/s2|ms2|rad_s|rads|rad|deg_s|degs|deg)"
@@ -104,7 +111,7 @@ def column_named(name: str, place: int) -> Column | None:
         text, inside = match.groups()
         if inside in ("0", "1", "2"):
             axis = int(inside)
-        elif inside.lower().replace("°", "").removeprefix("deg ").strip() in ("c", "degc", "celsius"):
+        elif inside.lower().replace("°", "").removeprefix("deg ").strip() in ("c", "degc", "celsius", "℃"):
             unit = "C"
         elif not (unit := unit_named(inside)):
             return None
@@ -121,15 +128,15 @@ def _stem(name: str, place: int, text: str, axis: int, unit: str) -> Column | No
 def _known(name: str, place: int, text: str, axis: int, unit: str) -> Column | None:
     compact = re.sub(r"[^a-z0-9]", "", text)
     for word in (compact, *_without_prefixes(compact)):
-        if word in OWN_TIMES:
+        if word in OWN_TIMES and unit in _OF_TIME:
             return Column(name, place, TIME, unit=unit or "s", of=OWN_TIMES[word])
-        if word in TIME_STEMS and axis < 0:
+        if word in TIME_STEMS and axis < 0 and unit in _OF_TIME:
             return Column(name, place, TIME, unit=unit or TIME_STEMS[word], rank=list(TIME_STEMS).index(word))
-        if (word in TEMPERATURE_STEMS and unit == "C") or word == "temperaturec":
+        if (word in (*TEMPERATURE_STEMS, "t") and unit == "C") or word == "temperaturec":
             return Column(name, place, TEMPERATURE)
         for of, stems in ((ACC, ACC_STEMS), (GYR, GYR_STEMS)):
             for stem, at in _axes(word, axis):
-                if stem in stems:
+                if stem in stems and unit in ("", *QUANTITIES[of]):
                     rank, around = list(stems).index(stem), stem in TURNED_AROUND
                     return Column(name, place, of, at, unit or stems[stem], rank, turned_around=around)
     return None
@@ -159,20 +166,28 @@ def _axes(word: str, axis: int) -> list[tuple[str, int]]:
     return found
 
 
+def bare_axis(name: str) -> tuple[int, str] | None:
+    """(axis, unit) of a column that is called x, y, z, `x-axis (g)` and the like; None of another."""
+    found = _AXIS.fullmatch(name.strip().lower())
+    return ("xyz".index(found[1]), unit_named(found[2] or "")) if found else None
+
+
 def columns_of(header: list[str]) -> list[Column]:
     """What the columns of a header hold, those that are known."""
     return [column for place, name in enumerate(header) if (column := column_named(name, place)) is not None]
 
 
-def three(columns: list[Column], quantity: str) -> tuple[Column, ...]:
-    """x, y, z of a quantity, of the first stem that has all of them; empty where none has."""
+def threes(columns: list[Column], quantity: str) -> list[tuple[Column, ...]]:
+    """x, y, z of a quantity, of each stem that has all of them, by rank."""
     of = [column for column in columns if column.quantity == quantity]
-    for rank in sorted({column.rank for column in of}):
-        found = [column for column in of if column.rank == rank]
-        axes = tuple(next((c for c in found if c.axis == axis), None) for axis in range(3))
-        if None not in axes and len(found) == 3:
-            return tuple(c for c in axes if c is not None)
-    return ()
+    ranks = sorted({column.rank for column in of})
+    found = [sorted((c for c in of if c.rank == rank), key=lambda c: c.axis) for rank in ranks]
+    return [tuple(axes) for axes in found if [c.axis for c in axes] == [0, 1, 2]]
 
 
-__all__ = ["ACC", "COUNTS", "GYR", "TEMPERATURE", "TIME", "Column", "column_named", "columns_of", "three"]
+def three(columns: list[Column], quantity: str) -> tuple[Column, ...]:
+    """The first of threes; empty where there are none."""
+    return next(iter(threes(columns, quantity)), ())
+
+
+__all__ = ["ACC", "COUNTS", "GYR", "TEMPERATURE", "TIME", "Column", "column_named", "columns_of", "three", "threes"]

@@ -1,4 +1,4 @@
-"""Tables of a phone's sensors, one of each, as phyphox and Sensor Logger leave them in a folder or a .zip.
+"""Tables of one sensor each in a folder or a .zip: phyphox, Sensor Logger, MetaBase, ulog2csv.
 
 Sensor Logger's Accelerometer.csv is without gravity; TotalAcceleration.csv and AccelerometerUncalibrated.csv are with
 it. Of several accelerometers the one is taken that is nearest to the sensor and holds gravity.
@@ -7,24 +7,28 @@ it. Of several accelerometers the one is taken that is nearest to the sensor and
 from __future__ import annotations
 
 import lzma
+import re
 import zipfile
 import zlib
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from ...data import Recording
 from ...errors import RecordingError
 from ..hints import NO_HINTS, Hints
 from ..rows import cannot_read
-from .names import ACC, GYR, Column, three
-from .streams import Stream, recording_of
+from .apps import is_about, said
+from .names import ACC, GYR, Column, bare_axis, three
+from .streams import recording_of
 from .table import stream_of
 from .text import TextTable, table_of, text_of
-from .units import acceleration_unit
+from .times import Stream
+from .units import QUANTITIES, acceleration_unit
 
 # a sensor's tables by their names, the one nearest to the sensor first; the unit where their program says none
 NAMES = {
-    ACC: ("accelerometeruncalibrated", "accelerometer", "acceleration", "totalacceleration", "acc", "accel"),
+    ACC: ("accelerometeruncalibrated", "accelerometer", "acceleration", "totalacceleration", "acc", "accel", "acce"),
     GYR: ("gyroscopeuncalibrated", "gyroscope", "gyro", "gyr", "rotationrate"),
 }
 UNITS = {ACC: "", GYR: "rad/s"}
@@ -57,7 +61,9 @@ def load_folder_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
     RecordingError : one cannot be read, or both do not make a recording.
     """
     try:
-        texts = {child.name: child.read_bytes() for child in sorted(path.iterdir()) if _sensor(child.name)}
+        files = sorted(child for child in (*path.iterdir(), *path.glob("meta/time.csv")) if child.is_file())
+        names = {child: child.relative_to(path).as_posix() for child in files}
+        texts = {name: child.read_bytes() for child, name in names.items() if _is_read(name)}
     except OSError as error:
         raise cannot_read(path, error) from error
     return _recording(path.name, texts, hints)
@@ -67,7 +73,7 @@ def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """The recording in an archive's tables; see load_folder_of_tables."""
     try:
         with zipfile.ZipFile(path) as archive:
-            members = [member for member in archive.infolist() if _sensor(member.filename)]
+            members = [member for member in archive.infolist() if _is_read(member.filename)]
             if sum(member.file_size for member in members) > MOST_BYTES:
                 raise RecordingError(
                     f"{path} holds more than {MOST_BYTES >> 20} MiB of tables", "unpack it, and give one"
@@ -80,17 +86,25 @@ def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
     return _recording(path.name, texts, hints)
 
 
+def _is_read(name: str) -> bool:
+    return bool(_sensor(name)) or is_about(name)
+
+
 def _sensor(name: str) -> str:
     """The quantity that a table of this name holds; empty of another."""
+    return next((quantity for quantity in NAMES if _rank(name, quantity) is not None), "")
+
+
+def _rank(name: str, quantity: str) -> int | None:
+    """The place of a table among those of the quantity, by its name or a word of it; None of another."""
     path = Path(name)
     if path.suffix.lower() not in SUFFIXES or "meta" in path.parts[:-1] or path.name.startswith("."):
-        return ""
-    stem = _plain(name)
-    return next((quantity for quantity, names in NAMES.items() if stem in names), "")
-
-
-def _plain(name: str) -> str:
-    return "".join(filter(str.isalnum, Path(name).stem.lower()))
+        return None
+    words = [word for word in re.split(r"[^a-z]+", path.stem.lower()) if word]
+    for word in ("".join(words), *words):
+        if word in NAMES[quantity] and not {"linear", "user"} & set(words):
+            return NAMES[quantity].index(word)
+    return None
 
 
 def _has_both(names: Iterable[str]) -> bool:
@@ -100,8 +114,10 @@ def _has_both(names: Iterable[str]) -> bool:
 def _recording(name: str, texts: Mapping[str, bytes], hints: Hints) -> Recording:
     found: dict[str, tuple[str, Stream]] = {}
     without_gravity = ""
-    for quantity, names in NAMES.items():
-        for member in sorted((m for m in texts if _sensor(m) == quantity), key=lambda m: names.index(_plain(m))):
+    about = said({member: data for member, data in texts.items() if is_about(member)})
+    for quantity in NAMES:
+        ranks = {member: rank for member in texts if (rank := _rank(member, quantity)) is not None}
+        for member in sorted(ranks, key=lambda m: (ranks[m], m)):
             stream = _stream(f"{name}/{Path(member).name}", texts[member], quantity)
             if quantity == ACC and len(stream.values) and not acceleration_unit(stream.values):
                 without_gravity = without_gravity or member
@@ -115,8 +131,9 @@ def _recording(name: str, texts: Mapping[str, bytes], hints: Hints) -> Recording
     if set(found) < {ACC, GYR}:
         raise RecordingError(f"{name} holds no table of both an accelerometer and a gyroscope", "record both")
     (of_acc, acc), (of_gyr, gyr) = found[ACC], found[GYR]
-    said = f"from {Path(of_acc).name} and {Path(of_gyr).name}"
-    return recording_of(acc, gyr, hints, name, remarks=[said])
+    acc = replace(acc, values=-acc.values if about.turned_around else acc.values, zero_ns=about.zero_ns)
+    of = f"from {Path(of_acc).name} and {Path(of_gyr).name}"
+    return recording_of(acc, gyr, hints, name, remarks=[of, *about.remarks])
 
 
 def _stream(name: str, data: bytes, quantity: str) -> Stream:
@@ -135,7 +152,11 @@ def _stream(name: str, data: bytes, quantity: str) -> Stream:
 
 def _bare(table: TextTable, quantity: str) -> tuple[Column, ...]:
     """x, y, z where the file's name alone says of what."""
-    named = {header.strip().lower(): place for place, header in enumerate(table.header)}
-    if not {"x", "y", "z"} <= set(named):
+    found = {axis[0]: (place, axis[1]) for place, name in enumerate(table.header) if (axis := bare_axis(name))}
+    if set(found) != {0, 1, 2}:
         return ()
-    return tuple(Column(axis, named[axis], quantity, i, UNITS[quantity]) for i, axis in enumerate("xyz"))
+    return tuple(
+        Column(table.header[place], place, quantity, i, unit or UNITS[quantity])
+        for i, (place, unit) in sorted(found.items())
+        if unit in ("", *QUANTITIES[quantity])
+    )

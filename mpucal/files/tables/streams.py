@@ -4,46 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from decimal import Decimal
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...data import STANDARD_GRAVITY_MPS2, Mask, Recording, Sensor, Vector
 from ...errors import RecordingError
 from ..hints import Hints
-from . import units
+from . import times, units
+from .times import Stream
 from .units import COUNTS, QUANTITIES, check_agrees
 
-Times = Sequence[Decimal] | NDArray[Any]
 FULL_SCALE = 32768
 # octaves: half of the way to the next range leaves room for gains of 0.7 to 1.4
 ANOTHER_RANGE = 0.5
-# periods between two rates over which nothing is interpolated
-LOST_PERIODS = 3.5
+# |a| of gravity that alone says a unit: counts of 512 to 1 g are no mg
+LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
 
 
-NS_OF = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
-# from 2001 to 2100: a time of day, and not one since a start
-UTC_NS = (10**18, 41 * 10**17)
-
-
-@dataclass(frozen=True)
-class Stream:
-    """What one sensor measured.
-
-    Attributes
-    ----------
-    times : (n,) exact: decimals, integers or floats; None: there are none.
-    values : (n, 3) as they stand in the file. time_unit, unit : as the file says them; empty where it does not.
-    """
-
-    times: Times | None
-    values: Vector
-    time_unit: str = ""
-    unit: str = ""
+def with_gravity(streams: Sequence[Stream]) -> int:
+    """The place of the first accelerometer that holds gravity; 0 where none does."""
+    return next((i for i, s in enumerate(streams) if len(s.values) and units.acceleration_unit(s.values)), 0)
 
 
 def recording_of(
@@ -70,18 +51,27 @@ def recording_of(
                 f"{name} holds {len(stream.values)} {what}, or some that no sensor reads",
                 "record for longer, or leave those lines out",
             )
-    (t, of_t), (t_gyr, of_t_gyr) = _seconds(acc, acc, hints, name), _seconds(gyr, acc, hints, name)
+    fresh = acc.fresh
+    temperature_c = None if temperature_c is None else temperature_c[fresh]
+    again = int((~fresh).sum())
+    acc, gyr = acc.part(fresh), gyr.part(gyr.fresh)
+    (t, of_t), (t_gyr, of_t_gyr) = (times.seconds(stream, acc, hints, name) for stream in (acc, gyr))
     a, of_a, a_clipped = _accelerations(acc, hints, name)
     joined = ""
     if not np.array_equal(t, t_gyr):
-        kept, values, gap, joined = _joined(t, t_gyr, gyr.values, name)
+        kept, values, gap, joined = times.joined(t, t_gyr, gyr.values, name)
         t, a, a_clipped = t[kept], a[kept], a_clipped[kept]
         temperature_c = None if temperature_c is None else temperature_c[kept]
     else:
         values, gap = gyr.values, np.zeros(len(t), bool)
     w, of_w, w_clipped = _rates(t, a, values, gyr.unit, hints, name)
-    times = of_t if of_t == of_t_gyr else f"{of_t} and {of_t_gyr}"
-    said = [f"Of {name} {times}, accelerations {of_a} and rates {of_w} were taken as such", *remarks, joined]
+    of_times = of_t if of_t == of_t_gyr else f"{of_t} and {of_t_gyr}"
+    said = [
+        f"Of {name} {of_times}, accelerations {of_a} and rates {of_w} were taken as such",
+        *remarks,
+        f"{again} samples that are written again were left out" if again else "",
+        joined,
+    ]
     recording = Recording.from_arrays(
         t,
         a,
@@ -94,55 +84,12 @@ def recording_of(
         name=name,
         taken="; ".join(filter(None, said)) + ".",
     )
-    return replace(recording, utc_ns=_utc_ns(acc, of_t))
-
-
-def _utc_ns(stream: Stream, of_t: str) -> int | None:
-    """The time of day of the first sample, where its time is one: ns since 1970."""
-    unit = of_t.removeprefix("times in ")
-    if stream.times is None or unit not in QUANTITIES["t"]:
-        return None
-    first = round(Decimal(str(stream.times[0])) * NS_OF[unit])
-    return first if UTC_NS[0] < first < UTC_NS[1] else None
-
-
-def _seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Vector, str]:
-    """Times (n,) [s] since the first stream's first, and how they were taken."""
-    if stream.times is None or first.times is None:
-        if hints.rate_hz is None:
-            raise RecordingError(f"{name} holds no times", "give the rate of its samples with --rate HZ")
-        return np.arange(len(stream.values)) / hints.rate_hz, f"a rate of {hints.rate_hz:g} Hz"
-    ticks = _since(stream.times, first.times[0])
-    if not (np.abs(ticks) < units.BEYOND**2).all():
-        raise RecordingError(f"{name} holds times that are none", "leave those lines out")
-    steps = np.diff(ticks)
-    # a burst of samples may come with one time
-    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    how = f"their step of {step:g} reads"
-    unit = check_agrees(
-        name, "t", hints.units.get("t", stream.time_unit), _seen(units.time_unit(step), hints, "t"), how
-    )
-    t = ticks * QUANTITIES["t"][unit]
-    back = np.diff(t) <= 0
-    if back.any():
-        at = int(back.argmax()) + 1
-        raise RecordingError(
-            f"{name}: time does not increase at sample {at} ({t[at - 1]:.6f} s, then {t[at]:.6f} s)",
-            "sort the samples by time and drop repeated ones",
-        )
-    return t, f"times in {unit}"
+    return replace(recording, utc_ns=times.utc_ns(acc, of_t))
 
 
 def _seen(unit: str, hints: Hints, quantity: str) -> str:
     """What the samples say, unless a person has said it."""
     return hints.units.get(quantity, unit)
-
-
-def _since(times: Times, origin: Any) -> Vector:
-    """(n,) times without the digits that they share."""
-    if isinstance(times, np.ndarray):
-        return np.asarray(times - origin, float)
-    return np.array([float(time - origin) for time in times])
 
 
 def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str, Mask]:
@@ -157,8 +104,9 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
             f"{name}: |a| is {size:.3g} in the median, so that gravity is not in it",
             "give the accelerometer itself, not the linear acceleration that was made of it",
         )
+    likely = LEAST_LIKELY <= size * QUANTITIES["acc"].get(seen, 0.0) / STANDARD_GRAVITY_MPS2 <= MOST_LIKELY
     how = f"|a| of {size:.4g} in the median reads"
-    unit = check_agrees(name, "acc", said, _seen(seen or said, hints, "acc"), how)
+    unit = check_agrees(name, "acc", said, _seen((seen if said or likely else "") or said, hints, "acc"), how)
     return values * QUANTITIES["acc"][unit], f"in {unit}", np.zeros(len(values), bool)
 
 
@@ -185,19 +133,37 @@ def _rates(t: Vector, a: Vector, values: Vector, said: str, hints: Hints, name: 
     if said == COUNTS or (not said and _are_counts(values) and (hints.gyro_range_dps or hints.accel_range_g)):
         if hints.gyro_range_dps is None:
             raise RecordingError(f"{name}: rates are counts of a range that nothing says", "give --gyro-range DPS")
-        scale = np.radians(hints.gyro_range_dps) / FULL_SCALE
+        scale, of = np.radians(hints.gyro_range_dps) / FULL_SCALE, f"counts of ±{hints.gyro_range_dps:g} deg/s"
         factor = units.turned(t, a, values * scale)
         if factor and is_another_range(abs(factor)) and "gyr" not in hints.units:
-            raise RecordingError(
-                f"{name}: gravity turns {abs(factor):.2g} times as fast as counts of"
-                f" ±{hints.gyro_range_dps:g} deg/s say",
-                "give the --gyro-range that the sensor had, or say --units gyr=counts if it was that",
+            raise _unlike(
+                name,
+                factor,
+                of,
+                hints,
+                "the --gyro-range that the sensor had (this one: --units gyr=counts)",
             )
-        return values * scale, f"in counts of ±{hints.gyro_range_dps:g} deg/s", _at_the_end(values)
-    seen = _seen(units.rate_unit(t, a, values), hints, "gyr")
-    how = "gravity turns" if seen else "how gravity turns reads"
-    unit = check_agrees(name, "gyr", said, seen, how)
-    return values * QUANTITIES["gyr"][unit], f"in {unit}", np.zeros(len(values), bool)
+        return values * scale, f"in {of}{_turned_around(factor)}", _at_the_end(values)
+    factor = units.turned(t, a, values)
+    seen = _seen(units.rate_unit(factor), hints, "gyr")
+    if factor and not seen:
+        of = said or "rad/s"
+        raise _unlike(name, factor / QUANTITIES["gyr"][of], of, hints, "their unit with --units gyr=UNIT")
+    unit = check_agrees(name, "gyr", said, seen, "gravity turns" if seen else "how gravity turns reads")
+    return values * QUANTITIES["gyr"][unit], f"in {unit}{_turned_around(factor)}", np.zeros(len(values), bool)
+
+
+def _unlike(name: str, factor: float, of: str, hints: Hints, remedy: str) -> RecordingError:
+    of_times = "--rate HZ" if hints.rate_hz else "--units t=UNIT"
+    return RecordingError(
+        f"{name}: gravity turns {abs(factor):.2g} times as fast as rates in {of} say",
+        f"say {remedy}, or of the times {of_times}",
+    )
+
+
+def _turned_around(factor: float | None) -> str:
+    """What is to be said of signs: calibrate refuses them, and says which."""
+    return " (gravity turns the other way, as where an axis has another sign)" if factor and factor < 0 else ""
 
 
 def is_another_range(ratio: float) -> bool:
@@ -211,27 +177,3 @@ def _are_counts(values: Vector) -> bool:
 
 def _at_the_end(values: Vector) -> Mask:
     return np.asarray(((values >= FULL_SCALE - 1) | (values <= -FULL_SCALE)).any(axis=1))
-
-
-def _joined(t: Vector, t_gyr: Vector, rates: Vector, name: str) -> tuple[slice, Vector, Mask, str]:
-    """Which accelerations lie within the rates' time, the rates at their times, gaps, and what to say of it."""
-    first, last = np.searchsorted(t, t_gyr[0], "left"), np.searchsorted(t, t_gyr[-1], "right")
-    if last - first < 2:
-        raise RecordingError(
-            f"{name}: accelerometer and gyroscope were not recorded at the same time"
-            f" (from {t[0]:.3f} to {t[-1]:.3f} s and from {t_gyr[0]:.3f} to {t_gyr[-1]:.3f} s)",
-            "give the two tables of one recording",
-        )
-    kept = slice(int(first), int(last))
-    at = t[kept]
-    values = np.column_stack([np.interp(at, t_gyr, axis) for axis in rates.T])
-    after = np.clip(np.searchsorted(t_gyr, at), 1, len(t_gyr) - 1)
-    apart = t_gyr[after] - t_gyr[after - 1]
-    lost = apart > LOST_PERIODS * float(np.median(np.diff(t_gyr)))
-    nearest = np.minimum(np.abs(at - t_gyr[after - 1]), np.abs(t_gyr[after] - at))
-    said = (
-        f"the rates were interpolated to the times of the accelerations, from which their own lie"
-        f" {1e3 * float(np.median(nearest)):.2f} ms apart in the median (the gyroscope begins"
-        f" {1e3 * (t_gyr[0] - t[0]):+.2f} ms after the accelerometer)"
-    )
-    return kept, values, lost, said

@@ -12,9 +12,11 @@ from ...errors import RecordingError
 from ..csv import COLUMNS
 from ..hints import NO_HINTS, Hints
 from ..rows import cannot_read
-from .names import ACC, GYR, TEMPERATURE, TIME, Column, columns_of, three
-from .streams import Stream, recording_of
+from .labelled import labelled_table
+from .names import ACC, GYR, TEMPERATURE, TIME, Column, columns_of, three, threes
+from .streams import recording_of, with_gravity
 from .text import PREAMBLE, SEPARATORS, TextTable, table_of, text_of
+from .times import Stream
 
 SNIFFED = 1 << 16
 
@@ -23,10 +25,14 @@ def is_table(path: Path) -> bool:
     """Whether a file begins as a table of both sensors that is not mpucal's own."""
     try:
         with path.open("rb") as file:
-            table = table_of(text_of(file.read(SNIFFED), path.name), path.name)
+            table = _table(text_of(file.read(SNIFFED), path.name), path.name)
     except (OSError, RecordingError):
         return False
     return table is not None and len(table.rows) > 1 and not _is_own(path)
+
+
+def _table(text: str, name: str) -> TextTable | None:
+    return labelled_table(text, name) or table_of(text, name)
 
 
 def _is_own(path: Path) -> bool:
@@ -47,7 +53,7 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
     except OSError as error:
         raise cannot_read(path, error) from error
     text = text_of(data, path.name)
-    table = table_of(text, path.name, headless=bool(hints.columns))
+    table = table_of(text, path.name, list(hints.columns.values())) if hints.columns else _table(text, path.name)
     if table is None or not table.rows:
         raise RecordingError(
             f"{path.name} names no columns of an accelerometer and a gyroscope in its first {PREAMBLE} lines",
@@ -59,24 +65,38 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
 def recording_of_table(table: TextTable, hints: Hints) -> Recording:
     """The recording in a table that holds both sensors."""
     columns = chosen(table.header, hints) if hints.columns else table.columns
-    acc, gyr = three(columns, ACC), three(columns, GYR)
-    if not acc or not gyr:
-        lacks = "a gyroscope" if acc else "an accelerometer"
-        has = ", ".join(name.strip() for name in table.header) or "unnamed"
+    all_acc, gyr = threes(columns, ACC), three(columns, GYR)
+    if not all_acc or not gyr:
+        lacks = "a gyroscope" if all_acc else "an accelerometer"
         raise RecordingError(
-            f"{table.name} holds no columns of {lacks}; its columns are {has}",
+            f"{table.name} holds no columns of {lacks}; its columns are {_listed(table.header)}",
             "give the folder with the tables of both, or name them with --columns t=NAME,ax=NAME,...",
         )
     warm = [column for column in columns if column.quantity == TEMPERATURE]
-    a, w = stream_of(table, columns, acc), stream_of(table, columns, gyr)
+    accelerometers = [stream_of(table, columns, of) for of in all_acc]
+    place = with_gravity(accelerometers)
+    acc, a, w = all_acc[place], accelerometers[place], stream_of(table, columns, gyr)
     temperature_c = table.numbers(warm[:1])[:, 0] if warm and len(a.values) == len(table.rows) else None
-    separated = [] if table.separator == "," else [f"its cells are separated by {SEPARATORS[table.separator]}"]
-    return recording_of(a, w, hints, table.name, temperature_c, [*remarks(acc), *separated])
+    called = SEPARATORS.get(table.separator, "names")
+    separated = [] if table.separator == "," else [f"its cells are separated by {called}"]
+    if w.times is None and hints.rate_hz is None:
+        raise RecordingError(
+            f"{table.name} holds no times that are known as such; its columns are {_listed(table.header)}",
+            "name them with --columns t=NAME,ax=NAME,... and --units t=UNIT, or"
+            " give the rate of its samples with --rate HZ",
+        )
+    return recording_of(a, w, hints, table.name, temperature_c, [*remarks(columns, acc), *separated])
 
 
-def remarks(acc: Sequence[Column]) -> list[str]:
-    """What is to be said of how a stream's columns were taken."""
-    return ["accelerations with the other sign, as iOS has them"] if acc[0].turned_around else []
+def _listed(header: Sequence[str]) -> str:
+    return ", ".join(name.strip() for name in header if name.strip()) or "unnamed"
+
+
+def remarks(columns: list[Column], acc: Sequence[Column]) -> list[str]:
+    """What is to be said of which columns were taken, and how."""
+    several = len(threes(columns, ACC)) > 1
+    of = [f"the accelerometer is {', '.join(column.name.strip() for column in acc)}"] if several else []
+    return [*of, *(["accelerations with the other sign, as iOS has them"] if acc[0].turned_around else [])]
 
 
 def stream_of(table: TextTable, columns: Sequence[Column], of: Sequence[Column]) -> Stream:
@@ -103,9 +123,10 @@ def chosen(header: Sequence[str], hints: Hints) -> list[Column]:
     RecordingError : the table has no such column.
     """
     named = {name.strip(): place for place, name in enumerate(header)}
+    plain = {name.partition("(")[0].strip(): place for name, place in named.items()}
     found = []
     for role, where in hints.columns.items():
-        place = where if isinstance(where, int) else named.get(where, -1)
+        place = where if isinstance(where, int) else named.get(where, plain.get(where, -1))
         if place < 0 or (header and place >= len(header)):
             raise RecordingError(
                 f"there is no column {where + 1 if isinstance(where, int) else where} for {role}",

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime, time
 from decimal import Decimal, InvalidOperation
 from io import StringIO
+from itertools import zip_longest
 
 import numpy as np
 
 from ...data import Vector
 from ...errors import RecordingError
-from .names import Column, columns_of
+from .names import Column, bare_axis, columns_of
+from .units import unit_named
 
 # and what they are called; None: any blanks
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
-# lines before the header: what a sketch says at its start, `sep=;`
-PREAMBLE = 40
+# lines before the header: what a sketch says at its start, `sep=;`, the settings that Betaflight's Explorer writes
+PREAMBLE = 200
 NS = 1_000_000_000
 # of a time, as nobody has more
 DIGITS = 40
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+# before each line, of Arduino's serial monitor
+MONITORED = re.compile(r"^\d\d:\d\d:\d\d\.\d{3} -> ", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -48,10 +54,9 @@ class TextTable:
     def has(self, column: Column) -> bool:
         """Whether the first line of a column holds a number or a date."""
         try:
-            _exact(self.rows[0][column.place])
-        except (IndexError, ValueError):
+            return _is_number(self.rows[0][column.place])
+        except IndexError:
             return False
-        return True
 
     def numbers(self, columns: Sequence[Column]) -> Vector:
         """(n, k) numbers; an empty cell is NaN.
@@ -71,7 +76,7 @@ class TextTable:
         return found
 
     def times(self, column: Column) -> list[Decimal]:
-        """(n,) exact times; dates in ns since 1970.
+        """(n,) exact times; dates and times of day in ns.
 
         Raises
         ------
@@ -87,8 +92,12 @@ class TextTable:
         return found
 
     def is_dated(self, column: Column) -> bool:
-        """Whether its times are dates."""
-        return "-" in self.rows[0][column.place].strip()[1:] and "e-" not in self.rows[0][column.place].lower()
+        """Whether its times are dates, or times of day."""
+        try:
+            Decimal(_point(self.rows[0][column.place].strip()))
+        except InvalidOperation:
+            return True
+        return False
 
     def _short(self, i: int) -> str:
         raise RecordingError(
@@ -105,21 +114,26 @@ class TextTable:
         )
 
 
+_OF_DAY = re.compile(r"\d\d:\d\d:\d\d(\.\d+)?").fullmatch
+
+
 def _point(text: str) -> str:
     return text.replace(",", ".") if "," in text and "." not in text else text
 
 
 def _exact(text: str) -> Decimal:
-    """A number, or a date in ns since 1970."""
+    """A number; of a date the ns since 1970, or since the year 1 if nothing says its zone; of a time since midnight."""
     text = text.strip()
     try:
         number = Decimal(_point(text))
         if number.is_finite() and abs(number.adjusted()) < DIGITS:
             return number
     except InvalidOperation:
-        date = datetime.fromisoformat(text)
-        seconds = int(date.replace(microsecond=0).timestamp())
-        return Decimal(seconds * NS + date.microsecond * 1000)
+        date = (
+            datetime.combine(datetime.min, time.fromisoformat(text)) if _OF_DAY(text) else datetime.fromisoformat(text)
+        )
+        since = date - (EPOCH if date.tzinfo else datetime.min)
+        return Decimal((since.days * 86400 + since.seconds) * NS + since.microseconds * 1000)
     raise ValueError(text)
 
 
@@ -133,38 +147,41 @@ def text_of(data: bytes, name: str) -> str:
     if b"\0" in data:
         raise RecordingError(f"{name} is no text", "give a table as text")
     try:
-        return data.decode("utf-8-sig")
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         # a spreadsheet's "m/s²" and "µs"
-        return data.decode("cp1252", "replace")
+        text = data.decode("cp1252", "replace")
+    return MONITORED.sub("", text) if MONITORED.match(text) else text
 
 
-def table_of(text: str, name: str, headless: bool = False, bare: bool = False) -> TextTable | None:
+def table_of(text: str, name: str, said: Sequence[str | int] = (), bare: bool = False) -> TextTable | None:
     """The table in a text; None where no line names an accelerometer's or a gyroscope's columns.
 
     Parameters
     ----------
-    headless : take the first line whose cells are numbers for the first sample, and one before it for the header.
+    said : the columns' names, of which the header has some, or their places, at which the first sample has numbers.
     bare : take the first line with the names x, y, z for the header.
     """
     begun = text.split("\n", PREAMBLE)[:PREAMBLE]
+    names, places = {of for of in said if isinstance(of, str)}, [of for of in said if isinstance(of, int)]
     for number, line in enumerate(begun):
         for separator in SEPARATORS:
             cells = _cells(line, separator)
-            if headless:
-                found = len(cells) > 5 and _is_row(cells)
+            plain = {cell.strip() for cell in cells}
+            if names:
+                found = len(cells) > 5 and bool(names & (plain | {of.partition("(")[0].strip() for of in plain}))
+            elif places:
+                found = len(cells) > max(5, *places) and all(_is_number(cells[place]) for place in places)
             elif bare:
-                found = {"x", "y", "z"} <= {cell.strip().lower() for cell in cells}
+                found = {axis[0] for cell in cells if (axis := bare_axis(cell))} == {0, 1, 2}
             else:
                 found = len({c.axis for c in columns_of(cells) if c.quantity in ("acc", "gyr")}) == 3
+            if found and places and not names:
+                before = _cells(begun[number - 1], separator) if number else []
+                return _read(text, name, before if len(before) == len(cells) else [], number, separator)
             if found:
-                header = cells
-                first = number + 1
-                if headless:
-                    before = _cells(begun[number - 1], separator) if number else []
-                    header, first = (before if len(before) == len(cells) else []), number
-                return _read(text, name, header, first, separator)
-    return None
+                return _read(text, name, cells, number + 1, separator)
+    return table_of(text, name, range(6)) if names else None
 
 
 def _cells(line: str, separator: str | None) -> list[str]:
@@ -178,10 +195,9 @@ def _cells(line: str, separator: str | None) -> list[str]:
         return []
 
 
-def _is_row(cells: list[str]) -> bool:
+def _is_number(cell: str) -> bool:
     try:
-        for cell in cells:
-            float(_point(cell.strip()))
+        _exact(cell)
     except ValueError:
         return False
     return True
@@ -204,4 +220,14 @@ def _read(text: str, name: str, header: list[str], first: int, separator: str | 
                 lines.append(line)
     except csv.Error as error:
         raise RecordingError(f"{name} is no table ({error})", "give a table as text") from error
+    if rows and _are_units(rows[0]):
+        header = [
+            f"{of} ({unit.strip()})" if unit.strip() else of for of, unit in zip_longest(header, rows[0], fillvalue="")
+        ]
+        rows, lines = rows[1:], lines[1:]
     return TextTable(name, header, rows, lines, separator)
+
+
+def _are_units(cells: list[str]) -> bool:
+    """Whether a line below the header says the units."""
+    return any(map(unit_named, cells)) and not any(_is_number(cell) for cell in cells)

@@ -23,10 +23,10 @@ QUANTITIES = {
 }
 _SPELLED = {
     "s": "s sec secs second seconds",
-    "ms": "ms msec millis millisecond milliseconds",
-    "us": "us usec micros microsecond microseconds",
-    "ns": "ns nsec nanos nanosecond nanoseconds",
-    "m/s^2": "m/s2 ms-2 m/s/s mps2 ms2 m/s**2 meters/second2 m/sec2",
+    "ms": "ms msec millis millisec millisecond milliseconds",
+    "us": "us usec micros microsec microsecond microseconds",
+    "ns": "ns nsec nanos nanosec nanosecond nanoseconds",
+    "m/s^2": "m/s2 ms-2 m/s/s mps2 ms2 m/(s2) m/s**2 meters/second2 m/sec2",
     "g": "g gs g-force gforce gee g0",
     "mg": "mg milli-g millig",
     "rad/s": "rad/s rads-1 radps rads rad/sec radians/s rps rad",
@@ -42,7 +42,7 @@ _PLAIN = str.maketrans(
 SLOWEST_HZ, FASTEST_HZ = 10.0, 8000.0
 # gains of 0.5 to 1.5 are a sensor's own
 LEAST_OF_G, MOST_OF_G = 0.45, 2.0
-LEAST_TURNED, MOST_TURNED = 0.5, 2.0
+LEAST_TURNED, MOST_TURNED = 0.6, 1.6
 SCATTER = 0.45
 # no unit makes such numbers of what a sensor reads, and their squares are finite
 BEYOND = 1e12
@@ -101,13 +101,10 @@ def turned(t: Vector, acc: Vector, gyr: Vector) -> float | None:
     return both / power
 
 
-def rate_unit(t: Vector, acc: Vector, gyr: Vector) -> str:
-    """The unit of (n, 3) rates that turn the accelerations as they turn; empty where that cannot be told."""
-    factor = turned(t, acc, gyr)
-    if factor is None:
-        return ""
+def rate_unit(factor: float | None) -> str:
+    """The unit of rates by what `turned` says of them; empty where that cannot be told."""
     units = {unit: si for unit, si in QUANTITIES["gyr"].items() if unit != COUNTS}
-    return next((unit for unit, si in units.items() if LEAST_TURNED <= abs(factor / si) <= MOST_TURNED), "")
+    return next((u for u, si in units.items() if factor and LEAST_TURNED <= abs(factor / si) <= MOST_TURNED), "")
 
 
 def check_agrees(name: str, quantity: str, said: str, seen: str, how: str) -> str:

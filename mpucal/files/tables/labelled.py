@@ -1,0 +1,26 @@
+"""Lines that name each number, as sketches print for Arduino's serial plotter: `AccelX:0.12,AccelY:...,GyroX:...`."""
+
+from __future__ import annotations
+
+import re
+
+from .names import ACC, GYR, column_named, columns_of, three
+from .text import PREAMBLE, TextTable
+
+# a name of one or two words, `:` or `=`, and a number
+_PAIR = re.compile(r"((?:[A-Za-z_]+[ _])?[A-Za-z_]\w*)\s?[:=]\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?![\w:])")
+
+
+def labelled_table(text: str, name: str) -> TextTable | None:
+    """The table in such lines; None where no line names all six. What stands between them is left out."""
+    for line in text.split("\n", PREAMBLE)[:PREAMBLE]:
+        header = _names(line)
+        columns = columns_of(header)
+        if three(columns, ACC) and three(columns, GYR):
+            found = [(i, _PAIR.findall(row)) for i, row in enumerate(text.split("\n"), 1) if _names(row) == header]
+            return TextTable(name, header, [[n for _, n in row] for _, row in found], [i for i, _ in found], ":")
+    return None
+
+
+def _names(line: str) -> list[str]:
+    return [name if column_named(name, 0) else name.split()[-1] for name, _ in _PAIR.findall(line)]

@@ -1,0 +1,126 @@
+"""Samples of one sensor with their times, and the times of two sensors as those of one recording, in seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from itertools import compress, pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...data import Mask, Vector
+from ...errors import RecordingError
+from ..hints import Hints
+from . import units
+from .units import QUANTITIES, check_agrees
+
+Times = Sequence[Decimal] | NDArray[Any]
+# periods between two rates over which nothing is interpolated
+LOST_PERIODS = 3.5
+NS_OF = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
+# from 2001 to 2100: a time of day, and not one since a start
+UTC_NS = (10**18, 41 * 10**17)
+
+
+@dataclass(frozen=True)
+class Stream:
+    """What one sensor measured.
+
+    Attributes
+    ----------
+    times : (n,) exact: decimals, integers or floats; None: there are none.
+    values : (n, 3) as they stand in the file. time_unit, unit : as the file says them; empty where it does not.
+    zero_ns : the time of day at time 0, in ns since 1970, where a file beside it says that.
+    """
+
+    times: Times | None
+    values: Vector
+    time_unit: str = ""
+    unit: str = ""
+    zero_ns: int | None = None
+
+    def part(self, kept: Mask) -> Stream:
+        """Its samples where `kept` (n,) is."""
+        if self.times is None or isinstance(self.times, np.ndarray):
+            times = None if self.times is None else self.times[kept]
+            return replace(self, times=times, values=self.values[kept])
+        return replace(self, times=list(compress(self.times, kept)), values=self.values[kept])
+
+    @property
+    def fresh(self) -> Mask:
+        """(n,) whether a sample is not the one before again, as loggers write it beside another sensor's."""
+        again = np.zeros(len(self.values), bool)
+        if self.times is not None and len(again):
+            again[1:] = [b == a for a, b in pairwise(self.times)]
+            again[1:] &= (self.values[1:] == self.values[:-1]).all(axis=1)
+        return ~again
+
+
+def utc_ns(stream: Stream, of_t: str) -> int | None:
+    """The time of day of the first sample, where its time is one: ns since 1970."""
+    unit = of_t.removeprefix("times in ")
+    if stream.times is None or unit not in QUANTITIES["t"]:
+        return None
+    first = round(Decimal(str(stream.times[0])) * NS_OF[unit]) + (stream.zero_ns or 0)
+    return first if UTC_NS[0] < first < UTC_NS[1] else None
+
+
+def seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Vector, str]:
+    """Times (n,) [s] since the first stream's first, and how they were taken."""
+    if stream.times is None or first.times is None:
+        if hints.rate_hz is None:
+            raise RecordingError(f"{name} holds no times", "give the rate of its samples with --rate HZ")
+        return np.arange(len(stream.values)) / hints.rate_hz, f"a rate of {hints.rate_hz:g} Hz"
+    ticks = _since(stream.times, first.times[0])
+    if not (np.abs(ticks) < units.BEYOND**2).all():
+        raise RecordingError(f"{name} holds times that are none", "leave those lines out")
+    steps = np.diff(ticks)
+    # a burst of samples may come with one time
+    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    how = f"their step of {step:g} reads"
+    unit = check_agrees(
+        name, "t", hints.units.get("t", stream.time_unit), hints.units.get("t", units.time_unit(step)), how
+    )
+    t = ticks * QUANTITIES["t"][unit]
+    back = np.diff(t) <= 0
+    if back.any():
+        at = int(back.argmax()) + 1
+        raise RecordingError(
+            f"{name}: time does not increase at sample {at} ({t[at - 1]:.6f} s, then {t[at]:.6f} s)",
+            "sort the samples by time and drop repeated ones",
+        )
+    return t, f"times in {unit}"
+
+
+def _since(times: Times, origin: Any) -> Vector:
+    """(n,) times without the digits that they share."""
+    if isinstance(times, np.ndarray):
+        return np.asarray(times - origin, float)
+    return np.array([float(time - origin) for time in times])
+
+
+def joined(t: Vector, t_gyr: Vector, rates: Vector, name: str) -> tuple[slice, Vector, Mask, str]:
+    """Which accelerations lie within the rates' time, the rates at their times, gaps, and what to say of it."""
+    first, last = np.searchsorted(t, t_gyr[0], "left"), np.searchsorted(t, t_gyr[-1], "right")
+    if last - first < 2:
+        raise RecordingError(
+            f"{name}: accelerometer and gyroscope were not recorded at the same time"
+            f" (from {t[0]:.3f} to {t[-1]:.3f} s and from {t_gyr[0]:.3f} to {t_gyr[-1]:.3f} s)",
+            "give the two tables of one recording",
+        )
+    kept = slice(int(first), int(last))
+    at = t[kept]
+    values = np.column_stack([np.interp(at, t_gyr, axis) for axis in rates.T])
+    after = np.clip(np.searchsorted(t_gyr, at), 1, len(t_gyr) - 1)
+    apart = t_gyr[after] - t_gyr[after - 1]
+    lost = apart > LOST_PERIODS * float(np.median(np.diff(t_gyr)))
+    nearest = np.minimum(np.abs(at - t_gyr[after - 1]), np.abs(t_gyr[after] - at))
+    said = (
+        f"the rates were interpolated to the times of the accelerations, from which their own lie"
+        f" {1e3 * float(np.median(nearest)):.2f} ms apart in the median (the gyroscope begins"
+        f" {1e3 * (t_gyr[0] - t[0]):+.2f} ms after the accelerometer)"
+    )
+    return kept, values, lost, said
