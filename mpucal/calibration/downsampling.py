@@ -50,7 +50,7 @@ def means(x: Vector, recording: Recording, flat: Flat, rate_hz: float) -> Vector
         return x
     start = flat.last % size
     m = (len(x) - start) // size
-    return np.asarray(x[start : start + m * size].reshape(m, size, *x.shape[1:]).mean(1))
+    return np.asarray(np.einsum("ij...->i...", x[start : start + m * size].reshape(m, size, *x.shape[1:])) / size)
 
 
 def _size(recording: Recording, rate_hz: float) -> int:

@@ -34,5 +34,5 @@ def noise_variance(recording: Recording) -> Vector:
 
 def louder(recording: Recording, flat: Flat) -> Vector:
     """(n,) the noise around each sample, as a factor of Sigma_a; 1 where it is as at rest."""
-    ratio = (noise_variance(recording) / flat.Sigma_a).mean(1)
+    ratio = noise_variance(recording) @ (1.0 / (3.0 * flat.Sigma_a))
     return np.asarray(np.where(ratio > LOUDER, ratio, 1.0))

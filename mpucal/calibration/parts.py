@@ -46,8 +46,9 @@ class Parts:
 
     def grouped(self, groups: NDArray[np.intp]) -> tuple[Vector, Vector]:
         """Gradients (m, p) and Fisher matrices (m, p, p) of groups of parts, by (k,) which group each part is in."""
-        member = groups == np.unique(groups)[:, None]
-        return member @ self.gradient, np.tensordot(member, self.fisher, 1)
+        member = (groups == np.unique(groups)[:, None]).astype(np.float64)
+        fisher = member @ self.fisher.reshape(len(self), -1)
+        return member @ self.gradient, fisher.reshape(-1, *self.fisher.shape[1:])
 
     def by_time(self, groups: int) -> NDArray[np.intp]:
         """(k,) the group of each part, in so many stretches of time."""

@@ -12,6 +12,7 @@ from .checks import found
 from .claim import Claim
 from .evidence import Evidence
 from .jackknife import OF_SIDE, OF_TIME
+from .rotation import lengths
 from .uncertainty import Uncertainty
 
 
@@ -52,5 +53,5 @@ def verdict(reasons: list[Reason]) -> Verdict:
 def _magnitude(acc: Vector | None) -> Magnitude:
     if acc is None:
         return {"median": np.nan, "mean": np.nan, "std": np.nan}
-    a = np.linalg.norm(acc, axis=1)
+    a = lengths(acc)
     return {"median": float(np.median(a)), "mean": float(a.mean()), "std": float(a.std())}

@@ -8,6 +8,7 @@ from ...data import Vector
 from ...reasons import Reason, reason
 from ..evidence import Evidence
 from ..flat_segment import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
+from ..rotation import lengths
 
 FEWEST_SAMPLES = 50
 LEAST_TURN_RAD = np.deg2rad(20.0)
@@ -36,7 +37,7 @@ def time_unit(e: Evidence) -> Reason | None:
 
 def accelerometer_unit(e: Evidence) -> Reason | None:
     """Accelerations in g or counts."""
-    acc = float(np.median(np.linalg.norm(e.recording.acc, axis=1)))
+    acc = float(np.median(lengths(e.recording.acc)))
     if 0.2 * e.gravity < acc < 5.0 * e.gravity:
         return None
     guess = "g" if acc < 5.0 else "mg" if 300.0 < acc < 1700.0 else "raw counts"

@@ -1,0 +1,40 @@
+"""Passes over runs of samples, compared with NumPy and SciPy on the same data."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mpucal.kernel import _kernel
+
+
+@pytest.fixture
+def x():
+    return np.random.default_rng(4).standard_normal((200, 3))
+
+
+def test_a_turn_is_its_steps_and_carries_what_enters_before_each(x):
+    phi, entering = 0.3 * x[:100], x[100:]
+    turn, sums = np.eye(3), np.zeros((3, 3, 3))
+    for step, vector in zip(Rotation.from_rotvec(phi).as_matrix(), entering, strict=True):
+        sums = np.einsum("ai,ijk->ajk", step, sums + np.einsum("ij,k->ijk", np.eye(3), vector))
+        turn = step @ turn
+    given, arrived = _kernel.turn(phi, entering)
+    np.testing.assert_allclose(given, turn, atol=1e-13)
+    np.testing.assert_allclose(arrived, sums, atol=1e-12)
+    np.testing.assert_array_equal(_kernel.turn(phi[:0])[0], np.eye(3))
+
+
+def test_means_and_variances_of_runs(x):
+    runs = np.array([[0, 1], [5, 80], [70, 200]])
+    mean, variance = _kernel.statistics(10.0 + x, runs)
+    np.testing.assert_allclose(mean, [10.0 + x[a:b].mean(0) for a, b in runs], rtol=1e-13)
+    np.testing.assert_allclose(variance, [x[a:b].var(0) for a, b in runs], atol=1e-13)
+    for outside in ([[0, 201]], [[-1, 5]], [[5, 5]]):
+        with pytest.raises(ValueError, match="a run is empty"):
+            _kernel.statistics(x, np.array(outside))
+
+
+@pytest.mark.parametrize("half", [0, 3, 500])
+def test_moving_means_are_of_what_there_is(x, half):
+    wanted = [x[max(i - half, 0) : i + half + 1].mean(0) for i in range(len(x))]
+    np.testing.assert_allclose(_kernel.moving_mean(x, half), wanted, atol=1e-13)
