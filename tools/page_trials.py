@@ -27,7 +27,9 @@ from mpucal.page.feed import Feed
 from mpucal.session.events import Meter, Prompt, PromptKind
 
 FLAT, SIDE = (1.0, 0.0, 0.0, 0.0), (0.5**0.5, 0.0, 0.5**0.5, 0.0)
-TURNING = Meter(0.0, 0.5, False, "", (0.0, 0.0, -1.0), 9.0, 200.0, None, FLAT, 90.0, "roll left 90 deg", SIDE)
+TURNING = Meter(
+    0.0, 0.5, False, "", (0.0, 0.0, -1.0), 9.0, 200.0, None, FLAT, 90.0, "90 deg more, roll it to the left", SIDE
+)
 # each frame notes when the page came to show another number
 WATCH = """() => {
   window.painted = [];

@@ -8,18 +8,16 @@ from typing import Any, TypeVar
 import click
 
 from ..page.address import HERE, address
+from ..terminal.flat import BOARD, BOARDS
 from .options import Parsed
 
 F = TypeVar("F", bound=Callable[..., Any])
-# which picture of the board the page draws
-BOARD, VEHICLE = "gy-521", "vehicle"
-BOARDS = (BOARD, "plain", VEHICLE)
 
 
 def page_options(command: F) -> F:
     """--page and --board."""
     for option in (
-        click.option("--board", type=click.Choice(BOARDS), help=f"The board that the page draws; default: {BOARD}."),
+        click.option("--board", type=click.Choice(BOARDS), help=f"The board that is drawn; default: {BOARD}."),
         click.option(
             "--page",
             metavar="lan|HOST:PORT",

@@ -29,10 +29,11 @@ from ..sources.opening import check_resumed, open_source
 from ..sources.resumed import open_resumed
 from ..sources.table import kinds_meant, source_title
 from ..terminal.console import Console, console
+from ..terminal.flat import BOARD, VEHICLE
 from ..terminal.hangup import outliving
 from .destination import device, session_sink_options
 from .options import aim_options, check_gyroscope, check_source, fit_options, given, source_options
-from .page import BOARD, VEHICLE, page_options
+from .page import page_options
 from .person import ask, ask_in_doubt
 from .running import running
 from .summary import summary, written
@@ -87,9 +88,10 @@ def command(
     source, kinds, options = _opened(resume, options, sinks, no_write, attended)
     check_gyroscope(source.plan.config)
     title = source_title(options)
-    terminal = console(quiet=yes, as_json=json_events, beep=beep, title=title)
     into = SessionFolder(resume or folder, source.capture_name, again=resume is not None)
-    about = {"title": title, "board": board or (VEHICLE if into.capture.name == CAPTURE_OF_VEHICLE.name else BOARD)}
+    board = board or (VEHICLE if into.capture.name == CAPTURE_OF_VEHICLE.name else BOARD)
+    terminal = console(quiet=yes, as_json=json_events, beep=beep, title=title, board=board)
+    about = {"title": title, "board": board}
     paced = not source.real_time and UNPACED not in str(options.get("bus"))
     seen = attended and sys.stderr.isatty() and not json_events
     hung_up = partial(terminal.hung_up, stop=page is None and not keep_going)

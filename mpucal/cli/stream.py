@@ -23,9 +23,10 @@ from ..result.correction import Correction, correction
 from ..session.ports import Source
 from ..sources.opening import open_source
 from ..sources.table import source_title
+from ..terminal.flat import BOARD, VEHICLE
 from .loading import loaded
 from .options import check_gyroscope, check_source, source_options
-from .page import BOARD, VEHICLE, page_options
+from .page import page_options
 
 EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.json --seconds 10`"
 

@@ -16,6 +16,7 @@ from typing import Any
 
 from ..errors import OutputError
 from ..session.events import Key, Output
+from ..terminal.flat import BOARD
 from ..terminal.view import View
 from .address import Address
 from .state import changes, state
@@ -69,7 +70,7 @@ class Feed:
             )
         self.url = f"http://{where.name}:{rest}/{token}/"
         self.visited = False
-        self._view = View()
+        self._view = View(board=str(about.get("board", BOARD)))
         self._fixed: dict[str, Any] = {**about, "keys": keys}
         self._offered: deque[dict[str, str]] = deque()
         self._pressed: deque[Key] = deque()

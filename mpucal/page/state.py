@@ -13,7 +13,7 @@ from ..terminal.words import groups
 
 CONNECTING = "Connecting"
 HOLD = "Hold still"
-TOLD = {Use.TAKEN: "Taken", Use.USEFUL: "New, taken", Use.SEEN: "Seen before"}
+TOLD = {Use.TAKEN: "Taken", Use.USEFUL: "Not that one, but useful", Use.SEEN: "Seen already"}
 # so many lines of talk are kept
 NOTES = 30
 
@@ -24,6 +24,7 @@ def state(view: View) -> dict[str, Any]:
         "moment": view.moment,
         "headline": headline(view),
         "prompt": view.prompt,
+        "confirming": view.confirming,
         "meter": view.meter,
         "countdown": view.waiting,
         "progress": view.progress,
@@ -57,12 +58,14 @@ def known(knowledge: Knowledge) -> tuple[dict[str, Any], ...]:
 def headline(view: View) -> str:
     """What to do this moment, without the numbers, which the page draws."""
     match view.moment:
+        case Moment.COUNTING if view.countdown is not None and view.countdown.elsewhere:
+            return f"New: {HOLD.lower()}"
         case Moment.COUNTING | Moment.NEAR:
             return HOLD
         case Moment.TOLD if view.held is not None:
             return TOLD[view.held.use]
         case Moment.TURN if view.meter is not None:
-            way = view.meter.turn.rsplit(" ", 2)[0]
+            way = view.meter.turn.rpartition(", ")[2]
             return way[:1].upper() + way[1:]
         case Moment.STEP if view.prompt is not None:
             return HEADLINES[view.prompt.kind].capitalize()

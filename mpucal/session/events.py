@@ -219,9 +219,9 @@ class Meter:
     rate_hz : samples a second as they come. temperature_c : of the chip; None where it says none.
     attitude : unit quaternion (w, x, y, z) that takes the board's axes to the room's: x right, y away, z up, as the
         board lay flat before whoever holds it.
-    missing_deg : what is missing to the wanted orientation [deg]. turn : the shortest turn there in words, such as
-        "roll left 60 deg"; empty where nothing is missing. wanted : the attitude that it leads to. None, empty and None
-        where no orientation is wanted.
+    missing_deg : what is missing to the wanted orientation [deg]. turn : the way there in words, such as "60 deg more,
+        roll it to the left"; empty where nothing is missing. wanted : the attitude that it leads to. None, empty and
+        None where no orientation is wanted.
     """
 
     t_s: float

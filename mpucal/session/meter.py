@@ -7,9 +7,10 @@ import math
 import numpy as np
 
 from ..data import Samples, Sensor, Vector
-from .attitude import Attitude
+from .attitude import Attitude, quaternion
 from .events import Caution, Direction, Meter, Output
 from .stillness import IN_THE_HAND, Moved, StillnessDetector, StillnessLimits
+from .way import Way
 from .windows import Window, Windows
 
 WINDOW_S = 0.25
@@ -30,7 +31,7 @@ class MotionWatch:
         self._sensor = sensor
         self._windows = Windows(WINDOW_S)
         self._stillness = StillnessDetector(limits)
-        self._attitude = Attitude()
+        self._attitude, self._way = Attitude(), Way()
         self._still = False
         self._said_s: dict[str, float] = {}
         self._temperature_c: float | None = None
@@ -53,7 +54,7 @@ class MotionWatch:
         sight = self._stillness.add(window)
         moving = isinstance(sight, Moved)
         self._still = not moving
-        turn = None if wanted is None else self._attitude.turn_to(wanted)
+        turn = None if wanted is None else self._way.turn_to(wanted, self._attitude.matrix)
         # against the mean of the last stillness: a gyroscope at rest reads its bias
         turning = float(np.linalg.norm(window.gyr - self._stillness.rest_rad_s))
         return Meter(
@@ -68,7 +69,7 @@ class MotionWatch:
             self._attitude.quaternion(),
             turn.missing_deg if turn else None,
             turn.words if turn else "",
-            turn.attitude if turn else None,
+            quaternion(turn.attitude) if turn else None,
         )
 
     def _cautions(self, samples: Samples, t_s: float) -> list[Caution]:

@@ -19,7 +19,7 @@ HOLD_S = 1.25
 WANTED_RAD = math.radians(15.0)
 SAID = {
     Use.TAKEN: "taken",
-    Use.USEFUL: "not that one, but new and useful",
+    Use.USEFUL: "not that one, but useful",
     Use.SEEN: "seen already",
 }
 

@@ -96,12 +96,12 @@ class Rotate:
         found: list[Output | Turned] = [knowledge]
         if self._until_end:
             return found
+        if advice and self._held is not None:
+            found.append(held(*self._held))
         if self._content():
             # tilts leave some parameters at their prior: the target does not apply to them
             what = "enough tilts seen" if self._tilt_only else "target reached"
             return [*found, Turned(f"{what}: {knowledge.words}")]
-        if advice and self._held is not None:
-            found.append(held(*self._held))
         if advice and knowledge.down is not None:
             self._said_s = knowledge.t_s
             # near level every tilt teaches: all of them are asked for. And nobody is asked twice for the same one, even

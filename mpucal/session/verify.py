@@ -149,7 +149,7 @@ class Verify:
         """Of what use it is: what the calibration has seen is of none, even where it was asked for."""
         if self._coverage.was_near(pause.acc, BENT * unseen_rad(self._tilt_only)):
             return Use.SEEN
-        return use_of(pause.acc, self.prompt.down, new=True, near_rad=ASKED_FOR_RAD)
+        return use_of(pause.acc, self.prompt.down, new=True)
 
     def _seen_already(self, t_s: float, asked_for: bool) -> list[Output | Finished]:
         """Who was where the board was asked to be is asked for another orientation."""

@@ -55,6 +55,8 @@ def knowledge_rows(view: View, columns: int, glyphs: Glyphs) -> list[Text]:
     kind = view.prompt.kind if view.prompt is not None else None
     if kind is PromptKind.VERIFY and view.verified:
         rows = [_said(v.text, "green" if v.agrees else "bold yellow") for v in view.verified[-KNOWLEDGE_ROWS:]]
+    elif view.confirming and columns < NARROW:
+        rows = [_said(line, "") for line in textwrap.wrap(view.confirming, max(columns - 2, NARROWEST))]
     elif kind is PromptKind.REST or view.knowledge is None:
         rows = [*_progress(view, glyphs), *(_said(note, "") for note in view.notes[-2:])]
     else:

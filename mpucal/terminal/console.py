@@ -9,6 +9,7 @@ from contextlib import AbstractContextManager
 from typing import Protocol
 
 from ..session.events import Key, Output
+from .flat import BOARD
 from .keys import Keys
 from .lines import JsonLines, Lines
 
@@ -37,13 +38,16 @@ class Console(Protocol):
         ...
 
 
-def console(quiet: bool, as_json: bool = False, beep: bool | None = None, title: str = "") -> Console:
+def console(
+    quiet: bool, as_json: bool = False, beep: bool | None = None, title: str = "", board: str = BOARD
+) -> Console:
     """The console on stderr and stdin.
 
     Parameters
     ----------
     quiet : nobody is asked anything. as_json : one JSON object a line in place of words.
     beep : ring at each change of prompt; None: where there is a screen. title : what is measured.
+    board : how it is drawn.
     """
     term = os.environ.get("TERM", "dumb")
     drawn = sys.stderr.isatty() and term not in ("", "dumb") and not as_json
@@ -55,4 +59,4 @@ def console(quiet: bool, as_json: bool = False, beep: bool | None = None, title:
     from .glyphs import glyphs_of  # noqa: PLC0415 - draws with rich, which takes a while to load
     from .screen import Screen  # noqa: PLC0415
 
-    return Screen(sys.stderr, keys, glyphs_of(sys.stderr, term), bell=beep is not False, title=title)
+    return Screen(sys.stderr, keys, glyphs_of(sys.stderr, term), bell=beep is not False, title=title, board=board)

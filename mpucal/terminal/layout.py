@@ -23,7 +23,10 @@ def lines(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
     """Exactly `rows` lines of at most `columns` characters."""
     roomy = columns >= LEAST_COLUMNS and rows >= LEAST_ROWS
     air = [_BLANK] if rows >= AIRY_ROWS else []
-    above = [_status(view, columns), *air, *_headline(view, columns, rows, glyphs), *_prompt(view, columns)]
+    headline = _headline(view, columns, rows, glyphs)
+    # two lines of letters leave one row less
+    prompt = _prompt(view, columns, _PROMPT_ROWS - (len(headline) == letters.TWO_ROWS))
+    above = [_status(view, columns), *air, *headline, *prompt]
     below = [
         meter(view, columns, glyphs),
         *knowledge_rows(view, columns, glyphs),
@@ -60,6 +63,9 @@ def _headline(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]
     for scale in (2, 1) if large else (1,):
         if letters.width(text, scale) + 2 <= columns and rows >= LEAST_ROWS:
             return [Text(f" {row}", style=style) for row in letters.large(text, glyphs.block, scale)]
+    pair = textwrap.wrap(text, max(letters.fit(columns - 2), 1), break_long_words=False)
+    if len(pair) == 2 and glyphs.unicode and rows >= LEAST_ROWS and letters.width(max(pair, key=len)) + 2 <= columns:
+        return [Text(f" {row}", style=style) for row in letters.two_lines(*pair)]
     return [Text(f" {text}", style=f"{style} reverse")]
 
 
@@ -69,10 +75,10 @@ def _headline_style(view: View) -> str:
     return "bold cyan" if view.waiting is None else "bold green"
 
 
-def _prompt(view: View, columns: int) -> list[Text]:
+def _prompt(view: View, columns: int, rows: int) -> list[Text]:
     said = view.prompt.text if view.prompt is not None else "Looking for the sensor."
-    wrapped = textwrap.wrap(said, max(columns - 2, NARROWEST), max_lines=_PROMPT_ROWS, placeholder=" ...")
-    return [Text(f" {line}", style="bold") for line in [*wrapped, *[""] * (_PROMPT_ROWS - len(wrapped))]]
+    wrapped = textwrap.wrap(said, max(columns - 2, NARROWEST), max_lines=rows, placeholder=" ...")
+    return [Text(f" {line}", style="bold") for line in [*wrapped, *[""] * (rows - len(wrapped))]]
 
 
 def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
@@ -86,6 +92,10 @@ def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]
     if view.meter is not None and view.meter.wanted is not None:
         canvas = board.picture(view.meter.wanted, wide, height)
         parts.append(("turn it like this", canvas.lines("yellow", glyphs.unicode), wide))
+    if view.confirming and height > 2:
+        beside = columns - wide - 3
+        asked = ["", *textwrap.wrap(view.confirming, beside), *[""] * height][:height]
+        parts.append(("", [Text(line, style="bold") for line in asked], beside))
     marks = _marks(view)
     if marks:
         for upper, name in ((False, "+Z up"), (True, "-Z up")):

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 ROWS = 5
 WIDTH, GAP = 5, 1
+# two lines of letters of half the height, and a gap between them
+TWO_ROWS = 6
+_HALVES = {"  ": " ", "# ": "▀", " #": "▄", "##": "█"}
 _UNKNOWN = " ### /#   #/  ## /     /  #  "
 _LETTERS = {
     " ": "     /     /     /     /     ",
@@ -43,6 +46,8 @@ _LETTERS = {
     "7": "#####/   # /  #  / #   /#    ",
     "8": " ### /#   #/ ### /#   #/ ### ",
     "9": " ### /#   #/ ####/    #/ ### ",
+    ",": "     /     /     /  #  / #   ",
+    ":": "     /  #  /     /  #  /     ",
     "+": "     /  #  /#####/  #  /     ",
     "-": "     /     /#####/     /     ",
 }
@@ -62,3 +67,19 @@ def large(text: str, block: str, scale: int = 1) -> list[str]:
         wide = "".join((block if dot == "#" else " ") * scale for dot in row)
         rows += [wide] * scale
     return rows
+
+
+def fit(columns: int) -> int:
+    """How many letters are no wider than `columns`."""
+    return (columns + GAP) // (WIDTH + GAP)
+
+
+def two_lines(first: str, second: str) -> list[str]:
+    """TWO_ROWS rows of half blocks that show two lines of text."""
+    upper, lower = (large(text, "#") for text in (first, second))
+    most = max(len(upper[0]), len(lower[0]))
+    dots = [row.ljust(most) for row in (*upper, "", *lower, "")]
+    return [
+        "".join(_HALVES[above + below] for above, below in zip(*pair, strict=True))
+        for pair in zip(dots[::2], dots[1::2], strict=True)
+    ]

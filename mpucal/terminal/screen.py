@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import TextIO
 
 from ..session.events import Decision, Key, Output, Prompt, Verification
+from .flat import BOARD
 from .glyphs import Glyphs
 from .keys import Keys
 from .layout import lines
@@ -32,12 +33,14 @@ class Screen:
     Parameters
     ----------
     out : a terminal. keys : what is pressed. glyphs : what `out` can show. bell : rings at each change of prompt.
-    title : what is measured.
+    title : what is measured. board : how it is drawn.
     """
 
-    def __init__(self, out: TextIO, keys: Keys, glyphs: Glyphs, bell: bool = True, title: str = "") -> None:
+    def __init__(
+        self, out: TextIO, keys: Keys, glyphs: Glyphs, bell: bool = True, title: str = "", board: str = BOARD
+    ) -> None:
         self._out, self._keys, self._glyphs, self._bell = out, keys, glyphs, bell
-        self._view = View(f"mpucal: {title}" if title else "mpucal")
+        self._view = View(f"mpucal: {title}" if title else "mpucal", board)
         self._ring = False
         self._changed = threading.Event()
         self._closed = threading.Event()

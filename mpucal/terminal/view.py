@@ -22,10 +22,11 @@ from ..session.events import (
     Use,
     Verification,
 )
+from .flat import BOARD, as_seen
 
 # so long it is said what became of the last orientation
 TOLD_S = 1.2
-TOLD = {Use.TAKEN: "TAKEN", Use.USEFUL: "NEW, TAKEN", Use.SEEN: "SEEN BEFORE"}
+TOLD = {Use.TAKEN: "TAKEN", Use.USEFUL: "NOT THAT ONE, BUT USEFUL", Use.SEEN: "SEEN ALREADY"}
 # nearer than this the board is held still, and turned no more
 NEAR_DEG = 15.0
 # a countdown that is not renewed for so long waits for nothing any more
@@ -60,11 +61,12 @@ class View:
 
     Attributes
     ----------
-    seen : the orientations that count, in the order in which they came. verified : since the last prompt to turn.
-    notes : decisions and other lines of talk, in order.
+    board : how it is drawn. seen : the orientations that count, in the order in which they came. verified : since the
+        last prompt to turn. notes : decisions and other lines of talk, in order.
     """
 
     title: str = "mpucal"
+    board: str = BOARD
     prompt: Prompt | None = None
     meter: Meter | None = None
     countdown: Countdown | None = None
@@ -133,6 +135,13 @@ class View:
         return self.knowledge.down
 
     @property
+    def confirming(self) -> str:
+        """What the person is to confirm as they lay the board flat, else nothing."""
+        if self.prompt is None or self.prompt.kind is not PromptKind.LAY_FLAT or self.meter is None:
+            return ""
+        return as_seen(self.meter.down, self.board)
+
+    @property
     def moment(self) -> Moment:
         """What matters now."""
         return self._now[0]
@@ -149,7 +158,8 @@ class View:
             return Moment.CONNECTING, CONNECTING
         waiting = self.waiting
         if waiting is not None and self.prompt.kind is not PromptKind.REST and self._counts(waiting):
-            word = "STILL" if self.prompt.kind is PromptKind.LAY_FLAT else "HOLD"
+            word = "NEW: HOLD" if waiting.elsewhere else "HOLD"
+            word = "STILL" if self.prompt.kind is PromptKind.LAY_FLAT else word
             return Moment.COUNTING, f"{word} {math.ceil(waiting.remaining_s)}"
         if self.held is not None and self.now_s is not None and self.now_s - self.held.t_s < TOLD_S:
             return Moment.TOLD, TOLD[self.held.use]
@@ -177,8 +187,10 @@ class View:
 
 def _way(turn: str) -> str:
     """What is missing to the wanted orientation, in large letters: "ROLL LEFT 60"."""
-    short = turn.removesuffix(" deg").replace("tip away and roll", "away").replace("tip toward you and roll", "near")
-    return short.upper()
+    degrees, _, way = turn.partition(" deg more, ")
+    for words, short in ((" it", ""), (" from you", ""), ("to the ", ""), ("toward", "to")):
+        way = way.replace(words, short)
+    return f"{way} {degrees}".upper()
 
 
 def axes(down: Direction) -> str:

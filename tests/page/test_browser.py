@@ -1,7 +1,6 @@
 """The page in a real browser, beside a session on the simulated chip."""
 
 import json
-import re
 import subprocess
 import sys
 import threading
@@ -30,11 +29,11 @@ def meter(t_s, missing_deg, turn, wanted=ON_ITS_SIDE):
 
 PHASES = {
     "lay flat": ([Prompt(PromptKind.LAY_FLAT, "Lay it flat.")], "Lay flat", "", "wait"),
-    "turn": ([TURN, meter(1.0, 91.0, "roll left 90 deg")], "Roll left", "90°", "turn"),
-    "near": ([meter(2.0, 9.0, "roll left 10 deg")], "Hold still", "9°", "hold"),
+    "turn": ([TURN, meter(1.0, 91.0, "90 deg more, roll it to the left")], "Roll it to the left", "90°", "turn"),
+    "near": ([meter(2.0, 9.0, "10 deg more, roll it to the left")], "Hold still", "9°", "hold"),
     "hold": ([meter(3.0, 4.0, ""), Countdown(3.0, 1.2, 2.0, False)], "Hold still", "2", "hold"),
     "taken": ([Held(4.2, Use.TAKEN, (1.0, 0.0, 0.0), "taken"), meter(4.25, 4.0, "")], "Taken", "", "yes"),
-    "seen": ([Held(6.0, Use.SEEN, (1.0, 0.0, 0.0), "seen already"), meter(6.1, 4.0, "")], "Seen before", "", "again"),
+    "seen": ([Held(6.0, Use.SEEN, (1.0, 0.0, 0.0), "seen already"), meter(6.1, 4.0, "")], "Seen already", "", "again"),
 }
 
 
@@ -110,7 +109,7 @@ def test_two_browsers_follow_a_session_to_its_results(chromium, tab, session):
     assert process.wait() == 0
     shown = tab.evaluate("shown")
     prompts = {event["text"] for event in events if event["event"] == "prompt"}
-    turns = {re.sub(r" \d+ deg$", "", event["turn"]).capitalize() for event in events if event["event"] == "meter"}
+    turns = {event["turn"].rpartition(", ")[2].capitalize() for event in events if event["event"] == "meter"}
     assert {one["prompt"] for one in shown} - {""} <= prompts
     assert {one["headline"] for one in shown} & turns
     # the results outlive the session

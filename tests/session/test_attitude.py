@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.data import Sensor
 from mpucal.session.aims import ALL_AROUND
-from mpucal.session.attitude import Attitude, quaternion, straight, turn_in_words
+from mpucal.session.attitude import quaternion, straight
 from mpucal.session.events import Ask, Connected, Knowledge, Learnt, Measured, Meter, Prompt, Target, Wish
 from mpucal.session.machine import Machine
 from mpucal.session.meter import MotionWatch
@@ -34,36 +34,6 @@ def test_a_quaternion_is_that_of_its_matrix(seed):
 
 def test_a_half_turn_has_a_quaternion():
     assert np.allclose(np.abs(quaternion(np.diag([1.0, -1.0, -1.0]))), [0, 1, 0, 0])
-
-
-@pytest.mark.parametrize(
-    ("axis", "words"),
-    [
-        ((0, 1, 0), "roll right 60 deg"),
-        ((0, -1, 0), "roll left 60 deg"),
-        ((-1, 0, 0), "tip away 60 deg"),
-        ((1, 0, 0), "tip toward you 60 deg"),
-        ((1, -1, 0), "tip toward you and roll left 60 deg"),
-    ],
-)
-def test_a_turn_in_words_says_where_the_top_goes(axis, words):
-    phi = np.array(axis) / np.linalg.norm(axis) * math.radians(61.0)
-    assert turn_in_words(phi) == words
-
-
-def test_next_to_nothing_is_no_turn():
-    assert turn_in_words(np.array([0.01, 0.0, 0.0])) == ""
-
-
-@pytest.mark.parametrize("down", ALL_AROUND.tolist())
-def test_the_missing_turn_leads_to_the_wanted_orientation(down):
-    attitude = Attitude()
-    attitude.matrix = Rotation.random(random_state=3).as_matrix()
-    turn = attitude.turn_to(down)
-    assert np.allclose(matrix(turn.attitude).apply(down), [0, 0, -1], atol=1e-9)
-    between = matrix(turn.attitude) * Rotation.from_matrix(attitude.matrix).inv()
-    assert np.degrees(between.magnitude()) == pytest.approx(turn.missing_deg)
-    assert between.as_rotvec()[2] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_gyroscope_carries_the_heading(board):

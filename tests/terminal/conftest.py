@@ -29,7 +29,9 @@ CORNER = (0.58, -0.57, 0.58)
 
 def meter(t_s, still=True, down=(0.0, 0.0, -1.0), what="", wanted=None):
     attitude, there = (quaternion(straight(-np.array(d) / np.linalg.norm(d))) for d in (down, wanted or down))
-    missing = {} if wanted is None else {"missing_deg": 61.0, "turn": "roll left 60 deg", "wanted": there}
+    missing = (
+        {} if wanted is None else {"missing_deg": 61.0, "turn": "60 deg more, roll it to the left", "wanted": there}
+    )
     return Meter(t_s, 0.4 if still else 1.6, still, what, down, 2.0, 199.97, 31.25, attitude, **missing)
 
 

@@ -1,8 +1,10 @@
 import re
+from dataclasses import replace
 
 import pytest
 
 from mpucal.session.events import Caution
+from mpucal.session.way import WAYS
 from mpucal.terminal.glyphs import ASCII, UNICODE
 from mpucal.terminal.layout import lines
 
@@ -56,6 +58,21 @@ def test_the_prompt_is_large_and_larger_on_a_large_screen(views):
     small, large = (text_of(views["laid"], *size) for size in ((80, 24), (160, 50)))
     assert sum("███" in line for line in small[1:6]) >= 3
     assert sum("██████" in line for line in large[2:12]) >= 6
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_each_way_is_said_in_large_letters(views, way):
+    view = views["turned"]
+    drawn = text_of(replace(view, meter=replace(view.meter, turn=f"135 deg more, {way}")))
+    assert re.search("[█▀▄]{3}", drawn[1])
+    assert "Turn the board: corner" in "\n".join(drawn[6:8])
+
+
+@pytest.mark.parametrize("size", [(40, 15), (80, 24), (160, 50)], ids=str)
+def test_as_it_is_laid_flat_the_person_is_asked_what_they_see(views, size):
+    drawn = " ".join("".join(text_of(views["laid"], *size)).split())
+    for word in ("Is it so", "chip", "pins", "says yes"):
+        assert word in drawn
 
 
 def test_on_a_low_screen_the_words_are_left(views):

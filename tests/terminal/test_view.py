@@ -23,15 +23,47 @@ def test_the_headline_says_what_to_do(views):
     [
         (Countdown(26.0, 2.0, 2.0, False), "ROLL LEFT 60"),
         (Countdown(26.0, 1.3, 2.0, False), "HOLD 2"),
+        (Countdown(26.0, 1.3, 2.0, False, elsewhere=True), "NEW: HOLD 2"),
         (Countdown(26.0, 1.3, 2.0, True), "ROLL LEFT 60"),
         (Countdown(26.0, 0.0, 2.0, False), "ROLL LEFT 60"),
         (Countdown(20.0, 1.3, 2.0, False), "ROLL LEFT 60"),
     ],
-    ids=["not begun", "runs", "paused", "over", "forgotten"],
+    ids=["not begun", "runs", "runs elsewhere", "paused", "over", "forgotten"],
 )
 def test_a_countdown_that_runs_is_the_headline(views, countdown, headline):
     view = replace(views["turned"], now_s=26.0, countdown=countdown)
     assert view.headline == headline
+
+
+@pytest.mark.parametrize(
+    ("words", "headline"),
+    [
+        ("roll it to the right", "ROLL RIGHT 125"),
+        ("tip it toward you", "TIP TO YOU 125"),
+        ("tip it away from you and to the left", "TIP AWAY AND LEFT 125"),
+        ("tip it toward you and to the right", "TIP TO YOU AND RIGHT 125"),
+    ],
+)
+def test_the_way_is_short_in_large_letters(views, words, headline):
+    view = views["turned"]
+    meter = replace(view.meter, turn=f"125 deg more, {words}")
+    assert replace(view, meter=meter).headline == headline
+
+
+@pytest.mark.parametrize(
+    ("board", "down", "words"),
+    [
+        ("gy-521", (0.0, 0.1, -0.99), "the chip faces up, the pins are toward you?"),
+        ("gy-521", (0.0, 0.0, 1.0), "the chip faces down, the pins are away from you?"),
+        ("plain", (0.0, 0.0, -1.0), "+Y points away from you?"),
+        ("vehicle", (0.0, 0.0, 1.0), "it stands on its feet"),
+        ("gy-521", (0.0, 0.7, -0.7), "it is tilted"),
+    ],
+)
+def test_a_person_confirms_what_they_see_by_leaving_it(views, board, down, words):
+    view = replace(views["laid"], board=board)
+    assert words in replace(view, meter=replace(view.meter, down=down)).confirming
+    assert views["turned"].confirming == ""
 
 
 def test_what_would_help_most_is_wanted_where_the_prompt_names_nothing(views):
@@ -77,7 +109,7 @@ def test_axes_that_carry_much_of_gravity_are_named(down, words):
 
 
 @pytest.mark.parametrize(
-    ("use", "headline"), [(Use.TAKEN, "TAKEN"), (Use.USEFUL, "NEW, TAKEN"), (Use.SEEN, "SEEN BEFORE")]
+    ("use", "headline"), [(Use.TAKEN, "TAKEN"), (Use.USEFUL, "NOT THAT ONE, BUT USEFUL"), (Use.SEEN, "SEEN ALREADY")]
 )
 def test_what_became_of_an_orientation_is_said_for_a_moment(views, use, headline):
     held = Held(26.0, use, (1.0, 0.0, 0.0), "")

@@ -98,7 +98,7 @@ function task() {
   document.body.dataset.look = look;
   put("headline", VERDICTS[done] ?? (done ? "Stopped" : state.headline ?? "Connecting"));
   put("prompt", done ? state.stopped ?? "" : promptWords());
-  put("step", done || !state.progress ? "" : state.progress.text);
+  put("step", done ? "" : state.confirming || (state.progress?.text ?? ""));
   put("number", number ?? "");
   $("arc").setAttribute("stroke-dasharray", `${Math.max(0, Math.min(100, 100 * share))} 100`);
   if (look === "turn") $("way").setAttribute("transform", `rotate(${wayDegrees()})`);
@@ -304,19 +304,19 @@ function announce(words, tone = null) {
   sound.say(words);
 }
 
-const turnWords = () => (state.meter?.turn ? state.meter.turn.replace(/ deg$/, " degrees") : "");
+const turnWords = () => (state.meter?.turn ? state.meter.turn.replace(" deg ", " degrees ") : "");
 
 function tellChanges(old, begins) {
   if (state.verdict !== old.verdict && state.verdict) return announce(VERDICTS[state.verdict], state.verdict === "refused" ? "wrong" : "done");
   if (state.stopped !== old.stopped && state.stopped) return announce(state.stopped, "wrong");
   if (state.verdict || state.stopped || state.live) return;
   if (state.held && state.held.t_s !== old.held?.t_s && !begins) {
-    return announce(state.held.use === "seen" ? "Seen before" : state.held.text, state.held.use === "seen" ? "wrong" : "taken");
+    return announce(state.held.text, state.held.use === "seen" ? "wrong" : "taken");
   }
   if (state.caution && state.caution.t_s !== old.caution?.t_s && !begins) {
     return announce(`${state.caution.what}. ${state.caution.do}`, "wrong");
   }
-  if (state.moment === "counting" && old.moment !== "counting") return announce("Hold", "hold");
+  if (state.moment === "counting" && old.moment !== "counting") return announce(state.confirming || state.headline, "hold");
   if (old.moment === "counting" && (state.moment === "turn" || state.moment === "near")) return announce(turnWords(), "wrong");
   const prompted = state.prompt?.text !== old.prompt?.text;
   if (state.moment === "turn" && (prompted || old.moment !== "turn" || performance.now() - saidAt > REPEAT_MS)) return announce(turnWords());

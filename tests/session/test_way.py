@@ -1,0 +1,48 @@
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mpucal.session.aims import ALL_AROUND
+from mpucal.session.way import Way
+
+
+@pytest.mark.parametrize(
+    ("axis", "words"),
+    [
+        ((0, 1, 0), "roll it to the right"),
+        ((0, -1, 0), "roll it to the left"),
+        ((-1, 0, 0), "tip it away from you"),
+        ((1, 0, 0), "tip it toward you"),
+        ((1, -1, 0), "tip it toward you and to the left"),
+    ],
+)
+def test_a_turn_in_words_says_where_the_top_goes(axis, words):
+    phi = np.array(axis) / np.linalg.norm(axis) * math.radians(61.0)
+    down = Rotation.from_rotvec(-phi).apply((0, 0, -1))
+    assert Way().turn_to(tuple(down), np.eye(3)).words == f"60 deg more, {words}"
+
+
+def test_next_to_nothing_is_no_turn():
+    assert Way().turn_to((0.01, 0.0, -1.0), np.eye(3)).words == ""
+
+
+@pytest.mark.parametrize("down", ALL_AROUND.tolist())
+def test_the_missing_turn_leads_to_the_wanted_orientation(down):
+    attitude = Rotation.random(random_state=3).as_matrix()
+    turn = Way().turn_to(down, attitude)
+    assert np.allclose(turn.attitude @ down, [0, 0, -1], atol=1e-9)
+    between = np.degrees(Rotation.from_matrix(turn.attitude @ attitude.T).magnitude())
+    # about one of eight axes where that leads near enough, and so hardly more than the shortest turn
+    assert turn.missing_deg - 1e-6 <= between <= turn.missing_deg + 5.0
+
+
+@pytest.mark.parametrize("tremor_deg", [1.0, 4.0])
+def test_the_way_of_a_board_that_is_upside_down_does_not_change_with_each_tremor(tremor_deg):
+    way, rng = Way(), np.random.default_rng(5)
+    shaken = [Rotation.from_rotvec(np.radians(tremor_deg) * rng.normal(size=3) * [1, 1, 0]) for _ in range(40)]
+    turns = [way.turn_to((0.0, 0.0, 1.0), each.as_matrix()) for each in shaken]
+    assert len({turn.words.partition(", ")[2] for turn in turns}) == 1
+    wanted = Rotation.from_matrix([turn.attitude for turn in turns])
+    assert np.degrees((wanted[1:] * wanted[:-1].inv()).magnitude()).max() < 20.0
