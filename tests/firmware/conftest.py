@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from mpucal.simulated.chip import open_simulated
+
 HERE = Path(__file__).parent
 FIRMWARE = HERE.parents[1] / "tools" / "firmware"
 ARDUINO = Path("/usr/share/arduino/hardware/arduino/avr")
@@ -96,3 +98,22 @@ def emulator(tmp_path_factory):
     module = _module(HERE / "emulator" / "board.py")
     library = module.build_library(tmp_path_factory.mktemp("board"))
     return module, library, _module(HERE / "emulator" / "port.py")
+
+
+@pytest.fixture
+def switch_on(emulator, avr_build, tmp_path):
+    """Switches a board on, with an EEPROM that outlives it; gives the board and a port to it."""
+    module, library, port = emulator
+    boards = []
+
+    def power(chip=None, elf=avr_build[0] / "mpucal_bridge.elf", eeprom=tmp_path / "eeprom.bin"):
+        clock = module.BoardClock()
+        on_twi = chip(clock) if chip else open_simulated("sim:seed=1", clock=clock)
+        board = module.Board(library, elf, eeprom, on_twi, clock)
+        boards.append(board)
+        board.run(0.001)
+        return board, port.BoardPort(board)
+
+    yield power
+    for board in boards:
+        board.cut_power()

@@ -15,10 +15,10 @@ import pytest
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.errors import BusError, NoAnswer
+from mpucal.errors import BusError
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
-from mpucal.simulated.chip import Chip, SimulatedBus, open_simulated
+from mpucal.simulated.chip import Chip, SimulatedBus
 from mpucal.simulated.chip.factory import Factory
 from mpucal.simulated.chip.models import MODELS
 from mpucal.sources.bridge.bus import BridgeBus
@@ -50,28 +50,6 @@ class Numbers:
 
 def _numbering(clock):
     return SimulatedBus(Chip(MODELS["mpu6050"], Numbers(), 0.0, Factory()), clock)
-
-
-@pytest.fixture
-def switch_on(emulator, avr_build, tmp_path):
-    """Switches a board on, with an EEPROM that outlives it; gives the board and a port to it."""
-    module, library, port = emulator
-    boards = []
-
-    def power(chip=None, elf=avr_build[0] / "mpucal_bridge.elf", eeprom=tmp_path / "eeprom.bin"):
-        clock = module.BoardClock()
-        board = module.Board(library, elf, eeprom, (chip or _simulated)(clock), clock)
-        boards.append(board)
-        board.run(0.001)
-        return board, port.BoardPort(board)
-
-    yield power
-    for board in boards:
-        board.cut_power()
-
-
-def _simulated(clock):
-    return open_simulated("sim:seed=1", clock=clock)
 
 
 def open_store(port):
@@ -168,23 +146,6 @@ def test_reads_and_writes_registers_in_the_bridges_time(switch_on):
     bus.write(reg.PWR_MGMT_1, b"\x01\x00")
     assert bus.read(reg.PWR_MGMT_1, 2).data == b"\x01\x00"
     assert board.overruns == 0
-
-
-def test_says_that_no_chip_answers(switch_on):
-    board, port = switch_on()
-    board.unplug_chip()
-    with pytest.raises(NoAnswer):
-        BridgeBus(port)
-
-
-def test_a_chip_unplugged_under_way_is_told(switch_on):
-    board, port = switch_on()
-    bus = BridgeBus(port)
-    board.unplug_chip()
-    with pytest.raises(NoAnswer):
-        bus.read(reg.WHO_AM_I, 1)
-    board.unplug_chip(False)
-    assert bus.read(reg.WHO_AM_I, 1).data == b"\x68"
 
 
 def test_half_a_kilohertz_fits_115200_baud(switch_on):

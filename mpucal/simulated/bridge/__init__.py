@@ -153,7 +153,7 @@ class EmulatedBridge:
         return wire.WriteReply(Status.OK, began)
 
     def _stream(self, request: wire.Stream, seq: int) -> Reply:
-        if request.frame_bytes > wire.MAX_READ or (request.frame_bytes and not 1 <= request.batch <= wire.MAX_LOOK):
+        if request.frame_bytes > wire.MAX_READ or (request.frame_bytes and not 1 <= request.batch <= wire.MAX_BATCH):
             return self._said(Status.BAD_PAYLOAD)
         self._stop()
         if request.frame_bytes:

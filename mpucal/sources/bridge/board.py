@@ -16,7 +16,7 @@ OK, NO_HELLO, UNKNOWN_TYPE, BAD_PAYLOAD, BAD_VERSION, NO_ANSWER, BUS_FAILED, OVE
 NO_BLOB, BAD_BLOB, BAD_OFFSET, NO_ROOM, NOT_BEGUN, STORAGE_FAILED = range(8, 14)
 ADDRESSES = (0x68, 0x69)
 INT_STATUS, FIFO_COUNT, FIFO_R_W = 0x3A, 0x72, 0x74
-MAX_READ, MAX_WRITE, MAX_BURST, MAX_LOOK, MAX_ENCODED, MAX_BLOB = 56, 32, 4096, 32, 71, 256
+MAX_READ, MAX_WRITE, MAX_BURST, MAX_BATCH, MAX_LOOK, MAX_ENCODED, MAX_BLOB = 56, 32, 4096, 32, 73, 71, 256
 BEAT_US = 100_000
 # the clock of a board is narrower than the protocol's
 TICKS = 2**30 - 1
@@ -306,7 +306,7 @@ class Bridge:
 
     def stream(self, frame_bytes, batch, seq):
         """Push what the FIFO collects."""
-        if frame_bytes > MAX_READ or (frame_bytes and not 1 <= batch <= MAX_LOOK):
+        if frame_bytes > MAX_READ or (frame_bytes and not 1 <= batch <= MAX_BATCH):
             raise Failed(BAD_PAYLOAD)
         self.frame_bytes, self.batch, self.seq = frame_bytes, batch, seq
         self.index = self.status = 0

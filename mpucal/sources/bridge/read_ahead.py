@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from .messages import MAX_LOOK, Frames, Status
+from .messages import MAX_BATCH, Frames, Status
 
 INDEX_WRAP = 2**16
 
@@ -72,11 +72,11 @@ class ReadAhead:
     def count(self) -> tuple[int, int, int]:
         """FIFO_COUNT, its time and when the host heard of it [ns]: of whole looks, as the count was at that time.
 
-        Never more than chips hold soundly, however long nobody asked; the rest is for the next time.
+        Of several looks never more than chips hold soundly, however long nobody asked; the rest is for the next time.
         """
         while self._looks and not (self._shown and self._looks[0].lost):
             look = self._looks[0]
-            if len(self._shown) + len(look.data) > MAX_LOOK * self._frame_bytes:
+            if self._shown and len(self._shown) + len(look.data) > MAX_BATCH * self._frame_bytes:
                 break
             self._looks.popleft()
             self._shown += look.data

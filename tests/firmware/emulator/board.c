@@ -1,8 +1,8 @@
 /* An emulated Arduino Uno: simavr's ATmega328P with its UART, its EEPROM in a file, and one chip on its TWI.
  *
  * A shared library; board.py drives it and says what the chip answers. What simavr 1.6 leaves out of the hardware and
- * a firmware could come to grief on is added here: a UART that holds two unread bytes and loses the next one, and an
- * EEPROM that is busy for 3.4 ms after a byte, which is lost if the power fails meanwhile.
+ * a firmware could come to grief on is added here: a UART that holds two unread bytes and loses the next one, an EEPROM
+ * that is busy for 3.4 ms after a byte, which is lost if the power fails meanwhile, and a chip that holds the bus.
  */
 #include <fcntl.h>
 #include <stdlib.h>
@@ -25,8 +25,18 @@ enum {
     FIFO_R_W = 0x74,
     UNREAD_BYTES = 2, /* ATmega328P data sheet, 19.7.5: a third one waits in the shift register */
     EEPROM_US = 3400, /* the same, table 8-1 */
-    EEPE = 1
+    EEPE = 1,
+    DDRC = 0x27,
+    SCL = 1 << 5,
+    ADDRESS_ACK = 0x18, /* the same, table 21-3 */
+    ADDRESS_NACK = 0x20,
+    DATA_ACK = 0x28,
+    DATA_NACK = 0x30,
+    CLOCKS_TO_FREE = 9 /* the rest of a byte and its acknowledge (I2C specification, UM10204, 3.1.16) */
 };
+
+/* What is the matter with the chip. */
+enum { SOUND, NO_ADDRESS, NO_DATA, HOLDS_BUS };
 
 /* The chip: a byte read from or written to a register, in the transfer that began at a cycle. */
 typedef uint8_t (*chip_read_t)(uint8_t address, uint64_t cycle);
@@ -42,10 +52,11 @@ struct board {
     avr_uart_t *uart;
     avr_eeprom_t *eeprom;
     avr_irq_t *twi;
+    avr_twi_t *twi_module;
     chip_read_t chip_read;
     chip_write_t chip_write;
     uint64_t transfer_began;
-    uint8_t chip_register, chip_selected, register_is_next, twi_fails;
+    uint8_t chip_register, chip_selected, register_is_next, fault, clocks, direction, addressed;
     struct line to_avr, from_avr;
     uint32_t overruns, eeprom_writes;
     uint16_t written_at;
@@ -96,9 +107,10 @@ static void on_twi(avr_irq_t *irq, uint32_t value, void *param) {
         board->chip_selected = 0;
     }
     if (what & TWI_COND_START) {
-        board->chip_selected = message.u.twi.addr >> 1 == CHIP_ADDRESS && !board->twi_fails;
+        board->chip_selected = message.u.twi.addr >> 1 == CHIP_ADDRESS && board->fault != NO_ADDRESS;
         board->register_is_next = 1;
         board->transfer_began = board->avr->cycle;
+        board->addressed = 1;
         if (board->chip_selected) {
             avr_raise_irq(board->twi + TWI_IRQ_INPUT, avr_twi_irq_msg(TWI_COND_ACK, message.u.twi.addr, 1));
         }
@@ -107,7 +119,7 @@ static void on_twi(avr_irq_t *irq, uint32_t value, void *param) {
     if (!board->chip_selected) {
         return;
     }
-    if (what & TWI_COND_WRITE) {
+    if (what & TWI_COND_WRITE && board->fault != NO_DATA) {
         avr_raise_irq(board->twi + TWI_IRQ_INPUT, avr_twi_irq_msg(TWI_COND_ACK, message.u.twi.addr, 1));
         if (board->register_is_next) {
             board->chip_register = message.u.twi.data;
@@ -120,6 +132,36 @@ static void on_twi(avr_irq_t *irq, uint32_t value, void *param) {
         uint8_t byte = board->chip_read(board->chip_register, board->transfer_began);
         board->chip_register += board->chip_register != FIFO_R_W;
         avr_raise_irq(board->twi + TWI_IRQ_INPUT, avr_twi_irq_msg(TWI_COND_READ, message.u.twi.addr, byte));
+    }
+}
+
+/* simavr gives an address for writing the state of data. What the TWI was told to do never ends while the bus is held. */
+static void on_twi_control(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+    (void)address;
+    (void)value;
+    struct board *board = param;
+    avr_twi_t *twi = board->twi_module;
+    if (board->addressed && (twi->next_twstate == DATA_ACK || twi->next_twstate == DATA_NACK)) {
+        twi->next_twstate = twi->next_twstate == DATA_ACK ? ADDRESS_ACK : ADDRESS_NACK;
+    }
+    board->addressed = 0;
+    avr_cycle_timer_slot_t *slot = avr->cycle_timers.timer;
+    while (slot && slot->param != twi) {
+        slot = slot->next;
+    }
+    if (slot && board->fault == HOLDS_BUS) {
+        avr_cycle_timer_cancel(avr, slot->timer, twi);
+    }
+}
+
+/* SCL pulled low by the port: after enough of that the chip lets go. */
+static void on_direction(avr_t *avr, avr_io_addr_t address, uint8_t value, void *param) {
+    struct board *board = param;
+    avr->data[address] = value;
+    board->clocks += value & SCL && !(board->direction & SCL);
+    board->direction = value;
+    if (board->fault == HOLDS_BUS && board->clocks >= CLOCKS_TO_FREE) {
+        board->fault = SOUND;
     }
 }
 
@@ -183,12 +225,15 @@ static int map_eeprom(avr_eeprom_t *eeprom, const char *path) {
 static void connect_board(struct board *board) {
     avr_t *avr = board->avr;
     board->uart = module(avr, "uart");
+    board->twi_module = module(avr, "twi");
     board->twi = avr_io_getirq(avr, AVR_IOCTL_TWI_GETIRQ(0), 0);
     uint32_t quiet = 0;
     avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS('0'), &quiet);
     avr_irq_register_notify(board->uart->io.irq + UART_IRQ_OUTPUT, on_transmitted, board);
     avr_irq_register_notify(board->twi + TWI_IRQ_OUTPUT, on_twi, board);
     avr_register_io_write(avr, board->eeprom->r_eecr, on_eeprom_control, board);
+    avr_register_io_write(avr, board->twi_module->r_twcr, on_twi_control, board);
+    avr_register_io_write(avr, DDRC, on_direction, board);
 }
 
 /* A board with the firmware of `elf` and 1 KiB of EEPROM in the file `eeprom`; NULL where a file cannot be used. */
@@ -258,9 +303,21 @@ void board_reset(struct board *board) {
     avr_reset(board->avr);
 }
 
-/* The chip answers its address no more (or again). */
-void board_fail_twi(struct board *board, int fails) {
-    board->twi_fails = fails != 0;
+/* From now on: 0 sound, 1 does not acknowledge its address, 2 nor data, 3 holds the bus until SCL has clocked it free. */
+void board_fault(struct board *board, uint8_t fault) {
+    board->fault = fault;
+    board->clocks = 0;
+}
+
+/* A register of the processor, as a fault of it may set it. */
+void board_poke(struct board *board, uint16_t address, uint8_t value) {
+    avr_t *avr = board->avr;
+    avr_io_addr_t io = AVR_DATA_TO_IO(address);
+    if (avr->io[io].w.c) {
+        avr->io[io].w.c(avr, address, value, avr->io[io].w.param);
+    } else {
+        avr->data[address] = value;
+    }
 }
 
 /* What was lost on the line because nobody took it in time. */

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
+from enum import IntEnum
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -16,6 +17,12 @@ BUFFER_BYTES = 1 << 16
 
 CHIP_READ = ctypes.CFUNCTYPE(ctypes.c_uint8, ctypes.c_uint8, ctypes.c_uint64)
 CHIP_WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint8, ctypes.c_uint8, ctypes.c_uint64)
+
+
+class Fault(IntEnum):
+    """What may be the matter with a chip, as board.c has it."""
+
+    SOUND, NO_ADDRESS, NO_DATA, HOLDS_BUS = range(4)
 
 
 def build_library(folder: Path) -> ctypes.CDLL:
@@ -33,7 +40,8 @@ def build_library(folder: Path) -> ctypes.CDLL:
         "board_send": (u32, [board, ctypes.c_char_p, u32]),
         "board_receive": (u32, [board, ctypes.c_char_p, u32]),
         "board_reset": (None, [board]),
-        "board_fail_twi": (None, [board, ctypes.c_int]),
+        "board_fault": (None, [board, u8]),
+        "board_poke": (None, [board, ctypes.c_uint16, u8]),
         "board_overruns": (u32, [board]),
         "board_eeprom_writes": (u32, [board]),
         "board_close": (None, [board, u8]),
@@ -129,9 +137,13 @@ class Board:
         """As DTR does when the port is opened; there is no bootloader."""
         self._library.board_reset(self._board)
 
-    def unplug_chip(self, unplugged: bool = True) -> None:
-        """The chip does not answer its address; or does again."""
-        self._library.board_fail_twi(self._board, unplugged)
+    def fault(self, fault: Fault) -> None:
+        """What is the matter with the chip from now on."""
+        self._library.board_fault(self._board, fault)
+
+    def poke(self, address: int, value: int) -> None:
+        """A register of the processor, as a fault of it may set it."""
+        self._library.board_poke(self._board, address, value)
 
     def cut_power(self, torn: int = 0xFF) -> None:
         """Now; a byte that is just being written to the EEPROM is left as `torn`."""

@@ -1,11 +1,13 @@
 /* The bridge on an ATmega328P at 16 MHz: an Arduino Uno, Nano or Pro Mini. */
 #include <avr/eeprom.h>
 #include <avr/interrupt.h>
+#include <avr/wdt.h>
 
 #include "clock.h"
 #include "mpucal_bridge.h"
 #include "twi.h"
 #include "uart.h"
+#include "watchdog.h"
 
 static uint8_t read_eeprom(uint16_t address) {
     return eeprom_read_byte((const uint8_t *)address);
@@ -29,12 +31,14 @@ static const struct mpucal_port PORT = {
 
 int main(void) {
     static struct mpucal_bridge bridge;
+    watchdog_begin();
     clock_begin();
     uart_begin();
     twi_begin();
     mpucal_bridge_begin(&bridge, &PORT);
     sei();
     for (;;) {
+        wdt_reset();
         if (uart_has_byte()) {
             mpucal_bridge_receive(&bridge, uart_take());
             continue;

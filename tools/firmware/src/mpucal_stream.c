@@ -9,7 +9,6 @@
 #define FIFO_R_W 0x74
 
 #define FRAMES_BODY 5 /* index, drops, left; then the frames */
-#define MAX_BATCH 32
 #define LOOK_US 800 /* a millisecond is the most, and a port may nap for a while */
 #define BEAT_US (MPUCAL_BEAT_MS * 1000UL)
 
@@ -17,7 +16,7 @@ uint8_t mpucal_on_stream(struct mpucal_bridge *bridge, struct mpucal_request req
     struct mpucal_stream *stream = &bridge->stream;
     uint8_t frame_bytes = request.size < 2 ? 0xFF : request.payload[0];
     uint8_t batch = request.size < 2 ? 0 : request.payload[1];
-    if (frame_bytes > MPUCAL_MAX_READ || (frame_bytes && (batch < 1 || batch > MAX_BATCH))) {
+    if (frame_bytes > MPUCAL_MAX_READ || (frame_bytes && (batch < 1 || batch > MPUCAL_MAX_BATCH))) {
         return MPUCAL_CODE_BAD_PAYLOAD;
     }
     stream->frame_bytes = frame_bytes;

@@ -6,6 +6,10 @@
 #include <mpucal_arduino.h>
 #include <mpucal_bridge.h>
 
+#if defined(__AVR__)
+#include <avr/wdt.h>
+#endif
+
 // The buffer of 64 bytes that an Arduino core has holds one request while another is carried out, which at this rate is
 // done before it is full. With -DSERIAL_RX_BUFFER_SIZE=256 it may be 500000, and then 1000 samples a second fit.
 #ifndef MPUCAL_BAUD
@@ -16,10 +20,43 @@ const uint32_t BAUD_RATE = MPUCAL_BAUD;
 const uint32_t I2C_HZ = 400000;
 const uint32_t I2C_TIMEOUT_MS = 25;
 const uint8_t WIRE_BYTES = 32;  // what the smallest Wire library takes at once
-const uint8_t WIRE_NO_ADDRESS = 2;
+const uint8_t WIRE_NO_ADDRESS = 2, WIRE_TIMED_OUT = 5;
 const uint8_t FIFO_R_W = 0x74, MEM_R_W = 0x6F;  // these do not auto-increment
 
+// How a core limits the time of a transfer: the first of these functions that its Wire has.
+template <typename W> static auto limitTime(W &wire, int) -> decltype(wire.setWireTimeout(1, true)) {
+    return wire.setWireTimeout(I2C_TIMEOUT_MS * 1000, true);
+}
+template <typename W> static auto limitTime(W &wire, long) -> decltype(wire.setTimeOut(1)) {
+    return wire.setTimeOut((uint16_t)I2C_TIMEOUT_MS);
+}
+template <typename W> static void limitTime(W &, ...) {}
+
+static void beginWire() {
+    Wire.begin();
+    Wire.setClock(I2C_HZ);
+    limitTime(Wire, 0);
+}
+
+// A chip that was cut off within a byte holds SDA low until it has clocked the rest of it out.
+static void freeBus() {
+#if defined(PIN_WIRE_SCL) && defined(WIRE_HAS_END)
+    Wire.end();
+    for (uint8_t bit = 0; bit < 9; bit++) {
+        digitalWrite(PIN_WIRE_SCL, LOW);
+        pinMode(PIN_WIRE_SCL, OUTPUT);
+        delayMicroseconds(2);
+        pinMode(PIN_WIRE_SCL, INPUT_PULLUP);
+        delayMicroseconds(2);
+    }
+    beginWire();
+#endif
+}
+
 static uint8_t codeOf(uint8_t wire) {
+    if (wire == WIRE_TIMED_OUT) {
+        freeBus();
+    }
     return wire == 0 ? MPUCAL_CODE_OK : wire == WIRE_NO_ADDRESS ? MPUCAL_CODE_NO_ANSWER : MPUCAL_CODE_BUS_FAILED;
 }
 
@@ -52,7 +89,8 @@ static uint8_t writeRegisters(uint8_t address, uint8_t first, const uint8_t *dat
 // Some cores send the register only with the read behind it, and cannot say then that nobody answered.
 static uint8_t whyNothing(uint8_t address) {
     Wire.beginTransmission(address);
-    return Wire.endTransmission() == WIRE_NO_ADDRESS ? MPUCAL_CODE_NO_ANSWER : MPUCAL_CODE_BUS_FAILED;
+    uint8_t code = codeOf(Wire.endTransmission());
+    return code == MPUCAL_CODE_OK ? (uint8_t)MPUCAL_CODE_BUS_FAILED : code;
 }
 
 static uint8_t readPiece(uint8_t address, uint8_t first, uint8_t *data, uint8_t count) {
@@ -91,23 +129,38 @@ static const struct mpucal_port port = {readRegisters, writeRegisters, nowUs,   
                                         &mpucalMemory, 2,              "mpucal-ino 0.1"};
 static struct mpucal_bridge bridge;
 
+#if defined(__AVR__)
+// Nothing has fed it for two seconds: the program starts anew, and the host's next request is answered with NO_HELLO. No
+// reset by the watchdog itself: the boot loader of older boards leaves it on then, and is reset for ever.
+ISR(WDT_vect, ISR_NAKED) { __asm__ __volatile__("jmp 0"); }
+
+static void watchdogBegin() {
+    noInterrupts();
+    wdt_reset();
+    WDTCSR = _BV(WDCE) | _BV(WDE);
+    WDTCSR = _BV(WDIE) | _BV(WDP2) | _BV(WDP1) | _BV(WDP0);
+    interrupts();
+}
+
+static void watchdogFeed() { wdt_reset(); }
+#else
+static void watchdogBegin() {}
+static void watchdogFeed() {}
+#endif
+
 void setup() {
 #if defined(ESP32) || defined(ESP8266)
     Serial.setRxBufferSize(1024);
 #endif
     Serial.begin(BAUD_RATE);
-    Wire.begin();
-    Wire.setClock(I2C_HZ);
-#if defined(WIRE_HAS_TIMEOUT)
-    Wire.setWireTimeout(I2C_TIMEOUT_MS * 1000, true);
-#elif defined(ESP32)
-    Wire.setTimeOut(I2C_TIMEOUT_MS);
-#endif
+    beginWire();
     mpucalMemoryBegin();
     mpucal_bridge_begin(&bridge, &port);
+    watchdogBegin();
 }
 
 void loop() {
+    watchdogFeed();
     if (Serial.available()) {
         mpucal_bridge_receive(&bridge, (uint8_t)Serial.read());
     } else {

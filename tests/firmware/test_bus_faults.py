@@ -1,0 +1,104 @@
+"""A chip that answers nothing, or holds the bus, and a processor that hangs: what firmware and sketch do then."""
+
+from __future__ import annotations
+
+import pytest
+
+from mpucal.chip import registers as reg
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.errors import BusError, NoAnswer
+from mpucal.sources.bridge import messages as wire
+from mpucal.sources.bridge.bus import BridgeBus
+from mpucal.sources.bridge.link import Link, LinkLost
+from mpucal.sources.bridge.messages import Status
+
+I2C_MS, REPLY_MS = 25, 100
+# of timer 0, which both clocks count with; in data space
+TCCR0B = 0x45
+
+
+@pytest.fixture
+def fault(emulator):
+    return emulator[0].Fault
+
+
+@pytest.fixture(params=["firmware", "sketch"])
+def bridge(request, switch_on):
+    """A board with the firmware or the sketch; gives it and a port to it."""
+    if request.param == "firmware":
+        return switch_on()
+    return switch_on(elf=request.getfixturevalue("sketches") / "mpucal_bridge_sketch.elf")
+
+
+def test_says_that_no_chip_answers(bridge, fault):
+    board, port = bridge
+    board.fault(fault.NO_ADDRESS)
+    with pytest.raises(NoAnswer):
+        BridgeBus(port)
+
+
+def test_a_chip_unplugged_under_way_is_told(bridge, fault):
+    board, port = bridge
+    bus = BridgeBus(port)
+    board.fault(fault.NO_ADDRESS)
+    with pytest.raises(NoAnswer):
+        bus.read(reg.WHO_AM_I, 1)
+    board.fault(fault.SOUND)
+    assert bus.read(reg.WHO_AM_I, 1).data == b"\x68"
+
+
+def test_data_that_are_not_acknowledged_are_no_missing_chip(bridge, fault):
+    board, port = bridge
+    link = Link(port, lambda *_: None)
+    link.greet()
+    board.fault(fault.NO_DATA)
+    answers = link.ask(wire.Write(reg.SMPLRT_DIV, b"\x07"), wire.Read(reg.WHO_AM_I, 1))
+    assert [answer.reply.status for (answer,) in answers] == [Status.BUS_FAILED] * 2
+    board.fault(fault.SOUND)
+    assert link.ask(wire.Read(reg.WHO_AM_I, 1))[0][0].reply.data == b"\x68"
+
+
+def test_a_bus_that_a_chip_holds_is_given_up_in_time_and_freed(bridge, fault):
+    board, port = bridge
+    link = Link(port, lambda *_: None)
+    link.greet()
+    board.fault(fault.HOLDS_BUS)
+    began_s = board.now_s
+    answers = link.ask(wire.Read(reg.WHO_AM_I, 1))
+    assert answers[0][0].reply.status == Status.BUS_FAILED
+    assert I2C_MS <= (board.now_s - began_s) * 1e3 < REPLY_MS
+    # nine pulses on SCL have freed it
+    assert link.ask(wire.Read(reg.WHO_AM_I, 1))[0][0].reply.data == b"\x68"
+
+
+def test_a_session_goes_on_after_the_bus_was_held(bridge, fault):
+    board, port = bridge
+    driver = Driver(BridgeBus(port), Config(rate_hz=200))
+    driver.start()
+    while board.now_s < 2:
+        driver.poll()
+    board.fault(fault.HOLDS_BUS)
+    while board.now_s < 4:
+        driver.poll()
+    recording = driver.recording()
+    assert recording.gap.any()
+    assert recording.t[-1] - recording.t[0] > 3
+    assert len(recording) > 550
+
+
+def test_a_program_that_hangs_is_started_anew(bridge, fault):
+    """Its clock has stopped, and so has what would give a transfer up."""
+    board, port = bridge
+    link = Link(port, lambda *_: None)
+    link.greet()
+    board.poke(TCCR0B, 0)
+    board.fault(fault.HOLDS_BUS)
+    with pytest.raises(BusError):
+        link.ask(wire.Read(reg.WHO_AM_I, 1))
+    board.fault(fault.SOUND)
+    board.run(2.5)
+    with pytest.raises(LinkLost, match="was reset"):
+        link.ask(wire.Read(reg.WHO_AM_I, 1))
+    link.greet()
+    assert link.ask(wire.Read(reg.WHO_AM_I, 1))[0][0].reply.data == b"\x68"
