@@ -17,6 +17,8 @@ from ..errors import EndOfCapture, OutputError
 from ..files.csv import CsvText
 from ..page.address import Address
 from ..page.live import live
+from ..recheck import days_since
+from ..recheck.watch import Watch
 from ..result.calibration import Calibration
 from ..result.clock import now
 from ..result.correction import Correction, correction
@@ -29,6 +31,8 @@ from .options import check_gyroscope, check_source, source_options
 from .page import page_options
 
 EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.json --seconds 10`"
+# of a source that does not say
+RATE_HZ = 200.0
 
 
 @click.command("stream", epilog=EXAMPLE)
@@ -37,12 +41,14 @@ EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.j
 @click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Record a capture as well.")
 @click.option("--seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop after this time [s].")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line instead of a table.")
+@click.option("--watch", "watched", is_flag=True, help="Warn where rests contradict CALIBRATION.")
 @page_options
 def command(
     calibration: Path,
     file: Path | None,
     seconds: float | None,
     as_json: bool,
+    watched: bool,
     page: Address | None,
     board: str | None,
     **options: Any,
@@ -65,13 +71,18 @@ def command(
     capture = source.measuring(file or Path(os.devnull), _say, now().isoformat())
     with capture as measuring, shown as screen, suppress(KeyboardInterrupt):
         ready: Correction | None = None
+        watch: Watch | None = None
         for samples in _polled(measuring.source, seconds):
             if ready is None:
                 sensor = measuring.source.recording().sensor
                 ready = _correction(applied, measuring.source)
+                watch = Watch(ready.calibration, days_since(applied), sensor.rate_hz or RATE_HZ) if watched else None
             calibrated = ready.apply(samples)
             write(calibrated)
             screen.add(samples, calibrated, sensor)
+            for finding in () if watch is None else watch.add(calibrated):
+                _say(finding)
+                screen.say(finding)
             sys.stdout.flush()
             measuring.source.forget()
 

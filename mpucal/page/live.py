@@ -38,6 +38,11 @@ class Live:
             acc, gyr = calibrated.acc.mean(axis=0), calibrated.gyr.mean(axis=0)
             self._feed.show(live={"acc": acc.tolist(), "magnitude": float(np.linalg.norm(acc)), "gyr": _known(gyr)})
 
+    def say(self, text: str) -> None:
+        """A line of talk, which stays."""
+        if self._feed is not None:
+            self._feed.say(text)
+
 
 @contextmanager
 def live(where: Address | None, title: str, board: str) -> Iterator[Live]:

@@ -74,7 +74,7 @@ def check(calibration: Calibration, recording: Recording, days: float | None = N
     observed = observe(recording, ready)
     if observed is None:
         return CheckResult(CANNOT_BE_TOLD, NOTHING, "the board never rested", AGAIN)
-    return _weighed_up(ready, recording, observed, _days(calibration, recording) if days is None else days)
+    return _weighed_up(ready, recording, observed, days_since(calibration, recording.utc_ns) if days is None else days)
 
 
 def _weighed_up(calibration: Calibration, recording: Recording, observed: Observed, days: float) -> CheckResult:
@@ -180,12 +180,12 @@ def _trimmed_otherwise(calibration: Calibration, sensor: Sensor) -> bool:
     return any((one ^ other) & ~1 for one, other in zip(held[0], held[1], strict=True))
 
 
-def _days(calibration: Calibration, recording: Recording) -> float:
-    """From the calibration to the recording, or to now; 0 where nobody knows."""
+def days_since(calibration: Calibration, utc_ns: int | None = None) -> float:
+    """From the calibration to a time, or to now; 0 where nobody knows."""
     try:
         made = datetime.fromisoformat(calibration.created)
     except ValueError:
         return 0.0
     made = made if made.tzinfo else made.replace(tzinfo=UTC)
-    then = datetime.now(UTC) if recording.utc_ns is None else datetime.fromtimestamp(recording.utc_ns * 1e-9, UTC)
+    then = datetime.now(UTC) if utc_ns is None else datetime.fromtimestamp(utc_ns * 1e-9, UTC)
     return max((then - made).total_seconds() / 86400.0, 0.0)

@@ -105,7 +105,7 @@ def observe(recording: Recording, calibration: Calibration) -> Observed | None:
     blocks.append(_Block.rate(recording, runs[0].tolist(), flat, calibration, len(runs)))
     of_rests = np.vstack([block.of_rests for block in blocks])
     J = np.vstack([block.of_theta for block in blocks])
-    J[:, : BETA.stop] += of_rests @ np.vstack([_of_accelerometer(a) for a in rests.a])
+    J[:, : BETA.stop] += of_rests @ np.vstack([of_accelerometer(a) for a in rests.a])
     R = of_rests @ rests.covariance @ of_rests.T + np.diag(np.concatenate([block.variance for block in blocks]))
     return Observed(
         np.concatenate([block.r for block in blocks]),
@@ -197,7 +197,7 @@ class _Block:
         return cls(r[known], np.zeros((int(known.sum()), 3 * rests)), of_theta[known], variance[known])
 
 
-def _of_accelerometer(a: Vector) -> Vector:
+def of_accelerometer(a: Vector) -> Vector:
     """(3, 12) of E s + beta by E, row-major, and beta."""
     return np.hstack([np.kron(np.eye(3), a), np.eye(3)])
 

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -96,3 +97,27 @@ def test_a_line_comes_at_once_and_a_closed_pipe_is_no_error(made):
     assert first.startswith(b"t,ax,ay,az,gx,gy,gz")
     assert len(first) < 4096
     assert not said
+
+
+def test_rests_that_contradict_the_calibration_are_told_once(mpucal, session):
+    right = session.folder / "calibration.json"
+    calibration = Calibration.load(right)
+    replace(calibration, b_a=calibration.b_a + np.array([0.0, 0.0, 0.3])).save("wrong.json")
+    words = (
+        "stream",
+        "--bus",
+        "sim:hand=still",
+        "--seed",
+        "3",
+        "--rate",
+        "100",
+        "--seconds",
+        "60",
+        "--watch",
+        "--apply",
+    )
+    assert "contradict" not in mpucal(*words, right).err
+    told = mpucal(*words, "wrong.json")
+    assert told.code == 0
+    assert told.err.count("rests contradict the calibration (|a| has an error of up to") == 1
+    assert told.out.count("\n") > 5900

@@ -1,0 +1,145 @@
+"""Whether rests in ordinary use contradict a calibration: their magnitudes and rates, one rest at a time, for days.
+
+A rest shows |a| - g, and the mean rate; nothing carries gravity from one rest to the next over hours, so that neither a
+mount nor a gyroscope's scale factor is seen. A rest may also be none: a vehicle that brakes evenly is as still.
+Therefore no single rest decides.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..calibration.static_intervals import ACC_SD_MPS2, GYRO_SD_RAD_S
+from ..calibration.verification import BIAS_RAD_S, FLOOR_MPS2
+from ..data import STANDARD_GRAVITY_MPS2, Samples, Vector
+from ..result.calibration import Calibration
+from . import drift
+from .hypotheses import NOTHING, weigh
+from .observed import BETA, DELTA, PARAMETERS, Observed, of_accelerometer
+
+BLOCK_S = 0.5
+# of a rest: so long at least, and at most: a board that lies for hours rests many times
+LEAST_BLOCKS, MOST_BLOCKS = 5, 21
+# so far a rest's blocks may be from its first
+STEP_MPS2 = 0.1
+# the last rests, of which this many at least are needed
+RESTS, LEAST_RESTS = 16, 4
+# days of rests are looked at one by one: each may err by chance less often than a check does
+FALSE_ALARMS = 2e-4
+TO_DO = "see what `mpucal check` says"
+
+
+@dataclass(frozen=True)
+class _Rest:
+    """Mean acceleration (3,) and its variance, mean rate (3,) and its variance, all calibrated; temperature or NaN."""
+
+    a: Vector
+    a_variance: float
+    w: Vector
+    w_variance: float
+    temperature_c: float
+
+
+class Watch:
+    """Looks at calibrated samples as they come, in constant memory; each sensor's finding is told once.
+
+    Parameters
+    ----------
+    calibration : ready for these samples. days : since it was made. rate_hz : samples a second.
+    """
+
+    def __init__(self, calibration: Calibration, days: float, rate_hz: float) -> None:
+        self._calibration, self._days = calibration, days
+        self._gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
+        self._size = max(round(BLOCK_S * rate_hz), 2)
+        self._held = np.zeros((0, 7))
+        self._blocks: list[Vector] = []
+        self._rests: deque[_Rest] = deque(maxlen=RESTS)
+        self._told: set[str] = set()
+
+    def add(self, calibrated: Samples) -> list[str]:
+        """What these samples bring to light: a sentence each."""
+        found = []
+        for part in np.split(np.arange(len(calibrated)), np.flatnonzero(calibrated.gap)):
+            if len(part) and calibrated.gap[part[0]]:
+                self._held = self._held[:0]
+                found += self._over()
+            columns = (calibrated.acc, calibrated.gyr, calibrated.temperature_c[:, None])
+            self._held = np.concatenate([self._held, np.hstack(columns)[part]])
+            while len(self._held) >= self._size:
+                block, self._held = self._held[: self._size], self._held[self._size :]
+                found += self._block(block)
+        return found
+
+    def _block(self, block: Vector) -> list[str]:
+        """Half a second more."""
+        mean, std = block.mean(0), block.std(0)
+        still = std[:3].max() < ACC_SD_MPS2 and not std[3:6].max() > GYRO_SD_RAD_S
+        found = []
+        if not still or (self._blocks and np.abs(mean[:3] - self._blocks[0][:3]).max() > STEP_MPS2):
+            found = self._over()
+        if still:
+            self._blocks.append(np.append(mean, std[:3].max() ** 2 / self._size))
+        if len(self._blocks) == MOST_BLOCKS:
+            found += self._over()
+        return found
+
+    def _over(self) -> list[str]:
+        """A rest is over."""
+        # a hand settles, and leaves early
+        blocks, self._blocks = np.array(self._blocks[1:-1]), []
+        if len(blocks) < LEAST_BLOCKS - 2:
+            return []
+        n = len(blocks)
+        between, within = blocks.var(0, ddof=1), float(blocks[:, 7].mean())
+        a_variance = max(float(between[:3].mean()), within) / n + FLOOR_MPS2**2
+        w_variance = float(between[3:6].mean()) / n + BIAS_RAD_S**2
+        self._rests.append(_Rest(blocks[:, :3].mean(0), a_variance, blocks[:, 3:6].mean(0), w_variance, blocks[-1, 6]))
+        return self._judged(list(self._rests))
+
+    def _judged(self, rests: list[_Rest]) -> list[str]:
+        if len(rests) < LEAST_RESTS:
+            return []
+        T, T_0 = rests[-1].temperature_c, self._calibration.sensor.temperature_c
+        change_c = None if T_0 is None or math.isnan(T) else T - T_0
+        nothing = drift.own_uncertainty(self._calibration) + drift.ageing(self._calibration, self._days, change_c)
+        happenings = drift.happenings(self._calibration, change_c)
+        observed = self._observed(rests)
+        weighed = weigh(observed, nothing, happenings)
+        what = weighed.told
+        # few orientations do not tell a bias from a scale factor
+        sensor = "gyroscope" if what.startswith("gyroscope") else "accelerometer"
+        if what == NOTHING or sensor in self._told or weighed.probability > FALSE_ALARMS:
+            return []
+        for k in range(len(rests)):
+            without = weigh(self._observed(rests[:k] + rests[k + 1 :]), nothing, happenings)
+            if without.told == NOTHING:
+                return []
+        self._told.add(sensor)
+        return [f"the last {len(rests)} rests contradict the calibration ({self._off(rests, sensor)}): {TO_DO}"]
+
+    def _off(self, rests: list[_Rest], sensor: str) -> str:
+        if sensor == "gyroscope":
+            rate = math.degrees(max(float(np.linalg.norm(rest.w)) for rest in rests))
+            return f"it turns by up to {rate:.2g} deg/s"
+        off = max((float(np.linalg.norm(rest.a)) - self._gravity for rest in rests), key=abs)
+        return f"|a| has an error of up to {off / drift.MG:+.2g} mg"
+
+    def _observed(self, rests: list[_Rest]) -> Observed:
+        k, gyro = len(rests), bool(np.isfinite([rest.w for rest in rests]).all())
+        a = np.array([rest.a for rest in rests])
+        length = np.linalg.norm(a, axis=1)
+        r, variance = length - self._gravity, [rest.a_variance for rest in rests]
+        J = np.zeros((k, PARAMETERS))
+        J[:, : BETA.stop] = [one / norm @ of_accelerometer(one) for one, norm in zip(a, length, strict=True)]
+        # a calibration without b_omega says nothing against a rate
+        if gyro and np.isfinite(self._calibration.b_omega).all():
+            of_rates = np.zeros((3 * k, PARAMETERS))
+            of_rates[:, DELTA] = np.tile(np.eye(3), (k, 1))
+            r, J = np.concatenate([r, *(rest.w for rest in rests)]), np.vstack([J, of_rates])
+            variance += [rest.w_variance for rest in rests for _ in range(3)]
+        return Observed(r, J, np.diag(variance), -a / length[:, None], None, 0.0)
