@@ -293,7 +293,8 @@ class CaptureReader:
                     yield block
         if meta is None:
             raise CaptureError(
-                f"{self._path} does not hold the head of a capture of mpucal", "give a capture that mpucal recorded"
+                f"{self._path} does not hold the head of a capture of mpucal",
+                "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu",
             )
         self.meta = meta
         self.recovered = None if finished else self._why_recovered(size - whole)
@@ -306,14 +307,16 @@ class CaptureReader:
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise CaptureError(
                 f"{self._path} holds a message on {channel.topic} that is none of mpucal's ({error})",
-                "give a capture that mpucal recorded",
+                "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu",
             ) from error
 
     def _check(self, magic: bytes) -> None:
         if not magic:
             raise CaptureError(f"{self._path} is empty", "record it again")
         if magic != MCAP0_MAGIC:
-            raise CaptureError(f"{self._path} is no MCAP file", "give a capture that mpucal recorded")
+            raise CaptureError(
+                f"{self._path} is no MCAP file", "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu"
+            )
 
     def _counted(self, block: Accesses | Record) -> None:
         if isinstance(block, Accesses):

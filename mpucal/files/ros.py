@@ -27,7 +27,7 @@ from .tables.streams import recording_of
 from .tables.times import Stream
 from .tables.units import COUNTS, acceleration_unit
 
-IMU = "sensor_msgs/msg/Imu"
+IMU, IMU_OF_ROS1, ROS1 = "sensor_msgs/msg/Imu", "sensor_msgs/Imu", b"ros1"
 SNIFFED = 1 << 16
 _HEADER = struct.Struct("<8xBQI")
 S = 1_000_000_000
@@ -38,15 +38,22 @@ REMEDY = "give a bag with sensor_msgs/Imu"
 
 def is_mcap_of_ros(path: Path) -> bool:
     """Whether an MCAP file begins as one of ROS, and not as a capture."""
-    try:
-        with path.open("rb") as file:
-            begun = file.read(SNIFFED)
-    except OSError:
-        return False
+    begun = _begun(path)
     if len(begun) < _HEADER.size or FORMAT.encode() in begun[: _HEADER.size + 100]:
         return False
-    profile = begun[_HEADER.size :][: _HEADER.unpack_from(begun)[2]]
-    return profile in (b"ros2", b"ros1") or IMU.encode() in begun
+    return _profile(begun) in (b"ros2", ROS1) or IMU.encode() in begun
+
+
+def _begun(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(SNIFFED)
+    except OSError:
+        return b""
+
+
+def _profile(begun: bytes) -> bytes:
+    return begun[_HEADER.size :][: _HEADER.unpack_from(begun)[2]] if len(begun) >= _HEADER.size else b""
 
 
 def is_folder_of_ros(path: Path) -> bool:
@@ -81,6 +88,9 @@ def load_bag(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """
     highlevel, typesys = library("rosbags.highlevel", "ros", path), library("rosbags.typesys", "ros", path)
     try:
+        if path.suffix.lower() == ".mcap" and _profile(_begun(path)) == ROS1:
+            topics, found = _of_ros1(path, typesys.get_typestore(typesys.Stores.ROS1_NOETIC), hints)
+            return _recording(path, topics, found, hints)
         with highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)) as bag:
             topics = _chosen(path.name, [c for c in bag.connections if c.msgtype == IMU], bag.topics, hints)
             found = {topic: _Messages() for topic in topics}
@@ -90,10 +100,36 @@ def load_bag(path: Path, hints: Hints = NO_HINTS) -> Recording:
         raise
     except Exception as error:
         # of sqlite, yaml, lz4 and what else reads it
-        raise RecordingError(f"{path} is no whole bag ({type(error).__name__}: {error})", REMEDY) from error
+        remedy = f"give its folder, {path.parent}" if is_folder_of_ros(path.parent) else REMEDY
+        raise RecordingError(f"{path} is no whole bag ({type(error).__name__}: {error})", remedy) from error
+    return _recording(path, topics, found, hints)
+
+
+def _of_ros1(path: Path, store: Any, hints: Hints) -> tuple[list[str], dict[str, _Messages]]:
+    """The messages in a bag of ROS 1 that `mcap convert` made an MCAP file; rosbags reads those of ROS 2."""
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+        if summary is None:
+            raise RecordingError(f"{path} has no summary", "give it to `mcap recover`")
+        there = list(summary.channels.values())
+        imus = [channel for channel in there if summary.schemas[channel.schema_id].name == IMU_OF_ROS1]
+        topics = _chosen(path.name, imus, [channel.topic for channel in there], hints)
+        found = {topic: _Messages() for topic in topics}
+        for _, channel, message in make_reader(file).iter_messages(topics=topics):
+            found[channel.topic].add(store.deserialize_ros1(message.data, IMU), message.log_time)
+    return topics, found
+
+
+def _recording(path: Path, topics: list[str], found: dict[str, _Messages], hints: Hints) -> Recording:
     acc, gyr = found[topics[0]], found[topics[-1]]
     remarks = [f"from {' and '.join(dict.fromkeys(topics))}", *acc.remarks, _calibrated(path)]
-    return recording_of(acc.stream("acc"), gyr.stream("gyr"), hints, path.name, remarks=list(filter(None, remarks)))
+    return recording_of(
+        acc.stream("acc", path.name),
+        gyr.stream("gyr", path.name),
+        hints,
+        path.name,
+        remarks=list(filter(None, remarks)),
+    )
 
 
 def _chosen(name: str, connections: Iterable[Any], all_topics: Iterable[str], hints: Hints) -> list[str]:
@@ -148,12 +184,12 @@ class _Messages:
     def remarks(self) -> list[str]:
         return [] if self.stamped else ["times are those of receipt, as the headers hold none"]
 
-    def stream(self, quantity: str) -> Stream:
+    def stream(self, quantity: str, name: str) -> Stream:
         """What it says of the quantity."""
         values = np.array(getattr(self, quantity), float).reshape(-1, 3)
         if not self.measured[quantity]:
             raise RecordingError(
-                f"the messages say by their covariances that there is no {_NAMES[quantity]}",
+                f"{name}: the messages say by their covariances that there is no {_NAMES[quantity]}",
                 "name the topics of the accelerometer and of the gyroscope with --topic ONE,OTHER",
             )
         unit = "rad/s"

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
@@ -68,6 +69,25 @@ def test_bags_give_the_samples_that_were_written(kind, walk, walk_ns, assert_sam
     if kind != "bag":
         assert_same(load(file_in(made)), walk, 0, 0)
         assert_same(open_rows(file_in(made)).recording(), walk, 0, 0)
+
+
+def test_a_bag_of_ros_1_that_was_made_an_mcap_file(walk, walk_ns, assert_same, tmp_path):
+    """As `mcap convert` does it."""
+    path = tmp_path / "walk.mcap"
+    with path.open("wb") as file:
+        writer = McapWriter(file)
+        writer.start("ros1", "mcap go v1")
+        definition = ROS1.generate_msgdef("sensor_msgs/msg/Imu")[0].encode()
+        channel = writer.register_channel(
+            "/imu0", "ros1", writer.register_schema("sensor_msgs/Imu", "ros1msg", definition)
+        )
+        for t, acc, gyr in zip(walk_ns.tolist(), walk.acc, walk.gyr, strict=True):
+            data = bytes(ROS1.serialize_ros1(message(ROS1, t, acc, gyr), "sensor_msgs/msg/Imu"))
+            writer.add_message(channel, t, data, t)
+        writer.finish()
+    assert_same(load(path), walk, 0, 0)
+    with pytest.raises(RecordingError, match="it has some on /imu0"):
+        load(path, Hints(topic="/imu1"))
 
 
 def test_g_is_told_from_mps2(walk, walk_ns, assert_same, tmp_path):
