@@ -193,6 +193,17 @@ def test_six_faces_by_hand_are_usable(hand):
     assert "few_orientations" in result.reasons
 
 
+def test_what_is_claimed_to_be_useless_is_refused_whatever_the_claim_rests_on(hand):
+    evidence, _ = weigh(hand(0, "pose6").recording, "auto", G)
+    wide = 1.0 / evidence.sure.rms_mps2
+    claim = replace(evidence.claim, left_out=replace(evidence.claim.left_out, time=wide * evidence.claim.model))
+    quality = judge(
+        replace(evidence, claim=claim, fit=replace(evidence.fit, covariance=wide**2 * evidence.fit.covariance))
+    )
+    assert quality["verdict"] == "refused"
+    assert "known to 1 m/s^2" in quality["reasons"][0]["message"]
+
+
 @pytest.mark.parametrize("degrees_a_second", [125, 250])
 def test_a_clipped_gyroscope_is_named(hand, degrees_a_second):
     recording = hand(3, "pose12").recording

@@ -33,8 +33,9 @@ def few_orientations(e: Evidence) -> Reason | None:
     side = " ".join(
         f"{'+' if w > 0 else '-'}{axis}" for axis, w in zip("xyz", e.sure.worst, strict=True) if abs(w) > 0.4
     )
-    if rms < e.gravity:
-        return reason("few_orientations", "uncertain", rms > USABLE_RMS_MPS2, rms=rms, side=side)
+    known = max(rms, e.sure.rms_mps2) if _useless(e) else rms
+    if known < e.gravity:
+        return reason("few_orientations", "uncertain", _useless(e), rms=known, side=side)
     return reason("few_orientations", "not_observable", side=side)
 
 
