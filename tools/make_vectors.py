@@ -1,7 +1,8 @@
 """Write the golden vectors of firmware_protocol.md: python tools/make_vectors.py [FOLDER].
 
 Each blob_*.bin lies beside a blob_*.json that says what a reader must find in it, or why it must refuse it. Each
-line_*.bin is what goes over a serial line, and the line_*.json beside it says which frames a receiver must find.
+line_*.bin is what goes over a serial line, and the line_*.json beside it says which frames a receiver must find. Each
+talk_*.json is what a host asks of a bridge, and what that must answer.
 """
 
 from __future__ import annotations
@@ -12,10 +13,9 @@ import struct
 import sys
 import zlib
 from dataclasses import asdict, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from mpucal.result.blob import Blob
 from mpucal.sources.bridge import messages as wire
@@ -65,19 +65,30 @@ def sealed(body: bytes, length: int | None = None) -> bytes:
 def accepted(blob: Blob, data: bytes | None = None) -> tuple[bytes, dict[str, Any]]:
     """A blob and what a reader finds in it; `data` are other bytes that mean the same."""
     values = {key: plain(value) for key, value in asdict(blob).items()}
-    D = np.array(blob.D).reshape(3, 3)
-    a = np.linalg.solve(D, np.array(Y) - blob.b_a + blob.applied_b_a)
-    content = {"blob": values, "y": list(Y), "a": a.tolist()}
-    return data or blob.encode(), content | (at_temperatures(blob, D) if any(blob.b_a_slope) else {})
+    content = {"blob": values, "y": list(Y), "a": applied(blob, 0.0)}
+    return data or blob.encode(), content | (at_temperatures(blob) if any(blob.b_a_slope) else {})
 
 
-def at_temperatures(blob: Blob, D: Any) -> dict[str, Any]:
+def at_temperatures(blob: Blob) -> dict[str, Any]:
     """What b_a(T) makes of Y."""
-    b_a = [
-        np.array(blob.b_a) + np.array(blob.b_a_slope) * (np.clip(T, *blob.temperature_range_c) - blob.temperature_c)
-        for T in TEMPERATURES_C
-    ]
-    return {"at_c": TEMPERATURES_C, "a_at": [np.linalg.solve(D, Y - b + blob.applied_b_a).tolist() for b in b_a]}
+    low, high = blob.temperature_range_c
+    away = [min(max(T, low), high) - blob.temperature_c for T in TEMPERATURES_C]
+    return {"at_c": TEMPERATURES_C, "a_at": [applied(blob, each) for each in away]}
+
+
+def applied(blob: Blob, away_c: float) -> list[float]:
+    """inv(D) (Y - b_a(T) + applied_b_a) by Cramer's rule in fractions: rounded once, the same on every machine."""
+    D = [[Fraction(value) for value in blob.D[at : at + 3]] for at in (0, 3, 6)]
+    terms = zip(Y, blob.b_a, blob.b_a_slope, blob.applied_b_a, strict=True)
+    y = [Fraction(y) - Fraction(b) - Fraction(s) * Fraction(away_c) + Fraction(h) for y, b, s, h in terms]
+    replaced = [[[y[i] if j == k else D[i][j] for j in range(3)] for i in range(3)] for k in range(3)]
+    return [float(determinant(M) / determinant(D)) for M in replaced]
+
+
+def determinant(M: list[list[Fraction]]) -> Fraction:
+    """Of 3 by 3."""
+    (a, b, c), (d, e, f), (g, h, i) = M
+    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
 
 def plain(value: Any) -> Any:
@@ -211,6 +222,74 @@ def lines() -> dict[str, tuple[bytes, dict[str, Any]]]:
     }
 
 
+# What a host asks of a bridge that was greeted, that stores nothing, and whose chip has 504 bytes in its FIFO: what is
+# settled, and requests with their replies' bytes behind t_us; of one that failed the status alone.
+
+Reply = tuple[wire.Status, bytes]
+Exchange = tuple[Frame, Reply | None]
+OK, CRC = (wire.Status.OK, b""), 0x5D9B9255
+COMMIT, FIRST = Frame(0x14, 9, wire.BlobCommit(188, CRC).payload()), (wire.Status.OK, struct.pack("<I", 1))
+BEGIN = Frame(0x12, 8, wire.BlobBegin(188).payload())
+READ: Exchange = (Frame(0x02, 2, bytes([0x72, 2])), (wire.Status.OK, b"\x01\xf8"))
+DATA: list[Exchange] = [
+    (Frame(0x13, at // 32, wire.BlobData(at, MEASURED.encode()[at : at + 32]).payload()), OK)
+    for at in range(0, 188, 32)
+]
+TALKS: dict[str, tuple[str, list[Exchange]]] = {
+    "fifo_count": ("FIFO_COUNT passes through as it is in the chip, big-endian", [READ]),
+    "types_from_0x80": (
+        "types from 0x80 on are ignored",
+        [(Frame(0x80, 1), None), (Frame(0x81, 1, wire.Hello().payload()), None), (Frame(0xFF, 1), None), READ],
+    ),
+    "other_magic": (
+        "a HELLO with another magic is answered with BAD_PAYLOAD, and nothing is done",
+        [(Frame(0x01, 3, b"MPUX\1\0\0"), (wire.Status.BAD_PAYLOAD, b"")), READ],
+    ),
+    "stream_stop_of_one_byte": (
+        "STREAM needs both bytes to stop, too",
+        [(Frame(0x05, 4, b"\0"), (wire.Status.BAD_PAYLOAD, b"")), (Frame(0x05, 5, b"\0\0"), OK)],
+    ),
+    "commit_too_early": (
+        "a commit that fails leaves what was begun as it was; one that is repeated succeeds, and changes nothing",
+        [(BEGIN, OK), DATA[0], (COMMIT, (wire.Status.BAD_OFFSET, b"")), *DATA[1:], (COMMIT, FIRST), (COMMIT, FIRST)],
+    ),
+    "begin_of_0": (
+        "a BLOB_BEGIN of 0 is taken, and its commit fails",
+        [
+            (Frame(0x12, 6, b"\0\0"), OK),
+            (Frame(0x14, 7, wire.BlobCommit(0, 0).payload()), (wire.Status.BAD_BLOB, b"")),
+            (Frame(0x10, 8), (wire.Status.NO_BLOB, b"")),
+        ],
+    ),
+    "generation_after_erase": (
+        "the generation begins at 1 again",
+        [
+            *((BEGIN, OK), *DATA, (COMMIT, FIRST), (Frame(0x15, 10), OK)),
+            (Frame(0x10, 11), (wire.Status.NO_BLOB, b"")),
+            *((BEGIN, OK), *DATA, (COMMIT, FIRST)),
+        ],
+    ),
+}
+
+
+def talk(settled: str, exchanges: list[Exchange]) -> dict[str, Any]:
+    """A talk's JSON: requests as bytes on the line, replies as frames whose t_us is 0."""
+    said = []
+    for request, reply in exchanges:
+        answer = reply and Frame(request.type | wire.REPLY_BIT, request.seq, bytes([reply[0]]) + bytes(4) + reply[1])
+        said.append({"host": request.encode().hex(), "bridge": plain_frame(answer) if answer else None})
+    return {"settled": settled, "talk": said}
+
+
+def slots(*generations: int) -> bytes:
+    """Both slots of the storage, each with MEASURED."""
+    seals = [struct.pack("<II", generation, generation ^ 0xFFFFFFFF) for generation in generations]
+    return b"".join(seal + MEASURED.encode().ljust(256, b"\0") for seal in seals)
+
+
+SLOTS = {"wrapped": (2**32 - 1, 1), "before_the_wrap": (2**32 - 2, 2**32 - 1), "half_way": (2**31, 1)}
+
+
 def write(folder: Path) -> None:
     """Write all vectors into the folder."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -218,6 +297,14 @@ def write(folder: Path) -> None:
         for name, (data, content) in made.items():
             (folder / f"{prefix}_{name}.bin").write_bytes(data)
             (folder / f"{prefix}_{name}.json").write_text(json.dumps(content, indent=2) + "\n")
+    for name, (settled, exchanges) in TALKS.items():
+        (folder / f"talk_{name}.json").write_text(json.dumps(talk(settled, exchanges), indent=2) + "\n")
+    for name, generations in SLOTS.items():
+        (folder / f"slots_{name}.bin").write_bytes(slots(*generations))
+        late = 0 if (generations[1] - generations[0]) % 2**32 >= 2**31 else 1
+        after = generations[late] % (2**32 - 1) + 1
+        content = {"stored": late, "generation": generations[late], "generation_of_the_next": after}
+        (folder / f"slots_{name}.json").write_text(json.dumps(content, indent=2) + "\n")
 
 
 if __name__ == "__main__":

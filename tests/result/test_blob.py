@@ -235,15 +235,7 @@ def test_the_tool_writes_the_vectors_that_are_there(tmp_path, monkeypatch):
     made = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     stored = {path.name: path.read_bytes() for path in VECTORS.iterdir()}
     assert made.keys() == stored.keys()
-    for name, content in stored.items():
-        if name.endswith(".json") and b'"a": ' in content:
-            # another machine's LAPACK may round the last digit of an inverse differently
-            ours, theirs = json.loads(made[name]), json.loads(content)
-            for key in {"a", "a_at"} & theirs.keys():
-                np.testing.assert_allclose(ours.pop(key), theirs.pop(key), rtol=1e-12)
-            assert ours == theirs
-        else:
-            assert made[name] == content
+    assert [name for name in stored if made[name] != stored[name]] == []
 
 
 def test_the_documents_table_is_the_codecs_format():
