@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from ..calibration.rotation import cross
 from ..data import Vector
 
 SMALL_RAD = 1e-8
@@ -24,17 +24,22 @@ def product(p: Vector, q: Vector) -> Vector:
 
 def exp(turn_rad: Vector) -> Vector:
     """The quaternions (..., 4) of rotation vectors (..., 3) [rad]."""
-    return np.asarray(Rotation.from_rotvec(turn_rad).as_quat()[..., [3, 0, 1, 2]])
+    half = 0.5 * np.asarray(turn_rad)
+    angle = np.linalg.norm(half, axis=-1, keepdims=True)
+    return np.concatenate((np.cos(angle), half * np.sinc(angle / np.pi)), axis=-1)
 
 
 def log(q: Vector) -> Vector:
     """The shortest rotation vectors (..., 3) [rad] of quaternions (..., 4)."""
-    return np.asarray(Rotation.from_quat(q[..., [1, 2, 3, 0]]).as_rotvec())
+    v = np.where(q[..., :1] < 0.0, -q[..., 1:], q[..., 1:])
+    sine = np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-300)
+    return np.asarray(2.0 * np.arctan2(sine, np.abs(q[..., :1])) / sine * v)
 
 
 def board_from_world(q: Vector) -> Vector:
     """R(x) of equation (3), (..., 3, 3), which takes the world's axes to the board's."""
-    return np.asarray(Rotation.from_quat(q[..., [1, 2, 3, 0]]).inv().as_matrix())
+    V = cross(q[..., 1:])
+    return np.asarray(np.eye(3) + 2.0 * (V @ V - q[..., 0, None, None] * V))
 
 
 def conjugate(q: Vector) -> Vector:

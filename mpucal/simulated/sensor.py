@@ -7,8 +7,8 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from ..calibration.rotation import rotation
 from ..chip.families import MPU6050, MPU6500
 from ..data import STANDARD_GRAVITY_MPS2, Mask, Vector
 
@@ -192,7 +192,8 @@ def non_orthogonality(zeta: float, eta: float, rho: float) -> Vector:
 
 def turned(angles_rad: Vector) -> Vector:
     """Rx Ry Rz of three angles [rad]."""
-    return np.asarray(Rotation.from_euler("XYZ", angles_rad).as_matrix())
+    x, y, z = rotation(np.diag(angles_rad))
+    return np.asarray(x @ y @ z)
 
 
 def density(std: Vector, rate_hz: float) -> Vector:
