@@ -15,13 +15,13 @@ UP = np.array([0.0, 0.0, 1.0])
 # The eight ways in which the board's top can be turned, from the right anticlockwise as seen from above.
 WAYS = (
     "roll it to the right",
-    "tip it away from you and to the right",
+    "tip it away and right",
     "tip it away from you",
-    "tip it away from you and to the left",
+    "tip it away and left",
     "roll it to the left",
-    "tip it toward you and to the left",
+    "tip it toward you and left",
     "tip it toward you",
-    "tip it toward you and to the right",
+    "tip it toward you and right",
 )
 ROUND_DEG = 5.0
 # A way is kept as long as it leads so near to the wanted orientation ...
@@ -74,8 +74,11 @@ class Way:
 
     def _keep_to(self, shortest: float, missing: float, new: bool) -> None:
         """Turn the way no more than it needs to lead there."""
-        nearest = _nearest(shortest)
-        aside = _wrapped((_angle(nearest) if new else self._toward) - shortest)
+        if new:
+            # where any way will do, it is a simple one
+            simple = missing > math.pi - KEPT_RAD
+            self._toward = _angle(2 * round(shortest / (math.pi / 2.0)) if simple else _nearest(shortest))
+        aside = _wrapped(self._toward - shortest)
         if abs(aside) > math.pi / 2.0 and missing < math.pi - KEPT_RAD:
             aside = _wrapped(aside + math.pi)
         reach = math.sin(KEPT_RAD) / max(math.sin(missing), 1e-9)

@@ -15,7 +15,7 @@ from mpucal.session.way import Way
         ((0, -1, 0), "roll it to the left"),
         ((-1, 0, 0), "tip it away from you"),
         ((1, 0, 0), "tip it toward you"),
-        ((1, -1, 0), "tip it toward you and to the left"),
+        ((1, -1, 0), "tip it toward you and left"),
     ],
 )
 def test_a_turn_in_words_says_where_the_top_goes(axis, words):

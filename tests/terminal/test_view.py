@@ -40,8 +40,8 @@ def test_a_countdown_that_runs_is_the_headline(views, countdown, headline):
     [
         ("roll it to the right", "ROLL RIGHT 125"),
         ("tip it toward you", "TIP TO YOU 125"),
-        ("tip it away from you and to the left", "TIP AWAY AND LEFT 125"),
-        ("tip it toward you and to the right", "TIP TO YOU AND RIGHT 125"),
+        ("tip it away and left", "TIP AWAY AND LEFT 125"),
+        ("tip it toward you and right", "TIP TO YOU AND RIGHT 125"),
     ],
 )
 def test_the_way_is_short_in_large_letters(views, words, headline):

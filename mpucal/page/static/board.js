@@ -161,11 +161,17 @@ export class Picture {
     }
   }
 
-  text(text, at, colour, size) {
+  // `around`: a rim in that colour, where words stand on anything
+  text(text, at, colour, size, around = null) {
     this.pen.fillStyle = colour;
     this.pen.font = `800 ${size}px system-ui, sans-serif`;
     this.pen.textAlign = "center";
     this.pen.textBaseline = "middle";
+    if (around) {
+      this.pen.strokeStyle = around;
+      this.pen.lineWidth = 0.28 * size;
+      this.pen.strokeText(text, ...at);
+    }
     this.pen.fillText(text, ...at);
   }
 }
@@ -275,10 +281,11 @@ function axis(picture, [name, direction, ink], at, model, sign) {
   const i = direction.indexOf(1), out = i === 2 ? (sign < 0) === Boolean(model.rotors) ? 0.35 : 0.15 : model.half[i];
   const along = (reach) => at(direction.map((v) => sign * v * reach)), from = along(out), [x, y] = along(out + (i === 2 ? 0.5 : 0.2));
   const colour = picture.ink(ink), size = Math.max(0.2 * picture.scale, 14 * picture.pixel), [u, v] = [x - from[0], y - from[1]];
+  stroke(picture, [from, [x, y]], picture.ink("--paper"), 0.085);
   stroke(picture, [from, [x, y]], colour, 0.045);
   head(picture, from, [x, y], colour, 0.11);
   const beyond = (0.11 * picture.scale + 0.8 * size) / Math.max(Math.hypot(u, v), 1);
-  picture.text(`${sign > 0 ? "+" : "−"}${name}`, [x + u * beyond, y + v * beyond], colour, size);
+  picture.text(`${sign > 0 ? "+" : "−"}${name}`, [x + u * beyond, y + v * beyond], colour, size, picture.ink("--paper"));
 }
 
 function stroke(picture, points, colour, width) {
