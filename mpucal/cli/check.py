@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import click
 from ..data import Recording
 from ..errors import UsageError
 from ..files import load
+from ..page.address import Address
 from ..recheck import check
 from ..recheck.outcome import CheckResult
 from ..recheck.update import updated
@@ -25,12 +27,15 @@ from ..sinks.choose import chosen
 from ..sinks.record import in_file
 from ..sinks.table import SINKS
 from ..sinks.write_back import write_to_all
+from ..sources.opened import Opened
 from ..sources.opening import one_of, open_source
 from ..sources.table import kinds_meant, source_title, used_by
-from ..terminal.console import console
+from ..terminal.console import Console, console
+from ..terminal.flat import BOARD, VEHICLE
 from .destination import device
 from .loading import force_option, loaded, trusted
 from .options import check_gyroscope, check_source, given, source_options
+from .page import beside, page_options
 from .person import ask, ask_in_doubt
 from .recording_options import given_hints, hint_options, say_taken
 from .running import running
@@ -55,6 +60,7 @@ CHECK_FILE = "check.json"
 @click.option("--yes", is_flag=True, help="Ask no questions.")
 @force_option
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@page_options
 def command(
     calibration: Path,
     file: Path | None,
@@ -63,6 +69,8 @@ def command(
     yes: bool,
     force: bool,
     as_json: bool,
+    page: Address | None,
+    board: str | None,
     **options: Any,
 ) -> int:
     """Say whether CALIBRATION is still right for its sensor: still good, drifted, remounted, or another sensor.
@@ -76,33 +84,43 @@ def command(
     if (file is None) == (not kinds):
         what = "a file and a source were given together" if kinds else "nothing to check it by was given"
         raise UsageError(what, f"give a recording, or {one_of(used_by('check'))}")
+    if page is not None and file is not None:
+        raise UsageError("--page was given without a source", "a recording needs no guidance: leave --page away")
     if sinks and (folder is None or file is not None):
         raise UsageError(
             "--to was given without -o and a source", "name the folder and the source, which is written to"
         )
     of = loaded(calibration) if folder is None else trusted(calibration, force)
+    told = partial(_told, of, folder, as_json)
     if file is not None:
         recording = load(file, given_hints(options))
         say_taken(recording.taken)
-    else:
-        recording = _measured(of, folder, yes, options)
-    result = check(of, recording)
-    click.echo(json.dumps(result.document(), indent=2) if as_json else result.page())
-    if folder is not None:
-        _leave(folder, of, result, recording, as_json)
-        if sinks and result.only_biases:
-            _write_back(sinks, folder, options, yes, as_json)
-    return result.exit_code
-
-
-def _measured(of: Calibration, folder: Path | None, yes: bool, options: dict[str, Any]) -> Recording:
-    """What the person showed; its capture is kept with -o."""
+        return told(recording)[0].exit_code
     check_source(click.get_current_context())
     # a simulated chip lives in the gravity in which it was calibrated
     options = {**options, **({"gravity": of.fit["gravity"]} if of.fit.get("gravity") else {})}
     source = open_source(options, given())
     check_gyroscope(source.plan.config)
-    person = console(quiet=yes, title=source_title(options))
+    board = board or (VEHICLE if options.get("mavlink") else BOARD)
+    terminal = console(quiet=yes, title=source_title(options), board=board)
+    attended = not yes and sys.stdin.isatty() and sys.stderr.isatty()
+    with beside(terminal, page, source, options, board, attended=attended) as (person, tell):
+        result, files = told(_measured(source, folder, person))
+        tell(result.verdict, (), result.page(), files)
+        if sinks and folder is not None and result.only_biases:
+            _write_back(sinks, folder, options, yes, as_json)
+    return result.exit_code
+
+
+def _told(of: Calibration, folder: Path | None, as_json: bool, recording: Recording) -> tuple[CheckResult, list[Path]]:
+    """Check, print what was found, and leave its files."""
+    result = check(of, recording)
+    click.echo(json.dumps(result.document(), indent=2) if as_json else result.page())
+    return result, [] if folder is None else _left(folder, of, result, recording, as_json)
+
+
+def _measured(source: Opened, folder: Path | None, person: Console) -> Recording:
+    """What the person showed; its capture is kept with -o."""
     into = None if folder is None else SessionFolder(folder, source.capture_name)
     with running(source, Path(os.devnull) if into is None else into.capture, person, checking=True) as runner:
         try:
@@ -112,7 +130,7 @@ def _measured(of: Calibration, folder: Path | None, yes: bool, options: dict[str
                 into.settle(runner.sensor)
 
 
-def _leave(folder: Path, of: Calibration, result: CheckResult, recording: Recording, as_json: bool) -> None:
+def _left(folder: Path, of: Calibration, result: CheckResult, recording: Recording, as_json: bool) -> list[Path]:
     """check.json, and where only the biases moved calibration.json and calibration.bin."""
     make_folder(folder)
     files = {CHECK_FILE: (json.dumps(result.document(), indent=2) + "\n").encode()}
@@ -121,6 +139,7 @@ def _leave(folder: Path, of: Calibration, result: CheckResult, recording: Record
         files |= {BLOB.name: after.blob().encode(), DOCUMENT.name: after.json().encode()}
     save(folder, files)
     click.echo(f"\nWritten to {folder}:\n  {', '.join(files)}", err=as_json)
+    return [folder / name for name in files]
 
 
 def _write_back(sinks: tuple[str, ...], folder: Path, options: dict[str, Any], yes: bool, as_json: bool) -> None:

@@ -1,17 +1,23 @@
-"""The options of a page beside a session or a stream."""
+"""The page beside a session, a check or a stream: its options, and where it is served."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
 import click
 
-from ..page.address import HERE, address
+from ..page.address import HERE, Address, address
+from ..page.console import Tells, on_page
+from ..sources.opened import Opened
+from ..sources.table import source_title
+from ..terminal.console import Console
 from ..terminal.flat import BOARD, BOARDS
 from .options import Parsed
 
 F = TypeVar("F", bound=Callable[..., Any])
+UNPACED = "pace=fast"
 
 
 def page_options(command: F) -> F:
@@ -29,3 +35,19 @@ def page_options(command: F) -> F:
     ):
         command = option(command)
     return command
+
+
+def beside(
+    terminal: Console,
+    page: Address | None,
+    source: Opened,
+    options: Mapping[str, Any],
+    board: str,
+    keys: bool = False,
+    as_json: bool = False,
+    attended: bool = False,
+) -> AbstractContextManager[tuple[Console, Tells]]:
+    """The terminal with a page beside it, see `on_page`; a source whose time runs ahead is shown at its own pace."""
+    paced = not source.real_time and UNPACED not in str(options.get("bus"))
+    about = {"title": source_title(options), "board": board}
+    return on_page(terminal, page, about, keys, paced, as_json, attended)

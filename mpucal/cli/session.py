@@ -15,7 +15,6 @@ from ..data import Recording
 from ..errors import MpucalError, RefusedError
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
 from ..page.address import Address
-from ..page.console import on_page
 from ..result.calibration import REFUSED, Calibration
 from ..result.session_files import CAPTURE_OF_VEHICLE, LOG
 from ..session.folder import SessionFolder
@@ -33,7 +32,7 @@ from ..terminal.flat import BOARD, VEHICLE
 from ..terminal.hangup import outliving
 from .destination import device, session_sink_options
 from .options import aim_options, check_gyroscope, check_source, fit_options, given, source_options
-from .page import page_options
+from .page import beside, page_options
 from .person import ask, ask_in_doubt
 from .running import running
 from .summary import summary, written
@@ -41,7 +40,6 @@ from .summary import summary, written
 # as remedies say it
 AGAIN = "start again"
 # a simulated chip that is to run as fast as it can does so on a page, too
-UNPACED = "pace=fast"
 EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board, `mpucal session --bus sim`"
 
 
@@ -91,19 +89,17 @@ def command(
     into = SessionFolder(resume or folder, source.capture_name, again=resume is not None)
     board = board or (VEHICLE if into.capture.name == CAPTURE_OF_VEHICLE.name else BOARD)
     terminal = console(quiet=yes, as_json=json_events, beep=beep, title=title, board=board)
-    about = {"title": title, "board": board}
-    paced = not source.real_time and UNPACED not in str(options.get("bus"))
     seen = attended and sys.stderr.isatty() and not json_events
     hung_up = partial(terminal.hung_up, stop=page is None and not keep_going)
     with (
         outliving(lambda: into.path / LOG.name, hung_up),
-        on_page(terminal, page, about, page_keys, paced, json_events, seen) as (person, tell),
+        beside(terminal, page, source, options, board, page_keys, json_events, seen) as (person, tell),
     ):
         # a program that reads the events finds it in calibration.json
         announcement = "" if json_events else announced(kinds, no_write)
         recording, calibration, paths = _run(source, into, person, announcement, name)
         files = [into.capture, *paths]
-        tell(calibration, summary(calibration), files)
+        tell(calibration.verdict, calibration.quality.get("reasons", ()), summary(calibration), files)
         if not as_json:
             if not json_events:
                 click.echo(err=True)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ..errors import MpucalError
-from ..result.calibration import Calibration
 from ..session.events import Command, Decision, Key, Output, Prompt
 from ..terminal.console import Console
 from ..terminal.keys import Keys
@@ -22,9 +21,11 @@ ASK_EVERY_S = 0.1
 
 
 class Tells(Protocol):
-    """Tells the page the result: the calibration, its summary in words, and the files."""
+    """Tells the page the result: the verdict, the reasons for it, a summary in words, and the files."""
 
-    def __call__(self, calibration: Calibration, summary: str, paths: Sequence[Path]) -> None: ...  # noqa: D102
+    def __call__(  # noqa: D102
+        self, verdict: str, reasons: Sequence[Mapping[str, object]], summary: str, paths: Sequence[Path]
+    ) -> None: ...
 
 
 class Beside:
@@ -93,16 +94,12 @@ def on_page(
     OutputError : the page cannot be served there.
     """
     if where is None:
-        yield console, lambda calibration, summary, paths: None
+        yield console, lambda verdict, reasons, summary, paths: None
         return
     feed = Feed(where, about, keys)
 
-    def tell(calibration: Calibration, summary: str, paths: Sequence[Path]) -> None:
-        feed.show(
-            verdict=calibration.verdict,
-            reasons=[dict(reason) for reason in calibration.quality.get("reasons", ())],
-            summary=summary,
-        )
+    def tell(verdict: str, reasons: Sequence[Mapping[str, object]], summary: str, paths: Sequence[Path]) -> None:
+        feed.show(verdict=verdict, reasons=[dict(reason) for reason in reasons], summary=summary)
         feed.offer(paths)
 
     try:

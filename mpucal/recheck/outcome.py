@@ -103,7 +103,7 @@ class CheckResult:
         lines += [f"To do: {self.remedy}."] if self.remedy else []
         lines += ["", *(_row(name, change) for name, change in self.changes.items())] if self.changes else []
         if self.probability is not None:
-            lines += ["", f"An unchanged sensor shows as much in {100.0 * self.probability:.2g} % of checks."]
+            lines += ["", f"An unchanged sensor shows as much in {100.0 * self.probability:.3g} % of checks."]
         lines += [f"{self.orientations} orientations in {self.seconds:.0f} s."] if self.seconds else []
         return "\n".join(lines)
 

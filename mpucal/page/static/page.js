@@ -12,7 +12,13 @@ const VERDICTS = {
   good: "The calibration is good.",
   usable: "The calibration is usable.",
   refused: "The calibration was refused.",
+  "still good": "The calibration is still good.",
+  drifted: "The sensor has drifted.",
+  remounted: "The sensor was remounted.",
+  "another sensor": "It is another sensor.",
+  "cannot be told": "It cannot be told.",
 };
+const FINE = ["good", "usable", "still good"];
 const REPORT = "report.html";
 const SAVE_AT_ONCE_BYTES = 2e7;
 let state = {}, source = null, heardAt = 0, fresh = false;
@@ -94,7 +100,7 @@ function task() {
   }
   const done = state.verdict ?? (state.stopped || state.ended ? "stopped" : "");
   document.body.dataset.verdict = done;
-  const { look, share, number } = done ? { look: done === "good" || done === "usable" ? "yes" : "no", share: 1 } : dial();
+  const { look, share, number } = done ? { look: FINE.includes(done) ? "yes" : "no", share: 1 } : dial();
   document.body.dataset.look = look;
   put("headline", VERDICTS[done] ?? (done ? "Stopped" : state.headline ?? "Connecting"));
   put("prompt", done ? state.stopped ?? "" : promptWords());
@@ -307,7 +313,7 @@ function announce(words, tone = null) {
 const turnWords = () => (state.meter?.turn ? state.meter.turn.replace(" deg ", " degrees ") : "");
 
 function tellChanges(old, begins) {
-  if (state.verdict !== old.verdict && state.verdict) return announce(VERDICTS[state.verdict], state.verdict === "refused" ? "wrong" : "done");
+  if (state.verdict !== old.verdict && state.verdict) return announce(VERDICTS[state.verdict], FINE.includes(state.verdict) ? "done" : "wrong");
   if (state.stopped !== old.stopped && state.stopped) return announce(state.stopped, "wrong");
   if (state.verdict || state.stopped || state.live) return;
   if (state.held && state.held.t_s !== old.held?.t_s && !begins) {
