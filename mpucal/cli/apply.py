@@ -62,7 +62,7 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool, *
     done = f"calibrated with {calibration.name} of {ready.calibration.created or 'an unknown time'}"
     seen = _Seen()
     with (
-        nullcontext(CsvText(lambda text: sys.stdout.write(text.decode())).write)
+        nullcontext(CsvText(lambda text: sys.stdout.write(text.decode()), rows.utc_ns).write)
         if target is None
         else open_writer(target, replace(rows, noise=noise), done) as write
     ):
@@ -71,14 +71,17 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool, *
             seen.add(samples, after, magnitudes=as_json)
             write(after)
     if as_json:
-        click.echo(json.dumps({"file": str(target), "done": done, **seen.facts()}, indent=2))
+        click.echo(json.dumps({"file": str(target), "done": done, "utc_ns": rows.utc_ns, **seen.facts()}, indent=2))
     elif target is not None:
         click.echo(f"{target}: {seen.samples} samples, {done}.")
 
 
 def _remarks(rows: Rows) -> tuple[str, ...]:
     others = f"Of {rows.name} this is the first IMU; {rows.others} more are in it." if rows.others else None
-    return tuple(filter(None, (rows.recovered, others)))
+    undated = (
+        None if rows.utc_ns is not None else f"{rows.name} does not say the time of day: its times stay as they are."
+    )
+    return tuple(filter(None, (rows.recovered, others, undated)))
 
 
 class _Seen:

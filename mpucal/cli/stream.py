@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -14,7 +15,7 @@ import click
 
 from ..data import STANDARD_GRAVITY_MPS2, Samples
 from ..errors import EndOfCapture, OutputError
-from ..files.csv import CsvText
+from ..files.csv import NS, CsvText
 from ..page.address import Address
 from ..page.live import live
 from ..recheck import days_since
@@ -55,7 +56,8 @@ def command(
 ) -> None:
     """Print calibrated samples, m/s² and rad/s, until Ctrl-C or --seconds; `mpucal apply` does it to recorded ones.
 
-    Memory use is constant, so it may run for days. Timestamps are provisional; record a capture for final ones.
+    Memory use is constant, so it may run for days. Timestamps are provisional; record a capture for final ones. The
+    time of day is the computer's when the first samples were read.
     """
     check_source(click.get_current_context())
     applied = loaded(calibration)
@@ -66,7 +68,7 @@ def command(
     source = open_source({**options, "gravity": gravity}, until_end=True)
     if page is not None:
         check_gyroscope(source.plan.config)
-    write = _json_lines if as_json else CsvText(lambda text: sys.stdout.write(text.decode())).write
+    text = CsvText(lambda text: sys.stdout.write(text.decode()))
     shown = live(page, source_title(options), board or (VEHICLE if options.get("mavlink") else BOARD))
     capture = source.measuring(file or Path(os.devnull), _say, now().isoformat())
     with capture as measuring, shown as screen, suppress(KeyboardInterrupt):
@@ -74,11 +76,16 @@ def command(
         watch: Watch | None = None
         for samples in _polled(measuring.source, seconds):
             if ready is None:
+                # the newest sample was read just now
+                text.utc_ns = time.time_ns() - round(float(samples.t[-1]) * NS)
                 sensor = measuring.source.recording().sensor
                 ready = _correction(applied, measuring.source)
                 watch = Watch(ready.calibration, days_since(applied), sensor.rate_hz or RATE_HZ) if watched else None
             calibrated = ready.apply(samples)
-            write(calibrated)
+            if as_json:
+                _json_lines(calibrated, text.utc_ns or 0)
+            else:
+                text.write(calibrated)
             screen.add(samples, calibrated, sensor)
             for finding in () if watch is None else watch.add(calibrated):
                 _say(finding)
@@ -109,12 +116,14 @@ def _correction(calibration: Calibration, source: Source) -> Correction:
     return ready
 
 
-def _json_lines(samples: Samples) -> None:
+def _json_lines(samples: Samples, utc_ns: int) -> None:
     columns: list[Callable[[], Any]] = [samples.t.tolist, samples.acc.tolist, samples.gyr.tolist]
     for t, a, w, warm in zip(*(column() for column in columns), samples.temperature_c.tolist(), strict=True):
         temperature_c = warm if warm == warm else None  # noqa: PLR0124 - NaN, which JSON has not
         turning = w if w[0] == w[0] else None
-        print(json.dumps({"t": t, "a": a, "w": turning, "temperature_c": temperature_c}))
+        print(
+            json.dumps({"t": t, "a": a, "w": turning, "temperature_c": temperature_c, "utc_ns": utc_ns + round(t * NS)})
+        )
 
 
 def _say(text: str) -> None:

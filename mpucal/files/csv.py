@@ -1,4 +1,7 @@
-"""Tables of text: the columns t [s], ax, ay, az [m/s^2], gx, gy, gz [rad/s], and temperature_c where it is known."""
+"""Tables of text: the columns t [s], ax, ay, az [m/s^2], gx, gy, gz [rad/s], and temperature_c where it is known.
+
+Where the time of day is known, utc_s is t in seconds since 1970; a float64 has it to 0.2 us.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import csv
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from decimal import Decimal
 from io import StringIO
 from pathlib import Path
 from typing import IO
@@ -19,8 +23,9 @@ from ._text import lines, numbers
 from .rows import Rows, Write, cannot_read, checked
 
 COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
-TEMPERATURE = "temperature_c"
+TEMPERATURE, UTC = "temperature_c", "utc_s"
 ALL = (*COLUMNS, TEMPERATURE)
+NS = 10**9
 # some 16000 lines
 BLOCK = 1 << 21
 _REMEDY = (
@@ -41,7 +46,7 @@ def csv_rows(path: Path) -> Rows:
     """
     try:
         with path.open("rb") as file:
-            begun = file.readline()
+            begun, second = file.readline(), file.readline()
         text = begun.decode("utf-8-sig")
         # a line may end with a carriage return alone
         first = StringIO(text, newline="").readline()
@@ -56,7 +61,19 @@ def csv_rows(path: Path) -> Rows:
         raise RecordingError(f"{path}: its first line is empty", _REMEDY)
     begin = len(begun) - len(text.removeprefix(first).encode())
     table = _Table(path, begin, len(header), _places(header, path))
-    return Rows(checked(table.runs(), path.name), name=path.name)
+    return Rows(checked(table.runs(), path.name), name=path.name, utc_ns=_utc_ns(header, second))
+
+
+def _utc_ns(header: list[str], second: bytes) -> int | None:
+    """The time of day at t = 0, by the line below the header; None where there is no column of it, or no number."""
+    cells = second.decode(errors="replace").split(",")
+    if UTC not in header or len(cells) != len(header):
+        return None
+    try:
+        utc_s, t = (Decimal(cells[header.index(name)].strip()) for name in (UTC, "t"))
+        return round((utc_s - t) * NS)
+    except (ArithmeticError, ValueError):
+        return None
 
 
 def _places(header: list[str], path: Path) -> dict[str, int]:
@@ -158,24 +175,25 @@ class CsvText:
 
     Parameters
     ----------
-    put : takes the text, a run of samples at a time.
+    put : takes the text, a run of samples at a time. utc_ns : the time of day at t = 0, where it is known.
     """
 
-    def __init__(self, put: Callable[[bytes], object]) -> None:
-        self._put = put
+    def __init__(self, put: Callable[[bytes], object], utc_ns: int | None = None) -> None:
+        self._put, self.utc_ns = put, utc_ns
         self._columns: list[int] = []
 
     def write(self, samples: Samples) -> None:
         """Take a run of samples."""
-        table: Vector = np.column_stack([samples.t, samples.acc, samples.gyr, samples.temperature_c])
+        utc_s = np.full(len(samples), np.nan) if self.utc_ns is None else samples.t + self.utc_ns / NS
+        table: Vector = np.column_stack([samples.t, samples.acc, samples.gyr, samples.temperature_c, utc_s])
         if not self._columns:
             self._columns = np.flatnonzero(~np.isnan(table).all(axis=0)).tolist()
-            self._put(",".join(ALL[column] for column in self._columns).encode() + b"\n")
+            self._put(",".join((*ALL, UTC)[column] for column in self._columns).encode() + b"\n")
         self._put(lines(np.ascontiguousarray(table[:, self._columns])))
 
 
 @contextmanager
-def csv_file(path: Path, _rows: Rows, _done: str) -> Iterator[Write]:
+def csv_file(path: Path, rows: Rows, _done: str) -> Iterator[Write]:
     """A table as a file; it has no column for the flat part, gaps, clipping and the sensor. See open_writer."""
     with whole_file(path) as file:
-        yield CsvText(file.write).write
+        yield CsvText(file.write, rows.utc_ns).write

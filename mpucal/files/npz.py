@@ -16,7 +16,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from shutil import copyfileobj
 from tempfile import TemporaryFile
@@ -36,7 +36,8 @@ NEEDED = ("t", "acc", "gyr")
 TEMPERATURES = ("temperature_c", "temperature")
 MASKS = ("gap", "acc_clipped", "gyr_clipped")
 DONE = "done"
-SMALL = ("flat", "flat_samples", "sensor", DONE)
+UTC = "utc_ns"
+SMALL = ("flat", "flat_samples", "sensor", DONE, UTC)
 COPIED = 1 << 20
 # as zipfile, its decompressors and numpy put it: encrypted, of an unknown method, longer than any memory
 DAMAGED = (
@@ -59,7 +60,7 @@ def load_npz(path: Path) -> Recording:
     missing = [key for key in NEEDED if key not in arrays]
     if missing:
         raise RecordingError(f"{path} has no {', '.join(missing)}; it has {', '.join(arrays) or 'nothing'}", _REMEDY)
-    return Recording.from_arrays(
+    recording = Recording.from_arrays(
         arrays["t"],
         arrays["acc"],
         arrays["gyr"],
@@ -71,6 +72,7 @@ def load_npz(path: Path) -> Recording:
         sensor=_sensor(arrays, path),
         name=path.name,
     )
+    return replace(recording, utc_ns=_utc_ns(arrays))
 
 
 def npz_rows(path: Path) -> Rows:
@@ -86,7 +88,13 @@ def npz_rows(path: Path) -> Rows:
     done = str(small.get(DONE, ""))
     if not by_rows:
         return Rows.of(load_npz(path), done)
-    return Rows(checked(_runs(path), path.name), _sensor(small, path), _flat(small, path), name=path.name, done=done)
+    runs, sensor, flat = checked(_runs(path), path.name), _sensor(small, path), _flat(small, path)
+    return Rows(runs, sensor, flat, name=path.name, done=done, utc_ns=_utc_ns(small))
+
+
+def _utc_ns(arrays: Mapping[str, Any]) -> int | None:
+    value = np.asarray(arrays.get(UTC, np.nan))
+    return int(value) if value.shape == () and value.dtype.kind in "iu" else None
 
 
 @contextmanager
@@ -198,7 +206,8 @@ def npz_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
             count += len(samples)
 
         yield write
-        small = {"sensor": json.dumps(asdict(rows.sensor)), DONE: done}
+        small: dict[str, Any] = {"sensor": json.dumps(asdict(rows.sensor)), DONE: done}
+        small |= {} if rows.utc_ns is None else {UTC: np.int64(rows.utc_ns)}
         with zipfile.ZipFile(file, "w") as archive:
             for name, column in columns.items():
                 _join(archive, name, column, count)

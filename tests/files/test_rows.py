@@ -3,6 +3,7 @@
 import csv
 import struct
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import hypothesis.extra.numpy as hnp
@@ -387,3 +388,18 @@ def test_a_time_that_no_message_holds_is_refused(tmp_path):
     samples.t[0] = -1.0
     with pytest.raises(RecordingError, match="time"), open_writer(tmp_path / "x.mcap", Rows(iter(())), "") as write:
         write(samples)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".csv", ".mcap"])
+@pytest.mark.parametrize("utc_ns", [None, 1_718_030_736_872_695_300])
+def test_the_time_of_day_is_kept(suffix, utc_ns, tmp_path):
+    n = 40
+    made = Recording.from_arrays(np.arange(n) * 0.01 + 0.5, np.full((n, 3), 5.66), np.full((n, 3), 0.1))
+    with open_writer(tmp_path / f"a{suffix}", Rows.of(replace(made, utc_ns=utc_ns)), "") as write:
+        write(made)
+    read = open_rows(tmp_path / f"a{suffix}") if suffix != ".mcap" else load(tmp_path / f"a{suffix}")
+    if utc_ns is None:
+        assert read.utc_ns is None
+    else:
+        # an .mcap's times begin with its first sample; a float64 of seconds has 0.2 us
+        assert abs(read.utc_ns - utc_ns - (500_000_000 if suffix == ".mcap" else 0)) <= 300
