@@ -19,6 +19,7 @@ from .walks import SIGNIFICANT, Walk, walked_covariance
 SINGULAR, TINY_MPS2 = 1e-6, 1e-9
 FLOOR_MPS2 = 5e-5  # nothing is known better where a walk was taken away, drawn straight from part to part
 MOST_LOUDER = 3.0  # a change makes its parts differ as well
+MOST_UNFELT = 20.0  # times what leaving parts out says: changes reach 10, turns with a steady pull 35 to 750
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,9 @@ def claim_of(fit: Fit, gravity: float, change: Walk | None, walked: float) -> Cl
     # where parts that stayed the same differ by more than their scores' noise, a change must stand out the more
     louder = min(max(left_out.claim(), model) / scores, MOST_LOUDER)
     if change is None or not fit.converged or change.gain < SIGNIFICANT * louder**2:
+        return Claim(model, floored, left_out, None)
+    # a sensor that changed pulls the estimate along; a hand that was pulled aside while it moved does not
+    if change.error(gravity) > MOST_UNFELT * max(left_out.claim(), model):
         return Claim(model, floored, left_out, None)
     return Claim(model, floored, left_out, change, change.error(gravity))
 

@@ -109,6 +109,29 @@ class Poses:
 
 
 @dataclass(frozen=True)
+class OnAChair:
+    """Still orientations, and after each the chair is turned, which gravity does not show.
+
+    spin_rad, spin_s : least and most of a turn of the chair.
+    """
+
+    count: int = 9
+    spin_rad: tuple[float, float] = (2.0, 7.0)
+    spin_s: tuple[float, float] = (3.0, 5.0)
+
+    def course(self, step_s: float, rng: np.random.Generator) -> Course:
+        """See Motion."""
+        attitude, legs = rotation.exp(np.zeros(3)), []
+        for _ in range(self.count - 1):
+            turn = direction(rng) * rng.uniform(0.9, 2.5)
+            attitude = rotation.product(attitude, rotation.exp(turn))
+            spin = rotation.up_in_board(attitude) * rng.choice([-1.0, 1.0]) * rng.uniform(*self.spin_rad)
+            legs += [Leg(turn, 1.5, 1.0), Leg(spin, rng.uniform(*self.spin_s), 1.0)]
+            attitude = rotation.product(attitude, rotation.exp(spin))
+        return along(legs, step_s)
+
+
+@dataclass(frozen=True)
 class Continuous:
     """Turned all the time about every axis: Gaussian rates within band_hz, rms_dps an axis."""
 

@@ -16,7 +16,7 @@ from mpucal.data import STANDARD_GRAVITY_MPS2
 from .around import Carried, Coning, Elevator, Hand, Sinking, Swing, Thumps, Vibration, Walking
 from .changes import GyroMoves, Slip, Stress, Teleport, Warming, ZeroStep
 from .chip import Chip
-from .course import Arcs, Continuous, Poses, Spins
+from .course import Arcs, Continuous, OnAChair, Poses, Spins
 from .digits import Flipped, LowByteZero, SignedLow, Torn
 from .family import PLAIN, SHARP, Family
 from .faults import CrossClipped, Flicker, GyroNonlinear, Hobby, Hysteresis, Nonlinear, Ripple, SenseOfGravity, Swapped
@@ -97,6 +97,7 @@ _MOVED = (
     replace(POSES, name="vibration throughout", around=(Vibration(flat_too=True),)),
     replace(POSES, name="coning 5 Hz", around=(Coning(),), sampling=Sampling(100.0)),
     replace(POSES, name="elevator", around=(Elevator(),)),
+    replace(POSES, name="turning chair", motion=OnAChair(), hand=Hand((0.2, 0.5), passes=8)),
     replace(POSES, name="swing", around=(Swing(),)),
     replace(CONTINUOUS, name="continuous in a swing", around=(Swing(),)),
     replace(POSES, name="train", around=(Carried(),)),
