@@ -20,7 +20,7 @@ FRAME = (
 )
 WIDTHS = {"desk": 1000, "phone": 375}
 HEIGHT = 5600
-DARK = "@media (prefers-color-scheme: dark)"
+DARK = "@media screen and (prefers-color-scheme: dark)"
 
 
 def picture(browser: str, page: str, width: int, target: Path) -> None:

@@ -5,7 +5,7 @@ CSS = """
   --paper: #ffffff; --ink: #1c2024; --faint: #60646c; --line: #d9d9e0; --raised: #f5f5f8;
   --before: #b4531f; --after: #1b66b3; --x: #c3352b; --y: #18794e; --z: #1b66b3;
   --good: #18794e; --usable: #8f5f00; --refused: #b3261e; }
-@media (prefers-color-scheme: dark) { :root {
+@media screen and (prefers-color-scheme: dark) { :root {
   --paper: #111315; --ink: #edeef0; --faint: #a5abb3; --line: #363a3f; --raised: #1a1d20;
   --before: #f0a070; --after: #70b8ff; --x: #ff8f86; --y: #4cc38a; --z: #70b8ff;
   --good: #4cc38a; --usable: #e2b447; --refused: #ff8f86; } }
@@ -37,7 +37,7 @@ svg { display: block; width: 100%; height: auto; }
 .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(21rem, 100%), 1fr)); gap: 0 1.5rem; }
 details { margin: .8rem 0; } summary { cursor: pointer; font-weight: bold; }
 @page { margin: 13mm; }
-@media print { html { font-size: 9.5pt; } pre { white-space: pre-wrap; }
+@media print { :root { color-scheme: light; } html { font-size: 9.5pt; } pre { white-space: pre-wrap; }
   body { max-width: none; padding: 0; font-size: 1rem; line-height: 1.35; }
   h1, h2, h3 { break-after: avoid; } h2 { margin: 1rem 0 .3rem; } table, figure, li { break-inside: avoid; }
   th, td { padding: .1rem .9rem .1rem 0; } .pair { grid-template-columns: 1fr 1fr; } figure { margin-top: .4rem; }
