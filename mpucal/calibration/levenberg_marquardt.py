@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 DECREMENT = 1e-3  # g' H^-1 g / 2: 0.04 standard deviations from the optimum, whatever the units
 LAST = 30.0  # so near, a whole step leaves a thousandth of the decrement: nobody need look back
 MOST_ITERATIONS = 60
+# Trials since the decrement last halved: so many bring no end. Who goes down a valley without one (a turn so slow that
+# the gyroscope's noise loses gravity) halves it no more; estimates that end have halved it within 5 of them.
+MOST_IN_VAIN, HALF = 10, 0.5
 # By how much V may rise in such a step; where the decrement falls to less than this share of it, the root is near, and
 # V, which then has its minimum elsewhere, says nothing.
 FROZEN_SLACK, NEAR_A_ROOT, SLACK_NEAR_A_ROOT = 1.0, 0.1, 200.0
@@ -88,16 +91,19 @@ def minimise(
 ) -> Minimum:
     """Minimise V + prior over the first `parameters` of NAMES, those of `fixed` (keys of PLACES) excepted.
 
-    Stops where the Newton decrement g' H^-1 g / 2 falls below `until`, or after `most` iterations. With `frozen` gains
-    the gradient is not exactly that of V, and a step that brings it nearer to zero is accepted too.
+    Stops where the Newton decrement g' H^-1 g / 2 falls below `until`, after `most` iterations, or where it no longer
+    falls. With `frozen` gains the gradient is not exactly that of V, and a step that brings it nearer to zero is
+    accepted too.
     """
     free = np.ones(parameters, bool)
     for name in fixed:
         free[PLACES[name]] = False
     at, damping, iterations, converged = _At(problem, theta, parameters, prior), DAMPING, 0, False
-    while iterations < most and damping < HOPELESS:
+    least, in_vain = np.inf, 0
+    while iterations < most and damping < HOPELESS and in_vain < MOST_IN_VAIN:
         gradient, H = at.gradient[free], at.H[np.ix_(free, free)]
         decrement = at.decrement(free)
+        least, in_vain = (decrement, 0) if decrement < HALF * least else (least, in_vain + 1)
         if decrement < until:
             converged = True
             break

@@ -19,7 +19,7 @@ from .flat_segment import Flat, flat_statistics
 from .gyro_matrix import WALD_99, at_prior, wald
 from .hand import fit_hand
 from .initial_estimate import initialise
-from .levenberg_marquardt import Minimum, minimise
+from .levenberg_marquardt import MOST_ITERATIONS, Minimum, minimise
 from .likelihood import evaluate
 from .masks import mask
 from .paper import fit_paper
@@ -174,8 +174,9 @@ class _InPlace:
         return minimum, errors
 
     def minimum(self, parameters: int, near: Minimum, errors: Errors = NO_ERRORS) -> Minimum:
-        """On all samples, from where another search ended."""
-        minimum = minimise(_erring(self._problem, errors), near.theta, parameters, self._prior)
+        """On all samples, from where another search ended; a search without an end has none on all samples either."""
+        most = MOST_ITERATIONS if near.converged else 0
+        minimum = minimise(_erring(self._problem, errors), near.theta, parameters, self._prior, most=most)
         return replace(minimum, iterations=near.iterations + minimum.iterations)
 
     def as_fit(self, minimum: Minimum, errors: Errors) -> Fit:

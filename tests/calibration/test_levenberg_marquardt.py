@@ -7,10 +7,10 @@ import pytest
 
 from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.initial_estimate import initialise
-from mpucal.calibration.levenberg_marquardt import DECREMENT, _nearer, minimise
+from mpucal.calibration.levenberg_marquardt import DECREMENT, MOST_ITERATIONS, _nearer, minimise
 from mpucal.calibration.likelihood import evaluate
 from mpucal.calibration.parameters import ACCEL, PLACES
-from mpucal.calibration.prior import Prior
+from mpucal.calibration.prior import Prior, prior_of
 from mpucal.calibration.problem import Problem, Series
 from mpucal.simulated.study.scenarios import paper_scenario
 
@@ -137,3 +137,12 @@ def test_a_step_of_frozen_gains_may_raise_V_where_it_all_but_ends_at_a_root(then
             return self._decrement
 
     assert _nearer(At(risen, then), At(0.0, 10.0), np.ones(1, bool), 10.0) == accepted
+
+
+def test_a_valley_without_an_end_is_left_soon():
+    recording = paper_scenario(0, rate_hz=20, turn_s=330.0).recording
+    flat = flat_statistics(recording, recording.flat)
+    slow = Problem(Series.after(recording, flat), flat, 9.82)
+    minimum = minimise(slow, initialise(slow, flat.b_omega), ACCEL, prior_of(flat), most=1000)
+    assert not minimum.converged
+    assert minimum.iterations < MOST_ITERATIONS
