@@ -15,6 +15,8 @@ from .errors import ArraysError, RecordingError, WrongType, WrongValue
 
 # of the times of any sensor's samples: no product of them overflows
 SHORTEST_S, LONGEST_S = 1e-12, 1e18
+# of m/s^2 and rad/s: farther than any sensor reads, and squares of it stay finite
+LARGEST = 1e9
 
 Vector = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -43,7 +45,7 @@ def rows(values: ArrayLike, key: str, n: int, name: str) -> Vector:
     array = numbers(values, key, name)
     if array.shape != (n, 3):
         raise ArraysError(f"{name}: {key} has shape {array.shape}, not ({n}, 3)", "give one row of x, y, z a sample")
-    bad = ~np.isfinite(array).all(axis=1)
+    bad = ~measured(array).all(axis=1)
     if bad.any():
         raise ArraysError(
             f"{name}: {key} is not a finite number in {int(bad.sum())} of {n} samples,"
@@ -51,6 +53,11 @@ def rows(values: ArrayLike, key: str, n: int, name: str) -> Vector:
             "leave those samples out, and keep the times of the others",
         )
     return array
+
+
+def measured(values: ArrayLike) -> Mask:
+    """Which are numbers that a sensor may have read: neither infinite nor beyond LARGEST."""
+    return np.asarray(np.abs(values) <= LARGEST)
 
 
 def seconds(t: ArrayLike, name: str) -> Vector:

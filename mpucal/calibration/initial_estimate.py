@@ -78,7 +78,9 @@ def _stretches(series: Series) -> list[slice]:
 def _from_the_flat_mean(problem: Problem, theta: Theta) -> Theta:
     """The same D and b_a, with the u that the flat mean then says."""
     s = np.linalg.lstsq(theta.D, problem.flat.y - theta.b_a, rcond=None)[0]
-    return replace(theta, u=np.asarray(s / max(float(np.linalg.norm(s)), 1e-9)))
+    length = float(np.linalg.norm(s))
+    # a dead accelerometer has a D of zeros, and says of no direction
+    return replace(theta, u=np.asarray(s / length)) if length > 1e-9 else theta
 
 
 def _misfit(problem: Problem, theta: Theta) -> float:

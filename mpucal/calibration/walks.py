@@ -77,7 +77,9 @@ class Walk(NamedTuple):
 
 
 def likeliest_walk(parts: Parts, D: Vector) -> Walk | None:
-    """Of what changed most likely; None where nothing did, beyond chance."""
+    """Of what changed most likely; None where nothing did, beyond chance, or a fit that failed cannot say."""
+    if not (np.isfinite(parts.H).all() and np.isfinite(D).all()):
+        return None
     times = parts.by_time(min(TIMES, len(parts)))
     first = np.searchsorted(times, np.arange(times[-1] + 1))
     last = np.append(first[1:], len(parts)) - 1

@@ -9,6 +9,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+from ..arguments import LARGEST
 from ..data import Recording
 from ..errors import RecordingError
 from ..mavlink.dialect import pymavlink
@@ -71,7 +72,7 @@ def _fill(log: Log, path: Path) -> None:
 def _reading(message: Any) -> Reading | None:
     imu = getattr(message, "I", IMUS[message.get_type()] - 1) + 1
     acc, gyr = (message.AccX, message.AccY, message.AccZ), (message.GyrX, message.GyrY, message.GyrZ)
-    if not all(map(math.isfinite, acc + gyr)):
+    if not all(abs(v) <= LARGEST for v in acc + gyr):
         return None
     warmth = getattr(message, "T", math.nan)
     return Reading(Stream(DATAFLASH, imu), int(message.TimeUS), acc, gyr, float(warmth))

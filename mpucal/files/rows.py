@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import measured
 from ..data import Autopilot, Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
 
@@ -78,7 +79,7 @@ def checked(runs: Iterator[Samples], name: str) -> Iterator[Samples]:
     at, last = 0, -np.inf
     for samples in runs:
         for key, values in (("acc", samples.acc), ("gyr", samples.gyr), ("t", samples.t)):
-            finite = np.isfinite(values)
+            finite = np.isfinite(values) if key == "t" else measured(values)
             if not finite.all():
                 first = at + int(finite.reshape(len(samples), -1).all(axis=1).argmin())
                 raise RecordingError(

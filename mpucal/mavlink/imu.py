@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from ..arguments import LARGEST
 from ..data import STANDARD_GRAVITY_MPS2
 from .dialect import Message
 
@@ -72,7 +73,7 @@ def reading(message: Message) -> Reading | None:
 
 def _highres(m: Message) -> Reading | None:
     acc, gyr = (m.xacc, m.yacc, m.zacc), (m.xgyro, m.ygyro, m.zgyro)
-    if m.fields_updated & HIGHRES_UPDATED != HIGHRES_UPDATED or not all(map(math.isfinite, acc + gyr)):
+    if m.fields_updated & HIGHRES_UPDATED != HIGHRES_UPDATED or not all(abs(v) <= LARGEST for v in acc + gyr):
         return None
     return Reading(Stream(HIGHRES, m.id + 1), m.time_usec, acc, gyr, m.temperature)
 

@@ -22,7 +22,7 @@ from .atomic import write_atomically
 from .blob import NO_RANGE, Blob, BlobError
 from .correlation import UNCORRELATED
 from .digest import DIGEST, digest, doubt
-from .document import arguments, checked, written
+from .document import arguments, checked, tellable, written
 from .error_model import bias_mg, scale_factor_error
 from .frozen import FrozenDict
 from .keys import Fit, Quality, Verdict
@@ -196,6 +196,11 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
             omega = vectors(frames.columns(frame, frames.GYR), "gyr", "rad/s")
             new[frames.GYR] = (omega - np.nan_to_num(self.b_omega)) @ self.K.T
         return frames.replaced(frame, new)
+
+    def tellable(self) -> Calibration:
+        """The same, in which unknown is what no reader takes: of a fit that failed."""
+        arrays: dict[str, Any] = tellable(vars(self))
+        return replace(self, **arrays)
 
     def document(self) -> dict[str, Any]:
         """The content of calibration.json; NaN becomes None."""

@@ -37,6 +37,7 @@ GYROSCOPE = (
     ("b_omega_std", "b_omega_std", (3,)),
     ("noise_std", "gyro_noise_std", (3,)),
 )
+_NUMBERS = ACCELEROMETER + GYROSCOPE
 # of a number in SI units, and of a matrix near the identity
 LARGEST, WORST_CONDITION = 1e9, 1e9
 ACCELEROMETER_FORMULA = "a = inv(D) @ (y - b_a)"
@@ -120,6 +121,17 @@ def checked(document: Any) -> dict[str, Any]:
     return document
 
 
+def tellable(fields: Mapping[str, Any]) -> dict[str, Vector]:
+    """A Calibration's arrays by name, without numbers and matrices that `checked` refuses: NaN in their place."""
+    arrays = {name: np.where(np.abs(fields[name]) <= LARGEST, fields[name], np.nan) for _, name, _ in _NUMBERS}
+    return {name: array if _is_fit(name, array) else np.full_like(array, np.nan) for name, array in arrays.items()}
+
+
+def _is_fit(name: str, array: Vector) -> bool:
+    """Whether it is no matrix that must be inverted and cannot be."""
+    return name not in ("D", "K") or not np.isfinite(array).all() or bool(np.linalg.cond(array) <= WORST_CONDITION)
+
+
 def _check_numbers(document: Mapping[str, Any]) -> None:
     if np.nanmax(np.abs(np.array(document.get(KEY, ()), float)), initial=0.0) > 1.0:
         raise ValueError(f"{KEY} holds a number beyond 1")
@@ -134,8 +146,8 @@ def _check_numbers(document: Mapping[str, Any]) -> None:
             if name.endswith("_std") and name in values
         ):
             raise ValueError(f"{key} holds a standard deviation below 0")
-        for name in ("D", "K"):
-            if np.isfinite(matrix := values.get(name, np.eye(3))).all() and np.linalg.cond(matrix) > WORST_CONDITION:
+        for name, array in values.items():
+            if not _is_fit(name, array):
                 raise ValueError(f"{name} cannot be inverted")
 
 

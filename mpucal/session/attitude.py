@@ -22,6 +22,8 @@ STEP_S = 0.02
 STILL_S, MOVING_S = 0.2, 2.0
 # Until the flat rest is over, a board at rest is drawn nearer to straight by at most so much a second.
 STRAIGHTEN_RAD_S = math.radians(30.0)
+# An accelerometer that reads less falls, or is dead.
+FALLING_MPS2 = 1e-3
 # A board that lies on its component side was turned over about its x axis.
 _TURNED_OVER = np.diag([1.0, -1.0, -1.0])
 
@@ -56,7 +58,9 @@ class Attitude:
         return quaternion(self.matrix)
 
     def _step(self, window: Window, still: bool) -> None:
-        up = window.acc / max(float(np.linalg.norm(window.acc)), 1e-9)
+        force = float(np.linalg.norm(window.acc))
+        # where no direction is up, the gyroscope alone carries
+        up = self.matrix.T @ UP if force < FALLING_MPS2 else window.acc / force
         if not self._begun:
             self._begun, self.matrix = True, straight(up)
             return

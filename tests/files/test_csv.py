@@ -8,7 +8,7 @@ from mpucal.data import Recording
 from mpucal.errors import OutputError, RecordingError
 from mpucal.files import load
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
+finite = st.floats(-1e9, 1e9)
 HEADER = "t,ax,ay,az,gx,gy,gz\n"
 
 

@@ -1,0 +1,247 @@
+"""Simulated worlds that can be left at any instant: a session goes on in a forked process, where faults strike it.
+
+A world is `--bus sim`, the same chip behind the emulated bridge, or `--mavlink sim`. Whenever its time goes on,
+`Moments.reach` hears of it. There the prefix forks a child for each case whose first fault is due, and goes on itself
+without; the child gives the faults to chip, bus, line, vehicle or its own process.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from mpucal.result.error_model import MG_PER_MPS2
+from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine, Memory
+from mpucal.simulated.bridge.spoilt import SpoiltBytes
+from mpucal.simulated.chip import SimulatedBus, open_simulated
+from mpucal.simulated.chip.faults import Faults
+from mpucal.simulated.faults import OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, kinds, mishaps
+from mpucal.simulated.mishaps import Mishap, ZeroStep
+from mpucal.simulated.vehicle.line import PacketLine
+from mpucal.simulated.vehicle.transport import SimulatedTransport
+from mpucal.sources.bridge.bus import BridgeBus
+
+CHIP, BRIDGE, VEHICLE = "chip", "bridge", "vehicle"
+SERIAL = tuple(kinds(Where.SERIAL))
+# of the process and its clock, in any world
+STEP = "step"
+PROCESS = ("killed", "terminated", "interrupted", "disk_full", "deaf")
+CLOCK = ("stopped_5s", "suspended_5min")
+PAUSES_S = {"stopped_5s": 5.0, "suspended_5min": 300.0}
+SIGNALS = {"killed": signal.SIGKILL, "terminated": signal.SIGTERM, "interrupted": signal.SIGINT}
+KINDS: dict[str, tuple[str, ...]] = {
+    CHIP: (*kinds(*OF_CHIP, Where.HAND, Where.DEFECT), STEP, *CLOCK, *PROCESS),
+    BRIDGE: (*kinds(*OF_CHIP, Where.HAND), STEP, *SERIAL, *CLOCK, *PROCESS),
+    VEHICLE: (*kinds(*OF_VEHICLE), *PROCESS),
+}
+SPOILT_BYTES, WITHIN_BYTES = 40, 4000
+STEP_MG = 3.0, 300.0
+ROOM_BYTES = 400_000
+
+
+@dataclass(frozen=True)
+class Blow:
+    """A fault of KINDS at a time of the world's clock, and a number that varies it."""
+
+    name: str
+    at_s: float
+    number: int
+
+    def __str__(self) -> str:
+        return f"{self.name}@{self.at_s:g}"
+
+    def fault(self) -> Fault | None:
+        """As the simulation's own table has it."""
+        table = kinds(*OF_CHIP, *OF_VEHICLE, Where.HAND, Where.DEFECT)
+        return Fault(self.name, self.at_s if table[self.name].timed else 0.0) if self.name in table else None
+
+
+class Moments:
+    """Hears how time goes on; `due` holds who is to be called at which time [s]."""
+
+    def __init__(self) -> None:
+        self.due: list[tuple[float, Callable[[], None]]] = []
+
+    def reach(self, now_s: float) -> None:
+        """It is `now_s`."""
+        while self.due and self.due[0][0] <= now_s:
+            self.due.pop(0)[1]()
+
+    def add(self, at_s: float, call: Callable[[], None]) -> None:
+        """Call it then."""
+        self.due = sorted([*self.due, (at_s, call)], key=lambda item: item[0])
+
+
+class World:
+    """What the hooks below have opened; one a process."""
+
+    def __init__(self, kind: str) -> None:
+        self.kind, self.moments = kind, Moments()
+        self.bus: HookedBus | None = None
+        self.line: EmulatedLine | None = None
+        self.transport: HookedTransport | None = None
+
+    @contextmanager
+    def opened(self) -> Iterator[None]:
+        """Meanwhile `--bus sim` and `--mavlink sim` open this world."""
+
+        def bridged(*arguments: Any) -> Bridged:
+            return Bridged(open_simulated(*arguments), self)
+
+        with (
+            patch("mpucal.simulated.chip.SimulatedBus", lambda *a: HookedBus(self, *a)),
+            patch("mpucal.simulated.vehicle.source.SimulatedTransport", lambda v: HookedTransport(self, v)),
+            patch("mpucal.simulated.chip.source.open_simulated", bridged if self.kind == BRIDGE else open_simulated),
+        ):
+            yield
+
+    def suffer(self, blows: Sequence[Blow]) -> None:
+        """From now on these happen, each at its time."""
+        faults = _faults(blows)
+        if self.bus is not None:
+            self.bus.suffer(faults, blows[0].number)
+            self.bus._motion._mishaps = (*self.bus._motion._mishaps, *_befallen(blows))
+        else:
+            self.transport.suffer(faults)
+        for blow in blows:
+            if blow.name in (*PROCESS, *CLOCK, *SERIAL):
+                self.moments.add(blow.at_s, lambda blow=blow: self._strike(blow))
+
+    def truths(self, blows: Sequence[Blow]) -> list[tuple[np.ndarray, np.ndarray]]:
+        """(D, b_a) of the sensor as it may be called: before and after what befell it, and amid what is slow."""
+        document = self.truth()
+        D, b_a = np.array(document["D"], float), np.array(document["b_a"], float)
+        maps = []
+        for mishap in _befallen(blows):
+            times = mishap._begun_s + np.array([-1.0, 10.0, 20.0, 30.0, 1000.0])
+            maps.append([_affine(mishap, t) for t in times])
+        found = []
+        for chosen in product(*maps):
+            A, c = np.eye(3), np.zeros(3)
+            for turn, shift in chosen:
+                A, c = turn @ A, turn @ c + shift
+            found.append((D @ A, b_a + D @ c))
+        return found
+
+    def truth(self) -> dict[str, Any]:
+        """What the session writes to truth.json, but for its faults."""
+        if self.bus is not None:
+            return self.bus.truth_document() or {}
+        return self.transport._vehicle.truth_document()
+
+    def _strike(self, blow: Blow) -> None:
+        if blow.name in SIGNALS:
+            os.kill(os.getpid(), SIGNALS[blow.name])
+        elif blow.name == "disk_full":
+            fill_disk(blow.number % ROOM_BYTES)
+        elif blow.name == "deaf":
+            os.dup2(os.open("/dev/full", os.O_WRONLY), 2)
+        elif blow.name in CLOCK and self.bus is not None:
+            self.bus._clock.spend(round(PAUSES_S[blow.name] * 1e9))
+        elif blow.name in SERIAL and self.line is not None:
+            rng = np.random.default_rng(blow.number)
+            spoilt = [
+                (int(at), blow.name, int(rng.integers(1, 256))) for at in rng.integers(0, WITHIN_BYTES, SPOILT_BYTES)
+            ]
+            if rng.random() < 0.5:
+                self.line.to_host = SpoiltBytes(spoilt)
+            else:
+                self.line.to_device = SpoiltBytes([(at // 16, *rest) for at, *rest in spoilt])
+
+
+class HookedBus(SimulatedBus):
+    """The simulated bus, whose world hears of each transfer."""
+
+    def __init__(self, world: World, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self._world = world
+        world.bus = self
+
+    def _begun(self) -> int:
+        self._world.moments.reach(self._clock.now() * 1e-9)
+        return super()._begun()
+
+    def suffer(self, faults: Sequence[Fault], seed: int) -> None:
+        """They happen from now on."""
+        self._faults = Faults(faults, self._chip, self._clock, np.random.default_rng(seed)) if faults else None
+
+
+class Bridged(BridgeBus):
+    """The simulated chip behind the emulated bridge and its line."""
+
+    real_time = False
+
+    def __init__(self, chip: SimulatedBus, world: World) -> None:
+        clock = chip._clock
+        world.line = EmulatedLine(EmulatedBridge(chip, clock.now, Memory()), clock)
+        self._chip_bus = chip
+        super().__init__(world.line)
+
+    def hear(self, prompt: Any) -> None:
+        """See SimulatedBus."""
+        self._chip_bus.hear(prompt)
+
+    def truth_document(self) -> dict[str, Any] | None:
+        """See SimulatedBus."""
+        return self._chip_bus.truth_document()
+
+
+class HookedTransport(SimulatedTransport):
+    """The simulated vehicle's line, whose world hears of each look."""
+
+    def __init__(self, world: World, vehicle: Any) -> None:
+        super().__init__(vehicle)
+        self._world = world
+        world.transport = self
+
+    def receive(self, until_ns: int) -> Any:
+        """See Transport."""
+        self._world.moments.reach(self._vehicle.now_us * 1e-6)
+        return super().receive(until_ns)
+
+    def suffer(self, faults: Sequence[Fault]) -> None:
+        """They happen from now on."""
+        vehicle = self._vehicle
+        vehicle.options = replace(vehicle.options, fault=tuple(faults))
+        vehicle._schedule = Schedule(faults)
+        self._line = PacketLine(faults, vehicle.options.seed)
+
+
+def fill_disk(room: int) -> None:
+    """No file of this process can be longer than `room` bytes: its writes fail as on a full disk."""
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+
+
+def _faults(blows: Sequence[Blow]) -> list[Fault]:
+    return [fault for fault in (blow.fault() for blow in blows) if fault is not None]
+
+
+def _befallen(blows: Sequence[Blow]) -> list[Mishap]:
+    """What befalls the sensor; none of a vehicle's."""
+    return [*mishaps(_faults(blows)), *(_step(blow) for blow in blows if blow.name == STEP)]
+
+
+def _step(blow: Blow) -> ZeroStep:
+    rng = np.random.default_rng(blow.number)
+    direction = rng.normal(size=3)
+    size = np.exp(rng.uniform(*np.log(STEP_MG))) / MG_PER_MPS2
+    step = ZeroStep(direction / np.linalg.norm(direction) * size)
+    step.begin(blow.at_s)
+    return step
+
+
+def _affine(mishap: Mishap, t_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """(A, c) by which specific force s is felt as A s + c then."""
+    at = np.full(4, t_s)
+    felt, _ = mishap.felt(np.vstack((np.zeros(3), np.eye(3))), np.zeros((4, 3)), at)
+    return (felt[1:] - felt[0]).T, felt[0]
