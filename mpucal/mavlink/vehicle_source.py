@@ -15,6 +15,7 @@ from .link import Link, S
 from .log import Log
 from .parameters.names import place
 from .prearm import ARMED
+from .px4_preparation import Preparation
 from .stream import Streams
 from .stream_parameters import read_stream_parameters
 from .vehicle import Vehicle
@@ -41,6 +42,7 @@ class VehicleSource:
     link : not locked yet. rate_hz : to ask for. system : whom to lock to, where there are several.
     say : tells the person a sentence. name : what to call the recording.
     writes : the result will be written to it: then its parameters must name its sensors.
+    prepare : of a PX4, have it name its sensors, and learn no offsets meanwhile; see Preparation.
     """
 
     def __init__(
@@ -51,6 +53,7 @@ class VehicleSource:
         say: Callable[[str], None],
         name: str,
         writes: bool = False,
+        prepare: bool = False,
     ) -> None:
         self._link = link
         self._rate_hz = rate_hz
@@ -58,6 +61,7 @@ class VehicleSource:
         self._say = say
         self._name = name
         self._writes = writes
+        self._preparation = Preparation(link, say) if prepare else None
         self._log = Log(ARDUPILOT)
         self._streams: Streams | None = None
         self._stream: Stream | None = None
@@ -82,6 +86,8 @@ class VehicleSource:
         self._say(f"This is {vehicle}; what is asked and written goes there alone.")
         self._link.lock(vehicle)
         firmware = self._firmware = PX4 if vehicle.is_px4 else ARDUPILOT
+        if self._preparation is not None and firmware == PX4:
+            self._preparation.prepare()
         self._log = Log(firmware, over_reboots=True)
         self._link.subscribe(self._hear)
         parameters = read_stream_parameters(self._link, firmware)
@@ -135,7 +141,9 @@ class VehicleSource:
         return round(self._last_us * 1e3) + self._link.now_ns() - self._sampled_ns
 
     def stop(self) -> None:
-        """Nothing: the vehicle's streams are left to its other ground stations, and to the write-back."""
+        """Undo what was prepared; the streams are left to its other ground stations, and to the write-back."""
+        if self._preparation is not None:
+            self._preparation.release()
 
     def _hear(self, message: Message) -> None:
         self._log.add_other(message)
@@ -178,7 +186,8 @@ class VehicleSource:
         if self._writes:
             raise WriteBackError(
                 f"{what}, so that nothing can be written to it, and nothing was measured",
-                "let QGroundControl calibrate them once, which names them, then start again; or take --no-write",
+                "lay it level and give --prepare, by which PX4 names them and takes their offsets as it lies; or take"
+                " --no-write",
             )
         self._say(f"{what}: the result is for files only.")
 
@@ -219,7 +228,11 @@ class VehicleSource:
         if not names:
             return
         self._told = len(self._log.changed)
-        by = " (PX4 does that itself while SENS_IMU_AUTOCAL is 1; set it to 0)" if self._firmware == PX4 else ""
+        by = (
+            " (PX4 does that itself while SENS_IMU_AUTOCAL is 1; --prepare holds it at 0)"
+            if self._firmware == PX4
+            else ""
+        )
         self._say(f"{names[0]} was changed while it was measured{by}: what came before counts as far as it can.")
 
 

@@ -36,6 +36,8 @@ from .table import AUTOPILOT, OLD_PARAM, OLD_PARAMS
 FILE, FOLDERS = "{}mpucal-imu{}.bin", {ARDUPILOT: "/APM/", PX4: "/fs/microsd/"}
 CORRECTION = re.compile(r"(OFFS|SCAL)_[XYZ]$|[XYZ](OFF|SCALE)$")
 SAVE_IDS = 76
+# what ArduPilot says of sensors whose ids are not those of their calibration
+UNCALIBRATED = re.compile(r"accel\w*.* cal", re.IGNORECASE)
 
 
 @contextmanager
@@ -220,12 +222,12 @@ class AutopilotSink:
                 )
 
     def _settled(self, planned: Sequence[Change]) -> Prearm:
-        """How it would arm now; sensors that have no ids after a wipe are given theirs."""
+        """How it would arm now; sensors that have no ids after a wipe, or those of others, are given theirs."""
         now = prearm(self._link)
         if self._firmware != ARDUPILOT or now.ready:
             return now
         ids = Parameters(self._link).read([change.place.sensor_id for change in planned])
-        if all(ids.values()):
+        if all(ids.values()) and not any(map(UNCALIBRATED.search, now.complaints)):
             return now
         command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, SAVE_IDS)
         return prearm(self._link)

@@ -72,6 +72,13 @@ MICROPYTHON = Option(
 SEED = Option("seed", "Which simulated sensor and hand.", "N", whole_number(0))
 SYSTEM = Option("system", "Which vehicle, if several.", "N", whole_number(1, 255))
 SOURCE_SYSTEM = Option("source_system", "MAVLink id of mpucal itself; by default 254.", "N", whole_number(1, 255))
+PREPARE = Option(
+    "prepare",
+    "Of a PX4 that lies level: have it name its accelerometers where it names none, and learn no offsets meanwhile.",
+    "yes|no",
+    choices=("yes", "no"),
+    bare="yes",
+)
 SIGNING_KEY = Option(
     "signing_key", "MAVLink 2 key: 32 bytes, 64 hexadecimal digits, or a passphrase.", "FILE", parse=Path
 )
@@ -166,7 +173,7 @@ SOURCES = [
         forms="udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, or /dev/ttyX[:BAUD]",
         opener="mpucal.sources.vehicle:open_source",
         delivers=Delivers.SAMPLES,
-        options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY),
+        options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY, PREPARE),
         settings=(RATE,),
     ),
     SourceKind(
@@ -176,7 +183,7 @@ SOURCES = [
         forms="sim[:key=value,...] for the simulated vehicle",
         opener="mpucal.simulated.vehicle.source:open_source",
         delivers=Delivers.SAMPLES,
-        options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY),
+        options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY, PREPARE),
         settings=(RATE,),
         title="simulated vehicle",
     ),

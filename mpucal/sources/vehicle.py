@@ -12,7 +12,7 @@ from .. import __version__
 from ..chip.config import RateAlone
 from ..chip.records import LATE, SessionEvent
 from ..data import Recording
-from ..errors import CaptureError, LinkError, UsageError
+from ..errors import CaptureError, EndOfCapture, LinkError, UsageError
 from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..mavlink.link import OWN_SYSTEM, Link
 from ..mavlink.log import read_log
@@ -35,7 +35,7 @@ from .kind import Request
 from .opened import Measuring, Say
 
 SESSION, END = "session", "end"
-MPUCAL, RECORDED, SOURCE, PLAN, SYSTEM = "mpucal", "recorded", "source", "plan", "system"
+MPUCAL, RECORDED, SOURCE, PLAN, SYSTEM, PREPARE = "mpucal", "recorded", "source", "plan", "system", "prepare"
 # counts up with every change of what the source sends and believes
 SOURCE_VERSION = 2
 NOTE_IDS = 65535
@@ -49,6 +49,7 @@ class OpenedVehicle:
     transport : open. plan : what to do; of its `config` the rate matters. system : whom to lock to.
     key : to sign with, or None. listeners : hear the prompts, besides the vehicle.
     own_system : under which MAVLink id we speak. writes : whether the result will be written to it.
+    prepare : whether a PX4 is to be made ready; see Preparation.
     truth : of a simulated vehicle. replay : the same transport where it is a replay. real_time : see Opened.
 
     Attributes
@@ -73,6 +74,7 @@ class OpenedVehicle:
         real_time: bool = True,
         own_system: int = OWN_SYSTEM,
         writes: bool = False,
+        prepare: bool = False,
     ) -> None:
         self.plan = plan
         self.listeners = (self._prompt, *listeners)
@@ -86,6 +88,7 @@ class OpenedVehicle:
         self._replay = replay
         self._own_system = own_system
         self._writes = writes
+        self._prepare = prepare
 
     def talk(self, person: Talk) -> Talk:
         """See Opened."""
@@ -97,12 +100,15 @@ class OpenedVehicle:
         with closing(self._transport), TlogWriter(capture) as writer:
             link = self.link = Link(self._transport, writer.packet, self._key, self._own_system)
             notes = _Noting(link)
-            plan = {SOURCE: SOURCE_VERSION, PLAN: asdict(self.plan), SYSTEM: self._system}
+            plan = {SOURCE: SOURCE_VERSION, PLAN: asdict(self.plan), SYSTEM: self._system, PREPARE: self._prepare}
             notes.keep(SESSION, 0, {MPUCAL: __version__, RECORDED: recorded, **plan})
-            source = VehicleSource(link, self.plan.config.rate_hz, self._system, say, capture.name, self._writes)
+            rate_hz = self.plan.config.rate_hz
+            source = VehicleSource(link, rate_hz, self._system, say, capture.name, self._writes, self._prepare)
             try:
                 yield Measuring(source, notes.keep, late=self._was_late)
             finally:
+                with suppress(EndOfCapture):
+                    source.stop()
                 # until when nothing more came: a replay ends its last poll there
                 notes.keep(END, 0, {})
 
@@ -207,16 +213,21 @@ def open_source(request: Request) -> OpenedVehicle:
 
 
 class OfUs(TypedDict):
-    """Under which system id we speak, and whether the result will be written to the vehicle."""
+    """Under which system id we speak, whether the result will be written to the vehicle, and what is prepared."""
 
     own_system: int
     writes: bool
+    prepare: bool
 
 
 def said_of_us(request: Request) -> OfUs:
     """What the options say of us."""
     own = request.values.get("source_system")
-    return {"own_system": OWN_SYSTEM if own is None else int(own), "writes": bool(request.values.get("writes"))}
+    return {
+        "own_system": OWN_SYSTEM if own is None else int(own),
+        "writes": bool(request.values.get("writes")),
+        "prepare": request.values.get("prepare") == "yes",
+    }
 
 
 def signing_key(request: Request) -> bytes | None:
@@ -254,7 +265,8 @@ def open_tlog(file: Path, asked: Plan, system: int | None) -> OpenedVehicle | Op
     try:
         plan = dict(head.data[PLAN])
         made = Plan(**{**plan, "config": RateAlone(**plan["config"])})
-        return OpenedVehicle(replay, made, head.data[SYSTEM], replay=replay, recovered=tlog.recovered)
+        prepare = bool(head.data.get(PREPARE))
+        return OpenedVehicle(replay, made, head.data[SYSTEM], replay=replay, recovered=tlog.recovered, prepare=prepare)
     except (KeyError, TypeError, ValueError) as error:
         raise CaptureError(
             f"the head of {tlog.name} does not say how it was made ({error})", "use `mpucal calibrate` on it"

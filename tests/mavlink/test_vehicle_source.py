@@ -209,6 +209,37 @@ def test_a_px4_that_names_no_sensor_is_told_before_anything_is_turned(writes):
         assert "the result is for files only" in said[-1]
 
 
+def test_a_px4_that_was_prepared_names_its_sensors_and_holds_its_offsets():
+    words = ",".join(f"CAL_ACC{imu}_ID=0" for imu in range(2))
+    vehicle = SimulatedVehicle(VehicleOptions.parse(f"sim:firmware=px4,imus=2,hand=still,fault=autocal@12,{words}"))
+    said, record = [], []
+    link = Link(SimulatedTransport(vehicle), lambda t_ns, data: record.append(Record(t_ns, data)))
+    source = VehicleSource(link, 100.0, None, said.append, "test", writes=True, prepare=True)
+    source.start()
+    assert vehicle.firmware.store["SENS_IMU_AUTOCAL"] == 0
+    t = polled(source, 8)
+    assert not [text for text in said if "was changed" in text]
+    recording = source.recording()
+    assert [one.autopilot.parameters["CAL_ACC1_ID"] > 0 for one in (recording, *recording.others)] == [True, True]
+    source.stop()
+    assert vehicle.firmware.store["SENS_IMU_AUTOCAL"] == 1
+    link = Link(Replay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)
+    again = VehicleSource(link, 100.0, None, lambda text: None, "test", prepare=True)
+    again.start()
+    repeated = polled(again, 6)
+    assert repeated == t[: len(repeated)]
+
+
+@pytest.mark.parametrize(("asked_hz", "came_hz"), [(100, 100), (125, 125), (200, 250), (250, 250)])
+def test_px4_is_asked_so_that_most_arrives(asked_hz, came_hz):
+    vehicle = SimulatedVehicle(VehicleOptions.parse("sim:firmware=px4,imus=2,hand=still"))
+    source = VehicleSource(
+        Link(SimulatedTransport(vehicle), lambda t_ns, data: None), asked_hz, None, lambda text: None, "test"
+    )
+    source.start()
+    assert len(polled(source, 3)) / 3 == pytest.approx(came_hz, rel=0.05)
+
+
 @pytest.mark.parametrize("own", [254, 255])
 def test_an_ardupilot_that_hears_one_station_alone(own):
     vehicle = SimulatedVehicle(VehicleOptions.parse("sim:imus=1,MAV_OPTIONS=1"))

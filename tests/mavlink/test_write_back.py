@@ -221,8 +221,9 @@ def test_an_imu_whose_fit_was_refused_keeps_its_parameters():
     assert "IMU 2 keeps" in applied.what
 
 
-def test_sensors_without_ids_are_given_theirs():
-    vehicle, _, link = vehicle_of("ardupilot", ",INS_ACC_ID=0,INS_ACC2_ID=0")
+@pytest.mark.parametrize("ids", ["INS_ACC_ID=0,INS_ACC2_ID=0", "INS_ACC2_ID=4711"], ids=["none", "another's"])
+def test_sensors_without_ids_of_their_own_are_given_theirs(ids):
+    vehicle, _, link = vehicle_of("ardupilot", f",{ids}")
     AutopilotSink(link).write(calibration_of(vehicle))
     assert vehicle.firmware.store["INS_ACC2_ID"] != 0
     assert vehicle.firmware.complaints() == []

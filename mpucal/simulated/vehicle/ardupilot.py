@@ -24,6 +24,8 @@ OFFSET, SCALE = 0.001, 1.001
 INCONSISTENT_MPS2 = 0.75
 # of MAV_OPTIONS
 ONLY_ITS_OWN = 1
+# of MAV_CMD_PREFLIGHT_CALIBRATION
+FORCE_SAVE = 76
 
 
 def stem(imu: int) -> str:
@@ -118,10 +120,13 @@ class ArduPilot(Firmware):
         """As stored, at once."""
         return self.store.vector(stem(imu) + "OFFS_"), self.store.vector(stem(imu) + "SCAL_")
 
-    def save_ids(self) -> None:
-        """Every IMU that is there."""
+    def calibrate(self, how: float) -> bool:
+        """Take the sensors that are there for the calibrated ones."""
+        if how != FORCE_SAVE:
+            return False
         for imu in range(self.options.imus):
             self.store[stem(imu) + "_ID"] = DEVICE_IDS[imu]
+        return True
 
     def hears(self, system: int) -> bool:
         """Everybody, or with MAV_OPTIONS' bit 0 its own ground station alone."""

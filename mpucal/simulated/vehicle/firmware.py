@@ -77,8 +77,8 @@ class Firmware(ABC):
         """Why it would not arm."""
 
     @abstractmethod
-    def save_ids(self) -> None:
-        """Take the present sensors for the calibrated ones (MAV_CMD_PREFLIGHT_CALIBRATION, param5 = 76)."""
+    def calibrate(self, how: float) -> bool:
+        """MAV_CMD_PREFLIGHT_CALIBRATION with this param5; whether it does that."""
 
     def hears(self, system: int) -> bool:
         """Whether it takes messages of a ground station with this id."""

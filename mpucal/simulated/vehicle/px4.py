@@ -23,6 +23,8 @@ LEARN_GYROSCOPE, LEARN_ACCELEROMETER = 1, 2
 # below which the rate is taken for a bias
 STILL_RAD_S = 0.05
 ALL_OF_THEM = 7
+# of MAV_CMD_PREFLIGHT_CALIBRATION
+QUICK = 4
 
 
 class Px4(Firmware):
@@ -98,7 +100,10 @@ class Px4(Firmware):
         m = dialect()
         if message_id == RAW_IMU or message_id not in (HIGHRES_IMU, SYS_STATUS, *SCALED_IMUS):
             return m.MAV_RESULT_FAILED, -1
-        return m.MAV_RESULT_ACCEPTED, max(interval_us, SHORTEST_US) if interval_us > 0 else 0
+        if interval_us <= 0:
+            return m.MAV_RESULT_ACCEPTED, 0
+        # a sample that comes before its interval is over is left out: every one, or every second
+        return m.MAV_RESULT_ACCEPTED, self.tick_us if interval_us <= self.tick_us else max(interval_us, SHORTEST_US)
 
     def set(self, wanted: Parameter) -> list[Parameter | int]:
         """Echoes it; an unknown name or another type is an error."""
@@ -127,8 +132,20 @@ class Px4(Firmware):
         """As it was taken over."""
         return self._offset[imu], self._scale[imu]
 
-    def save_ids(self) -> None:
-        """Does not: each slot names its sensor."""
+    def calibrate(self, how: float) -> bool:
+        """Name each sensor, with the offset that makes it level: the quick calibration of `commander`."""
+        if how != QUICK:
+            return False
+        for imu in range(self.options.imus):
+            slot = self._slot(imu)
+            slot = imu if slot is None else slot
+            felt = self.corrected[imu, 0]
+            level = self.rotation.T @ (felt - [0.0, 0.0, -STANDARD_GRAVITY_MPS2]) + self._offset[imu]
+            self.store[f"CAL_ACC{slot}_ID"] = DEVICE_IDS[imu]
+            for axis, value in zip(AXES, level, strict=True):
+                self.store[f"CAL_ACC{slot}_{axis}OFF"] = float(value)
+        self._take_over()
+        return True
 
     def complaints(self) -> list[str]:
         """Every sensor needs a slot."""

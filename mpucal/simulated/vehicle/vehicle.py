@@ -33,7 +33,6 @@ SLOWER_WHILE_BUSY = 4
 SEQUENCE = 256
 QUADROTOR = 2
 ARMED = 128
-FORCE_SAVE = 76
 REBOOT_US = 2 * S_US
 SECOND_STATION_HZ = 4
 
@@ -212,9 +211,8 @@ class SimulatedVehicle:
         return int(dialect().MAV_RESULT_ACCEPTED)
 
     def _preflight_calibration(self, message: Message) -> int:
-        if self.firmware.armed or message.param5 != FORCE_SAVE:
+        if self.firmware.armed or not self.firmware.calibrate(message.param5):
             return int(dialect().MAV_RESULT_FAILED)
-        self.firmware.save_ids()
         return int(dialect().MAV_RESULT_ACCEPTED)
 
     def _statustext(self, message: Message) -> None:

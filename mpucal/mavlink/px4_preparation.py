@@ -1,0 +1,64 @@
+"""A PX4 made ready to be calibrated: its accelerometers named by their ids, its own learning of offsets held.
+
+What was asked for by --prepare; the parameters are those of PX4's `sensors` and `commander` modules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..errors import LinkError
+from .dialect import dialect
+from .firmwares import PX4
+from .link import Link, S
+from .parameters.client import Parameters
+from .parameters.encoding import INT32
+from .parameters.names import all_places
+from .request import command
+from .stream_parameters import read_parameters
+
+AUTOCAL = "SENS_IMU_AUTOCAL"
+# MAV_CMD_PREFLIGHT_CALIBRATION, param5: offsets from where it lies level, which also stores each sensor's id
+QUICK = 4
+NAMED_NS = 10 * S
+
+
+class Preparation:
+    """What is changed on the PX4 that `link` is locked to, for a session; `say` tells the person."""
+
+    def __init__(self, link: Link, say: Callable[[str], None]) -> None:
+        self._link, self._say = link, say
+        self._held = False
+
+    def prepare(self) -> None:
+        """Have it name its accelerometers where it names none, and switch SENS_IMU_AUTOCAL off until `release`.
+
+        Raises
+        ------
+        EndOfCapture, LinkError : see Parameters.set.
+        """
+        if not self._named():
+            self._say(f"{self._link.vehicle} names its accelerometers now: leave it level, and do not touch it.")
+            command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, QUICK)
+            end_ns = self._link.now_ns() + NAMED_NS
+            while not self._named() and self._link.now_ns() < end_ns:
+                list(self._link.messages(self._link.now_ns() + S))
+        if read_parameters(self._link, (AUTOCAL,), PX4).get(AUTOCAL):
+            Parameters(self._link).set(AUTOCAL, 0, INT32)
+            self._held = True
+            self._say(f"{AUTOCAL} is 0 for the session, and then 1 again: PX4 learns no offsets of its own meanwhile.")
+
+    def _named(self) -> bool:
+        ids = read_parameters(self._link, [where.sensor_id for where in all_places(PX4)], PX4)
+        # one that does not answer is asked for again, and judged, with the rest
+        return not ids or any(ids.values())
+
+    def release(self) -> None:
+        """Switch it on again where `prepare` switched it off; a vehicle that is gone is left, and that is said."""
+        if not self._held:
+            return
+        self._held = False
+        try:
+            Parameters(self._link).set(AUTOCAL, 1, INT32)
+        except LinkError:
+            self._say(f"{AUTOCAL} could not be set back: set it to 1 with your ground station.")
