@@ -57,7 +57,7 @@ def c_matrix(matrix: Vector) -> str:
 
 def py_matrix(matrix: Vector) -> str:
     """The rows of a Python list."""
-    return ",\n".join(f"    [{_joined(f'{v:.8f}' for v in row)}]" for row in matrix)
+    return ",\n".join(f"    [{_joined(f'{v:.12g}' for v in row)}]" for row in matrix)
 
 
 def temperatures(c: Calibration) -> tuple[float, float, float]:
@@ -73,7 +73,7 @@ def in_python(c: Calibration) -> str:
     at, start, end = temperatures(c)
     return f"""import numpy as np
 
-{_matrices(c)}B_A_SLOPE = np.array([{_joined(f"{v:.8f}" for v in c.b_a_slope)}])  # m/s^2 per degree Celsius
+{_matrices(c)}B_A_SLOPE = np.array([{_joined(f"{v:.12g}" for v in c.b_a_slope)}])  # m/s^2 per degree Celsius
 AT_C, RANGE_C = {at:.6g}, ({start:.6g}, {end:.6g})
 
 
@@ -116,7 +116,7 @@ if __name__ == "__main__":
 
 def _matrices(c: Calibration) -> str:
     rows = py_matrix(c.inverse)
-    bias = _joined(f"{v:.8f}" for v in c.b_a_to_subtract)
+    bias = _joined(f"{v:.12g}" for v in c.b_a_to_subtract)
     return f"INV_D = np.array([\n{rows},\n])\nB_A = np.array([{bias}])  # m/s^2\n"
 
 

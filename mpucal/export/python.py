@@ -13,7 +13,7 @@ from .losses import head
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
     """The module's text, with `notes` in its head."""
-    b_omega = ", ".join(f"{value:.8f}" for value in np.nan_to_num(calibration.b_omega))
+    b_omega = ", ".join(f"{value:.12g}" for value in np.nan_to_num(calibration.b_omega))
     return f'''"""{head(calibration)}, rad/s.{"".join(f"{chr(10)}{chr(10)}{note}" for note in notes)}
 """
 
