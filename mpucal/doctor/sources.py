@@ -23,6 +23,12 @@ def examine_spi_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
         yield from examine(source.bus, source.plan.config, seconds, lambda _bus: ())
 
 
+def examine_usb_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
+    """A chip on a USB adapter, whose bus the kernel does not know; see examine."""
+    with closing(source.bus):
+        yield from examine(source.bus, source.plan.config, seconds, lambda _bus: ())
+
+
 def examine_bridge_and_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
     """A bridge's firmware, its serial line, and the chip behind it; see examine."""
     with closing(source.bus):

@@ -1,0 +1,144 @@
+"""A chip on USB adapters: both libraries themselves, over USB layers of ours."""
+
+from __future__ import annotations
+
+import sys
+import time
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from mpucal.__main__ import run
+from mpucal.chip import registers as reg
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.doctor.finding import Finding, Mark
+from mpucal.errors import BusError, NoAnswer
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip.clock import FastClock
+from mpucal.sources import usb_i2c
+from mpucal.sources.usb_i2c import Ftdi, Mcp2221, UsbBus, adapters
+
+pytest.importorskip("pyftdi")
+pytest.importorskip("EasyMCP2221")
+SPELLED = {"ftdi": "ftdi://ftdi:232h/1", "mcp2221": "mcp2221"}
+
+
+class HostClock(FastClock):
+    """The host's, since the chip was made."""
+
+    def __init__(self):
+        super().__init__()
+        self._begun_ns = time.monotonic_ns()
+
+    def now(self):
+        return time.monotonic_ns() - self._begun_ns
+
+    def spend(self, ns):
+        """The adapter has spent it already."""
+
+
+@pytest.fixture
+def chip():
+    return open_simulated("sim:seed=1,hand=still", clock=HostClock())
+
+
+@pytest.fixture
+def plugged(chip, monkeypatch):
+    """Both adapters are plugged in, with one chip between them."""
+    from pyftdi.usbtools import UsbTools
+
+    ftdi = _beside("ftdi_device")
+    backend = ModuleType("an_ft232h")
+    backend.get_backend = lambda: ftdi.Backend(chip)
+    monkeypatch.setitem(sys.modules, "an_ft232h", backend)
+    monkeypatch.setattr(UsbTools, "BACKENDS", ("an_ft232h",))
+    UsbTools.flush_cache()
+    UsbTools.UsbApi = None
+    hid = _beside("mcp2221_device").Hid(chip)
+    monkeypatch.setattr("EasyMCP2221.MCP2221.hid", hid)
+    monkeypatch.setitem(sys.modules, "hid", hid)
+    yield chip
+    UsbTools.release_all_devices()
+    UsbTools.flush_cache()
+    UsbTools.UsbApi = None
+
+
+def _beside(name):
+    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(params=[("ftdi", Ftdi), ("mcp2221", Mcp2221)], ids=["ftdi", "mcp2221"])
+def adapter(request, plugged):
+    return SPELLED[request.param[0]], request.param[1]
+
+
+def test_registers_go_both_ways(adapter):
+    bus = UsbBus(*adapter)
+    assert (bus.address, bus.read(reg.WHO_AM_I, 1).data) == (0x68, b"\x68")
+    bus.write(reg.PWR_MGMT_1, b"\x01\x00")
+    bus.write(reg.SMPLRT_DIV, b"\x07\x03\x08\x10")
+    assert bus.read(reg.SMPLRT_DIV, 4).data == b"\x07\x03\x08\x10"
+    # more than a report of the one, and than a block of the other
+    assert len(bus.read(reg.SMPLRT_DIV, 90).data) == 90
+    bus.close()
+
+
+def test_an_address_where_nothing_is_is_told(adapter):
+    with pytest.raises(NoAnswer, match=r"0x69"):
+        UsbBus(*adapter, 0x69)
+    bus = UsbBus(*adapter)
+    assert bus.read(reg.WHO_AM_I, 1).data == b"\x68"
+    bus.close()
+
+
+def test_the_driver_samples_over_it(adapter):
+    bus = UsbBus(*adapter)
+    driver = Driver(bus, Config(rate_hz=100))
+    driver.start()
+    end = time.monotonic() + 1.0
+    while time.monotonic() < end:
+        driver.poll()
+    recording = driver.recording()
+    assert len(recording) > 50
+    driver.stop()
+    bus.close()
+
+
+def test_what_is_plugged_in_is_listed(plugged):
+    assert [spelled for spelled, _ in adapters()] == ["ftdi://ftdi:ft232h:FT232H/1", "mcp2221"]
+
+
+def test_none_is_listed_where_none_is(monkeypatch):
+    monkeypatch.setattr(usb_i2c, "find_spec", lambda _name: None)
+    assert adapters() == []
+
+
+@pytest.mark.parametrize("name", SPELLED)
+def test_the_doctor_lists_adapters_and_examines_the_chip(name, plugged, capsys, monkeypatch):
+    def examine(bus, *_):
+        yield Finding("chip", Mark.OK, f"0x{bus.read(reg.WHO_AM_I, 1).data.hex()}", "", {})
+
+    monkeypatch.setattr("mpucal.doctor.sources.examine", examine)
+    assert run(["doctor", "--bus", SPELLED[name]]) == 0
+    said = capsys.readouterr().out
+    assert all(text in said for text in ("--bus ftdi://ftdi:ft232h:FT232H/1", "--bus mcp2221", "0x68"))
+
+
+@pytest.mark.parametrize("name", ["ftdi://ftdi:2232h/1", "mcp2221:none"])
+def test_an_adapter_that_is_not_there_is_told(name, plugged):
+    kind = Ftdi if name.startswith("ftdi") else Mcp2221
+    with pytest.raises(BusError, match=r"the USB adapter .* cannot be opened"):
+        UsbBus(name, kind)
+
+
+@pytest.mark.parametrize("name", SPELLED)
+def test_a_missing_library_is_named(name, monkeypatch, capsys):
+    monkeypatch.setattr(usb_i2c, "find_spec", lambda _name: None)
+    assert run(["show", "--bus", SPELLED[name]]) == BusError.exit_code
+    assert "pip install mpucal[usb]" in capsys.readouterr().err
