@@ -106,14 +106,15 @@ def added():
 def test_kinds_of_source_share_an_option(added):
     """One is meant by a word of its value, another by an option beside it; whatever the order of the rows."""
     beside = Option("pins")
-    by_word = replace(SOURCES[0], what="an adapter", word="ftdi", forms="ftdi://... for an adapter")
-    by_option = replace(SOURCES[2], what="a board without firmware", options=(beside,), beside="pins")
+    by_word = replace(SOURCES[0], what="an adapter", word="ch347", forms="ch347:... for an adapter")
+    serial = next(kind for kind in SOURCES if kind.option.name == "serial")
+    by_option = replace(serial, what="a board without firmware", options=(beside,), beside="pins")
     added(by_word)
     added(by_option)
-    assert kinds_meant({"bus": "ftdi://1", "pins": None}) == [by_word]
+    assert kinds_meant({"bus": "ch347:1", "pins": None}) == [by_word]
     assert kinds_meant({"bus": "/dev/i2c-1", "pins": None}) == [SOURCES[0]]
     assert kinds_meant({"serial": "x", "pins": "4,5"}) == [by_option]
-    assert kinds_meant({"serial": "x", "pins": None}) == [SOURCES[2]]
+    assert kinds_meant({"serial": "x", "pins": None}) == [serial]
     assert by_option.spelled == "--serial --pins"
     with pytest.raises(UsageError, match="--pins was given beside --bus ftdi, which has none"):
         check_source({"bus": "ftdi://1", "pins": "4,5"}, {"pins": "--pins"}, "session")
