@@ -18,7 +18,6 @@ from .walks import SIGNIFICANT, Walk, walked_covariance
 
 SINGULAR, TINY_MPS2 = 1e-6, 1e-9
 FLOOR_MPS2 = 5e-5  # nothing is known better where a walk was taken away, drawn straight from part to part
-MOST_LOUDER = 3.0  # a change makes its parts differ as well
 MOST_UNFELT = 20.0  # times what leaving parts out says: changes reach 10, turns with a steady pull 35 to 750
 
 
@@ -61,15 +60,12 @@ def claim_of(fit: Fit, gravity: float, change: Walk | None, walked: float) -> Cl
     if fit.parts is None or not np.isfinite(fit.covariance).all() or abs(np.linalg.det(fit.D)) < SINGULAR:
         return None
     rms = partial(_rms, fit.D, gravity=gravity)
-    model, scores = rms(fit.covariance), rms(inverse(fit.parts.H))
-    floored = model
+    model = floored = rms(fit.covariance)
     if walked:
-        wider = max(1.0, rms(walked_covariance(fit.parts, fit.D, walked)) / scores)
+        wider = max(1.0, rms(walked_covariance(fit.parts, fit.D, walked)) / rms(inverse(fit.parts.H)))
         floored = float(np.hypot(wider * model, FLOOR_MPS2))
     left_out = jackknife(fit.parts, fit.D, gravity)
-    # where parts that stayed the same differ by more than their scores' noise, a change must stand out the more
-    louder = min(max(left_out.claim(), model) / scores, MOST_LOUDER)
-    if change is None or not fit.converged or change.gain < SIGNIFICANT * louder**2:
+    if change is None or not fit.converged or change.alone < SIGNIFICANT:
         return Claim(model, floored, left_out, None)
     # a sensor that changed pulls the estimate along; a hand that was pulled aside while it moved does not
     if change.error(gravity) > MOST_UNFELT * max(left_out.claim(), model):

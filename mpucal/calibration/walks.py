@@ -9,6 +9,10 @@ To second order all that is needed are the parts' scores. With theta eliminated 
 quadratic form is S + I/q, and by the eigenvalues of S the marginal likelihood of every q is a sum:
 
     2 log p(q)/p(0) = sum c^2 / (lambda + 1/q) - log(1 + q lambda)
+
+Where nothing changed, c^2 / lambda is 1 on average for each eigenvector. A change is in few of them, those that are
+slow; where parts differ by what no model holds (a pivot that swings), all are larger. So what nothing but a change
+explains is the gain with c^2 over the median of them all.
 """
 
 from __future__ import annotations
@@ -37,6 +41,8 @@ STEPS: dict[What, Vector] = {
 }
 # twice the logarithm of how much likelier a walk must be than none; sensors that stayed reach 10
 SIGNIFICANT = 20.0
+# the median of the square of a normal variable; an eigenvector of less than so much of the largest is not seen
+MEDIAN_SQUARE, UNSEEN = 0.455, 1e-9
 
 
 class Walk(NamedTuple):
@@ -45,12 +51,14 @@ class Walk(NamedTuple):
     Attributes
     ----------
     what : changed. gain : 2 log of how much likelier it is than none. q : variance of a step from part to part.
+    alone : the gain where all eigenvectors are taken to be as loud as their median is.
     delta : (k, 3) from the estimate, m/s^2, rad/s or rad. t : (k,) s after the flat segment, the middles of the parts;
     of sides none.
     """
 
     what: What
     gain: float
+    alone: float
     q: float
     delta: Vector
     t: Vector
@@ -139,7 +147,11 @@ def _walk(what: What, parts: Parts, D: Vector, gradient: Vector, fisher: Vector,
     eigenvalues = np.maximum(eigenvalues, 0.0)
     c = U.T @ (sums.T @ (follow @ parts.left - (gradient @ B).ravel()))
     q = STEPS[what][:, None]
-    gain = np.sum(c**2 / (eigenvalues + 1.0 / q) - np.log1p(q * eigenvalues), axis=1)
+    seen = eigenvalues > UNSEEN * eigenvalues[-1]
+    loud = max(float(np.median(c[seen] ** 2 / eigenvalues[seen])) / MEDIAN_SQUARE, 1.0)
+    gain, alone = (
+        np.sum(square / (eigenvalues + 1.0 / q) - np.log1p(q * eigenvalues), axis=1) for square in (c**2, c**2 / loud)
+    )
     best = int(gain.argmax())
     delta = (sums @ (U @ (c / (eigenvalues + 1.0 / q[best])))).reshape(k, 3)
-    return Walk(what, float(gain[best]), float(q[best, 0]), delta, t)
+    return Walk(what, float(gain[best]), float(alone.max()), float(q[best, 0]), delta, t)

@@ -19,7 +19,7 @@ def walk_of(recording):
     return likeliest_walk(evidence.fit.parts, evidence.fit.D)
 
 
-@pytest.mark.parametrize("motion", ["continuous", "wobble30", "pose12", "calm jerks"])
+@pytest.mark.parametrize("motion", ["continuous", "wobble30", "wobble100", "pose12", "calm jerks"])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_sensor_that_stays_the_same_does_not_walk(hand, motion, seed):
     evidence, _ = weigh(hand(seed, motion).recording, "auto", G)
@@ -86,5 +86,5 @@ def test_the_likelihood_is_that_of_the_joint_gaussian():
 
 
 def test_a_walk_is_drawn_straight_from_where_the_turning_begins():
-    walk = Walk("gyroscope", 30.0, 1e-8, np.array([[0.0, 0.0, 0.2], [0.0, 0.0, 0.4]]), np.array([1.0, 3.0]))
+    walk = Walk("gyroscope", 30.0, 30.0, 1e-8, np.array([[0.0, 0.0, 0.2], [0.0, 0.0, 0.4]]), np.array([1.0, 3.0]))
     np.testing.assert_allclose(walk.at(np.array([0.0, 0.5, 1.0, 2.0, 9.0]))[:, 2], [0.0, 0.1, 0.2, 0.3, 0.4])
