@@ -65,7 +65,8 @@ def claim_of(fit: Fit, gravity: float, change: Walk | None, walked: float) -> Cl
         wider = max(1.0, rms(walked_covariance(fit.parts, fit.D, walked)) / rms(inverse(fit.parts.H)))
         floored = float(np.hypot(wider * model, FLOOR_MPS2))
     left_out = jackknife(fit.parts, fit.D, gravity)
-    if change is None or not fit.converged or change.alone < SIGNIFICANT:
+    # a model that knows no hand leaves the hand's motion in every part, and its estimate is off by that
+    if change is None or not fit.converged or (change.alone if "tau" in fit.names else change.gain) < SIGNIFICANT:
         return Claim(model, floored, left_out, None)
     # a sensor that changed pulls the estimate along; a hand that was pulled aside while it moved does not
     if change.error(gravity) > MOST_UNFELT * max(left_out.claim(), model):
