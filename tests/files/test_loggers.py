@@ -118,6 +118,14 @@ def test_lines_that_name_each_number(ending, walk, assert_same, tmp_path):
     assert_same(load(path), walk, 1e-9, 1e-9, 1e-9)
 
 
+@pytest.mark.parametrize("text", ["a" * 60_000, "a_" * 30_000, "ab " * 20_000, "ax:" * 20_000, "ax:1 " * 12_000])
+def test_a_long_line_of_letters_is_no_table(text, tmp_path):
+    """At once: the time that a pattern takes must not grow with the square of a line's length."""
+    (tmp_path / "walk.txt").write_text(text)
+    with pytest.raises(RecordingError, match="names no columns of an accelerometer"):
+        load(tmp_path / "walk.txt")
+
+
 def test_the_serial_monitors_times_before_the_lines_of_a_table(walk, assert_same, tmp_path):
     lines = made(walk, walk.t).to_csv(index=False).splitlines()
     (tmp_path / "walk.csv").write_text("\n".join(f"12:34:56.789 -> {line}" for line in lines))

@@ -7,8 +7,12 @@ import re
 from .names import ACC, GYR, column_named, columns_of, three
 from .text import PREAMBLE, TextTable
 
-# a name of one or two words, `:` or `=`, and a number
-_PAIR = re.compile(r"((?:[A-Za-z_]+[ _])?[A-Za-z_]\w*)\s?[:=]\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?![\w:])")
+# a name of one or two words, `:` or `=`, and a number; bounded, so that a long line of letters takes no long time
+_NAME, _NUMBER = (
+    r"(?<!\w)((?:[A-Za-z]{1,20} )?[A-Za-z_]\w{0,40})",
+    r"([-+]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[eE][-+]?\d{1,3})?)",
+)
+_PAIR = re.compile(rf"{_NAME}\s?[:=][ \t]{{0,9}}{_NUMBER}(?![\w:])")
 
 
 def labelled_table(text: str, name: str) -> TextTable | None:

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from ...data import Recording
 from ...errors import RecordingError
+from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from ..hints import NO_HINTS, Hints
 from ..rows import cannot_read
 from .apps import is_about, said
@@ -40,8 +41,9 @@ MOST_BYTES = 1 << 30
 
 
 def is_folder_of_tables(path: Path) -> bool:
-    """Whether a folder holds a table of an accelerometer and one of a gyroscope."""
-    return _has_both(child.name for child in path.iterdir())
+    """Whether a folder holds a table of an accelerometer and one of a gyroscope, and no session."""
+    names = {child.name for child in path.iterdir()}
+    return _has_both(names) and not names & {CAPTURE.name, CAPTURE_OF_VEHICLE.name}
 
 
 def is_archive_of_tables(path: Path) -> bool:
@@ -140,7 +142,7 @@ def _stream(name: str, data: bytes, quantity: str) -> Stream:
     text = text_of(data, name)
     table = table_of(text, name) or table_of(text, name, bare=True)
     if table is None or not table.rows:
-        raise RecordingError(f"{name} names no columns x, y and z", "export the recording again")
+        raise RecordingError(f"{name} names no columns x, y and z", "name its columns in its first line: time, x, y, z")
     columns = table.columns
     of = three(columns, quantity) or _bare(table, quantity)
     if not of:
