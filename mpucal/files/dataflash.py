@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import struct
 from contextlib import closing, redirect_stderr, redirect_stdout, suppress
 from io import StringIO
 from pathlib import Path
@@ -22,8 +21,6 @@ PARAMETER = "PARM"
 # before ArduPilot 4.0 each IMU had a message of its own; since then `I` counts them from 0
 IMUS = {"IMU": 1, "IMU2": 2, "IMU3": 3}
 US = 1_000
-
-_DAMAGE = (ValueError, TypeError, KeyError, IndexError, AttributeError, OSError, ZeroDivisionError, struct.error)
 
 
 def is_dataflash(path: Path) -> bool:
@@ -59,7 +56,8 @@ def load_dataflash(path: Path) -> Recording:
 def _fill(log: Log, path: Path) -> None:
     """Take the IMU and parameter messages, up to where the file is damaged."""
     DFReader = pymavlink("DFReader")
-    with suppress(*_DAMAGE), closing(DFReader.DFReader_binary(str(path))) as reader:
+    # pymavlink raises plain Exceptions, too
+    with suppress(Exception), closing(DFReader.DFReader_binary(str(path))) as reader:
         while (message := reader.recv_match(type=[PARAMETER, *IMUS])) is not None:
             if message.get_type() == PARAMETER:
                 log.parameter(str(message.Name), float(message.Value))

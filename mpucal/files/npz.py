@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import lzma
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -42,7 +43,7 @@ COPIED = 1 << 20
 # as zipfile, its decompressors and numpy put it: encrypted, of an unknown method, longer than any memory
 DAMAGED = (
     *(ValueError, TypeError, AttributeError, ArithmeticError, LookupError, EOFError, RuntimeError, MemoryError),
-    *(SyntaxError, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
+    *(SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
 )
 _REMEDY = "give an .npz with t [s] (n,), acc [m/s^2] (n, 3) and gyr [rad/s] (n, 3)"
 
