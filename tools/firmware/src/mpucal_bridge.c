@@ -76,7 +76,7 @@ static uint8_t on_burst(struct mpucal_bridge *bridge, struct mpucal_request requ
     uint8_t *body = bridge->out + BODY_AT;
     for (;;) {
         uint16_t left = (uint16_t)(count - offset);
-        uint8_t piece = left < MPUCAL_MAX_READ ? (uint8_t)left : MPUCAL_MAX_READ;
+        uint8_t piece = (uint8_t)(left < MPUCAL_MAX_READ ? left : MPUCAL_MAX_READ);
         reply->t_us = bridge->port->now_us();
         reply->code = bridge->port->read_registers(bridge->address, request.payload[0], body + 2, piece);
         reply->body_size = (uint8_t)(2 + piece);
