@@ -20,6 +20,8 @@ from .windows import Window, Windows
 STEP_S = 0.02
 # Gravity corrects the tilt with this time constant: at rest, and among the hand's accelerations.
 STILL_S, MOVING_S = 0.2, 2.0
+# ... by at most so much a second: before there was a rest, a turning board may have been taken for one at rest.
+CORRECT_RAD_S = math.radians(60.0)
 # Until the flat rest is over, a board at rest is drawn nearer to straight by at most so much a second.
 STRAIGHTEN_RAD_S = math.radians(30.0)
 # An accelerometer that reads less falls, or is dead.
@@ -67,7 +69,9 @@ class Attitude:
         seconds = window.end_s - window.start_s
         self.matrix = self.matrix @ rotation((window.gyr - self._bias_rad_s) * seconds)
         share = 1.0 - math.exp(-seconds / (STILL_S if still else MOVING_S))
-        self.matrix = rotation(share * shortest_turn(self.matrix @ up, UP)) @ self.matrix
+        missing = shortest_turn(self.matrix @ up, UP)
+        most = CORRECT_RAD_S * seconds / max(float(np.linalg.norm(missing)), 1e-9)
+        self.matrix = rotation(min(share, most) * missing) @ self.matrix
         if still and not self._levelled:
             most, askew = STRAIGHTEN_RAD_S * seconds, heading(straight(self.matrix[2]), self.matrix)
             self.matrix = rotation(UP * min(max(askew, -most), most)) @ self.matrix

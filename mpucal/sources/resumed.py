@@ -13,7 +13,7 @@ from ..chip.records import KEY, LATE
 from ..errors import UsageError
 from ..files.folder import captures_in
 from ..files.mcap import CaptureWriter, read_capture
-from ..result.session_files import CAPTURE
+from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from ..session.events import Key, Output, Prompt
 from ..session.plan import Plan
 from ..session.ports import Talk
@@ -124,6 +124,9 @@ def open_resumed(folder: Path) -> ResumedChip:
     UsageError : there is no session, or its source cannot be opened again. CaptureError : a damaged head.
     """
     files = captures_in(folder)
+    if (folder / CAPTURE_OF_VEHICLE.name).exists():
+        remedy = f"`mpucal calibrate {folder}` takes what there is of it; or start again"
+        raise UsageError(f"the session in {folder} is a vehicle's, which cannot be resumed", remedy)
     if not files:
         raise UsageError(f"{folder} holds no session that could be resumed", "give the folder of an interrupted one")
     captures = [read_capture(file) for file in files]

@@ -101,6 +101,13 @@ def test_what_cannot_be_resumed_says_so(mpucal, words, sentence):
     assert sentence in result.err
 
 
+def test_a_vehicle_cannot_be_resumed(mpucal, tmp_path):
+    (tmp_path / "capture.tlog").touch()
+    result = mpucal("session", "--resume", str(tmp_path))
+    assert result.code == 2
+    assert "is a vehicle's, which cannot be resumed" in result.err
+
+
 def test_a_capture_without_a_source_cannot_be_resumed(mpucal, tmp_path):
     capture = read_capture(STORED)
     (tmp_path / "old").mkdir()
