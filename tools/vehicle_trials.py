@@ -64,6 +64,7 @@ class Trial:
 
 
 UDP = "udp:127.0.0.1:{}"
+FRESH = ("firmware=px4", "CAL_ACC0_ID=0", "CAL_ACC1_ID=0")
 TRIALS = (
     Trial("ardupilot udp", UDP),
     Trial("px4 udp", UDP, ("firmware=px4",)),
@@ -81,6 +82,8 @@ TRIALS = (
     Trial("px4 udp, silent before it is turned", UDP, ("firmware=px4", "fault=silence@8"), (), (), 3, None, "nothing"),
     Trial("ardupilot udp, a parameter refused", UDP, ("refuse=INS_ACC2SCAL_Y",), code=6, says="are back"),
     Trial("px4 udp, a parameter refused", UDP, ("firmware=px4", "refuse=CAL_ACC1_YSCALE"), code=6, says="are back"),
+    Trial("px4 udp, fresh from the factory", UDP, FRESH, code=6, says="nothing was measured"),
+    Trial("px4 udp, fresh and prepared", UDP, FRESH, (), ("--prepare",), says="names its accelerometers now"),
     Trial("two vehicles", UDP, (), ("--vehicles", "2"), (), 2, None, "choose one with --system N"),
     Trial("the second of two vehicles", UDP, (), ("--vehicles", "2"), ("--system", "2"), 0, 2),
     Trial("a vehicle that signs, no key", UDP, (), ("--signing-key", "KEY"), (), 3, None, "--signing-key"),

@@ -185,7 +185,7 @@ class AutopilotSink:
         now = applied(calibration, [change.imu for change in planned])
         with self._stored(now, planned) as paths:
             writer.write(old, new, lambda: verify(planned, old, rest, stillness.wait()))
-        after = self._settled(planned)
+        after = self._settled()
         said = [*self._said(planned, before, after), *_kept(possible, planned, left_out(calibration)), *self._saves()]
         return Applied(now, "; ".join([*said, *paths]))
 
@@ -221,13 +221,13 @@ class AutopilotSink:
                     "connect the vehicle that was calibrated, or calibrate this one",
                 )
 
-    def _settled(self, planned: Sequence[Change]) -> Prearm:
-        """How it would arm now; sensors that have no ids after a wipe, or those of others, are given theirs."""
+    def _settled(self) -> Prearm:
+        """How it would arm now; an ArduPilot whose saved ids are none or others' saves those of its sensors.
+
+        It shows its sensors' ids all the same: AP_InertialSensor::register_accel sets them, and does not save them.
+        """
         now = prearm(self._link)
-        if self._firmware != ARDUPILOT or now.ready:
-            return now
-        ids = Parameters(self._link).read([change.place.sensor_id for change in planned])
-        if all(ids.values()) and not any(map(UNCALIBRATED.search, now.complaints)):
+        if self._firmware != ARDUPILOT or not any(map(UNCALIBRATED.search, now.complaints)):
             return now
         command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, SAVE_IDS)
         return prearm(self._link)

@@ -43,6 +43,7 @@ class ArduPilot(Firmware):
 
     def __init__(self, options: VehicleOptions) -> None:
         super().__init__(options)
+        self._saved_ids: list[int] = []
         store = self.store
         store.add("SYSID_THISMAV", options.system, INT16)
         store.add("MAV_OPTIONS", 0, INT16)
@@ -62,7 +63,11 @@ class ArduPilot(Firmware):
             store.add("INS_USE" + (str(imu + 1) if imu else ""), 1, INT8)
 
     def start(self) -> None:
-        """Filters begin anew."""
+        """Filters begin anew; each sensor shows its own id, whichever was saved."""
+        if not self._saved_ids:
+            self._saved_ids = [int(self.store[stem(imu) + "_ID"]) for imu in range(self.options.imus)]
+        for imu in range(self.options.imus):
+            self.store[stem(imu) + "_ID"] = DEVICE_IDS[imu]
         cutoffs = (float(self.store["INS_ACCEL_FILTER"]), float(self.store["INS_GYRO_FILTER"]))
         self._low_pass = LowPass(cutoffs, LOOP_HZ)
         self._taken = -1
@@ -124,8 +129,7 @@ class ArduPilot(Firmware):
         """Take the sensors that are there for the calibrated ones."""
         if how != FORCE_SAVE:
             return False
-        for imu in range(self.options.imus):
-            self.store[stem(imu) + "_ID"] = DEVICE_IDS[imu]
+        self._saved_ids = list(DEVICE_IDS[: self.options.imus])
         return True
 
     def hears(self, system: int) -> bool:
@@ -136,7 +140,7 @@ class ArduPilot(Firmware):
         """Of AP_Arming's: every IMU calibrated, and all of one opinion."""
         for imu in range(self.options.imus):
             offset, scale = self.correction(imu)
-            if self.store[stem(imu) + "_ID"] != DEVICE_IDS[imu] or not offset.any() or not scale.all():
+            if self._saved_ids[imu] != DEVICE_IDS[imu] or not offset.any() or not scale.all():
                 return ["PreArm: 3D Accel calibration needed"]
         apart = np.abs(self.corrected[:, 0] - self.corrected[0, 0]).max()
         return ["PreArm: Accels inconsistent"] if apart > INCONSISTENT_MPS2 else []
