@@ -93,7 +93,9 @@ class Streams:
             if stream.name in self._wanted and rates.get(stream, 0.0) < FALLEN * self._expected_hz(stream, best_hz):
                 self._again(stream)
         for stream, rate_hz in rates.items():
-            self._best_hz[stream] = max(rate_hz, self._best_hz.get(stream, 0.0))
+            best_hz = max(rate_hz, self._best_hz.get(stream, 0.0))
+            # what a link held back comes in a burst
+            self._best_hz[stream] = min(best_hz, self._wanted.get(stream.name, best_hz))
 
     def _expected_hz(self, stream: Stream, best_hz: float) -> float:
         """The rate to hold a stream to: its best, or, where it was slow from the beginning, what the fastest shows."""
