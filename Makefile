@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 TESTED := $(VENV)/.tested
 export PYTHON
 
-.PHONY: session test slow kernel lint bench wheel docs firmware clean
+.PHONY: session test slow kernel lint audit bench wheel docs firmware clean
 
 session: $(READY)
 	@$(BIN)/mpucal session --bus sim
@@ -23,6 +23,12 @@ lint: $(TESTED)
 	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
+
+# what is locked, against the known vulnerabilities; needs the network, and says which packages it could not look up
+audit:
+	@python3 -m venv build/audit
+	@build/audit/bin/pip install --quiet pip-audit
+	@build/audit/bin/pip-audit --disable-pip --require-hashes --requirement tools/lock.txt
 
 bench: $(READY)
 	@$(BIN)/python tools/bench.py
