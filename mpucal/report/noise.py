@@ -71,7 +71,8 @@ def render(noise: Noise) -> str:
     ]
     pictures = [_allan(noise, sensor) for sensor in SENSORS]
     course = _course(noise) if len(noise.course) > 1 else ""
-    caption = "Overlapping Allan deviation, thin lines its 95 % interval, and the data sheet's white noise."
+    beside = ", and the data sheet's white noise" if noise.data_sheet else ""
+    caption = f"Overlapping Allan deviation, thin lines its 95 % interval{beside}."
     suspicious = "".join(paragraph(f"{row['message']}.") for row in noise.suspicious)
     about = f"{noise.samples} samples at {noise.rate_hz:.1f} Hz in {noise.seconds / 3600.0:.2f} h."
     name = noise.sensor.chip or "a sensor"
@@ -102,10 +103,11 @@ def _allan(noise: Noise, sensor: str) -> str:
     for deviation, colour in zip(deviations.T, (X, Y, Z), strict=True):
         marks += [axes.line(tau, deviation, colour, 1.6)]
         marks += [axes.line(tau, deviation + sign * share, colour, 0.5) for sign in (-1.0, 1.0)]
+    named = [("x", X), ("y", Y), ("z", Z)]
     if sensor in noise.data_sheet:
         marks.append(axes.line(tau, np.log10(factor * noise.data_sheet[sensor]) - 0.5 * tau, INK, 0.8))
-    named = legend(("x", X), ("y", Y), ("z", Z), ("data sheet", INK))
-    return svg(f"allan-{sensor}", f"Allan deviation of the {sensor}", HEIGHT, *marks, axes.frame(), named)
+        named.append(("data sheet", INK))
+    return svg(f"allan-{sensor}", f"Allan deviation of the {sensor}", HEIGHT, *marks, axes.frame(), legend(*named))
 
 
 def _course(noise: Noise) -> str:
