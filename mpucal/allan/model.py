@@ -30,6 +30,8 @@ LEAST_CLUSTERS = 5.0
 MOST_LEFT_OUT = 7
 FITS = 1e-3
 ROUNDS, LEAST_SHARE = 6, 1e-4
+# of a square that is not told from zero
+LEAST_FREEDOM = 8.0
 
 
 @dataclass(frozen=True)
@@ -114,13 +116,17 @@ def _covariance(sizes: Vector, squares: Vector, samples: int) -> Vector:
 
 
 def _interval(squares: Vector, std: Vector) -> tuple[Vector, Vector]:
-    """The ends of 95 % intervals of squares: as of a chi-squared variable where they are known, else from zero on."""
+    """The ends of 95 % intervals of squares, which are not negative.
+
+    Their errors are those of the other coefficients as well: as of a normal variable below. Above, the std that was
+    found is too small where the square is: as of a chi-squared variable, or a normal one, whichever is farther.
+    """
     from scipy.stats import chi2, norm  # noqa: PLC0415
 
     tail = 0.5 * (1.0 - CONFIDENCE)
     std = np.maximum(std, 1e-12 * np.maximum(squares, 1e-300))
-    known = squares > 2.0 * std
-    freedom = np.where(known, 2.0 * (squares / std) ** 2, 8.0)
-    low = np.where(known, squares * freedom / chi2.isf(tail, freedom), 0.0)
-    high = np.where(known, squares * freedom / chi2.isf(1.0 - tail, freedom), squares + norm.isf(tail) * std)
-    return low, np.maximum(high, squares)
+    freedom = np.maximum(2.0 * (squares / std) ** 2, LEAST_FREEDOM)
+    aside = norm.isf(tail) * std
+    return np.maximum(squares - aside, 0.0), np.maximum(
+        squares + aside, squares * freedom / chi2.isf(1.0 - tail, freedom)
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -173,4 +174,7 @@ def _distributed() -> Any:
         import pyarrow  # noqa: F401, PLC0415 - for the table, which comes last
     except ImportError as error:
         raise UsageError(f"{error.name} is not installed", INSTALL) from error
+    # what died is told in one sentence, by whoever lost it
+    for name in ("distributed.client", "tornado.application"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     return distributed
