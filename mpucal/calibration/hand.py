@@ -31,7 +31,7 @@ from .initial_estimate import initialise
 from .levenberg_marquardt import Minimum, information, minimise
 from .local_noise import louder
 from .parameters import HAND
-from .parts import parts_of
+from .parts import ends_of, parts_of
 from .preprocessing import Preprocessed, preprocess
 from .prior import Prior, prior_of
 from .problem import Problem
@@ -54,11 +54,11 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
         noise = Noise("white", likeliest(fine.white, near(noise.sigma), theta))
     problem = _moved(noise.problem(fine), fine, theta)
     prior = prior_of(fine.flat)
-    minimum = minimise(problem, theta, HAND, prior, frozen=True)
+    minimum = minimise(problem, theta, HAND, prior, frozen=True, ends=ends_of(problem))
     iterations = search.iterations + minimum.iterations
     if wald(minimum) < WALD_99 and not at_prior(minimum.covariance()):
         perfect = replace(minimum.theta, K=np.eye(3))
-        minimum = minimise(problem, perfect, HAND, prior, fixed=("K",), frozen=True)
+        minimum = minimise(problem, perfect, HAND, prior, fixed=("K",), frozen=True, ends=ends_of(problem))
         iterations += minimum.iterations
     parts = parts_of(problem, minimum, prior)
     minimum = _doubted(minimum, noise, search.prepared, fine)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..data import Vector
 from .fit import Fit
@@ -42,6 +43,7 @@ class Minimum:
     theta : the estimate. V : its cost with the prior. nis : mean of e' S^-1 e over the samples.
     H : (p, p) Fisher matrix with the prior's, over all p parameters, those held fixed as well.
     free : (p,) True where a parameter was estimated.
+    seen : the last evaluation, and where it was; last : (p,) the step from there to theta, which was not looked at.
     """
 
     theta: Theta
@@ -51,6 +53,8 @@ class Minimum:
     free: Vector
     iterations: int
     converged: bool
+    seen: tuple[Theta, Evaluation]
+    last: Vector
 
     def covariance(self) -> Vector:
         """(p, p) inverse of H over the free parameters; zero for those held fixed."""
@@ -88,18 +92,19 @@ def minimise(
     until: float = DECREMENT,
     most: int = MOST_ITERATIONS,
     frozen: bool = False,
+    ends: NDArray[np.int64] | None = None,
 ) -> Minimum:
     """Minimise V + prior over the first `parameters` of NAMES, those of `fixed` (keys of PLACES) excepted.
 
     Stops where the Newton decrement g' H^-1 g / 2 falls below `until`, after `most` iterations, or where it no longer
     falls. With `frozen` gains the gradient is not exactly that of V, and a step that brings it nearer to zero is
-    accepted too.
+    accepted too. Evaluations give sums up to `ends` as well, see evaluate.
     """
     free = np.ones(parameters, bool)
     for name in fixed:
         free[PLACES[name]] = False
-    at, damping, iterations, converged = _At(problem, theta, parameters, prior), DAMPING, 0, False
-    least, in_vain = np.inf, 0
+    at, damping, iterations, converged = _At(problem, theta, parameters, prior, ends), DAMPING, 0, False
+    least, in_vain, last = np.inf, 0, np.zeros(parameters)
     while iterations < most and damping < HOPELESS and in_vain < MOST_IN_VAIN:
         gradient, H = at.gradient[free], at.H[np.ix_(free, free)]
         decrement = at.decrement(free)
@@ -109,17 +114,18 @@ def minimise(
             break
         step = np.zeros(parameters)
         if decrement < LAST * until and not frozen:
-            step[free] = -_solve(H, gradient)
-            at.step(step, decrement)
+            last[free] = -_solve(H, gradient)
             converged, iterations = True, iterations + 1
             break
         step[free] = -_solve(H + damping * np.diag(np.diag(H)), gradient)
-        trial = _At(problem, at.theta.moved(step), parameters, prior)
+        trial = _At(problem, at.theta.moved(step), parameters, prior, ends)
         if trial.V < at.V or (frozen and _nearer(trial, at, free, decrement)):
             at, damping, iterations = trial, damping * EASIER, iterations + 1
         else:
             damping *= HARDER
-    return Minimum(at.theta, at.V, at.data.squares / max(len(problem.series), 1), at.H, free, iterations, converged)
+    theta, V = (at.theta.moved(last), at.V - decrement) if last.any() else (at.theta, at.V)
+    nis = at.data.squares / max(len(problem.series), 1)
+    return Minimum(theta, V, nis, at.H, free, iterations, converged, (at.theta, at.data), last)
 
 
 def _nearer(trial: _At, at: _At, free: Vector, decrement: float) -> bool:
@@ -131,9 +137,11 @@ def _nearer(trial: _At, at: _At, free: Vector, decrement: float) -> bool:
 class _At:
     """V, gradient and H with the prior's share, at theta."""
 
-    def __init__(self, problem: Problem, theta: Theta, parameters: int, prior: Prior) -> None:
+    def __init__(
+        self, problem: Problem, theta: Theta, parameters: int, prior: Prior, ends: NDArray[np.int64] | None
+    ) -> None:
         self.theta = theta
-        self.data: Evaluation = evaluate(problem, theta, parameters)
+        self.data: Evaluation = evaluate(problem, theta, parameters, ends)
         away = (values(theta) - prior.mean)[:parameters]
         precision = prior.precision[:parameters]
         self.V = self.data.V + 0.5 * float(precision @ (away * away))
@@ -141,11 +149,6 @@ class _At:
             self.V = np.inf
         self.gradient = self.data.gradient + precision * away
         self.H = self.data.fisher + np.diag(precision)
-
-    def step(self, step: Vector, decrement: float) -> None:
-        """Transition theta by the last step, by which V falls by the decrement."""
-        self.theta = self.theta.moved(step)
-        self.V -= decrement
 
     def decrement(self, free: Vector) -> float:
         """Newton decrement g' H^-1 g / 2 over the free parameters: how much V would still fall."""

@@ -25,31 +25,42 @@ USED = {0: 0, ACCEL: lanes_used("accel"), IMU: lanes_used("imu")}
 
 
 class Evaluation(NamedTuple):
-    """V, sum of e' S^-1 e over the samples, gradient (p,), Fisher matrix (p, p) in the order of NAMES."""
+    """V, sum of e' S^-1 e over the samples, gradient (p,), Fisher matrix (p, p) in the order of NAMES.
+
+    to_ends : gradients (k, lanes) and Fisher matrices (k, lanes, lanes) up to each of k ends, in the kernel's order;
+        None where none were asked for.
+    """
 
     V: float
     squares: float
     gradient: Vector
     fisher: Vector
+    to_ends: tuple[Vector, Vector] | None = None
 
 
-def evaluate(problem: Problem, theta: Theta, parameters: int) -> Evaluation:
+def evaluate(problem: Problem, theta: Theta, parameters: int, ends: NDArray[np.int64] | None = None) -> Evaluation:
     """V(theta) with its derivatives by the first `parameters` of NAMES.
 
     ACCEL, IMU (or 0: V alone): equation (8) by the exact filter. HAND: by the hand's filter, whose derivatives hold
     gains and weights: the gradient is zero where the estimate should be, not where V is least.
+
+    Parameters
+    ----------
+    ends : (k,) where parts of the series end, the last one the number of samples; moved on by less than a block of
+        steps. Their sums cost next to nothing.
 
     Raises
     ------
     ValueError : the exact filter was asked of a problem that only the hand's filter can solve.
     """
     if parameters == HAND:
-        V, squares, gradient, fisher = _hand(problem, theta, derivatives=True)
+        V, squares, gradient, fisher = _hand(problem, theta, derivatives=True, ends=ends)
     else:
         _refuse_a_hand(problem)
-        V, squares, gradient, fisher = _exact(problem, theta, parameters)
+        V, squares, gradient, fisher = _exact(problem, theta, parameters, ends)
     lanes = _lanes(parameters)
-    return Evaluation(V, squares, gradient[0, lanes], fisher[0][np.ix_(lanes, lanes)])
+    to_ends = None if ends is None else (gradient, fisher)
+    return Evaluation(V, squares, gradient[-1, lanes], fisher[-1][np.ix_(lanes, lanes)], to_ends)
 
 
 class PartScores(NamedTuple):
@@ -59,24 +70,24 @@ class PartScores(NamedTuple):
     fisher: Vector
     flat: Evaluation
 
+    def moved(self, step: Vector) -> PartScores:
+        """The same to second order after a step (p,)."""
+        flat = self.flat._replace(gradient=self.flat.gradient + self.flat.fisher @ step)
+        return PartScores(self.gradient + self.fisher @ step, self.fisher, flat)
 
-def part_scores(problem: Problem, theta: Theta, parameters: int, ends: NDArray[np.int64]) -> PartScores:
-    """Gradient and Fisher matrix, part by part, with the filter's memory of the parts before; see evaluate.
+
+def part_scores(problem: Problem, theta: Theta, parameters: int, to_ends: tuple[Vector, Vector]) -> PartScores:
+    """Gradient and Fisher matrix, part by part, with the filter's memory of the parts before.
 
     The flat segment's mean, by which the filter begins, belongs to no part.
 
     Parameters
     ----------
-    ends : (k,) where each part ends, the last one the number of samples; moved on by less than a block of steps.
+    to_ends : what evaluate gave of the same problem at theta.
     """
-    if parameters == HAND:
-        _, _, gradient, fisher = _hand(problem, theta, derivatives=True, ends=ends)
-    else:
-        _refuse_a_hand(problem)
-        _, _, gradient, fisher = _exact(problem, theta, parameters, ends)
     begin = evaluate(problem.first(0), theta, parameters)
     lanes = _lanes(parameters)
-    gradient, fisher = gradient[:, lanes], fisher[:, lanes[:, None], lanes]
+    gradient, fisher = to_ends[0][:, lanes], to_ends[1][:, lanes[:, None], lanes]
     return PartScores(
         np.diff(gradient, axis=0, prepend=begin.gradient[None]),
         np.diff(fisher, axis=0, prepend=begin.fisher[None]),

@@ -19,12 +19,12 @@ from .flat_segment import Flat, flat_statistics
 from .gyro_matrix import WALD_99, at_prior, wald
 from .hand import fit_hand
 from .initial_estimate import initialise
-from .levenberg_marquardt import MOST_ITERATIONS, Minimum, minimise
+from .levenberg_marquardt import DECREMENT, MOST_ITERATIONS, Minimum, minimise
 from .likelihood import evaluate
 from .masks import mask
 from .paper import fit_paper
 from .parameters import ACCEL, IMU
-from .parts import parts_of
+from .parts import ends_of, parts_of
 from .prior import prior_of
 from .problem import Problem, Series
 from .rotation import lengths
@@ -54,9 +54,8 @@ class Errors(NamedTuple):
 NO_ERRORS = Errors()
 ERRORS = tuple(Errors(kappa, floor) for kappa in (0.0, 1e-4, 3e-4, 1e-3) for floor in (0.0, 1e-3, 3e-3, 1e-2))
 ERROR_PASSES, ERRING_NIS = 2, 30.0
-
-
 MOST_WALKS = 2
+PROMISING = WALD_99 / 3.0  # of the decrement, of which twice is as much of the statistic
 
 
 class Choice(NamedTuple):
@@ -106,8 +105,8 @@ def choose(recording: Recording, flat: Flat, gravity: float) -> Choice:
             if minimum.nis >= (EXPLAINED_BY_ERRORS_NIS if erring else EXPLAINED_NIS):
                 continue
             if parameters == ACCEL:
-                imu = in_place.minimum(IMU, minimum, errors)
-                minimum = imu if imu.converged and wald(imu) > WALD_99 else minimum
+                imu = in_place.with_matrix(minimum, errors)
+                minimum = minimum if imu is None else imu
             return _chosen(in_place, minimum, errors)
     hand = fit_hand(recording, flat, gravity)
     kept = "K" if "K_xx" in hand.names else "no K (it is not told from the identity)"
@@ -173,11 +172,23 @@ class _InPlace:
             minimum = self.minimum(parameters, minimum, errors)
         return minimum, errors
 
-    def minimum(self, parameters: int, near: Minimum, errors: Errors = NO_ERRORS) -> Minimum:
+    def minimum(self, parameters: int, near: Minimum, errors: Errors = NO_ERRORS, until: float = DECREMENT) -> Minimum:
         """On all samples, from where another search ended; a search without an end has none on all samples either."""
         most = MOST_ITERATIONS if near.converged else 0
-        minimum = minimise(_erring(self._problem, errors), near.theta, parameters, self._prior, most=most)
+        problem = _erring(self._problem, errors)
+        minimum = minimise(problem, near.theta, parameters, self._prior, until=until, most=most, ends=ends_of(problem))
         return replace(minimum, iterations=near.iterations + minimum.iterations)
+
+    def with_matrix(self, near: Minimum, errors: Errors) -> Minimum | None:
+        """With K beside the parameters of `accel`; None where it is not told from the identity.
+
+        The statistic is twice what V falls by: where the first decrement promises little of it, the search ends there.
+        """
+        hint = self.minimum(IMU, near, errors, until=PROMISING)
+        if wald(hint) == 0.0:
+            return None
+        imu = self.minimum(IMU, near, errors)
+        return imu if imu.converged and wald(imu) > WALD_99 else None
 
     def as_fit(self, minimum: Minimum, errors: Errors) -> Fit:
         """With what the parts of the recording say."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..data import Vector
 from .levenberg_marquardt import Minimum
-from .likelihood import part_scores
+from .likelihood import evaluate, part_scores
 from .prior import Prior
 from .problem import Problem
 from .theta import values
@@ -55,14 +55,25 @@ class Parts:
         return np.arange(len(self)) * groups // len(self)
 
 
+def ends_of(problem: Problem) -> NDArray[np.int64] | None:
+    """(k,) where the parts of a problem end; None for a series too short to be cut."""
+    n = len(problem.series)
+    k = min(MOST_PARTS, n // FEWEST_SAMPLES)
+    return np.arange(1, k + 1, dtype=np.int64) * n // k if k > 1 else None
+
+
 def parts_of(problem: Problem, minimum: Minimum, prior: Prior) -> Parts | None:
-    """The parts of a problem at its minimum; None for a series too short to be cut."""
-    series, theta, free = problem.series, minimum.theta, minimum.free
-    k = min(MOST_PARTS, len(series) // FEWEST_SAMPLES)
-    if k < 2:
+    """The parts of a problem at its minimum; None for a series too short to be cut.
+
+    A minimum that was found with the sums up to the parts' ends costs no further pass of the filter.
+    """
+    series, theta, free, ends = problem.series, minimum.theta, minimum.free, ends_of(problem)
+    if ends is None:
         return None
-    ends = np.arange(1, k + 1, dtype=np.int64) * len(series) // k
-    scores = part_scores(problem, theta, len(free), ends)
+    seen, at = minimum.seen
+    to_ends = at.to_ends or evaluate(problem, seen, len(free), ends).to_ends
+    assert to_ends is not None
+    scores, k = part_scores(problem, seen, len(free), to_ends).moved(minimum.last), len(ends)
     t = np.concatenate([[0.0], np.cumsum(series.dt)])
     starts = np.concatenate([[0], ends[:-1]]).astype(np.intp)  # 32 bits on some ARMs
     mean = np.add.reduceat(series.y, starts) / np.diff(ends, prepend=0)[:, None]

@@ -37,7 +37,8 @@ def in_place():
 def test_the_parts_scores_sum_to_the_whole(made, parameters, block):
     problem, theta = made()
     n = len(problem.series)
-    scores = part_scores(problem, theta, parameters, np.array([n // 3, n // 2, n]))
+    cut = evaluate(problem, theta, parameters, np.array([n // 3, n // 2, n]))
+    scores = part_scores(problem, theta, parameters, cut.to_ends)
     begin, whole = evaluate(problem.first(0), theta, parameters), evaluate(problem, theta, parameters)
     np.testing.assert_allclose(scores.gradient.sum(0) + begin.gradient, whole.gradient, rtol=1e-9)
     np.testing.assert_allclose(scores.fisher.sum(0) + scores.flat.fisher, whole.fisher, rtol=1e-9, atol=1e-6)
