@@ -30,3 +30,32 @@ def test_the_core_compiles_without_a_warning(processor, optimised, tmp_path):
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert len(list(tmp_path.glob("*.o"))) == len(sources)
+
+
+CORE = Path("/usr/share/arduino/hardware/arduino/avr")
+BOARDS = {
+    "AVR_UNO": ("atmega328p", "standard"),
+    "AVR_MEGA2560": ("atmega2560", "mega"),
+    "AVR_LEONARDO": ("atmega32u4", "leonardo"),
+}
+SKETCHES = ("mpucal_bridge", "mpucal_corrected")
+
+
+@pytest.mark.parametrize("sketch", SKETCHES)
+@pytest.mark.parametrize("board", BOARDS)
+def test_the_sketches_compile_without_a_warning_of_theirs(board, sketch, tmp_path):
+    """Stricter than the IDE, which has no -Wconversion; the core itself does not stand it."""
+    if shutil.which("avr-g++") is None or not CORE.exists():
+        pytest.skip("needs avr-g++ and arduino-core-avr, of the packages in tools/ci_packages.txt")
+    mcu, variant = BOARDS[board]
+    folders = (CORE / "cores/arduino", CORE / "variants" / variant, CORE / "libraries/Wire/src")
+    named = {"F_CPU": "16000000UL", "ARDUINO": "10819", "DECIMAL_DIG": "__DECIMAL_DIG__", f"ARDUINO_{board}": "1"}
+    named |= {"USB_VID": "0x2341", "USB_PID": "0x8036", "USB_MANUFACTURER": '"x"', "USB_PRODUCT": '"y"'}
+    words = ["avr-g++", "-std=gnu++11", "-Os", "-fno-exceptions", f"-mmcu={mcu}", "-Wall", "-Wextra", "-Wconversion"]
+    words += [f"-D{name}={value}" for name, value in named.items()]
+    words += [f"-I{folder}" for folder in (*folders, CORE / "libraries/EEPROM/src", SOURCES)]
+    source = SOURCES.parent / "examples" / sketch / f"{sketch}.ino"
+    words += ["-include", "Arduino.h", "-x", "c++", "-c", str(source), "-o", str(tmp_path / "sketch.o")]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert [line for line in done.stderr.splitlines() if "warning:" in line and str(CORE) not in line] == []
