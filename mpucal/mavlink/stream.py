@@ -18,6 +18,8 @@ LADDER_HZ = (200.0, 100.0, 50.0, 25.0, 10.0)
 ARRIVE_NS, ENOUGH = S, 3
 ACK_S, ACK_TRIES = 0.7, 4
 
+# HIGHRES_IMU is in no stream group: who lowers it asks for it by name
+STREAMRATE = "start MAVProxy with --streamrate=-1"
 # of the rate asked for: where less comes of a PX4, it is asked for so much more
 MOST, SOONER = 0.8, 2.0
 
@@ -180,7 +182,7 @@ class Streams:
         self._quiet_until_ns = now_ns + SAY_AGAIN_NS
         self._say(
             f"{alive[0].name} was slowed down {self._slowed(alive[0], rates)}, and has been asked for again: "
-            "another ground station lowers it (start MAVProxy with --streamrate=-1)."
+            f"another ground station lowers it ({'stop that one' if alive[0].name == HIGHRES else STREAMRATE})."
         )
 
     def _slowed(self, stream: Stream, rates: Mapping[Stream, float]) -> str:
