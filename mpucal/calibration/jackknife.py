@@ -17,11 +17,14 @@ from typing import Literal
 import numpy as np
 
 from ..data import Vector
+from .levenberg_marquardt import inverse
 from .parameters import ACCELEROMETER
 from .parts import Parts
 
 TIMES, FEWEST_GROUPS = 8, 4
 ROBUST = 1.2
+# the jackknife by side is this many times what it is by chance at most, times how much more than by chance sides differ
+MOST_BY_CHANCE, TINY_MPS2 = 3.0, 1e-9
 # of the jackknife that is claimed: less than all of it, since the groups are few and not alike
 OF_TIME, OF_SIDE = 0.7, 0.75
 
@@ -52,23 +55,44 @@ class Jackknife:
 def jackknife(parts: Parts, D: Vector, gravity: float) -> Jackknife:
     """By the parts' scores: one Newton step from the estimate leads to that without a group, weights and noise held."""
     groups = parts.by_time(min(TIMES, len(parts)))
-    by_time = _moved(parts, *parts.grouped(groups), D, gravity)
-    by_side = _moved(parts, *parts.grouped(parts.side), D, gravity)
+    to_sphere = _to_sphere(D, gravity)
+    gradient, fisher = parts.grouped(groups)
+    by_time = _moved(gradient, parts.H - fisher, to_sphere)
+    gradient, fisher = parts.grouped(parts.side)
+    by_side = _moved(gradient, parts.H - fisher, to_sphere)
+    known = inverse(parts.H)
+    # without a side that few others make up for, the estimate moves far by chance
+    chance = _rms(np.stack([inverse(H) for H in parts.H - fisher]) - known, to_sphere)
+    most = MOST_BY_CHANCE * float(np.median(by_side / chance)) * float(_rms(known, to_sphere))
     worst = np.flatnonzero(groups == int(np.argmax(by_time)))
     span = float(parts.start[worst[0]]), float(parts.end[worst[-1]])
-    return Jackknife(_spread(by_time), _spread(by_side), span)
+    return Jackknife(_spread(by_time), min(_spread(by_side), most), span)
 
 
-def _moved(parts: Parts, gradient: Vector, fisher: Vector, D: Vector, gravity: float) -> Vector:
+def _to_sphere(D: Vector, gravity: float) -> Vector:
+    """(12, 12) takes an error of (D row-major, b_a) to twelve numbers whose squares add up to its mean square [m/s^2].
+
+    A calibrated reading moves by inv(D) (dD s + db), and the mean of |A s + c|^2 over |s| = g is g^2/3 |A|^2 + |c|^2.
+    """
+    back, result = np.linalg.inv(D), np.zeros((12, 12))
+    result[:9, :9] = gravity / np.sqrt(3.0) * np.kron(back, np.eye(3))
+    result[9:, 9:] = back
+    return result
+
+
+def _moved(gradient: Vector, H: Vector, to_sphere: Vector) -> Vector:
     """(m,) m/s^2, rms over the sphere, by which the estimate without each group differs from their median."""
-    H = parts.H - fisher
     scale = 1.0 / np.sqrt(np.maximum(np.diagonal(H, axis1=1, axis2=2), 1e-300))
     step = np.linalg.solve(H * scale[:, :, None] * scale[:, None, :], (gradient * scale)[:, :, None])[:, :, 0] * scale
     step = step[:, ACCELEROMETER] - np.median(step[:, ACCELEROMETER], axis=0)
-    # a calibrated reading moves by inv(D) (dD s + db), and the mean of |A s + c|^2 over |s| = g is g^2/3 |A|^2 + |c|^2
-    inverse = np.linalg.inv(D)
-    A, c = inverse @ step[:, :9].reshape(-1, 3, 3), step[:, 9:] @ inverse.T
-    return np.asarray(np.sqrt(gravity**2 / 3.0 * np.sum(A * A, axis=(1, 2)) + np.sum(c * c, axis=1)))
+    return np.asarray(np.linalg.norm(step @ to_sphere.T, axis=1))
+
+
+def _rms(covariance: Vector, to_sphere: Vector) -> Vector:
+    """(...,) m/s^2 over the sphere, of covariances (..., p, p)."""
+    of = covariance[..., ACCELEROMETER, ACCELEROMETER]
+    trace = np.trace(to_sphere @ of @ to_sphere.T, axis1=-2, axis2=-1)
+    return np.asarray(np.sqrt(np.maximum(trace, TINY_MPS2**2)))
 
 
 def _spread(moved: Vector) -> float:

