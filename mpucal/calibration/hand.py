@@ -80,12 +80,12 @@ def _doubted(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preproce
     prior, fixed = prior_of(fine.flat), () if minimum.free.all() else ("K",)
     at, problem, transitions = minimum, noise.problem(rough), transitions_of(rough, minimum.theta)
     variance, leverage = miss_variances(transitions), np.zeros(1)
-    for _ in range(PASSES if transitions else 0):
+    for again in range(PASSES if transitions else 0):
+        transitions = transitions_of(rough, at.theta) if again else transitions
         leverage = leverages(transitions, rough, at.theta, at.covariance(), variance)
         variance = miss_variances(transitions, leverage)
         problem = _scaled(problem, q_scale(transitions, variance, len(problem.series)))
         at = _roughly(problem, at.theta, prior, fixed)
-        transitions = transitions_of(rough, at.theta)
     problem, transitions = noise.problem(fine), transitions_of(fine, at.theta)
     if transitions:  # rests are found anew here, and their number may differ by one
         variance = miss_variances(transitions, float(leverage.mean()))

@@ -19,7 +19,7 @@ from .flat_segment import Flat, flat_statistics
 from .gyro_matrix import WALD_99, at_prior, wald
 from .hand import fit_hand
 from .initial_estimate import initialise
-from .levenberg_marquardt import DECREMENT, MOST_ITERATIONS, Minimum, minimise
+from .levenberg_marquardt import MOST_ITERATIONS, Minimum, minimise
 from .likelihood import evaluate
 from .masks import mask
 from .paper import fit_paper
@@ -38,6 +38,7 @@ EXPLAINED_BY_ERRORS_NIS = 3.3  # whose sizes are the likeliest, and leave 3 wher
 HOPELESS_NIS = 10.0  # of means over blocks, in which white noise is less and a hand's is not
 
 SEARCH_HZ, ROUGHLY = 50.0, 0.05
+COARSE_HZ, MANY_MEANS = 10.0, 20_000  # of more means than so many, 10 a second show first whether a search has an end
 
 
 class Errors(NamedTuple):
@@ -172,11 +173,10 @@ class _InPlace:
             minimum = self.minimum(parameters, minimum, errors)
         return minimum, errors
 
-    def minimum(self, parameters: int, near: Minimum, errors: Errors = NO_ERRORS, until: float = DECREMENT) -> Minimum:
+    def minimum(self, parameters: int, near: Minimum, errors: Errors = NO_ERRORS) -> Minimum:
         """On all samples, from where another search ended; a search without an end has none on all samples either."""
-        most = MOST_ITERATIONS if near.converged else 0
-        problem = _erring(self._problem, errors)
-        minimum = minimise(problem, near.theta, parameters, self._prior, until=until, most=most, ends=ends_of(problem))
+        problem, most = _erring(self._problem, errors), MOST_ITERATIONS if near.converged else 0
+        minimum = minimise(problem, near.theta, parameters, self._prior, most=most, ends=ends_of(problem))
         return replace(minimum, iterations=near.iterations + minimum.iterations)
 
     def with_matrix(self, near: Minimum, errors: Errors) -> Minimum | None:
@@ -184,8 +184,10 @@ class _InPlace:
 
         The statistic is twice what V falls by: where the first decrement promises little of it, the search ends there.
         """
-        hint = self.minimum(IMU, near, errors, until=PROMISING)
-        if wald(hint) == 0.0:
+        problem = _erring(self._problem, errors)
+        if not near.converged:
+            return None
+        if minimise(problem, near.theta, IMU, self._prior, until=PROMISING, most=1).iterations == 0:
             return None
         imu = self.minimum(IMU, near, errors)
         return imu if imu.converged and wald(imu) > WALD_99 else None
@@ -197,8 +199,19 @@ class _InPlace:
 
     def _rough(self, parameters: int) -> Minimum:
         if parameters not in self._roughly:
-            self._roughly[parameters] = minimise(self._thin, self._first, parameters, self._prior, until=ROUGHLY)
+            self._roughly[parameters] = self._searched(parameters)
         return self._roughly[parameters]
+
+    def _searched(self, parameters: int) -> Minimum:
+        """A long recording is searched by coarser means first, as far as they explain it."""
+        theta, most, iterations = self._first, MOST_ITERATIONS, 0
+        if len(self._thin.series) > MANY_MEANS:
+            coarse = minimise(self._means(COARSE_HZ), theta, parameters, self._prior, until=ROUGHLY)
+            if coarse.nis < EXPLAINED_NIS:
+                theta, iterations = coarse.theta, coarse.iterations
+                most = MOST_ITERATIONS if coarse.converged else 0
+        minimum = minimise(self._thin, theta, parameters, self._prior, until=ROUGHLY, most=most)
+        return replace(minimum, iterations=iterations + minimum.iterations)
 
     @cached_property
     def _first(self) -> Theta:
@@ -211,7 +224,10 @@ class _InPlace:
     @cached_property
     def _thin(self) -> Problem:
         """Means over blocks: white noise leaves little in a block beside its mean."""
-        thin, at = downsampled(self.recording, self._flat, SEARCH_HZ)
+        return self._means(SEARCH_HZ)
+
+    def _means(self, rate_hz: float) -> Problem:
+        thin, at = downsampled(self.recording, self._flat, rate_hz)
         return _problem(thin, flat_statistics(thin, at), self._gravity)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from mpucal.calibration import model_selection
 from mpucal.calibration.ekf import Ekf, exponential, orientation_of, product
 from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.gyro_matrix import WALD_99
@@ -213,3 +214,14 @@ def test_gravity_scales_the_gains_alone(gravity):
 
 def test_the_wald_threshold_is_the_quantile_that_it_is_said_to_be():
     assert pytest.approx(chi2.ppf(0.99, len(BY_NAME["K"].names)), rel=1e-3) == WALD_99
+
+
+def test_a_long_recording_is_searched_by_coarser_means_to_the_same_end(monkeypatch):
+    recording = paper_scenario(4, rate_hz=50, turn_s=20.0).recording
+    flat = flat_statistics(recording, recording.flat)
+    at_once = fit_accel(recording, flat, G)
+    monkeypatch.setattr(model_selection, "MANY_MEANS", 100)
+    by_coarser = fit_accel(recording, flat, G)
+    assert by_coarser.converged
+    assert not np.array_equal(by_coarser.D, at_once.D)  # another way
+    np.testing.assert_array_less(np.abs(by_coarser.D - at_once.D).ravel(), 0.05 * at_once.std(*D_NAMES))
