@@ -29,7 +29,7 @@ ODD_STEPS, EXACTLY, FEWEST_VALUES, MOST_SAMPLES = 8.0, 0.02, 6, 20_000
 # Below this a step [m/s^2, rad/s] may be that of a float32, which is coarser the larger a value is.
 LEAST_ODD_STEP = 1e-3
 # beyond these an axis' rounding is no calibration's noise any more
-HONEST_STD, MOST_MPS2, USABLE_RAD_S = 4.0, 0.1, np.deg2rad(0.5)
+HONEST_STD, MOST_MPS2, USABLE_RAD_S = 2.0, 0.1, np.deg2rad(0.5)
 
 Counts = NDArray[np.int64]
 
