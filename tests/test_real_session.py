@@ -113,7 +113,9 @@ def session_of(folder, recording):
     return outcome(folder / "board", "session", "--replay", folder / "capture.mcap")
 
 
-@pytest.mark.parametrize(("name", "most_deg"), [("mpu9150_a", 0.1), ("imucal_session", 0.15)])
+@pytest.mark.parametrize(
+    ("name", "most_deg"), [("mpu9150_a", 0.1), pytest.param("imucal_session", 0.15, marks=pytest.mark.slow)]
+)
 def test_a_recording_whose_person_was_told_nothing_is_calibrated(tmp_path, name, most_deg):
     """They lay flat for less than ten seconds; the MPU-9150s' show spikes to 74 m/s^2 where they were put down."""
     recording = RECORDINGS / f"{name}.npz"

@@ -52,7 +52,7 @@ def test_a_calibration_is_applied_to_it(mpucal, capture, calibration, target):
 def test_it_is_streamed_without_rates(mpucal, calibration):
     words = ("stream", *FAST, "--apply", "c.json", "--seconds", "0.05")
     lines = mpucal(*words).out.splitlines()
-    assert lines[0] == "t,ax,ay,az"
+    assert lines[0] == "t,ax,ay,az,utc_s"
     assert len(lines) > 150
     sample = json.loads(mpucal(*words, "--json").out.splitlines()[0])
     assert sample["w"] is sample["temperature_c"] is None

@@ -62,6 +62,7 @@ def guided(port, board, folder):
     return session.returncode, "".join(said)
 
 
+@pytest.mark.slow
 def test_a_session_ends_in_the_boards_eeprom_and_is_read_back_after_a_restart(switch_on, tmp_path):
     folder = tmp_path / "board"
     with switch_on() as (board, port):
