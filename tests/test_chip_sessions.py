@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import mpucal
 from mpucal.__main__ import run
 
 CHIPS = {
@@ -17,6 +18,7 @@ CHIPS = {
     "icm20690": "ICM-20690",
     "icm20602": "ICM-20602",
     "mpu6886": "MPU-6886",
+    "mpu6050,fault=no_fifo": "MPU-6050",
 }
 
 
@@ -31,3 +33,16 @@ def test_a_session_on_each_chip_ends_good(chip, tmp_path, capsys):
     assert found["sensor"]["temperature_c"] == pytest.approx(27, abs=0.3)
     error = np.abs(np.array(found["accelerometer"]["D"]) - truth["D"])
     assert error.max() < 2e-3
+
+
+def test_a_session_without_a_fifo_is_replayed_to_the_bit(tmp_path, capsys):
+    def session(*words):
+        run(["session", *words, "--yes", "--json", "--json-events"])
+        return {key: value for key, value in json.loads(capsys.readouterr().out).items() if key != "created"}
+
+    made = tmp_path / "made"
+    words = ["--bus", "sim:fault=no_fifo/nack@9", "--seed", "4", "--rate", "50", "--model", "hand"]
+    found = session(*words, "-o", str(made))
+    assert session("--replay", str(made), "-o", str(tmp_path / "again")) == found
+    assert [reason["code"] for reason in found["quality"]["reasons"]] == ["data_lost"]
+    assert mpucal.load(made / "capture.mcap").gap.sum() == 1

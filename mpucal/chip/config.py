@@ -16,6 +16,8 @@ MIN_POLL_S = 0.001
 SLOW_POLL_S = 0.040
 FAST_POLL_S, FAST_HZ = 0.020, 400
 ALONE_POLL_S = 0.005
+# read one by one, samples take the bus half the time at this rate and 400 kHz, and all of it at a quarter of that
+MOST_POLLED_HZ = 250
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,9 @@ class Config:
         range_g = min(self.accel_range_g * part.accel_sensitivity, reg.ACCEL_RANGES_G[-1])
         return Settings(
             part=part,
-            smplrt_div=0 if self.accel_alone else reg.sample_rate_divider(self.rate_hz, self.dlpf),
+            smplrt_div=0
+            if self.accel_alone or not part.fifo_bytes
+            else reg.sample_rate_divider(self.rate_hz, self.dlpf),
             dlpf_cfg=self.dlpf,
             fs_sel=reg.GYRO_RANGES_DPS.index(self.gyro_range_dps),
             afs_sel=next(i for i, nominal_g in enumerate(reg.ACCEL_RANGES_G) if nominal_g >= range_g),
@@ -84,6 +88,9 @@ class Config:
         )
 
     def _check_part(self, part: Part) -> None:
+        if not part.fifo_bytes and self.rate_hz > MOST_POLLED_HZ:
+            what = f"this {part.chip} has no FIFO, so that each sample is read by itself"
+            raise ChipError(what, f"take --rate {MOST_POLLED_HZ} or less")
         filtered_apart = part.family.has_accel_config2
         if self.accel_alone and not filtered_apart:
             raise ChipError(

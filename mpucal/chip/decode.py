@@ -103,8 +103,11 @@ class Decoder:
         elif register in (reg.INT_STATUS, reg.INT_ENABLE) and register + len(data) > reg.INT_STATUS:
             lost = register == reg.INT_ENABLE and not data[0] & reg.INT_FIFO_OFLOW
             self._heard("status", t_ns, host_ns)
+            if self._fifo.polled:
+                self._fifo.counted(t_ns, reg.FRAME_BYTES)
+                self._fifo.data(data[reg.ACCEL_XOUT_H - register :])
             overflow = bool(data[reg.INT_STATUS - register] & reg.INT_FIFO_OFLOW)
-            self.fault = self._fifo.judged(overflow, lost)
+            self.fault = self._fifo.judged(overflow and not self._fifo.polled, lost)
         elif register == reg.TEMP_OUT_H:
             self._fifo.temperature(int.from_bytes(data, "big", signed=True))
         else:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from enum import Enum, auto
 
 from ..data import Recording, Samples, Sensor
@@ -49,6 +50,9 @@ OVERFLOWS = 3
 
 # INT_ENABLE, the DMP's status and INT_STATUS in one read: INT_ENABLE is 0 in a chip that was reset meanwhile
 STATUS_BYTES = reg.INT_STATUS - reg.INT_ENABLE + 1
+# the same and a sample, of a chip without a FIFO
+SAMPLE_BYTES = reg.ACCEL_XOUT_H + reg.FRAME_BYTES - reg.INT_ENABLE
+NO_FIFO = "the chip's FIFO stays empty, so that its samples are read one by one and their times are the computer's"
 
 
 class Need(Enum):
@@ -63,6 +67,7 @@ _CURES = {
     None: Need.NOTHING,
     FifoFault.OVERFLOW: Need.RESTART,
     FifoFault.MISALIGNED: Need.RESTART,
+    FifoFault.LATE: Need.RESTART,
     FifoFault.LOST: Need.RESTART,
 }
 
@@ -127,9 +132,11 @@ class Driver:
         self._settings = self._config.settings(self._decoder.part)
         configure(self._port, self._settings)
         self._restart()
-        for sentence in filter(None, (remark(self._settings.sensor), self._correction())):
+        no_fifo = NO_FIFO if self._settings.polled else None
+        for sentence in filter(None, (remark(self._settings.sensor), self._correction(), no_fifo)):
             self._say(sentence)
-        return self._settings.sensor
+        sensor = self._settings.sensor
+        return replace(sensor, rate_hz=self._config.rate_hz) if self._settings.polled else sensor
 
     def poll(self) -> Samples:
         """Wait for the next poll and give the samples since the last; their times are provisional.
@@ -147,7 +154,7 @@ class Driver:
         trouble: BusError | ChipError | None = None
         try:
             if self._need is Need.NOTHING:
-                self._need = self._drain(running)
+                self._need = self._look() if running.polled else self._drain(running)
             if self._need is not Need.NOTHING:
                 self._recover(running)
         except (BusError, ChipError) as error:
@@ -216,6 +223,20 @@ class Driver:
         if frames:
             self._frame_ns = min(self._frame_ns, (self._port.now_ns - begun_ns) / frames)
         self._overflows += self._decoder.fault is FifoFault.OVERFLOW
+        return _CURES.get(self._decoder.fault, Need.SET_UP)
+
+    def _look(self) -> Need:
+        """Read samples one by one, for as long as there are polls of a FIFO apart."""
+        step_ns = round(1e9 / self._config.rate_hz)
+        for _ in range(max(1, round(self._config.period_s * self._config.rate_hz))):
+            self._port.sleep_until(self._next_poll_ns)
+            try:
+                self._port.read(reg.INT_ENABLE, SAMPLE_BYTES)
+            except BusError:
+                return Need.RESTART
+            self._next_poll_ns += step_ns
+            if self._decoder.fault is not None:
+                break
         return _CURES.get(self._decoder.fault, Need.SET_UP)
 
     def _check_pace(self, settings: Settings) -> None:

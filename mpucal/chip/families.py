@@ -128,7 +128,7 @@ class Part:
 
     @property
     def fifo_bytes(self) -> int:
-        """Size of its FIFO as this driver configures it: the larger one."""
+        """Size of its FIFO as this driver configures it: the larger one; 0: it has none."""
         return self.wide_fifo_bytes or self.family.fifo_bytes
 
 

@@ -21,6 +21,7 @@ from . import registers as reg
 from .clock import NS, SampleClock, Times, increasing
 from .flips import Flips
 from .host_clock import HostClock
+from .looked import LookedClock
 from .settings import Settings
 
 Counts = NDArray[np.int16]
@@ -44,6 +45,7 @@ class FifoFault(StrEnum):
     OVERFLOW = "overflow"
     MISALIGNED = "misaligned"
     STUCK = "stuck"
+    LATE = "late"
     LOST = "lost its settings"
 
 
@@ -66,7 +68,8 @@ class FifoDecoder:
 
     def __init__(self, settings: Settings) -> None:
         self._settings, self._columns = settings, settings.columns
-        self._clock = SampleClock(settings.nominal_rate_hz)
+        clock = LookedClock if settings.polled else SampleClock
+        self._clock: SampleClock | LookedClock = clock(settings.nominal_rate_hz)
         self._host = HostClock()
         self._runs: list[Run] = []
         self._taken = 0
@@ -86,6 +89,11 @@ class FifoDecoder:
     def believed(self) -> int:
         """How many frames were believed."""
         return self._believed
+
+    @property
+    def polled(self) -> bool:
+        """Whether samples are read one by one; each is `counted`, `data` and `judged`."""
+        return self._settings.polled
 
     @property
     def frame_words(self) -> int:
@@ -133,6 +141,8 @@ class FifoDecoder:
             return FifoFault.OVERFLOW
         if self._odd_bytes or len(data) % self._settings.frame_bytes:
             return FifoFault.MISALIGNED
+        if look is not None and isinstance(self._clock, LookedClock) and self._clock.late(look[0]):
+            return FifoFault.LATE
         frames = np.frombuffer(data, ">i2").reshape(-1, self._settings.frame_words).astype(np.int16)
         # frames that wait for others, all alike, have nothing flipped
         last = self._runs[-1].frames if self._runs and not len(self._alike) else self._alike

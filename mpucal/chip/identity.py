@@ -41,7 +41,7 @@ class Behaviour:
 
     def saw(self, register: int, data: bytes, held: Mapping[int, int]) -> None:
         """`data` was read from `register` on, while the registers were known to hold `held`."""
-        if register == reg.FIFO_COUNT_H and held.get(reg.FIFO_EN, 0):
+        if register == reg.FIFO_COUNT_H and (held.get(reg.FIFO_EN) or held.get(reg.USER_CTRL)):
             shown, before = int.from_bytes(data, "big"), self._shown_bytes
             self._shown_bytes = shown
             if shown == before:
@@ -56,7 +56,7 @@ class Behaviour:
 
     @property
     def fifo_bytes(self) -> int | None:
-        """What its FIFO holds after a reset; None where it was never filled."""
+        """What its FIFO holds after a reset, 0 where it has none; None where filling it was never tried."""
         return self._fifo_bytes.get(False)
 
     def part(self, who_am_i: int) -> Part:

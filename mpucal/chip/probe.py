@@ -70,7 +70,7 @@ def _settled(port: Port) -> int:
 
 
 def probe(port: Port) -> None:
-    """Fill the FIFO of a chip that was reset and is awake, and see what it shows of gravity.
+    """Fill the FIFO of a chip that was reset and is awake, if it has one, and see what it shows of gravity.
 
     Raises
     ------
@@ -94,21 +94,24 @@ def probe(port: Port) -> None:
 
 
 def _filled(port: Port) -> int | None:
-    """How many bytes the FIFO holds once they do not get more; None where they never do. Stopped before and after."""
+    """How many bytes the FIFO holds once they do not get more; None where they never do. Stopped before and after.
+
+    0 where it stays empty.
+    """
     port.write(reg.FIFO_EN, reg.FIFO_EN_FRAME)
     port.read(reg.FIFO_EN, 1)
     port.write(reg.USER_CTRL, reg.USER_CTRL_FIFO_EN)
-    full, before = None, 0
+    full, before, most = None, 0, 0
     for _ in range(LOOKS):
         port.sleep(LOOK_NS)
         count = int.from_bytes(port.read(reg.FIFO_COUNT_H, 2), "big")
         if count and count == before:
             full = count
             break
-        before = count
+        before, most = count, max(most, count)
     port.write(reg.FIFO_EN, 0)
     port.write(reg.USER_CTRL, 0)
-    return full
+    return full if most else 0
 
 
 def _shows_a_time(head: bytes) -> bool:

@@ -34,6 +34,11 @@ class Settings:
     accel_alone: bool = False
 
     @property
+    def polled(self) -> bool:
+        """Whether each sample is read by itself, from a chip without a FIFO: the newest of those that it takes."""
+        return not self.part.fifo_bytes
+
+    @property
     def nominal_rate_hz(self) -> float:
         """The sample rate of a chip whose clock is right; none is."""
         return reg.ACCEL_ALONE_HZ if self.accel_alone else reg.sample_rate_hz(self.smplrt_div, self.dlpf_cfg)

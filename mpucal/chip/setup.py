@@ -78,7 +78,7 @@ def configured(port: Port, settings: Settings) -> bool:
 
 
 def restart_fifo(port: Port, settings: Settings) -> None:
-    """Empty the FIFO and fill it anew; it resets only while it is disabled (RM-MPU-6000A r4.2, register 106).
+    """Empty the FIFO, if there is one, and fill it anew; it resets only while disabled (RM-MPU-6000A r4.2, 106).
 
     Raises
     ------
@@ -87,6 +87,9 @@ def restart_fifo(port: Port, settings: Settings) -> None:
     port.write(reg.FIFO_EN, 0)
     port.write(reg.USER_CTRL, 0)
     port.write(reg.USER_CTRL, reg.USER_CTRL_FIFO_RESET)
+    if settings.polled:
+        port.read(reg.TEMP_OUT_H, 2)
+        return
     port.write(reg.USER_CTRL, reg.USER_CTRL_FIFO_EN)
     port.read(reg.INT_STATUS, 1)
     port.read(reg.TEMP_OUT_H, 2)

@@ -13,9 +13,9 @@ import numpy as np
 
 from ..chip.access import Bus
 from ..chip.bench import Bench
-from ..chip.config import Config
+from ..chip.config import MOST_POLLED_HZ, Config
 from ..chip.decode import Decoder
-from ..chip.driver import Driver
+from ..chip.driver import NO_FIFO, Driver
 from ..chip.families import PARTS, Family, Part
 from ..chip.identity import remark
 from ..chip.offsets import PLACES, Block, restore
@@ -91,6 +91,8 @@ def _awake(port: Port, driver: Driver, config: Config, seconds: float, olds: lis
     sensor = driver.start()
     part, family = driver.part, driver.part.family
     yield _identity(sensor)
+    if not part.fifo_bytes:
+        yield Finding("FIFO", Mark.NOTE, NO_FIFO, f"take --rate {MOST_POLLED_HZ} or less, and a bus of 400 kHz")
     yield _held(port, family, olds)
     end_ns = driver.now_ns() + round(seconds * 1e9)
     while driver.now_ns() < end_ns:

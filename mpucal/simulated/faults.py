@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Self
 
+from ..chip.registers import FIFO_COUNT_H, FIFO_R_W
 from .mishaps import Knock, Mishap, Slip, Warmth, ZeroStep
 
 
@@ -76,6 +77,11 @@ def _of_a_clock(register: int, data: bytes) -> bytes:
     """What a DS3231 gives: its 19 registers, again and again."""
     held = TIME + bytes(12)
     return bytes(held[(register + i) % len(held)] for i in range(len(data)))
+
+
+def _without_fifo(register: int, data: bytes) -> bytes:
+    """Of FIFO_COUNT and of the FIFO, nothing."""
+    return bytes(len(data)) if FIFO_COUNT_H <= register <= FIFO_R_W else data
 
 
 _ROWS = (
@@ -179,6 +185,7 @@ _ROWS = (
         alters=lambda _, data: bytes(len(data)),
     ),
     FaultKind("rtc", Where.DEFECT, "a DS3231 clock answers in its place", timed=False, alters=_of_a_clock),
+    FaultKind("no_fifo", Where.DEFECT, "the FIFO stays empty", timed=False, alters=_without_fifo),
     FaultKind("low_x", Where.DEFECT, "accelerometer x stays at -32768", timed=False, pins=((0,), -32768)),
     FaultKind("zero_z", Where.DEFECT, "accelerometer z stays at 0", timed=False, pins=((2,), 0)),
     FaultKind("zero_acc", Where.DEFECT, "the accelerometer stays at 0", timed=False, pins=(ACC, 0)),

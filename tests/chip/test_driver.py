@@ -361,6 +361,26 @@ def test_two_seconds_without_a_sample(bench, stream, dead):
         stream(driver, 10)
 
 
+def test_a_chip_without_a_fifo_is_read_sample_by_sample(bench, stream):
+    """The times are those of the reads, and a host that is late leaves a gap."""
+    desk = bench()
+    desk.before["answer", reg.FIFO_COUNT_H] = lambda data: bytes(len(data))
+    driver = desk.driver()
+    assert driver.start().rate_hz == 200
+    stream(driver, 1)
+    desk.stall(0.1)
+    stream(driver, 1)
+    recording = driver.recording()
+    assert recording.gap.sum() == 1
+    looks = [t.t_ns for t in desk.transactions if t.op == "read" and len(t.data) == 17]
+    assert set(np.round(recording.t * 1e9).astype(int)) < set(looks)
+    assert len(recording) > len(looks) - 8
+    late = np.flatnonzero(np.diff(recording.t) > 0.05)
+    assert (late + 1).tolist() == np.flatnonzero(recording.gap).tolist()
+    with pytest.raises(ChipError, match=r"has no FIFO.*--rate 250 or less"):
+        desk.driver(Config(rate_hz=1000)).start()
+
+
 def test_stopping_quiets_the_fifo_and_leaves_the_chip_awake(bench, stream):
     desk = bench()
     driver = desk.driver()

@@ -1,5 +1,6 @@
 """Which chip it is by its behaviour, told from the accesses alone; and what must not be written to."""
 
+import itertools
 import re
 
 import numpy as np
@@ -196,9 +197,16 @@ def test_a_stranger_is_refused_by_reading_alone(registers, says):
 
 
 def test_a_part_of_the_table_whose_fifo_never_fills_is_refused():
-    registers = {reg.WHO_AM_I: 0x68, reg.PWR_MGMT_1: 0x01}
+    stranger = Stranger({reg.WHO_AM_I: 0x68, reg.PWR_MGMT_1: 0x01})
+    counts, read = itertools.count(1), stranger.read
+
+    def restless(register, count):
+        stranger.registers[reg.FIFO_COUNT_L] = next(counts)
+        return read(register, count)
+
+    stranger.read = restless
     with pytest.raises(ChipError, match="FIFO does not fill as its register map says"):
-        Driver(Stranger(registers)).start()
+        Driver(stranger).start()
 
 
 def test_every_part_is_found_by_its_identity():
