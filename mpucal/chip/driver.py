@@ -7,6 +7,7 @@ accesses. DRIVER_VERSION counts up with every change of them.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -80,6 +81,10 @@ class Driver:
     bus : where the chip is. config : how it is to measure. name : what to call its recording.
     say : is told what a person should know of this chip as it starts, and of its bus as it stops: one sentence, no full
         stop. tally : counts the transfers.
+
+    Attributes
+    ----------
+    faults : how often what was read was not believed, by kind.
     """
 
     def __init__(
@@ -99,7 +104,7 @@ class Driver:
         self._next_poll_ns = 0
         self._need = Need.NOTHING
         self._fruitless_ns = 0
-        self._overflows = 0
+        self.faults: Counter[FifoFault] = Counter()
         self._frame_ns = math.inf
 
     def now_ns(self) -> int:
@@ -210,7 +215,7 @@ class Driver:
         count, begun_ns = self._fifo_count(settings.frame_bytes), self._port.now_ns
         self._plan_next_poll()
         if count >= settings.part.fifo_bytes - SPARE_FRAMES * settings.frame_bytes:
-            self._overflows += 1
+            self.faults[FifoFault.OVERFLOW] += 1
             return Need.RESTART
         frames = count // settings.frame_bytes
         try:
@@ -222,8 +227,7 @@ class Driver:
             return Need.RESTART
         if frames:
             self._frame_ns = min(self._frame_ns, (self._port.now_ns - begun_ns) / frames)
-        self._overflows += self._decoder.fault is FifoFault.OVERFLOW
-        return _CURES.get(self._decoder.fault, Need.SET_UP)
+        return self._judged()
 
     def _look(self) -> Need:
         """Read samples one by one, for as long as there are polls of a FIFO apart."""
@@ -237,12 +241,19 @@ class Driver:
             self._next_poll_ns += step_ns
             if self._decoder.fault is not None:
                 break
-        return _CURES.get(self._decoder.fault, Need.SET_UP)
+        return self._judged()
+
+    def _judged(self) -> Need:
+        """What the last poll needs, and counts why."""
+        fault = self._decoder.fault
+        if fault is not None:
+            self.faults[fault] += 1
+        return _CURES.get(fault, Need.SET_UP)
 
     def _check_pace(self, settings: Settings) -> None:
         """Raise BusError where frames come faster than even the quickest look took them, and not by chance."""
         rate_hz = settings.nominal_rate_hz
-        if self._overflows < OVERFLOWS or self._frame_ns * rate_hz < 1e9 or self._frame_ns == math.inf:
+        if self.faults[FifoFault.OVERFLOW] < OVERFLOWS or self._frame_ns * rate_hz < 1e9 or self._frame_ns == math.inf:
             return
         raise BusError(
             f"the bus moves {1e9 / self._frame_ns:.0f} samples a second, where the chip takes {rate_hz:g}",
@@ -251,8 +262,10 @@ class Driver:
 
     def _recover(self, settings: Settings) -> None:
         """Start the FIFO anew; before that, set up a chip that has lost its settings or repeats itself."""
-        if self._need is Need.SET_UP or not configured(self._port, settings):
+        if self._need is not Need.SET_UP and not configured(self._port, settings):
+            self.faults[FifoFault.LOST] += 1
             self._need = Need.SET_UP
+        if self._need is Need.SET_UP:
             self._set_up_again(settings)
         self._restart()
 

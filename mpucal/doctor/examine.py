@@ -17,6 +17,7 @@ from ..chip.config import MOST_POLLED_HZ, Config
 from ..chip.decode import Decoder
 from ..chip.driver import NO_FIFO, Driver
 from ..chip.families import PARTS, Family, Part
+from ..chip.fifo import FifoFault
 from ..chip.identity import remark
 from ..chip.offsets import PLACES, Block, restore
 from ..chip.port import Port
@@ -36,6 +37,15 @@ MANY, MOST = 0.05, 0.5
 
 # of what the factory measured: an axis that moves by less is dead
 UNMOVED = 0.05
+
+# of gaps, with what helps
+CAUSES = {
+    FifoFault.OVERFLOW: ("the FIFO overflowed: it was read too late", "end other programs, or take a lower --rate"),
+    FifoFault.LATE: ("a sample was read too late", "end other programs, or take a lower --rate"),
+    FifoFault.MISALIGNED: ("the frames in the FIFO slipped", REMEDY),
+    FifoFault.LOST: ("the chip lost its settings: it was reset", "its supply breaks down: check its wires, and motors"),
+    FifoFault.STUCK: ("the sensor repeated itself", "if that happens again and again, replace the chip"),
+}
 
 Look = Callable[[Bus], Iterable[Finding]]
 
@@ -103,6 +113,10 @@ def _awake(port: Port, driver: Driver, config: Config, seconds: float, olds: lis
     else:
         yield Finding(
             "stream", Mark.BAD, f"{len(recording)} samples in {seconds:g} s", "check the wires and the supply"
+        )
+    for fault, times in driver.faults.items():
+        yield Finding(
+            "gaps", Mark.BAD, f"{times} × {CAUSES[fault][0]}", CAUSES[fault][1], {"fault": fault, "times": times}
         )
     if driver.flipped:
         what = f"{driver.flipped} of {len(recording)} samples had a bit flipped on the bus, and were set right"
