@@ -114,9 +114,13 @@ class Parser:
     def _decoded(self, data: bytearray) -> Packet | None:
         if data[0] == V2 and data[FLAGS_AT] & ~SIGNED:
             return None
+        signing = self._mav.signing
+        times = dict(signing.stream_timestamps)
         try:
             message = self._mav.decode(data)
         except dialect().MAVError as error:
+            # pymavlink remembers a signature's time before it checks it: a forged one would outdate all that follow
+            signing.stream_timestamps = times
             self.refused += "signature" in str(error)
             return None
         return Packet(bytes(data), message)

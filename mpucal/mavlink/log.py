@@ -20,7 +20,7 @@ from .firmwares import ARDUPILOT, PX4, preferred_messages
 from .gatherer import Gatherer, Row
 from .imu import Reading, reading
 from .join import BEYOND, CORRECTIONS, SETTLED_US, Segment, joined, through
-from .parameters.encoding import is_parameter, of_wire
+from .parameters.encoding import parameter_of
 from .tlog import Record
 
 # whose change alters the streams
@@ -57,8 +57,8 @@ class Log:
 
     def add_other(self, message: Message) -> None:
         """Take a message that is no IMU's."""
-        if is_parameter(message):
-            parameter = of_wire(message, self.firmware == PX4)
+        parameter = parameter_of(message, self.firmware == PX4)
+        if parameter is not None:
             self.parameter(parameter.name, float(parameter.value))
 
     def parameter(self, name: str, value: float) -> None:

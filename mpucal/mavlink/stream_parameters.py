@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from .dialect import Message
 from .firmwares import EKF2_IMU_CTRL, PX4
 from .link import Link, S
-from .parameters.encoding import is_parameter, name_bytes, of_wire
+from .parameters.encoding import name_bytes, parameter_of
 from .parameters.names import CUSTOM_ANGLES
 
 ORIENTATION = "AHRS_ORIENTATION"
@@ -79,7 +79,6 @@ def _request(link: Link, names: Sequence[str]) -> None:
 
 
 def _take(message: Message, held: dict[str, float], names: Sequence[str], firmware: str) -> None:
-    if is_parameter(message):
-        parameter = of_wire(message, firmware == PX4)
-        if parameter.name in names:
-            held[parameter.name] = float(parameter.value)
+    parameter = parameter_of(message, firmware == PX4)
+    if parameter is not None and parameter.name in names:
+        held[parameter.name] = float(parameter.value)

@@ -92,6 +92,17 @@ def test_a_stranger_changes_nothing(script, station, key):
     assert heard[0] == heard[1]
 
 
+def test_a_forged_signature_of_a_later_time_outdates_no_true_one(script, station):
+    vehicle, forger = station(key=KEY), station(key=b"x" * 32)
+    forger.mav.signing.timestamp = 1 << 47
+    begun = heartbeats(vehicle, HOME, 2)
+    own = [(2 + 0.02 * k, HOME, vehicle.raw(20_000 * k)) for k in range(100)]
+    forged = [(2.01, HOME, forger.raw(1, acc=(9, 9, 9)))]
+    link, _ = locked(script(in_order(begun, own, forged)), KEY)
+    heard = [message for message in link.messages(5 * S) if message.get_type() == "RAW_IMU"]
+    assert [message.time_usec for message in heard] == [20_000 * k for k in range(100)]
+
+
 def test_others_at_the_vehicles_address_are_kept_but_not_heard(script, station):
     vehicle, gimbal, other = station(), station(1, component=154), station(3)
     arriving = in_order(heartbeats(vehicle, HOME, 4), [(3.1, HOME, gimbal.raw(1)), (3.2, HOME, other.raw(1))])

@@ -18,11 +18,12 @@ from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.document import autopilot_document
 from mpucal.mavlink.prearm import prearm
 from mpucal.mavlink.prompts import Heard, to_message
+from mpucal.mavlink.transport import Bytes
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
 from mpucal.result.journal import Journal
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
-from mpucal.simulated.vehicle.transport import SimulatedTransport
+from mpucal.simulated.vehicle.transport import ADDRESS, SimulatedTransport
 from mpucal.sinks.autopilot import AutopilotSink
 from mpucal.sinks.table import SINKS
 from mpucal.sinks.write_back import write_to
@@ -496,3 +497,53 @@ def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_
     assert "left alone" in AutopilotSink(link, journal=journal).recover()
     assert sets.sets == 0
     assert other.firmware.store["INS_ACCOFFS_X"] == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(
+    ("kind", "attacker"),
+    [
+        ("mixed", "a stranger"),
+        ("mixed", "against signing"),
+        ("parameters", "the address forged"),
+        ("values", "the address forged"),
+        ("ftp", "the address forged"),
+    ],
+)
+def test_nothing_is_set_that_was_not_asked_for(kind, attacker, hostile, monkeypatch):
+    key = hostile.KEY if attacker == hostile.SIGNED else None
+    vehicle = SimulatedVehicle(VehicleOptions.parse("sim:imus=1"), key=key)
+    attack = hostile.Attack(kind, attacker, "ardupilot", 5, 40.0)
+    monkeypatch.setattr(hostile.HostileTransport, "attack", attack, raising=False)
+    link = Link(hostile.HostileTransport(vehicle), lambda t_ns, data: None, key)
+    link.lock(link.listen()[0])
+    link.send(to_message(Heard("lay_flat", None)))
+    list(link.messages(link.now_ns() + 4_000_000_000))
+    calibration = calibration_of(vehicle)
+    new, old = calibration.extra["autopilot"]["params_new"], stored(vehicle)
+    try:
+        AutopilotSink(link, store=True).write(calibration)
+    except WriteBackError:
+        assert attacker == hostile.FORGED
+        assert stored(vehicle) == old
+    else:
+        assert {name: stored(vehicle)[name] for name in new} == pytest.approx(new)
+    assert attack.sent > 100
+    for name, value, before in attack.sets:
+        assert value in (before, pytest.approx(new[name]))
+
+
+def test_who_answers_in_the_vehicles_place_is_told_by_its_answers(station):
+    vehicle, transport, link = vehicle_of("ardupilot", ",imus=1")
+    impostor = station()
+    send = transport.send
+
+    def also_answered(data, address):
+        transport._queue.append(
+            Bytes(impostor.message("param_value", b"INS_ACCOFFS_Y", 0.3, 9, 9, 1), ADDRESS, link.now_ns())
+        )
+        send(data, address)
+
+    transport.send = also_answered
+    with pytest.raises(WriteBackError, match=r"nothing was written.*INS_ACCOFFS_Y = 0.001 and 0.3"):
+        AutopilotSink(link).write(calibration_of(vehicle))
+    assert transport.sets == 0

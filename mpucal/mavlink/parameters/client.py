@@ -7,12 +7,14 @@ from dataclasses import dataclass
 
 from ...errors import LinkError
 from ..dialect import Message
-from ..link import Link
+from ..link import Link, S
 from ..request import ask
-from .encoding import REAL32, Number, Parameter, as_float32, error_name, name_bytes, of_wire, to_wire
+from .encoding import REAL32, Number, Parameter, as_float32, error_name, name_bytes, parameter_of, to_wire
 
 # over a radio that loses a packet in five each way, ten tries fail once in 30,000
 TIMEOUT_S, TRIES = 0.5, 10
+# how late an answer may come that another was faster than
+LATE_NS = S // 2
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,8 @@ class Parameters:
     def __init__(self, link: Link) -> None:
         self._link = link
         self._bytewise = link.vehicle.is_px4
+        self._heard: dict[str, set[Number]] = {}
+        link.subscribe(self._hear)
 
     def read(self, names: Sequence[str]) -> dict[str, Number]:
         """The values of all of `names`.
@@ -37,6 +41,27 @@ class Parameters:
         LinkError : one does not come. EndOfCapture : a replay holds no more.
         """
         return {name: self._read(name).value for name in names}
+
+    def read_surely(self, names: Sequence[str]) -> dict[str, Number]:
+        """The same, where all that is heard of each agrees: two senders as one vehicle are told by their answers.
+
+        Raises
+        ------
+        LinkError : one does not come, or comes with two values. EndOfCapture : a replay holds no more.
+        """
+        self._heard = {name: set() for name in names}
+        for _ in range(2):
+            held = self.read(names)
+        list(self._link.messages(self._link.now_ns() + LATE_NS))
+        heard, self._heard = self._heard, {}
+        for name, values in heard.items():
+            if len(values) > 1:
+                some = " and ".join(f"{value:.6g}" for value in sorted(values)[:2])
+                raise LinkError(
+                    f"{self._link.vehicle} is heard to hold {name} = {some}",
+                    "see who else writes parameters or answers as this vehicle; signing (--signing-key) shuts them out",
+                )
+        return held
 
     def set(self, name: str, value: float, kind: int = REAL32) -> None:
         """Set one, and wait until the vehicle says that it has this value.
@@ -67,6 +92,11 @@ class Parameters:
         held = self.read(tuple(values))
         return {name: held[name] for name, value in values.items() if held[name] != as_float32(value)}
 
+    def _hear(self, message: Message) -> None:
+        parameter = parameter_of(message, self._bytewise) if self._heard else None
+        if parameter is not None and parameter.name in self._heard:
+            self._heard[parameter.name].add(parameter.value)
+
     def _read(self, name: str) -> Parameter:
         vehicle = self._link.vehicle
         request = self._link.mav.param_request_read_encode(vehicle.system, vehicle.component, name_bytes(name), -1)
@@ -77,9 +107,7 @@ class Parameters:
         raise LinkError(f"{vehicle} does not report {name} ({why})", "check the link and the firmware's version")
 
     def _answer(self, received: Message, name: str) -> Parameter | Refused | None:
-        kind = received.get_type()
-        if kind == "PARAM_VALUE" and received.param_id == name:
-            return of_wire(received, self._bytewise)
-        if kind == "PARAM_ERROR" and received.param_id == name:
+        if received.get_type() == "PARAM_ERROR" and received.param_id == name:
             return Refused(error_name(received.error))
-        return None
+        parameter = parameter_of(received, self._bytewise)
+        return parameter if parameter is not None and parameter.name == name else None

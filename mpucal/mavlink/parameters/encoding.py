@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import dataclass
 
@@ -77,7 +78,7 @@ def of_wire(message: Message, bytewise: bool) -> Parameter:
     kind = int(message.param_type)
     value: Number = float(message.param_value)
     if kind in BYTEWISE:
-        value = BYTEWISE[kind].unpack(wire_bytes(message))[0] if bytewise else round(value)
+        value = BYTEWISE[kind].unpack(wire_bytes(message))[0] if bytewise else _whole(value)
     index, count = getattr(message, "param_index", -1), getattr(message, "param_count", 0)
     return Parameter(str(message.param_id), value, kind, int(index), int(count))
 
@@ -90,9 +91,16 @@ def wire_bytes(message: Message) -> bytes:
     return packet[at : at + min(packet[1], FLOAT32.size)].ljust(FLOAT32.size, b"\0")
 
 
-def is_parameter(message: Message) -> bool:
-    """Whether it is a PARAM_VALUE."""
-    return bool(message.get_type() == "PARAM_VALUE")
+def _whole(value: float) -> Number:
+    return round(value) if math.isfinite(value) else value
+
+
+def parameter_of(message: Message, bytewise: bool) -> Parameter | None:
+    """The parameter in a PARAM_VALUE; None of another message, and of a value that is not finite."""
+    if message.get_type() != "PARAM_VALUE":
+        return None
+    parameter = of_wire(message, bytewise)
+    return parameter if math.isfinite(parameter.value) else None
 
 
 def name_bytes(name: str) -> bytes:

@@ -54,10 +54,10 @@ class Writer:
 
         Raises
         ------
-        LinkError : it does not say.
+        LinkError : it does not say, or says two things.
         """
         names = [name for where in self._places for name in where.names]
-        return {name: float(value) for name, value in self._parameters.read(names).items()}
+        return {name: float(value) for name, value in self._parameters.read_surely(names).items()}
 
     def write(self, old: Mapping[str, float], new: Mapping[str, float], verify: Callable[[], None]) -> None:
         """Set what of `new` is not in `old`, read all back, `verify`; on any failure put `old` back.
