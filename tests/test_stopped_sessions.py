@@ -38,9 +38,9 @@ def test_a_session_goes_on_where_time_passed_it_by(worlds, tmp_path):
         code = run(
             [
                 "session",
-                source,
+                "--mavlink",
                 "sim:seed=3",
-                *(["--no-write"] if source == "--mavlink" else []),
+                "--no-write",
                 "-o",
                 str(tmp_path / "board"),
                 "--yes",

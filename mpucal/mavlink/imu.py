@@ -63,12 +63,16 @@ class Reading:
     temperature_c: float
 
 
+# 285 years in us, which a float holds exactly
+LATEST = 1 << 53
+
+
 def reading(message: Message) -> Reading | None:
     """The content of an IMU message; None of another one, or where it has no new accelerations and rates."""
     read = _READ.get(message.get_type())
     content = None if read is None else read(message)
     # an instance that is not there is sent as zeros, which no sensor feels
-    return content if content is not None and any(content.acc + content.gyr) else None
+    return content if content is not None and any(content.acc + content.gyr) and content.time < LATEST else None
 
 
 def _highres(m: Message) -> Reading | None:
