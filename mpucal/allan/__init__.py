@@ -122,9 +122,10 @@ class NoiseMeter:
 
     def _suspicious(self, white: Vector, course: Vector, rate_hz: float) -> list[dict[str, str]]:
         seconds = self._trace.seconds if self._trace is not None else 0.0
-        blocks, angle = turned(course[:, :6]) if len(course) else (0, 0.0)
-        if blocks:
-            said = f"the board was turned, gravity by {math.degrees(angle):.0f} deg, for {blocks * seconds:.0f} s"
+        turn = turned(course[:, :6]) if len(course) else None
+        if turn is not None:
+            block, angle = turn
+            said = f"the board was turned, gravity by {math.degrees(angle):.0f} deg, from {block * seconds:.0f} s on"
             return [{"code": "moved", "message": f"{said}: these numbers are of the motion, not of the sensor"}]
         found = []
         for tone in self._spectrum.tones(rate_hz):

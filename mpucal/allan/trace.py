@@ -68,9 +68,9 @@ def steps(means: Vector) -> list[tuple[int, int, float]]:
     return found
 
 
-def turned(means: Vector) -> tuple[int, float]:
-    """(blocks, rad) of means (k, 6) of accelerations and rates: in how many it was turned, and how far gravity was."""
+def turned(means: Vector) -> tuple[int, float] | None:
+    """(block, rad) of means (k, 6) of accelerations and rates: when it was first turned, and how far gravity was."""
     acc, rate = means[:, :3], np.linalg.norm(means[:, 3:6] - np.median(means[:, 3:6], axis=0), axis=1)
-    usual = np.median(acc, axis=0)
-    away = np.arctan2(np.linalg.norm(np.cross(acc, usual), axis=1), acc @ usual)
-    return int(np.sum((away > TURNED_RAD) | (rate > TURNED_RAD_S))), float(away.max())
+    away = np.arctan2(np.linalg.norm(np.cross(acc, acc[0]), axis=1), acc @ acc[0])
+    moved = np.flatnonzero((away > TURNED_RAD) | (rate > TURNED_RAD_S))
+    return (int(moved[0]), float(away.max())) if len(moved) else None

@@ -21,6 +21,7 @@ from ..errors import RecordingError
 from ..result.atomic import whole_file
 from ._text import lines, numbers
 from .rows import Rows, Write, cannot_read, checked
+from .tables.times import possible_utc_ns
 
 COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 TEMPERATURE, UTC = "temperature_c", "utc_s"
@@ -71,7 +72,7 @@ def _utc_ns(header: list[str], second: bytes) -> int | None:
         return None
     try:
         utc_s, t = (Decimal(cells[header.index(name)].strip()) for name in (UTC, "t"))
-        return round((utc_s - t) * NS)
+        return possible_utc_ns(round((utc_s - t) * NS))
     except (ArithmeticError, ValueError):
         return None
 

@@ -32,6 +32,7 @@ from ..errors import RecordingError
 from ..result.atomic import whole_file
 from ..strict_json import parsed
 from .rows import ROWS, Rows, Write, cannot_read, checked
+from .tables.times import possible_utc_ns
 
 NEEDED = ("t", "acc", "gyr")
 TEMPERATURES = ("temperature_c", "temperature")
@@ -95,7 +96,7 @@ def npz_rows(path: Path) -> Rows:
 
 def _utc_ns(arrays: Mapping[str, Any]) -> int | None:
     value = np.asarray(arrays.get(UTC, np.nan))
-    return int(value) if value.shape == () and value.dtype.kind in "iu" else None
+    return possible_utc_ns(int(value)) if value.shape == () and value.dtype.kind in "iu" else None
 
 
 @contextmanager

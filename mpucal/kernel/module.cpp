@@ -254,7 +254,8 @@ NB_MODULE(_kernel, m) {
   m.def(
       "statistics",
       [](const Array& x, const nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>& runs) {
-        const std::size_t k = runs.size() / 2;
+        const std::size_t k = runs.shape(0);
+        if (runs.shape(1) != 2) throw std::invalid_argument("a run is a first sample and a last + 1");
         for (std::size_t r = 0; r < k; ++r)
           if (runs(r, 0) < 0 || runs(r, 1) <= runs(r, 0) || 3 * static_cast<std::size_t>(runs(r, 1)) > x.size())
             throw std::invalid_argument("a run is empty, or not within the samples");

@@ -121,7 +121,10 @@ def test_a_board_that_was_turned_has_no_tones(lying):
     ]
     (moved,) = noise_of(replace(lying, acc=acc)).suspicious
     assert moved["code"] == "moved"
-    assert "gravity by 8 deg, for 12" in moved["message"]
+    assert "gravity by 8 deg, from 30" in moved["message"]
+    # half of it upside down: no direction is the usual one
+    (moved,) = noise_of(replace(lying, acc=lying.acc * np.where(t < t.mean(), 1.0, -1.0)[:, None])).suspicious
+    assert "gravity by 180 deg" in moved["message"]
     # about the vertical, which gravity does not see
     gyr = lying.gyr.copy()
     gyr[turned, 2] += 0.1

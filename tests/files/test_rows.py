@@ -390,6 +390,13 @@ def test_a_time_that_no_message_holds_is_refused(tmp_path):
         write(samples)
 
 
+@pytest.mark.parametrize("utc_s", ["1e30", "1e400", "-1e9", "nan"])
+def test_a_time_of_day_that_is_none_is_left_out(utc_s, tmp_path):
+    lines = [f"{0.01 * k},0,0,9.8,0,0,0,{utc_s}" for k in range(40)]
+    (tmp_path / "a.csv").write_text("\n".join(["t,ax,ay,az,gx,gy,gz,utc_s", *lines]))
+    assert open_rows(tmp_path / "a.csv").utc_ns is None
+
+
 @pytest.mark.parametrize("suffix", [".npz", ".csv", ".mcap"])
 @pytest.mark.parametrize("utc_ns", [None, 1_718_030_736_872_695_300])
 def test_the_time_of_day_is_kept(suffix, utc_ns, tmp_path):

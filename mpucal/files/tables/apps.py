@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import PurePath
 
+from ...errors import RecordingError
 from .text import NS, text_of
 
 METADATA, TIME = "metadata.csv", "meta/time.csv"
@@ -36,11 +37,11 @@ def said(files: Mapping[str, bytes]) -> Said:
     """What the files say, by their names; nothing where there are none or they cannot be understood."""
     found = Said()
     for name, data in files.items():
-        lines = text_of(data, name).splitlines()
-        separator = next((cell for cell in ",;\t" if lines and cell in lines[0]), ",")
         try:
+            lines = text_of(data, name).splitlines()
+            separator = next((cell for cell in ",;\t" if lines and cell in lines[0]), ",")
             read = list(csv.DictReader(lines, delimiter=separator))
-        except csv.Error:
+        except (RecordingError, csv.Error):
             continue
         rows = [{key.lower(): cell for key, cell in row.items() if key and cell} for row in read]
         if name.lower().endswith(TIME):

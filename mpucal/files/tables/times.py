@@ -65,7 +65,12 @@ def utc_ns(stream: Stream, of_t: str) -> int | None:
     if stream.times is None or unit not in QUANTITIES["t"]:
         return None
     first = round(Decimal(str(stream.times[0])) * NS_OF[unit]) + (stream.zero_ns or 0)
-    return first if UTC_NS[0] < first < UTC_NS[1] else None
+    return possible_utc_ns(first)
+
+
+def possible_utc_ns(ns: int) -> int | None:
+    """A time of day [ns since 1970]; None for one that no recording is of."""
+    return ns if UTC_NS[0] < ns < UTC_NS[1] else None
 
 
 def seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Vector, str]:
