@@ -44,8 +44,9 @@ class Preparation:
             while not self._named() and self._link.now_ns() < end_ns:
                 list(self._link.messages(self._link.now_ns() + S))
         if read_parameters(self._link, (AUTOCAL,), PX4).get(AUTOCAL):
-            Parameters(self._link).set(AUTOCAL, 0, INT32)
+            # before it is set: where the answer is lost, it may be 0 all the same
             self._held = True
+            Parameters(self._link).set(AUTOCAL, 0, INT32)
             self._say(f"{AUTOCAL} is 0 for the session, and then 1 again: PX4 learns no offsets of its own meanwhile.")
 
     def _named(self) -> bool:

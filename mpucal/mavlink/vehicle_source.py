@@ -86,8 +86,11 @@ class VehicleSource:
         self._say(f"This is {vehicle}; what is asked and written goes there alone.")
         self._link.lock(vehicle)
         firmware = self._firmware = PX4 if vehicle.is_px4 else ARDUPILOT
-        if self._preparation is not None and firmware == PX4:
-            self._preparation.prepare()
+        if self._preparation is not None:
+            if firmware == PX4:
+                self._preparation.prepare()
+            else:
+                self._say("--prepare is for a PX4 only: nothing was prepared.")
         self._log = Log(firmware, over_reboots=True)
         self._link.subscribe(self._hear)
         parameters = read_stream_parameters(self._link, firmware)

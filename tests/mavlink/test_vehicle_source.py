@@ -6,6 +6,7 @@ import pytest
 from mpucal.errors import EndOfCapture, LinkError, UsageError, WriteBackError
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
+from mpucal.mavlink.parameters.client import Parameters
 from mpucal.mavlink.parameters.names import ardupilot_place, mounting
 from mpucal.mavlink.stream_parameters import read_stream_parameters, stream_parameter_names
 from mpucal.mavlink.tlog import Record, Tlog
@@ -228,6 +229,33 @@ def test_a_px4_that_was_prepared_names_its_sensors_and_holds_its_offsets():
     again.start()
     repeated = polled(again, 6)
     assert repeated == t[: len(repeated)]
+
+
+def test_autocal_is_set_back_where_the_answer_to_holding_it_is_lost(monkeypatch):
+    vehicle = SimulatedVehicle(VehicleOptions.parse("sim:firmware=px4,imus=1,hand=still"))
+    set_surely = Parameters.set
+
+    def lost(self, name, value, kind):
+        set_surely(self, name, value, kind)
+        if value == 0:
+            raise LinkError("no answer", "ask again")
+
+    monkeypatch.setattr(Parameters, "set", lost)
+    link = Link(SimulatedTransport(vehicle), lambda t_ns, data: None)
+    source = VehicleSource(link, 100.0, None, lambda text: None, "test", prepare=True)
+    with pytest.raises(LinkError):
+        source.start()
+    assert vehicle.firmware.store["SENS_IMU_AUTOCAL"] == 0
+    source.stop()
+    assert vehicle.firmware.store["SENS_IMU_AUTOCAL"] == 1
+
+
+def test_an_ardupilot_is_told_that_nothing_was_prepared():
+    vehicle = SimulatedVehicle(VehicleOptions.parse("sim:imus=1,hand=still"))
+    said = []
+    link = Link(SimulatedTransport(vehicle), lambda t_ns, data: None)
+    VehicleSource(link, 100.0, None, said.append, "test", prepare=True).start()
+    assert [text for text in said if "nothing was prepared" in text]
 
 
 @pytest.mark.parametrize(("asked_hz", "came_hz"), [(100, 100), (125, 125), (200, 250), (250, 250)])
