@@ -66,7 +66,7 @@ static inline int mpucal_correct_gyro_counts(const int16_t counts[3], float rang
 def _check(used: str, measured: float, unit: str) -> str:
     if not measured or measured % 1:
         return ""
-    return f"""/* Define {used} as the range that your code sets: another one than this does not compile. */
+    return f"""/* Define {used} as the range that your code sets, an integer: another one than this does not compile. */
 #if defined({used}) && {used} != {measured:g}
 #error "mpucal: this calibration is of +-{measured:g} {unit}, and {used} is another range"
 #endif

@@ -14,6 +14,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
+from mpucal.chip import registers as reg
 from mpucal.data import STANDARD_GRAVITY_MPS2 as G
 from mpucal.export.forms import form
 
@@ -102,10 +103,23 @@ def test_micropythons_recipe_runs(calibration, monkeypatch):
     exec(form("micropython").export(calibration)[0], vars(module))
     monkeypatch.setitem(sys.modules, "calibration", module)
     words = (*COUNTS[:3], -700, *COUNTS[3:])
-    i2c = SimpleNamespace(readfrom_mem=lambda *where: struct.pack(">7h", *words) if where == (0x68, 0x3B, 14) else None)
-    names = {"i2c": i2c}
+    # asleep after power-up
+    registers = bytearray(128)
+    registers[reg.PWR_MGMT_1] = 0x40
+
+    def write(address, register, data):
+        assert address == 0x68
+        registers[register : register + len(data)] = data
+
+    def read(*where):
+        assert where == (0x68, 0x3B, 14)
+        assert not registers[reg.PWR_MGMT_1] & 0x40
+        return struct.pack(">7h", *words)
+
+    names = {"i2c": SimpleNamespace(readfrom_mem=read, writeto_mem=write)}
     exec(re.search(r"```python\n# MicroPython\n(.*?)```", PAGE, re.DOTALL)[1], names)
-    y, y_w = np.array(COUNTS[:3]) * 4 * G / 32768, np.array(COUNTS[3:]) * np.radians(500 / 32768)
+    range_g, range_dps = 2 << (registers[reg.ACCEL_CONFIG] >> 3 & 3), 250 << (registers[reg.GYRO_CONFIG] >> 3 & 3)
+    y, y_w = np.array(COUNTS[:3]) * range_g * G / 32768, np.array(COUNTS[3:]) * np.radians(range_dps / 32768)
     a, w = calibration.apply(y, y_w)
     np.testing.assert_allclose(names["a"], a, atol=1e-5)
     np.testing.assert_allclose(names["w"], w, atol=1e-5)
