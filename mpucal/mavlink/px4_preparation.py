@@ -5,15 +5,18 @@ What was asked for by --prepare; the parameters are those of PX4's `sensors` and
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from ..errors import LinkError
 from .dialect import dialect
 from .firmwares import PX4
+from .imu import HIGHRES, MESSAGE_ID, reading
 from .link import Link, S
 from .parameters.client import Parameters
 from .parameters.encoding import INT32
 from .parameters.names import all_places
+from .prompts import Heard, to_message
 from .request import command
 from .stream_parameters import read_parameters
 
@@ -21,6 +24,8 @@ AUTOCAL = "SENS_IMU_AUTOCAL"
 # MAV_CMD_PREFLIGHT_CALIBRATION, param5: offsets from where it lies level, which also stores each sensor's id
 QUICK = 4
 NAMED_NS = 10 * S
+# how far from level it may seem to lie: offsets of 60 mg of two axes, which are not known yet, are 5 degrees of it
+LEVEL_DEG, LEVEL_NS, LOOK_US = 8, 20 * S, 20_000
 
 
 class Preparation:
@@ -38,16 +43,38 @@ class Preparation:
         EndOfCapture, LinkError : see Parameters.set.
         """
         if not self._named():
-            self._say(f"{self._link.vehicle} names its accelerometers now: leave it level, and do not touch it.")
-            command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, QUICK)
-            end_ns = self._link.now_ns() + NAMED_NS
-            while not self._named() and self._link.now_ns() < end_ns:
-                list(self._link.messages(self._link.now_ns() + S))
+            self._name()
         if read_parameters(self._link, (AUTOCAL,), PX4).get(AUTOCAL):
             # before it is set: where the answer is lost, it may be 0 all the same
             self._held = True
             Parameters(self._link).set(AUTOCAL, 0, INT32)
             self._say(f"{AUTOCAL} is 0 for the session, and then 1 again: PX4 learns no offsets of its own meanwhile.")
+
+    def _name(self) -> None:
+        """Its quick calibration, once it lies level; no sensor used the offsets that this replaces."""
+        vehicle = self._link.vehicle
+        self._say(f"Lay {vehicle} level, top up: it names its accelerometers then, with offsets as it lies.")
+        self._link.send(to_message(Heard("lay_flat", None)))
+        command(self._link, dialect().MAV_CMD_SET_MESSAGE_INTERVAL, MESSAGE_ID[HIGHRES], LOOK_US)
+        end_ns = self._link.now_ns() + LEVEL_NS
+        while not self._is_level():
+            if self._link.now_ns() >= end_ns:
+                self._say(
+                    f"{vehicle} was not seen to lie level within {LEVEL_DEG} degrees, so it names no accelerometers:"
+                    " start again with it on a level table."
+                )
+                return
+        self._say("It names them now: do not touch it. Where this session writes nothing, it keeps these offsets.")
+        command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, QUICK)
+        end_ns = self._link.now_ns() + NAMED_NS
+        while not self._named() and self._link.now_ns() < end_ns:
+            list(self._link.messages(self._link.now_ns() + S))
+
+    def _is_level(self) -> bool:
+        """Whether each sample of a second has gravity along z, as where the vehicle stands on its feet."""
+        heard = [reading(message) for message in self._link.messages(self._link.now_ns() + S)]
+        felt = [one.acc for one in heard if one is not None]
+        return bool(felt) and all(math.hypot(x, y) < -z * math.tan(math.radians(LEVEL_DEG)) for x, y, z in felt)
 
     def _named(self) -> bool:
         ids = read_parameters(self._link, [where.sensor_id for where in all_places(PX4)], PX4)

@@ -231,6 +231,18 @@ def test_a_px4_that_was_prepared_names_its_sensors_and_holds_its_offsets():
     assert repeated == t[: len(repeated)]
 
 
+def test_a_px4_that_does_not_lie_level_is_not_asked_to_name_its_sensors():
+    vehicle = SimulatedVehicle(VehicleOptions.parse("sim:firmware=px4,imus=1,hand=still,CAL_ACC0_ID=0"))
+    # who holds it hears nothing, and goes on holding it tilted
+    vehicle.imus.hear = lambda prompt, t_s: None
+    said = []
+    link = Link(SimulatedTransport(vehicle), lambda t_ns, data: None)
+    VehicleSource(link, 100.0, None, said.append, "test", prepare=True).start()
+    assert [text for text in said if "was not seen to lie level" in text]
+    assert vehicle.firmware.store["CAL_ACC0_ID"] == 0
+    assert not np.any(vehicle.firmware.store.vector("CAL_ACC0_", "OFF"))
+
+
 def test_autocal_is_set_back_where_the_answer_to_holding_it_is_lost(monkeypatch):
     vehicle = SimulatedVehicle(VehicleOptions.parse("sim:firmware=px4,imus=1,hand=still"))
     set_surely = Parameters.set
