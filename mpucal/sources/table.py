@@ -15,9 +15,12 @@ from .kind import Delivers, Option, SourceKind
 
 
 def bus_name(text: str) -> str:
-    """A bus as text; the number of an adapter becomes its path."""
+    """A bus as text; the number of an adapter becomes its path, and a kind's word is taken in any case."""
     if not text:
         raise ValueError("no bus is named: give /dev/i2c-N, or sim.")
+    word, colon, rest = text.partition(":")
+    if word.lower() in {kind.word for kind in SOURCES if kind.option is BUS}:
+        return word.lower() + colon + rest
     return f"/dev/i2c-{text}" if text.isdecimal() else text
 
 

@@ -79,7 +79,7 @@ class Mcp2221:
         from EasyMCP2221.exceptions import NotAckError  # noqa: PLC0415 - the same
 
         self.missing = NotAckError
-        self._device = EasyMCP2221.Device(usbserial=name.partition(":")[2] or None)
+        self._device = EasyMCP2221.Device(usbserial=name.partition(":")[2] or None, scan_serial=True)
         self._device.I2C_speed(I2C_HZ)
 
     def exchange(self, address: int, out: bytes, count: int) -> bytes:
@@ -195,14 +195,34 @@ def adapters() -> list[tuple[str, str]]:
     if find_spec("pyftdi"):
         found += _ftdi_there()
     if find_spec("EasyMCP2221"):
+        found += _mcp2221_there()
+    return found
+
+
+def _mcp2221_there() -> list[tuple[str, str]]:
+    try:
         import hid  # noqa: PLC0415 - EasyMCP2221's
 
         devices: list[dict[str, Any]] = hid.enumerate(MCP2221_VENDOR, MCP2221_PRODUCT)
-        found += [
-            (f"mcp2221:{each['serial_number']}" if len(devices) > 1 else "mcp2221", str(each["product_string"]))
-            for each in devices
-        ]
-    return found
+    except Exception:  # there is no hidapi, or no permission to look
+        return []
+    several = len(devices) > 1
+    return [
+        (f"mcp2221:{each['serial_number'] or _serial(i)}" if several else "mcp2221", str(each["product_string"]))
+        for i, each in enumerate(devices)
+    ]
+
+
+def _serial(place: int) -> str:
+    """The serial in the flash of an MCP2221 that does not enumerate with it, as they leave the factory."""
+    import EasyMCP2221  # noqa: PLC0415 - an extra
+
+    try:
+        device = EasyMCP2221.Device(devnum=place)
+    except Exception:  # another program has it
+        return "SERIAL"
+    device.__del__()
+    return str(device.usbserial)
 
 
 def _ftdi_there() -> list[tuple[str, str]]:

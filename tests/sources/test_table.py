@@ -28,6 +28,13 @@ def test_a_row_is_found_by_what_a_person_writes(kind):
     assert kinds_meant(values) == [kind]
 
 
+@pytest.mark.parametrize("word", ["sim", "ftdi", "mcp2221"])
+def test_a_word_is_taken_in_any_case(word):
+    parse = next(kind.option.parse for kind in SOURCES if kind.word == word)
+    assert parse(f"{word.upper()}:A=b") == f"{word}:A=b"
+    assert parse("/dev/I2C:1") == "/dev/I2C:1"
+
+
 def test_none_and_several():
     assert kinds_meant({"bus": None, "replay": None}) == []
     assert source_title({"bus": None}) == ""

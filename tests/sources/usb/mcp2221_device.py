@@ -8,22 +8,27 @@ SPEED_TAKEN, NACK = 0x20, c.I2C_ST_WRADDRL_NACK_STOP
 
 
 class Hid:
-    """The module; `chip` is at 0x68."""
+    """The module; `chip` is at 0x68 of each adapter, whose flash holds a serial that it does or does not enumerate."""
 
-    def __init__(self, chip):
+    def __init__(self, chip, serials=("0001",), enumerated=True):
+        self.adapters = {str(i).encode(): serial for i, serial in enumerate(serials, 1)}
+        self.enumerated, self.opened = enumerated, b""
         self.chip, self.state, self.pending, self.register = chip, c.I2C_ST_IDLE, b"", 0
 
     def enumerate(self, vendor=0, product=0):
         here = (vendor, product) in ((0, 0), (c.DEV_DEFAULT_VID, c.DEV_DEFAULT_PID))
-        one = {"path": b"1", "serial_number": "0001", "product_string": "MCP2221", "interface_number": 2}
-        return [one | {"vendor_id": c.DEV_DEFAULT_VID, "product_id": c.DEV_DEFAULT_PID}] if here else []
+        each = {"product_string": "MCP2221", "interface_number": 2}
+        each |= {"vendor_id": c.DEV_DEFAULT_VID, "product_id": c.DEV_DEFAULT_PID}
+        found = [(path, serial if self.enumerated else "") for path, serial in self.adapters.items()]
+        return [each | {"path": path, "serial_number": serial} for path, serial in found] if here else []
 
     def device(self):
         return self
 
     def open_path(self, path):
-        if path != b"1":
+        if path not in self.adapters:
             raise OSError("open failed")
+        self.opened = path
 
     def close(self):
         pass
@@ -60,7 +65,8 @@ class Hid:
             if not self.pending:
                 self.state = c.I2C_ST_IDLE
         elif code == c.CMD_READ_FLASH_DATA:
-            self.answer[2:4] = bytes([2, 3])
+            text = self.adapters[self.opened].encode("utf-16-le") if report[1] == c.FLASH_DATA_USB_SERIALNUM else b""
+            self.answer[2 : 4 + len(text)] = bytes([2 + len(text), 3]) + text
 
     def _write(self, code, address, data):
         if address >> 1 != 0x68:
