@@ -7,7 +7,7 @@ import pytest
 from mpucal.data import STANDARD_GRAVITY_MPS2 as G
 from mpucal.errors import RecordingError
 from mpucal.files import load
-from mpucal.files.hints import Hints, parse_columns, parse_units
+from mpucal.files.hints import NO_HINTS, Hints, parse_columns, parse_units
 
 NAMES = ["ax", "ay", "az", "gx", "gy", "gz"]
 
@@ -116,6 +116,20 @@ def test_lines_that_name_each_number(ending, walk, assert_same, tmp_path):
     lines = [LINES[ending].format(*a, *w, t) for a, w, t in zip(walk.acc, walk.gyr, walk.t, strict=True)]
     path.write_text("\n".join(["MPU6050 Found!", *lines[:50], "Temperature: 25.1 degC", *lines[50:], lines[0][:30]]))
     assert_same(load(path), walk, 1e-9, 1e-9, 1e-9)
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_lines_that_lack_a_number_are_said(timed, walk, tmp_path):
+    """And are gaps where the samples have no times of their own."""
+    line = LINES[".txt"] if timed else LINES[".txt"].partition(",t:")[0]
+    lines = [line.format(*a, *w, t) for a, w, t in zip(walk.acc, walk.gyr, walk.t, strict=True)]
+    # below a line that measures nothing; one has not a number, one is torn
+    lines[60], lines[80] = line.format("nan", *range(6)), lines[80][:30]
+    (tmp_path / "walk.txt").write_text("\n".join([*lines[:40], "Temperature: 25.1 degC", *lines[40:]]))
+    found = load(tmp_path / "walk.txt", NO_HINTS if timed else Hints(rate_hz=walk.rate_hz))
+    assert "2 lines that lack a number were left out" in found.taken
+    assert len(found) == len(walk) - 2
+    assert np.flatnonzero(found.gap).tolist() == ([] if timed else [60, 79])
 
 
 @pytest.mark.parametrize("text", ["a" * 60_000, "a_" * 30_000, "ab " * 20_000, "ax:" * 20_000, "ax:1 " * 12_000])

@@ -21,8 +21,16 @@ def labelled_table(text: str, name: str) -> TextTable | None:
         header = _names(line)
         columns = columns_of(header)
         if three(columns, ACC) and three(columns, GYR):
-            found = [(i, _PAIR.findall(row)) for i, row in enumerate(text.split("\n"), 1) if _names(row) == header]
-            return TextTable(name, header, [[n for _, n in row] for _, row in found], [i for i, _ in found], ":")
+            measured = [header[c.place] for c in columns if c.quantity in (ACC, GYR)]
+            part = re.compile(rf"(?<!\w)({'|'.join(map(re.escape, measured))})\s?[:=]")
+            found, lost = [], []
+            for i, row in enumerate(text.split("\n"), 1):
+                if _names(row) == header:
+                    found.append((i, _PAIR.findall(row)))
+                elif part.search(row):
+                    lost.append(i)
+            rows, lines = [[n for _, n in row] for _, row in found], [i for i, _ in found]
+            return TextTable(name, header, rows, lines, ":", lost)
     return None
 
 

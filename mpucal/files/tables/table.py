@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -85,7 +86,10 @@ def recording_of_table(table: TextTable, hints: Hints) -> Recording:
             "name them with --columns t=NAME,ax=NAME,... and --units t=UNIT, or"
             " give the rate of its samples with --rate HZ",
         )
-    return recording_of(a, w, hints, table.name, temperature_c, [*remarks(columns, acc), *separated])
+    lost = [f"{len(table.lost)} lines that lack a number were left out"] if table.lost else []
+    recording = recording_of(a, w, hints, table.name, temperature_c, [*remarks(columns, acc), *separated, *lost])
+    # with times of their own, these show it
+    return replace(recording, gap=recording.gap | table.after_lost) if lost and w.times is None else recording
 
 
 def _listed(header: Sequence[str]) -> str:

@@ -13,7 +13,7 @@ from itertools import zip_longest
 
 import numpy as np
 
-from ...data import Vector
+from ...data import Mask, Vector
 from ...errors import RecordingError
 from .names import Column, bare_axis, columns_of
 from .units import unit_named
@@ -38,6 +38,7 @@ class TextTable:
     ----------
     header : the columns' names; empty where there are none. rows : the cells of each line that has some.
     lines : the number of each, from 1. separator : one of SEPARATORS, between cells.
+    lost : the numbers of lines that hold a part of a row, and are left out.
     """
 
     name: str
@@ -45,6 +46,7 @@ class TextTable:
     rows: list[list[str]]
     lines: list[int]
     separator: str | None = ","
+    lost: Sequence[int] = ()
 
     @property
     def columns(self) -> list[Column]:
@@ -57,6 +59,14 @@ class TextTable:
             return _is_number(self.rows[0][column.place])
         except IndexError:
             return False
+
+    @property
+    def after_lost(self) -> Mask:
+        """(n,) whether lines are lost between a row and the one before."""
+        found = np.zeros(len(self.rows), bool)
+        places = np.searchsorted(self.lines, np.array(self.lost, int))
+        found[places[(places > 0) & (places < len(found))]] = True
+        return found
 
     def numbers(self, columns: Sequence[Column]) -> Vector:
         """(n, k) numbers; an empty cell is NaN.
