@@ -117,6 +117,8 @@ def _opened(
 ) -> tuple[Opened, tuple[SinkKind, ...], dict[str, Any]]:
     """The source, the sinks that the result goes to, and the options that name the source."""
     if resume is None:
+        # the write-back opens a simulated vehicle again, which then holds what it was given meanwhile
+        options = {**options, "kept": {}}
         kinds = chosen(sinks, no_write, check_source(click.get_current_context()))
         opening = {**options, "attended": attended, "writes": bool(kinds)}
         return open_source(opening, given()), kinds, options

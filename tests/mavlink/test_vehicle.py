@@ -13,9 +13,12 @@ from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.encoding import name_bytes, of_wire, to_wire
 from mpucal.mavlink.prompts import Heard, to_message
+from mpucal.mavlink.request import command
 from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import parse_url
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
+from mpucal.simulated.vehicle.px4 import DEVICE_IDS
+from mpucal.sources.opening import open_source
 
 S_US = 1_000_000
 HIGHRES, RAW, SCALED, SCALED2 = 105, 27, 26, 116
@@ -247,3 +250,12 @@ def test_the_tool_puts_it_on_a_real_port(port, firmware):
             link.close()
         finally:
             running.terminate()
+
+
+def test_what_a_command_opens_again_holds_its_parameters():
+    values = {"mavlink": "sim:firmware=px4,imus=1,CAL_ACC0_ID=0", "kept": {}}
+    with open_source(values).connected(lambda text: None) as link:
+        command(link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 4)
+    held = [open_source(each).contents()["parameters"] for each in (values, {**values, "kept": {}})]
+    assert [each["CAL_ACC0_ID"] for each in held] == [DEVICE_IDS[0], 0]
+    assert held[0]["CAL_ACC0_ZOFF"] != held[1]["CAL_ACC0_ZOFF"]

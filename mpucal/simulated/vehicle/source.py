@@ -9,9 +9,13 @@ from .transport import SimulatedTransport
 
 
 def open_source(request: Request) -> OpenedVehicle:
-    """The vehicle that `sim:key=value,...` describes, in the gravity of the plan; see VehicleOptions.parse."""
+    """The vehicle that `sim:key=value,...` describes, in the gravity of the plan; see VehicleOptions.parse.
+
+    Opened again by the same command, which hands on a dict `kept`, it holds the parameters that it held before.
+    """
     key = signing_key(request)
     vehicle = SimulatedVehicle(VehicleOptions.parse(request.value), request.plan.gravity, key)
+    vehicle.switch_on(request.values.get("kept", {}).setdefault(request.value, vehicle.firmware.store))
     transport = SimulatedTransport(vehicle)
     system = request.values.get("system")
     return OpenedVehicle(

@@ -21,6 +21,7 @@ from .imus import Imus
 from .options import VehicleOptions
 from .px4 import Px4
 from .storage import Card
+from .store import ParameterStore
 from .streams import StreamTimes
 
 FIRMWARES: dict[str, type[Firmware]] = {"ardupilot": ArduPilot, "px4": Px4}
@@ -100,6 +101,12 @@ class SimulatedVehicle:
         sent = list(self._out)
         self._out.clear()
         return sent
+
+    def switch_on(self, store: ParameterStore) -> None:
+        """Start with the parameters in `store`, and keep them there."""
+        if store is not self.firmware.store:
+            self.firmware.store = store
+            self.firmware.start()
 
     def truth_document(self) -> dict[str, Any]:
         """What is true of the streams while the parameters are as they are: of IMU 1, and of the others."""
