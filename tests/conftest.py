@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import tempfile
 from pathlib import Path
 
@@ -16,6 +17,10 @@ os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="mpucal-state-")
 
 from mpucal.files import open_writer
 from mpucal.files.rows import Rows
+
+# a shell in the background, or nohup, has these ignored, and what a test starts inherits that
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # Files that take longest go first: a process that takes one last would work alone.
 SLOW = (
