@@ -12,8 +12,10 @@ import pytest
 from mpucal.session.threads import ONE_THREAD
 
 os.environ.update(ONE_THREAD)  # as the program does, and before NumPy or SciPy loads
-# notes of writes belong to no home
-os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="mpucal-state-")
+# notes of writes belong to no home; workers of xdist and what tests start inherit the folder of the first process
+if "PYTEST_XDIST_WORKER" not in os.environ:
+    STATE = tempfile.TemporaryDirectory(prefix="mpucal-state-")
+    os.environ["XDG_STATE_HOME"] = STATE.name
 
 from mpucal.files import open_writer
 from mpucal.files.rows import Rows

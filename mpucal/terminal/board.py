@@ -1,17 +1,14 @@
-"""The picture of the board: a plate with its chip, its pins and its axes, in the attitude that a Meter carries."""
+"""The picture of the board or the vehicle with its axes, in the attitude that a Meter carries."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 from ..session.events import Direction, Quaternion
 from .canvas import Canvas, Point
+from .models import MODELS
 
-# half a breakout: length along x, width along y, thickness along z
-HALF = (1.0, 0.7, 0.09)
-_CHIP = 0.28
-# a row of pins along the edge at -y, which is nearest to whoever laid it flat
-_PINS, _PIN_AT, _PIN_DOWN = 8, -0.6, -0.3
 _AXES: tuple[tuple[str, Direction, str], ...] = (
     ("X", (1.0, 0.0, 0.0), "bold red"),
     ("Y", (0.0, 1.0, 0.0), "bold green"),
@@ -25,14 +22,15 @@ _TURN_DEG, _TILT_DEG = -28.0, 30.0
 _LEAST_FACE = 0.35
 _VIEWS_DEG = (_TURN_DEG, 28.0), (_TILT_DEG, 52.0, 12.0, 70.0)
 _REACH = 1.75
+# rows from which the lines of a plate's edge do not run into each other
 _LARGE = 14
 
 Matrix = tuple[Direction, Direction, Direction]
 
 
-def picture(attitude: Quaternion, columns: int, rows: int) -> Canvas:
-    """The board with the given attitude."""
-    canvas = Canvas(columns, rows)
+def picture(kind: str, attitude: Quaternion, columns: int, rows: int) -> Canvas:
+    """The board of a kind (`models.py`) with the given attitude."""
+    canvas, model = Canvas(columns, rows), MODELS[kind]
     board = matrix(attitude)
     across, up, eye = view_of(board)
     scale = min(canvas.centre[0], canvas.centre[1] * 1.15) / _REACH
@@ -41,21 +39,10 @@ def picture(attitude: Quaternion, columns: int, rows: int) -> Canvas:
         room = _times(board, point)
         return (canvas.centre[0] + scale * _dot(across, room), canvas.centre[1] - scale * _dot(up, room))
 
-    def rectangle(x: float, y: float, z: float) -> None:
-        corners = [seen((i * x, j * y, z)) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        for k in range(4):
-            canvas.line(corners[k - 1], corners[k])
-
-    x, y, z = HALF
-    front = _dot(eye, _times(board, (0.0, 0.0, 1.0))) > 0.0
-    rectangle(x, y, z if front else -z)
-    if rows >= _LARGE:  # where both edges of the plate do not run into each other
-        rectangle(x, y, -z if front else z)
-        for k in range(_PINS):
-            pin = 0.8 * x * (2 * k / (_PINS - 1) - 1.0)
-            canvas.line(seen((pin, _PIN_AT, z if front else -z)), seen((pin, _PIN_AT, _PIN_DOWN)))
-    if front:
-        rectangle(_CHIP, _CHIP, z)
+    front = _dot(eye, _times(board, (0.0, 0.0, model.up))) > 0.0
+    for stroke in model.strokes(front, rows >= _LARGE):
+        for a, b in pairwise(stroke):
+            canvas.line(seen(a), seen(b))
     for (letter, axis, style), tip, end in zip(_AXES, _TIPS, _LETTERS, strict=True):
         canvas.line(seen((0.0, 0.0, 0.0)), seen(_scaled(axis, tip)))
         canvas.letter(seen(_scaled(axis, end)), letter, style)

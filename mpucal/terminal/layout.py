@@ -87,11 +87,11 @@ def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]
     quarter = (columns - 4) // 4
     wide, round_ = min(quarter + 2, 4 * height), min(quarter - 2, 2 * height)
     parts: list[tuple[str, list[Text], int]] = []
-    if view.meter is not None:
-        parts.append(("now", board.picture(view.meter.attitude, wide, height).lines("", glyphs.unicode), wide))
-    if view.meter is not None and view.meter.wanted is not None:
-        canvas = board.picture(view.meter.wanted, wide, height)
-        parts.append(("turn it like this", canvas.lines("yellow", glyphs.unicode), wide))
+    attitudes = (view.meter.attitude, view.meter.wanted) if view.meter is not None else ()
+    for name, style, attitude in zip(("now", "turn it like this"), ("", "yellow"), attitudes, strict=False):
+        if attitude is not None:
+            canvas = board.picture(view.board, attitude, wide, height)
+            parts.append((name, canvas.lines(style, glyphs.unicode), wide))
     if view.confirming and height > 2:
         beside = columns - wide - 3
         asked = ["", *textwrap.wrap(view.confirming, beside), *[""] * height][:height]

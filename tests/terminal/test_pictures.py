@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from mpucal.session.attitude import quaternion, straight
 from mpucal.terminal import board, globe, letters
 from mpucal.terminal.canvas import Canvas
+from mpucal.terminal.flat import BOARDS
 from mpucal.terminal.view import HEADLINES
 
 DIRECTIONS = [
@@ -62,18 +63,19 @@ def where(canvas, letter):
 def test_the_letter_of_the_axis_that_is_down_is_below_the_others(axis, letter, size):
     for sign in (1.0, -1.0):
         down = tuple(sign if i == axis else 0.0 for i in range(3))
-        canvas = board.picture(held(down), *size)
+        canvas = board.picture("gy-521", held(down), *size)
         rows = {other: where(canvas, other)[0] for other in "XYZ"}
         others = [row for other, row in rows.items() if other != letter]
         assert (rows[letter] > max(others)) if sign > 0 else (rows[letter] < min(others))
 
 
-@pytest.mark.parametrize("down", DIRECTIONS, ids=str)
-def test_the_board_differs_from_any_other_way_to_hold_it(down):
+@pytest.mark.parametrize("size", [(22, 9), (44, 20)], ids=["small", "large"])
+def test_each_kind_of_board_differs_in_any_way_to_hold_it(size):
     drawn = [
-        "\n".join(line.plain for line in board.picture(held(other), 22, 9).lines("", unicode=unicode))
+        "\n".join(line.plain for line in board.picture(kind, held(down), *size).lines("", unicode=unicode))
+        for kind in (BOARDS if size[1] > 10 else ("gy-521", "vehicle"))
         for unicode in (True, False)
-        for other in DIRECTIONS
+        for down in DIRECTIONS
     ]
     assert len(set(drawn)) == len(drawn)
 
