@@ -138,9 +138,11 @@ class Watcher:
     _same: Prompt | None = None
 
     def _hold(self, headline: str, meter: Meter) -> None:
-        turning = self.view.prompt is not None and self.view.prompt.kind in (PromptKind.ROTATE, PromptKind.VERIFY)
-        far = meter.missing_deg is not None and meter.missing_deg > NEAR_DEG + 5.0
-        self.wrong["hold far away"] += turning and far and headline == HOLD
+        if self.view.wanted is None or meter.missing_deg is None or headline != HOLD:
+            return
+        # gravity decides; after a turn beyond the gyroscope's range the attitude needs half a second to follow it
+        missing = math.degrees(math.acos(max(-1.0, min(1.0, float(np.dot(meter.down, self.view.wanted))))))
+        self.wrong["hold far away"] += min(missing, meter.missing_deg) > NEAR_DEG + 5.0
 
 
 def angle(a: Any, b: Any) -> float:

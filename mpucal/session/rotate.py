@@ -137,7 +137,9 @@ class Rotate:
         # what has been counted is not new any more
         if self._held is None or self._held[0].run != pause.run or pause.seconds < PAUSE_S - 1e-6:
             self._held = pause, use_of(pause.acc, self.prompt.down, self.coverage.is_new(pause.acc))
-        found: list[Output | Turned] = [*counted(pause, self._held[1])]
+        # what was said of it ends its countdown, also where a bump held that up
+        told = pause.run <= self._advised_run and not self._asked
+        found: list[Output | Turned] = [] if told else [*counted(pause, self._held[1])]
         if pause.seconds >= REST_S - 1e-6:
             self.coverage.rests(pause.acc)
         if pause.seconds >= PAUSE_S - 1e-6 and self.coverage.pauses(pause.acc):

@@ -92,7 +92,7 @@ class View:
             case Countdown():
                 view = replace(self, countdown=output)
             case Held():
-                view = replace(self, held=output)
+                view = replace(self, held=output, countdown=None)
             case Progress():
                 view = replace(self, progress=output)
             case Knowledge():
@@ -120,8 +120,10 @@ class View:
 
     @property
     def waiting(self) -> Countdown | None:
-        """The countdown, where one runs."""
+        """The countdown, where one runs: until the board moves, or it was not renewed."""
         if self.countdown is None or self.now_s is None or self.countdown.remaining_s <= 0.0:
+            return None
+        if self.meter is not None and self.meter.t_s > self.countdown.t_s and not self.meter.still:
             return None
         return self.countdown if self.now_s - self.countdown.t_s <= COUNTDOWN_HOLDS_S else None
 

@@ -35,6 +35,14 @@ def test_a_countdown_that_runs_is_the_headline(views, countdown, headline):
     assert view.headline == headline
 
 
+def test_a_countdown_ends_where_the_board_moves_or_was_told_of(views):
+    counting = replace(views["turned"], now_s=26.0, countdown=Countdown(26.0, 1.3, 2.0, False))
+    moves = counting.after(replace(counting.meter, t_s=26.2, still=False))
+    assert moves.headline == "ROLL LEFT 60"
+    assert counting.after(replace(counting.meter, t_s=26.2, still=True)).headline == "HOLD 2"
+    assert counting.after(Held(26.2, Use.TAKEN, (1.0, 0.0, 0.0), "taken")).headline == "TAKEN"
+
+
 @pytest.mark.parametrize(
     ("words", "headline"),
     [
