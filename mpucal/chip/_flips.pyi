@@ -1,8 +1,8 @@
-"""Words of frames that jump and come back; see flips.cpp."""
+"""Made by tools/make_stubs.py from the compiled module; its functions say what they do."""
 
-import numpy as np
+import numpy
 from numpy.typing import NDArray
 
 def until_jumps(
-    run: NDArray[np.int16], ends: NDArray[np.int64], median: NDArray[np.float64]
+    run: NDArray[numpy.int16], ends: NDArray[numpy.int64], median: NDArray[numpy.float64]
 ) -> tuple[int, list[tuple[int, int]]]: ...

@@ -1,8 +1,9 @@
-"""Tables of numbers as text, both ways; see text.cpp."""
+"""Made by tools/make_stubs.py from the compiled module; its functions say what they do."""
 
 from collections.abc import Sequence
 
-from ..data import Vector
+import numpy
+from numpy.typing import NDArray
 
-def lines(table: Vector) -> bytes: ...
-def numbers(text: bytes, width: int, places: Sequence[int]) -> Vector | None: ...
+def lines(table: NDArray[numpy.float64]) -> bytes: ...
+def numbers(text: bytes, width: int, places: Sequence[int]) -> NDArray[numpy.float64] | None: ...

@@ -1,61 +1,69 @@
-"""The kernel's Python face; see filter.hpp for what each array means."""
+"""Made by tools/make_stubs.py from the compiled module; its functions say what they do."""
 
-from numpy import float64, int64
+import numpy
 from numpy.typing import NDArray
 
-_Array = NDArray[float64]
-
-layout: str  # of the parameters that it was built for, parameters.LAYOUT
+layout: str = ...
 
 def evaluate(
-    theta: _Array,
-    constants: _Array,
+    theta: NDArray[numpy.float64],
+    constants: NDArray[numpy.float64],
     lanes: int,
-    y: _Array,
-    omega: _Array,
-    dt: _Array,
-    r_scale: _Array | None = None,
-    q_scale: _Array | None = None,
-    q_extra: _Array | None = None,
-    ends: NDArray[int64] | None = None,
-) -> tuple[float, float, _Array, _Array]: ...
+    y: NDArray[numpy.float64],
+    omega: NDArray[numpy.float64],
+    dt: NDArray[numpy.float64],
+    r_scale: NDArray[numpy.float64] | None = None,
+    q_scale: NDArray[numpy.float64] | None = None,
+    q_extra: NDArray[numpy.float64] | None = None,
+    ends: NDArray[numpy.int64] | None = None,
+) -> tuple[float, float, NDArray[numpy.float64], NDArray[numpy.float64]]: ...
 def evaluate_hand(
-    theta: _Array,
-    constants: _Array,
+    theta: NDArray[numpy.float64],
+    constants: NDArray[numpy.float64],
     derivatives: bool,
-    y: _Array,
-    omega: _Array,
-    dt: _Array,
-    r_scale: _Array | None = None,
-    q_scale: _Array | None = None,
-    q_extra: _Array | None = None,
-    rate: _Array | None = None,
-    alpha: _Array | None = None,
-    r_extra: _Array | None = None,
-    jerk: _Array | None = None,
-    reset: _Array | None = None,
-    ends: NDArray[int64] | None = None,
-) -> tuple[float, float, _Array, _Array]: ...
+    y: NDArray[numpy.float64],
+    omega: NDArray[numpy.float64],
+    dt: NDArray[numpy.float64],
+    r_scale: NDArray[numpy.float64] | None = None,
+    q_scale: NDArray[numpy.float64] | None = None,
+    q_extra: NDArray[numpy.float64] | None = None,
+    rate: NDArray[numpy.float64] | None = None,
+    alpha: NDArray[numpy.float64] | None = None,
+    r_extra: NDArray[numpy.float64] | None = None,
+    jerk: NDArray[numpy.float64] | None = None,
+    reset: NDArray[numpy.float64] | None = None,
+    ends: NDArray[numpy.int64] | None = None,
+) -> tuple[float, float, NDArray[numpy.float64], NDArray[numpy.float64]]: ...
 def trace_hand(
-    theta: _Array,
-    constants: _Array,
-    y: _Array,
-    omega: _Array,
-    dt: _Array,
-    r_scale: _Array | None = None,
-    q_scale: _Array | None = None,
-    q_extra: _Array | None = None,
-    rate: _Array | None = None,
-    alpha: _Array | None = None,
-    r_extra: _Array | None = None,
-    jerk: _Array | None = None,
-    reset: _Array | None = None,
-) -> tuple[_Array, _Array, _Array]: ...
+    theta: NDArray[numpy.float64],
+    constants: NDArray[numpy.float64],
+    y: NDArray[numpy.float64],
+    omega: NDArray[numpy.float64],
+    dt: NDArray[numpy.float64],
+    r_scale: NDArray[numpy.float64] | None = None,
+    q_scale: NDArray[numpy.float64] | None = None,
+    q_extra: NDArray[numpy.float64] | None = None,
+    rate: NDArray[numpy.float64] | None = None,
+    alpha: NDArray[numpy.float64] | None = None,
+    r_extra: NDArray[numpy.float64] | None = None,
+    jerk: NDArray[numpy.float64] | None = None,
+    reset: NDArray[numpy.float64] | None = None,
+) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64]]: ...
 def moments(
-    b_omega: _Array, y: _Array, omega: _Array, dt: _Array, r_scale: _Array | None = None
-) -> tuple[_Array, _Array, _Array, _Array, float, float]: ...
-def turn(phi: _Array, x: _Array | None = None) -> tuple[_Array, _Array]: ...
-def statistics(x: _Array, runs: NDArray[int64]) -> tuple[_Array, _Array]: ...
-def moving_mean(x: _Array, half: int) -> _Array: ...
+    b_omega: NDArray[numpy.float64],
+    y: NDArray[numpy.float64],
+    omega: NDArray[numpy.float64],
+    dt: NDArray[numpy.float64],
+    r_scale: NDArray[numpy.float64] | None = None,
+) -> tuple[
+    NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], float, float
+]: ...
+def turn(
+    phi: NDArray[numpy.float64], x: NDArray[numpy.float64] | None = None
+) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]: ...
+def statistics(
+    x: NDArray[numpy.float64], runs: NDArray[numpy.int64]
+) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]: ...
+def moving_mean(x: NDArray[numpy.float64], half: int) -> NDArray[numpy.float64]: ...
 def instruction_set() -> str: ...
 def use_instruction_set(name: str) -> None: ...

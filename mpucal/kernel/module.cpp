@@ -3,6 +3,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "filter.hpp"
@@ -145,8 +147,8 @@ NB_MODULE(_kernel, m) {
           nb::gil_scoped_release release;
           evaluate(parameters, series, values, lanes, result);
         }
-        return nb::make_tuple(result.V, result.squares, give(std::move(gradient), {k, p}),
-                              give(std::move(fisher), {k, p, p}));
+        return std::make_tuple(result.V, result.squares, give(std::move(gradient), {k, p}),
+                               give(std::move(fisher), {k, p, p}));
       },
       nb::arg("theta"), nb::arg("constants"), nb::arg("lanes"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
       nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
@@ -179,8 +181,8 @@ NB_MODULE(_kernel, m) {
           nb::gil_scoped_release release;
           evaluate_hand(parameters, series, values, result);
         }
-        return nb::make_tuple(result.V, result.squares, give(std::move(gradient), {k, p}),
-                              give(std::move(fisher), {k, p, p}));
+        return std::make_tuple(result.V, result.squares, give(std::move(gradient), {k, p}),
+                               give(std::move(fisher), {k, p, p}));
       },
       nb::arg("theta"), nb::arg("constants"), nb::arg("derivatives"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
       nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
@@ -211,8 +213,8 @@ NB_MODULE(_kernel, m) {
           evaluate_hand(parameters, series, values, result);
         }
         const std::size_t n = series.n;
-        return nb::make_tuple(give(std::move(innovation), {n, 3}), give(std::move(gravity), {n, 3}),
-                              give(std::move(motion), {n, 3}));
+        return std::make_tuple(give(std::move(innovation), {n, 3}), give(std::move(gravity), {n, 3}),
+                               give(std::move(motion), {n, 3}));
       },
       nb::arg("theta"), nb::arg("constants"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"),
       nb::arg("r_scale").none() = nb::none(), nb::arg("q_scale").none() = nb::none(),
@@ -233,8 +235,8 @@ NB_MODULE(_kernel, m) {
           moments(series, bias, sums);
         }
         auto copy = [](const double* p, std::size_t n) { return std::vector<double>(p, p + n); };
-        return nb::make_tuple(give(copy(&sums.CC[0][0], 81), {9, 9}), give(copy(&sums.yC[0][0], 27), {3, 9}),
-                              give(copy(sums.C, 9), {9}), give(copy(sums.y, 3), {3}), sums.yy, sums.n);
+        return std::make_tuple(give(copy(&sums.CC[0][0], 81), {9, 9}), give(copy(&sums.yC[0][0], 27), {3, 9}),
+                               give(copy(sums.C, 9), {9}), give(copy(sums.y, 3), {3}), sums.yy, sums.n);
       },
       nb::arg("b_omega"), nb::arg("y"), nb::arg("omega"), nb::arg("dt"), nb::arg("r_scale").none() = nb::none(),
       "Sums of C C', y C', C, y, y y and the count, C_t the turn since the start.");
@@ -246,7 +248,7 @@ NB_MODULE(_kernel, m) {
         Turned turned;
         turn(pointer(phi, 3 * n, "phi"), pointer(x, 3 * n, "x"), n, turned);
         const double *F = &turned.F[0][0], *sums = &turned.sums[0][0][0];
-        return nb::make_tuple(give({F, F + 9}, {3, 3}), give({sums, sums + 27}, {3, 3, 3}));
+        return std::make_tuple(give({F, F + 9}, {3, 3}), give({sums, sums + 27}, {3, 3, 3}));
       },
       nb::arg("phi"), nb::arg("x").none() = nb::none(),
       "The turn of steps phi (n, 3), and what unit vectors times x (n, 3) that enter before each step become by its end.");
@@ -261,7 +263,7 @@ NB_MODULE(_kernel, m) {
             throw std::invalid_argument("a run is empty, or not within the samples");
         std::vector<double> mean(3 * k), variance(3 * k);
         statistics(x.data(), runs.data(), k, mean.data(), variance.data());
-        return nb::make_tuple(give(std::move(mean), {k, 3}), give(std::move(variance), {k, 3}));
+        return std::make_tuple(give(std::move(mean), {k, 3}), give(std::move(variance), {k, 3}));
       },
       nb::arg("x"), nb::arg("runs"), "Means and variances (k, 3) of x (n, 3) over runs (k, 2), first and last + 1.");
 
