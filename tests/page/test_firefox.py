@@ -1,0 +1,154 @@
+"""The page in a Firefox that prefers the dark, driven by its own remote protocol (Marionette) over a socket."""
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from contextlib import suppress
+
+import pytest
+
+BROWSER = shutil.which("firefox-esr") or shutil.which("firefox")
+PREFERENCES = {
+    "marionette.port": 0,  # any that is free
+    "layout.css.prefers-color-scheme.content-override": 0,  # dark
+    # it asks nobody for anything
+    "app.update.auto": False,
+    "browser.shell.checkDefaultBrowser": False,
+    "datareporting.policy.dataSubmissionEnabled": False,
+    "network.captive-portal-service.enabled": False,
+    "network.connectivity-service.enabled": False,
+    "network.dns.disableIPv6": True,
+    "services.settings.server": "data:,",
+    "toolkit.telemetry.enabled": False,
+}
+# whether anything is drawn in a canvas
+DRAWN = """
+const canvas = document.getElementById('now');
+return canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((v) => v > 0);
+"""
+
+
+class Firefox:
+    """One window of a phone's size, of a browser with a profile of its own.
+
+    Each message either way is its length, a colon and JSON: [0, number, command, parameters] and
+    [1, number, error, result].
+    """
+
+    def __init__(self, profile):
+        lines = (f"user_pref({json.dumps(name)}, {json.dumps(value)});\n" for name, value in PREFERENCES.items())
+        (profile / "user.js").write_text("".join(lines), encoding="utf-8")
+        self.process = subprocess.Popen(
+            [BROWSER, "--headless", "--no-remote", "--marionette", "--profile", profile],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "HOME": str(profile), "MOZ_CRASHREPORTER_DISABLE": "1"},
+        )
+        self.line = socket.create_connection(("127.0.0.1", self._port(profile)), 30.0)
+        self.answers = self.line.makefile("rb")
+        self._receive()
+        self.number = 0
+        self.call("WebDriver:NewSession", capabilities={})
+        self.call("WebDriver:SetWindowRect", width=390, height=844)
+
+    def _port(self, profile):
+        """Where it listens, once it does."""
+        until = time.monotonic() + 60.0
+        while time.monotonic() < until and self.process.poll() is None:
+            with suppress(OSError, ValueError):
+                return int((profile / "MarionetteActivePort").read_text())
+            time.sleep(0.05)
+        pytest.fail("Firefox does not listen")
+
+    def _receive(self):
+        size = b"".join(iter(lambda: self.answers.read(1), b":"))
+        return json.loads(self.answers.read(int(size)))
+
+    def call(self, command, **parameters):
+        """What it answers to a command."""
+        self.number += 1
+        text = json.dumps([0, self.number, command, parameters]).encode()
+        self.line.sendall(b"%d:%s" % (len(text), text))
+        _, number, error, result = self._receive()
+        assert (number, error) == (self.number, None)
+        return result
+
+    def run(self, script):
+        """What a script of the page returns."""
+        return self.call("WebDriver:ExecuteScript", script=script, args=[])["value"]
+
+    def wait(self, script, seconds=30.0):
+        """Until what a script returns is true."""
+        until = time.monotonic() + seconds
+        while not (found := self.run(script)):
+            assert time.monotonic() < until, f"{script}: {self.text()}"
+            time.sleep(0.05)
+        return found
+
+    def text(self):
+        """What can be read."""
+        return self.run("return document.body.innerText")
+
+    def close(self):
+        """End it."""
+        with suppress(OSError, ValueError):
+            self.call("Marionette:Quit", flags=["eForceQuit"])
+        self.line.close()
+        try:
+            self.process.wait(20.0)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+@pytest.fixture(scope="module")
+def firefox(tmp_path_factory):
+    """A browser."""
+    if BROWSER is None:
+        pytest.skip("there is no Firefox here")
+    browser = Firefox(tmp_path_factory.mktemp("firefox"))
+    yield browser
+    browser.close()
+
+
+def luminance(colour):
+    """0..1 of "rgb(r, g, b)"."""
+    return sum(map(int, colour.strip("rgb()").split(","))) / 765
+
+
+def test_a_session_is_followed_to_its_end_in_the_dark(firefox, tmp_path):
+    words = ["session", "--bus", "sim:pace=fast", "--seed", "3", "--page", "--yes", "--json-events", "-o", "board"]
+    command = [sys.executable, "-m", "mpucal", *words]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=-1, stderr=-1, text=True) as session:
+        firefox.call("WebDriver:Navigate", url=json.loads(session.stderr.readline())["address"])
+        firefox.run("""
+            window.shown = new Set();
+            new MutationObserver(() => shown.add(document.getElementById('headline').textContent))
+              .observe(document.body, {subtree: true, childList: true, characterData: true});
+        """)
+        events = [json.loads(line) for line in session.stderr]
+        firefox.wait("return document.body.innerText.includes('The calibration is good.')")
+        assert session.wait() == 0
+    turns = {event["turn"].rpartition(", ")[2].capitalize() for event in events if event["event"] == "meter"}
+    assert set(firefox.run("return [...shown]")) & turns
+    assert luminance(firefox.run("return getComputedStyle(document.body).backgroundColor")) < 0.1
+    assert luminance(firefox.run("return getComputedStyle(document.body).color")) > 0.9
+
+
+def test_a_lost_connection_is_said_and_mends_itself(firefox, serve):
+    server, board = serve(), {"t_s": 1.0, "rate_hz": 200.0, "temperature_c": None, "attitude": [1, 0, 0, 0]}
+    server.latest.update({"title": "a chip", "board": "gy-521", "headline": "Before", "meter": board})
+    firefox.call("WebDriver:Navigate", url=server.url)
+    firefox.wait("return document.body.innerText.includes('Before')")
+    firefox.wait(DRAWN)
+    port = server.server_port
+    server.stop()
+    firefox.wait("return document.getElementById('lost').checkVisibility()")
+    again = serve(port)
+    again.latest.update({"title": "a chip", "headline": "After"})
+    firefox.wait("return document.body.innerText.includes('After')")
+    assert firefox.run("return document.getElementById('lost').hidden")
