@@ -95,12 +95,18 @@ def _run_lengths(mask: Mask) -> Vector:
 
 def _on_a_line(values: Vector, t: Vector) -> Mask:
     """(n,) True within straight lines that all axes follow exactly, and not at rest: somebody drew them."""
-    slopes = np.diff(values.T) / np.diff(t)
-    bend, steep = np.abs(np.diff(slopes)), np.abs(slopes[:, 1:])
-    straight: Mask = np.all(bend <= LINE_TOLERANCE * steep, axis=0)
+    dt, straight = np.diff(t), np.ones(max(len(t) - 2, 0), bool)
+    turns = ~straight
+    for column in values.T:
+        slope = np.diff(column) / dt
+        steep = np.abs(slope[1:])
+        straight &= np.abs(np.diff(slope)) <= LINE_TOLERANCE * steep
+        if not straight.any():  # nearly every recording: the other axes need not be asked
+            return np.zeros(len(values), bool)
+        turns |= steep > 0
     if 2 * np.count_nonzero(straight) > len(straight):  # computed data: nothing in them has noise
         return np.zeros(len(values), bool)
-    straight &= (steep > 0).any(0)
+    straight &= turns
     edges = np.diff(np.concatenate([[False], straight, [False]]).astype(np.int8))
     drawn = np.zeros(len(values), bool)
     for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):

@@ -137,8 +137,7 @@ def _stuck_high(counts: Counts, gap: NDArray[np.bool_]) -> tuple[int, int] | Non
 def _odd_steps(values: Vector) -> Low | None:
     """The axis whose every value is a multiple of a step that is many times the step of another axis."""
     part = values[:: max(len(values) // MOST_SAMPLES, 1)]
-    changes = np.abs(np.diff(part, axis=0))
-    if not (changes.min(0, where=changes > 0.0, initial=np.inf) >= LEAST_ODD_STEP).any():
+    if all(_is_fine(column) for column in part.T):
         return None  # without a value sorted: this is nearly every recording
     unique = [np.unique(column) for column in part.T]
     if min(map(len, unique)) < FEWEST_VALUES:
@@ -150,3 +149,9 @@ def _odd_steps(values: Vector) -> Low | None:
     if steps[axis] < max(ODD_STEPS * finest, LEAST_ODD_STEP) or np.abs(places - np.rint(places)).max() > EXACTLY:
         return None
     return Low(axis, round(float(np.log2(steps[axis] / finest))), 0, steps[axis])
+
+
+def _is_fine(column: Vector) -> bool:
+    """Whether some value follows another by less than a step that is odd."""
+    change = np.abs(np.diff(column))
+    return bool(np.any((change > 0.0) & (change < LEAST_ODD_STEP)))
