@@ -12,7 +12,7 @@ from ..data import Recording, Vector
 from .claim import Claim
 from .fit import Fit
 from .flat_segment import Flat, find_flat, flat_statistics
-from .rotation import turned
+from .rotation import lengths, turned
 from .sphere import fibonacci_sphere
 from .static_intervals import static_intervals, statistics
 from .tilt import tilted_directions
@@ -115,7 +115,7 @@ class Evidence:
         at = np.flatnonzero(moving)[:: max(np.count_nonzero(moving) // ENOUGH_MOVES, 1)]
         steps = flat.last + n // 2 + np.arange(n)[:, None] + at * n
         turns = (r.t[steps] - r.t[steps - 1])[:, :, None] * (r.gyr[steps] - flat.b_omega)
-        if np.linalg.norm(turns, axis=2).sum() < FAR_TOO_FAR * _angles(u[at + 1], u[at]).sum():
+        if lengths(turns.reshape(-1, 3)).sum() < FAR_TOO_FAR * _angles(u[at + 1], u[at]).sum():
             return False
         miss, miss_in_degrees = (
             np.median(_angles(np.array([turned(-unit * turns[:, k]) @ u[i] for k, i in enumerate(at)]), u[at + 1]))
@@ -153,8 +153,8 @@ def _median_and_max(values: list[float]) -> tuple[float, float]:
 
 def _means(values: Vector, n: int) -> Vector:
     """(m, 3) means of consecutive windows of n samples; the remainder is left out."""
-    m = len(values) // n
-    return np.asarray(values[: m * n].reshape(m, n, 3).mean(1))
+    first = n * np.arange(len(values) // n)
+    return statistics(values, np.stack([first, first + n], axis=1))[0]
 
 
 def _angles(u: Vector, v: Vector) -> Vector:

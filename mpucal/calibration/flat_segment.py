@@ -131,7 +131,9 @@ def _limit(sd: Vector, least: float, most: float) -> Vector:
 
 def _variance(part: Vector, whole: Vector, quietest: float) -> Vector:
     step = np.array([_step(column) for column in whole.T])
-    return np.asarray(np.maximum(part.var(0, ddof=1), np.maximum(step**2 / 12.0, quietest**2)))
+    away = part - part.mean(0)
+    variance = np.einsum("ij,ij->j", away, away) / (len(part) - 1)
+    return np.asarray(np.maximum(variance, np.maximum(step**2 / 12.0, quietest**2)))
 
 
 def _step(column: Vector) -> float:

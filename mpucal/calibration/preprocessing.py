@@ -145,5 +145,5 @@ def _shaken(recording: Recording, flat: Flat) -> Vector:
     away = size - size.mean()
     half = max(round(0.5 * SHAKEN_S * recording.rate_hz), 2)
     mean, square = _kernel.moving_mean(np.stack([away, away**2], axis=1), half).T
-    variance = np.maximum(square - mean**2 - 1.3 * noise_variance(recording).mean(1), 0.0)[flat.last :]
+    variance = np.maximum(square - mean**2 - 1.3 * noise_variance(recording) @ np.full(3, 1.0 / 3.0), 0.0)[flat.last :]
     return np.asarray(variance / (variance + SHAKEN_MPS2**2))

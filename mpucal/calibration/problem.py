@@ -8,11 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..data import Recording, Vector
+from ..kernel import _kernel
 from .flat_segment import Flat
-
-# Of the second difference of rates: 1/24 for samples of a smooth rate, 1/16 for its means over the sample's time. The
-# low-pass filter of a chip is in between.
-CHORD = 0.05
 
 
 @dataclass(frozen=True)
@@ -53,27 +50,13 @@ class Series:
     def after(cls, recording: Recording, flat: Flat) -> Series:
         """The samples after the flat segment, with the mean rates from sample to sample."""
         dt = np.diff(recording.t[flat.last - 1 :])
-        omega = _mean_rates(recording.gyr[max(flat.last - 2, 0) :], flat, dt)
+        omega = _kernel.mean_rates(np.ascontiguousarray(recording.gyr), flat.b_omega, dt)
         return cls(y=np.ascontiguousarray(recording.acc[flat.last :]), omega=omega, dt=dt)
 
     def arrays(self, names: tuple[str, ...]) -> dict[str, Any]:
         """The named fields as the kernel's keyword arguments."""
         values = {name: getattr(self, name) for name in names}
         return {name: None if value is None else np.ascontiguousarray(value) for name, value in values.items()}
-
-
-def _mean_rates(gyr: Vector, flat: Flat, dt: Vector) -> Vector:
-    """(n, 3) rad/s, the rotation vector of each step over its time, by the samples from one before it on.
-
-    The midpoint rate, less what the curve of the rates adds to its chord (a cubic through four samples), and the second
-    term of the Magnus series for rates that turn from w_0 to w_1, dt/12 w_0 x w_1 (coning).
-    """
-    n = len(dt)
-    before, here, there = gyr[-n - 2 : -n - 1] if len(gyr) > n + 1 else gyr[:1], gyr[-n - 1 : -1], gyr[-n:]
-    bend = np.concatenate([before, here[:-1]]) - here - there + np.concatenate([there[1:], there[-1:]])
-    w = here - flat.b_omega
-    turned: Vector = 0.5 * (here + there) - CHORD * bend + dt[:, None] / 12.0 * np.cross(w, there - flat.b_omega)
-    return turned
 
 
 SERIES = ("y", "omega", "dt", "r_scale", "q_scale", "q_extra")

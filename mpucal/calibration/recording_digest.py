@@ -19,6 +19,6 @@ def recording_digest(recording: Recording) -> str:
     digest = hashlib.sha256()
     for values in (recording.acc, recording.gyr):
         # a gyroscope that was not measured is NaN
-        measured = np.clip(np.nan_to_num(values), -MOST, MOST)
+        measured = np.clip(np.where(np.isnan(values), 0.0, values), -MOST, MOST)
         digest.update(np.rint(measured / STEP).astype("<i8").tobytes())
     return digest.hexdigest()

@@ -34,14 +34,13 @@ def static_intervals(recording: Recording, flat: Flat) -> Intervals:
     n = max(round(WINDOW_S * recording.rate_hz), 4)
     if len(recording) < n:
         return np.zeros((0, 2), np.intp)
-    gyr_limit = np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_omega), GYRO_SD_RAD_S)
-    acc_limit = np.maximum(TIMES_QUIET * np.sqrt(flat.Sigma_a), ACC_SD_MPS2)
-    windows = np.ones(len(recording) - n + 1, bool)
-    vibration = np.sqrt(VIBRATION * noise_variance(recording)[n // 2 : n // 2 + len(windows)])
-    for i in range(3):  # an axis at a time: what it takes in between is several times the recording
-        mean, sd = _moving(recording.gyr[:, i], n)
-        windows &= (sd < gyr_limit[i]) & (np.abs(mean - flat.b_omega[i]) < GYRO_MEAN_RAD_S)
-        windows &= _moving(recording.acc[:, i], n)[1] < np.maximum(acc_limit[i], vibration[:, i])
+    gyr_limit = np.maximum(TIMES_QUIET**2 * flat.Sigma_omega, GYRO_SD_RAD_S**2)
+    acc_limit = np.maximum(TIMES_QUIET**2 * flat.Sigma_a, ACC_SD_MPS2**2)
+    mean, variance = _kernel.moving_statistics(np.ascontiguousarray(recording.gyr), n)
+    windows = np.all((variance < gyr_limit[:, None]) & (np.abs(mean.T - flat.b_omega).T < GYRO_MEAN_RAD_S), axis=0)
+    variance = _kernel.moving_statistics(np.ascontiguousarray(recording.acc), n)[1]
+    vibration = VIBRATION * noise_variance(recording)[n // 2 : n // 2 + len(windows)].T
+    windows &= np.all(variance < np.maximum(vibration, acc_limit[:, None]), axis=0)
     covered = np.zeros(len(recording) + 1, np.intp)
     at = np.flatnonzero(windows)
     covered[at] += 1
@@ -67,16 +66,6 @@ def gravity_turns(recording: Recording, runs: Intervals) -> Vector:
 def statistics(values: Vector, runs: Intervals) -> tuple[Vector, Vector]:
     """Means and variances (k, 3) of values (n, 3) over runs of samples."""
     return _kernel.statistics(np.ascontiguousarray(values), np.ascontiguousarray(runs, np.int64))
-
-
-def _moving(values: Vector, n: int) -> tuple[Vector, Vector]:
-    """Means and standard deviations (len - n + 1,) of all windows of n samples of an axis."""
-    middle = values.mean()
-    x = np.concatenate([[0.0], values - middle])
-    sums, squares = np.cumsum(x), np.cumsum(x * x)
-    mean = (sums[n:] - sums[:-n]) / n
-    variance = (squares[n:] - squares[:-n]) / n - mean**2
-    return mean + middle, np.sqrt(np.maximum(variance, 0.0))
 
 
 def _runs(mask: Mask) -> Intervals:

@@ -276,6 +276,32 @@ NB_MODULE(_kernel, m) {
       },
       nb::arg("x"), nb::arg("half"), "Means of x (n, m) over up to `half` samples on both sides of each.");
 
+  m.def(
+      "moving_statistics",
+      [](const Array& x, std::size_t size) {
+        const std::size_t n = x.size() / 3;
+        pointer(x, 3 * n, "x");
+        if (size < 1 || size > n) throw std::invalid_argument("a window is empty, or longer than the samples");
+        std::vector<double> mean(3 * (n - size + 1)), variance(mean.size());
+        moving_statistics(x.data(), n, size, mean.data(), variance.data());
+        return std::make_tuple(give(std::move(mean), {3, n - size + 1}), give(std::move(variance), {3, n - size + 1}));
+      },
+      nb::arg("x"), nb::arg("size"),
+      "Means and variances (3, n - size + 1) of x (n, 3) over all windows of so many samples.");
+
+  m.def(
+      "mean_rates",
+      [](const Array& rate, const Array& bias, const Array& dt) {
+        const std::size_t n = dt.size(), samples = rate.size() / 3;
+        pointer(rate, 3 * samples, "rate");
+        if (samples <= n) throw std::invalid_argument("there are no rates before the steps");
+        std::vector<double> mean(3 * n);
+        mean_rates(rate.data(), samples, pointer(bias, 3, "bias"), dt.data(), n, mean.data());
+        return give(std::move(mean), {n, 3});
+      },
+      nb::arg("rate"), nb::arg("bias"), nb::arg("dt"),
+      "Rotation vectors over their times (n, 3) of the steps that lead to the last n rates; the bias is left in.");
+
   m.def("instruction_set", []() -> std::string { return evaluate == evaluate_portable ? "portable" : "avx2"; },
         "Which build of the filter runs.");
   m.def(

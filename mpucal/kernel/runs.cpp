@@ -10,6 +10,10 @@
 namespace mpucal {
 namespace {
 
+// Of the second difference of rates: 1/24 for samples of a smooth rate, 1/16 for its means over the sample's time. The
+// low-pass filter of a chip is in between.
+constexpr double kChord = 0.05;
+
 // M = F M, column by column
 template <std::size_t columns>
 void carry(const double (&F)[3][3], double (&M)[3][columns]) {
@@ -58,6 +62,38 @@ void moving_mean(const double* x, std::size_t n, std::size_t columns, std::size_
     const std::size_t low = i > half ? i - half : 0, high = std::min(i + half + 1, n);
     for (std::size_t j = 0; j < columns; ++j)
       mean[columns * i + j] = (sums[columns * high + j] - sums[columns * low + j]) / static_cast<double>(high - low);
+  }
+}
+
+void moving_statistics(const double* x, std::size_t n, std::size_t size, double* mean, double* variance) {
+  const std::size_t windows = n - size + 1;
+  for (int j = 0; j < 3; ++j, mean += windows, variance += windows) {
+    const auto from_first = [&](std::size_t i) { return x[3 * i + j] - x[j]; };  // squares of it cancel the less
+    double sum = 0.0, squares = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double in = from_first(i), out = i < size ? 0.0 : from_first(i - size);
+      sum += in - out;
+      squares += in * in - out * out;
+      if (i + 1 < size) continue;
+      const double middle = sum / static_cast<double>(size);
+      mean[i + 1 - size] = middle + x[j];
+      variance[i + 1 - size] = std::max(squares / static_cast<double>(size) - middle * middle, 0.0);
+    }
+  }
+}
+
+void mean_rates(const double* rate, std::size_t samples, const double bias[3], const double* dt, std::size_t n,
+                double* mean) {
+  for (std::size_t i = samples - n; i < samples; ++i, ++dt) {
+    const double *here = rate + 3 * (i - 1), *there = here + 3;
+    const double *before = i > 1 ? here - 3 : here, *after = i + 1 < samples ? there + 3 : there;
+    double w[3], v[3];
+    for (int j = 0; j < 3; ++j) w[j] = here[j] - bias[j], v[j] = there[j] - bias[j];
+    for (int j = 0; j < 3; ++j) {
+      const int k = (j + 1) % 3, l = (j + 2) % 3;
+      const double bend = before[j] - here[j] - there[j] + after[j], coning = *dt / 12.0 * (w[k] * v[l] - w[l] * v[k]);
+      *mean++ = 0.5 * (here[j] + there[j]) - kChord * bend + coning;
+    }
   }
 }
 

@@ -1,4 +1,4 @@
-// Passes over runs of samples that have no filter: what their steps turn, their means and variances, moving means.
+// Passes over runs of samples that have no filter: what their steps turn, their means and variances, moving or of steps.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -17,5 +17,12 @@ void statistics(const double* x, const std::int64_t* runs, std::size_t count, do
 
 // Means (n, columns) of x (n, columns) over samples i - half..i + half, as far as there are any.
 void moving_mean(const double* x, std::size_t n, std::size_t columns, std::size_t half, double* mean);
+
+// Means and variances (3, n - size + 1) of x (n, 3) over all windows of so many samples.
+void moving_statistics(const double* x, std::size_t n, std::size_t size, double* mean, double* variance);
+
+// The rotation vectors (n, 3) of the steps that lead to the last n of `samples` rates [rad/s], each over its time dt.
+void mean_rates(const double* rate, std::size_t samples, const double bias[3], const double* dt, std::size_t n,
+                double* mean);
 
 }  // namespace mpucal

@@ -1,5 +1,8 @@
 """Passes over runs of samples, compared with NumPy and SciPy on the same data."""
 
+from functools import reduce
+from operator import mul
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -38,3 +41,31 @@ def test_means_and_variances_of_runs(x):
 def test_moving_means_are_of_what_there_is(x, half):
     wanted = [x[max(i - half, 0) : i + half + 1].mean(0) for i in range(len(x))]
     np.testing.assert_allclose(_kernel.moving_mean(x, half), wanted, atol=1e-13)
+
+
+@pytest.mark.parametrize("size", [1, 7, 200])
+def test_moving_statistics_are_of_whole_windows(x, size):
+    mean, variance = _kernel.moving_statistics(10.0 + x, size)
+    windows = np.lib.stride_tricks.sliding_window_view(10.0 + x, size, axis=0)
+    np.testing.assert_allclose(mean, windows.mean(-1).T, rtol=1e-13)
+    np.testing.assert_allclose(variance, windows.var(-1).T, atol=1e-12)
+    for wrong in (0, 201):
+        with pytest.raises(ValueError, match="a window is empty"):
+            _kernel.moving_statistics(x, wrong)
+
+
+def test_mean_rates_turn_as_far_as_a_body_whose_axis_goes_round():
+    bias, angle, slow, t = np.array([0.1, -0.2, 0.3]), 0.2, 20.0, np.arange(302) / 100.0
+    round_, zero = np.stack([np.cos(slow * t), np.sin(slow * t)]), np.zeros_like(t)
+    at = Rotation.from_rotvec(angle * np.stack([*round_, zero], axis=1))
+    across = np.stack([-round_[1], round_[0], zero], axis=1)
+    rate = slow * (np.sin(angle) * across - (1.0 - np.cos(angle)) * np.array([0.0, 0.0, 1.0]))
+    mean = _kernel.mean_rates(bias + rate, bias, np.diff(t)[1:]) - bias
+    midpoint = 0.5 * (rate[1:-1] + rate[2:])
+    miss, of_midpoint = (
+        (at[1].inv() * at[-1] * reduce(mul, Rotation.from_rotvec(steps / 100.0)).inv()).magnitude()
+        for steps in (mean, midpoint)
+    )
+    assert miss < 0.1 * of_midpoint
+    with pytest.raises(ValueError, match="no rates before"):
+        _kernel.mean_rates(rate[:5], bias, np.ones(5))

@@ -65,7 +65,7 @@ def vibrating(e: Evidence) -> Reason | None:
     """A motor that runs, from the start or from later on."""
     if e.flat is None or e.fit is None:
         return None
-    std = np.sqrt(noise_variance(e.recording).mean(1))
+    std = np.sqrt(noise_variance(e.recording) @ np.full(3, 1.0 / 3.0))
     share = float(np.mean(std > np.maximum(VIBRATING_MPS2, LOUDER_THAN_FLAT * np.sqrt(e.flat.Sigma_a.mean()))))
     at_rest = float(np.median(std[e.flat.first : e.flat.last]))
     if share < VIBRATING_SHARE and at_rest < SHAKING_MPS2:
