@@ -47,6 +47,11 @@ def pair(*figures: str) -> str:
     return f'<div class="pair">\n{text}</div>\n' if text else ""
 
 
+def first(decision: str, values: str) -> str:
+    """What is seen first: where there is room, what to do stands to the right of the values."""
+    return f'<div class="first">\n{decision}{values}</div>\n'
+
+
 def table(id_: str, caption: str, head: Iterable[str], rows: Iterable[Iterable[str]], words: int = 99) -> str:
     """A table whose rows begin with their names; from cell number `words` on they are text rather than numbers."""
     lines = [f'<div class="wide"><table id="{id_}">']

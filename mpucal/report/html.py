@@ -17,7 +17,7 @@ from ..files.formats import is_of_session
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.session_files import CAPTURE
 from .decision import what_now
-from .elements import as_float, code, details, heading, number, pair, paragraph, quantity, section, table
+from .elements import as_float, code, details, first, heading, number, pair, paragraph, quantity, section, table
 from .found import accelerometer_section, formula, gyroscope_table, is_regular, matrices, verification_section
 from .gallery import gallery
 from .style import CSS
@@ -40,8 +40,7 @@ def render(calibration: Calibration, recording: Recording | None = None) -> str:
     no_pictures = recording is not None and track is None
     body = (
         _verdict(calibration, recording),
-        what_now(calibration),
-        accelerometer_section(calibration),
+        first(what_now(calibration), accelerometer_section(calibration)),
         verification_section(calibration),
         section(
             "At rest, before and after",

@@ -27,13 +27,23 @@ caption { text-align: left; padding-bottom: .3rem; }
 th, td { padding: .25rem 1.2rem .25rem 0; border-bottom: 1px solid var(--line); text-align: right;
   white-space: nowrap; }
 th { font-weight: normal; } th[scope=row], td.words { text-align: left; }
-td.words { white-space: normal; min-width: 7rem; }
+td.words { white-space: normal; min-width: 7rem; } #accelerometer th:nth-child(5) { text-align: left; }
 pre { background: var(--raised); padding: .8rem 1rem; overflow-x: auto; font-size: .85rem; }
 figure { margin: 1.2rem 0 0; max-width: 40rem; }
 figcaption { font-size: .9rem; }
 svg { display: block; width: 100%; height: auto; }
 @media (max-width: 34rem) { pre { font-size: .78rem; } #formula, #reproduce { white-space: pre-wrap; }
-  th, td { padding-right: .7rem; font-size: .9rem; white-space: normal; } }
+  th, td { padding-right: .7rem; font-size: .9rem; white-space: normal; }
+  #accelerometer { width: 100%; } #accelerometer th:nth-child(5) { display: none; }
+  #accelerometer tr { display: grid; grid-template-columns: 7rem repeat(3, 1fr);
+    border-bottom: 1px solid var(--line); }
+  #accelerometer th, #accelerometer td { border: 0; }
+  #accelerometer td.words { grid-column: 1 / -1; padding-top: 0; }
+  #accelerometer td.words:not(:empty)::before { content: "data sheet: "; color: var(--faint); } }
+@media screen and (min-width: 72rem) { body { max-width: 80rem; } p:not(.verdict) { max-width: 58rem; }
+  .first { display: grid; grid-template-columns: minmax(0, 2.2fr) minmax(0, 1fr); gap: 0 2rem; font-size: .93rem; }
+  .first > :last-child { order: -1; } .first .pair { display: block; } .first h2 { margin-top: 1.2rem; }
+  .first ul { padding-left: 1.2rem; } }
 .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(21rem, 100%), 1fr)); gap: 0 1.5rem; }
 details { margin: .8rem 0; } summary { cursor: pointer; font-weight: bold; }
 @page { margin: 13mm; }

@@ -20,6 +20,10 @@ FRAME = """<!DOCTYPE html><html><body style="margin:0">
     pictures: [...page.querySelectorAll('svg')].map(svg => svg.getBoundingClientRect().width),
     sticking_out: [...page.querySelectorAll('p, li, figure, h1, h2, th')]
       .filter(e => e.getBoundingClientRect().right > {width} && !e.closest('.wide')).length,
+    cut: [...page.querySelectorAll('#accelerometer td')]
+      .filter(e => e.getBoundingClientRect().right > {width}).length,
+    decided: Math.max(...[...page.querySelectorAll('#accelerometer, .first ul')]
+      .map(e => e.getBoundingClientRect().bottom)),
     paper: getComputedStyle(page.body).backgroundColor,
     fetched: performance.getEntriesByType('resource').length }}));"></iframe></body></html>
 """
@@ -47,8 +51,12 @@ def look(result, tmp_path_factory):
 def test_nothing_sticks_out_and_all_pictures_are_seen(look, width):
     seen = look(width)
     assert seen["wide"] <= width
-    assert seen["sticking_out"] == 0
+    assert seen["sticking_out"] == seen["cut"] == 0
     assert len(seen["pictures"]) == 7
     assert all(300 < picture <= 640 for picture in seen["pictures"])
     assert seen["paper"] == "rgb(255, 255, 255)"
     assert seen["fetched"] == 0
+
+
+def test_a_desk_shows_all_that_is_to_be_decided_at_once(look):
+    assert look(1280)["decided"] <= 800
