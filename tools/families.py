@@ -4,7 +4,7 @@ python tools/families.py --seeds 0:6
 python tools/families.py --families 'poses*,continuous' --seeds 0:33 --workers 2 --json families.json
 
 A family is a row of tools/worlds/table.py; tools/worlds/judge.py says what is false, and which limits there are. Seeds
-0 to 32 are for development: limits and constants are set on them. Seeds 1000 to 1032 are for reports, and nothing is
+0 to 32 are for development: limits and constants are set on them. Seeds 2000 to 2032 are for reports, and nothing is
 set on what they show; tests have 100 and 101. The exit code is 1 where a limit is broken.
 """
 

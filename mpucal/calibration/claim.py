@@ -18,6 +18,7 @@ from .walks import SIGNIFICANT, Walk, walked_covariance
 
 SINGULAR, TINY_MPS2 = 1e-6, 1e-9
 FLOOR_MPS2 = 5e-5  # nothing is known better where a walk was taken away, drawn straight from part to part
+MOST_NIS = 5.0  # of innovations that the model explains; 3 is expected
 MOST_UNFELT = 20.0  # times what leaving parts out says: changes reach 10, turns with a steady pull 35 to 750
 
 
@@ -65,8 +66,8 @@ def claim_of(fit: Fit, gravity: float, change: Walk | None, walked: float) -> Cl
         wider = max(1.0, rms(walked_covariance(fit.parts, fit.D, walked)) / rms(inverse(fit.parts.H)))
         floored = float(np.hypot(wider * model, FLOOR_MPS2))
     left_out = jackknife(fit.parts, fit.D, gravity)
-    # a model that knows no hand leaves the hand's motion in every part, and its estimate is off by that
-    if change is None or not fit.converged or (change.alone if "tau" in fit.names else change.gain) < SIGNIFICANT:
+    # a model that does not explain its innovations leaves the hand's motion in every part, and is off by that
+    if change is None or not fit.converged or (change.alone if fit.nis <= MOST_NIS else change.gain) < SIGNIFICANT:
         return Claim(model, floored, left_out, None)
     # a sensor that changed pulls the estimate along; a hand that was pulled aside while it moved does not
     if change.error(gravity) > MOST_UNFELT * max(left_out.claim(), model):

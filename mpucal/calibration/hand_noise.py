@@ -17,8 +17,8 @@ HAND_MPS2 = WHITE_MPS2[4:]  # who goes from rest to rest, has a hand
 PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 
 # A pivot travels farther than a bounded position of one lambda, the more the wilder it is: sigma (1.5 + 0.5 sigma) for
-# the estimate, and six times that for what its covariance admits.
-FARTHER, FARTHER_STILL, HONEST = 1.5, 0.5, 6.0
+# the estimate, and four times that for what its covariance admits.
+FARTHER, FARTHER_STILL, HONEST = 1.5, 0.5, 4.0
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from ..data import Recording, Vector
 from .downsampling import downsampled
 from .flat_segment import Flat
-from .hand_noise import FARTHER, FIRST_MPS2, HONEST, PIVOT_MPS2, WHITE_MPS2, likeliest, near
+from .hand_noise import FARTHER, FIRST_MPS2, PIVOT_MPS2, WHITE_MPS2, likeliest, near
 from .initial_estimate import initialise
 from .levenberg_marquardt import Minimum, information, minimise
 from .likelihood import value
@@ -29,6 +29,9 @@ ROUGHLY, MOST_ROUGHLY = 0.05, 4
 
 # So weak that nothing measured gives way to them, strong enough for a D of which nothing is known yet.
 D_SD, B_A_SD_MPS2 = 0.5, 5.0
+
+# times a pivot's travel that the covariance admits: more than a calibration's, which hears its parts as well
+DOUBT = 6.0
 
 
 @dataclass(frozen=True)
@@ -82,9 +85,9 @@ def interim_estimate(
     minimum = _minimum(problem, theta, prior)
     H = minimum.H
     if not prepared.rests_often:
-        # who does not pause leans on a hand's travel, of which little is known: as the calibration, admit more of it
+        # who does not pause leans on a hand's travel, of which little is known: admit more of it
         pivot = min(PIVOT_MPS2, key=lambda s: value(prepared.pivot(s, FLOOR_MPS2), minimum.theta))
-        doubt = prepared.pivot(HONEST * FARTHER * pivot, FLOOR_MPS2)
+        doubt = prepared.pivot(DOUBT * FARTHER * pivot, FLOOR_MPS2)
         H = information(doubt, minimum.theta, prior)
     covariance = replace(minimum, H=H).covariance()[ACCELEROMETER, ACCELEROMETER]
     sigma = likeliest(prepared.white, near(sigma), minimum.theta)

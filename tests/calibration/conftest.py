@@ -32,7 +32,7 @@ def near_ideal(seed=0, D=None, G_gyro=None, **scenario):
         K=np.eye(3) if G_gyro is None else np.linalg.inv(G_gyro),
         b_omega=np.array([0.02, -0.03, 0.01]),
         gravity=G,
-        accel_noise_density=density(0.1, scenario["rate_hz"]),
+        accel_noise_density=density(0.08, scenario["rate_hz"]),
         gyro_noise_density=density(0.03, scenario["rate_hz"]),
     )
     return paper_scenario(seed, sensor=sensor, **scenario)

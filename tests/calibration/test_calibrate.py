@@ -78,7 +78,7 @@ def test_the_document_says_what_was_done(ideal):
     assert (fit["samples"], fit["seconds"]) == (2000, pytest.approx(39.98))
     assert 2.7 < fit["nis"] < 3.3
     assert document["sensor"]["chip"] == "mpu6050"
-    np.testing.assert_allclose(calibration.noise_std, 0.1, rtol=0.1)
+    np.testing.assert_allclose(calibration.noise_std, 0.08, rtol=0.1)
     np.testing.assert_allclose(calibration.gyro_noise_std, 0.03, rtol=0.1)
     assert document["gyroscope"]["K"] == np.eye(3).tolist()
     assert document["gyroscope"]["K_std"] == [[None] * 3] * 3  # not estimated

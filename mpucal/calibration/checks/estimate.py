@@ -6,14 +6,14 @@ import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2
 from ...reasons import Reason, reason
+from ..claim import MOST_NIS
 from ..evidence import Evidence
 from ..tilt import CONE_RAD
 from ..walks import Walk
 
 # of a claim, 1 sigma: errors of 0.1 m/s^2 are then rare
-GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.075, 0.4
+GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.055, 0.4
 CHANCE = 1.5  # times the model's claim: so much parts differ by chance
-CONSISTENT_NIS = 5.0
 RESTS_MPS2, RESTS_RAD = 0.08, np.deg2rad(1.5)
 HONEST_FACTOR = 5.0
 REFUSED_FACTOR = 5.0
@@ -74,7 +74,7 @@ def inconsistent(e: Evidence) -> Reason | None:
     if e.fit is None or e.sure is None:
         return None
     # a robust model leaves outliers in its innovations: only the others are judged by them
-    if e.model != "hand" and e.fit.nis > CONSISTENT_NIS:
+    if e.model != "hand" and e.fit.nis > MOST_NIS:
         after = float(np.median(np.linalg.norm(e.calibrated, axis=1))) if e.calibrated is not None else np.nan
         return reason(
             "inconsistent", "innovations", _useless(e) or not abs(after / e.gravity - 1.0) < 0.05, nis=e.fit.nis
