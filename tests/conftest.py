@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import tempfile
 from pathlib import Path
 
 import pytest
+
+# `python -m pytest` looks for modules in the folder that it runs in first, and the sources there have no kernel
+if str(Path(__file__).parents[1]) in sys.path:
+    sys.path.remove(str(Path(__file__).parents[1]))
 
 from mpucal.session.threads import ONE_THREAD
 
@@ -41,6 +46,15 @@ SLOW = (
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Order the files; those of a file stay as they are."""
     items.sort(key=lambda item: SLOW.index(item.path.name) if item.path.name in SLOW else len(SLOW))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def elsewhere(tmp_path_factory):
+    """A folder to run in: what a test starts looks for modules where it runs, too."""
+    home = Path.cwd()
+    os.chdir(tmp_path_factory.mktemp("elsewhere"))
+    yield
+    os.chdir(home)
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,7 @@
 
 import re
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 
@@ -21,9 +22,11 @@ def plain(function):
 
 def test_the_stubs_are_those_of_the_modules(monkeypatch, capsys):
     stubtest = pytest.importorskip("mypy.stubtest")
+    monkeypatch.chdir(Path(__file__).parents[2])  # where it looks for the stubs
     for module in map(import_module, NAMES):
         compiled = {name: value for name, value in vars(module).items() if hasattr(value, "__nb_signature__")}
         assert compiled
         for name, value in compiled.items():
             monkeypatch.setattr(module, name, plain(value))
-    assert stubtest.test_stubs(stubtest.parse_options([*NAMES])) == 0, capsys.readouterr().out
+    options = stubtest.parse_options([*NAMES, "--mypy-config-file", "pyproject.toml"])
+    assert stubtest.test_stubs(options) == 0, capsys.readouterr().out
