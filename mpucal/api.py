@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from numbers import Real
 from os import PathLike
 from pathlib import Path
 from typing import Literal
 
 from .allan import noise_of
-from .arguments import a_path
+from .arguments import a_path, real
 from .calibration import calibrate as _calibrate
 from .data import STANDARD_GRAVITY_MPS2, Recording
 from .errors import WrongType, WrongValue
@@ -21,6 +20,7 @@ from .result.clock import now
 from .result.noise import Noise as Noise  # noqa: PLC0414
 
 ModelName = Literal["auto", "hand", "imu", "accel", "paper", "tilt"]
+UNITS = {"accel_range": "the full scale in g", "gyro_range": "the full scale in deg/s", "rate": "samples a second"}
 
 
 def load(
@@ -49,17 +49,15 @@ def load(
     RecordingError : no such file, one of another kind, no recording in it, or doubtful columns or units.
     CaptureError : a capture that cannot be read. ChipError : the capture of a chip that is not known.
     UsageError : something is said of a file of which nothing has to be said.
-    WrongType : `path` is no path. WrongValue : no such columns or units.
+    WrongType : `path` is no path, or a hint of another type. WrongValue : no such columns, units, range or rate.
     """
+    for name, value in (("topic", topic), ("columns", columns), ("units", units)):
+        if not isinstance(value, str | None):
+            raise WrongType(f"{name} is {value!r}", "give it as text, see docs/recordings.md")
+    scales = {"accel_range": accel_range, "gyro_range": gyro_range, "rate": rate}
+    checked = [None if value is None else real(value, name, UNITS[name], least=1e-9) for name, value in scales.items()]
     try:
-        hints = Hints(
-            topic,
-            parse_columns(columns) if columns else {},
-            parse_units(units) if units else {},
-            accel_range,
-            gyro_range,
-            rate,
-        )
+        hints = Hints(topic, parse_columns(columns) if columns else {}, parse_units(units) if units else {}, *checked)
     except ValueError as error:
         raise WrongValue(str(error), "see docs/recordings.md") from error
     return _load(a_path(path, "a recording"), hints)
@@ -86,10 +84,9 @@ def calibrate(
     WrongType : an argument of another type. WrongValue : no such model, or a gravity that is none.
     SourceError : the file holds no recording, see load.
     """
-    recording = _recording(recording)
-    if not isinstance(gravity, Real) or isinstance(gravity, bool):
-        raise WrongType(f"gravity is {gravity!r}", "give the local gravity in m/s^2, about 9.81")
-    return _calibrate(recording, model, float(gravity), gravity_anyway)
+    recording = recording_of(recording)
+    local = real(gravity, "gravity", "the local gravity in m/s^2, about 9.81")
+    return _calibrate(recording, model, local, gravity_anyway)
 
 
 def check(
@@ -114,7 +111,8 @@ def check(
 
     Raises
     ------
-    WrongType : an argument of another type. UsageError : a calibration that was refused, or of another kind of samples.
+    WrongType, WrongValue : an argument of another type, or days before the calibration. UsageError : a calibration that
+        was refused, or of another kind of samples.
     SourceError : a file holds no calibration, or no recording.
     """
     if isinstance(calibration, str | PathLike):
@@ -122,7 +120,8 @@ def check(
     if not isinstance(calibration, Calibration):
         what = "give a mpucal.Calibration, as of mpucal.calibrate, or the path of one"
         raise WrongType(f"{type(calibration).__name__} is no calibration", what)
-    return _check(calibration, _recording(recording), days)
+    between = None if days is None else real(days, "days", "how many lie between both", least=0.0)
+    return _check(calibration, recording_of(recording), between)
 
 
 def noise(recording: Recording | str | PathLike[str]) -> Noise:
@@ -140,10 +139,16 @@ def noise(recording: Recording | str | PathLike[str]) -> Noise:
     ------
     WrongType : an argument of another type. RecordingError : too few samples.
     """
-    return noise_of(_recording(recording), now().isoformat())
+    return noise_of(recording_of(recording), now().isoformat())
 
 
-def _recording(given: Recording | str | PathLike[str]) -> Recording:
+def recording_of(given: Recording | str | PathLike[str]) -> Recording:
+    """A recording, or that of a path.
+
+    Raises
+    ------
+    WrongType : it is neither. SourceError : see load.
+    """
     if isinstance(given, str | PathLike):
         given = load(given)
     if not isinstance(given, Recording):

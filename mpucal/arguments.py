@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import stat
+from numbers import Real
 from operator import index
 from os import PathLike
 from pathlib import Path
@@ -124,6 +126,36 @@ def a_path(path: Any, what: str) -> Path:
     if not isinstance(path, str | PathLike):
         raise WrongType(f"{what} is given as {type(path).__name__}", "give the path of its file")
     return Path(path)
+
+
+def real(value: Any, what: str, wanted: str, least: float = -math.inf) -> float:
+    """A finite number, `least` or more.
+
+    Raises
+    ------
+    WrongType : it is no number. WrongValue : it is smaller, or not finite.
+    """
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise WrongType(f"{what} is {value!r}", f"give {wanted}")
+    if not math.isfinite(value) or value < least:
+        raise WrongValue(f"{what} is {value}", f"give {wanted}")
+    return float(value)
+
+
+def shaped(values: ArrayLike, name: str, *shapes: tuple[int, ...]) -> Vector:
+    """Numbers of one of the shapes, the first of which is wanted.
+
+    Raises
+    ------
+    WrongType : they are no numbers. WrongValue : another shape.
+    """
+    try:
+        array = np.asarray(values, float)
+    except (TypeError, ValueError) as error:
+        raise WrongType(f"{name} is no array of numbers ({error})", f"give numbers of shape {shapes[0]}") from error
+    if array.shape not in shapes:
+        raise WrongValue(f"{name} has shape {array.shape}", f"give numbers of shape {shapes[0]}")
+    return array
 
 
 def regular(path: Path) -> Path:

@@ -17,6 +17,7 @@ from . import frames
 from .arguments import Mask as Mask  # noqa: PLC0414 - rooms above take them from here
 from .arguments import Vector as Vector  # noqa: PLC0414
 from .arguments import column, mask, rows, seconds, stretch
+from .errors import WrongType
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -197,8 +198,10 @@ class Recording(Samples):
         Raises
         ------
         ArraysError : wrong shapes, values that are no numbers, or time that does not increase. It is a RecordingError
-            and a ValueError.
+            and a ValueError. WrongType : `sensor` is none.
         """
+        if not isinstance(sensor, Sensor | None):
+            raise WrongType(f"{name}: sensor is {sensor!r}", "give a Sensor, as of another recording, or leave it out")
         t = seconds(t, name)
         n = len(t)
         acc, gyr = rows(acc, "acc", n, name), rows(gyr, "gyr", n, name)

@@ -65,7 +65,7 @@ def weigh(
     ------
     WrongValue : no such model, or a gravity that is none.
     """
-    if model not in MODELS:
+    if model not in tuple(MODELS):  # which takes what has no hash
         raise WrongValue(f"there is no model {model!r}", f"choose one of {', '.join(MODELS)}")
     if not (np.isfinite(gravity) and gravity > 0):
         raise WrongValue(f"gravity is {gravity}", "give the local gravity in m/s^2, about 9.81")

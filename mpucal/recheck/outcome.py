@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -13,9 +13,13 @@ from ..result.calibration import Calibration
 from .observed import BETA, DELTA, UPPER, E, G
 
 FORMAT, VERSION = "mpucal.check", 1
-STILL_GOOD, DRIFTED, REMOUNTED = "still good", "drifted", "remounted"
-ANOTHER_SENSOR, CANNOT_BE_TOLD = "another sensor", "cannot be told"
-EXIT_CODES: Mapping[str, int] = {STILL_GOOD: 0, DRIFTED: 5, REMOUNTED: 5, ANOTHER_SENSOR: 5, CANNOT_BE_TOLD: 4}
+Verdict = Literal["still good", "drifted", "remounted", "another sensor", "cannot be told"]
+STILL_GOOD: Verdict = "still good"
+DRIFTED: Verdict = "drifted"
+REMOUNTED: Verdict = "remounted"
+ANOTHER_SENSOR: Verdict = "another sensor"
+CANNOT_BE_TOLD: Verdict = "cannot be told"
+EXIT_CODES: Mapping[Verdict, int] = {STILL_GOOD: 0, DRIFTED: 5, REMOUNTED: 5, ANOTHER_SENSOR: 5, CANNOT_BE_TOLD: 4}
 MENDED_BY_BIASES = ("nothing", "bias", "gyroscope's bias", "temperature")
 AXES = "xyz"
 
@@ -46,8 +50,8 @@ class Change:
         )
 
 
-@dataclass(frozen=True)
-class CheckResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class CheckResult:  # noqa: PLW1641 - arrays have no hash either
     """Whether a calibration is still right for its sensor.
 
     Attributes
@@ -63,9 +67,11 @@ class CheckResult:
         the data sheet, accounts for what was seen; None where it is not known or nothing happened.
     orientations : how many were seen, 20 deg apart. seconds : how long the recording is.
     theta : (21,), covariance : (21, 21), the estimate behind it, see `mpucal.recheck.observed`; None: there is none.
+
+    Results are equal whose check.json is the same.
     """
 
-    verdict: str
+    verdict: Verdict
     what: str
     message: str
     remedy: str = ""
@@ -79,6 +85,12 @@ class CheckResult:
     seconds: float = 0.0
     theta: Vector | None = None
     covariance: Vector | None = None
+
+    def __eq__(self, other: object) -> bool:
+        return self.document() == other.document() if isinstance(other, CheckResult) else NotImplemented
+
+    def __repr__(self) -> str:
+        return f"<CheckResult: {self.verdict}; {self.message}>"
 
     @property
     def exit_code(self) -> int:

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
+from io import BytesIO
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..chip.families import Family, family_of
 from ..data import Recording, Vector
 from ..result.calibration import Calibration
+from ..result.error_model import MG_PER_MPS2
 from .elements import paragraph, table
 from .pictures import envelope
 from .track import Track
-from .units import AXES, accelerometer, estimated_error
+from .units import AXES, ParameterRow, accelerometer, estimated_error
+from .usual import tolerance
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SIZE_IN = (8.0, 4.5)
+WIDTH_IN, HEIGHT_IN = 8.0, 4.5
 
 
 def html(calibration: Calibration) -> str:
@@ -31,24 +37,14 @@ def html(calibration: Calibration) -> str:
     return paragraph(said) + table("mpucal", caption, ["", *AXES], rows)
 
 
-def plot_calibration(calibration: Calibration, recording: Recording) -> Figure:
-    """|a| of a recording over time, before and after.
+def plot_calibration(calibration: Calibration, recording: Recording | None) -> Figure:
+    """The parameters beside the data sheet; of a recording |a| before and after, of each rest too, and innovations.
 
     Raises
     ------
     ImportError : matplotlib is not installed.
     """
-    from matplotlib.figure import Figure  # noqa: PLC0415 - only where something is drawn
-
-    track = Track(recording, calibration)
-    figure = Figure(figsize=SIZE_IN, layout="constrained")
-    axes = figure.subplots()
-    for name, acc in (("before", recording.acc), ("after", track.calibrated)):
-        axes.plot(*envelope(track.t, np.linalg.norm(acc, axis=1)), linewidth=0.8, label=name)
-    axes.axhline(track.gravity, color="black", linewidth=0.8, linestyle="--", label="gravity")
-    axes.set(xlabel="time [s]", ylabel="|a| [m/s²]")
-    axes.legend()
-    return figure
+    return _parameters(calibration) if recording is None else _before_and_after(Track(recording, calibration))
 
 
 def plot_recording(recording: Recording) -> Figure:
@@ -58,9 +54,7 @@ def plot_recording(recording: Recording) -> Figure:
     ------
     ImportError : matplotlib is not installed.
     """
-    from matplotlib.figure import Figure  # noqa: PLC0415 - only where something is drawn
-
-    figure = Figure(figsize=SIZE_IN, layout="constrained")
+    figure = _figure(HEIGHT_IN)
     upper, lower = figure.subplots(2, sharex=True)
     t = np.asarray(recording.t - recording.t[0])
     _lines(upper, t, recording.acc, "acceleration [m/s²]")
@@ -70,6 +64,69 @@ def plot_recording(recording: Recording) -> Figure:
         for axes in (upper, lower):
             axes.axvspan(t[recording.flat[0]], t[recording.flat[1] - 1], alpha=0.2, label="flat")
     upper.legend()
+    return figure
+
+
+def _figure(height_in: float) -> Figure:
+    """An empty figure, which a notebook shows as a picture."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - only where something is drawn
+
+    figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    # IPython knows figures only where pyplot was imported
+    vars(figure)["_repr_png_"] = partial(_png, figure)
+    return figure
+
+
+def _png(figure: Figure) -> bytes:
+    file = BytesIO()
+    figure.savefig(file, format="png")
+    return file.getvalue()
+
+
+def _parameters(calibration: Calibration) -> Figure:
+    """Scale factor errors, biases and misalignments with their standard uncertainties."""
+    figure = _figure(HEIGHT_IN)
+    sheet = family_of(calibration.sensor.chip)
+    gain, bias, *angles = accelerometer(calibration)
+    panels = figure.subplots(1, 3, width_ratios=(1, 1, 2))
+    for axes, rows in zip(panels, ([gain], [bias], angles), strict=True):
+        _values(axes, rows, sheet)
+    return figure
+
+
+def _values(axes: Axes, rows: Sequence[ParameterRow], sheet: Family | None) -> None:
+    """Rows of one unit, and what the data sheet allows behind them."""
+    name, *_ = rows[0].name.split(" x->")
+    which = [(row, i) for row in rows for i in range(3) if AXES[i] in row.axes]
+    x = [row.name.split()[-1] if len(row.axes) == 1 else AXES[i] for row, i in which]
+    if sheet is not None:
+        allowed = np.array([tolerance(row, sheet)[i] for row, i in which])
+        axes.bar(x, 2.0 * allowed, bottom=-allowed, color="0.9", label="data sheet")
+        if len(rows) > 1:
+            axes.legend()
+    axes.axhline(0.0, color="black", linewidth=0.8)
+    values, std = ([getattr(row, of)[i] for row, i in which] for of in ("value", "std"))
+    axes.errorbar(x, values, std, fmt="o", capsize=4.0)
+    axes.set_title(f"{name} [{rows[0].unit}]")
+
+
+def _before_and_after(track: Track) -> Figure:
+    figure = _figure(2.0 * HEIGHT_IN)
+    magnitude, rests, innovations = figure.subplots(3)
+    for name, acc in (("before", track.recording.acc), ("after", track.calibrated)):
+        magnitude.plot(*envelope(track.t, np.linalg.norm(acc, axis=1)), linewidth=0.8, label=name)
+        error = np.linalg.norm(track.at_rest(acc), axis=1) - track.gravity
+        rests.plot(np.arange(1, len(error) + 1), MG_PER_MPS2 * error, "o", label=name)
+    magnitude.axhline(track.gravity, color="black", linewidth=0.8, linestyle="--", label="gravity")
+    magnitude.set(xlabel="time [s]", ylabel="|a| [m/s²]")
+    rests.axhline(0.0, color="black", linewidth=0.8)
+    rests.set(xlabel="rest", ylabel="|a| − gravity [mg]")
+    e = track.innovations
+    if e is not None:
+        _lines(innovations, track.t[-len(e) :], e, "innovation [m/s²]")
+        innovations.legend()
+    innovations.set_xlabel("time [s]")
+    magnitude.legend()
     return figure
 
 

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from os import PathLike
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, TypeVar, cast, overload
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import frames
-from ..arguments import a_path, content, vectors
+from ..arguments import a_path, content, shaped, vectors
 from ..data import Recording, Sensor, Vector
 from ..errors import RecordingError, WrongValue
 from ..strict_json import MOST_BYTES, parsed
@@ -30,6 +31,13 @@ from .keys import Fit, Quality, Verdict
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+SHAPES = {
+    **dict.fromkeys(("D", "D_std", "K", "K_std"), (3, 3)),
+    **dict.fromkeys(("b_a", "b_a_std", "noise_std", "b_omega", "b_omega_std", "gyro_noise_std"), (3,)),
+    **dict.fromkeys(("applied_in_hardware", "b_a_slope", "b_a_slope_std"), (3,)),
+    "temperature_range_c": (2,),
+    "correlation": (21, 21),
+}
 F = TypeVar("F", bound=frames.Frame)
 GOOD: Verdict = "good"
 USABLE: Verdict = "usable"
@@ -88,6 +96,8 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     doubt: str = ""
 
     def __post_init__(self) -> None:
+        for name, shape in SHAPES.items():
+            object.__setattr__(self, name, shaped(getattr(self, name), name, shape))
         for name in ("fit", "quality", "extra"):
             object.__setattr__(self, name, FrozenDict(getattr(self, name)))
 
@@ -103,14 +113,15 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     def _repr_html_(self) -> str:
         return str(resolve_name("mpucal.report.notebook:html")(self))
 
-    def plot(self, recording: Recording) -> Figure:
-        """A figure of |a| over time, before and after; needs mpucal[plot].
+    def plot(self, recording: Recording | str | PathLike[str] | None = None) -> Figure:
+        """A figure of the parameters beside the data sheet; of a recording |a| before and after. Needs mpucal[plot].
 
         Raises
         ------
-        ImportError : matplotlib is not installed.
+        ImportError : matplotlib is not installed. WrongType : no recording, nor the path of one.
         """
-        figure: Figure = resolve_name("mpucal.report.notebook:plot_calibration")(self, recording)
+        seen = None if recording is None else resolve_name("mpucal.api:recording_of")(recording)
+        figure: Figure = resolve_name("mpucal.report.notebook:plot_calibration")(self, seen)
         return figure
 
     @property
@@ -180,12 +191,12 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         if frames.is_frame(acc):
             return self._applied_to_frame(acc)
         y = vectors(acc, "acc", "m/s^2")
+        T = None if temperature_c is None else shaped(temperature_c, "temperature_c", y.shape[:-1], ())
+        omega = None if gyr is None else shaped(vectors(gyr, "gyr", "rad/s"), "gyr", y.shape)
         # b_a minus what the offset registers subtract: y comes from the chip with that already gone
-        y = y - (self.b_a_at(temperature_c) - self.applied_in_hardware)
+        y = y - (self.b_a_at(T) - self.applied_in_hardware)
         a: Vector = y @ self.inverse.T
-        if gyr is None:
-            return a
-        return a, (vectors(gyr, "gyr", "rad/s") - np.nan_to_num(self.b_omega)) @ self.K.T
+        return a if omega is None else (a, self._rates(omega))
 
     def _applied_to_frame(self, frame: Any) -> Any:
         T = np.asarray(frame["temperature_c"], float) if "temperature_c" in frame.columns else None
@@ -193,9 +204,11 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
             frames.ACC: self.apply(frames.columns(frame, frames.ACC), temperature_c=T)
         }
         if frames.places(frame, frames.GYR):
-            omega = vectors(frames.columns(frame, frames.GYR), "gyr", "rad/s")
-            new[frames.GYR] = (omega - np.nan_to_num(self.b_omega)) @ self.K.T
+            new[frames.GYR] = self._rates(vectors(frames.columns(frame, frames.GYR), "gyr", "rad/s"))
         return frames.replaced(frame, new)
+
+    def _rates(self, omega: Vector) -> Vector:
+        return np.asarray((omega - np.nan_to_num(self.b_omega)) @ self.K.T)
 
     def tellable(self) -> Calibration:
         """The same, in which unknown is what no reader takes: of a fit that failed."""

@@ -26,8 +26,8 @@ WHITE, INSTABILITY, WALK, QUANTISATION = "white_noise", "bias_instability", "ran
 COEFFICIENTS = (WHITE, INSTABILITY, WALK, QUANTISATION)
 
 
-@dataclass(frozen=True, eq=False)
-class Noise:
+@dataclass(frozen=True, eq=False, repr=False)
+class Noise:  # noqa: PLW1641 - arrays have no hash either
     """The noise of six axes: accelerometer x, y, z [m/s^2], gyroscope x, y, z [rad/s].
 
     Attributes
@@ -40,6 +40,8 @@ class Noise:
     data_sheet : white noise of the kind of chip, by sensor [units/sqrt(Hz), two-sided]; empty: no known chip.
     suspicious : what was, a code and a sentence each.
     course_s, course : (m,) s, (m, 7) slow means, the temperature last; not in the file.
+
+    Noises are equal whose noise.json is the same.
     """
 
     values: Mapping[str, Vector]
@@ -57,6 +59,13 @@ class Noise:
     suspicious: tuple[Mapping[str, str], ...] = ()
     course_s: Vector = field(default_factory=lambda: np.zeros(0))
     course: Vector = field(default_factory=lambda: np.zeros((0, 7)))
+
+    def __eq__(self, other: object) -> bool:
+        return self.document() == other.document() if isinstance(other, Noise) else NotImplemented
+
+    def __repr__(self) -> str:
+        white = f"{self.of(ACCELEROMETER, WHITE):.3g} m/s^2/sqrt(Hz), {self.of(GYROSCOPE, WHITE):.3g} rad/s/sqrt(Hz)"
+        return f"<Noise of {self.sensor.chip or 'a sensor'}: white noise {white}; {self.seconds:.0f} s>"
 
     def of(self, sensor: str, coefficient: str) -> float:
         """One number of three axes: the root of the mean of their squares; NaN where none is known."""

@@ -13,6 +13,9 @@ from .flat import BOARD
 from .keys import Keys
 from .lines import JsonLines, Lines
 
+# Jupyter sets it for its kernels
+KERNEL = "JPY_PARENT_PID"
+
 
 class Console(Protocol):
     """Says what the session says, and asks the keyboard where there is one."""
@@ -50,8 +53,10 @@ def console(
     board : how it is drawn.
     """
     term = os.environ.get("TERM", "dumb")
-    drawn = sys.stderr.isatty() and term not in ("", "dumb") and not as_json
-    keys = Keys(None if quiet or not sys.stdin.isatty() else sys.stdin, single=drawn)
+    # what a cell of a notebook starts has a terminal that shows no screen and hears no keys
+    seen = KERNEL not in os.environ
+    drawn = seen and sys.stderr.isatty() and term not in ("", "dumb") and not as_json
+    keys = Keys(sys.stdin if seen and not quiet and sys.stdin.isatty() else None, single=drawn)
     if as_json:
         return JsonLines(sys.stderr, keys)
     if not drawn:

@@ -1,5 +1,6 @@
 """Calibrations and recordings as a notebook shows them."""
 
+import pickle
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -40,6 +41,17 @@ def test_they_say_in_a_line_what_they_are(recording, calibration):
     assert "nan" in repr(mpucal.calibrate(recording.part(0, 50)))
 
 
+def test_results_say_so_too_and_compare_by_value(recording, calibration):
+    checked, noise = mpucal.check(calibration, recording), mpucal.noise(recording)
+    assert repr(checked).startswith("<CheckResult: still good; the bias is within ")
+    assert repr(noise).startswith("<Noise of MPU-6500: white noise ")
+    for result in (checked, noise):
+        assert len(repr(result)) < 120
+        assert pickle.loads(pickle.dumps(result)) == result != recording
+    assert checked != mpucal.check(calibration, recording, days=30.0)
+    assert noise != mpucal.noise(recording.part(0, 5000))
+
+
 def test_the_table_holds_the_numbers(calibration):
     page = Texts()
     page.feed(calibration._repr_html_())
@@ -50,11 +62,28 @@ def test_the_table_holds_the_numbers(calibration):
 
 def test_the_figures_hold_the_data(recording, calibration):
     pytest.importorskip("matplotlib")
-    (axes,) = calibration.plot(recording).axes
-    before, after, gravity = (np.asarray(line.get_ydata()) for line in axes.lines)
+    magnitude, rests, innovations = calibration.plot(recording).axes
+    before, after, gravity = (np.asarray(line.get_ydata()) for line in magnitude.lines)
     a = np.linalg.norm(calibration.apply(recording.acc), axis=1)
     assert (after.min(), after.max()) == (a.min(), a.max())
     assert not np.array_equal(before, after) and set(gravity) == {9.80665}
+    before, after, _ = (np.abs(line.get_ydata()).max() for line in rests.lines)
+    assert after < 0.1 * before
+    assert len(innovations.lines) == 3
     upper, lower = recording.plot().axes
     assert [max(line.get_ydata()) for line in upper.lines] == recording.acc.max(axis=0).tolist()
     assert len(lower.lines) == 3
+
+
+def test_the_figure_of_a_calibration_holds_its_parameters(calibration):
+    pytest.importorskip("matplotlib")
+    drawn = [value for axes in calibration.plot().axes for value in axes.containers[-1].lines[0].get_ydata()]
+    rows = accelerometer(calibration)
+    assert drawn == [value for row in rows for value, cell in zip(row.value, row.cells, strict=True) if cell]
+
+
+def test_a_notebook_is_given_a_picture(recording, calibration):
+    pytest.importorskip("matplotlib")
+    for figure in (recording.plot(), calibration.plot(), calibration.plot(recording)):
+        assert figure._repr_png_().startswith(b"\x89PNG\r\n")
+        assert pickle.loads(pickle.dumps(figure)).axes

@@ -36,6 +36,14 @@ def test_what_the_streams_allow(monkeypatch, err, term, as_json, kind):
     assert type(console(quiet=False, as_json=as_json)) is kind
 
 
+def test_a_cell_of_a_notebook_has_a_terminal_without_a_screen(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    monkeypatch.setattr(sys, "stdin", Terminal())
+    monkeypatch.setenv("TERM", "xterm-color")
+    monkeypatch.setenv("JPY_PARENT_PID", "1")
+    assert type(console(quiet=False)) is Lines
+
+
 @pytest.mark.parametrize(("beep", "rings"), [(None, 0), (True, 1), (False, 0)])
 def test_lines_ring_only_when_asked(monkeypatch, beep, rings):
     monkeypatch.setattr(sys, "stderr", io.StringIO())
