@@ -21,11 +21,11 @@ from .hand_noise import (
     HAND_MPS2,
     HONEST,
     PIVOT_MPS2,
+    SOME_MPS2,
     WHITE_MPS2,
     Noise,
     farther,
     likeliest,
-    near,
 )
 from .initial_estimate import initialise
 from .levenberg_marquardt import Minimum, information, minimise
@@ -51,7 +51,7 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     search = _Search(preprocess(*downsampled(recording, flat, SEARCH_HZ), gravity, rough))
     theta, noise = search.run(initialise(fine.problem, fine.flat.b_omega))
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
-        noise = Noise("white", likeliest(fine.white, near(noise.sigma), theta))
+        noise = Noise("white", likeliest(fine.white, SOME_MPS2, theta, noise.sigma))
     problem = _moved(noise.problem(fine), fine, theta)
     prior = prior_of(fine.flat)
     minimum = minimise(problem, theta, HAND, prior, frozen=True, ends=ends_of(problem))
@@ -80,12 +80,13 @@ def _doubted(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preproce
     prior, fixed = prior_of(fine.flat), () if minimum.free.all() else ("K",)
     at, problem, transitions = minimum, noise.problem(rough), transitions_of(rough, minimum.theta)
     variance, leverage = miss_variances(transitions), np.zeros(1)
-    for again in range(PASSES if transitions else 0):
-        transitions = transitions_of(rough, at.theta) if again else transitions
+    for _ in range(PASSES if transitions else 0):
         leverage = leverages(transitions, rough, at.theta, at.covariance(), variance)
         variance = miss_variances(transitions, leverage)
         problem = _scaled(problem, q_scale(transitions, variance, len(problem.series)))
-        at = _roughly(problem, at.theta, prior, fixed)
+        before, at = at, _roughly(problem, at.theta, prior, fixed)
+        if at.theta is not before.theta:
+            transitions = transitions_of(rough, at.theta)
     problem, transitions = noise.problem(fine), transitions_of(fine, at.theta)
     if transitions:  # rests are found anew here, and their number may differ by one
         variance = miss_variances(transitions, float(leverage.mean()))
@@ -118,21 +119,22 @@ class _Search:
         """First Huber's loss, which finds the way from afar; then the redescending one, and the likeliest sigma."""
         prepared = self.prepared
         theta = self._roughly(replace(prepared.white(FIRST_MPS2), tail=0.0), theta)
-        sigma = 0.0
-        sigmas = HAND_MPS2 if prepared.rests_often else WHITE_MPS2
+        sigma, sigmas = HAND_MPS2[0], HAND_MPS2 if prepared.rests_often else WHITE_MPS2
         for _ in range(2):
-            sigma = likeliest(prepared.white, sigmas, theta)
+            sigma = likeliest(prepared.white, sigmas, theta, sigma)
             theta = self._roughly(prepared.white(sigma), theta)
         if sigma == 0.0:
             return theta, Noise("none", 0.0)
         noise = Noise("white", sigma)
         if not prepared.rests_often:
-            sigma = likeliest(prepared.pivot, PIVOT_MPS2, theta)
+            sigma = likeliest(prepared.pivot, PIVOT_MPS2, theta, PIVOT_MPS2[0])
             theta = self._roughly(prepared.pivot(sigma), theta)
-            sigma = likeliest(prepared.pivot, PIVOT_MPS2, theta)
+            sigma = likeliest(prepared.pivot, PIVOT_MPS2, theta, sigma)
             noise = Noise("pivot", farther(sigma))
         for _ in range(PASSES):
-            theta = self._roughly(_moved(noise.problem(prepared), prepared, theta), theta)
+            before, theta = theta, self._roughly(_moved(noise.problem(prepared), prepared, theta), theta)
+            if theta is before:
+                break
         return theta, noise
 
     def _roughly(self, problem: Problem, theta: Theta) -> Theta:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
@@ -13,6 +14,7 @@ from .theta import Theta
 
 FIRST_MPS2 = 0.3  # by which a search begins
 WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
+SOME_MPS2 = WHITE_MPS2[1:]
 HAND_MPS2 = WHITE_MPS2[4:]  # who goes from rest to rest, has a hand
 PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 
@@ -35,17 +37,22 @@ class Noise:
         return prepared.white(self.sigma, CORRELATION_S if self.kind == "white" else 0.0)
 
 
-def likeliest(problem_of: Callable[[float], Problem], sigmas: tuple[float, ...], theta: Theta) -> float:
-    """The sigma of least V at theta."""
-    return min(sigmas, key=lambda sigma: value(problem_of(sigma), theta))
+def likeliest(problem_of: Callable[[float], Problem], sigmas: tuple[float, ...], theta: Theta, begin: float) -> float:
+    """The sigma of least V at theta: along the grid from `begin` as far as V falls, which has one minimum."""
+
+    def cost(at: int) -> float:
+        return value(problem_of(sigmas[at]), theta) if 0 <= at < len(sigmas) else math.inf
+
+    at = first = sigmas.index(begin)
+    least = cost(at)
+    for step in (1, -1):
+        while (there := cost(at + step)) < least:
+            at, least = at + step, there
+        if at != first:
+            break
+    return sigmas[at]
 
 
 def farther(sigma: float) -> float:
     """The sigma of a pivot, whose likeliest bounded position has this one."""
     return (FARTHER + FARTHER_STILL * sigma) * sigma
-
-
-def near(sigma: float) -> tuple[float, ...]:
-    """The neighbours of a sigma on the grid, itself among them, zero excepted."""
-    at = WHITE_MPS2.index(sigma)
-    return WHITE_MPS2[max(at - 1, 1) : at + 3]

@@ -7,13 +7,14 @@ twenty times as fast.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ..data import Recording, Vector
 from .downsampling import downsampled
 from .flat_segment import Flat
-from .hand_noise import FARTHER, FIRST_MPS2, PIVOT_MPS2, WHITE_MPS2, likeliest, near
+from .hand_noise import FARTHER, FIRST_MPS2, HAND_MPS2, PIVOT_MPS2, SOME_MPS2, WHITE_MPS2, likeliest
 from .initial_estimate import initialise
 from .levenberg_marquardt import Minimum, information, minimise
 from .likelihood import value
@@ -80,17 +81,18 @@ def interim_estimate(
         sigma = before.sigma
     else:
         theta = _right_handed(_minimum(rough, theta, prior).theta)
-        sigma = likeliest(prepared.white, WHITE_MPS2, theta)
+        sigma = likeliest(prepared.white, WHITE_MPS2, theta, HAND_MPS2[0])
     problem = prepared.white(sigma, CORRELATION_S)
     minimum = _minimum(problem, theta, prior)
     H = minimum.H
     if not prepared.rests_often:
         # who does not pause leans on a hand's travel, of which little is known: admit more of it
-        pivot = min(PIVOT_MPS2, key=lambda s: value(prepared.pivot(s, FLOOR_MPS2), minimum.theta))
+        pivots = partial(prepared.pivot, floor=FLOOR_MPS2)
+        pivot = likeliest(pivots, PIVOT_MPS2, minimum.theta, PIVOT_MPS2[0])
         doubt = prepared.pivot(DOUBT * FARTHER * pivot, FLOOR_MPS2)
         H = information(doubt, minimum.theta, prior)
     covariance = replace(minimum, H=H).covariance()[ACCELEROMETER, ACCELEROMETER]
-    sigma = likeliest(prepared.white, near(sigma), minimum.theta)
+    sigma = likeliest(prepared.white, SOME_MPS2, minimum.theta, max(sigma, SOME_MPS2[0]))
     return InterimEstimate(minimum.theta, H, covariance, problem, sigma, minimum.converged)
 
 

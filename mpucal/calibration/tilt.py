@@ -16,9 +16,8 @@ from .fit import Fit
 from .flat_segment import Flat
 from .gyro_matrix import KNOWN, at_prior
 from .hand import ROUGHLY
-from .hand_noise import WHITE_MPS2
+from .hand_noise import HAND_MPS2, WHITE_MPS2, likeliest
 from .levenberg_marquardt import Minimum, minimise
-from .likelihood import value
 from .parameters import B_A_NAMES, D_NAMES, NAMES
 from .preprocessing import CORRELATION_S, Preprocessed, preprocess
 from .prior import Prior, prior_of
@@ -43,7 +42,7 @@ def fit_tilt(recording: Recording, flat: Flat, gravity: float) -> Fit:
     theta = Theta.start(np.eye(3), np.zeros(3), prepared.flat.b_omega, u)
     minimum = minimise(_white(prepared, 0.0), theta, len(NAMES), prior, frozen=True)
     for _ in range(ROUNDS):
-        sigma = min(WHITE_MPS2, key=lambda s: value(prepared.white(s), minimum.theta))
+        sigma = likeliest(prepared.white, WHITE_MPS2, minimum.theta, HAND_MPS2[0])
         minimum = minimise(_white(prepared, sigma), minimum.theta, len(NAMES), prior, until=ROUGHLY, frozen=True)
     return _as_fit(minimum)
 
