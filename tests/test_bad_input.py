@@ -87,6 +87,8 @@ def test_a_bus_that_fails_says_why_and_leaves_nothing(mpucal, tmp_path, monkeypa
         (["session", "--bus", "sim", "--address", "0x68"], "--address was given beside --bus sim, which has none"),
         (["session", "--bus", "sim", "--rate", "3"], "take 3.90625 Hz"),
         (["record", "--bus", "sim", "--seconds", "0"], "--seconds"),
+        (["stream", "--bus", "sim", "--seconds", "nan"], "'nan' is no finite number"),
+        (["doctor", "--bus", "sim", "--seconds", "inf"], "'inf' is no finite number"),
         (["record"], "no source was given"),
         (["doctor", "--bus", ""], "no bus is named"),
         (["sesion", "--bus", "sim"], "did you mean session?"),

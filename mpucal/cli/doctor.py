@@ -15,7 +15,7 @@ from ..errors import SourceError
 from ..session.at_rest import put_down
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
-from .options import check_gyroscope, check_source, source_options
+from .options import Finite, check_gyroscope, check_source, source_options
 from .person import say
 
 EXAMPLE = "Example: `mpucal doctor --bus /dev/i2c-1`, or `mpucal doctor --bus sim:chip=clone98,who_am_i=0x68`"
@@ -24,9 +24,7 @@ EXAMPLE = "Example: `mpucal doctor --bus /dev/i2c-1`, or `mpucal doctor --bus si
 @click.command("doctor", epilog=EXAMPLE)
 @source_options("doctor")
 @click.option("--json", "as_json", is_flag=True, help="Print only the findings, as JSON.")
-@click.option(
-    "--seconds", type=click.FloatRange(2.0), default=10.0, show_default=True, help="Time to observe the samples [s]."
-)
+@click.option("--seconds", type=Finite(2.0), default=10.0, show_default=True, help="Time to observe the samples [s].")
 def command(as_json: bool, seconds: float, **options: Any) -> int:
     """Examine what is on a bus, which chip it really is and whether it works as specified; for a bug report.
 

@@ -23,7 +23,7 @@ from ..session.ports import Source
 from ..session.results import make_folder, save
 from ..sources.opening import one_of, open_source
 from ..sources.table import kinds_meant, used_by
-from .options import check_gyroscope, check_source, given, source_options
+from .options import ABOVE_ZERO, check_gyroscope, check_source, given, source_options
 from .recording_options import given_hints, hint_options, say_taken
 
 EXAMPLE = "Example: `mpucal noise walk.npz -o noise`, or `mpucal noise --bus sim --hours 0.02`"
@@ -37,9 +37,7 @@ TELL_S = {True: 2.0, False: 60.0}
 @click.argument("file", metavar="[FILE|DIR]", type=click.Path(path_type=Path), required=False)
 @source_options("noise")
 @hint_options("accel_range", "gyro_range", "rate")
-@click.option(
-    "--hours", type=click.FloatRange(min=0.0, min_open=True), help="Measure for this long; else until Ctrl-C."
-)
+@click.option("--hours", type=ABOVE_ZERO, help="Measure for this long; else until Ctrl-C.")
 @click.option(
     "-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for noise.json and noise.html."
 )

@@ -39,6 +39,20 @@ class Parsed(click.ParamType[Any]):
             self.fail(str(error), param, ctx)
 
 
+class Finite(click.FloatRange):
+    """A number within a range, and no nan, which every range admits."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is no finite number.", param, ctx)
+        return float(number)
+
+
+ABOVE_ZERO = Finite(min=0.0, min_open=True)
+
+
 def local_gravity(text: str) -> float:
     """A local gravity in m/s² as text."""
     try:

@@ -13,7 +13,7 @@ from ..result.clock import stamp
 from ..sources.opening import open_source
 from ..terminal.console import console
 from ..terminal.hangup import outliving
-from .options import check_source, fit_options, given, source_options
+from .options import ABOVE_ZERO, check_source, fit_options, given, source_options
 from .running import running
 
 EXAMPLE = "Example: `mpucal record --bus /dev/i2c-1 -o capture.mcap --seconds 60`"
@@ -23,7 +23,7 @@ EXAMPLE = "Example: `mpucal record --bus /dev/i2c-1 -o capture.mcap --seconds 60
 @source_options("record")
 @fit_options
 @click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="The capture file.")
-@click.option("--seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop after this time [s].")
+@click.option("--seconds", type=ABOVE_ZERO, help="Stop after this time [s].")
 def command(file: Path | None, seconds: float | None, **options: Any) -> None:
     """Record to a capture file until Enter, Ctrl-C or --seconds; `mpucal calibrate` reads it.
 

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import click
 
 from ..files.hints import Hints, parse_columns, parse_units
-from .options import Parsed, given
+from .options import ABOVE_ZERO, Parsed, given
 
 F = TypeVar("F", bound=Callable[..., Any])
 NAMES = {
@@ -19,7 +19,6 @@ NAMES = {
     "gyro_range": "gyro_range_dps",
     "rate": "rate_hz",
 }
-_ABOVE_ZERO = click.FloatRange(min=0.0, min_open=True)
 
 
 def hint_options(*left_out: str) -> Callable[[F], F]:
@@ -40,11 +39,11 @@ def hint_options(*left_out: str) -> Callable[[F], F]:
             type=Parsed(parse_units),
             help="Units of a table or a bag: t=ms,acc=g,gyr=deg/s.",
         ),
-        "accel_range": click.option("--accel-range", metavar="G", type=_ABOVE_ZERO, help="Full scale of counts [g]."),
+        "accel_range": click.option("--accel-range", metavar="G", type=ABOVE_ZERO, help="Full scale of counts [g]."),
         "gyro_range": click.option(
-            "--gyro-range", metavar="DPS", type=_ABOVE_ZERO, help="Full scale of counts [deg/s]."
+            "--gyro-range", metavar="DPS", type=ABOVE_ZERO, help="Full scale of counts [deg/s]."
         ),
-        "rate": click.option("--rate", metavar="HZ", type=_ABOVE_ZERO, help="Rate of samples without times [Hz]."),
+        "rate": click.option("--rate", metavar="HZ", type=ABOVE_ZERO, help="Rate of samples without times [Hz]."),
     }
 
     def decorate(command: F) -> F:

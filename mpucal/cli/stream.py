@@ -28,7 +28,7 @@ from ..sources.opening import open_source
 from ..sources.table import source_title
 from ..terminal.flat import BOARD, VEHICLE
 from .loading import loaded
-from .options import check_gyroscope, check_source, source_options
+from .options import ABOVE_ZERO, check_gyroscope, check_source, source_options
 from .page import page_options
 
 EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.json --seconds 10`"
@@ -40,7 +40,7 @@ RATE_HZ = 200.0
 @source_options("stream")
 @click.option("--apply", "calibration", metavar="CALIBRATION", type=click.Path(path_type=Path), required=True)
 @click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Record a capture as well.")
-@click.option("--seconds", type=click.FloatRange(min=0.0, min_open=True), help="Stop after this time [s].")
+@click.option("--seconds", type=ABOVE_ZERO, help="Stop after this time [s].")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line instead of a table.")
 @click.option("--watch", "watched", is_flag=True, help="Warn where rests contradict CALIBRATION.")
 @page_options
