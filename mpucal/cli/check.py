@@ -15,6 +15,7 @@ from ..data import Recording
 from ..errors import UsageError
 from ..files import load
 from ..page.address import Address
+from ..page.result import Result
 from ..recheck import check
 from ..recheck.outcome import CheckResult
 from ..recheck.update import updated
@@ -102,11 +103,12 @@ def command(
     source = open_source(options, given())
     check_gyroscope(source.plan.config)
     board = board or (VEHICLE if options.get("mavlink") else BOARD)
-    terminal = console(quiet=yes, title=source_title(options), board=board)
+    title = source_title(options)
+    terminal = console(quiet=yes, title=title, board=board)
     attended = not yes and sys.stdin.isatty() and sys.stderr.isatty()
-    with beside(terminal, page, source, options, board, attended=attended) as (person, tell):
+    with beside(terminal, page, source, options, title, board, attended=attended) as (person, tell):
         result, files = told(_measured(source, folder, person))
-        tell(result.verdict, (), result.page(), files)
+        tell(Result(result.verdict, summary=result.page()), files)
         if sinks and folder is not None and result.only_biases:
             _write_back(sinks, folder, options, yes, as_json)
     return result.exit_code

@@ -11,7 +11,6 @@ import click
 from ..page.address import HERE, Address, address
 from ..page.console import Tells, on_page
 from ..sources.opened import Opened
-from ..sources.table import source_title
 from ..terminal.console import Console
 from ..terminal.flat import BOARD, BOARDS
 from .options import Parsed
@@ -42,6 +41,7 @@ def beside(
     page: Address | None,
     source: Opened,
     options: Mapping[str, Any],
+    title: str,
     board: str,
     keys: bool = False,
     as_json: bool = False,
@@ -49,5 +49,5 @@ def beside(
 ) -> AbstractContextManager[tuple[Console, Tells]]:
     """The terminal with a page beside it, see `on_page`; a source whose time runs ahead is shown at its own pace."""
     paced = not source.real_time and UNPACED not in str(options.get("bus"))
-    about = {"title": source_title(options), "board": board}
+    about = {"title": title, "board": board}
     return on_page(terminal, page, about, keys, paced, as_json, attended)

@@ -35,7 +35,7 @@ from .options import aim_options, check_gyroscope, check_source, fit_options, gi
 from .page import beside, page_options
 from .person import ask, ask_in_doubt
 from .running import running
-from .summary import summary, written
+from .summary import on_a_page, summary, written
 
 # as remedies say it
 AGAIN = "start again"
@@ -52,7 +52,7 @@ EXAMPLE = "Example: `mpucal session --bus /dev/i2c-1 -o board7`; without a board
 @click.option(
     "--resume", metavar="DIR", type=click.Path(path_type=Path), help="Continue the interrupted session in DIR."
 )
-@click.option("--name", metavar="BOARD", help="What the board is called, for the report.")
+@click.option("--name", metavar="BOARD", help="What the board is called, for the screen, the page and the report.")
 @click.option("--yes", is_flag=True, help="Ask no questions.")
 @click.option("--json", "as_json", is_flag=True, help="Print only calibration.json.")
 @click.option("--json-events", is_flag=True, help="Print each event as a line of JSON on stderr.")
@@ -85,7 +85,7 @@ def command(
     attended = not yes and sys.stdin.isatty()
     source, kinds, options = _opened(resume, options, sinks, no_write, attended)
     check_gyroscope(source.plan.config)
-    title = source_title(options)
+    title = f"{name}, {source_title(options)}" if name else source_title(options)
     into = SessionFolder(resume or folder, source.capture_name, again=resume is not None)
     board = board or (VEHICLE if into.capture.name == CAPTURE_OF_VEHICLE.name else BOARD)
     terminal = console(quiet=yes, as_json=json_events, beep=beep, title=title, board=board)
@@ -93,13 +93,13 @@ def command(
     hung_up = partial(terminal.hung_up, stop=page is None and not keep_going)
     with (
         outliving(lambda: into.path / LOG.name, hung_up),
-        beside(terminal, page, source, options, board, page_keys, json_events, seen) as (person, tell),
+        beside(terminal, page, source, options, title, board, page_keys, json_events, seen) as (person, tell),
     ):
         # a program that reads the events finds it in calibration.json
         announcement = "" if json_events else announced(kinds, no_write)
         recording, calibration, paths = _run(source, into, person, announcement, name)
         files = [into.capture, *paths]
-        tell(calibration.verdict, calibration.quality.get("reasons", ()), summary(calibration), files)
+        tell(on_a_page(calibration), files)
         if not as_json:
             if not json_events:
                 click.echo(err=True)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..data import STANDARD_GRAVITY_MPS2
+from ..page.result import Result
 from ..report.units import AXES, accelerometer, estimated_error
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.document import ACCELEROMETER_FORMULA
@@ -29,6 +30,17 @@ def summary(calibration: Calibration) -> str:
         reasons = calibration.quality.get("reasons", [])
         lines = [SENTENCES[calibration.verdict], *(_reason(reason["message"]) for reason in reasons), ""]
     return "\n".join([*lines, *_parameters(calibration), *_accuracy(calibration), *_fit(calibration)])
+
+
+def on_a_page(calibration: Calibration) -> Result:
+    """The same for a page, which has columns and lines of its own."""
+    return Result(
+        calibration.verdict,
+        estimated_error(calibration),
+        calibration.quality.get("reasons", ()),
+        [(f"{row.name}, {row.unit}", row.cells) for row in accelerometer(calibration)],
+        "\n".join(_fit(calibration)).strip(),
+    )
 
 
 def written(paths: Sequence[Path]) -> str:

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -16,16 +17,15 @@ from ..terminal.console import Console
 from ..terminal.keys import Keys
 from .address import Address, qr_code
 from .feed import Feed
+from .result import Result
 
 ASK_EVERY_S = 0.1
 
 
 class Tells(Protocol):
-    """Tells the page the result: the verdict, the reasons for it, a summary in words, and the files."""
+    """Tells the page the result, and which files hold it."""
 
-    def __call__(  # noqa: D102
-        self, verdict: str, reasons: Sequence[Mapping[str, object]], summary: str, paths: Sequence[Path]
-    ) -> None: ...
+    def __call__(self, result: Result, paths: Sequence[Path]) -> None: ...  # noqa: D102
 
 
 class Beside:
@@ -94,12 +94,12 @@ def on_page(
     OutputError : the page cannot be served there.
     """
     if where is None:
-        yield console, lambda verdict, reasons, summary, paths: None
+        yield console, lambda result, paths: None
         return
     feed = Feed(where, about, keys)
 
-    def tell(verdict: str, reasons: Sequence[Mapping[str, object]], summary: str, paths: Sequence[Path]) -> None:
-        feed.show(verdict=verdict, reasons=[dict(reason) for reason in reasons], summary=summary)
+    def tell(result: Result, paths: Sequence[Path]) -> None:
+        feed.show(**asdict(result))
         feed.offer(paths)
 
     try:

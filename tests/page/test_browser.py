@@ -110,7 +110,12 @@ def test_two_browsers_follow_a_session_to_its_results(chromium, tab, session):
     shown = tab.evaluate("shown")
     prompts = {event["text"] for event in events if event["event"] == "prompt"}
     turns = {event["turn"].rpartition(", ")[2].capitalize() for event in events if event["event"] == "meter"}
-    assert {one["prompt"] for one in shown} - {""} <= prompts
+    found = tab.inner_text("#prompt")
+    assert found.startswith("Estimated error at rest: ")
+    assert {one["prompt"] for one in shown} - {"", found} <= prompts
+    # the values of x, y and z, all within the width of a phone
+    assert tab.locator("#values td:not(:empty)").count() == 12
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
     assert {one["headline"] for one in shown} & turns
     # the results outlive the session
     with other.expect_download() as download:

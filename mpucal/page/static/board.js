@@ -144,6 +144,12 @@ export class Picture {
     return [k * dot(this.eye.across, point), -k * dot(this.eye.up, point)];
   }
 
+  // where a letter of that size is seen whole
+  inside(at, size) {
+    const { width, height } = this.canvas, most = [width / 2 - 0.75 * size, height / 2 - 0.6 * size];
+    return at.map((v, i) => Math.max(-most[i], Math.min(most[i], v)));
+  }
+
   path(points, close = true) {
     this.pen.beginPath();
     points.forEach((point, k) => (k ? this.pen.lineTo(...point) : this.pen.moveTo(...point)));
@@ -285,7 +291,7 @@ function axis(picture, [name, direction, ink], at, model, sign) {
   stroke(picture, [from, [x, y]], colour, 0.045);
   head(picture, from, [x, y], colour, 0.11);
   const beyond = (0.11 * picture.scale + 0.8 * size) / Math.max(Math.hypot(u, v), 1);
-  picture.text(`${sign > 0 ? "+" : "−"}${name}`, [x + u * beyond, y + v * beyond], colour, size, picture.ink("--paper"));
+  picture.text(`${sign > 0 ? "+" : "−"}${name}`, picture.inside([x + u * beyond, y + v * beyond], size), colour, size, picture.ink("--paper"));
 }
 
 function stroke(picture, points, colour, width) {

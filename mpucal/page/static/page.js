@@ -103,7 +103,7 @@ function task() {
   const { look, share, number } = done ? { look: FINE.includes(done) ? "yes" : "no", share: 1 } : dial();
   document.body.dataset.look = look;
   put("headline", VERDICTS[done] ?? (done ? "Stopped" : state.headline ?? "Connecting"));
-  put("prompt", done ? state.stopped ?? "" : promptWords());
+  put("prompt", done ? state.stopped ?? state.said ?? "" : promptWords());
   put("step", done ? "" : state.confirming || (state.progress?.text ?? ""));
   put("number", number ?? "");
   $("arc").setAttribute("stroke-dasharray", `${Math.max(0, Math.min(100, 100 * share))} 100`);
@@ -262,6 +262,13 @@ function result() {
   $("reasons").replaceChildren(...(state.reasons ?? []).map(({ message, remedy }) => element("li", `${message}. ${remedy}.`)));
   put("summary", state.summary ?? "");
   $("summary").parentElement.hidden = !state.summary;
+  $("values").hidden = !state.values?.length;
+  $("values").tBodies[0].replaceChildren(...(state.values ?? []).map(([name, cells]) => {
+    const row = element("tr"), head = element("th", name);
+    head.scope = "row";
+    row.append(head, ...cells.map((cell) => element("td", cell.replace("± ", "±\u00a0"))));
+    return row;
+  }));
   if (state.results && !$("results").childElementCount) $("results").append(...reportFirst(state.results).flatMap(file));
 }
 
