@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 # `python -m pytest` looks for modules in the folder that it runs in first, and the sources there have no kernel
 if str(Path(__file__).parents[1]) in sys.path:
@@ -28,6 +29,10 @@ from mpucal.files.rows import Rows
 # a shell in the background, or nohup, has these ignored, and what a test starts inherits that
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+# how long a busy machine takes says nothing about what is tested
+settings.register_profile("patient", deadline=None)
+settings.load_profile("patient")
 
 # Files that take longest go first: a process that takes one last would work alone.
 SLOW = (

@@ -97,12 +97,12 @@ class Decoder:
             self._evidence.saw(register, data, self._held)
         elif register == reg.FIFO_COUNT_H:
             self._fifo.counted(t_ns, int.from_bytes(data, "big"))
-            self._heard("look", t_ns, host_ns)
         elif register == reg.FIFO_R_W:
             self._fifo.data(data)
         elif register in (reg.INT_STATUS, reg.INT_ENABLE) and register + len(data) > reg.INT_STATUS:
             lost = register == reg.INT_ENABLE and not data[0] & reg.INT_FIFO_OFLOW
-            self._heard("status", t_ns, host_ns)
+            if host_ns is not None:
+                self._fifo.heard(t_ns, host_ns)
             if self._fifo.polled:
                 self._fifo.counted(t_ns, reg.FRAME_BYTES)
                 self._fifo.data(data[reg.ACCEL_XOUT_H - register :])
@@ -187,20 +187,15 @@ class Decoder:
         frames = accesses.frames[accesses.first[reads[0]] : accesses.behind[reads[-1]]]
         lengths = accesses.behind[reads] - accesses.first[reads]
         polls = self._fifo.plain_polls(accesses.t_ns[looks], frames, lengths)
-        for kind, each in (("look", looks[:polls]), ("status", checks[:polls])):
-            heard = each[accesses.heard[each]]
-            if len(heard):
-                self._fifo.heard_many(kind, accesses.t_ns[heard], accesses.host_ns[heard])
+        heard = checks[:polls][accesses.heard[checks[:polls]]]
+        if len(heard):
+            self._fifo.heard_many(accesses.t_ns[heard], accesses.host_ns[heard])
         if polls:
             self.fault = None
         return POLL * polls
 
     def _hold(self, register: int, data: bytes) -> None:
         self._held.update(enumerate(data, register))
-
-    def _heard(self, kind: str, t_ns: int, host_ns: int | None) -> None:
-        if self._fifo is not None and host_ns is not None:
-            self._fifo.heard(kind, t_ns, host_ns)
 
     def _fifo_was_reset(self) -> None:
         settings = Settings.from_registers(self._held, self.part, self._name)

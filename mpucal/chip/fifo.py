@@ -109,13 +109,13 @@ class FifoDecoder:
         """The temperature register shows `count`: what an aligned frame will show too."""
         self._temperature = count
 
-    def heard(self, kind: str, t_ns: int, host_ns: int) -> None:
-        """What was done at `t_ns` was heard of at `host_ns`, see Reply; by a message of a `kind` that are all alike."""
-        self._host.saw(kind, t_ns, host_ns)
+    def heard(self, t_ns: int, host_ns: int) -> None:
+        """What was done at `t_ns` was heard of at `host_ns`, see Reply; by a reply that is like all others told of."""
+        self._host.saw(t_ns, host_ns)
 
-    def heard_many(self, kind: str, t_ns: Whole, host_ns: Whole) -> None:
-        """The same of (n,) messages."""
-        self._host.saw_many(kind, t_ns, host_ns)
+    def heard_many(self, t_ns: Whole, host_ns: Whole) -> None:
+        """The same of (n,) replies."""
+        self._host.saw_many(t_ns, host_ns)
 
     def counted(self, t_ns: int, count_bytes: int) -> None:
         """The FIFO held `count_bytes` at `t_ns`."""

@@ -1,22 +1,25 @@
 """The rate of a bus's clock against the host's, from the times at which the host heard what happened when.
 
-A message is under way for some time, never for less than the line needs: host_i = t_i + a_k + delay_i, delay_i > 0,
-with one a_k for each kind k of message, which are of different lengths. So a line lies under the pairs of a kind,
-whatever an adapter holds back. Each of a few groups of consecutive pairs gives the one that was least delayed. With
-priors of the rate's error and of its drift, the parabolas
+A reply is under way for some time, never for less than the line needs: host_i = t_i + a + delay_i, delay_i > 0. So a
+line lies under the pairs, whatever an adapter holds back. Each of a few groups of consecutive pairs gives the one that
+was least delayed. With priors of the rate's error and of its drift, the parabola
 
     host(t) - t = a_k + b (t - t_m) + c (t - t_m)^2
 
-go through those, b the rate error in the middle of the recording. A group's least delay varies as the distance of its
-two least delays does (Renyi's spacings), or as the residuals do where these are larger: in step with an adapter's
-bursts, replies that are asked for and frames that come by themselves are each late in another way.
+goes through those, b the rate error in the middle of the recording, with an a_k for each run k of pairs: one ends
+where a clock began anew, and where the bus was silent, since a bridge may have been reset then. A group's least delay
+varies as the distance of its two least delays does (Renyi's spacings), or as the residuals do where these are larger.
+
+Of use are replies alone, and of those what is asked for at times that are in step with nothing: what comes by itself
+does so at the chip's rate, and goes through an adapter's bursts later and later, as if the bridge's clock were off.
 """
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +38,8 @@ STEADY_S = 20e-6
 # One of the clocks began anew where host - bus moves by more, beside what the rate may be off.
 LEAP_S = 0.5
 HELD_BACK_S = 0.05
+# what is silence, and in usual distances of pairs; a bridge that was lost is given up after 0.25 s
+SILENT_S, SILENT = 0.2, 4.0
 # pairs that a stream of days keeps, and by how much their number grows until the rate is estimated again
 KEPT, GROWTH = 20_000, 1.1
 
@@ -75,38 +80,34 @@ class HostClock:
     """Gathers pairs; without any, the bus's clock is taken to be the host's."""
 
     def __init__(self) -> None:
-        self._pairs: dict[str, tuple[array[int], array[int]]] = {}
-        self._number, self._next = 0, GROUPS * LEAST_IN_GROUP
+        self._times, self._heard = array("q"), array("q")
+        self._next = GROUPS * LEAST_IN_GROUP
         self._since_s, self._shown_s, self._slope = 0.0, 0.0, 0.0
 
     def __bool__(self) -> bool:
-        return bool(self._pairs)
+        return bool(self._times)
 
-    def saw(self, kind: str, t_ns: int, host_ns: int) -> None:
-        """A message of a `kind`, about what happened at `t_ns` of the bus's clock, came in at `host_ns`."""
-        times, heard = self._pairs.setdefault(kind, (array("q"), array("q")))
-        if times and t_ns <= times[-1]:
+    def saw(self, t_ns: int, host_ns: int) -> None:
+        """A reply about what happened at `t_ns` of the bus's clock came in at `host_ns`."""
+        if self._times and t_ns <= self._times[-1]:
             return
-        times.append(t_ns)
-        heard.append(host_ns)
-        self._number += 1
-        if self._number >= self._next:
-            self._estimate(t_ns)
+        self._times.append(t_ns)
+        self._heard.append(host_ns)
+        self._estimate_if_due()
 
-    def saw_many(self, kind: str, t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> None:
-        """The same of (n,) messages, of which one estimate is made at most."""
-        times, heard = self._pairs.setdefault(kind, (array("q"), array("q")))
-        latest = np.concatenate(([times[-1] if times else t_ns[0] - 1], t_ns))
+    def saw_many(self, t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> None:
+        """The same of (n,) replies, of which one estimate is made at most."""
+        latest = np.concatenate(([self._times[-1] if self._times else t_ns[0] - 1], t_ns))
         later = t_ns > np.maximum.accumulate(latest)[:-1]
-        times.extend(t_ns[later].tolist())
-        heard.extend(host_ns[later].tolist())
-        self._number += int(later.sum())
-        if self._number >= self._next:
-            self._estimate(times[-1])
+        self._times.extend(t_ns[later].tolist())
+        self._heard.extend(host_ns[later].tolist())
+        self._estimate_if_due()
 
-    def _estimate(self, t_ns: int) -> None:
-        self._next = int(GROWTH * self._number) + 1
-        at_s = t_ns * NS
+    def _estimate_if_due(self) -> None:
+        if len(self._times) < self._next:
+            return
+        self._next = int(GROWTH * len(self._times)) + 1
+        at_s = self._times[-1] * NS
         self._shown_s = float(self.provisional_s(at_s))
         self._since_s, self._slope = at_s, float(self.fit().slope(at_s))
 
@@ -116,34 +117,29 @@ class HostClock:
 
     def forget(self) -> None:
         """Let go of what is too old to tell the rate now."""
-        if self._number > KEPT:
-            for times, heard in self._pairs.values():
-                del times[: len(times) // 2], heard[: len(heard) // 2]
-            self._number = sum(len(times) for times, _ in self._pairs.values())
-            self._next = int(GROWTH * self._number) + 1
+        if len(self._times) > KEPT:
+            del self._times[: KEPT // 2], self._heard[: KEPT // 2]
+            self._next = int(GROWTH * len(self._times)) + 1
 
     def fit(self) -> ClockFit:
         """The parabola under all pairs; there is one at least."""
-        return fitted({kind: (np.array(t), np.array(host)) for kind, (t, host) in self._pairs.items()})
+        return fitted(np.array(self._times), np.array(self._heard))
 
     def final(self) -> Callable[[Vector], Vector]:
         """Times (n,) [s] of the bus's clock to times at the host's rate, by all pairs."""
         return self.fit().host_s if self else lambda t_s: t_s
 
 
-Pairs = tuple[NDArray[np.int64], NDArray[np.int64]]
-
-
-def fitted(pairs: Mapping[str, Pairs]) -> ClockFit:
-    """The parabolas under (n,) times [ns] of the bus and the host, by kind; of their longest run without a leap."""
-    kinds = [_longest(*each) for each in pairs.values()]
-    kinds.sort(key=lambda each: -len(each[0]))
-    t, host = kinds[0]
-    first_s, last_s = int(t[0]) * NS, int(t[-1]) * NS
-    mid_ns, ahead_ns = (int(t[0]) + int(t[-1])) // 2, int(host[0] - t[0])
+def fitted(t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> ClockFit:
+    """The parabola under (n,) times of the bus and the host."""
+    first_s, last_s = int(t_ns[0]) * NS, int(t_ns[-1]) * NS
+    mid_ns = (int(t_ns[0]) + int(t_ns[-1])) // 2
     unknown = ClockFit(0.0, 0.0, RATE_STD, first_s, mid_ns * NS, last_s)
-    grouped = [_grouped(np.asarray((t - mid_ns) * NS), np.asarray((host - t - ahead_ns) * NS)) for t, host in kinds]
-    groups = [each for each in grouped if each is not None]
+    ahead_ns = host_ns - t_ns
+    groups = [
+        (_grouped((t_ns[run] - mid_ns) * NS), _grouped((ahead_ns[run] - ahead_ns[run][0]) * NS))
+        for run in _runs(t_ns, ahead_ns)
+    ]
     if not groups or any(_crude_slope(t, ahead) > MOST for t, ahead in groups):
         return unknown
     x, H = np.zeros(2), np.eye(2)
@@ -152,21 +148,20 @@ def fitted(pairs: Mapping[str, Pairs]) -> ClockFit:
     return ClockFit(float(x[0]), float(x[1]), float(np.sqrt(np.linalg.inv(H)[0, 0])), first_s, mid_ns * NS, last_s)
 
 
-def _longest(t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> Pairs:
-    ahead, passed = np.diff(host_ns - t_ns) * NS, np.diff(t_ns) * NS
-    cuts = np.flatnonzero(np.abs(ahead) > LEAP_S + 2.0 * RATE_STD * passed) + 1
-    edges = np.concatenate(([0], cuts, [len(t_ns)]))
-    longest = int(np.argmax(np.diff(edges)))
-    part = slice(edges[longest], edges[longest + 1])
-    return t_ns[part], host_ns[part]
+def _runs(t_ns: NDArray[np.int64], ahead_ns: NDArray[np.int64]) -> Iterator[slice]:
+    """Those that are long enough, between silences and leaps of one of the clocks."""
+    passed, moved = np.diff(t_ns) * NS, np.abs(np.diff(ahead_ns)) * NS
+    silent_s = max(SILENT_S, SILENT * float(np.median(passed))) if len(passed) else SILENT_S
+    cuts = np.flatnonzero((passed > silent_s) | (moved > LEAP_S + 2.0 * RATE_STD * passed)) + 1
+    for first, last in pairwise((0, *cuts.tolist(), len(t_ns))):
+        if last - first >= GROUPS * LEAST_IN_GROUP:
+            yield slice(first, last)
 
 
-def _grouped(t: Vector, ahead: Vector) -> tuple[Vector, Vector] | None:
-    """Both as (GROUPS, n), the first few left out; None of too few."""
-    n = len(t) // GROUPS
-    if n < LEAST_IN_GROUP:
-        return None
-    return t[-n * GROUPS :].reshape(GROUPS, n), ahead[-n * GROUPS :].reshape(GROUPS, n)
+def _grouped(each: NDArray[np.floating]) -> Vector:
+    """(n,) as (GROUPS, n / GROUPS), the first few left out."""
+    n = len(each) // GROUPS
+    return np.asarray(each[-n * GROUPS :].reshape(GROUPS, n), np.float64)
 
 
 def _crude_slope(t: Vector, ahead: Vector) -> float:
@@ -185,7 +180,7 @@ def _least(t: Vector, ahead: Vector, x: Vector) -> tuple[Vector, Vector, float]:
 
 
 def _parabola(least: list[tuple[Vector, Vector, float]], x: Vector) -> tuple[Vector, Vector]:
-    """(b, c) and their information (2, 2); each kind's offset is eliminated by its means."""
+    """(b, c) and their information (2, 2); each run's offset is eliminated by its means."""
     H: Vector = np.diag([RATE_STD**-2, (0.5 * DRIFT_STD_PER_S) ** -2])
     g = np.zeros(2)
     for at, seen, spacing in least:

@@ -7,11 +7,12 @@ read ahead of a FIFO that was started without a reset: whoever lets it fill sees
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 
 from ...chip import registers as reg
 from ...chip.access import Reply
+from ...chip.clock import look_phase
 from ...errors import BusError, NoAnswer
 from .fifo_watch import CONTROLS, FifoWatch
 from .link import MS, Answer, Link, LinkLost
@@ -39,6 +40,9 @@ BATCH = 4
 GONE_NS = 500 * MS
 # A cable is plugged in again, and a boot loader waits for two seconds.
 RECOVER_NS = 10_000 * MS
+# An FTDI adapter hands over what came every 16 ms. What is asked in step with that is answered as late each time, or
+# later and later, as if the bridge's clock were off by 100 ppm.
+HELD_NS = 16 * MS
 
 
 class BridgeBus:
@@ -59,6 +63,7 @@ class BridgeBus:
         self._watch = FifoWatch()
         self._ahead: ReadAhead | None = None
         self._lost = False
+        self._asked = 0
         self._dead: BusError | None = None
         try:
             self._address = self.link.greet(address or 0).address
@@ -81,9 +86,12 @@ class BridgeBus:
             return Reply(held.to_bytes(2, "big"), t_ns, host_ns)
         if ahead is not None and register == reg.FIFO_R_W:
             return Reply(*ahead.pop(count))
-        reply = self._read_now(register, count)
         at = reg.INT_STATUS - register
-        return self._judged(reply, at) if register != reg.FIFO_R_W and 0 <= at < count else reply
+        if register == reg.FIFO_R_W or not 0 <= at < count:
+            return self._read_now(register, count)
+        if at == count - 1:
+            self._step_out_of_line()
+        return self._judged(self._read_now(register, count), at)
 
     def write(self, register: int, data: bytes) -> int:
         """Write `data` from `register` on, and return the time."""
@@ -102,16 +110,7 @@ class BridgeBus:
 
     def sleep_until(self, t_ns: int) -> None:
         """Wait until the bridge's clock shows `t_ns`, as far as is known, and take what it pushes."""
-        while True:
-            host_ns = self._port.now_ns()
-            left_ns = t_ns - self.link.clock.now(host_ns)
-            if left_ns <= 0:
-                return
-            try:
-                self.link.wait(host_ns + left_ns)
-            except BusError:
-                # the next access says so
-                return
+        self._wait(lambda host_ns: t_ns - self.link.clock.now(host_ns))
 
     def close(self) -> None:
         """Stop what the bridge pushes, if it still listens, and let go of the port."""
@@ -120,11 +119,28 @@ class BridgeBus:
                 self.link.ask(Stream(0, 0))
         self.link.close()
 
+    def _wait(self, left_ns: Callable[[int], int]) -> None:
+        """Take what is pushed until nothing is left of the time that `left_ns` gives for the host's."""
+        while (left := left_ns(host_ns := self._port.now_ns())) > 0:
+            try:
+                self.link.wait(host_ns + left)
+            except BusError:
+                # the next access says so
+                return
+
+    def _step_out_of_line(self) -> None:
+        """Wait for another part of HELD_NS each time, so that some reply is hardly held back."""
+        self._asked += 1
+        until_ns = self._port.now_ns() + round((look_phase(self._asked) + 0.5) * HELD_NS)
+        self._wait(lambda host_ns: until_ns - host_ns)
+
     def _read_now(self, register: int, count: int) -> Reply:
         if count > MAX_BURST:
             raise BusError(f"a bridge reads at most {MAX_BURST} bytes at once, not {count}", "read less at once")
         answers = [answer for several in self._ask(*_reads(register, count)) for answer in several]
-        return Reply(b"".join(_data(answers)), self._seen_from(answers[0].t_ns), answers[0].host_ns)
+        begun_ns, host_ns = answers[0].t_ns, answers[0].host_ns
+        seen_ns = self._seen_from(begun_ns)
+        return Reply(b"".join(_data(answers)), seen_ns, host_ns - (begun_ns - seen_ns))
 
     def _judged(self, reply: Reply, at: int) -> Reply:
         """What was read, with INT_STATUS at `at`: it tells what was lost on the way to the host, too."""

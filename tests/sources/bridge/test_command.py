@@ -22,11 +22,11 @@ BLOB = Path(__file__).parents[3] / "fixtures" / "vectors" / "blob_measured.bin"
 
 @pytest.fixture
 def board(serve):
-    """A bridge on a socket; its memory outlives it."""
+    """A bridge on a socket; its memory outlives it. Its time is never taken for a clock that is a little off."""
     made = SimpleNamespace(memory=Memory(), clock=FastClock())
     made.chip = open_simulated("sim:seed=5", clock=made.clock)
     bridge = EmulatedBridge(made.chip, made.clock.now, made.memory)
-    made.server = serve(bridge, made.clock, "socket")
+    made.server = serve(bridge, made.clock, "socket", 5_000_000)
     made.name = made.server.name
     return made
 
