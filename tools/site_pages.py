@@ -11,6 +11,8 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).parents[1]
 # read by people who never see the site, and so at the top of the source tree
 OUTSIDE = ("firmware_protocol.md", "CONTRIBUTING.md")
+# what the theme would fetch so that the search works in pages that are read from a folder, and what does that here
+SHIM, WORKER = "https://unpkg.com/iframe-worker/shim", "javascripts/worker.js"
 LINK = re.compile(r"\[([^\]]+)\]\(([^)#:]+)(#[^)]*)?\)")
 
 
@@ -40,3 +42,13 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         return text if path.exists() else link[0]
 
     return LINK.sub(replaced, markdown)
+
+
+def on_post_page(output: str, page: Any, config: Any) -> str:
+    """Nothing that is fetched from elsewhere."""
+    return output.replace(SHIM, "../" * page.url.count("/") + WORKER)
+
+
+def on_post_template(output_content: str, template_name: str, config: Any) -> str:
+    """So in the page of what is not found."""
+    return output_content.replace(SHIM, WORKER)
