@@ -237,7 +237,8 @@ KINDS: Mapping[str, Kind] = {
         of_the_sensor=True,
     ),
     "clock_off": Kind(
-        "The clock that the samples' times come from, a bridge's, is off against the host's, or its rate is not known.",
+        "The clock that the samples' times come from, a bridge's, is off against the host's, or its rate is not known;"
+        " or accelerometer and gyroscope were not measured at the same times.",
         {
             "corrected": Sentence(
                 "the bridge's clock runs {ppm:+.0f} ppm against this computer's (1 sigma {std:.0f}), and all times were"
@@ -256,6 +257,13 @@ KINDS: Mapping[str, Kind] = {
                 " the gyroscope's scale factors to be exact: D and b_a may have larger errors than their uncertainties"
                 " say",
                 "use --model hand, which estimates them",
+                False,
+            ),
+            "apart": Sentence(
+                "the accelerometer {how} the gyroscope by {lag:.0f} ms, more than filters leave: they have not the same"
+                " times",
+                "record each sensor with times of its own; D and b_a are corrected for it, and calibrated samples are"
+                " not",
                 False,
             ),
         },
@@ -279,29 +287,37 @@ KINDS: Mapping[str, Kind] = {
         {
             "times": Sentence(
                 "the samples are {step:.4g} s apart, too far to follow a turn: their times seem to be in {unit}seconds",
-                "convert them to seconds",
+                "convert them to seconds, or say --units t=UNIT",
                 True,
             ),
             "accelerometer": Sentence(
                 "the accelerometer's median magnitude is {magnitude:.4g}, not near {gravity:.4g} m/s^2: it seems to be"
                 " in {unit}",
-                "convert it to m/s^2",
+                "convert it to m/s^2, or say --units acc=UNIT",
                 True,
             ),
             "scale_factors": Sentence(
                 "all three scale factors are near {factor:.3g}, and no accelerometer has such an error: it seems to be"
                 " in another unit than m/s^2",
-                "convert it to m/s^2",
+                "convert it to m/s^2, or say --units acc=UNIT",
                 True,
+            ),
+            "alike": Sentence(
+                "all three scale factors are near {factor:.3g}, and data sheets allow 3 %: range, unit or gravity seem"
+                " not to be those assumed",
+                "check them; D holds for samples in the same unit and range",
+                False,
             ),
             "gyroscope": Sentence(
                 "the gyroscope reads up to {rate:.4g}, which as rad/s is {degrees:.0f} deg/s and does not fit how"
                 " gravity turned: it seems to be in {unit}",
-                "convert it to rad/s",
+                "convert it to rad/s, or say --units gyr=UNIT",
                 True,
             ),
         },
         "mpucal.calibrate(replace(r, acc=r.acc / 9.80665))",
+        "it is far off; where all scale factors are off alike by 10 % and more they are estimated, and the calibration"
+        " is usable",
     ),
     "moved_while_still": Kind(
         "The board moved in the segment in which it was said to lie flat.",

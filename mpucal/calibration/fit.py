@@ -28,6 +28,7 @@ class Fit:
     V : the cost function (8) at the estimate.
     parts : what each part of the recording says against the estimate; None where that is not known.
     at_prior : names of those parameters of which the data say little: they are what was known beforehand.
+    delay_s : by which the accelerometer lags behind the gyroscope; 0 where a model does not estimate it.
     """
 
     D: Vector
@@ -42,6 +43,7 @@ class Fit:
     V: float
     at_prior: tuple[str, ...] = ()
     parts: Parts | None = None
+    delay_s: float = 0.0
 
     def std(self, *names: str) -> Vector:
         """Standard deviations of the named parameters, NaN for those that were not estimated."""

@@ -79,6 +79,7 @@ class Minimum:
             V=self.V,
             at_prior=at_prior,
             parts=parts,
+            delay_s=theta.tau,
         )
 
 

@@ -324,8 +324,16 @@ def test_a_factor_that_is_no_range_is_named(ideal, factor, said):
     refused_for("units_suspect", replace(recording, acc=recording.acc * factor), said, "convert it")
 
 
+@pytest.mark.parametrize("factor", [1.3, 0.75, 1.5])
+def test_gains_that_are_off_alike_are_said(ideal, factor):
+    recording = ideal(0).recording
+    result = judged(replace(recording, acc=recording.acc * factor))
+    assert (result.verdict, list(result.reasons)) == ("usable", ["units_suspect"])
+    assert "data sheets allow 3 %" in result.reasons["units_suspect"]
+
+
 @pytest.mark.parametrize(
-    "gains", [(0.5, 1.0, 1.5), (0.5, 0.5, 0.6), (1.5, 1.5, 1.5), (0.54, 0.54, 0.54), (1.05, 0.95, 1.0)], ids=str
+    "gains", [(0.5, 1.0, 1.5), (0.5, 0.5, 0.6), (1.4, 1.5, 1.6), (1.05, 1.05, 1.05), (1.05, 0.95, 1.0)], ids=str
 )
 def test_gains_that_are_no_power_of_two_are_legitimate(ideal, gains):
     assert judged(ideal(0, D=np.diag(gains), rate_hz=100).recording) == Judged("good", {})

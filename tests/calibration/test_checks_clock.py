@@ -36,3 +36,17 @@ def test_what_is_not_known_of_the_clock_is_not_known_of_k(ideal):
     np.testing.assert_array_equal(found.K, plain.K)
     expected = np.sqrt(np.diag(plain.K_std) ** 2 + (0.01 * np.diag(plain.K)) ** 2)
     np.testing.assert_allclose(np.diag(found.K_std), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("lag_s", "words"), [(0.03, "lags behind"), (-0.03, "runs ahead of"), (0.005, None)])
+def test_an_accelerometer_that_lags_behind_the_gyroscope_is_said(in_hand, lag_s, words):
+    recording = in_hand.recording
+    acc = np.column_stack([np.interp(recording.t - lag_s, recording.t, axis) for axis in recording.acc.T])
+    plain, found = calibrate(recording), calibrate(replace(recording, acc=acc))
+    assert (found.verdict, len(found.quality["reasons"])) == (("good", 0) if words is None else ("usable", 1))
+    for reason in found.quality["reasons"]:
+        assert reason["code"] == "clock_off"
+        assert f"{words} the gyroscope by " in reason["message"]
+        said_ms = float(reason["message"].split("gyroscope by ")[1].split()[0])
+        assert said_ms == pytest.approx(30, abs=3)
+    assert np.abs(found.D - plain.D).max() < 5e-3, "the delay is estimated"

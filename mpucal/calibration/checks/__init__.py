@@ -5,7 +5,7 @@ recording    moved while still, clipped, lost, warming or vibrating
 bits         low or high bits of an axis that never move
 gravity      a gravity that no place on Earth has
 sensor       wrong range, units, axes or gyroscope, by a trustworthy fit
-clock        a bus whose clock is off, or not known
+clock        a bus whose clock is off, or not known; sensors of which one lags behind the other
 estimate     directions not observable, no convergence, contradictions, a change midway
 """
 
@@ -45,6 +45,7 @@ CHECKS: tuple[Check, ...] = (
     gravity.gravity_unlikely,
     bits.bits_stuck,
     clock.clock_off,
+    clock.apart,
     estimate.not_converged,
     estimate.inconsistent,
     estimate.changed_midway,

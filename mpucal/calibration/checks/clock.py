@@ -1,14 +1,17 @@
-"""The check of the clock that the samples' times come from, where that is not the host's."""
+"""Checks of the samples' times: the clock that they come from, and whether both sensors have the same."""
 
 from __future__ import annotations
 
 from ...reasons import Reason, reason
 from ..evidence import Evidence
+from ..parameters import BY_NAME
 
 # A quartz crystal is within 100 ppm; a scale factor that is off by as much as these is a tenth of what is aimed at.
 OFF_PPM, UNKNOWN = 500.0, 500e-6
 # they estimate no scale factor of the gyroscope
 TRUSTING = ("accel", "paper", "tilt")
+# What filters of chips leave is some ms; those of an autopilot's stream are set by its owner, and leave 20.
+LAG_S, SURE = 0.012, 5.0
 
 
 def clock_off(e: Evidence) -> Reason | None:
@@ -21,3 +24,17 @@ def clock_off(e: Evidence) -> Reason | None:
             return reason("clock_off", "trusted", std=std * 1e6, model=e.model)
         return reason("clock_off", "unknown", std=std * 1e6)
     return reason("clock_off", "corrected", ppm=ppm, std=std * 1e6) if abs(ppm) > OFF_PPM else None
+
+
+def apart(e: Evidence) -> Reason | None:
+    """An accelerometer that lags behind the gyroscope, or runs ahead of it, by more than filters leave."""
+    if e.fit is None or e.claim is None or e.recording.autopilot is not None:
+        return None
+    (of_prior,) = BY_NAME["tau"].sd
+    std = float(e.fit.std("tau")[0]) / e.claim.inflation
+    # what the data alone say: the prior draws the estimate towards 0
+    data = 1.0 - (std / of_prior) ** 2
+    if not data > 0.0 or abs(e.fit.delay_s / data) < max(LAG_S, SURE * std / data**0.5):
+        return None
+    lag = 1e3 * e.fit.delay_s / data
+    return reason("clock_off", "apart", lag=abs(lag), how="lags behind" if lag > 0 else "runs ahead of")
