@@ -6,18 +6,19 @@ on both sides of a transition show by how much.
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..data import Vector
 from ..kernel import _kernel
 from .parameters import NAMES, PLACES
 from .preprocessing import POSE_MPS2, Preprocessed
-from .rotation import cross, turned
+from .problem import Series
+from .rotation import cross, lengths, turned
 from .static_intervals import statistics
-from .theta import Theta
+from .theta import UPPER, Theta
 
 SPEED_OF_TREMOR_S = 0.04  # what a tremor's speed is to its acceleration
 FEWEST_TRANSITIONS = 3
@@ -28,18 +29,18 @@ WORTHLESS = 0.02
 LEAST_LEFT = 1.0
 
 
-class StaticPose(NamedTuple):
-    """A rest as the transitions see it.
+class StaticPoses(NamedTuple):
+    """The k rests as the transitions see them.
 
-    first, last : samples of the recording. coming, leaving : (3,) m/s^2, its mean specific force in the body's axes at
-    the first and at the last sample. variance : rad^2 an axis, of its direction.
+    first, last : (k,) samples of the recording. coming, leaving : (k, 3) m/s^2, the mean specific force of each in the
+    body's axes at its first and at its last sample. variance : (k,) rad^2 an axis, of its direction.
     """
 
-    first: int
-    last: int
+    first: NDArray[np.intp]
+    last: NDArray[np.intp]
     coming: Vector
     leaving: Vector
-    variance: float
+    variance: Vector
 
 
 class Transition(NamedTuple):
@@ -64,18 +65,19 @@ def transitions_of(prepared: Preprocessed, theta: Theta) -> list[Transition]:
     series, flat = prepared.problem.series, prepared.flat
     turns = -series.dt[:, None] * ((series.omega - theta.b_omega) @ theta.K.T)
     rests = _rests(prepared, turns, theta)
-    if len(rests) <= FEWEST_TRANSITIONS:
+    if len(rests.first) <= FEWEST_TRANSITIONS:
         return []
-    transitions = []
-    for one, other in pairwise(rests):
-        span = slice(one.last - flat.last, other.first + 1 - flat.last)
-        F = turned(turns[span])
-        miss = _miss(F @ one.leaving, other.coming)
-        of_gyro = float(np.sum(series.dt[span] ** 2) * flat.Sigma_omega.mean())
-        known = of_gyro + (0.0 if series.q_extra is None else float(series.q_extra[span].sum()))
-        variance = known + one.variance + other.variance
-        transitions.append(Transition(span, F, one.leaving, other.coming, miss, variance, of_gyro))
-    return transitions
+    spans = [slice(*span) for span in zip(rests.last[:-1] - flat.last, rests.first[1:] + 1 - flat.last, strict=True)]
+    F, leaving, coming = np.array([turned(turns[span]) for span in spans]), rests.leaving[:-1], rests.coming[1:]
+    # the sine of the angle between two directions, along their axis
+    carried = np.einsum("kij,kj->ki", F, leaving)
+    miss = np.cross(carried, coming) / (lengths(carried) * lengths(coming))[:, None]
+    of_gyro = flat.Sigma_omega.mean() * np.array([series.dt[span] @ series.dt[span] for span in spans])
+    variance = of_gyro + rests.variance[:-1] + rests.variance[1:]
+    if series.q_extra is not None:
+        variance += [series.q_extra[span].sum() for span in spans]
+    columns = spans, F, leaving, coming, miss, variance.tolist(), of_gyro.tolist()
+    return [Transition(*of) for of in zip(*columns, strict=True)]
 
 
 def miss_variances(transitions: list[Transition], leverage: Vector | float = 0.0) -> Vector:
@@ -114,38 +116,35 @@ def leverages(
 
     J : (3, p) the miss by the parameters, C : `covariance` (p, p) of theta, which the misses of `variance` (k,) gave.
     """
-    inverse = np.asarray(np.linalg.pinv(theta.D))
-    J = np.array([_jacobian(transition, prepared, theta, inverse) for transition in transitions])
+    J = _jacobians(transitions, prepared.problem.series, theta)
     taken = np.sum((J @ covariance) * J, axis=(1, 2))
     return np.asarray(np.clip(taken / variance, 0.0, 2.0))
 
 
-def _jacobian(transition: Transition, prepared: Preprocessed, theta: Theta, inverse: Vector) -> Vector:
-    """(3, p) of the miss u x v by the parameters in the order of NAMES, with u and v near each other."""
-    series = prepared.problem.series
-    steps = series.dt[transition.span, None] * (series.omega[transition.span] - theta.b_omega)
+def _jacobians(transitions: list[Transition], series: Series, theta: Theta) -> Vector:
+    """(k, 3, p) of the misses u x v by the parameters in the order of NAMES, with u and v near each other."""
     # phi, the error of the turn in the axes of its end: a step's is -dt dK (omega - b_omega); b_omega the rests tell
-    phi = np.zeros((3, len(NAMES)))
-    whole, arrived = _kernel.turn(-steps @ theta.K.T, steps)
-    by_K = -arrived - np.swapaxes(arrived, 1, 2) * (1.0 - np.eye(3))
-    i, j = np.triu_indices(3)
-    phi[:, PLACES["K"]] = by_K[:, i, j]
-    # s = inv(D) (y - b_a): ds = -inv(D) (dD s + db_a)
-    u, v = whole @ transition.leaving, transition.coming
-    du, dv = whole @ _by_accelerometer(inverse, transition.leaving), _by_accelerometer(inverse, transition.coming)
-    du -= cross(u) @ phi
-    return np.asarray((cross(u) @ dv - cross(v) @ du) / (np.linalg.norm(u) * np.linalg.norm(v)))
+    steps = [series.dt[of.span, None] * (series.omega[of.span] - theta.b_omega) for of in transitions]
+    arrived = np.array([_kernel.turn(-step @ theta.K.T, step)[1] for step in steps])
+    by_K = -arrived - np.swapaxes(arrived, 2, 3) * (1.0 - np.eye(3))
+    phi = np.zeros((len(transitions), 3, len(NAMES)))
+    phi[:, :, PLACES["K"]] = by_K[:, :, *UPPER]
+    F, leaving, v = (np.array([getattr(of, name) for of in transitions]) for name in ("F", "leaving", "coming"))
+    u, inverse = np.einsum("kij,kj->ki", F, leaving), np.asarray(np.linalg.pinv(theta.D))
+    du = F @ _by_accelerometer(inverse, leaving) - cross(u) @ phi
+    J = cross(u) @ _by_accelerometer(inverse, v) - cross(v) @ du
+    return np.asarray(J / (lengths(u) * lengths(v))[:, None, None])
 
 
 def _by_accelerometer(inverse: Vector, s: Vector) -> Vector:
-    """(3, p) of a measured gravity s by D and b_a."""
-    ds = np.zeros((3, len(NAMES)))
-    ds[:, PLACES["D"]] = -np.einsum("ki,j->kij", inverse, s).reshape(3, 9)
-    ds[:, PLACES["b_a"]] = -inverse
+    """(k, 3, p) of measured gravities s (k, 3) by D and b_a: s = inv(D) (y - b_a), ds = -inv(D) (dD s + db_a)."""
+    ds = np.zeros((len(s), 3, len(NAMES)))
+    ds[:, :, PLACES["D"]] = -np.einsum("ai,kj->kaij", inverse, s).reshape(-1, 3, 9)
+    ds[:, :, PLACES["b_a"]] = -inverse
     return ds
 
 
-def _rests(prepared: Preprocessed, turns: Vector, theta: Theta) -> list[StaticPose]:
+def _rests(prepared: Preprocessed, turns: Vector, theta: Theta) -> StaticPoses:
     """The flat segment and the rests after it; `turns` (n, 3) rad are the steps of the series."""
     recording, flat = prepared.recording, prepared.flat
     inverse = np.linalg.pinv(theta.D)  # a search may pass through a singular D: that is no reason to stop it
@@ -153,22 +152,11 @@ def _rests(prepared: Preprocessed, turns: Vector, theta: Theta) -> list[StaticPo
     mean, spread = statistics(recording.acc, runs)
     s, n = (mean - theta.b_a) @ inverse.T, runs[:, 1] - runs[:, 0]
     # a board in a hand turns a little as it rests: each sample counts in the axes of either end
-    path = np.cumsum(np.vstack([np.zeros((flat.last + 1, 3)), turns]), axis=0)
-    acc = (recording.acc - theta.b_a) @ inverse.T
-    across = np.array([_mean_cross(path[a + 1 : b + 1] - path[a], acc[a:b]) for a, b in runs]).reshape(-1, 3)
-    coming, leaving = (s + np.cross(path[at] - path[runs[:, 0]], s) - across for at in (runs[:, 0] + 1, runs[:, 1]))
+    path = np.zeros((len(recording) + 1, 3))
+    np.cumsum(turns, axis=0, out=path[flat.last + 1 :])
+    across = statistics(np.cross(path[1:], (recording.acc - theta.b_a) @ inverse.T), runs)[0]
+    coming, leaving = (s + np.cross(path[at], s) - across for at in (runs[:, 0] + 1, runs[:, 1]))
     tremor = np.maximum(np.mean(spread - flat.Sigma_a, axis=1), 0.0)
     of_tremor = 2.0 * tremor * (SPEED_OF_TREMOR_S * recording.rate_hz / n) ** 2
     variance = (POSE_MPS2**2 + flat.Sigma_a.mean() / n + of_tremor) / prepared.problem.gravity**2
-    return [StaticPose(*pose) for pose in zip(*runs.T.tolist(), coming, leaving, variance.tolist(), strict=True)]
-
-
-def _mean_cross(a: Vector, b: Vector) -> Vector:
-    """(3,) mean of the cross products of the rows of a and b (n, 3)."""
-    M = a.T @ b / len(a)
-    return np.array([M[1, 2] - M[2, 1], M[2, 0] - M[0, 2], M[0, 1] - M[1, 0]])
-
-
-def _miss(carried: Vector, seen: Vector) -> Vector:
-    """(3,) sine of the angle between two directions, along their axis."""
-    return np.asarray(cross(carried) @ seen / (np.linalg.norm(carried) * np.linalg.norm(seen)))
+    return StaticPoses(runs[:, 0], runs[:, 1], coming, leaving, variance)
