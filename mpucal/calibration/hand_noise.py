@@ -45,7 +45,7 @@ def likeliest(problem_of: Callable[[float], Problem], sigmas: tuple[float, ...],
 
     at = first = sigmas.index(begin)
     least = cost(at)
-    for step in (1, -1):
+    for step in (-1, 1):  # all samples show less of it than means do
         while (there := cost(at + step)) < least:
             at, least = at + step, there
         if at != first:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .parts import Parts
 
 DECREMENT = 1e-3  # g' H^-1 g / 2: 0.04 standard deviations from the optimum, whatever the units
-LAST = 30.0  # so near, a whole step leaves a thousandth of the decrement: nobody need look back
+LAST = 30.0  # so near, a whole step leaves next to nothing of the decrement: nobody need look back
 MOST_ITERATIONS = 60
 # Trials since the decrement last halved: so many bring no end. Who goes down a valley without one (a turn so slow that
 # the gyroscope's noise loses gravity) halves it no more; estimates that end have halved it within 5 of them.
@@ -114,7 +114,7 @@ def minimise(
             converged = True
             break
         step = np.zeros(parameters)
-        if decrement < LAST * until and not frozen:
+        if decrement < LAST * (DECREMENT if frozen else until):
             last[free] = -_solve(H, gradient)
             converged, iterations = True, iterations + 1
             break
