@@ -1,10 +1,11 @@
 """Bridges whose clocks are off: how well their rate, K and D are found, and whether within what is claimed.
 
-python tools/clock_trials.py [SESSIONS]      clocks of -1 to +1 %, 50 ppm a minute of drift, bursts of 1, 4 and 16 ms
+python tools/clock_trials.py [SESSIONS [FIRST_SEED]]     -1 to +1 %, drifts of 50 ppm a minute, bursts of 1 to 16 ms
 """
 
 from __future__ import annotations
 
+import multiprocessing
 import sys
 from typing import Any
 
@@ -39,24 +40,33 @@ def recorded(seed: int, ppm: float, drift_ppm_a_minute: float, burst_ms: int) ->
     return driver.recording(), chip.truth_document()
 
 
-def main(sessions: int) -> None:
+def trial(seed: int) -> tuple[str, dict[str, list[float]]]:
+    """A line about the session, and the errors of rate [ppm], K and D in their standard uncertainties."""
+    rng = np.random.default_rng([seed, 7])
+    ppm, drift, burst_ms = rng.uniform(-1e4, 1e4), float(rng.choice([-50, 0, 50])), int(rng.choice([1, 4, 16]))
+    recording, truth = recorded(seed, ppm, drift, burst_ms)
+    found, sensor = mpucal.calibrate(recording, gravity=truth["gravity"]), recording.sensor
+    error = (sensor.clock_ppm or 0.0) - (ppm + drift * SECONDS / 120)
+    std = (sensor.clock_std or np.nan) * 1e6
+    z = {
+        "ppm": [error / std],
+        "K": np.diag((found.K - truth["K"]) / found.K_std).tolist(),
+        "D": ((found.D - truth["D"]) / found.D_std).ravel().tolist(),
+    }
+    line = f"{seed:4d}  {burst_ms:2d} ms {ppm:+7.0f} ppm: off by {error:+.2f} ({std:.2f}), {found.verdict}"
+    return line, z
+
+
+def main(sessions: int, first: int) -> None:
     """Print a line a session, and rms values of all."""
     z: dict[str, list[float]] = {"ppm": [], "K": [], "D": []}
-    for seed in range(sessions):
-        rng = np.random.default_rng([seed, 7])
-        ppm, drift, burst_ms = rng.uniform(-1e4, 1e4), float(rng.choice([-50, 0, 50])), int(rng.choice([1, 4, 16]))
-        recording, truth = recorded(seed, ppm, drift, burst_ms)
-        found, sensor = mpucal.calibrate(recording, gravity=truth["gravity"]), recording.sensor
-        error = (sensor.clock_ppm or 0.0) - (ppm + drift * SECONDS / 120)
-        std = (sensor.clock_std or np.nan) * 1e6
-        z["ppm"].append(error / std)
-        z["K"] += np.diag((found.K - truth["K"]) / found.K_std).tolist()
-        z["D"] += ((found.D - truth["D"]) / found.D_std).ravel().tolist()
-        print(
-            f"{seed:4d}  {burst_ms:2d} ms {ppm:+7.0f} ppm: off by {error:+.2f} ({std:.2f}), {found.verdict}", flush=True
-        )
+    with multiprocessing.Pool() as pool:
+        for line, errors in pool.imap(trial, range(first, first + sessions)):
+            print(line, flush=True)
+            for name, each in errors.items():
+                z[name] += each
     print("rms z: " + ", ".join(f"{name} {np.sqrt(np.nanmean(np.square(each))):.2f}" for name, each in z.items()))
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 20)
+    main(*(int(word) for word in (sys.argv[1:] + ["20", "0"][len(sys.argv) - 1 :])))

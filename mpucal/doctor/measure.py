@@ -15,6 +15,8 @@ from .noise import density, trembles
 
 # times the data sheet's typical density
 NOISY, BROKEN = 1.5, 3.0
+# five times what a quartz crystal may be off
+OFF_PPM = 500.0
 # +-3 % of scale and 80 mg of zero
 FAR_FROM_G = 0.11
 # what the stream may be short of: its first and last poll
@@ -24,6 +26,8 @@ USUAL_C = (-10.0, 70.0)
 
 def examine_stream(recording: Recording, nominal_hz: float, seconds: float, family: Family | None) -> Iterator[Finding]:
     """Rate, losses, noise and what rest shows, of so many `seconds` of samples; None: its data sheet is not known."""
+    if recording.sensor.clock_ppm is not None:
+        yield _clock(recording.sensor.clock_ppm, float(recording.sensor.clock_std or np.nan))
     yield _rate(recording, nominal_hz)
     yield _losses(recording, seconds)
     acc, gyr = recording.acc, np.degrees(recording.gyr)
@@ -50,10 +54,23 @@ def examine_stream(recording: Recording, nominal_hz: float, seconds: float, fami
         yield _temperature(float(np.nanmean(recording.temperature_c)))
 
 
+def _clock(ppm: float, std: float) -> Finding:
+    what = f"{ppm:+.0f} ppm against this computer's (1 sigma {std * 1e6:.0f})"
+    data = {"ppm": ppm, "std_ppm": std * 1e6}
+    if std * 1e6 > OFF_PPM:
+        return Finding(
+            "bridge's clock", Mark.NOTE, what, "watch for longer (--seconds 30): its rate is not known yet", data
+        )
+    if abs(ppm) > OFF_PPM:
+        return Finding("bridge's clock", Mark.NOTE, what, "nothing has to be done: times are corrected for that", data)
+    return Finding("bridge's clock", Mark.OK, what, "", data)
+
+
 def _rate(recording: Recording, nominal_hz: float) -> Finding:
     hz = float(recording.sensor.rate_hz or np.nan)
     off = hz / nominal_hz - 1
-    ok = abs(off) <= RATE_TOLERANCE
+    # where a bridge's clock is hardly known, so is this
+    ok = abs(off) <= RATE_TOLERANCE + 2.0 * (recording.sensor.clock_std or 0.0)
     return Finding(
         "sample rate",
         Mark.OK if ok else Mark.BAD,

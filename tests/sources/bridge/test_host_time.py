@@ -7,6 +7,8 @@ from mpucal import load
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.chip.records import UTC
+from mpucal.doctor.finding import Mark
+from mpucal.doctor.measure import examine_stream
 from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
 from mpucal.simulated.chip import open_simulated
@@ -23,14 +25,17 @@ MS = 1_000_000
 def recorded(tmp_path):
     """The recording of so many seconds of turns behind a bridge whose clock is off, its capture, and the truth."""
 
-    def run(seconds, ppm, drift_ppm_a_minute=0.0, burst_ms=1, seed=1):
+    def run(seconds, ppm, drift_ppm_a_minute=0.0, burst_ms=1, seed=1, chip="chip=mpu6050", reset_s=None):
         clock = FastClock()
-        chip = open_simulated("sim:hand=random,noise=0.3", seed=seed, clock=clock)
+        chip = open_simulated(f"sim:hand=random,noise=0.3,{chip}", seed=seed, clock=clock)
         drift = 0.5 * drift_ppm_a_minute * 1e-6 / 60 * 1e-9
 
         def shown():
             t = clock.now()
             return t + round(ppm * 1e-6 * t + drift * t * t)
+
+        def shown_since(begun):
+            return lambda: shown() - begun
 
         line = EmulatedLine(EmulatedBridge(chip, shown), clock, burst_ns=burst_ms * MS)
         path = tmp_path / "capture.mcap"
@@ -40,10 +45,22 @@ def recorded(tmp_path):
             driver = Driver(Tap(bus, Dated(writer)), Config())
             driver.start()
             while clock.now() < seconds * 1e9:
+                if reset_s is not None and clock.now() > reset_s * 1e9:
+                    line.device, reset_s = EmulatedBridge(chip, shown_since(shown())), None
                 driver.poll()
         return driver.recording(), path, chip.truth_document()
 
     return run
+
+
+def test_the_doctor_says_how_far_it_is_off(recorded):
+    for ppm, mark in ((7000, Mark.NOTE), (-50, Mark.OK)):
+        recording, _, truth = recorded(20, ppm, burst_ms=16, seed=3)
+        told = {finding.topic: finding for finding in examine_stream(recording, 200.0, 20.0, None)}
+        clock = told["bridge's clock"]
+        assert (clock.mark, clock.data["ppm"]) == (mark, pytest.approx(ppm, abs=40))
+        true_hz = 200 * (1 + truth["rate_error_ppm"] * 1e-6)
+        assert told["sample rate"].data["rate_hz"] == pytest.approx(true_hz, rel=60e-6)
 
 
 @pytest.mark.parametrize(("ppm", "drift", "burst_ms"), [(5000, 0, 1), (-10000, 50, 4), (10000, -50, 16)])
@@ -55,6 +72,22 @@ def test_the_rate_is_known_and_corrected(recorded, ppm, drift, burst_ms):
     true_hz = 200 * (1 + truth["rate_error_ppm"] * 1e-6)
     assert sensor.rate_hz == pytest.approx(true_hz, rel=4 * sensor.clock_std + 20e-6)
     assert recording.rate_hz == pytest.approx(true_hz, rel=100e-6)
+
+
+@pytest.mark.parametrize("rate_error_ppm", [-130, 30])
+def test_frames_in_step_with_an_adapters_bursts_mislead_nobody(recorded, rate_error_ppm):
+    """Four looks of 20 ms take as long as five bursts of 16 ms: each is later by as much as the chip is slow."""
+    recording, *_ = recorded(30, 0, burst_ms=16, chip=f"rate_error_ppm={rate_error_ppm}")
+    sensor = recording.sensor
+    assert sensor.clock_std < 20e-6
+    assert sensor.clock_ppm == pytest.approx(0, abs=min(20, 4e6 * sensor.clock_std))
+
+
+def test_a_bridge_that_was_reset_keeps_its_rate(recorded):
+    recording, *_ = recorded(40, 5000, burst_ms=16, reset_s=15)
+    assert recording.gap.sum() == 1
+    assert recording.sensor.clock_std < 50e-6
+    assert recording.sensor.clock_ppm == pytest.approx(5000, abs=4e6 * recording.sensor.clock_std)
 
 
 def test_a_capture_keeps_it(recorded):
