@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import tempfile
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -28,7 +29,8 @@ from mpucal.files.rows import Rows
 
 # a shell in the background, or nohup, has these ignored, and what a test starts inherits that
 signal.signal(signal.SIGINT, signal.default_int_handler)
-signal.signal(signal.SIGHUP, signal.SIG_DFL)
+if hasattr(signal, "SIGHUP"):
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # how long a busy machine takes says nothing about what is tested
 settings.register_profile("patient", deadline=None)
@@ -51,6 +53,19 @@ SLOW = (
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Order the files; those of a file stay as they are."""
     items.sort(key=lambda item: SLOW.index(item.path.name) if item.path.name in SLOW else len(SLOW))
+
+
+# some of what tests import; a slice of them needs less
+NEEDED = ("jsonschema", "matplotlib", "mypy", "polars", "pyarrow", "pymavlink", "rosbags", "yaml")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Say in a sentence what all tests need, where they are asked for without it."""
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing and config.args_source is config.ArgsSource.TESTPATHS:
+        raise pytest.UsageError(
+            f"{', '.join(missing)} missing: pip install 'mpucal[mavlink,plot,dev]', or name a folder."
+        )
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -1,4 +1,4 @@
-"""The session that the README shows is what a newcomer sees, and what the pages show of Python runs."""
+"""The session that the tutorial shows is what a newcomer sees, and what the pages show of Python runs."""
 
 import contextlib
 import io
@@ -12,7 +12,7 @@ import mpucal
 from mpucal.__main__ import run
 
 PROJECT = Path(__file__).parents[1]
-README = (PROJECT / "README.md").read_text(encoding="utf-8")
+TUTORIAL = (PROJECT / "docs" / "tutorial.md").read_text(encoding="utf-8")
 
 
 def shape(text):
@@ -32,7 +32,7 @@ def session(tmp_path_factory):
 
 def test_the_session_is_a_real_one(session):
     _, said, printed = session
-    shown = shape(re.search(r"```\n(.*?)```", README, re.DOTALL)[1])
+    shown = shape(re.search(r"```\n(.*?)```", TUTORIAL, re.DOTALL)[1])
     result = shape(printed)
     assert shown[-len(result) :] == result
     # the keys are named, and a line is written over, on a terminal only

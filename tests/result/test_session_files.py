@@ -1,4 +1,4 @@
-"""The table of a session's files: their numbered names, and the README's copy of it."""
+"""The table of a session's files: their numbered names, and its copy in docs/session.md."""
 
 import re
 from pathlib import Path
@@ -10,14 +10,14 @@ from mpucal.result.session_files import CAPTURE, SESSION_FILES
 from mpucal.session.results import save
 from mpucal.sinks.table import SINKS
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "session.md"
 
 
-def test_the_readme_has_the_same_rows():
-    section = re.search(r"## What a session leaves\n(.*?)\n\n[^|]", README.read_text(encoding="utf-8"), re.DOTALL)[1]
+def test_the_page_has_the_same_rows():
+    section = re.search(r"## What a session leaves\n(.*)", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1]
     rows = re.findall(r"^\| `(.+?)` \| (.+) \|$", section, re.MULTILINE)
     left = [*SESSION_FILES, *(file for kind in SINKS.values() for file in kind.session_files)]
-    assert rows == [(file.name, file.what) for file in left]
+    assert rows == [(file.name, file.what.replace("](firm", "](../firm")) for file in left]
 
 
 def test_each_one_is_free_until_it_is_there(tmp_path):
