@@ -19,6 +19,7 @@ from .walks import SIGNIFICANT, Walk, walked_covariance
 SINGULAR, TINY_MPS2 = 1e-6, 1e-9
 FLOOR_MPS2 = 5e-5  # nothing is known better where a walk was taken away, drawn straight from part to part
 MOST_NIS = 5.0  # of innovations that the model explains; 3 is expected
+UNCOMPARED = 2.0  # times the model's claim, where too few sides were down to be compared
 MOST_UNFELT = 20.0  # times what leaving parts out says: changes reach 10, turns with a steady pull 35 to 750
 
 
@@ -28,9 +29,10 @@ class Claim:
 
     Attributes
     ----------
-    model : m/s^2, rms over all directions, by the covariance of the model. floored : the same, but with
-        what is left of a walk of the gyroscope's bias where one was taken away. left_out : by leaving parts out.
-    change : of the sensor while the board was turned; None where it stayed the same. of_change : m/s^2, its error.
+    model : m/s^2, rms over all directions, by the covariance of the model. floored : the same, but with what is left of
+        a walk of the gyroscope's bias where one was taken away, and for what too few sides cannot contradict.
+    left_out : by leaving parts out. change : of the sensor while the board was turned; None where it stayed the same.
+    of_change : m/s^2, its error.
     """
 
     model: float
@@ -66,6 +68,8 @@ def claim_of(fit: Fit, gravity: float, change: Walk | None, walked: float) -> Cl
         wider = max(1.0, rms(walked_covariance(fit.parts, fit.D, walked)) / rms(inverse(fit.parts.H)))
         floored = float(np.hypot(wider * model, FLOOR_MPS2))
     left_out = jackknife(fit.parts, fit.D, gravity)
+    if not left_out.side:
+        floored *= UNCOMPARED
     # a model that does not explain its innovations leaves the hand's motion in every part, and is off by that
     if change is None or not fit.converged or (change.alone if fit.nis <= MOST_NIS else change.gain) < SIGNIFICANT:
         return Claim(model, floored, left_out, None)

@@ -19,8 +19,8 @@ from .gyro_matrix import WALD_99, at_prior, wald
 from .hand_noise import (
     FIRST_MPS2,
     HAND_MPS2,
-    HONEST,
     PIVOT_MPS2,
+    SLOWLY_PER_S,
     SOME_MPS2,
     WHITE_MPS2,
     Noise,
@@ -76,7 +76,7 @@ def _doubted(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preproce
     if noise.kind == "none":
         return minimum
     if noise.kind == "pivot":
-        noise = replace(noise, sigma=HONEST * noise.sigma)
+        noise = replace(noise, lam=SLOWLY_PER_S)
     prior, fixed = prior_of(fine.flat), () if minimum.free.all() else ("K",)
     at, problem, transitions = minimum, noise.problem(rough), transitions_of(rough, minimum.theta)
     variance, leverage = miss_variances(transitions), np.zeros(1)

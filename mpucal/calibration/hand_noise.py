@@ -18,22 +18,26 @@ SOME_MPS2 = WHITE_MPS2[1:]
 HAND_MPS2 = WHITE_MPS2[4:]  # who goes from rest to rest, has a hand
 PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 
-# A pivot travels farther than a bounded position of one lambda, the more the wilder it is: sigma (1.5 + 0.5 sigma) for
-# the estimate, and four times that for what its covariance admits.
-FARTHER, FARTHER_STILL, HONEST = 1.5, 0.5, 4.0
+# A pivot travels farther than a bounded position of one lambda, the more the wilder it is: sigma (1.5 + 0.5 sigma). Its
+# covariance admits that it comes back more slowly, 1/s: what sways as slowly as gravity turns is not told from it.
+FARTHER, FARTHER_STILL, SLOWLY_PER_S = 1.5, 0.5, 2.0
 
 
 @dataclass(frozen=True)
 class Noise:
-    """The hand's acceleration while it moves: none, white (correlated), or a pivot's, of sigma m/s^2."""
+    """The hand's acceleration while it moves: none, white (correlated), or a pivot's, of sigma m/s^2.
+
+    lam : 1/s, how fast a pivot comes back, where it is not as the estimate has it.
+    """
 
     kind: Literal["none", "white", "pivot"]
     sigma: float
+    lam: float | None = None
 
     def problem(self, prepared: Preprocessed) -> Problem:
         """What the filter runs over with this noise."""
         if self.kind == "pivot":
-            return prepared.pivot(self.sigma, FLOOR_MPS2)
+            return prepared.pivot(self.sigma, FLOOR_MPS2, self.lam)
         return prepared.white(self.sigma, CORRELATION_S if self.kind == "white" else 0.0)
 
 

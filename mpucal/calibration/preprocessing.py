@@ -60,13 +60,17 @@ class Preprocessed:
         longer = 1.0 + 2.0 * correlation_s / self._dt
         return self._with(r_extra=self.pose + longer * sigma**2 * self.motion)
 
-    def pivot(self, sigma: float, floor: float = 0.0) -> Problem:
-        """A pivot whose bounded travel accelerates the board by sigma m/s^2 while moving, over a white floor."""
-        jerk = jerk_density(sigma, self.problem.lam) * self.motion
+    def pivot(self, sigma: float, floor: float = 0.0, lam: float | None = None) -> Problem:
+        """A pivot whose bounded travel accelerates the board by sigma m/s^2 while moving, over a white floor.
+
+        lam : 1/s, what brings the travel back, where it is not the problem's own.
+        """
+        lam = lam or self.problem.lam
+        jerk = jerk_density(sigma, lam) * self.motion
         if self.problem.series.jerk is not None:
-            jerk = jerk + self.problem.series.jerk
+            jerk = jerk + lam / self.problem.lam * self.problem.series.jerk  # of the same tremor
         white = 2.0 * FLOOR_CORRELATION_S / self._dt * floor**2 * self.motion
-        return self._with(jerk=jerk, r_extra=self.pose + white)
+        return replace(self._with(jerk=jerk, r_extra=self.pose + white), lam=lam)
 
     @cached_property
     def _dt(self) -> float:
