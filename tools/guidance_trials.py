@@ -32,6 +32,7 @@ from mpucal.chip.driver import Driver
 from mpucal.data import Vector
 from mpucal.errors import Abandoned
 from mpucal.page.state import HOLD, state
+from mpucal.session.attitude import matrix
 from mpucal.session.events import Countdown, Held, Key, Meter, Output, Progress, Prompt, PromptKind
 from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
@@ -41,7 +42,6 @@ from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.hand import MISS_RAD, ON_THE_TABLE, REACTION_S, Stance
 from mpucal.simulated.hands import KINDS, Guided
 from mpucal.simulated.legs import STEP_S, Leg
-from mpucal.terminal.board import matrix
 from mpucal.terminal.view import NEAR_DEG, View
 
 BEYOND_DEG = 20.0

@@ -300,32 +300,25 @@ class FifoDecoder:
         """The same, each later than `last_t_s`."""
         if last_t_s is None:
             return samples
-        t = increasing(np.insert(samples.t, 0, last_t_s), LEAST_STEP / self._clock.rate_hz)[1:]
+        t = increasing(np.concatenate(([last_t_s], samples.t)), LEAST_STEP / self._clock.rate_hz)[1:]
         return replace(samples, t=t)
 
     def _samples(self, runs: list[Run], times_s: Times) -> Samples:
         if not runs:
             return Samples.empty()
         frames = np.concatenate([run.frames for run in runs])
-        settings = self._settings
-        gap = np.zeros(len(frames), bool)
+        settings, alone, n = self._settings, self._settings.accel_alone, len(frames)
+        gap = np.zeros(n, bool)
         gap[np.cumsum([0] + [len(run.frames) for run in runs[:-1]])] = [run.gap for run in runs]
-        alone = Samples(
+        accel, gyro = frames[:, self._columns.accel], frames[:, self._columns.gyro]
+        return Samples(
             t=self._times_s(runs, times_s),
-            acc=frames[:, self._columns.accel] * settings.mps2_per_lsb,
-            gyr=np.full((len(frames), 3), np.nan),
-            temperature_c=np.full(len(frames), np.nan),
+            acc=accel * settings.mps2_per_lsb,
+            gyr=np.full((n, 3), np.nan) if alone else gyro * reg.rad_s_per_lsb(settings.fs_sel),
+            temperature_c=np.full(n, np.nan) if alone else self._celsius(frames[:, self._columns.temperature]),
             gap=gap,
-            acc_clipped=_clipped(frames[:, self._columns.accel]),
-            gyr_clipped=np.zeros(len(frames), bool),
-        )
-        if settings.accel_alone:
-            return alone
-        return replace(
-            alone,
-            gyr=frames[:, self._columns.gyro] * reg.rad_s_per_lsb(settings.fs_sel),
-            temperature_c=self._celsius(frames[:, self._columns.temperature]),
-            gyr_clipped=_clipped(frames[:, self._columns.gyro]),
+            acc_clipped=_clipped(accel),
+            gyr_clipped=np.zeros(n, bool) if alone else _clipped(gyro),
         )
 
     def _celsius(self, counts: Any) -> Any:
@@ -340,10 +333,8 @@ class FifoDecoder:
         return float(self._celsius(self._warmth / self._believed))
 
     def _times_s(self, runs: list[Run], times_s: Times) -> Vector:
-        lengths = [len(run.frames) for run in runs]
-        starts = np.cumsum([0, *lengths[:-1]])
-        segment = np.repeat([run.segment for run in runs], lengths)
-        index = np.arange(sum(lengths)) + np.repeat([run.first for run in runs] - starts, lengths)
+        segment = np.concatenate([np.full(len(run.frames), run.segment) for run in runs])
+        index = np.concatenate([np.arange(run.first, run.first + len(run.frames)) for run in runs])
         return increasing(times_s(segment, index), LEAST_STEP / self._clock.rate_hz)
 
 

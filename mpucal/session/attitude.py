@@ -12,7 +12,7 @@ import numpy as np
 
 from ..calibration.rotation import rotation, shortest_turn
 from ..data import Samples, Vector
-from .events import Quaternion
+from .events import Direction, Quaternion
 from .way import UP, heading
 from .windows import Window, Windows
 
@@ -29,17 +29,14 @@ FALLING_MPS2 = 1e-3
 # A board that lies on its component side was turned over about its x axis.
 _TURNED_OVER = np.diag([1.0, -1.0, -1.0])
 
+Matrix = tuple[Direction, Direction, Direction]
+
 
 class Attitude:
-    """Follows one board, a sample at a time.
-
-    Attributes
-    ----------
-    matrix : (3, 3), the attitude at the last sample.
-    """
+    """Follows one board, a sample at a time; in plain numbers, which for one step are faster than arrays."""
 
     def __init__(self) -> None:
-        self.matrix: Vector = np.eye(3)
+        self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._begun = self._levelled = False
         self._windows = Windows(STEP_S, spread=False)
         self._bias_rad_s: Vector = np.zeros(3)
@@ -55,28 +52,67 @@ class Attitude:
         for window in self._windows.add(samples):
             self._step(window, still)
 
+    @property
+    def matrix(self) -> Vector:
+        """(3, 3), the attitude at the last sample."""
+        return np.array(matrix(self._q))
+
     def quaternion(self) -> Quaternion:
         """The attitude as a unit quaternion (w, x, y, z) with w >= 0."""
-        return quaternion(self.matrix)
+        w, x, y, z = self._q
+        return (-w, -x, -y, -z) if w < 0.0 else self._q
 
     def _step(self, window: Window, still: bool) -> None:
-        force = float(np.linalg.norm(window.acc))
-        # where no direction is up, the gyroscope alone carries
-        up = self.matrix.T @ UP if force < FALLING_MPS2 else window.acc / force
+        force = math.hypot(*window.acc.tolist())
         if not self._begun:
-            self._begun, self.matrix = True, straight(up)
+            self._begun = True
+            self._q = quaternion(straight(window.acc / force if force >= FALLING_MPS2 else UP))
             return
         seconds = window.end_s - window.start_s
-        self.matrix = self.matrix @ rotation((window.gyr - self._bias_rad_s) * seconds)
-        share = 1.0 - math.exp(-seconds / (STILL_S if still else MOVING_S))
-        missing = shortest_turn(self.matrix @ up, UP)
-        most = CORRECT_RAD_S * seconds / max(float(np.linalg.norm(missing)), 1e-9)
-        self.matrix = rotation(min(share, most) * missing) @ self.matrix
+        q = _product(self._q, _turn(*((window.gyr - self._bias_rad_s) * seconds).tolist()))
+        # where no direction is up, the gyroscope alone carries
+        if force >= FALLING_MPS2:
+            x, y, z = (sum(m * a for m, a in zip(row, window.acc.tolist(), strict=True)) for row in matrix(q))
+            aside = math.hypot(x, y)
+            missing = math.atan2(aside, z)
+            share = 1.0 - math.exp(-seconds / (STILL_S if still else MOVING_S))
+            turn = min(share * missing, CORRECT_RAD_S * seconds) / aside if aside else 0.0
+            q = _product(_turn(y * turn, -x * turn, 0.0), q)
         if still and not self._levelled:
-            most, askew = STRAIGHTEN_RAD_S * seconds, heading(straight(self.matrix[2]), self.matrix)
-            self.matrix = rotation(UP * min(max(askew, -most), most)) @ self.matrix
-        u, _, v = np.linalg.svd(self.matrix)
-        self.matrix = u @ v
+            now = np.array(matrix(q))
+            most, askew = STRAIGHTEN_RAD_S * seconds, heading(straight(now[2]), now)
+            q = _product(_turn(0.0, 0.0, min(max(askew, -most), most)), q)
+        w, x, y, z = (part / math.hypot(*q) for part in q)
+        self._q = (w, x, y, z)
+
+
+def _turn(x: float, y: float, z: float) -> Quaternion:
+    """By the rotation vector (x, y, z) [rad]."""
+    half = 0.5 * math.hypot(x, y, z)
+    scale = 0.5 * (math.sin(half) / half if half else 1.0)
+    return (math.cos(half), scale * x, scale * y, scale * z)
+
+
+def _product(p: Quaternion, q: Quaternion) -> Quaternion:
+    """First the turn q, then p."""
+    a, b, c, d = p
+    w, x, y, z = q
+    return (
+        a * w - b * x - c * y - d * z,
+        a * x + b * w + c * z - d * y,
+        a * y - b * z + c * w + d * x,
+        a * z + b * y - c * x + d * w,
+    )
+
+
+def matrix(attitude: Quaternion) -> Matrix:
+    """The rotation (3, 3) of a unit quaternion (w, x, y, z)."""
+    w, x, y, z = attitude
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
 
 
 def straight(up: Vector) -> Vector:

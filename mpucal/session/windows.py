@@ -67,16 +67,28 @@ class Windows:
 
 def _window(samples: Samples, first: int, last: int, spread: bool) -> Window:
     acc, gyr = samples.acc[first:last], samples.gyr[first:last]
+    acc_mean, gyr_mean = _mean(acc), _mean(gyr)
     return Window(
         float(samples.t[first]),
         float(samples.t[last]),
-        acc.mean(0),
-        gyr.mean(0),
-        acc.std(0) if spread else UNKNOWN,
-        gyr.std(0) if spread else UNKNOWN,
+        acc_mean,
+        gyr_mean,
+        _deviation(acc, acc_mean) if spread else UNKNOWN,
+        _deviation(gyr, gyr_mean) if spread else UNKNOWN,
         not bool(samples.gap[first:last].any()),
         last - first,
     )
+
+
+def _mean(rows: Vector) -> Vector:
+    """np.mean(rows, 0), in half its time and to the last bit."""
+    return np.asarray(np.add.reduce(rows, 0) / len(rows))
+
+
+def _deviation(rows: Vector, mean: Vector) -> Vector:
+    """np.std(rows, 0), likewise."""
+    beside = rows - mean
+    return np.asarray(np.sqrt(np.add.reduce(beside * beside, 0) / len(rows)))
 
 
 def _tail(samples: Samples, first: int) -> Samples:

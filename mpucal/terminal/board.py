@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+from ..session.attitude import Matrix, matrix
 from ..session.events import Direction, Quaternion
 from .canvas import Canvas, Point
 from .models import MODELS
@@ -24,8 +25,6 @@ _VIEWS_DEG = (_TURN_DEG, 28.0), (_TILT_DEG, 52.0, 12.0, 70.0)
 _REACH = 1.75
 # rows from which the lines of a plate's edge do not run into each other
 _LARGE = 14
-
-Matrix = tuple[Direction, Direction, Direction]
 
 
 def picture(kind: str, attitude: Quaternion, columns: int, rows: int) -> Canvas:
@@ -47,16 +46,6 @@ def picture(kind: str, attitude: Quaternion, columns: int, rows: int) -> Canvas:
         canvas.line(seen((0.0, 0.0, 0.0)), seen(_scaled(axis, tip)))
         canvas.letter(seen(_scaled(axis, end)), letter, style)
     return canvas
-
-
-def matrix(attitude: Quaternion) -> Matrix:
-    """The rotation (3, 3) of a unit quaternion (w, x, y, z)."""
-    w, x, y, z = attitude
-    return (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
 
 
 def view_of(board: Matrix) -> Matrix:

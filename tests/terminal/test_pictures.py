@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mpucal.session.attitude import quaternion, straight
+from mpucal.session.attitude import matrix, quaternion, straight
 from mpucal.terminal import board, globe, letters
 from mpucal.terminal.canvas import Canvas
 from mpucal.terminal.flat import BOARDS
@@ -42,7 +42,7 @@ def held(down):
 @pytest.mark.parametrize("seed", range(20))
 def test_the_matrix_is_that_of_the_quaternion(seed):
     turn = Rotation.random(random_state=seed)
-    np.testing.assert_allclose(board.matrix(turn.as_quat(scalar_first=True)), turn.as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(matrix(turn.as_quat(scalar_first=True)), turn.as_matrix(), atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(200))
