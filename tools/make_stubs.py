@@ -16,7 +16,13 @@ from nanobind.stubgen import StubGen
 
 ROOT = Path(__file__).parents[1]
 HEAD = '"""Made by tools/make_stubs.py from the compiled module; its functions say what they do."""\n'
-COMPILED = ("mpucal.kernel._kernel", "mpucal.files._text", "mpucal.chip._flips")
+COMPILED = (
+    "mpucal.kernel._kernel",
+    "mpucal.files._text",
+    "mpucal.files._packed",
+    "mpucal.chip._flips",
+    "mpucal.chip._pieces",
+)
 # what an array is besides its type (order, device) is asked for as a call is made; type checkers know none of it
 DETAILS = re.compile(r"Annotated\[(NDArray\[[\w.]+\]), dict\((?:[^()]|\([^)]*\))*\)\]")
 

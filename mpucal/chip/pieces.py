@@ -1,7 +1,7 @@
 """Where a straight line broke: least squares in pieces, for a sample clock whose rate changed.
 
 Binary segmentation: of all places, the one at which two lines explain the points best is a break where they do so
-beyond chance; then the same on either side of it.
+beyond chance; then the same on either side of it. `pieces.cpp` looks at all places.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..data import Vector
+from ._pieces import best_break
 
 # A break must explain this many times the variance that is left. Chance alone, over all places, stays below 30.
 BREAK = 100.0
@@ -114,24 +115,8 @@ def _break(t_s: Vector, y: Vector) -> int | None:
     n = len(t_s)
     if n < 2 * LEAST_POINTS or t_s[-1] - t_s[0] < 2 * LEAST_S:
         return None
-    t, y = t_s - t_s.mean(), y - y.mean()
-    before, after = _left_over(t, y), _left_over(t[::-1], y[::-1])[::-1]
-    # before[k]: of points 0..k; after[k]: of points k..n-1
-    at = np.arange(LEAST_POINTS, n - LEAST_POINTS + 1)
-    at = at[(t[at - 1] - t[0] >= LEAST_S) & (t[-1] - t[at] >= LEAST_S)]
-    if not len(at):
+    at, both, one = best_break(t_s - t_s.mean(), y - y.mean(), LEAST_POINTS, LEAST_S)
+    if at < 0:
         return None
-    both = before[at - 1] + after[at]
-    best = int(np.argmin(both))
-    variance = max(both[best] / (n - 4), LEAST_VARIANCE)
-    return int(at[best]) if before[-1] - both[best] > BREAK * variance else None
-
-
-def _left_over(t: Vector, y: Vector) -> Vector:
-    """(n,) the sum of squares about the line through points 0..k, for every k."""
-    k = np.arange(1, len(t) + 1)
-    st, sy = np.cumsum(t), np.cumsum(y)
-    stt = np.cumsum(t * t) - st * st / k
-    sty = np.cumsum(t * y) - st * sy / k
-    syy = np.cumsum(y * y) - sy * sy / k
-    return np.asarray(np.maximum(syy - np.divide(sty * sty, stt, out=np.zeros_like(stt), where=stt > 0), 0.0))
+    variance = max(both / (n - 4), LEAST_VARIANCE)
+    return at if one - both > BREAK * variance else None

@@ -58,7 +58,8 @@ def capture_rows(*paths: Path) -> Rows:
     spool.add(decoder.release(last=True))
     if spool.frames < 2:
         raise RecordingError(f"{session.name} holds {spool.frames} samples", "record for longer")
-    runs = _without(decoder.final(spool.runs()), session.forgotten)
+    runs = decoder.final(spool.runs())
+    runs = _without(runs, session.forgotten) if session.forgotten else runs
     return Rows(runs, decoder.sensor, recovered=session.recovered, name=session.name, utc_ns=session.utc_ns)
 
 

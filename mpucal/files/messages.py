@@ -111,9 +111,9 @@ def accesses_of(message: bytes) -> Accesses:
             files.append(value.decode())
         elif number in _NAMES:
             columns[_NAMES[number]] = value
-    kind, register, count, moved, words, steps, heard = (
+    kind, register, count, moved, steps, heard = (
         protobuf.unpacked(columns.get(name, b""))
-        for name in ("kind", "register", "count", "moved", "words", "step_ns", "heard_ns")
+        for name in ("kind", "register", "count", "moved", "step_ns", "heard_ns")
     )
     if not len(kind):
         raise ValueError("no access")
@@ -130,7 +130,7 @@ def accesses_of(message: bytes) -> Accesses:
         t_ns,
         host_ns,
         np.frombuffer(columns["data"], np.uint8),
-        np.cumsum(protobuf.unzigzag(words).reshape(-1, columns["frame_words"]), axis=0, dtype=np.int16),
+        protobuf.frames(columns.get("words", b""), columns["frame_words"]),
         failures,
         tuple(files),
     )

@@ -2,7 +2,8 @@
 
 A field is a key, `number << 3 | wire type`, and a varint (type 0) or a length with so many bytes (type 2). A varint is
 seven bits a byte, the lowest first, the eighth set in all but its last. Signed integers (sint) are zigzag: 0, -1, 1,
--2. Source: https://protobuf.dev/programming-guides/encoding, and descriptor.proto for the schema.
+-2. `packed.cpp` unpacks them. Source: https://protobuf.dev/programming-guides/encoding, and descriptor.proto for the
+schema.
 """
 
 from __future__ import annotations
@@ -12,10 +13,14 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._packed import frames, unpacked
+
 Columns = NDArray[np.uint64]
 
 VARINT, BYTES = 0, 2
 LONGEST = 10
+__all__ = ["field", "fields", "frames", "packed", "schema", "unpacked", "unzigzag", "zigzag"]
+
 # descriptor.proto: types and labels of fields
 TYPES = {"uint64": 4, "string": 9, "message": 11, "bytes": 12, "uint32": 13, "sint32": 17, "sint64": 18}
 OPTIONAL, REPEATED = 1, 3
@@ -59,34 +64,6 @@ def packed(values: ArrayLike) -> bytes:
     digits = (value >> (np.uint64(7) * column.astype(np.uint64)) & np.uint64(127)).astype(np.uint8)
     digits[column < widths[:, None] - 1] |= 128
     return bytes(digits[shown])
-
-
-def unpacked(data: bytes) -> Columns:
-    """(n,) what `packed` was given.
-
-    Raises
-    ------
-    ValueError : the last number is cut, or one is too long.
-    """
-    digits = np.frombuffer(data, np.uint8)
-    last = np.flatnonzero(digits < 128)
-    if not len(digits):
-        return np.zeros(0, np.uint64)
-    if not len(last) or last[-1] != len(digits) - 1:
-        raise ValueError("a number is cut")
-    if len(last) == len(digits):
-        return digits.astype(np.uint64)
-    first = np.concatenate(([0], last[:-1] + 1))
-    width = last - first + 1
-    widest = int(width.max())
-    if widest > LONGEST:
-        raise ValueError("a number is longer than 64 bits")
-    value = (digits[first] & 127).astype(np.uint64)
-    for place in range(1, widest):
-        # of ever fewer numbers: most are short
-        longer = np.flatnonzero(width > place)
-        value[longer] |= (digits[first[longer] + place] & np.uint64(127)).astype(np.uint64) << np.uint64(7 * place)
-    return value
 
 
 def zigzag(values: ArrayLike) -> Columns:
