@@ -11,15 +11,18 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).parents[1]
 # read by people who never see the site, and so at the top of the source tree
 OUTSIDE = ("firmware_protocol.md", "CONTRIBUTING.md")
+SCHEMA = "calibration.schema.json"
 # what the theme would fetch so that the search works in pages that are read from a folder, and what does that here
 SHIM, WORKER = "https://unpkg.com/iframe-worker/shim", "javascripts/worker.js"
 LINK = re.compile(r"\[([^\]]+)\]\(([^)#:]+)(#[^)]*)?\)")
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pages that lie outside docs/."""
+    """Add the pages that lie outside docs/, and the schema."""
     for name in OUTSIDE:
         files.append(File.generated(config, name, content=(ROOT / name).read_text(encoding="utf-8")))
+    schema = (ROOT / "mpucal" / "result" / SCHEMA).read_text(encoding="utf-8")
+    files.append(File.generated(config, f"reference/{SCHEMA}", content=schema))
     return files
 
 
@@ -42,6 +45,11 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         return text if path.exists() else link[0]
 
     return LINK.sub(replaced, markdown)
+
+
+def on_page_content(html: str, page: Any, config: Any, files: Files) -> str:
+    """No default where click has none, which mkdocs-click shows by its name."""
+    return html.replace("<code>Sentinel.UNSET</code>", "")
 
 
 def on_post_page(output: str, page: Any, config: Any) -> str:

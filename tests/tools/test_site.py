@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from mpucal.cli import commands
+
 SITE = Path(__file__).parents[2] / "build" / "site"
 CHROMIUM = shutil.which("chromium")
 PAGES = ("index", "notebook", "reference/commands", "reference/python")
@@ -47,3 +49,9 @@ def test_the_search_finds(page):
     page.locator(".md-search__input").press_sequentially("misalignment", delay=20)
     page.locator(".md-search-result__item a").first.wait_for()
     assert [url for url in page.fetched if not url.startswith(("file:", "data:"))] == []
+
+
+def test_every_command_has_its_section():
+    text = (SITE / "reference" / "commands.html").read_text(encoding="utf-8")
+    assert [name for name in commands.list_commands(None) if f'id="mpucal-{name}"' not in text] == []
+    assert "Sentinel" not in text
