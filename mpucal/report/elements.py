@@ -32,8 +32,8 @@ def paragraph(text: str, id_: str = "", note: bool = False) -> str:
 
 
 def code(text: str, id_: str) -> str:
-    """Text for a machine."""
-    return f'<pre id="{id_}">{escape(text)}</pre>\n'
+    """Text for a machine; where it is wider than the page, keys scroll it."""
+    return f'<pre id="{id_}" tabindex="0">{escape(text)}</pre>\n'
 
 
 def figure(svg: str, caption: str) -> str:
@@ -57,7 +57,7 @@ def table(id_: str, caption: str, head: Iterable[str], rows: Iterable[Iterable[s
     lines = [f'<div class="wide"><table id="{id_}">']
     if caption:
         lines.append(f"<caption>{escape(caption)}</caption>")
-    columns = "".join(f'<th scope="col">{escape(name)}</th>' for name in head)
+    columns = "".join(f'<th scope="col">{escape(name)}</th>' if name else "<td></td>" for name in head)
     if columns:
         lines.append(f"<tr>{columns}</tr>")
     for name, *values in rows:

@@ -65,8 +65,9 @@ def render(calibration: Calibration, recording: Recording | None = None) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n"
-        f"<h1>{escape(title)}</h1>\n{paragraph(', '.join(facts), 'facts', note=True)}{''.join(body)}</body>\n</html>\n"
+        f"<title>{escape(title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n<main>\n"
+        f"<h1>{escape(title)}</h1>\n{paragraph(', '.join(facts), 'facts', note=True)}{''.join(body)}"
+        "</main>\n</body>\n</html>\n"
     )
 
 

@@ -8,6 +8,7 @@ import threading
 import pytest
 
 from mpucal.page.state import changes, state
+from mpucal.reasons import Reason
 from mpucal.session.events import Countdown, Held, Meter, Prompt, PromptKind, Use
 from mpucal.terminal.view import View
 
@@ -53,8 +54,10 @@ def test_each_phase_has_its_words_its_angle_and_its_form(tab, server):
         show()
         tab.wait_for_function("look => document.body.dataset.look === look", arg=look)
         assert (tab.inner_text("#headline"), tab.text_content("#number")) == (headline, number)
-    show(verdict="refused", reasons=[{"code": "x", "message": "too few orientations", "remedy": "turn it more"}])
-    tab.wait_for_selector("text=too few orientations. turn it more.")
+    against = Reason("few_orientations", "too few orientations", "turn it more", refuse=True)
+    show(verdict="refused", reasons=[against.document()])
+    tab.wait_for_selector("#reasons li")
+    assert tab.inner_text("#reasons") == "Too few orientations. Turn it more."
     assert tab.inner_text("#headline") == "The calibration was refused."
     assert tab.get_attribute("body", "data-look") == "no"
 

@@ -231,5 +231,5 @@ def test_prints_on_two_pages(result, tmp_path):
 
 def test_the_page_shows_them(result):
     for name, text in (("c", in_c), ("python", in_python), ("ros", in_ros)):
-        shown = re.search(rf'<pre id="{name}">(.*?)</pre>', result.html, re.DOTALL)[1]
+        shown = re.search(rf'<pre id="{name}"[^>]*>(.*?)</pre>', result.html, re.DOTALL)[1]
         assert unescape(shown) == text(result.calibration)

@@ -117,7 +117,7 @@ def test_the_sentence_says_how_sure(result):
 
 
 def test_it_says_how_to_fit_it_again(result):
-    commands = html.unescape(re.search(r'<pre id="reproduce">(.*?)</pre>', result.html, re.DOTALL)[1]).splitlines()
+    commands = html.unescape(re.search(r'<pre id="reproduce"[^>]*>(.*?)</pre>', result.html, re.DOTALL)[1]).splitlines()
     fit = result.document["fit"]
     assert commands[0] == f"mpucal calibrate mpu6050.mcap --model {fit['model']} --gravity {fit['gravity']} -o again"
     assert commands[1] == "mpucal session --replay mpu6050.mcap -o replayed"

@@ -259,7 +259,12 @@ const target = () => (state.meter?.wanted ? state.prompt?.down ?? state.knowledg
 
 function result() {
   $("result").hidden = !state.verdict;
-  $("reasons").replaceChildren(...(state.reasons ?? []).map(({ message, remedy }) => element("li", `${message}. ${remedy}.`)));
+  // a reason's message ends with its remedy
+  $("reasons").replaceChildren(...(state.reasons ?? []).map(({ message, remedy }) => {
+    const reason = element("li");
+    reason.append(element("strong", sentence(message.replace(`; ${remedy}`, ""))), " ", sentence(remedy));
+    return reason;
+  }));
   put("summary", state.summary ?? "");
   $("summary").parentElement.hidden = !state.summary;
   $("values").hidden = !state.values?.length;
@@ -272,6 +277,7 @@ function result() {
   if (state.results && !$("results").childElementCount) $("results").append(...reportFirst(state.results).flatMap(file));
 }
 
+const sentence = (words) => `${words[0].toUpperCase()}${words.slice(1)}.`;
 const reportFirst = (files) => [...files].sort((a, b) => (b.name === REPORT) - (a.name === REPORT));
 const size = (bytes) => (bytes > 1e6 ? `${(bytes / 1e6).toFixed(1)} MB` : `${Math.ceil(bytes / 1e3)} kB`);
 
