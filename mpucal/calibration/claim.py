@@ -11,7 +11,6 @@ import numpy as np
 from ..data import Vector
 from .fit import Fit
 from .jackknife import Jackknife, jackknife
-from .levenberg_marquardt import inverse
 from .parameters import ACCELEROMETER
 from .uncertainty import uncertainty
 from .walks import SIGNIFICANT, Walk, walked_covariance
@@ -65,7 +64,7 @@ def claim_of(fit: Fit, gravity: float, change: Walk | None, walked: float) -> Cl
     rms = partial(_rms, fit.D, gravity=gravity)
     model = floored = rms(fit.covariance)
     if walked:
-        wider = max(1.0, rms(walked_covariance(fit.parts, fit.D, walked)) / rms(inverse(fit.parts.H)))
+        wider = max(1.0, rms(walked_covariance(fit.parts, fit.D, walked)) / rms(fit.parts.covariance))
         floored = float(np.hypot(wider * model, FLOOR_MPS2))
     left_out = jackknife(fit.parts, fit.D, gravity)
     if not left_out.side:

@@ -60,10 +60,9 @@ def jackknife(parts: Parts, D: Vector, gravity: float) -> Jackknife:
     by_time = _moved(gradient, parts.H - fisher, to_sphere)
     gradient, fisher = parts.grouped(parts.side)
     by_side = _moved(gradient, parts.H - fisher, to_sphere)
-    known = inverse(parts.H)
     # without a side that few others make up for, the estimate moves far by chance
-    chance = _rms(np.stack([inverse(H) for H in parts.H - fisher]) - known, to_sphere)
-    most = MOST_BY_CHANCE * float(np.median(by_side / chance)) * float(_rms(known, to_sphere))
+    chance = _rms(inverse(parts.H - fisher) - parts.covariance, to_sphere)
+    most = MOST_BY_CHANCE * float(np.median(by_side / chance)) * float(_rms(parts.covariance, to_sphere))
     worst = np.flatnonzero(groups == int(np.argmax(by_time)))
     span = float(parts.start[worst[0]]), float(parts.end[worst[-1]])
     return Jackknife(_spread(by_time), min(_spread(by_side), most), span)

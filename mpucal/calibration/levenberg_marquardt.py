@@ -163,14 +163,15 @@ def information(problem: Problem, theta: Theta, prior: Prior) -> Vector:
 
 
 def inverse(H: Vector) -> Vector:
-    """H^-1 with H scaled to a unit diagonal; of what nothing is known, the variance is infinite in all but name."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
-    scaled = H * np.outer(scale, scale)
+    """(..., p, p) H^-1, by a unit diagonal; of what nothing is known, the variance is infinite in all but name."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diagonal(H, axis1=-2, axis2=-1), 1e-300))
+    scale = scale[..., :, None] * scale[..., None, :]
+    scaled = H * scale
     try:
         result = np.linalg.inv(scaled)
     except np.linalg.LinAlgError:
         result = np.linalg.pinv(scaled, hermitian=True)
-    return np.asarray(result * np.outer(scale, scale))
+    return np.asarray(result * scale)
 
 
 def _solve(H: Vector, g: Vector) -> Vector:

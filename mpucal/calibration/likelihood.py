@@ -6,6 +6,7 @@ Two filters: the exact one for a sensor that turns in place, and the hand's, who
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -60,7 +61,7 @@ def evaluate(problem: Problem, theta: Theta, parameters: int, ends: NDArray[np.i
         V, squares, gradient, fisher = _exact(problem, theta, parameters, ends)
     lanes = _lanes(parameters)
     to_ends = None if ends is None else (gradient, fisher)
-    return Evaluation(V, squares, gradient[-1, lanes], fisher[-1][np.ix_(lanes, lanes)], to_ends)
+    return Evaluation(V, squares, gradient[-1, lanes], fisher[-1, lanes[:, None], lanes], to_ends)
 
 
 class PartScores(NamedTuple):
@@ -132,6 +133,7 @@ def _hand(
     return _kernel.evaluate_hand(theta.packed(TABLE), constants, derivatives, **series, ends=ends)
 
 
+@cache
 def _lanes(parameters: int) -> NDArray[np.intp]:
     return np.array(LANES[:parameters], np.intp)
 

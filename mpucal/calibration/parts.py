@@ -7,12 +7,13 @@ the covariance of the estimate knows nothing of it, and only the parts show it: 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..data import Vector
-from .levenberg_marquardt import Minimum
+from .levenberg_marquardt import Minimum, inverse
 from .likelihood import evaluate, part_scores
 from .prior import Prior
 from .problem import Problem
@@ -43,6 +44,11 @@ class Parts:
 
     def __len__(self) -> int:
         return len(self.side)
+
+    @cached_property
+    def covariance(self) -> Vector:
+        """(p, p) of the estimate, by the model."""
+        return inverse(self.H)
 
     def grouped(self, groups: NDArray[np.intp]) -> tuple[Vector, Vector]:
         """Gradients (m, p) and Fisher matrices (m, p, p) of groups of parts, by (k,) which group each part is in."""

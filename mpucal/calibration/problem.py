@@ -55,8 +55,7 @@ class Series:
 
     def arrays(self, names: tuple[str, ...]) -> dict[str, Any]:
         """The named fields as the kernel's keyword arguments."""
-        values = {name: getattr(self, name) for name in names}
-        return {name: None if value is None else np.ascontiguousarray(value) for name, value in values.items()}
+        return {name: getattr(self, name) for name in names}
 
 
 SERIES = ("y", "omega", "dt", "r_scale", "q_scale", "q_extra")
@@ -90,8 +89,8 @@ class Problem:
     def constants(self) -> Vector:
         """The exact filter's: gravity, Sigma_a, Sigma_omega, the flat mean, its count."""
         flat = self.flat
-        return np.array([self.gravity, *flat.Sigma_a, *flat.Sigma_omega, *flat.y, flat.n])
+        return np.concatenate([[self.gravity], flat.Sigma_a, flat.Sigma_omega, flat.y, [flat.n]])
 
     def constants_of_a_hand(self) -> Vector:
         """The hand's filter's: the exact one's, then huber, tail and lam."""
-        return np.append(self.constants(), [self.huber, self.tail, self.lam])
+        return np.concatenate([self.constants(), [self.huber, self.tail, self.lam]])

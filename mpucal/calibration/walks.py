@@ -18,6 +18,7 @@ explains is the gain with c^2 over the median of them all.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -131,18 +132,22 @@ def _block_diagonal(blocks: Vector) -> Vector:
     return M.reshape(3 * k, 3 * k)
 
 
+@cache
+def _sums(k: int) -> Vector:
+    """(3 k, 3 k) adds up k vectors of three numbers: each with all before it."""
+    return np.asarray(np.kron(np.tri(k), np.eye(3)))
+
+
 def _walk(what: What, parts: Parts, D: Vector, gradient: Vector, fisher: Vector, t: Vector) -> Walk:
     k, B = len(gradient), _directions(what, D, len(parts.H))
     to_theta = fisher @ B  # (k, p, 3)
     S = _block_diagonal(B.T @ to_theta)
     across = to_theta.transpose(1, 0, 2).reshape(-1, 3 * k)
-    scale = 1.0 / np.sqrt(np.diag(parts.H))
-    H = parts.H * np.outer(scale, scale)
     # how theta follows a delta
-    follow = (np.linalg.solve(H, across * scale[:, None]) * scale[:, None]).T
+    follow = across.T @ parts.covariance
     S -= follow @ across
     # the deltas of a walk are sums of x
-    sums = np.kron(np.eye(k) if what == "side" else np.tri(k), np.eye(3))
+    sums = np.eye(3 * k) if what == "side" else _sums(k)
     eigenvalues, U = np.linalg.eigh(sums.T @ S @ sums)
     eigenvalues = np.maximum(eigenvalues, 0.0)
     c = U.T @ (sums.T @ (follow @ parts.left - (gradient @ B).ravel()))
