@@ -110,7 +110,8 @@ def _right_handed(theta: Theta) -> Theta:
 
 
 def _minimum(problem: Problem, theta: Theta, prior: Prior) -> Minimum:
-    return minimise(problem, theta, HAND, prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True)
+    # what is asked for next hangs on H, so that it is that of the estimate itself
+    return minimise(problem, theta, HAND, prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True, unseen=0.0)
 
 
 def _prior(flat: Flat) -> Prior:

@@ -93,13 +93,15 @@ def minimise(
     until: float = DECREMENT,
     most: int = MOST_ITERATIONS,
     frozen: bool = False,
+    unseen: float = LAST,
     ends: NDArray[np.int64] | None = None,
 ) -> Minimum:
     """Minimise V + prior over the first `parameters` of NAMES, those of `fixed` (keys of PLACES) excepted.
 
     Stops where the Newton decrement g' H^-1 g / 2 falls below `until`, after `most` iterations, or where it no longer
-    falls. With `frozen` gains the gradient is not exactly that of V, and a step that brings it nearer to zero is
-    accepted too. Evaluations give sums up to `ends` as well, see evaluate.
+    falls. Below `unseen` times `until` a whole step is the last, and nobody looks where it led. With `frozen` gains the
+    gradient is not exactly that of V, and a step that brings it nearer to zero is accepted too. Evaluations give sums
+    up to `ends` as well, see evaluate.
     """
     free = np.ones(parameters, bool)
     for name in fixed:
@@ -114,7 +116,7 @@ def minimise(
             converged = True
             break
         step = np.zeros(parameters)
-        if decrement < LAST * (DECREMENT if frozen else until):
+        if decrement < unseen * until:
             last[free] = -_solve(H, gradient)
             converged, iterations = True, iterations + 1
             break

@@ -121,9 +121,11 @@ def _at_the_rail(values: Vector, ranges: Vector) -> Mask:
     for column in values.T:
         for rail in (column.max(), column.min()):
             at = column == rail
+            if np.count_nonzero(at) < FEWEST_AT_A_RANGE:
+                continue
             known = np.any(np.abs(np.abs(rail) / ranges - 1.0) < RANGE_TOLERANCE)
             runs = int(np.count_nonzero(at[1:] & at[:-1]))
-            if (known and at.sum() >= FEWEST_AT_A_RANGE) or (runs >= FEWEST_ANYWHERE and _beyond(column, rail)):
+            if known or (runs >= FEWEST_ANYWHERE and _beyond(column, rail)):
                 clipped |= at
     return clipped
 
