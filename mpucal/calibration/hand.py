@@ -49,7 +49,7 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     fine = preprocess(recording, (flat.first, flat.last), gravity, noise_factor)
     rough = means(noise_factor, recording, flat, SEARCH_HZ)
     search = _Search(preprocess(*downsampled(recording, flat, SEARCH_HZ), gravity, rough))
-    theta, noise = search.run(initialise(fine.problem, fine.flat.b_omega))
+    theta, noise = search.run(initialise(search.prepared.problem, fine.flat.b_omega))
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
         noise = Noise("white", likeliest(fine.white, SOME_MPS2, theta, noise.sigma))
     problem = _moved(noise.problem(fine), fine, theta)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 
 from ..data import Vector
 
 
+@cache
 def fibonacci_sphere(n: int) -> Vector:
     """(n, 3) unit vectors spread evenly over the sphere."""
     k = np.arange(n) + 0.5
