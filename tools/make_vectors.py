@@ -2,7 +2,8 @@
 
 Each blob_*.bin lies beside a blob_*.json that says what a reader must find in it, or why it must refuse it. Each
 line_*.bin is what goes over a serial line, and the line_*.json beside it says which frames a receiver must find. Each
-talk_*.json is what a host asks of a bridge, and what that must answer.
+talk_*.json is what a host asks of a bridge, and what that must answer; clock_*.json is what a narrow clock shows, and
+the 32 bits that the bridge must make of it.
 """
 
 from __future__ import annotations
@@ -227,7 +228,9 @@ def lines() -> dict[str, tuple[bytes, dict[str, Any]]]:
 
 Reply = tuple[wire.Status, bytes]
 Exchange = tuple[Frame, Reply | None]
-OK, CRC = (wire.Status.OK, b""), 0x5D9B9255
+# several are sent at once
+Talk = list[Exchange | list[Exchange]]
+OK, BAD_PAYLOAD, CRC = (wire.Status.OK, b""), (wire.Status.BAD_PAYLOAD, b""), 0x5D9B9255
 COMMIT, FIRST = Frame(0x14, 9, wire.BlobCommit(188, CRC).payload()), (wire.Status.OK, struct.pack("<I", 1))
 BEGIN = Frame(0x12, 8, wire.BlobBegin(188).payload())
 READ: Exchange = (Frame(0x02, 2, bytes([0x72, 2])), (wire.Status.OK, b"\x01\xf8"))
@@ -235,7 +238,7 @@ DATA: list[Exchange] = [
     (Frame(0x13, at // 32, wire.BlobData(at, MEASURED.encode()[at : at + 32]).payload()), OK)
     for at in range(0, 188, 32)
 ]
-TALKS: dict[str, tuple[str, list[Exchange]]] = {
+TALKS: dict[str, tuple[str, Talk]] = {
     "fifo_count": ("FIFO_COUNT passes through as it is in the chip, big-endian", [READ]),
     "types_from_0x80": (
         "types from 0x80 on are ignored",
@@ -243,11 +246,15 @@ TALKS: dict[str, tuple[str, list[Exchange]]] = {
     ),
     "other_magic": (
         "a HELLO with another magic is answered with BAD_PAYLOAD, and nothing is done",
-        [(Frame(0x01, 3, b"MPUX\1\0\0"), (wire.Status.BAD_PAYLOAD, b"")), READ],
+        [(Frame(0x01, 3, b"MPUX\1\0\0"), BAD_PAYLOAD), READ],
     ),
     "stream_stop_of_one_byte": (
         "STREAM needs both bytes to stop, too",
-        [(Frame(0x05, 4, b"\0"), (wire.Status.BAD_PAYLOAD, b"")), (Frame(0x05, 5, b"\0\0"), OK)],
+        [(Frame(0x05, 4, b"\0"), BAD_PAYLOAD), (Frame(0x05, 5, b"\0\0"), OK)],
+    ),
+    "window": (
+        "a host may send MIN_WINDOW requests at once; each is answered, in their order",
+        [[READ, (Frame(0x02, 3, bytes([0x72, 2])), READ[1])], [(Frame(0x05, 4, b"\0"), BAD_PAYLOAD), READ]],
     ),
     "commit_too_early": (
         "a commit that fails leaves what was begun as it was; one that is repeated succeeds, and changes nothing",
@@ -272,13 +279,32 @@ TALKS: dict[str, tuple[str, list[Exchange]]] = {
 }
 
 
-def talk(settled: str, exchanges: list[Exchange]) -> dict[str, Any]:
-    """A talk's JSON: requests as bytes on the line, replies as frames whose t_us is 0."""
-    said = []
-    for request, reply in exchanges:
-        answer = reply and Frame(request.type | wire.REPLY_BIT, request.seq, bytes([reply[0]]) + bytes(4) + reply[1])
-        said.append({"host": request.encode().hex(), "bridge": plain_frame(answer) if answer else None})
+def talk(settled: str, exchanges: Talk) -> dict[str, Any]:
+    """A talk's JSON: requests as bytes on the line, replies as frames whose t_us is 0; a list where several are due."""
+    said: list[dict[str, Any]] = []
+    for exchange in exchanges:
+        asked = exchange if isinstance(exchange, list) else [exchange]
+        answers = [
+            plain_frame(Frame(request.type | wire.REPLY_BIT, request.seq, bytes([reply[0]]) + bytes(4) + reply[1]))
+            for request, reply in asked
+            if reply is not None
+        ]
+        one = answers[0] if answers else None
+        host = b"".join(request.encode() for request, _ in asked)
+        said.append({"host": host.hex(), "bridge": answers if isinstance(exchange, list) else one})
     return {"settled": settled, "talk": said}
+
+
+def clock(bits: int) -> dict[str, Any]:
+    """A clock's JSON: what one of so many bits shows when it is asked, and `t_us`, which wraps meanwhile."""
+    # hardly less than it counts to
+    passed_us = [i * (2**bits - 3) for i in range(6)]
+    return {
+        "settled": "a clock that is narrower than 32 bits is extended to them",
+        "bits": bits,
+        "shows": [us % 2**bits for us in passed_us],
+        "t_us": [(2**32 - 2 ** (bits + 1) + us) % 2**32 for us in passed_us],
+    }
 
 
 def slots(*generations: int) -> bytes:
@@ -287,6 +313,8 @@ def slots(*generations: int) -> bytes:
     return b"".join(seal + MEASURED.encode().ljust(256, b"\0") for seal in seals)
 
 
+# MicroPython's has 30; others have a timer of 24
+CLOCK_BITS = (24, 30)
 SLOTS = {"wrapped": (2**32 - 1, 1), "before_the_wrap": (2**32 - 2, 2**32 - 1), "half_way": (2**31, 1)}
 
 
@@ -299,6 +327,8 @@ def write(folder: Path) -> None:
             (folder / f"{prefix}_{name}.json").write_text(json.dumps(content, indent=2) + "\n")
     for name, (settled, exchanges) in TALKS.items():
         (folder / f"talk_{name}.json").write_text(json.dumps(talk(settled, exchanges), indent=2) + "\n")
+    for bits in CLOCK_BITS:
+        (folder / f"clock_{bits}_bits.json").write_text(json.dumps(clock(bits), indent=2) + "\n")
     for name, generations in SLOTS.items():
         (folder / f"slots_{name}.bin").write_bytes(slots(*generations))
         late = 0 if (generations[1] - generations[0]) % 2**32 >= 2**31 else 1

@@ -17,16 +17,29 @@ PACKAGE = Path(__file__).parents[1]
 FOLDERS = (PACKAGE / "firmware", PACKAGE.parent / "tools" / "firmware")
 LIBRARY = ("src", "examples", "library.properties", "library.json", "keywords.txt", "README.md")
 HEX = "mpucal_bridge.hex"
-# boards with an ATmega328P at 16 MHz, and the rate of their boot loader
-BOARDS = {"uno": 115_200, "nano": 115_200, "nano-old": 57_600}
+LICENCE = "LICENSE"
+# boards with an ATmega328P at 16 MHz, which take the image, and the rate of their boot loader
+BAUDS = {"uno": 115_200, "nano": 115_200, "nano-old": 57_600}
+# what arduino-cli calls others, for which it builds the sketch and finds their own tool
+NAMES = {
+    "mega": "arduino:avr:mega",
+    "leonardo": "arduino:avr:leonardo",
+    "esp32": "esp32:esp32:esp32",
+    "esp8266": "esp8266:esp8266:nodemcuv2",
+    "pico": "rp2040:rp2040:rpipico",
+}
 
 
 @click.command("firmware", epilog=EXAMPLE)
 @click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Write the Arduino library here.")
 @click.option("--flash", "port", metavar="PORT", help="Write the bridge onto the board on this serial port.")
-@click.option("--board", type=click.Choice(list(BOARDS)), default="uno", show_default=True, help="What is on PORT.")
+@click.option("--board", type=click.Choice([*BAUDS, *NAMES]), default="uno", show_default=True, help="What is on PORT.")
 def command(folder: Path | None, port: str | None, board: str) -> None:
-    """Write the serial bridge's firmware: as a library for the Arduino IDE, or onto an Uno or Nano, by avrdude."""
+    """Write the serial bridge's firmware: as a library for the Arduino IDE, or onto a board.
+
+    An Uno or Nano is written by avrdude, from an image that mpucal holds; for other boards arduino-cli builds the
+    sketch, and writes it with the tool of their core.
+    """
     if (folder is None) == (port is None):
         raise UsageError("`mpucal firmware` takes one of -o DIR and --flash PORT", "give one of them")
     if folder is not None:
@@ -51,6 +64,9 @@ def _write(folder: Path) -> None:
         for name in LIBRARY:
             copy = shutil.copytree if (source / name).is_dir() else shutil.copyfile
             copy(source / name, folder / name)
+        # in a checkout it is that of all
+        licences = (source / LICENCE, source.parents[1] / LICENCE)
+        shutil.copyfile(next(filter(Path.is_file, licences), licences[0]), folder / LICENCE)
     except FileExistsError as error:
         raise OutputError(f"{folder} is there already", "choose another folder with -o") from error
     except OSError as error:
@@ -58,16 +74,27 @@ def _write(folder: Path) -> None:
 
 
 def _flash(port: str, board: str) -> None:
+    words = _by_avrdude(port, BAUDS[board]) if board in BAUDS else _by_arduino(port, NAMES[board])
+    if shutil.which(words[0]) is None:
+        core = "" if board in BAUDS else f" and the core {NAMES[board].rpartition(':')[0]}"
+        raise SourceError(f"there is no {words[0]} to write it with", f"install it{core}, then: {shlex.join(words)}")
+    if subprocess.run(words, check=False).returncode:
+        raise WriteBackError(
+            f"{words[0]} could not write to the board on {port}",
+            "check that nothing else uses the port, and --board: an old Nano needs nano-old",
+        )
+
+
+def _by_avrdude(port: str, baud: int) -> list[str]:
     source = _source()
     image = next((path for path in (source / HEX, source / "build" / HEX) if path.is_file()), None)
     if image is None:
         raise SourceError("this installation of mpucal holds no image of the bridge", "make it: `make firmware`")
     upload = f"flash:w:{image}:i"
-    words = ["avrdude", "-p", "atmega328p", "-c", "arduino", "-b", str(BOARDS[board]), "-P", port, "-D", "-U", upload]
-    if shutil.which(words[0]) is None:
-        raise SourceError("there is no avrdude to write it with", f"install it, then: {shlex.join(words)}")
-    if subprocess.run(words, check=False).returncode:
-        raise WriteBackError(
-            f"avrdude could not write to the board on {port}",
-            "check that nothing else uses the port; an old Nano needs --board nano-old",
-        )
+    return ["avrdude", "-p", "atmega328p", "-c", "arduino", "-b", str(baud), "-P", port, "-D", "-U", upload]
+
+
+def _by_arduino(port: str, name: str) -> list[str]:
+    source = _source()
+    sketch = str(source / "examples" / "mpucal_bridge")
+    return ["arduino-cli", "compile", "--upload", "-b", name, "-p", port, "--library", str(source), sketch]

@@ -32,8 +32,8 @@ def installed(tmp_path, monkeypatch):
     return folder
 
 
-def avrdude(folder, code):
-    path = folder / "avrdude"
+def program(folder, code, name="avrdude"):
+    path = folder / name
     path.write_text(f'#!/bin/sh\necho "$@" > {folder}/said\nexit {code}\n')
     path.chmod(0o755)
 
@@ -41,7 +41,7 @@ def avrdude(folder, code):
 def test_the_library_is_written_whole(tmp_path, capsys):
     folder = tmp_path / "libraries" / "mpucal"
     assert run(["firmware", "-o", str(folder)]) == 0
-    for name in firmware.LIBRARY:
+    for name in (*firmware.LIBRARY, firmware.LICENCE):
         assert (folder / name).exists()
     for path in FIRMWARE.glob("src/*"):
         assert (folder / "src" / path.name).read_bytes() == path.read_bytes()
@@ -51,7 +51,7 @@ def test_the_library_is_written_whole(tmp_path, capsys):
 
 @pytest.mark.parametrize(("board", "baud"), [("uno", "115200"), ("nano-old", "57600")])
 def test_avrdude_is_told_what_to_write(installed, programs, board, baud):
-    avrdude(programs, 0)
+    program(programs, 0)
     assert run(["firmware", "--flash", "/dev/ttyX", "--board", board]) == 0
     said = (programs / "said").read_text().split()
     assert said[said.index("-b") + 1] == baud
@@ -60,9 +60,20 @@ def test_avrdude_is_told_what_to_write(installed, programs, board, baud):
 
 
 def test_a_board_that_was_not_written_is_said(installed, programs, capsys):
-    avrdude(programs, 1)
+    program(programs, 1)
     assert run(["firmware", "--flash", "/dev/ttyX"]) == 6
     assert "could not write to the board on /dev/ttyX" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("board", firmware.NAMES)
+def test_other_boards_are_left_to_arduino_cli(installed, programs, capsys, board):
+    assert run(["firmware", "--flash", "/dev/ttyX", "--board", board]) == 3
+    command = capsys.readouterr().err.partition("then: ")[2].strip().rstrip(".")
+    name, core = firmware.NAMES[board], installed / "examples" / "mpucal_bridge"
+    assert command == f"arduino-cli compile --upload -b {name} -p /dev/ttyX --library {installed} {core}"
+    program(programs, 0, "arduino-cli")
+    assert run(["firmware", "--flash", "/dev/ttyX", "--board", board]) == 0
+    assert f"arduino-cli {(programs / 'said').read_text().strip()}" == command
 
 
 def test_without_avrdude_the_command_is_given(installed, programs, capsys):

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -28,6 +30,12 @@ def test_both_package_managers_read_the_same():
     package = json.loads((FIRMWARE / "library.json").read_text())
     assert (properties["name"], properties["version"]) == (package["name"], package["version"])
     assert properties["category"] == "Sensors"
+    # what the IDE takes no library without, and Library Manager none where it is empty or no URL
+    for name in ("author", "maintainer", "sentence", "paragraph", "url"):
+        assert properties[name]
+    assert urlsplit(properties["url"]).scheme == "https"
+    (author,) = tomllib.loads((FIRMWARE.parents[1] / "pyproject.toml").read_text())["project"]["authors"]
+    assert properties["author"] == properties["maintainer"] == package["authors"]["name"] == author["name"]
     assert (FIRMWARE / "src" / properties["includes"]).is_file()
 
 
