@@ -10,8 +10,8 @@ from ..parameters import BY_NAME
 OFF_PPM, UNKNOWN = 500.0, 500e-6
 # they estimate no scale factor of the gyroscope
 TRUSTING = ("accel", "paper", "tilt")
-# What filters of chips leave is some ms; those of an autopilot's stream are set by its owner, and leave 20.
-LAG_S, SURE = 0.012, 5.0
+# What filters leave is 10 ms at most where both have the same; those of an autopilot are set by its owner, and differ.
+LAG_S, SURE = 0.02, 5.0
 
 
 def clock_off(e: Evidence) -> Reason | None:
