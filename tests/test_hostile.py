@@ -16,7 +16,7 @@ def holds(tool, *words):
 
 
 def test_readers_refuse_mutated_bytes():
-    holds("fuzz.py", "--seconds", "0.5")
+    holds("fuzz.py", "--seconds", "0.2")
 
 
 @pytest.mark.parametrize(("seed", "target"), [("207790003882", "npz"), ("207790000083", "dataflash")])

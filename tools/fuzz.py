@@ -2,8 +2,9 @@
 
     python tools/fuzz.py --seconds 60 [TARGET ...]
 
-Each target has a corpus of the fixtures and of files that are made here, and gets bytes of it that are damaged as in
-tools/campaign_recordings.py, cut, joined, or with one piece in the place of another's. A line counts its executions.
+Each target has a corpus of the fixtures, of files that are made here, or of one in a dialect of tools/dialects.py, as
+rosbags, pyulog, pandas and others write it, and gets bytes of it that are damaged as in tools/campaign_recordings.py,
+cut, joined, or with one piece in the place of another's. A line counts its executions.
 What it should not have raised is printed with the seed that makes it again (--first SEED --seconds 0 TARGET).
 """
 
@@ -15,6 +16,7 @@ import signal
 import sys
 import time
 import traceback
+import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,10 +24,12 @@ from types import FrameType
 
 import numpy as np
 from campaign_recordings import OF_BYTES
+from dialects import dialects, walk
 
 from mpucal import Calibration
 from mpucal.errors import MpucalError
 from mpucal.files import load
+from mpucal.files.hints import NO_HINTS, Hints
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.result.blob import Blob, BlobError
 from mpucal.result.noise import Noise
@@ -44,13 +48,13 @@ def table() -> np.ndarray:
     return np.column_stack((t, np.tile((0.1, -0.2, 9.8), (300, 1)), np.sin(t)[:, None] * (1.0, 0.5, -0.5)))
 
 
-def of_file(read: Callable[[Path], object], place: Path, name: str) -> Run:
+def of_file(read: Callable[..., object], place: Path, name: str, *more: object) -> Run:
     """Of bytes as a file of that name."""
     path = place / name
 
     def run(data: bytes) -> object:
         path.write_bytes(data)
-        return read(path)
+        return read(path, *more)
 
     return run
 
@@ -99,12 +103,33 @@ def targets(place: Path) -> dict[str, tuple[Run, list[bytes]]]:
         "mcap": (of_file(load, place, "r.mcap"), captures),
         "tlog": (of_file(load, place, "r.tlog"), [bytes(8) + heartbeats()]),
         "dataflash": (of_file(load, place, "r.bin"), [b"\xa3\x95\x80" + bytes(range(86)) * 9, blobs[0]]),
-        "ulg": (of_file(load, place, "r.ulg"), [b"ULog\x01\x12\x35\x01" + bytes(range(256)) * 2]),
-        "bag": (of_file(load, place, "r.bag"), [b"#ROSBAG V2.0\n" + bytes(range(256)) * 2]),
-        "db3": (of_file(load, place, "r.db3"), [b"SQLite format 3\0" + bytes(range(256)) * 4]),
-        "parquet": (of_file(load, place, "r.parquet"), [b"PAR1" + bytes(range(256)) + b"PAR1"]),
-        "zip": (of_file(load, place, "r.zip"), [npz.getvalue()]),
+        **{name: of_dialect(place, *written) for name, written in written_dialects(place).items()},
     }
+
+
+def written_dialects(place: Path) -> dict[str, tuple[Path, Hints]]:
+    """Name -> a file of some 60 samples; of what is a folder, an archive, or the bag's file."""
+    found, short = {}, walk().part(2000, 2060)
+    ns = np.rint(short.t * 1e9).astype(np.int64) + 1_700_000_000_000_000_000
+    for number, (name, (_, write, hints)) in enumerate(dialects().items()):
+        folder = place / str(number)
+        folder.mkdir()
+        path = write(folder, short, ns)
+        children = sorted(path.iterdir()) if path.is_dir() else []
+        if path / "metadata.yaml" in children:
+            path = next(child for child in children if child.suffix != ".yaml")
+        elif children:
+            path = folder / "tables.zip"
+            with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+                for child in children:
+                    archive.write(child, child.name)
+        found[name] = path, hints
+    return found
+
+
+def of_dialect(place: Path, path: Path, hints: Hints = NO_HINTS) -> tuple[Run, list[bytes]]:
+    """Its reader, and its file as the corpus."""
+    return of_file(load, place, f"r{path.suffix}", hints), [path.read_bytes()]
 
 
 def mutated(corpus: Sequence[bytes], seed: int) -> bytes:
@@ -155,7 +180,7 @@ def main() -> int:
         for name in asked.targets or of:
             count, wrong = fuzz(name, *of[name], asked.first, asked.seconds)
             bad += wrong
-            print(f"{name:<18}{count:>9} executions, seeds from {asked.first} on: {wrong} wrong", flush=True)
+            print(f"{name:<44}{count:>9} executions, seeds from {asked.first} on: {wrong} wrong", flush=True)
     return int(bad > 0)
 
 

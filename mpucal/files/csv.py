@@ -30,8 +30,8 @@ NS = 10**9
 # some 16000 lines
 BLOCK = 1 << 21
 _REMEDY = (
-    f"name the columns in the first line, in any order: {','.join(COLUMNS)} (s, m/s^2, rad/s), or say with --columns"
-    " t=NAME,ax=NAME,... which is what"
+    f"name the columns in the first line, in any order: {','.join(COLUMNS)} (s, m/s^2, rad/s), or say which is what:"
+    f" --columns t=NAME,ax=NAME,... or, in their order, --columns {','.join(COLUMNS)}"
 )
 
 

@@ -14,7 +14,7 @@ from .extras import library
 from .hints import NO_HINTS, Hints
 from .tables.names import ACC, GYR, TEMPERATURE, TIME, Column, columns_of, three, threes
 from .tables.streams import recording_of, with_gravity
-from .tables.table import chosen, remarks
+from .tables.table import chosen, remarks, whole
 from .tables.times import Stream
 
 
@@ -63,14 +63,14 @@ def _stream(arrays: dict[str, NDArray[Any]], of: tuple[Column, ...], clocks: lis
     except (TypeError, ValueError) as error:
         raise RecordingError(f"{of[0].name} and the like hold no numbers ({error})", "write numbers") from error
     values = -values if of[0].turned_around else values
-    there = ~np.isnan(values).all(axis=1)
+    there, lost = whole(values)
     unit = of[0].unit if len({column.unit for column in of}) == 1 else ""
     clock = min((c for c in clocks if c.of in ("", of[0].quantity)), key=lambda c: (not c.of, c.rank), default=None)
     if clock is None:
-        return Stream(None, values[there], unit=unit)
+        return Stream(None, values[there], unit=unit, places=np.flatnonzero(there), lost=lost)
     times, time_unit = arrays[clock.name][there], clock.unit
     if times.dtype.kind in "Mm":
         times, time_unit = times.astype(f"{times.dtype.kind}8[ns]").astype(np.int64), "ns"
     elif times.dtype.kind == "u":
         times = times.astype(np.int64)
-    return Stream(times, values[there], time_unit, unit)
+    return Stream(times, values[there], time_unit, unit, lost=lost)

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable
+from contextlib import redirect_stdout
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +51,8 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """
     reader = library("pyulog", "px4", path)
     try:
-        with path.open("rb") as file:
+        # it prints what it finds of damage, where results go
+        with path.open("rb") as file, redirect_stdout(StringIO()):
             log = reader.ULog(file, [COMBINED, ACCEL, GYRO])
     except OSError as error:
         raise RecordingError(f"cannot read {path} ({error.strerror or error})", "check the path") from error
@@ -60,6 +63,7 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
     if hints.topic not in (None, COMBINED, ACCEL):
         raise RecordingError(f"{path.name} is read by {ACCEL} or {COMBINED}", f"give --topic {ACCEL} or {COMBINED}")
     raw = (ACCEL, 0) in topics and (GYRO, 0) in topics
+    damage = ["it is damaged, and what is whole of it was read"] if log.file_corruption else []
     try:
         fast = raw and all(_is_fast(topics[name, 0]) for name in (ACCEL, GYRO))
         if raw and (hints.topic == ACCEL or (hints.topic is None and (fast or (COMBINED, 0) not in topics))):
@@ -67,7 +71,7 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
             others = sum(name == ACCEL for name, _ in topics) - 1
             more = [f"{others} more accelerometers are in it"] if others else []
             return recording_of(
-                acc, gyr, hints, path.name, remarks=[f"from {ACCEL} and {GYRO}, the first of each", *more]
+                acc, gyr, hints, path.name, remarks=[f"from {ACCEL} and {GYRO}, the first of each", *more, *damage]
             )
         if (COMBINED, 0) in topics and hints.topic != ACCEL:
             combined = topics[COMBINED, 0]
@@ -76,7 +80,7 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
             acc = replace(acc, times=np.asarray(acc.times) + _later_us(combined))
             slow = [f"{ACCEL} is logged too slowly"] if raw and not fast else []
             remark = f"from {COMBINED}, which PX4 has corrected by its parameters already"
-            return recording_of(acc, gyr, hints, path.name, remarks=[remark, *slow])
+            return recording_of(acc, gyr, hints, path.name, remarks=[remark, *slow, *damage])
     except _DAMAGE as error:
         raise RecordingError(f"{path} is no whole log of PX4 ({error})", "fetch it from the vehicle again") from error
     has = ", ".join(sorted({name for name, _ in topics})) or "none of them"

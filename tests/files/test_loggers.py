@@ -175,3 +175,97 @@ def test_times_that_are_not_known_as_such_are_named(walk, tmp_path):
     made(walk, walk.t).rename(columns={"time": "SampleTimeFine"}).to_csv(tmp_path / "walk.csv", index=False)
     with pytest.raises(RecordingError, match="no times that are known as such; its columns are SampleTimeFine, ax"):
         load(tmp_path / "walk.csv")
+
+
+def sensor_loggers_one_table(walk, sign, in_g, uncalibrated=True):
+    """Its columns stand in the order z, y, x; `accelerometer` is without gravity."""
+    still = np.random.default_rng(0).normal(0.0, 0.05, (len(walk), 3))
+    of = {"accelerometer": still, "totalAcceleration": sign * walk.acc, "gyroscope": walk.gyr}
+    if uncalibrated:
+        of["accelerometerUncalibrated"] = sign * walk.acc / (G if in_g else 1.0)
+    columns = {f"{name}_{axis}": values[:, "xyz".index(axis)] for name, values in of.items() for axis in "zyx"}
+    return pd.DataFrame({"seconds_elapsed": walk.t, **columns})
+
+
+@pytest.mark.parametrize("ios", [False, True])
+def test_sensor_loggers_one_table(ios, walk, assert_same, tmp_path):
+    sensor_loggers_one_table(walk, -1 if ios else 1, ios).to_csv(tmp_path / "one.csv", index=False)
+    read = load(tmp_path / "one.csv")
+    assert_same(read, walk, 1e-9, 1e-9, 1e-9)
+    assert ("the other sign, as iOS has them" in read.taken) == ios
+
+
+def test_a_table_that_does_not_say_whose_sign_it_has_is_said(walk, assert_same, tmp_path):
+    sensor_loggers_one_table(walk, 1, False, uncalibrated=False).to_csv(tmp_path / "one.csv", index=False)
+    assert "which on iOS is the other one" in load(tmp_path / "one.csv").taken
+
+
+def pair(folder, walk, times, order=(0, 1, 2, 3)):
+    """Two tables without names, as data sets have them: time, x, y, z."""
+    for name, values in (("acce.txt", walk.acc), ("gyro.txt", walk.gyr)):
+        columns = [times, *values.T]
+        table = pd.DataFrame({k: columns[place] for k, place in enumerate(order)})
+        table.to_csv(folder / name, sep=" ", header=False, index=False)
+
+
+def test_two_tables_without_names(walk, walk_ns, assert_same, tmp_path):
+    pair(tmp_path, walk, walk_ns)
+    read = load(tmp_path)
+    assert_same(read, walk)
+    assert "from acce.txt and gyro.txt" in read.taken
+
+
+@pytest.mark.parametrize("said", ["ax,ay,az,t", "t=4,ax=1,ay=2,az=3,gx=1,gy=2,gz=3"])
+def test_two_tables_without_names_whose_columns_are_said(said, walk, walk_ns, assert_same, tmp_path):
+    pair(tmp_path, walk, walk_ns, (1, 2, 3, 0))
+    with pytest.raises(RecordingError):
+        load(tmp_path)
+    assert_same(load(tmp_path, Hints(columns=parse_columns(said))), walk)
+
+
+@pytest.mark.parametrize("odd", ["", "nan", "inf"])
+def test_lines_that_lack_a_number_are_left_out_and_said(odd, walk, tmp_path):
+    rows = made(walk, walk.t).astype(str)
+    rows.iloc[100, 2] = odd
+    rows.to_csv(tmp_path / "a.csv", index=False)
+    read = load(tmp_path / "a.csv")
+    np.testing.assert_allclose(read.acc, np.delete(walk.acc, 100, axis=0), atol=1e-9)
+    assert "1 lines whose accelerations lack a number were left out" in read.taken
+    rows.drop(columns="time").to_csv(tmp_path / "b.csv", index=False)
+    read = load(tmp_path / "b.csv", Hints(rate_hz=100.0))
+    assert read.t[100] - read.t[99] == pytest.approx(0.02), "its time passed all the same"
+
+
+def test_a_line_that_was_torn_at_the_end_is_left_out_and_said(walk, assert_same, tmp_path):
+    text = made(walk, walk.t).to_csv(index=False)
+    (tmp_path / "a.csv").write_text(text + "99.0,1.0,2.0")
+    read = load(tmp_path / "a.csv")
+    assert_same(read, walk, 1e-9, 1e-9, 1e-9)
+    assert "1 lines that lack a number" in read.taken
+
+
+def test_seconds_and_nanoseconds_in_columns_of_their_own(walk, walk_ns, assert_same, tmp_path):
+    table = made(walk, walk_ns // 10**9).rename(columns={"time": "header.stamp.sec"})
+    table.insert(1, "header.stamp.nanosec", walk_ns % 10**9)
+    table.to_csv(tmp_path / "a.csv", index=False)
+    read = load(tmp_path / "a.csv")
+    assert_same(read, walk, 1e-9, 1e-9, 1e-9)
+    assert read.utc_ns == walk_ns[0]
+
+
+@pytest.mark.parametrize(("encoding", "end"), [("utf-16", "\n"), ("utf-8-sig", "\r\n"), ("utf-8", "\r")])
+def test_text_as_other_systems_write_it(encoding, end, walk, assert_same, tmp_path):
+    made(walk, walk.t).to_csv(tmp_path / "a.csv", index=False, encoding=encoding, lineterminator=end)
+    assert_same(load(tmp_path / "a.csv"), walk, 1e-9, 1e-9, 1e-9)
+
+
+def test_a_line_for_each_sensor(walk, tmp_path):
+    """As Adafruit's basic_readings prints."""
+    lines = "Acceleration X: {:.4f}, Y: {:.4f}, Z: {:.4f} m/s^2\r\nRotation X: {:.5f}, Y: {:.5f}, Z: {:.5f} rad/s\r\n"
+    text = "".join(
+        lines.format(*a, *w) + "Temperature: 25.00 degC\r\n\r\n" for a, w in zip(walk.acc, walk.gyr, strict=True)
+    )
+    (tmp_path / "a.txt").write_text("MPU6050 Found!\r\n" + text)
+    read = load(tmp_path / "a.txt", Hints(rate_hz=100.0))
+    np.testing.assert_allclose(read.acc, walk.acc, atol=1e-4)
+    np.testing.assert_allclose(read.gyr, walk.gyr, atol=1e-5)

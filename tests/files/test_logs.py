@@ -163,3 +163,13 @@ def test_a_library_that_is_missing_is_named(name, extra, tmp_path, monkeypatch):
     (tmp_path / name).touch()
     with pytest.raises(RecordingError, match=rf"pip install 'mpucal\[{extra}\]'"):
         load(tmp_path / name)
+
+
+def test_a_damaged_log_says_so_in_what_was_taken_alone(walk, t_us, tmp_path, capsys):
+    path = ulog(tmp_path / "log.ulg", ("sensor_combined", 0, combined(t_us, walk)))
+    data = bytearray(path.read_bytes())
+    half = len(data) // 2
+    data[half : half + 40] = bytes(40)
+    path.write_bytes(data)
+    assert "it is damaged" in load(path).taken
+    assert capsys.readouterr().out == "", "results go there"

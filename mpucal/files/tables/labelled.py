@@ -13,10 +13,14 @@ _NAME, _NUMBER = (
     r"([-+]?(?:\d{1,20}\.?\d{0,20}|\.\d{1,20})(?:[eE][-+]?\d{1,3})?)",
 )
 _PAIR = re.compile(rf"{_NAME}\s?[:=][ \t]{{0,9}}{_NUMBER}(?![\w:])")
+# a line for each sensor, as in Adafruit's examples: `Acceleration X: 0.1, Y: ...` and `Rotation X: 0.2, Y: ...`
+_AXES = re.compile(r"^(Acceleration|Rotation) X:([^,\n]{1,30}),[ ]?Y:([^,\n]{1,30}),[ ]?Z:", re.MULTILINE)
+_TWO_LINES = re.compile(r"^(AccelerationX:[^\n]{1,90})\n(?=RotationX:)", re.MULTILINE)
 
 
 def labelled_table(text: str, name: str) -> TextTable | None:
     """The table in such lines; None where no line names all six. What stands between them is left out."""
+    text = _TWO_LINES.sub(r"\1, ", _AXES.sub(r"\1X:\2, \1Y:\3, \1Z:", text))
     for line in text.split("\n", PREAMBLE)[:PREAMBLE]:
         header = _names(line)
         columns = columns_of(header)

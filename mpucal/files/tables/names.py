@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from .units import COUNTS, QUANTITIES, unit_named
 
-TIME, ACC, GYR, TEMPERATURE = "t", "acc", "gyr", "temperature_c"
+TIME, NANOSECONDS, ACC, GYR, TEMPERATURE = "t", "nanoseconds", "acc", "gyr", "temperature_c"
 # stem -> the unit that its program writes, empty where that differs; the first known is taken where there are several
 ACC_STEMS = {
     "accelerometeruncalibrated": "",
@@ -50,6 +50,7 @@ GYR_STEMS = {
     "gyroadc": "deg/s",
     "rotationrate": "",
     "motionrotationrate": "",
+    "rotation": "",
 }
 TIME_STEMS = {
     "headerstamp": "ns",
@@ -72,7 +73,16 @@ TIME_STEMS = {
     "millis": "ms",
     "micros": "us",
     "rtctime": "",
+    "datetime": "",
+    "date": "",
+    "secs": "s",
+    "headerstampsec": "s",
+    "headerstampsecs": "s",
+    "stampsec": "s",
+    "stampsecs": "s",
 }
+# beside whole seconds: builtin_interfaces/Time, and ROS 1's time
+NANOSECOND_STEMS = tuple(f"{of}{word}" for of in ("", "stamp", "headerstamp") for word in ("nanosec", "nsecs", "nsec"))
 # each sensor's own clock: SensorLog
 OWN_TIMES = {"accelerometertimestampsincereboot": ACC, "gyrotimestampsincereboot": GYR}
 TEMPERATURE_STEMS = ("temperature", "temp")
@@ -130,6 +140,8 @@ def _known(name: str, place: int, text: str, axis: int, unit: str) -> Column | N
     for word in (compact, *_without_prefixes(compact)):
         if word in OWN_TIMES and unit in _OF_TIME:
             return Column(name, place, TIME, unit=unit or "s", of=OWN_TIMES[word])
+        if word in NANOSECOND_STEMS and not unit:
+            return Column(name, place, NANOSECONDS)
         if word in TIME_STEMS and axis < 0 and unit in _OF_TIME:
             return Column(name, place, TIME, unit=unit or TIME_STEMS[word], rank=list(TIME_STEMS).index(word))
         if (word in (*TEMPERATURE_STEMS, "t") and unit == "C") or word == "temperaturec":
@@ -190,4 +202,16 @@ def three(columns: list[Column], quantity: str) -> tuple[Column, ...]:
     return next(iter(threes(columns, quantity)), ())
 
 
-__all__ = ["ACC", "COUNTS", "GYR", "TEMPERATURE", "TIME", "Column", "column_named", "columns_of", "three", "threes"]
+__all__ = [
+    "ACC",
+    "COUNTS",
+    "GYR",
+    "NANOSECONDS",
+    "TEMPERATURE",
+    "TIME",
+    "Column",
+    "column_named",
+    "columns_of",
+    "three",
+    "threes",
+]

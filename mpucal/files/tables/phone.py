@@ -22,7 +22,7 @@ from ..rows import cannot_read
 from .apps import is_about, said
 from .names import ACC, GYR, Column, bare_axis, three
 from .streams import recording_of
-from .table import stream_of
+from .table import chosen, stream_of
 from .text import TextTable, table_of, text_of
 from .times import Stream
 from .units import QUANTITIES, acceleration_unit
@@ -120,7 +120,7 @@ def _recording(name: str, texts: Mapping[str, bytes], hints: Hints) -> Recording
     for quantity in NAMES:
         ranks = {member: rank for member in texts if (rank := _rank(member, quantity)) is not None}
         for member in sorted(ranks, key=lambda m: (ranks[m], m)):
-            stream = _stream(f"{name}/{Path(member).name}", texts[member], quantity)
+            stream = _stream(f"{name}/{Path(member).name}", texts[member], quantity, hints)
             if quantity == ACC and len(stream.values) and not acceleration_unit(stream.values):
                 without_gravity = without_gravity or member
                 continue
@@ -138,18 +138,40 @@ def _recording(name: str, texts: Mapping[str, bytes], hints: Hints) -> Recording
     return recording_of(acc, gyr, hints, name, remarks=[of, *about.remarks])
 
 
-def _stream(name: str, data: bytes, quantity: str) -> Stream:
-    text = text_of(data, name)
-    table = table_of(text, name) or table_of(text, name, bare=True)
+def _stream(name: str, data: bytes, quantity: str, hints: Hints) -> Stream:
+    text, said = text_of(data, name), _said(hints, quantity)
+    if said:
+        table = table_of(text, name, list(said.values()))
+    else:
+        table = table_of(text, name) or table_of(text, name, bare=True) or _of_four(text, name)
     if table is None or not table.rows:
-        raise RecordingError(f"{name} names no columns x, y and z", "name its columns in its first line: time, x, y, z")
-    columns = table.columns
+        raise RecordingError(
+            f"{name} names no columns x, y and z",
+            "name its columns in its first line (time, x, y, z), or say their order with --columns t,ax,ay,az",
+        )
+    columns = chosen(table.header, replace(hints, columns=said)) if said else table.columns
     of = three(columns, quantity) or _bare(table, quantity)
     if not of:
         raise RecordingError(
             f"{name} holds the columns {', '.join(table.header)}, and no {quantity}", "record both sensors"
         )
     return stream_of(table, columns, of)
+
+
+def _said(hints: Hints, quantity: str) -> dict[str, str | int]:
+    """Role -> column of one sensor's table; where the gyroscope's are not said they are as the accelerometer's."""
+    letter = "a" if quantity == ACC else "g"
+    of = letter if f"{letter}x" in hints.columns else "a"
+    found = {role.replace(of, letter): where for role, where in hints.columns.items() if role[0] in (of, "t")}
+    return found if len(found) > 1 else {}
+
+
+def _of_four(text: str, name: str) -> TextTable | None:
+    """A table of four numbers a line, as data sets have them: time, x, y, z."""
+    table = table_of(text, name, range(4))
+    if table is None or any(len(row) != 4 for row in table.rows):
+        return None
+    return replace(table, header=["time", "x", "y", "z"])
 
 
 def _bare(table: TextTable, quantity: str) -> tuple[Column, ...]:

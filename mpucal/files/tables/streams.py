@@ -46,14 +46,17 @@ def recording_of(
     RecordingError : units that nothing says or that do not fit, times that do not overlap, no recording.
     """
     for stream, what in ((acc, "accelerations"), (gyr, "rates")):
-        if len(stream.values) < 2 or not (np.abs(stream.values) < units.BEYOND).all():
+        if len(stream.values) < 2:
+            raise RecordingError(f"{name} holds {len(stream.values)} {what}", "record for longer")
+        read = np.abs(stream.values).max(axis=1) < units.BEYOND
+        if not read.all():
             raise RecordingError(
-                f"{name} holds {len(stream.values)} {what}, or some that no sensor reads",
-                "record for longer, or leave those lines out",
+                f"{name}: sample {int(read.argmin())} has {what} that no sensor reads", "leave that sample out"
             )
     fresh = acc.fresh
     temperature_c = None if temperature_c is None else temperature_c[fresh]
     again = int((~fresh).sum())
+    lost = [(acc.lost, "accelerations"), (gyr.lost, "rates")]
     acc, gyr = acc.part(fresh), gyr.part(gyr.fresh)
     (t, of_t), (t_gyr, of_t_gyr) = (times.seconds(stream, acc, hints, name) for stream in (acc, gyr))
     a, of_a, a_clipped = _accelerations(acc, hints, name)
@@ -70,6 +73,7 @@ def recording_of(
         f"Of {name} {of_times}, accelerations {of_a} and rates {of_w} were taken as such",
         *remarks,
         f"{again} samples that are written again were left out" if again else "",
+        *(f"{count} lines whose {what} lack a number were left out" for count, what in lost if count),
         joined,
     ]
     recording = Recording.from_arrays(

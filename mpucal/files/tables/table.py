@@ -8,18 +8,34 @@ from pathlib import Path
 
 import numpy as np
 
-from ...data import Recording
+from ...data import Mask, Recording, Vector
 from ...errors import RecordingError
 from ..csv import COLUMNS
 from ..hints import NO_HINTS, Hints
 from ..rows import cannot_read
 from .labelled import labelled_table
-from .names import ACC, GYR, TEMPERATURE, TIME, Column, columns_of, three, threes
+from .names import (
+    ACC,
+    GYR,
+    NANOSECONDS,
+    TEMPERATURE,
+    TIME,
+    Column,
+    columns_of,
+    three,
+    threes,
+)
 from .streams import recording_of, with_gravity
-from .text import PREAMBLE, SEPARATORS, TextTable, table_of, text_of
+from .text import NS, PREAMBLE, SEPARATORS, TextTable, table_of, text_of
 from .times import Stream
+from .units import acceleration_unit
 
 SNIFFED = 1 << 16
+# of all lines, those without a number: more are another sensor's
+ANOTHERS = 0.1
+# of Sensor Logger's one table: what has another unit on iOS, and what does not say whose sign it has
+IN_G_ON_IOS, UNTOLD = "accelerometeruncalibrated_", "totalacceleration_"
+OTHER_SIGN = "accelerations with the other sign, as iOS has them"
 
 
 def is_table(path: Path) -> bool:
@@ -29,7 +45,7 @@ def is_table(path: Path) -> bool:
             table = _table(text_of(file.read(SNIFFED), path.name), path.name)
     except (OSError, RecordingError):
         return False
-    return table is not None and len(table.rows) > 1 and not _is_own(path)
+    return table is not None and not _is_own(path)
 
 
 def _table(text: str, name: str) -> TextTable | None:
@@ -38,7 +54,7 @@ def _table(text: str, name: str) -> TextTable | None:
 
 def _is_own(path: Path) -> bool:
     with path.open("rb") as file:
-        first = file.readline().decode("utf-8-sig", "replace").lower()
+        first = file.readline().decode("utf-8-sig", "replace").lower().partition("\r")[0]
     return set(COLUMNS) <= {cell.strip().strip('"') for cell in first.split(",")}
 
 
@@ -55,7 +71,9 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
         raise cannot_read(path, error) from error
     text = text_of(data, path.name)
     table = table_of(text, path.name, list(hints.columns.values())) if hints.columns else _table(text, path.name)
-    if table is None or not table.rows:
+    if table is not None and not table.rows:
+        raise RecordingError(f"{path.name} holds no lines below the names of its columns", "record it again")
+    if table is None:
         raise RecordingError(
             f"{path.name} names no columns of an accelerometer and a gyroscope in its first {PREAMBLE} lines",
             "name them with --columns t=NAME,ax=NAME,... or --columns t,ax,ay,az,gx,gy,gz, and --units",
@@ -87,7 +105,9 @@ def recording_of_table(table: TextTable, hints: Hints) -> Recording:
             " give the rate of its samples with --rate HZ",
         )
     lost = [f"{len(table.lost)} lines that lack a number were left out"] if table.lost else []
-    recording = recording_of(a, w, hints, table.name, temperature_c, [*remarks(columns, acc), *separated, *lost])
+    a, of_ios = as_of_ios(a, acc)
+    said = [*remarks(columns, acc), *of_ios, *separated, *lost]
+    recording = recording_of(a, w, hints, table.name, temperature_c, said)
     # with times of their own, these show it
     return replace(recording, gap=recording.gap | table.after_lost) if lost and w.times is None else recording
 
@@ -100,23 +120,41 @@ def remarks(columns: list[Column], acc: Sequence[Column]) -> list[str]:
     """What is to be said of which columns were taken, and how."""
     several = len(threes(columns, ACC)) > 1
     of = [f"the accelerometer is {', '.join(column.name.strip() for column in acc)}"] if several else []
-    return [*of, *(["accelerations with the other sign, as iOS has them"] if acc[0].turned_around else [])]
+    return [*of, *([OTHER_SIGN] if acc[0].turned_around else [])]
+
+
+def as_of_ios(stream: Stream, acc: Sequence[Column]) -> tuple[Stream, list[str]]:
+    """The accelerations of Sensor Logger's one table with Android's sign, and what is to be said of it."""
+    name = acc[0].name.strip().lower()
+    if name.startswith(IN_G_ON_IOS) and acceleration_unit(stream.values) == "g":
+        return replace(stream, values=-stream.values), [OTHER_SIGN]
+    may_be = "the accelerations' sign was left as it is, which on iOS is the other one (b_a then has it, too)"
+    return stream, [may_be] if name.startswith(UNTOLD) else []
 
 
 def stream_of(table: TextTable, columns: Sequence[Column], of: Sequence[Column]) -> Stream:
-    """What one sensor's columns hold, without the lines in which they are empty."""
+    """What one sensor's columns hold, without the lines that lack one of them."""
     values = table.numbers(of)
     if of[0].turned_around:
         values = -values
-    there = np.asarray(~np.isnan(values).all(axis=1))
+    there, lost = whole(values)
     clocks = [c for c in columns if c.quantity == TIME and c.of in ("", of[0].quantity) and table.has(c)]
     clock = min(clocks, key=lambda c: (not c.of, c.rank), default=None)
     unit = of[0].unit if len({column.unit for column in of}) == 1 else ""
     if clock is None:
-        return Stream(None, values[there], unit=unit)
-    times = table.times(clock)
+        return Stream(None, values[there], unit=unit, places=np.flatnonzero(there), lost=lost)
+    times, time_unit = table.times(clock), "ns" if table.is_dated(clock) else clock.unit
+    if time_unit == "s" and (parts := [c for c in columns if c.quantity == NANOSECONDS]):
+        times, time_unit = [s * NS + ns for s, ns in zip(times, table.times(parts[0]), strict=True)], "ns"
     kept = [time for time, is_there in zip(times, there, strict=True) if is_there]
-    return Stream(kept, values[there], "ns" if table.is_dated(clock) else clock.unit, unit)
+    return Stream(kept, values[there], time_unit, unit, lost=lost)
+
+
+def whole(values: Vector) -> tuple[Mask, int]:
+    """(n,) whether a line of (n, 3) has its numbers, and how many were lost: not those of a line for another sensor."""
+    there = np.asarray(np.isfinite(values).all(axis=1))
+    empty = np.isnan(values).all(axis=1)
+    return there, int((~there & ~empty).sum()) if empty.mean() > ANOTHERS else int((~there).sum())
 
 
 def chosen(header: Sequence[str], hints: Hints) -> list[Column]:

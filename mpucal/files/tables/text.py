@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, time
@@ -154,13 +155,19 @@ def text_of(data: bytes, name: str) -> str:
     ------
     RecordingError : it is none.
     """
-    if b"\0" in data:
+    if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        # a spreadsheet's "Unicode text"; what was read of it may end within a letter
+        text = data.decode("utf-16", "replace")
+    elif b"\0" in data:
         raise RecordingError(f"{name} is no text", "give a table as text")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        # a spreadsheet's "m/s²" and "µs"
-        text = data.decode("cp1252", "replace")
+    else:
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            # a spreadsheet's "m/s²" and "µs"
+            text = data.decode("cp1252", "replace")
+    if "\n" not in text:
+        text = text.replace("\r", "\n")
     return MONITORED.sub("", text) if MONITORED.match(text) else text
 
 
@@ -179,9 +186,11 @@ def table_of(text: str, name: str, said: Sequence[str | int] = (), bare: bool = 
             cells = _cells(line, separator)
             plain = {cell.strip() for cell in cells}
             if names:
-                found = len(cells) > 5 and bool(names & (plain | {of.partition("(")[0].strip() for of in plain}))
+                found = len(cells) >= len(said) and bool(
+                    names & (plain | {of.partition("(")[0].strip() for of in plain})
+                )
             elif places:
-                found = len(cells) > max(5, *places) and all(_is_number(cells[place]) for place in places)
+                found = len(cells) > max(places) and all(_is_number(cells[place]) for place in places)
             elif bare:
                 found = {axis[0] for cell in cells if (axis := bare_axis(cell))} == {0, 1, 2}
             else:
@@ -191,7 +200,7 @@ def table_of(text: str, name: str, said: Sequence[str | int] = (), bare: bool = 
                 return _read(text, name, before if len(before) == len(cells) else [], number, separator)
             if found:
                 return _read(text, name, cells, number + 1, separator)
-    return table_of(text, name, range(6)) if names else None
+    return table_of(text, name, range(len(said))) if names else None
 
 
 def _cells(line: str, separator: str | None) -> list[str]:
@@ -230,12 +239,16 @@ def _read(text: str, name: str, header: list[str], first: int, separator: str | 
                 lines.append(line)
     except csv.Error as error:
         raise RecordingError(f"{name} is no table ({error})", "give a table as text") from error
+    torn = [lines[-1]] if len(rows) > 1 and not text.endswith("\n") and len(rows[-1]) < len(rows[-2]) else []
+    if torn:
+        # a logger that was switched off
+        rows, lines = rows[:-1], lines[:-1]
     if rows and _are_units(rows[0]):
         header = [
             f"{of} ({unit.strip()})" if unit.strip() else of for of, unit in zip_longest(header, rows[0], fillvalue="")
         ]
         rows, lines = rows[1:], lines[1:]
-    return TextTable(name, header, rows, lines, separator)
+    return TextTable(name, header, rows, lines, separator, torn)
 
 
 def _are_units(cells: list[str]) -> bool:

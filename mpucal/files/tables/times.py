@@ -34,6 +34,7 @@ class Stream:
     times : (n,) exact: decimals, integers or floats; None: there are none.
     values : (n, 3) as they stand in the file. time_unit, unit : as the file says them; empty where it does not.
     zero_ns : the time of day at time 0, in ns since 1970, where a file beside it says that.
+    places : (n,) of its samples among all lines, where lines that lack a number were left out. lost : how many.
     """
 
     times: Times | None
@@ -41,6 +42,8 @@ class Stream:
     time_unit: str = ""
     unit: str = ""
     zero_ns: int | None = None
+    places: NDArray[np.int64] | None = None
+    lost: int = 0
 
     def part(self, kept: Mask) -> Stream:
         """Its samples where `kept` (n,) is."""
@@ -78,7 +81,8 @@ def seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Vec
     if stream.times is None or first.times is None:
         if hints.rate_hz is None:
             raise RecordingError(f"{name} holds no times", "give the rate of its samples with --rate HZ")
-        return np.arange(len(stream.values)) / hints.rate_hz, f"a rate of {hints.rate_hz:g} Hz"
+        places = np.arange(len(stream.values)) if stream.places is None else stream.places
+        return places / hints.rate_hz, f"a rate of {hints.rate_hz:g} Hz"
     ticks = _since(stream.times, first.times[0])
     if not (np.abs(ticks) < units.BEYOND**2).all():
         raise RecordingError(f"{name} holds times that are none", "leave those lines out")
