@@ -41,6 +41,8 @@ def load_parquet(path: Path, hints: Hints = NO_HINTS) -> Recording:
             "name them with --columns t=NAME,ax=NAME,...",
         )
     clocks = [column for column in columns if column.quantity == TIME and arrays[column.name].dtype.kind in "iufMm"]
+    # the index of pandas has no name where nobody gave it one
+    clocks = clocks or [Column(n, i, TIME) for i, n in enumerate(names) if arrays[n].dtype.kind in "mM"][:1]
     accelerometers, w = [_stream(arrays, of, clocks) for of in all_acc], _stream(arrays, gyr, clocks)
     place = with_gravity(accelerometers)
     acc, a = all_acc[place], accelerometers[place]

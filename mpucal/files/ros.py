@@ -24,6 +24,7 @@ from .hints import NO_HINTS, Hints
 from .mcap import CALIBRATED, FORMAT
 from .rows import Rows
 from .tables.streams import recording_of
+from .tables.table import whole
 from .tables.times import Stream
 from .tables.units import COUNTS, acceleration_unit
 
@@ -196,7 +197,9 @@ class _Messages:
         if quantity == "acc":
             seen = acceleration_unit(values) if len(values) else ""
             unit = seen if seen and seen != COUNTS else "m/s^2"
-        return Stream(np.array(self.stamps if self.stamped else self.received, np.int64), values, "ns", unit)
+        there, lost = whole(values)
+        times = np.array(self.stamps if self.stamped else self.received, np.int64)
+        return Stream(times[there], values[there], "ns", unit, lost=lost)
 
 
 _NAMES = {"acc": "acceleration", "gyr": "rate"}

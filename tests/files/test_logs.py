@@ -138,6 +138,11 @@ def test_a_parquet_file(kind, walk, walk_ns, assert_same, tmp_path):
     assert read.utc_ns == (walk_ns[0] if kind in ("integers", "dates") else None)
 
 
+def test_an_index_of_dates_without_a_name(walk, walk_ns, assert_same, tmp_path):
+    parquet_of(walk).set_index(pd.to_datetime(walk_ns, utc=True)).to_parquet(tmp_path / "walk.parquet")
+    assert_same(load(tmp_path / "walk.parquet"), walk)
+
+
 def test_its_columns_are_named(walk, assert_same, tmp_path):
     made = parquet_of(walk, when=walk.t)
     made.columns = ["when", *"abcdef"]

@@ -73,7 +73,7 @@ def recording_of(
         f"Of {name} {of_times}, accelerations {of_a} and rates {of_w} were taken as such",
         *remarks,
         f"{again} samples that are written again were left out" if again else "",
-        *(f"{count} lines whose {what} lack a number were left out" for count, what in lost if count),
+        *(f"{count} samples whose {what} lack a number were left out" for count, what in lost if count),
         joined,
     ]
     recording = Recording.from_arrays(
