@@ -78,6 +78,14 @@ def dialects() -> dict[str, tuple[str, Write, Hints]]:
         (folder / "walk.txt").write_text("\n".join(lines))
         return folder / "walk.txt"
 
+    def one_table(folder: Path, w: Walk, _ns: Any) -> Path:
+        loggers["sensor_loggers_one_table"](w, -1, in_g=True).to_csv(folder / "walk.csv", index=False)
+        return folder / "walk.csv"
+
+    def unnamed(folder: Path, w: Walk, ns: Any) -> Path:
+        loggers["pair"](folder, w, ns)
+        return folder
+
     def own(folder: Path, w: Walk, _ns: Any) -> Path:
         with open_writer(folder / "walk.mcap", Rows.of(w), "") as write:
             write(w)
@@ -94,6 +102,8 @@ def dialects() -> dict[str, tuple[str, Write, Hints]]:
         "AndroSensor, `;` and decimal commas": ("pandas", table("AndroSensor", sep=";", decimal=","), NO_HINTS),
         "phyphox, a folder": ("pandas", phone("phyphox"), NO_HINTS),
         "Sensor Logger, a folder": ("pandas", phone("sensor_logger"), NO_HINTS),
+        "Sensor Logger on iOS, one table": ("pandas", one_table, NO_HINTS),
+        "two tables without names": ("pandas", unnamed, NO_HINTS),
         "lines that name each number": ("Python", labelled, NO_HINTS),
         "MPU6050_raw": ("Python", raw, counts),
         "a sketch's counts": ("NumPy", sketch, counts),
