@@ -145,7 +145,7 @@ function caution() {
   const shown = now && meter && meter.t_s - now.t_s < 6 && !state.verdict;
   $("caution").hidden = !shown;
   if (shown) {
-    put("what", `${now.what}:`);
+    put("what", `${capital(now.what)}:`);
     put("do", now.do);
   }
 }
@@ -277,7 +277,8 @@ function result() {
   if (state.results && !$("results").childElementCount) $("results").append(...reportFirst(state.results).flatMap(file));
 }
 
-const sentence = (words) => `${words[0].toUpperCase()}${words.slice(1)}.`;
+const capital = (words) => words[0].toUpperCase() + words.slice(1);
+const sentence = (words) => `${capital(words)}.`;
 const reportFirst = (files) => [...files].sort((a, b) => (b.name === REPORT) - (a.name === REPORT));
 const size = (bytes) => (bytes > 1e6 ? `${(bytes / 1e6).toFixed(1)} MB` : `${Math.ceil(bytes / 1e3)} kB`);
 
