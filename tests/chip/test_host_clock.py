@@ -80,3 +80,14 @@ def test_a_bridge_that_was_reset_keeps_its_rate(step_ms):
     fit = fitted(t_ns, host_ns)
     assert fit.ppm == pytest.approx(5000, abs=max(20, 3e6 * fit.b_std))
     assert fit.b_std < 50e-6
+
+
+def test_a_bridge_that_is_lost_now_and_then_keeps_its_rate():
+    """It stalls before that, and what it says is late."""
+    t_ns, host_ns = pairs(np.random.default_rng(6), 120, -8000, burst_s=0.016, a_second=20)
+    for lost in range(2000, 2400, 80):
+        host_ns[lost - 20 : lost] += 300 * 10**6
+    kept = np.arange(len(t_ns)) % 80 > 20
+    fit = fitted(t_ns[kept], host_ns[kept])
+    assert fit.ppm == pytest.approx(-8000, abs=4e6 * fit.b_std)
+    assert fit.b_std < 500e-6
