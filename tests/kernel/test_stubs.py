@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
-NAMES = ("mpucal.kernel._kernel", "mpucal.files._text", "mpucal.chip._flips")
+PROJECT = Path(__file__).parents[2]
+STUBS = sorted(path.relative_to(PROJECT) for path in (PROJECT / "mpucal").rglob("*.pyi"))
+NAMES = [".".join(path.with_suffix("").parts) for path in STUBS]
 # nanobind writes a default as its place in a list, and of an array what Python cannot read
 DEFAULT, DETAILS = re.compile(r"\\(\d+)"), re.compile(r"ndarray\[[^\]]*\]")
 
@@ -22,7 +24,7 @@ def plain(function):
 
 def test_the_stubs_are_those_of_the_modules(monkeypatch, capsys):
     stubtest = pytest.importorskip("mypy.stubtest")
-    monkeypatch.chdir(Path(__file__).parents[2])  # where it looks for the stubs
+    monkeypatch.chdir(PROJECT)  # where it looks for the stubs
     for module in map(import_module, NAMES):
         compiled = {name: value for name, value in vars(module).items() if hasattr(value, "__nb_signature__")}
         assert compiled

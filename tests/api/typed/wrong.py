@@ -14,5 +14,6 @@ calibration.quality["verdit"]  # wrong
 calibration.verdict == "fine"  # wrong
 calibration.apply(acc=None)  # wrong
 calibration.apply(np.eye(3)).columns  # wrong
+mpucal.check(calibration, recording).verdict == "fine"  # wrong
 recording.to_dataframe("excel")  # wrong
 mpucal.calibrated(recording)  # wrong
