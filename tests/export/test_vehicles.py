@@ -9,6 +9,7 @@ import pytest
 from pymavlink.mavparm import MAVParmDict
 
 from mpucal.data import Autopilot
+from mpucal.errors import WriteBackError
 from mpucal.export.forms import form
 from mpucal.mavlink.parameters.document import autopilot_document
 from mpucal.result.calibration import Calibration
@@ -131,3 +132,11 @@ def test_an_id_that_the_vehicle_did_not_say_is_missed(name):
     text, notes = form(name).export(calibration)
     assert of not in parsed(text)
     assert f"did not say what {of} is" in " ".join(notes)
+
+
+@pytest.mark.parametrize("key", ["mounting", "params_old", "imu", "firmware", "message", "residual_mps2"])
+def test_a_document_that_no_session_wrote_is_refused(key):
+    made = of_vehicle("ardupilot", 0, np.diag(GAIN))
+    lacking = {name: value for name, value in made.extra["autopilot"].items() if name != key}
+    with pytest.raises(WriteBackError, match="not what a session writes"):
+        form("ardupilot").export(replace(made, extra=MappingProxyType({"autopilot": lacking})))

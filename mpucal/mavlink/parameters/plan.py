@@ -69,9 +69,15 @@ def changes(calibration: Calibration, firmware: str) -> tuple[Change, ...]:
     of_first = calibration.extra.get("autopilot")
     if not of_first:
         raise WriteBackError(f"{NOTHING}: the calibration is of no vehicle", "give one made with --mavlink")
-    others = [other for other in calibration.extra.get("others", []) if _holds(other)]
-    found = [_change(of, firmware) for of in (of_first, *(other["autopilot"] for other in others))]
-    return tuple(found)
+    try:
+        others = [other for other in calibration.extra.get("others", []) if _holds(other)]
+        return tuple(_change(of, firmware) for of in (of_first, *(other["autopilot"] for other in others)))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise WriteBackError(
+            f"{NOTHING}: what the calibration says of its vehicle is not what a session writes"
+            f" ({type(error).__name__}: {error})",
+            "give the calibration.json of a session",
+        ) from error
 
 
 def helping(planned: Sequence[Change]) -> tuple[Change, ...]:
