@@ -231,7 +231,7 @@ def test_lines_that_lack_a_number_are_left_out_and_said(odd, walk, tmp_path):
     read = load(tmp_path / "a.csv")
     np.testing.assert_allclose(read.acc, np.delete(walk.acc, 100, axis=0), atol=1e-9)
     assert "1 samples whose accelerations lack a number were left out" in read.taken
-    rows.drop(columns="time").to_csv(tmp_path / "b.csv", index=False)
+    (tmp_path / "b.csv").write_text(rows.drop(columns="time").to_csv(index=False) + "1.0,2.0")
     read = load(tmp_path / "b.csv", Hints(rate_hz=100.0))
     assert read.t[100] - read.t[99] == pytest.approx(0.02), "its time passed all the same"
 

@@ -108,8 +108,11 @@ def recording_of_table(table: TextTable, hints: Hints) -> Recording:
     a, of_ios = as_of_ios(a, acc)
     said = [*remarks(columns, acc), *of_ios, *separated, *lost]
     recording = recording_of(a, w, hints, table.name, temperature_c, said)
-    # with times of their own, these show it
-    return replace(recording, gap=recording.gap | table.after_lost) if lost and w.times is None else recording
+    if not lost or hints.rate_hz is None or w.times is not None:
+        # with times of their own, these show it
+        return recording
+    at = np.rint(recording.t * hints.rate_hz).astype(np.int64)
+    return replace(recording, gap=recording.gap | table.after_lost[at])
 
 
 def _listed(header: Sequence[str]) -> str:
