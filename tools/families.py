@@ -4,7 +4,7 @@ python tools/families.py --seeds 0:6
 python tools/families.py --families 'poses*,continuous' --seeds 0:33 --workers 2 --json families.json
 
 A family is a row of tools/worlds/table.py; tools/worlds/judge.py says what is false, and which limits there are. Seeds
-0 to 32 are for development: limits and constants are set on them. Seeds 3000 to 3032 are for reports, and nothing is
+0 to 32 are for development: limits and constants are set on them. Seeds 4000 to 4032 are for reports, and nothing is
 set on what they show; tests have 100 and 101. The exit code is 1 where a limit is broken.
 """
 
@@ -103,7 +103,7 @@ def main() -> int:
     """Judge, print and save."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--families", help="names or patterns of names, with commas between them")
-    parser.add_argument("--seeds", type=seeds_of, default=range(6), help="FIRST:END, such as 0:33 or 3000:3033")
+    parser.add_argument("--seeds", type=seeds_of, default=range(6), help="FIRST:END, such as 0:33 or 4000:4033")
     parser.add_argument("--model", default="auto")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes")
     parser.add_argument("--json", type=Path, help="write every run to this file")

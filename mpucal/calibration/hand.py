@@ -17,11 +17,11 @@ from .fit import Fit
 from .flat_segment import Flat
 from .gyro_matrix import WALD_99, at_prior, wald
 from .hand_noise import (
+    CALM_MPS2,
     FIRST_MPS2,
     HAND_MPS2,
     PIVOT_MPS2,
     SLOWLY_PER_S,
-    SOME_MPS2,
     WHITE_MPS2,
     Noise,
     farther,
@@ -51,7 +51,7 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     search = _Search(preprocess(*downsampled(recording, flat, SEARCH_HZ), gravity, rough))
     theta, noise = search.run(initialise(search.prepared.problem, fine.flat.b_omega))
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
-        noise = Noise("white", likeliest(fine.white, SOME_MPS2, theta, noise.sigma))
+        noise = Noise("white", likeliest(fine.white, CALM_MPS2, theta, noise.sigma))
     problem = _moved(noise.problem(fine), fine, theta)
     prior = prior_of(fine.flat)
     minimum = minimise(problem, theta, HAND, prior, frozen=True, ends=ends_of(problem))

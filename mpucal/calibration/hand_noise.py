@@ -16,6 +16,7 @@ FIRST_MPS2 = 0.3  # by which a search begins
 WHITE_MPS2 = (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
 SOME_MPS2 = WHITE_MPS2[1:]
 HAND_MPS2 = WHITE_MPS2[4:]  # who goes from rest to rest, has a hand
+CALM_MPS2 = WHITE_MPS2[3:]  # and, over all samples, a calm one at least: what looks calmer is taken for jerks
 PIVOT_MPS2 = (0.1, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 
 # A pivot travels farther than a bounded position of one lambda, the more the wilder it is: sigma (1.5 + 0.5 sigma). Its
