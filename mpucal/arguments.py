@@ -107,7 +107,7 @@ def vectors(values: ArrayLike, name: str, unit: str) -> Vector:
     WrongType : they are no numbers. WrongValue : the last axis is not x, y, z.
     """
     try:
-        array = np.asarray(values, float)
+        array = _real(np.asarray(values))
     except (TypeError, ValueError) as error:
         raise WrongType(f"{name} is no array of numbers ({error})", f"give (..., 3) {unit}") from error
     if array.ndim == 0 or array.shape[-1] != 3:
@@ -121,10 +121,12 @@ def a_path(path: Any, what: str) -> Path:
 
     Raises
     ------
-    WrongType : it is none.
+    WrongType : it is none. WrongValue : no file can be called so.
     """
     if not isinstance(path, str | PathLike):
         raise WrongType(f"{what} is given as {type(path).__name__}", "give the path of its file")
+    if "\0" in str(path):
+        raise WrongValue(f"{what} is given as {str(path)!r}", "give the path of its file")
     return Path(path)
 
 
@@ -150,7 +152,7 @@ def shaped(values: ArrayLike, name: str, *shapes: tuple[int, ...]) -> Vector:
     WrongType : they are no numbers. WrongValue : another shape.
     """
     try:
-        array = np.asarray(values, float)
+        array = _real(np.asarray(values))
     except (TypeError, ValueError) as error:
         raise WrongType(f"{name} is no array of numbers ({error})", f"give numbers of shape {shapes[0]}") from error
     if array.shape not in shapes:
@@ -201,11 +203,16 @@ def _array(values: ArrayLike, key: str, name: str) -> NDArray[Any]:
 def _as_float(array: NDArray[Any], key: str, name: str) -> Vector:
     """A copy in float64."""
     try:
-        if array.dtype.kind in "mM":
-            raise TypeError("they are times")
-        return array.astype(np.float64)
+        return _real(array).copy()
     except (TypeError, ValueError) as error:
         raise _no_numbers(key, name, error) from error
+
+
+def _real(array: NDArray[Any]) -> Vector:
+    """In float64; neither times nor complex numbers are silently taken for numbers."""
+    if array.dtype.kind in "mMc":
+        raise TypeError("they are complex" if array.dtype.kind == "c" else "they are times")
+    return array.astype(np.float64, copy=False)
 
 
 def _no_numbers(key: str, name: str, error: Exception) -> ArraysError:

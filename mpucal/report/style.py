@@ -49,7 +49,7 @@ details { margin: .8rem 0; } summary { cursor: pointer; font-weight: bold; }
 @page { margin: 13mm; }
 @media print { :root { color-scheme: light; } html { font-size: 9.5pt; } pre { white-space: pre-wrap; }
   body { max-width: none; padding: 0; font-size: 1rem; line-height: 1.35; }
-  h1, h2, h3 { break-after: avoid; } h2 { margin: 1rem 0 .3rem; } table, figure, li { break-inside: avoid; }
+  h1, h2, h3, h2 + p { break-after: avoid; } h2 { margin: 1rem 0 .3rem; } p, table, figure, li { break-inside: avoid; }
   th, td { padding: .1rem .9rem .1rem 0; } .pair { grid-template-columns: 1fr 1fr; } figure { margin-top: .4rem; }
   details:not([open]) { display: none; } }
 """

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from .. import frames
 from ..arguments import a_path, content, shaped, vectors
 from ..data import Recording, Sensor, Vector
-from ..errors import RecordingError, WrongValue
+from ..errors import RecordingError, WrongType, WrongValue
 from ..strict_json import MOST_BYTES, parsed
 from .atomic import write_atomically
 from .blob import NO_RANGE, Blob, BlobError
@@ -277,18 +277,36 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
                 raise RecordingError(f"{path} is no config blob: {error}", "give an undamaged blob") from error
         try:
             document = checked(parsed(data))
-            return replace(cls.from_document(document), doubt=doubt(document))
+            return replace(cls(**arguments(document)), doubt=doubt(document))
         except ValueError as error:
             raise RecordingError(f"{path} holds no calibration ({error})", "give a calibration.json") from error
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Calibration:
-        """The inverse of `document`; unknown keys are ignored, missing ones are unknown numbers."""
-        return cls(**arguments(document))
+        """The inverse of `document`; unknown keys are ignored, missing ones are unknown numbers.
+
+        Raises
+        ------
+        WrongType : it is no mapping. WrongValue : it is no document of a calibration.
+        """
+        remedy = "give what Calibration.document() returned, or load a calibration.json"
+        if not isinstance(document, Mapping):
+            raise WrongType(f"the document of a calibration is given as {type(document).__name__}", remedy)
+        try:
+            return cls(**arguments(document))
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise WrongValue(f"this is no document of a calibration ({error})", remedy) from error
 
     @classmethod
     def from_blob(cls, blob: Blob) -> Calibration:
-        """A calibration of a blob's numbers; what a blob does not hold is unknown."""
+        """A calibration of a blob's numbers; what a blob does not hold is unknown.
+
+        Raises
+        ------
+        WrongType : it is no blob.
+        """
+        if not isinstance(blob, Blob):
+            raise WrongType(f"a blob is given as {type(blob).__name__}", "give what Calibration.blob() returned")
         return cls(
             D=np.array(blob.D).reshape(3, 3),
             b_a=np.array(blob.b_a),
