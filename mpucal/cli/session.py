@@ -23,6 +23,7 @@ from ..sinks.kind import SinkKind
 from ..sinks.record import in_session
 from ..sinks.sink import Applied
 from ..sinks.write_back import write_to_all
+from ..sources.kind import NAME
 from ..sources.opened import Opened
 from ..sources.opening import check_resumed, open_source
 from ..sources.resumed import open_resumed
@@ -83,7 +84,8 @@ def command(
     """
     resume: Path | None = options.pop("resume")
     attended = not yes and sys.stdin.isatty()
-    source, kinds, options = _opened(resume, options, sinks, no_write, attended)
+    source, kinds, options = _opened(resume, {**options, NAME: name}, sinks, no_write, attended)
+    name = name or options.get(NAME)
     check_gyroscope(source.plan.config)
     title = f"{name}, {source_title(options)}" if name else source_title(options)
     into = SessionFolder(resume or folder, source.capture_name, again=resume is not None)
@@ -144,7 +146,7 @@ def _run(
                 folder.settle(runner.sensor)
             calibration = runner.calibrate(recording, fit)
             if name:
-                calibration = replace(calibration, extra={**calibration.extra, "name": name})
+                calibration = replace(calibration, extra={**calibration.extra, NAME: name})
             return recording, calibration, runner.write(folder.path, calibration, recording, source.truth)
     except BaseException as error:
         if folder.capture.exists():

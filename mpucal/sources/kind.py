@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ..session.plan import Plan
 
+# of the board, beside the options of its source
+NAME = "name"
+
 
 @dataclass(frozen=True)
 class Option:
@@ -123,6 +126,7 @@ class Request:
 
     @property
     def words(self) -> dict[str, Any]:
-        """What opens the same source again, in JSON's own types."""
+        """What opens the same source again, in JSON's own types, and what the board is called, if anything."""
         names = (self.kind.option.name, *(option.name for option in self.kind.options))
-        return {name: self.values.get(name) for name in names}
+        called = {NAME: self.values[NAME]} if self.values.get(NAME) else {}
+        return {**{name: self.values.get(name) for name in names}, **called}

@@ -58,7 +58,7 @@ def joined(folder):
 )
 def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, tmp_path, sign, after_s):
     folder = tmp_path / "board"
-    come_to_s = interrupted(folder, sign, after_s)
+    come_to_s = interrupted(folder, sign, after_s, "--name", "Bench 7")
     whole_s = read_capture(folder / "capture.mcap").records[-1].t_ns * 1e-9
     assert come_to_s - whole_s < 1.0
 
@@ -72,6 +72,7 @@ def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, tmp_path, s
     assert prompts[-2:] == ["verify", "rest"]
 
     found = Calibration.load(folder / "calibration.json")
+    assert found.extra["name"] == "Bench 7"
     parts, unbroken = load(folder), load(joined(folder))
     for name in Samples.__dataclass_fields__:
         assert np.array_equal(getattr(parts, name), getattr(unbroken, name), equal_nan=name == "temperature_c")
