@@ -68,7 +68,8 @@ class Keys:
             stack.callback(self._heard)
             for number in _ENDING:
                 stack.callback(signal.signal, number, signal.signal(number, self._interrupt))
-            if self._single and self._keyboard is not None:
+            # a terminal may go away before anybody listens, as while a page is waited for
+            if self._single and self._keyboard is not None and self._keyboard.isatty():
                 stack.enter_context(_without_lines(self._keyboard))
             yield
 

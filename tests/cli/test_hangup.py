@@ -59,3 +59,11 @@ def test_a_session_that_keeps_going_gets_its_result(tmp_path):
     assert "the terminal went away" in log
     assert log.count("flat and still for 10 s: done") == 1
     assert "The calibration is good." in log
+
+
+def test_a_session_whose_terminal_goes_while_it_waits_for_its_page_goes_on(tmp_path):
+    pid, terminal = session_on_a_terminal(tmp_path, "--page", "--bus", "sim:seed=3")
+    read_until(terminal, b"Open the page")
+    os.close(terminal)
+    assert exit_code(pid) == 0
+    assert "The calibration is good." in (tmp_path / "board" / "session.log").read_text()
