@@ -50,7 +50,7 @@ def test_a_session_ends_in_order_and_says_in_its_log_how_to_go_on(tmp_path):
 
 def test_a_session_that_keeps_going_gets_its_result(tmp_path):
     pid, terminal = session_on_a_terminal(tmp_path, "--keep-going", "--bus", "sim:seed=3")
-    read_until(terminal, b"flat on a firm surface")
+    read_until(terminal, b" Hz ")  # it runs so fast that a busy machine may not paint every prompt
     os.close(terminal)
     os.kill(pid, signal.SIGHUP)  # the shell's, after the kernel's
     assert exit_code(pid) == 0

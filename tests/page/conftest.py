@@ -1,6 +1,5 @@
 """A page's server in this process, and a browser that opens the page."""
 
-import shutil
 import socket
 import sys
 import threading
@@ -11,7 +10,6 @@ import pytest
 from mpucal.page.server import Server
 
 TOKEN = "c2VjcmV0LXRva2VuLTEyOA"
-BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
 
 
 class Watched(Server):
@@ -82,18 +80,6 @@ def serve():
 @pytest.fixture
 def server(serve):
     return serve()
-
-
-@pytest.fixture(scope="session")
-def chromium():
-    """A browser."""
-    if BROWSER is None:
-        pytest.skip("there is no Chromium here")
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    with api.sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """The documentation site as a browser shows it from its folder, where nothing else can be reached."""
 
-import shutil
 from pathlib import Path
 
 import pytest
@@ -8,27 +7,15 @@ import pytest
 from mpucal.cli import commands
 
 SITE = Path(__file__).parents[2] / "build" / "site"
-CHROMIUM = shutil.which("chromium")
 PAGES = ("index", "notebook", "reference/commands", "reference/python")
 
-pytestmark = pytest.mark.skipif(
-    not CHROMIUM or not (SITE / "index.html").exists(), reason="no Chromium, or no `make docs`"
-)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    api = pytest.importorskip("playwright.sync_api")
-    with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield browser
-        browser.close()
+pytestmark = pytest.mark.skipif(not (SITE / "index.html").exists(), reason="there is no site: `make docs`")
 
 
 @pytest.fixture(params=[(1280, 900), (390, 844)], ids=["desktop", "phone"])
-def page(request, browser):
+def page(request, chromium):
     width, height = request.param
-    page = browser.new_page(viewport={"width": width, "height": height})
+    page = chromium.new_page(viewport={"width": width, "height": height})
     page.fetched = []
     page.on("request", lambda asked: page.fetched.append(asked.url))
     yield page
