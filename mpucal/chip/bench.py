@@ -41,11 +41,12 @@ class Bench:
 
     Parameters
     ----------
-    port : the chip's.
+    port : the chip's. patience : how many times to look, 0.6 s each, whether the board lies still.
     """
 
-    def __init__(self, port: Port) -> None:
+    def __init__(self, port: Port, patience: int = PATIENCE) -> None:
         self._port = port
+        self._patience = patience
         self._held: dict[int, int] = {}
 
     def __enter__(self) -> Self:
@@ -71,7 +72,7 @@ class Bench:
         ------
         BusError : a transfer failed three times. ChipError : the board moves on and on.
         """
-        for _ in range(PATIENCE):
+        for _ in range(self._patience):
             self._port.sleep(SETTLE_NS)
             looks = self._looks()
             variance, of_noise = looks.var(0), np.diff(looks, axis=0).var(0) / 2

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from functools import partial
 
 import numpy as np
 
 from ..chip.access import Bus
-from ..chip.bench import Bench
+from ..chip.bench import PATIENCE, Bench
 from ..chip.config import MOST_POLLED_HZ, Config
 from ..chip.decode import Decoder
 from ..chip.driver import NO_FIFO, Driver
@@ -38,6 +39,9 @@ MANY, MOST = 0.05, 0.5
 # of what the factory measured: an axis that moves by less is dead
 UNMOVED = 0.05
 
+# a board that was waited for in vain is not waited for once more
+IMPATIENCE = 3
+
 # of gaps, with what helps
 CAUSES = {
     FifoFault.OVERFLOW: ("the FIFO overflowed: it was read too late", "end other programs, or take a lower --rate"),
@@ -59,6 +63,7 @@ def examine(bus: Bus, config: Config, seconds: float, way: Look = examine_speed)
     """
     tally = Tally()
     port = Port(bus, Decoder("doctor"), tally)
+    patience = IMPATIENCE
     try:
         # a stranger is not written to
         read_identity(port)
@@ -67,13 +72,14 @@ def examine(bus: Bus, config: Config, seconds: float, way: Look = examine_speed)
         with suppress(ChipError), Bench(port) as bench:
             # until the board is put down; one that is not is told of later
             bench.rest()
+            patience = PATIENCE
     except SourceError as error:
         yield from _transfers(tally)
         yield failed("chip", error)
         return
     driver = Driver(bus, config, "doctor", tally=tally)
     try:
-        yield from _awake(port, driver, config, seconds, olds)
+        yield from _awake(port, driver, config, seconds, olds, patience)
     except SourceError as error:
         yield from _transfers(tally)
         yield failed("broken off", error)
@@ -97,7 +103,9 @@ def _transfers(tally: Tally, always: bool = False) -> Iterator[Finding]:
         yield Finding("transfers", Mark.BAD if tally.share > MANY else Mark.NOTE, str(tally), REMEDY, data)
 
 
-def _awake(port: Port, driver: Driver, config: Config, seconds: float, olds: list[Block]) -> Iterator[Finding]:
+def _awake(
+    port: Port, driver: Driver, config: Config, seconds: float, olds: list[Block], patience: int
+) -> Iterator[Finding]:
     sensor = driver.start()
     part, family = driver.part, driver.part.family
     yield _identity(sensor)
@@ -125,7 +133,7 @@ def _awake(port: Port, driver: Driver, config: Config, seconds: float, olds: lis
     named = PARTS.get(sensor.who_am_i or 0)
     answers_as_it_is = named is not None and named.family.name == family.name
     doubts = [] if answers_as_it_is else ["WHO_AM_I and behaviour disagree"]
-    for step in (_self_test, _offsets):
+    for step in (_self_test, partial(_offsets, patience=patience)):
         finding, doubt = step(port, part)
         doubts += doubt
         yield finding
@@ -179,9 +187,9 @@ def _unmoved(test: SelfTest) -> str:
     )
 
 
-def _offsets(port: Port, part: Part) -> tuple[Finding, list[str]]:
+def _offsets(port: Port, part: Part, patience: int) -> tuple[Finding, list[str]]:
     try:
-        with Bench(port) as bench:
+        with Bench(port, patience) as bench:
             response = measured_response(port, bench, part.family.accel_offset_h)
     except ChipError as error:
         # a board that moved says nothing about the chip

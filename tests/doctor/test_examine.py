@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from mpucal.chip.bench import LOOKS, PATIENCE
 from mpucal.chip.config import Config
 from mpucal.doctor.examine import examine
 from mpucal.doctor.finding import Finding, Mark
@@ -71,6 +72,24 @@ def test_what_is_amiss_is_found(keys, topic, mark):
     told = findings(open_simulated(f"sim:{keys}"))
     assert told[topic].mark is mark
     assert told[topic].remedy
+
+
+def test_a_board_that_is_never_put_down_is_waited_for_once():
+    told = findings(open_simulated("sim:hand=restless"))
+    assert "the board moves" in told["offset registers"].what
+    assert PATIENCE * LOOKS < told["transfers"].data["transfers"] < 1.5 * PATIENCE * LOOKS
+
+
+def test_a_board_that_is_put_down_late_is_examined_as_any():
+    bus = open_simulated("sim:hand=still", seed=51)
+    told = {}
+    for finding in examine(bus, Config(), 3.0):
+        # the first finding of the chip itself comes after the wait
+        if finding.topic == "chip":
+            bus.hear(Prompt(PromptKind.REST, ""))
+        told[finding.topic] = finding
+    assert told["transfers"].data["transfers"] > PATIENCE * LOOKS
+    assert told["offset registers"].mark is Mark.OK
 
 
 def test_transfers_that_fail_now_and_then_are_counted_and_stop_nothing():
