@@ -38,7 +38,7 @@ def _error_std(sure: Uncertainty | None, claim: Claim | None) -> ErrorStd:
         "rms": np.nan if sure is None else sure.rms_mps2,
         "magnitude": np.nan if sure is None else sure.magnitude_mps2,
         "direction_deg": np.nan if sure is None else float(np.rad2deg(sure.direction_rad)),
-        "model": np.nan if claim is None else claim.model,
+        "model": np.nan if claim is None else claim.floored,
         "without_a_time": np.nan if left_out is None else OF_TIME * left_out.time,
         "without_a_side": np.nan if left_out is None else OF_SIDE * left_out.side,
         "decided_by": None if claim is None else claim.by,

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate, weigh
+from mpucal.calibration.claim import claim_of
 from mpucal.calibration.flat_segment import find_flat, flat_statistics
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.jackknife import jackknife
@@ -84,6 +85,14 @@ def test_a_nonlinear_sensor_is_claimed_by_its_sides():
     bent = replace(made.recording, acc=s + 0.005 * s**2 / (2.0 * G))
     fit = calibrate(bent, gravity=G)
     assert sph_rms(made.truth, fit.D, fit.b_a) < 3.0 * fit.quality["error_std"]["rms"]
+
+
+def test_where_too_few_sides_were_down_to_be_compared_the_model_is_believed_half():
+    fit = weigh(hand_scenario(1, "continuous").recording, "hand", G)[0].fit
+    alike = np.zeros_like(fit.parts.side)
+    sides = claim_of(fit, G, None, 0.0), claim_of(replace(fit, parts=replace(fit.parts, side=alike)), G, None, 0.0)
+    assert sides[1].left_out.side == 0.0
+    assert sides[1].floored == 2.0 * sides[0].floored
 
 
 def test_what_decided_is_in_the_document():

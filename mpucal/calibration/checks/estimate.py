@@ -45,7 +45,7 @@ def _model_rms(e: Evidence) -> float | None:
         return None
     if e.claim is None or e.claim.inflation < CHANCE or (e.claim.by == "side" and not _sides_contradict(e)):
         return e.sure.rms_mps2
-    return e.claim.model
+    return e.claim.floored
 
 
 def _sides_contradict(e: Evidence) -> bool:
@@ -117,7 +117,7 @@ def _change_of(e: Evidence, what: str) -> Walk | None:
     """
     if e.claim is None or e.claim.change is None or e.claim.change.what != what or _excused(e):
         return None
-    known = e.claim.model <= USABLE_RMS_MPS2
+    known = e.claim.floored <= USABLE_RMS_MPS2
     return e.claim.change if known and e.claim.of_change > LEAST_CHANGE_MPS2[what] else None
 
 
@@ -133,7 +133,7 @@ def parts_disagree(e: Evidence) -> Reason | None:
         return None
     if _excused(e) and not _useless(e):
         return None
-    too_large = claim.inflation >= CHANCE and e.sure.rms_mps2 > GOOD_RMS_MPS2 >= claim.model
+    too_large = claim.inflation >= CHANCE and e.sure.rms_mps2 > GOOD_RMS_MPS2 >= claim.floored
     much = claim.inflation > DISAGREE and claim.left_out.claim() > DISAGREE_MPS2
     if _sides_contradict(e):
         return reason("inconsistent", "sides", rms=e.sure.rms_mps2)
