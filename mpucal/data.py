@@ -39,6 +39,7 @@ class Sensor:
     clock_ppm, clock_std : of a bus with a clock of its own: how fast that ran, which was corrected, and the relative
         standard deviation that is left of all times' scale; None: the times are the host's.
     least_noise : m/s^2, rad/s: standard deviations that a sample has at least, however still it reads.
+    accel_lag_s : by how much its filters make the accelerometer later than the gyroscope, by the data sheet.
     """
 
     chip: str | None = None
@@ -52,6 +53,7 @@ class Sensor:
     least_noise: tuple[float, float] = (0.0, 0.0)
     clock_ppm: float | None = None
     clock_std: float | None = None
+    accel_lag_s: float = 0.0
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Self:

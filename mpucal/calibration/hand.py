@@ -33,7 +33,7 @@ from .local_noise import louder
 from .parameters import HAND
 from .parts import ends_of, parts_of
 from .preprocessing import Preprocessed, preprocess
-from .prior import Prior, prior_of
+from .prior import Prior
 from .problem import Problem
 from .theta import Theta
 from .transitions import leverages, miss_variances, q_scale, transitions_of
@@ -53,7 +53,7 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
         noise = Noise("white", likeliest(fine.white, CALM_MPS2, theta, noise.sigma))
     problem = _moved(noise.problem(fine), fine, theta)
-    prior = prior_of(fine.flat)
+    prior = fine.prior()
     minimum = minimise(problem, theta, HAND, prior, frozen=True, ends=ends_of(problem))
     iterations = search.iterations + minimum.iterations
     if wald(minimum) < WALD_99 and not at_prior(minimum.covariance()):
@@ -77,7 +77,7 @@ def _doubted(minimum: Minimum, noise: Noise, rough: Preprocessed, fine: Preproce
         return minimum
     if noise.kind == "pivot":
         noise = replace(noise, lam=SLOWLY_PER_S)
-    prior, fixed = prior_of(fine.flat), () if minimum.free.all() else ("K",)
+    prior, fixed = fine.prior(), () if minimum.free.all() else ("K",)
     at, problem, transitions = minimum, noise.problem(rough), transitions_of(rough, minimum.theta)
     variance, leverage = miss_variances(transitions), np.zeros(1)
     for _ in range(PASSES if transitions else 0):
@@ -112,7 +112,7 @@ class _Search:
 
     def __init__(self, prepared: Preprocessed) -> None:
         self.prepared = prepared
-        self.prior = prior_of(prepared.flat)
+        self.prior = prepared.prior()
         self.iterations = 0
 
     def run(self, theta: Theta) -> tuple[Theta, Noise]:

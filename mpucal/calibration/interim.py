@@ -20,7 +20,7 @@ from .levenberg_marquardt import Minimum, information, minimise
 from .likelihood import value
 from .parameters import ACCELEROMETER, HAND, PLACES
 from .preprocessing import CORRELATION_S, FLOOR_MPS2, Preprocessed, preprocess
-from .prior import Prior, prior_of
+from .prior import Prior
 from .problem import Problem
 from .theta import Theta
 
@@ -73,7 +73,7 @@ def interim_estimate(
     it begins with a loss that finds its way from afar.
     """
     prepared = preprocess(*downsampled(recording, flat, FIT_HZ), gravity)
-    prior = _prior(prepared.flat)
+    prior = prepared.prior(D=(np.eye(3).ravel(), D_SD), b_a=(0.0, B_A_SD_MPS2))
     rough = replace(prepared.white(FIRST_MPS2), tail=0.0)
     starts = _starts(prepared) if before is None else (*_starts(prepared), before.theta)
     theta = min(starts, key=lambda start: value(rough, start) + prior.cost(start))
@@ -112,7 +112,3 @@ def _right_handed(theta: Theta) -> Theta:
 def _minimum(problem: Problem, theta: Theta, prior: Prior) -> Minimum:
     # what is asked for next hangs on H, so that it is that of the estimate itself
     return minimise(problem, theta, HAND, prior, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True, unseen=0.0)
-
-
-def _prior(flat: Flat) -> Prior:
-    return prior_of(flat, D=(np.eye(3).ravel(), D_SD), b_a=(0.0, B_A_SD_MPS2))

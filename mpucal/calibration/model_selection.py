@@ -129,7 +129,7 @@ class _InPlace:
 
     def __init__(self, recording: Recording, flat: Flat, gravity: float, walked: float = 0.0) -> None:
         self.recording, self._flat, self._gravity, self.walked = recording, flat, gravity, walked
-        self._prior = prior_of(flat)
+        self._prior = prior_of(flat, recording.sensor)
         self._roughly: dict[int, Minimum] = {}
 
     def attempts(self) -> Iterator[tuple[_InPlace, bool]]:

@@ -13,6 +13,7 @@ from .flat_segment import Flat, flat_statistics
 from .gyro_drift import without_drift
 from .local_noise import louder, noise_variance
 from .masks import mask
+from .prior import Prior, prior_of
 from .problem import Problem, Series
 from .rotation import lengths
 from .static_intervals import Intervals, static_intervals, statistics
@@ -54,6 +55,10 @@ class Preprocessed:
     def rests_often(self) -> bool:
         """Whether there are rests enough to lean on them alone."""
         return self.rests >= MANY_RESTS
+
+    def prior(self, **more: tuple[Vector | float, Vector | float]) -> Prior:
+        """What is known of the parameters beforehand; `more` as in prior_of."""
+        return prior_of(self.flat, self.recording.sensor, **more)
 
     def white(self, sigma: float, correlation_s: float = 0.0) -> Problem:
         """White acceleration of sigma m/s^2 while moving; a correlation time tau makes it (1 + 2 tau / dt) of that."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data import Vector
+from ..data import Sensor, Vector
 from .flat_segment import Flat
-from .parameters import NAMES, PLACES, TABLE
+from .parameters import BY_NAME, NAMES, PLACES, TABLE
 from .theta import Theta, values
 
 
@@ -33,10 +33,11 @@ class Prior:
         return 0.5 * float(self.precision @ (away * away))
 
 
-def prior_of(flat: Flat, **more: tuple[Vector | float, Vector | float]) -> Prior:
-    """The table's priors, and b_omega by the flat segment.
+def prior_of(flat: Flat, sensor: Sensor, **more: tuple[Vector | float, Vector | float]) -> Prior:
+    """The table's priors, b_omega by the flat segment, and tau about what the sensor's filters are said to leave.
 
     more : of further rows, as Prior.of takes them.
     """
     known = {row.name: (np.array(row.mean), np.array(row.sd)) for row in TABLE if row.sd}
+    known["tau"] = (np.array(sensor.accel_lag_s), np.array(BY_NAME["tau"].sd))
     return Prior.of(b_omega=(flat.b_omega, np.sqrt(flat.Sigma_omega / flat.n)), **known, **more)

@@ -20,7 +20,6 @@ from .hand_noise import HAND_MPS2, WHITE_MPS2, likeliest
 from .levenberg_marquardt import Minimum, minimise
 from .parameters import B_A_NAMES, D_NAMES, NAMES
 from .preprocessing import CORRELATION_S, Preprocessed, preprocess
-from .prior import Prior, prior_of
 from .problem import Problem
 from .theta import Theta
 
@@ -37,7 +36,7 @@ HONEST = 2.5
 def fit_tilt(recording: Recording, flat: Flat, gravity: float) -> Fit:
     """D, b_a, b_omega, K of a sensor that stayed within a tilt of how it lay flat."""
     prepared = preprocess(recording, (flat.first, flat.last), gravity)
-    prior = _prior(prepared.flat)
+    prior = prepared.prior(D=(np.eye(3).ravel(), D_SD), b_a=(0.0, BIAS_SD_MPS2))
     u = prepared.flat.y / np.linalg.norm(prepared.flat.y)
     theta = Theta.start(np.eye(3), np.zeros(3), prepared.flat.b_omega, u)
     minimum = minimise(_white(prepared, 0.0), theta, len(NAMES), prior, frozen=True)
@@ -55,10 +54,6 @@ def tilted_directions(down: Vector, directions: Vector) -> Vector:
 def _white(prepared: Preprocessed, sigma: float) -> Problem:
     # a redescending loss forgets a start that is far away
     return replace(prepared.white(sigma, CORRELATION_S), tail=0.0 if sigma == 0.0 else 1.0)
-
-
-def _prior(flat: Flat) -> Prior:
-    return prior_of(flat, D=(np.eye(3).ravel(), D_SD), b_a=(0.0, BIAS_SD_MPS2))
 
 
 def _as_fit(minimum: Minimum) -> Fit:

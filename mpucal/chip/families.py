@@ -63,6 +63,8 @@ class Family:
         after it; otherwise 8 bits each, from SELF_TEST_GYRO and from SELF_TEST_ACCEL on.
     asleep : it sleeps after power-on and reset.
     fifo_reset_needs_stop : FIFO_RESET acts only while FIFO_EN of USER_CTRL is 0 (RM-MPU-6000A, register 106).
+    accel_lag_ms : by DLPF_CFG, how much longer the accelerometer's filter delays than the gyroscope's, to the
+        millisecond; empty: not told.
     half_range_revision : letter of a revision whose accelerometer has half the sensitivity; empty where there is none.
     accel_noise_ug, gyro_noise_dps : typical noise densities, ug/sqrt(Hz) and deg/s/sqrt(Hz).
     zero_rate_dps : tolerance of the gyroscope's output at rest, deg/s. zero_g_mg : of the accelerometer's x, y, z, mg.
@@ -91,6 +93,7 @@ class Family:
     fifo_en_with_temperature: bool = False
     gyro_range_shift: int = reg.FULL_SCALE_SHIFT
     fifo_reset_needs_stop: bool = False
+    accel_lag_ms: tuple[int, ...] = ()
     half_range_revision: str = ""
     zero_g_mg: tuple[float, float, float] = (60.0, 60.0, 80.0)
     scale_percent: float = 3.0
@@ -107,6 +110,10 @@ class Family:
             at[group] = slice(first, first + group.words)
             first += group.words
         return Columns(at[WordGroup.ACCEL], at[WordGroup.TEMPERATURE].start, at[WordGroup.GYRO])
+
+    def accel_lag_s(self, dlpf_cfg: int) -> float:
+        """By how much the accelerometer lags behind the gyroscope; 0 where no document tells."""
+        return 1e-3 * self.accel_lag_ms[dlpf_cfg] if dlpf_cfg < len(self.accel_lag_ms) else 0.0
 
 
 @dataclass(frozen=True)
@@ -148,6 +155,8 @@ MPU6050 = Family(
     zero_rate_dps=20.0,
     zero_g_mg=(50.0, 50.0, 80.0),
     fifo_reset_needs_stop=True,
+    # register 26: 0 and 0.98 ms at 0, 4.9 and 4.8 ms at 3, no more than 0.4 ms apart elsewhere
+    accel_lag_ms=(-1, 0, 0, 0, 0, 0, 0),
     half_range_revision="C",
     data_sheet="PS-MPU-6000A r3.4",
     zero_g_drift="±35 mg (x, y) and ±60 mg (z) from 0 to 70 °C",
@@ -168,6 +177,8 @@ MPU6500 = Family(
     accel_noise_ug=300.0,
     gyro_noise_dps=0.01,
     zero_rate_dps=5.0,
+    # registers 26 and 29: 1.88 and 0.97 ms at 0, 4.88 and 5.9 ms at 3, 32.48 and 33.48 ms at 6
+    accel_lag_ms=(1, -1, -1, -1, -1, -1, -1),
     data_sheet="PS-MPU-9250A r1.0",
     zero_g_drift="±1.5 mg/°C",
 )
@@ -197,6 +208,7 @@ ICM20689 = replace(
     lsb_per_c=326.8,
     zero_c=25.0,
     asleep=True,
+    accel_lag_ms=(),
     data_sheet="",
     zero_g_drift="",
 )

@@ -80,6 +80,7 @@ class Settings:
             accel_range_g=reg.ACCEL_RANGES_G[self.afs_sel] / self.part.accel_sensitivity,
             gyro_range_dps=None if self.accel_alone else float(reg.GYRO_RANGES_DPS[self.fs_sel]),
             rate_hz=self.nominal_rate_hz,
+            accel_lag_s=self.part.family.accel_lag_s(self.dlpf_cfg),
         )
 
     def registers(self) -> dict[int, int]:

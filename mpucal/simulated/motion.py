@@ -118,22 +118,33 @@ class Motion:
         """The hand hears `prompt` at `t_s`."""
         self._hand.hear(prompt, t_s)
 
-    def means(self, edges_s: Vector) -> tuple[Vector, Vector]:
+    def means(self, edges_s: Vector, force_late_s: float = 0.0) -> tuple[Vector, Vector]:
         """Mean specific force (n, 3) [m/s^2] and rate (n, 3) [rad/s] between (n + 1,) increasing times [s].
 
         What lies before the last edge is forgotten then.
+
+        Parameters
+        ----------
+        force_late_s : the force is that of so much earlier than the rate; negative: the rate is.
         """
         self._extend(float(edges_s[-1]))
-        place = edges_s * STEP_HZ - self._first
-        node = np.minimum(place.astype(int), len(self._sums) - 2)
-        part = (place - node)[:, None]
-        sums = (1 - part) * self._sums[node] + part * self._sums[node + 1]
-        means = (sums[1:] - sums[:-1]) / (edges_s[1:] - edges_s[:-1])[:, None]
-        self._forget(int(node[-1]))
-        force, rate = means[:, :3], means[:, 3:]
+        felt, node = self._between(edges_s)
+        force, rate = np.hsplit(felt, 2)
+        if force_late_s:
+            late, node = self._between(edges_s - abs(force_late_s))
+            force, rate = (late[:, :3], rate) if force_late_s > 0.0 else (force, late[:, 3:])
+        self._forget(node)
         for mishap in self._mishaps:
             force, rate = mishap.felt(force, rate, edges_s[1:])
         return force, rate
+
+    def _between(self, edges_s: Vector) -> tuple[Vector, int]:
+        """Mean force and rate (n, 6) between (n + 1,) times [s], and the step before the last of these."""
+        place = np.maximum(edges_s * STEP_HZ - self._first, 0.0)
+        node = np.minimum(place.astype(int), len(self._sums) - 2)
+        part = (place - node)[:, None]
+        sums = (1 - part) * self._sums[node] + part * self._sums[node + 1]
+        return (sums[1:] - sums[:-1]) / (edges_s[1:] - edges_s[:-1])[:, None], int(node[-1])
 
     def warmer_c(self, edges_s: Vector) -> Vector:
         """(n,) by how much the chip is warmer than at first, between (n + 1,) times [s]."""

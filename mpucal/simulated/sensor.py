@@ -27,6 +27,7 @@ class Setting:
     rate_hz : nominal sample rate. accel_range_g, gyro_range_dps : full scales.
     accel_offset_g, gyro_offset_dps : (3,) what offset registers and self test add.
     lsb_per_c, zero_c : temperature is counts / lsb_per_c + zero_c.
+    accel_lag_s : by how much its filters make the accelerometer later than the gyroscope.
     """
 
     rate_hz: float
@@ -36,6 +37,7 @@ class Setting:
     zero_c: float
     accel_offset_g: tuple[float, float, float] = (0.0, 0.0, 0.0)
     gyro_offset_dps: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    accel_lag_s: float = 0.0
 
     @property
     def mps2_per_lsb(self) -> float:

@@ -143,6 +143,6 @@ def test_a_valley_without_an_end_is_left_soon():
     recording = paper_scenario(0, rate_hz=20, turn_s=330.0).recording
     flat = flat_statistics(recording, recording.flat)
     slow = Problem(Series.after(recording, flat), flat, 9.82)
-    minimum = minimise(slow, initialise(slow, flat.b_omega), ACCEL, prior_of(flat), most=1000)
+    minimum = minimise(slow, initialise(slow, flat.b_omega), ACCEL, prior_of(flat, recording.sensor), most=1000)
     assert not minimum.converged
     assert minimum.iterations < MOST_ITERATIONS

@@ -44,6 +44,13 @@ def test_register_values_of_the_map():
     assert (chosen.sensor.gyro_range_dps, chosen.sensor.accel_range_g) == (500, 8)
 
 
+@pytest.mark.parametrize(
+    ("who_am_i", "dlpf", "lag_s"), [(0x68, 3, 0.0), (0x68, 0, -0.001), (0x71, 3, -0.001), (0x98, 3, 0)]
+)
+def test_what_filters_make_of_the_accelerometers_time(who_am_i, dlpf, lag_s):
+    assert Settings(part_of(who_am_i), 4, dlpf, 1, 2).sensor.accel_lag_s == lag_s
+
+
 def test_a_6050_has_no_second_accelerometer_register():
     assert reg.ACCEL_CONFIG2 not in Settings(part_of(0x68), 4, 3, 1, 1).registers()
 

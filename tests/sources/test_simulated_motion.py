@@ -255,3 +255,22 @@ def test_the_shortest_turn(a, b):
     turn = rotation.shortest_turn(a, b)
     np.testing.assert_allclose(matrix(rotation.exp(turn)) @ a, b, atol=1e-9)
     assert np.linalg.norm(turn) == pytest.approx(np.arccos(np.clip(a @ b, -1, 1)), abs=1e-7)
+
+
+@pytest.mark.parametrize("late_s", [0.001, -0.001])
+def test_one_of_the_two_may_be_that_of_earlier(late_s):
+    edges = np.arange(400) * PERIOD_S
+    said = [prompt("rotate")]
+
+    def means(at, *late):
+        hand, motion = np.random.default_rng(3).spawn(2)
+        moved = Motion(KINDS["random"](hand), motion, GRAVITY)
+        moved.hear(said[0], 0.0)
+        return moved.means(at, *late)
+
+    force, rate = means(edges, late_s)
+    on_time, earlier = means(edges), means(edges[1:] - 0.001)
+    late, punctual = (0, 1) if late_s > 0 else (1, 0)
+    np.testing.assert_allclose((force, rate)[late][1:], earlier[late], atol=1e-9)
+    np.testing.assert_array_equal((force, rate)[punctual], on_time[punctual])
+    assert np.abs(earlier[late] - on_time[late][1:]).max() > 1e-3

@@ -32,9 +32,9 @@ def apart(e: Evidence) -> Reason | None:
         return None
     (of_prior,) = BY_NAME["tau"].sd
     std = float(e.fit.std("tau")[0]) / e.claim.inflation
-    # what the data alone say: the prior draws the estimate towards 0
-    data = 1.0 - (std / of_prior) ** 2
-    if not data > 0.0 or abs(e.fit.delay_s / data) < max(LAG_S, SURE * std / data**0.5):
+    # what the data alone say: the prior draws the estimate towards what filters leave
+    data, filters_s = 1.0 - (std / of_prior) ** 2, e.recording.sensor.accel_lag_s
+    lag_s = filters_s + (e.fit.delay_s - filters_s) / data if data > 0.0 else 0.0
+    if not data > 0.0 or abs(lag_s) < max(LAG_S, SURE * std / data**0.5):
         return None
-    lag = 1e3 * e.fit.delay_s / data
-    return reason("clock_off", "apart", lag=abs(lag), how="lags behind" if lag > 0 else "runs ahead of")
+    return reason("clock_off", "apart", lag=1e3 * abs(lag_s), how="lags behind" if lag_s > 0 else "runs ahead of")

@@ -271,6 +271,7 @@ def _setting(registers: bytearray, rate_hz: float, model: Model, factory: Factor
         zero_c=model.family.zero_c,
         accel_offset_g=(ax, ay, az),
         gyro_offset_dps=(gx, gy, gz),
+        accel_lag_s=model.family.accel_lag_s(registers[reg.CONFIG] & reg.CONFIG_DLPF_CFG),
     )
 
 
