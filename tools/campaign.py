@@ -14,8 +14,10 @@ the command that repeats it. Seeds begin with the day's number. Exit code 1 wher
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import os
+import pkgutil
 import shutil
 import sys
 import time
@@ -24,28 +26,37 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from unittest.mock import patch
+
+# before NumPy loads: a second thread would only wait
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import numpy as np
 from campaign_judge import Outcome, judged, table
 from campaign_recordings import struck_recordings
 from campaign_worlds import BRIDGE, CHIP, KINDS, VEHICLE, Blow, World
 
+import mpucal
 from mpucal import durable
 from mpucal.__main__ import _keep_streams, run
 from mpucal.chip.config import MAX_FRAMES_A_POLL, Config
+from mpucal.mavlink.dialect import dialect
+from mpucal.session import results, rotate
 
 CASES = 16
 LAST_S = 66.0
 CHIPS = ("mpu6050", "mpu6500", "clone98")
-HANDS = ("guided", "guided", "guided", "wandering", "placing", "random")
+HANDS = (*("guided",) * 6, "wandering", "placing", "random")
 RATES = (50, 100, 25)
 FIRMWARES = ("ardupilot", "px4")
+# a report is made for one of so many
+REPORTS = 8
 # once for every so many of the chip alone
 WORLDS = (*(CHIP,) * 8, BRIDGE, VEHICLE)
-POLL_S = 0.2
+POLL_S, KNOW_EVERY_S = 0.5, 3.0
 CPU_S, WALL_S = 120, 600.0
 FOLDER = "board"
 
@@ -81,7 +92,8 @@ def words(number: int) -> list[str]:
     """The command of a prefix."""
     to = ["--to", "chip"] if number % 3 == 0 else []
     if world_of(number) == VEHICLE:
-        source, to = ["--mavlink", f"sim:seed={number % 1000},firmware={FIRMWARES[number // 10 % 2]}"], []
+        vehicle = f"sim:seed={number % 1000},firmware={FIRMWARES[number // 10 % 2]}"
+        source, to = ["--mavlink", vehicle, "--rate", "50"], []
     else:
         chip = f"sim:seed={number % 100_000},chip={CHIPS[number % 3]},hand={HANDS[number // 3 % len(HANDS)]}"
         source = ["--bus", chip, "--rate", str(RATES[number // 7 % len(RATES)])]
@@ -124,6 +136,8 @@ class Prefix:
         pid = os.fork()
         if pid == 0:
             self._child = True
+            if case.k % REPORTS:
+                results.report = lambda _: None
             self._move(place)
             self._world.moments.due.clear()
             self._world.suffer(case.blows)
@@ -178,9 +192,19 @@ def _unsynced(durable_file: durable.Durable, _file: object) -> None:
 
 @contextmanager
 def quick_polls() -> Iterator[None]:
-    """A chip is looked at as seldom as its FIFO allows: processor time goes into what is to be tried."""
-    with patch.object(Config, "period_s", property(lambda config: min(POLL_S, MAX_FRAMES_A_POLL / config.rate_hz))):
+    """A chip is looked at and a fit made as seldom as may be: processor time goes into what is to be tried."""
+    period_s = property(lambda config: min(POLL_S, MAX_FRAMES_A_POLL / config.rate_hz))
+    with patch.object(Config, "period_s", period_s), patch.object(rotate, "KNOW_EVERY_S", KNOW_EVERY_S):
         yield
+
+
+def ready() -> None:
+    """Load what a session loads when it needs it, so that no fork has to."""
+    for module in pkgutil.walk_packages(mpucal.__path__, "mpucal."):
+        with suppress(ImportError):
+            import_module(module.name)
+    dialect()
+    gc.freeze()
 
 
 def _redirect(place: Path) -> None:
@@ -251,6 +275,7 @@ def main() -> int:
     parser.add_argument("--json", type=Path, help="a line for each outcome")
     asked = parser.parse_args()
     print(f"seeds from {asked.first} on", flush=True)
+    ready()
     with TemporaryDirectory() as temporary:
         place = asked.keep or Path(temporary)
         os.environ["XDG_STATE_HOME"] = str(place / "state")

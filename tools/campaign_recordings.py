@@ -30,7 +30,7 @@ SOURCES = {
     "mcap": ["--bus", "sim:seed=4", "--rate", "25"],
     "npz": ["--bus", "sim:seed=5,chip=mpu6500", "--rate", "50"],
     "csv": ["--bus", "sim:seed=6,chip=clone98", "--rate", "25"],
-    "tlog": ["--mavlink", "sim:seed=7"],
+    "tlog": ["--mavlink", "sim:seed=7", "--rate", "50"],
 }
 ODD = (np.nan, np.inf, 1e300, -1e300, 5e-324, 0.0, -32768.0, 1e19)
 Rng = np.random.Generator

@@ -67,6 +67,14 @@ def packet_length(data: bytes | bytearray) -> int | None:
     return HEADER[data[0]] + data[1] + CHECKSUM + signature
 
 
+def header(packet: bytes) -> tuple[int, tuple[int, int]]:
+    """Message id, and (system, component) of the sender, of a whole packet, whose sum is not looked at."""
+    at = HEADER[packet[0]]
+    id_bytes = 3 if packet[0] == V2 else 1
+    ids_at = at - id_bytes - 2
+    return int.from_bytes(packet[at - id_bytes : at], "little"), (packet[ids_at], packet[ids_at + 1])
+
+
 class Parser:
     """Bytes in, whole packets out; what is damaged is left out, and the next packet found.
 

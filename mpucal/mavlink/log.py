@@ -15,16 +15,17 @@ from ..calibration.flat_segment import find_flat
 from ..data import Recording
 from ..errors import RecordingError
 from .clock import US, Jump
-from .dialect import Message, Parser, dialect
+from .dialect import Message, Parser, dialect, header
 from .firmwares import ARDUPILOT, PX4, preferred_messages
 from .gatherer import Gatherer, Row
-from .imu import Reading, reading
+from .imu import MESSAGE_ID, Reading, reading
 from .join import BEYOND, CORRECTIONS, SETTLED_US, Segment, joined, through
 from .parameters.encoding import parameter_of
 from .tlog import Record
 
 # whose change alters the streams
 SHAPING = (*CORRECTIONS, *BEYOND)
+IMU_MESSAGES = frozenset(MESSAGE_ID.values())
 
 
 class Log:
@@ -170,7 +171,13 @@ def _vehicles(records: Iterable[Record]) -> dict[tuple[int, int], str]:
     m = dialect()
     firmware: dict[tuple[int, int], str] = {}
     imu: set[tuple[int, int]] = set()
-    for _, message in _messages(records):
+
+    def telling(record: Record) -> bool:
+        message_id, ids = header(record.data)
+        return message_id == m.MAVLINK_MSG_ID_HEARTBEAT or (ids not in imu and message_id in IMU_MESSAGES)
+
+    # most of a log is one IMU's messages: decoding the first of them is enough
+    for _, message in _messages(record for record in records if telling(record)):
         ids = _sender(message)
         if message.get_type() == "HEARTBEAT" and message.autopilot != m.MAV_AUTOPILOT_INVALID:
             firmware[ids] = PX4 if message.autopilot == m.MAV_AUTOPILOT_PX4 else ARDUPILOT
