@@ -1,7 +1,7 @@
 """`mpucal noise` on simulated noise of known coefficients: what is found against what is true, and its intervals.
 
-python tools/noise_trials.py                        an MPU-6050's six axes, an hour at 100 Hz, 20 times
-python tools/noise_trials.py --hours 3 --runs 50
+python tools/noise_trials.py                        four kinds of axes, an hour at 100 Hz, 20 times
+python tools/noise_trials.py --hours 3 --runs 100
 """
 
 from __future__ import annotations
@@ -30,8 +30,11 @@ AXES = {
 }
 
 
+CONFIDENCES = (0.68, 0.95)
+
+
 def of_seed(item: tuple[str, int], hours: float) -> Vector:
-    """(3, 3): value, low and high of white noise, bias instability and random walk, each by the truth."""
+    """(5, 3): value, low and high by confidence, of white noise, bias instability and random walk, by the truth."""
     name, seed = item
     n = round(3600.0 * hours * RATE_HZ)
     samples = noise(np.random.default_rng([seed, *name.encode()]), n, RATE_HZ, *AXES[name])
@@ -39,10 +42,10 @@ def of_seed(item: tuple[str, int], hours: float) -> Vector:
     for part in np.array_split(samples[:, None], max(n // 16384, 1)):
         octaves.add(part)
     sizes, variances, _ = octaves.variances()
-    found = fitted(sizes, variances[:, 0], n, 1.0 / RATE_HZ)
-    if found is None:
-        return np.full((3, 3), np.nan)
-    return np.array([found.value[:3], found.low[:3], found.high[:3]]) / np.array(AXES[name])
+    found = [fitted(sizes, variances[:, 0], n, 1.0 / RATE_HZ, confidence) for confidence in CONFIDENCES]
+    ends = [end[:3] for one in found if one is not None for end in (one.low, one.high)]
+    value = np.full(3, np.nan) if found[0] is None else found[0].value[:3]
+    return np.array([value, *ends]) / np.array(AXES[name])
 
 
 def main() -> None:
@@ -55,15 +58,13 @@ def main() -> None:
     options = parser.parse_args()
     items = [(name, options.seed + run) for name in AXES for run in range(options.runs)]
     found = list(in_parallel(partial(of_seed, hours=options.hours), items, options.jobs, "noise"))
-    lines = Table(
-        "axis", "coefficient", "true", "found / true", "rms of it", "in the interval, %", "of 95 %: high / true"
-    )
+    lines = Table("axis", "coefficient", "true", "found / true", "rms of it", "in 68 %", "in 95 %", "its end / true")
     for name, truth in AXES.items():
         of = np.array([one for (axis, _), one in zip(items, found, strict=True) if axis == name])
         for i in range(3):
-            value, low, high = of[:, 0, i], of[:, 1, i], of[:, 2, i]
-            inside = 100.0 * np.mean((low <= 1.0) & (high >= 1.0))
-            cells = (f"{np.mean(value):.3f}", f"{np.std(value):.3f}", f"{inside:.0f}", f"{np.median(high):.2f}")
+            value, *ends = of[:, :, i].T
+            inside = [f"{100.0 * np.mean((low <= 1.0) & (high >= 1.0)):.0f} %" for low, high in (ends[:2], ends[2:])]
+            cells = (f"{np.mean(value):.3f}", f"{np.std(value):.3f}", *inside, f"{np.median(ends[-1]):.2f}")
             lines.add_row(name, NAMES[i].replace("_", " "), f"{truth[i]:g}", *cells)
     Console(width=130).print(lines)
 

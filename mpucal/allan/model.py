@@ -30,8 +30,8 @@ LEAST_CLUSTERS = 5.0
 MOST_LEFT_OUT = 7
 FITS = 1e-3
 ROUNDS, LEAST_SHARE = 6, 1e-4
-# of a square that is not told from zero
-LEAST_FREEDOM = 8.0
+# an interval's end is looked for between these times the square or its deviation, at so many places
+NEAR, FAR, PLACES = 1e-3, 1e2, 40
 
 
 @dataclass(frozen=True)
@@ -44,31 +44,33 @@ class Coefficients:
     first: float
 
 
-def fitted(sizes: Vector, variances: Vector, samples: int, step_s: float) -> Coefficients | None:
+def fitted(
+    sizes: Vector, variances: Vector, samples: int, step_s: float, confidence: float = CONFIDENCE
+) -> Coefficients | None:
     """The coefficients of (k,) Allan variances at (k,) sizes in samples; None where there are too few octaves.
 
     step_s : time of a sample [s]; the coefficients are in units a root of a Hz, units, units a root of a s, units s.
+    confidence : how often the intervals hold the truth.
     """
     used = (sizes <= samples / LEAST_CLUSTERS) & (variances > 0.0)
     sizes, variances = sizes[used], variances[used]
-    best: tuple[float, int, Vector, Vector] | None = None
+    best: _Fit | None = None
     for first in range(min(MOST_LEFT_OUT, max(len(sizes) - 5, 0)) + 1):
         if len(sizes) - first < 4:
             break
-        squares, covariance, probability = _squares(sizes[first:], variances[first:], samples, first == 0)
-        if best is None or probability > best[0]:
-            best = probability, first, squares, covariance
-        if probability > FITS:
+        fit = _Fit(sizes[first:], variances[first:], samples, terms=3 if first else 4)
+        if best is None or fit.probability > best.probability:
+            best = fit
+        if fit.probability > FITS:
             break
     if best is None:
         return None
-    _, first, squares, covariance = best
     units = np.array([step_s, 1.0, 1.0 / step_s, step_s**2])
-    low, high = _interval(squares, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-    if first:
-        squares, low, high = (np.append(part[:3], np.nan) for part in (squares, low, high))
-    value, low, high = (np.sqrt(part * units) for part in (squares, low, high))
-    return Coefficients(value, low, high, float(sizes[first]))
+    found = np.full((3, 4), np.nan)
+    for i in range(len(best.squares)):
+        found[:, i] = best.unbiased(i), *best.interval(i, confidence)
+    value, low, high = np.sqrt(found * units)
+    return Coefficients(value, low, high, float(best.sizes[0]))
 
 
 def modelled(sizes: Vector) -> Vector:
@@ -78,55 +80,66 @@ def modelled(sizes: Vector) -> Vector:
     return np.stack([1.0 / m, flicker, m / 3.0 + 1.0 / (6.0 * m), 3.0 / m**2], axis=1)
 
 
-def _squares(sizes: Vector, variances: Vector, samples: int, quantised: bool) -> tuple[Vector, Vector, float]:
-    """(4,), (4, 4), and how often the model shows variances as unlikely as these."""
-    from scipy.optimize import nnls  # noqa: PLC0415 - slow to import
-    from scipy.stats import chi2  # noqa: PLC0415
+class _Fit:
+    """The squares (terms,) of the coefficients, and how often the model shows variances as unlikely as these."""
 
-    kept = [0, 1, 2, 3] if quantised else [0, 1, 2]
-    A = modelled(sizes)[:, kept]
-    scale = variances[0] / np.abs(A).max(0)
-    # as if every octave stood alone: where to begin, and a floor for noise of another kind than these
-    alone = np.diag(2.0 * variances**2 * sizes / samples)
-    C = alone
-    for _ in range(ROUNDS):
-        root = np.linalg.cholesky(C + LEAST_SHARE * alone)
-        W, w = np.linalg.solve(root, A * scale), np.linalg.solve(root, variances)
-        squares = scale * nnls(W, w)[0]
-        C = _covariance(sizes, squares if quantised else np.append(squares, 0.0), samples)
-    left = w - W @ (squares / scale)
-    probability = float(chi2.sf(left @ left, max(len(sizes) - len(kept), 1)))
-    covariance = np.zeros((4, 4))
-    covariance[np.ix_(kept, kept)] = np.linalg.pinv(W.T @ W) * np.outer(scale, scale)
-    full = np.zeros(4)
-    full[kept] = squares
-    return full, covariance, probability
+    def __init__(self, sizes: Vector, variances: Vector, samples: int, terms: int) -> None:
+        from scipy.optimize import nnls  # noqa: PLC0415 - slow to import
+        from scipy.stats import chi2  # noqa: PLC0415
+
+        self.sizes, self._A = sizes, modelled(sizes)[:, :terms]
+        # as if every octave stood alone: where to begin, and a floor for noise of another kind than these
+        self._alone = np.diag(2.0 * variances**2 * sizes / samples)
+        self._products = _products(sizes, samples)[:terms, :terms]
+        self._scale = variances[0] / np.abs(self._A).max(0)
+        C = self._alone
+        for _ in range(ROUNDS):
+            root = np.linalg.cholesky(C + LEAST_SHARE * self._alone)
+            W, w = np.linalg.solve(root, self._A * self._scale), np.linalg.solve(root, variances)
+            self.squares = self._scale * nnls(W, w)[0]
+            C = np.einsum("a,b,abij->ij", self.squares, self.squares, self._products)
+        left = w - W @ (self.squares / self._scale)
+        self.probability = float(chi2.sf(left @ left, max(len(sizes) - terms, 1)))
+
+    def unbiased(self, i: int) -> float:
+        """Square i so that its root is right in the mean: a root bends, by an eighth of the square's relative variance.
+
+        Not by more where it is not told from zero.
+        """
+        square = float(self.squares[i])
+        share = min(float(self._std(i, square)[0]) / square, 1.0) if square > 0.0 else 0.0
+        return square * (1.0 + share**2 / 8.0) ** 2
+
+    def interval(self, i: int, confidence: float) -> tuple[float, float]:
+        """The ends for square i: the truths that are as far from what was found as chance goes.
+
+        How far that is depends on the truth: the larger it is, the more it scatters.
+        """
+        from scipy.stats import norm  # noqa: PLC0415
+
+        square, far = float(self.squares[i]), float(norm.isf(0.5 * (1.0 - confidence)))
+        largest = max(square, float(self._std(i, 0.0)[0]))
+        truth = np.concatenate([[0.0], np.geomspace(NEAR, FAR, PLACES) * largest])
+        std = self._std(i, truth)
+        low, high = (np.interp(square, np.maximum.accumulate(truth + sign * far * std), truth) for sign in (1, -1))
+        return float(low), float(high)
+
+    def _std(self, i: int, truth: float | Vector) -> Vector:
+        """(p,) of square i, were (p,) `truth` true and the other squares as found."""
+        squares = np.tile(self.squares, (np.size(truth), 1))
+        squares[:, i] = truth
+        A = self._A * self._scale
+        C = np.einsum("pa,pb,abij->pij", squares, squares, self._products) + LEAST_SHARE * self._alone
+        information = A.T @ np.linalg.solve(C, np.broadcast_to(A, (len(C), *A.shape)))
+        return np.asarray(self._scale[i] * np.sqrt(np.linalg.pinv(information, hermitian=True)[:, i, i]))
 
 
-def _covariance(sizes: Vector, squares: Vector, samples: int) -> Vector:
-    """(k, k) of the Allan variances, by the density of the noise."""
+def _products(sizes: Vector, samples: int) -> Vector:
+    """(4, 4, k, k): Cov(AVAR_i, AVAR_j) is the sum of these over a and b, times the squares of a and of b."""
     f = np.geomspace(0.003 / sizes[-1], 0.5, 160 * math.ceil(math.log2(200.0 * sizes[-1])))
     sine2 = np.sin(np.pi * f) ** 2
-    white, flicker, walk, quantised = squares
-    S = white + flicker / (2.0 * np.pi * f) + walk / (4.0 * sine2) + quantised * 4.0 * sine2
+    S = np.stack([np.ones(len(f)), 1.0 / (2.0 * np.pi * f), 1.0 / (4.0 * sine2), 4.0 * sine2])
     H = 2.0 * np.sin(np.pi * np.outer(sizes, f)) ** 4 / (sizes[:, None] ** 2 * sine2)
-    weighted = S * H * np.sqrt(2.0 * np.gradient(f))
+    weighted = S[:, None] * H * np.sqrt(2.0 * np.gradient(f))
     of = np.maximum(samples - 2.0 * sizes + 1.0, 1.0)
-    return np.asarray(2.0 * weighted @ weighted.T / np.sqrt(np.outer(of, of)))
-
-
-def _interval(squares: Vector, std: Vector) -> tuple[Vector, Vector]:
-    """The ends of 95 % intervals of squares, which are not negative.
-
-    Their errors are those of the other coefficients as well: as of a normal variable below. Above, the std that was
-    found is too small where the square is: as of a chi-squared variable, or a normal one, whichever is farther.
-    """
-    from scipy.stats import chi2, norm  # noqa: PLC0415
-
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    std = np.maximum(std, 1e-12 * np.maximum(squares, 1e-300))
-    freedom = np.maximum(2.0 * (squares / std) ** 2, LEAST_FREEDOM)
-    aside = norm.isf(tail) * std
-    return np.maximum(squares - aside, 0.0), np.maximum(
-        squares + aside, squares * freedom / chi2.isf(1.0 - tail, freedom)
-    )
+    return np.asarray(2.0 * np.einsum("aif,bjf->abij", weighted, weighted, optimize=True) / np.sqrt(np.outer(of, of)))

@@ -10,11 +10,11 @@ from ..data import Vector
 def noise(rng: np.random.Generator, n: int, rate_hz: float, white: float, instability: float, walk: float) -> Vector:
     """(n,) samples of white noise [units/sqrt(Hz), two-sided], bias instability [units], random walk [units/sqrt(s)].
 
-    The slow two are drawn in the frequency domain, over twice the time so that their ends do not meet, by the densities
-    of IEEE Std 952, annex C.
+    Bias instability is drawn in the frequency domain, by the density of IEEE Std 952, annex C, over twice the time so
+    that its ends do not meet. A random walk is a sum: what it does beyond that time belongs to its variance.
     """
     f = np.fft.rfftfreq(2 * n)[1:]
-    density = instability**2 / (2.0 * np.pi * f) + walk**2 / rate_hz / (4.0 * np.sin(np.pi * f) ** 2)
-    drawn = rng.standard_normal((2, len(f))) * np.sqrt(density * n)
-    slow = np.fft.irfft(np.concatenate([[0.0], drawn[0] + 1j * drawn[1]]), 2 * n)[:n]
-    return np.asarray(slow + white * np.sqrt(rate_hz) * rng.standard_normal(n))
+    drawn = rng.standard_normal((2, len(f))) * instability * np.sqrt(n / (2.0 * np.pi * f))
+    flicker = np.fft.irfft(np.concatenate([[0.0], drawn[0] + 1j * drawn[1]]), 2 * n)[:n]
+    steps = walk / np.sqrt(rate_hz) * rng.standard_normal(n)
+    return np.asarray(flicker + np.cumsum(steps) + white * np.sqrt(rate_hz) * rng.standard_normal(n))

@@ -8,6 +8,7 @@ import pytest
 
 import mpucal
 from mpucal.allan import NoiseMeter, noise_of
+from mpucal.allan.model import fitted, modelled
 from mpucal.allan.octaves import Octaves
 from mpucal.data import Recording, Sensor
 from mpucal.export.forms import form
@@ -85,6 +86,30 @@ def test_the_coefficients_are_those_that_were_simulated(found):
     inside = [(found.low[name] <= value) & (value <= found.high[name] * (1 + 1e-12)) for name, value in TRUE.items()]
     # 18 intervals of 95 %: fewer than 15 of them would be chance in 1 of 1000
     assert np.sum(inside) >= 15
+
+
+def test_what_is_simulated_walks_as_it_should_for_long():
+    """At an eighth of the time, too: a period of the simulation would be seen there."""
+    drawn = np.stack([noise(np.random.default_rng(seed), 1024, 1.0, 0.0, 0.0, 1.0) for seed in range(1500)], axis=1)
+    octaves = Octaves(drawn.shape[1])
+    octaves.add(drawn)
+    sizes, variances, _ = octaves.variances()
+    ratio = variances[sizes == 128].mean() / modelled(np.array([128.0]))[0, 2]
+    assert ratio == pytest.approx(1.0, abs=0.04)
+
+
+def test_intervals_hold_the_truth_at_their_rate():
+    """60 rests at once, of coefficients that their octaves hardly tell apart."""
+    truth, n = np.array([1.0, 0.35, 0.01]), 2**15
+    octaves = Octaves(60)
+    octaves.add(np.stack([noise(np.random.default_rng(seed), n, 1.0, *truth) for seed in range(60)], axis=1))
+    sizes, variances, _ = octaves.variances()
+    for confidence in (0.68, 0.95):
+        of = [fitted(sizes, each, n, 1.0, confidence) for each in variances.T]
+        inside = np.mean([(one.low[:3] <= truth) & (truth <= one.high[:3]) for one in of])
+        assert inside == pytest.approx(confidence, abs=2.5 * np.sqrt(confidence * (1.0 - confidence) / len(of)))
+    values = np.mean([one.value[:3] for one in of], axis=0)
+    np.testing.assert_allclose(values / truth, 1.0, atol=0.1)
 
 
 def test_beside_the_data_sheet(found):
