@@ -30,8 +30,8 @@ def initialise(problem: Problem, b_omega: Vector) -> Theta:
     through sums of C_t's products, so a search over the whole sphere costs as much as one sample.
     (u, D) and (-u, -D) fit equally well: det D > 0 decides.
 
-    A gap in which the board turned breaks C_t: where there are gaps, stretches between them are tried as well, and the
-    filter, which knows how little is known across a gap, says which estimate is best.
+    A gap in which the board turned breaks C_t: where there are gaps, stretches between them and a perfect sensor are
+    tried as well, and the filter, which knows how little is known across a gap, says which estimate is best.
 
     Parameters
     ----------
@@ -41,7 +41,9 @@ def initialise(problem: Problem, b_omega: Vector) -> Theta:
     stretches = _stretches(problem.series)
     if not stretches:
         return whole
-    tried = [whole, *(_from_the_flat_mean(problem, _between_gaps(problem, part, b_omega)) for part in stretches)]
+    perfect = Theta.start(np.eye(3), np.zeros(3), b_omega, np.array([0.0, 0.0, 1.0]))
+    rough = [perfect, *(_between_gaps(problem, part, b_omega) for part in stretches)]
+    tried = [whole, *(_from_the_flat_mean(problem, theta) for theta in rough)]
     return min(tried, key=lambda theta: _misfit(problem, theta))
 
 

@@ -1,6 +1,9 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from mpucal.calibration import calibrate
 from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.masks import mask, with_masks
@@ -85,6 +88,19 @@ def test_a_gap_in_which_the_board_turned_does_no_harm(first):
     np.testing.assert_allclose(theta.D, D, atol=0.02)
     np.testing.assert_allclose(theta.b_a, b_a, atol=0.1)
     np.testing.assert_allclose(theta.u, [0, 0, 1], atol=0.02)
+
+
+def test_pieces_lost_all_over_do_not_lead_it_astray(hand, pick):
+    simulated, rng = hand(4, "pose12"), np.random.default_rng(4)
+    t = simulated.recording.t - simulated.recording.t[0]
+    kept, at = np.ones(len(t), bool), 10.5
+    while at < t[-1] - 1.0:
+        last = at + rng.uniform(0.1, 0.5)
+        kept &= (t < at) | (t >= last)
+        at = last + rng.uniform(0.5, 5.0)
+    found = calibrate(replace(pick(simulated.recording, kept), flat=simulated.recording.flat))
+    assert found.fit["converged"]
+    np.testing.assert_array_less(np.abs(found.b_a - simulated.truth.b_a), 4.0 * found.b_a_std)
 
 
 def test_the_sphere_is_covered_evenly():
