@@ -77,7 +77,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         if EVENTS not in _words(arguments):
             error.show()
             return error.exit_code
-        return _event(error.exit_code, error.format_message(), "see `mpucal session --help`")
+        return _event(error.exit_code, error.format_message(), f"see `mpucal {_words(arguments)[0]} --help`")
     except click.Abort:
         raise KeyboardInterrupt from None
     except MpucalError as error:

@@ -102,14 +102,9 @@ def imperfect(recording: mpucal.Recording, rng: np.random.Generator) -> mpucal.R
 def of_pair(item: tuple[str, int], motion: str = ASKED, perfect: bool = False) -> Trial | None:
     """Calibrate, let something happen, and check; None where the calibration was refused."""
     event, seed = item
-    of_sensor, of_event, of_age, of_errors = np.random.default_rng([seed, 21]).spawn(4)
-    sensor = hand_sensor(of_sensor)
-    before = hand_scenario(2 * seed, "pose12", tremble=True, sensor=sensor)
-    calibration = mpucal.calibrate(at(before.recording, TEMPERATURE_C), gravity=GRAVITY_MPS2)
+    calibration, aged, of_event, of_errors = calibrated_and_aged(seed)
     if calibration.verdict == "refused":
         return None
-    age = drift.ageing(calibration, DAYS, 0.0)
-    aged = aged_by(before.truth, of_age.multivariate_normal(np.zeros(len(age)), age))
     after, temperature_c = happened(aged, event, of_event)
     recording = at(hand_scenario(2 * seed + 1, motion, tremble=True, sensor=after).recording, temperature_c)
     recording = recording if perfect else imperfect(recording, of_errors)
@@ -118,6 +113,18 @@ def of_pair(item: tuple[str, int], motion: str = ASKED, perfect: bool = False) -
     if told.theta is not None:
         error = float(np.abs(calibration.D @ told.theta[BETA] + calibration.b_a - after.b_a).max()) / drift.MG
     return Trial(event, seed, told.verdict, told.what, told.probability, told.seconds, error)
+
+
+def calibrated_and_aged(
+    seed: int,
+) -> tuple[mpucal.Calibration, SensorTruth, np.random.Generator, np.random.Generator]:
+    """A calibration by twelve poses, its sensor some days later, and what draws further events and errors."""
+    of_sensor, of_event, of_age, of_errors = np.random.default_rng([seed, 21]).spawn(4)
+    before = hand_scenario(2 * seed, "pose12", tremble=True, sensor=hand_sensor(of_sensor))
+    calibration = mpucal.calibrate(at(before.recording, TEMPERATURE_C), gravity=GRAVITY_MPS2)
+    age = drift.ageing(calibration, DAYS, 0.0)
+    aged = aged_by(before.truth, of_age.multivariate_normal(np.zeros(len(age)), age))
+    return calibration, aged, of_event, of_errors
 
 
 def at(recording: mpucal.Recording, temperature_c: float) -> mpucal.Recording:

@@ -19,14 +19,17 @@ from ..files.csv import NS, CsvText
 from ..page.address import Address
 from ..page.live import live
 from ..recheck import days_since
-from ..recheck.watch import Watch
+from ..recheck.watch import Contradiction, Watch
 from ..result.calibration import Calibration
 from ..result.clock import now
 from ..result.correction import Correction, correction
+from ..session.events import Caution
 from ..session.ports import Source
 from ..sources.opening import open_source
 from ..sources.table import source_title
 from ..terminal.flat import BOARD, VEHICLE
+from ..terminal.keys import Keys
+from ..terminal.lines import JsonLines
 from .loading import loaded
 from .options import ABOVE_ZERO, check_gyroscope, check_source, source_options
 from .page import page_options
@@ -43,6 +46,7 @@ RATE_HZ = 200.0
 @click.option("--seconds", type=ABOVE_ZERO, help="Stop after this time [s].")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line instead of a table.")
 @click.option("--watch", "watched", is_flag=True, help="Warn where rests contradict CALIBRATION.")
+@click.option("--json-events", is_flag=True, help="Print each warning as a line of JSON on stderr.")
 @page_options
 def command(
     calibration: Path,
@@ -50,6 +54,7 @@ def command(
     seconds: float | None,
     as_json: bool,
     watched: bool,
+    json_events: bool,
     page: Address | None,
     board: str | None,
     **options: Any,
@@ -70,7 +75,8 @@ def command(
         check_gyroscope(source.plan.config)
     text = CsvText(lambda text: sys.stdout.write(text.decode()))
     shown = live(page, source_title(options), board or (VEHICLE if options.get("mavlink") else BOARD))
-    capture = source.measuring(file or Path(os.devnull), _say, now().isoformat())
+    talk = _Talk(json_events)
+    capture = source.measuring(file or Path(os.devnull), talk.say, now().isoformat())
     with capture as measuring, shown as screen, suppress(KeyboardInterrupt):
         ready: Correction | None = None
         watch: Watch | None = None
@@ -79,7 +85,7 @@ def command(
                 # the newest sample was read just now
                 text.utc_ns = time.time_ns() - round(float(samples.t[-1]) * NS)
                 sensor = measuring.source.recording().sensor
-                ready = _correction(applied, measuring.source)
+                ready = _correction(applied, measuring.source, talk)
                 watch = Watch(ready.calibration, days_since(applied), sensor.rate_hz or RATE_HZ) if watched else None
             calibrated = ready.apply(samples)
             if as_json:
@@ -88,10 +94,31 @@ def command(
                 text.write(calibrated)
             screen.add(samples, calibrated, sensor)
             for finding in () if watch is None else watch.add(calibrated):
-                _say(finding)
-                screen.say(finding)
+                talk.warn(finding)
+                screen.say(str(finding))
             sys.stdout.flush()
             measuring.source.forget()
+
+
+class _Talk:
+    """What is said on stderr, as sentences or as events of a line of JSON each."""
+
+    def __init__(self, as_json: bool) -> None:
+        self._events = JsonLines(sys.stderr, Keys()) if as_json else None
+
+    def say(self, text: str) -> None:
+        """A sentence."""
+        if self._events is None:
+            click.echo(f"mpucal: {text.strip()}", err=True)
+        else:
+            self._events.say(text)
+
+    def warn(self, finding: Contradiction) -> None:
+        """Of what rests contradict."""
+        if self._events is None:
+            self.say(str(finding))
+        else:
+            self._events.hear(Caution(finding.t_s, f"{finding.sensor}_contradicted", finding.what, finding.do))
 
 
 def _polled(source: Source, seconds: float | None) -> Iterator[Samples]:
@@ -108,11 +135,11 @@ def _polled(source: Source, seconds: float | None) -> Iterator[Samples]:
             source.stop()
 
 
-def _correction(calibration: Calibration, source: Source) -> Correction:
+def _correction(calibration: Calibration, source: Source, talk: _Talk) -> Correction:
     recording = source.recording()
     ready = correction(calibration, recording.sensor, recording.autopilot)
     for remark in ready.remarks:
-        _say(remark)
+        talk.say(remark)
     return ready
 
 
@@ -124,7 +151,3 @@ def _json_lines(samples: Samples, utc_ns: int) -> None:
         print(
             json.dumps({"t": t, "a": a, "w": turning, "temperature_c": temperature_c, "utc_ns": utc_ns + round(t * NS)})
         )
-
-
-def _say(text: str) -> None:
-    click.echo(f"mpucal: {text.strip()}", err=True)

@@ -30,6 +30,7 @@ STEP_MPS2 = 0.1
 RESTS, LEAST_RESTS = 16, 4
 # days of rests are looked at one by one: each may err by chance less often than a check does
 FALSE_ALARMS = 2e-4
+DAY_S = 86400.0
 TO_DO = "see what `mpucal check` says"
 
 
@@ -44,26 +45,44 @@ class _Rest:
     temperature_c: float
 
 
+@dataclass(frozen=True)
+class Contradiction:
+    """What rests say against a calibration, of the accelerometer or the gyroscope, at `t_s` of the samples."""
+
+    t_s: float
+    sensor: str
+    what: str
+    do: str = TO_DO
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.do}"
+
+
 class Watch:
     """Looks at calibrated samples as they come, in constant memory; each sensor's finding is told once.
 
     Parameters
     ----------
-    calibration : ready for these samples. days : since it was made. rate_hz : samples a second.
+    calibration : ready for these samples. days : since it was made, at the first of them. rate_hz : samples a second.
     """
 
     def __init__(self, calibration: Calibration, days: float, rate_hz: float) -> None:
         self._calibration, self._days = calibration, days
         self._gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
         self._size = max(round(BLOCK_S * rate_hz), 2)
+        self._first_s: float | None = None
+        self._t_s = 0.0
         self._held = np.zeros((0, 7))
         self._blocks: list[Vector] = []
         self._rests: deque[_Rest] = deque(maxlen=RESTS)
         self._told: set[str] = set()
 
-    def add(self, calibrated: Samples) -> list[str]:
-        """What these samples bring to light: a sentence each."""
-        found = []
+    def add(self, calibrated: Samples) -> list[Contradiction]:
+        """What these samples bring to light."""
+        found: list[Contradiction] = []
+        if len(calibrated):
+            self._t_s = float(calibrated.t[-1])
+            self._first_s = self._t_s if self._first_s is None else self._first_s
         for part in np.split(np.arange(len(calibrated)), np.flatnonzero(calibrated.gap)):
             if len(part) and calibrated.gap[part[0]]:
                 self._held = self._held[:0]
@@ -75,11 +94,11 @@ class Watch:
                 found += self._block(block)
         return found
 
-    def _block(self, block: Vector) -> list[str]:
+    def _block(self, block: Vector) -> list[Contradiction]:
         """Half a second more."""
         mean, std = block.mean(0), block.std(0)
         still = std[:3].max() < ACC_SD_MPS2 and not std[3:6].max() > GYRO_SD_RAD_S
-        found = []
+        found: list[Contradiction] = []
         if not still or (self._blocks and np.abs(mean[:3] - self._blocks[0][:3]).max() > STEP_MPS2):
             found = self._over()
         if still:
@@ -88,7 +107,7 @@ class Watch:
             found += self._over()
         return found
 
-    def _over(self) -> list[str]:
+    def _over(self) -> list[Contradiction]:
         """A rest is over."""
         # a hand settles, and leaves early
         blocks, self._blocks = np.array(self._blocks[1:-1]), []
@@ -101,12 +120,13 @@ class Watch:
         self._rests.append(_Rest(blocks[:, :3].mean(0), a_variance, blocks[:, 3:6].mean(0), w_variance, blocks[-1, 6]))
         return self._judged(list(self._rests))
 
-    def _judged(self, rests: list[_Rest]) -> list[str]:
+    def _judged(self, rests: list[_Rest]) -> list[Contradiction]:
         if len(rests) < LEAST_RESTS:
             return []
         T, T_0 = rests[-1].temperature_c, self._calibration.sensor.temperature_c
         change_c = None if T_0 is None or math.isnan(T) else T - T_0
-        nothing = drift.own_uncertainty(self._calibration) + drift.ageing(self._calibration, self._days, change_c)
+        days = self._days + (self._t_s - (self._first_s or 0.0)) / DAY_S
+        nothing = drift.own_uncertainty(self._calibration) + drift.ageing(self._calibration, days, change_c)
         happenings = drift.happenings(self._calibration, change_c)
         observed = self._observed(rests)
         weighed = weigh(observed, nothing, happenings)
@@ -120,7 +140,8 @@ class Watch:
             if without.told == NOTHING:
                 return []
         self._told.add(sensor)
-        return [f"the last {len(rests)} rests contradict the calibration ({self._off(rests, sensor)}): {TO_DO}"]
+        said = f"the last {len(rests)} rests contradict the calibration ({self._off(rests, sensor)})"
+        return [Contradiction(self._t_s, sensor, said)]
 
     def _off(self, rests: list[_Rest], sensor: str) -> str:
         if sensor == "gyroscope":

@@ -281,7 +281,7 @@ class Caution:
     """Something is not as it should be: `what` in one line, and what to `do` about it now.
 
     `code` names its kind for those who count them: moved, trembling, too_fast, clipped, data_lost, not_turned,
-    seen_already, doubtful, knocked, refused.
+    seen_already, doubtful, knocked, refused; of a stream accelerometer_contradicted, gyroscope_contradicted.
     """
 
     t_s: float

@@ -124,3 +124,7 @@ def test_rests_that_contradict_the_calibration_are_told_once(mpucal, session):
     assert told.code == 0
     assert told.err.count("rests contradict the calibration (|a| has an error of up to") == 1
     assert told.out.count("\n") > 5900
+    (event,) = map(json.loads, mpucal(*words, "wrong.json", "--json-events").err.splitlines())
+    assert (event["event"], event["code"]) == ("caution", "accelerometer_contradicted")
+    assert 0.0 < event["t_s"] < 60.0
+    assert f"{event['what']}: {event['do']}" in told.err

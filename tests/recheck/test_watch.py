@@ -51,12 +51,12 @@ def test_a_right_calibration_is_left_alone(seed):
 def test_a_bias_that_moved_is_told_once():
     said, _ = told(replace(TRUTH, b_a=TRUTH.b_a + np.array([0.0, 12.0, 0.0]) * drift.MG))
     assert len(said) == 1
-    assert abs(float(said[0].split("up to ")[1].split(" mg")[0])) == pytest.approx(12.0, abs=4.0)
+    assert abs(float(said[0].what.split("up to ")[1].split(" mg")[0])) == pytest.approx(12.0, abs=4.0)
 
 
 def test_a_gyroscope_that_moved_is_told():
     said, _ = told(replace(TRUTH, b_omega=TRUTH.b_omega + np.radians([0.0, 3.0, 0.0])))
-    assert "turns by up to 3" in said[0]
+    assert "turns by up to 3" in said[0].what
 
 
 def test_a_rest_that_was_none_decides_nothing():
