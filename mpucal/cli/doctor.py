@@ -33,10 +33,24 @@ def command(as_json: bool, seconds: float, **options: Any) -> int:
     """
     kind = check_source(click.get_current_context())
     value = options[kind.option.name]
-    findings = tuple(_findings(kind, options, seconds))
+    findings = tuple(_shown(_findings(kind, options, seconds)))
     tell = document if as_json else text
     click.echo(tell(str(value), __version__, findings))
     return SourceError.exit_code if any(finding.mark is Mark.BAD for finding in findings) else 0
+
+
+def _shown(findings: Iterator[Finding]) -> Iterator[Finding]:
+    """The same; meanwhile a terminal shows what was looked at last, and for how long already."""
+    from rich.console import Console  # noqa: PLC0415 - most commands need none of it
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn  # noqa: PLC0415
+
+    terminal = Console(stderr=True)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=terminal, transient=True, disable=not terminal.is_terminal) as progress:
+        line = progress.add_task("Examining", total=None)
+        for finding in findings:
+            progress.update(line, description=f"Examining ({finding.topic}: done)")
+            yield finding
 
 
 def _findings(kind: SourceKind, options: Mapping[str, Any], seconds: float) -> Iterator[Finding]:

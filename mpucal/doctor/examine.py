@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from functools import partial
 
 import numpy as np
 
@@ -23,12 +22,13 @@ from ..chip.identity import remark
 from ..chip.offsets import PLACES, Block, restore
 from ..chip.port import Port
 from ..chip.probe import read_identity
-from ..chip.response import measured_response
+from ..chip.response import Response, measured_response
 from ..chip.self_test import SelfTest, run_self_test
 from ..chip.tally import REMEDY, Tally
 from ..data import Sensor
 from ..errors import ChipError, OddOffsets, SourceError
-from .dead import DEAD_AXIS, REPLACE, named
+from .bits import examine_bits
+from .dead import DEAD_AXIS, REPLACE, STUCK_BITS, named
 from .finding import Finding, Mark, failed
 from .measure import examine_stream
 from .speed import examine_speed
@@ -133,10 +133,9 @@ def _awake(
     named = PARTS.get(sensor.who_am_i or 0)
     answers_as_it_is = named is not None and named.family.name == family.name
     doubts = [] if answers_as_it_is else ["WHO_AM_I and behaviour disagree"]
-    for step in (_self_test, partial(_offsets, patience=patience)):
-        finding, doubt = step(port, part)
-        doubts += doubt
+    for finding, doubt in (_self_test(port, part), *_shifted(port, part, patience)):
         yield finding
+        doubts += doubt
     yield _verdict(sensor, doubts)
 
 
@@ -187,26 +186,44 @@ def _unmoved(test: SelfTest) -> str:
     )
 
 
-def _offsets(port: Port, part: Part, patience: int) -> tuple[Finding, list[str]]:
+def _shifted(port: Port, part: Part, patience: int) -> Iterator[tuple[Finding, list[str]]]:
+    """What the offset registers do, and the bits that do not move when they shift what is measured."""
+    family, odd = part.family, None
     try:
         with Bench(port, patience) as bench:
-            response = measured_response(port, bench, part.family.accel_offset_h)
+            try:
+                response = measured_response(port, bench, family.accel_offset_h)
+                yield _offsets(response, family)
+            except OddOffsets as error:
+                # a bit that is stuck makes an axis answer oddly, too
+                lsb_per_g = family.accel_offset_lsb_per_g
+                odd, response = error, Response(family.accel_offset_h, lsb_per_g, np.full(3, 1.0 / lsb_per_g))
+            bits, axes = examine_bits(port, bench, part, response)
     except ChipError as error:
         # a board that moved says nothing about the chip
-        doubts = ["its offset registers are not as in any genuine part"] if isinstance(error, OddOffsets) else []
-        return Finding("offset registers", Mark.NOTE, error.what, error.remedy), doubts
+        yield Finding("offset registers", Mark.NOTE, error.what, error.remedy), []
+        return
+    if odd is not None and axes in (0, 3):
+        doubt = "its offset registers are not as in any genuine part"
+        yield Finding("offset registers", Mark.NOTE, odd.what, odd.remedy), [doubt]
+    else:
+        yield bits, [STUCK_BITS] if axes else []
+
+
+def _offsets(response: Response, family: Family) -> tuple[Finding, list[str]]:
     where = f"0x{response.place[0]:02x}"
     data = {"place": response.place[0], "lsb_per_g": response.lsb_per_g, "g_per_lsb": response.g_per_lsb.tolist()}
     mg = ", ".join(f"{256_000 * value:.1f}" for value in response.g_per_lsb)
     what = f"at {where}, {response.lsb_per_g:.0f} LSB/g (256 counts moved x, y, z by {mg} mg)"
-    if response.place == part.family.accel_offset_h:
+    if response.place == family.accel_offset_h:
         return Finding("offset registers", Mark.OK, what, "", data), []
     return Finding("offset registers", Mark.NOTE, what, "", data), [f"its offset registers are at {where}"]
 
 
 def _verdict(sensor: Sensor, doubts: list[str]) -> Finding:
-    if DEAD_AXIS in doubts:
-        return Finding("genuine?", Mark.UNKNOWN, f"undecided: the chip has a {DEAD_AXIS}", REPLACE)
+    for defect in (DEAD_AXIS, STUCK_BITS):
+        if defect in doubts:
+            return Finding("genuine?", Mark.UNKNOWN, f"undecided: {defect}", REPLACE)
     if not doubts:
         return Finding("genuine?", Mark.OK, f"consistent with a genuine {sensor.chip}", "", {"doubts": []})
     return Finding(

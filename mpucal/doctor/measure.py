@@ -15,6 +15,8 @@ from .noise import density, trembles
 
 # times the data sheet's typical density
 NOISY, BROKEN = 1.5, 3.0
+# of the sample clock's rate; the least that a warming chip's does not do
+CHANGED = 0.002
 # five times what a quartz crystal may be off
 OFF_PPM = 500.0
 # +-3 % of scale and 80 mg of zero
@@ -32,11 +34,9 @@ def examine_stream(recording: Recording, nominal_hz: float, seconds: float, fami
     yield _losses(recording, seconds)
     acc, gyr = recording.acc, np.degrees(recording.gyr)
     hz = float(recording.sensor.rate_hz or nominal_hz)
-    dead = dead_axes(recording)
-    if dead is not None:
-        yield dead
+    yield from dead_axes(recording)
     # what stands still has no noise, and rounding would be taken for a hand's
-    acc_lives, gyr_lives = live_axes(acc), live_axes(gyr)
+    acc_lives, gyr_lives = live_axes(recording)
     if acc_lives.any() and trembles(acc[:, acc_lives], hz):
         yield Finding("noise", Mark.UNKNOWN, "the board moved", "put it on a firm surface and try again")
         return
@@ -71,13 +71,26 @@ def _rate(recording: Recording, nominal_hz: float) -> Finding:
     off = hz / nominal_hz - 1
     # where a bridge's clock is hardly known, so is this
     ok = abs(off) <= RATE_TOLERANCE + 2.0 * (recording.sensor.clock_std or 0.0)
-    return Finding(
-        "sample rate",
-        Mark.OK if ok else Mark.BAD,
-        f"{hz:.3f} Hz instead of {nominal_hz:g} Hz, {100 * off:+.2f} % (data sheet: within 1 %)",
-        "" if ok else "the chip's clock is outside its specification: use the measured rate",
-        {"rate_hz": hz, "nominal_hz": nominal_hz},
-    )
+    what = f"{hz:.3f} Hz instead of {nominal_hz:g} Hz, {100 * off:+.2f} % (data sheet: within 1 %)"
+    data = {"rate_hz": hz, "nominal_hz": nominal_hz}
+    if ok and (change := _change(recording)) is not None:
+        at_s, before_hz, after_hz = change
+        what = f"the chip's clock changed after {at_s:.0f} s: from {before_hz:.3f} to {after_hz:.3f} Hz"
+        remedy = "times follow it; if that happens again, check its supply, or replace the chip"
+        return Finding("sample rate", Mark.NOTE, what, remedy, data)
+    remedy = "" if ok else "the chip's clock is outside its specification: use the measured rate"
+    return Finding("sample rate", Mark.OK if ok else Mark.BAD, what, remedy, data)
+
+
+def _change(recording: Recording) -> tuple[float, float, float] | None:
+    """Seconds, and the rates [Hz] before and after, of a sample clock that changed: its times lie on several lines."""
+    period = np.where(recording.gap[1:], np.nan, np.diff(recording.t))
+    first, last = float(period[0]), float(period[-1])
+    # NaN is no change
+    if not abs(last / first - 1) > CHANGED:
+        return None
+    at = int(np.argmax(np.abs(period / first - 1) > abs(last / first - 1) / 2))
+    return float(recording.t[at] - recording.t[0]), 1.0 / first, 1.0 / last
 
 
 def _losses(recording: Recording, asked_s: float) -> Finding:

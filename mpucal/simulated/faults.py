@@ -191,6 +191,8 @@ _ROWS = (
     FaultKind("zero_acc", Where.DEFECT, "the accelerometer stays at 0", timed=False, pins=(ACC, 0)),
     FaultKind("full_acc", Where.DEFECT, "the accelerometer stays at 32767", timed=False, pins=(ACC, 32767)),
     FaultKind("zero_gyro", Where.DEFECT, "the gyroscope stays at 0", timed=False, pins=(GYR, 0)),
+    FaultKind("stuck_ax", Where.DEFECT, "accelerometer x stays at 1234", timed=False, pins=((0,), 1234)),
+    FaultKind("zero_gz", Where.DEFECT, "gyroscope z stays at 0", timed=False, pins=((6,), 0)),
     FaultKind("stuck_gy", Where.DEFECT, "gyroscope y stays at -15", timed=False, pins=((5,), -15)),
     FaultKind("stuck_temp", Where.DEFECT, "the thermometer stays at 0", timed=False, pins=(TEMPERATURE, 0)),
     FaultKind("loose", Where.HAND, "the accelerometer turns by 8 deg on its mount", mishap=Slip),

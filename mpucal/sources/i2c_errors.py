@@ -57,7 +57,8 @@ def transfer_error(error: OSError, path: str, address: int) -> BusError:
     if error.errno == errno.ETIMEDOUT:
         return BusHeld(
             f"the I2C bus does not come free (0x{address:02x} on {path})",
-            "a wire holds SDA or SCL low: take the chip's supply away for a moment, and check for shorts",
+            "a wire holds SDA or SCL low, or nothing pulls them up: check for shorts,"
+            " and take the chip's supply away for a moment",
         )
     what, remedy = _TRANSFER.get(
         error.errno or 0,

@@ -1,11 +1,15 @@
 """The examination on the simulated chip: what each kind of chip and fault is told to be."""
 
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from mpucal.chip.bench import LOOKS, PATIENCE
 from mpucal.chip.config import Config
+from mpucal.data import Recording, Sensor
+from mpucal.doctor.dead import dead_axes, live_axes
 from mpucal.doctor.examine import examine
 from mpucal.doctor.finding import Finding, Mark
 from mpucal.doctor.page import document, text
@@ -128,6 +132,25 @@ def test_a_dead_axis_is_named(fault, axes):
     dead = [f for f in examine(still(f"sim:fault={fault}"), Config(), 3.0) if f.topic == "dead axis"]
     assert dead[0].data["dead"] == axes
     assert "replace the chip" in dead[0].remedy
+
+
+def test_an_axis_that_dies_midway_is_named_and_one_that_rarely_changes_is_not():
+    rng = np.random.default_rng(1)
+    counts = np.rint(rng.normal((300, -7, 8192), 16, (2000, 3)))
+    acc = counts * (4 * 9.80665 / 32768)
+    acc[1200:, 1] = acc[1200, 1]
+    rare = np.where(np.arange(2000) % 900 == 899, 0.001, 0.0)
+    gyr = np.column_stack([rng.normal(0, 1e-3, (2000, 2)), rare])
+    recording = replace(Recording.from_arrays(np.arange(2000) / 200, acc, gyr), sensor=Sensor(accel_range_g=4.0))
+    (found,) = dead_axes(recording)
+    assert (found.data["dead"], "from 6 s on" in found.what) == (["accelerometer y"], True)
+    assert [mask.tolist() for mask in live_axes(recording)] == [[True, False, True], [True, True, True]]
+
+
+def test_a_stuck_bit_is_looked_for_where_a_revision_c_shows_half_of_g():
+    told = findings(open_simulated("sim:chip=mpu6050c,fault=high_bit@0"))
+    assert told["stuck bits"].what == "bit 12 of accelerometer y does not move"
+    assert findings(open_simulated("sim:chip=mpu6050c"))["stuck bits"].mark is Mark.OK
 
 
 def still(words):
