@@ -209,7 +209,7 @@ KINDS: Mapping[str, Kind] = {
             ),
         },
         "mpucal session --bus sim:fault=overflow@30 --seed 1",
-        "more than half of the recording is missing",
+        "more than half of the recording is missing, interruptions of more than 10 s not counted",
         turn_again=True,
     ),
     "left_handed": Kind(

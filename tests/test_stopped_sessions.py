@@ -1,4 +1,4 @@
-"""A computer that stops for 5 s, or is set to another day: a vehicle's session goes on, with a marked gap."""
+"""A computer that stops, or is set to another day: a vehicle's session goes on, with a marked gap."""
 
 import sys
 from importlib import import_module
@@ -11,9 +11,14 @@ import pytest
 
 import mpucal
 from mpucal.__main__ import run
+from mpucal.mavlink.link import Link
+from mpucal.mavlink.tlog import Record, Tlog
+from mpucal.mavlink.tlog_replay import Replay
 from mpucal.mavlink.transport import Clock
+from mpucal.mavlink.vehicle_source import VehicleSource
+from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
+from mpucal.simulated.vehicle.transport import SimulatedTransport
 
-STOPPED_S = 5.0
 DAY_NS = 86_400 * 10**9
 
 
@@ -30,26 +35,18 @@ def pass_by(world, seconds):
     transport._vehicle.go_on(transport._vehicle.now_us + round(seconds * 1e6))
 
 
-def test_a_session_goes_on_where_time_passed_it_by(worlds, tmp_path):
+@pytest.mark.parametrize(("at_s", "stopped_s"), [(10.0, 70.0), (24.0, 70.0)])
+def test_a_session_goes_on_where_time_passed_it_by(worlds, tmp_path, capsys, at_s, stopped_s):
     world = worlds.World(worlds.VEHICLE)
-    world.moments.add(24.0, lambda: pass_by(world, STOPPED_S))
+    world.moments.add(at_s, lambda: pass_by(world, stopped_s))
     days = iter(range(1, 1_000_000))
     with world.opened(), patch("time.time_ns", lambda: time_ns() + (-1) ** next(days) * DAY_NS):
-        code = run(
-            [
-                "session",
-                "--mavlink",
-                "sim:seed=3",
-                "--no-write",
-                "-o",
-                str(tmp_path / "board"),
-                "--yes",
-            ]
-        )
+        code = run(["session", "--mavlink", "sim:seed=3,imus=1", "--no-write", "-o", str(tmp_path / "board"), "--yes"])
     assert code == 0
+    assert f"stood still for {stopped_s:.0f} s, and read nothing" in capsys.readouterr().err
     recording = mpucal.load(tmp_path / "board")
     steps = np.diff(recording.t)
-    assert steps.max() == pytest.approx(STOPPED_S, abs=2)
+    assert steps.max() == pytest.approx(stopped_s, abs=2)
     assert recording.gap[1:][steps > 0.5].all()
 
 
@@ -59,3 +56,19 @@ def test_the_time_of_a_link_never_follows_who_sets_the_clock():
     for jump_ns in (DAY_NS, -DAY_NS):
         with patch("time.time_ns", lambda jump_ns=jump_ns: time_ns() + jump_ns):
             assert 0 <= clock.now_ns() - begun_ns < DAY_NS // 2
+
+
+def test_a_program_that_stood_still_is_told_from_a_vehicle_that_was_silent():
+    vehicle = SimulatedVehicle(VehicleOptions.parse("sim:imus=1,hand=still"))
+    transport, record, said = SimulatedTransport(vehicle), [], []
+    link = Link(transport, lambda t_ns, data: record.append(Record(t_ns, data)))
+    source = VehicleSource(link, 100.0, None, said.append, "test")
+    first = [source.start(), *(source.poll().t.tolist() for _ in range(20))]
+    vehicle._now_us += 300_000_000
+    first += [source.poll().t.tolist() for _ in range(40)]
+    assert [text for text in said if "stood still for 300 s" in text]
+    assert not [text for text in said if "has sent nothing" in text]
+    assert source.recording().gap.sum() == 1
+    link = Link(Replay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)
+    again = VehicleSource(link, 100.0, None, lambda text: None, "test")
+    assert [again.start(), *(again.poll().t.tolist() for _ in range(59))] == first[:-1]

@@ -35,6 +35,8 @@ class VehicleClock:
         self._offset_us = 0
         self._latest_us = 0
         self._received_us = 0
+        # by how much the clock ran ahead of the times of receipt at most, but for what they differ by
+        self._ahead_us = 0
 
     def us(self, raw: int, received_ns: int) -> tuple[int, Jump]:
         """The time of `raw` in us, and what the clock did before it.
@@ -46,6 +48,7 @@ class VehicleClock:
         received_us = received_ns // US
         if self._raw is None:
             self._raw, self._latest_us, self._received_us = raw, raw * self._unit_us, received_us
+            self._ahead_us = self._latest_us - received_us
             return self._latest_us, Jump.NONE
         step_us = (raw - self._raw) * self._unit_us
         wrapped_us = step_us + WRAP * self._unit_us
@@ -54,11 +57,13 @@ class VehicleClock:
             self._offset_us += WRAP * self._unit_us
             step_us = wrapped_us
         jump = Jump.NONE
-        if step_us < -LATE_US or step_us > passed_us + STRAY_US:
+        # against all that came, not the last: what was read late, after a pause, came in a burst
+        if step_us < -LATE_US or self._latest_us + step_us - received_us > self._ahead_us + STRAY_US:
             jump = Jump.REBOOT if step_us < 0 else Jump.SET
             self._offset_us += max(passed_us, 1) - step_us
             step_us = max(passed_us, 1)
         t_us = raw * self._unit_us + self._offset_us
         if step_us > 0:
             self._raw, self._latest_us, self._received_us = raw, t_us, received_us
+            self._ahead_us = max(self._ahead_us, t_us - received_us)
         return t_us, jump

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from ..errors import BusError, LinkError, NoAnswer
 from .dialect import MAGIC, SIGNED, Message, Packet, Parser, dialect
-from .transport import Bytes, Transport
+from .transport import STOOD_NS, Bytes, Transport
 from .vehicle import Vehicle, vehicle_of
 
 # of us: a ground station beside the usual 255, as a component that autopilots expect of one
@@ -142,6 +142,8 @@ class Link:
     def messages(self, until_ns: int) -> Iterator[Message]:
         """The vehicle's messages until `until_ns`; who leaves early loses none.
 
+        Where the program or its computer stood still meanwhile, it is later than `until_ns` afterwards.
+
         Raises
         ------
         EndOfCapture : a replay holds no more. LinkError : the link broke.
@@ -181,8 +183,13 @@ class Link:
             received = self._transport.receive(min(until_ns, self._next_heartbeat_ns))
             if received is not None:
                 self._queue.extend(self._parsed(received))
+            now_ns = self._transport.now_ns() if received is None else received.t_ns
+            if self._vehicle is not None and now_ns - until_ns > STOOD_NS:
+                # nobody was waiting meanwhile: there is nothing to be told of that time
+                until_ns = now_ns
+                break
             # strangers' bytes are no reason to stay longer
-            if (self._transport.now_ns() if received is None else received.t_ns) >= until_ns and not self._queue:
+            if now_ns >= until_ns and not self._queue:
                 break
         self._now_ns = max(self._now_ns, until_ns)
 

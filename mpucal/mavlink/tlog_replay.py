@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -9,7 +10,7 @@ from ..errors import EndOfCapture
 from .dialect import Packet, Parser, dialect
 from .session_events import Note, Notes, is_own
 from .tlog import Tlog
-from .transport import Bytes
+from .transport import STOOD_NS, Bytes
 
 
 class Noted(NamedTuple):
@@ -30,6 +31,8 @@ class Replay:
     def __init__(self, tlog: Tlog) -> None:
         self.name = tlog.name
         self._records = tlog.records
+        # whatever was recorded: our own heartbeats tell a vehicle that was silent from a program that stood still
+        self._times_ns = [record.t_ns for record in tlog.records]
         self._parser = Parser(dialect().MAVLink(None))
         self._notes = Notes()
         self._pending: list[Noted] = []
@@ -53,7 +56,9 @@ class Replay:
         if ended and until_ns > self._end_ns:
             raise EndOfCapture(f"{self.name} ends")
         if ended or self._records[self._at].t_ns >= until_ns:
-            self._now_ns = max(self._now_ns, until_ns)
+            at = bisect_left(self._times_ns, until_ns)
+            next_ns = self._times_ns[at] if at < len(self._times_ns) else until_ns
+            self._now_ns = max(self._now_ns, next_ns if next_ns - until_ns > STOOD_NS else until_ns)
             return None
         record = self._records[self._at]
         t_ns = max(record.t_ns, self._now_ns)

@@ -6,6 +6,8 @@ import time
 from typing import NamedTuple, Protocol
 
 US = 1_000
+# who asked for bytes until a time, and gets them so much later, stood still meanwhile: SIGSTOP, a suspended computer
+STOOD_NS = 3_000_000_000
 
 
 class Bytes(NamedTuple):

@@ -18,6 +18,7 @@ from .prearm import ARMED
 from .px4_preparation import Preparation
 from .stream import Streams
 from .stream_parameters import read_stream_parameters
+from .transport import STOOD_NS
 from .vehicle import Vehicle
 
 POLL_NS = S // 20
@@ -68,6 +69,7 @@ class VehicleSource:
         self._rows: list[Row] = []
         self._last_us: float | None = None
         self._heard_ns = self._sampled_ns = 0
+        self._stood_ns = 0
         self._rebooted = False
         self._firmware = ARDUPILOT
         self._told = 0
@@ -114,15 +116,30 @@ class VehicleSource:
         ------
         EndOfCapture : a replay holds no more. LinkError : the vehicle fell silent for good, or the link broke.
         """
-        for _ in self._link.messages(self._link.now_ns() + POLL_NS):
+        if self._stood_ns:
+            self._say(f"This program, or its computer, stood still for {self._stood_ns / S:.0f} s, and read nothing.")
+            self._stood_ns = 0
+            self._wait_until_back()
+        begun_ns = self._link.now_ns()
+        for _ in self._link.messages(begun_ns + POLL_NS):
             self._heard_ns = self._link.now_ns()
             self._received += 1
+        stood_ns = self._link.now_ns() - begun_ns
+        if stood_ns > STOOD_NS:
+            # what came before is given first
+            self._stood_ns = stood_ns
+            self._heard_ns = self._sampled_ns = self._link.now_ns()
+            return self._taken()
         if self._streams is not None:
             self._streams.watch()
         if self._rebooted or self._link.now_ns() - self._sampled_ns >= SILENT_NS:
+            self._say(f"{self._link.vehicle} {self._trouble()}: wait until it is back, and hold it still meanwhile.")
             self._wait_until_back()
         self._tell_changes()
         self._weigh()
+        return self._taken()
+
+    def _taken(self) -> Samples:
         rows, self._rows = self._rows, []
         samples = samples_of(rows, self._last_us)
         if rows:
@@ -195,8 +212,7 @@ class VehicleSource:
         self._say(f"{what}: the result is for files only.")
 
     def _wait_until_back(self) -> None:
-        """After a reboot, or a silence, have it stream again, and read its parameters anew."""
-        self._say(f"{self._link.vehicle} {self._trouble()}: wait until it is back, and hold it still meanwhile.")
+        """After a reboot, a silence or a pause, have it stream again, and read its parameters anew."""
         end_ns = self._link.now_ns() + BACK_NS
         while not self._streams_again():
             if self._link.now_ns() >= end_ns:

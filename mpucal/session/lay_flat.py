@@ -58,6 +58,7 @@ class LayFlat:
 
     def resumed(self) -> list[Output]:
         """The board may be anywhere now."""
+        self._windows = Windows(WINDOW_S)
         self._stillness.forget()
         self._still, self._begun_s = None, None
         return [PROMPT]

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from . import lay_flat
 from .aims import AIMS, NORMAL
 from .choose import Choose
@@ -132,10 +134,13 @@ class Machine:
 
     def _measured(self, event: Measured) -> list[Output]:
         samples = event.samples
+        # after so long the person begins anew what was asked for, and the time for it does, too
+        before_s = samples.t[0] if self._sampled_s is None else self._sampled_s
+        again = self._step.resumed() if np.diff(samples.t, prepend=before_s).max() > SILENT_S else []
         self._sampled_s = float(samples.t[-1])
         self._samples += len(samples)
         seen = self._watch.add(samples, self._wanted) if self._watch else []
-        return [*seen, *self._follow(self._step.add(samples))]
+        return [*again, *seen, *self._follow(self._step.add(samples))]
 
     @property
     def _wanted(self) -> Direction | None:

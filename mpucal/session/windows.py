@@ -18,7 +18,7 @@ class Window:
 
     Attributes
     ----------
-    start_s, end_s : times of its first sample and of the one after its last [s].
+    start_s, end_s : times of its first sample and of the one after its last, or, before a gap, its length later [s].
     acc, gyr : (3,) means [m/s^2], [rad/s]. acc_sd, gyr_sd : (3,) standard deviations.
     whole : no sample is missing within it or just before it. count : of its samples.
     """
@@ -59,18 +59,18 @@ class Windows:
             last = int(np.searchsorted(pending.t, self._full_s))
             if last == len(pending):
                 break
-            windows.append(_window(pending, first, last, self._spread))
+            windows.append(_window(pending, first, last, self._length_s, self._spread))
             first = last
         self._parts = [_tail(pending, first)]
         return windows
 
 
-def _window(samples: Samples, first: int, last: int, spread: bool) -> Window:
+def _window(samples: Samples, first: int, last: int, length_s: float, spread: bool) -> Window:
     acc, gyr = samples.acc[first:last], samples.gyr[first:last]
     acc_mean, gyr_mean = _mean(acc), _mean(gyr)
     return Window(
         float(samples.t[first]),
-        float(samples.t[last]),
+        float(samples.t[first]) + length_s if samples.gap[last] else float(samples.t[last]),
         acc_mean,
         gyr_mean,
         _deviation(acc, acc_mean) if spread else UNKNOWN,

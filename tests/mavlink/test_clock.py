@@ -49,3 +49,11 @@ def test_time_goes_on_over_a_reset():
 def test_a_late_packet_keeps_its_time():
     found = run(1000, [(1000, 1.0), (1030, 1.03), (1010, 1.031), (1040, 1.04)])
     assert [t_us for t_us, _ in found] == [1_000_000, 1_030_000, 1_010_000, 1_040_000]
+
+
+def test_what_was_read_late_in_a_burst_is_no_clock_that_was_set():
+    # read until 100.5, then not for 300 s: of what came meanwhile the first was kept, and the newest follow
+    pairs = [(1_000_000, 100.5), (1_010_000, 400.5), (301_000_000, 400.51), (301_010_000, 400.52)]
+    found = run(1, pairs)
+    assert [t_us for t_us, _ in found] == [raw for raw, _ in pairs]
+    assert {jump for _, jump in found} == {Jump.NONE}

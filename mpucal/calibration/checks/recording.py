@@ -11,6 +11,7 @@ from ..local_noise import noise_variance
 
 WARMER_C = 5.0
 MOST_CLIPPED = 0.2
+INTERRUPTED_S = 10.0
 # of the accelerometer's noise: more than at rest for a share of the time, or at rest more than any sensor has
 VIBRATING_MPS2, LOUDER_THAN_FLAT, VIBRATING_SHARE = 0.2, 2.5, 0.2
 SHAKING_MPS2 = 0.5
@@ -50,12 +51,14 @@ def data_lost(e: Evidence) -> Reason | None:
     if not gaps.any():
         return None
     places = int(np.count_nonzero(gaps & ~np.append(False, gaps[:-1])))
-    lost = float(np.diff(t, prepend=t[0])[gaps].sum())
-    # a session that was resumed has a gap that no bus is to blame for
+    missing = np.diff(t, prepend=t[0])[gaps]
+    lost = float(missing.sum())
+    # a session that was interrupted has a gap that no bus is to blame for
+    interrupted = float(missing[missing > INTERRUPTED_S].sum())
     return reason(
         "data_lost",
         "bus" if e.recording.autopilot is None else "link",
-        lost > 0.5 * float(t[-1] - t[0]),
+        lost - interrupted > 0.5 * float(t[-1] - t[0] - interrupted),
         places=f"{places} place{'s' if places > 1 else ''}",
         seconds=lost,
     )
