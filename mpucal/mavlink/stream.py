@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Collection, Mapping
 
 from ..errors import LinkError
 from .dialect import Message, dialect
@@ -18,7 +18,7 @@ LADDER_HZ = (200.0, 100.0, 50.0, 25.0, 10.0)
 ARRIVE_NS, ENOUGH = S, 3
 ACK_S, ACK_TRIES = 0.7, 4
 
-# HIGHRES_IMU is in no stream group: who lowers it asks for it by name
+# HIGHRES_IMU is in no stream group, and PX4 knows none: who lowers it asks for it by name
 STREAMRATE = "start MAVProxy with --streamrate=-1"
 # of the rate asked for: where less comes of a PX4, it is asked for so much more
 MOST, SOONER = 0.8, 2.0
@@ -45,7 +45,7 @@ class Streams:
         self._parameters = parameters
         self._rate_hz = rate_hz
         self._say = say
-        self._counts: Counter[Stream] = Counter()
+        self._times: defaultdict[Stream, set[int]] = defaultdict(set)
         self._wanted: dict[str, float] = {}
         self._best_hz: dict[Stream, float] = {}
         self._fallen: list[Stream] = []
@@ -64,15 +64,15 @@ class Streams:
             self._ask(name)
         if self._came_hz(first) < MOST * self._rate_hz and self._firmware == PX4:
             self._ask_sooner()
-        self._counts.clear()
+        self._times.clear()
         self._window_ns = self._link.now_ns()
         return first
 
     def _came_hz(self, stream: Stream) -> float:
-        self._counts.clear()
+        self._times.clear()
         begun_ns = self._link.now_ns()
         list(self._link.messages(begun_ns + ARRIVE_NS))
-        return self._counts[stream] * S / (self._link.now_ns() - begun_ns)
+        return len(self._times[stream]) * S / (self._link.now_ns() - begun_ns)
 
     def _ask_sooner(self) -> None:
         """PX4 leaves out every sample that comes before its interval is over: 125 Hz of 250 where 200 are asked for."""
@@ -87,8 +87,8 @@ class Streams:
         if now_ns - self._window_ns < WATCH_NS:
             return
         seconds = (now_ns - self._window_ns) / S
-        rates = {stream: count / seconds for stream, count in self._counts.items()}
-        self._counts.clear()
+        rates = {stream: _rate_hz(stream, times, seconds) for stream, times in self._times.items()}
+        self._times.clear()
         self._window_ns = now_ns
         self._tell(rates)
         for stream, best_hz in self._best_hz.items():
@@ -110,13 +110,13 @@ class Streams:
             self._request(name)
         # nobody slowed what was away
         self._fallen = []
-        self._counts.clear()
+        self._times.clear()
         self._window_ns = self._link.now_ns()
 
     def _hear(self, message: Message) -> None:
         content = reading(message)
         if content is not None:
-            self._counts[content.stream] += 1
+            self._times[content.stream].add(content.time)
 
     def _first(self) -> Stream:
         for name in self._order:
@@ -149,9 +149,9 @@ class Streams:
 
     def _arrives(self, stream: Stream) -> bool:
         """Whether `stream` comes, waiting for it where it did not yet."""
-        self._counts.clear()
+        self._times.clear()
         until_ns = self._link.now_ns() + ARRIVE_NS
-        return any(self._counts[stream] >= ENOUGH for _ in self._link.messages(until_ns))
+        return any(len(self._times[stream]) >= ENOUGH for _ in self._link.messages(until_ns))
 
     def _request_data_stream(self) -> None:
         """REQUEST_DATA_STREAM (66), which older firmwares know; PX4 ignores it."""
@@ -180,9 +180,10 @@ class Streams:
         if not alive or now_ns < self._quiet_until_ns:
             return
         self._quiet_until_ns = now_ns + SAY_AGAIN_NS
+        by_name = alive[0].name == HIGHRES or self._firmware == PX4
         self._say(
             f"{alive[0].name} was slowed down {self._slowed(alive[0], rates)}, and has been asked for again: "
-            f"another ground station lowers it ({'stop that one' if alive[0].name == HIGHRES else STREAMRATE})."
+            f"another ground station lowers it ({'stop that one' if by_name else STREAMRATE})."
         )
 
     def _slowed(self, stream: Stream, rates: Mapping[Stream, float]) -> str:
@@ -206,3 +207,9 @@ class Streams:
             f"{self._link.vehicle} sends no IMU messages, though {names if not signed else 'they'} were asked for",
             remedy if signed else check,
         )
+
+
+def _rate_hz(stream: Stream, times: Collection[int], seconds: float) -> float:
+    """How often it came by its own clock; a burst or a busy vehicle are no other rate."""
+    span_us = (max(times) - min(times)) * stream.unit_us
+    return (len(times) - 1) * US_PER_S / span_us if len(times) > ENOUGH else len(times) / seconds

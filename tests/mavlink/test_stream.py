@@ -25,6 +25,7 @@ def vehicle(script, station, decoded):
             self.due_ns = {}
             self.asked = []
             self.answer = self.answered
+            self.slower = 1
 
         def set(self, message_id, hz):
             self.interval_ns[message_id] = round(S / hz)
@@ -47,7 +48,7 @@ def vehicle(script, station, decoded):
             due = [(t_ns, message_id) for message_id, t_ns in self.due_ns.items()]
             t_ns, message_id = min(due, default=(until_ns, 0))
             if t_ns < until_ns and not (self.arriving and self.arriving[0].t_ns <= t_ns):
-                data = MAKE[message_id](t_ns // 1000)
+                data = MAKE[message_id](t_ns // 1000 // self.slower)
                 self.due_ns[message_id] += self.interval_ns[message_id]
                 self.arriving = [*script([(t_ns / S, HOME, data)]).arriving, *self.arriving]
             return super().receive(until_ns)
@@ -120,6 +121,14 @@ def test_a_slightly_lower_rate_is_let_be(vehicle):
     said = []
     assert watched(vehicle(), 160, said) < 170
     assert said == []
+
+
+def test_a_vehicle_whose_time_goes_slowly_was_slowed_by_nobody(vehicle):
+    said, transport = [], vehicle()
+    transport.slower = 4
+    assert watched(transport, 50, said) < 60
+    assert said == []
+    assert transport.asked.count((RAW, 200)) == 1
 
 
 def test_a_vehicle_that_streams_nothing_is_one_sentence(vehicle):

@@ -62,7 +62,7 @@ def verify(planned: Sequence[Change], old: Mapping[str, float], before: StillMea
     raise WriteBackError(
         f"IMU {planned[worst].imu}'s stream does not show its new parameters, by {misses[worst, worst]:.3f} m/s^2 more"
         " than it may differ",
-        "check that nobody else writes parameters, then calibrate again",
+        "check that nobody else writes parameters, and how they say it is mounted, then calibrate again",
     )
 
 
