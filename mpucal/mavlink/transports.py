@@ -9,6 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 from ..errors import LinkError, NoAnswer
+from .returning import Returning
 from .transport import Bytes, Clock, Transport
 from .url import Kind, Url
 
@@ -188,15 +189,15 @@ class Serial:
 
 
 def open_transport(url: Url) -> Transport:
-    """What a URL names, open.
+    """What a URL names, open; a connection or a device that goes away is opened again.
 
     Raises
     ------
     LinkError : it cannot be opened.
     """
     if url.kind is Kind.TCP:
-        return Tcp(url)
-    return Serial(url) if url.kind is Kind.SERIAL else Udp(url)
+        return Returning(url, Tcp)
+    return Returning(url, Serial) if url.kind is Kind.SERIAL else Udp(url)
 
 
 def _readable(channel: Any, wait_ns: int) -> bool:

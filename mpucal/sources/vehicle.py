@@ -50,7 +50,8 @@ class OpenedVehicle:
     key : to sign with, or None. listeners : hear the prompts, besides the vehicle.
     own_system : under which MAVLink id we speak. writes : whether the result will be written to it.
     prepare : whether a PX4 is to be made ready; see Preparation.
-    truth : of a simulated vehicle. replay : the same transport where it is a replay. real_time : see Opened.
+    truth : tells what is true of a simulated vehicle's streams now. replay : the same transport where it is a replay.
+    real_time : see Opened.
 
     Attributes
     ----------
@@ -68,7 +69,7 @@ class OpenedVehicle:
         key: bytes | None = None,
         *,
         listeners: Sequence[Callable[[Prompt], None]] = (),
-        truth: Mapping[str, Any] | None = None,
+        truth: Callable[[], Mapping[str, Any]] | None = None,
         replay: Replay | None = None,
         recovered: str | None = None,
         real_time: bool = True,
@@ -78,7 +79,7 @@ class OpenedVehicle:
     ) -> None:
         self.plan = plan
         self.listeners = (self._prompt, *listeners)
-        self.truth = truth
+        self._truth = truth
         self.recovered = recovered
         self.real_time = real_time and replay is None
         self.link: Link | None = None
@@ -89,6 +90,11 @@ class OpenedVehicle:
         self._own_system = own_system
         self._writes = writes
         self._prepare = prepare
+
+    @property
+    def truth(self) -> Mapping[str, Any] | None:
+        """Of the streams under the parameters that it holds by now: those to which a recording is composed."""
+        return None if self._truth is None else self._truth()
 
     def talk(self, person: Talk) -> Talk:
         """See Opened."""

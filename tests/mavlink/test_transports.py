@@ -5,6 +5,8 @@ import pty
 import socket
 import tty
 from contextlib import closing
+from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -27,6 +29,34 @@ def free_udp():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
         line.bind(("127.0.0.1", 0))
         return line.getsockname()[1]
+
+
+class Line:
+    """A serial line, and its other end."""
+
+    def __init__(self):
+        self.ours, self._theirs = pty.openpty()
+        tty.setraw(self.ours)
+        self.url = Url(Kind.SERIAL, os.ttyname(self._theirs), 57600)
+
+    def close(self):
+        os.close(self.ours)
+        os.close(self._theirs)
+
+
+def heard(line, transport):
+    """What arrives of who writes until somebody listens."""
+    for _ in range(50):
+        os.write(line.ours, b"hello")
+        received = transport.receive(transport.now_ns() + SOON_NS // 50)
+        if received is not None:
+            return received
+    raise AssertionError("nothing was heard")
+
+
+def nothing(transport):
+    """Whether nothing comes of who is away, for as long as it is looked for anew."""
+    return not any(transport.receive(transport.now_ns() + SOON_NS // 25) for _ in range(4))
 
 
 def soon(transport):
@@ -78,18 +108,26 @@ def test_a_taken_port_is_one_sentence(other):
         open_transport(Url(Kind.UDP, "127.0.0.1", other.getsockname()[1]))
 
 
-def test_tcp_moves_bytes_and_says_when_it_is_closed():
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        transport = open_transport(Url(Kind.TCP, "127.0.0.1", server.getsockname()[1]))
-        line, _ = server.accept()
+def test_tcp_moves_bytes_and_is_connected_again():
+    server = socket.create_server(("127.0.0.1", 0))
+    where = server.getsockname()
+    transport = open_transport(Url(Kind.TCP, *where))
+    line, _ = server.accept()
     with closing(transport):
         line.sendall(b"hello")
         assert soon(transport).data == b"hello"
         transport.send(b"answer", "whoever")
         assert line.recv(99) == b"answer"
         line.close()
-        with pytest.raises(LinkError, match="closed the connection"):
-            soon(transport)
+        server.close()
+        assert nothing(transport)
+        transport.send(b"lost", None)
+        with socket.create_server(where) as server:
+            assert nothing(transport)
+            line, _ = server.accept()
+            line.sendall(b"again")
+            assert soon(transport).data == b"again"
+            line.close()
 
 
 def test_nobody_at_a_tcp_port():
@@ -99,18 +137,44 @@ def test_nobody_at_a_tcp_port():
         open_transport(Url(Kind.TCP, "127.0.0.1", port))
 
 
-def test_a_serial_line_moves_bytes_and_says_when_it_is_gone():
-    ours, theirs = pty.openpty()
-    tty.setraw(ours)
-    with closing(open_transport(Url(Kind.SERIAL, os.ttyname(theirs), 57600))) as transport:
-        os.write(ours, b"hello")
+def test_a_serial_line_moves_bytes():
+    with closing(Line()) as line, closing(open_transport(line.url)) as transport:
+        os.write(line.ours, b"hello")
         assert soon(transport).data == b"hello"
         transport.send(b"answer", None)
-        assert os.read(ours, 99) == b"answer"
-        os.close(ours)
-        with pytest.raises(LinkError, match="broke"):
-            soon(transport)
-    os.close(theirs)
+        assert os.read(line.ours, 99) == b"answer"
+
+
+def test_a_device_that_comes_back_under_its_name_is_opened_again(tmp_path):
+    name = tmp_path / "by-id"
+    first, second = Line(), Line()
+    name.symlink_to(first.url.host)
+    with closing(open_transport(replace(first.url, host=str(name)))) as transport, closing(second):
+        address = heard(first, transport).address
+        first.close()
+        name.unlink()
+        assert nothing(transport)
+        transport.send(b"lost", None)
+        name.symlink_to(second.url.host)
+        # the vehicle of before is heard: a link is locked to its address
+        assert heard(second, transport).address == address
+
+
+def test_a_board_that_comes_back_as_another_port_is_known_by_its_serial_number(monkeypatch):
+    first, second, other = Line(), Line(), Line()
+    ports = {first.url.host: "1A2B", other.url.host: "9C"}
+
+    def comports():
+        return [SimpleNamespace(device=at, vid=0x1209, pid=0x5740, serial_number=n) for at, n in ports.items()]
+
+    monkeypatch.setattr("serial.tools.list_ports.comports", comports)
+    with closing(open_transport(first.url)) as transport, closing(second), closing(other):
+        address = heard(first, transport).address
+        first.close()
+        del ports[first.url.host]
+        assert nothing(transport)
+        ports[second.url.host] = "1A2B"
+        assert heard(second, transport).address == address
 
 
 def test_no_such_device():

@@ -12,8 +12,10 @@ from mpucal.mavlink.stream_parameters import read_stream_parameters, stream_para
 from mpucal.mavlink.tlog import Record, Tlog
 from mpucal.mavlink.tlog_replay import Replay
 from mpucal.mavlink.vehicle_source import VehicleSource
+from mpucal.session.plan import Plan
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
+from mpucal.sources.vehicle import OpenedVehicle
 
 
 class Disturbed(SimulatedTransport):
@@ -229,6 +231,21 @@ def test_a_px4_that_was_prepared_names_its_sensors_and_holds_its_offsets():
     again.start()
     repeated = polled(again, 6)
     assert repeated == t[: len(repeated)]
+
+
+def test_the_truth_after_a_preparation_is_that_of_what_was_measured(tmp_path):
+    vehicle = SimulatedVehicle(VehicleOptions.parse("sim:firmware=px4,imus=1,CAL_ACC0_ID=0"))
+    opened = OpenedVehicle(SimulatedTransport(vehicle), Plan(), truth=vehicle.truth_document, prepare=True)
+    fresh = opened.truth
+    with opened.measuring(tmp_path / "capture.tlog", lambda text: None, "") as measuring:
+        measuring.source.start()
+        polled(measuring.source, 3)
+        recording = measuring.source.recording()
+    truth = opened.truth
+    assert np.linalg.norm(np.subtract(truth["b_a"], fresh["b_a"])) > 0.1
+    # as it lies: level but for what a table is off by
+    expected = np.array(truth["D"]) @ [0, 0, -9.80665] + truth["b_a"]
+    np.testing.assert_allclose(recording.acc.mean(0), expected, atol=0.03)
 
 
 def test_a_px4_that_does_not_lie_level_is_not_asked_to_name_its_sensors():

@@ -23,7 +23,7 @@ def open_source(request: Request) -> OpenedVehicle:
         request.plan,
         system,
         key,
-        truth=vehicle.truth_document(),
+        truth=vehicle.truth_document,
         real_time=transport.real_time,
         **said_of_us(request),
     )
