@@ -80,10 +80,17 @@ def _to_sphere(D: Vector, gravity: float) -> Vector:
 
 
 def _moved(gradient: Vector, H: Vector, to_sphere: Vector) -> Vector:
-    """(m,) m/s^2, rms over the sphere, by which the estimate without each group differs from their median."""
+    """(m,) m/s^2, rms over the sphere, by which the estimate without each group differs from their median.
+
+    Infinite where a group is all that tells a parameter.
+    """
     scale = 1.0 / np.sqrt(np.maximum(np.diagonal(H, axis1=1, axis2=2), 1e-300))
-    step = np.linalg.solve(H * scale[:, :, None] * scale[:, None, :], (gradient * scale)[:, :, None])[:, :, 0] * scale
-    step = step[:, ACCELEROMETER] - np.median(step[:, ACCELEROMETER], axis=0)
+    try:
+        step = np.linalg.solve(H * scale[:, :, None] * scale[:, None, :], (gradient * scale)[:, :, None])[:, :, 0]
+    except np.linalg.LinAlgError:
+        return np.full(len(gradient), np.inf)
+    step = (step * scale)[:, ACCELEROMETER]
+    step = step - np.median(step, axis=0)
     return np.asarray(np.linalg.norm(step @ to_sphere.T, axis=1))
 
 

@@ -70,6 +70,7 @@ class Family:
     zero_rate_dps : tolerance of the gyroscope's output at rest, deg/s. zero_g_mg : of the accelerometer's x, y, z, mg.
     scale_percent, cross_axis_percent : tolerances of the scale factors and cross-axis sensitivities of both.
     data_sheet : where the accelerometer's tolerances stand; empty: not at hand. nonlinearity_percent : of its range.
+    spi_data_hz : fastest SPI clock for what is measured and the FIFO; 1 MHz for all other registers.
     zero_g_drift : how far its output at 0 g moves with temperature, in words.
     """
 
@@ -100,6 +101,7 @@ class Family:
     cross_axis_percent: float = 2.0
     data_sheet: str = ""
     nonlinearity_percent: float = 0.5
+    spi_data_hz: int = 8_000_000
     zero_g_drift: str = ""
 
     @property
@@ -159,6 +161,7 @@ MPU6050 = Family(
     accel_lag_ms=(-1, 0, 0, 0, 0, 0, 0),
     half_range_revision="C",
     data_sheet="PS-MPU-6000A r3.4",
+    spi_data_hz=20_000_000,
     zero_g_drift="±35 mg (x, y) and ±60 mg (z) from 0 to 70 °C",
 )
 
@@ -180,6 +183,7 @@ MPU6500 = Family(
     # registers 26 and 29: 1.88 and 0.97 ms at 0, 4.88 and 5.9 ms at 3, 32.48 and 33.48 ms at 6
     accel_lag_ms=(1, -1, -1, -1, -1, -1, -1),
     data_sheet="PS-MPU-9250A r1.0",
+    spi_data_hz=20_000_000,
     zero_g_drift="±1.5 mg/°C",
 )
 
@@ -210,6 +214,7 @@ ICM20689 = replace(
     asleep=True,
     accel_lag_ms=(),
     data_sheet="",
+    spi_data_hz=8_000_000,
     zero_g_drift="",
 )
 

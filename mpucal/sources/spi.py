@@ -1,9 +1,10 @@
 """A chip on a Linux SPI bus, by spidev.
 
 A message is one byte of address, with bit 7 set to read, then the data (PS-MPU-6000A r3.4, section 9.4: mode 3, 1 MHz
-for all registers; the measured ones and the FIFO are read faster). While a chip is used so, its I2C is to be off: the
-bit I2C_IF_DIS is added to what is written to USER_CTRL and taken from what is read there, so that the driver above and
-its captures are those of I2C. An ICM-20602 and its like have the bit in register 112, which is its own (DS-000176).
+for all registers; the measured ones and the FIFO are read as fast as the part allows). While a chip is used so, its
+I2C is to be off: the bit I2C_IF_DIS is added to what is written to USER_CTRL and taken from what is read there, so that
+the driver above and its captures are those of I2C. An ICM-20602 and its like have the bit in register 112, which is its
+own (DS-000176).
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from ..chip.access import Reply
-from ..chip.families import PARTS
+from ..chip.families import PARTS, Part
 from ..chip.registers import (
     ACCEL_XOUT_H,
     FIFO_R_W,
@@ -24,13 +25,12 @@ from ..chip.registers import (
     USER_CTRL,
     WHO_AM_I,
 )
-from ..errors import BusError
+from ..errors import BusError, UsageError
 from .chip import OpenedChip
 from .kind import Request
 
 READ, MODE = 0x80, 3
-# an ICM-20689 is not made for more than 8 MHz, an MPU-6500 for 20
-REGISTER_HZ, DATA_HZ = 1_000_000, 8_000_000
+REGISTER_HZ, LEAST_DATA_HZ = 1_000_000, 8_000_000
 I2C_IF_DIS = 0x10
 I2C_IF, I2C_IF_OFF = 0x70, 0x40
 # spidev's buffer, less the address
@@ -48,10 +48,11 @@ class SpiBus:
 
     Parameters
     ----------
-    path : /dev/spidevB.C.
+    path : /dev/spidevB.C, or with the fastest clock that its wires bear: /dev/spidevB.C:HZ.
 
     Raises
     ------
+    UsageError : a clock that is none.
     BusError : no such device, no permission, no SPI device at all, or the library is missing.
     """
 
@@ -60,15 +61,19 @@ class SpiBus:
             import spidev  # noqa: PLC0415 - only where there is an SPI bus
         except ImportError:
             raise BusError("the Python library spidev is not installed", "pip install mpucal[spi]") from None
-        self._path = path
+        self._path, _, hz = path.partition(":")
+        if hz and not (hz.isdecimal() and int(hz) >= REGISTER_HZ):
+            raise UsageError(f"{hz} is no clock for an SPI bus", f"give {self._path}:HZ, of {REGISTER_HZ} or more")
+        self._most_hz = float(hz or "inf")
+        self._data_hz = int(min(LEAST_DATA_HZ, self._most_hz))
         self._device = spidev.SpiDev()
         with self._told():
-            self._device.open_path(path)
+            self._device.open_path(self._path)
         try:
             with self._told():
                 self._device.mode = MODE
                 self._device.bits_per_word = 8
-                self._device.max_speed_hz = DATA_HZ
+                self._device.max_speed_hz = self._data_hz
         except BusError:
             self._device.close()
             raise
@@ -77,14 +82,13 @@ class SpiBus:
     def read(self, register: int, count: int) -> Reply:
         """`count` bytes from `register` on, in messages of up to 4095 bytes; the time is the one just before."""
         t_ns, data = time.monotonic_ns(), b""
-        hz = DATA_HZ if register in DATA else REGISTER_HZ
+        hz = self._data_hz if register in DATA else REGISTER_HZ
         while len(data) < count:
             place = register if register == FIFO_R_W else register + len(data)
             part = min(count - len(data), LONGEST)
             data += self._moved(bytes([READ | place]) + bytes(part), hz)[1:]
         if register == WHO_AM_I:
-            part_here = PARTS.get(data[0])
-            self._own_register = part_here is not None and part_here.family.fifo_en_with_temperature
+            self._knows(PARTS.get(data[0]))
         return Reply(_altered(register, data, lambda held: held & ~I2C_IF_DIS), t_ns)
 
     def write(self, register: int, data: bytes) -> int:
@@ -104,6 +108,12 @@ class SpiBus:
     def close(self) -> None:
         """Let go of the device."""
         self._device.close()
+
+    def _knows(self, part: Part | None) -> None:
+        """What chip answers, where it is one of the table."""
+        if part is not None:
+            self._own_register = part.family.fifo_en_with_temperature
+            self._data_hz = int(min(part.family.spi_data_hz, self._most_hz))
 
     def _moved(self, message: bytes, hz: int) -> bytes:
         with self._told():

@@ -166,7 +166,7 @@ SOURCES = [
     SourceKind(
         what="a chip on an SPI bus of this computer",
         option=SPI,
-        forms="/dev/spidevB.C; needs the extra spi",
+        forms="/dev/spidevB.C[:HZ]; needs the extra spi",
         opener="mpucal.sources.spi:open_source",
         delivers=Delivers.REGISTERS,
         settings=OF_A_CHIP,

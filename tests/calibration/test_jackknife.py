@@ -9,7 +9,7 @@ from mpucal.calibration import calibrate, weigh
 from mpucal.calibration.claim import claim_of
 from mpucal.calibration.flat_segment import find_flat, flat_statistics
 from mpucal.calibration.initial_estimate import initialise
-from mpucal.calibration.jackknife import jackknife
+from mpucal.calibration.jackknife import _moved, jackknife
 from mpucal.calibration.likelihood import evaluate, part_scores
 from mpucal.calibration.parameters import ACCEL, HAND
 from mpucal.calibration.parts import Parts
@@ -102,3 +102,10 @@ def test_what_decided_is_in_the_document():
     assert error["rms"] == pytest.approx(
         max(error["model"], error["without_a_time"], error["without_a_side"]), rel=1e-6
     )
+
+
+def test_a_group_that_is_all_that_tells_a_parameter_moves_it_without_bound():
+    told = np.tile(np.eye(12), (4, 1, 1))
+    told[2, 3, 3] = 0.0
+    assert np.isinf(_moved(np.ones((4, 12)), told, np.eye(12))).all()
+    assert np.isfinite(_moved(np.ones((4, 12)), told + np.eye(12), np.eye(12))).all()

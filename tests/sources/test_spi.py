@@ -16,7 +16,7 @@ from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.doctor.finding import Mark
 from mpucal.doctor.sources import examine_spi_chip
-from mpucal.errors import BusError
+from mpucal.errors import BusError, UsageError
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.clock import FastClock
@@ -74,21 +74,35 @@ def opened(monkeypatch):
     return make
 
 
-def test_mode_speed_and_messages(opened):
-    bus, device = opened()
+@pytest.mark.parametrize(
+    ("chip", "who_am_i", "data_hz"), [("mpu6500", b"\x70", 20_000_000), ("clone98", b"\x98", 8_000_000)]
+)
+def test_mode_speed_and_messages(opened, chip, who_am_i, data_hz):
+    bus, device = opened(f"chip={chip},hand=still")
     assert (device.path, device.mode, device.bits_per_word) == ("/dev/spidev0.0", 3, 8)
-    assert bus.read(reg.WHO_AM_I, 1).data == b"\x70"
+    assert bus.read(reg.WHO_AM_I, 1).data == who_am_i
     bus.write(reg.SMPLRT_DIV, b"\x04\x03")
     bus.read(reg.ACCEL_XOUT_H, 14)
     bus.read(reg.FIFO_R_W, 28)
     assert device.messages == [
         (b"\xf5\x00", 1_000_000),
         (b"\x19\x04\x03", 1_000_000),
-        (b"\xbb" + bytes(14), 8_000_000),
-        (b"\xf4" + bytes(28), 8_000_000),
+        (b"\xbb" + bytes(14), data_hz),
+        (b"\xf4" + bytes(28), data_hz),
     ]
     bus.close()
     assert device.closed
+
+
+def test_a_clock_that_wires_bear_is_not_passed(opened):
+    opened()
+    bus = SpiBus("/dev/spidev0.0:4000000")
+    bus.read(reg.WHO_AM_I, 1)
+    bus.read(reg.FIFO_R_W, 28)
+    assert bus._device.path == "/dev/spidev0.0"
+    assert [hz for _, hz in bus._device.messages] == [1_000_000, 4_000_000]
+    with pytest.raises(UsageError, match=r"quick is no clock .*give /dev/spidev0\.0:HZ"):
+        SpiBus("/dev/spidev0.0:quick")
 
 
 def test_a_long_read_of_the_fifo_is_cut_and_goes_on_at_the_same_register(opened):
