@@ -36,6 +36,7 @@ class Sensor:
     ----------
     accel_offsets : the words that its accelerometer's offset registers x, y, z held meanwhile.
     message : of an IMU of a vehicle, the MAVLink message that carried its samples, filtered and by radio.
+    steps : m/s^2, rad/s that its samples are whole multiples of, where its noise at rest may be less; else 0.
     clock_ppm, clock_std : of a bus with a clock of its own: how fast that ran, which was corrected, and the relative
         standard deviation that is left of all times' scale; None: the times are the host's.
     least_noise : m/s^2, rad/s: standard deviations that a sample has at least, however still it reads.
@@ -51,6 +52,7 @@ class Sensor:
     accel_offsets: tuple[int, int, int] | None = None
     message: str | None = None
     least_noise: tuple[float, float] = (0.0, 0.0)
+    steps: tuple[float, float] = (0.0, 0.0)
     clock_ppm: float | None = None
     clock_std: float | None = None
     accel_lag_s: float = 0.0
@@ -73,7 +75,7 @@ def _checked(key: str, value: Any) -> Any:
         return None
     if key in ("chip", "message"):
         valid = isinstance(value, str) and NAME.fullmatch(value) is not None
-    elif key in ("accel_offsets", "least_noise"):
+    elif key in ("accel_offsets", "least_noise", "steps"):
         kind, count = (int, 3) if key == "accel_offsets" else (int | float, 2)
         valid = isinstance(value, list | tuple) and len(value) == count and all(_is(kind, item) for item in value)
         value = tuple(value) if valid else value

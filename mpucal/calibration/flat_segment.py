@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data import Recording, Vector
+from ..data import Recording, Sensor, Vector
 from .local_noise import VIBRATION, noise_variance
 
 WINDOW_S = 0.5
@@ -23,6 +23,9 @@ GYRO_SD_MIN_RAD_S, ACC_SD_MIN_MPS2 = 0.03, 0.15
 # Neighbouring windows of a still board agree this well beyond their noise.
 GYRO_STEP_RAD_S, ACC_STEP_MPS2 = 0.01, 0.03
 
+# In steps^2: at rest, less variance than that leaves the readings on one step or two, which no mean makes finer.
+UNVARIED, UNIFORM = 0.3, 1.0 / 12.0
+
 # No sensor of this kind is quieter; data without noise are simulated, or stuck.
 QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S = 1e-4, 1e-5
 
@@ -36,6 +39,7 @@ class Flat:
     first, last : samples first..last-1 are the segment.
     y : (3,) m/s^2, mean of the accelerometer. b_omega : (3,) rad/s, mean of the gyroscope.
     Sigma_a : (3,) (m/s^2)^2 and Sigma_omega : (3,) (rad/s)^2, the diagonals of the covariances.
+    rounded : (m/s^2)^2 of y by coarse steps of the stream, which no number of samples makes less.
     """
 
     first: int
@@ -44,11 +48,17 @@ class Flat:
     b_omega: Vector
     Sigma_a: Vector
     Sigma_omega: Vector
+    rounded: float = 0.0
 
     @property
     def n(self) -> int:
         """Number of samples."""
         return self.last - self.first
+
+    @property
+    def worth(self) -> float:
+        """How many samples of independent noise y is worth."""
+        return min(self.n, float(self.Sigma_a.min()) / self.rounded) if self.rounded else self.n
 
 
 def find_flat(recording: Recording) -> tuple[int, int] | None:
@@ -115,7 +125,14 @@ def flat_statistics(recording: Recording, flat: tuple[int, int]) -> Flat:
         b_omega=gyr.mean(0),
         Sigma_a=_variance(acc, recording.acc, max(least_acc, QUIETEST_ACC_MPS2)),
         Sigma_omega=_variance(gyr, recording.gyr, max(least_gyr, QUIETEST_GYRO_RAD_S)),
+        rounded=rounding_variance(recording.sensor, acc.var(0)),
     )
+
+
+def rounding_variance(sensor: Sensor, variance: Vector) -> float:
+    """(m/s^2)^2 of a mean acceleration at rest, however long: of readings in coarse steps, whose variance is (3,)."""
+    step = sensor.steps[0]
+    return UNIFORM * step**2 if (variance < UNVARIED * step**2).any() else 0.0
 
 
 def _windows(values: NDArray[Any], n: int) -> NDArray[Any]:

@@ -48,7 +48,7 @@ class HANDass:
 
     def _run(self) -> None:
         series, flat, zero = self.problem.series, self.problem.flat, np.zeros(3)
-        self._measure(flat.y, flat.Sigma_a / flat.n, zero, zero, 0.0, np.inf)
+        self._measure(flat.y, flat.Sigma_a / flat.worth, zero, zero, 0.0, np.inf)
         self.squares = 0.0
         for i in range(len(series)):
             self._turn(i)

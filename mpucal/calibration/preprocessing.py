@@ -9,7 +9,7 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..kernel import _kernel
-from .flat_segment import Flat, flat_statistics
+from .flat_segment import Flat, flat_statistics, rounding_variance
 from .gyro_drift import without_drift
 from .local_noise import louder, noise_variance
 from .masks import mask
@@ -107,7 +107,8 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     reset, jerk, pose = np.full(len(series), -1.0), np.zeros(len(series)), np.zeros(len(series))
     for (a, b), variance in zip(after.tolist(), statistics(series.y, after)[1], strict=True):
         tremor = _tremor(variance, float(loud[a:b].mean()) * flat.Sigma_a)
-        reset[a], jerk[a:b], pose[a:b] = tremor, jerk_density(tremor, lam), POSE_MPS2**2 * (b - a)
+        reset[a], jerk[a:b] = tremor, jerk_density(tremor, lam)
+        pose[a:b] = (POSE_MPS2**2 + rounding_variance(recording.sensor, variance)) * (b - a)
         if b < len(series):
             reset[b] = 0.0
     series = replace(series, rate=rate, alpha=alpha, reset=reset, jerk=jerk, r_extra=pose)

@@ -89,7 +89,7 @@ class Problem:
     def constants(self) -> Vector:
         """The exact filter's: gravity, Sigma_a, Sigma_omega, the flat mean, its count."""
         flat = self.flat
-        return np.concatenate([[self.gravity], flat.Sigma_a, flat.Sigma_omega, flat.y, [flat.n]])
+        return np.concatenate([[self.gravity], flat.Sigma_a, flat.Sigma_omega, flat.y, [flat.worth]])
 
     def constants_of_a_hand(self) -> Vector:
         """The hand's filter's: the exact one's, then huber, tail and lam."""

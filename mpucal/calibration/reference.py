@@ -44,7 +44,7 @@ def evaluate_reference(problem: Problem, theta: Theta, parameters: int) -> Evalu
     if p:
         ds[PLACES["tilt"]] = [g * t for t in tangents(theta.u)]
     state = _State(g * theta.u, np.zeros((3, 3)), ds, np.zeros((p, 3, 3)))
-    state = _measure(state, flat.y, flat.Sigma_a / flat.n, theta, g, sums)
+    state = _measure(state, flat.y, flat.Sigma_a / flat.worth, theta, g, sums)
     sums.squares = 0.0
     for i in range(len(series)):
         state = _propagate(state, problem, theta, i)

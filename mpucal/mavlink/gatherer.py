@@ -190,6 +190,7 @@ def _recording(gathered: Gathered, fine: Gathered | None, autopilot: Autopilot, 
         temperature_c=float(known.mean()) if len(known) else None,
         message=stream.name,
         least_noise=least_noise(stream),
+        steps=steps(stream),
     )
     columns = {key: getattr(samples, key) for key in Samples.__dataclass_fields__}
     return Recording(**columns, sensor=sensor, name=name, autopilot=autopilot)
@@ -211,6 +212,11 @@ def _finer(gathered: Gathered, fine: Gathered) -> Vector | None:
 def least_noise(stream: Stream) -> tuple[float, float]:
     """m/s^2, rad/s that a sample of a stream has at least, however still it reads."""
     return WHOLE_NOISE if stream.is_whole else (0.0, 0.0)
+
+
+def steps(stream: Stream) -> tuple[float, float]:
+    """m/s^2, rad/s that a stream's numbers are whole multiples of; 0 for floats."""
+    return (ACC_LSB_MPS2, GYRO_LSB_RAD_S) if stream.is_whole else (0.0, 0.0)
 
 
 def chip(firmware: str, imu: int) -> str:

@@ -9,7 +9,7 @@ from ..errors import LinkError, UsageError, WriteBackError
 from .clock import Jump
 from .dialect import Message
 from .firmwares import ARDUPILOT, PX4
-from .gatherer import Row, chip, least_noise, samples_of
+from .gatherer import Row, chip, least_noise, samples_of, steps
 from .imu import Stream, reading
 from .link import Link, S
 from .log import Log
@@ -107,6 +107,7 @@ class VehicleSource:
             rate_hz=self._rate_hz,
             message=self._stream.name,
             least_noise=least_noise(self._stream),
+            steps=steps(self._stream),
         )
 
     def poll(self) -> Samples:

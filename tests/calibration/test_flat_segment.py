@@ -116,6 +116,21 @@ def test_coarse_steps_hide_noise_but_do_not_abolish_it():
     np.testing.assert_allclose(np.sqrt(flat.Sigma_a), 0.06 / np.sqrt(12.0), rtol=1e-6)
 
 
+@pytest.mark.parametrize("noise", [0.06, 2.0])
+def test_a_mean_of_readings_on_one_step_is_known_to_that_step_alone(noise):
+    rng, step = np.random.default_rng(2), 0.01
+    off, claimed = [], []
+    for true in rng.uniform(0.0, step, (60, 3)):
+        acc = step * np.rint((true + rng.normal(0.0, noise * step, (500, 3))) / step)
+        recording = Recording.from_arrays(np.arange(500) / 100.0, acc, np.zeros((500, 3)))
+        of = flat_statistics(replace(recording, sensor=replace(recording.sensor, steps=(step, 0.0))), (0, 500))
+        off.append(of.y - true)
+        claimed.append(np.sqrt(of.Sigma_a / of.worth))
+    z = np.sqrt(np.mean(np.square(np.array(off) / claimed)))
+    # an axis that leaves its step now and then is off by less than is claimed
+    assert 0.4 < z < 1.3
+
+
 def test_data_without_noise_still_have_a_variance():
     flat = flat_statistics(record(np.tile(UP, (100, 1)), np.zeros((100, 3))), (0, 50))
     np.testing.assert_allclose(flat.Sigma_a, QUIETEST_ACC_MPS2**2)

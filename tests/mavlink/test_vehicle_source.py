@@ -99,6 +99,7 @@ def test_a_still_quantised_gyro_is_not_believed_to_be_without_noise():
     polled(source, 3)
     recording = source.recording()
     assert min(recording.sensor.least_noise) > 0.0
+    assert min(recording.sensor.steps) > 0.0
     assert recording.flat is not None
 
 
