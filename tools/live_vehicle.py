@@ -48,7 +48,7 @@ MPUCAL = Path(sys.executable).parent / "mpucal"
 # the head of what a SITL sends for each step: a magic number, its steps a second, their count
 HEAD, MAGIC = struct.Struct("<HHI"), (18458, 29569)
 BLOCK = 20
-OWN_SYSTEM = 253
+OWN_SYSTEM = 255
 IMUS = 3
 PATIENCE_S = 30
 KINDS_OF_ERROR = ("BIAS", "SCAL")
