@@ -1,12 +1,12 @@
-"""A program that is /dev/i2c-1: a simulated chip behind a mocked I2C adapter, until its input ends.
+"""A program that is /dev/i2c-1 and /dev/spidev0.0: a simulated chip behind mocked adapters, until its input ends.
 
     python device.py sim:chip=mpu6500 CLOCK_FILE
 
 `still` in place of `sim` is the chip of the contract that all buses keep: the same counts again and again.
 
 On stdout, a line of JSON with the environment in which programs find it. On stdin, lines of JSON: {"prompt": ...}
-lets the hand hear it, {"adapter": {...}} changes the adapter, {"registers": {...}} writes to the chip; each is
-answered by an empty line. CLOCK_FILE holds the time, see clock.c.
+lets the hand hear it, {"adapter": {...}} changes the adapter, {"registers": {...}} writes to the chip, {"seen": FILE}
+writes the messages on SPI to a file; each is answered by an empty line. CLOCK_FILE holds the time, see clock.c.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from adapter import Adapter
+from spi import SpiDevice
 from umockdev import Testbed
 
 from mpucal.chip.access import Reply
@@ -26,7 +27,7 @@ from mpucal.simulated.chip.clock import CLOCKS, SimulatedClock
 from mpucal.simulated.chip.factory import Factory
 from mpucal.simulated.chip.models import MODELS
 
-NODE, STILL, CLOCK_CHIP = "/dev/i2c-1", "still", "DS3231"
+NODE, SPI_NODE, STILL, CLOCK_CHIP = "/dev/i2c-1", "/dev/spidev0.0", "still", "DS3231"
 DEVICES = """\
 P: /devices/platform/i2c-1
 E: SUBSYSTEM=i2c
@@ -37,6 +38,11 @@ N: i2c-1
 E: SUBSYSTEM=i2c-dev
 E: DEVNAME=/dev/i2c-1
 A: name=mocked adapter
+
+P: /devices/platform/spi0.0/spidev/spidev0.0
+N: spidev0.0
+E: SUBSYSTEM=spidev
+E: DEVNAME=/dev/spidev0.0
 """
 
 
@@ -100,9 +106,10 @@ def open_bus(text: str, clock: Path) -> SimulatedBus | ClockChip:
 def main(text: str, clock: str) -> None:
     """Serve until stdin ends."""
     bus = open_bus(text, Path(clock))
-    adapter, testbed = Adapter(bus), Testbed()
+    adapter, spi, testbed = Adapter(bus), SpiDevice(bus), Testbed()
     testbed.add(DEVICES)
     testbed.attach(NODE, adapter.answer)
+    testbed.attach(SPI_NODE, spi.answer)
     environment = {"UMOCKDEV_DIR": testbed.folder, "LD_PRELOAD": "libumockdev-preload.so.0"}
     print(json.dumps(environment), flush=True)
     for line in sys.stdin:
@@ -112,6 +119,8 @@ def main(text: str, clock: str) -> None:
             elif what == "adapter":
                 for name, setting in value.items():
                     setattr(adapter, name, frozenset(setting) if name == "bound" else setting)
+            elif what == "seen":
+                Path(value).write_text(json.dumps(spi.seen))
             elif what == "registers":
                 for register, data in value.items():
                     bus.write(int(register), bytes.fromhex(data))
