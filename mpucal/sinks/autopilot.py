@@ -11,7 +11,7 @@ from ..errors import LinkError, RecordingError, WriteBackError
 from ..mavlink.dialect import dialect
 from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..mavlink.ftp import Storage
-from ..mavlink.link import Link
+from ..mavlink.link import Link, S
 from ..mavlink.parameters.applied import applied, of_imu
 from ..mavlink.parameters.client import Parameters
 from ..mavlink.parameters.names import all_places
@@ -38,6 +38,7 @@ CORRECTION = re.compile(r"(OFFS|SCAL)_[XYZ]$|[XYZ](OFF|SCALE)$")
 SAVE_IDS = 76
 # what ArduPilot says of sensors whose ids are not those of their calibration
 UNCALIBRATED = re.compile(r"accel\w*.* cal", re.IGNORECASE)
+INCONSISTENT, AGREE_NS = re.compile(r"accel\w* inconsistent", re.IGNORECASE), 13 * S
 
 
 @contextmanager
@@ -224,13 +225,19 @@ class AutopilotSink:
     def _settled(self) -> Prearm:
         """How it would arm now; an ArduPilot whose saved ids are none or others' saves those of its sensors.
 
+        It calls IMUs inconsistent until they have agreed for ten seconds (AP_Arming::ins_accels_consistent).
         It shows its sensors' ids all the same: AP_InertialSensor::register_accel sets them, and does not save them.
         """
         now = prearm(self._link)
-        if self._firmware != ARDUPILOT or not any(map(UNCALIBRATED.search, now.complaints)):
+        if self._firmware != ARDUPILOT:
             return now
-        command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, SAVE_IDS)
-        return prearm(self._link)
+        if any(map(UNCALIBRATED.search, now.complaints)):
+            command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, SAVE_IDS)
+            now = prearm(self._link)
+        until_ns = self._link.now_ns() + AGREE_NS
+        while any(map(INCONSISTENT.search, now.complaints)) and self._link.now_ns() < until_ns:
+            now = prearm(self._link)
+        return now
 
     def _said(self, planned: Sequence[Change], before: Prearm, after: Prearm) -> list[str]:
         imus = " and ".join(str(change.imu) for change in planned)

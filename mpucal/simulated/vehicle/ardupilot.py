@@ -21,7 +21,8 @@ SHORTEST_MS = 3
 DEVICE_IDS = (2753028, 2753036, 2753044)
 # what a SITL's parameters are, which is not the identity
 OFFSET, SCALE = 0.001, 1.001
-INCONSISTENT_MPS2 = 0.75
+# by how much accelerometers may differ from the first, z counting half, and for how long they must not
+INCONSISTENT_MPS2, AGREED_S = np.array([0.75, 0.75, 2.25]), 10
 # of MAV_OPTIONS
 ONLY_ITS_OWN = 1
 # of MAV_CMD_PREFLIGHT_CALIBRATION
@@ -71,6 +72,8 @@ class ArduPilot(Firmware):
         cutoffs = (float(self.store["INS_ACCEL_FILTER"]), float(self.store["INS_GYRO_FILTER"]))
         self._low_pass = LowPass(cutoffs, LOOP_HZ)
         self._taken = -1
+        self._ticks = 0
+        self._agreed_since: int | None = None
 
     def sense(self, raw: Vector) -> None:
         """(raw - OFFS) * SCAL in the sensor's axes, R_b, low pass."""
@@ -81,6 +84,9 @@ class ArduPilot(Firmware):
         in_sensor = raw.copy()
         in_sensor[:, 0] = (raw[:, 0] - self._offsets) * self._scales
         self.corrected = self._low_pass(in_sensor @ self.rotation.T)
+        self._ticks += 1
+        if self._ticks % LOOP_HZ == 0:
+            self._compare()
 
     def message(self, message_id: int, t_us: int) -> Message | None:
         """RAW_IMU is IMU 1, corrected and filtered like the rest."""
@@ -137,10 +143,20 @@ class ArduPilot(Firmware):
         return not int(self.store["MAV_OPTIONS"]) & ONLY_ITS_OWN or system == self.store["MAV_GCS_SYSID"]
 
     def complaints(self) -> list[str]:
-        """Of AP_Arming's: every IMU calibrated, and all of one opinion."""
+        """Of AP_Arming's: every IMU calibrated, and all of one opinion for ten seconds."""
         for imu in range(self.options.imus):
             offset, scale = self.correction(imu)
             if self._saved_ids[imu] != DEVICE_IDS[imu] or not offset.any() or not scale.all():
                 return ["PreArm: 3D Accel calibration needed"]
-        apart = np.abs(self.corrected[:, 0] - self.corrected[0, 0]).max()
-        return ["PreArm: Accels inconsistent"] if apart > INCONSISTENT_MPS2 else []
+        since = self._compare()
+        agree = len(self.corrected) == 1 or (since is not None and self._ticks - since >= AGREED_S * LOOP_HZ)
+        return [] if agree else ["PreArm: Accels inconsistent"]
+
+    def _compare(self) -> int | None:
+        """Since which tick the accelerometers agree; None where they do not."""
+        apart = np.linalg.norm((self.corrected[:, 0] - self.corrected[0, 0]) * [1.0, 1.0, 0.5], axis=1)
+        if (apart > INCONSISTENT_MPS2[: len(apart)]).any():
+            self._agreed_since = None
+        elif self._agreed_since is None:
+            self._agreed_since = self._ticks
+        return self._agreed_since
