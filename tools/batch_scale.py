@@ -1,46 +1,52 @@
-"""How `mpucal batch` scales: rows a second by workers, what the engine costs a row, and a long run with bad files.
+"""How `mpucal batch` scales: rows a second by workers, what the engine costs a row, and what kills do to it.
 
 python tools/batch_scale.py --captures 200 --workers 1 2
-python tools/batch_scale.py --captures 10000 --workers 2 --engine-only
+python tools/batch_scale.py --captures 10000 --workers 2 --kill --of sessions/*/capture.mcap
+python tools/batch_scale.py --captures 2000 --engine-only
 
-Synthetic captures: a stored session's accesses with every board's own bias, that is with other counts in its FIFO
-frames; one in each hundred is cut, and one is junk. With --engine-only they hold three seconds, which are refused at
-once: what is left is reading, the engine and the journal.
+Synthetic captures: stored sessions' accesses with every board's own bias, that is with other counts in their FIFO
+frames; of each hundred one is cut, and one is junk. With --engine-only there are none to read: what is left is the
+engine and the journal. With --kill a worker is killed after a third of the rows, and the whole cluster after two.
 """
 
 from __future__ import annotations
 
 import argparse
+import resource
 import tempfile
 import time
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import psutil
 
 from mpucal.batch.journal import Journal
-from mpucal.batch.many import JOURNAL, Progress, local_client, run
+from mpucal.batch.many import JOURNAL, local_client, run
 from mpucal.batch.row import Settings, row_of
-from mpucal.batch.table import write
+from mpucal.batch.table import table_of, write
 from mpucal.chip import registers as reg
 from mpucal.chip.access import Transaction
 from mpucal.files.mcap import CaptureWriter, read_capture
 
-SESSION = Path(__file__).parents[1] / "fixtures" / "sessions" / "mpu6050.mcap"
-SHORT_NS = 3_000_000_000
+SESSIONS = Path(__file__).parents[1] / "fixtures" / "sessions"
 
 
-def write_captures(folder: Path, count: int, short: bool) -> list[str]:
+def write_captures(folder: Path, count: int, stored: Sequence[Path]) -> list[str]:
     """That many captures, of which each hundred has one that is cut and one that is junk."""
-    capture, rng = read_capture(SESSION), np.random.default_rng(1)
-    records = [each for each in capture.records if not short or each.t_ns < capture.records[0].t_ns + SHORT_NS]
+    captures, rng = [read_capture(path) for path in stored], np.random.default_rng(1)
     paths = []
     for i in range(count):
-        path = folder / f"{i:06d}.mcap"
+        path, capture = folder / f"{i:06d}.mcap", captures[i % len(captures)]
         bias = np.concatenate((rng.normal(0, 100, 3), [0], rng.normal(0, 20, 3))).round().astype(np.int32)
         with CaptureWriter(path) as writer:
             writer.start(capture.meta)
-            for each in records:
+            for each in capture.records:
                 if not isinstance(each, Transaction):
                     writer.event(each.name, each.t_ns, each.data)
                 elif each.register == reg.FIFO_R_W:
@@ -56,53 +62,101 @@ def write_captures(folder: Path, count: int, short: bool) -> list[str]:
     return paths
 
 
-def timed(folder: Path, paths: list[str], workers: int, settings: Settings) -> tuple[float, Progress]:
-    """Seconds of a batch on so many workers, once they are there, and how it ended."""
-    journal = Journal(folder / JOURNAL, settings.key)
+@dataclass
+class Cost:
+    """Of a batch: s by the clock, s of processors in this program and in the workers that lived on."""
+
+    seconds: float = 0.0
+    program_s: float = 0.0
+    workers_s: float = 0.0
+
+    @contextmanager
+    def counted(self) -> Iterator[None]:
+        """What happens meanwhile."""
+        children = psutil.Process().children(recursive=True)
+        begun, program_s, workers_s = time.perf_counter(), time.process_time(), _processor_s(children)
+        try:
+            yield
+        finally:
+            self.seconds += time.perf_counter() - begun
+            self.program_s += time.process_time() - program_s
+            self.workers_s += _processor_s(children) - workers_s
+
+    def said(self, rows: int) -> str:
+        """A row."""
+        each = (1e3 * x / rows for x in (self.program_s, self.workers_s))
+        return "{:.2f} rows/s; of a processor a row: program and scheduler {:.2f} ms, workers {:.2f} ms".format(
+            rows / self.seconds, *each
+        )
+
+
+def _processor_s(children: list[psutil.Process]) -> float:
+    return float(sum(sum(child.cpu_times()[:2]) for child in children if child.is_running()))
+
+
+def timed(paths: list[str], workers: int, journal: Journal, settings: Settings, until: int | None = None) -> Cost:
+    """A batch on workers of its own; `until` : a worker is killed after half of so many rows, and all after them."""
+    cost = Cost()
     with local_client(workers) as client:
         client.wait_for_workers(workers)
         # what a worker imports with its first row
-        client.run(row_of, str(folder / "none.mcap"), settings)
-        begun = time.perf_counter()
-        *_, last = run(paths, client, journal, settings)
-        seconds = time.perf_counter() - begun
-    write(folder, journal.rows(paths))
-    journal.close()
-    return seconds, last
+        client.run(row_of, str(SESSIONS / "mpu6050.mcap"), settings)
+        processes = list(client.run(_process).values())
+        with cost.counted():
+            for progress in islice(run(paths, client, journal, settings), until):
+                if until is not None and progress.done == until // 2:
+                    psutil.Process(processes[0]).kill()
+    return cost
+
+
+def _process() -> int:
+    return psutil.Process().pid
+
+
+def measured(folder: Path, paths: list[str], workers: int, settings: Settings, kill: bool) -> Any:
+    """What a batch costs; its table."""
+    folder.mkdir()
+    journal = Journal(folder / JOURNAL, settings.key)
+    try:
+        if kill:
+            timed(paths, workers, journal, settings, until=2 * len(paths) // 3)
+            print(f"{workers} workers, one killed, and then all: {len(journal)} rows are there", flush=True)
+        kept = len(journal)
+        cost = timed(paths, workers, journal, settings)
+        print(f"{workers} workers: {cost.said(len(paths) - kept)}", flush=True)
+        cost = timed(paths, workers, journal, settings)
+        print(f"  again, all there already: {cost.said(len(paths))}", flush=True)
+        write(folder, journal.rows(paths))
+        return table_of(journal.rows(paths))
+    finally:
+        journal.close()
 
 
 def main() -> None:
     """Measure what the options name."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--captures", type=int, default=100)
+    parser.add_argument("--of", type=Path, nargs="+", default=sorted(SESSIONS.glob("mpu6[05]*.mcap")), help="captures")
     parser.add_argument("--workers", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--model", default="auto")
-    parser.add_argument("--engine-only", action="store_true", help="captures of three seconds, refused at once")
+    parser.add_argument("--engine-only", action="store_true", help="captures that are not there")
+    parser.add_argument("--kill", action="store_true", help="a worker, and then all of them, in the last batch")
     options = parser.parse_args()
-    settings = Settings(options.model, 9.80665)
+    settings, tables = Settings(options.model, 9.80665), []
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        begun = time.perf_counter()
-        paths = write_captures(folder, options.captures, options.engine_only)
-        size = sum(Path(path).stat().st_size for path in paths) / 1e6
-        print(f"{len(paths)} captures, {size:.1f} MB, written in {time.perf_counter() - begun:.0f} s", flush=True)
-        few = paths[:20]
-        begun, processor = time.perf_counter(), time.process_time()
-        for path in few:
-            row_of(path, settings)
-        alone, alone_cpu = (each / len(few) for each in (time.perf_counter() - begun, time.process_time() - processor))
-        print(f"one after the other: {1e3 * alone:.1f} ms a row, {1e3 * alone_cpu:.1f} ms of a processor", flush=True)
+        if options.engine_only:
+            paths = [f"{name}/none/{i}.mcap" for i in range(options.captures)]
+        else:
+            begun = time.perf_counter()
+            paths = write_captures(Path(name), options.captures, options.of)
+            size = sum(Path(path).stat().st_size for path in paths) / 1e6
+            print(f"{len(paths)} captures, {size:.1f} MB, written in {time.perf_counter() - begun:.0f} s", flush=True)
         for workers in options.workers:
-            place = folder / f"out-{workers}"
-            place.mkdir()
-            seconds, last = timed(place, paths, workers, settings)
-            each_ms = 1e3 * seconds * workers / last.done
-            print(
-                f"{workers} workers: {last.done / seconds:.2f} rows/s, {each_ms:.1f} ms of a worker a row", flush=True
-            )
-            print(f"  {last.failed} unreadable", flush=True)
-            seconds, last = timed(place, paths, workers, settings)
-            print(f"  again, all done: {1e3 * seconds / last.done:.2f} ms a row, {last.kept} kept", flush=True)
+            kill = options.kill and workers == options.workers[-1]
+            tables.append(measured(Path(name) / f"out-{workers}", paths, workers, settings, kill))
+    counts = Counter(verdict or "not read" for verdict in tables[0]["verdict"].to_pylist())
+    print(f"{dict(counts)}; the same by all workers: {all(each.equals(tables[0]) for each in tables)}")
+    print(f"this program took {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB at most")
 
 
 if __name__ == "__main__":

@@ -1,12 +1,13 @@
-"""The batch itself: recordings to dask's workers, a few hundred under way at a time, and rows back as they come."""
+"""The batch itself: recordings to dask's workers, a few hundred tasks at a time, and rows back as they come."""
 
 from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,10 +15,13 @@ from typing import Any
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import SourceError, UsageError
 from .journal import Journal
-from .row import Settings, row_of
+from .row import Settings, rows_of
 
-# recordings that the scheduler knows of at once: more are no faster, and take memory
+# tasks that the scheduler knows of at once: more are no faster, and take memory
 UNDER_WAY = 256
+# recordings of a task, which costs as much as ten milliseconds of calibrating: at most, and so that each worker has
+# so many tasks that none waits long for the last
+MOST_OF_A_TASK, TASKS_OF_A_WORKER = 8, 16
 JOURNAL = "rows.jsonl"
 INSTALL = "pip install 'mpucal[batch]'"
 WAIT_S = 60
@@ -86,29 +90,41 @@ def run(paths: Sequence[str], client: Any, journal: Journal, settings: Settings)
     from distributed import as_completed  # noqa: PLC0415
 
     begun, done, kept, failed = time.monotonic(), 0, 0, 0
-    todo, under_way = iter(dict.fromkeys(paths)), {}
-    of = len(set(paths))
+    names = list(dict.fromkeys(paths))
+    size = len(names) // (TASKS_OF_A_WORKER * max(len(client.ncores()), 1))
+    todo, under_way = _batched(names, min(max(size, 1), MOST_OF_A_TASK)), {}
     results = as_completed(loop=client.loop, with_results=True, raise_errors=False)
 
-    def send(count: int) -> None:
-        for _, path in zip(range(count), todo, strict=False):
-            future = client.submit(row_of, path, settings, journal.digest(path), pure=False)
-            under_way[future.key] = path
+    def send(tasks: Iterable[Sequence[str]]) -> None:
+        for task in tasks:
+            known = [journal.digest(path) for path in task]
+            future = client.submit(rows_of, task, settings, known, pure=False)
+            under_way[future.key] = task
             results.add(future)
 
-    send(UNDER_WAY)
+    send(islice(todo, UNDER_WAY))
     for future, result in results:
-        path = under_way.pop(future.key)
+        task = under_way.pop(future.key)
         if future.status in ("cancelled", "lost"):
             raise SourceError("the scheduler was lost", "start it, and run the same again: what is done stays done")
-        row = result if future.status == "finished" else _died(path, result)
-        if "batch" in row:
-            journal.add(row)
-        else:
-            kept += 1
-        done, failed = done + 1, failed + ("error" in row)
-        send(1)
-        yield Progress(done, of, kept, failed, time.monotonic() - begun)
+        rows = result if future.status == "finished" else []
+        if not rows and len(task) > 1:
+            # which of them it was shows where each is alone
+            send([path] for path in task)
+            continue
+        for row in rows or [_died(task[0], result)]:
+            if "batch" in row:
+                journal.add(row)
+            else:
+                kept += 1
+            done, failed = done + 1, failed + ("error" in row)
+            yield Progress(done, len(names), kept, failed, time.monotonic() - begun)
+        send(islice(todo, 1))
+
+
+def _batched(names: Sequence[str], size: int) -> Iterator[Sequence[str]]:
+    """The names, so many at a time."""
+    return (names[first : first + size] for first in range(0, len(names), size))
 
 
 def _died(path: str, result: Any) -> dict[str, Any]:

@@ -6,7 +6,7 @@ Units are those of calibration.json: m/s^2, rad/s, degrees Celsius, s.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -54,6 +54,11 @@ class Settings:
     def key(self) -> str:
         """What a row depends on besides its file."""
         return f"{__version__} {self.model} {self.gravity!r} {self.gravity_anyway} {bool(self.reports)}"
+
+
+def rows_of(paths: Sequence[str], settings: Settings, known: Sequence[str | None]) -> list[dict[str, Any]]:
+    """The rows of several, see row_of."""
+    return [row_of(path, settings, digest) for path, digest in zip(paths, known, strict=True)]
 
 
 def row_of(path: str, settings: Settings, known: str | None = None) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic, sleep
 
+import cloudpickle
 import distributed
 import fsspec
 import numpy as np
@@ -57,7 +58,7 @@ def started(folder, count=2):
         options = ("--nthreads", 1, "--no-nanny", "--no-dashboard", "--local-directory", folder)
         workers = [stack.enter_context(process("distributed.cli.dask_worker", *here, *options)) for _ in range(count)]
         begun = monotonic()
-        while not file.exists() and monotonic() - begun < LONG_S:
+        while not (file.exists() and file.stat().st_size) and monotonic() - begun < LONG_S:
             sleep(0.05)
         yield Cluster(json.loads(file.read_text())["address"], workers)
 
@@ -110,6 +111,36 @@ def test_a_worker_is_killed_and_then_the_scheduler(cluster, captures, tmp_path):
     assert again.slice(1).equals(expected.slice(1))
     assert again["digest"][0] == again["digest"][1]
     journal.close()
+
+
+def test_the_one_that_workers_die_of_is_told_of_those_beside_it(tmp_path, monkeypatch):
+    """Several recordings make a task; each is tried alone after that."""
+    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "0")
+    paths = [f"/none/{i}.mcap" for i in range(100)]
+    paths[40] = "/none/deadly.mcap"
+    journal = Journal(tmp_path / "rows.jsonl", SETTINGS.key)
+    with started(tmp_path, 3) as three, distributed.Client(three.address, set_as_default=False) as client:
+        client.wait_for_workers(3, timeout=LONG_S)
+        client.run(_mortal)
+        *_, progress = run(paths, client, journal, SETTINGS)
+    assert (progress.done, progress.failed) == (100, 100)
+    errors = [row["error"] for row in journal.rows(paths)]
+    assert "workers died" in errors[40]
+    assert sum("workers died" in error for error in errors) == 1
+    journal.close()
+
+
+def _mortal():
+    """A worker that dies of one path."""
+    import os
+
+    from mpucal.batch import row
+
+    digest_of = row.digest_of
+    row.digest_of = lambda path: os._exit(1) if path.stem == "deadly" else digest_of(path)
+
+
+cloudpickle.register_pickle_by_value(sys.modules[__name__])
 
 
 def test_the_command_writes_a_table_and_a_page(cluster, captures, tmp_path, capsys, monkeypatch):
