@@ -1,4 +1,4 @@
-"""A computer that stops, or is set to another day: a vehicle's session goes on, with a marked gap."""
+"""A computer that stops, or is set to another day: a session goes on, with a marked gap."""
 
 import sys
 from importlib import import_module
@@ -48,6 +48,26 @@ def test_a_session_goes_on_where_time_passed_it_by(worlds, tmp_path, capsys, at_
     steps = np.diff(recording.t)
     assert steps.max() == pytest.approx(stopped_s, abs=2)
     assert recording.gap[1:][steps > 0.5].all()
+
+
+@pytest.mark.parametrize(("kind", "stopped_s"), [("CHIP", 5.0), ("BRIDGE", 300.0)])
+def test_a_chip_is_turned_on_after_a_stop(worlds, tmp_path, capsys, kind, stopped_s):
+    world = worlds.World(getattr(worlds, kind))
+    world.moments.add(30.0, lambda: world.bus._clock.spend(round(stopped_s * 1e9)))
+    with world.opened():
+        code = run(["session", "--bus", "sim:seed=3", "--rate", "50", "-o", str(tmp_path / "board"), "--yes"])
+    said = capsys.readouterr().err
+    assert code == 0, said
+    assert "no samples" not in said
+    recording = mpucal.load(tmp_path / "board")
+    steps = np.diff(recording.t)
+    assert steps.max() == pytest.approx(stopped_s, abs=1)
+    assert recording.gap[1:][steps > 0.5].all()
+    # as much was turned after it as before
+    assert recording.t[-1] - recording.t[steps.argmax() + 1] > 20
+    calibration = mpucal.Calibration.load(tmp_path / "board" / "calibration.json")
+    assert calibration.quality["verification"]
+    assert [reason["code"] for reason in calibration.quality["reasons"]] == ["data_lost"]
 
 
 def test_the_time_of_a_link_never_follows_who_sets_the_clock():

@@ -43,7 +43,8 @@ from .rotate import Rotate
 from .table import State, next_state
 from .verify import Verify
 
-SILENT_S = 5.0
+# a source that is asked must answer within the first; who asks more seldom than the second was stopped meanwhile
+SILENT_S, ASKED_S = 5.0, 2.0
 
 REST = Prompt(PromptKind.REST, "You can put the board down.")
 COMPUTING = Prompt(PromptKind.REST, "You can put the board down. The calibration is being computed.")
@@ -82,6 +83,8 @@ class Machine:
         self._flat: Rested | None = None
         self._samples = self._flat_samples = 0
         self._sampled_s: float | None = None
+        self._ticked_s: float | None = None
+        self._away_s = 0.0
 
     @property
     def checked(self) -> Checked | None:
@@ -137,7 +140,7 @@ class Machine:
         # after so long the person begins anew what was asked for, and the time for it does, too
         before_s = samples.t[0] if self._sampled_s is None else self._sampled_s
         again = self._step.resumed() if np.diff(samples.t, prepend=before_s).max() > SILENT_S else []
-        self._sampled_s = float(samples.t[-1])
+        self._sampled_s, self._away_s = float(samples.t[-1]), 0.0
         self._samples += len(samples)
         seen = self._watch.add(samples, self._wanted) if self._watch else []
         return [*again, *seen, *self._follow(self._step.add(samples))]
@@ -182,7 +185,11 @@ class Machine:
     def _tick(self, t_s: float) -> list[Output]:
         if self._sampled_s is None:
             self._sampled_s = t_s
-        if t_s - self._sampled_s < SILENT_S:
+        if self._ticked_s is not None:
+            # a computer that was stopped or suspended did not ask
+            self._away_s += max(t_s - self._ticked_s - ASKED_S, 0.0)
+        self._ticked_s = t_s
+        if t_s - self._sampled_s - self._away_s < SILENT_S:
             return []
         why = f"the sensor sent no samples for {SILENT_S:.0f} s"
         if self._flat:
@@ -211,7 +218,7 @@ class Machine:
         ]
 
     def _resumed(self, state: State) -> list[Output]:
-        self._sampled_s = None
+        self._sampled_s = self._ticked_s = None
         if state is State.ABORTED:
             self._step = lay_flat.LayFlat(patient=self._until_end)
         return [Decision("the session resumes where it stopped"), *self._step.resumed()]
