@@ -507,6 +507,12 @@ KINDS: Mapping[str, Kind] = {
                 "run the session again, and hold the board still in each orientation that is asked for",
                 False,
             ),
+            "lost": Sentence(
+                "samples are missing in every turn to an orientation that the calibration has not seen, so it is not"
+                " verified",
+                "use a nearer or faster link or a lower rate, and run the session again",
+                False,
+            ),
             "never_still": Sentence(
                 "the board was never still in a new orientation, so the calibration is not verified",
                 "run the session again, and hold the board still",

@@ -38,7 +38,7 @@ class NewOrientation:
     down : (3,) unit, what pointed down, calibrated. magnitude, magnitude_std : |a| - g [m/s^2].
     direction, direction_std : angle of gravity carried here to gravity here [rad].
     turn : (3,) rad, how the board turned on its way here, in its own axes. miss : (3,) rad, that angle about its axis.
-    clipped : the gyroscope was at the end of its range on that way: it says nothing of the direction.
+    clipped : the gyroscope was at the end of its range on that way, or samples are missing: nothing says the direction.
     """
 
     down: Vector

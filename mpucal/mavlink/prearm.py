@@ -13,6 +13,8 @@ SYS_STATUS = 1
 HEARTBEAT_NS = 5 * S
 COMPLAINTS_NS, TRIES = 3 * S // 2, 3
 PREFIXES = ("PreArm: ", "Preflight Fail: ", "Arm: ")
+# PX4 gives most of its reasons as events (EVENT, 410), whose words its component metadata holds
+IN_EVENTS = "its events say why, as QGroundControl shows them"
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,8 @@ def prearm(link: Link) -> Prearm:
                 complaints.append(message.text.partition(": ")[2])
         if ready is not None:
             break
+    if ready is False and not complaints and vehicle.is_px4:
+        complaints.append(IN_EVENTS)
     return Prearm(ready, tuple(dict.fromkeys(complaints)))
 
 

@@ -426,6 +426,12 @@ def test_px4_says_whether_it_would_arm_though_it_does_not_list_the_check(words):
     assert prearm(link).ready is not bool(words)
 
 
+def test_px4_that_tells_why_by_events_alone_is_said_to(monkeypatch):
+    vehicle, _, link = vehicle_of("px4")
+    monkeypatch.setattr(vehicle.firmware, "complaints", lambda: ["in an event"])
+    assert str(prearm(link)) == "would not arm: its events say why, as QGroundControl shows them"
+
+
 class Killed(BaseException):
     """As kill -9: nothing of the program runs any more."""
 

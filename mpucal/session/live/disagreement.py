@@ -36,6 +36,8 @@ def judged(
     shown = [rest for rest in rests if any(rest is other for other in new) or not rest.agrees]
     found = tuple(_found(rest, i + 1, max(of, len(shown)), float(recording.t[-1])) for i, rest in enumerate(shown))
     against = _against(rests, shown, recording, contradiction)
+    if against is None and rests and all(rest.clipped for rest in rests):
+        return Checked(found, None, reason("verification_failed", "lost"))
     if against is None and len(new) < of:
         return Checked(found, None, reason("verification_failed", "too_few", number=len(new), of=of))
     return Checked(found, against is None, against)
@@ -49,7 +51,7 @@ def _against(
     warmer = _warmer_c(recording)
     if abs(warmer) > WARMER_C:
         return reason("temperature_moved", "since_flat", how="rose" if warmer > 0 else "fell", change=abs(warmer))
-    if rests and all(rest.clipped for rest in rests):
+    if rests and all(rest.clipped for rest in rests) and recording.gyr_clipped.any():
         return reason("gyro_clipped", "every_turn")
     if not agree and much_clipped(recording):
         return reason("gyro_clipped", "disagreement")

@@ -30,6 +30,7 @@ class Firmware(ABC):
     autopilot : MAV_AUTOPILOT. tick_us : how often it runs. bytewise : how its integers travel.
     folder : of its card. store : its parameters.
     check_is_present : SYS_STATUS names the check before arming among what is there.
+    sends_on_request : MAV_CMD_REQUEST_MESSAGE brings it; else it comes in its stream alone.
     corrected : (imus, 2, 3) specific force [m/s^2] and rate [rad/s] in the vehicle's axes.
     """
 
@@ -38,6 +39,7 @@ class Firmware(ABC):
     bytewise: bool
     folder: str
     check_is_present = True
+    sends_on_request = True
     streams: tuple[tuple[int, int], ...] = ()
 
     def __init__(self, options: VehicleOptions) -> None:

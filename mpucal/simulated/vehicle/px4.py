@@ -34,7 +34,7 @@ class Px4(Firmware):
     tick_us = 1_000_000 // LOOP_HZ
     folder = "/fs/microsd/"
     bytewise = True
-    check_is_present = False
+    check_is_present = sends_on_request = False
     streams = ((HIGHRES_IMU, 20_000), (SYS_STATUS, 1_000_000))
 
     def __init__(self, options: VehicleOptions) -> None:

@@ -207,6 +207,8 @@ class SimulatedVehicle:
         wanted = self._message(int(message.param1))
         if wanted is None:
             return int(dialect().MAV_RESULT_FAILED)
+        if not self.firmware.sends_on_request:
+            return int(dialect().MAV_RESULT_DENIED)
         self._send(wanted)
         return int(dialect().MAV_RESULT_ACCEPTED)
 

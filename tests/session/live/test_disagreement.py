@@ -77,6 +77,13 @@ def test_says_what_is_wrong(rests, data, contradiction, code, words):
     assert len(checked.found) == len(rests)
 
 
+def test_turns_that_miss_samples_blame_no_range_and_verify_nothing():
+    checked = judged([rest(clipped=True)] * 3, [rest(clipped=True)] * 3, 3, recording(), None)
+    assert checked.agrees is None
+    assert checked.reason.what.startswith("samples are missing in every turn")
+    assert not checked.reason.refuse
+
+
 MOVED = Reason("verification_failed", "it moved", "fasten it", True)
 
 
