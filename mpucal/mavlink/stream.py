@@ -19,7 +19,9 @@ ARRIVE_NS, ENOUGH = S, 3
 ACK_S, ACK_TRIES = 0.7, 4
 
 # HIGHRES_IMU is in no stream group, and PX4 knows none: who lowers it asks for it by name
-STREAMRATE = "start MAVProxy with --streamrate=-1"
+STREAMRATE, STOP_IT = "start MAVProxy with --streamrate=-1", "stop that one"
+# of PX4, which sends everything less often where a link's bandwidth is used up
+TOO_MUCH = ", or its link is too slow for that (MAV_0_RATE and the like; give a lower --rate)"
 # of the rate asked for: where less comes of a PX4, it is asked for so much more
 MOST, SOONER = 0.8, 2.0
 
@@ -180,10 +182,11 @@ class Streams:
         if not alive or now_ns < self._quiet_until_ns:
             return
         self._quiet_until_ns = now_ns + SAY_AGAIN_NS
-        by_name = alive[0].name == HIGHRES or self._firmware == PX4
+        is_px4 = self._firmware == PX4
+        remedy = STOP_IT if is_px4 or alive[0].name == HIGHRES else STREAMRATE
         self._say(
             f"{alive[0].name} was slowed down {self._slowed(alive[0], rates)}, and has been asked for again: "
-            f"another ground station lowers it ({'stop that one' if by_name else STREAMRATE})."
+            f"another ground station lowers it ({remedy}){TOO_MUCH if is_px4 else ''}."
         )
 
     def _slowed(self, stream: Stream, rates: Mapping[Stream, float]) -> str:

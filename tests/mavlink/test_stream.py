@@ -2,13 +2,13 @@ import pytest
 
 from mpucal.errors import LinkError
 from mpucal.mavlink.dialect import dialect
-from mpucal.mavlink.firmwares import ARDUPILOT
+from mpucal.mavlink.firmwares import ARDUPILOT, PX4
 from mpucal.mavlink.imu import Stream
 from mpucal.mavlink.link import Link, S
 from mpucal.mavlink.stream import Streams
 
 HOME = "10.0.0.2:14555"
-RAW, HIGHRES, SCALED2 = 27, 105, 116
+RAW, HIGHRES, SCALED, SCALED2 = 27, 105, 26, 116
 
 
 @pytest.fixture
@@ -56,6 +56,7 @@ def vehicle(script, station, decoded):
     maker = station()
     MAKE = {
         RAW: maker.raw,
+        SCALED: lambda t_us: maker.message("scaled_imu", t_us // 1000, 0, 0, -1000, 0, 0, 0, 0, 0, 0),
         SCALED2: lambda t_us: maker.message("scaled_imu2", t_us // 1000, 0, 0, -1000, 0, 0, 0, 0, 0, 0),
         HIGHRES: lambda t_us: maker.message(
             "highres_imu", t_us, 0, 0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 25.0, 0xFFFF, 0
@@ -64,10 +65,10 @@ def vehicle(script, station, decoded):
     return Streaming
 
 
-def streams(transport, said=None, rate_hz=200.0):
+def streams(transport, said=None, rate_hz=200.0, firmware=ARDUPILOT):
     link = Link(transport, lambda t_ns, data: None)
     link.lock(link.listen()[0])
-    return link, Streams(link, ARDUPILOT, {}, rate_hz, (said if said is not None else []).append)
+    return link, Streams(link, firmware, {}, rate_hz, (said if said is not None else []).append)
 
 
 @pytest.mark.parametrize(
@@ -92,16 +93,17 @@ def test_a_denied_rate_is_followed_by_lower_ones(vehicle):
     assert [hz for message_id, hz in transport.asked if message_id == RAW] == [400, 200, 100]
 
 
-def watched(transport, lowered_hz, said):
-    """How many RAW_IMU come in the 20 s after another station set its rate."""
-    link, asked = streams(transport, said)
+def watched(transport, lowered_hz, said, firmware=ARDUPILOT):
+    """How many of IMU 1's messages come in the 20 s after another station set its rate."""
+    message_id, name = (SCALED, "SCALED_IMU") if firmware == PX4 else (RAW, "RAW_IMU")
+    link, asked = streams(transport, said, firmware=firmware)
     asked.start()
     counted = []
-    link.subscribe(lambda message: counted.append(message) if message.get_type() == "RAW_IMU" else None)
+    link.subscribe(lambda message: counted.append(message) if message.get_type() == name else None)
     for second in range(30):
         if second == 10:
             counted.clear()
-            transport.set(RAW, lowered_hz)
+            transport.set(message_id, lowered_hz)
         for _ in range(20):
             list(link.messages(link.now_ns() + S // 20))
             asked.watch()
@@ -115,6 +117,14 @@ def test_a_lowered_rate_is_asked_for_again_and_told(vehicle, lowered_hz):
     assert len(said) == 1
     assert "RAW_IMU was slowed down from 200 Hz" in said[0]
     assert "--streamrate=-1" in said[0]
+
+
+def test_px4_may_be_slowed_by_its_own_link(vehicle):
+    said = []
+    assert watched(vehicle(streams=(SCALED,)), 60, said, PX4) > 140
+    assert len(said) == 1
+    assert "MAV_0_RATE" in said[0]
+    assert "--streamrate" not in said[0]
 
 
 def test_a_slightly_lower_rate_is_let_be(vehicle):
