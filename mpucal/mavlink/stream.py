@@ -15,7 +15,8 @@ from .request import command
 US_PER_S = 1e6
 # what ArduPilot gives at a loop of 400 Hz: a rate that it denies is followed by the next lower one
 LADDER_HZ = (200.0, 100.0, 50.0, 25.0, 10.0)
-ARRIVE_NS, ENOUGH = S, 3
+# over a slow radio the first ones come late
+ARRIVE_NS, ENOUGH, RATE_NS = 3 * S, 3, S
 ACK_S, ACK_TRIES = 0.7, 4
 
 # HIGHRES_IMU is in no stream group, and PX4 knows none: who lowers it asks for it by name
@@ -73,7 +74,7 @@ class Streams:
     def _came_hz(self, stream: Stream) -> float:
         self._times.clear()
         begun_ns = self._link.now_ns()
-        list(self._link.messages(begun_ns + ARRIVE_NS))
+        list(self._link.messages(begun_ns + RATE_NS))
         return len(self._times[stream]) * S / (self._link.now_ns() - begun_ns)
 
     def _ask_sooner(self) -> None:
@@ -81,7 +82,7 @@ class Streams:
         for name in self._wanted:
             self._wanted[name] = SOONER * self._rate_hz
             self._request(name)
-        list(self._link.messages(self._link.now_ns() + ARRIVE_NS))
+        list(self._link.messages(self._link.now_ns() + RATE_NS))
 
     def watch(self) -> None:
         """Ask again for what comes slower than it did; call this often."""
@@ -196,8 +197,8 @@ class Streams:
         return f"to {rates[stream]:.0f} Hz, where {self._wanted[stream.name]:.0f} were asked for"
 
     def _nothing(self) -> LinkError:
-        names = HIGHRES if self._firmware == PX4 else f"{HIGHRES} and {RAW}"
         signed = self._link.signed_only
+        names = f"{self._order[0]} was" if self._firmware == PX4 else f"{HIGHRES} and {RAW} were"
         remedy = "give the vehicle's --signing-key: it signs, and hears nobody who does not"
         check = "check that the link goes both ways, then start again"
         if not self._parameters:
@@ -207,7 +208,7 @@ class Streams:
                 " SYSID_MYGCS, usually 255) with --source-system"
             )
         return LinkError(
-            f"{self._link.vehicle} sends no IMU messages, though {names if not signed else 'they'} were asked for",
+            f"{self._link.vehicle} sends no IMU messages, though {'they were' if signed else names} asked for",
             remedy if signed else check,
         )
 

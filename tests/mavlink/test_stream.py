@@ -145,6 +145,14 @@ def test_a_vehicle_that_streams_nothing_is_one_sentence(vehicle):
     _, asked = streams(vehicle(streams=()))
     with pytest.raises(LinkError, match="sends no IMU messages, though HIGHRES_IMU and RAW_IMU were asked for: check"):
         asked.start()
+    _, asked = streams(vehicle(streams=()), firmware=PX4)
+    with pytest.raises(LinkError, match="sends no IMU messages, though SCALED_IMU was asked for: check"):
+        asked.start()
+
+
+def test_a_slow_link_brings_the_first_ones_late(vehicle):
+    _, asked = streams(vehicle(streams=(RAW,), fastest_hz=333), rate_hz=1.2)
+    assert asked.start() == Stream("RAW_IMU", 1)
 
 
 def test_the_messages_asked_for_are_those_of_the_dialect():
