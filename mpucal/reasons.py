@@ -106,6 +106,11 @@ def reason(code: str, sentence: str, refuse: bool | None = None, **numbers: obje
 _LAY_IT_DOWN = "lay it on a table for ten seconds before you turn it"
 _SLOWER = "turn more slowly, or choose a larger --gyro-range"
 
+WARM_VEHICLE = (
+    "leave the vehicle switched on until its IMU is warm, then measure again: an autopilot that heats it (to"
+    " BRD_HEAT_TARG of ArduPilot, SENS_IMU_TEMP of PX4) takes some minutes"
+)
+
 KINDS: Mapping[str, Kind] = {
     "never_still": Kind(
         "The board did not lie still before it was turned, so the gyroscope's bias and the noise are not known.",
@@ -366,6 +371,16 @@ KINDS: Mapping[str, Kind] = {
             "since_flat": Sentence(
                 "the chip's temperature {how} by {change:.0f} C since the board lay flat, and its biases with it",
                 "let the board warm up for ten minutes, away from the sun and from draughts, and run the session again",
+                True,
+            ),
+            "of_vehicle": Sentence(
+                "the temperature moved from {low:.1f} to {high:.1f} C, and the biases with it",
+                WARM_VEHICLE,
+                False,
+            ),
+            "of_vehicle_since_flat": Sentence(
+                "the IMU's temperature {how} by {change:.0f} C since the vehicle lay flat, and its biases with it",
+                WARM_VEHICLE,
                 True,
             ),
         },

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from .imu import DATAFLASH, HIGHRES, RAW
@@ -10,6 +11,10 @@ ARDUPILOT, PX4 = "ArduPilot", "PX4"
 
 # of which bit 0 has the estimator learn the gyroscope's bias, bit 1 the accelerometer's
 EKF2_IMU_CTRL, BIASES = "EKF2_IMU_CTRL", 0b11
+
+# cut-off frequencies [Hz] of ArduPilot's low passes of the second order (LowPassFilter2p), 0: none. PX4's streams are
+# those of vehicle_imu, which its filters follow.
+FILTERS = ("INS_ACCEL_FILTER", "INS_GYRO_FILTER")
 
 SCALED_ORDER = ("SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
 
@@ -25,3 +30,13 @@ def preferred_messages(firmware: str, parameters: Mapping[str, float]) -> tuple[
     control = parameters.get(EKF2_IMU_CTRL)
     unbiased = control is not None and not int(control) & BIASES
     return (HIGHRES, *SCALED_ORDER) if unbiased else SCALED_ORDER
+
+
+def accel_lag_s(parameters: Mapping[str, float]) -> float:
+    """By how much an autopilot's low passes make its accelerometers later than its gyroscopes; 0 where it did not say.
+
+    A Butterworth filter of order 2 delays what is slow by sqrt(2) / (2 pi f).
+    """
+    cutoffs = [parameters.get(name) for name in FILTERS]
+    delays = [math.sqrt(2.0) / (2.0 * math.pi * f) if f > 0.0 else 0.0 for f in cutoffs if f is not None]
+    return delays[0] - delays[1] if len(delays) == len(FILTERS) else 0.0

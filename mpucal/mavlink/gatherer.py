@@ -11,6 +11,7 @@ import numpy as np
 
 from ..data import Autopilot, Recording, Samples, Sensor, Vector
 from .clock import Jump, VehicleClock
+from .firmwares import accel_lag_s
 from .imu import ACC_LSB_MPS2, GYRO_LSB_RAD_S, SCALED, Reading, Stream
 
 US_PER_S = 1e6
@@ -191,6 +192,7 @@ def _recording(gathered: Gathered, fine: Gathered | None, autopilot: Autopilot, 
         message=stream.name,
         least_noise=least_noise(stream),
         steps=steps(stream),
+        accel_lag_s=accel_lag_s(autopilot.parameters),
     )
     columns = {key: getattr(samples, key) for key in Samples.__dataclass_fields__}
     return Recording(**columns, sensor=sensor, name=name, autopilot=autopilot)

@@ -1,11 +1,11 @@
-"""Read the parameters that change what a vehicle's IMU streams hold: corrections, mounting, sensor ids."""
+"""Read the parameters that change what a vehicle's IMU streams hold: corrections, mounting, filters, sensor ids."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from .dialect import Message
-from .firmwares import EKF2_IMU_CTRL, PX4
+from .firmwares import EKF2_IMU_CTRL, FILTERS, PX4
 from .link import Link, S
 from .parameters.encoding import name_bytes, parameter_of
 from .parameters.names import CUSTOM_ANGLES
@@ -29,7 +29,7 @@ def stream_parameter_names(firmware: str) -> tuple[str, ...]:
         return (EKF2_IMU_CTRL, "SENS_BOARD_ROT", *board, *slots)
     accs = ["INS_ACC", *(f"INS_ACC{imu}" for imu in range(2, IMUS + 1))]
     kinds = ("_ID", *(f"{kind}_{axis}" for kind in ("OFFS", "SCAL") for axis in AXES))
-    return (ORIENTATION, *(f"{acc}{kind}" for acc in accs for kind in kinds))
+    return (ORIENTATION, *FILTERS, *(f"{acc}{kind}" for acc in accs for kind in kinds))
 
 
 def read_stream_parameters(link: Link, firmware: str) -> dict[str, float]:

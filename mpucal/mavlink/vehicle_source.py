@@ -8,7 +8,7 @@ from ..data import Recording, Samples, Sensor
 from ..errors import LinkError, UsageError, WriteBackError
 from .clock import Jump
 from .dialect import Message
-from .firmwares import ARDUPILOT, PX4
+from .firmwares import ARDUPILOT, PX4, accel_lag_s
 from .gatherer import Row, chip, least_noise, samples_of, steps
 from .imu import Stream, reading
 from .link import Link, S
@@ -108,6 +108,7 @@ class VehicleSource:
             message=self._stream.name,
             least_noise=least_noise(self._stream),
             steps=steps(self._stream),
+            accel_lag_s=accel_lag_s(parameters),
         )
 
     def poll(self) -> Samples:

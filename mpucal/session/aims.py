@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product as choices
 from types import MappingProxyType
 
 import numpy as np
 
-from ..data import Vector
+from ..data import Sensor, Vector
 from .events import Direction, Target
 
 _corners = np.array([c for c in choices((-1.0, 0.0, 1.0), repeat=3) if any(c)])
@@ -45,6 +45,15 @@ AIMS: Mapping[str, Aim] = MappingProxyType(
     }
 )
 NORMAL = "normal"
+# of an autopilot's IMU, whose samples come filtered, in whole units or at other times than they were taken
+LEAST_OF_VEHICLE = 14
+
+
+def aim_of(target: str, sensor: Sensor | None = None) -> Aim:
+    """The aim of that target; of a vehicle's IMU more orientations make it as good."""
+    aim = AIMS[target]
+    least = LEAST_OF_VEHICLE if target == NORMAL and sensor is not None and sensor.message else aim.least
+    return replace(aim, least=max(least, aim.least))
 
 
 def unseen_rad(tilt_only: bool) -> float:

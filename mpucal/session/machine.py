@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from . import lay_flat
-from .aims import AIMS, NORMAL
+from .aims import NORMAL, aim_of
 from .choose import Choose
 from .events import (
     Abort,
@@ -76,7 +76,8 @@ class Machine:
         checking: bool = False,
     ) -> None:
         self.state = State.CONNECT
-        self._until_end, self._aim, self._tilt_only = until_end, AIMS[target], tilt_only
+        self._until_end, self._target, self._tilt_only = until_end, target, tilt_only
+        self._aim = aim_of(target)
         self._attended, self._checking = attended, checking
         self._step: lay_flat.LayFlat | Rotate | Choose | Verify = lay_flat.LayFlat(patient=until_end)
         self._watch: MotionWatch | None = None
@@ -105,7 +106,7 @@ class Machine:
             case Tick(t_s):
                 return self._tick(t_s)
             case Connected(sensor):
-                self._watch = MotionWatch(sensor)
+                self._aim, self._watch = aim_of(self._target, sensor), MotionWatch(sensor)
                 return [lay_flat.PROMPT]
             case Rested(still_s):
                 self._flat, self._flat_samples = event, self._samples

@@ -37,7 +37,7 @@ from .opened import Measuring, Say
 SESSION, END = "session", "end"
 MPUCAL, RECORDED, SOURCE, PLAN, SYSTEM, PREPARE = "mpucal", "recorded", "source", "plan", "system", "prepare"
 # counts up with every change of what the source sends and believes
-SOURCE_VERSION = 3
+SOURCE_VERSION = 4
 NOTE_IDS = 65535
 
 

@@ -380,6 +380,12 @@ def test_warming_up_is_named(good, to, verdict):
         assert "warm up first" in result.reasons["temperature_moved"]
 
 
+def test_a_vehicle_that_heats_its_imu_is_left_to_be_warm(good):
+    sensor = replace(good.sensor, message="HIGHRES_IMU")
+    result = judged(replace(good, sensor=sensor, temperature_c=np.linspace(20.0, 32.0, len(good))))
+    assert "BRD_HEAT_TARG of ArduPilot" in result.reasons["temperature_moved"]
+
+
 def test_one_glitch_of_the_thermometer_is_no_warming(good):
     temperature = np.full(len(good), 25.0)
     temperature[7] = 90.0

@@ -2,6 +2,7 @@ from itertools import chain
 
 import numpy as np
 import pytest
+from scipy.signal import butter, group_delay
 
 from mpucal.errors import EndOfCapture, LinkError, UsageError, WriteBackError
 from mpucal.mavlink.firmwares import ARDUPILOT
@@ -90,6 +91,28 @@ def test_the_angles_of_a_board_that_is_turned_by_its_own_are_asked_for():
     R_b = mounting(ARDUPILOT, ardupilot_place(1), source.recording().autopilot.parameters)
     # turned over its nose, then to the right: its x points to the vehicle's y, its y to x, its z up
     np.testing.assert_allclose(R_b, [[0, 1, 0], [1, 0, 0], [0, 0, -1]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("words", "cutoffs_hz"),
+    [("", (20, 20)), ("INS_GYRO_FILTER=40", (20, 40)), ("type=rover", (10, 4)), ("INS_ACCEL_FILTER=0", (0, 20))],
+)
+def test_the_filters_tell_by_how_much_both_sensors_are_apart(words, cutoffs_hz):
+    source, _, _ = opened(f"imus=1,hand=still,{words}".strip(","))
+    sensor = source.start()
+    polled(source, 0.5)
+    # of the filters as they are computed, at 400 Hz, for what is slow
+    delays = [group_delay(butter(2, f, fs=400.0), [0.1], fs=400.0)[1][0] / 400.0 if f else 0.0 for f in cutoffs_hz]
+    for lag_s in (sensor.accel_lag_s, source.recording().sensor.accel_lag_s):
+        assert lag_s == pytest.approx(delays[0] - delays[1], abs=2e-4)
+
+
+@pytest.mark.parametrize("words", ["type=plane", "type=rover", "firmware=px4,type=plane"])
+def test_planes_and_rovers_are_measured_like_copters(words):
+    source, _, said = opened(f"imus=1,hand=still,fault=arm@8,{words}")
+    source.start()
+    assert len(polled(source, 5)) > 450
+    assert [text for text in said if "was armed" in text]
 
 
 def test_a_still_quantised_gyro_is_not_believed_to_be_without_noise():

@@ -86,4 +86,6 @@ def temperature_moved(e: Evidence) -> Reason | None:
     low, high = np.quantile(known, [0.02, 0.98])
     if high - low <= WARMER_C:
         return None
+    if e.recording.sensor.message:
+        return reason("temperature_moved", "of_vehicle", low=low, high=high)
     return reason("temperature_moved", "range", low=low, high=high)

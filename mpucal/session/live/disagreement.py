@@ -50,7 +50,10 @@ def _against(
     agree = all(rest.agrees for rest in shown)
     warmer = _warmer_c(recording)
     if abs(warmer) > WARMER_C:
-        return reason("temperature_moved", "since_flat", how="rose" if warmer > 0 else "fell", change=abs(warmer))
+        how = "rose" if warmer > 0 else "fell"
+        if recording.sensor.message:
+            return reason("temperature_moved", "of_vehicle_since_flat", how=how, change=abs(warmer))
+        return reason("temperature_moved", "since_flat", how=how, change=abs(warmer))
     if rests and all(rest.clipped for rest in rests) and recording.gyr_clipped.any():
         return reason("gyro_clipped", "every_turn")
     if not agree and much_clipped(recording):

@@ -54,8 +54,9 @@ class ArduPilot(Firmware):
             store.add(name, 0.0)
         for axis in AXES:
             store.add(f"AHRS_TRIM_{axis}", 0.0)
-        store.add("INS_ACCEL_FILTER", 20, INT16)
-        store.add("INS_GYRO_FILTER", 20, INT16)
+        filter_hz = 10 if options.type == "rover" else 20
+        store.add("INS_ACCEL_FILTER", filter_hz, INT16)
+        store.add("INS_GYRO_FILTER", 4 if options.type == "rover" else 20, INT16)
         for imu in range(3):
             there = imu < options.imus
             store.add_vector(stem(imu) + "OFFS_", OFFSET if there else 0.0)

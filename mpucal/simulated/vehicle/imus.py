@@ -41,13 +41,13 @@ class Imus:
         self.truths = tuple(_truth(options.seed, number, gravity) for number in range(options.imus))
         self._setting = Setting(rate_hz, ACCEL_RANGE_G, GYRO_RANGE_DPS, lsb_per_c=333.87, zero_c=21.0)
         self._responses = [truth.response(self._setting) for truth in self.truths]
-        self._sample = 0
+        self._sample, self._warmer_c = 0, 0.0
         self._block = np.empty((0, options.imus, 2, 3))
 
     @property
     def temperature_c(self) -> float:
         """Of their dies."""
-        return self.truths[0].temperature_c
+        return self.truths[0].temperature_c + self._warmer_c
 
     def hear(self, prompt: HandPrompt, t_s: float) -> None:
         """The hand hears `prompt`, whose `down` is in the vehicle's axes."""
@@ -85,6 +85,7 @@ class Imus:
 
     def _measured(self) -> Vector:
         edges = (self._sample + np.arange(BLOCK + 1)) / self._rate_hz
+        self._warmer_c = float(self._motion.warmer_c(edges)[-1])
         force, rate = (means @ FROM_HAND @ self._rotation for means in self._motion.means(edges))
         return np.stack([self._in_si(response, force, rate) for response in self._responses], axis=1)
 

@@ -12,6 +12,7 @@ from ..hands import KINDS
 from ..words import FAULT, Parser, at_least, faults, one_of, parsed, whole
 
 FIRMWARES = ("ardupilot", "px4")
+TYPES = ("copter", "plane", "rover")
 PACES = ("fast", "real")
 MOST_IMUS = 3
 LAST_ORIENTATION = 40
@@ -23,7 +24,7 @@ class VehicleOptions:
 
     Attributes
     ----------
-    firmware : ardupilot or px4. imus : how many it has. system : its MAVLink id.
+    firmware : ardupilot or px4. type : copter, plane or rover. imus : how many it has. system : its MAVLink id.
     rotation : MAV_SENSOR_ORIENTATION of its board. highres : an ArduPilot of 4.6 or later, with HIGHRES_IMU.
     seed : of its sensors, their noise and the hand. hand : which. pace : fast or real, of `--mavlink sim`.
     rotate_at : s after which the hand begins to turn it though nobody prompts; None: it waits.
@@ -32,6 +33,7 @@ class VehicleOptions:
     """
 
     firmware: str = "ardupilot"
+    type: str = "copter"
     imus: int = 2
     system: int = 1
     rotation: int = 0
@@ -72,6 +74,7 @@ def _orientation(text: str) -> int:
 
 PARSERS: dict[str, Parser] = {
     "firmware": one_of(FIRMWARES),
+    "type": one_of(TYPES),
     "imus": whole(1, MOST_IMUS),
     "system": whole(1, 250),
     "rotation": (_orientation, "a MAV_SENSOR_ORIENTATION: 0 to 40, 100 to 102"),

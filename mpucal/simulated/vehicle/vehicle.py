@@ -32,7 +32,8 @@ US = 1_000
 HEARTBEAT = 0
 SLOWER_WHILE_BUSY = 4
 SEQUENCE = 256
-QUADROTOR = 2
+# MAV_TYPE
+TYPES = {"plane": 1, "copter": 2, "rover": 10}
 ARMED = 128
 REBOOT_US = 2 * S_US
 SECOND_STATION_HZ = 4
@@ -121,13 +122,13 @@ class SimulatedVehicle:
             self._streams.set(message_id, interval_us, self._now_us)
         self._list: deque[str] = deque()
         self.firmware.start()
-        self.firmware.temperature_c = self.imus.temperature_c
 
     def _tick(self) -> None:
         for fault in self._schedule.due(self._now_us * US):
             if fault.kind.strike is not None:
                 fault.kind.strike(self)
         self.firmware.sense(self.imus.next())
+        self.firmware.temperature_c = self.imus.temperature_c
         if self._now_us < self._silent_until_us:
             return
         for message_id in self._streams.due(self._now_us, SLOWER_WHILE_BUSY if self._list else 1):
@@ -143,7 +144,9 @@ class SimulatedVehicle:
     def _heartbeat(self) -> Message:
         mode = ARMED if self.firmware.armed else 0
         state = dialect().MAV_STATE_ACTIVE if self.firmware.armed else dialect().MAV_STATE_STANDBY
-        return dialect().MAVLink_heartbeat_message(QUADROTOR, self.firmware.autopilot, 81 | mode, 0, state, 3)
+        return dialect().MAVLink_heartbeat_message(
+            TYPES[self.options.type], self.firmware.autopilot, 81 | mode, 0, state, 3
+        )
 
     def _send(self, message: Message) -> None:
         data = bytes(message.pack(self._mav))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.verification import NewOrientation
-from mpucal.data import Recording
+from mpucal.data import Recording, Sensor
 from mpucal.reasons import Reason
 from mpucal.result.calibration import Calibration
 from mpucal.session.events import Checked
@@ -17,7 +17,7 @@ def rest(magnitude=0.0, direction=0.0, turn=(1.2, 0.0, 0.0), miss=(0.0, 0.0, 0.0
     return NewOrientation(down, magnitude, 0.005, direction, np.radians(0.1), np.array(turn), np.array(miss), clipped)
 
 
-def recording(warmer_c=0.0, acc_clipped=0, gyr_clipped=0):
+def recording(warmer_c=0.0, acc_clipped=0, gyr_clipped=0, message=None):
     n = 1000
     marks = np.arange(n)
     return Recording.from_arrays(
@@ -27,6 +27,7 @@ def recording(warmer_c=0.0, acc_clipped=0, gyr_clipped=0):
         temperature_c=25.0 + warmer_c * (np.arange(n) > n // 2),
         acc_clipped=marks < acc_clipped,
         gyr_clipped=marks < gyr_clipped,
+        sensor=Sensor(message=message),
     )
 
 
@@ -46,6 +47,7 @@ TURNED = [rest(direction=0.05, turn=(0.0, 0.0, turn), miss=(0.0, 0.0, 0.04 * tur
         ([rest(0.05), rest()], recording(gyr_clipped=50), None, "gyro_clipped", "beyond the gyroscope's range"),
         ([rest()], recording(warmer_c=15.0), None, "temperature_moved", "rose by 15 C"),
         ([rest()], recording(warmer_c=-12.0), None, "temperature_moved", "fell by 12 C"),
+        ([rest()], recording(15.0, message="RAW_IMU"), None, "temperature_moved", "vehicle lay flat"),
         ([], recording(), None, "verification_failed", "never still in a new orientation"),
         ([rest()], recording(), CONTRADICTION, "inconsistent", "contradict"),
         ([rest()], recording(acc_clipped=3), CONTRADICTION, "inconsistent", "knocked the board"),
@@ -60,6 +62,7 @@ TURNED = [rest(direction=0.05, turn=(0.0, 0.0, turn), miss=(0.0, 0.0, 0.04 * tur
         "some clipped",
         "warm",
         "cold",
+        "a vehicle that heats its IMU",
         "no rest",
         "rests",
         "rests after a knock",
