@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
 
 from ..chip.families import PARTS
 from ..errors import SourceError
@@ -48,7 +49,11 @@ def examine_iio(source: OpenedIio, seconds: float) -> Iterator[Finding]:
         part = PARTS.get(sensor.who_am_i or 0)
         # what is polled has no rate of its own
         nominal_hz = rate_hz if driver.buffered else recording.rate_hz
-        yield from examine_stream(recording, nominal_hz, seconds, None if part is None else part.family)
+        # a driver's stamps are as exact as its interrupts: over all of them half an interval at each end
+        sensor = replace(recording.sensor, clock_std=0.5 / len(recording))
+        yield from examine_stream(
+            replace(recording, sensor=sensor), nominal_hz, seconds, None if part is None else part.family
+        )
     else:
         what = f"{len(recording)} samples in {seconds:g} s"
         yield Finding("stream", Mark.BAD, what, "see what `dmesg` says of the driver and its interrupts")

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,8 @@ from .opened import Say
 SYSFS, DEVICES = Path("/sys/bus/iio/devices"), Path("/dev")
 RULES = Path("/etc/udev/rules.d")
 GROUPS = ("buffer", "scan_elements", "trigger")
+# what is written there is meant to stay
+STAYS = "_calibbias"
 # of a capture's head: which devices, and the trigger
 OF_IIO = "iio"
 SHOWN = ("name", "in_", "sampling", "trigger/")
@@ -114,6 +116,7 @@ class IioFiles(Files):
     def __init__(self, sysfs: Path | None = None, dev: Path | None = None) -> None:
         self._sysfs, self._dev = sysfs or SYSFS, dev or DEVICES
         self._open: dict[str, int] = {}
+        self._before: dict[str, bytes] = {}
 
     def check(self, device: str) -> None:
         """BusError where there is no such device."""
@@ -145,12 +148,9 @@ class IioFiles(Files):
         device, _, name = register.partition("/")
         t_ns = time.monotonic_ns()
         with self._told(device, name, data.decode()):
-            # one write without a buffer: the driver refuses it there and then
-            fd = os.open(self._sysfs / register, os.O_WRONLY | os.O_TRUNC)
-            try:
-                os.write(fd, data)
-            finally:
-                os.close(fd)
+            if not name.endswith(STAYS) and register not in self._before:
+                self._before[register] = (self._sysfs / register).read_bytes().strip()
+            self._put(register, data)
         return t_ns
 
     def sleep_until(self, t_ns: int) -> None:
@@ -158,10 +158,23 @@ class IioFiles(Files):
         time.sleep(max(0, t_ns - time.monotonic_ns()) * 1e-9)
 
     def close(self) -> None:
-        """Let go of the buffers."""
+        """Let go of the buffers, and put back what an error or Ctrl-C left: no driver ends a buffer by itself."""
         for fd in self._open.values():
             os.close(fd)
         self._open = {}
+        while self._before:
+            register, text = self._before.popitem()
+            with suppress(OSError):
+                if (self._sysfs / register).read_bytes().strip() != text:
+                    self._put(register, text)
+
+    def _put(self, register: str, data: bytes) -> None:
+        # one write without a buffer: the driver refuses it there and then
+        fd = os.open(self._sysfs / register, os.O_WRONLY | os.O_TRUNC)
+        try:
+            os.write(fd, data)
+        finally:
+            os.close(fd)
 
     def _buffer(self, device: str, count: int) -> Reply:
         t_ns = time.monotonic_ns()

@@ -99,6 +99,21 @@ def test_a_buffer_that_stays_empty_names_the_interrupt(tree):
     os.close(fifo)
 
 
+def test_what_an_error_left_is_put_back_as_the_files_are_closed(tree):
+    """No kernel ends a buffer whose reader went away: the next one would be told that another program reads it."""
+    calibbias = tree / "in_accel_x_calibbias"
+    calibbias.write_text("5\n")
+    before = {path: path.read_text().strip() for path in tree.rglob("*") if path.is_file()}
+    files = IioFiles()
+    fifo = os.open(iio.DEVICES / "iio:device0", os.O_RDWR)
+    IioDriver(files, BOTH, SETTINGS).start()
+    files.write("iio:device0/in_accel_x_calibbias", b"7")
+    assert (tree / "buffer/enable").read_text() == "1"
+    files.close()
+    os.close(fifo)
+    assert {path: path.read_text().strip() for path in before} == before | {calibbias: "7"}
+
+
 def test_what_is_polled_is_interpolated_to_common_times(tree):
     """Each channel grows with its own time: at common times all of one kind read alike."""
     accesses = []
