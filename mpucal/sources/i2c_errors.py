@@ -52,6 +52,10 @@ def opening_error(error: OSError, path: str) -> BusError:
 
 def transfer_error(error: OSError, path: str, address: int) -> BusError:
     """Why a transfer with the chip at `address` failed."""
+    if error.errno != errno.EBUSY and path.startswith("/") and not Path(path).exists():
+        # an adapter on USB breaks off (EIO) what it cannot carry out any more
+        what, remedy = _TRANSFER[errno.ENODEV]
+        return BusError(f"{what} ({path})", remedy)
     if error.errno in (errno.EREMOTEIO, errno.ENXIO):
         return nobody(path, (address,))
     if error.errno == errno.ETIMEDOUT:

@@ -82,6 +82,15 @@ def test_a_failed_transfer_is_a_sentence_and_not_repeated(adapter, op, number, k
     assert kernel.requests == [smbus2.I2C_RDWR]
 
 
+def test_an_adapter_that_was_unplugged_is_gone_whatever_the_number(adapter):
+    kernel = adapter()
+    bus = I2cBus(str(kernel.path))
+    kernel.failures[smbus2.I2C_RDWR] = errno.EIO
+    kernel.path.unlink()
+    with pytest.raises(BusError, match=r"the adapter is gone \(.*i2c-1\): plug it in again"):
+        bus.read(reg.FIFO_R_W, 4)
+
+
 def test_where_a_stub_has_no_chip_nothing_answers(adapter):
     """i2c-stub says ENODEV of an empty address; of an adapter that was unplugged the file is gone besides."""
     kernel = adapter()
