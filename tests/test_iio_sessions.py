@@ -36,9 +36,12 @@ def test_a_session_ends_good_and_replays_to_the_bit(tmp_path, capsys):
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-2)
 
 
-def test_the_doctor_examines_it(capsys):
-    assert run(["doctor", "--iio", "sim:hand=still", "--seconds", "4", "--json"]) == 0
+@pytest.mark.parametrize("trigger", [(), ("--trigger", "none")], ids=["buffered", "polled"])
+def test_the_doctor_examines_it(capsys, trigger):
+    assert run(["doctor", "--iio", "sim:hand=still", "--seconds", "4", "--json", *trigger]) == 0
     told = {finding["topic"]: finding for finding in json.loads(capsys.readouterr().out)["findings"]}
-    assert {"iio:device0", "buffer", "ranges", "sample rate", "losses", "at rest"} <= set(told)
+    assert {"iio:device0", "ranges", "sample rate", "losses", "at rest"} <= set(told)
+    assert ("buffer" in told) is (not trigger)
+    assert told["sample rate"]["mark"] == "ok"
     assert told["iio:device0"]["data"]["in_accel_scale"]
     assert not [topic for topic, finding in told.items() if finding["mark"] == "bad"]

@@ -85,6 +85,9 @@ def _rate(recording: Recording, nominal_hz: float) -> Finding:
 def _change(recording: Recording) -> tuple[float, float, float] | None:
     """Seconds, and the rates [Hz] before and after, of a sample clock that changed: its times lie on several lines."""
     period = np.where(recording.gap[1:], np.nan, np.diff(recording.t))
+    if not np.nanmedian(np.abs(np.diff(period))) < CHANGED * np.nanmedian(period):
+        # each sample has a time of its own: a driver of the kernel stamps it, or the channels are polled
+        return None
     first, last = float(period[0]), float(period[-1])
     # NaN is no change
     if not abs(last / first - 1) > CHANGED:
