@@ -121,7 +121,8 @@ def _histograms(found: Iterable[Parameter], prefix: str) -> str:
     lines = [axes.line(at, np.repeat(count, 2), colour) for count, colour in zip(counts, (X, Y, Z), strict=False)]
     for limit in (*limits, *-limits):
         lines.append(axes.line(np.array([limit, limit]), np.array([0.0, most]), BEFORE))
-    named = legend(*((each.name[-1], colour) for each, colour in zip(some, (X, Y, Z), strict=False)))
+    sheet = (("data sheet", BEFORE),) if len(limits) else ()
+    named = legend(*((each.name[-1], colour) for each, colour in zip(some, (X, Y, Z), strict=False)), *sheet)
     label = f"histograms: {prefix} of x, y and z"
     return svg(prefix.replace(" ", "-"), label, _HEIGHT, *lines, axes.frame(), named)
 
@@ -200,7 +201,7 @@ def _repeats(columns: Columns) -> str:
 def _errors(columns: Columns) -> str:
     rows = [(path, error) for path, error in zip(columns["path"], columns["error"], strict=True) if error]
     caption = f"The first {MOST} of {len(rows)}" if len(rows) > MOST else ""
-    return section("Not read", table("errors", caption, ("recording", "why"), rows[:MOST], words=True)) if rows else ""
+    return section("Not read", table("errors", caption, ("recording", "why"), rows[:MOST], words=0)) if rows else ""
 
 
 def _reports(columns: Columns) -> str:

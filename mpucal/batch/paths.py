@@ -7,6 +7,7 @@ from glob import glob, has_magic
 from typing import Any
 
 from ..errors import RecordingError, UsageError
+from .row import lacking
 
 
 def found(words: Iterable[str]) -> list[str]:
@@ -18,10 +19,12 @@ def found(words: Iterable[str]) -> list[str]:
     """
     paths: list[str] = []
     for word in words:
-        if not has_magic(word):
+        remote = "://" in word
+        # behind a question mark a URL has its query
+        if not has_magic(word.partition("?")[0] if remote else word):
             paths.append(word)
             continue
-        matches = _remote(word) if "://" in word else sorted(glob(word, recursive=True))  # noqa: PTH207 - patterns may be absolute
+        matches = _remote(word) if remote else sorted(glob(word, recursive=True))  # noqa: PTH207 - patterns may be absolute
         if not matches:
             raise RecordingError(f"nothing is found by {word}", "check the pattern")
         paths += matches
@@ -34,5 +37,7 @@ def _remote(word: str) -> list[str]:
 
         system: Any = fsspec.core.url_to_fs(word)[0]
         return sorted(system.unstrip_protocol(path) for path in system.glob(word))
-    except (ImportError, ValueError) as error:
-        raise UsageError(f"{word} cannot be looked into ({error})", "pip install 'mpucal[batch]'") from error
+    except ImportError as error:
+        raise UsageError(f"{word} cannot be looked into ({error})", lacking(word)) from error
+    except (ValueError, OSError) as error:
+        raise UsageError(f"{word} cannot be looked into ({error})", "check the URL and what may read it") from error

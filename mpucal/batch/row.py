@@ -146,15 +146,21 @@ def fetched(path: str) -> Iterator[Path]:
     import fsspec  # noqa: PLC0415
 
     with TemporaryDirectory(prefix="mpucal-") as folder:
-        local = Path(folder) / PurePosixPath(path).name
+        # a signed URL goes on behind the name
+        local = Path(folder) / PurePosixPath(path.partition("?")[0]).name
         try:
             system, there = fsspec.core.url_to_fs(path)
             system.get(there, str(local), recursive=system.isdir(there))
         except Exception as error:
-            raise RecordingError(
-                f"cannot fetch {path} ({type(error).__name__}: {error})", "check it, and that this worker may read it"
-            ) from error
+            do = lacking(path) if isinstance(error, ImportError) else "check it, and that this worker may read it"
+            raise RecordingError(f"cannot fetch {path} ({type(error).__name__}: {error})", do) from error
         yield local
+
+
+def lacking(url: str) -> str:
+    """What to do where fsspec has no package for a URL."""
+    scheme = url.partition("://")[0].removesuffix("s") if url.startswith("http") else url.partition("://")[0]
+    return f"pip install 'fsspec[{scheme}]', here and where the workers are"
 
 
 def digest_of(path: Path) -> str:

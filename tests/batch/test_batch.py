@@ -23,6 +23,7 @@ from mpucal.__main__ import run as call
 from mpucal.batch.journal import Journal
 from mpucal.batch.many import run
 from mpucal.batch.page import page
+from mpucal.batch.paths import found
 from mpucal.batch.row import COLUMNS, Settings, row_of
 from mpucal.batch.table import table_of, write
 from mpucal.result.calibration import Calibration
@@ -173,6 +174,17 @@ def test_urls_are_read_where_the_worker_is(captures):
     assert far["batch"] == "line"
     assert {**far, "path": "", "batch": ""} == {**here, "path": "", "batch": ""}
     assert "cannot fetch memory://line/none.mcap" in row_of("memory://line/none.mcap", SETTINGS)["error"]
+
+
+def test_a_url_that_nothing_can_read_says_what_is_lacking(monkeypatch):
+    monkeypatch.setitem(sys.modules, "aiohttp", None)
+    monkeypatch.delitem(sys.modules, "fsspec.implementations.http", raising=False)
+    for url in ("http://127.0.0.1:9/a.mcap", "https://127.0.0.1:9/a.mcap"):
+        assert "pip install 'fsspec[http]'" in row_of(url, SETTINGS)["error"]
+    with pytest.raises(mpucal.MpucalError, match=r"cannot be looked into .* pip install 'fsspec\[http\]'"):
+        found(["http://127.0.0.1:9/*.mcap"])
+    signed = "https://bucket.example/a.mcap?signature=1*2"
+    assert found([signed]) == [signed]
 
 
 def test_the_page_names_what_is_odd(tmp_path):
