@@ -188,7 +188,7 @@ class HostileTransport(SimulatedTransport):
         self._due = 0
         self._asked = Parser(dialect().MAVLink(None))
 
-    def settle(self, address: str) -> None:
+    def settle(self, address: str | None) -> None:
         """See Transport."""
         self._locked_us = self._vehicle.now_us
 

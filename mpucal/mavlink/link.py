@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ..errors import BusError, LinkError, NoAnswer
@@ -64,6 +65,7 @@ class Link:
         self._heard: list[tuple[int, str | None, bytes]] = []
         self._listeners: list[Listener] = []
         self._vehicle: Vehicle | None = None
+        self._seeking = False
         self._next_heartbeat_ns = self._now_ns
         self._sequence: int | None = None
         self.lost = 0
@@ -130,6 +132,17 @@ class Link:
                 self._record(t_ns, data)
         self._heard = []
 
+    def seek(self) -> None:
+        """Hear the other ports of the vehicle's host too until its heartbeat comes: who starts anew may take another.
+
+        Raises
+        ------
+        LinkError : our own port was taken meanwhile.
+        """
+        if self._transport.datagrams and not self._transport.outward and not self._seeking:
+            self._seeking = True
+            self._transport.settle(None)
+
     def send(self, message: Message) -> None:
         """Send to the vehicle, and nobody else.
 
@@ -148,8 +161,12 @@ class Link:
         ------
         EndOfCapture : a replay holds no more. LinkError : the link broke.
         """
-        vehicle = self.vehicle
         for arrived in self._arrivals(until_ns):
+            if self._seeking and self._is_back(arrived):
+                self._seeking = False
+                self._vehicle = replace(self.vehicle, address=arrived.address)
+                self._transport.settle(arrived.address)
+            vehicle = self.vehicle
             if arrived.address != vehicle.address:
                 continue
             self._record(arrived.t_ns, arrived.packet.data)
@@ -170,6 +187,11 @@ class Link:
     def close(self) -> None:
         """Close the transport."""
         self._transport.close()
+
+    def _is_back(self, arrived: _Arrived) -> bool:
+        """Whether it is the vehicle's heartbeat, from its host."""
+        heard = vehicle_of(arrived.address, arrived.packet.message)
+        return heard is not None and replace(heard, address=self.vehicle.address) == self.vehicle
 
     def _arrivals(self, until_ns: int) -> Iterator[_Arrived]:
         while True:
@@ -194,7 +216,7 @@ class Link:
         self._now_ns = max(self._now_ns, until_ns)
 
     def _parsed(self, received: Bytes) -> list[_Arrived]:
-        if self._vehicle is not None and received.address != self._vehicle.address:
+        if self._vehicle is not None and not self._may_be(received.address, self._vehicle.address):
             return []
         if self._transport.datagrams and received.data[:1] not in MAGIC:
             self._junk += 1
@@ -209,6 +231,10 @@ class Link:
         packets = [_Arrived(received.t_ns, received.address, packet) for packet in parse(received.data)]
         self._junk += not packets
         return packets
+
+    def _may_be(self, address: str, known: str) -> bool:
+        """Whether the vehicle may be there: where it was, or, while it is sought, at another port of its host."""
+        return address == known or (self._seeking and address.rpartition(":")[0] == known.rpartition(":")[0])
 
     def _beat(self) -> None:
         """A ground station's HEARTBEAT each second, to whom we may speak."""

@@ -71,7 +71,7 @@ class Returning:
             except LinkError:
                 self._away()
 
-    def settle(self, address: str) -> None:
+    def settle(self, address: str | None) -> None:
         """See Transport: it has one partner."""
 
     def close(self) -> None:

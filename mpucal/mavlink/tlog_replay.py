@@ -70,7 +70,7 @@ class Replay:
     def send(self, data: bytes, address: str | None) -> None:
         """See Transport: nobody hears it."""
 
-    def settle(self, address: str) -> None:
+    def settle(self, address: str | None) -> None:
         """See Transport: it holds one vehicle's packets."""
 
     def close(self) -> None:

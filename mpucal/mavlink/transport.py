@@ -44,8 +44,8 @@ class Transport(Protocol):
         """Send to `address`, as `receive` gave it; None: to the partner of an outward transport. LinkError."""
         ...
 
-    def settle(self, address: str) -> None:
-        """From now on hear that address alone, where the transport can see to it."""
+    def settle(self, address: str | None) -> None:
+        """From now on hear that address alone, where the transport can see to it; None: whoever sends, as at first."""
         ...
 
     def close(self) -> None:

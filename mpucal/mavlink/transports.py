@@ -33,15 +33,19 @@ class Udp:
         self._clock = Clock()
         self.name = str(url)
         self.outward = url.kind is Kind.UDPOUT
+        self._url = url
+        self._open()
+
+    def _open(self) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-            self._partner = (socket.gethostbyname(url.host), url.port)
+            self._partner = (socket.gethostbyname(self._url.host), self._url.port)
             self._socket.bind(("", 0) if self.outward else self._partner)
         except OSError as error:
             self._socket.close()
-            raise _cannot_open(url, error) from error
+            raise _cannot_open(self._url, error) from error
 
     @property
     def port(self) -> int:
@@ -68,8 +72,12 @@ class Udp:
         with suppress(OSError):
             self._socket.sendto(data, (host, int(port)) if address else self._partner)
 
-    def settle(self, address: str) -> None:
+    def settle(self, address: str | None) -> None:
         """See Transport: a connected socket's strangers are turned away by the kernel, before they fill its buffer."""
+        if address is None:
+            self._socket.close()
+            self._open()
+            return
         host, _, port = address.rpartition(":")
         with suppress(OSError):
             self._socket.connect((host, int(port)))
@@ -126,7 +134,7 @@ class Tcp:
         except OSError as error:
             raise _broken(self.name, error) from error
 
-    def settle(self, address: str) -> None:
+    def settle(self, address: str | None) -> None:
         """See Transport: it has one partner."""
 
     def close(self) -> None:
@@ -180,7 +188,7 @@ class Serial:
         except self._failure as error:
             raise _broken(self.name, error) from error
 
-    def settle(self, address: str) -> None:
+    def settle(self, address: str | None) -> None:
         """See Transport: it has one partner."""
 
     def close(self) -> None:

@@ -216,6 +216,8 @@ class VehicleSource:
     def _wait_until_back(self) -> None:
         """After a reboot, a silence or a pause, have it stream again, and read its parameters anew."""
         end_ns = self._link.now_ns() + BACK_NS
+        if not self._rebooted:
+            self._link.seek()
         while not self._streams_again():
             if self._link.now_ns() >= end_ns:
                 raise LinkError(

@@ -59,7 +59,7 @@ class Script:
         self._now_ns = max(self._now_ns, until_ns)
         return None
 
-    def settle(self, address: str) -> None:
+    def settle(self, address: str | None) -> None:
         pass
 
     def send(self, data: bytes, address: str | None) -> None:

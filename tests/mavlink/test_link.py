@@ -71,6 +71,21 @@ def test_several_vehicles_end_with_their_list(script, station):
         one_of(vehicles[:1] * 100, None)
 
 
+def test_a_vehicle_that_comes_back_at_another_port_is_found_there_once_it_is_sought(script, station, decoded):
+    moved, neighbour = "10.0.0.2:40001", "10.0.0.2:999"
+    after = [(20.5 + k, moved, station().heartbeat()) for k in range(10)]
+    others = [(20.2 + k, neighbour, station(7).heartbeat()) for k in range(10)]
+    elsewhere = [(20.1 + k, STRANGER, station().heartbeat()) for k in range(10)]
+    transport = script(in_order(heartbeats(station(), HOME, 3), after, others, elsewhere))
+    link, record = locked(transport)
+    assert len(list(link.messages(22 * S))) == 1
+    link.seek()
+    assert len(list(link.messages(26 * S))) == 4
+    assert link.vehicle.address == moved
+    assert transport.sent[-1][1] == moved
+    assert {decoded(data).get_srcSystem() for _, data in record} == {1, OWN_SYSTEM}
+
+
 def test_one_system_at_two_addresses_is_not_guessed_at(script, station):
     transport = script(in_order(heartbeats(station(), HOME), heartbeats(station(), STRANGER)))
     with pytest.raises(UsageError, match="stop the other"):

@@ -83,10 +83,13 @@ def test_the_kernel_turns_strangers_away_once_the_vehicle_is_known(other):
         transport.settle(soon(transport).address)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
             stranger.sendto(b"stranger", ("127.0.0.1", port))
-        other.sendto(b"again", ("127.0.0.1", port))
-        assert soon(transport).data == b"again"
-        transport.send(b"answer", None)
-        assert other.recv(99) == b"answer"
+            other.sendto(b"again", ("127.0.0.1", port))
+            assert soon(transport).data == b"again"
+            transport.send(b"answer", None)
+            assert other.recv(99) == b"answer"
+            transport.settle(None)
+            stranger.sendto(b"whoever", ("127.0.0.1", port))
+            assert soon(transport).data == b"whoever"
 
 
 def test_udpout_speaks_first(other):

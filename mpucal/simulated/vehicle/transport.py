@@ -48,7 +48,7 @@ class SimulatedTransport:
         """See Transport."""
         self._vehicle.hear(data)
 
-    def settle(self, address: str) -> None:
+    def settle(self, address: str | None) -> None:
         """See Transport: it is the only one."""
 
     def close(self) -> None:
