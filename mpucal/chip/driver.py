@@ -30,7 +30,7 @@ from .settings import Settings
 from .setup import configure, configured, quiet, reset, restart_fifo, wake
 from .tally import REMEDY, Tally
 
-DRIVER_VERSION = 5
+DRIVER_VERSION = 6
 
 # so long without a sample that can be believed, and the driver gives up
 DEAD_NS = 2_000_000_000
@@ -220,8 +220,8 @@ class Driver:
         frames = count // settings.frame_bytes
         try:
             if frames:
-                self._port.read_once(reg.FIFO_R_W, frames * settings.frame_bytes)
-            self._port.read_once(reg.INT_ENABLE, STATUS_BYTES)
+                self._port.read_away(reg.FIFO_R_W, frames * settings.frame_bytes)
+            self._port.read_away(reg.INT_ENABLE, STATUS_BYTES)
         except BusError:
             # the bytes, or the flag, that went by are gone: a second read would begin within a frame
             return Need.RESTART

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from ..errors import BusError
+from ..errors import BusError, NoAnswer
 from .access import Bus
 from .decode import Decoder
 from .tally import Tally
@@ -39,10 +39,16 @@ class Port:
 
     def read(self, register: int, count: int) -> bytes:
         """`count` bytes from `register` on; up to three tries."""
-        return self._retried(lambda: self.read_once(register, count))
+        return self._retried(lambda: self._read(register, count))
 
-    def read_once(self, register: int, count: int) -> bytes:
-        """The same where reading takes something away from the chip, so that a second read gives something else."""
+    def read_away(self, register: int, count: int) -> bytes:
+        """The same where reading takes something away from the chip, so that a second read gives something else.
+
+        Repeated only where nothing was acknowledged: a chip is addressed before it gives its first byte.
+        """
+        return self._retried(lambda: self._read(register, count), NoAnswer)
+
+    def _read(self, register: int, count: int) -> bytes:
         reply = self._counted(lambda: self._bus.read(register, count))
         self._now_ns = max(self._now_ns, reply.t_ns)
         self._decoder.saw_read(register, reply.data, reply.t_ns, reply.host_ns)
@@ -75,11 +81,11 @@ class Port:
             self.tally.failed(error)
             raise
 
-    def _retried(self, access: Callable[[], T]) -> T:
+    def _retried(self, access: Callable[[], T], of: type[BusError] = BusError) -> T:
         for _ in range(TRIES - 1):
             try:
                 return access()
-            except BusError:
+            except of:
                 self.sleep(RETRY_NS)
                 self.tally.retries += 1
         return access()

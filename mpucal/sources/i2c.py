@@ -9,6 +9,7 @@ Source: Linux Documentation/i2c/dev-interface.rst and fault-codes.rst; drivers/i
 from __future__ import annotations
 
 import errno
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -113,7 +114,11 @@ class I2cBus:
             while len(data) < count:
                 # FIFO_R_W gives the next bytes again and again, any other register is followed by the next
                 place = register if register == FIFO_R_W else register + len(data)
-                data += self._part(place, count - len(data))
+                try:
+                    data += self._part(place, count - len(data))
+                except OSError as error:
+                    # what came before is gone: no transfer that nobody acknowledged
+                    raise (OSError(errno.EIO, os.strerror(errno.EIO)) if data else error) from error
         return Reply(data, t_ns)
 
     def write(self, register: int, data: bytes) -> int:

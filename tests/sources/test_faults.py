@@ -125,6 +125,13 @@ def test_what_passes_by_is_a_gap_at_most(name, gaps, lost_s):
     assert np.diff(recording.t).min() > 0
 
 
+def test_one_transfer_in_fifty_that_is_not_acknowledged_loses_nothing():
+    bus = open_simulated("sim:seed=3,fault=nacks")
+    recording, error = measured(bus, 20.0)
+    assert error is None
+    assert not recording.gap.any()
+
+
 @pytest.mark.parametrize(
     ("name", "says"),
     [("stuck", "a wire holds SDA or SCL low"), ("unplugged", "nothing answers at 0x68")],

@@ -172,6 +172,23 @@ def test_an_smbus_adapter_moves_blocks_of_32_bytes(adapter):
     assert max(length for transfer in kernel.transfers for _, length in transfer) == 32
 
 
+def test_a_block_that_is_not_acknowledged_after_another_is_no_transfer_that_took_nothing(adapter, monkeypatch):
+    kernel = adapter()
+    kernel.functions = int(smbus2.I2cFunc.SMBUS_BYTE_DATA | smbus2.I2cFunc.SMBUS_I2C_BLOCK)
+    bus = I2cBus(str(kernel.path))
+    whole = bus._part
+
+    def fails_after_one(register, count):
+        if count < 40:
+            raise OSError(errno.EREMOTEIO, "Remote I/O error")
+        return whole(register, count)
+
+    monkeypatch.setattr(bus, "_part", fails_after_one)
+    with pytest.raises(BusError) as caught:
+        bus.read(reg.FIFO_R_W, 64)
+    assert not isinstance(caught.value, NoAnswer)
+
+
 def test_registers_in_blocks_are_those_in_one_burst(adapter):
     whole, parts = adapter(), adapter("mpu6050")
     expected = I2cBus(str(whole.path)).read(0x00, 100).data
