@@ -5,6 +5,7 @@
 
     python tools/sim_vehicle.py tcp:127.0.0.1:5760     # listens; mpucal session --mavlink tcp:127.0.0.1:5760
     python tools/sim_vehicle.py pty                    # says which device
+    python tools/sim_vehicle.py pty:/tmp/by-id         # leads to it; a reboot makes it another device
 
 It prints the station's --mavlink on its first line, then runs until it is stopped. Everything else is KEY=VALUE: the
 vehicle's keys (an unknown one lists them) and its parameters' first values. What a station has to live with:
@@ -46,7 +47,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, epilog=f"faults:\n{faults}", formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("port", metavar="udp:HOST:PORT|tcp:HOST:PORT|pty")
+    parser.add_argument("port", metavar="udp:HOST:PORT|tcp:HOST:PORT|pty[:LINK]")
     parser.add_argument("words", metavar="KEY=VALUE", nargs="*")
     parser.add_argument("--vehicles", type=int, default=1, help="how many (udp)")
     parser.add_argument("--stranger", action="store_true", help="send forged and truncated packets (udp)")
@@ -83,11 +84,11 @@ def open_port(text: str) -> StationPort:
     """What `text` names."""
     kind, _, rest = text.partition(":")
     host, _, number = rest.rpartition(":")
-    if text == "pty":
-        return PtyPort()
+    if kind == "pty":
+        return PtyPort(Path(rest) if rest else None)
     if kind in ("udp", "tcp") and host and number.isdecimal():
         return UdpPort(host, int(number)) if kind == "udp" else TcpPort(host, int(number))
-    raise UsageError(f"{text} is no port", "give udp:HOST:PORT, tcp:HOST:PORT or pty")
+    raise UsageError(f"{text} is no port", "give udp:HOST:PORT, tcp:HOST:PORT, pty or pty:LINK")
 
 
 class Ride:
@@ -99,6 +100,9 @@ class Ride:
 
     def go_on(self, until_us: int) -> None:
         """Hear what came, and live until `until_us`."""
+        if isinstance(self._port, PtyPort):
+            # a board on USB is gone while it boots
+            self._port.plug(not self._vehicle.silent)
         for data in self._port.receive():
             self._vehicle.hear(data, self._port.datagrams)
         for data in self._line.carry([packet.data for packet in self._vehicle.go_on(until_us)]):

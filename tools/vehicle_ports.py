@@ -8,6 +8,7 @@ import select
 import socket
 import tty
 from contextlib import suppress
+from pathlib import Path
 from typing import Protocol
 
 from mpucal.errors import LinkError
@@ -123,30 +124,55 @@ class TcpPort:
 
 
 class PtyPort:
-    """A pseudo-terminal, which a station opens as its serial port."""
+    """A pseudo-terminal, which a station opens as its serial port.
+
+    Parameters
+    ----------
+    link : a path that leads to it, as /dev/serial/by-id does to a board on USB, and to another one each time that it is
+        plugged in. None: it stays.
+    """
 
     datagrams = False
 
-    def __init__(self) -> None:
-        self._master, self._slave = pty.openpty()
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self.name = os.ttyname(self._slave)
+    def __init__(self, link: Path | None = None) -> None:
+        self._link = link
+        self._ends: tuple[int, int] | None = None
+        self.name = self._open() if link is None else str(link)
+        self.plug()
+
+    def plug(self, there: bool = True) -> None:
+        """Have it there, or gone, where a link leads to it."""
+        if self._link is None or there == (self._ends is not None):
+            return
+        if there:
+            self._link.symlink_to(self._open())
+        else:
+            self.close()
+
+    def _open(self) -> str:
+        self._ends = master, slave = pty.openpty()
+        tty.setraw(slave)
+        os.set_blocking(master, False)
+        return os.ttyname(slave)
 
     def send(self, data: bytes) -> None:
         """See StationPort; what nobody reads is lost."""
-        with suppress(OSError):
-            os.write(self._master, data)
+        if self._ends is not None:
+            with suppress(OSError):
+                os.write(self._ends[0], data)
 
     def receive(self) -> list[bytes]:
         """See StationPort."""
-        if not select.select([self._master], [], [], 0)[0]:
+        if self._ends is None or not select.select([self._ends[0]], [], [], 0)[0]:
             return []
         with suppress(OSError):
-            return [os.read(self._master, CHUNK)]
+            return [os.read(self._ends[0], CHUNK)]
         return []
 
     def close(self) -> None:
         """See StationPort."""
-        os.close(self._master)
-        os.close(self._slave)
+        for end in self._ends or ():
+            os.close(end)
+        self._ends = None
+        if self._link is not None:
+            self._link.unlink(missing_ok=True)

@@ -79,6 +79,7 @@ TRIALS = (
     Trial("ardupilot udp, armed meanwhile", UDP, ("fault=arm@40",), code=6, says="is armed"),
     Trial("ardupilot udp, reboots before it is turned", UDP, ("fault=reboot@8",), says="is back"),
     Trial("ardupilot udp, reboots while it is turned", UDP, ("fault=reboot@45",), says="is back"),
+    Trial("ardupilot pty, another device after a reboot", "pty:{folder}/usb", ("fault=reboot@45",), says="is back"),
     Trial("px4 udp, silent before it is turned", UDP, ("firmware=px4", "fault=silence@8"), (), (), 3, None, "nothing"),
     Trial("ardupilot udp, a parameter refused", UDP, ("refuse=INS_ACC2SCAL_Y",), code=6, says="are back"),
     Trial("px4 udp, a parameter refused", UDP, ("firmware=px4", "refuse=CAL_ACC1_YSCALE"), code=6, says="are back"),
@@ -104,8 +105,9 @@ def main() -> int:
     chosen = [(n, trial) for n, trial in enumerate(TRIALS) if all(word in trial.name for word in arguments.words)]
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(AT_ONCE) as pool:
         jobs = [
-            partial(run, trial, trial.port.format(arguments.first_port + n), Path(folder) / str(n))
+            partial(run, trial, trial.port.format(arguments.first_port + n, folder=at), at)
             for n, trial in chosen
+            for at in [Path(folder) / str(n)]
         ]
         results = list(pool.map(lambda job: job(), jobs))
     print(f"{sum(results)} of {len(results)} ended as expected")

@@ -334,6 +334,17 @@ def test_another_new_orientation_than_the_one_asked_for_is_useful(board, verifyi
     assert "2 of 3" in verifying.of(Prompt)[-1].text
 
 
+def test_another_is_asked_for_where_one_was_seen_after_all(board, verifying, varied):
+    verifying.checked = Checked((), None, MOVED)
+    show(verifying, board, varied[9:12])
+    assert verifying.state is State.VERIFY
+    assert "3 of 3" in verifying.of(Prompt)[-1].text
+    verifying.checked = Checked((), agrees=True)
+    show(verifying, board, varied[12:13])
+    assert verifying.state is State.CALIBRATE
+    assert verifying.machine.checked.agrees
+
+
 def test_a_disagreement_is_told_and_kept(board, verifying, varied):
     verifying.checked = Checked((), False, MOVED)
     show(verifying, board, varied[9:12])

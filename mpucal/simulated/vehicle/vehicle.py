@@ -82,9 +82,14 @@ class SimulatedVehicle:
         """How far it has gone on."""
         return self._now_us
 
+    @property
+    def silent(self) -> bool:
+        """Whether it sends and hears nothing now, as while it boots."""
+        return self._now_us < self._silent_until_us
+
     def hear(self, data: bytes, datagram: bool = True) -> None:
         """Bytes arrive now: a datagram of whole packets, or a piece of a stream."""
-        if self._now_us < self._silent_until_us:
+        if self.silent:
             return
         for packet in self._parser.datagram(data) if datagram else self._parser.stream(data):
             # a prompt goes to the hand, not to the firmware
@@ -129,7 +134,7 @@ class SimulatedVehicle:
                 fault.kind.strike(self)
         self.firmware.sense(self.imus.next())
         self.firmware.temperature_c = self.imus.temperature_c
-        if self._now_us < self._silent_until_us:
+        if self.silent:
             return
         for message_id in self._streams.due(self._now_us, SLOWER_WHILE_BUSY if self._list else 1):
             message = self._heartbeat() if message_id == HEARTBEAT else self._message(message_id)
