@@ -56,9 +56,12 @@ $(TESTED): $(BUILT_OF)
 KERNEL := build/kernel
 kernel: $(TESTED)
 	@mkdir -p $(KERNEL)
-	@ls $(KERNEL)/linux-image-*.deb >/dev/null 2>&1 || [ -n "$$MPUCAL_KERNEL" ] || (cd $(KERNEL) && \
-		apt-get -qq download $$(apt-cache depends linux-image-amd64 | sed -n 's/.*Depends: //p'))
-	@$(BIN)/pytest -m kernel tests/linux
+	@ls $(KERNEL)/linux-kbuild-*.deb >/dev/null 2>&1 || [ -n "$$MPUCAL_KERNEL" ] || (cd $(KERNEL) && \
+		image=$$(apt-cache depends linux-image-amd64 | sed -n 's/.*Depends: //p') && headers=linux-headers-$${image#*-*-} && \
+		apt-get -qq -o APT::Sandbox::User=root download $$image $$headers \
+			$$(apt-cache depends $$headers | sed -n 's/.*Depends: \(linux-[hk]\)/\1/p')) || \
+		echo "kernel: could not fetch Debian's linux-image and linux-headers"
+	@$(BIN)/pytest -m kernel -rs --numprocesses 2 --dist loadfile tests/linux
 
 # needs avr-gcc and avr-libc; says how much flash and RAM the bridge takes
 firmware:

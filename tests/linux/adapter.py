@@ -1,18 +1,23 @@
-"""The simulated chip behind an I2C adapter that the kernel drives: an i2c-tiny-usb, over USB/IP and a socket pair.
+"""Simulated chips behind an I2C adapter that the kernel drives: an i2c-tiny-usb, over USB/IP and a socket pair.
 
 Source: Linux Documentation/usb/usbip_protocol.rst; drivers/i2c/busses/i2c-tiny-usb.c for its requests.
 """
 
 from __future__ import annotations
 
+import json
 import socket
 import struct
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from threading import Lock, Thread
+from types import SimpleNamespace
 
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip import SimulatedBus, open_simulated
+from mpucal.simulated.chip.clock import RealClock
 
 DEVICE = struct.pack("<BBHBBBBHHHBBBB", 18, 1, 0x0110, 0xFF, 0, 0, 64, 0x0403, 0xC631, 0x0205, 0, 0, 0, 1)
 CONFIGURATION = struct.pack("<BBHBBBBB", 9, 2, 18, 1, 1, 0, 0x80, 50) + struct.pack("<9B", 9, 4, 0, 0, 0, 0xFF, 0, 0, 0)
@@ -20,14 +25,21 @@ CONFIGURATION = struct.pack("<BBHBBBBB", 9, 2, 18, 1, 1, 0, 0x80, 50) + struct.p
 ABILITIES = struct.pack("<I", 0x0EFF0001)
 SUBMIT, UNLINK, IN = 1, 2, 1
 GET_FUNC, GET_STATUS, BEGINS, IO = 1, 3, 1, 4
-FULL_SPEED, ADDRESS = 2, 0x68
+FULL_SPEED, ADDRESSES = 2, (0x68, 0x69)
 
 
 class Adapter:
-    """Answers the control requests of the kernel's driver."""
+    """Answers the control requests of the kernel's driver.
 
-    def __init__(self, bus) -> None:
-        self._bus, self._register, self._status = bus, 0, 0
+    Parameters
+    ----------
+    buses : by their address, those to the chips.
+    """
+
+    def __init__(self, buses: Mapping[int, SimulatedBus]) -> None:
+        self._buses, self._register, self._status = buses, 0, 0
+        # what register 0 holds, which the kernel's driver takes for an MPU-6050's INT_STATUS: see docs/iio.md
+        self.register_0 = dict.fromkeys(buses, 1)
 
     def answer(self, setup: bytes, out: bytes) -> bytes:
         kind, request, value, index, length = struct.unpack("<BBHHH", setup)
@@ -40,20 +52,21 @@ class Adapter:
             return bytes([self._status])
         if not request & IO:
             return b""
-        if index != ADDRESS:
+        if index not in self._buses:
             self._status = 2
             return bytes(length) if kind & 0x80 else b""
         self._status = 1
         if value & 1:
-            return self._bus.read(self._register, length).data
+            data = self._buses[index].read(self._register, length).data
+            return data if self._register else bytes([self.register_0[index]]) + data[1:]
         if out:
             self._register = out[0]
         if len(out) > 1:
-            self._bus.write(out[0], out[1:])
+            self._buses[index].write(out[0], out[1:])
         return b""
 
 
-def serve(line: socket.socket, adapter: Adapter) -> None:
+def serve(line: socket.socket, adapter: Adapter, at_once: Lock) -> None:
     """USB/IP's commands, one after the other."""
     while head := _exactly(line, 48):
         command, number, _, direction, _ = struct.unpack(">5I", head[:20])
@@ -62,7 +75,8 @@ def serve(line: socket.socket, adapter: Adapter) -> None:
             continue
         length = struct.unpack(">I", head[24:28])[0]
         out = _exactly(line, length) if direction != IN and length else b""
-        data = adapter.answer(head[40:48], out)
+        with at_once:
+            data = adapter.answer(head[40:48], out)
         moved = len(data) if direction == IN else len(out)
         head = struct.pack(">5IiIiII8x", 3, number, 0, 0, 0, 0, moved, 0, 0, 0)
         line.sendall(head + (data if direction == IN else b""))
@@ -78,15 +92,35 @@ def _exactly(line: socket.socket, count: int) -> bytes:
     return data
 
 
-if __name__ == "__main__":
+def obey(adapter: Adapter, buses: Mapping[int, SimulatedBus], at_once: Lock) -> None:
+    """Lines of JSON on stdin, until they end: what the hands hear, or what register 0 of a chip holds."""
+    for line in sys.stdin:
+        told = json.loads(line)
+        with at_once:
+            if "prompt" in told:
+                for bus in buses.values():
+                    bus.hear(SimpleNamespace(**told["prompt"]))
+            else:
+                adapter.register_0[told["address"]] = told["register_0"]
+
+
+def main(text: str) -> None:
+    """Serve the same chip at both addresses, moved by the same hand; on stdout, a line of JSON with its truth."""
+    clock, at_once = RealClock(), Lock()
+    buses = {address: open_simulated(text, clock=clock) for address in ADDRESSES}
+    for bus in buses.values():
+        # the kernel waits two seconds for a transfer: what loads at the first ones is loaded before
+        driver = Driver(bus, Config(rate_hz=50))
+        driver.start()
+        driver.poll()
+        driver.stop()
+    adapter = Adapter(buses)
     ours, kernels = socket.socketpair()
-    bus = open_simulated(sys.argv[1])
-    # the kernel waits two seconds for a transfer: what loads at the first ones is loaded before
-    driver = Driver(bus, Config(rate_hz=50))
-    driver.start()
-    driver.poll()
-    driver.stop()
-    adapter = Adapter(bus)
-    attach = Path("/sys/devices/platform/vhci_hcd.0/attach")
-    attach.write_text(f"0 {kernels.fileno()} 65538 {FULL_SPEED}")
-    serve(ours, adapter)
+    Path("/sys/devices/platform/vhci_hcd.0/attach").write_text(f"0 {kernels.fileno()} 65538 {FULL_SPEED}")
+    Thread(target=serve, args=(ours, adapter, at_once), daemon=True).start()
+    print(json.dumps(buses[ADDRESSES[0]].truth_document()), flush=True)
+    obey(adapter, buses, at_once)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

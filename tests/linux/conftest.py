@@ -1,18 +1,29 @@
-"""A Debian kernel in QEMU: a program runs in it as root, over the host's files, which it cannot change."""
+"""A Debian kernel in QEMU: a program runs in it as root, over the host's files, which it cannot change.
+
+The guest's clock counts the instructions that it executes, a nanosecond each (-icount), so that what is measured there
+does not depend on how busy or slow the host is; limits are in the guest's time and in the host's processor time.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+import resource
 import shutil
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from mpucal.result.calibration import Calibration
+
 HERE = Path(__file__).parent
-LONGEST_S = 600
+PACKAGES = HERE.parents[1] / "build" / "kernel"
+# in the guest's time, and of the host's processor
+LONGEST_S, LONGEST_CPU_S = 900, 3600
 
 # in the order in which they need each other
 MODULES = (
@@ -28,9 +39,6 @@ MODULES = (
     "9p",
     "overlay",
     "i2c-dev",
-    "i2c-smbus",
-    "i2c-i801",
-    "i2c-stub",
     "i2c-mux",
     "industrialio",
     "kfifo_buf",
@@ -44,20 +52,19 @@ MODULES = (
     "vhci-hcd",
     "i2c-tiny-usb",
 )
-# the program loads these itself, with parameters
-LATER = ("i2c-stub", "inv-mpu6050-i2c")
-PROGRAMS = ("qemu-system-x86_64", "busybox", "iasl", "dpkg-deb")
+OWN = "interrupt"
+PROGRAMS = ("qemu-system-x86_64", "busybox", "dpkg-deb", "make", "gcc")
 QEMU = {
-    "-accel": "tcg,thread=multi",
+    "-accel": "tcg",
+    "-icount": "shift=0",
     "-cpu": "max",
-    "-smp": "2",
     "-m": "768",
     "-M": "q35",
     "-display": "none",
     "-serial": "stdio",
-    "-fsdev": "local,id=host,path=/,security_model=none,readonly=on,multidevs=remap",
+    "-append": "console=ttyS0 quiet panic=-1 mitigations=off",
 }
-DEVICES = ("edu,addr=4", "virtio-9p-pci,fsdev=host,mount_tag=host")
+QUIET = ("-nodefaults", "-no-user-config", "-no-reboot")
 INIT = """#!/bin/busybox sh
 /bin/busybox --install -s /bin
 mount -t proc proc /proc; mount -t sysfs sys /sys; mount -t devtmpfs dev /dev
@@ -66,77 +73,117 @@ mount -t 9p -o trans=virtio,version=9p2000.L,msize=512000,cache=loose,ro host /l
 mount -t tmpfs upper /upper; mkdir -p /upper/files /upper/work
 mount -t overlay -o lowerdir=/lower,upperdir=/upper/files,workdir=/upper/work root /root
 for folder in proc sys dev; do mount -o bind /$folder /root/$folder; done
-mkdir -p /root/modules /root/dev/shm; mount -o bind /modules /root/modules
+mkdir -p /root/modules /root/dev/shm /root/out; mount -o bind /modules /root/modules
+mount -t 9p -o trans=virtio,version=9p2000.L,msize=512000 out /root/out
 mount -t tmpfs shm /root/dev/shm; mount -t tmpfs run /root/run; mount -t tmpfs tmp /root/tmp
 ip link set lo up
-HOME=/run chroot /root {command}
+HOME=/run timeout {longest_s} chroot /root {command}
 echo "ENDED $?"
 poweroff -f
 """
 
 
-def missing() -> list[str]:
-    """The programs that are needed and are not there."""
-    return [name for name in PROGRAMS if shutil.which(name) is None]
+@dataclass(frozen=True)
+class Guest:
+    """What became of a program in that kernel.
 
-
-def boot(package: Path, command: str, table: Path, folder: Path, seconds: float) -> str:
-    """What the kernel and `command`, a shell's, print until it ends.
-
-    Parameters
+    Attributes
     ----------
-    package : a Debian linux-image, unpacked in `folder` alone. table : an ACPI table's source, for QEMU.
+    said : by step, what it told. out : the folder of what it left.
     """
-    modules = _unpacked(package, folder)
+
+    said: dict[str, dict]
+    out: Path
+
+
+@pytest.fixture(scope="module")
+def guest(request, tmp_path_factory):
+    """guest.py's part that the test's module names, on a machine of its own."""
+    folder = tmp_path_factory.mktemp("boot")
+    (folder / "out").mkdir()
+    packages = _packages()
+    output = _boot(packages, f"{sys.executable} {HERE / 'guest.py'} {request.module.PART}", folder)
+    lines = [json.loads(line[5:]) for line in output.splitlines() if line.startswith("SAID ")]
+    assert "ENDED 0" in output, output[-4000:]
+    return Guest({line["step"]: line for line in lines}, folder / "out")
+
+
+def _packages() -> list[Path]:
+    """Debian's kernel and its headers."""
+    lacking = [name for name in PROGRAMS if shutil.which(name) is None]
+    named = Path(os.environ.get("MPUCAL_KERNEL", PACKAGES))
+    images, found = sorted(named.glob("linux-image-*.deb")), sorted(named.glob("linux-*.deb"))
+    lacking += [] if images else ["linux-image"]
+    lacking += [] if len(found) >= 4 else ["linux-headers and linux-kbuild"]
+    if lacking:
+        pytest.skip(f"no {', '.join(lacking)}: install the programs, and let `make kernel` fetch the kernel's packages")
+    return found
+
+
+def _boot(packages: list[Path], command: str, folder: Path) -> str:
+    """What the kernel and `command`, a shell's, print until it ends."""
+    modules = _unpacked(packages, folder)
     root = folder / "initramfs"
     for name in ("bin", "lower", "upper", "root", "proc", "sys", "dev", "modules"):
         (root / name).mkdir(parents=True)
     shutil.copy(str(shutil.which("busybox")), root / "bin" / "busybox")
-    for module in MODULES:
+    for module in (*MODULES, OWN):
         shutil.copy(modules[module], root / "modules")
     init = root / "init"
-    init.write_text(INIT.format(modules=" ".join(m for m in MODULES if m not in LATER), command=command))
+    init.write_text(INIT.format(modules=" ".join(MODULES), longest_s=LONGEST_S, command=command))
     init.chmod(0o755)
     archive, names = folder / "initramfs.cpio", "\n".join(sorted(str(p.relative_to(root)) for p in root.rglob("*")))
     with archive.open("wb") as out:
         subprocess.run(["busybox", "cpio", "-o", "-H", "newc"], input=names.encode(), stdout=out, cwd=root, check=True)
-    subprocess.run(["iasl", "-p", folder / "table", table], check=True, capture_output=True)
-    kernel = next(folder.glob("boot/vmlinuz-*"))
-    words = ["-kernel", kernel, "-initrd", archive, "-acpitable", f"file={folder / 'table.aml'}"]
-    words += ["-append", "console=ttyS0 quiet panic=-1 mitigations=off"]
+    words = [PROGRAMS[0], *QUIET, "-kernel", next(folder.glob("boot/vmlinuz-*")), "-initrd", archive]
     words += [word for option in QEMU.items() for word in option]
-    words += [word for device in DEVICES for word in ("-device", device)]
-    quiet = ["-nodefaults", "-no-user-config", "-no-reboot"]
-    ran = subprocess.run(
-        ["timeout", "-k", "5", str(seconds), PROGRAMS[0], *quiet, *words],
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        check=False,
-    )
-    return ran.stdout.decode(errors="replace")
+    words += _shared("host", "/", "readonly=on,multidevs=remap") + _shared("out", folder / "out", "readonly=off")
+    console = folder / "console"
+    with console.open("wb") as out:
+        subprocess.run(words, stdin=subprocess.DEVNULL, stdout=out, stderr=out, check=False, preexec_fn=_limit)
+    return console.read_text(errors="replace")
 
 
-def _unpacked(package: Path, folder: Path) -> dict[str, Path]:
-    """The kernel and its modules, by name."""
+def _shared(name: str, path: Path | str, how: str) -> list[str]:
+    """A folder of the host, for the guest to mount by its name."""
+    backend = f"local,id={name},path={path},security_model=none,{how}"
+    return ["-fsdev", backend, "-device", f"virtio-9p-pci,fsdev={name},mount_tag={name}"]
+
+
+def _limit() -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_CPU_S, LONGEST_CPU_S))
+
+
+def _unpacked(packages: list[Path], folder: Path) -> dict[str, Path]:
+    """The kernel and its modules, by name; our own is compiled."""
     wanted = ["./boot/vmlinuz-*", *(f"*/{module}.ko" for module in MODULES)]
-    with subprocess.Popen(["dpkg-deb", "--fsys-tarfile", package], stdout=subprocess.PIPE) as data:
-        subprocess.run(["tar", "-x", "-C", folder, "--wildcards", *wanted], stdin=data.stdout, check=True)
-    return {path.stem: path for path in folder.glob("lib/modules/**/*.ko")}
+    for package in packages:
+        chosen = wanted if package.name.startswith("linux-image-") else ["./usr"]
+        with subprocess.Popen(["dpkg-deb", "--fsys-tarfile", package], stdout=subprocess.PIPE) as data:
+            subprocess.run(["tar", "-x", "-C", folder, "--wildcards", *chosen], stdin=data.stdout, check=True)
+    headers = next(folder.glob("usr/src/linux-headers-*/Module.symvers")).parent
+    top = headers / "Makefile"
+    # it names its other half by where that would be installed
+    top.write_text(top.read_text().replace("/usr/src", f"{folder}/usr/src"))
+    own = folder / OWN
+    own.mkdir()
+    shutil.copy(HERE / f"{OWN}.c", own)
+    (own / "Kbuild").write_text(f"obj-m := {OWN}.o\n")
+    subprocess.run(["make", "-C", headers, f"M={own}", "CC=gcc", "modules"], check=True, capture_output=True)
+    return {path.stem: path for path in (*folder.glob("lib/modules/**/*.ko"), own / f"{OWN}.ko")}
 
 
-def package():
-    named = os.environ.get("MPUCAL_KERNEL")
-    found = [Path(named)] if named else sorted((HERE.parents[1] / "build" / "kernel").glob("linux-image-*.deb"))
-    if missing() or not found:
-        pytest.skip(f"no {', '.join(missing()) or 'kernel: give MPUCAL_KERNEL=linux-image-...deb'}")
-    return found[0]
+@pytest.fixture(scope="session")
+def good():
+    """Asserts that a session ended good, its D and b_a the truth's within four standard deviations."""
 
+    def judge(guest, step):
+        found = Calibration.load(guest.out / step / "calibration.json")
+        assert guest.said[step]["code"] == 0, guest.said[step]
+        assert found.quality["verdict"] == "good"
+        for name in ("D", "b_a"):
+            truth = np.array(guest.said["truth"][name])
+            assert (np.abs(getattr(found, name) - truth) < 4 * getattr(found, f"{name}_std")).all()
+        return found
 
-@pytest.fixture(scope="module")
-def said(tmp_path_factory):
-    """By step, what mpucal did and said in that kernel."""
-    deb, folder = package(), tmp_path_factory.mktemp("boot")
-    output = boot(deb, f"{sys.executable} {HERE / 'guest.py'}", HERE / "mpu.asl", folder, LONGEST_S)
-    lines = [json.loads(line[5:]) for line in output.splitlines() if line.startswith("SAID ")]
-    assert "ENDED 0" in output, output[-4000:]
-    return {line["step"]: line for line in lines}
+    return judge

@@ -1,37 +1,34 @@
-"""Runs in the kernel that boot.py starts: what mpucal does there, a line of JSON each."""
+"""Runs in the kernel that conftest.py boots: mpucal's commands; what they say in lines of JSON, their files in OUT."""
 
 from __future__ import annotations
 
-import ctypes
 import json
-import mmap
 import os
-import struct
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from threading import Timer
 from typing import Any
 
-import numpy as np
-import smbus2
 from click.testing import CliRunner
 
-import mpucal
 from mpucal import cli
 from mpucal.errors import MpucalError
 
-IIO, I2C = Path("/sys/bus/iio/devices"), Path("/sys/bus/i2c/devices")
-EEPROM = 0x57
-# QEMU's adapter gives 0 for the last byte of a block: of the FIFO's count, and of a frame
-FRAMES, GYRO_Z = 18, -3072
-LOADED = ["/bin/busybox", "insmod"]
+IIO, I2C = Path("/sys/bus/iio/devices"), Path("/sys/bus/i2c")
+OUT = Path("/out")
+HERE = Path(__file__).parent
+MPUCAL = Path(sys.executable).parent / "mpucal"
+ADDRESSES = ("0068", "0069")
+DETACH = Path("/sys/devices/platform/vhci_hcd.0/detach")
+RATE = ("--rate", "50")
 
 
 def tell(step: str, **facts: Any) -> None:
+    """A line for the test, with the time since the kernel started."""
     up = float(Path("/proc/uptime").read_text().split()[0])
     print("SAID " + json.dumps({"step": step, "up": up, **facts}), flush=True)
 
@@ -41,138 +38,163 @@ def run(step: str, *words: str, **facts: Any) -> str:
     ran = CliRunner().invoke(cli.commands, list(words), standalone_mode=False)
     error = ran.exception
     sentence = str(error) if isinstance(error, MpucalError) else repr(error) if error else ""
-    code = ran.return_value if error is None else sentence
-    tell(step, code=code, output=ran.stdout, said=ran.stderr[-2000:], **facts)
+    tell(step, code=ran.return_value or 0 if error is None else sentence, out=ran.stdout, said=ran.stderr, **facts)
     return ran.stdout
 
 
-def wait_for(there: Callable[[], Any], seconds: float = 150.0) -> Any:
+def record(step: str, *words: str, seconds: float = 4) -> None:
+    """`mpucal record`, to a file in OUT that is named after the step."""
+    run(step, "record", *words, *RATE, "--seconds", str(seconds), "-o", str(OUT / f"{step}.mcap"))
+
+
+def wait_for(there: Callable[[], Any], seconds: float = 60.0) -> Any:
+    """What it gives once it gives something; of the time that the guest sees."""
     end = time.monotonic() + seconds
     while not (found := there()) and time.monotonic() < end:
         time.sleep(0.1)
+    if not found:
+        raise TimeoutError(f"waited {seconds:g} s")
     return found
 
 
-def adapter_named(part: str) -> Path:
-    return wait_for(lambda: next((p.parent for p in I2C.glob("i2c-*/name") if part in p.read_text()), None))
+def later(seconds: float, do: Callable[[], Any]) -> None:
+    """Do it while a command runs."""
+    Timer(seconds, do).start()
 
 
-def device_of(client: str) -> Path:
-    return wait_for(lambda: next(iter((I2C / client).glob("iio:device*")), None))
+class Board:
+    """Two simulated chips in a hand, behind a real adapter; see adapter.py.
+
+    Attributes
+    ----------
+    bus : the adapter's number. rate_hz : what the chips make of 50 Hz.
+    """
+
+    def __init__(self, text: str) -> None:
+        program = [sys.executable, str(HERE / "adapter.py"), text]
+        self._process = subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        truth = json.loads(self._process.stdout.readline())
+        tell("truth", **truth)
+        self.rate_hz = 50 * (1 + truth["rate_error_ppm"] * 1e-6)
+        names = wait_for(lambda: [p for p in I2C.glob("devices/i2c-*/name") if "i2c-tiny-usb" in p.read_text()])
+        self.bus = names[0].parent.name.removeprefix("i2c-")
+
+    def hears(self, kind: str, down: Any = None) -> None:
+        """A prompt."""
+        self._told(prompt={"kind": kind, "down": down})
+
+    def register_0(self, address: int, value: int) -> None:
+        """What a chip holds there."""
+        self._told(address=address, register_0=value)
+        # nothing answers; it is done long before a command gets so far
+        time.sleep(0.1)
+
+    def session(self, step: str, *words: str) -> None:
+        """A whole session, its prompts obeyed; its folder comes to OUT."""
+        folder = f"/run/{step.replace(' ', '-')}"
+        command = [str(MPUCAL), "session", *words, *RATE, "--target", "quick", "--yes", "--json-events", "-o", folder]
+        said = []
+        with subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+            for line in process.stderr:
+                event = json.loads(line) if line.startswith("{") else {"event": "line", "what": line}
+                if event["event"] == "prompt":
+                    self.hears(event["kind"], event.get("down"))
+                if event["event"] in ("line", "error", "note", "prompt"):
+                    said.append(event)
+        subprocess.run(["cp", "-r", folder, OUT], check=False)
+        tell(step, code=process.wait(), said=said)
+
+    def unplug(self) -> None:
+        """Take the adapter out of its socket."""
+        DETACH.write_text("0")
+
+    def close(self) -> None:
+        """End the chips."""
+        self._process.kill()
+        self._process.wait()
+
+    def _told(self, **what: Any) -> None:
+        self._process.stdin.write(json.dumps(what) + "\n")
+        self._process.stdin.flush()
 
 
-def summary(path: Path) -> dict[str, Any]:
-    if not path.exists():
-        return {"samples": 0}
-    recording = mpucal.load(path)
-    acc, gyr = recording.acc, recording.gyr
-    return {
-        "samples": len(recording),
-        "rate_hz": recording.rate_hz,
-        "steps_ms": [float(v) * 1e3 for v in np.percentile(np.diff(recording.t), (0, 50, 100))],
-        "acc": acc.mean(0).tolist(),
-        "gyr": gyr.mean(0).tolist(),
-        "first": acc[0].tolist(),
-        "sensor": vars(recording.sensor),
-    }
+def over_bus(board: Board) -> None:
+    """The real /dev/i2c-N."""
+    bus = ("--bus", board.bus)
+    board.hears("lay_flat")
+    run("doctor", "doctor", *bus, "--seconds", "2", *RATE, "--json")
+    record("recorded", *bus)
+    board.session("session", *bus)
+    board.hears("lay_flat")
+    later(3, board.unplug)
+    record("unplugged", *bus, seconds=20)
 
 
-def live() -> None:
-    """The simulated chip on a real adapter: by --bus, then held by the kernel's own driver."""
-    program = [sys.executable, str(Path(__file__).parent / "adapter.py"), "sim:pace=real,hand=still,seed=4"]
-    with subprocess.Popen(program) as adapter:
-        try:
-            bus = adapter_named("i2c-tiny-usb").name.removeprefix("i2c-")
-            run("recorded", "record", "--bus", bus, "--rate", "50", "--seconds", "4", "-o", "/run/bus.mcap")
-            tell("recording", **summary(Path("/run/bus.mcap")))
-            (I2C / f"i2c-{bus}" / "new_device").write_text("mpu6050 0x68")
-            if not Path("/sys/bus/i2c/drivers/inv-mpu6050-i2c").exists():
-                subprocess.run([*LOADED, "/modules/inv-mpu6050-i2c.ko"], check=True)
-            device = device_of(f"{bus}-0068")
-            tell("bound", device=device.name, names=sorted(p.name for p in device.iterdir()))
-            run("held", "record", "--bus", bus, "--seconds", "1", "-o", "/run/held.mcap")
-            run("polled", "record", "--iio", device.name, "--rate", "50", "--seconds", "4", "-o", "/run/polled.mcap")
-            tell("polled recording", **summary(Path("/run/polled.mcap")))
-            run("examined", "doctor", "--iio", device.name, "--seconds", "3", "--rate", "50", "--json")
-            calibbias(device)
-            (I2C / f"i2c-{bus}" / "delete_device").write_text("0x68")
-            run("doctor", "doctor", "--bus", bus, "--seconds", "2", "--rate", "50", "--json")
-        finally:
-            adapter.kill()
-
-
-def calibbias(device: Path) -> None:
-    """Written through the kernel and read back."""
-    names = [f"in_accel_{axis}_calibbias" for axis in "xyz"]
-    before = [int((device / name).read_text()) for name in names]
-    for name, word in zip(names, before, strict=True):
-        (device / name).write_text(str(word + 100))
-    tell("calibbias", before=before, after=[int((device / name).read_text()) for name in names])
-
-
-def buffered() -> None:
-    """The kernel's own driver with an interrupt: its buffer, and the case in which it stays empty."""
-    bus = int(adapter_named("SMBus I801").name.removeprefix("i2c-"))
-    registers = smbus2.SMBus(bus, force=True)
-
-    def put(register: int, *values: int) -> None:
-        for i, value in enumerate(values):
-            registers.write_byte_data(EEPROM, register + i, value, force=True)
-
-    put(0x75, 0x68)
-    put(0x6B, 0x40)
-    subprocess.run([*LOADED, "/modules/inv-mpu6050-i2c.ko"], check=True)
-    device = wait_for(lambda: next(iter(IIO.glob("iio:device*")), None))
-    tell("probed", name=(device / "name").read_text().strip(), buffer=(device / "buffer").is_dir())
-    pulse, stop = _interrupt(), threading.Event()
-    state = {"ready": 1, "count": 0}
-
-    def measure() -> None:
-        next_s = time.monotonic()
-        while not stop.is_set():
-            n = state["count"] = state["count"] + 1
-            with suppress(OSError):
-                put(0x74, *struct.pack(">7h", n, -n, 8192 + n, 0, 1000 + n, 2000, GYRO_Z))
-                put(0x00, state["ready"])
-                put(0x72, 1, 0)
-                pulse()
-            next_s += FRAMES / 50
-            time.sleep(max(0.0, next_s - time.monotonic()))
-
-    measuring = threading.Thread(target=measure, daemon=True)
-    measuring.start()
-    words = ["record", "--iio", device.name, "--rate", "50", "--seconds", "4"]
-    run("buffered", *words, "-o", "/run/buffer.mcap")
-    if Path("/run/buffer.mcap").exists():
-        tell("buffered recording", **summary(Path("/run/buffer.mcap")))
-    tell("put back", enable=(device / "buffer/enable").read_text(), rate=(device / "sampling_frequency").read_text())
-    other = os.open(f"/dev/{device.name}", os.O_RDONLY | os.O_NONBLOCK)
-    run("another reader", *words, "-o", "/run/other.mcap")
+def over_iio(board: Board) -> None:
+    """The kernel's own driver, with an interrupt."""
+    device, *_ = bound(board)
+    iio, held, client = ("--iio", device), IIO / device, f"{board.bus}-{ADDRESSES[0]}"
+    tell("bound", device=device)
+    record("held", "--bus", board.bus, "--address", "0x68")
+    run("doctor", "doctor", *iio, "--seconds", "2", *RATE, "--json")
+    record("polled", *iio, "--trigger", "none")
+    record("buffered", *iio)
+    tell("put back", enable=(held / "buffer/enable").read_text(), rate=(held / "sampling_frequency").read_text())
+    other = os.open(f"/dev/{device}", os.O_RDONLY | os.O_NONBLOCK)
+    record("another reader", *iio)
     os.close(other)
-    state["ready"] = 0
-    run("empty", *words, "-o", "/run/empty.mcap")
-    stop.set()
-    measuring.join()
+    board.register_0(0x68, 0)
+    record("empty", *iio)
+    board.register_0(0x68, 1)
+    later(2, sleep_through)
+    record("overrun", *iio, seconds=8)
+    board.session("session", *iio)
+    written(board, iio)
+    later(2, lambda: (I2C / "drivers/inv-mpu6050-i2c/unbind").write_text(client))
+    record("unbound", *iio, seconds=20)
 
 
-def _interrupt() -> Callable[[], None]:
-    """Raises and lowers the line of QEMU's edu device."""
-    folder = Path("/sys/bus/pci/devices/0000:00:04.0")
-    with (folder / "config").open("r+b", buffering=0) as config:
-        config.seek(4)
-        config.write(b"\x02\x00")
-    memory = mmap.mmap(os.open(folder / "resource0", os.O_RDWR | os.O_SYNC), 4096)
-    up, down = (ctypes.c_uint32.from_buffer(memory, at) for at in (0x60, 0x64))
+def over_two(board: Board) -> None:
+    """Accelerometer and gyroscope of two devices."""
+    accel, gyro = bound(board)
+    board.session("session", "--iio", f"accel={accel},gyro={gyro}")
 
-    def pulse() -> None:
-        up.value = 1
-        down.value = 1
 
-    return pulse
+def bound(board: Board) -> list[str]:
+    """The devices that the kernel's driver makes of the chips, as on a board with INT wires."""
+    board.hears("lay_flat")
+    addresses = ",".join(f"0x{address}" for address in ADDRESSES)
+    wires = [f"adapter={board.bus}", f"addresses={addresses}", f"period_us={round(1e6 / board.rate_hz)}"]
+    subprocess.run(["/bin/busybox", "insmod", "/modules/interrupt.ko", *wires], check=True)
+    clients = [I2C / "devices" / f"{board.bus}-{address}" for address in ADDRESSES]
+    return [wait_for(lambda c=c: [path.name for path in c.glob("iio:device*")])[0] for c in clients]
+
+
+def sleep_through() -> None:
+    """This process stands still for four seconds; the kernel goes on, and its buffer holds two."""
+    subprocess.Popen(["/bin/sh", "-c", f"sleep 4; kill -CONT {os.getpid()}"])
+    os.kill(os.getpid(), 19)
+
+
+def written(board: Board, iio: tuple[str, str]) -> None:
+    """What a session found, into calibbias and to udev, and out again."""
+    with suppress(OSError):
+        subprocess.run(["/lib/systemd/systemd-udevd", "--daemon"], check=False)
+    board.hears("lay_flat")
+    found = OUT / "session/calibration.json"
+    record("as it was", *iio)
+    run("written", "write", str(found), "kernel", *iio, "--yes", "-o", "/run/written")
+    record("corrected", *iio)
+    rules = [path.read_text() for path in Path("/etc/udev/rules.d").glob("*mpucal*")]
+    tell("rules", rules=rules, calibbias=[(IIO / iio[1] / f"in_accel_{a}_calibbias").read_text() for a in "xyz"])
+    run("put back by mpucal", "write", "/run/written/iio-state.json", "kernel", *iio, "--yes")
+    record("as it is again", *iio)
 
 
 if __name__ == "__main__":
     tell("up", kernel=os.uname().release)
-    for part in (buffered, live):
-        if not sys.argv[1:] or part.__name__ in sys.argv[1:]:
-            part()
+    made = Board("sim:chip=mpu6050,seed=7")
+    try:
+        {"bus": over_bus, "iio": over_iio, "two": over_two}[sys.argv[1]](made)
+    finally:
+        made.close()
