@@ -51,6 +51,7 @@ BLOCK = 20
 OWN_SYSTEM = 255
 IMUS = 3
 PATIENCE_S = 30
+SAID = ("prompt", "note", "decision", "caution", "error")
 KINDS_OF_ERROR = ("BIAS", "SCAL")
 
 
@@ -211,7 +212,7 @@ def session(body: Body, words: list[str]) -> int:
             if event["event"] == "prompt":
                 body.hear(event["kind"], event["down"])
             said = [str(event[key]).strip() for key in ("text", "why", "what", "do") if event.get(key)]
-            if said and event["event"] != "progress":
+            if said and event["event"] in SAID:
                 print(f"{event['event']}: {' '.join(said)}", file=sys.stderr)
     return process.returncode
 
