@@ -150,7 +150,11 @@ def fetched(path: str) -> Iterator[Path]:
         local = Path(folder) / PurePosixPath(path.partition("?")[0]).name
         try:
             system, there = fsspec.core.url_to_fs(path)
-            system.get(there, str(local), recursive=system.isdir(there))
+            if system.isdir(there):
+                system.get(there, str(local), recursive=True)
+            else:
+                # get would take a signed URL's question mark for a pattern
+                system.get_file(there, str(local))
         except Exception as error:
             do = lacking(path) if isinstance(error, ImportError) else "check it, and that this worker may read it"
             raise RecordingError(f"cannot fetch {path} ({type(error).__name__}: {error})", do) from error
