@@ -14,14 +14,15 @@ from ..data import Vector
 from .firmwares import PX4
 from .gatherer import Gatherer
 from .parameters.compose import Correction
-from .parameters.names import mounting, place
+from .parameters.names import AXES, Place, mounting, place, px4_place
 
 Values = Mapping[str, float]
 
 # whose change alters the streams: beyond what is composed, or by a correction
 MOUNTED = ("AHRS_ORIENTATION", "AHRS_CUSTOM", "CUST_ROT", "SENS_BOARD")
-BEYOND = ("INS_GYR", "CAL_GYRO", *MOUNTED, "EKF2_IMU_CTRL")
-CORRECTIONS = ("INS_ACC", "CAL_ACC")
+BEYOND = ("INS_GYR", *MOUNTED, "EKF2_IMU_CTRL")
+ACCELEROMETER = ("INS_ACC", "CAL_ACC")
+CORRECTIONS = (*ACCELEROMETER, "CAL_GYRO")
 # PX4 tells of a change up to a second after it is in use; the parameters of one change come one after the other
 LATE_US = {PX4: 1_500_000}
 SETTLED_US = 500_000
@@ -41,30 +42,62 @@ class Segment:
 
 @dataclass(frozen=True)
 class Through:
-    """What an IMU delivers, seen through another correction of the same mounting R_b."""
+    """What an IMU delivers, seen through another correction of the same mounting R_b.
+
+    Attributes
+    ----------
+    rate : (3,) rad/s, by which its rates become greater, in the vehicle's axes.
+    """
 
     now: Correction
     then: Correction
     R_b: Vector
+    rate: Vector
 
-    def __call__(self, acc: Vector) -> Vector:
+    def acc(self, acc: Vector) -> Vector:
         """(..., 3) m/s^2."""
         return self.now.seen_through(self.then, self.R_b, acc)
+
+    def gyr(self, gyr: Vector) -> Vector:
+        """(..., 3) rad/s."""
+        return np.asarray(gyr + self.rate)
 
 
 def through(firmware: str, imu: int, now: Values, then: Values) -> Through | None:
     """From the stream of an IMU under `now` to the one under `then`; None where that is not known."""
     if any(now.get(name, value) != value for name, value in then.items() if name.startswith(BEYOND)):
         return None
-    if _ids(now) != _ids(then):
+    where = _place(firmware, imu, now, then)
+    if where is None or 0 != now.get(where.sensor_id, 0) != then.get(where.sensor_id, 0) != 0:
         return None
-    where = place(firmware, imu, now)
-    if where is None:
-        return None
-    corrections, R_b = (where.correction(now), where.correction(then)), mounting(firmware, where, now)
+    corrections, R_b = (
+        (_correction(firmware, where, now), _correction(firmware, where, then)),
+        mounting(firmware, where, now),
+    )
     if corrections[0] is None or corrections[1] is None or R_b is None or not np.all(corrections[0].scale):
         return None
-    return Through(where.used(corrections[0]), where.used(corrections[1]), R_b)
+    rate = R_b @ (_gyro_offset(where, now, then) - _gyro_offset(where, then, now))
+    return Through(where.used(corrections[0]), where.used(corrections[1]), R_b, rate)
+
+
+def _place(firmware: str, imu: int, now: Values, then: Values) -> Place | None:
+    """Where an IMU's correction is in both; PX4 names its sensors meanwhile in the slots of their numbers."""
+    if firmware == PX4 and _ids(now) != _ids(then):
+        return px4_place(imu, imu - 1)
+    return place(firmware, imu, now)
+
+
+def _correction(firmware: str, where: Place, values: Values) -> Correction | None:
+    """Of a sensor that PX4 does not name yet, none: it delivers what it measures."""
+    if firmware == PX4 and values.get(where.sensor_id) == 0:
+        return Correction(np.zeros(3), np.ones(3))
+    return where.correction(values)
+
+
+def _gyro_offset(where: Place, values: Values, otherwise: Values) -> Vector:
+    """(3,) rad/s that PX4 subtracts; what was never told has not changed."""
+    names = [where.sensor_id.replace("ACC", "GYRO").replace("ID", f"{axis}OFF") for axis in AXES]
+    return np.array([values.get(name, otherwise.get(name, 0.0)) for name in names])
 
 
 def joined(segments: Sequence[Segment], firmware: str, over_reboots: bool) -> Segment:
@@ -108,7 +141,7 @@ def _add(
         numbers = numbers[kept]
         turned = None if same else through(firmware, stream.imu, segment.parameters, then)
         if turned is not None:
-            numbers[:, :3] = turned(numbers[:, :3])
+            numbers[:, :3], numbers[:, 3:6] = turned.acc(numbers[:, :3]), turned.gyr(numbers[:, 3:6])
         made.extend(stream, times_us[kept], numbers)
 
 
@@ -117,4 +150,4 @@ def _shaping(values: Values) -> dict[str, float]:
 
 
 def _ids(values: Values) -> dict[str, float]:
-    return {name: value for name, value in values.items() if name.endswith("_ID") and name.startswith(CORRECTIONS)}
+    return {name: value for name, value in values.items() if name.endswith("_ID") and name.startswith(ACCELEROMETER)}

@@ -98,8 +98,8 @@ class Log:
         back = through(self.firmware, content.stream.imu, self.segments[-1].parameters, self.segments[0].parameters)
         if back is None:
             return row
-        x, y, z = back(np.array(content.acc)).tolist()
-        return Row(row.t_us, replace(content, acc=(x, y, z)))
+        acc, gyr = back.acc(np.array(content.acc)).tolist(), back.gyr(np.array(content.gyr)).tolist()
+        return Row(row.t_us, replace(content, acc=tuple(acc), gyr=tuple(gyr)))
 
     def forget(self) -> None:
         """Let go of all readings so far, and go on under the same parameters."""

@@ -26,7 +26,8 @@ def stream_parameter_names(firmware: str) -> tuple[str, ...]:
         kinds = ("ID", "PRIO", "ROT", *(f"{axis}{kind}" for kind in ("OFF", "SCALE") for axis in AXES))
         slots = [f"CAL_ACC{slot}_{kind}" for slot in range(SLOTS) for kind in kinds]
         board = [f"SENS_BOARD_{axis}_OFF" for axis in AXES]
-        return (EKF2_IMU_CTRL, "SENS_BOARD_ROT", *board, *slots)
+        rates = [f"CAL_GYRO{slot}_{axis}OFF" for slot in range(SLOTS) for axis in AXES]
+        return (EKF2_IMU_CTRL, "SENS_BOARD_ROT", *board, *slots, *rates)
     accs = ["INS_ACC", *(f"INS_ACC{imu}" for imu in range(2, IMUS + 1))]
     kinds = ("_ID", *(f"{kind}_{axis}" for kind in ("OFFS", "SCAL") for axis in AXES))
     return (ORIENTATION, *FILTERS, *(f"{acc}{kind}" for acc in accs for kind in kinds))

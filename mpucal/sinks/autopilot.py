@@ -34,7 +34,7 @@ from .sink import Applied
 from .table import AUTOPILOT, OLD_PARAM, OLD_PARAMS
 
 FILE, FOLDERS = "{}mpucal-imu{}.bin", {ARDUPILOT: "/APM/", PX4: "/fs/microsd/"}
-CORRECTION = re.compile(r"(OFFS|SCAL)_[XYZ]$|[XYZ](OFF|SCALE)$")
+CORRECTION = re.compile(r"ACC\d?(OFFS|SCAL)_[XYZ]$|ACC\d_[XYZ](OFF|SCALE)$")
 SAVE_IDS = 76
 # what ArduPilot says of sensors whose ids are not those of their calibration
 UNCALIBRATED = re.compile(r"accel\w*.* cal", re.IGNORECASE)

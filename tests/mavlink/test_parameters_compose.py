@@ -6,7 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
+from mpucal.mavlink.join import through
 from mpucal.mavlink.parameters.compose import Correction, compose
+from mpucal.mavlink.parameters.names import px4_place
 from mpucal.mavlink.rotation import orientation
 
 ORIENTATIONS = [number for number in range(41) if orientation(number) is not None]
@@ -106,3 +108,16 @@ def test_orientations_are_pymavlinks_euler_angles(number):
 def test_an_orientation_without_angles_is_unknown():
     assert orientation(100) is None
     assert orientation(77) is None
+
+
+def test_a_sensor_that_px4_names_later_than_the_next_one_keeps_its_own_correction():
+    unnamed = {"SENS_BOARD_ROT": 0.0} | {
+        name: float(name.endswith("SCALE")) for slot in range(4) for name in px4_place(slot + 1, slot).names
+    }
+    unnamed |= {f"CAL_ACC{slot}_ID": 0.0 for slot in range(4)}
+    second = unnamed | {"CAL_ACC1_ID": 7.0, "CAL_ACC1_XOFF": 0.4}
+    both = second | {"CAL_ACC0_ID": 5.0, "CAL_ACC0_YOFF": 0.3}
+    for now, moved in ((unnamed, -0.3), (second, -0.3), (both, 0.0)):
+        assert through("PX4", 1, now, both).acc(np.zeros(3)) == pytest.approx([0.0, moved, 0.0])
+    assert through("PX4", 2, unnamed, both).acc(np.zeros(3)) == pytest.approx([-0.4, 0.0, 0.0])
+    assert through("PX4", 1, both, both | {"CAL_ACC0_ID": 9.0}) is None

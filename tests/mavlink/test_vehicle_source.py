@@ -194,9 +194,9 @@ def test_after_a_reboot_its_streams_are_asked_for_again_and_join(words):
     assert repeated == t[: len(repeated)]
 
 
-@pytest.mark.parametrize("words", ["firmware=px4,fault=autocal@9"])
+@pytest.mark.parametrize("words", ["", ",CAL_ACC0_ID=0,CAL_ACC1_ID=0"], ids=["named", "named meanwhile"])
 def test_offsets_that_px4_commits_meanwhile_are_composed(words):
-    source, _, said = opened(words + ",hand=still")
+    source, _, said = opened(f"firmware=px4,fault=autocal@9,hand=still{words}")
     source.start()
     polled(source, 15)
     assert [text for text in said if "was changed while it was measured" in text and "SENS_IMU_AUTOCAL" in text]
@@ -206,6 +206,8 @@ def test_offsets_that_px4_commits_meanwhile_are_composed(words):
     (cut,) = np.flatnonzero(recording.gap)
     # before the change as after it: as if the new offsets had been there all the time
     np.testing.assert_allclose(recording.acc[:cut].mean(0), recording.acc[cut:].mean(0), atol=0.01)
+    assert np.linalg.norm([new[f"CAL_GYRO0_{axis}OFF"] for axis in "XYZ"]) > 2e-3
+    np.testing.assert_allclose(recording.gyr[:cut].mean(0), recording.gyr[cut:].mean(0), atol=5e-4)
 
 
 def test_another_system_is_not_locked_to():

@@ -52,6 +52,7 @@ class Px4(Firmware):
             store.add(f"CAL_ACC{slot}_ROT", -1, INT32)
             store.add_vector(f"CAL_ACC{slot}_", 0.0, "OFF")
             store.add_vector(f"CAL_ACC{slot}_", 1.0, "SCALE")
+            store.add_vector(f"CAL_GYRO{slot}_", 0.0, "OFF")
 
     def start(self) -> None:
         """From the identity, what is stored is taken over where it differs enough."""
@@ -60,6 +61,7 @@ class Px4(Firmware):
         self._take_over()
 
     def _take_over(self) -> None:
+        self._rates = np.array([self.store.vector(f"CAL_GYRO{imu}_", "OFF") for imu in range(self.options.imus)])
         for imu in range(self.options.imus):
             slot = self._slot(imu)
             if slot is None:
@@ -77,7 +79,7 @@ class Px4(Firmware):
     def sense(self, raw: Vector) -> None:
         """R_b ((raw - OFF) * SCALE), and what the EKF makes of IMU 1."""
         self.corrected[:, 0] = (raw[:, 0] - self._offset) * self._scale @ self.rotation.T
-        self.corrected[:, 1] = raw[:, 1] @ self.rotation.T
+        self.corrected[:, 1] = (raw[:, 1] - self._rates) @ self.rotation.T
         control, rate = int(self.store["EKF2_IMU_CTRL"]), self.corrected[0, 1]
         if control & LEARN_GYROSCOPE and np.linalg.norm(rate) < STILL_RAD_S:
             self._gyro_bias = self._gyro_bias + (rate - self._gyro_bias) * self.tick_us * 1e-6 / LEARN_S
@@ -118,15 +120,20 @@ class Px4(Firmware):
         return [self.store.parameter(wanted.name)]
 
     def learn_offsets(self) -> list[str]:
-        """SENS_IMU_AUTOCAL: the estimator's bias of IMU 1 joins its offsets, in a slot that names it."""
+        """SENS_IMU_AUTOCAL: the estimator's biases of IMU 1 join its offsets, in a slot that names it."""
         if not self.store["SENS_IMU_AUTOCAL"]:
             return []
         slot = self._slot(0) or 0
         self.store[f"CAL_ACC{slot}_ID"] = DEVICE_IDS[0]
         for axis, value in zip(AXES, self._offset[0] + self.rotation.T @ self._bias, strict=True):
             self.store[f"CAL_ACC{slot}_{axis}OFF"] = float(value)
+        rate = self.store.vector("CAL_GYRO0_", "OFF") + self.rotation.T @ self._gyro_bias
+        for axis, value in zip(AXES, rate, strict=True):
+            self.store[f"CAL_GYRO0_{axis}OFF"] = float(value)
+        self._gyro_bias = np.zeros(3)
         self._take_over()
-        return [f"CAL_ACC{slot}_ID", *(f"CAL_ACC{slot}_{axis}OFF" for axis in AXES)]
+        told = [f"CAL_ACC{slot}_{axis}OFF" for axis in AXES] + [f"CAL_GYRO0_{axis}OFF" for axis in AXES]
+        return [f"CAL_ACC{slot}_ID", *told]
 
     def correction(self, imu: int) -> tuple[Vector, Vector]:
         """As it was taken over."""
