@@ -31,8 +31,8 @@ def test_every_sample_is_recorded(guest):
     assert (found.sensor.chip, found.sensor.accel_range_g) == ("MPU-6050", 4)
 
 
-def test_a_session_ends_good_with_the_chips_own_truth(guest, good):
-    good(guest, "session")
+def test_a_session_ends_good_with_the_chips_own_truth(guest, near):
+    assert near(guest).quality["verdict"] == "good"
 
 
 def test_its_capture_replays_elsewhere(guest, tmp_path):
