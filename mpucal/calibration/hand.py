@@ -7,6 +7,7 @@ correlation time; where it hardly rests, the second derivative of a position tha
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +28,7 @@ from .hand_noise import (
     farther,
     likeliest,
 )
-from .initial_estimate import initialise
+from .initial_estimate import initialise, perfect
 from .levenberg_marquardt import Minimum, information, minimise
 from .local_noise import louder
 from .parameters import HAND
@@ -44,12 +45,23 @@ PASSES = 3
 
 
 def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
-    """D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves."""
+    """D, b_a, b_omega, K, lever arm r and delay tau of a sensor that a hand moves.
+
+    A search that does not settle where there are gaps begins once more, from a perfect sensor.
+    """
+    fit = _fit_from(initialise, recording, flat, gravity)
+    if fit.converged or not recording.gap.any():
+        return fit
+    again = _fit_from(perfect, recording, flat, gravity)
+    return again if again.converged else fit
+
+
+def _fit_from(begin: Callable[[Problem, Vector], Theta], recording: Recording, flat: Flat, gravity: float) -> Fit:
     noise_factor = louder(recording, flat)
     fine = preprocess(recording, (flat.first, flat.last), gravity, noise_factor)
     rough = means(noise_factor, recording, flat, SEARCH_HZ)
     search = _Search(preprocess(*downsampled(recording, flat, SEARCH_HZ), gravity, rough))
-    theta, noise = search.run(initialise(search.prepared.problem, fine.flat.b_omega))
+    theta, noise = search.run(begin(search.prepared.problem, fine.flat.b_omega))
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
         noise = Noise("white", likeliest(fine.white, CALM_MPS2, theta, noise.sigma))
     problem = _moved(noise.problem(fine), fine, theta)
@@ -57,8 +69,8 @@ def fit_hand(recording: Recording, flat: Flat, gravity: float) -> Fit:
     minimum = minimise(problem, theta, HAND, prior, frozen=True, ends=ends_of(problem))
     iterations = search.iterations + minimum.iterations
     if wald(minimum) < WALD_99 and not at_prior(minimum.covariance()):
-        perfect = replace(minimum.theta, K=np.eye(3))
-        minimum = minimise(problem, perfect, HAND, prior, fixed=("K",), frozen=True, ends=ends_of(problem))
+        trusted = replace(minimum.theta, K=np.eye(3))
+        minimum = minimise(problem, trusted, HAND, prior, fixed=("K",), frozen=True, ends=ends_of(problem))
         iterations += minimum.iterations
     parts = parts_of(problem, minimum, prior)
     minimum = _doubted(minimum, noise, search.prepared, fine)

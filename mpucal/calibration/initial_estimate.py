@@ -41,10 +41,13 @@ def initialise(problem: Problem, b_omega: Vector) -> Theta:
     stretches = _stretches(problem.series)
     if not stretches:
         return whole
-    perfect = Theta.start(np.eye(3), np.zeros(3), b_omega, np.array([0.0, 0.0, 1.0]))
-    rough = [perfect, *(_between_gaps(problem, part, b_omega) for part in stretches)]
-    tried = [whole, *(_from_the_flat_mean(problem, theta) for theta in rough)]
-    return min(tried, key=lambda theta: _misfit(problem, theta))
+    rough = [_from_the_flat_mean(problem, _between_gaps(problem, part, b_omega)) for part in stretches]
+    return min([whole, perfect(problem, b_omega), *rough], key=lambda theta: _misfit(problem, theta))
+
+
+def perfect(problem: Problem, b_omega: Vector) -> Theta:
+    """A perfect sensor, as it lay in the flat segment."""
+    return _from_the_flat_mean(problem, Theta.start(np.eye(3), np.zeros(3), b_omega, np.array([0.0, 0.0, 1.0])))
 
 
 def _between_gaps(problem: Problem, part: slice, b_omega: Vector) -> Theta:

@@ -39,6 +39,12 @@ def exact(D, b_a, u, n=400, seed=0, lost=()):
     return Problem(mask(Series.after(recording, flat), recording, flat), flat, 9.82)
 
 
+def linear(problem, b_omega):
+    """The start from a series as if it had no gaps."""
+    whole = replace(problem, series=replace(problem.series, q_extra=None))
+    return initialise(whole, b_omega)
+
+
 @pytest.mark.parametrize("u", [(0, 0, 1), (0, 0, -1), (0.6, 0.8, 0), (-0.5, 0.5, np.sqrt(0.5))], ids=str)
 def test_without_noise_it_is_exact_whatever_lay_down(u):
     D = np.array([[1.3, 0.1, -0.2], [0.3, 0.6, 0.1], [0.0, -0.2, 0.9]])
@@ -90,7 +96,9 @@ def test_a_gap_in_which_the_board_turned_does_no_harm(first):
     np.testing.assert_allclose(theta.u, [0, 0, 1], atol=0.02)
 
 
-def test_pieces_lost_all_over_do_not_lead_it_astray(hand, pick):
+@pytest.mark.parametrize("begin", [initialise, linear], ids=["the best of all", "a start that does not settle"])
+def test_pieces_lost_all_over_do_not_lead_it_astray(begin, hand, pick, monkeypatch):
+    monkeypatch.setattr("mpucal.calibration.hand.initialise", begin)
     simulated, rng = hand(4, "pose12"), np.random.default_rng(4)
     t = simulated.recording.t - simulated.recording.t[0]
     kept, at = np.ones(len(t), bool), 10.5
