@@ -181,6 +181,8 @@ def written(board: Board, iio: tuple[str, str]) -> None:
     with suppress(OSError):
         subprocess.run(["/lib/systemd/systemd-udevd", "--daemon"], check=False)
     board.hears("lay_flat")
+    # until the hand has put it down
+    time.sleep(6)
     found = OUT / "session/calibration.json"
     record("as it was", *iio)
     run("written", "write", str(found), "kernel", *iio, "--yes", "-o", "/run/written")
