@@ -94,6 +94,8 @@ class Streams:
         self._times.clear()
         self._window_ns = now_ns
         self._tell(rates)
+        if not self._best_hz:
+            self._tell_what_comes(rates)
         for stream, best_hz in self._best_hz.items():
             if stream.name in self._wanted and rates.get(stream, 0.0) < FALLEN * self._expected_hz(stream, best_hz):
                 self._again(stream)
@@ -189,6 +191,16 @@ class Streams:
             f"{alive[0].name} was slowed down {self._slowed(alive[0], rates)}, and has been asked for again: "
             f"another ground station lowers it ({remedy}){TOO_MUCH if is_px4 else ''}."
         )
+
+    def _tell_what_comes(self, rates: Mapping[Stream, float]) -> None:
+        """Say at first what a vehicle makes of the rate asked for."""
+        slow = [
+            f"{s.name} at {hz:.0f} Hz"
+            for s, hz in rates.items()
+            if s.name in self._wanted and hz < MOST * self._rate_hz
+        ]
+        if slow:
+            self._say(f"{self._rate_hz:.0f} Hz were asked for; the vehicle sends {', '.join(slow)}.")
 
     def _slowed(self, stream: Stream, rates: Mapping[Stream, float]) -> str:
         best_hz = self._best_hz[stream]

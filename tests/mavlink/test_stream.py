@@ -93,6 +93,16 @@ def test_a_denied_rate_is_followed_by_lower_ones(vehicle):
     assert [hz for message_id, hz in transport.asked if message_id == RAW] == [400, 200, 100]
 
 
+def test_the_person_is_told_once_which_rate_comes_instead(vehicle):
+    said = []
+    link, asked = streams(vehicle(fastest_hz=120), said, rate_hz=400.0)
+    asked.start()
+    for _ in range(200):
+        list(link.messages(link.now_ns() + S // 20))
+        asked.watch()
+    assert said == ["400 Hz were asked for; the vehicle sends RAW_IMU at 100 Hz."]
+
+
 def watched(transport, lowered_hz, said, firmware=ARDUPILOT):
     """How many of IMU 1's messages come in the 20 s after another station set its rate."""
     message_id, name = (SCALED, "SCALED_IMU") if firmware == PX4 else (RAW, "RAW_IMU")
