@@ -12,6 +12,8 @@ engine and the journal. With --kill a worker is killed after a third of the rows
 from __future__ import annotations
 
 import argparse
+import csv
+import io
 import resource
 import tempfile
 import time
@@ -21,7 +23,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import psutil
@@ -29,7 +30,7 @@ import psutil
 from mpucal.batch.journal import Journal
 from mpucal.batch.many import JOURNAL, local_client, run
 from mpucal.batch.row import Settings, row_of
-from mpucal.batch.table import table_of, write
+from mpucal.batch.table import write
 from mpucal.chip import registers as reg
 from mpucal.chip.access import Transaction
 from mpucal.files.mcap import CaptureWriter, read_capture
@@ -113,8 +114,8 @@ def _process() -> int:
     return psutil.Process().pid
 
 
-def measured(folder: Path, paths: list[str], workers: int, settings: Settings, kill: bool) -> Any:
-    """What a batch costs; its table."""
+def measured(folder: Path, paths: list[str], workers: int, settings: Settings, kill: bool) -> bytes:
+    """What a batch costs; its results.csv."""
     folder.mkdir()
     journal = Journal(folder / JOURNAL, settings.key)
     try:
@@ -126,8 +127,7 @@ def measured(folder: Path, paths: list[str], workers: int, settings: Settings, k
         print(f"{workers} workers: {cost.said(len(paths) - kept)}", flush=True)
         cost = timed(paths, workers, journal, settings)
         print(f"  again, all there already: {cost.said(len(paths))}", flush=True)
-        write(folder, journal.rows(paths))
-        return table_of(journal.rows(paths))
+        return write(folder, journal.rows(paths))[1].read_bytes()
     finally:
         journal.close()
 
@@ -154,9 +154,10 @@ def main() -> None:
         for workers in options.workers:
             kill = options.kill and workers == options.workers[-1]
             tables.append(measured(Path(name) / f"out-{workers}", paths, workers, settings, kill))
-    counts = Counter(verdict or "not read" for verdict in tables[0]["verdict"].to_pylist())
-    print(f"{dict(counts)}; the same by all workers: {all(each.equals(tables[0]) for each in tables)}")
-    print(f"this program took {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB at most")
+    counts = Counter(row["verdict"] or "not read" for row in csv.DictReader(io.StringIO(tables[0].decode())))
+    print(f"{dict(counts)}; results.csv the same by all workers: {all(each == tables[0] for each in tables)}")
+    here, each = (resource.getrusage(who).ru_maxrss / 1024 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    print(f"this program took {here:.0f} MB at most, a worker {each:.0f} MB")
 
 
 if __name__ == "__main__":

@@ -25,6 +25,9 @@ MOST_OF_A_TASK, TASKS_OF_A_WORKER = 8, 16
 JOURNAL = "rows.jsonl"
 INSTALL = "pip install 'mpucal[batch]'"
 WAIT_S = 60
+# a worker that died is there again after seconds, and on a busy machine after minutes: until then dask must not give it
+# up, as by itself after 15 s, or nobody takes what is left
+COMES_BACK = {"distributed.deploy.lost-worker-timeout": "1 hour"}
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,8 @@ def run(paths: Sequence[str], client: Any, journal: Journal, settings: Settings)
     names = list(dict.fromkeys(paths))
     size = len(names) // (TASKS_OF_A_WORKER * max(len(client.ncores()), 1))
     todo, under_way = _batched(names, min(max(size, 1), MOST_OF_A_TASK)), {}
+    suspects: list[str] = []
+    alone = False
     results = as_completed(loop=client.loop, with_results=True, raise_errors=False)
 
     def send(tasks: Iterable[Sequence[str]]) -> None:
@@ -108,11 +113,10 @@ def run(paths: Sequence[str], client: Any, journal: Journal, settings: Settings)
         if future.status in ("cancelled", "lost"):
             raise SourceError("the scheduler was lost", "start it, and run the same again: what is done stays done")
         rows = result if future.status == "finished" else []
-        if not rows and len(task) > 1:
-            # which of them it was shows where each is alone
-            send([path] for path in task)
-            continue
-        for row in rows or [_died(task[0], result)]:
+        if not rows and not alone:
+            # which of these, or of those that waited beside them, it was shows where each is alone
+            suspects += task
+        for row in rows or ([_died(task[0], result)] if alone else ()):
             if "batch" in row:
                 journal.add(row)
             else:
@@ -120,6 +124,9 @@ def run(paths: Sequence[str], client: Any, journal: Journal, settings: Settings)
             done, failed = done + 1, failed + ("error" in row)
             yield Progress(done, len(names), kept, failed, time.monotonic() - begun)
         send(islice(todo, 1))
+        if not under_way and suspects:
+            alone = True
+            send([[suspects.pop(0)]])
 
 
 def _batched(names: Sequence[str], size: int) -> Iterator[Sequence[str]]:
@@ -141,8 +148,11 @@ def local_client(workers: int | None = None, dashboard: bool = False) -> Iterato
     UsageError : dask.distributed or pyarrow is not installed.
     """
     distributed = _distributed()
+    import dask  # noqa: PLC0415
+
     with (
         TemporaryDirectory(prefix="mpucal-") as scratch,
+        dask.config.set(COMES_BACK),
         distributed.LocalCluster(
             n_workers=workers,
             threads_per_worker=1,

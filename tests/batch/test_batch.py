@@ -2,8 +2,10 @@
 
 import csv
 import json
+import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from contextlib import ExitStack, contextmanager
@@ -12,6 +14,7 @@ from pathlib import Path
 from time import monotonic, sleep
 
 import cloudpickle
+import dask
 import distributed
 import fsspec
 import numpy as np
@@ -21,7 +24,7 @@ import pytest
 import mpucal.batch
 from mpucal.__main__ import run as call
 from mpucal.batch.journal import Journal
-from mpucal.batch.many import run
+from mpucal.batch.many import local_client, run
 from mpucal.batch.page import page
 from mpucal.batch.paths import found
 from mpucal.batch.row import COLUMNS, Settings, row_of
@@ -131,10 +134,19 @@ def test_the_one_that_workers_die_of_is_told_of_those_beside_it(tmp_path, monkey
     journal.close()
 
 
+def test_a_worker_that_comes_back_late_is_waited_for():
+    """Beyond the time that dask itself gives one, which here is none."""
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "0 s"}), local_client(1) as client:
+        (first,) = client.run(os.getpid).values()
+        os.kill(first, signal.SIGKILL)
+        begun = monotonic()
+        while not set(client.run(os.getpid, on_error="ignore").values()) - {first} and monotonic() - begun < LONG_S:
+            sleep(0.1)
+        client.wait_for_workers(1, timeout=1)
+
+
 def _mortal():
     """A worker that dies of one path."""
-    import os
-
     from mpucal.batch import row
 
     digest_of = row.digest_of
