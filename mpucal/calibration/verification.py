@@ -27,6 +27,8 @@ FLOOR_MPS2, FLOOR_RAD, BIAS_RAD_S = 0.003, math.radians(0.05), math.radians(0.02
 # Beyond so many standard deviations chance is no excuse.
 MOST_STD = 4.0
 LEAST_REST_S, BLOCK_S = 0.75, 0.25
+# No hand turns so fast so soon. An autopilot's simulator does; its low pass and 200 samples a second carry it so well.
+LEAP_RAD_S, LEAP_RAD_S2, LEAP_RAD = np.radians([200.0, 10_000.0, 0.5]).tolist()
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ class _Move:
         self.steps = dt[:, None] * (0.5 * (r.gyr[b - 1 : c] + r.gyr[b : c + 1]) - flat.b_omega)
         self.clipped = bool(r.gyr_clipped[between].any() or r.gap[b : c + 1].any())
         noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
-        self.gyro_var = 2.0 * noise
+        self.gyro_var = 2.0 * noise + (LEAP_RAD**2 if _leaps(r.gyr[between], dt) else 0.0)
 
     def judged_by(self, fit: Fit, gravity: float) -> NewOrientation:
         """What its end says of a fit."""
@@ -120,6 +122,12 @@ class _Move:
         """(3,) sine of the angle between gravity carried to its end and gravity there, along the axis of that angle."""
         F = turned(-(self.steps @ from_elements(Form.SYMMETRIC, theta[12:18]).T))
         return np.cross(_unit(F @ _calibrated(theta, self.z)), _unit(self._end(theta)))
+
+
+def _leaps(gyr: Vector, dt: Vector) -> bool:
+    """Whether rates (n, 3) change as no hand's do, over the (n - 1,) seconds between them."""
+    fast = bool((np.abs(gyr) > LEAP_RAD_S).any())
+    return fast and bool((np.abs(np.diff(gyr, axis=0)) > LEAP_RAD_S2 * dt[:, None]).any())
 
 
 def _calibrated(theta: Vector, y: Vector) -> Vector:

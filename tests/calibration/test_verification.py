@@ -1,0 +1,47 @@
+"""New orientations of a perfect sensor whose gyroscope carries a turn 1 deg too short, or not."""
+
+import numpy as np
+import pytest
+
+from mpucal.calibration.fit import Fit
+from mpucal.calibration.flat_segment import flat_statistics
+from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
+from mpucal.calibration.verification import new_orientations
+from mpucal.data import Recording
+
+G, HZ, REST_S = 9.80665, 200.0, 3.0
+KNOWN = Fit(
+    D=np.eye(3),
+    b_a=np.zeros(3),
+    b_omega=np.zeros(3),
+    K=np.eye(3),
+    names=(*D_NAMES, *B_A_NAMES),
+    covariance=1e-8 * np.eye(12),
+    iterations=1,
+    converged=True,
+    nis=3.0,
+    V=0.0,
+)
+
+
+def turned(turn_s, missing_deg):
+    """A rest, a quarter turn about x at a constant rate, and a rest."""
+    n_rest, n_turn = round(REST_S * HZ), round(turn_s * HZ)
+    rate = np.concatenate([np.zeros(n_rest), np.full(n_turn, 0.5 * np.pi / turn_s), np.zeros(n_rest)])
+    angle = np.cumsum(rate) / HZ
+    rng = np.random.default_rng(1)
+    acc = G * np.column_stack([0 * angle, np.sin(angle), np.cos(angle)]) + rng.normal(0, 0.01, (len(angle), 3))
+    gyr = np.column_stack([rate * (1.0 - missing_deg / 90.0), 0 * rate, 0 * rate]) + rng.normal(0, 1e-3, acc.shape)
+    recording = Recording.from_arrays(np.arange(len(angle)) / HZ, acc, gyr)
+    flat = flat_statistics(recording, (0, n_rest - 20))
+    (rest,) = new_orientations(recording, flat, KNOWN, G, n_rest)
+    return rest
+
+
+@pytest.mark.parametrize(
+    ("turn_s", "missing_deg", "agrees"), [(1.5, 0.0, True), (1.5, 1.0, False), (0.1, 1.0, True), (0.1, 4.0, False)]
+)
+def test_a_leap_is_carried_less_well_than_a_hands_turn(turn_s, missing_deg, agrees):
+    rest = turned(turn_s, missing_deg)
+    assert np.degrees(rest.direction) == pytest.approx(missing_deg, abs=0.1)
+    assert rest.agrees == agrees
