@@ -11,7 +11,7 @@ from ..data import Vector
 SEGMENT = 4096
 # so much a line stands above its neighbours, beyond chance
 LEAST_SHARE, SURPRISE = 0.3, 1e-4
-NEIGHBOURS, LINE, AT_MOST = 32, 2, 1
+NEIGHBOURS, LINE, AT_MOST = (8, 32), 2, 1
 
 
 @dataclass(frozen=True)
@@ -50,10 +50,12 @@ class Spectrum:
             return []
         density = 2.0 * self._power / (self._segments * rate_hz * np.sum(self._window**2))
         freedom = 2 * self._segments
-        most = float(chi2.isf(SURPRISE / len(density), freedom)) / freedom
+        # both over the median, by which the neighbours are told
+        most = float(chi2.isf(SURPRISE / len(density), freedom) / chi2.median(freedom))
         found: list[Tone] = []
         for axis, of in enumerate(density.T):
-            floor = np.maximum(median_filter(of, 2 * NEIGHBOURS + 1, mode="nearest"), 1e-300)
+            # the near ones where the density is steep, as that of drift at low frequencies
+            floor = np.maximum(*(median_filter(of, 2 * many + 1, mode="reflect") for many in NEIGHBOURS)) + 1e-300
             above = of / floor
             # the lowest bins are drift, and at the last the filter that folds has no neighbours
             above[: 2 * LINE] = above[-2 * LINE :] = 0.0

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from itertools import islice
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -19,6 +20,7 @@ from ..files import open_rows
 from ..report.noise import render, summary
 from ..result.clock import now
 from ..result.noise import Noise
+from ..session.at_rest import put_down
 from ..session.ports import Source
 from ..session.results import make_folder, save
 from ..sources.opening import one_of, open_source
@@ -31,6 +33,8 @@ DOCUMENT, PAGE = "noise.json", "noise.html"
 # bias instability is wanted to this share of itself (1 sigma)
 WANTED = 0.1
 TELL_S = {True: 2.0, False: 60.0}
+# the time in which a person puts the board down, in runs of a second
+PUT_DOWN_RUNS = 5
 
 
 @click.command("noise", epilog=EXAMPLE)
@@ -83,7 +87,10 @@ def _of_source(options: dict[str, Any], seconds: float | None) -> Noise:
         # what has been measured outlives who ends it, and a source that fails
         with suppress(KeyboardInterrupt, EndOfCapture):
             sensor = measuring.source.start()
-            for samples in _polled(measuring.source):
+            left_out = 0 if options["replay"] else PUT_DOWN_RUNS
+            if left_out:
+                put_down(source.listeners, _say)
+            for samples in islice(_polled(measuring.source), left_out, None):
                 meter = meter or NoiseMeter(sensor)
                 meter.add(samples)
                 measuring.source.forget()
@@ -121,7 +128,8 @@ def _progress() -> Iterator[Any]:
         of = "" if seconds is None else f" of {_long(seconds)}"
         needed_s = meter.needed_s(WANTED)
         more = "" if needed_s is None else f"; bias instability to {100 * WANTED:.0f} %: {_long(needed_s)} more"
-        click.echo(f"\r{_long(meter.seconds)}{of}{more}   ", err=True, nl=not on_a_terminal)
+        said = f"{_long(meter.seconds)}{of}{more}"
+        click.echo(f"\r{said}   " if on_a_terminal else said, err=True, nl=not on_a_terminal)
 
     try:
         yield tell

@@ -10,6 +10,7 @@ import mpucal
 from mpucal.allan import NoiseMeter, noise_of
 from mpucal.allan.model import fitted, modelled
 from mpucal.allan.octaves import Octaves
+from mpucal.allan.spectrum import Spectrum
 from mpucal.data import Recording, Sensor
 from mpucal.export.forms import form
 from mpucal.result.noise import Noise, with_noise
@@ -133,6 +134,15 @@ def test_what_is_suspicious(lying):
     assert "gyroscope y: a step of +0.04" in said["step"]
     assert "moved by 6.0 °C" in said["temperature"]
     assert "gyroscope z" in said["temperature"]
+
+
+def test_a_short_rest_has_no_tones():
+    """Of one segment, white or with drift."""
+    rng = np.random.default_rng(5)
+    for walk in (0.0, 1e-3):
+        spectrum = Spectrum(50)
+        spectrum.add(np.stack([noise(rng, 5000, 200.0, 2e-3, 0.0, walk) for _ in range(50)], axis=1))
+        assert spectrum.tones(200.0) == []
 
 
 def test_a_board_that_was_turned_has_no_tones(lying):

@@ -43,10 +43,17 @@ def test_of_a_recording_and_taken_by_other_commands(mpucal, session, lying, tmp_
 
 
 def test_of_a_sensor_for_some_hours(mpucal):
-    told = mpucal("noise", "--bus", "sim:hand=still", "--rate", "100", "--hours", "0.01", "--json")
+    told = mpucal("noise", "--bus", "sim", "--rate", "100", "--hours", "0.01", "--json")
     assert told.code == 0, told.err
+    assert "let go of it" in told.err
     document = json.loads(told.out)
     assert 36.0 <= document["seconds"] < 38.0
+    # the hand that trembles has put it down before that
+    assert document["suspicious"] == []
+    assert (
+        max(document["accelerometer"]["white_noise"]["value"])
+        < 2 * document["accelerometer"]["data_sheet"]["white_noise"]
+    )
     assert document["accelerometer"]["data_sheet"]["white_noise"] == pytest.approx(2.77e-3, rel=0.01)
 
 
