@@ -138,7 +138,7 @@ def _outliers(columns: Columns, found: Iterable[Parameter]) -> str:
     if len(rows) > MOST:
         caption += f"; the farthest {MOST} of {len(rows)}"
     head = ("recording", "parameter", "value", "spreads away")
-    return section("Outliers", table("outliers", caption, head, rows[:MOST])) if rows else ""
+    return section("Outliers", table("outliers", caption, head, rows[:MOST], links=_links(columns))) if rows else ""
 
 
 def _groups(title: str, what: str, names: Sequence[str | None], columns: Columns, found: Sequence[Parameter]) -> str:
@@ -205,9 +205,15 @@ def _errors(columns: Columns) -> str:
 
 
 def _reports(columns: Columns) -> str:
-    links = [
-        f'<li><a href="reports/{escape(report)}">{escape(path)}</a>: {escape(verdict or "")}</li>\n'
-        for path, report, verdict in zip(columns["path"], columns["report"], columns["verdict"], strict=True)
-        if report
+    verdicts, links = dict(zip(columns["path"], columns["verdict"], strict=True)), _links(columns)
+    items = [
+        f'<li><a href="{escape(place)}">{escape(path)}</a>: {escape(verdicts[path] or "")}</li>\n'
+        for path, place in links.items()
     ]
-    return section("Reports", f"<ul>{''.join(links)}</ul>\n") if links else ""
+    return section("Reports", f"<ul>{''.join(items)}</ul>\n") if items else ""
+
+
+def _links(columns: Columns) -> dict[str, str]:
+    """From each recording to its report."""
+    pairs = zip(columns["path"], columns["report"], strict=True)
+    return {path: f"reports/{report}" for path, report in pairs if report}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from html import escape
 from typing import Any
 
@@ -52,8 +52,18 @@ def first(decision: str, values: str) -> str:
     return f'<div class="first">\n{decision}{values}</div>\n'
 
 
-def table(id_: str, caption: str, head: Iterable[str], rows: Iterable[Iterable[str]], words: int = 99) -> str:
-    """A table whose rows begin with their names; from cell number `words` on they are text rather than numbers."""
+def table(
+    id_: str,
+    caption: str,
+    head: Iterable[str],
+    rows: Iterable[Iterable[str]],
+    words: int = 99,
+    links: Mapping[str, str] | None = None,
+) -> str:
+    """A table whose rows begin with their names; from cell number `words` on they are text rather than numbers.
+
+    `links` : by name, where it leads.
+    """
     lines = [f'<div class="wide"><table id="{id_}">']
     if caption:
         lines.append(f"<caption>{escape(caption)}</caption>")
@@ -63,7 +73,9 @@ def table(id_: str, caption: str, head: Iterable[str], rows: Iterable[Iterable[s
     for name, *values in rows:
         kinds = ['<td class="words">' if k >= words else "<td>" for k in range(len(values))]
         cells = "".join(f"{kind}{escape(value)}</td>" for kind, value in zip(kinds, values, strict=True))
-        lines.append(f'<tr><th scope="row">{escape(name)}</th>{cells}</tr>')
+        place = (links or {}).get(name)
+        named = f'<a href="{escape(place)}">{escape(name)}</a>' if place else escape(name)
+        lines.append(f'<tr><th scope="row">{named}</th>{cells}</tr>')
     return "\n".join([*lines, "</table></div>\n"])
 
 

@@ -210,6 +210,7 @@ def test_the_page_names_what_is_odd(tmp_path):
                 "batch": f"day-{again}",
                 "digest": f"{board}-{again}",
                 "sensor": f"{board}",
+                "report": f"r{board}-{again}.html",
             }
             row |= {
                 "verdict": "refused" if board == 3 else "good",
@@ -226,6 +227,7 @@ def test_the_page_names_what_is_odd(tmp_path):
     html = page(parquet).html
     outliers = html[html.index('id="outliers"') : html.index("By batch")]
     assert set(re.findall(r"b\d+-\d\.mcap", outliers)) == {"b77-0.mcap", "b77-1.mcap"}
+    assert '<a href="reports/r77-1.html">b77-1.mcap</a>' in outliers
     assert "never_still" in html[html.index('id="reasons"') : html.index('id="parameters"')]
     ((number, rms),) = re.findall(r">b_a</th><td>(\d+)</td><td>([\d.]+)</td>", html)
     assert int(number) == 3 * 199
