@@ -54,7 +54,7 @@ def command(
     try:
         with remote_client(scheduler) if scheduler else local_client(workers, dashboard) as client:
             if dashboard:
-                say(f"mpucal: the dashboard is at {client.dashboard_link}")
+                say(f"the dashboard is at {client.dashboard_link}")
             _follow(run(paths, client, journal, settings))
         _tell(folder, paths, journal)
     finally:
@@ -68,7 +68,7 @@ def _follow(progress: Iterator[Progress]) -> None:
     for each in progress:
         if time.monotonic() - said > EVERY_S or each.done == each.of:
             said = time.monotonic()
-            say(f"  {_words(each)}")
+            say(_words(each))
 
 
 def _words(progress: Progress) -> str:
