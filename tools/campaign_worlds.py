@@ -136,7 +136,7 @@ class World:
         """What the session writes to truth.json, but for its faults."""
         if self.bus is not None:
             return self.bus.truth_document() or {}
-        return self.transport._vehicle.truth_document()
+        return self.transport.truth
 
     def _strike(self, blow: Blow) -> None:
         if blow.name in SIGNALS:
@@ -201,6 +201,8 @@ class HookedTransport(SimulatedTransport):
     def __init__(self, world: World, vehicle: Any) -> None:
         super().__init__(vehicle)
         self._world = world
+        # a write-back changes what its streams are
+        self.truth = vehicle.truth_document()
         world.transport = self
 
     def receive(self, until_ns: int) -> Any:
