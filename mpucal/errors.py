@@ -14,7 +14,8 @@ MpucalError
 │   │   ├── BusHeld          a wire is held low, so that every transfer takes its time-out
 │   │   └── LinkError        the link to a vehicle broke, or cannot be used
 │   └── ChipError            the chip answers, but not as its register map says
-│       └── OddOffsets       so do its offset registers, wherever they were looked for
+│       ├── OddOffsets       so do its offset registers, wherever they were looked for
+│       └── ChipReset        it lost its settings while it was measured
 ├── OutputError           3  a result cannot be written where it was asked to go
 ├── Abandoned             4  the session ended before there was anything to calibrate
 ├── RefusedError          5  the calibration was refused, or failed its verification
@@ -106,6 +107,16 @@ class ChipError(SourceError):
 
 class OddOffsets(ChipError):  # noqa: N818 - reads as the sentence it is
     """The accelerometer's offset registers answer in no known place, or as in no known one."""
+
+
+class ChipReset(ChipError):  # noqa: N818 - reads as the sentence it is
+    """The chip lost its settings while it was measured, and what was read says nothing."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "the chip lost its settings while it was measured: it was reset",
+            "its supply breaks down: check the wires and connectors, and motors on the same supply, then start again",
+        )
 
 
 class OutputError(MpucalError):

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from ..data import Vector
-from ..errors import BusError, ChipError
+from ..errors import BusError, ChipError, ChipReset
 from . import registers as reg
 from .port import Port
 
@@ -71,11 +71,12 @@ class Bench:
 
         Raises
         ------
-        BusError : a transfer failed three times. ChipError : the board moves on and on.
+        BusError : a transfer failed three times. ChipReset : the chip was reset. ChipError : the board moves on and on.
         """
         for _ in range(self._patience):
             self._port.sleep(SETTLE_NS)
             looks = self._looks()
+            check_kept(self._port, reg.ACCEL_CONFIG, bytes([SETTING[reg.ACCEL_CONFIG]]))
             # revision C of the 6050 shows half of gravity; known once, offsets may shift what is shown
             sensitivity = self._sensitivity or (0.5 if np.linalg.norm(looks.mean(0)) < HALF_SENSITIVITY_G else 1.0)
             looks /= sensitivity
@@ -99,3 +100,9 @@ class Bench:
         for register, value in reversed(self._held.items()):
             with suppress(BusError):
                 self._port.write(register, value)
+
+
+def check_kept(port: Port, register: int, value: bytes) -> None:
+    """Raise ChipReset where the registers from `register` on no longer hold `value`; one bit may flip on the bus."""
+    if all(port.read(register, len(value)) != value for _ in range(2)):
+        raise ChipReset

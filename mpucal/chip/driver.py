@@ -313,6 +313,12 @@ class Driver:
                 f"the {chip} loses its settings again and again",
                 "its supply breaks down: check the wires and connectors, then start again",
             )
+        if self.faults and self.faults.most_common(1)[0][0] is FifoFault.STUCK:
+            return ChipError(
+                f"the {chip} repeats itself: nothing that it measures changes, not even its noise",
+                "take its supply away for a moment, check its solder joints and start again; if it does that again,"
+                " replace the chip",
+            )
         return ChipError(
             f"the {chip} gave no sample that can be believed for {DEAD_NS * 1e-9:g} s",
             "take its supply away for a moment, slow the bus down or the rate, and start again",

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..data import Vector
 from . import registers as reg
+from .bench import check_kept
 from .families import Part
 from .port import Port
 
@@ -47,9 +48,11 @@ def run_self_test(port: Port, part: Part) -> SelfTest:
 
     Raises
     ------
-    BusError : a transfer failed three times.
+    BusError : a transfer failed three times. ChipReset : the chip was reset meanwhile.
     """
     held, family = port.read(reg.GYRO_CONFIG, 2), part.family
+    # a reset clears the first two, or puts the chip to sleep
+    kept = [(register, port.read(register, 1)) for register in (reg.CONFIG, reg.SMPLRT_DIV, reg.PWR_MGMT_1)]
     afs_sel = PACKED_AFS_SEL if family.packed_self_test else AFS_SEL
     try:
         off = _answer(port, 0, afs_sel)
@@ -57,6 +60,8 @@ def run_self_test(port: Port, part: Part) -> SelfTest:
     finally:
         port.write_block(reg.GYRO_CONFIG, held)
         port.sleep(SETTLE_NS)
+    for register, value in kept:
+        check_kept(port, register, value)
     accel = (on - off)[:3] / (reg.ACCEL_LSB_PER_G[afs_sel] * part.accel_sensitivity)
     gyro = (on - off)[4:] / reg.GYRO_LSB_PER_DPS[FS_SEL]
     accel_g, gyro_dps = _promised(port, family.packed_self_test)

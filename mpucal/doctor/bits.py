@@ -50,7 +50,8 @@ def examine_bits(port: Port, bench: Bench, part: Part, response: Response) -> tu
     none = f"none of {STEPS[0]} to {STEPS[-1] + 1} of the accelerometer"
     if not stuck:
         return Finding(STUCK_BITS, Mark.OK, none, "", data), 0
-    return Finding(STUCK_BITS, Mark.BAD, f"{', '.join(stuck)} does not move", REPLACE, data), len(stuck)
+    what = f"{', '.join(stuck)} {'does' if len(stuck) == 1 else 'do'} not move"
+    return Finding(STUCK_BITS, Mark.BAD, what, REPLACE, data), len(stuck)
 
 
 def _missed(shown: Vector, meant: Vector) -> Vector:

@@ -26,7 +26,7 @@ from ..chip.response import Response, measured_response
 from ..chip.self_test import SelfTest, run_self_test
 from ..chip.tally import REMEDY, Tally
 from ..data import Sensor
-from ..errors import ChipError, OddOffsets, SourceError
+from ..errors import ChipError, ChipReset, OddOffsets, SourceError
 from .bits import examine_bits
 from .dead import DEAD_AXIS, REPLACE, STUCK_BITS, named
 from .finding import Finding, Mark, failed
@@ -199,6 +199,8 @@ def _shifted(port: Port, part: Part, patience: int) -> Iterator[tuple[Finding, l
                 lsb_per_g = family.accel_offset_lsb_per_g
                 odd, response = error, Response(family.accel_offset_h, lsb_per_g, np.full(3, 1.0 / lsb_per_g))
             bits, axes = examine_bits(port, bench, part, response)
+    except ChipReset:
+        raise
     except ChipError as error:
         # a board that moved says nothing about the chip
         yield Finding("offset registers", Mark.NOTE, error.what, error.remedy), []

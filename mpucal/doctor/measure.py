@@ -103,7 +103,8 @@ def _losses(recording: Recording, asked_s: float) -> Finding:
     if not gaps and seconds > asked_s - ENDS_S:
         return Finding("losses", Mark.OK, f"none of {what}", "", data)
     remedy = "shorten the wires, check connectors and supply, or slow the bus down"
-    return Finding("losses", Mark.BAD, f"{gaps} gaps in {what}; {asked_s:g} s were expected", remedy, data)
+    gapped = f"{gaps} gap{'' if gaps == 1 else 's'} in {what}"
+    return Finding("losses", Mark.BAD, f"{gapped}; {asked_s:g} s were expected", remedy, data)
 
 
 def _noise(topic: str, measured: np.ndarray, typical: float, key: str, unit: str) -> Finding:

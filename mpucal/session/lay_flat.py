@@ -18,6 +18,8 @@ PATIENCE_S = 60.0
 WORTH_SAYING_S = 1.0
 # ... and a board that keeps moving is spoken of this often.
 SAY_AGAIN_S = 5.0
+# what helps where samples are missing, of any source
+LOST = "check the wires or the link, end other programs, or take a lower --rate"
 
 PROMPT = Prompt(
     PromptKind.LAY_FLAT,
@@ -99,9 +101,8 @@ class LayFlat:
         ]
         if moved.after_s >= WORTH_SAYING_S or t_s - self._spoke_s >= SAY_AGAIN_S:
             self._spoke_s = t_s
-            found.append(
-                Caution(t_s, "trembling", f"not still: {moved.what}", "put it on a firm surface and let go of it")
-            )
+            remedy = LOST if moved.lost else "put it on a firm surface and let go of it"
+            found.append(Caution(t_s, "trembling", f"not still: {moved.what}", remedy))
         return found
 
     def _progress(self, t_s: float, text: str) -> Progress:
@@ -111,5 +112,5 @@ class LayFlat:
 def _never_still(moved: Moved) -> Stopped:
     return Stopped(
         f"the board was not still for {FLAT_S:.0f} s within {PATIENCE_S:.0f} s (last: {moved.what})",
-        "put it on a firm surface, away from vibration, and start again",
+        f"{LOST}, and start again" if moved.lost else "put it on a firm surface, away from vibration, and start again",
     )

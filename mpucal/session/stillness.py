@@ -62,10 +62,14 @@ class Still:
 
 @dataclass(frozen=True)
 class Moved:
-    """It moves, after `after_s` of stillness; `what`: which sensor saw it, how much and about which axis."""
+    """It moves, after `after_s` of stillness; `what`: which sensor saw it, how much and about which axis.
+
+    `lost` : samples are missing, so that nobody knows whether it moved.
+    """
 
     after_s: float
     what: str
+    lost: bool = False
 
 
 class StillnessDetector:
@@ -118,7 +122,7 @@ class StillnessDetector:
         return Still(self.seconds, acc, self.rest_rad_s, self._number)
 
     def _bumped(self, window: Window, what: str) -> Moved:
-        moved = Moved(self.seconds, what)
+        moved = Moved(self.seconds, what, lost=not window.whole)
         if self._run:
             seconds = window.end_s - window.start_s
             self._bump_s += seconds

@@ -182,3 +182,12 @@ def test_page_and_document_hold_every_finding():
     assert page.endswith("1 fault (!), no notes (* or ?).")
     assert [finding["topic"] for finding in content["findings"]] == ["chip", "bus"]
     assert content["findings"][1]["data"] == {"hz": 1.0}
+
+
+@pytest.mark.parametrize(("chip", "at_s"), [("mpu6050", 7.72), ("mpu6050", 11.16), ("mpu6500", 7.72)])
+def test_a_reset_while_it_is_measured_is_no_defect_of_the_chip(chip, at_s):
+    """In the self test, and as the offset registers shift what is measured."""
+    told = findings(open_simulated(f"sim:chip={chip},fault=brownout@{at_s}"))
+    assert "lost its settings" in told["broken off"].what
+    assert "supply" in told["broken off"].remedy
+    assert not {"dead axis", "stuck bits"} & {topic for topic, found in told.items() if found.mark is Mark.BAD}

@@ -539,3 +539,15 @@ def test_decides_the_same_however_the_samples_arrive(make_board, varied):
         return [output for output in session.said if isinstance(output, Prompt | Decision)], len(session.of(Seen))
 
     assert decided(3) == decided(7) == decided(50)
+
+
+def test_samples_that_are_lost_again_and_again_are_not_blamed_on_the_table(board):
+    session = Session()
+    while session.state is State.LAY_FLAT:
+        samples = board.still(0.3)
+        samples.gap[0] = True
+        session.feed(samples)
+    last = [output for output in session.said if isinstance(output, Decision)][-1]
+    assert "samples were lost" in last.why
+    assert "wires" in last.remedy
+    assert not any("surface" in said.do for said in session.said if isinstance(said, Caution))
