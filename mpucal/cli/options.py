@@ -103,7 +103,9 @@ def _declared(option: Option, text: str, hidden: bool = False) -> Callable[[F], 
 
 
 def _sentence(words: str) -> str:
-    return f"{words[:1].upper()}{words[1:]}."
+    """A form such as udp:PORT keeps its small letter, as it is typed."""
+    first, _, _ = words.partition(" ")
+    return f"{words if ':' in first else words[:1].upper() + words[1:]}."
 
 
 def fit_options(command: F) -> F:

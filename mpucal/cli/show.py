@@ -67,7 +67,7 @@ def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) ->
         if left is not None:
             say(
                 f"a write to {sink.where} was cut off at {left[AT]}: it may hold some old and some new values;"
-                f" the next `mpucal write CALIBRATION {sink.name} {kind.option.spelled} ...` begins with that"
+                f" the next `mpucal write CALIBRATION {sink.name} {kind.option.spelled} ...` first puts the old ones back"
             )
     if kind.store:
         with resolve_name(kind.store)(options) as store:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import islice
 from typing import Any, NamedTuple
 
 from ..errors import BusError, LinkError, NoAnswer
@@ -103,25 +104,29 @@ class Link:
         self._listeners.append(listener)
 
     def listen(self) -> tuple[Vehicle, ...]:
-        """Who sends an autopilot's HEARTBEAT within two seconds (the first one may take six).
+        """Who sends an autopilot's HEARTBEAT within two seconds (of the first one, where that comes later; it may take six).
 
         Raises
         ------
         NoAnswer : nobody does, or none whose signature holds.
         """
         begun_ns = self._now_ns
-        found: dict[tuple[str, int], Vehicle] = {}
-        for patience_ns in (LISTEN_NS, PATIENCE_NS):
-            for arrived in self._arrivals(begun_ns + patience_ns):
-                self._heard.append((arrived.t_ns, arrived.address, arrived.packet.data))
-                vehicle = vehicle_of(arrived.address, arrived.packet.message)
-                if vehicle is not None:
-                    found.setdefault((vehicle.address, vehicle.system), vehicle)
-                    if patience_ns != LISTEN_NS:
-                        break
-            if found:
-                return tuple(found.values())
-        raise self._nobody()
+        vehicles = list(self._beating(begun_ns + LISTEN_NS))
+        if not vehicles:
+            vehicles = list(islice(self._beating(begun_ns + PATIENCE_NS), 1))
+            if not vehicles:
+                raise self._nobody()
+            # several that are powered together come one after another
+            vehicles += self._beating(self._now_ns + LISTEN_NS)
+        return tuple({(vehicle.address, vehicle.system): vehicle for vehicle in vehicles}.values())
+
+    def _beating(self, until_ns: int) -> Iterator[Vehicle]:
+        """Who sends a HEARTBEAT, each time that it comes."""
+        for arrived in self._arrivals(until_ns):
+            self._heard.append((arrived.t_ns, arrived.address, arrived.packet.data))
+            vehicle = vehicle_of(arrived.address, arrived.packet.message)
+            if vehicle is not None:
+                yield vehicle
 
     def lock(self, vehicle: Vehicle) -> None:
         """Hear `vehicle` alone from now on, and send to it."""

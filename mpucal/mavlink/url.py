@@ -50,6 +50,8 @@ def parse_url(text: str) -> Url:
     head, _, rest = text.partition(":")
     if head in (Kind.UDP, Kind.UDPOUT, Kind.TCP):
         host, _, port = rest.rpartition(":")
+        if rest and not host and not rest.isdecimal():
+            raise _wrong(text, "it names no port")
         if not host and head == Kind.UDP:
             host = EVERYWHERE
         return Url(Kind(head), _host(host, text), _port(port, text))

@@ -71,6 +71,14 @@ def test_several_vehicles_end_with_their_list(script, station):
         one_of(vehicles[:1] * 100, None)
 
 
+def test_a_second_vehicle_is_heard_where_the_first_comes_late(script, station):
+    late = [(t_s + 3, *rest) for t_s, *rest in heartbeats(station(), HOME)]
+    later = [(t_s + 3.7, *rest) for t_s, *rest in heartbeats(station(7), STRANGER)]
+    link = Link(script(in_order(late, later)), lambda t_ns, data: None)
+    assert [vehicle.system for vehicle in link.listen()] == [1, 7]
+    assert link.now_ns() == 5.5 * S
+
+
 def test_a_vehicle_that_comes_back_at_another_port_is_found_there_once_it_is_sought(script, station, decoded):
     moved, neighbour = "10.0.0.2:40001", "10.0.0.2:999"
     after = [(20.5 + k, moved, station().heartbeat()) for k in range(10)]
