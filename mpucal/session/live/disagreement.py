@@ -118,9 +118,12 @@ def _warmer_c(recording: Recording) -> float:
 def _found(rest: NewOrientation, number: int, of: int, t_s: float) -> Verification:
     x, y, z = rest.down.tolist()
     down: Direction = (x, y, z)
+    known = f"1 sigma {np.rad2deg(rest.direction_std):.2f}"
+    if rest.clipped:
+        known = "not judged: on the way samples were lost or the gyroscope clipped"
     text = (
         f"new orientation {number} of {of}: |a| error {rest.magnitude:+.3f} m/s² (1 sigma {rest.magnitude_std:.3f}),"
-        f" direction error {np.rad2deg(rest.direction):.2f} deg (1 sigma {np.rad2deg(rest.direction_std):.2f})"
+        f" direction error {np.rad2deg(rest.direction):.2f} deg ({known})"
     )
     return Verification(
         t_s,

@@ -80,6 +80,13 @@ def test_says_what_is_wrong(rests, data, contradiction, code, words):
     assert len(checked.found) == len(rests)
 
 
+def test_a_direction_that_nothing_shows_is_called_not_judged():
+    lost, whole = (rest(direction=0.02, clipped=clipped) for clipped in (True, False))
+    shown = judged([lost, whole], [lost, whole], 2, recording(), None).found
+    assert ["(not judged: on the way samples were lost" in one.text for one in shown] == [True, False]
+    assert "direction error 1.15 deg (1 sigma 0.10)" in shown[1].text
+
+
 def test_turns_that_miss_samples_blame_no_range_and_verify_nothing():
     checked = judged([rest(clipped=True)] * 3, [rest(clipped=True)] * 3, 3, recording(), None)
     assert checked.agrees is None
