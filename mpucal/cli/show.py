@@ -66,8 +66,8 @@ def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) ->
         left = Journal.of(sink.name, options[kind.option.name]).left() if sink.behind(kind) else None
         if left is not None:
             say(
-                f"a write to {sink.where} was cut off at {left[AT]}: it may hold some old and some new values;"
-                f" the next `mpucal write CALIBRATION {sink.name} {kind.option.spelled} ...` first puts the old ones back"
+                f"a write to {sink.where} was cut off at {left[AT]}: it may hold old and new values;"
+                f" the next `mpucal write CALIBRATION {sink.name} {kind.option.spelled} ...` first restores the old"
             )
     if kind.store:
         with resolve_name(kind.store)(options) as store:

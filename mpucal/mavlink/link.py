@@ -104,7 +104,7 @@ class Link:
         self._listeners.append(listener)
 
     def listen(self) -> tuple[Vehicle, ...]:
-        """Who sends an autopilot's HEARTBEAT within two seconds (of the first one, where that comes later; it may take six).
+        """Who sends an autopilot's HEARTBEAT within two seconds, of the first one where it comes later (within six).
 
         Raises
         ------
