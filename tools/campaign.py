@@ -31,8 +31,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
-# before NumPy loads: a second thread would only wait
-os.environ["OPENBLAS_NUM_THREADS"] = "1"
+from mpucal.session.threads import ONE_THREAD
+
+# before NumPy loads
+os.environ.update(ONE_THREAD)
 
 import numpy as np
 from campaign_judge import Outcome, judged, table

@@ -11,6 +11,7 @@ from ..local_noise import noise_variance
 
 WARMER_C = 5.0
 MOST_CLIPPED = 0.2
+# a longer gap is an interruption, whose length says nothing about the link
 INTERRUPTED_S = 10.0
 # of the accelerometer's noise: more than at rest for a share of the time, or at rest more than any sensor has
 VIBRATING_MPS2, LOUDER_THAN_FLAT, VIBRATING_SHARE = 0.2, 2.5, 0.2
