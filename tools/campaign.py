@@ -49,16 +49,18 @@ from mpucal.mavlink.dialect import dialect
 from mpucal.session import results, rotate
 
 CASES = 16
-LAST_S = 66.0
+# a session that aims at less ends sooner: how often each, and until when faults begin
+TARGETS = (*("quick",) * 3, "normal")
+LAST_S = {"quick": 50.0, "normal": 66.0}
 CHIPS = ("mpu6050", "mpu6500", "clone98")
 HANDS = (*("guided",) * 6, "wandering", "placing", "random")
-RATES = (50, 100, 25)
+RATES = (50, 25, 100, 25)
 FIRMWARES = ("ardupilot", "px4")
 # a report is made for one of so many
 REPORTS = 8
 # once for every so many of the chip alone
 WORLDS = (*(CHIP,) * 8, BRIDGE, VEHICLE)
-POLL_S, KNOW_EVERY_S = 0.5, 3.0
+POLL_S, KNOW_EVERY_S, SELDOM = 0.5, 3.0, 8.0
 CPU_S, WALL_S = 120, 600.0
 FOLDER = "board"
 
@@ -82,11 +84,17 @@ def world_of(number: int) -> str:
     return WORLDS[number % len(WORLDS)]
 
 
+def target_of(number: int) -> str:
+    """What a prefix aims at."""
+    return TARGETS[number // 2 % len(TARGETS)]
+
+
 def drawn(number: int, k: int) -> Case:
     """What happens in a case."""
     rng = np.random.default_rng([number, k])
     names = rng.choice(KINDS[world_of(number)], rng.integers(1, 5)).tolist()
-    blows = [Blow(name, round(float(rng.uniform(0.0, LAST_S)), 2), int(rng.integers(1 << 31))) for name in names]
+    last_s = LAST_S[target_of(number)]
+    blows = [Blow(name, round(float(rng.uniform(0.0, last_s)), 2), int(rng.integers(1 << 31))) for name in names]
     return Case(number, k, tuple(sorted(blows, key=lambda blow: blow.at_s)))
 
 
@@ -99,7 +107,7 @@ def words(number: int) -> list[str]:
     else:
         chip = f"sim:seed={number % 100_000},chip={CHIPS[number % 3]},hand={HANDS[number // 3 % len(HANDS)]}"
         source = ["--bus", chip, "--rate", str(RATES[number // 7 % len(RATES)])]
-    return ["session", *source, *to, "-o", FOLDER, "--yes"]
+    return ["session", *source, *to, "--target", target_of(number), "-o", FOLDER, "--yes"]
 
 
 class Prefix:
@@ -196,7 +204,8 @@ def _unsynced(durable_file: durable.Durable, _file: object) -> None:
 def quick_polls() -> Iterator[None]:
     """A chip is looked at and a fit made as seldom as may be: processor time goes into what is to be tried."""
     period_s = property(lambda config: min(POLL_S, MAX_FRAMES_A_POLL / config.rate_hz))
-    with patch.object(Config, "period_s", period_s), patch.object(rotate, "KNOW_EVERY_S", KNOW_EVERY_S):
+    seldom = {"KNOW_EVERY_S": KNOW_EVERY_S, "SELDOM": SELDOM}
+    with patch.object(Config, "period_s", period_s), patch.multiple(rotate, **seldom):
         yield
 
 

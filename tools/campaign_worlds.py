@@ -35,8 +35,8 @@ SERIAL = tuple(kinds(Where.SERIAL))
 # of the process and its clock, in any world
 STEP = "step"
 PROCESS = ("killed", "terminated", "interrupted", "disk_full", "deaf")
-CLOCK = ("stopped_5s", "suspended_5min")
-PAUSES_S = {"stopped_5s": 5.0, "suspended_5min": 300.0}
+CLOCK = ("stopped_5s", "suspended_2min")
+PAUSES_S = {"stopped_5s": 5.0, "suspended_2min": 120.0}
 SIGNALS = {"killed": signal.SIGKILL, "terminated": signal.SIGTERM, "interrupted": signal.SIGINT}
 KINDS: dict[str, tuple[str, ...]] = {
     CHIP: (*kinds(*OF_CHIP, Where.HAND, Where.DEFECT), STEP, *CLOCK, *PROCESS),

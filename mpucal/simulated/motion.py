@@ -159,16 +159,20 @@ class Motion:
         return rotation.product(near[0], rotation.exp((place - node) * rotation.between(near)[0]))
 
     def _extend(self, t_s: float) -> None:
+        sums, attitudes = [self._sums], [self._attitudes]
         while self._stance.step <= t_s * STEP_HZ:
-            self._go_on()
+            felt, more = self._go_on()
+            sums.append(sums[-1][-1] + np.cumsum(felt, axis=0))
+            attitudes.append(more)
+        self._sums, self._attitudes = np.concatenate(sums), np.concatenate(attitudes)
 
     def _forget(self, nodes: int) -> None:
         self._first += nodes
         self._sums = self._sums[nodes:]
         self._attitudes = self._attitudes[nodes:]
 
-    def _go_on(self) -> None:
-        """The next quarter of a second, or less where a leg ends."""
+    def _go_on(self) -> tuple[Vector, Vector]:
+        """What is felt (n, 6) in the next quarter of a second, or less where a leg ends, and the attitudes (n, 4)."""
         leg = self._hand.leg(self._stance)
         first, last = self._stance.step, min(leg.last, self._stance.step + steps(AHEAD_S))
         nodes = np.arange(first, last + 1, dtype=float)
@@ -178,11 +182,8 @@ class Motion:
         up = rotation.up_in_board(attitudes)
         force = self._gravity * (up[1:] + up[:-1]) / 2
         force += self._swing(turns / STEP_S) + self._clumsiness(leg, nodes, grip)
-        felt = np.hstack((force * STEP_S, rotation.between(attitudes)))
-        sums = self._sums[-1] + np.cumsum(felt, axis=0)
-        self._sums = np.concatenate((self._sums, sums))
-        self._attitudes = np.concatenate((self._attitudes, attitudes[1:]))
         self._stance = Stance(last, planned[-1], float(grip[-1]))
+        return np.hstack((force * STEP_S, rotation.between(attitudes))), attitudes[1:]
 
     def _shaken(self, planned: Vector, first: int, grip: Vector) -> Vector:
         """The attitudes (n, 4) as the hand meant them, with its tremor in it."""
