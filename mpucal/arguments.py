@@ -19,6 +19,8 @@ from .errors import ArraysError, RecordingError, WrongType, WrongValue
 SHORTEST_S, LONGEST_S = 1e-12, 1e18
 # of m/s^2 and rad/s: farther than any sensor reads, and squares of it stay finite
 LARGEST = 1e9
+# of a local gravity [m/s^2], from small moons to centrifuges
+LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2 = 1e-3, 1e4
 
 Vector = NDArray[np.float64]
 Mask = NDArray[np.bool_]

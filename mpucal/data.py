@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import re
+import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import frames
+from .arguments import LARGEST, column, mask, rows, seconds, stretch
 from .arguments import Mask as Mask  # noqa: PLC0414 - rooms above take them from here
 from .arguments import Vector as Vector  # noqa: PLC0414
-from .arguments import column, mask, rows, seconds, stretch
 from .errors import WrongType
 
 if TYPE_CHECKING:
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 STANDARD_GRAVITY_MPS2 = 9.80665
 # names reach scripts and source code: these characters end no string and no comment there
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .:+()-]{0,63}")
+BYTE = 0xFF
+MAY_BE_NEGATIVE = ("temperature_c", "clock_ppm", "accel_lag_s")
 
 
 @dataclass(frozen=True)
@@ -79,15 +81,17 @@ def _checked(key: str, value: Any) -> Any:
         kind, count = (int, 3) if key == "accel_offsets" else (int | float, 2)
         valid = isinstance(value, list | tuple) and len(value) == count and all(_is(kind, item) for item in value)
         value = tuple(value) if valid else value
+    elif key == "who_am_i":
+        valid = _is(int, value) and 0 <= value <= BYTE
     else:
-        valid = _is(int if key == "who_am_i" else int | float, value)
+        valid = _is(int | float, value) and (value >= 0 or key in MAY_BE_NEGATIVE)
     if not valid:
-        raise ValueError(f"sensor: {key} is {value!r}")
+        raise ValueError(f"sensor: {key} is {reprlib.repr(value)}")
     return value
 
 
 def _is(kind: Any, value: Any) -> bool:
-    return isinstance(value, kind) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, kind) and not isinstance(value, bool) and abs(value) <= LARGEST
 
 
 @dataclass(frozen=True)

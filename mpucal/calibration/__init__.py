@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import WrongValue
 from ..result import keys
@@ -67,7 +68,7 @@ def weigh(
     """
     if model not in tuple(MODELS):  # which takes what has no hash
         raise WrongValue(f"there is no model {model!r}", f"choose one of {', '.join(MODELS)}")
-    if not (np.isfinite(gravity) and gravity > 0):
+    if not LEAST_GRAVITY_MPS2 <= gravity <= MOST_GRAVITY_MPS2:
         raise WrongValue(f"gravity is {gravity}", "give the local gravity in m/s^2, about 9.81")
     before = Evidence(recording, gravity, None, None, model)
     if no_gyroscope(before) is not None:

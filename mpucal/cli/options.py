@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import click
 from click.core import ParameterSource
 
+from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
 from ..calibration import MODELS
 from ..chip.config import Config
 from ..data import STANDARD_GRAVITY_MPS2
@@ -59,7 +60,7 @@ def local_gravity(text: str) -> float:
         gravity = float(text)
     except ValueError:
         gravity = math.nan
-    if not 0.0 < gravity < math.inf:
+    if not LEAST_GRAVITY_MPS2 <= gravity <= MOST_GRAVITY_MPS2:
         raise ValueError(f"{text!r} is no local gravity: give it in m/s², about 9.81.")
     return gravity
 

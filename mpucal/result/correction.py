@@ -44,6 +44,8 @@ def correction(calibration: Calibration, sensor: Sensor, autopilot: Autopilot | 
     """
     if calibration.quality.get("verdict") == REFUSED:
         raise UsageError("the calibration was refused", "measure again, as its reasons say")
+    if not all(np.isfinite(array).all() for array in (calibration.D, calibration.b_a, calibration.K)):
+        raise UsageError("the calibration holds no D, b_a or K", "give one that does")
     of = calibration.sensor
     if None not in (of.who_am_i, sensor.who_am_i) and of.who_am_i != sensor.who_am_i:
         raise UsageError(

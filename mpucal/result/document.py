@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import reprlib
 from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import datetime
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import LARGEST, LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
 from ..data import Sensor, Vector
 from .correlation import KEY, LOWER, from_lower
 from .schema import check_document
@@ -37,9 +39,10 @@ GYROSCOPE = (
     ("b_omega_std", "b_omega_std", (3,)),
     ("noise_std", "gyro_noise_std", (3,)),
 )
+HARDWARE = (("b_a", "applied_in_hardware", (3,)),)
 _NUMBERS = ACCELEROMETER + GYROSCOPE
-# of a number in SI units, and of a matrix near the identity
-LARGEST, WORST_CONDITION = 1e9, 1e9
+# of a matrix near the identity
+WORST_CONDITION = 1e9
 ACCELEROMETER_FORMULA = "a = inv(D) @ (y - b_a)"
 GYROSCOPE_FORMULA = "w = K @ (y - b_omega)"
 # fromisoformat takes any character between date and time
@@ -85,13 +88,12 @@ def arguments(document: Mapping[str, Any]) -> dict[str, Any]:
     for key in ("D", "b_a"):
         if key not in acc:
             raise KeyError(key)
-    hardware = document.get("applied_in_hardware", {})
     return {
         "D": np.full((3, 3), np.nan),
         "b_a": np.full(3, np.nan),
         **_read(acc, ACCELEROMETER + TEMPERATURE),
         **_read(document.get("gyroscope", {}), GYROSCOPE),
-        **_read(hardware, (("b_a", "applied_in_hardware", (3,)),)),
+        **_read(document.get("applied_in_hardware", {}), HARDWARE),
         **({KEY: from_lower(_array(document[KEY], LOWER[0].shape))} if KEY in document else {}),
         "fit": dict(document.get("fit", {})),
         "quality": dict(document.get("quality", {})),
@@ -111,7 +113,7 @@ def checked(document: Any) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise ValueError(f"it is a {type(document).__name__}, not an object")
     if document.get("format") != FORMAT:
-        raise ValueError(f'"format" is {document.get("format")!r}, not {FORMAT!r}')
+        raise ValueError(f'"format" is {reprlib.repr(document.get("format"))}, not {FORMAT!r}')
     version = document.setdefault("version", VERSION)
     if isinstance(version, int) and version > VERSION:
         raise ValueError(f"version {version} is newer than {VERSION}")
@@ -128,14 +130,20 @@ def tellable(fields: Mapping[str, Any]) -> dict[str, Vector]:
 
 
 def _is_fit(name: str, array: Vector) -> bool:
-    """Whether it is no matrix that must be inverted and cannot be."""
-    return name not in ("D", "K") or not np.isfinite(array).all() or bool(np.linalg.cond(array) <= WORST_CONDITION)
+    """Whether it is no matrix that must be inverted and cannot be; one that is not known at all need not be."""
+    if name not in ("D", "K") or np.isnan(array).all():
+        return True
+    return bool(np.isfinite(array).all() and np.linalg.cond(array) <= WORST_CONDITION)
 
 
 def _check_numbers(document: Mapping[str, Any]) -> None:
     if np.nanmax(np.abs(np.array(document.get(KEY, ()), float)), initial=0.0) > 1.0:
         raise ValueError(f"{KEY} holds a number beyond 1")
-    for key, rows in (("accelerometer", ACCELEROMETER), ("gyroscope", GYROSCOPE)):
+    for key, rows in (
+        ("accelerometer", ACCELEROMETER + TEMPERATURE),
+        ("gyroscope", GYROSCOPE),
+        ("applied_in_hardware", HARDWARE),
+    ):
         values = _read(document.get(key, {}), rows)
         # farther from a sensor than anything that was ever measured: their products stay finite
         if any(np.nanmax(np.abs(array), initial=0.0) > LARGEST for array in values.values()):
@@ -149,6 +157,23 @@ def _check_numbers(document: Mapping[str, Any]) -> None:
         for name, array in values.items():
             if not _is_fit(name, array):
                 raise ValueError(f"{name} cannot be inverted")
+        if np.isnan(values.get("applied_in_hardware", 0.0)).any():
+            raise ValueError("applied_in_hardware holds null")
+    gravity = document.get("fit", {}).get("gravity")
+    if gravity is not None and not LEAST_GRAVITY_MPS2 <= gravity <= MOST_GRAVITY_MPS2:
+        raise ValueError(f"fit.gravity is {gravity:g} m/s^2")
+    _check_slope(document)
+
+
+def _check_slope(document: Mapping[str, Any]) -> None:
+    """b_a(T) is a line through b_a at the sensor's temperature, within a range that holds it; or there is none."""
+    of = _read(document.get("accelerometer", {}), TEMPERATURE)
+    if not np.any(of.get("b_a_slope", 0.0)):
+        return
+    T = document.get("sensor", {}).get("temperature_c")
+    low, high = of.get("temperature_range_c", (np.nan, np.nan))
+    if T is None or not (low <= T <= high and np.isfinite(of["b_a_slope"]).all()):
+        raise ValueError("b_a_slope is given, and not of which temperatures")
 
 
 Rows = tuple[tuple[str, str, tuple[int, ...]], ...]
@@ -167,7 +192,7 @@ def _date(text: Any) -> str:
     if text == "":
         return ""
     if not isinstance(text, str) or not DATE.fullmatch(text):
-        raise ValueError(f"created is {text!r}, which is no ISO 8601 time")
+        raise ValueError(f"created is {reprlib.repr(text)}, which is no ISO 8601 time")
     datetime.fromisoformat(text)
     return text
 

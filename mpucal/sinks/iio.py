@@ -102,7 +102,8 @@ class KernelSink:
 
     def write(self, calibration: Calibration) -> Applied:
         """Write calibbias and udev's matrix, read both back, and see calibbias in the samples; see Sink."""
-        if calibration.quality.get("verdict") == REFUSED or not np.isfinite(calibration.b_a).all():
+        known = np.isfinite(calibration.D).all() and np.isfinite(calibration.b_a).all()
+        if calibration.quality.get("verdict") == REFUSED or not known:
             raise WriteBackError("nothing was written: the calibration was refused", "repeat the session as it says")
         texts = self._decoder.texts(self._source.devices.accel)
         words, why = offset_words(calibration)

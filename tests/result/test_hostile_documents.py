@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mpucal.errors import RecordingError
+from mpucal.data import Sensor
+from mpucal.errors import RecordingError, UsageError
 from mpucal.result.calibration import Calibration
+from mpucal.result.correction import correction
 from mpucal.strict_json import parsed
 
 ONE = Calibration(
@@ -20,6 +22,9 @@ ONE = Calibration(
     fit={"model": "imu", "gravity": 9.81},
     quality={"verdict": "good", "reasons": []},
     created="2024-05-17T09:30:00+00:00",
+    b_a_slope=np.full(3, 0.01),
+    temperature_range_c=np.array([20.0, 40.0]),
+    sensor=Sensor(temperature_c=25.0),
     correlation=np.eye(21) + 0.5 * (np.eye(21, k=1) + np.eye(21, k=-1)),
 )
 ONE = replace(ONE, extra={"others": [ONE.document()], "autopilot": {"params_old": {"INS_ACCOFFS_X": 0.0}, "imu": 1}})
@@ -42,7 +47,14 @@ def loaded(folder, text):
         ("accelerometer b_a 0", 1e300),
         ("accelerometer b_a 0", 10**400),
         ("accelerometer D_std 0 0", -1e-3),
+        ("accelerometer D 0", [None] * 3),
+        ("accelerometer b_a_slope", [1e300] * 3),
+        ("sensor temperature_c", None),
+        ("accelerometer temperature_range_c", [50.0, 20.0]),
         ("gyroscope K", [[0, 0, 0]] * 3),
+        ("gyroscope K 1 1", None),
+        ("applied_in_hardware b_a", [None] * 3),
+        ("applied_in_hardware b_a 0", 1e300),
         ("correlation", [0.0] * 209),
         ("correlation 7", 1.5),
         ("quality reasons", 5),
@@ -50,12 +62,20 @@ def loaded(folder, text):
         ("quality reasons", [{"code": "x'; DROP", "message": ""}]),
         ("quality verdict", "excellent"),
         ("fit gravity", "9.81"),
+        ("fit gravity", 1e300),
+        ("fit gravity", -9.81),
         ("fit", []),
         ("sensor accel_range_g", "four"),
+        ("sensor accel_range_g", -4),
+        ("sensor rate_hz", 1e300),
+        ("sensor who_am_i", 1000),
+        ("sensor accel_offsets", [10**18] * 3),
+        ("sensor chip", "x" * 60_000),
         ("sensor chip", "'''); import os; ('''"),
         ("sensor chip", "\ud800"),
         ("created", "yesterday"),
         ("created", 5),
+        ("created", "x" * 60_000),
         ("autopilot", [1]),
         ("autopilot params_old INS_ACCOFFS_X", "1"),
         ("others 0 accelerometer D", [[0, 0, 0]] * 3),
@@ -77,6 +97,7 @@ def test_what_is_wrong_is_one_sentence(tmp_path, where, wrong):
         loaded(tmp_path, json.dumps(document, ensure_ascii=False))
     assert "holds no calibration" in str(raised.value)
     assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 400
 
 
 @pytest.mark.parametrize(
@@ -128,6 +149,14 @@ def test_no_bit_that_flips_changes_a_number_without_a_word(tmp_path_factory, at)
     except RecordingError:
         return
     assert read.doubt or replace(read, created=ONE.created) == ONE  # when it was made is no number
+
+
+@pytest.mark.parametrize("unknown", ["D", "b_a", "K"])
+def test_what_is_not_known_is_not_applied(tmp_path, unknown):
+    read = loaded(tmp_path, replace(ONE, **{unknown: np.full_like(getattr(ONE, unknown), np.nan)}).json())
+    assert read.verdict == "good"
+    with pytest.raises(UsageError, match="holds no D, b_a or K"):
+        correction(read, Sensor())
 
 
 def test_a_pipe_or_device_is_no_file(tmp_path):
