@@ -58,6 +58,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(arguments)
     except KeyboardInterrupt:
+        # where it came while text was executed, as for a dataclass, CPython ends by SIGINT, unless text was since
+        exec("")
         words = _words(arguments)
         kept = "; what was recorded until then is kept" if words and words[0] in RECORDING else ""
         if EVENTS in words:
