@@ -20,6 +20,7 @@ from ..chip.families import PARTS
 from ..chip.registers import FIFO_R_W, WHO_AM_I
 from ..errors import BusError, NoAnswer
 from .chip import OpenedChip
+from .claim import claim
 from .i2c_errors import nobody, opening_error, transfer_error
 from .kind import Request
 
@@ -38,30 +39,6 @@ SHORTEST_LIMIT = 4
 def open_source(request: Request) -> OpenedChip:
     """The chip on the bus that --bus names; see I2cBus."""
     return OpenedChip(I2cBus(request.value, request.values.get("address")), request.plan, words=request.words)
-
-
-def claim(handle: int | None, address: int, path: str) -> None:
-    """Keep other sessions from the chip at `address` of an open adapter: one of two would empty the other's FIFO.
-
-    The lock is on the byte of that number (fcntl(2)), so that two chips on one bus are two; it ends with the process.
-
-    Raises
-    ------
-    BusError : another process has it.
-    """
-    try:
-        import fcntl  # noqa: PLC0415 - not on Windows, which has no such bus
-
-        if handle is not None:
-            fcntl.lockf(handle, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, address)
-    except (BlockingIOError, PermissionError) as error:
-        raise BusError(
-            f"another mpucal uses the chip at 0x{address:02x} on {path}",
-            "end it, or take the other chip with --address",
-        ) from error
-    except (ImportError, OSError, TypeError):
-        # a device that knows no locks
-        return
 
 
 class I2cBus:
@@ -92,7 +69,8 @@ class I2cBus:
             self._longest = SMBUS_BLOCK_BYTES if self._blocks else MAX_MESSAGE_BYTES
             self._repeated_start = True
             self._address = self._find(ADDRESSES if address is None else (address,))
-            claim(self._smbus.fd, self._address, self._path)
+            chip = f"the chip at 0x{self._address:02x} on {self._path}"
+            claim(self._smbus.fd, chip, "end it, or take the other chip with --address", self._address)
         except BaseException:
             self._smbus.close()
             raise

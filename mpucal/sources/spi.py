@@ -27,6 +27,7 @@ from ..chip.registers import (
 )
 from ..errors import BusError, UsageError
 from .chip import OpenedChip
+from .claim import claim
 from .kind import Request
 
 READ, MODE = 0x80, 3
@@ -53,7 +54,7 @@ class SpiBus:
     Raises
     ------
     UsageError : a clock that is none.
-    BusError : no such device, no permission, no SPI device at all, or the library is missing.
+    BusError : no such device, no permission, no SPI device at all, another process's, or the library is missing.
     """
 
     def __init__(self, path: str) -> None:
@@ -70,6 +71,7 @@ class SpiBus:
         with self._told():
             self._device.open_path(self._path)
         try:
+            claim(self._device.fileno(), f"the chip on {self._path}")
             with self._told():
                 self._device.mode = MODE
                 self._device.bits_per_word = 8

@@ -83,6 +83,20 @@ class Device:
         """The installed command."""
         return self.run(Path(sys.executable).parent / "mpucal", *words)
 
+    @contextmanager
+    def recording(self, *words):
+        """The command `record` meanwhile, once it has the chip."""
+        capture = self.folder / "held.mcap"
+        command = [Path(sys.executable).parent / "mpucal", "record", *words, "--seconds", "100000", "-o", capture]
+        with subprocess.Popen(
+            command, env=self.environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        ) as process:
+            try:
+                process.stderr.readline()
+                yield
+            finally:
+                process.kill()
+
     def session(self, *words) -> Result:
         """The same, guiding the simulated hand through a session; it may fail before."""
         self._share(0, told=0, worked=0, worker=0)

@@ -55,6 +55,26 @@ def test_its_bias_goes_into_the_chip_and_out_again(guided):
     assert mocked.run("i2cget", "-y", "1", "0x68", "0x77", "w").out == before
 
 
+SECOND = {
+    "session": ("--yes", "-o", "two"),
+    "record": ("-o", "two.mcap"),
+    "stream": ("--apply", "board/calibration.json"),
+    "doctor": (),
+    "write": ("board/calibration.json", "chip", "--yes"),
+}
+
+
+def test_a_chip_that_is_recorded_is_nobody_elses(guided):
+    mocked, _ = guided
+    before = sorted(mocked.folder.rglob("*"))
+    with mocked.recording("--bus", NODE):
+        for command, words in SECOND.items():
+            refused = mocked.mpucal(command, "--bus", NODE, *words)
+            assert refused.code == 3, command
+            assert "another mpucal uses the chip at 0x68 on /dev/i2c-1" in refused.out + refused.err, command
+    assert sorted(set(mocked.folder.rglob("*")) - set(before)) == [mocked.folder / "held.mcap"]
+
+
 def test_a_clone_that_calls_itself_a_6050_gets_its_bias_where_a_6500_keeps_it(device):
     mocked = device("sim:chip=clone98,who_am_i=0x68,D=1/0/0/0/1/0/0/0/1,b_a=0.3/-0.2/0.4")
     mocked.tell(prompt={"kind": "lay_flat", "down": None})

@@ -39,6 +39,9 @@ class SpiDev:
             raise OSError(self.opens, os.strerror(self.opens))
         self.path = path
 
+    def fileno(self):
+        return None
+
     def xfer2(self, values, speed_hz=0, delay_usecs=0, bits_per_word=0):
         assert isinstance(values, list)
         assert len(values) <= 4096
