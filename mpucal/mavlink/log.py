@@ -6,6 +6,7 @@ measured before a reboot; of stretches that cannot be joined the longest is take
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
@@ -25,6 +26,8 @@ from .tlog import Record
 
 # whose change alters the streams
 SHAPING = (*CORRECTIONS, *BEYOND)
+# what firmwares' names are made of, and more of them than any has
+NAME, MOST_PARAMETERS = re.compile(r"\w{1,16}", re.ASCII), 4096
 IMU_MESSAGES = frozenset(MESSAGE_ID.values())
 
 
@@ -63,8 +66,11 @@ class Log:
             self.parameter(parameter.name, float(parameter.value))
 
     def parameter(self, name: str, value: float) -> None:
-        """A parameter as the vehicle holds it from now on."""
+        """A parameter as the vehicle holds it from now on; one that no firmware has is none."""
         now = self.segments[-1]
+        known = now.parameters
+        if NAME.fullmatch(name) is None or (name not in known and len(known) >= MOST_PARAMETERS):
+            return
         if len(now) and name.startswith(SHAPING) and now.parameters.get(name, value) != value:
             now = Segment(dict(now.parameters), now.gatherer.following())
             self.segments.append(now)

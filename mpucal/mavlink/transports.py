@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import select
 import socket
@@ -225,4 +226,6 @@ def _broken(name: str, error: Exception) -> LinkError:
 
 def _why(error: Exception) -> str:
     number = getattr(error, "errno", None)
+    if number in (errno.EAGAIN, errno.EBUSY):
+        return "another program uses it"
     return str(error) if number is None or number < 0 else os.strerror(number)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import mpucal
 from mpucal.errors import CaptureError, OutputError, RecordingError
-from mpucal.mavlink.log import read_log
+from mpucal.mavlink.log import Log, read_log
 from mpucal.mavlink.tlog import Record, TlogWriter, read_tlog
 
 START_NS = 1_700_000_000_000_000_000
@@ -114,6 +114,22 @@ def test_a_parameter_that_changes_splits_a_log(station, tmp_path):
     recording = mpucal.load(log_of(tmp_path, packets))
     assert len(recording) == 300
     assert recording.autopilot.parameters["INS_ACCOFFS_X"] == 0.25
+
+
+@pytest.mark.parametrize(("name", "kept"), [("INS_POS1_X", True), ("a\x1b[2J", False), ("", False), ("Ä", False)])
+def test_what_no_firmware_calls_a_parameter_is_none(name, kept):
+    log = Log("ArduPilot")
+    log.parameter(name, 1.0)
+    assert (name in log.segments[-1].parameters) == kept
+
+
+def test_more_parameters_than_any_firmware_has_are_not_kept():
+    log = Log("ArduPilot")
+    for number in range(10_000):
+        log.parameter(f"P{number}", 1.0)
+    log.parameter("P1", 2.0)
+    assert len(log.segments[-1].parameters) < 10_000
+    assert log.segments[-1].parameters["P1"] == 2.0
 
 
 def test_several_vehicles_are_listed_and_one_can_be_chosen(station, tmp_path):
