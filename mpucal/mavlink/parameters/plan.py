@@ -126,7 +126,7 @@ def _change(autopilot: Mapping[str, Any], firmware: str) -> Change:
     imu = int(autopilot["imu"])
     if autopilot["firmware"] != firmware:
         raise WriteBackError(
-            f"{NOTHING}: the calibration is of an {autopilot['firmware']} vehicle, and this is {firmware}",
+            f"{NOTHING}: the calibration is of {autopilot['firmware']}, and this is {firmware}",
             "connect the vehicle that was calibrated",
         )
     where = place_of(firmware, imu, autopilot[NEW])
