@@ -69,7 +69,7 @@ def judged(place: Path, code: int | None, blows: Sequence[Any], world: Any) -> O
     except MpucalError as error:
         wrong += [str(error)] if document.exists() else []
         return Outcome(code, last, wrong=tuple(wrong), recorded=recorded)
-    error, z = errors(calibration, world.truths(blows))
+    error, z = errors(calibration, world.truths(blows, folder))
     wrong += false(calibration, error, z)
     return Outcome(code, last, calibration.verdict, round(error, 4), round(z, 2), tuple(wrong), recorded)
 

@@ -145,7 +145,7 @@ def originals(place: Path) -> dict[str, tuple[Path, SimpleNamespace]]:
         path = next(path for path in folder.iterdir() if path.name.startswith("capture"))
         if suffix not in path.name:
             path = _written(load(path), folder / f"recording.{suffix}")
-        found[suffix] = path, SimpleNamespace(truths=lambda _, true=true: true)
+        found[suffix] = path, SimpleNamespace(truths=lambda *_, true=true: true)
     return found
 
 

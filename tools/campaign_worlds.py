@@ -7,6 +7,7 @@ without; the child gives the faults to chip, bus, line, vehicle or its own proce
 
 from __future__ import annotations
 
+import json
 import os
 import resource
 import signal
@@ -14,6 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import product
+from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
@@ -116,9 +118,9 @@ class World:
             if blow.name in (*PROCESS, *CLOCK, *SERIAL):
                 self.moments.add(blow.at_s, lambda blow=blow: self._strike(blow))
 
-    def truths(self, blows: Sequence[Blow]) -> list[tuple[np.ndarray, np.ndarray]]:
+    def truths(self, blows: Sequence[Blow], folder: Path) -> list[tuple[np.ndarray, np.ndarray]]:
         """(D, b_a) of the sensor as it may be called: before and after what befell it, and amid what is slow."""
-        document = self.truth()
+        document = self.truth(folder)
         D, b_a = np.array(document["D"], float), np.array(document["b_a"], float)
         maps = []
         for mishap in _befallen(blows):
@@ -132,11 +134,13 @@ class World:
             found.append((D @ A, b_a + D @ c))
         return found
 
-    def truth(self) -> dict[str, Any]:
-        """What the session writes to truth.json, but for its faults."""
+    def truth(self, folder: Path) -> dict[str, Any]:
+        """What a session without faults writes to truth.json."""
         if self.bus is not None:
             return self.bus.truth_document() or {}
-        return self.transport.truth
+        # a vehicle may have changed its own offsets meanwhile, and is written to afterwards
+        written = folder / "truth.json"
+        return json.loads(written.read_text()) if written.exists() else self.transport.truth
 
     def _strike(self, blow: Blow) -> None:
         if blow.name in SIGNALS:
@@ -201,7 +205,6 @@ class HookedTransport(SimulatedTransport):
     def __init__(self, world: World, vehicle: Any) -> None:
         super().__init__(vehicle)
         self._world = world
-        # a write-back changes what its streams are
         self.truth = vehicle.truth_document()
         world.transport = self
 
@@ -221,7 +224,7 @@ class HookedTransport(SimulatedTransport):
 def fill_disk(room: int) -> None:
     """No file of this process can be longer than `room` bytes: its writes fail as on a full disk."""
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
 
 
 def _faults(blows: Sequence[Blow]) -> list[Fault]:
