@@ -518,7 +518,8 @@ def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_
 def test_nothing_is_set_that_was_not_asked_for(kind, attacker, hostile, monkeypatch):
     key = hostile.KEY if attacker == hostile.SIGNED else None
     vehicle = SimulatedVehicle(VehicleOptions.parse("sim:imus=1"), key=key)
-    attack = hostile.Attack(kind, attacker, "ardupilot", 5, 40.0)
+    attack = hostile.Attack(kind, attacker, "ardupilot", 0, 40.0)
+    attack.draw("write")
     monkeypatch.setattr(hostile.HostileTransport, "attack", attack, raising=False)
     link = Link(hostile.HostileTransport(vehicle), lambda t_ns, data: None, key)
     link.lock(link.listen()[0])
