@@ -47,11 +47,12 @@ class Accesses:
     def __post_init__(self) -> None:
         """ValueError where the columns do not fit each other."""
         columns = (self.heard, self.framed, self.register, self.count, self.moved, self.t_ns, self.host_ns)
-        plain, framed = int(self.moved[~self.framed].sum()), self.moved[self.framed]
+        if any(len(column) != len(self.write) for column in columns):
+            raise ValueError("columns of different lengths")
+        framed = self.moved[self.framed]
         fits = (
-            all(len(column) == len(self.write) for column in columns)
-            and bool((self.moved >= 0).all())
-            and plain == len(self.data)
+            bool((self.moved >= 0).all())
+            and int(self.moved[~self.framed].sum()) == len(self.data)
             and int(framed.sum()) == 2 * self.frames.size
             and not (framed % max(2 * self.frames.shape[1], 1)).any()
             and all(0 <= number < len(self) for number in self.failures)

@@ -7,8 +7,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <stdexcept>
 #include <utility>
 #include <vector>
+
+#include "../aligned.hpp"
 
 namespace nb = nanobind;
 
@@ -45,10 +48,21 @@ Jumps jumps(const std::int16_t* run, std::size_t words, std::size_t first, std::
 
 std::pair<std::size_t, Jumps> until_jumps(Frames run, Ends ends, Medians median) {
   const std::size_t words = run.shape(1);
+  const std::int16_t* const frames = mpucal::aligned(run);
+  const std::int64_t* const end = mpucal::aligned(ends);
+  double* const medians = mpucal::aligned(median);
+  if (median.shape(0) != words) throw std::invalid_argument("there is a median for each word");
+  // each frame that is judged has a neighbour on either side
+  std::int64_t least = 2;
+  for (std::size_t poll = 0; poll < ends.shape(0); ++poll) {
+    if (end[poll] < least || end[poll] > static_cast<std::int64_t>(run.shape(0)))
+      throw std::invalid_argument("the ends of the polls do not ascend within the frames");
+    least = end[poll];
+  }
   std::size_t first = 1;
   for (std::size_t poll = 0; poll < ends.shape(0); ++poll) {
-    const std::size_t last = static_cast<std::size_t>(ends(poll)) - 1;
-    const Jumps found = jumps(run.data(), words, first, last, median.data());
+    const std::size_t last = static_cast<std::size_t>(end[poll]) - 1;
+    const Jumps found = jumps(frames, words, first, last, medians);
     if (!found.empty()) return {poll, found};
     first = last;
   }

@@ -5,8 +5,11 @@
 
 #include <cmath>
 #include <cstddef>
+#include <stdexcept>
 #include <tuple>
 #include <vector>
+
+#include "../aligned.hpp"
 
 namespace nb = nanobind;
 
@@ -34,17 +37,21 @@ class LeftOver {
 
 // (at, of both, of one): the first point of the second of the two lines that leave least, what these leave, and what
 // one line leaves; at -1 where no place has `least` points and `least_s` on either side.
-std::tuple<std::ptrdiff_t, double, double> best_break(Points t, Points y, std::ptrdiff_t least, double least_s) {
-  const auto n = static_cast<std::ptrdiff_t>(t.shape(0));
+std::tuple<std::ptrdiff_t, double, double> best_break(const Points& times, const Points& values, std::ptrdiff_t least,
+                                                      double least_s) {
+  const auto n = static_cast<std::ptrdiff_t>(times.shape(0));
+  const double *const t = mpucal::aligned(times), *const y = mpucal::aligned(values);
+  if (values.shape(0) != times.shape(0)) throw std::invalid_argument("t and y have different lengths");
+  if (least < 1) throw std::invalid_argument("a line has one point or more");
   std::vector<double> after(static_cast<std::size_t>(n));
   LeftOver backwards, forwards;
-  for (std::ptrdiff_t i = n; i-- > 0;) after[static_cast<std::size_t>(i)] = backwards.next(t(i), y(i));
+  for (std::ptrdiff_t i = n; i-- > 0;) after[static_cast<std::size_t>(i)] = backwards.next(t[i], y[i]);
   std::ptrdiff_t best = -1;
   double both = 0.0, one = 0.0;
   for (std::ptrdiff_t i = 0; i < n; ++i) {
     const std::ptrdiff_t at = i + 1;  // `one` is of the points before it
-    one = forwards.next(t(i), y(i));
-    if (at < least || at > n - least || !(t(at - 1) - t(0) >= least_s) || !(t(n - 1) - t(at) >= least_s)) continue;
+    one = forwards.next(t[i], y[i]);
+    if (at < least || at > n - least || !(t[at - 1] - t[0] >= least_s) || !(t[n - 1] - t[at] >= least_s)) continue;
     const double left = one + after[static_cast<std::size_t>(at)];
     if (best < 0 || left < both) best = at, both = left;
   }

@@ -118,6 +118,8 @@ def accesses_of(message: bytes) -> Accesses:
     if not len(kind):
         raise ValueError("no access")
     t_ns, is_heard = np.cumsum(protobuf.unzigzag(steps)), (kind & np.uint64(HEARD)) > 0
+    if len(t_ns) != len(kind) or len(heard) != is_heard.sum():
+        raise ValueError("times that are not those of the accesses")
     host_ns = np.zeros(len(t_ns), np.int64)
     host_ns[is_heard] = t_ns[is_heard] + np.cumsum(protobuf.unzigzag(heard))
     return Accesses(

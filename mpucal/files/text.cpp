@@ -16,6 +16,8 @@
 #include <string_view>
 #include <vector>
 
+#include "../aligned.hpp"
+
 namespace nb = nanobind;
 
 namespace {
@@ -69,11 +71,11 @@ bool is_number(const char* begin, const char* end, double& value) {
 
 nb::bytes lines(const Table& table) {
   const std::size_t rows = table.shape(0), columns = table.shape(1);
+  const double* value = mpucal::aligned(table);
   std::vector<char> text(rows * columns * (WIDEST + 1));
   char* at = text.data();
   {
     const Apart apart;
-    const double* value = table.data();
     for (std::size_t i = 0; i < rows * columns; ++i) {
       at = put(at, value[i]);
       *at++ = (i + 1) % columns ? ',' : '\n';

@@ -15,6 +15,7 @@
 #include <tuple>
 #include <vector>
 
+#include "../aligned.hpp"
 #include "filter.hpp"
 #include "hand.hpp"
 #include "runs.hpp"
@@ -48,7 +49,7 @@ const double* pointer(const Array& array, std::size_t size, const char* name) {
   if (array.size() != size)
     throw std::invalid_argument(std::string(name) + " holds " + std::to_string(array.size()) + " numbers, not " +
                                 std::to_string(size));
-  return array.data();
+  return aligned(array);
 }
 
 const double* pointer(const std::optional<Array>& array, std::size_t size, const char* name) {
@@ -65,7 +66,7 @@ Series make_series(const Array& y, const Array& omega, const Array& dt, const st
                    const std::optional<Array>& q_scale, const std::optional<Array>& q_extra) {
   Series series;
   const std::size_t n = series.n = dt.size();
-  series.dt = dt.data();
+  series.dt = aligned(dt);
   series.y = pointer(y, 3 * n, "y");
   series.omega = pointer(omega, 3 * n, "omega");
   series.r_scale = pointer(r_scale, n, "r_scale");
@@ -109,7 +110,7 @@ using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::d
 // The samples at which sums are wanted: those given, or the last alone
 std::vector<long> make_ends(const std::optional<Indices>& given, std::size_t n) {
   std::vector<long> ends{static_cast<long>(n)};
-  if (given) ends.assign(given->data(), given->data() + given->size());
+  if (given) ends.assign(aligned(*given), aligned(*given) + given->size());
   if (!std::is_sorted(ends.begin(), ends.end()) || ends.empty() || ends.front() < 0 || ends.back() != static_cast<long>(n))
     throw std::invalid_argument("ends do not ascend to the number of samples");
   return ends;
@@ -257,12 +258,13 @@ NB_MODULE(_kernel, m) {
       "statistics",
       [](const Array& x, const nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>& runs) {
         const std::size_t k = runs.shape(0);
+        const std::int64_t* const ends = aligned(runs);
         if (runs.shape(1) != 2) throw std::invalid_argument("a run is a first sample and a last + 1");
         for (std::size_t r = 0; r < k; ++r)
-          if (runs(r, 0) < 0 || runs(r, 1) <= runs(r, 0) || 3 * static_cast<std::size_t>(runs(r, 1)) > x.size())
+          if (runs(r, 0) < 0 || runs(r, 1) <= runs(r, 0) || static_cast<std::size_t>(runs(r, 1)) > x.size() / 3)
             throw std::invalid_argument("a run is empty, or not within the samples");
         std::vector<double> mean(3 * k), variance(3 * k);
-        statistics(x.data(), runs.data(), k, mean.data(), variance.data());
+        statistics(aligned(x), ends, k, mean.data(), variance.data());
         return std::make_tuple(give(std::move(mean), {k, 3}), give(std::move(variance), {k, 3}));
       },
       nb::arg("x"), nb::arg("runs"), "Means and variances (k, 3) of x (n, 3) over runs (k, 2), first and last + 1.");
@@ -271,7 +273,7 @@ NB_MODULE(_kernel, m) {
       "moving_mean",
       [](const nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>& x, std::size_t half) {
         std::vector<double> mean(x.size());
-        moving_mean(x.data(), x.shape(0), x.shape(1), half, mean.data());
+        moving_mean(aligned(x), x.shape(0), x.shape(1), half, mean.data());
         return give(std::move(mean), {x.shape(0), x.shape(1)});
       },
       nb::arg("x"), nb::arg("half"), "Means of x (n, m) over up to `half` samples on both sides of each.");
@@ -283,7 +285,7 @@ NB_MODULE(_kernel, m) {
         pointer(x, 3 * n, "x");
         if (size < 1 || size > n) throw std::invalid_argument("a window is empty, or longer than the samples");
         std::vector<double> mean(3 * (n - size + 1)), variance(mean.size());
-        moving_statistics(x.data(), n, size, mean.data(), variance.data());
+        moving_statistics(aligned(x), n, size, mean.data(), variance.data());
         return std::make_tuple(give(std::move(mean), {3, n - size + 1}), give(std::move(variance), {3, n - size + 1}));
       },
       nb::arg("x"), nb::arg("size"),
@@ -296,7 +298,7 @@ NB_MODULE(_kernel, m) {
         pointer(rate, 3 * samples, "rate");
         if (samples <= n) throw std::invalid_argument("there are no rates before the steps");
         std::vector<double> mean(3 * n);
-        mean_rates(rate.data(), samples, pointer(bias, 3, "bias"), dt.data(), n, mean.data());
+        mean_rates(aligned(rate), samples, pointer(bias, 3, "bias"), aligned(dt), n, mean.data());
         return give(std::move(mean), {n, 3});
       },
       nb::arg("rate"), nb::arg("bias"), nb::arg("dt"),

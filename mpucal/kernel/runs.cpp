@@ -56,10 +56,11 @@ void statistics(const double* x, const std::int64_t* runs, std::size_t count, do
 }
 
 void moving_mean(const double* x, std::size_t n, std::size_t columns, std::size_t half, double* mean) {
+  if (n == 0) return;
   std::vector<double> sums(columns * (n + 1));
   for (std::size_t i = 0; i < columns * n; ++i) sums[i + columns] = sums[i] + x[i];
   for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t low = i > half ? i - half : 0, high = std::min(i + half + 1, n);
+    const std::size_t low = i > half ? i - half : 0, high = half < n - i ? i + half + 1 : n;
     for (std::size_t j = 0; j < columns; ++j)
       mean[columns * i + j] = (sums[columns * high + j] - sums[columns * low + j]) / static_cast<double>(high - low);
   }

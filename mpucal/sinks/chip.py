@@ -104,7 +104,7 @@ class ChipSink:
         ------
         RecordingError : `path` is no such file. WriteBackError : see Sink.
         """
-        wanted = _blocks(path)
+        wanted = kept_blocks(path)
         with _refusing():
             read_identity(self._port)
             olds = self._blocks()
@@ -245,7 +245,7 @@ def _hex(blocks: Sequence[Block]) -> dict[str, str]:
     return {f"0x{block.place[0]:02x}": block.data.hex() for block in blocks}
 
 
-def _blocks(path: Path) -> list[Block]:
+def kept_blocks(path: Path) -> list[Block]:
     """What `keep` saved."""
     held = kept(CHIP_OFFSETS, path, FORMAT, REGISTERS)[REGISTERS]
     try:

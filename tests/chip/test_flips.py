@@ -5,7 +5,7 @@ import pytest
 
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.chip.flips import Flips
+from mpucal.chip.flips import Flips, until_jumps
 from mpucal.simulated.chip import open_simulated
 
 NONE = np.zeros((0, 7), np.int16)
@@ -78,3 +78,9 @@ def test_a_bus_with_bit_errors_gives_the_samples_of_one_without():
     assert none == 0
     assert found > 10
     assert flipped < 10 * clean
+
+
+@pytest.mark.parametrize(("ends", "medians"), [([9], 7), ([1], 7), ([6, 4], 7), ([8], 6)])
+def test_polls_beyond_the_frames_are_refused(ends, medians):
+    with pytest.raises(ValueError, match=r"ends of the polls|a median for each"):
+        until_jumps(np.zeros((8, 7), np.int16), np.array(ends), np.ones(medians))

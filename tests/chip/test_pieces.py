@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mpucal.chip.clock import SampleClock
-from mpucal.chip.pieces import breaks, lines, steady
+from mpucal.chip.pieces import best_break, breaks, lines, steady
 
 
 def counted(rates_hz, each_s=20.0, seed=0, late_s=0.001):
@@ -70,3 +70,10 @@ def test_final_times_of_a_steady_clock_are_those_of_one_line():
     index = np.arange(int(y[-1]))
     zeros = np.zeros_like(index)
     np.testing.assert_allclose(clock.final()(zeros, index), clock.times_s(zeros, index), rtol=0, atol=1e-9)
+
+
+def test_lines_through_points_that_are_not_there_are_refused():
+    with pytest.raises(ValueError, match="different lengths"):
+        best_break(np.arange(20.0), np.arange(10.0), 3, 0.0)
+    with pytest.raises(ValueError, match="one point"):
+        best_break(np.arange(20.0), np.arange(20.0), 0, -1e9)

@@ -19,9 +19,10 @@ from mpucal.chip.access import Failure, Transaction
 from mpucal.chip.decode import decode
 from mpucal.chip.records import FORGET, SessionEvent
 from mpucal.errors import CaptureError, OutputError
-from mpucal.files import mcap
+from mpucal.files import mcap, protobuf
 from mpucal.files.capture import capture_rows, load_capture
 from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.files.messages import accesses_message
 
 META = {"mpucal": "0.1.0", "chip": "MPU-6050", "options": {"gravity": 9.81, "seed": None}}
 
@@ -275,3 +276,12 @@ def test_captures_of_version_1_are_read():
     """JSON, a message an access, as mpucal wrote it until it was given columns."""
     assert b"mpucal.Transaction" in VERSION_1.read_bytes()
     assert len(load_capture(VERSION_1)) > 200
+
+
+@pytest.mark.parametrize("number", [5, 6], ids=["times", "times heard"])
+def test_a_message_whose_columns_do_not_fit_is_refused(path, number, monkeypatch):
+    monkeypatch.setattr(mcap, "accesses_message", lambda accesses: message + protobuf.field(number, b"\2"))
+    message = accesses_message(polls(3))
+    write(path, polls(3))
+    with pytest.raises(CaptureError, match="none of mpucal's"):
+        read_capture(path)

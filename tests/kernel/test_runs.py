@@ -32,12 +32,12 @@ def test_means_and_variances_of_runs(x):
     mean, variance = _kernel.statistics(10.0 + x, runs)
     np.testing.assert_allclose(mean, [10.0 + x[a:b].mean(0) for a, b in runs], rtol=1e-13)
     np.testing.assert_allclose(variance, [x[a:b].var(0) for a, b in runs], atol=1e-13)
-    for outside in ([[0, 201]], [[-1, 5]], [[5, 5]]):
+    for outside in ([[0, 201]], [[-1, 5]], [[5, 5]], [[0, (1 << 64) // 3 + 1]]):
         with pytest.raises(ValueError, match="a run is empty"):
             _kernel.statistics(x, np.array(outside))
 
 
-@pytest.mark.parametrize("half", [0, 3, 500])
+@pytest.mark.parametrize("half", [0, 3, 500, (1 << 64) - 1])
 def test_moving_means_are_of_what_there_is(x, half):
     wanted = [x[max(i - half, 0) : i + half + 1].mean(0) for i in range(len(x))]
     np.testing.assert_allclose(_kernel.moving_mean(x, half), wanted, atol=1e-13)
@@ -69,3 +69,9 @@ def test_mean_rates_turn_as_far_as_a_body_whose_axis_goes_round():
     assert miss < 0.1 * of_midpoint
     with pytest.raises(ValueError, match="no rates before"):
         _kernel.mean_rates(rate[:5], bias, np.ones(5))
+
+
+def test_numbers_that_are_not_aligned_are_refused(x):
+    shifted = np.frombuffer(b"\0" + x.tobytes(), offset=1).reshape(x.shape)
+    with pytest.raises(ValueError, match="not aligned"):
+        _kernel.moving_mean(shifted, 3)

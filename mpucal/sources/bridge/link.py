@@ -26,6 +26,8 @@ from .messages import (
     BlobCommit,
     BlobData,
     BlobErase,
+    BlobRead,
+    BlobReadReply,
     Burst,
     BurstReply,
     Frames,
@@ -34,6 +36,7 @@ from .messages import (
     Message,
     MessageError,
     Read,
+    ReadReply,
     Reply,
     Status,
     answer_of,
@@ -99,12 +102,15 @@ class _Asked:
         return not first <= INT_STATUS < first + self.request.count and first != FIFO_R_W
 
     def is_answered_by(self, frame: Frame, reply: Reply) -> bool:
-        """Whether `reply` is what it waits for: of a BURST, a piece behind one that was lost is not."""
+        """Whether `reply` is what it waits for, with as many bytes as were asked for; of a BURST, the next piece."""
         if self.done or (frame.seq, frame.type) != (self.seq, self.request.TYPE | REPLY_BIT):
             return False
-        if not isinstance(reply, BurstReply):
+        if isinstance(reply, ReadReply | BlobReadReply) and isinstance(self.request, Read | BlobRead):
+            return reply.status != Status.OK or len(reply.data) == self.request.count
+        if not isinstance(reply, BurstReply) or not isinstance(self.request, Burst):
             return True
-        return reply.offset == sum(len(a.reply.data) for a in self.answers if isinstance(a.reply, BurstReply))
+        held = sum(len(a.reply.data) for a in self.answers if isinstance(a.reply, BurstReply))
+        return reply.offset == held and held + len(reply.data) <= self.request.count
 
     def encoded(self) -> bytes:
         return Frame(self.request.TYPE, self.seq, self.request.payload()).encode()

@@ -122,3 +122,12 @@ def test_a_hello_asks_for_the_address(rig):
     made = rig(address=0x69)
     Link(made.line, lambda seq, frames, t_ns: None).greet(0x69)
     assert Hello.decode(sent(made.line)[0].payload).address == 0x69
+
+
+@pytest.mark.parametrize("data", [b"", b"\x68\x68"], ids=["too few bytes", "too many"])
+def test_other_bytes_than_were_asked_for_are_no_answer(link, data):
+    link.line.to_host = lambda said: b"".join(
+        Frame(f.type, f.seq, f.payload[:5] + data).encode() for f in Deframer().feed(said)
+    )
+    with pytest.raises(LinkLost, match="no longer answers"):
+        link.link.ask(WHO)
