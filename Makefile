@@ -6,7 +6,9 @@ READY := $(VENV)/.ready
 TESTED := $(VENV)/.tested
 export PYTHON
 
-.PHONY: session test slow kernel lint audit bench wheel docs firmware clean
+SECONDS ?= 600
+
+.PHONY: session test slow fuzz kernel lint audit bench wheel docs firmware clean
 
 session: $(READY)
 	@$(BIN)/mpucal session --bus sim
@@ -17,6 +19,13 @@ test: lint docs
 # what `make test` leaves out for its time
 slow: $(TESTED)
 	$(BIN)/pytest --numprocesses auto -m slow
+
+# readers, peers, compiled modules and the firmware's core on hostile input, for SECONDS and a quarter as much again
+fuzz: $(TESTED)
+	@$(BIN)/pip install --quiet --disable-pip-version-check atheris
+	@$(BIN)/python -W ignore tools/fuzz.py --guided --budget $(SECONDS)
+	@$(BIN)/python tools/fuzz_kernel.py --seconds $$(($(SECONDS) / 8))
+	@if command -v clang >/dev/null; then $(BIN)/python tools/fuzz_core.py --seconds $$(($(SECONDS) / 8)); fi
 
 lint: $(TESTED)
 	$(BIN)/ruff check --quiet .

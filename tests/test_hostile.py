@@ -1,4 +1,4 @@
-"""Slices of tools/fuzz.py, tools/syscalls.py and tools/campaign.py; seeds are the day's, and printed."""
+"""Slices of tools/fuzz.py and its like, tools/syscalls.py and tools/campaign.py; seeds are the day's, and printed."""
 
 import shutil
 import subprocess
@@ -16,7 +16,18 @@ def holds(tool, *words):
 
 
 def test_readers_refuse_mutated_bytes():
-    holds("fuzz.py", "--seconds", "0.2")
+    holds("fuzz.py", "--seconds", "0.15")
+
+
+def test_by_coverage():
+    pytest.importorskip("atheris")
+    holds("fuzz.py", "--guided", "--seconds", "2", "bridge", "mcap's messages")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("clang"), reason="needs clang")
+def test_the_firmwares_core_on_hostile_requests():
+    holds("fuzz_core.py", "--seconds", "5")
 
 
 @pytest.mark.parametrize(("seed", "target"), [("207790003882", "npz"), ("207790000083", "dataflash")])

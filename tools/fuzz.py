@@ -1,139 +1,49 @@
 """Readers and decoders on mutated bytes: nothing but the package's own errors comes out, and within a second or two.
 
     python tools/fuzz.py --seconds 60 [TARGET ...]
+    python tools/fuzz.py --guided --seconds 60 [TARGET ...]      # by coverage; needs atheris
 
-Each target has a corpus of the fixtures, of files that are made here, or of one in a dialect of tools/dialects.py, as
-rosbags, pyulog, pandas and others write it, and gets bytes of it that are damaged as in tools/campaign_recordings.py,
-cut, joined, or with one piece in the place of another's. A line counts its executions.
+Each target of tools/fuzz_targets.py has a corpus of the fixtures, of files that are made here, or of one in a dialect
+of tools/dialects.py, as rosbags, pyulog, pandas and others write it, and gets bytes of it that are damaged as in
+tools/campaign_recordings.py, cut, joined, or with one piece in the place of another's. A line counts its executions.
 What it should not have raised is printed with the seed that makes it again (--first SEED --seconds 0 TARGET).
+
+Guided, libFuzzer keeps what reaches new branches of mpucal in build/fuzz/TARGET, goes on from there the next time, and
+says how many branches were reached. Half of the mutants are those of above. What was wrong is kept in
+build/fuzz/TARGET.wrong until it is mended, and run again by --again FILE TARGET.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import io
+import os
+import re
 import signal
 import sys
 import time
 import traceback
-import zipfile
 from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import FrameType
 
 import numpy as np
-from campaign_recordings import OF_BYTES
-from dialects import dialects, walk
 
-from mpucal import Calibration
-from mpucal.errors import MpucalError
-from mpucal.files import load
-from mpucal.files.hints import NO_HINTS, Hints
-from mpucal.mavlink.dialect import Parser, dialect
-from mpucal.result.blob import Blob, BlobError
-from mpucal.result.noise import Noise
-from mpucal.sources.bridge import messages as wire
-from mpucal.sources.bridge.frame import Deframer, Frame
-
-FIXTURES = Path(__file__).parents[1] / "fixtures"
-LONGEST_S = 20
-EXPECTED = (MpucalError, BlobError, wire.MessageError)
+ROOT = Path(__file__).parents[1]
+KEPT = ROOT / "build" / "fuzz"
+LONGEST_S, LARGEST_MB = 20, 4096
+MISSING = "fuzz.py: --guided needs atheris, which is not installed: pip install atheris (CPython 3.11 to 3.13)."
 Run = Callable[[bytes], object]
-
-
-def table() -> np.ndarray:
-    """(n, 7) a short recording."""
-    t = np.arange(300) * 0.01
-    return np.column_stack((t, np.tile((0.1, -0.2, 9.8), (300, 1)), np.sin(t)[:, None] * (1.0, 0.5, -0.5)))
-
-
-def of_file(read: Callable[..., object], place: Path, name: str, *more: object) -> Run:
-    """Of bytes as a file of that name."""
-    path = place / name
-
-    def run(data: bytes) -> object:
-        path.write_bytes(data)
-        return read(path, *more)
-
-    return run
-
-
-def frames(data: bytes) -> None:
-    """What comes over a serial line."""
-    for frame in Deframer().feed(data):
-        kind = wire.REQUESTS.get(frame.type)
-        if kind is not None:
-            kind.decode(frame.payload)
-
-
-def packets(data: bytes) -> None:
-    """What comes as a datagram, and what comes as a stream."""
-    for packet in Parser(dialect().MAVLink(None)).datagram(data):
-        packet.message.to_dict()
-    list(Parser(dialect().MAVLink(None)).stream(data))
-
-
-def heartbeats() -> bytes:
-    """A few packets."""
-    link = dialect().MAVLink(None, 1, 1)
-    said = [link.heartbeat_encode(2, 3, 0, 0, 3), link.raw_imu_encode(1, 2, 3, 4, 5, 6, 7, 8, 9, 10)]
-    said.append(link.param_value_encode(b"INS_ACCOFFS_X", 0.1, 9, 3, 1))
-    return b"".join(bytes(message.pack(link)) for message in said)
-
-
-def targets(place: Path) -> dict[str, tuple[Run, list[bytes]]]:
-    """By name: what is run, and its corpus."""
-    rows, npz, csv = table(), io.BytesIO(), io.BytesIO()
-    np.savez(npz, t=rows[:, 0], acc=rows[:, 1:4], gyr=rows[:, 4:])
-    np.savetxt(csv, rows, delimiter=",", header="t,ax,ay,az,gx,gy,gz", comments="")
-    made = Calibration(D=np.eye(3) * 1.01, b_a=np.array([0.1, -0.2, 0.3])).json().encode()
-    blobs = [path.read_bytes() for path in sorted((FIXTURES / "vectors").glob("blob*.bin"))]
-    hello = [Frame(kind, n, bytes(range(n))).encode() for n, kind in enumerate(wire.REQUESTS)]
-    captures = [path.read_bytes() for path in sorted((FIXTURES / "faults").glob("s*.mcap"))]
-    return {
-        "calibration.json": (of_file(Calibration.load, place, "c.json"), [made]),
-        "noise.json": (of_file(Noise.load, place, "n.json"), [made, b'{"format": "mpucal.noise", "tau_s": [1.0]}']),
-        "blob": (Blob.decode, blobs),
-        "frames": (frames, [b"".join(hello), *hello]),
-        "packets": (packets, [heartbeats()]),
-        "csv": (of_file(load, place, "r.csv"), [csv.getvalue()]),
-        "txt": (of_file(load, place, "r.txt"), [csv.getvalue(), b"a/g:\t1\t2\t3\t4\t5\t6\n" * 30]),
-        "npz": (of_file(load, place, "r.npz"), [npz.getvalue()]),
-        "mcap": (of_file(load, place, "r.mcap"), captures),
-        "tlog": (of_file(load, place, "r.tlog"), [bytes(8) + heartbeats()]),
-        "dataflash": (of_file(load, place, "r.bin"), [b"\xa3\x95\x80" + bytes(range(86)) * 9, blobs[0]]),
-        **{name: of_dialect(place, *written) for name, written in written_dialects(place).items()},
-    }
-
-
-def written_dialects(place: Path) -> dict[str, tuple[Path, Hints]]:
-    """Name -> a file of some 60 samples; of what is a folder, an archive, or the bag's file."""
-    found, short = {}, walk().part(2000, 2060)
-    ns = np.rint(short.t * 1e9).astype(np.int64) + 1_700_000_000_000_000_000
-    for number, (name, (_, write, hints)) in enumerate(dialects().items()):
-        folder = place / str(number)
-        folder.mkdir()
-        path = write(folder, short, ns)
-        children = sorted(path.iterdir()) if path.is_dir() else []
-        if path / "metadata.yaml" in children:
-            path = next(child for child in children if child.suffix != ".yaml")
-        elif children:
-            path = folder / "tables.zip"
-            with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-                for child in children:
-                    archive.write(child, child.name)
-        found[name] = path, hints
-    return found
-
-
-def of_dialect(place: Path, path: Path, hints: Hints = NO_HINTS) -> tuple[Run, list[bytes]]:
-    """Its reader, and its file as the corpus."""
-    return of_file(load, place, f"r{path.suffix}", hints), [path.read_bytes()]
+Check = Callable[[bytes], str | None]
 
 
 def mutated(corpus: Sequence[bytes], seed: int) -> bytes:
     """Damaged by its seed."""
+    from campaign_recordings import OF_BYTES  # noqa: PLC0415 - not before the package is instrumented
+
     rng = np.random.default_rng(seed)
     data = bytearray(corpus[rng.integers(len(corpus))])
     if rng.random() < 0.2:
@@ -144,21 +54,87 @@ def mutated(corpus: Sequence[bytes], seed: int) -> bytes:
     return bytes(data)
 
 
-def fuzz(name: str, run: Run, corpus: Sequence[bytes], first: int, seconds: float) -> tuple[int, int]:
-    """Executions, and how many raised what they should not."""
-    until, seed, wrong = time.monotonic() + seconds, first, 0
-    while True:
+def checked(run: Run) -> Check:
+    """What of its exceptions should not be, as a trace; None where all is well."""
+    from mpucal.errors import MpucalError  # noqa: PLC0415 - as above
+    from mpucal.result.blob import BlobError  # noqa: PLC0415
+    from mpucal.sources.bridge.messages import MessageError  # noqa: PLC0415
+
+    def check(data: bytes) -> str | None:
         signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST_S)
         try:
-            run(mutated(corpus, seed))
-        except EXPECTED:
+            run(data)
+        except (MpucalError, BlobError, MessageError):
             pass
         except Exception:
+            return traceback.format_exc(limit=-4)
+        return None
+
+    return check
+
+
+def blind(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds: float) -> tuple[str, int]:
+    """What was done, and how many raised what they should not."""
+    until, seed, wrong = time.monotonic() + seconds, first, 0
+    while True:
+        if (trace := check(mutated(corpus, seed))) is not None:
             wrong += 1
-            print(f"{name}, seed {seed}:\n{traceback.format_exc(limit=-4)}", flush=True)
+            print(f"{name}, seed {seed}:\n{trace}", flush=True)
         seed += 1
         if time.monotonic() >= until:
-            return seed - first, wrong
+            return f"{seed - first:>9} executions, seeds from {first} on", wrong
+
+
+def guided(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds: float) -> tuple[str, int]:
+    """The same; libFuzzer ends its process, which therefore is another one."""
+    folder = KEPT / re.sub(r"\W+", "_", name)
+    wrong, log = folder.with_suffix(".wrong"), folder.with_suffix(".log")
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in wrong.glob("*"):
+        if check(path.read_bytes()) is None:
+            path.unlink()
+    for data in corpus:
+        (folder / hashlib.sha1(data, usedforsecurity=False).hexdigest()).write_bytes(data)
+    pid = os.fork()
+    if not pid:
+        _fuzz(name, check, folder, wrong, log, first, seconds)
+    status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    said = log.read_text(errors="replace")
+    count, reached = (
+        (re.findall(pattern, said) or ["0"])[-1] for pattern in (r"number_of_executed_units: (\d+)", r" cov: (\d+)")
+    )
+    if status:
+        print(f"{name}: ended with {status}; see {log}", flush=True)
+    found = len(list(wrong.glob("*"))) + bool(status)
+    return f"{count:>9} executions, {reached:>5} branches, seed {first}", found
+
+
+def _fuzz(name: str, check: Check, folder: Path, wrong: Path, log: Path, first: int, seconds: float) -> None:
+    import atheris  # noqa: PLC0415 - only here
+
+    seen: set[str] = set()
+
+    def one(data: bytes) -> None:
+        trace = check(data)
+        where = "".join(re.findall(r"^  File.*", trace or "", re.M))
+        if trace is None or where in seen:
+            return
+        seen.add(where)
+        wrong.mkdir(exist_ok=True)
+        path = wrong / hashlib.sha1(data, usedforsecurity=False).hexdigest()
+        path.write_bytes(data)
+        print(f"{name}, {path}:\n{trace}", flush=True)
+
+    def mutate(data: bytes, most: int, seed: int) -> bytes:
+        return mutated([data or b"\0"], seed)[:most] if seed % 2 else atheris.Mutate(data, most)
+
+    os.dup2(os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
+    longest = max(path.stat().st_size for path in folder.iterdir())
+    limits = {"max_total_time": max(round(seconds), 1), "timeout": 3 * LONGEST_S, "rss_limit_mb": LARGEST_MB}
+    rest = {"max_len": 2 * longest, "len_control": 0, "seed": first % (1 << 31), "print_final_stats": 1}
+    options = [f"-{key}={value}" for key, value in {**limits, **rest}.items()]
+    atheris.Setup(["fuzz", *options, f"-artifact_prefix={wrong}.", str(folder)], one, custom_mutator=mutate)
+    atheris.Fuzz()
 
 
 def too_long(_signal: int, _frame: FrameType | None) -> None:
@@ -171,16 +147,41 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("targets", nargs="*", metavar="TARGET")
     parser.add_argument("--seconds", type=float, default=60.0, help="of each target")
+    parser.add_argument("--budget", type=float, help="of all of them, in place of --seconds")
     parser.add_argument("--first", type=int, default=time.time_ns() // 86_400_000_000_000 * 10**7)
+    parser.add_argument("--guided", action="store_true", help="by coverage")
+    parser.add_argument("--again", type=Path, help="run one target on this file's bytes")
     asked = parser.parse_args()
+    if asked.guided:
+        try:
+            import atheris  # noqa: PLC0415 - a person may do without
+        except ImportError:
+            sys.exit(MISSING)
+        # an editable install's finder has loaders of its own, whose code cannot be instrumented: it is asked last
+        sys.path.insert(0, str(ROOT))
+        sys.meta_path.sort(key=lambda finder: not isinstance(finder, type))
+        # what is imported from here on: the package, and what it imports only later
+        atheris.instrument_imports(include=["mpucal"]).__enter__()
+    told = io.StringIO() if asked.guided else sys.stderr
+    with redirect_stderr(told):
+        from fuzz_targets import targets  # noqa: PLC0415 - see above
+
     signal.signal(signal.SIGVTALRM, too_long)
     bad = 0
     with TemporaryDirectory() as place:
-        of = targets(Path(place))
-        for name in asked.targets or of:
-            count, wrong = fuzz(name, *of[name], asked.first, asked.seconds)
+        with redirect_stderr(told):
+            of = targets(Path(place))
+        names = asked.targets or list(of)
+        seconds = asked.seconds if asked.budget is None else asked.budget / len(names)
+        for name in names:
+            run, corpus = of[name]
+            if asked.again is not None:
+                run(asked.again.read_bytes())
+                continue
+            way = guided if asked.guided else blind
+            did, wrong = way(name, checked(run), corpus, asked.first, seconds)
             bad += wrong
-            print(f"{name:<44}{count:>9} executions, seeds from {asked.first} on: {wrong} wrong", flush=True)
+            print(f"{name:<44}{did}: {wrong} wrong", flush=True)
     return int(bad > 0)
 
 
