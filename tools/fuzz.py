@@ -10,7 +10,8 @@ What it should not have raised is printed with the seed that makes it again (--f
 
 Guided, libFuzzer keeps what reaches new branches of mpucal in build/fuzz/TARGET, goes on from there the next time, and
 says how many branches were reached. Half of the mutants are those of above. What was wrong is kept in
-build/fuzz/TARGET.wrong until it is mended, and run again by --again FILE TARGET.
+build/fuzz/TARGET.wrong until it is mended. --again FILE TARGET runs a file again, or all of a folder: with
+build/fuzz/TARGET, coverage.py tells which lines are reached.
 """
 
 from __future__ import annotations
@@ -137,6 +138,14 @@ def _fuzz(name: str, check: Check, folder: Path, wrong: Path, log: Path, first: 
     atheris.Fuzz()
 
 
+def again(name: str, check: Check, path: Path) -> int:
+    """How many of these files are wrong."""
+    paths = sorted(path.iterdir()) if path.is_dir() else [path]
+    traces = [trace for each in paths if (trace := check(each.read_bytes())) is not None]
+    print(*traces, f"{name:<44}{len(paths):>9} files: {len(traces)} wrong", sep="\n", flush=True)
+    return len(traces)
+
+
 def too_long(_signal: int, _frame: FrameType | None) -> None:
     """It takes longer than any reader may."""
     raise TimeoutError(f"longer than {LONGEST_S} s of processor time")
@@ -150,7 +159,7 @@ def main() -> int:
     parser.add_argument("--budget", type=float, help="of all of them, in place of --seconds")
     parser.add_argument("--first", type=int, default=time.time_ns() // 86_400_000_000_000 * 10**7)
     parser.add_argument("--guided", action="store_true", help="by coverage")
-    parser.add_argument("--again", type=Path, help="run one target on this file's bytes")
+    parser.add_argument("--again", type=Path, help="run a target on this file, or all of a folder")
     asked = parser.parse_args()
     if asked.guided:
         try:
@@ -176,7 +185,7 @@ def main() -> int:
         for name in names:
             run, corpus = of[name]
             if asked.again is not None:
-                run(asked.again.read_bytes())
+                bad += again(name, checked(run), asked.again)
                 continue
             way = guided if asked.guided else blind
             did, wrong = way(name, checked(run), corpus, asked.first, seconds)

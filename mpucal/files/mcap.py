@@ -347,8 +347,8 @@ class _Bounded:
         self._file, self._size, self.at = file, size, 0
 
     def read(self, count: int) -> bytes:
-        """At most `count` bytes."""
-        data = self._file.read(min(count, self._size - self.at))
+        """At most `count` bytes; none where a damaged length makes it negative."""
+        data = self._file.read(max(0, min(count, self._size - self.at)))
         self.at += len(data)
         return data
 

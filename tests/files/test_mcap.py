@@ -200,6 +200,7 @@ def test_a_chunk_longer_than_any_memory_is_damage(path):
         pytest.param(b"t,ax,ay,az\n0,0,0,9.8\n", "no MCAP file", id="text"),
         pytest.param(b"\x89MCAP0\r\n", "does not hold the head", id="magic alone"),
         pytest.param(b"\x89MCAP0\r\n" + bytes(range(256)), "does not hold the head", id="junk after the magic"),
+        pytest.param(b"\x89MCAP0\r\n\x05\x05" + bytes(29), "does not hold the head", id="a message of 5 bytes"),
     ],
 )
 def test_what_is_no_capture_is_refused(path, content, says):
