@@ -13,6 +13,7 @@ import zipfile
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
+from runpy import run_path
 
 import numpy as np
 from dialects import dialects, walk
@@ -59,7 +60,8 @@ from mpucal.sources.bridge.frame import Frame
 from mpucal.sources.parts import parts_of
 from mpucal.sources.table import SOURCES
 
-FIXTURES = Path(__file__).parents[1] / "fixtures"
+ROOT = Path(__file__).parents[1]
+FIXTURES = ROOT / "fixtures"
 Run = Callable[[bytes], object]
 # topic, step of the time [ns], length; of topic 2, the file's head
 PIECE_OF_CAPTURE = struct.Struct("<BqH")
@@ -210,6 +212,7 @@ def targets(place: Path) -> dict[str, tuple[Run, list[bytes]]]:
         "tlog": (of_file(load, place, "r.tlog"), [tlog(said) for said in vehicle_says()]),
         "tlog's packets": (lambda data: load_tlog_of(place / "p.tlog", data), vehicle_says()),
         "dataflash": (of_file(load, place, "r.bin"), [b"\xa3\x95\x80" + bytes(range(86)) * 9, blobs[0]]),
+        "dataflash of a flight": (of_file(load, place, "r.bin"), [flight()]),
         **{name: of_dialect(place, *written) for name, written in written_dialects(place).items()},
     }
 
@@ -235,6 +238,20 @@ def of_file(read: Callable[..., object], place: Path, name: str, *more: object) 
         return read(path, *more)
 
     return run
+
+
+def flight() -> bytes:
+    """A dataflash log of two IMUs, by the writer of the tests."""
+    log = run_path(str(ROOT / "tests" / "mavlink" / "conftest.py"))["Dataflash"]()
+    log.describe("FMT", 0x80, "BBnNZ", "Type,Length,Name,Format,Columns")
+    log.describe("PARM", 0x81, "QNff", "TimeUS,Name,Value,Default")
+    log.describe("IMU", 0x82, "QBffffffIIfBBHH", "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T,GH,AH,GHz,AHz")
+    log.add("PARM", 0, b"INS_ACCOFFS_X", 0.05, 0.0)
+    for t, *row in table()[:40]:
+        for imu in range(2):
+            log.add("IMU", round(t * 1e6), imu, *row[3:], *row[:3], 0, 0, 31.5, 1, 1, 1000, 1000)
+    data: bytes = log.bytes()
+    return data
 
 
 def written_dialects(place: Path) -> dict[str, tuple[Path, Hints]]:
