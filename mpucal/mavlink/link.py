@@ -13,7 +13,7 @@ from itertools import islice
 from typing import Any, NamedTuple
 
 from ..errors import BusError, LinkError, NoAnswer
-from .dialect import MAGIC, SIGNED, Message, Packet, Parser, dialect
+from .dialect import LONGEST, MAGIC, SIGNED, Message, Packet, Parser, dialect
 from .transport import STOOD_NS, Bytes, Transport
 from .vehicle import Vehicle, vehicle_of
 
@@ -24,7 +24,8 @@ S = 1_000_000_000
 LISTEN_NS, PATIENCE_NS = 2 * S, 6 * S
 HEARTBEAT_NS = S
 SEQUENCE = 256
-# more senders than a network of vehicles has, and more pieces without a packet than a bad link brings in six seconds
+# more senders than a network of vehicles has; more datagrams or packets' lengths without a packet than a bad link
+# brings in six seconds, such as a serial line of 921,600 Bd that is read at another rate
 MOST_SENDERS, FLOOD = 64, 2000
 # signatures count 10 us since 2015-01-01
 SIGNING_EPOCH_NS, SIGNING_UNIT_NS = 1_420_070_400 * S, 10_000
@@ -234,7 +235,8 @@ class Link:
             parser = self._parsers[received.address] = Parser(self._receiver())
         parse = parser.datagram if self._transport.datagrams else parser.stream
         packets = [_Arrived(received.t_ns, received.address, packet) for packet in parse(received.data)]
-        self._junk += not packets
+        if not packets:
+            self._junk += 1 if self._transport.datagrams else -(-len(received.data) // LONGEST)
         return packets
 
     def _may_be(self, address: str, known: str) -> bool:

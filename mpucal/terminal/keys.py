@@ -23,7 +23,7 @@ _WORDS = {
 _ENDING = (signal.SIGINT, signal.SIGTERM)
 _AT_ONCE = 64
 # so long a Ctrl-C waits for who reads the sensor, who may hang on a device
-PATIENCE_S = 0.4
+PATIENCE_S = 0.25
 
 
 class Keys:

@@ -1,6 +1,6 @@
 import pytest
 
-from mpucal.errors import LinkError, NoAnswer, UsageError
+from mpucal.errors import BusError, LinkError, NoAnswer, UsageError
 from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM, Link, S
 from mpucal.mavlink.request import ask, command
 from mpucal.mavlink.vehicle_source import one_of
@@ -53,6 +53,14 @@ def test_a_flood_of_strangers_is_named_and_ends_no_later(script, station):
     link, _ = locked(script(in_order(heartbeats(station(), HOME), junk)))
     heard = list(link.messages(4 * S))
     assert (len(heard), link.now_ns()) == (2, 4 * S)
+
+
+@pytest.mark.parametrize(("kB", "words"), [(60, "no autopilot's heartbeat came"), (600, "is flooded")])
+def test_noise_on_a_serial_line_is_a_flood_where_it_is_more_than_a_line_carries(script, kB, words):
+    noise = [(5 * k / kB, HOME, bytes([k % 256]) * 1000) for k in range(kB)]
+    link = Link(script(noise, outward=True, datagrams=False), lambda t_ns, data: None)
+    with pytest.raises(BusError, match=f"{words}.*within 6 s"):
+        link.listen()
 
 
 def test_several_vehicles_end_with_their_list(script, station):
