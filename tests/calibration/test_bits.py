@@ -54,6 +54,10 @@ def high_bit(acc, gyr):
     acc[:, 1] &= ~(1 << 12)
 
 
+def middle_bit(acc, gyr):
+    acc[:, 0] |= 1 << 6
+
+
 def high_bit_set(acc, gyr):
     acc[:, 1] |= 1 << 13
 
@@ -70,6 +74,7 @@ def sign(acc, gyr):
         (low_byte_later, "the low 8 bits of the accelerometer's y never move from "),
         (low_byte_on_a_bad_bus, "the low 8 bits of the accelerometer's x never move"),
         (high_bit, "bit 12 of the accelerometer's y never moves"),
+        (middle_bit, "bit 6 of the accelerometer's x never moves"),
         (high_bit_set, "bit 13 of the accelerometer's y never moves"),
         (sign, "bit 15 of the accelerometer's z never moves"),
     ],
@@ -84,6 +89,10 @@ def test_bits_that_never_move_are_named(counted, spoil, what):
 def test_where_the_range_is_not_known_the_other_axes_tell(counted):
     found = against(counted(UNKNOWN, low_byte))
     assert found.what.startswith("the low 8 bits of the accelerometer's x never move")
+
+
+def test_where_the_range_is_not_known_counts_are_known_again(counted):
+    assert against(counted(UNKNOWN, middle_bit)).what.startswith("bit 6 of the accelerometer's x never moves")
 
 
 def test_a_byte_that_is_lost_of_all_axes_is_no_coarse_sensor(counted):

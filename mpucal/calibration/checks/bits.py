@@ -1,11 +1,13 @@
 """Check of the bits of which readings are made: an axis whose low or high bits never move.
 
-Counts are known again where the range is known (16 bits, as the MPU-6050 and its successors have). Where it is not,
-the steps of an axis are compared with those of the others. A sensor that is coarse on all axes is no fault.
+Counts are known again where the range is known, or where all values are whole counts of one of the chip's (16 bits, as
+the MPU-6050 and its successors have). Where they are not, the steps of an axis are compared with those of the others.
+A sensor that is coarse on all axes is no fault.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -18,12 +20,13 @@ from .unusable import dead_accelerometer, dead_gyroscope
 
 # PS-MPU-6000A r3.4, section 6: sensitivities at 16 bits
 FULL_SCALE, GYRO_LSB_PER_DPS, GYRO_DPS = 32768, 131.0, 250.0
+ACCEL_RANGES_G, GYRO_RANGES_DPS = (16.0, 8.0, 4.0, 2.0), (2000.0, 1000.0, 500.0, 250.0)
 # So many low bits more than those that no axis moves are dead; so many on all axes are no coarse sensor's any more.
 DEAD_BITS, DEAD_BITS_OF_ALL = 3, 7
 # They are looked for in pieces, as they may die midway; of the changes in a piece some may be errors of a bus.
 MOST_PIECES, SHORTEST_PIECE_S, FEWEST_CHANGES, SHARE_OF_ERRORS = 64, 2.0, 12, 0.1
-# A stuck high bit takes values out of the middle of those that are passed.
-HIGH_BITS, SIGN, OF_ALL_VALUES = range(8, 16), 15, 0.9
+# A stuck bit takes values out of the middle of those that are passed; a low one does so in many places.
+LOW_BITS, HIGH_BITS, SIGN, OF_ALL_VALUES, FEWEST_PLACES = range(1, 8), range(8, 16), 15, 0.9, 16
 # Where the range is not known: how many steps of another axis make a step that is odd, and how exactly.
 ODD_STEPS, EXACTLY, FEWEST_VALUES, MOST_SAMPLES = 8.0, 0.02, 6, 20_000
 # Below this a step [m/s^2, rad/s] may be that of a float32, which is coarser the larger a value is.
@@ -48,24 +51,24 @@ def bits_stuck(e: Evidence) -> Reason | None:
     if dead_accelerometer(e) is not None or dead_gyroscope(e) is not None:
         return None
     acc_range, gyro_range = e.recording.sensor.accel_range_g, e.recording.sensor.gyro_range_dps
-    acc_lsb = None if acc_range is None else acc_range * STANDARD_GRAVITY_MPS2 / FULL_SCALE
-    gyr_lsb = None if gyro_range is None else np.deg2rad(gyro_range / GYRO_DPS / GYRO_LSB_PER_DPS)
+    acc_lsbs = [g * STANDARD_GRAVITY_MPS2 / FULL_SCALE for g in ([acc_range] if acc_range else ACCEL_RANGES_G)]
+    gyr_lsbs = [np.deg2rad(w / GYRO_DPS / GYRO_LSB_PER_DPS) for w in ([gyro_range] if gyro_range else GYRO_RANGES_DPS)]
     most = MOST_MPS2 if e.sure is None else min(MOST_MPS2, HONEST_STD * e.sure.rms_mps2)
-    return _stuck(e, e.recording.acc, acc_lsb, "accelerometer", "m/s^2", most) or _stuck(
-        e, e.recording.gyr, gyr_lsb, "gyroscope", "rad/s", USABLE_RAD_S
+    return _stuck(e, e.recording.acc, acc_lsbs, "accelerometer", "m/s^2", most) or _stuck(
+        e, e.recording.gyr, gyr_lsbs, "gyroscope", "rad/s", USABLE_RAD_S
     )
 
 
-def _stuck(e: Evidence, values: Vector, lsb: float | None, sensor: str, unit: str, most: float) -> Reason | None:
-    counts = None if not lsb else _counts(values, lsb)
+def _stuck(e: Evidence, values: Vector, lsbs: Iterable[float], sensor: str, unit: str, most: float) -> Reason | None:
+    lsb, counts = next(((lsb, found) for lsb in lsbs if (found := _counts(values, lsb)) is not None), (0.0, None))
     if counts is None:
         low = _odd_steps(values)
     else:
-        high = _stuck_high(counts, e.recording.gap)
-        if high is not None:
-            axis, bit = high
+        one, low = _stuck_bit(counts, e.recording.gap, HIGH_BITS), _stuck_low(counts, lsb, e.recording.rate_hz)
+        one = one or (_stuck_bit(counts, e.recording.gap, LOW_BITS) if low is None else None)
+        if one is not None:
+            axis, bit = one
             return reason("bits_stuck", "high", sensor=sensor, axis="xyz"[axis], bit=bit)
-        low = _stuck_low(counts, float(lsb or 1.0), e.recording.rate_hz)
     if low is None:
         return None
     seconds = float(e.recording.t[low.first] - e.recording.t[0])
@@ -120,16 +123,19 @@ def _dead_bits(lowest: NDArray[np.int_]) -> int:
     return int(moved[int(SHARE_OF_ERRORS * len(moved))]) if len(moved) >= FEWEST_CHANGES else -1
 
 
-def _stuck_high(counts: Counts, gap: NDArray[np.bool_]) -> tuple[int, int] | None:
-    """(axis, bit) that is the same throughout, though values on both sides of it are passed."""
+def _stuck_bit(counts: Counts, gap: NDArray[np.bool_], bits: range) -> tuple[int, int] | None:
+    """(axis, bit) that is the same throughout, though lower ones move, and values on both sides of it are passed."""
     halves = [part for part in (counts[: len(counts) // 2], counts[len(counts) // 2 :]) if not gap.any() and len(part)]
     for part in (counts, *halves):
         moved = np.bitwise_or.reduce(part ^ part[0], axis=0)
         passed = np.ptp(part, axis=0)
         for axis in range(3):
-            for bit in HIGH_BITS:
+            for bit in bits:
                 enough = 2 ** (bit + 1) if bit < SIGN else OF_ALL_VALUES * 2**SIGN
-                if not moved[axis] >> bit & 1 and passed[axis] >= enough:
+                lower = moved[axis] & (1 << bit) - 1
+                if moved[axis] >> bit & 1 or not lower or passed[axis] < enough:
+                    continue
+                if bit in HIGH_BITS or len(np.unique(part[:, axis] >> (bit + 1))) >= FEWEST_PLACES:
                     return axis, bit
     return None
 
