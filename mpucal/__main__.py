@@ -6,6 +6,7 @@ from __future__ import annotations
 import errno
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -18,6 +19,8 @@ BUG = 1
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 # the commands whose capture is written as it happens
 RECORDING = ("session", "record")
+# by a terminal, beside the ends of lines
+OBEYED = re.compile("[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 # errors are events then, too
 EVENTS = "--json-events"
 
@@ -31,16 +34,27 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _keep_streams() -> None:
-    """Whatever becomes of stderr, what was measured is worth more than what is said of it."""
+    """Streams that take every text; whatever becomes of stderr, what was measured is worth more than what is said."""
     for handle in (0, 1, 2):
         try:
             os.fstat(handle)
         except OSError:
             # a file that is opened later would take its place, and receive what is said
             os.open(os.devnull, os.O_RDWR)
+    encoding = "utf-8" if sys.stdout is None else sys.stdout.encoding
+    to_a_person = os.isatty(1)
+    raw = io.BufferedWriter(io.FileIO(1, "wb", closefd=False))
+    sys.stdout = _Plain(raw, encoding, "backslashreplace", line_buffering=to_a_person)
     if sys.stderr is None or not sys.stderr.isatty():
         raw = io.BufferedWriter(_Unfailing(2, "wb", closefd=False))
-        sys.stderr = io.TextIOWrapper(raw, "utf-8", "backslashreplace", line_buffering=True)
+        sys.stderr = _Plain(raw, "utf-8", "backslashreplace", line_buffering=True)
+
+
+class _Plain(io.TextIOWrapper):
+    """Text that a terminal only shows: what it would obey, as in the name of a file, is escaped."""
+
+    def write(self, text: str) -> int:
+        return super().write(OBEYED.sub(lambda found: ascii(found[0])[1:-1], text))
 
 
 class _Unfailing(io.FileIO):

@@ -18,7 +18,7 @@ from . import frames
 from .arguments import LARGEST, column, mask, rows, seconds, stretch
 from .arguments import Mask as Mask  # noqa: PLC0414 - rooms above take them from here
 from .arguments import Vector as Vector  # noqa: PLC0414
-from .errors import WrongType
+from .errors import WrongType, on_one_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -184,6 +184,10 @@ class Recording(Samples):
     autopilot: Autopilot | None = None
     others: tuple[Recording, ...] = ()
     taken: str | None = None
+
+    def __post_init__(self) -> None:
+        # a file may be called anything
+        object.__setattr__(self, "name", on_one_line(self.name))
 
     @classmethod
     def from_arrays(

@@ -29,6 +29,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 
+def on_one_line(text: str) -> str:
+    """A text that names files and quotes what they hold, as a terminal only shows it: what else it obeys is escaped."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 class MpucalError(Exception):
     """Root of the tree: what happened, on what, and what to do next.
 
@@ -42,8 +47,8 @@ class MpucalError(Exception):
 
     def __init__(self, what: str, remedy: str) -> None:
         super().__init__(what, remedy)
-        self.what = what
-        self.remedy = remedy
+        self.what = on_one_line(what)
+        self.remedy = on_one_line(remedy)
 
     def __str__(self) -> str:
         return f"{self.what}: {self.remedy}{'' if self.remedy.endswith('?') else '.'}"

@@ -1,5 +1,6 @@
-"""Slices of tools/fuzz.py and its like, tools/syscalls.py and tools/campaign.py; seeds are the day's, and printed."""
+"""Slices of tools/fuzz.py and its like, tools/syscalls.py and tools/campaign.py, their seeds the day's; and names."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 TOOLS = Path(__file__).parents[1] / "tools"
+SESSION = TOOLS.parent / "fixtures" / "sessions" / "mpu6050.mcap"
 
 
 def holds(tool, *words):
@@ -45,3 +47,16 @@ def test_files_are_old_or_new_whatever_call_fails():
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs /proc")
 def test_what_is_struck_ends_as_it_may():
     holds("campaign.py", "--sessions", "16", "--recordings", "40")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="names are bytes on Linux alone")
+def test_a_file_may_be_called_anything(tmp_path):
+    named = tmp_path / os.fsdecode(b"walk\xff\x1b[2J\n.mcap")
+    shutil.copy(SESSION, named)
+    gone = named.with_suffix(".gone.mcap")
+    for words in ("calibrate", named, "-o", tmp_path / "results"), ("show", named), ("calibrate", gone):
+        done = subprocess.run([sys.executable, "-m", "mpucal", *words], capture_output=True, check=False)
+        assert done.returncode == (3 if gone in words else 0), done.stderr
+        assert b"\x1b" not in done.stdout + done.stderr
+    assert rb"walk\udcff\x1b[2J\n" in done.stderr
+    assert rb"walk\udcff\x1b[2J\n" in (tmp_path / "results" / "report.html").read_bytes()
