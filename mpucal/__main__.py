@@ -11,12 +11,16 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from .errors import Abandoned, MpucalError, OutputError
+from .errors import Abandoned, MpucalError, OutputError, SourceError
 from .session.threads import ONE_THREAD
 
 BUG = 1
 # of a full disk or quota behind stdout
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
+# what the loader says of a library that memory does not hold
+UNMAPPED = "failed to map segment"
+# what a computer may answer to whatever is asked of it
+DENIED = (*NO_ROOM, errno.EIO, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENFILE, errno.ENOMEM)
 # the commands whose capture is written as it happens
 RECORDING = ("session", "record")
 # by a terminal, beside the ends of lines
@@ -80,6 +84,18 @@ def run(arguments: Sequence[str] | None = None) -> int:
             return _event(Abandoned.exit_code, f"interrupted{kept}", "")
         print(f"mpucal: interrupted{kept}.", file=sys.stderr)
         return Abandoned.exit_code
+    except OSError as error:
+        if error.errno not in DENIED:
+            return _bug(arguments)
+        if error.errno in NO_ROOM and error.filename is None:
+            # Python would complain again while it flushes
+            sys.stdout = None
+            print(f"mpucal: the output cannot be written ({error.strerror}): make room where it goes.", file=sys.stderr)
+            return OutputError.exit_code
+        what = error.filename or "a file or device"
+        return _denied(arguments, f"cannot use {what} ({error.strerror})", "check its permissions, and the disk")
+    except MemoryError:
+        return _denied(arguments, "there is not enough memory", "end other programs, or give a shorter recording")
 
 
 def _run(arguments: Sequence[str] | None) -> int:
@@ -104,19 +120,25 @@ def _run(arguments: Sequence[str] | None) -> int:
     except SystemExit:
         # click's own end where who read the results has left: that is no error
         return 0
-    except OSError as error:
-        if error.errno not in NO_ROOM:
-            return _bug(arguments)
-        # Python would complain again while it flushes
-        sys.stdout = None
-        print(f"mpucal: the output cannot be written ({error.strerror}): make room where it goes.", file=sys.stderr)
-        return OutputError.exit_code
-    except Exception:
+    except (OSError, MemoryError):
+        # as while modules are loaded
+        raise
+    except Exception as error:
+        if isinstance(error, ImportError) and UNMAPPED in str(error):
+            raise MemoryError from error
         return _bug(arguments)
 
 
 def _words(arguments: Sequence[str] | None) -> Sequence[str]:
     return sys.argv[1:] if arguments is None else arguments
+
+
+def _denied(arguments: Sequence[str] | None, what: str, do: str) -> int:
+    """What the computer cannot give, in a sentence or event."""
+    if EVENTS in _words(arguments):
+        return _event(SourceError.exit_code, what, do)
+    print(f"mpucal: {what}: {do}.", file=sys.stderr)
+    return SourceError.exit_code
 
 
 def _event(exit_code: int, what: str, remedy: str) -> int:

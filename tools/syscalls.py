@@ -1,80 +1,72 @@
-"""Fail every system call of a command in turn, and cut the power after each: is the old file there, or the new one?
+"""Fail each system call of a command in turn, then its allocations, and cut the power: is each file the old or the new?
 
-    python tools/syscalls.py [COMMAND ...] [--every N] [--errno EIO]
+    python tools/syscalls.py [COMMAND ...] [--each] [--most N] [--allocations N] [--seed N]
 
-tools/syscalls.c is preloaded: it counts open, write, fsync, fdatasync, close, rename, unlink, mkdir and mmap of what
-lies below the folder. For each the command runs again, and that call fails: it must end with a documented
-exit code and a sentence, and each file be the old one or the new one, whole.
+tools/syscalls.c is preloaded: it counts what a command asks of the files below a folder (open, read, write, fsync,
+close, rename, unlink, mkdir, chmod, stat, opendir, mmap). The command runs again and again, and each time one of its
+calls fails, with an error that such a call may have. Calls that repeat (the same call, of the same file) are a kind:
+its first, second, middle and last are failed; with --each, every one; with --most, so many of these. Then one
+allocation of 4 kB or more gets no memory, or all from one on do not: the first and the last, and so many drawn by the
+seed. Sessions are quick ones. Wrong is: a trace or a crash, an exit code that is not documented, no sentence, a file
+that is neither the old one nor the new one, whole; a recording that is gone, a device that holds something else than
+before while nothing says so. Crashes of NumPy, some of whose loops use a buffer that they did not get, are counted.
 
-Then its calls are replayed into a model of a disk, on which what was not synced is lost, in part or whole, and renames
-and new names of a folder that was not synced come in any order. After each call, each file must again be old or new.
-Exit code 1 where one was not.
+Its calls are also replayed into a model of a disk (tools/disk_model.py), and the power is cut after calls of each
+kind: each file must be old or new, what was synced be there, and a note of a write as long as its device is between.
+Seeds are the day's number. Exit code 1 where something was wrong.
 """
 
 from __future__ import annotations
 
 import argparse
-import ctypes
 import errno
+import json
 import os
 import random
 import re
 import shutil
 import subprocess
 import sys
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from mpucal.__main__ import _keep_streams, run
+from disk_model import Call, Disk, logged
+from syscalls_commands import STATE, WORDS, Ended, Failing, ended, prepared
+
 from mpucal.errors import MpucalError
 from mpucal.files import load
 from mpucal.result.blob import Blob
 
 SHIM = Path(__file__).with_suffix(".c")
 CODES = (0, 3, 4, 5, 6)
-SIM = "sim:seed=3,chip=mpu6500,temperature_c="
-WORDS = {
-    "session": ["session", "--bus", f"{SIM}20", "--rate", "25", "-o", "new", "--yes"],
-    "record": ["record", "--bus", f"{SIM}20", "--seconds", "3", "-o", "board/walk.mcap"],
-    "calibrate": ["calibrate", "in.npz", "-o", "board"],
-    "merge": ["merge", "a.json", "b.json", "-o", "board"],
-    "check": ["check", "a.json", "in.mcap", "-o", "board"],
-    "write": ["write", "a.json", "chip", "--bus", f"{SIM}20", "-o", "board", "--yes"],
-    "export": ["export", "a.json", "--to", "c-header", "-o", "board/calibration.h"],
-    "apply": ["apply", "a.json", "in.npz", "-o", "board/out.csv"],
+DISK = (errno.EIO, errno.ENOSPC, errno.EDQUOT)
+REFUSED = (errno.EROFS, errno.EACCES)
+ERRORS = {
+    "o": (*DISK, *REFUSED, errno.EMFILE, errno.EINTR),
+    "i": (errno.EIO, errno.EINTR),
+    "w": (*DISK, errno.EFBIG, errno.EINTR),
+    "s": DISK,
+    "c": DISK,
+    "r": (*DISK, *REFUSED),
+    "u": (errno.EIO, *REFUSED),
+    "m": (*DISK, *REFUSED),
+    "p": (errno.EIO, *REFUSED),
+    "l": (errno.EIO, errno.EACCES),
+    "a": (errno.ENOMEM, errno.EACCES),
 }
 # of files that are made anew with the time in them
-DATE = re.compile(rb"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?([.]\d+)?([+-]\d\d:\d\d|Z| UTC)?")
-CUTS, DRAWS = 60, 3
+DATE = re.compile(rb'"digest": "[\w:]+"|' rb"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?([.]\d+)?([+-]\d\d:\d\d|Z| UTC)?")
+TEMPORARY = re.compile(r"(^|/)[.](.+)[.]\w{8}$")
+CAPTURES = (".mcap", ".tlog")
+COPY = "bridge/"
+# some of whose loops use a buffer that they did not get
+NUMPY = "_multiarray_umath"
+DRAWS, LEAST_BYTES = 3, 4096
+Files = Mapping[str, bytes]
 Whole = Callable[[str, bytes], bool]
-
-
-def ended(
-    words: Sequence[str], folder: Path, n: int = 0, error: int = errno.EIO, log: int = -1
-) -> tuple[int, str, int]:
-    """Exit code, what was said and how many calls counted, of a command whose call `n` fails."""
-    shim = ctypes.CDLL(None)
-    said = folder.parent / "said"
-    hear, tell = os.pipe()
-    pid = os.fork()
-    if pid == 0:
-        os.chdir(folder)
-        for handle in (1, 2):
-            os.dup2(os.open(said if handle == 2 else "/dev/null", os.O_RDWR | os.O_CREAT | os.O_TRUNC), handle)
-        _keep_streams()
-        shim.syscalls_arm(str(folder).encode(), n, error, log)
-        code = run(words)
-        os.write(tell, str(shim.syscalls_count()).encode())
-        os._exit(code)
-    _, status = os.waitpid(pid, 0)
-    os.close(tell)
-    counted = os.read(hear, 20)
-    os.close(hear)
-    return os.waitstatus_to_exitcode(status), said.read_text("utf-8", "replace"), int(counted or 0)
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -82,16 +74,20 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def either(old: dict[str, bytes], new: dict[str, bytes]) -> Whole:
-    """Whether a file is as before, or as the command makes it."""
+def either(old: Files, new: Files) -> Whole:
+    """Whether a file is as before, or as the command makes it; a temporary one, and a note of a write, is no result."""
 
     def whole(name: str, data: bytes) -> bool:
-        if data == old.get(name):
+        if data == old.get(name) or Path(name).name.startswith(".") or name.startswith(STATE):
             return True
         if name not in new:
             return False
-        if name.endswith((".mcap", ".tlog")):
-            return readable(name, data)
+        if name.startswith(COPY):
+            # what mpucal brings along can be had again
+            return True
+        if name.endswith(CAPTURES):
+            # what is not closed yet is read as far as it goes, or refused in a sentence
+            return True
         if name.endswith(".html"):
             # it tells the minute
             return data.rstrip().endswith(b"</html>")
@@ -102,198 +98,169 @@ def either(old: dict[str, bytes], new: dict[str, bytes]) -> Whole:
     return whole
 
 
-def readable(name: str, data: bytes) -> bool:
-    """A capture is read as far as it goes, or refused in a sentence."""
-    with TemporaryDirectory() as place:
-        path = Path(place) / Path(name).name
-        path.write_bytes(data)
-        with suppress(MpucalError):
-            load(path)
-    return True
-
-
-def prepared(place: Path) -> Path:
-    """A folder with what the commands read, and an older result."""
-    start = place / "start"
-    start.mkdir()
-    for name, celsius in (("a", "20"), ("b", "45,hand=placing")):
-        folder = place / name
-        assert ended(["session", "--bus", f"{SIM}{celsius}", "--rate", "25", "-o", str(folder), "--yes"], start)[0] == 0
-        shutil.copy(folder / "calibration.json", start / f"{name}.json")
-    shutil.copy(place / "a" / "capture.mcap", start / "in.mcap")
-    with (start / "in.npz").open("wb") as file:
-        import numpy as np  # noqa: PLC0415
-
-        recording = load(start / "in.mcap")
-        np.savez(file, t=recording.t, acc=recording.acc, gyr=recording.gyr)
-    shutil.copytree(place / "b", start / "board", ignore=shutil.ignore_patterns("capture*"))
-    return start
-
-
-def failing(name: str, start: Path, every: int, error: int) -> tuple[int, Counter[int], list[str]]:
-    """How many calls were failed, how the command ended, and what was wrong."""
-    here = start.parent / "here"
-
-    def anew() -> None:
-        shutil.rmtree(here, ignore_errors=True)
-        shutil.copytree(start, here)
-
-    anew()
-    old = files(here)
-    code, said, count = ended(WORDS[name], here)
-    whole = either(old, files(here))
-    assert code == 0, said
-    codes: Counter[int] = Counter()
-    wrong = []
-    for n in range(1 + random.randrange(every), count + 1, every):
-        anew()
-        code, said, _ = ended(WORDS[name], here, n, error)
-        codes[code] += 1
-        last = (said.strip().splitlines() or [""])[-1]
-        if code not in CODES or "Traceback" in said or (code not in (0, 5) and not last.startswith("mpucal: ")):
-            wrong.append(f"{name}: call {n} failed, exit {code}: {last}")
-        now = files(here)
-        # an old report beside a new calibration would be another's
-        gone = [path for path in old.keys() - now.keys() if not path.endswith("report.html")]
-        wrong += [f"{name}: call {n} failed, and {path} is gone" for path in gone]
-        wrong += [f"{name}: call {n} failed, {path} is neither old nor new" for path in spoilt(now, whole)]
-    return codes.total(), codes, wrong
-
-
-def spoilt(found: dict[str, bytes], whole: Whole) -> Iterator[str]:
-    """Those that are neither old nor new; a temporary file that could not be taken away is no result."""
+def spoilt(found: Files, whole: Whole) -> Iterator[str]:
+    """Those that are neither old nor new."""
     for name, data in found.items():
         try:
-            fit = Path(name).name.startswith(".") or whole(name, data)
+            fit = whole(name, data)
         except (MpucalError, ValueError):
             fit = False
         if not fit:
             yield name
 
 
-@dataclass
-class Inode:
-    """A file: its content on the disk, and what was written since."""
-
-    kept: bytes = b""
-    since: list[tuple[int, bytes]] = field(default_factory=list)
-
-    def after(self, writes: Sequence[tuple[int, bytes]]) -> bytes:
-        """Its content with these writes alone."""
-        data = bytearray(self.kept)
-        for at, part in writes:
-            data.extend(bytes(max(0, at + len(part) - len(data))))
-            data[at : at + len(part)] = part
-        return bytes(data)
+def noted(found: Files) -> bool:
+    """Whether a note of a write is there that can be read."""
+    return any(
+        "old" in (said := json.loads(data)) or "registers" in said
+        for name, data in found.items()
+        if name.startswith(STATE) and not Path(name).name.startswith(".")
+    )
 
 
-class Disk:
-    """Files by name as a power cut leaves them."""
+class Trial:
+    """A command on copies of `start`."""
 
-    def __init__(self, content: dict[str, bytes]) -> None:
-        self._names = {name: Inode(data) for name, data in content.items()}
-        self._now = dict(self._names)
-        # names that were set or taken away since their folder was synced
-        self._since: list[tuple[str, Inode | None]] = []
+    def __init__(self, name: str, start: Path) -> None:
+        self._words, self._start, self._here = WORDS[name], start, start.parent / "here"
+        self._anew()
+        self.old = files(self._here)
+        with (start.parent / "log").open("w+b", buffering=0) as log:
+            done = ended(self._words, self._here, Failing(least=LEAST_BYTES, log=log.fileno()))
+            log.seek(0)
+            self.log = list(logged(log.read(), str(self._here)))
+        assert done.code == 0, done.said
+        self.new, self.allocations = files(self._here), done.allocations
+        self.calls = [call for call in self.log if call.op != "d"]
+        self.whole = either(self.old, self.new)
 
-    def call(self, op: str, flags: int, at: int, path: str, other: str, data: bytes) -> None:
-        """One that was logged."""
-        if op == "o" and flags & os.O_CREAT and (path not in self._now or flags & (os.O_TRUNC | os.O_EXCL)):
-            self._set(path, Inode())
-        elif op == "w" and path in self._now:
-            self._now[path].since.append((at, data))
-        elif op == "s" and path in self._now:
-            inode = self._now[path]
-            inode.kept, inode.since = inode.after(inode.since), []
-        elif op == "s":
-            for name, inode in self._since:
-                self._settle(self._names, name, inode)
-            self._since = []
-        elif op == "r" and path in self._now:
-            inode = self._now[path]
-            self._set(path, None)
-            self._set(other, inode)
-        elif op == "u":
-            self._set(path, None)
+    def failed(self, failing: Failing) -> tuple[str, list[str]]:
+        """How the command ends where this fails, and what was wrong."""
+        self._anew()
+        done = ended(self._words, self._here, failing)
+        if (done.crashed or "").startswith(NUMPY):
+            return "NumPy crashed", []
+        return f"exit {done.code}", list(self._wrong(done, files(self._here), failing.call))
 
-    def cut(self, rng: random.Random, share: float) -> dict[str, bytes]:
-        """What is there after a cut that lets `share` of what was not synced reach the disk, in any order."""
-        names = dict(self._names)
-        for name, inode in rng.sample(self._since, len(self._since)):
-            if rng.random() < share:
-                self._settle(names, name, inode)
-        return {
-            name: inode.after([write for write in inode.since if rng.random() < share]) for name, inode in names.items()
-        }
+    def _wrong(self, done: Ended, now: Files, call: int) -> Iterator[str]:
+        last = (done.said.strip().splitlines() or [""])[-1]
+        if done.code not in CODES or "Traceback" in done.said:
+            trace = done.said[done.said.find("Traceback") :].splitlines()[-4:-1] if "Traceback" in done.said else ()
+            yield f"exit {done.code}: {done.crashed or last} {' | '.join(trace)}"
+        elif done.code not in (0, 5) and not last.startswith("mpucal: "):
+            yield f"exit {done.code} without a sentence: {last}"
+        # an old report beside a new calibration would be another's
+        yield from (f"{name} is gone" for name in self.old.keys() - now.keys() if not name.endswith("report.html"))
+        yield from (f"{name} is neither old nor new" for name in spoilt(now, self.whole))
+        if done.code == 0:
+            yield from (f"exit 0 without {name}" for name in self.new.keys() - now.keys())
+        if noted(now) != (done.changed and done.code != 0):
+            yield f"exit {done.code}, device {'changed' if done.changed else 'as before'}, note: {noted(now)}"
+        for name in (name for name in self.new.keys() - self.old.keys() if name.endswith(CAPTURES)):
+            written = [i for i, each in enumerate(self.calls, 1) if each.op == "w" and each.path == name]
+            # of which the first holds the head
+            if name in now if done.code == 0 else written[1] < call:
+                try:
+                    load(self._here / name)
+                except MpucalError as error:
+                    yield f"exit {done.code}, and what was recorded is lost: {error}"
 
-    def _set(self, name: str, inode: Inode | None) -> None:
-        self._settle(self._now, name, inode)
-        self._since.append((name, inode))
+    def cut_off(self, rng: random.Random, looked: Sequence[int]) -> tuple[int, list[str]]:
+        """How many cuts were looked at, of those after entries of the log, and what was wrong."""
+        disk, wrong, cuts = Disk(self.old), [], 0
+        states = [call.data for call in self.log if call.op == "d"]
+        state = b""
+        for i, call in enumerate(self.log):
+            disk.call(call)
+            state = call.data if call.op == "d" else state
+            for share in (0.0, 1.0, *(rng.random() for _ in range(DRAWS))) if i in looked else ():
+                left = disk.cut(rng, share)
+                cuts += 1
+                bad = [f"{name} is neither old nor new" for name in spoilt(left, self.whole)]
+                bad += [
+                    f"{name} was synced, and is gone"
+                    for name in disk.synced
+                    if name.endswith(CAPTURES) and name not in left
+                ]
+                if state and state not in (states[0], states[-1]) and not noted(left):
+                    bad.append("the device is neither old nor new, and nothing says so")
+                if i == len(self.log) - 1 and noted(left):
+                    bad.append("all is done, and the next write will undo it")
+                wrong += [f"power cut after {i} ({call.op} {call.path}): {each}" for each in bad]
+        return cuts, wrong
 
-    @staticmethod
-    def _settle(names: dict[str, Inode], name: str, inode: Inode | None) -> None:
-        if inode is None:
-            names.pop(name, None)
-        else:
-            names[name] = inode
+    def _anew(self) -> None:
+        shutil.rmtree(self._here, ignore_errors=True)
+        shutil.copytree(self._start, self._here)
 
 
-def cut_off(name: str, start: Path) -> tuple[int, list[str]]:
-    """How many cuts were looked at, and what was wrong."""
-    here, rng = start.parent / "here", random.Random(1)
-    shutil.rmtree(here, ignore_errors=True)
-    shutil.copytree(start, here)
-    old = files(here)
-    with (start.parent / "log").open("w+b", buffering=0) as log:
-        assert ended(WORDS[name], here, log=log.fileno())[0] == 0
-        log.seek(0)
-        calls = list(logged(log.read(), f"{here}/"))
-    whole, disk, wrong, cuts = either(old, files(here)), Disk(old), [], 0
-    looked = set(rng.sample(range(len(calls)), min(CUTS, len(calls)))) | {len(calls) - 1}
+def sampled(calls: Sequence[Call], each: bool) -> list[int]:
+    """Indices of calls: of each kind the first, second, middle and last; or all."""
+    kinds = defaultdict(list)
     for i, call in enumerate(calls):
-        disk.call(*call)
-        if i not in looked:
-            continue
-        for share in (0.0, 1.0, *(rng.random() for _ in range(DRAWS))):
-            cuts += 1
-            for path in spoilt(disk.cut(rng, share), whole):
-                wrong.append(f"{name}: power cut after call {i} ({call[0]} {call[3]}): {path} is neither old nor new")
-    return cuts, wrong
+        kinds[call.op, TEMPORARY.sub(r"\1\2~", call.path)].append(i)
+    some = ({of[0], of[min(1, len(of) - 1)], of[len(of) // 2], of[-1]} for of in kinds.values())
+    return list(range(len(calls))) if each else sorted(set().union(*some))
 
 
-def logged(log: bytes, root: str) -> Iterator[tuple[str, int, int, str, str, bytes]]:
-    """(op, flags, offset, path, other path, data) of each call."""
-    while log:
-        head, _, log = log.partition(b"\n")
-        op, _, at, size, path, other = head.decode().split("\t")
-        data, log = log[: int(size)], log[int(size) :]
-        yield op, int(at), int(at), path.removeprefix(root), other.removeprefix(root), data
+def tried(name: str, start: Path, asked: argparse.Namespace) -> Iterator[str]:
+    """What was wrong with a command; a line of the table is printed."""
+    rng = random.Random(f"{name} {asked.seed}")
+    trial = Trial(name, start)
+    todo = [
+        (f"{trial.calls[i].op} {trial.calls[i].path}", Failing(i + 1, rng.choice(ERRORS[trial.calls[i].op])))
+        for i in sampled(trial.calls, asked.each)
+    ]
+    todo = rng.sample(todo, min(asked.most or len(todo), len(todo)))
+    most = trial.allocations
+    drawn = sorted({1, most, *(rng.randint(1, most) for _ in range(asked.allocations))}) if asked.allocations else ()
+    starved = [
+        ("memory", Failing(least=LEAST_BYTES, allocation=n, since=since)) for n in drawn for since in (False, True)
+    ]
+    codes: dict[str, Counter[str]] = defaultdict(Counter)
+    wrong = []
+    for what, failing in (*todo, *starved):
+        code, bad = trial.failed(failing)
+        codes["memory" if failing.least else "calls"][code] += 1
+        how = (
+            f"allocation {failing.allocation}{' on' if failing.since else ''}"
+            if failing.least
+            else (f"call {failing.call} ({what}) {errno.errorcode[failing.error]}")
+        )
+        wrong += [f"{name}: {how}: {each}" for each in bad]
+    looked = sampled(trial.log, asked.each)
+    cuts, worse = trial.cut_off(rng, [*looked, len(trial.log) - 1])
+    wrong += [f"{name}: {each}" for each in worse]
+    ends = "; ".join(
+        f"{counted.total()} of {len(trial.calls) if what == 'calls' else most} {what} ("
+        + ", ".join(f"{code}: {n}" for code, n in sorted(counted.items()))
+        + ")"
+        for what, counted in codes.items()
+    )
+    print(f"{name:<21} failed {ends}; {cuts} power cuts: {len(wrong)} wrong", flush=True)
+    asked.totals.update({"calls": len(todo), "allocations": len(starved), "power cuts": cuts})
+    yield from wrong
 
 
 def main() -> int:
     """Run them; the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("commands", nargs="*", metavar="COMMAND", help=f"some of {', '.join(WORDS)}; default: all")
-    parser.add_argument("--every", type=int, default=1, help="fail every N-th call alone")
-    parser.add_argument("--errno", default="EIO")
+    parser.add_argument("commands", nargs="*", metavar="COMMAND", help=f"some of: {', '.join(WORDS)}; default: all")
+    parser.add_argument("--each", action="store_true", help="fail every call, and cut the power after each")
+    parser.add_argument(
+        "--most", type=int, metavar="N", help="fail so many calls of a command at most, drawn by the seed"
+    )
+    parser.add_argument("--allocations", type=int, default=0, metavar="N", help="fail so many, too")
+    parser.add_argument("--seed", type=int, default=int(time.time()) // 86400)
     asked = parser.parse_args()
     if "LD_PRELOAD" not in os.environ:
         return preloaded()
-    points, wrong = 0, []
-    with TemporaryDirectory() as place:
-        os.environ["XDG_STATE_HOME"] = f"{place}/state"
-        start = prepared(Path(place).resolve())
-        for name in asked.commands or WORDS:
-            count, codes, bad = failing(name, start, asked.every, getattr(errno, asked.errno))
-            cuts, worse = cut_off(name, start)
-            points, wrong = points + count, [*wrong, *bad, *worse]
-            ends = ", ".join(f"exit {code}: {n}" for code, n in sorted(codes.items()))
-            print(
-                f"{name:<10}{count:>5} calls failed ({ends}), {cuts} power cuts: {len(bad) + len(worse)} wrong",
-                flush=True,
-            )
+    asked.totals = Counter()
+    print(f"seed {asked.seed}", flush=True)
+    with prepared() as start:
+        wrong = [each for name in asked.commands or WORDS for each in tried(name, start, asked)]
     print("\n".join(wrong))
-    print(f"{points} calls failed: {len(wrong)} wrong")
+    print(", ".join(f"{n} {what}" for what, n in asked.totals.items()) + f": {len(wrong)} wrong")
     return int(bool(wrong))
 
 

@@ -28,7 +28,7 @@ from ..chip.accesses import Accesses
 from ..chip.records import Record, SessionEvent
 from ..durable import Durable
 from ..errors import CaptureError, OutputError
-from ..result.atomic import whole_file
+from ..result.atomic import sync_folder, whole_file
 from ..strict_json import parsed_own
 from .messages import BUS, SESSION, accesses_message, accesses_schema, event_message, event_schema, records_of
 
@@ -41,7 +41,8 @@ CHUNK_NS = 500_000_000
 # of a closed capture: the longest, and the part of what precedes it
 CLOSED_CHUNK_NS, CLOSED_CHUNK_PART = 10_000_000_000, 10
 
-# the last two: a length that no memory holds
+# of writing: the latter is zstd without memory. Of reading, the last two: a length that no memory holds
+_FAILED = (OSError, ZstdError)
 _DAMAGE = (
     McapError,
     CRCValidationError,
@@ -69,6 +70,7 @@ class CaptureWriter:
             self._file = self._path.open("wb")
         except OSError as error:
             raise self._cannot_write(error) from error
+        sync_folder(self._path.parent)
         # the chunks' index grows by 1 MB an hour: in vain where nothing is kept
         self._stream = _Stream(self._file, CHUNK_NS, chunked=self._path != Path(os.devnull))
         self._durable = Durable(self._file)
@@ -83,7 +85,7 @@ class CaptureWriter:
         """Keep a register access; the message's publish time is the host's clock."""
         try:  # as `_writing`, in a third of its time
             self._stream.add(transaction)
-        except OSError as error:
+        except _FAILED as error:
             raise self._cannot_write(error) from error
 
     def event(self, name: str, t_ns: int, data: Mapping[str, Any] | None = None) -> None:
@@ -98,7 +100,7 @@ class CaptureWriter:
             self._file.flush()
         if self._stream.started and self._path.is_file():
             # without it the file is as whole, and longer
-            with suppress(OutputError, CaptureError):
+            with suppress(OutputError, CaptureError, ZstdError, MemoryError):
                 self._with_longer_chunks()
 
     def __enter__(self) -> Self:
@@ -121,12 +123,12 @@ class CaptureWriter:
     def _writing(self) -> Iterator[None]:
         try:
             yield
-        except OSError as error:
+        except _FAILED as error:
             raise self._cannot_write(error) from error
 
-    def _cannot_write(self, error: OSError) -> OutputError:
+    def _cannot_write(self, error: Exception) -> OutputError:
         return OutputError(
-            f"cannot write the capture {self._path} ({error.strerror or error})",
+            f"cannot write the capture {self._path} ({getattr(error, 'strerror', None) or error})",
             "choose a place that you may write to, with room on it, with -o",
         )
 

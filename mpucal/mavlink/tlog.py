@@ -12,6 +12,7 @@ from typing import NamedTuple, Self
 
 from ..durable import Durable
 from ..errors import CaptureError, OutputError
+from ..result.atomic import sync_folder
 from .dialect import HEADER, LONGEST, packet_length
 
 STAMP = struct.Struct(">Q")
@@ -43,6 +44,7 @@ class TlogWriter:
             self._file = path.open("wb")
         except OSError as error:
             raise self._cannot_write(error) from error
+        sync_folder(self._path.parent)
         self._durable = Durable(self._file)
 
     def packet(self, t_ns: int, data: bytes) -> None:

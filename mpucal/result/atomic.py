@@ -87,7 +87,7 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
             os.fsync(file.fileno())
         temporary.chmod(0o644)
         temporary.replace(path)
-        _sync_folder(path.parent)
+        sync_folder(path.parent)
     except BaseException as error:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
@@ -99,8 +99,21 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
         ) from error
 
 
-def _sync_folder(folder: Path) -> None:
-    # The rename itself is durable only once its folder is. Where that fails the new file is there nevertheless.
+def make_folders(folder: Path) -> None:
+    """Make `folder`, and those that it lies in, where they are missing, so that a power cut leaves them there.
+
+    Raises
+    ------
+    OSError : one cannot be made.
+    """
+    missing = [each for each in (folder, *folder.parents) if not each.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    for each in missing:
+        sync_folder(each.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """See to it that a power cut leaves the names in `folder` as they are now; a disk that fails does not matter."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:

@@ -16,7 +16,7 @@ from typing import Any
 
 from ..errors import OutputError
 from ..strict_json import parsed
-from .atomic import write_atomically
+from .atomic import make_folders, sync_folder, write_atomically
 from .clock import now
 
 AT = "at"
@@ -39,14 +39,19 @@ class Journal:
         if self._path is None:
             return
         with suppress(OSError, OutputError):
-            self._path.parent.mkdir(parents=True, exist_ok=True)
+            make_folders(self._path.parent)
             write_atomically(self._path, json.dumps({AT: now().isoformat(), **content}, indent=2).encode())
 
     def done(self) -> None:
         """The device holds one state again, the old or the new one."""
         if self._path is not None:
-            with suppress(OSError):
+            # a note that stays, or that a power cut brings back, would have the next write undo this one
+            try:
                 self._path.unlink(missing_ok=True)
+                sync_folder(self._path.parent)
+            except OSError:
+                with suppress(OutputError):
+                    write_atomically(self._path, b"{}")
 
     def left(self) -> dict[str, Any] | None:
         """What a write that was cut off noted; None where none was."""

@@ -15,7 +15,7 @@ import numpy as np
 from ..data import Recording
 from ..errors import OutputError
 from ..report import render
-from ..result.atomic import write_atomically, write_together
+from ..result.atomic import make_folders, write_atomically, write_together
 from ..result.calibration import REFUSED, Calibration
 from ..result.session_files import DOCUMENT, REPORT, SESSION_FILES
 
@@ -99,7 +99,7 @@ def make_folder(folder: Path) -> None:
     OutputError : it cannot be made.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folders(folder)
     except OSError as error:
         raise OutputError(
             f"cannot make the folder {folder} ({error.strerror})", "choose another one with -o"

@@ -106,9 +106,10 @@ def put_back(kind: SinkKind, sink: Sink, kept: Path, folder: Path, say: Say) -> 
 
 @contextmanager
 def _interrupted_as_refused(sink: Sink) -> Iterator[None]:
-    """By Ctrl-C, SIGTERM or SIGHUP a sink puts back what was there; then this is a write-back that failed."""
+    """By Ctrl-C, SIGTERM, SIGHUP or lack of memory a sink puts back what was there: a write-back that failed."""
     with interrupting():
         try:
             yield
-        except KeyboardInterrupt as error:
-            raise WriteBackError(f"the write was interrupted, and {sink.where} is as before", "start again") from error
+        except (KeyboardInterrupt, MemoryError) as error:
+            why = "there was not enough memory" if isinstance(error, MemoryError) else "the write was interrupted"
+            raise WriteBackError(f"{why}, and {sink.where} is as before", "start again") from error

@@ -65,3 +65,22 @@ def test_a_full_disk_behind_stdout_is_3(mpucal, tmp_path, monkeypatch):
     result = mpucal("show", "c.json")
     assert result.code == 3
     assert result.err == "mpucal: the output cannot be written (No space left on device): make room where it goes.\n"
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (MemoryError(), "there is not enough memory: end other programs, or give a shorter recording."),
+        (PermissionError(errno.EACCES, "Permission denied", "x/c.json"), "cannot use x/c.json (Permission denied)"),
+        (OSError(errno.EMFILE, "Too many open files"), "cannot use a file or device (Too many open files)"),
+    ],
+)
+def test_what_the_computer_refuses_is_3(mpucal, monkeypatch, error, said):
+    def refused(_path):
+        raise error
+
+    monkeypatch.setattr("mpucal.cli.show.load", refused)
+    result = mpucal("show", "some.npz")
+    assert result.code == 3
+    assert result.err.startswith(f"mpucal: {said}")
+    assert result.err.count("\n") == 1

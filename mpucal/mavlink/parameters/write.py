@@ -19,7 +19,7 @@ TAKEN_OVER_NS = S // 4
 # of the journal
 OLD, NEW = "old", "new"
 
-FAILURES = (MpucalError, EndOfCapture, KeyboardInterrupt)
+FAILURES = (MpucalError, EndOfCapture, KeyboardInterrupt, MemoryError)
 
 
 class Step(NamedTuple):
