@@ -4,6 +4,7 @@ from __future__ import annotations
 
 # next to nothing here: what takes a while to load does so where Ctrl-C finds its sentence
 import errno
+import gc
 import io
 import os
 import re
@@ -34,7 +35,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for variable, one in ONE_THREAD.items():
         os.environ.setdefault(variable, one)
     _keep_streams()
-    sys.exit(run(arguments))
+    code = run(arguments)
+    # Python looks through everything for cycles at its end, which takes longer than some commands
+    gc.freeze()
+    sys.exit(code)
 
 
 def _keep_streams() -> None:
