@@ -202,14 +202,14 @@ KINDS: Mapping[str, Kind] = {
         turn_again=True,
     ),
     "data_lost": Kind(
-        "Samples are missing: the bus or the link was too slow or failed, or the session was interrupted.",
+        "Samples are missing or stuck: the bus or the link was too slow or failed, or the session was interrupted.",
         {
             "bus": Sentence(
-                "samples are missing in {places} ({seconds:.2f} s in all)",
+                "samples are missing or stuck in {places} ({seconds:.2f} s in all)",
                 "unless the measurement was interrupted there, use a faster bus or a lower rate",
             ),
             "link": Sentence(
-                "samples are missing in {places} ({seconds:.2f} s in all)",
+                "samples are missing or stuck in {places} ({seconds:.2f} s in all)",
                 "unless the measurement was interrupted there, use a nearer or faster link or a lower rate",
             ),
         },

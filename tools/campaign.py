@@ -50,7 +50,7 @@ from mpucal.session import results, rotate
 
 CASES = 16
 # a session that aims at less ends sooner: how often each, and until when faults begin
-TARGETS = (*("quick",) * 3, "normal")
+TARGETS = (*("quick",) * 7, "normal")
 LAST_S = {"quick": 50.0, "normal": 66.0}
 CHIPS = ("mpu6050", "mpu6500", "clone98")
 HANDS = (*("guided",) * 6, "wandering", "placing", "random")
@@ -58,8 +58,8 @@ RATES = (50, 25, 100, 25)
 FIRMWARES = ("ardupilot", "px4")
 # a report is made for one of so many
 REPORTS = 8
-# once for every so many of the chip alone
-WORLDS = (*(CHIP,) * 8, BRIDGE, VEHICLE)
+# once for every so many of the chip alone, which costs least
+WORLDS = (*(CHIP,) * 15, BRIDGE, VEHICLE)
 POLL_S, KNOW_EVERY_S, SELDOM = 0.5, 3.0, 8.0
 CPU_S, WALL_S = 120, 600.0
 FOLDER = "board"

@@ -47,7 +47,7 @@ KINDS: dict[str, tuple[str, ...]] = {
 }
 SPOILT_BYTES, WITHIN_BYTES = 40, 4000
 STEP_MG = 3.0, 300.0
-ROOM_BYTES = 400_000
+ROOM_BYTES, SAID_BYTES = 400_000, 20_000
 
 
 @dataclass(frozen=True)
@@ -222,8 +222,12 @@ class HookedTransport(SimulatedTransport):
 
 
 def fill_disk(room: int) -> None:
-    """No file of this process can be longer than `room` bytes: its writes fail as on a full disk."""
+    """No file of this process can be longer than `room` bytes: its writes fail as on a full disk.
+
+    But what is said goes to a file here, and has room.
+    """
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    room = max(room, os.fstat(2).st_size + SAID_BYTES)
     resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
 
 

@@ -21,6 +21,7 @@ from .claim import claim_of, claimed
 from .evidence import Evidence
 from .fit import Fit
 from .flat_segment import Flat, find_flat, flat_statistics, tells
+from .lone_jumps import without_lone_jumps
 from .masks import reset, with_masks
 from .model_selection import METHODS, Choice, choose
 from .parameters import B_A_NAMES, B_OMEGA_NAMES, BY_NAME, D_NAMES
@@ -73,7 +74,7 @@ def weigh(
     before = Evidence(recording, gravity, None, None, model)
     if no_gyroscope(before) is not None:
         return before, {"model": model, "why": "nothing could be estimated"}
-    recording = with_masks(recording)
+    recording = without_lone_jumps(with_masks(recording))
     segment = recording.flat or find_flat(recording)
     flat = flat_statistics(recording, segment) if segment is not None and tells(recording, segment) else None
     over = None if flat is None else reset(recording, flat)

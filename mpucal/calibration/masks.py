@@ -25,6 +25,9 @@ LOST_RAD, SETTLING = 0.2, 5
 
 LINE_TOLERANCE, SHORTEST_LINE = 1e-6, 8
 
+# Of a rate that repeats while the board turns by so much [rad/s]: as long as chance makes at rest so rarely.
+SHORTEST_REPEAT, BY_CHANCE, TURNING = 8, 1e-6, 0.3
+
 GAP_INTERVALS = 2.5  # a longer time between samples than so many intervals is a gap
 
 # Of a board that is back at once: how far gravity turns within a step beyond what the gyroscope tells, how much of that
@@ -44,11 +47,13 @@ def with_masks(recording: Recording) -> Recording:
     acc_g, gyro_dps = recording.sensor.accel_range_g, recording.sensor.gyro_range_dps
     acc_ranges = ACC_RANGES if acc_g is None else np.array([acc_g]) * STANDARD_GRAVITY_MPS2
     gyro_ranges = GYRO_RANGES if gyro_dps is None else np.deg2rad([gyro_dps])
+    gyr_clipped = recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, gyro_ranges))
+    stuck = of_a_chip & _stuck(recording.gyr) & ~gyr_clipped
     return replace(
         recording,
-        gap=recording.gap | paused | _on_a_line(recording.gyr, recording.t),
+        gap=recording.gap | paused | _on_a_line(recording.gyr, recording.t) | stuck,
         acc_clipped=recording.acc_clipped | (of_a_chip & _at_the_rail(recording.acc, acc_ranges)),
-        gyr_clipped=recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, gyro_ranges)),
+        gyr_clipped=gyr_clipped,
     )
 
 
@@ -113,6 +118,25 @@ def _on_a_line(values: Vector, t: Vector) -> Mask:
         if last - first >= SHORTEST_LINE:
             drawn[first + 1 : last + 2] = True
     return drawn
+
+
+def _stuck(values: Vector) -> Mask:
+    """(n,) True where a rate repeats while the board turns, for longer than its noise at the start lets it."""
+    stuck = np.zeros(len(values), bool)
+    for column in values.T:
+        same = np.diff(column) == 0.0
+        start = same[: max(len(same) // 20, 50)]
+        by_chance = (np.count_nonzero(start) + 1) / (len(start) + 2)
+        longest = max(np.log(BY_CHANCE / len(values)) / np.log(by_chance), SHORTEST_REPEAT)
+        if not same.any() or _run_lengths(same)[same].max() < longest:
+            continue
+        edges = np.diff(np.concatenate([[False], same, [False]]).astype(np.int8))
+        for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+            # a rate that is far from rest, or others that change
+            most = np.ptp(values[first : last + 1], axis=0).max()
+            if last - first >= longest and max(most, abs(column[first] - column[0])) > TURNING:
+                stuck[first + 1 : last + 2] = True
+    return stuck
 
 
 def _at_the_rail(values: Vector, ranges: Vector) -> Mask:

@@ -201,3 +201,23 @@ def test_a_recording_is_known_again_by_its_digest(ideal, tmp_path):
     assert {calibrate(r, "accel", G).fit["recording_digest"] for r in (later, rounded)} == {digest}
     for other in (recording.part(0, len(recording) - 1), replace(recording, acc=recording.acc + 1e-4)):
         assert calibrate(other, "accel", G).fit["recording_digest"] != digest
+
+
+def test_a_gyroscopes_words_that_jump_alone_move_nothing(hand):
+    scenario = hand(3, "pose12")
+    rng, gyr = np.random.default_rng(5), scenario.recording.gyr.copy()
+    gyr[rng.integers(0, len(gyr), 10), rng.integers(0, 3, 10)] += 40.0 * rng.normal(size=10)
+    spoilt, whole = calibrate(replace(scenario.recording, gyr=gyr)), calibrate(scenario.recording)
+    assert spoilt.verdict == "good"
+    assert np.abs(spoilt.D - whole.D).max() < 1e-3
+
+
+def test_a_gyroscopes_axis_that_stood_still_while_others_turned_is_not_believed(hand):
+    recording = hand(3, "pose12").recording
+    rates = np.abs(recording.gyr[:, 1])
+    turning = int(np.flatnonzero(rates > 0.5 * rates.max())[0])
+    gyr = recording.gyr.copy()
+    gyr[turning : turning + 300, 1] = gyr[turning, 1]
+    spoilt = calibrate(replace(recording, gyr=gyr))
+    assert [reason["code"] for reason in spoilt.quality["reasons"]] == ["data_lost"]
+    assert np.abs(spoilt.D - calibrate(recording).D).max() < 2e-3

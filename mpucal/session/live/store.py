@@ -6,13 +6,11 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from ...calibration.lone_jumps import without_lone_jumps
 from ...data import Mask, Recording, Samples, Sensor, Vector
 
 # Means of what comes faster: a hand does nothing that is not seen at this rate.
 MOST_HZ = 200.0
-# A word that jumps alone: by so much [m/s^2, rad/s] at least, by so many times what its neighbours depart from theirs,
-# and they differ by so little of it.
-LEAST_JUMP, JUMPS, RETURNS = np.repeat((0.3, 0.15), 3), 8.0, 0.25
 
 
 class SampleStore:
@@ -52,8 +50,7 @@ class SampleStore:
     def recording(self) -> Recording:
         """All of them, without the flips that the decoder saw too late."""
         self._join()
-        acc, gyr = np.hsplit(_without_flips(np.hstack([self._done.acc, self._done.gyr])), 2)
-        return Recording(**{**vars(self._done), "acc": acc, "gyr": gyr}, sensor=self._sensor)
+        return without_lone_jumps(Recording(**vars(self._done), sensor=self._sensor))
 
     def _join(self) -> None:
         if self._parts:
@@ -62,25 +59,6 @@ class SampleStore:
 
 def _cut(samples: Samples, first: int, last: int) -> Samples:
     return Samples(*(getattr(samples, f.name)[first:last] for f in fields(Samples)))
-
-
-def _without_flips(words: Vector) -> Vector:
-    """(n, 6) with the mean of its neighbours for a word that jumps alone and is back with the next sample.
-
-    A bit flipped in the last frame of a poll is set right with the next poll only (chip/flips.py), when the samples
-    are here already.
-    """
-    before, after = words[:-2], words[2:]
-    mean = 0.5 * (before + after)
-    off = np.pad(np.abs(words[1:-1] - mean), ((3, 3), (0, 0)))
-    # the departures of the samples beside it hold half of the jump: those beyond them do not
-    usual = np.max([off[k : len(off) - 6 + k] for k in (0, 1, 5, 6)], axis=0)
-    off = off[3:-3]
-    jumps = off > np.maximum(LEAST_JUMP, JUMPS * usual)
-    flipped = jumps & (np.abs(after - before) < RETURNS * off) & (jumps.sum(axis=1, keepdims=True) == 1)
-    right = words.copy()
-    right[1:-1][flipped] = mean[flipped]
-    return right
 
 
 def _means(samples: Samples, size: int) -> Samples:
