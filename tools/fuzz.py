@@ -41,6 +41,10 @@ Run = Callable[[bytes], object]
 Check = Callable[[bytes], str | None]
 
 
+class TooLongError(BaseException):
+    """It takes longer than any reader may; no reader takes it for an error of a library's."""
+
+
 def mutated(corpus: Sequence[bytes], seed: int) -> bytes:
     """Damaged by its seed."""
     from campaign_recordings import OF_BYTES  # noqa: PLC0415 - not before the package is instrumented
@@ -67,7 +71,7 @@ def checked(run: Run) -> Check:
             run(data)
         except (MpucalError, BlobError, MessageError):
             pass
-        except Exception:
+        except (Exception, TooLongError):
             return traceback.format_exc(limit=-4)
         return None
 
@@ -148,7 +152,7 @@ def again(name: str, check: Check, path: Path) -> int:
 
 def too_long(_signal: int, _frame: FrameType | None) -> None:
     """It takes longer than any reader may."""
-    raise TimeoutError(f"longer than {LONGEST_S} s of processor time")
+    raise TooLongError(f"longer than {LONGEST_S} s of processor time")
 
 
 def main() -> int:

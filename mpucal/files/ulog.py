@@ -11,7 +11,7 @@ import struct
 from collections.abc import Iterable
 from contextlib import redirect_stdout
 from dataclasses import replace
-from io import StringIO
+from io import BufferedReader, FileIO, StringIO
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,20 @@ _DAMAGE = (
 )
 
 
+class _PastTheEnd(BufferedReader):
+    """A file in which a read goes on by what it asked for at the end, too.
+
+    pyulog goes back by that from a damaged message, and would read the same bytes for ever.
+    """
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """What there is."""
+        data = super().read(size)
+        if size is not None and len(data) < size:
+            self.seek(size - len(data), 1)
+        return data
+
+
 def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
     """The recording of the first IMU of a PX4's log, or of sensor_combined where `hints.topic` names that.
 
@@ -52,7 +66,7 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
     reader = library("pyulog", "px4", path)
     try:
         # it prints what it finds of damage, where results go
-        with path.open("rb") as file, redirect_stdout(StringIO()):
+        with _PastTheEnd(FileIO(path)) as file, redirect_stdout(StringIO()):
             log = reader.ULog(file, [COMBINED, ACCEL, GYRO])
     except OSError as error:
         raise RecordingError(f"cannot read {path} ({error.strerror or error})", "check the path") from error

@@ -178,3 +178,10 @@ def test_a_damaged_log_says_so_in_what_was_taken_alone(walk, t_us, tmp_path, cap
     path.write_bytes(data)
     assert "it is damaged" in load(path).taken
     assert capsys.readouterr().out == "", "results go there"
+
+
+def test_a_log_that_ends_within_a_damaged_message_is_read_to_its_end(tmp_path):
+    message = (51).to_bytes(2, "little") + b"\0" + bytes(50)
+    (tmp_path / "log.ulg").write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8) + message)
+    with pytest.raises(RecordingError, match="holds no sensor_accel"):
+        load(tmp_path / "log.ulg")
