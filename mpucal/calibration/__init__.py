@@ -74,7 +74,8 @@ def weigh(
     before = Evidence(recording, gravity, None, None, model)
     if no_gyroscope(before) is not None:
         return before, {"model": model, "why": "nothing could be estimated"}
-    recording = without_lone_jumps(with_masks(recording))
+    # an acceleration that jumps alone may be a knock, which the fit weighs itself
+    recording = replace(with_masks(recording), gyr=without_lone_jumps(recording).gyr)
     segment = recording.flat or find_flat(recording)
     flat = flat_statistics(recording, segment) if segment is not None and tells(recording, segment) else None
     over = None if flat is None else reset(recording, flat)

@@ -48,7 +48,7 @@ def with_masks(recording: Recording) -> Recording:
     acc_ranges = ACC_RANGES if acc_g is None else np.array([acc_g]) * STANDARD_GRAVITY_MPS2
     gyro_ranges = GYRO_RANGES if gyro_dps is None else np.deg2rad([gyro_dps])
     gyr_clipped = recording.gyr_clipped | (of_a_chip & _at_the_rail(recording.gyr, gyro_ranges))
-    stuck = of_a_chip & _stuck(recording.gyr) & ~gyr_clipped
+    stuck = of_a_chip & _stuck(recording.gyr, gyr_clipped)
     return replace(
         recording,
         gap=recording.gap | paused | _on_a_line(recording.gyr, recording.t) | stuck,
@@ -120,8 +120,8 @@ def _on_a_line(values: Vector, t: Vector) -> Mask:
     return drawn
 
 
-def _stuck(values: Vector) -> Mask:
-    """(n,) True where a rate repeats while the board turns, for longer than its noise at the start lets it."""
+def _stuck(values: Vector, clipped: Mask) -> Mask:
+    """(n,) True where a rate within its range repeats while the board turns, longer than its noise at first lets it."""
     stuck = np.zeros(len(values), bool)
     for column in values.T:
         same = np.diff(column) == 0.0
@@ -134,7 +134,7 @@ def _stuck(values: Vector) -> Mask:
         for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
             # a rate that is far from rest, or others that change
             most = np.ptp(values[first : last + 1], axis=0).max()
-            if last - first >= longest and max(most, abs(column[first] - column[0])) > TURNING:
+            if last - first >= longest and not clipped[first] and max(most, abs(column[first] - column[0])) > TURNING:
                 stuck[first + 1 : last + 2] = True
     return stuck
 
