@@ -63,7 +63,7 @@ class Disk:
 
     Attributes
     ----------
-    synced : content of each file as it last was when it was synced.
+    synced : content of each file as it last was when it was synced. placed : contents that took the place of a name.
     """
 
     def __init__(self, content: Mapping[str, bytes]) -> None:
@@ -72,6 +72,7 @@ class Disk:
         # names that were set or taken away since their folder was synced
         self._since: list[tuple[str, Inode | None]] = []
         self.synced: dict[str, bytes] = {}
+        self.placed: dict[str, list[bytes]] = {}
 
     def call(self, call: Call) -> None:
         """One that happened."""
@@ -95,6 +96,7 @@ class Disk:
         elif op == "r" and inode is not None:
             self._set(path, None)
             self._set(call.other, inode)
+            self.placed.setdefault(call.other, []).append(inode.after(inode.since))
         elif op == "u":
             self._set(path, None)
 

@@ -74,8 +74,11 @@ def files(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def either(old: Files, new: Files) -> Whole:
-    """Whether a file is as before, or as the command makes it; a temporary one, and a note of a write, is no result."""
+def either(old: Files, new: Files, placed: Mapping[str, Sequence[bytes]]) -> Whole:
+    """Whether a file is as before, or as the command makes it (one after the other, before and after a write-back).
+
+    A temporary file, and a note of a write, is no result.
+    """
 
     def whole(name: str, data: bytes) -> bool:
         if data == old.get(name) or Path(name).name.startswith(".") or name.startswith(STATE):
@@ -93,7 +96,7 @@ def either(old: Files, new: Files) -> Whole:
             return data.rstrip().endswith(b"</html>")
         if name.endswith(".bin"):
             return bool(Blob.decode(data))
-        return DATE.sub(b"", data) == DATE.sub(b"", new[name])
+        return DATE.sub(b"", data) in (DATE.sub(b"", each) for each in (new[name], *placed.get(name, ())))
 
     return whole
 
@@ -132,7 +135,10 @@ class Trial:
         assert done.code == 0, done.said
         self.new, self.allocations = files(self._here), done.allocations
         self.calls = [call for call in self.log if call.op != "d"]
-        self.whole = either(self.old, self.new)
+        disk = Disk(self.old)
+        for call in self.calls:
+            disk.call(call)
+        self.whole = either(self.old, self.new, disk.placed)
 
     def failed(self, failing: Failing) -> tuple[str, list[str]]:
         """How the command ends where this fails, and what was wrong."""
@@ -154,8 +160,9 @@ class Trial:
         yield from (f"{name} is neither old nor new" for name in spoilt(now, self.whole))
         if done.code == 0:
             yield from (f"exit 0 without {name}" for name in self.new.keys() - now.keys())
-        if noted(now) != (done.changed and done.code != 0):
-            yield f"exit {done.code}, device {'changed' if done.changed else 'as before'}, note: {noted(now)}"
+        told = noted(now) or "put back what was there" in last
+        if told != (done.changed and done.code != 0):
+            yield f"exit {done.code}, device {'changed' if done.changed else 'as before'}, told: {told}"
         for name in (name for name in self.new.keys() - self.old.keys() if name.endswith(CAPTURES)):
             written = [i for i, each in enumerate(self.calls, 1) if each.op == "w" and each.path == name]
             # of which the first holds the head

@@ -19,6 +19,8 @@ from .sink import Applied, Restorable, Sink
 # asks whether to go on; WriteBackError where the person says no, or where there is a doubt and no person
 Ask = Callable[[str], None]
 
+NO_MEMORY = "there was not enough memory"
+
 
 def keep(kind: SinkKind, sink: Sink, folder: Path, say: Say) -> tuple[Path, ...]:
     """Save what the sink holds, and tell how to bring it back; see Sink.keep."""
@@ -43,11 +45,19 @@ def write_to(kind: SinkKind, sink: Sink, calibration: Calibration, folder: Path,
     extra = {**applied.calibration.extra, WRITTEN: [*applied.calibration.extra.get(WRITTEN, ()), entry]}
     try:
         return replace(applied, calibration=record(kind, replace(applied.calibration, extra=extra)))
-    except OutputError as error:
+    except (OutputError, MemoryError) as cause:
+        error = (
+            cause if isinstance(cause, OutputError) else OutputError(NO_MEMORY, "end other programs, and start again")
+        )
         if not isinstance(sink, Restorable) or not kept:
-            raise OutputError(f"{applied.what}, but {error.what}", error.remedy) from error
+            raise OutputError(f"{applied.what}, but {error.what}", error.remedy) from cause
         # a bias that is gone from the samples, with no file that says so, would be removed twice
-        raise WriteBackError(f"{error.what}; {sink.put_back(kept[0])}", error.remedy) from error
+        try:
+            back = sink.put_back(kept[0])
+        except MemoryError:
+            do = f"put back what was there with `mpucal write {kept[0]} {kind.name} ...`"
+            raise OutputError(f"{applied.what}, but {error.what}", do) from cause
+        raise WriteBackError(f"{error.what}; {back}", error.remedy) from cause
 
 
 def write_to_all(
@@ -111,5 +121,5 @@ def _interrupted_as_refused(sink: Sink) -> Iterator[None]:
         try:
             yield
         except (KeyboardInterrupt, MemoryError) as error:
-            why = "there was not enough memory" if isinstance(error, MemoryError) else "the write was interrupted"
+            why = NO_MEMORY if isinstance(error, MemoryError) else "the write was interrupted"
             raise WriteBackError(f"{why}, and {sink.where} is as before", "start again") from error

@@ -81,8 +81,8 @@ def as_it_is(kind, now):
 
 
 @settings(deadline=None, max_examples=60)
-@given(fails=st.sets(st.integers(1, 4), max_size=2), full_after=st.none() | st.integers(0, 4))
-def test_the_old_state_or_the_new_one_and_the_files_say_which(tmp_path_factory, fails, full_after):
+@given(fails=st.sets(st.integers(1, 4), max_size=2), full_after=st.none() | st.integers(0, 4), memory=st.booleans())
+def test_the_old_state_or_the_new_one_and_the_files_say_which(tmp_path_factory, fails, full_after, memory):
     folder = tmp_path_factory.mktemp("faults")
     measured = Calibration(np.eye(3), BIAS, quality=GOOD)
     measured.save(folder / "calibration.json")
@@ -90,6 +90,8 @@ def test_the_old_state_or_the_new_one_and_the_files_say_which(tmp_path_factory, 
 
     def record(kind, now):
         if full_after is not None and len(saved) >= full_after:
+            if not memory:
+                raise MemoryError
             unsaved(kind, now)
         saved.append(kind.name)
         now.save(folder / "calibration.json")
