@@ -57,8 +57,11 @@ ERRORS = {
     "l": (errno.EIO, errno.EACCES),
     "a": (errno.ENOMEM, errno.EACCES),
 }
-# of files that are made anew with the time in them
-DATE = re.compile(rb'"digest": "[\w:]+"|' rb"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?([.]\d+)?([+-]\d\d:\d\d|Z| UTC)?")
+# of files that are made anew with the time in them: a check counts how old a calibration is
+DATE = re.compile(
+    rb'"digest": "[\w:]+"|(?<=[.]\d{4})\d+|'
+    rb"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?([.]\d+)?([+-]\d\d:\d\d|Z| UTC)?"
+)
 TEMPORARY = re.compile(r"(^|/)[.](.+)[.]\w{8}$")
 CAPTURES = (".mcap", ".tlog")
 COPY = "bridge/"
