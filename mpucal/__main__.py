@@ -17,7 +17,7 @@ from .session.threads import ONE_THREAD
 
 BUG = 1
 # of a full disk or quota behind stdout
-NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 # what the loader says of a library that memory does not hold
 UNMAPPED = "failed to map segment"
 # what a computer may answer to whatever is asked of it

@@ -18,6 +18,8 @@ DEEPEST = 32
 LONGEST_STRING = 1 << 16
 MOST_DIGITS = 40
 LARGEST_INTEGER = 1 << 64
+# squares of it stay finite
+LARGEST = 1e150
 # what a terminal obeys, and what no encoding writes
 FORBIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 
@@ -91,7 +93,7 @@ def _integer(digits: str) -> int:
 
 def _number(digits: str) -> float:
     value = float(digits) if len(digits) <= LONGEST_STRING else math.inf
-    if not math.isfinite(value):
+    if abs(value) > LARGEST:
         raise ValueError("a number is too large")
     return value
 

@@ -49,6 +49,18 @@ def test_what_is_struck_ends_as_it_may():
     holds("campaign.py", "--sessions", "16", "--recordings", "40")
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs named pipes and ulimit")
+def test_a_pipe_is_not_replayed_and_too_little_room_is_said(tmp_path):
+    os.mkfifo(tmp_path / "capture.mcap")
+    mpucal = [sys.executable, "-m", "mpucal"]
+    done = subprocess.run([*mpucal, "session", "--replay", tmp_path], capture_output=True, timeout=60, check=False)
+    assert (done.returncode, b"is a pipe or device" in done.stderr) == (3, True)
+    limited = f'ulimit -f 1; "$@" > {tmp_path}/out.csv'
+    words = ["apply", SESSION.with_name("mpu6050.json"), SESSION]
+    done = subprocess.run(["sh", "-c", limited, "sh", *mpucal, *words], capture_output=True, check=False)
+    assert (done.returncode, b"make room where it goes" in done.stderr) == (3, True)
+
+
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="names are bytes on Linux alone")
 def test_a_file_may_be_called_anything(tmp_path):
     named = tmp_path / os.fsdecode(b"walk\xff\x1b[2J\n.mcap")

@@ -23,6 +23,7 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from zstandard import ZstdError
 
+from ..arguments import regular
 from ..chip.access import Transaction
 from ..chip.accesses import Accesses
 from ..chip.records import Record, SessionEvent
@@ -258,7 +259,7 @@ class CaptureReader:
     def blocks(self) -> Iterator[Accesses | Record]:
         """The same, register accesses as many at a time as the file has them."""
         try:
-            with self._path.open("rb") as file:
+            with regular(self._path).open("rb") as file:
                 yield from self._blocks(file)
         except OSError as error:
             raise CaptureError(

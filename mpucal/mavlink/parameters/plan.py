@@ -12,7 +12,7 @@ from ...data import Vector
 from ...errors import WriteBackError
 from ...result.calibration import REFUSED, Calibration
 from ...result.improvement import is_better
-from ..imu import SCALED, Stream
+from ..imu import MESSAGE_ID, SCALED, Stream
 from .compose import Correction
 from .document import NEW, OLD, RESIDUAL, RESIDUAL_OLD, UNCERTAIN
 from .names import Place, place_of
@@ -122,7 +122,19 @@ def _holds(document: Mapping[str, Any]) -> bool:
     return verdict != REFUSED and bool(document.get("autopilot", {}).get(NEW))
 
 
+def _check_holds(autopilot: Mapping[str, Any], *keys: str) -> None:
+    lacking = [key for key in keys if autopilot.get(key) is None or (key == "message" and not _is_message(autopilot))]
+    if lacking:
+        raise WriteBackError(f"{NOTHING}: the calibration has no {lacking[0]} of the vehicle", "give a session's own")
+
+
+def _is_message(autopilot: Mapping[str, Any]) -> bool:
+    name = autopilot["message"]
+    return isinstance(name, str) and name in MESSAGE_ID
+
+
 def _change(autopilot: Mapping[str, Any], firmware: str) -> Change:
+    _check_holds(autopilot, "imu", "firmware", OLD)
     imu = int(autopilot["imu"])
     if autopilot["firmware"] != firmware:
         raise WriteBackError(
@@ -141,6 +153,7 @@ def _change(autopilot: Mapping[str, Any], firmware: str) -> Change:
             f"{NOTHING}: {beyond}, which {firmware} accepts of its own calibration",
             "check that the vehicle was turned to every side, and the sensor",
         )
+    _check_holds(autopilot, "message", "mounting", RESIDUAL)
     name = str(autopilot["message"])
     return Change(
         where,
