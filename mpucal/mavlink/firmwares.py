@@ -32,11 +32,15 @@ def preferred_messages(firmware: str, parameters: Mapping[str, float]) -> tuple[
     return (HIGHRES, *SCALED_ORDER) if unbiased else SCALED_ORDER
 
 
+# of a low pass: firmwares take whole Hz, and 0 for none
+LEAST_HZ = 1.0
+
+
 def accel_lag_s(parameters: Mapping[str, float]) -> float:
     """By how much an autopilot's low passes make its accelerometers later than its gyroscopes; 0 where it did not say.
 
     A Butterworth filter of order 2 delays what is slow by sqrt(2) / (2 pi f).
     """
     cutoffs = [parameters.get(name) for name in FILTERS]
-    delays = [math.sqrt(2.0) / (2.0 * math.pi * f) if f > 0.0 else 0.0 for f in cutoffs if f is not None]
+    delays = [math.sqrt(2.0) / (2.0 * math.pi * f) if f >= LEAST_HZ else 0.0 for f in cutoffs if f is not None]
     return delays[0] - delays[1] if len(delays) == len(FILTERS) else 0.0
