@@ -8,7 +8,7 @@ export PYTHON
 
 SECONDS ?= 600
 
-.PHONY: session test slow fuzz kernel lint audit bench wheel docs firmware clean
+.PHONY: session test slow campaign fuzz kernel lint audit bench wheel docs firmware clean
 
 session: $(READY)
 	@$(BIN)/mpucal session --bus sim
@@ -19,6 +19,10 @@ test: lint docs
 # what `make test` leaves out for its time
 slow: $(TESTED)
 	$(BIN)/pytest --numprocesses auto -m slow
+
+# struck sessions and recordings, with seeds that change by the day and are printed
+campaign: $(TESTED)
+	@$(BIN)/python tools/campaign.py --sessions 200 --recordings 2000
 
 # readers, peers, compiled modules and the firmware's core on hostile input, for SECONDS and a quarter as much again
 fuzz: $(TESTED)

@@ -49,10 +49,9 @@ def _keep_streams() -> None:
         except OSError:
             # a file that is opened later would take its place, and receive what is said
             os.open(os.devnull, os.O_RDWR)
-    encoding = "utf-8" if sys.stdout is None else sys.stdout.encoding
-    to_a_person = os.isatty(1)
-    raw = io.BufferedWriter(io.FileIO(1, "wb", closefd=False))
-    sys.stdout = _Plain(raw, encoding, "backslashreplace", line_buffering=to_a_person)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        encoding, to_a_person = sys.stdout.encoding, sys.stdout.line_buffering
+        sys.stdout = _Plain(sys.stdout.detach(), encoding, "backslashreplace", line_buffering=to_a_person)
     if sys.stderr is None or not sys.stderr.isatty():
         raw = io.BufferedWriter(_Unfailing(2, "wb", closefd=False))
         sys.stderr = _Plain(raw, "utf-8", "backslashreplace", line_buffering=True)

@@ -14,7 +14,7 @@ from .fit import Fit
 from .flat_segment import Flat, find_flat, flat_statistics
 from .rotation import lengths, turned
 from .sphere import fibonacci_sphere
-from .static_intervals import static_intervals, statistics
+from .static_intervals import in_pieces, static_intervals, statistics
 from .tilt import tilted_directions
 from .uncertainty import DIRECTIONS, Uncertainty, uncertainty
 
@@ -23,6 +23,8 @@ LEAST_MOVE_RAD = np.deg2rad(2.0)  # of gravity in half a second, above noise
 ENOUGH_MOVES = 100
 FAR_TOO_FAR = 20.0  # times as far as gravity: no rates in rad/s, but for turns about the vertical
 LONGEST_MOVE_S = 20.0  # over which a gyroscope still says where gravity went
+# Rests that can contradict each other; of fewer, pieces so long do.
+FEWEST_RESTS, PIECE_S = 3, 3.0
 
 
 class Agreement(NamedTuple):
@@ -125,12 +127,14 @@ class Evidence:
 
     @cached_property
     def agreement(self) -> Agreement | None:
-        """Of the static intervals, three or more, under the fit."""
+        """Of the static intervals, three or more, under the fit; of pieces of them, where they are fewer."""
         fit, flat, r = self.fit, self.flat, self.recording
         if fit is None or flat is None or self.calibrated is None:
             return None
         runs = static_intervals(r, flat)
-        if len(runs) < 3:
+        if len(runs) < FEWEST_RESTS:
+            runs = in_pieces(runs, round(PIECE_S * r.rate_hz))
+        if len(runs) < FEWEST_RESTS:
             return None
         poses, bias = statistics(self.calibrated, runs)[0], statistics(r.gyr, runs)[0]
         misses = []

@@ -68,6 +68,12 @@ def statistics(values: Vector, runs: Intervals) -> tuple[Vector, Vector]:
     return _kernel.statistics(np.ascontiguousarray(values), np.ascontiguousarray(runs, np.int64))
 
 
+def in_pieces(runs: Intervals, n: int) -> Intervals:
+    """(m, 2) the runs cut into pieces of n samples; what is left of each is left out."""
+    pieces = [(at, at + n) for first, last in runs.tolist() for at in range(first, last - n + 1, n)]
+    return np.array(pieces, np.intp).reshape(-1, 2)
+
+
 def _runs(mask: Mask) -> Intervals:
     """(k, 2) first and last + 1 of the runs of True."""
     edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))

@@ -557,3 +557,14 @@ def test_a_gravity_that_no_place_on_earth_has_is_said_unless_it_is_meant(good, g
     assert said["verdict"] == ("usable" if unlikely else "good")
     meant = calibrate(good, "accel", gravity, gravity_anyway=True)
     assert (meant.quality["verdict"], meant.quality["reasons"]) == ("good", [])
+
+
+def test_a_bias_that_stepped_at_the_only_rest_is_refused(hand):
+    # it lies for 25 s, and is never still again
+    turned = hand(3, "continuous").recording
+    indices = np.concatenate([np.arange(1500) % 500, np.arange(len(turned))])
+    lying = Recording.from_arrays(0.01 * np.arange(len(indices)), turned.acc[indices], turned.gyr[indices])
+    assert "inconsistent" not in judged(lying).reasons
+    stepped = judged(replace(lying, acc=lying.acc - np.outer(lying.t > 8.0, (0.0, 0.0, 2.0))))
+    assert stepped.verdict == "refused"
+    assert "contradict each other" in stepped.reasons["inconsistent"]

@@ -72,9 +72,13 @@ def test_a_wrong_gain_of_two_percent_is_measured_as_such(in_hand):
     assert rests.magnitude_rms == pytest.approx(G * 0.02 / 1.02, rel=0.1)
 
 
-def test_without_rests_there_is_nothing_to_compare(hand):
+def test_an_only_rest_is_compared_with_gravity_piece_by_piece(hand):
     simulated = hand(0, "continuous")
-    assert evidence(simulated.recording, exact_fit(simulated.truth)).agreement is None
+    truth = simulated.truth
+    right = evidence(simulated.recording, exact_fit(truth)).agreement
+    wrong = evidence(simulated.recording, exact_fit(replace(truth, D=truth.D * 1.02))).agreement
+    assert right.magnitude_rms < 0.01
+    assert wrong.magnitude_rms == pytest.approx(G * 0.02 / 1.02, rel=0.1)
 
 
 @pytest.mark.parametrize("broken", [{"D": np.zeros((3, 3))}, {"D": np.full((3, 3), np.nan)}], ids=["singular", "nan"])
