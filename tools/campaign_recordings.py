@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -163,7 +164,7 @@ def damaged(path: Path, number: int) -> tuple[list[Damage], bytes]:
     kinds: list[Callable] = []
     data = bytearray(path.read_bytes())
     if path.suffix in (".npz", ".csv") and rng.random() < 0.7:
-        rows = [row.copy() for row in _table(load(path))]
+        rows = [row.copy() for row in _table(path)]
         kinds = list(rng.choice(np.array(OF_ROWS, object), rng.integers(1, MOST_BLOWS + 1)))
         for kind in kinds:
             rows = kind(rows, rng) if rows else rows
@@ -177,7 +178,9 @@ def damaged(path: Path, number: int) -> tuple[list[Damage], bytes]:
     return [Damage(kind.__name__) for kind in kinds], bytes(data)
 
 
-def _table(recording: Recording) -> np.ndarray:
+@cache
+def _table(path: Path) -> np.ndarray:
+    recording = load(path)
     return np.column_stack((recording.t, recording.acc, recording.gyr))
 
 

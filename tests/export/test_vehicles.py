@@ -138,5 +138,5 @@ def test_an_id_that_the_vehicle_did_not_say_is_missed(name):
 def test_a_document_that_no_session_wrote_is_refused(key):
     made = of_vehicle("ardupilot", 0, np.diag(GAIN))
     lacking = {name: value for name, value in made.extra["autopilot"].items() if name != key}
-    with pytest.raises(WriteBackError, match="not what a session writes"):
+    with pytest.raises(WriteBackError, match=f"has no {key} of the vehicle"):
         form("ardupilot").export(replace(made, extra=MappingProxyType({"autopilot": lacking})))

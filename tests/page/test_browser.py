@@ -37,6 +37,9 @@ PHASES = {
     "seen": ([Held(6.0, Use.SEEN, (1.0, 0.0, 0.0), "seen already"), meter(6.1, 4.0, "")], "Seen already", "", "again"),
 }
 
+DRAWN = """([look, number]) =>
+    document.body.dataset.look === look && document.querySelector("#number").textContent === number"""
+
 
 def test_each_phase_has_its_words_its_angle_and_its_form(tab, server):
     view, old = View(), {}
@@ -52,8 +55,8 @@ def test_each_phase_has_its_words_its_angle_and_its_form(tab, server):
         for output in outputs:
             view = view.after(output)
         show()
-        tab.wait_for_function("look => document.body.dataset.look === look", arg=look)
-        assert (tab.inner_text("#headline"), tab.text_content("#number")) == (headline, number)
+        tab.wait_for_function(DRAWN, arg=[look, number])
+        assert tab.inner_text("#headline") == headline
     against = Reason("few_orientations", "too few orientations", "turn it more", refuse=True)
     show(verdict="refused", reasons=[against.document()])
     tab.wait_for_selector("#reasons li")
