@@ -86,6 +86,15 @@ def test_bits_that_never_move_are_named(counted, spoil, what):
     assert found.what.startswith(what)
 
 
+def test_a_bit_that_died_midway_is_named_across_gaps_and_errors(hand):
+    r = hand(3, "continuous").recording
+    counts = np.rint(r.acc / LSB).astype(int)
+    counts[len(r) // 3 :, 1] &= ~(1 << 12)
+    counts[::2000, 1] |= 1 << 12
+    recording = replace(r, acc=counts * LSB, gap=np.arange(len(r)) == len(r) * 3 // 4, sensor=KNOWN)
+    assert against(recording).what.startswith("bit 12 of the accelerometer's y never moves")
+
+
 def test_where_the_range_is_not_known_the_other_axes_tell(counted):
     found = against(counted(UNKNOWN, low_byte))
     assert found.what.startswith("the low 8 bits of the accelerometer's x never move")

@@ -27,6 +27,8 @@ DEAD_BITS, DEAD_BITS_OF_ALL = 3, 7
 MOST_PIECES, SHORTEST_PIECE_S, FEWEST_CHANGES, SHARE_OF_ERRORS = 64, 2.0, 12, 0.1
 # A stuck bit takes values out of the middle of those that are passed; a low one does so in many places.
 LOW_BITS, HIGH_BITS, SIGN, OF_ALL_VALUES, FEWEST_PLACES = range(1, 8), range(8, 16), 15, 0.9, 16
+# Where a bit died midway, and a bus errs: errors among the samples, leaps over the bit, and samples on either side.
+MOST_ERRORS, FEWEST_LEAPS, STAYS = 0.005, 3, 0.05
 # Where the range is not known: how many steps of another axis make a step that is odd, and how exactly.
 ODD_STEPS, EXACTLY, FEWEST_VALUES, MOST_SAMPLES = 8.0, 0.02, 6, 20_000
 # Below this a step [m/s^2, rad/s] may be that of a float32, which is coarser the larger a value is.
@@ -137,7 +139,24 @@ def _stuck_bit(counts: Counts, gap: NDArray[np.bool_], bits: range) -> tuple[int
                     continue
                 if bit in HIGH_BITS or len(np.unique(part[:, axis] >> (bit + 1))) >= FEWEST_PLACES:
                     return axis, bit
-    return None
+    last = len(counts) // 2
+    found = ((axis, bit) for axis in range(3) for bit in bits if bit in HIGH_BITS and bit < SIGN)
+    return next((at for at in found if _leaps(counts[last:, at[0]], gap[last:], at[1])), None)
+
+
+def _leaps(counts: Counts, gap: NDArray[np.bool_], bit: int) -> bool:
+    """Whether values (n,) leap over those with another value of a bit, again and again, and stay on both sides.
+
+    Gaps and errors of a bus may lie between: leaps across a gap count for nothing, and a few samples may be errors.
+    """
+    with_it = int(np.count_nonzero(counts >> bit & 1))
+    errors = min(with_it, len(counts) - with_it)
+    if errors > MOST_ERRORS * len(counts):
+        return False
+    side = counts >> (bit + 1)
+    leaps = int(np.count_nonzero((side[1:] != side[:-1]) & ~gap[1:]))
+    _, stays = np.unique(side, return_counts=True)
+    return leaps > max(FEWEST_LEAPS, 10 * errors) and int(np.count_nonzero(stays > STAYS * len(counts))) > 1
 
 
 def _odd_steps(values: Vector) -> Low | None:
