@@ -100,6 +100,13 @@ def test_where_the_range_is_not_known_the_other_axes_tell(counted):
     assert found.what.startswith("the low 8 bits of the accelerometer's x never move")
 
 
+def test_beside_numbers_as_fine_as_they_can_be_an_axis_is_judged_too(counted):
+    recording = counted(UNKNOWN, low_byte)
+    acc = 1.001 * recording.acc
+    acc[:2, 1:] = [[0.0, 0.0], [5e-324, 5e-324]]
+    assert against(replace(recording, acc=acc)).what.startswith("the low 15 bits of the accelerometer's x")
+
+
 def test_where_the_range_is_not_known_counts_are_known_again(counted):
     assert against(counted(UNKNOWN, middle_bit)).what.startswith("bit 6 of the accelerometer's x never moves")
 

@@ -173,7 +173,9 @@ def _odd_steps(values: Vector) -> Low | None:
     places = (unique[axis] - unique[axis][0]) / steps[axis]
     if steps[axis] < max(ODD_STEPS * finest, LEAST_ODD_STEP) or np.abs(places - np.rint(places)).max() > EXACTLY:
         return None
-    return Low(axis, round(float(np.log2(steps[axis] / finest))), 0, steps[axis])
+    # of a word of 16 bits; what other axes hold beside it may be as fine as a number can be
+    bits = min(round(float(np.log2(steps[axis]) - np.log2(finest))), SIGN)
+    return Low(axis, bits, 0, steps[axis])
 
 
 def _is_fine(column: Vector) -> bool:
