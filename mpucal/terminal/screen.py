@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from queue import Empty, SimpleQueue
 from typing import TextIO
 
 from ..session.events import Decision, Key, Output, Prompt, Verification
@@ -42,8 +43,9 @@ class Screen:
         self._out, self._keys, self._glyphs, self._bell = out, keys, glyphs, bell
         self._view = View(f"mpucal: {title}" if title else "mpucal", board)
         self._ring = False
-        self._changed = threading.Event()
-        self._closed = threading.Event()
+        # a queue, as SIGHUP may come amid a put, which may be done again then; an event's lock may not
+        self._changed: SimpleQueue[None] = SimpleQueue()
+        self._closed: SimpleQueue[None] = SimpleQueue()
         self._open = False
         self._painter = Painter(out)
         self._drawing: threading.Thread | None = None
@@ -55,13 +57,13 @@ class Screen:
         self._view = self._view.after(output)
         if isinstance(output, Decision | Verification) and not self._open:
             self.say(f"  {_line_of(output)}")
-        self._changed.set()
+        self._changed.put(None)
 
     def say(self, text: str) -> None:
         """A line of talk, kept for the end while the screen is shown."""
         if self._open:
             self._view = self._view.noted(text.strip())
-            self._changed.set()
+            self._changed.put(None)
         else:
             print(text, file=self._out, flush=True)
 
@@ -96,21 +98,24 @@ class Screen:
 
     def _close(self) -> None:
         """Draw no more, and give the terminal back; once is enough."""
-        self._closed.set()
-        self._changed.set()
+        self._closed.put(None)
+        self._changed.put(None)
         if self._drawing is not None and self._open:
             self._drawing.join(LAST_WORD_S)
         self._painter.give_back()
 
     def _draw(self) -> None:
-        self._changed.set()
-        while not self._closed.is_set():
-            self._changed.wait()
-            self._changed.clear()
+        self._changed.put(None)
+        while self._closed.empty():
+            self._changed.get()
+            while not self._changed.empty():
+                self._changed.get()
             ring, self._ring = self._ring, False
             size = self._painter.size()
             self._painter.paint(lines(self._view, *size, self._glyphs), size, ring)
-            self._closed.wait(LEAST_INTERVAL_S)
+            with suppress(Empty):
+                self._closed.get(timeout=LEAST_INTERVAL_S)
+                return
 
 
 def _line_of(output: Decision | Verification) -> str:
