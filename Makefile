@@ -22,14 +22,14 @@ slow: $(TESTED)
 
 # struck sessions and recordings, with seeds that change by the day and are printed
 campaign: $(TESTED)
-	@$(BIN)/python tools/campaign.py --sessions 200 --recordings 2000
+	@$(BIN)/python -m tools.lab campaign --sessions 200 --recordings 2000
 
 # readers, peers, compiled modules and the firmware's core on hostile input, for SECONDS and a quarter as much again
 fuzz: $(TESTED)
 	@$(BIN)/pip install --quiet --disable-pip-version-check atheris
-	@$(BIN)/python -W ignore tools/fuzz.py --guided --budget $(SECONDS)
-	@$(BIN)/python tools/fuzz_kernel.py --seconds $$(($(SECONDS) / 8))
-	@if command -v clang >/dev/null; then $(BIN)/python tools/fuzz_core.py --seconds $$(($(SECONDS) / 8)); fi
+	@$(BIN)/python -W ignore -m tools.attack fuzz --guided --budget $(SECONDS)
+	@$(BIN)/python -m tools.attack fuzz_kernel --seconds $$(($(SECONDS) / 8))
+	@if command -v clang >/dev/null; then $(BIN)/python -m tools.attack fuzz_core --seconds $$(($(SECONDS) / 8)); fi
 
 lint: $(TESTED)
 	$(BIN)/ruff check --quiet .
@@ -44,7 +44,7 @@ audit:
 	@build/audit/bin/pip-audit --disable-pip --require-hashes --requirement tools/lock.txt
 
 bench: $(READY)
-	@$(BIN)/python tools/bench.py
+	@$(BIN)/python -m tools.bench speed
 
 # sdist and wheel, tried in environments of their own
 wheel:
@@ -78,7 +78,7 @@ kernel: $(TESTED)
 
 # needs avr-gcc and avr-libc; says how much flash and RAM the bridge takes
 firmware:
-	@$(MAKE) --no-print-directory -C tools/firmware
+	@$(MAKE) --no-print-directory -C mpucal/firmware
 
 clean:
 	rm -rf $(VENV) build

@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# `python -m pytest` looks for modules in the folder that it runs in first, and the sources there have no kernel
+# Programs of tools/ are tested, too. The folder comes last: the sources of mpucal in it have no kernel.
 if str(Path(__file__).parents[1]) in sys.path:
     sys.path.remove(str(Path(__file__).parents[1]))
+sys.path.append(str(Path(__file__).parents[1]))
 
 from mpucal.session.threads import ONE_THREAD
 
@@ -27,6 +28,8 @@ if "PYTEST_XDIST_WORKER" not in os.environ:
 
 from mpucal.files import open_writer
 from mpucal.files.rows import Rows
+
+PROJECT = str(Path(__file__).parents[1])
 
 # a shell in the background, or nohup, has these ignored, and what a test starts inherits that
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -100,5 +103,16 @@ def save():
         with open_writer(Path(path), rows, "") as write:
             for samples in rows.runs:
                 write(samples)
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def program():
+    """The command that runs a program of tools/, from any folder."""
+
+    def call(folder, name, *words):
+        code = f"import sys; sys.path.append({PROJECT!r}); from tools.programs import run; run({folder!r})"
+        return [sys.executable, "-P", "-c", code, name, *map(str, words)]
 
     return call

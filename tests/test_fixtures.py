@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -39,8 +38,8 @@ def test_a_key_press_is_among_them():
     assert len(presses) == 2
 
 
-def test_the_tool_makes_them(tmp_path):
-    subprocess.run([sys.executable, PROJECT / "tools" / "make_fixtures.py", tmp_path], check=True)
+def test_the_tool_makes_them(program, tmp_path):
+    subprocess.run(program("make", "fixtures", tmp_path), check=True)
     files = sorted(path.relative_to(FIXTURES) for path in FIXTURES.glob("*/*"))
     assert files == sorted(path.relative_to(tmp_path) for path in tmp_path.glob("*/*"))
     for path in files:

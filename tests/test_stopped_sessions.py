@@ -1,8 +1,5 @@
 """A computer that stops, or is set to another day: a session goes on, with a marked gap."""
 
-import sys
-from importlib import import_module
-from pathlib import Path
 from time import time_ns
 from unittest.mock import patch
 
@@ -18,15 +15,9 @@ from mpucal.mavlink.transport import Clock
 from mpucal.mavlink.vehicle_source import VehicleSource
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
+from tools.lab import campaign_worlds as worlds
 
 DAY_NS = 86_400 * 10**9
-
-
-@pytest.fixture(scope="module")
-def worlds():
-    sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
-    yield import_module("campaign_worlds")
-    del sys.path[0]
 
 
 def pass_by(world, seconds):
@@ -36,7 +27,7 @@ def pass_by(world, seconds):
 
 
 @pytest.mark.parametrize(("at_s", "stopped_s"), [(10.0, 70.0), (24.0, 70.0)])
-def test_a_session_goes_on_where_time_passed_it_by(worlds, tmp_path, capsys, at_s, stopped_s):
+def test_a_session_goes_on_where_time_passed_it_by(tmp_path, capsys, at_s, stopped_s):
     world = worlds.World(worlds.VEHICLE)
     world.moments.add(at_s, lambda: pass_by(world, stopped_s))
     days = iter(range(1, 1_000_000))
@@ -51,7 +42,7 @@ def test_a_session_goes_on_where_time_passed_it_by(worlds, tmp_path, capsys, at_
 
 
 @pytest.mark.parametrize(("kind", "stopped_s"), [("CHIP", 5.0), ("BRIDGE", 300.0)])
-def test_a_chip_is_turned_on_after_a_stop(worlds, tmp_path, capsys, kind, stopped_s):
+def test_a_chip_is_turned_on_after_a_stop(tmp_path, capsys, kind, stopped_s):
     world = worlds.World(getattr(worlds, kind))
     world.moments.add(30.0, lambda: world.bus._clock.spend(round(stopped_s * 1e9)))
     with world.opened():

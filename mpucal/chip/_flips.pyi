@@ -1,4 +1,4 @@
-"""Made by tools/make_stubs.py from the compiled module; its functions say what they do."""
+"""Made by tools/make/stubs.py from the compiled module; its functions say what they do."""
 
 import numpy
 from numpy.typing import NDArray

@@ -13,8 +13,7 @@ from ..errors import OutputError, SourceError, UsageError, WriteBackError
 
 EXAMPLE = "Example: `mpucal firmware -o libraries/mpucal` writes the library into a sketchbook."
 PACKAGE = Path(__file__).parents[1]
-# where an installation keeps it, and where a checkout does
-FOLDERS = (PACKAGE / "firmware", PACKAGE.parent / "tools" / "firmware")
+FOLDER = PACKAGE / "firmware"
 LIBRARY = ("src", "examples", "library.properties", "library.json", "keywords.txt", "README.md")
 HEX = "mpucal_bridge.hex"
 LICENCE = "LICENSE"
@@ -51,10 +50,9 @@ def command(folder: Path | None, port: str | None, board: str) -> None:
 
 
 def _source() -> Path:
-    found = next((each for each in FOLDERS if (each / "library.properties").is_file()), None)
-    if found is None:
-        raise SourceError("this installation of mpucal holds no firmware", "install it again, or take tools/firmware")
-    return found
+    if not (FOLDER / "library.properties").is_file():
+        raise SourceError("this installation of mpucal holds no firmware", "install it again")
+    return FOLDER
 
 
 def _write(folder: Path) -> None:

@@ -39,7 +39,7 @@ def examine_bridge(bus: Bus) -> Iterator[Finding]:
     if pushes:
         yield Finding("bridge", Mark.OK, f"{what}, and pushes samples", "", data)
     else:
-        remedy = "keep to 200 Hz or less, or put a firmware on it that pushes samples (tools/firmware)"
+        remedy = "keep to 200 Hz or less, or put a firmware on it that pushes samples (mpucal/firmware)"
         yield Finding("bridge", Mark.NOTE, f"{what}, and pushes no samples", remedy, data)
     yield _line(median_ms(bus, LONG_BYTES))
 

@@ -12,8 +12,8 @@ from mpucal.calibration import MODELS, calibrate
 from mpucal.calibration.parameters import ACCEL
 from mpucal.data import Recording, Sensor
 from mpucal.errors import MpucalError, UsageError
-from mpucal.simulated.study.metrics import sph_rms
-from mpucal.simulated.study.scenarios import hand_scenario, paper_scenario
+from tools.lab.study.metrics import sph_rms
+from tools.lab.study.scenarios import hand_scenario, paper_scenario
 
 G = 9.82
 

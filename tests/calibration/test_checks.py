@@ -12,8 +12,8 @@ from mpucal.calibration.parameters import HAND
 from mpucal.calibration.quality import judge
 from mpucal.calibration.rotation import rotation
 from mpucal.data import Recording
-from mpucal.simulated.study.metrics import sph_rms
-from mpucal.simulated.study.scenarios import paper_scenario
+from tools.lab.study.metrics import sph_rms
+from tools.lab.study.scenarios import paper_scenario
 
 G = 9.82
 

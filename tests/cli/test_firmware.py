@@ -9,7 +9,7 @@ import pytest
 from mpucal.__main__ import run
 from mpucal.cli import firmware
 
-FIRMWARE = Path(__file__).parents[2] / "tools" / "firmware"
+FIRMWARE = Path(__file__).parents[2] / "mpucal" / "firmware"
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def installed(tmp_path, monkeypatch):
     folder.mkdir()
     (folder / "library.properties").write_text("name=mpucal\n")
     (folder / firmware.HEX).write_text(":00000001FF\n")
-    monkeypatch.setattr(firmware, "FOLDERS", (folder,))
+    monkeypatch.setattr(firmware, "FOLDER", folder)
     return folder
 
 

@@ -14,7 +14,7 @@ import pytest
 from mpucal.export.code import in_c, in_python, in_ros
 
 Y = np.array([[0.5, -3.0, 9.0], [-9.7, 0.1, 0.4], [4.0, 6.0, -6.5]])
-LIBRARY = Path(__file__).parents[2] / "tools" / "firmware" / "src"
+LIBRARY = Path(__file__).parents[2] / "mpucal" / "firmware" / "src"
 MAIN = """
 #include <stdio.h>
 int main(void) {{

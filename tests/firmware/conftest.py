@@ -11,7 +11,7 @@ import pytest
 from mpucal.simulated.chip import open_simulated
 
 HERE = Path(__file__).parent
-FIRMWARE = HERE.parents[1] / "tools" / "firmware"
+FIRMWARE = HERE.parents[1] / "mpucal" / "firmware"
 ARDUINO = Path("/usr/share/arduino/hardware/arduino/avr")
 SIMAVR = Path("/usr/include/simavr/sim_avr.h")
 

@@ -18,7 +18,7 @@ import pytest
 from mpucal.result.blob import LENGTH, MAX_LENGTH, Blob, BlobError
 
 ROOT = Path(__file__).parents[2]
-SOURCES = ROOT / "tools" / "firmware" / "src"
+SOURCES = ROOT / "mpucal" / "firmware" / "src"
 VECTORS = ROOT / "fixtures" / "vectors"
 MEASURED = Blob.decode((VECTORS / "blob_measured.bin").read_bytes())
 

@@ -53,7 +53,7 @@ def library(tmp_path_factory):
     folder = tmp_path_factory.mktemp("apply_at")
     (folder / "host.c").write_text(HOST)
     flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", "-shared", "-fPIC"]
-    words = ["gcc", *flags, f"-I{ROOT / 'tools/firmware/src'}", "-o", "host.so", "host.c"]
+    words = ["gcc", *flags, f"-I{ROOT / 'mpucal/firmware/src'}", "-o", "host.so", "host.c"]
     subprocess.run(words, cwd=folder, check=True)
     return ctypes.CDLL(str(folder / "host.so"))
 

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 VECTORS = ROOT / "fixtures" / "vectors"
 DOCUMENT = (ROOT / "firmware_protocol.md").read_text()
 HEADERS = "".join(
-    (ROOT / "tools" / "firmware" / "src" / f"mpucal_{name}.h").read_text() for name in ("protocol", "frame")
+    (ROOT / "mpucal" / "firmware" / "src" / f"mpucal_{name}.h").read_text() for name in ("protocol", "frame")
 )
 BLOB = (VECTORS / "blob_measured.bin").read_bytes()
 OTHER = (VECTORS / "blob_appended.bin").read_bytes()

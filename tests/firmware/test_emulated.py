@@ -64,7 +64,7 @@ def test_flash_and_ram_leave_room(avr_build):
 
 
 def test_the_bridges_ram_is_as_stated(avr_build):
-    header = (ROOT / "tools" / "firmware" / "src" / "mpucal_bridge.h").read_text()
+    header = (ROOT / "mpucal" / "firmware" / "src" / "mpucal_bridge.h").read_text()
     (stated,) = re.findall(r"struct mpucal_bridge \((\d+) bytes", header)
     symbols = subprocess.run(
         ["avr-nm", "-S", avr_build[0] / "mpucal_bridge.elf"], capture_output=True, text=True, check=True
@@ -78,7 +78,7 @@ def test_the_readme_gives_the_cycles_that_are_counted(make):
         pytest.skip("needs simavr, of the packages in tools/ci_packages.txt")
     said = make("cycles")[1]
     counted = re.findall(r"\d+ cycles", said)
-    readme = (ROOT / "tools" / "firmware" / "README.md").read_text()
+    readme = (ROOT / "mpucal" / "firmware" / "README.md").read_text()
     # the compiler's version decides the last per cents
     for cycles, stated in zip(counted, re.findall(r"\d+\s+cycles", readme), strict=True):
         assert int(cycles.split()[0]) == pytest.approx(int(stated.split()[0]), rel=0.15)

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-FIRMWARE = Path(__file__).parents[2] / "tools" / "firmware"
+FIRMWARE = Path(__file__).parents[2] / "mpucal" / "firmware"
 BOARDS = ("uno", "nano-cpu=atmega328old", "mega-cpu=atmega2560", "leonardo")
 SKETCHES = ("mpucal_bridge", "mpucal_corrected")
 

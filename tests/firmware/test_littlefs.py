@@ -12,7 +12,7 @@ import pytest
 from mpucal.result.blob import Blob
 
 HERE = Path(__file__).parent / "host" / "littlefs"
-SOURCES = Path(__file__).parents[2] / "tools" / "firmware" / "src"
+SOURCES = Path(__file__).parents[2] / "mpucal" / "firmware" / "src"
 OLD = Path(__file__).parents[2] / "fixtures" / "vectors" / "blob_measured.bin"
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-SOURCES = Path(__file__).parents[2] / "tools" / "firmware" / "src"
+SOURCES = Path(__file__).parents[2] / "mpucal" / "firmware" / "src"
 AVR = {name: ("avr-gcc", f"-mmcu={name}") for name in ("atmega328p", "atmega2560", "atmega32u4", "attiny1614")}
 ARM = {
     "cortex-m0plus": ("arm-none-eabi-gcc", "-mcpu=cortex-m0plus", "-mthumb"),

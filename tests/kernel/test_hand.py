@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration.hand_reference import evaluate_hand_reference, gains, innovations
 from mpucal.calibration.likelihood import evaluate, trace, value
 from mpucal.calibration.parameters import HAND
 from mpucal.calibration.problem import Problem, Series
 from mpucal.kernel import _kernel
+from tools.lab.hand_reference import evaluate_hand_reference, gains, innovations
 
 
 @pytest.fixture(scope="module")

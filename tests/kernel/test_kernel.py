@@ -8,8 +8,8 @@ import pytest
 from mpucal.calibration.likelihood import evaluate
 from mpucal.calibration.parameters import ACCEL, IMU, NAMES
 from mpucal.calibration.problem import Problem, Series
-from mpucal.calibration.reference import evaluate_reference
 from mpucal.kernel import _kernel
+from tools.lab.reference import evaluate_reference
 
 
 @pytest.fixture(scope="module")

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import struct
-import sys
 from collections.abc import Callable, Sequence
-from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 from typing import ClassVar
@@ -18,14 +16,6 @@ from mpucal.mavlink.transport import Bytes
 
 CAPTURES = Path(__file__).parents[2].parent / "shared" / "captures"
 S = 1_000_000_000
-
-
-@pytest.fixture(scope="session")
-def hostile():
-    """tools/hostile_vehicle.py as a module."""
-    sys.path.insert(0, str(Path(__file__).parents[2] / "tools"))
-    yield import_module("hostile_vehicle")
-    del sys.path[0]
 
 
 @pytest.fixture

@@ -4,8 +4,6 @@ import contextlib
 import shutil
 import socket
 import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -17,7 +15,6 @@ from mpucal.mavlink.url import Kind, Url
 from mpucal.mavlink.vehicle_source import VehicleSource
 
 MAVPROXY = shutil.which("mavproxy.py")
-TOOL = Path(__file__).parents[2] / "tools" / "sim_vehicle.py"
 
 pytestmark = pytest.mark.skipif(MAVPROXY is None, reason="MAVProxy is not installed (pip install MAVProxy)")
 
@@ -38,12 +35,12 @@ def running(*command, **how):
         process.communicate()
 
 
-def test_a_vehicle_behind_mavproxy_is_measured_and_its_log_read(tmp_path):
+def test_a_vehicle_behind_mavproxy_is_measured_and_its_log_read(program, tmp_path):
     master, out = free_port(), free_port()
     link = Link(Udp(Url(Kind.UDP, "127.0.0.1", out)), lambda t_ns, data: None)
     proxy = (MAVPROXY, f"--master=udp:127.0.0.1:{master}", f"--out=udp:127.0.0.1:{out}", "--non-interactive")
     words = ("--state-basedir", str(tmp_path), "--logfile", str(tmp_path / "proxy.tlog"), "--streamrate=-1")
-    vehicle = (sys.executable, str(TOOL), f"udp:127.0.0.1:{master}")
+    vehicle = program("lab", "sim_vehicle", f"udp:127.0.0.1:{master}")
     with running(*proxy, *words, cwd=tmp_path, stderr=subprocess.DEVNULL), running(*vehicle):
         source = VehicleSource(link, 100.0, None, lambda text: None, "behind MAVProxy")
         try:

@@ -1,9 +1,7 @@
 """The simulated vehicle does what ArduPilot and PX4 do, quirks included."""
 
 import subprocess
-import sys
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -237,9 +235,8 @@ def test_unknown_words_are_refused(words):
 
 @pytest.mark.parametrize("port", ["tcp:127.0.0.1:0", "pty"])
 @pytest.mark.parametrize("firmware", FIRMWARES)
-def test_the_tool_puts_it_on_a_real_port(port, firmware):
-    tool = Path(__file__).parents[2] / "tools" / "sim_vehicle.py"
-    command = [sys.executable, str(tool), port, f"firmware={firmware}", "--speed", "4"]
+def test_the_tool_puts_it_on_a_real_port(program, port, firmware):
+    command = program("lab", "sim_vehicle", port, f"firmware={firmware}", "--speed", "4")
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
         try:
             url = running.stdout.readline().strip()

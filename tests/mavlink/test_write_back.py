@@ -27,6 +27,7 @@ from mpucal.simulated.vehicle.transport import ADDRESS, SimulatedTransport
 from mpucal.sinks.autopilot import AutopilotSink
 from mpucal.sinks.table import SINKS
 from mpucal.sinks.write_back import write_to
+from tools.attack import hostile_vehicle as hostile
 
 FIRMWARES = ("ardupilot", "px4")
 SCALED = ("SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
@@ -515,7 +516,7 @@ def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_
         ("ftp", "the address forged"),
     ],
 )
-def test_nothing_is_set_that_was_not_asked_for(kind, attacker, hostile, monkeypatch):
+def test_nothing_is_set_that_was_not_asked_for(kind, attacker, monkeypatch):
     key = hostile.KEY if attacker == hostile.SIGNED else None
     vehicle = SimulatedVehicle(VehicleOptions.parse("sim:imus=1"), key=key)
     attack = hostile.Attack(kind, attacker, "ardupilot", 0, 40.0)

@@ -11,6 +11,7 @@ import mpucal
 from mpucal.data import Sensor
 from mpucal.result.calibration import Calibration
 from mpucal.result.comparison import CONFIDENCE, compare
+from tools.lab.halves import halves
 
 ROOT = Path(__file__).parents[2]
 RECORDINGS = ROOT.parent / "shared" / "recordings"
@@ -110,13 +111,10 @@ def test_what_else_differs_is_said(change, says):
         ("mpu6050_session", 300.0),
     ],
 )
-def test_halves_of_a_real_recording_are_never_called_different(name, seen_mg, monkeypatch):
+def test_halves_of_a_real_recording_are_never_called_different(name, seen_mg):
     path = RECORDINGS / f"{name}.npz"
     if not path.exists():
         pytest.skip("the real recordings are not beside the project")
-    monkeypatch.syspath_prepend(str(ROOT / "tools"))
-    from halves import halves
-
     recording = mpucal.load(path)
     first, second = (mpucal.calibrate(half, gravity=9.81) for half in halves(recording))
     found = compare(first, second)

@@ -1,6 +1,4 @@
 import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -104,7 +102,6 @@ def test_every_state_but_the_last_two_can_be_aborted():
     assert [state for state in State if Abort not in TRANSITIONS[state]] == [State.DONE, State.ABORTED]
 
 
-def test_the_documented_diagram_is_drawn_from_the_table():
-    tool = Path(__file__).parents[2] / "tools" / "draw_session.py"
-    checked = subprocess.run([sys.executable, tool, "--check"], capture_output=True, text=True, check=False)
+def test_the_documented_diagram_is_drawn_from_the_table(program):
+    checked = subprocess.run(program("make", "draw_session", "--check"), capture_output=True, text=True, check=False)
     assert checked.returncode == 0, checked.stderr

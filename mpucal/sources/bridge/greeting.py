@@ -45,14 +45,14 @@ class Heard:
         if not self._bytes:
             return BusError(
                 f"nothing answers on {port}",
-                f"check that the board there runs the bridge's firmware (tools/firmware), or {another()}",
+                f"check that the board there runs the bridge's firmware (mpucal/firmware), or {another()}",
             )
         if self.floods:
             return BusError(*flooded(port))
         if self._holds(CIRCUIT):
             return BusError(
                 f"CircuitPython answers on {port}, and no bridge",
-                "put MicroPython on the board, or the bridge's firmware (tools/firmware): CircuitPython takes every "
+                "put MicroPython on the board, or the bridge's firmware (mpucal/firmware): CircuitPython takes every "
                 "byte 3 on its console for Ctrl-C",
             )
         if self.is_repl:
@@ -64,7 +64,7 @@ class Heard:
         if text:
             return BusError(
                 f"what is on {port} is no bridge: it says {text!r}",
-                f"put the bridge's firmware on it (tools/firmware), or {another()}",
+                f"put the bridge's firmware on it (mpucal/firmware), or {another()}",
             )
         rates = " or ".join(str(baud) for baud in bauds)
         return BusError(

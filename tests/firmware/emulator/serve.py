@@ -1,6 +1,6 @@
 """The emulated Uno on a pseudo terminal, for whoever talks to a serial port: prints that one's name, and runs.
 
-    python tests/firmware/emulator/serve.py tools/firmware/build/mpucal_bridge.elf eeprom.bin --chip sim:seed=1
+    python tests/firmware/emulator/serve.py mpucal/firmware/build/mpucal_bridge.elf eeprom.bin --chip sim:seed=1
 
 The board is switched off when stdin ends. Lines on stdin are what `mpucal session --json-events` says, for the hand
 that holds the simulated chip.

@@ -1,4 +1,4 @@
-/* The core for libFuzzer: bytes and requests from a host, a chip, and a memory of any content; see tools/fuzz_core.py.
+/* The core for libFuzzer: bytes and requests from a host, a chip, and a memory of any content; see tools/attack/fuzz_core.py.
  *
  * The input is pieces, each a kind and a length: bytes as they are; bytes as the content of a frame, whose sum is made
  * here; nothing, for so many looks; a blob, whose CRC is made here; and the memory's content. */

@@ -1,0 +1,169 @@
+// The serial bridge for boards with the Arduino core: `mpucal session --serial PORT` measures through it.
+//
+// SDA and SCL go to the sensor, which gets 3.3 V. An Uno, Nano or Pro Mini is better served by mpucal/firmware/avr.
+#include <Wire.h>
+
+#include <mpucal_arduino.h>
+#include <mpucal_bridge.h>
+
+#if defined(__AVR__)
+#include <avr/wdt.h>
+#endif
+
+// The buffer of 64 bytes that an Arduino core has holds one request while another is carried out, which at this rate is
+// done before it is full. With -DSERIAL_RX_BUFFER_SIZE=256 it may be 500000, and then 1000 samples a second fit.
+#ifndef MPUCAL_BAUD
+#define MPUCAL_BAUD 115200
+#endif
+
+const uint32_t BAUD_RATE = MPUCAL_BAUD;
+const uint32_t I2C_HZ = 400000;
+const uint32_t I2C_TIMEOUT_MS = 25;
+const uint8_t WIRE_BYTES = 32;  // what the smallest Wire library takes at once
+const uint8_t WIRE_NO_ADDRESS = 2, WIRE_TIMED_OUT = 5;
+const uint8_t FIFO_R_W = 0x74, MEM_R_W = 0x6F;  // these do not auto-increment
+
+// How a core limits the time of a transfer: the first of these functions that its Wire has.
+template <typename W> static auto limitTime(W &wire, int) -> decltype(wire.setWireTimeout(1, true)) {
+    return wire.setWireTimeout(I2C_TIMEOUT_MS * 1000, true);
+}
+template <typename W> static auto limitTime(W &wire, long) -> decltype(wire.setTimeOut(1)) {
+    return wire.setTimeOut((uint16_t)I2C_TIMEOUT_MS);
+}
+template <typename W> static void limitTime(W &, ...) {}
+
+static void beginWire() {
+    Wire.begin();
+    Wire.setClock(I2C_HZ);
+    limitTime(Wire, 0);
+}
+
+// A chip that was cut off within a byte holds SDA low until it has clocked the rest of it out.
+static void freeBus() {
+#if defined(PIN_WIRE_SCL) && defined(WIRE_HAS_END)
+    Wire.end();
+    for (uint8_t bit = 0; bit < 9; bit++) {
+        digitalWrite(PIN_WIRE_SCL, LOW);
+        pinMode(PIN_WIRE_SCL, OUTPUT);
+        delayMicroseconds(2);
+        pinMode(PIN_WIRE_SCL, INPUT_PULLUP);
+        delayMicroseconds(2);
+    }
+    beginWire();
+#endif
+}
+
+static uint8_t codeOf(uint8_t wire) {
+    if (wire == WIRE_TIMED_OUT) {
+        freeBus();
+    }
+    return wire == 0 ? MPUCAL_CODE_OK : wire == WIRE_NO_ADDRESS ? MPUCAL_CODE_NO_ANSWER : MPUCAL_CODE_BUS_FAILED;
+}
+
+static uint8_t registerAfter(uint8_t first, uint8_t done) {
+    return first == FIFO_R_W || first == MEM_R_W ? first : (uint8_t)(first + done);
+}
+
+// An AVR's Wire says that it took all of several bytes, and drops those for which it has no room: one byte at a time.
+static uint8_t writePiece(uint8_t address, uint8_t first, const uint8_t *data, uint8_t count) {
+    Wire.beginTransmission(address);
+    bool fits = Wire.write(first) == 1;
+    for (uint8_t i = 0; i < count; i++) {
+        fits = Wire.write(data[i]) == 1 && fits;
+    }
+    uint8_t code = codeOf(Wire.endTransmission());
+    return code == MPUCAL_CODE_OK && !fits ? (uint8_t)MPUCAL_CODE_BUS_FAILED : code;
+}
+
+// The register takes one of Wire's bytes.
+static uint8_t writeRegisters(uint8_t address, uint8_t first, const uint8_t *data, uint8_t count) {
+    uint8_t done = 0, code;
+    do {
+        uint8_t left = (uint8_t)(count - done), piece = left < WIRE_BYTES ? left : (uint8_t)(WIRE_BYTES - 1);
+        code = writePiece(address, registerAfter(first, done), data + done, piece);
+        done = (uint8_t)(done + piece);
+    } while (code == MPUCAL_CODE_OK && done < count);
+    return code;
+}
+
+// Some cores send the register only with the read behind it, and cannot say then that nobody answered.
+static uint8_t whyNothing(uint8_t address) {
+    Wire.beginTransmission(address);
+    uint8_t code = codeOf(Wire.endTransmission());
+    return code == MPUCAL_CODE_OK ? (uint8_t)MPUCAL_CODE_BUS_FAILED : code;
+}
+
+static uint8_t readPiece(uint8_t address, uint8_t first, uint8_t *data, uint8_t count) {
+    Wire.beginTransmission(address);
+    Wire.write(first);
+    uint8_t code = codeOf(Wire.endTransmission(false));
+    if (code != MPUCAL_CODE_OK) {
+        return code;
+    }
+    if (Wire.requestFrom(address, count) != count) {
+        return whyNothing(address);
+    }
+    for (uint8_t i = 0; i < count; i++) {
+        data[i] = (uint8_t)Wire.read();
+    }
+    return MPUCAL_CODE_OK;
+}
+
+// More than one piece is one transfer only for the FIFO: a host reads no more than 14 other registers at once.
+static uint8_t readRegisters(uint8_t address, uint8_t first, uint8_t *data, uint8_t count) {
+    for (uint8_t done = 0; done < count; done = (uint8_t)(done + WIRE_BYTES)) {
+        uint8_t left = (uint8_t)(count - done), piece = left < WIRE_BYTES ? left : WIRE_BYTES;
+        uint8_t code = readPiece(address, registerAfter(first, done), data + done, piece);
+        if (code != MPUCAL_CODE_OK) {
+            return code;
+        }
+    }
+    return MPUCAL_CODE_OK;
+}
+
+static uint32_t nowUs() { return micros(); }
+
+static void sendBytes(const uint8_t *bytes, uint8_t count) { Serial.write(bytes, count); }
+
+static const struct mpucal_port port = {readRegisters, writeRegisters, nowUs,           sendBytes,
+                                        &mpucalMemory, 2,              "mpucal-ino 0.1"};
+static struct mpucal_bridge bridge;
+
+#if defined(__AVR__)
+// Nothing has fed it for two seconds: the program starts anew, and the host's next request is answered with NO_HELLO. No
+// reset by the watchdog itself: the boot loader of older boards leaves it on then, and is reset for ever.
+ISR(WDT_vect, ISR_NAKED) { __asm__ __volatile__("jmp 0"); }
+
+static void watchdogBegin() {
+    noInterrupts();
+    wdt_reset();
+    WDTCSR = _BV(WDCE) | _BV(WDE);
+    WDTCSR = _BV(WDIE) | _BV(WDP2) | _BV(WDP1) | _BV(WDP0);
+    interrupts();
+}
+
+static void watchdogFeed() { wdt_reset(); }
+#else
+static void watchdogBegin() {}
+static void watchdogFeed() {}
+#endif
+
+void setup() {
+#if defined(ESP32) || defined(ESP8266)
+    Serial.setRxBufferSize(1024);
+#endif
+    Serial.begin(BAUD_RATE);
+    beginWire();
+    mpucalMemoryBegin();
+    mpucal_bridge_begin(&bridge, &port);
+    watchdogBegin();
+}
+
+void loop() {
+    watchdogFeed();
+    if (Serial.available()) {
+        mpucal_bridge_receive(&bridge, (uint8_t)Serial.read());
+    } else {
+        mpucal_bridge_look(&bridge);
+    }
+}

@@ -1,0 +1,77 @@
+"""Slices of the fuzzers, the failed system calls and the campaign; and files of any name."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SESSION = Path(__file__).parents[3] / "fixtures" / "sessions" / "mpu6050.mcap"
+
+
+@pytest.fixture
+def holds(program):
+    def call(folder, name, *words):
+        done = subprocess.run(program(folder, name, *words), capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+    return call
+
+
+def test_readers_refuse_mutated_bytes(holds):
+    holds("attack", "fuzz", "--seconds", "0.15")
+
+
+def test_by_coverage(holds):
+    pytest.importorskip("atheris")
+    holds("attack", "fuzz", "--guided", "--seconds", "2", "bridge", "mcap's messages")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("clang"), reason="needs clang")
+def test_the_firmwares_core_on_hostile_requests(holds):
+    holds("attack", "fuzz_core", "--seconds", "5")
+
+
+@pytest.mark.parametrize(("seed", "target"), [("207790003882", "npz"), ("207790000083", "dataflash")])
+def test_what_once_ended_in_a_trace(holds, seed, target):
+    holds("attack", "fuzz", "--first", seed, "--seconds", "0", target)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux") or not shutil.which("cc"), reason="needs Linux and cc")
+def test_files_are_old_or_new_whatever_call_or_allocation_fails(holds):
+    holds("attack", "syscalls", "export", "write", "--most", "6", "--allocations", "1")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs /proc")
+def test_what_is_struck_ends_as_it_may(holds):
+    holds("lab", "campaign", "--sessions", "16", "--recordings", "40")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs named pipes and ulimit")
+def test_a_pipe_is_not_replayed_and_too_little_room_is_said(tmp_path):
+    os.mkfifo(tmp_path / "capture.mcap")
+    mpucal = [sys.executable, "-m", "mpucal"]
+    done = subprocess.run([*mpucal, "session", "--replay", tmp_path], capture_output=True, timeout=60, check=False)
+    assert (done.returncode, b"is a pipe or device" in done.stderr) == (3, True)
+    limited = f'ulimit -f 1; "$@" > {tmp_path}/out.csv'
+    words = ["apply", SESSION.with_name("mpu6050.json"), SESSION]
+    done = subprocess.run(["sh", "-c", limited, "sh", *mpucal, *words], capture_output=True, check=False)
+    assert (done.returncode, b"make room where it goes" in done.stderr) == (3, True)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="names are bytes on Linux alone")
+def test_a_file_may_be_called_anything(tmp_path):
+    named = tmp_path / os.fsdecode(b"walk\xff\x1b[2J\n.mcap")
+    shutil.copy(SESSION, named)
+    gone = named.with_suffix(".gone.mcap")
+    for words in ("calibrate", named, "-o", tmp_path / "results"), ("show", named), ("calibrate", gone):
+        done = subprocess.run([sys.executable, "-m", "mpucal", *words], capture_output=True, check=False)
+        assert done.returncode == (3 if gone in words else 0), done.stderr
+        assert b"\x1b" not in done.stdout + done.stderr
+    assert rb"walk\udcff\x1b[2J\n" in done.stderr
+    assert rb"walk\udcff\x1b[2J\n" in (tmp_path / "results" / "report.html").read_bytes()

@@ -1,0 +1,49 @@
+"""docs/architecture.md: its drawing is that of the imports, and what it points at is there."""
+
+import ast
+import re
+from graphlib import CycleError
+from pathlib import Path
+
+import pytest
+
+from tools.make import draw_rooms
+
+ROOT = Path(__file__).parents[3]
+DOCUMENT = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+REFERENCES = {(path, name) for path, name in re.findall(r"`([\w/]+\.(?:py|[ch]pp|md))(?::\s+([\w.]+))?`", DOCUMENT)}
+
+
+def test_the_drawing_is_that_of_the_imports():
+    drawn = draw_rooms.DRAWN.search(DOCUMENT).group()
+    assert drawn == draw_rooms.drawing(draw_rooms.arrows()), "run tools/make/draw_rooms.py"
+
+
+def test_an_arrow_that_a_longer_way_implies_is_left_out():
+    imports = {"top": {"middle", "bottom"}, "middle": {"bottom"}, "bottom": set()}
+    assert draw_rooms.floors(imports) == ["bottom", "middle", "top"]
+    assert draw_rooms.reduced(imports) == {"top": {"middle"}, "middle": {"bottom"}, "bottom": set()}
+
+
+def test_a_circle_cannot_be_drawn():
+    with pytest.raises(CycleError):
+        draw_rooms.floors({"one": {"other"}, "other": {"one"}})
+
+
+def defined(tree, name):
+    """Whether a module defines, or imports, a name such as Class.method."""
+    first, *rest = name.split(".")
+    for node in tree.body:
+        names = {getattr(node, "name", None)}
+        if isinstance(node, ast.Assign | ast.AnnAssign):
+            names = {ast.unparse(target) for target in getattr(node, "targets", None) or [node.target]}
+        if first in names:
+            return not rest or defined(node, ".".join(rest))
+    return False
+
+
+@pytest.mark.parametrize(("path", "name"), sorted(REFERENCES), ids=lambda word: word or "file")
+def test_what_it_points_at_is_there(path, name):
+    found = next((folder / path for folder in (ROOT / "mpucal", ROOT) if (folder / path).exists()), None)
+    assert found is not None
+    assert not name or defined(ast.parse(found.read_text(encoding="utf-8")), name)

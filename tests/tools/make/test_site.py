@@ -1,0 +1,44 @@
+"""The documentation site as a browser shows it from its folder, where nothing else can be reached."""
+
+from pathlib import Path
+
+import pytest
+
+from mpucal.cli import commands
+
+SITE = Path(__file__).parents[3] / "build" / "site"
+PAGES = ("index", "notebook", "reference/commands", "reference/python")
+
+pytestmark = pytest.mark.skipif(not (SITE / "index.html").exists(), reason="there is no site: `make docs`")
+
+
+@pytest.fixture(params=[(1280, 900), (390, 844)], ids=["desktop", "phone"])
+def page(request, chromium):
+    width, height = request.param
+    page = chromium.new_page(viewport={"width": width, "height": height})
+    page.fetched = []
+    page.on("request", lambda asked: page.fetched.append(asked.url))
+    yield page
+    page.close()
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_fits_and_fetches_nothing_from_elsewhere(page, name):
+    page.goto((SITE / f"{name}.html").as_uri())
+    assert page.evaluate("document.documentElement.scrollWidth") <= page.viewport_size["width"]
+    assert page.evaluate("[...document.images].every((image) => image.complete && image.naturalWidth > 0)")
+    assert [url for url in page.fetched if not url.startswith(("file:", "data:"))] == []
+
+
+def test_the_search_finds(page):
+    page.goto((SITE / "reference" / "python.html").as_uri())
+    page.click(".md-search__form" if page.viewport_size["width"] > 1000 else ".md-header__button[for=__search]")
+    page.locator(".md-search__input").press_sequentially("misalignment", delay=20)
+    page.locator(".md-search-result__item a").first.wait_for()
+    assert [url for url in page.fetched if not url.startswith(("file:", "data:"))] == []
+
+
+def test_every_command_has_its_section():
+    text = (SITE / "reference" / "commands.html").read_text(encoding="utf-8")
+    assert [name for name in commands.list_commands(None) if f'id="mpucal-{name}"' not in text] == []
+    assert "Sentinel" not in text

@@ -1,0 +1,198 @@
+"""Readers and decoders on mutated bytes: nothing but the package's own errors comes out, and within a second or two.
+
+    python -m tools.attack fuzz --seconds 60 [TARGET ...]
+    python -m tools.attack fuzz --guided --seconds 60 [TARGET ...]      # by coverage; needs atheris
+
+Each target of fuzz_targets.py has a corpus of the fixtures, of files that are made here, or of one in a dialect
+of lab/dialects.py, as rosbags, pyulog, pandas and others write it, and gets bytes of it that are damaged as in
+lab/campaign_recordings.py, cut, joined, or with one piece in the place of another's. A line counts its executions.
+What it should not have raised is printed with the seed that makes it again (--first SEED --seconds 0 TARGET).
+
+Guided, libFuzzer keeps what reaches new branches of mpucal in build/fuzz/TARGET, goes on from there the next time, and
+says how many branches were reached. Half of the mutants are those of above. What was wrong is kept in
+build/fuzz/TARGET.wrong until it is mended. --again FILE TARGET runs a file again, or all of a folder: with
+build/fuzz/TARGET, coverage.py tells which lines are reached.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import io
+import os
+import re
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import FrameType
+
+import numpy as np
+
+ROOT = Path(__file__).parents[2]
+KEPT = ROOT / "build" / "fuzz"
+LONGEST_S, LARGEST_MB = 20, 4096
+MISSING = "fuzz.py: --guided needs atheris, which is not installed: pip install atheris (CPython 3.11 to 3.13)."
+Run = Callable[[bytes], object]
+Check = Callable[[bytes], str | None]
+
+
+class TooLongError(BaseException):
+    """It takes longer than any reader may; no reader takes it for an error of a library's."""
+
+
+def mutated(corpus: Sequence[bytes], seed: int) -> bytes:
+    """Damaged by its seed."""
+    from ..lab.campaign_recordings import OF_BYTES  # noqa: PLC0415 - not before the package is instrumented
+
+    rng = np.random.default_rng(seed)
+    data = bytearray(corpus[rng.integers(len(corpus))])
+    if rng.random() < 0.2:
+        data += corpus[rng.integers(len(corpus))]
+    for _ in range(rng.integers(1, 4)):
+        if data:
+            OF_BYTES[rng.integers(len(OF_BYTES))](data, rng)
+    return bytes(data)
+
+
+def checked(run: Run) -> Check:
+    """What of its exceptions should not be, as a trace; None where all is well."""
+    from mpucal.errors import MpucalError  # noqa: PLC0415 - as above
+    from mpucal.result.blob import BlobError  # noqa: PLC0415
+    from mpucal.sources.bridge.messages import MessageError  # noqa: PLC0415
+
+    def check(data: bytes) -> str | None:
+        signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST_S)
+        try:
+            run(data)
+        except (MpucalError, BlobError, MessageError):
+            pass
+        except (Exception, TooLongError):
+            return traceback.format_exc(limit=-4)
+        return None
+
+    return check
+
+
+def blind(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds: float) -> tuple[str, int]:
+    """What was done, and how many raised what they should not."""
+    until, seed, wrong = time.monotonic() + seconds, first, 0
+    while True:
+        if (trace := check(mutated(corpus, seed))) is not None:
+            wrong += 1
+            print(f"{name}, seed {seed}:\n{trace}", flush=True)
+        seed += 1
+        if time.monotonic() >= until:
+            return f"{seed - first:>9} executions, seeds from {first} on", wrong
+
+
+def guided(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds: float) -> tuple[str, int]:
+    """The same; libFuzzer ends its process, which therefore is another one."""
+    folder = KEPT / re.sub(r"\W+", "_", name)
+    wrong, log = folder.with_suffix(".wrong"), folder.with_suffix(".log")
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in wrong.glob("*"):
+        if check(path.read_bytes()) is None:
+            path.unlink()
+    for data in corpus:
+        (folder / hashlib.sha1(data, usedforsecurity=False).hexdigest()).write_bytes(data)
+    pid = os.fork()
+    if not pid:
+        _fuzz(name, check, folder, wrong, log, first, seconds)
+    status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    said = log.read_text(errors="replace")
+    count, reached = (
+        (re.findall(pattern, said) or ["0"])[-1] for pattern in (r"number_of_executed_units: (\d+)", r" cov: (\d+)")
+    )
+    if status:
+        print(f"{name}: ended with {status}; see {log}", flush=True)
+    found = len(list(wrong.glob("*"))) + bool(status)
+    return f"{count:>9} executions, {reached:>5} branches, seed {first}", found
+
+
+def _fuzz(name: str, check: Check, folder: Path, wrong: Path, log: Path, first: int, seconds: float) -> None:
+    import atheris  # noqa: PLC0415 - only here
+
+    seen: set[str] = set()
+
+    def one(data: bytes) -> None:
+        trace = check(data)
+        where = "".join(re.findall(r"^  File.*", trace or "", re.M))
+        if trace is None or where in seen:
+            return
+        seen.add(where)
+        wrong.mkdir(exist_ok=True)
+        path = wrong / hashlib.sha1(data, usedforsecurity=False).hexdigest()
+        path.write_bytes(data)
+        print(f"{name}, {path}:\n{trace}", flush=True)
+
+    def mutate(data: bytes, most: int, seed: int) -> bytes:
+        return mutated([data or b"\0"], seed)[:most] if seed % 2 else atheris.Mutate(data, most)
+
+    os.dup2(os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
+    longest = max(path.stat().st_size for path in folder.iterdir())
+    limits = {"max_total_time": max(round(seconds), 1), "timeout": 3 * LONGEST_S, "rss_limit_mb": LARGEST_MB}
+    rest = {"max_len": 2 * longest, "len_control": 0, "seed": first % (1 << 31), "print_final_stats": 1}
+    options = [f"-{key}={value}" for key, value in {**limits, **rest}.items()]
+    atheris.Setup(["fuzz", *options, f"-artifact_prefix={wrong}.", str(folder)], one, custom_mutator=mutate)
+    atheris.Fuzz()
+
+
+def again(name: str, check: Check, path: Path) -> int:
+    """How many of these files are wrong."""
+    paths = sorted(path.iterdir()) if path.is_dir() else [path]
+    traces = [trace for each in paths if (trace := check(each.read_bytes())) is not None]
+    print(*traces, f"{name:<44}{len(paths):>9} files: {len(traces)} wrong", sep="\n", flush=True)
+    return len(traces)
+
+
+def too_long(_signal: int, _frame: FrameType | None) -> None:
+    """It takes longer than any reader may."""
+    raise TooLongError(f"longer than {LONGEST_S} s of processor time")
+
+
+def main() -> int:
+    """Run them; 1 where one raised what it should not."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("targets", nargs="*", metavar="TARGET")
+    parser.add_argument("--seconds", type=float, default=60.0, help="of each target")
+    parser.add_argument("--budget", type=float, help="of all of them, in place of --seconds")
+    parser.add_argument("--first", type=int, default=time.time_ns() // 86_400_000_000_000 * 10**7)
+    parser.add_argument("--guided", action="store_true", help="by coverage")
+    parser.add_argument("--again", type=Path, help="run a target on this file, or all of a folder")
+    asked = parser.parse_args()
+    if asked.guided:
+        try:
+            import atheris  # noqa: PLC0415 - a person may do without
+        except ImportError:
+            sys.exit(MISSING)
+        # an editable install's finder has loaders of its own, whose code cannot be instrumented: it is asked last
+        sys.path.insert(0, str(ROOT))
+        sys.meta_path.sort(key=lambda finder: not isinstance(finder, type))
+        # what is imported from here on: the package, and what it imports only later
+        atheris.instrument_imports(include=["mpucal"]).__enter__()
+    told = io.StringIO() if asked.guided else sys.stderr
+    with redirect_stderr(told):
+        from .fuzz_targets import targets  # noqa: PLC0415 - see above
+
+    signal.signal(signal.SIGVTALRM, too_long)
+    bad = 0
+    with TemporaryDirectory() as place:
+        with redirect_stderr(told):
+            of = targets(Path(place))
+        names = asked.targets or list(of)
+        seconds = asked.seconds if asked.budget is None else asked.budget / len(names)
+        for name in names:
+            run, corpus = of[name]
+            if asked.again is not None:
+                bad += again(name, checked(run), asked.again)
+                continue
+            way = guided if asked.guided else blind
+            did, wrong = way(name, checked(run), corpus, asked.first, seconds)
+            bad += wrong
+            print(f"{name:<44}{did}: {wrong} wrong", flush=True)
+    return int(bad > 0)

@@ -1,0 +1,263 @@
+"""What tools/attack/fuzz.py has peers say: bridges, vehicles, browsers; the bytes to be mutated are what they say.
+
+Check sums and sequence numbers, which would turn nearly all mutated bytes away, are made here: a peer's bytes are
+pieces, each a head that ends with a length, and so many bytes.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from mpucal.chip import registers as reg
+from mpucal.errors import LinkError
+from mpucal.mavlink.dialect import Parser, dialect
+from mpucal.mavlink.ftp import Payload, Storage
+from mpucal.mavlink.link import Link
+from mpucal.mavlink.parameters.client import Parameters
+from mpucal.mavlink.prearm import Watch
+from mpucal.mavlink.stream_parameters import stream_parameter_names
+from mpucal.mavlink.transport import Bytes
+from mpucal.page.requests import Door
+from mpucal.page.server import Handler
+from mpucal.sources.bridge import messages as wire
+from mpucal.sources.bridge.bus import BridgeBus
+from mpucal.sources.bridge.frame import MAX_PAYLOAD, Deframer, Frame
+from mpucal.sources.bridge.port import Chunk
+from mpucal.sources.bridge.store import Store
+
+MS = 1_000_000
+# kind, sequence number, length: both as asked where they are 0
+PIECE_OF_BRIDGE = struct.Struct("<BBB")
+# which of PACKETS, system, component, ms after the piece before, length
+PIECE_OF_VEHICLE = struct.Struct("<BBBHB")
+BEGUN_US = 1_000_000_000
+PACKETS = (
+    "heartbeat",
+    "raw_imu",
+    "scaled_imu",
+    "scaled_imu2",
+    "scaled_imu3",
+    "highres_imu",
+    "attitude",
+    "sys_status",
+    "statustext",
+    "command_ack",
+    "param_value",
+    "param_error",
+    "file_transfer_protocol",
+    "timesync",
+    "system_time",
+    "autopilot_version",
+)
+
+
+def pieces(data: bytes, head: struct.Struct) -> Iterator[tuple[Any, ...]]:
+    """Each head's fields, with the bytes in place of their length."""
+    at = 0
+    while at + head.size <= len(data):
+        *fields, size = head.unpack_from(data, at)
+        at += head.size + size
+        yield *fields, data[at - size : at]
+
+
+def joined(head: struct.Struct, rows: Sequence[Sequence[Any]]) -> bytes:
+    """The inverse of `pieces`."""
+    return b"".join(head.pack(*fields, len(content)) + content for *fields, content in rows)
+
+
+def frames(data: bytes) -> None:
+    """What comes over a serial line."""
+    for frame in Deframer().feed(data):
+        if frame.type in wire.REQUESTS:
+            wire.REQUESTS[frame.type].decode(frame.payload)
+        else:
+            wire.answer_of(frame.type, frame.payload)
+
+
+class HostileBridge:
+    """A Port, behind which pieces are sent: one for each look, then nothing."""
+
+    name, bauds = "a port", (115200,)
+
+    def __init__(self, data: bytes) -> None:
+        self._pieces, self._t_ns = pieces(data, PIECE_OF_BRIDGE), 0
+        self._waiting, self._asked = list[Frame](), Frame(0, 0)
+
+    def now_ns(self) -> int:
+        """Each look takes a millisecond."""
+        return self._t_ns
+
+    def read(self, until_ns: int) -> Chunk | None:
+        """The next piece, as an answer to the oldest request; see Port."""
+        kind, seq, payload = next(self._pieces, (None, 0, b""))
+        if kind is None:
+            self._t_ns = max(self._t_ns, until_ns)
+            return None
+        self._t_ns += MS
+        if self._waiting and not kind:
+            self._asked = self._waiting.pop(0)
+        frame = Frame(kind or self._asked.type | wire.REPLY_BIT, seq or self._asked.seq, payload[:MAX_PAYLOAD])
+        return Chunk(frame.encode(), self._t_ns)
+
+    def write(self, data: bytes) -> None:
+        """What is asked."""
+        self._waiting += Deframer().feed(data)
+
+    def set_baud(self, baud: int) -> None:
+        """See Port."""
+
+    reopen = revive = set_baud
+
+    def close(self) -> None:
+        """See Port."""
+
+
+def bridge(data: bytes) -> None:
+    """What a bridge answers to who it is, what it keeps, what a chip holds, and what it pushes."""
+    bus = BridgeBus(HostileBridge(data))
+    store = Store(bus.link)
+    store.who_am_i()
+    store.read()
+    bus.read(reg.WHO_AM_I, 1)
+    bus.read(reg.INT_STATUS, 15)
+    bus.write(reg.FIFO_EN, b"\x78")
+    bus.write(reg.USER_CTRL, bytes([reg.USER_CTRL_FIFO_EN | reg.USER_CTRL_FIFO_RESET]))
+    for _ in range(3):
+        count = int.from_bytes(bus.read(reg.FIFO_COUNT_H, 2).data, "big")
+        bus.read(reg.INT_STATUS, 1)
+        bus.read(reg.FIFO_R_W, min(count, 1024) or 1)
+
+
+def bridge_says() -> list[bytes]:
+    """What an honest one would say, in the order in which `bridge` asks."""
+    ok = struct.pack("<BI", 0, 1000)
+    hello = wire.HelloReply(0, 1000, wire.MAGIC, 1, 0, 0x68, 7, 3, 512, b"bridge").payload()
+    blob = bytes(range(60))
+    state = wire.BlobStateReply(0, 2000, 1, len(blob), 7).payload()
+    pushed = wire.Frames(0, 3000, 0, 0, 0, bytes(48)).payload()
+    answers = [hello, ok + b"\x68", state, ok + blob[:56], ok + blob[56:], ok + b"\x68", ok + bytes(15), ok, ok, ok]
+    said = joined(PIECE_OF_BRIDGE, [(0, 0, answer) for answer in answers])
+    return [said + joined(PIECE_OF_BRIDGE, [(wire.Frames.TYPE, 0, pushed), (0, 0, ok + b"\1")] * 6)]
+
+
+def packets(data: bytes) -> None:
+    """What comes as a datagram, and what comes as a stream."""
+    for packet in Parser(dialect().MAVLink(None)).datagram(data):
+        packet.message.to_dict()
+    list(Parser(dialect().MAVLink(None)).stream(data))
+
+
+def vehicles(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Times [us] and packets with sums that hold."""
+    m, t_us = dialect(), BEGUN_US
+    for number, (which, system, component, step_ms, payload) in enumerate(pieces(data, PIECE_OF_VEHICLE)):
+        t_us += 1000 * step_ms
+        kind = getattr(m, f"MAVLink_{PACKETS[which % len(PACKETS)]}_message")
+        id_ = kind.id.to_bytes(3, "little")
+        body = struct.pack("<BBBBBB", len(payload), 0, 0, number % 256, system, component) + id_ + payload
+        crc = m.x25crc(body + bytes([kind.crc_extra])).crc
+        yield t_us, b"\xfd" + body + struct.pack("<H", crc)
+
+
+def tlog(data: bytes) -> bytes:
+    """As a ground station records them."""
+    return b"".join(struct.pack(">Q", t_us) + packet for t_us, packet in vehicles(data))
+
+
+class HostileVehicle:
+    """A Transport, over which packets come, then nothing."""
+
+    name, datagrams, outward = "a link", True, False
+
+    def __init__(self, data: bytes) -> None:
+        self._packets, self._t_us = vehicles(data), BEGUN_US
+
+    def now_ns(self) -> int:
+        """Of the last packet, or later."""
+        return self._t_us * 1000
+
+    def receive(self, until_ns: int) -> Bytes | None:
+        """See Transport; after the last packet the link is gone."""
+        t_us, packet = next(self._packets, (0, b""))
+        if not packet:
+            raise LinkError("it says no more", "")
+        self._t_us = max(self._t_us, t_us)
+        return Bytes(packet, "192.0.2.1:1", self.now_ns())
+
+    def send(self, data: bytes, address: str | None) -> None:
+        """See Transport."""
+
+    def settle(self, address: str | None) -> None:
+        """See Transport."""
+
+    def close(self) -> None:
+        """See Transport."""
+
+
+def vehicle(data: bytes) -> None:
+    """What a vehicle answers: who it is, its parameters, a file."""
+    link = Link(HostileVehicle(data), lambda t_ns, packet: None)
+    found = link.listen()
+    link.lock(found[0])
+    str(Watch(link).armed)
+    Storage(link).get("/x")
+    Parameters(link).read_surely(stream_parameter_names(link.vehicle.firmware)[:2])
+
+
+def vehicle_says() -> list[bytes]:
+    """What a vehicle says in a second, and what `vehicle` asks for."""
+    m, link = dialect(), dialect().MAVLink(None, 1, 1)
+
+    def piece(message: Any) -> tuple[int, int, int, int, bytes]:
+        packet, name = bytes(message.pack(link)), message.get_type().lower()
+        return PACKETS.index(name), 1, 1, 800 if message is beat else 20, packet[10:-2]
+
+    beat = m.MAVLink_heartbeat_message(2, 3, 81, 0, 3, 3)
+    imus = [m.MAVLink_raw_imu_message(20_000 * n, 9, 0, -1000, n, 2, 3, 0, 0, 0, 0, 2500) for n in range(40)]
+    more = [
+        m.MAVLink_highres_imu_message(20_000 * n, *(0.5, 0.0, -9.8, 0.1, 0.2, 0.3), *[0.0] * 7, 63) for n in range(40)
+    ]
+    names = stream_parameter_names("ArduPilot")[:2]
+    values = [m.MAVLink_param_value_message(name.encode(), 0.5, 9, 9, 1) for name in names * 3]
+    answers = [Payload(2, 0, 128, b"", requested=4), Payload(3, 0, 128, b"data", requested=5)]
+    answers += [Payload(4, 0, 129, b"\x06", requested=5), Payload(5, 0, 128, b"", requested=1)]
+    files = [m.MAVLink_file_transfer_protocol_message(0, 254, 190, bytearray(one.encode())) for one in answers]
+    text = m.MAVLink_statustext_message(6, b'mpucal {"name":"key","data":{"key":"enough"}}', 1, 0)
+    asked = joined(PIECE_OF_VEHICLE, [piece(one) for one in (*[beat] * 3, *files, *values, text, beat)])
+    return [asked, *(joined(PIECE_OF_VEHICLE, [piece(one) for one in (beat, text, *kind)]) for kind in (imus, more))]
+
+
+def http(data: bytes) -> None:
+    """What a browser asks for."""
+    page = SimpleNamespace(
+        door=Door("h:1", "t", True),
+        results={"report.html": Path(__file__)},
+        pressed=lambda key: None,
+        seat=lambda: False,
+    )
+    connection = SimpleNamespace(
+        recv=io.BytesIO(data).read,
+        sendall=lambda sent: None,
+        settimeout=lambda seconds: None,
+        setsockopt=lambda *option: None,
+        makefile=lambda *how: io.BytesIO(),
+    )
+    Handler(connection, ("192.0.2.1", 1), page)  # type: ignore[arg-type]
+
+
+def browser_says() -> list[bytes]:
+    """What browsers ask for."""
+    targets = (
+        "GET /t/",
+        "GET /t/page.js",
+        "GET /t/events",
+        "GET /t/results/report.html",
+        "POST /t/keys/redo",
+        "PUT /x",
+    )
+    return [f"{target} HTTP/1.1\r\nHost: h:1\r\nOrigin: http://h:1\r\n\r\n".encode() for target in targets]

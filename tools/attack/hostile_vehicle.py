@@ -1,0 +1,248 @@
+"""Hostile MAVLink packets beside a vehicle, during a session that writes back and during `mpucal write --store`.
+
+    python -m tools.attack hostile_vehicle                          # every kind, until 100,000 packets of it were heard
+    python -m tools.attack hostile_vehicle --packets 2000 --runs 1 ids ftp
+
+The simulated vehicle and the attacker share one link, and the packets go through the code that those of a socket do.
+The attacker sends as a stranger (an address of its own), as the vehicle (its address forged, nothing signed) and
+against signing (the address forged, both sides sign, and it has no key, but packets of an earlier session). Each run
+is a process of its own: both commands, the first with `--rate` packets a second of the vehicle's time from the lock on,
+the others with bursts of any rate and length at any time, some from before the lock on.
+
+Of a stranger, and against signing, the calibration must be the undisturbed one to the bit, and be written. Always
+wrong is an exit code that says nothing, a trace, a hang, no sentence, a file in part, a parameter set that is neither
+the vehicle's own value nor that of calibration.json, and a calibration that promises what it does not hold, where no
+samples were forged. Exit code 1 where a run was wrong; `--said` shows how the others ended.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import resource
+import signal
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from mpucal.session.threads import ONE_THREAD
+
+# before NumPy loads
+os.environ.update(ONE_THREAD)
+
+import numpy as np
+
+from mpucal.__main__ import _keep_streams, run
+from mpucal.errors import MpucalError
+from mpucal.mavlink.parameters.write import DETOUR
+from mpucal.mavlink.tlog import read_tlog
+from mpucal.result.calibration import Calibration
+
+from ..lab.campaign import ready
+from ..lab.campaign_judge import CODES, _parts, errors, false
+from .hostile_link import ATTACKERS, FORGED, MOST_HEARD, SIGNED, STRANGER, Attack, HostileTransport, hostile
+from .hostile_packets import KINDS
+
+KEY = bytes(range(32))
+FIRMWARES = ("ardupilot", "px4")
+# what may be taken for the vehicle's samples, where the address is forged and nothing signed
+OF_SAMPLES = ("values", "time", "replayed", "junk", "mixed")
+MOST_RUNS = 60
+CPU_S, WALL_S = 300, 1200
+NO_VEHICLE = 2
+QUICK = ("--rate", "50", "--target", "quick")
+NUMBER = re.compile(r"-?\d[\d.e+-]*|nan|inf")
+
+
+def commands(attack: Attack, clean: Path | None) -> Iterator[tuple[str, list[str]]]:
+    """Each command, and the file whose parameters it may set."""
+    vehicle = [f"sim:firmware={attack.firmware}"]
+    signing = ["--signing-key", "key"] if attack.attacker == SIGNED else []
+    yield "out/calibration.json", ["session", "--mavlink", *vehicle, *signing, *QUICK, "-o", "out", "--yes"]
+    if clean is not None:
+        words = ["write", str(clean), "autopilot", "--mavlink", *vehicle, *signing, "--store", "--yes", "-o", "written"]
+        yield str(clean), words
+
+
+def suffer(attack: Attack, clean: Path | None, place: Path) -> dict[str, Any]:
+    """Run the commands here, in this process, and judge them."""
+    place.mkdir(parents=True)
+    os.chdir(place)
+    Path("key").write_bytes(KEY)
+    os.environ["XDG_STATE_HOME"] = str(place / "state")
+    said = os.open("said", os.O_RDWR | os.O_CREAT | os.O_APPEND)
+    os.dup2(said, 1)
+    os.dup2(said, 2)
+    _keep_streams()
+    codes, wrong, lasts, unasked = [], [], [], 0
+    with hostile(attack):
+        for file, words in commands(attack, clean):
+            attack.draw(words[0])
+            codes.append(run(words))
+            text = Path("said").read_text("utf-8", "replace")
+            lasts.append((text.strip().splitlines() or [""])[-1])
+            extra = not_asked(attack.sets, Path(file))
+            unasked += len(extra)
+            wrong += [f"{words[0]} set {extra[0]}"] if extra else []
+            wrong += unfit(attack, codes[-1], text, lasts[-1])
+    wrong += _parts(Path("out"), codes[0])
+    if attack.attacker == SIGNED or (attack.attacker == STRANGER and not attack.early):
+        undisturbed = clean is None or same(Path("out/calibration.json"), clean)
+        wrong += [f"not as without: exit codes {codes}"] if any(codes) or not undisturbed else []
+    fooled, lies = judge_samples(attack)
+    ends = [f"exit {code}: {NUMBER.sub('N', last)}" for code, last in zip(codes, lasts, strict=True) if code]
+    wrong += lies
+    return {"sent": attack.sent, "codes": codes, "wrong": wrong, "unasked": unasked, "fooled": fooled, "ends": ends}
+
+
+def unfit(attack: Attack, code: int, text: str, last: str) -> list[str]:
+    """What is wrong with how a command ended."""
+    if "Traceback" in text:
+        return [f"a trace ({last[:120]})"]
+    if code not in CODES and not (code == NO_VEHICLE and attack.early):
+        return [f"exit code {code} ({last[:120]})"]
+    return [f"no sentence ({last[:120]})"] if code not in (0, 5) and not last.startswith("mpucal: ") else []
+
+
+def judge_samples(attack: Attack) -> tuple[int, list[str]]:
+    """1 where a calibration is farther from the truth than it says; that is wrong where no samples were forged."""
+    try:
+        calibration = Calibration.load(Path("out/calibration.json"))
+    except MpucalError:
+        return 0, []
+    truth = HostileTransport.truths[0]
+    error, z = errors(calibration, [(np.array(truth["D"], float), np.array(truth["b_a"], float))])
+    lies = [f"{lie}: {error:.3f} m/s^2, {z:.1f} claims" for lie in false(calibration, error, z)]
+    forged = attack.attacker == FORGED and attack.kind in OF_SAMPLES
+    return len(lies), [] if forged else lies
+
+
+def not_asked(sets: list[tuple[str, float, float]], file: Path) -> list[tuple[str, float]]:
+    """What was set that is neither of the calibration in `file` nor the vehicle's own."""
+    new: dict[str, float] = {}
+    if file.is_file():
+        document = json.loads(file.read_text())
+        for imu in (document, *document["others"]):
+            new |= imu["autopilot"].get("params_new", {})
+    return [
+        (name, value)
+        for name, value, old in sets
+        if name not in new or not min(abs(value - old), abs(value - new[name])) <= DETOUR * 1.01
+    ]
+
+
+def same(file: Path, clean: Path) -> bool:
+    """Whether both hold the same D and b_a."""
+    if not file.is_file():
+        return False
+    one, other = map(Calibration.load, (file, clean))
+    return bool(np.array_equal(one.D, other.D) and np.array_equal(one.b_a, other.b_a))
+
+
+Task = tuple[Attack, Path | None, Path]
+
+
+def outcomes(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Attack, dict[str, Any]]]:
+    """Of each, run in a process of its own, as they end."""
+    waiting, running = list(tasks), {}
+    while waiting or running:
+        while waiting and len(running) < jobs:
+            task = waiting.pop(0)
+            pid = os.fork()
+            if pid == 0:
+                alone(task)
+            running[pid] = task
+        pid, status, usage = os.wait3(0)
+        attack, _, place = running.pop(pid)
+        try:
+            outcome = json.loads((place / "outcome.json").read_text())
+        except FileNotFoundError:
+            wrong = [f"it hung, or was ended ({os.waitstatus_to_exitcode(status)})"]
+            outcome = {"sent": 0, "codes": ["?"], "wrong": wrong, "unasked": 0, "fooled": 0, "ends": []}
+        yield attack, {**outcome, "mb": usage.ru_maxrss // 1024}
+
+
+def alone(task: Task) -> None:
+    """Suffer it, leave what became of it, and end; a hang is ended by the kernel."""
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
+    signal.alarm(WALL_S)
+    outcome = suffer(*task)
+    (task[2] / "outcome.json").write_text(json.dumps(outcome))
+    os._exit(0)
+
+
+def main() -> int:
+    """Run them and print the table; the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"some of: {', '.join(KINDS)}; default: all")
+    parser.add_argument("--packets", type=int, default=100_000, help="of each kind and attacker, at least")
+    parser.add_argument("--runs", type=int, default=3, help="of each kind, attacker and firmware, at least")
+    parser.add_argument("--rate", type=float, default=1000.0, help="packets a second of the vehicle's time")
+    parser.add_argument("--attacker", choices=ATTACKERS, action="append")
+    parser.add_argument("--firmware", choices=FIRMWARES, action="append")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--said", action="store_true", help="show with which sentences commands ended")
+    parser.add_argument("--keep", type=Path, help="where the files of the runs stay")
+    asked = parser.parse_args()
+    ready()
+    failed = 0
+    with tempfile.TemporaryDirectory() as temporary:
+        place = (asked.keep or Path(temporary)).resolve()
+        for kind in asked.kinds or KINDS:
+            for attacker in asked.attacker or ATTACKERS:
+                failed += campaign(asked, place, kind, attacker)
+    return int(failed > 0)
+
+
+def undisturbed(place: Path, attacker: str, firmware: str) -> Path:
+    """What a session without an attack leaves, as often as it is needed."""
+    signed = SIGNED if attacker == SIGNED else STRANGER
+    folder = place / f"{firmware} {signed}"
+    if not folder.exists():
+        [(_, outcome)] = outcomes([(Attack("ids", signed, firmware, 0, 0.0), None, folder)], 1)
+        if outcome["wrong"] or any(outcome["codes"]):
+            raise SystemExit(f"{firmware} undisturbed: {outcome}")
+    return folder / "out"
+
+
+def campaign(asked: argparse.Namespace, place: Path, kind: str, attacker: str) -> int:
+    """Runs until enough packets of one kind were heard; how many were wrong."""
+    firmwares = asked.firmware or FIRMWARES
+    clean = {firmware: undisturbed(place, attacker, firmware) for firmware in firmwares}
+    heard = {f: tuple(r.data for r in read_tlog(clean[f] / "capture.tlog").records[-MOST_HEARD // 2 :]) for f in clean}
+    done: list[dict[str, Any]] = []
+    for seed in range(MOST_RUNS):
+        if seed >= asked.runs and sum(outcome["sent"] for outcome in done) >= asked.packets:
+            break
+        tasks = []
+        for firmware in firmwares:
+            here = place / f"{kind}-{attacker.replace(' ', '-')}-{firmware}-{seed}"
+            attack = Attack(kind, attacker, firmware, seed, asked.rate, heard[firmware])
+            tasks.append((attack, clean[firmware] / "calibration.json", here))
+        done += [outcome for _, outcome in outcomes(tasks, asked.jobs)]
+    print(row(kind, attacker, done))
+    wrongs = Counter(wrong for outcome in done for wrong in outcome["wrong"])
+    ends = Counter(end for outcome in done for end in outcome["ends"])
+    for wrong, count in wrongs.most_common(8):
+        print(f"    WRONG {count} x {wrong}")
+    for end, count in ends.most_common() if asked.said else ():
+        print(f"    {count} x {end}")
+    sys.stdout.flush()
+    return len(wrongs)
+
+
+def row(kind: str, attacker: str, done: Sequence[dict[str, Any]]) -> str:
+    """Of the table."""
+    sent, unasked, fooled = (sum(outcome[key] for outcome in done) for key in ("sent", "unasked", "fooled"))
+    wrong = sum(bool(outcome["wrong"]) for outcome in done)
+    codes = Counter(",".join(map(str, outcome["codes"])) for outcome in done)
+    exits = " ".join(f"{code} x{count}" for code, count in codes.most_common())
+    return (
+        f"{kind:11}{attacker:20}{sent:8} packets in {len(done)} runs, {unasked} sets not asked for, {fooled} fooled,"
+        f" {wrong} wrong; {max(o['mb'] for o in done)} MB; exits {exits}"
+    )

@@ -1,0 +1,52 @@
+"""The compiled modules of build/asan in place of those that are installed; to be imported before mpucal.
+
+As a plugin of pytest: `-p sanitized`, with what `environment` says.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+BUILT = ROOT / "build" / "asan"
+MODULES = ("kernel._kernel", "files._text", "files._packed", "chip._flips", "chip._pieces")
+
+
+def build() -> None:
+    """Compile them, with the options of an installation but for the sanitizers and the optimiser's level."""
+    options = ["-DMPUCAL_SANITIZE=ON", f"-DPython_EXECUTABLE={sys.executable}"]
+    targets = [name.partition(".")[2] for name in MODULES]
+    for command in (["-S", ROOT, "-B", BUILT, *options], ["--build", BUILT, "--target", *targets]):
+        subprocess.run(["cmake", *map(str, command)], check=True, stdout=subprocess.DEVNULL)
+
+
+def environment() -> dict[str, str]:
+    """In which a Python loads them; its own blocks of memory are each by themselves, and many are kept to its end."""
+    # C++'s, too: else the exceptions that Python does not know are not intercepted
+    libraries = [
+        subprocess.run(["gcc", f"-print-file-name={name}"], capture_output=True, text=True, check=True).stdout.strip()
+        for name in ("libasan.so", "libstdc++.so")
+    ]
+    paths = os.pathsep.join((str(Path(__file__).parent), str(ROOT)))
+    asan = "detect_leaks=0:allocator_may_return_null=1"
+    return {
+        **os.environ,
+        "LD_PRELOAD": " ".join(libraries),
+        "ASAN_OPTIONS": asan,
+        "UBSAN_OPTIONS": "print_stacktrace=1",
+        "PYTHONMALLOC": "malloc",
+        "PYTHONPATH": paths,
+    }
+
+
+if "libasan" in os.environ.get("LD_PRELOAD", ""):
+    for name in MODULES:
+        path = next(BUILT.glob(f"{name.partition('.')[2]}.*.so"))
+        spec = spec_from_file_location(f"mpucal.{name}", path)
+        module = module_from_spec(spec)
+        sys.modules[f"mpucal.{name}"] = module
+        spec.loader.exec_module(module)

@@ -1,0 +1,283 @@
+"""Fail each system call of a command in turn, then its allocations, and cut the power: is each file the old or the new?
+
+    python -m tools.attack syscalls [COMMAND ...] [--each] [--most N] [--allocations N] [--seed N]
+
+syscalls.c is preloaded: it counts what a command asks of the files below a folder (open, read, write, fsync,
+close, rename, unlink, mkdir, chmod, stat, opendir, mmap). The command runs again and again, and each time one of its
+calls fails, with an error that such a call may have. Calls that repeat (the same call, of the same file) are a kind:
+its first, second, middle and last are failed; with --each, every one; with --most, so many of these. Then one
+allocation of 4 kB or more gets no memory, or all from one on do not: the first and the last, and so many drawn by the
+seed. Sessions are quick ones. Wrong is: a trace or a crash, an exit code that is not documented, no sentence, a file
+that is neither the old one nor the new one, whole; a recording that is gone, a device that holds something else than
+before while nothing says so. Crashes of NumPy, some of whose loops use a buffer that they did not get, are counted.
+
+Its calls are also replayed into a model of a disk (disk_model.py), and the power is cut after calls of each
+kind: each file must be old or new, what was synced be there, and a note of a write as long as its device is between.
+Seeds are the day's number. Exit code 1 where something was wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import json
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from mpucal.errors import MpucalError
+from mpucal.files import load
+from mpucal.result.blob import Blob
+
+from .disk_model import Call, Disk, logged
+from .syscalls_commands import STATE, WORDS, Ended, Failing, ended, prepared
+
+SHIM = Path(__file__).with_suffix(".c")
+CODES = (0, 3, 4, 5, 6)
+DISK = (errno.EIO, errno.ENOSPC, errno.EDQUOT)
+REFUSED = (errno.EROFS, errno.EACCES)
+ERRORS = {
+    "o": (*DISK, *REFUSED, errno.EMFILE, errno.EINTR),
+    "i": (errno.EIO, errno.EINTR),
+    "w": (*DISK, errno.EFBIG, errno.EINTR),
+    "s": DISK,
+    "c": DISK,
+    "r": (*DISK, *REFUSED),
+    "u": (errno.EIO, *REFUSED),
+    "m": (*DISK, *REFUSED),
+    "p": (errno.EIO, *REFUSED),
+    "l": (errno.EIO, errno.EACCES),
+    "a": (errno.ENOMEM, errno.EACCES),
+}
+# of files that are made anew with the time in them: a check counts how old a calibration is
+DATE = re.compile(
+    rb'"digest": "[\w:]+"|(?<=[.]\d{4})\d+|'
+    rb"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?([.]\d+)?([+-]\d\d:\d\d|Z| UTC)?"
+)
+TEMPORARY = re.compile(r"(^|/)[.](.+)[.]\w{8}$")
+CAPTURES = (".mcap", ".tlog")
+COPY = "bridge/"
+# some of whose loops use a buffer that they did not get
+NUMPY = "_multiarray_umath"
+DRAWS, LEAST_BYTES = 3, 4096
+Files = Mapping[str, bytes]
+Whole = Callable[[str, bytes], bool]
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """Content by name, of what lies below."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def either(old: Files, new: Files, placed: Mapping[str, Sequence[bytes]]) -> Whole:
+    """Whether a file is as before, or as the command makes it (one after the other, before and after a write-back).
+
+    A temporary file, and a note of a write, is no result.
+    """
+
+    def whole(name: str, data: bytes) -> bool:
+        if data == old.get(name) or Path(name).name.startswith(".") or name.startswith(STATE):
+            return True
+        if name not in new:
+            return False
+        if name.startswith(COPY):
+            # what mpucal brings along can be had again
+            return True
+        if name.endswith(CAPTURES):
+            # what is not closed yet is read as far as it goes, or refused in a sentence
+            return True
+        if name.endswith(".html"):
+            # it tells the minute
+            return data.rstrip().endswith(b"</html>")
+        if name.endswith(".bin"):
+            return bool(Blob.decode(data))
+        return DATE.sub(b"", data) in (DATE.sub(b"", each) for each in (new[name], *placed.get(name, ())))
+
+    return whole
+
+
+def spoilt(found: Files, whole: Whole) -> Iterator[str]:
+    """Those that are neither old nor new."""
+    for name, data in found.items():
+        try:
+            fit = whole(name, data)
+        except (MpucalError, ValueError):
+            fit = False
+        if not fit:
+            yield name
+
+
+def noted(found: Files) -> bool:
+    """Whether a note of a write is there that can be read."""
+    return any(
+        "old" in (said := json.loads(data)) or "registers" in said
+        for name, data in found.items()
+        if name.startswith(STATE) and not Path(name).name.startswith(".")
+    )
+
+
+class Trial:
+    """A command on copies of `start`."""
+
+    def __init__(self, name: str, start: Path) -> None:
+        self._words, self._start, self._here = WORDS[name], start, start.parent / "here"
+        self._anew()
+        self.old = files(self._here)
+        with (start.parent / "log").open("w+b", buffering=0) as log:
+            done = ended(self._words, self._here, Failing(least=LEAST_BYTES, log=log.fileno()))
+            log.seek(0)
+            self.log = list(logged(log.read(), str(self._here)))
+        assert done.code == 0, done.said
+        self.new, self.allocations = files(self._here), done.allocations
+        self.calls = [call for call in self.log if call.op != "d"]
+        disk = Disk(self.old)
+        for call in self.calls:
+            disk.call(call)
+        self.whole = either(self.old, self.new, disk.placed)
+
+    def failed(self, failing: Failing) -> tuple[str, list[str]]:
+        """How the command ends where this fails, and what was wrong."""
+        self._anew()
+        done = ended(self._words, self._here, failing)
+        if (done.crashed or "").startswith(NUMPY):
+            return "NumPy crashed", []
+        return f"exit {done.code}", list(self._wrong(done, files(self._here), failing.call))
+
+    def _wrong(self, done: Ended, now: Files, call: int) -> Iterator[str]:
+        last = (done.said.strip().splitlines() or [""])[-1]
+        if done.code not in CODES or "Traceback" in done.said:
+            trace = done.said[done.said.find("Traceback") :].splitlines()[-4:-1] if "Traceback" in done.said else ()
+            yield f"exit {done.code}: {done.crashed or last} {' | '.join(trace)}"
+        elif done.code not in (0, 5) and not last.startswith("mpucal: "):
+            yield f"exit {done.code} without a sentence: {last}"
+        # an old report beside a new calibration would be another's
+        yield from (f"{name} is gone" for name in self.old.keys() - now.keys() if not name.endswith("report.html"))
+        yield from (f"{name} is neither old nor new" for name in spoilt(now, self.whole))
+        if done.code == 0:
+            yield from (f"exit 0 without {name}" for name in self.new.keys() - now.keys())
+        told = noted(now) or "put back what was there" in last
+        if told != (done.changed and done.code != 0):
+            yield f"exit {done.code}, device {'changed' if done.changed else 'as before'}, told: {told}"
+        for name in (name for name in self.new.keys() - self.old.keys() if name.endswith(CAPTURES)):
+            written = [i for i, each in enumerate(self.calls, 1) if each.op == "w" and each.path == name]
+            # of which the first holds the head
+            if name in now if done.code == 0 else written[1] < call:
+                try:
+                    load(self._here / name)
+                except MpucalError as error:
+                    yield f"exit {done.code}, and what was recorded is lost: {error}"
+
+    def cut_off(self, rng: random.Random, looked: Sequence[int]) -> tuple[int, list[str]]:
+        """How many cuts were looked at, of those after entries of the log, and what was wrong."""
+        disk, wrong, cuts = Disk(self.old), [], 0
+        states = [call.data for call in self.log if call.op == "d"]
+        state = b""
+        for i, call in enumerate(self.log):
+            disk.call(call)
+            state = call.data if call.op == "d" else state
+            for share in (0.0, 1.0, *(rng.random() for _ in range(DRAWS))) if i in looked else ():
+                left = disk.cut(rng, share)
+                cuts += 1
+                bad = [f"{name} is neither old nor new" for name in spoilt(left, self.whole)]
+                bad += [
+                    f"{name} was synced, and is gone"
+                    for name in disk.synced
+                    if name.endswith(CAPTURES) and name not in left
+                ]
+                if state and state not in (states[0], states[-1]) and not noted(left):
+                    bad.append("the device is neither old nor new, and nothing says so")
+                if i == len(self.log) - 1 and noted(left):
+                    bad.append("all is done, and the next write will undo it")
+                wrong += [f"power cut after {i} ({call.op} {call.path}): {each}" for each in bad]
+        return cuts, wrong
+
+    def _anew(self) -> None:
+        shutil.rmtree(self._here, ignore_errors=True)
+        shutil.copytree(self._start, self._here)
+
+
+def sampled(calls: Sequence[Call], each: bool) -> list[int]:
+    """Indices of calls: of each kind the first, second, middle and last; or all."""
+    kinds = defaultdict(list)
+    for i, call in enumerate(calls):
+        kinds[call.op, TEMPORARY.sub(r"\1\2~", call.path)].append(i)
+    some = ({of[0], of[min(1, len(of) - 1)], of[len(of) // 2], of[-1]} for of in kinds.values())
+    return list(range(len(calls))) if each else sorted(set().union(*some))
+
+
+def tried(name: str, start: Path, asked: argparse.Namespace) -> Iterator[str]:
+    """What was wrong with a command; a line of the table is printed."""
+    rng = random.Random(f"{name} {asked.seed}")
+    trial = Trial(name, start)
+    todo = [
+        (f"{trial.calls[i].op} {trial.calls[i].path}", Failing(i + 1, rng.choice(ERRORS[trial.calls[i].op])))
+        for i in sampled(trial.calls, asked.each)
+    ]
+    todo = rng.sample(todo, min(asked.most or len(todo), len(todo)))
+    most = trial.allocations
+    drawn = sorted({1, most, *(rng.randint(1, most) for _ in range(asked.allocations))}) if asked.allocations else ()
+    starved = [
+        ("memory", Failing(least=LEAST_BYTES, allocation=n, since=since)) for n in drawn for since in (False, True)
+    ]
+    codes: dict[str, Counter[str]] = defaultdict(Counter)
+    wrong = []
+    for what, failing in (*todo, *starved):
+        code, bad = trial.failed(failing)
+        codes["memory" if failing.least else "calls"][code] += 1
+        how = (
+            f"allocation {failing.allocation}{' on' if failing.since else ''}"
+            if failing.least
+            else (f"call {failing.call} ({what}) {errno.errorcode[failing.error]}")
+        )
+        wrong += [f"{name}: {how}: {each}" for each in bad]
+    looked = sampled(trial.log, asked.each)
+    cuts, worse = trial.cut_off(rng, [*looked, len(trial.log) - 1])
+    wrong += [f"{name}: {each}" for each in worse]
+    ends = "; ".join(
+        f"{counted.total()} of {len(trial.calls) if what == 'calls' else most} {what} ("
+        + ", ".join(f"{code}: {n}" for code, n in sorted(counted.items()))
+        + ")"
+        for what, counted in codes.items()
+    )
+    print(f"{name:<21} failed {ends}; {cuts} power cuts: {len(wrong)} wrong", flush=True)
+    asked.totals.update({"calls": len(todo), "allocations": len(starved), "power cuts": cuts})
+    yield from wrong
+
+
+def main() -> int:
+    """Run them; the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("commands", nargs="*", metavar="COMMAND", help=f"some of: {', '.join(WORDS)}; default: all")
+    parser.add_argument("--each", action="store_true", help="fail every call, and cut the power after each")
+    parser.add_argument(
+        "--most", type=int, metavar="N", help="fail so many calls of a command at most, drawn by the seed"
+    )
+    parser.add_argument("--allocations", type=int, default=0, metavar="N", help="fail so many, too")
+    parser.add_argument("--seed", type=int, default=int(time.time()) // 86400)
+    asked = parser.parse_args()
+    if "LD_PRELOAD" not in os.environ:
+        return preloaded()
+    asked.totals = Counter()
+    print(f"seed {asked.seed}", flush=True)
+    with prepared() as start:
+        wrong = [each for name in asked.commands or WORDS for each in tried(name, start, asked)]
+    print("\n".join(wrong))
+    print(", ".join(f"{n} {what}" for what, n in asked.totals.items()) + f": {len(wrong)} wrong")
+    return int(bool(wrong))
+
+
+def preloaded() -> int:
+    """The same with the shim."""
+    with TemporaryDirectory() as place:
+        library = Path(place) / "syscalls.so"
+        subprocess.run(["cc", "-O1", "-shared", "-fPIC", "-o", library, SHIM, "-ldl"], check=True)
+        again = [sys.executable, "-m", "tools.attack", "syscalls", *sys.argv[1:]]
+        return subprocess.run(again, env={**os.environ, "LD_PRELOAD": str(library)}, check=False).returncode

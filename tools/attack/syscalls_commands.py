@@ -1,0 +1,209 @@
+"""The commands of syscalls.py, run in a child of the shim's, with what their simulated device then holds."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import re
+import shutil
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from mpucal.__main__ import _keep_streams, run
+from mpucal.chip.offsets import PLACES
+from mpucal.files import load
+from mpucal.result.journal import Journal
+from mpucal.simulated.chip.chip import Chip
+from mpucal.simulated.vehicle.store import ParameterStore
+from mpucal.sinks.autopilot import CORRECTION
+
+from ..lab.campaign import quick_polls, ready
+
+SIM, VEHICLE = "sim:seed=3,chip=mpu6500,temperature_c=", "sim:seed=7,imus=1"
+QUICK = ["--target", "quick", "--yes"]
+SESSION = ["session", "--bus", f"{SIM}20", "--rate", "25", *QUICK, "-o"]
+FLIGHT = ["session", "--mavlink", VEHICLE, "--rate", "50", *QUICK, "--no-write", "-o"]
+WORDS = {
+    "session": [*SESSION, "new", "--to", "chip"],
+    "session of a vehicle": [*FLIGHT, "new"],
+    "record": ["record", "--bus", f"{SIM}20", "--seconds", "3", "-o", "board/walk.mcap"],
+    "calibrate": ["calibrate", "in.npz", "-o", "board"],
+    "merge": ["merge", "a.json", "b.json", "-o", "board"],
+    "check": ["check", "a.json", "--bus", f"{SIM}20", "--yes", "-o", "board"],
+    "check of a file": ["check", "a.json", "in.mcap", "-o", "board"],
+    "write": ["write", "a.json", "chip", "--bus", f"{SIM}20", "-o", "board", "--yes"],
+    "write to a vehicle": ["write", "v.json", "autopilot", "--mavlink", VEHICLE, "-o", "board", "--yes"],
+    "restore": ["write", "chip-offsets.json", "chip", "--bus", f"{SIM}20", "-o", "board", "--yes"],
+    "export": ["export", "a.json", "--to", "c-header", "-o", "board/calibration.h"],
+    "apply": ["apply", "a.json", "in.npz", "-o", "board/out.csv"],
+    "stream": ["stream", "--bus", f"{SIM}20", "--apply", "a.json", "--seconds", "2", "-o", "board/stream.mcap"],
+    "noise": ["noise", "in.npz", "-o", "board"],
+    "firmware": ["firmware", "-o", "bridge"],
+}
+# exit codes of crashes are above, and on top of their stack the shim, and what was called
+SIGNAL, OUTER = 128, re.compile(r"syscalls[.]so|libc[.]so|libpython|bin/python")
+# notes of writes, below the folder
+STATE = ".state"
+
+
+@dataclass(frozen=True)
+class Failing:
+    """What is to fail in a run.
+
+    Attributes
+    ----------
+    call, error : the number of a call, and its errno. least, allocation, since : the number of an allocation of `least`
+    bytes or more, and whether those after it fail, too. log : a file for all calls.
+    """
+
+    call: int = 0
+    error: int = 0
+    least: int = 0
+    allocation: int = 0
+    since: bool = False
+    log: int = -1
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended.
+
+    Attributes
+    ----------
+    code : exit code; 128 + signal where it crashed. said : on stderr; a crash with its stack.
+    allocations : so many counted. changed : its device holds something else than before the write.
+    """
+
+    code: int
+    said: str
+    allocations: int
+    changed: bool
+
+    @property
+    def crashed(self) -> str | None:
+        """The library that crashed, or called what did."""
+        libraries = re.findall(r"^(\S+)\(", self.said, re.MULTILINE) if self.code > SIGNAL else []
+        return next((Path(each).name for each in libraries if not OUTER.search(each)), None)
+
+
+class Devices:
+    """The simulated devices of this process.
+
+    Attributes
+    ----------
+    before : what they held as a sink was opened; None: none was.
+    """
+
+    def __init__(self) -> None:
+        self._chips: list[Any] = []
+        self._stores: list[Any] = []
+        self.before: str | None = None
+
+    def state(self) -> str:
+        """What is to last of them: offset registers, parameters that correct samples."""
+        words = [bytes(chip._registers[place[0] : place[2] + 2]).hex() for chip in self._chips for place in PLACES]
+        return " ".join(
+            [*words, *(f"{name}={store[name]}" for store in self._stores for name in store if CORRECTION.search(name))]
+        )
+
+    @contextmanager
+    def watched(self, shim: Any) -> Iterator[None]:
+        """Log each change of the state since a sink was opened."""
+
+        def opening(*words: str) -> Journal:
+            self.before = self.state()
+            shim.syscalls_device(self.before.encode())
+            return of(*words)
+
+        def after(method: Any, mine: list[Any]) -> Any:
+            def changing(device: Any, *values: Any) -> None:
+                method(device, *values)
+                if not any(device is each for each in mine):
+                    mine.append(device)
+                if self.before is not None:
+                    shim.syscalls_device(self.state().encode())
+
+            return changing
+
+        of = Journal.of
+        with ExitStack() as stack:
+            stack.enter_context(patch.object(Journal, "of", opening))
+            stack.enter_context(patch.object(Chip, "__init__", after(Chip.__init__, self._chips)))
+            stack.enter_context(patch.object(Chip, "write", after(Chip.write, self._chips)))
+            setting = after(ParameterStore.__setitem__, self._stores)
+            stack.enter_context(patch.object(ParameterStore, "__setitem__", setting))
+            yield
+
+
+def ended(words: Sequence[str], folder: Path, failing: Failing = Failing()) -> Ended:
+    """Run a command in `folder`."""
+    said = folder.parent / "said"
+    hear, tell = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        code = 1
+        try:
+            code = _child(words, folder, failing, said, tell)
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            os._exit(code)
+    os.close(tell)
+    told = os.read(hear, 100).decode().split()
+    os.close(hear)
+    _, status = os.waitpid(pid, 0)
+    allocations, changed = map(int, told or (0, 0))
+    return Ended(os.waitstatus_to_exitcode(status), said.read_text("utf-8", "replace"), allocations, bool(changed))
+
+
+def _child(words: Sequence[str], folder: Path, failing: Failing, said: Path, tell: int) -> int:
+    shim, devices = ctypes.CDLL(None), Devices()
+    shim.allocations_arm.argtypes = (ctypes.c_size_t, ctypes.c_int, ctypes.c_int)
+    os.chdir(folder)
+    os.environ["XDG_STATE_HOME"] = str(folder / STATE)
+    for handle in (1, 2):
+        os.dup2(os.open(said if handle == 2 else os.devnull, os.O_RDWR | os.O_CREAT | os.O_TRUNC), handle)
+    _keep_streams()
+    with devices.watched(shim), quick_polls():
+        shim.syscalls_arm(str(folder).encode(), failing.call, failing.error, failing.log)
+        shim.allocations_arm(failing.least, failing.allocation, failing.since)
+        code = run(words)
+        allocations = shim.allocations_count()
+        shim.allocations_arm(0, 0, 0)
+        shim.syscalls_arm(b"", 0, 0, -1)
+    changed = devices.before is not None and devices.state() != devices.before
+    os.write(tell, f"{allocations} {int(changed)}".encode())
+    return code
+
+
+@contextmanager
+def prepared() -> Iterator[Path]:
+    """A folder with what the commands read, and an older result; all of mpucal is loaded, for the children."""
+    ready()
+    with TemporaryDirectory() as temporary:
+        place = Path(temporary).resolve()
+        start = place / "start"
+        start.mkdir()
+        warm = [word.replace(f"{SIM}20", f"{SIM}45,hand=placing") for word in SESSION]
+        for name, words in (("a", SESSION), ("b", warm), ("v", FLIGHT)):
+            folder = place / name
+            made = ended([*words, str(folder)], start)
+            assert made.code == 0, made.said
+            shutil.copy(folder / "calibration.json", start / f"{name}.json")
+        written = ended([*WORDS["write"][:-3], "-o", str(place / "a"), "--yes"], start)
+        assert written.code == 0, written.said
+        shutil.copy(place / "a" / "chip-offsets.json", start)
+        shutil.copy(place / "a" / "capture.mcap", start / "in.mcap")
+        recording = load(start / "in.mcap")
+        np.savez(start / "in.npz", t=recording.t, acc=recording.acc, gyr=recording.gyr)
+        shutil.copytree(place / "b", start / "board", ignore=shutil.ignore_patterns("capture*"))
+        shutil.rmtree(start / STATE, ignore_errors=True)
+        yield start

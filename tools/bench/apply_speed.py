@@ -1,0 +1,137 @@
+"""How fast `mpucal apply` goes, and in how much memory, beside NumPy's own formula on an array in memory.
+
+python -m tools.bench apply_speed                                             1 GB of samples, archive to archive
+python -m tools.bench apply_speed --gigabytes 0.1 --of .csv .npz --to .csv .mcap
+python -m tools.bench apply_speed --gigabytes 0.1 --of .mcap          a capture: a stored session's polls, repeated
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from mpucal.chip import registers as reg
+from mpucal.chip.access import Transaction
+from mpucal.data import Samples
+from mpucal.files import open_writer
+from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.files.rows import ROWS, Rows
+from mpucal.result.calibration import Calibration
+
+# t, acc, gyr and temperature as float64, and three masks
+BYTES = 8 * 8 + 3
+SESSION = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
+D = np.array([[1.021, 0.013, -0.007], [-0.009, 0.987, 0.021], [0.004, -0.016, 1.034]])
+B_A = np.array([0.31, -0.22, 1.08])
+
+
+def write_samples(path: Path, count: int) -> None:
+    """A recording of that many samples, made a run at a time."""
+    rng = np.random.default_rng(1)
+    acc, gyr, no = rng.normal(0.0, 5.0, (ROWS, 3)), rng.normal(0.0, 1.0, (ROWS, 3)), np.zeros(ROWS, bool)
+    with open_writer(path, Rows(iter(())), "") as write:
+        for first in range(0, count, ROWS):
+            t = np.arange(first, first + ROWS) * 0.001
+            run = Samples(t, acc + 1e-9 * first, gyr, np.full(ROWS, 25.0), no, no, no)
+            n = min(ROWS, count - first)
+            write(Samples(*(getattr(run, name)[:n] for name in Samples.__dataclass_fields__)))
+
+
+def write_capture(path: Path, count: int) -> None:
+    """A capture of at least that many samples: those of a stored session, again and again."""
+    capture = read_capture(SESSION)
+    accesses = [record for record in capture.records if isinstance(record, Transaction)]
+    begin = next(i for i, access in enumerate(accesses) if access.register == reg.FIFO_R_W) - 1
+    # the last three put the chip to rest
+    polls, length_ns = accesses[begin:-3], accesses[-4].t_ns - accesses[begin].t_ns
+    frames = sum(len(access.data) for access in polls if access.register == reg.FIFO_R_W) // reg.FRAME_BYTES
+    with CaptureWriter(path) as writer:
+        writer.start(capture.meta)
+        for access in accesses[:begin]:
+            writer.transaction(access)
+        for again in range(-(-count // frames)):
+            for access in polls:
+                writer.transaction(replace(access, t_ns=access.t_ns + again * length_ns))
+
+
+def applied(folder: Path, source: Path, target: Path) -> tuple[float, float, float]:
+    """Seconds, the processor's seconds and peak megabytes of `mpucal apply`, a process of its own."""
+    words = [sys.executable, "-m", "mpucal", "apply", "c.json", source.name, "-o", target.name]
+    code = (
+        "import json, resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL);"
+        "used = resource.getrusage(resource.RUSAGE_CHILDREN);"
+        "print(json.dumps([used.ru_utime + used.ru_stime, used.ru_maxrss / 1024]))"
+    )
+    begun = time.perf_counter()
+    done = subprocess.run([sys.executable, "-c", code, *words], cwd=folder, capture_output=True, text=True, check=True)
+    processor_s, peak = json.loads(done.stdout)
+    return time.perf_counter() - begun, processor_s, peak
+
+
+def in_memory(count: int) -> float:
+    """Samples the processor's second of the formula alone, on arrays that are there."""
+    rng = np.random.default_rng(1)
+    acc, gyr = rng.normal(size=(count, 3)), rng.normal(size=(count, 3))
+    gain, K, b_omega = np.linalg.inv(D), np.eye(3), np.zeros(3)
+    begun = time.process_time()
+    a, w = (acc - B_A) @ gain.T, (gyr - b_omega) @ K.T
+    seconds = time.process_time() - begun
+    return len(a) / seconds if len(w) else 0.0
+
+
+def copied(source: Path) -> float:
+    """Megabytes a second of a plain copy on the same disk, flushed."""
+    begun = time.perf_counter()
+    subprocess.run(["dd", f"if={source}", f"of={source}.copy", "bs=4M", "conv=fsync", "status=none"], check=True)
+    seconds = time.perf_counter() - begun
+    Path(f"{source}.copy").unlink()
+    return source.stat().st_size / 1e6 / seconds
+
+
+def main() -> None:
+    """Measure what the options name."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--gigabytes", type=float, default=1.0)
+    kinds = [".npz", ".csv", ".mcap"]
+    parser.add_argument("--of", nargs="+", default=[".npz"], choices=kinds)
+    parser.add_argument("--to", nargs="+", default=[".npz"], choices=kinds)
+    parser.add_argument("--folder", type=Path, default=None, help="On which disk; by default a temporary folder's.")
+    options = parser.parse_args()
+    count = round(options.gigabytes * 1e9 / BYTES)
+    formula = in_memory(min(count, 5_000_000)) / 1e6
+    print(f"NumPy's formula on arrays in memory: {formula:.1f} million samples a second of the processor's")
+    with tempfile.TemporaryDirectory(dir=options.folder) as name:
+        folder = Path(name)
+        Calibration(D, B_A, quality={"verdict": "good", "reasons": []}).save(folder / "c.json")
+        for source in options.of:
+            measure(folder, source, options.to, count)
+
+
+def measure(folder: Path, kind: str, endings: list[str], count: int) -> None:
+    """Print a line for each ending: `count` samples of a kind of file applied to."""
+    write = write_capture if kind == ".mcap" else write_samples
+    source, small = folder / f"in{kind}", folder / f"small{kind}"
+    write(source, count)
+    write(small, 2 * ROWS)
+    *_, least = applied(folder, small, folder / "out.npz")
+    size = source.stat().st_size
+    print(f"{kind} of {count} samples, {size / 1e9:.2f} GB; a plain copy: {copied(source):.0f} MB/s")
+    for ending in endings:
+        target = folder / f"out{ending}"
+        seconds, processor_s, peak = applied(folder, source, target)
+        print(
+            f"mpucal apply, {kind} to {ending}: {count / seconds / 1e6:.2f} million samples/s,"
+            f" {count / processor_s / 1e6:.2f} a second of the processor's,"
+            f" {size / 1e6 / processor_s:.0f} MB read in it, {peak:.0f} MB of memory at most"
+            f" ({least:.0f} MB with {2 * ROWS} samples)"
+        )
+        target.unlink()
+    source.unlink()

@@ -1,0 +1,191 @@
+"""How much of a bus the driver takes, 400 kHz I2C or SPI, whether it keeps up, and how well it knows the sample rate.
+
+    python -m tools.bench bus_budget [CAPTURE.mcap] [--seconds 3600] [--seeds 100]
+
+The share is counted from the transactions, as the simulated chip's driver makes them or as a capture holds them: a
+transfer over I2C takes 27 bits of addresses and register, 3 of start, repeated start and stop, and 9 a byte; over SPI a
+byte of address and 8 bits a byte, registers at 1 MHz and what is measured at 20 MHz. Samples are numbered, so that a
+lost one is seen.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from mpucal.chip.access import Transaction
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.chip.families import MPU6500
+from mpucal.data import Recording, Vector
+from mpucal.files.mcap import read_capture
+from mpucal.simulated.chip.bus import SimulatedBus
+from mpucal.simulated.chip.chip import Chip
+from mpucal.simulated.chip.clock import FastClock, RealClock
+from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.sensor import Counts, Setting
+from mpucal.sources.spi import DATA, REGISTER_HZ, SpiBus
+from mpucal.sources.tap import Tap
+
+BUS_HZ = 400_000
+READ_BITS, WRITE_BITS, BYTE_BITS = 30, 20, 9
+FASTEST_PPM = 10_000.0
+# chip, rate [Hz], and how late the host may be [s]; at 4000 Hz with the accelerometer alone
+BUDGETS = (
+    ("mpu6050", 200, 0.020),
+    ("mpu6050", 1000, 0.020),
+    ("mpu6500", 200, 0.010),
+    ("mpu6500", 1000, 0.010),
+    ("mpu6500", 4000, 0.010),
+)
+
+
+class NumberedFeed:
+    """Samples 0, 1, 2, ... in accelerometer x, modulo 30000."""
+
+    def __init__(self) -> None:
+        self.next = 0
+
+    def samples(self, edges_s: Vector, setting: Setting) -> Counts:
+        """The next samples of a board at rest."""
+        n = len(edges_s) - 1
+        rows = np.tile(np.array([0, 0, round(32768 / setting.accel_range_g), -2000, 0, 0, 0], np.int16), (n, 1))
+        rows[:, 0] = np.arange(self.next, self.next + n) % 30000
+        self.next += n
+        return rows
+
+
+class JitterClock(FastClock):
+    """A host that wakes up to `late_s` too late, each time by chance."""
+
+    def __init__(self, late_s: float, seed: int = 0) -> None:
+        super().__init__()
+        self._late_ns, self._rng = late_s * 1e9, np.random.default_rng(seed)
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Go on to `t_ns`, and by chance further."""
+        super().sleep_until(t_ns + int(self._rng.uniform(0, self._late_ns)))
+
+
+class Kept(list[Transaction]):
+    """Keeps what crosses the bus."""
+
+    def transaction(self, transaction: Transaction) -> None:
+        """Keep one more."""
+        self.append(transaction)
+
+
+def share(transactions: Sequence[Transaction]) -> float:
+    """Of the bus, from the first of them to the last."""
+    bits = sum((READ_BITS if t.op == "read" else WRITE_BITS) + BYTE_BITS * t.count for t in transactions)
+    return bits / BUS_HZ / ((transactions[-1].t_ns - transactions[0].t_ns) * 1e-9)
+
+
+def spi_share(transactions: Sequence[Transaction]) -> float:
+    """The same of an SPI bus, as mpucal/sources/spi.py moves them."""
+    busy_s = sum(8 * (t.count + 1) / (MPU6500.spi_data_hz if t.register in DATA else REGISTER_HZ) for t in transactions)
+    return busy_s / ((transactions[-1].t_ns - transactions[0].t_ns) * 1e-9)
+
+
+def run(
+    model: str,
+    rate_hz: float,
+    seconds: float,
+    late_s: float,
+    ppm: float = FASTEST_PPM,
+    seed: int = 0,
+    share: Callable[[Sequence[Transaction]], float] = share,
+) -> tuple[Recording, float, float]:
+    """What was recorded on a host that is late, the share of the bus, and processor seconds a second."""
+    kept = Kept()
+    bus = SimulatedBus(Chip(MODELS[model], NumberedFeed(), ppm, Factory()), JitterClock(late_s, seed))
+    driver = Driver(Tap(bus, kept), Config(rate_hz=rate_hz))
+    driver.start()
+    kept.clear()
+    begun_ns, begun = driver.now_ns(), time.process_time()
+    while driver.now_ns() < begun_ns + seconds * 1e9:
+        driver.poll()
+    return driver.recording(), share(kept), (time.process_time() - begun) / seconds
+
+
+class Wired:
+    """As much of spidev.SpiDev as SpiBus uses, with an MPU-6500 behind it that lives in real time."""
+
+    def __init__(self) -> None:
+        self._chip = SimulatedBus(Chip(MODELS["mpu6500"], NumberedFeed(), 0.0, Factory()), RealClock())
+
+    def open_path(self, path: str) -> None:
+        """Any."""
+
+    def xfer2(self, values: list[int], _hz: int) -> list[int]:
+        """One message: the address, with bit 7 to read, and the data."""
+        if values[0] & 0x80:
+            return [0, *self._chip.read(values[0] & 0x7F, len(values) - 1).data]
+        self._chip.write(values[0], bytes(values[1:]))
+        return values
+
+
+def spi_processor(rate_hz: float, seconds: float) -> float:
+    """Processor seconds a second of reading over SPI in real time; the simulated chip is in it, the wires are not."""
+    sys.modules["spidev"] = library = ModuleType("spidev")
+    library.SpiDev = Wired  # type: ignore[attr-defined]
+    driver = Driver(Tap(SpiBus("simulated"), Kept()), Config(rate_hz=rate_hz))
+    driver.start()
+    begun_ns, begun = driver.now_ns(), time.process_time()
+    while driver.now_ns() < begun_ns + seconds * 1e9:
+        driver.poll()
+    return (time.process_time() - begun) / seconds
+
+
+def lost(recording: Recording) -> int:
+    """How many samples are missing between the first and the last."""
+    number = np.rint(recording.acc[:, 0] / 9.80665 * 8192).astype(int)
+    return int(((np.diff(number) % 30000) - 1).sum())
+
+
+def rate_error_ppm(rate_hz: float, seconds: float, seeds: int) -> float:
+    """The root mean square of the measured rate's error, on a host 1 ms late."""
+    errors = []
+    for seed in range(seeds):
+        ppm = float(np.random.default_rng(seed).uniform(-8000, 8000))
+        recording, _, _ = run("mpu6050", rate_hz, seconds, 0.001, ppm, seed)
+        assert recording.sensor.rate_hz is not None
+        errors.append((recording.sensor.rate_hz / rate_hz / (1 + ppm * 1e-6) - 1) * 1e6)
+    return float(np.sqrt(np.mean(np.square(errors))))
+
+
+def main() -> None:
+    """Print it all."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("capture", type=Path, nargs="?", help="count its transactions instead")
+    parser.add_argument("--seconds", type=float, default=3600.0, help="how long the long run takes, of simulated time")
+    parser.add_argument("--seeds", type=int, default=100, help="how often each rate is measured")
+    options = parser.parse_args()
+    if options.capture is not None:
+        records = read_capture(options.capture).records
+        print(f"{share([r for r in records if isinstance(r, Transaction)]):.1%} of a 400 kHz bus, with the start")
+        return
+    for model, rate_hz, late_s in BUDGETS:
+        recording, of_bus, of_processor = run(model, rate_hz, 60.0, late_s)
+        print(
+            f"{model} at {rate_hz} Hz, host up to {late_s * 1e3:.0f} ms late: {of_bus:.1%} of the bus,"
+            f" {lost(recording)} of {len(recording)} samples lost, {of_processor:.1%} of a processor"
+        )
+    for rate_hz in (1000, 4000):
+        _, of_bus, _ = run("mpu6500", rate_hz, 60.0, 0.010, share=spi_share)
+        of_processor = spi_processor(rate_hz, 10.0)
+        print(f"mpu6500 at {rate_hz} Hz over SPI: {of_bus:.1%} of the bus, {of_processor:.1%} of a processor")
+    for model, late_s in (("mpu6050", 0.020), ("mpu6500", 0.010)):
+        recording, _, _ = run(model, 1000, options.seconds, late_s)
+        missing = f"{lost(recording)} of {len(recording)} samples lost"
+        print(f"{model}, {options.seconds:.0f} s at 1000 Hz: {missing}", flush=True)
+    for rate_hz, seconds in ((1000, 10), (200, 10), (1000, 30)):
+        ppm = rate_error_ppm(rate_hz, seconds, options.seeds)
+        print(f"rate at {rate_hz} Hz after {seconds} s: {ppm:.1f} ppm rms, {options.seeds} seeds", flush=True)

@@ -1,0 +1,194 @@
+"""The reading loop's worst gap while fits run beside it, and what of a core a live session takes.
+
+python -m tools.bench loop_gap --rate 1000 --seconds 70
+python -m tools.bench loop_gap --rate 200 --seconds 70
+
+A session on the simulated chip at a person's pace, recorded into a capture: the gap is the time between two looks into
+the FIFO, which at 1 kHz overflows 36 ms after it was emptied. Compared are a session without fits, with fits in the
+loop, with fits in a process of their own, as a session has them, and that with a page which one client reads, and
+another one has stopped reading. The simulation itself takes a part of the time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+
+from mpucal.chip import registers as reg
+from mpucal.chip.access import Bus, Reply
+from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
+from mpucal.data import Sensor
+from mpucal.errors import EndOfCapture
+from mpucal.files.mcap import CaptureWriter
+from mpucal.page.address import Address
+from mpucal.page.feed import Feed
+from mpucal.session.events import Event, Key, Output
+from mpucal.session.live.apart import Apart
+from mpucal.session.live.fits import Task
+from mpucal.session.live.questions import Here, Worker
+from mpucal.session.plan import Plan
+from mpucal.session.runner import Runner
+from mpucal.simulated.chip import open_simulated
+from mpucal.sources.tap import Tap
+
+FIFO_FRAMES = 512 // reg.FRAME_BYTES
+
+
+Hire = Callable[[Plan, Sensor], Worker]
+
+
+class Idle:
+    """Answers nothing, at once."""
+
+    def __init__(self, _plan: Plan, _sensor: Sensor) -> None: ...
+
+    def submit(self, _task: Task) -> Future[Event | None]:
+        """See Worker."""
+        answer: Future[Event | None] = Future()
+        answer.set_result(None)
+        return answer
+
+    def close(self) -> None:
+        """See Worker."""
+
+
+HIRED: dict[str, tuple[Hire, bool]] = {
+    "without fits": (Idle, False),
+    "with fits in the loop": (Here, False),
+    "with fits apart": (Apart, False),
+    "with fits apart, and a page": (Apart, True),
+}
+READS = "import sys, urllib.request; urllib.request.urlopen(sys.argv[1] + 'events').read()"
+
+
+class Timed:
+    """A bus that notes when the FIFO is looked at, and ends after some seconds."""
+
+    def __init__(self, bus: Bus, seconds: float) -> None:
+        self._bus, self._end_ns = bus, time.monotonic_ns() + round(seconds * 1e9)
+        self.looks_ns: list[int] = []
+
+    def read(self, register: int, count: int) -> Reply:
+        """See Bus."""
+        if register == reg.FIFO_COUNT_H:
+            self.looks_ns.append(time.monotonic_ns())
+        if time.monotonic_ns() > self._end_ns:
+            raise EndOfCapture
+        return self._bus.read(register, count)
+
+    def write(self, register: int, data: bytes) -> int:
+        """See Bus."""
+        return self._bus.write(register, data)
+
+    def sleep_until(self, t_ns: int) -> None:
+        """See Bus."""
+        self._bus.sleep_until(t_ns)
+
+    def close(self) -> None:
+        """See Bus."""
+        self._bus.close()
+
+
+class Nobody:
+    """Says nothing; at the first prompt, when the chip is set up, the count of looks begins. A page may be told."""
+
+    def __init__(self, bus: Timed, feed: Feed | None) -> None:
+        self._bus: Timed | None = bus
+        self._feed = feed
+
+    def hear(self, output: Output) -> None:
+        """Begin to count."""
+        if self._feed is not None:
+            self._feed.hear(output)
+        if self._bus is not None:
+            self._bus.looks_ns.clear()
+        self._bus = None
+
+    def pressed(self) -> Sequence[Key]:
+        """Nothing."""
+        return ()
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Gaps (n,) between looks [ms], and what of a core was used."""
+
+    gaps_ms: np.ndarray
+    share: float
+
+
+@contextmanager
+def followed(page: bool) -> Iterator[Feed | None]:
+    """A page with its two clients, if there is to be one."""
+    if not page:
+        yield None
+        return
+    feed = Feed(Address(), {"title": "trial", "board": "gy-521"})
+    where = urlsplit(feed.url)
+    with (
+        socket.create_connection((where.hostname, where.port)) as stalled,
+        subprocess.Popen([sys.executable, "-c", READS, feed.url]) as reading,
+    ):
+        stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
+        stalled.sendall(f"GET {where.path}events HTTP/1.1\r\nHost: {where.netloc}\r\n\r\n".encode())
+        yield feed
+        reading.kill()
+        feed.close()
+
+
+def measure(rate_hz: float, seconds: float, hire: Hire, page: bool) -> Measured:
+    """One session of so long."""
+    chip = open_simulated("sim:pace=real", seed=1)
+    bus = Timed(chip, seconds)
+    plan = Plan(Config(rate_hz=rate_hz), target="best")
+    with (
+        followed(page) as feed,
+        tempfile.TemporaryDirectory() as folder,
+        CaptureWriter(Path(folder) / "capture.mcap") as writer,
+    ):
+        writer.start({})
+        driver = Driver(Tap(bus, writer), plan.config)
+        runner = Runner(driver, Nobody(bus, feed), writer.event, plan, (chip.hear,), hire=hire)
+        begun, used_s = time.monotonic(), _used_s()
+        runner.measure()
+        share = (_used_s() - used_s) / (time.monotonic() - begun)
+    return Measured(np.diff(bus.looks_ns) * 1e-6, share)
+
+
+def _used_s() -> float:
+    """CPU time of this process and of those that have ended."""
+    used = os.times()
+    return used.user + used.system + used.children_user + used.children_system
+
+
+def main() -> int:
+    """Measure all of them."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--rate", type=float, default=1000.0)
+    parser.add_argument("--seconds", type=float, default=70.0)
+    arguments = parser.parse_args()
+    print(f"{arguments.rate:g} Hz, {arguments.seconds:g} s; a 512-byte FIFO holds", end=" ")
+    print(f"{1000.0 * FIFO_FRAMES / arguments.rate:.0f} ms")
+    for name, (hire, page) in HIRED.items():
+        found = measure(arguments.rate, arguments.seconds, hire, page)
+        gaps = found.gaps_ms
+        print(
+            f"{name}: gaps {np.median(gaps):.1f} ms in the median, "
+            f"{np.quantile(gaps, 0.99):.1f} at 99 %, {gaps.max():.1f} at worst; {found.share:.0%} of a core",
+            flush=True,
+        )
+    return 0

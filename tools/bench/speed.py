@@ -1,0 +1,244 @@
+"""How long things take and how much memory they need: python -m tools.bench speed [--json FILE].
+
+The kernel is compared with its NumPy twins on the same data in the same run, so that their ratio means the same on
+every machine. Times are the processor's, so that what else runs counts little. Nothing here passes or fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+import tracemalloc
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from mpucal.session.threads import ONE_THREAD
+
+os.environ.update(ONE_THREAD)  # as the program does, and before NumPy or SciPy loads
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+import mpucal
+from mpucal.calibration.flat_segment import flat_statistics
+from mpucal.calibration.initial_estimate import initialise
+from mpucal.calibration.likelihood import evaluate, value
+from mpucal.calibration.model_selection import METHODS, choose, fit_accel
+from mpucal.calibration.parameters import ACCEL, HAND, IMU
+from mpucal.calibration.problem import Problem, Series
+from mpucal.calibration.theta import Theta
+from mpucal.data import Recording
+from mpucal.kernel import _kernel
+from tools.lab.hand_reference import evaluate_hand_reference
+from tools.lab.reference import evaluate_reference
+from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario, paper_scenario
+
+FLAT_S, TURNS = 10.0, 3
+# long enough for a loop's start not to count, and what the twins do in a second
+KERNEL_STEPS, TWIN_STEPS = 10_000, 300
+# a millisecond or two each: so many that a burst of other work does not make the median
+MORE_OF_A_KERNEL = 15
+GROWTH = (1_000, 10_000, 100_000, 1_000_000)
+HELP = "from mpucal.__main__ import run; run(['--help']); import sys; sys.stderr.write(str('numpy' in sys.modules))"
+
+
+def turned(seconds: float, rate_hz: float) -> Recording:
+    """Ten seconds flat, then one turn about each axis, by a sensor of the paper's simulation."""
+    return paper_scenario(0, rate_hz=rate_hz, turn_s=(seconds - FLAT_S) / TURNS).recording
+
+
+def median_s(call: Callable[[], Any], runs: int, clock: Callable[[], float] = time.process_time) -> float:
+    """The median time of `runs` calls [s], after one that warms up."""
+    call()
+    times = []
+    for _ in range(runs):
+        began = clock()
+        call()
+        times.append(clock() - began)
+    return statistics.median(times)
+
+
+def calibrations(runs: int) -> list[dict[str, Any]]:
+    """Of whole calibrations with their verdicts, and of the estimation alone."""
+    by_hand = hand_scenario(0, "pose12").recording
+    rows = []
+    for motion, recording, model in (
+        ("three turns", turned(60.0, 200.0), "accel"),
+        ("three turns", turned(60.0, 200.0), "auto"),
+        ("three turns", turned(160.0, 100.0), "accel"),
+        ("three turns", turned(160.0, 100.0), "auto"),
+        ("12 poses by hand", by_hand, "auto"),
+    ):
+        found = mpucal.calibrate(recording, model=model, gravity=GRAVITY_MPS2)
+        flat = flat_statistics(recording, recording.flat)
+        estimate = choose if model == "auto" else METHODS[model]
+        estimation_s = median_s(lambda e=estimate, r=recording, f=flat: e(r, f, GRAVITY_MPS2), runs)
+        whole_s = median_s(lambda r=recording, m=model: mpucal.calibrate(r, model=m, gravity=GRAVITY_MPS2), runs)
+        rows.append(
+            {
+                "motion": motion,
+                "seconds": float(recording.t[-1] - recording.t[0]),
+                "rate_hz": recording.rate_hz,
+                "model": model if found.fit["model"] == model else f"{model}: {found.fit['model']}",
+                "iterations": found.fit["iterations"],
+                "estimation_ms": 1e3 * estimation_s,
+                "ms": 1e3 * whole_s,
+            }
+        )
+    return rows
+
+
+def problem_of(recording: Recording) -> tuple[Problem, Theta]:
+    """What the filters run over, and where an estimate begins."""
+    flat = flat_statistics(recording, recording.flat)
+    problem = Problem(Series.after(recording, flat), flat, GRAVITY_MPS2)
+    return problem, initialise(problem, flat.b_omega)
+
+
+def as_hand(problem: Problem) -> Problem:
+    """The same for the hand's filter, with everything that it may be given."""
+    series = problem.series
+    n = len(series)
+    alpha = np.gradient(series.omega, axis=0) / series.dt[:, None]
+    moved = replace(series, rate=series.omega, alpha=alpha, jerk=np.full(n, 1.0), r_extra=np.zeros(n))
+    return replace(problem, series=moved, huber=3.0)
+
+
+def cut(problem: Problem, steps: int) -> Problem:
+    """Its first steps."""
+    arrays = {name: None if x is None else x[:steps] for name, x in vars(problem.series).items()}
+    return replace(problem, series=replace(problem.series, **arrays))
+
+
+def kernel(runs: int) -> list[dict[str, Any]]:
+    """Of one step of V, and of V with gradient and Fisher matrix, beside the NumPy twin."""
+    problem, theta = problem_of(turned(60.0, 200.0))
+    runs *= MORE_OF_A_KERNEL
+    rows = []
+    for parameters, of in ((ACCEL, problem), (IMU, problem), (HAND, as_hand(problem))):
+        long, short = cut(of, KERNEL_STEPS), cut(of, TWIN_STEPS)
+        hand = parameters == HAND
+        alone = value if hand else lambda p, t: evaluate(p, t, 0)
+        twin = evaluate_hand_reference if hand else lambda p, t, n=parameters: evaluate_reference(p, t, n)
+        ns_value = 1e9 * median_s(lambda c=alone, p=long: c(p, theta), runs) / KERNEL_STEPS
+        ns_all = 1e9 * median_s(lambda p=long, n=parameters: evaluate(p, theta, n), runs) / KERNEL_STEPS
+        ns_twin = 1e9 * median_s(lambda c=twin, p=short: c(p, theta), 1) / TWIN_STEPS
+        rows.append(
+            {
+                "parameters": parameters,
+                "filter": "hand" if hand else "exact",
+                "value_ns": ns_value,
+                "derivatives_ns": ns_all,
+                "twin_ns": ns_twin,
+                "ratio": ns_twin / ns_all,
+            }
+        )
+    return rows
+
+
+def growth(runs: int) -> list[dict[str, Any]]:
+    """Of the fit by `accel` of a minute at one rate after the other: time, and the most memory it needed."""
+    rows = []
+    for n in GROWTH:
+        recording = turned(60.0, n / 60.0)
+        flat = flat_statistics(recording, recording.flat)
+        s = median_s(lambda r=recording, f=flat: fit_accel(r, f, GRAVITY_MPS2), runs)
+        whole = peak_bytes(lambda r=recording: mpucal.calibrate(r, model="accel", gravity=GRAVITY_MPS2))
+        rows.append(
+            {
+                "samples": len(recording),
+                "ms": 1e3 * s,
+                "us_a_sample": 1e6 * s / len(recording),
+                "bytes_a_sample": whole / len(recording),
+            }
+        )
+    return rows
+
+
+def peak_bytes(call: Callable[[], Any]) -> int:
+    """The most memory that the call's arrays took beyond what was there; the kernel itself keeps none a sample."""
+    tracemalloc.start()
+    call()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return peak
+
+
+def start(runs: int) -> dict[str, Any]:
+    """Of `mpucal --help` as a process, beside an interpreter that does nothing."""
+
+    def process(program: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+
+    def ms(program: str) -> float:
+        return 1e3 * median_s(lambda: process(program), runs, children_s)
+
+    return {
+        "help_ms": ms(HELP),
+        "python_ms": ms("pass"),
+        "numpy_loaded": process(HELP).stderr == "True",
+    }
+
+
+def children_s() -> float:
+    """The processor's time that the processes started from here have taken."""
+    spent = os.times()
+    return spent.children_user + spent.children_system
+
+
+def tables(document: dict[str, Any]) -> list[Table]:
+    """What was measured, for a person."""
+    whole = Table("recording", title="mpucal.calibrate")
+    for column in ("model", "iterations", "estimation ms", "whole ms"):
+        whole.add_column(column, justify="left" if column == "model" else "right")
+    for row in document["calibrate"]:
+        recording = f"{row['motion']}, {row['seconds']:.0f} s at {row['rate_hz']:.0f} Hz"
+        times = f"{row['estimation_ms']:.1f}", f"{row['ms']:.1f}"
+        whole.add_row(recording, row["model"], str(row["iterations"]), *times)
+
+    step = Table("parameters", "filter", title=f"one step of the filter ({document['instruction_set']})")
+    for column in ("V [ns]", "V, gradient, Fisher [ns]", "the same in NumPy [ns]", "NumPy / kernel"):
+        step.add_column(column, justify="right")
+    for row in document["kernel"]:
+        cells = [f"{row[key]:,.0f}" for key in ("value_ns", "derivatives_ns", "twin_ns", "ratio")]
+        step.add_row(str(row["parameters"]), row["filter"], *cells)
+
+    grown = Table(title="the fit of `accel`, by the number of samples")
+    for column in ("samples", "ms", "µs a sample", "peak bytes a sample, verdict included"):
+        grown.add_column(column, justify="right")
+    for row in document["growth"]:
+        times = f"{row['ms']:.1f}", f"{row['us_a_sample']:.2f}"
+        grown.add_row(f"{row['samples']:,}", *times, f"{row['bytes_a_sample']:.0f}")
+    grown.caption = (
+        f"`mpucal --help` takes {document['start']['help_ms']:.0f} ms, of which the interpreter "
+        f"{document['start']['python_ms']:.0f}; NumPy loaded: {'yes' if document['start']['numpy_loaded'] else 'no'}"
+    )
+    return [whole, step, grown]
+
+
+def main() -> None:
+    """Measure, print and save."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--runs", type=int, default=7, help="of which the median counts")
+    parser.add_argument("--json", type=Path, help="write the figures to this file")
+    options = parser.parse_args()
+    document = {
+        "instruction_set": _kernel.instruction_set(),
+        "calibrate": calibrations(options.runs),
+        "kernel": kernel(options.runs),
+        "growth": growth(min(options.runs, 3)),
+        "start": start(options.runs),
+    }
+    console = Console(width=100)
+    for table in tables(document):
+        console.print(table)
+    if options.json:
+        options.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,5 @@
+"""`python -m tools.lab PROGRAM ...` runs a program of this folder; without one it lists them."""
+
+from tools.programs import run
+
+run("lab")

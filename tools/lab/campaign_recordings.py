@@ -1,0 +1,267 @@
+"""Recordings whose bytes, bits, rows and values are damaged, calibrated: for tools/lab/campaign.py --recordings."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import resource
+import shutil
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr, redirect_stdout, suppress
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from mpucal import Recording
+from mpucal.__main__ import run
+from mpucal.files import load, open_writer
+from mpucal.files.rows import Rows
+
+from .campaign_judge import judged
+
+SECONDS, MEMORY = 120, 4 << 30
+MOST_BLOWS = 4
+SOURCES = {
+    "mcap": ["--bus", "sim:seed=4", "--rate", "25"],
+    "npz": ["--bus", "sim:seed=5,chip=mpu6500", "--rate", "50"],
+    "csv": ["--bus", "sim:seed=6,chip=clone98", "--rate", "25"],
+    "tlog": ["--mavlink", "sim:seed=7", "--rate", "25"],
+}
+# packet by packet, a log takes ten times as long
+ORDER = (*("mcap", "npz", "csv") * 3, "tlog")
+ODD = (np.nan, np.inf, 1e300, -1e300, 5e-324, 0.0, -32768.0, 1e19)
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True)
+class Damage:
+    """A kind of damage, as a Blow of the campaign's table."""
+
+    name: str
+
+    def __str__(self) -> str:
+        return self.name
+
+
+def bits(data: bytearray, rng: Rng) -> None:
+    """Up to 30 bits flip."""
+    for at in rng.integers(0, len(data), rng.integers(1, 31)):
+        data[at] ^= 1 << rng.integers(8)
+
+
+def some_bytes(data: bytearray, rng: Rng) -> None:
+    """Up to 20 bytes are others."""
+    for at in rng.integers(0, len(data), rng.integers(1, 21)):
+        data[at] = rng.integers(256)
+
+
+def cut(data: bytearray, rng: Rng) -> None:
+    """The end is missing."""
+    del data[rng.integers(len(data)) :]
+
+
+def hole(data: bytearray, rng: Rng) -> None:
+    """A page that never reached the disk."""
+    at = int(rng.integers(len(data)))
+    size = min(4096, len(data) - at)
+    data[at : at + size] = bytes(size)
+
+
+def moved(data: bytearray, rng: Rng) -> None:
+    """A run stands in another place."""
+    a, b = rng.integers(0, len(data), 2)
+    size = int(rng.integers(1, 2000))
+    data[a : a + size] = data[b : b + size]
+
+
+def lost(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
+    """A run of rows is missing."""
+    at = rng.integers(len(rows))
+    return rows[:at] + rows[at + rng.integers(1, 200) :]
+
+
+def twice(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
+    """A run of rows stands there again."""
+    at = rng.integers(len(rows))
+    return rows[:at] + rows[max(0, at - rng.integers(1, 100)) :]
+
+
+def swapped(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
+    """Two rows change places."""
+    a, b = rng.integers(0, len(rows), 2)
+    rows[a], rows[b] = rows[b], rows[a]
+    return rows
+
+
+def odd(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
+    """Up to 5 values are none that a sensor gives."""
+    for at in rng.integers(0, len(rows), rng.integers(1, 6)):
+        rows[at][rng.integers(len(rows[at]))] = rng.choice(ODD)
+    return rows
+
+
+def spikes(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
+    """Up to 20 values of one column are far off."""
+    column, size = rng.integers(1, 7), 10.0 ** rng.uniform(-1, 2)
+    for at in rng.integers(0, len(rows), rng.integers(1, 21)):
+        rows[at][column] += size * rng.normal()
+    return rows
+
+
+def stuck(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
+    """A column repeats itself for a while."""
+    column, at = rng.integers(1, 7), int(rng.integers(len(rows)))
+    for row in rows[at : at + int(rng.integers(2, 400))]:
+        row[column] = rows[at][column]
+    return rows
+
+
+def shifted(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
+    """The clock jumps, in either direction."""
+    by_s = rng.normal() * 10.0 ** rng.uniform(-2, 4)
+    for row in rows[rng.integers(len(rows)) :]:
+        row[0] += by_s
+    return rows
+
+
+OF_BYTES = (bits, some_bytes, cut, hole, moved)
+OF_ROWS = (lost, twice, swapped, odd, spikes, stuck, shifted)
+
+
+def originals(place: Path) -> dict[str, tuple[Path, SimpleNamespace]]:
+    """A recording in each format, and what is true of its sensor."""
+    found = {}
+    for suffix, source in SOURCES.items():
+        folder = place / f"of_{suffix}"
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+            run(["session", *source, "-o", str(folder), "--yes", "--no-write"])
+        truth = json.loads((folder / "truth.json").read_text())
+        true = [(np.array(truth["D"]), np.array(truth["b_a"]))]
+        path = next(path for path in folder.iterdir() if path.name.startswith("capture"))
+        if suffix not in path.name:
+            path = _written(load(path), folder / f"recording.{suffix}")
+        found[suffix] = path, SimpleNamespace(truths=lambda *_, true=true: true)
+    return found
+
+
+def _written(recording: Recording, path: Path) -> Path:
+    rows = Rows.of(recording)
+    with open_writer(path, rows, "") as write:
+        for run_ in rows.runs:
+            write(run_)
+    return path
+
+
+def damaged(path: Path, number: int) -> tuple[list[Damage], bytes]:
+    """The kinds of damage by its number, and the damaged file."""
+    rng = np.random.default_rng(number)
+    kinds: list[Callable] = []
+    data = bytearray(path.read_bytes())
+    if path.suffix in (".npz", ".csv") and rng.random() < 0.7:
+        rows = [row.copy() for row in _table(path)]
+        kinds = list(rng.choice(np.array(OF_ROWS, object), rng.integers(1, MOST_BLOWS + 1)))
+        for kind in kinds:
+            rows = kind(rows, rng) if rows else rows
+        data = bytearray(_file(path.suffix, np.array(rows).reshape(-1, 7)))
+    if not kinds or rng.random() < 0.1:
+        more = list(rng.choice(np.array(OF_BYTES, object), rng.integers(1, MOST_BLOWS)))
+        for kind in more:
+            if data:
+                kind(data, rng)
+        kinds += more
+    return [Damage(kind.__name__) for kind in kinds], bytes(data)
+
+
+@cache
+def _table(path: Path) -> np.ndarray:
+    recording = load(path)
+    return np.column_stack((recording.t, recording.acc, recording.gyr))
+
+
+def _file(suffix: str, rows: np.ndarray) -> bytes:
+    made = io.BytesIO()
+    if suffix == ".npz":
+        np.savez(made, t=rows[:, 0], acc=rows[:, 1:4], gyr=rows[:, 4:])
+    else:
+        np.savetxt(made, rows, delimiter=",", header="t,ax,ay,az,gx,gy,gz", comments="")
+    return made.getvalue()
+
+
+def one(number: int, of: dict[str, tuple[Path, SimpleNamespace]], place: Path) -> dict:
+    """The outcome of one damaged recording."""
+    suffix = ORDER[number % len(ORDER)]
+    path, truth = of[suffix]
+    kinds, data = damaged(path, number)
+    board = place / "board"
+    shutil.rmtree(place, ignore_errors=True)
+    board.mkdir(parents=True)
+    file = place / f"struck.{suffix}"
+    file.write_bytes(data)
+    begun = time.process_time()
+    with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
+        code = run(["calibrate", str(file), "--json"])
+    if out.getvalue():
+        (board / "calibration.json").write_text(out.getvalue())
+    (place / "err").write_text(err.getvalue())
+    outcome = judged(place, code, kinds, truth)
+    line = {"case": f"r{number}", "blows": list(map(str, kinds)), "world": suffix}
+    return {**line, "cpu_s": time.process_time() - begun, **asdict(outcome)}
+
+
+def struck_recordings(first: int, count: int, jobs: int, place: Path, seconds: float) -> Iterator[dict]:
+    """The outcomes, as they come; who crashes or hangs is told by number, and the others go on."""
+    of = originals(place)
+    until = time.monotonic() + seconds
+    hear, tell = os.pipe()
+    running: dict[int, int] = {}
+    at = dict.fromkeys(range(jobs), first - 1)
+    left = {j: range(first + j, first + count, jobs) for j in range(jobs)}
+    with os.fdopen(hear, "r") as lines:
+        os.set_blocking(hear, False)
+        while any(left.values()) or running:
+            for j, numbers in left.items():
+                if numbers and j not in running.values():
+                    running[_work(numbers, of, place / f"job{j}", tell, until)] = j
+                    left[j] = range(0)
+            time.sleep(0.05)
+            pid, status = os.waitpid(-1, os.WNOHANG)
+            for line in iter(lines.readline, ""):
+                told = json.loads(line)
+                if isinstance(told, int):
+                    at[(told - first) % jobs] = told
+                else:
+                    yield told
+            if pid:
+                j = running.pop(pid)
+                if status:
+                    yield {**_DIED, "case": f"r{at[j]}", "wrong": [f"died with {os.waitstatus_to_exitcode(status)}"]}
+                    left[j] = range(at[j] + jobs, first + count, jobs)
+    os.close(tell)
+
+
+_DIED = {"world": "?", "blows": ["?"], "cpu_s": 0.0, "verdict": ""}
+
+
+def _work(numbers: range, of: dict, place: Path, tell: int, until: float) -> int:
+    pid = os.fork()
+    if pid:
+        return pid
+    with suppress(ValueError):
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    for number in numbers:
+        if time.monotonic() > until:
+            break
+        os.write(tell, f"{number}\n".encode())
+        # of processor time: the machine may have other things to do
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)
+        os.write(tell, (json.dumps(one(number, of, place)) + "\n").encode())
+    sys.stdout.flush()
+    os._exit(0)

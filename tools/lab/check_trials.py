@@ -1,0 +1,205 @@
+"""`mpucal check` on simulated pairs of a calibration and a check with known truth, and on halves of real recordings.
+
+python -m tools.lab check_trials --runs 500                      what is told against what happened, each as often
+python -m tools.lab check_trials --only nothing --runs 2000      false alarms
+python -m tools.lab check_trials recordings/*.npz                halves of real recordings: nothing happened
+
+A pair is an MPU-6050 in a trembling hand: twelve poses make the calibration, a flat rest and the three orientations
+that are asked for, each missed by some degrees, the check; with `--any` any three. Beside what happens to it, every
+sensor ages by five days, as `mpucal.recheck.drift` says of an unchanged one, and its rests and turns err by what
+`mpucal.recheck.observed` says that no mounting and no gyroscope is better than; `--perfect` leaves that out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections import Counter
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+import mpucal
+from mpucal.calibration.rotation import rotation
+from mpucal.calibration.verification import BIAS_RAD_S, FLOOR_MPS2, FLOOR_RAD
+from mpucal.data import Sensor, Vector
+from mpucal.recheck import check, drift
+from mpucal.recheck.observed import BETA, NONLINEAR, changed
+from mpucal.simulated.sensor import SensorTruth
+from tools.lab.study.motions import CHECK_S, FLAT_S
+from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario
+from tools.lab.study.sensors import hand_sensor
+
+from .halves import halves
+from .monte_carlo import in_parallel
+
+DAYS = 5.0
+TEMPERATURE_C = 25.0
+# of a turn in that motion
+MOVE_S = 1.6
+BIAS_MG = (2.0, 5.0, 10.0, 30.0)
+ASKED, ANY = "check as asked", "check"
+EVENTS = ("nothing", *(f"bias {mg:g} mg" for mg in BIAS_MG), "scale 0.3 %", "mount 1 deg", "15 degC", "another sensor")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One pair: what happened, and what was told."""
+
+    event: str
+    seed: int
+    verdict: str
+    what: str
+    probability: float | None
+    seconds: float
+    error_mg: float | None
+
+
+def happened(truth: SensorTruth, event: str, rng: np.random.Generator) -> tuple[SensorTruth, float]:
+    """The sensor after `event`, and its temperature."""
+    size, direction = _size(event), rng.standard_normal(3)
+    direction /= np.linalg.norm(direction)
+    if event.startswith("bias"):
+        return replace(truth, b_a=truth.b_a + size * drift.MG * direction), TEMPERATURE_C
+    if event.startswith("scale"):
+        axis = np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])
+        return replace(truth, D=truth.D @ np.diag(1.0 + 0.01 * size * axis)), TEMPERATURE_C
+    if event.startswith("mount"):
+        return replace(truth, D=truth.D @ rotation(np.radians(size) * direction)), TEMPERATURE_C
+    if event.startswith("15"):
+        spread = drift.BY_TEMPERATURE["MPU-6050"].covariance() * size**2
+        return aged_by(truth, rng.multivariate_normal(np.zeros(len(spread)), spread)), TEMPERATURE_C + size
+    if event == "another sensor":
+        return hand_sensor(rng), TEMPERATURE_C
+    return truth, TEMPERATURE_C
+
+
+def aged_by(truth: SensorTruth, theta: Vector) -> SensorTruth:
+    """The sensor after a change theta (21,), see mpucal.recheck.observed."""
+    after = changed(mpucal.Calibration(truth.D, truth.b_a, K=truth.K, b_omega=truth.b_omega), theta)
+    return replace(truth, D=after.D, b_a=after.b_a, K=after.K, b_omega=after.b_omega)
+
+
+def imperfect(recording: mpucal.Recording, rng: np.random.Generator) -> mpucal.Recording:
+    """With a mounting that gives in each orientation, and a gyroscope that errs in each turn."""
+    acc, gyr, step_s = recording.acc.copy(), recording.gyr.copy(), 1.0 / recording.rate_hz
+    every_s = CHECK_S / 3
+    for k in range(3):
+        rest, move = (recording.t >= FLAT_S + every_s * k + begun for begun in (MOVE_S, 0.0))
+        move &= ~rest
+        angle = float(np.linalg.norm(gyr[move] - gyr[recording.t < FLAT_S].mean(0), axis=1).sum()) * step_s
+        std = np.sqrt(FLOOR_RAD**2 + (NONLINEAR * angle) ** 2 + (BIAS_RAD_S * every_s) ** 2)
+        gyr[move] += rng.normal(0.0, std, 3) / MOVE_S
+        rest &= recording.t < FLAT_S + every_s * (k + 1) + MOVE_S
+        acc[rest] += rng.normal(0.0, FLOOR_MPS2, 3)
+    return replace(recording, acc=acc, gyr=gyr)
+
+
+def of_pair(item: tuple[str, int], motion: str = ASKED, perfect: bool = False) -> Trial | None:
+    """Calibrate, let something happen, and check; None where the calibration was refused."""
+    event, seed = item
+    calibration, aged, of_event, of_errors = calibrated_and_aged(seed)
+    if calibration.verdict == "refused":
+        return None
+    after, temperature_c = happened(aged, event, of_event)
+    recording = at(hand_scenario(2 * seed + 1, motion, tremble=True, sensor=after).recording, temperature_c)
+    recording = recording if perfect else imperfect(recording, of_errors)
+    told = check(calibration, recording, days=DAYS)
+    error = None
+    if told.theta is not None:
+        error = float(np.abs(calibration.D @ told.theta[BETA] + calibration.b_a - after.b_a).max()) / drift.MG
+    return Trial(event, seed, told.verdict, told.what, told.probability, told.seconds, error)
+
+
+def calibrated_and_aged(
+    seed: int,
+) -> tuple[mpucal.Calibration, SensorTruth, np.random.Generator, np.random.Generator]:
+    """A calibration by twelve poses, its sensor some days later, and what draws further events and errors."""
+    of_sensor, of_event, of_age, of_errors = np.random.default_rng([seed, 21]).spawn(4)
+    before = hand_scenario(2 * seed, "pose12", tremble=True, sensor=hand_sensor(of_sensor))
+    calibration = mpucal.calibrate(at(before.recording, TEMPERATURE_C), gravity=GRAVITY_MPS2)
+    age = drift.ageing(calibration, DAYS, 0.0)
+    aged = aged_by(before.truth, of_age.multivariate_normal(np.zeros(len(age)), age))
+    return calibration, aged, of_event, of_errors
+
+
+def at(recording: mpucal.Recording, temperature_c: float) -> mpucal.Recording:
+    """The recording at a temperature, its rest to be found."""
+    sensor = Sensor(chip="MPU-6050", rate_hz=recording.sensor.rate_hz, temperature_c=temperature_c)
+    return replace(recording, sensor=sensor, temperature_c=np.full(len(recording), temperature_c), flat=None)
+
+
+def of_halves(path: Path, gravity: float) -> list[Trial]:
+    """Each half of a recording against the calibration of the other, as far as it is one."""
+    try:
+        parts = halves(mpucal.load(path))
+    except mpucal.MpucalError:
+        return []
+    trials = []
+    for number, (one, other) in enumerate((parts, parts[::-1])):
+        calibration = mpucal.calibrate(one, gravity=gravity)
+        if calibration.verdict != "refused":
+            told = check(calibration, other, days=0.0)
+            trials.append(Trial(path.stem, number, told.verdict, told.what, told.probability, told.seconds, None))
+    return trials
+
+
+def _size(event: str) -> float:
+    numbers = [word.removesuffix("degC") for word in event.replace("degC", " degC").split()]
+    return next((float(word) for word in numbers if word.replace(".", "", 1).isdigit()), 0.0)
+
+
+def table(title: str, trials: list[Trial]) -> Table:
+    """What was told, in % of the pairs of each event."""
+    told = sorted({_told(trial) for trial in trials}, key=lambda name: (name != "still good", name))
+    lines = Table("what happened", "pairs", *told, "changed %", "error mg", title=title)
+    for event in dict.fromkeys(trial.event for trial in trials):
+        of = [trial for trial in trials if trial.event == event]
+        count = Counter(_told(trial) for trial in of)
+        cells = [f"{100.0 * count[name] / len(of):.1f}" if count[name] else "" for name in told]
+        moved = sum(trial.verdict not in ("still good", "cannot be told") for trial in of)
+        errors = [trial.error_mg for trial in of if trial.error_mg is not None]
+        rms = f"{np.sqrt(np.mean(np.square(errors))):.2f}" if errors else ""
+        lines.add_row(event, str(len(of)), *cells, f"{100.0 * moved / len(of):.1f}", rms)
+    return lines
+
+
+def _told(trial: Trial) -> str:
+    return trial.verdict if trial.what == "nothing" else f"{trial.what}"
+
+
+def arguments() -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("recordings", nargs="*", type=Path, help="real recordings, halved")
+    parser.add_argument("--only", action="append", choices=EVENTS, help="may be given more than once; none: all")
+    parser.add_argument("--runs", type=int, default=500, help="pairs, shared by the events")
+    parser.add_argument("--seed", type=int, default=0, help="the first of the seeds")
+    parser.add_argument("--any", action="store_true", help="any three orientations, not those that are asked for")
+    parser.add_argument("--perfect", action="store_true", help="neither the mounting nor the gyroscope errs besides")
+    parser.add_argument("--gravity", type=float, default=9.81, help="m/s^2, of the recordings")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
+    parser.add_argument("--json", type=Path, help="write the trials to this file")
+    return parser.parse_args()
+
+
+def main() -> None:
+    """Simulate or halve, check, print and save."""
+    options = arguments()
+    console = Console(width=160)
+    if options.recordings:
+        found = in_parallel(partial(of_halves, gravity=options.gravity), options.recordings, options.jobs, "halves")
+        trials = [trial for of_one in found for trial in of_one]
+    else:
+        events = tuple(options.only or EVENTS)
+        items = [(events[number % len(events)], options.seed + number) for number in range(options.runs)]
+        one = partial(of_pair, motion=ANY if options.any else ASKED, perfect=options.perfect)
+        trials = [trial for trial in in_parallel(one, items, options.jobs, "pairs") if trial is not None]
+    console.print(table("what was told, %", trials))
+    if options.json:
+        options.json.write_text(json.dumps([asdict(trial) for trial in trials], indent=1) + "\n")

@@ -1,0 +1,69 @@
+"""Bridges whose clocks are off: how well their rate, K and D are found, and whether within what is claimed.
+
+python -m tools.lab clock_trials [SESSIONS [FIRST_SEED]]     -1 to +1 %, drifts of 50 ppm a minute, bursts of 1 to 16 ms
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+from typing import Any
+
+import numpy as np
+
+import mpucal
+from mpucal.chip.driver import Driver
+from mpucal.session.events import Prompt, PromptKind
+from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.chip.clock import FastClock
+from mpucal.sources.bridge.bus import BridgeBus
+
+SECONDS, FLAT_S, MS = 75.0, 12.0, 1_000_000
+
+
+def recorded(seed: int, ppm: float, drift_ppm_a_minute: float, burst_ms: int) -> tuple[mpucal.Recording, Any]:
+    """A recording of a hand that is told to lay the board flat, then to turn it; and the truth."""
+    clock = FastClock()
+    chip = open_simulated("sim:hand=random", seed=seed, clock=clock)
+
+    def shown() -> int:
+        t_s = clock.now() * 1e-9
+        return clock.now() + round(ppm * 1e3 * t_s + 0.5e3 / 60 * drift_ppm_a_minute * t_s**2)
+
+    driver = Driver(BridgeBus(EmulatedLine(EmulatedBridge(chip, shown), clock, burst_ns=burst_ms * MS)))
+    driver.start()
+    for kind, until_s in ((PromptKind.LAY_FLAT, FLAT_S), (PromptKind.ROTATE, SECONDS)):
+        chip.hear(Prompt(kind, ""))
+        while clock.now() < until_s * 1e9:
+            driver.poll()
+    return driver.recording(), chip.truth_document()
+
+
+def trial(seed: int) -> tuple[str, dict[str, list[float]]]:
+    """A line about the session, and the errors of rate [ppm], K and D in their standard uncertainties."""
+    rng = np.random.default_rng([seed, 7])
+    ppm, drift, burst_ms = rng.uniform(-1e4, 1e4), float(rng.choice([-50, 0, 50])), int(rng.choice([1, 4, 16]))
+    recording, truth = recorded(seed, ppm, drift, burst_ms)
+    found, sensor = mpucal.calibrate(recording, gravity=truth["gravity"]), recording.sensor
+    error = (sensor.clock_ppm or 0.0) - (ppm + drift * SECONDS / 120)
+    std = (sensor.clock_std or np.nan) * 1e6
+    z = {
+        "ppm": [error / std],
+        "K": np.diag((found.K - truth["K"]) / found.K_std).tolist(),
+        "D": ((found.D - truth["D"]) / found.D_std).ravel().tolist(),
+    }
+    line = f"{seed:4d}  {burst_ms:2d} ms {ppm:+7.0f} ppm: off by {error:+.2f} ({std:.2f}), {found.verdict}"
+    return line, z
+
+
+def main() -> None:
+    """Print a line a session, and rms values of all."""
+    sessions, first = (int(word) for word in (sys.argv[1:] + ["20", "0"][len(sys.argv) - 1 :]))
+    z: dict[str, list[float]] = {"ppm": [], "K": [], "D": []}
+    with multiprocessing.Pool() as pool:
+        for line, errors in pool.imap(trial, range(first, first + sessions)):
+            print(line, flush=True)
+            for name, each in errors.items():
+                z[name] += each
+    print("rms z: " + ", ".join(f"{name} {np.sqrt(np.nanmean(np.square(each))):.2f}" for name, each in z.items()))

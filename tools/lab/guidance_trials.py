@@ -1,0 +1,199 @@
+"""What a person is shown while they are guided, by hands of every kind; and a hand that has nothing but the words.
+
+python -m tools.lab guidance_trials --seeds 20
+python -m tools.lab guidance_trials --seeds 20 --hand wandering
+
+Counted over whole sessions on the simulated chip, as the page shows them: pictures that jump by more than 20 deg
+beyond what gravity and the gyroscope turned meanwhile (the board's, and where the wanted one is drawn), a HOLD
+farther from the wanted orientation than 15 deg that is not said to be useful, an orientation asked for in place of
+another without a word on what was held, and counts above their total. Then the time to the verdict of the hand that is
+given the wanted orientation is compared with that of one that turns the board as the page says in words, by so many
+degrees, and looks again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import multiprocessing
+import os
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from mpucal.calibration import calibrate
+from mpucal.chip.driver import Driver
+from mpucal.data import Vector
+from mpucal.errors import Abandoned
+from mpucal.page.state import HOLD, state
+from mpucal.session.attitude import matrix
+from mpucal.session.events import Countdown, Held, Key, Meter, Output, Progress, Prompt, PromptKind
+from mpucal.session.plan import Plan
+from mpucal.session.runner import Runner
+from mpucal.session.way import WAYS
+from mpucal.simulated import rotation as quaternions
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.hand import MISS_RAD, ON_THE_TABLE, REACTION_S, Stance
+from mpucal.simulated.hands import KINDS, Guided
+from mpucal.simulated.legs import STEP_S, Leg
+from mpucal.terminal.view import NEAR_DEG, View
+
+BEYOND_DEG = 20.0
+COUNT = re.compile(r"(\d+) of (\d+)")
+BY_WORDS = "by words"
+LOOKS_S = 0.25
+
+
+class ByWords(Guided):
+    """Turns the board as it is told in words, seen from where it laid the board flat, and looks again."""
+
+    HEADLINE, DEGREES = "", 0.0
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        super().__init__(rng)
+        self._room: Vector | None = None
+        self._words, self._due_s = "", math.inf
+
+    def rotate(self, now: Stance) -> Leg:
+        """By what is said, a reaction time after it was said; still where nothing is."""
+        if self._room is None or now.held == ON_THE_TABLE:
+            self._room = now.attitude
+        way = self.HEADLINE.lower()
+        t_s = now.step * STEP_S
+        if way not in WAYS:
+            self._words = ""
+        elif way != self._words:
+            self._words, self._due_s = way, t_s + self._rng.uniform(*REACTION_S)
+        if not self._words or t_s < self._due_s:
+            return self.pause(now, LOOKS_S)
+        self._words = ""
+        toward = WAYS.index(way) * math.pi / 4.0
+        axis = np.array([0.0, -math.sin(toward), math.cos(toward), 0.0])
+        for q in (self._room, quaternions.conjugate(now.attitude)):
+            axis = quaternions.product(quaternions.product(q, axis), quaternions.conjugate(q))
+        miss = self._rng.normal(size=3)
+        miss *= MISS_RAD * math.sqrt(self._rng.uniform()) / np.linalg.norm(miss)
+        return self.move(now, math.radians(self.DEGREES) * axis[1:] + miss, self.HELD)
+
+
+KINDS[BY_WORDS] = ByWords
+
+
+@dataclass
+class Watcher:
+    """Sees what the page shows, and counts what is wrong with it."""
+
+    view: View = field(default_factory=View)
+    wrong: Counter[str] = field(default_factory=Counter)
+    holds: int = 0
+    told: bool = True
+    finished_s: float = math.nan
+
+    def hear(self, output: Output) -> None:
+        """Look."""
+        before, self.view = self.view, self.view.after(output)
+        shown = state(self.view)
+        match output:
+            case Meter():
+                ByWords.HEADLINE, ByWords.DEGREES = shown["headline"], 5.0 * round((output.missing_deg or 0.0) / 5.0)
+                self._jumps(before, output)
+                self._hold(shown["headline"], output)
+            case Prompt(kind=kind):
+                turning = kind in (PromptKind.ROTATE, PromptKind.VERIFY)
+                if turning and before.prompt is not None and before.prompt.kind is kind:
+                    self.wrong["changed without a word"] += output.down != before.prompt.down and not self.told
+                self.told = self.told and not turning
+                if kind is PromptKind.REST:
+                    self.finished_s = self.view.now_s or math.nan
+            case Held():
+                self.told = True
+            case Countdown():
+                self.holds += state(before)["moment"] != "counting" == shown["moment"]
+            case Progress(done=done, of=of, text=text):
+                counts = [tuple(map(int, found)) for found in COUNT.findall(text)]
+                self.wrong["counts above their total"] += done > of or any(a > b for a, b in counts)
+
+    def pressed(self) -> Sequence[Key]:
+        """Nothing."""
+        return ()
+
+    def _jumps(self, before: View, meter: Meter) -> None:
+        if before.meter is None:
+            return
+        last = before.meter
+        gravity = math.degrees(math.acos(min(1.0, float(np.dot(last.down, meter.down)))))
+        own = gravity + (meter.t_s - last.t_s) * max(last.turning_dps, meter.turning_dps)
+        self.wrong["jumps of the board"] += angle(last.attitude, meter.attitude) > own + BEYOND_DEG
+        if last.wanted is None or meter.wanted is None or self._same is not before.prompt:
+            self._same = before.prompt
+            return
+        self.wrong["jumps of the wanted one"] += angle(last.wanted, meter.wanted) > own + BEYOND_DEG
+
+    _same: Prompt | None = None
+
+    def _hold(self, headline: str, meter: Meter) -> None:
+        if self.view.wanted is None or meter.missing_deg is None or headline != HOLD:
+            return
+        # gravity decides; after a turn beyond the gyroscope's range the attitude needs half a second to follow it
+        missing = math.degrees(math.acos(max(-1.0, min(1.0, float(np.dot(meter.down, self.view.wanted))))))
+        self.wrong["hold far away"] += min(missing, meter.missing_deg) > NEAR_DEG + 5.0
+
+
+def angle(a: Any, b: Any) -> float:
+    """Between two attitudes, quaternions (4,) [deg]."""
+    turned = np.array(matrix(a)).T @ np.array(matrix(b))
+    return math.degrees(math.acos(min(1.0, max(-1.0, 0.5 * (float(np.trace(turned)) - 1.0)))))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """How one session went."""
+
+    verdict: str
+    finished_s: float
+    holds: int
+    wrong: Counter[str]
+
+
+def run(hand: str, seed: int) -> Trial:
+    """One session, watched."""
+    plan, watcher = Plan(), Watcher()
+    bus = open_simulated(f"sim:hand={hand}", plan.gravity, seed)
+    runner = Runner(Driver(bus, plan.config), watcher, lambda *_: None, plan, (bus.hear,))
+    try:
+        recording = runner.measure()
+    except Abandoned:
+        return Trial("abandoned", math.nan, watcher.holds, watcher.wrong)
+    verdict = runner.calibrate(recording, partial(calibrate, model=plan.model, gravity=plan.gravity)).verdict
+    return Trial(verdict, watcher.finished_s, watcher.holds, watcher.wrong)
+
+
+def main() -> int:
+    """Run them; 1 where something was shown wrong, or words take too long."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--hand", nargs="*", default=list(KINDS), choices=list(KINDS))
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    arguments = parser.parse_args()
+    finished, wrong = {}, Counter[str]()
+    with multiprocessing.get_context("fork").Pool(arguments.jobs) as pool:
+        for hand in arguments.hand:
+            trials = pool.map(partial(run, hand), range(arguments.seeds))
+            found = sum((trial.wrong for trial in trials), Counter())
+            good = [trial.finished_s for trial in trials if trial.verdict == "good"]
+            finished[hand] = float(np.median(good)) if good else math.nan
+            holds = sum(trial.holds for trial in trials)
+            said = ", ".join(f"{n} {what}" for what, n in found.items()) or "nothing wrong"
+            print(
+                f"{hand:<10} {len(good):>3} good, {finished[hand]:6.1f} s in the median; {holds} holds: {said}",
+                flush=True,
+            )
+            wrong += found
+    ratio = finished.get(BY_WORDS, math.nan) / finished.get("guided", math.nan)
+    print(f"by words in {ratio:.2f} times the time of the hand that is given the orientation")
+    return 1 if wrong or ratio > 1.2 else 0

@@ -1,0 +1,228 @@
+"""A session with a running ArduPilot SITL, turned by the simulated hand, and how near its result comes to the truth.
+
+    arducopter --model JSON:127.0.0.1 --serial0 udpclient:127.0.0.1:14550 &          # ArduPilot's own program
+    python -m tools.lab live_vehicle --mavlink udp:127.0.0.1:14550 --parameters tcp:127.0.0.1:5762 -- --yes
+
+The hand does what the session's prompts say; where it brings the vehicle goes to the SITL through its JSON interface
+(ArduPilot's libraries/SITL/examples/JSON). What the SITL makes of it, SIM_ACCn_BIAS and SIM_ACCn_SCAL, is what the
+session is to find. Words after `--` go to `mpucal session`. The line at the end: exit code, verdict, how far the
+vehicle's parameters were from the truth at worst and how far they are now (offset [m/s^2], scale), and the rms over D
+and b_a of all IMUs of (estimate - truth) / standard uncertainty.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import closing, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mpucal.data import STANDARD_GRAVITY_MPS2, Vector
+from mpucal.errors import NoAnswer
+from mpucal.mavlink.firmwares import ARDUPILOT
+from mpucal.mavlink.link import Link
+from mpucal.mavlink.parameters.compose import Correction
+from mpucal.mavlink.parameters.names import AXES, ardupilot_place, mounting
+from mpucal.mavlink.prompts import Heard
+from mpucal.mavlink.stream_parameters import read_parameters, read_stream_parameters
+from mpucal.mavlink.transport import Transport
+from mpucal.mavlink.transports import open_transport
+from mpucal.mavlink.url import parse_url
+from mpucal.simulated.hands import KINDS
+from mpucal.simulated.motion import Motion
+from mpucal.simulated.vehicle.imus import FROM_HAND, turned_over
+
+MPUCAL = Path(sys.executable).parent / "mpucal"
+# the head of what a SITL sends for each step: a magic number, its steps a second, their count
+HEAD, MAGIC = struct.Struct("<HHI"), (18458, 29569)
+BLOCK = 20
+OWN_SYSTEM = 255
+IMUS = 3
+PATIENCE_S = 30
+SAID = ("prompt", "note", "decision", "caution", "error")
+KINDS_OF_ERROR = ("BIAS", "SCAL")
+
+
+class Body:
+    """The vehicle's body in the hand: answers each step of the SITL with what its sensors feel then.
+
+    Parameters
+    ----------
+    port : of UDP, where the SITL sends its steps. hand : its kind. seed : of the hand.
+    """
+
+    def __init__(self, port: int, hand: str, seed: int) -> None:
+        of_hand, of_motion = np.random.default_rng(seed).spawn(2)
+        self._motion = Motion(KINDS[hand](of_hand), of_motion, STANDARD_GRAVITY_MPS2)
+        self._lock = threading.Lock()
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1", port))
+        self._t_s = self._booted_s = 0.0
+        self._ahead: deque[tuple[float, dict[str, Any]]] = deque()
+        # R_b, from the axes of the sensors, in which the SITL's body is, to those of the vehicle
+        self.mounting = np.eye(3)
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def hear(self, kind: str, down: tuple[float, float, float] | None) -> None:
+        """A prompt, whose `down` is in the vehicle's axes."""
+        with self._lock:
+            self._motion.hear(Heard(kind, None if down is None else turned_over(down)), self._t_s)
+
+    def _serve(self) -> None:
+        answer, last = b"", -1
+        while True:
+            data, sitl = self._socket.recvfrom(1024)
+            magic, rate_hz, count = HEAD.unpack_from(data)
+            if magic not in MAGIC:
+                continue
+            # what is asked again is answered as before
+            if count != last or not answer:
+                # a SITL's clock starts with it
+                self._booted_s = self._t_s if count < last else self._booted_s
+                answer = self._next(rate_hz)
+            last = count
+            self._socket.sendto(answer, sitl)
+
+    def _next(self, rate_hz: int) -> bytes:
+        if not self._ahead:
+            self._ahead.extend(self._steps(rate_hz))
+        self._t_s, step = self._ahead.popleft()
+        step["timestamp"] = self._t_s - self._booted_s
+        # its parser wants no space after a colon
+        return f"\n{json.dumps(step, separators=(',', ':'))}\n".encode()
+
+    def _steps(self, rate_hz: int) -> Iterator[tuple[float, dict[str, Any]]]:
+        with self._lock:
+            edges = self._t_s + np.arange(BLOCK + 1) / rate_hz
+            force, rate = (means @ FROM_HAND @ self.mounting for means in self._motion.means(edges))
+            w, x, y, z = self._motion.attitude(float(edges[-1])).tolist()
+        at = {"position": [0, 0, 0], "velocity": [0, 0, 0], "quaternion": [w, x, -y, -z]}
+        for t_s, felt, turn in zip(edges[1:].tolist(), force.tolist(), rate.tolist(), strict=True):
+            yield t_s, {"imu": {"gyro": turn, "accel_body": felt}, **at}
+
+
+class Held:
+    """What the vehicle holds of its IMUs, and what it should.
+
+    Parameters
+    ----------
+    parameters : by name.
+    """
+
+    def __init__(self, parameters: Mapping[str, float]) -> None:
+        self.parameters = parameters
+        self.imus = round(parameters["SIM_IMU_COUNT"])
+
+    def true(self, imu: int) -> Correction:
+        """The parameters that IMU `imu`, counted from 1, needs."""
+        bias, scale = (np.array([self.parameters[f"SIM_ACC{imu}_{kind}_{a}"] for a in AXES]) for kind in KINDS_OF_ERROR)
+        # a scale of 0 is 1 to it
+        return Correction(bias, np.where(scale == 0, 1.0, scale))
+
+    def off(self) -> tuple[float, float]:
+        """How far its parameters are from the truth at worst: offset [m/s^2], scale."""
+        offset, scale = [], []
+        for imu in range(1, self.imus + 1):
+            held, true = ardupilot_place(imu).correction(self.parameters), self.true(imu)
+            if held is not None:
+                offset.append(np.abs(held.offset - true.offset).max())
+                scale.append(np.abs(held.scale - true.scale).max())
+        return float(max(offset)), float(max(scale))
+
+    def z(self, document: Mapping[str, Any]) -> Vector:
+        """(12,) of D and b_a of one IMU's document, where this is what was held while it was measured."""
+        imu = int(document["autopilot"]["imu"])
+        where = ardupilot_place(imu)
+        R, held, true = mounting(ARDUPILOT, where, self.parameters), where.correction(self.parameters), self.true(imu)
+        if R is None or held is None:
+            return np.empty(0)
+        found = document["accelerometer"]
+        truth = {"D": R @ np.diag(held.scale / true.scale) @ R.T, "b_a": R @ (held.scale * (true.offset - held.offset))}
+        parts = [(np.array(found[key]) - truth[key]) / np.array(found[f"{key}_std"]) for key in truth]
+        return np.concatenate([part.ravel() for part in parts])
+
+
+def held(url: str) -> Held:
+    """What it holds now, asked at another of its ports."""
+    names = [f"SIM_ACC{imu}_{kind}_{a}" for imu in range(1, IMUS + 1) for kind in KINDS_OF_ERROR for a in AXES]
+    with closing(_opened(url)) as transport:
+        link = Link(transport, lambda _t_ns, _packet: None, own_system=OWN_SYSTEM)
+        link.lock(link.listen()[0])
+        own = read_parameters(link, ["SIM_IMU_COUNT", *names], ARDUPILOT)
+        return Held(own | read_stream_parameters(link, ARDUPILOT))
+
+
+def _opened(url: str) -> Transport:
+    """A transport; a SITL opens its ports some seconds after it began to step.
+
+    Raises
+    ------
+    NoAnswer : it does not.
+    """
+    for _ in range(PATIENCE_S):
+        with suppress(NoAnswer):
+            return open_transport(parse_url(url))
+        time.sleep(1.0)
+    return open_transport(parse_url(url))
+
+
+def main() -> int:
+    """Run one session, and print its line; its exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--mavlink", required=True, metavar="URL", help="of the session")
+    parser.add_argument("--parameters", required=True, metavar="URL", help="another one of the same SITL")
+    parser.add_argument("--port", type=int, default=9002, help="where the SITL looks for its JSON model")
+    parser.add_argument("--hand", choices=KINDS, default="guided")
+    parser.add_argument("--seed", type=int, default=0, help="of the hand")
+    parser.add_argument("-o", "--folder", type=Path, help="of the session's files")
+    parser.add_argument("words", nargs="*", help="for mpucal session")
+    arguments = parser.parse_args()
+    body = Body(arguments.port, arguments.hand, arguments.seed)
+    before = held(arguments.parameters)
+    R_b = mounting(ARDUPILOT, ardupilot_place(1), before.parameters)
+    if R_b is not None:
+        body.mounting = R_b
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = arguments.folder or Path(temporary) / "session"
+        code = session(body, ["--mavlink", arguments.mavlink, "-o", str(folder), *arguments.words])
+        file = folder / "calibration.json"
+        document = json.loads(file.read_text()) if file.exists() else None
+    print(line(code, before, held(arguments.parameters), document))
+    return code
+
+
+def session(body: Body, words: list[str]) -> int:
+    """Run `mpucal session`, have the hand hear its prompts, and say what it says; its exit code."""
+    command = [str(MPUCAL), "session", "--json-events", *words]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True) as process:
+        for text in process.stderr or ():
+            event: dict[str, Any] = json.loads(text) if text.startswith("{") else {"event": "error", "text": text}
+            if event["event"] == "prompt":
+                body.hear(event["kind"], event["down"])
+            said = [str(event[key]).strip() for key in ("text", "why", "what", "do") if event.get(key)]
+            if said and event["event"] in SAID:
+                print(f"{event['event']}: {' '.join(said)}", file=sys.stderr)
+    return process.returncode
+
+
+def line(code: int, before: Held, after: Held, document: Mapping[str, Any] | None) -> str:
+    """What came of it."""
+    z = np.empty(0)
+    if document is not None:
+        z = np.concatenate([before.z(one) for one in (document, *document.get("others", [])) if "accelerometer" in one])
+    rms = float(np.sqrt(np.mean(z**2))) if len(z) else np.nan
+    verdict = document["quality"]["verdict"] if document else "none"
+    was, now = (f"{offset:.5f} {scale:.6f}" for offset, scale in (before.off(), after.off()))
+    return f"exit {code} {verdict}: was {was}, is {now}, z {rms:.2f}"

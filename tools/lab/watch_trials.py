@@ -1,0 +1,115 @@
+"""`mpucal stream --watch` over hours of simulated use: how often it warns of a sound sensor, and when of a changed one.
+
+python -m tools.lab watch_trials --only nothing --runs 20 --hours 1        warnings that are none
+python -m tools.lab watch_trials --runs 40 --hours 0.5                     how long until a bias step is told
+
+Each minute a hand takes an MPU-6050 from a table, holds it in six or eight orientations, turns it without a pause, or
+turns it while it walks, and puts it down again; it trembles all the while. The calibration is one by twelve poses five
+days before, as in tools/lab/check_trials.py, and each rest's mounting gives in by as much as there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from mpucal.calibration.verification import FLOOR_MPS2
+from mpucal.data import Recording
+from mpucal.recheck.watch import Watch
+from mpucal.simulated.sensor import SensorTruth
+from tools.lab.study.scenarios import hand_scenario
+
+from .check_trials import DAYS, EVENTS, TEMPERATURE_C, at, calibrated_and_aged, happened
+from .monte_carlo import in_parallel
+
+RATE_HZ = 100.0
+USES = ("pose7", "pose9", "continuous", "wobble30")
+WATCHED = ("nothing", "bias 5 mg", "bias 10 mg", "bias 20 mg")
+PART_S = 5.0
+# a mounting gives in anew about as often as a hand holds the board otherwise
+GIVES_S = 7.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """Hours of use: how many, what was told first of each sensor, and after how long [s]."""
+
+    event: str
+    seed: int
+    hours: float
+    told: tuple[tuple[str, float], ...]
+
+
+def of_use(item: tuple[str, int], hours: float) -> Run | None:
+    """One sensor's hours; None where its calibration was refused."""
+    event, seed = item
+    calibration, aged, of_event, of_errors = calibrated_and_aged(seed)
+    if calibration.verdict == "refused":
+        return None
+    after, _ = happened(aged, event, of_event)
+    watch = Watch(calibration, DAYS, RATE_HZ)
+    told: list[tuple[str, float]] = []
+    for samples in _minutes(after, of_errors, hours):
+        acc, gyr = calibration.apply(samples.acc, samples.gyr)
+        told += [(each.sensor, each.t_s) for each in watch.add(replace(samples, acc=acc, gyr=gyr))]
+        if told and event != "nothing":
+            break
+    return Run(event, seed, hours, tuple(told))
+
+
+def _minutes(sensor: SensorTruth, rng: np.random.Generator, hours: float) -> Iterator[Recording]:
+    """What the sensor gives, in parts; nothing is known of what is between one minute and the next."""
+    begun_s, size = 0.0, round(PART_S * RATE_HZ)
+    while begun_s < 3600.0 * hours:
+        seed, use = int(rng.integers(2**31)), str(rng.choice(USES))
+        recording = at(hand_scenario(seed, use, tremble=True, rate_hz=RATE_HZ, sensor=sensor).recording, TEMPERATURE_C)
+        every = np.floor(recording.t / GIVES_S).astype(int)
+        acc = recording.acc + rng.normal(0.0, FLOOR_MPS2, (every[-1] + 1, 3))[every]
+        gap = np.arange(len(recording)) == 0
+        minute = replace(recording, acc=acc, gap=gap, t=recording.t + begun_s)
+        for first in range(0, len(minute), size):
+            yield minute.part(first, first + size)
+        begun_s = float(minute.t[-1]) + 1.0
+
+
+def table(runs: list[Run]) -> Table:
+    """Of each event: how many were told, in how many hours, and when."""
+    lines = Table("what happened", "sensors", "hours", "told %", "warnings in 100 h", "minutes until, median", "90 %")
+    for event in dict.fromkeys(run.event for run in runs):
+        of = [run for run in runs if run.event == event]
+        hours = sum(run.told[0][1] / 3600.0 if run.told and event != "nothing" else run.hours for run in of)
+        warnings = sum(len(run.told) for run in of)
+        minutes = [run.told[0][1] / 60.0 if run.told else np.inf for run in of]
+        told = f"{100.0 * np.mean(np.isfinite(minutes)):.0f}"
+        when = [f"{x:.1f}" if np.isfinite(x) else "" for x in np.quantile(minutes, (0.5, 0.9), method="higher")]
+        rate = f"{100.0 * warnings / hours:.2f}" if event == "nothing" else ""
+        lines.add_row(event, str(len(of)), f"{hours:.1f}", told, rate, *when)
+    return lines
+
+
+def main() -> None:
+    """Simulate, watch, print and save."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--only", action="append", choices=EVENTS, help="may be given more than once")
+    parser.add_argument("--runs", type=int, default=20, help="sensors, shared by the events")
+    parser.add_argument("--hours", type=float, default=0.5, help="of use, of each sensor")
+    parser.add_argument("--seed", type=int, default=0, help="the first of the seeds")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
+    parser.add_argument("--json", type=Path, help="write the runs to this file")
+    options = parser.parse_args()
+    events = tuple(options.only or WATCHED)
+    items = [(events[number % len(events)], options.seed + number) for number in range(options.runs)]
+    found = in_parallel(partial(of_use, hours=options.hours), items, options.jobs, "sensors")
+    runs = [run for run in found if run is not None]
+    Console(width=120).print(table(runs))
+    if options.json:
+        options.json.write_text(json.dumps([asdict(run) for run in runs], indent=1) + "\n")

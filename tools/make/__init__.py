@@ -1,0 +1,1 @@
+"""Generated files: documentation, drawings, fixtures, vectors and stubs, made from the code."""

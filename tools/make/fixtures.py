@@ -1,0 +1,125 @@
+"""Make every fixture anew, all from seeds: python -m tools.make fixtures [FOLDER].
+
+sessions/NAME.mcap is the capture of a whole session on the simulated chip, and NAME.json beside it is what that session
+said and found: what a replay must say and find too. faults/ are those of faults.py, vectors/ those of
+vectors.py.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from mpucal.calibration import calibrate
+from mpucal.chip.config import Config
+from mpucal.chip.records import SessionEvent
+from mpucal.cli.running import running
+from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.session.events import Key, Output, Progress
+from mpucal.session.plan import Plan
+from mpucal.sources.opening import open_again
+from mpucal.terminal.keys import Keys
+from mpucal.terminal.lines import JsonLines
+
+from . import faults, vectors
+
+FOLDER = Path(__file__).parent.parent / "fixtures"
+# named, so that what `auto` chooses is free to change without them
+MODEL = "hand"
+# what a person is asked and told, without the dials between
+SAID = ("prompt", "decision")
+
+
+@dataclass(frozen=True)
+class Script:
+    """A session to be captured: on which simulated chip, how set, and when the person presses Enter.
+
+    Attributes
+    ----------
+    bus : as after --bus. config : how the chip measures. enter : beginnings of the progress that Enter answers.
+    """
+
+    bus: str
+    config: Config
+    enter: Sequence[str] = ()
+
+
+SESSIONS = {
+    "mpu6050": Script("sim:seed=1", Config(rate_hz=100, poll_s=0.05)),
+    "mpu6500": Script("sim:seed=2,chip=mpu6500,rate_error_ppm=9000", Config(8, 1000, rate_hz=100, poll_s=0.1)),
+    "enter": Script("sim:seed=3", Config(2, 250, rate_hz=50), ("still for 5 of", "orientation 8 of")),
+}
+
+
+class Typist(JsonLines):
+    """Presses Enter the first time that the progress begins with one of `enter`."""
+
+    def __init__(self, enter: Sequence[str]) -> None:
+        self.said = StringIO()
+        super().__init__(self.said, Keys(None, single=False))
+        self._enter = list(enter)
+        self._pressed: list[Key] = []
+
+    def hear(self, output: Output) -> None:
+        """Say it, and perhaps answer."""
+        super().hear(output)
+        if isinstance(output, Progress) and self._enter and output.text.startswith(self._enter[0]):
+            self._enter.pop(0)
+            self._pressed.append(Key.ENOUGH)
+
+    def pressed(self) -> Sequence[Key]:
+        """What was pressed since the last call."""
+        pressed, self._pressed = self._pressed, []
+        return pressed
+
+
+def make_session(script: Script, capture: Path) -> dict[str, Any]:
+    """Run it into `capture`, and return what it said and found."""
+    source = open_again({"bus": script.bus}, Plan(script.config, model=MODEL))
+    person = Typist(script.enter)
+    with tempfile.TemporaryDirectory() as folder:
+        dated = Path(folder) / capture.name
+        with running(source, dated, person) as runner:
+            recording = runner.measure()
+            calibration = runner.calibrate(recording, partial(calibrate, model=MODEL))
+        without_date(dated, capture)
+    said = [json.loads(line) for line in person.said.getvalue().splitlines()]
+    return {
+        "bus": script.bus,
+        "said": [output for output in said if output["event"] in SAID],
+        "samples": len(recording),
+        "verdict": calibration.verdict,
+        "D": calibration.D.tolist(),
+        "b_a": calibration.b_a.tolist(),
+    }
+
+
+def without_date(dated: Path, capture: Path) -> None:
+    """Write `dated` again without the time of day, so that a fixture changes only where a session does."""
+    read = read_capture(dated)
+    with CaptureWriter(capture) as writer:
+        writer.start({key: value for key, value in read.meta.items() if key != "recorded"})
+        for record in read.records:
+            if isinstance(record, SessionEvent):
+                writer.event(record.name, record.t_ns, record.data)
+            else:
+                writer.transaction(record)
+
+
+def main() -> None:
+    """Make them all."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
+    sessions = folder / "sessions"
+    sessions.mkdir(parents=True, exist_ok=True)
+    for name, script in SESSIONS.items():
+        found = make_session(script, sessions / f"{name}.mcap")
+        (sessions / f"{name}.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    faults.write(folder / "faults")
+    vectors.write(folder / "vectors")

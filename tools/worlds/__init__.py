@@ -1,1 +1,0 @@
-"""Simulated hands and sensors in families, by which `tools/families.py` judges the verdicts of calibrations."""
