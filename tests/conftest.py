@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
 import signal
@@ -103,6 +104,27 @@ def save():
         with open_writer(Path(path), rows, "") as write:
             for samples in rows.runs:
                 write(samples)
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def once(tmp_path_factory):
+    """A folder that is filled once in a run, by whichever worker of xdist comes first; nothing is to be changed in it."""
+    shared = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        shared = shared.parent
+
+    def call(name, make):
+        folder = shared / "once" / name
+        folder.parent.mkdir(exist_ok=True)
+        with (folder.parent / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not folder.exists():
+                made = Path(tempfile.mkdtemp(dir=folder.parent))
+                make(made)
+                made.rename(folder)
+        return folder
 
     return call
 
