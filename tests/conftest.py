@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 # Programs of tools/ are tested, too. The folder comes last: the sources of mpucal in it have no kernel.
 if str(Path(__file__).parents[1]) in sys.path:
@@ -37,28 +37,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 if hasattr(signal, "SIGHUP"):
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
-# how long a busy machine takes says nothing about what is tested
-settings.register_profile("patient", deadline=None)
-settings.load_profile("patient")
-
-# Files that take longest go first: a process that takes one last would work alone.
-SLOW = (
-    "test_real_session.py",
-    "test_installed.py",
-    "test_make_reasons.py",
-    "test_library.py",
-    "test_board.py",
-    "test_browser.py",
-    "test_emulated.py",
-    "test_resume.py",
-    "test_fixtures.py",
-)
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Order the files; those of a file stay as they are."""
-    items.sort(key=lambda item: SLOW.index(item.path.name) if item.path.name in SLOW else len(SLOW))
-
+# `gate` runs the same examples every time; `search` draws others, by the seed of --hypothesis-seed (`make search`).
+# How long a busy machine takes says nothing about what is tested.
+PATIENT = {"deadline": None, "database": None, "suppress_health_check": [HealthCheck.too_slow]}
+settings.register_profile("gate", derandomize=True, **PATIENT)
+settings.register_profile("search", print_blob=True, **PATIENT)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "gate"))
 
 # some of what tests import; a slice of them needs less
 NEEDED = ("jsonschema", "matplotlib", "mypy", "polars", "pyarrow", "pymavlink", "rosbags", "yaml")
@@ -110,7 +94,7 @@ def save():
 
 @pytest.fixture(scope="session")
 def once(tmp_path_factory):
-    """A folder that is filled once in a run, by whichever worker of xdist comes first; nothing is to be changed in it."""
+    """A folder that is filled once in a run, by the first worker of xdist that asks; nothing is to be changed in it."""
     shared = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         shared = shared.parent
