@@ -6,8 +6,10 @@ import fcntl
 import os
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
+from collections import Counter
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -31,6 +33,8 @@ from mpucal.files import open_writer
 from mpucal.files.rows import Rows
 
 PROJECT = str(Path(__file__).parents[1])
+UNTRACKED = pytest.StashKey[set[str]]()
+LEFT = pytest.StashKey[list[str]]()
 
 # a shell in the background, or nohup, has these ignored, and what a test starts inherits that
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -55,6 +59,58 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError(
             f"{', '.join(missing)} missing: pip install 'mpucal[mavlink,plot,dev]', or name a folder."
         )
+
+
+def untracked() -> set[str]:
+    """Files of the checkout that git neither tracks nor ignores; none where this is no checkout."""
+    if not Path(PROJECT, ".git").exists() or shutil.which("git") is None:
+        return set()
+    words = ("git", "-C", PROJECT, "ls-files", "--others", "--exclude-standard")
+    return set(subprocess.run(words, capture_output=True, text=True, check=True).stdout.splitlines())
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Keep which files there were."""
+    if not hasattr(session.config, "workerinput"):
+        session.config.stash[UNTRACKED] = untracked()
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Fail a run that left files in the checkout."""
+    if not hasattr(session.config, "workerinput"):
+        session.config.stash[LEFT] = sorted(untracked() - session.config.stash[UNTRACKED])
+        if session.config.stash[LEFT]:
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def missing_packages() -> list[str]:
+    """Debian packages of tools/ci_packages.txt that are not installed; none where this is no Debian."""
+    if shutil.which("dpkg-query") is None:
+        return []
+    lines = Path(PROJECT, "tools", "ci_packages.txt").read_text(encoding="utf-8").splitlines()
+    wanted = [name for line in lines if (name := line.partition("#")[0].strip())]
+    words = ("dpkg-query", "--show", "--showformat", "${Package} ${Status}\n", *wanted)
+    shown = subprocess.run(words, capture_output=True, text=True, check=False).stdout
+    return [name for name in wanted if f"{name} install ok installed" not in shown.splitlines()]
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Say what the run left behind, and why tests were skipped."""
+    for path in config.stash[LEFT]:
+        terminalreporter.write_line(
+            f"{path} was left in the checkout by this run: a test writes outside its folder.", red=True
+        )
+    skipped = Counter(
+        report.longrepr[2].removeprefix("Skipped: ") for report in terminalreporter.stats.get("skipped", [])
+    )
+    if missing := missing_packages() if skipped else []:
+        terminalreporter.write_line(
+            f"{skipped.total()} tests were skipped; most need Debian packages that are missing here: {', '.join(missing)}. "
+            "`sudo tools/ci_packages` installs them."
+        )
+    else:
+        for reason, count in skipped.most_common():
+            terminalreporter.write_line(f"{count} skipped: {reason}")
 
 
 @pytest.fixture(scope="session", autouse=True)

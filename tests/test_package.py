@@ -83,3 +83,12 @@ def test_links_lead_somewhere(text):
 def test_a_page_names_each(page, names):
     text = (PROJECT / "docs" / page).read_text(encoding="utf-8")
     assert [name for name in names if f"`{name}`" not in text] == []
+
+
+def test_no_large_file_is_tracked():
+    """Test output that was added by accident was 12 MB once; recordings belong into fixtures/."""
+    if not (PROJECT / ".git").exists():
+        pytest.skip("this is no checkout")
+    listed = subprocess.run(["git", "-C", PROJECT, "ls-files", "-z"], capture_output=True, text=True, check=True).stdout
+    files = [PROJECT / name for name in listed.split("\0") if name and not name.startswith("fixtures/")]
+    assert [path for path in files if path.is_file() and path.stat().st_size > 1_000_000] == []
