@@ -105,8 +105,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     )
     if missing := missing_packages() if skipped else []:
         terminalreporter.write_line(
-            f"{skipped.total()} tests were skipped; most need Debian packages that are missing here: {', '.join(missing)}. "
-            "`sudo tools/ci_packages` installs them."
+            f"{skipped.total()} tests were skipped, most for lack of Debian packages: {', '.join(missing)}. "
+            "`sudo tools/ci_packages` installs these."
         )
     else:
         for reason, count in skipped.most_common():
