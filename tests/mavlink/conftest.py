@@ -1,14 +1,11 @@
-"""A link over simulated time to a simulated vehicle, and logs of known sensors."""
+"""A link over simulated time, and packets of a vehicle."""
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
-from typing import ClassVar
 
-import numpy as np
 import pytest
 
 from mpucal.mavlink.dialect import dialect
@@ -100,63 +97,3 @@ def decoded():
     """decoded(data): the message in a packet."""
     mav = dialect().MAVLink(None)
     return lambda data: mav.decode(bytearray(data))
-
-
-@pytest.fixture(scope="session")
-def turned():
-    """turned(n, hz): t [s], acc, gyr of a sensor with known D and b_a, flat first and then turned about varied axes."""
-
-    def make(D, b_a, seconds=60.0, hz=50.0):
-        t = np.arange(round(seconds * hz)) / hz
-        moving = np.clip((t - 12.0) / 1.0, 0.0, 1.0)
-        w = moving[:, None] * np.stack(
-            [1.1 * np.sin(0.9 * t), 0.9 * np.sin(0.53 * t + 1.0), 0.8 * np.cos(0.31 * t)], axis=1
-        )
-        R, down = np.eye(3), np.zeros((len(t), 3))
-        for k in range(len(t)):
-            down[k] = R.T @ [0.0, 0.0, -9.80665]
-            turn = 0.5 * (w[k] + w[min(k + 1, len(t) - 1)]) / hz
-            angle = np.linalg.norm(turn)
-            if angle:
-                x, y, z = turn / angle
-                K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-                R = R @ (np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K)
-        noise = np.random.default_rng(4)
-        acc = down @ np.asarray(D).T + b_a + noise.normal(0.0, 0.02, (len(t), 3))
-        return t, acc, w + noise.normal(0.0, 0.001, (len(t), 3)) + [0.004, -0.003, 0.002]
-
-    return make
-
-
-class Dataflash:
-    """Writes ArduPilot's binary log: FMT messages that describe the others, then those."""
-
-    TYPES: ClassVar = {"n": 4, "N": 16, "Z": 64}
-
-    def __init__(self) -> None:
-        self._data = bytearray()
-        self._kinds: dict[str, tuple[int, str]] = {}
-
-    def describe(self, name: str, kind: int, format_: str, columns: str) -> None:
-        code = "<" + "".join(f"{self.TYPES[c]}s" if c in self.TYPES else c for c in format_)
-        self._kinds[name] = (kind, code)
-        fmt = struct.pack(
-            "<BB4s16s64s", kind, 3 + struct.calcsize(code), name.encode(), format_.encode(), columns.encode()
-        )
-        self._data += b"\xa3\x95\x80" + fmt
-
-    def add(self, name: str, *values) -> None:
-        kind, code = self._kinds[name]
-        self._data += b"\xa3\x95" + bytes([kind]) + struct.pack(code, *values)
-
-    def bytes(self) -> bytes:
-        return bytes(self._data)
-
-
-@pytest.fixture
-def dataflash() -> Dataflash:
-    log = Dataflash()
-    log.describe("FMT", 0x80, "BBnNZ", "Type,Length,Name,Format,Columns")
-    log.describe("PARM", 0x81, "QNff", "TimeUS,Name,Value,Default")
-    log.describe("IMU", 0x82, "QBffffffIIfBBHH", "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T,GH,AH,GHz,AHz")
-    return log

@@ -1,6 +1,5 @@
 """The words of the command line that name vehicles, and what contradicts them."""
 
-import hashlib
 import re
 
 import pytest
@@ -8,7 +7,6 @@ from click.testing import CliRunner
 
 from mpucal.cli import commands
 from mpucal.errors import UsageError
-from mpucal.mavlink.signing import read_key
 
 
 def run(*words):
@@ -52,29 +50,6 @@ def test_a_capture_of_mpucal_fixes_its_options(recorded, tmp_path):
     result = run("session", "--replay", recorded, "--gravity", 9.8, "-o", tmp_path / "out", "--yes")
     assert isinstance(result.exception, UsageError)
     assert "the capture fixes it" in str(result.exception)
-
-
-KEY = bytes(range(32))
-
-
-@pytest.mark.parametrize(
-    ("content", "key"),
-    [
-        (KEY, KEY),
-        (KEY.hex().encode() + b"\n", KEY),
-        (b"correct horse\n", hashlib.sha256(b"correct horse").digest()),
-    ],
-    ids=["bytes", "hexadecimal", "passphrase"],
-)
-def test_the_forms_of_a_key(content, key, tmp_path):
-    (tmp_path / "key").write_bytes(content)
-    assert read_key(tmp_path / "key") == key
-
-
-def test_an_empty_key_is_refused(tmp_path):
-    (tmp_path / "key").write_bytes(b" \n")
-    with pytest.raises(UsageError, match="is empty"):
-        read_key(tmp_path / "key")
 
 
 def test_a_rate_is_asked_of_a_vehicle_whatever_a_chip_has(tmp_path):

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mpucal.simulated import rotation
 from mpucal.simulated.hands import KINDS
 from mpucal.simulated.motion import AHEAD_S, Motion, Wobble
 
@@ -225,36 +224,6 @@ def test_a_wobble_has_its_strength_and_its_integral():
     spectrum = np.abs(np.fft.rfft(values, axis=0)) ** 2
     frequency = np.fft.rfftfreq(len(values), step)
     assert spectrum[(frequency > 1.5) & (frequency < 10.5)].sum() > 0.99 * spectrum.sum()
-
-
-def test_quaternions_against_matrices():
-    rng = np.random.default_rng(1)
-    steps = rng.normal(size=(300, 3)) * 0.3
-    running = rotation.running_product(np.array([1.0, 0.0, 0.0, 0.0]), rotation.exp(steps))
-    R = np.eye(3)
-    for q, step in zip(running[1:], steps, strict=True):
-        R = R @ matrix(rotation.exp(step))
-        np.testing.assert_allclose(matrix(q), R, atol=1e-9)
-        np.testing.assert_allclose(rotation.up_in_board(q), R[2], atol=1e-9)
-        np.testing.assert_allclose(rotation.board_from_world(q), R.T, atol=1e-9)
-    np.testing.assert_allclose(rotation.between(running), steps, atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("a", "b"),
-    [
-        pytest.param([0, 0, 1], [0, 0, 1], id="the same"),
-        pytest.param([0, 0, 1], [0, 0, -1], id="opposite"),
-        pytest.param([1, 0, 0], [-1, 0, 0], id="opposite x"),
-        pytest.param([1, 0, 0], [0, 0.6, 0.8], id="across"),
-        pytest.param([0, 0, 1], [0, 1e-5, 1], id="nearly the same"),
-    ],
-)
-def test_the_shortest_turn(a, b):
-    a, b = (np.array(v) / np.linalg.norm(v) for v in (a, b))
-    turn = rotation.shortest_turn(a, b)
-    np.testing.assert_allclose(matrix(rotation.exp(turn)) @ a, b, atol=1e-9)
-    assert np.linalg.norm(turn) == pytest.approx(np.arccos(np.clip(a @ b, -1, 1)), abs=1e-7)
 
 
 @pytest.mark.parametrize("late_s", [0.001, -0.001])

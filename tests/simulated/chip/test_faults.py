@@ -25,7 +25,7 @@ from mpucal.simulated.chip.models import MODELS
 from mpucal.simulated.faults import OF_CHIP, Fault, kinds
 from mpucal.sources.replay import ReplayBus
 
-CAPTURES = Path(__file__).parents[2] / "fixtures" / "faults"
+CAPTURES = Path(__file__).parents[3] / "fixtures" / "faults"
 TRUE = (-700, 1500, -1600, 1700)
 
 

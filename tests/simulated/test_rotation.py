@@ -1,0 +1,46 @@
+"""Rotations of the simulated hand, against matrices."""
+
+import numpy as np
+import pytest
+
+from mpucal.simulated import rotation
+
+
+def matrix(q):
+    """The rotation matrix of a quaternion, by Rodrigues' formula instead of the quaternion's."""
+    angle = 2 * np.arctan2(np.linalg.norm(q[1:]), q[0])
+    if angle == 0:
+        return np.eye(3)
+    x, y, z = q[1:] / np.linalg.norm(q[1:])
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def test_quaternions_against_matrices():
+    rng = np.random.default_rng(1)
+    steps = rng.normal(size=(300, 3)) * 0.3
+    running = rotation.running_product(np.array([1.0, 0.0, 0.0, 0.0]), rotation.exp(steps))
+    R = np.eye(3)
+    for q, step in zip(running[1:], steps, strict=True):
+        R = R @ matrix(rotation.exp(step))
+        np.testing.assert_allclose(matrix(q), R, atol=1e-9)
+        np.testing.assert_allclose(rotation.up_in_board(q), R[2], atol=1e-9)
+        np.testing.assert_allclose(rotation.board_from_world(q), R.T, atol=1e-9)
+    np.testing.assert_allclose(rotation.between(running), steps, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("a", "b"),
+    [
+        pytest.param([0, 0, 1], [0, 0, 1], id="the same"),
+        pytest.param([0, 0, 1], [0, 0, -1], id="opposite"),
+        pytest.param([1, 0, 0], [-1, 0, 0], id="opposite x"),
+        pytest.param([1, 0, 0], [0, 0.6, 0.8], id="across"),
+        pytest.param([0, 0, 1], [0, 1e-5, 1], id="nearly the same"),
+    ],
+)
+def test_the_shortest_turn(a, b):
+    a, b = (np.array(v) / np.linalg.norm(v) for v in (a, b))
+    turn = rotation.shortest_turn(a, b)
+    np.testing.assert_allclose(matrix(rotation.exp(turn)) @ a, b, atol=1e-9)
+    assert np.linalg.norm(turn) == pytest.approx(np.arccos(np.clip(a @ b, -1, 1)), abs=1e-7)
