@@ -8,24 +8,36 @@ export PYTHON
 
 SECONDS ?= 600
 
-.PHONY: session test slow campaign fuzz kernel lint audit bench wheel docs firmware clean
+.PHONY: session test tests slow search campaign fuzz kernel lint audit bench wheel docs firmware clean
 
 session: $(READY)
 	@$(BIN)/mpucal session --bus sim
 
-test: lint docs
-	$(BIN)/pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
+# linters, types and tests side by side; the tests build the site of the documentation, too
+test: $(TESTED)
+	@$(MAKE) --no-print-directory -j2 lint tests
+
+tests: $(TESTED)
+	@$(BIN)/pytest --numprocesses auto --dist worksteal
 
 # what `make test` leaves out for its time
 slow: $(TESTED)
 	$(BIN)/pytest --numprocesses auto -m slow
 
+# the property tests with examples that are drawn by SEED
+SEED := $(or $(SEED),$(shell date +%s))
+search: $(TESTED)
+	@echo "search: make search SEED=$(SEED) draws the same examples again"
+	@HYPOTHESIS_PROFILE=search $(BIN)/pytest --numprocesses auto --dist worksteal -m "hypothesis and not kernel and not slow" \
+		--hypothesis-seed=$(SEED)
+
 # struck sessions and recordings, with seeds that change by the day and are printed
 campaign: $(TESTED)
 	@$(BIN)/python -m tools.lab campaign --sessions 200 --recordings 2000
 
-# readers, peers, compiled modules and the firmware's core on hostile input, for SECONDS and a quarter as much again
-fuzz: $(TESTED)
+# the search above; then readers, peers, compiled modules and the firmware's core on hostile input, for SECONDS and a
+# quarter as much again
+fuzz: search
 	@$(BIN)/pip install --quiet --disable-pip-version-check atheris
 	@$(BIN)/python -W ignore -m tools.attack fuzz --guided --budget $(SECONDS)
 	@$(BIN)/python -m tools.attack fuzz_kernel --seconds $$(($(SECONDS) / 8))

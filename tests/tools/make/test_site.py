@@ -1,15 +1,29 @@
 """The documentation site as a browser shows it from its folder, where nothing else can be reached."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from mpucal.cli import commands
 
-SITE = Path(__file__).parents[3] / "build" / "site"
+PROJECT = Path(__file__).parents[3]
 PAGES = ("index", "notebook", "reference/commands", "reference/python")
 
-pytestmark = pytest.mark.skipif(not (SITE / "index.html").exists(), reason="there is no site: `make docs`")
+
+@pytest.fixture(scope="session")
+def site(once):
+    """The site as `make docs` builds it; a warning is an error."""
+
+    def make(folder):
+        words = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", folder]
+        quiet = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+        done = subprocess.run(words, cwd=PROJECT, env=quiet, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+    return once("site", make)
 
 
 @pytest.fixture(params=[(1280, 900), (390, 844)], ids=["desktop", "phone"])
@@ -23,22 +37,22 @@ def page(request, chromium):
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_a_page_fits_and_fetches_nothing_from_elsewhere(page, name):
-    page.goto((SITE / f"{name}.html").as_uri())
+def test_a_page_fits_and_fetches_nothing_from_elsewhere(site, page, name):
+    page.goto((site / f"{name}.html").as_uri())
     assert page.evaluate("document.documentElement.scrollWidth") <= page.viewport_size["width"]
     assert page.evaluate("[...document.images].every((image) => image.complete && image.naturalWidth > 0)")
     assert [url for url in page.fetched if not url.startswith(("file:", "data:"))] == []
 
 
-def test_the_search_finds(page):
-    page.goto((SITE / "reference" / "python.html").as_uri())
+def test_the_search_finds(site, page):
+    page.goto((site / "reference" / "python.html").as_uri())
     page.click(".md-search__form" if page.viewport_size["width"] > 1000 else ".md-header__button[for=__search]")
     page.locator(".md-search__input").press_sequentially("misalignment", delay=20)
     page.locator(".md-search-result__item a").first.wait_for()
     assert [url for url in page.fetched if not url.startswith(("file:", "data:"))] == []
 
 
-def test_every_command_has_its_section():
-    text = (SITE / "reference" / "commands.html").read_text(encoding="utf-8")
+def test_every_command_has_its_section(site):
+    text = (site / "reference" / "commands.html").read_text(encoding="utf-8")
     assert [name for name in commands.list_commands(None) if f'id="mpucal-{name}"' not in text] == []
     assert "Sentinel" not in text
