@@ -77,8 +77,9 @@ def seconds(t: ArrayLike, name: str) -> Vector:
     t = given / np.timedelta64(1, "s") if given.dtype.kind == "m" else _as_float(given, "t", name)
     if t.ndim != 1 or len(t) < 2:
         raise ArraysError(f"{name}: t has shape {t.shape}, not (n,) with n >= 2", "give one time in seconds a sample")
-    _check_time(t, name)
-    least, most = np.diff(t).min(), t[-1] - t[0]
+    with np.errstate(over="ignore"):
+        _check_time(t, name)
+        least, most = np.diff(t).min(), t[-1] - t[0]
     if least < SHORTEST_S or not most < LONGEST_S:
         raise ArraysError(f"{name}: t has steps of {least:g} s within {most:g} s", "give times in seconds")
     return t
@@ -214,7 +215,9 @@ def _real(array: NDArray[Any]) -> Vector:
     """In float64; neither times nor complex numbers are silently taken for numbers."""
     if array.dtype.kind in "mMc":
         raise TypeError("they are complex" if array.dtype.kind == "c" else "they are times")
-    return array.astype(np.float64, copy=False)
+    # what is too large for a float64 becomes infinite
+    with np.errstate(over="ignore"):
+        return array.astype(np.float64, copy=False)
 
 
 def _no_numbers(key: str, name: str, error: Exception) -> ArraysError:

@@ -21,10 +21,11 @@ from ..chip.decode import Decoder, decode
 from ..chip.fifo import Run
 from ..chip.records import FORGET, UTC, SessionEvent
 from ..data import Recording, Samples
-from ..errors import RecordingError
+from ..errors import CaptureError, RecordingError
 from ..iio.decode import decode as decode_iio
 from .mcap import CaptureReader
 from .rows import ROWS, Rows
+from .tables.times import possible_utc_ns
 
 
 def load_capture(*paths: Path) -> Recording:
@@ -37,7 +38,9 @@ def load_capture(*paths: Path) -> Recording:
     session = _Accesses(paths)
     recording = decode_iio(session.one_by_one(), session.name) if _of_kernel(paths) else decode(session, session.name)
     for first, last in sorted(session.forgotten.items(), reverse=True):
-        recording = recording.without(first, last)
+        recording = recording.without(min(max(first, 0), len(recording)), min(last, len(recording)))
+    if len(recording) < 2:
+        raise RecordingError(f"{session.name} holds {len(recording)} samples that may be used", "record for longer")
     return replace(recording, recovered=session.recovered, utc_ns=session.utc_ns)
 
 
@@ -85,10 +88,19 @@ class _Accesses:
                 if not isinstance(record, SessionEvent):
                     yield record
                 elif record.name == UTC and self.utc_ns is None:
-                    self.utc_ns = int(record.data[UTC]) - record.t_ns
+                    self.utc_ns = possible_utc_ns(self._number(record, UTC) - record.t_ns)
                 elif record.name == FORGET:
-                    self.forgotten[int(record.data["first"])] = int(record.data["last"])
+                    first, last = (self._number(record, key) for key in ("first", "last"))
+                    self.forgotten[first] = last
             self.recovered = reader.recovered or self.recovered
+
+    def _number(self, event: SessionEvent, key: str) -> int:
+        try:
+            return int(event.data[key])
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            raise CaptureError(
+                f"{self.name} holds an event {event.name} without a whole number {key}", "give what mpucal recorded"
+            ) from error
 
     def one_by_one(self) -> Generator[Transaction]:
         """The same, each on its own."""

@@ -81,8 +81,10 @@ def messages(samples: Samples, noise: Vector, utc_ns: int = 0) -> tuple[NDArray[
     ------
     RecordingError : a time that no message can hold.
     """
-    if not (np.isfinite(samples.t) & (samples.t >= 0.0) & (samples.t < 2.0**31)).all():
-        raise RecordingError("a time is no number of seconds from 0 to 2^31", "give times in seconds, from any origin")
+    if not (np.isfinite(samples.t) & (samples.t >= 0.0) & (samples.t + utc_ns / S < 2.0**31 - 1)).all():
+        raise RecordingError(
+            "a time is no number of seconds from 0 to 2^31, as a message of ROS holds it", "write a .csv or .npz"
+        )
     t_ns = np.rint(samples.t * S).astype(np.int64) + utc_ns
     rows = np.zeros(len(samples), MESSAGE)
     rows["cdr"] = np.void(b"\0\1\0\0")

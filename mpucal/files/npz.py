@@ -119,9 +119,9 @@ def _flat(arrays: Mapping[str, Any], path: Path) -> tuple[int, int] | None:
     if key not in arrays:
         return None
     try:
-        values = [int(value) for value in np.atleast_1d(arrays[key])]
+        values = [int(value) for value in np.atleast_1d(arrays[key]).tolist()]
         first, last = [0, *values] if key == "flat_samples" else values
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise RecordingError(
             f"{path}: {key} is {arrays[key]}",
             "give flat as (first, last + 1), or flat_samples as how many samples lie flat at the start",
@@ -152,7 +152,9 @@ class _Column:
     def take(self, count: int, dtype: type) -> NDArray[Any]:
         """The next `count` rows."""
         data = self._file.read(count * self._width * self.dtype.itemsize)
-        return np.frombuffer(data, self.dtype).reshape(count, *self.shape[1:]).astype(dtype)
+        # what is too large for a float64 becomes infinite, and is refused as that
+        with np.errstate(over="ignore"):
+            return np.frombuffer(data, self.dtype).reshape(count, *self.shape[1:]).astype(dtype)
 
 
 def _by_rows(archive: zipfile.ZipFile) -> bool:

@@ -72,7 +72,9 @@ def _stream(arrays: dict[str, NDArray[Any]], of: tuple[Column, ...], clocks: lis
         return Stream(None, values[there], unit=unit, places=np.flatnonzero(there), lost=lost)
     times, time_unit = arrays[clock.name][there], clock.unit
     if times.dtype.kind in "Mm":
+        if np.isnat(times).any():
+            raise RecordingError(f"{clock.name or 'the index'} lacks a time", "leave those lines out")
         times, time_unit = times.astype(f"{times.dtype.kind}8[ns]").astype(np.int64), "ns"
-    elif times.dtype.kind == "u":
+    elif times.dtype.kind in "iu":
         times = times.astype(np.int64)
     return Stream(times, values[there], time_unit, unit, lost=lost)

@@ -185,6 +185,12 @@ class _Messages:
     def remarks(self) -> list[str]:
         return [] if self.stamped else ["times are those of receipt, as the headers hold none"]
 
+    def _times(self, name: str) -> list[int]:
+        times = self.stamps if self.stamped else self.received
+        if times and max(times) >> 63:
+            raise RecordingError(f"{name} holds times that are none", "give the bag as it was recorded")
+        return times
+
     def stream(self, quantity: str, name: str) -> Stream:
         """What it says of the quantity."""
         values = np.array(getattr(self, quantity), float).reshape(-1, 3)
@@ -198,7 +204,7 @@ class _Messages:
             seen = acceleration_unit(values) if len(values) else ""
             unit = seen if seen and seen != COUNTS else "m/s^2"
         there, lost = whole(values)
-        times = np.array(self.stamps if self.stamped else self.received, np.int64)
+        times = np.array(self._times(name), np.int64)
         return Stream(times[there], values[there], "ns", unit, lost=lost)
 
 

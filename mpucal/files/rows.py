@@ -86,7 +86,8 @@ def checked(runs: Iterator[Samples], name: str) -> Iterator[Samples]:
                     f"{name}: {key} is not a finite number in sample {first}",
                     "leave out what is no number, and keep the times of the others",
                 )
-        back = np.diff(samples.t, prepend=last) <= 0
+        with np.errstate(over="ignore"):
+            back = np.diff(samples.t, prepend=last) <= 0
         if back.any():
             raise RecordingError(
                 f"{name}: time does not increase at sample {at + int(back.argmax())}",

@@ -113,7 +113,9 @@ def _stream(data: Any, names: Iterable[str], unit: str) -> Stream:
     values: Vector = np.column_stack([np.asarray(data[name], float) for name in names])
     # a driver that does not say when a sample was taken says 0; sensor_combined has no such field
     times = data.get("timestamp_sample", data["timestamp"])
-    return Stream(np.asarray(times if np.all(times) else data["timestamp"], np.int64), values, "us", unit)
+    # a damaged log may call them fractions, of which some are none
+    with np.errstate(invalid="ignore"):
+        return Stream(np.asarray(times if np.all(times) else data["timestamp"], np.int64), values, "us", unit)
 
 
 def _later_us(combined: Any) -> NDArray[np.int64]:

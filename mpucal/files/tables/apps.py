@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from pathlib import PurePath
 
 from ...errors import RecordingError
@@ -62,5 +62,5 @@ def _of_phyphox(rows: list[dict[str, str]]) -> Said:
     try:
         at = [Decimal(starts[0][key].replace(",", ".")) for key in ("system time", "experiment time")]
         return Said(zero_ns=int((at[0] - at[1]) * NS))
-    except (IndexError, KeyError, InvalidOperation, OverflowError, ValueError):
+    except (IndexError, KeyError, ArithmeticError, ValueError):
         return Said()

@@ -58,6 +58,9 @@ def recording_of(
     again = int((~fresh).sum())
     lost = [(acc.lost, "accelerations"), (gyr.lost, "rates")]
     acc, gyr = acc.part(fresh), gyr.part(gyr.fresh)
+    for stream, what in ((acc, "accelerations"), (gyr, "rates")):
+        if len(stream.values) < 2:
+            raise RecordingError(f"{name} holds the same {what} again and again, at one time", "record it again")
     (t, of_t), (t_gyr, of_t_gyr) = (times.seconds(stream, acc, hints, name) for stream in (acc, gyr))
     a, of_a, a_clipped = _accelerations(acc, hints, name)
     joined = ""
@@ -171,8 +174,8 @@ def _turned_around(factor: float | None) -> str:
 
 
 def is_another_range(ratio: float) -> bool:
-    """Whether what should be 1 is nearer to 2, 4, 8 or their inverses, as with another full scale of the same chip."""
-    return abs(math.log2(ratio)) > ANOTHER_RANGE
+    """Whether what should be 1 is 0 or nearer to 2, 4, 8 or their inverses, as with another full scale of the chip."""
+    return ratio == 0.0 or abs(math.log2(ratio)) > ANOTHER_RANGE
 
 
 def _are_counts(values: Vector) -> bool:

@@ -157,7 +157,8 @@ def whole(values: Vector) -> tuple[Mask, int]:
     """(n,) whether a line of (n, 3) has its numbers, and how many were lost: not those of a line for another sensor."""
     there = np.asarray(np.isfinite(values).all(axis=1))
     empty = np.isnan(values).all(axis=1)
-    return there, int((~there & ~empty).sum()) if empty.mean() > ANOTHERS else int((~there).sum())
+    others = int(empty.sum()) > ANOTHERS * len(values)
+    return there, int((~there & ~empty).sum()) if others else int((~there).sum())
 
 
 def chosen(header: Sequence[str], hints: Hints) -> list[Column]:

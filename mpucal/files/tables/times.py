@@ -107,7 +107,9 @@ def seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Vec
 def _since(times: Times, origin: Any) -> Vector:
     """(n,) times without the digits that they share."""
     if isinstance(times, np.ndarray):
-        return np.asarray(times - origin, float)
+        # of infinite times `seconds` says what they are
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray(times - origin, float)
     return np.array([float(time - origin) for time in times])
 
 

@@ -83,7 +83,7 @@ def turned(t: Vector, acc: Vector, gyr: Vector) -> float | None:
     t : (n,) s. acc : in any unit. gyr : in rad/s, if the factor is 1.
     """
     dt = float(np.median(np.diff(t)))
-    width = max(1, round(TURN_S / 2 / dt))
+    width = max(1, round(min(TURN_S / 2 / dt, len(t))))
     if len(t) < 10 * width:
         return None
     kernel = np.full(width, 1.0 / width)
