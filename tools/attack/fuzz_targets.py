@@ -243,7 +243,7 @@ def of_file(read: Callable[..., object], place: Path, name: str, *more: object) 
 
 def flight() -> bytes:
     """A dataflash log of two IMUs, by the writer of the tests."""
-    log = run_path(str(ROOT / "tests" / "mavlink" / "conftest.py"))["Dataflash"]()
+    log = run_path(str(ROOT / "tests" / "files" / "test_dataflash.py"))["Dataflash"]()
     log.describe("FMT", 0x80, "BBnNZ", "Type,Length,Name,Format,Columns")
     log.describe("PARM", 0x81, "QNff", "TimeUS,Name,Value,Default")
     log.describe("IMU", 0x82, "QBffffffIIfBBHH", "TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T,GH,AH,GHz,AHz")
