@@ -1,127 +1,169 @@
 """Is a verdict true? Simulated hands and sensors of many kinds, calibrated and compared with what they are.
 
 python -m tools.lab families --seeds 0:6
-python -m tools.lab families --families 'poses*,continuous' --seeds 0:33 --workers 2 --json families.json
+python -m tools.lab families --families 'poses*;continuous' --seeds 0:33 --jobs 2 --json families.json
 
-A family is a row of worlds/table.py; worlds/judge.py says what is false, and which limits there are. Seeds
-0 to 32 are for development: limits and constants are set on them. Seeds 4000 to 4032 are for reports, and nothing is
-set on what they show; tests have 100 and 101. The exit code is 1 where a limit is broken.
+A family is a row of scenarios/table.py. An error is the rms over the whole sphere of a calibrated vector's error
+[m/s^2]; the claim is quality.error_std.rms. A `good` verdict is false where the error is above 3 claims or 0.1 m/s^2, a
+`usable` one where it is above 5 claims. Seeds 0 to 32 are for development: limits and constants are set on them. Seeds
+4000 to 4032 are for reports, and nothing is set on what they show; tests have 100 and 101. The exit code is 1 where a
+limit is broken.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
-import multiprocessing
-import os
+import time
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict
-from fnmatch import fnmatchcase
+from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 
-from mpucal.session.threads import ONE_THREAD
+import numpy as np
 
-os.environ.update(ONE_THREAD)  # before NumPy loads, here and in the workers
+import mpucal
+from mpucal.errors import MpucalError
+from mpucal.result.calibration import GOOD, REFUSED, USABLE
 
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
+from .judge import Judgement, judged, rms
+from .scenarios.family import GRAVITY_MPS2, Wanted, simulate
+from .scenarios.table import FAMILIES
+from .table import grouped, show, table
+from .trials import command_line, in_parallel, names_of, save
 
-from .worlds.family import Family, Wanted
-from .worlds.judge import RMS_Z, Count, Run, beside, broken, count, judged
-from .worlds.table import FAMILIES
+GOOD_MPS2 = 0.1
+CRASHED = "crashed"
+# who is told of an unlikely gravity knows that all gains are in units of it, and the truth is compared so
+GRAVITY_NAMED = "gravity_unlikely"
+# limits over all families, and over one of those whose recordings nothing is wrong with
+FALSE_SHARE, GOOD_SHARE, SHARP_MPS2 = 0.003, 0.98, 1e-3
+# of a family's errors in claims: below, its claims are too wide, and above, too narrow
+RMS_CLAIMS = (0.5, 1.5)
 
 
-def one(item: tuple[str, int], model: str) -> Run:
-    """A family's name and a seed, judged."""
+@dataclass(frozen=True)
+class Run(Judgement):
+    """The verdict on the recording of a seed: which model, how long it took [s], and its reasons in words."""
+
+    family: str = ""
+    seed: int = 0
+    model: str = ""
+    seconds: float = 0.0
+    why: str = ""
+
+    @property
+    def false(self) -> bool:
+        """Whether the verdict is."""
+        return super().false or (self.verdict == GOOD and not self.error <= GOOD_MPS2)
+
+
+def of_seed(item: tuple[str, int], model: str = "auto") -> Run:
+    """Simulate a family's name and a seed, calibrate and compare."""
     name, seed = item
-    return judged(FAMILIES[name], seed, model)
+    family = FAMILIES[name]
+    simulated = simulate(family, seed)
+    gravity, began = family.told_gravity or GRAVITY_MPS2, time.perf_counter()
+    try:
+        result = mpucal.calibrate(simulated.recording, model=model, gravity=gravity)
+    except Exception as error:  # whatever it is, the other runs go on, and the exit code is 1
+        verdict = REFUSED if isinstance(error, MpucalError) else CRASHED
+        return Run(verdict, (type(error).__name__,), family=name, seed=seed, why=repr(error))
+    seconds, truth = time.perf_counter() - began, simulated.truth
+    reasons = result.quality["reasons"]
+    D, unit = truth.D, truth.gravity
+    if GRAVITY_NAMED in [reason["code"] for reason in reasons] and result.verdict != GOOD:
+        D, unit = D * (unit / gravity), gravity
+    worth = judged(result, (D, truth.b_a), gravity=unit)
+    why = "; ".join(str(reason["message"]) for reason in reasons)
+    return Run(**vars(worth), family=name, seed=seed, model=str(result.fit["model"]), seconds=seconds, why=why)
 
 
-def all_of(families: Sequence[Family], seeds: Sequence[int], model: str, workers: int) -> list[Run]:
-    """Every seed of every family, on so many processes."""
-    items = [(family.name, seed) for family in families for seed in seeds]
-    with multiprocessing.get_context("spawn").Pool(workers) as pool:
-        runs = pool.imap(partial(one, model=model), items)
-        return list(track(runs, "families", len(items), console=Console(stderr=True), transient=True))
+def of_verdict(runs: Sequence[Run], *verdicts: str) -> list[Run]:
+    """Those with one of these verdicts."""
+    return [run for run in runs if run.verdict in verdicts]
 
 
-def number(value: float) -> str:
-    """Two digits; nothing where there is no number."""
-    return "" if math.isnan(value) else f"{value:.2g}" if value < 100 else f"{value:.0f}"
+def false(runs: Sequence[Run], verdict: str) -> int:
+    """How many of this verdict are false."""
+    return sum(run.false for run in of_verdict(runs, verdict))
 
 
-def cells(of: Count) -> list[str]:
-    """A line's numbers."""
-    reasons = ", ".join(f"{code} {n}" for code, n in list(of.reasons.items())[:3])
-    verdicts = (of.good, of.usable, of.refused + of.crashed, of.false_good, of.false_usable)
-    values = (of.rms_z, of.max_z, of.error, of.claim, of.worst_good)
-    return [*(str(n) if n else "" for n in verdicts), *(number(v) for v in values), reasons]
+def told(runs: Sequence[Run], what: str) -> list[float]:
+    """`error`, `claim` or `claims` of those that are not refused."""
+    return [getattr(run, what) for run in of_verdict(runs, GOOD, USABLE)]
 
 
-def table(families: Sequence[Family], runs: Sequence[Run]) -> Table:
-    """A line for each family, and one for all."""
-    lines = Table("family", "wanted", title=f"{len(runs)} calibrations; errors in m/s², rms over the sphere")
-    for column in "good", "usable", "refused", "false\ngood", "false\nusable", "rms z", "max z":
-        lines.add_column(column, justify="right")
-    for column in "median\nerror", "median\nclaim", "worst\ngood":
-        lines.add_column(column, justify="right")
-    lines.add_column("reasons")
-    for family in families:
-        of = [run for run in runs if run.family == family.name]
-        wanted = "" if family.wanted is Wanted.HONEST else family.wanted.value
-        lines.add_row(family.name, wanted, *cells(count(of)))
-    lines.add_section()
-    lines.add_row("all", "", *cells(count(runs)))
-    return lines
+def median(values: Sequence[float]) -> float:
+    """NaN of nothing."""
+    return float(np.median(values)) if values else math.nan
 
 
-def chosen(patterns: str | None) -> list[Family]:
-    """The families whose names match one of these, with commas between them; all without.
-
-    Raises
-    ------
-    ValueError : a pattern that matches none.
-    """
-    if patterns is None:
-        return list(FAMILIES.values())
-    for pattern in patterns.split(","):
-        if not any(fnmatchcase(name, pattern) for name in FAMILIES):
-            raise ValueError(f"no family is called {pattern!r}; they are: {', '.join(FAMILIES)}")
-    return [f for name, f in FAMILIES.items() if any(fnmatchcase(name, p) for p in patterns.split(","))]
+def worst_good(runs: Sequence[Run]) -> float:
+    """The largest error of a good one [m/s^2]."""
+    return max((run.error for run in of_verdict(runs, GOOD)), default=math.nan)
 
 
-def seeds_of(text: str) -> range:
-    """FIRST:END, or one seed."""
-    first, colon, end = text.partition(":")
-    return range(int(first), int(end) if colon else int(first) + 1)
+def reasons(runs: Sequence[Run]) -> str:
+    """The three most frequent."""
+    return ", ".join(f"{code} {n}" for code, n in Counter(c for run in runs for c in run.reasons).most_common(3))
+
+
+COLUMNS = {
+    "good": lambda runs: len(of_verdict(runs, GOOD)),
+    "usable": lambda runs: len(of_verdict(runs, USABLE)),
+    "refused": lambda runs: len(of_verdict(runs, REFUSED, CRASHED)),
+    "false\ngood": lambda runs: false(runs, GOOD),
+    "false\nusable": lambda runs: false(runs, USABLE),
+    "rms in\nclaims": lambda runs: rms(told(runs, "claims")),
+    "most": lambda runs: max(told(runs, "claims"), default=None),
+    "median\nerror": lambda runs: median(told(runs, "error")),
+    "median\nclaim": lambda runs: median(told(runs, "claim")),
+    "worst\ngood": worst_good,
+    "reasons": reasons,
+}
+
+
+def broken(runs: Sequence[Run]) -> list[str]:
+    """The limits that the runs break, a sentence each."""
+    good, usable, crashed = (len(of_verdict(runs, verdict)) for verdict in (GOOD, USABLE, CRASHED))
+    found = []
+    if false(runs, GOOD) > FALSE_SHARE * good:
+        found.append(f"{false(runs, GOOD)} of {good} good verdicts are false, more than {100 * FALSE_SHARE:g} %")
+    if worst_good(runs) > GOOD_MPS2:
+        found.append(f"a good one is off by {worst_good(runs):.3g} m/s², more than {GOOD_MPS2:g}")
+    if false(runs, USABLE):
+        found.append(f"{false(runs, USABLE)} of {usable} usable verdicts are false")
+    if crashed:
+        found.append(f"{crashed} calibrations crashed")
+    for name, of in grouped(runs, lambda run: run.family).items():
+        wanted, good = FAMILIES[name].wanted, len(of_verdict(of, GOOD))
+        if wanted is not Wanted.HONEST and good < GOOD_SHARE * len(of):
+            found.append(f"{name}: {good} of {len(of)} are good, less than {100 * GOOD_SHARE:g} %")
+        if wanted is Wanted.SHARP and not median(told(of, "error")) <= SHARP_MPS2:
+            found.append(f"{name}: median error {median(told(of, 'error')):.2g} m/s², more than {SHARP_MPS2:g}")
+    return found
+
+
+def beside(runs: Sequence[Run]) -> dict[str, float]:
+    """The rms in claims by name of those families in which it lies outside RMS_CLAIMS."""
+    claims = {name: rms(told(of, "claims")) for name, of in grouped(runs, lambda run: run.family).items()}
+    return {name: x for name, x in claims.items() if x < RMS_CLAIMS[0] or x > RMS_CLAIMS[1]}
 
 
 def main() -> int:
     """Judge, print and save."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--families", help="names or patterns of names, with commas between them")
-    parser.add_argument("--seeds", type=seeds_of, default=range(6), help="FIRST:END, such as 0:33 or 4000:4033")
+    parser = command_line(__doc__, seeds="0:6")
+    parser.add_argument("--families", type=names_of(FAMILIES), default=[*FAMILIES], help="patterns, with ; between")
     parser.add_argument("--model", default="auto")
-    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes")
-    parser.add_argument("--json", type=Path, help="write every run to this file")
     options = parser.parse_args()
-    try:
-        families = chosen(options.families)
-    except ValueError as error:
-        parser.error(str(error))
-    runs = all_of(families, options.seeds, options.model, options.workers)
-    # as wide as its content, whatever the terminal
-    console = Console(width=170)
-    console.print(table(families, runs))
-    odd = ", ".join(f"{name} {number(z)}" for name, z in beside(families, runs).items())
-    console.print(f"rms z outside {RMS_Z[0]}..{RMS_Z[1]}: {odd or 'none'}", highlight=False)
-    limits = broken(families, runs)
-    console.print("\n".join(f"BROKEN {limit}" for limit in limits) or "every limit is kept", highlight=False)
-    if options.json:
-        document = {"seeds": [*options.seeds], "broken": limits, "runs": [{**asdict(r), "z": r.z} for r in runs]}
-        text = json.dumps(document, indent=1).replace("NaN", "null").replace("Infinity", "null")
-        options.json.write_text(text + "\n", encoding="utf-8")
+    items = [(name, seed) for name in options.families for seed in options.seeds]
+    runs = list(in_parallel(partial(of_seed, model=options.model), items, options.jobs, "families"))
+    title = f"{len(runs)} calibrations; errors in m/s², rms over the sphere"
+    lines = grouped(runs, lambda run: (run.family, FAMILIES[run.family].wanted.value))
+    show(table({**lines, ("all", ""): runs}, COLUMNS, title), width=170)
+    limits = broken(runs)
+    odd = ", ".join(f"{name} {value:.2g}" for name, value in beside(runs).items())
+    print(f"rms in claims outside {RMS_CLAIMS[0]}..{RMS_CLAIMS[1]}: {odd or 'none'}")
+    print("\n".join(f"BROKEN {limit}" for limit in limits) or "every limit is kept")
+    save(options.json, {"seeds": [*options.seeds], "broken": limits, "runs": runs})
     return 1 if limits else 0

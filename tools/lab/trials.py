@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import fnmatch
 import json
 import multiprocessing
 import os
@@ -33,6 +34,19 @@ def seed_range(text: str) -> range:
     """The seeds from A to B - 1 of `A:B`; of `N` alone the first N."""
     first, _, last = text.rpartition(":")
     return range(int(first or 0), int(last))
+
+
+def names_of(known: Iterable[str]) -> Callable[[str], list[str]]:
+    """A type of argument: the known names that match patterns with `;` between them, in their order."""
+    names = list(known)
+
+    def chosen(patterns: str) -> list[str]:
+        for pattern in patterns.split(";"):
+            if not fnmatch.filter(names, pattern):
+                raise argparse.ArgumentTypeError(f"nothing is called {pattern!r}; there are: {'; '.join(names)}")
+        return [name for name in names if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns.split(";"))]
+
+    return chosen
 
 
 def in_parallel(

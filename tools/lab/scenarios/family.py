@@ -15,11 +15,10 @@ from mpucal.simulated.sensor import SensorTruth
 from .around import Around, Hand
 from .body import attitudes, specific_force
 from .chip import Chip
-from .course import Course, Motion, Poses
-from .digits import Digits
+from .course import Course, Motion, Rng, poses
+from .delivery import Digits, Timing
 from .faults import Fault, Readings
 from .sampling import Sampling
-from .timing import Timing
 
 GRAVITY_MPS2 = 9.81
 TEMPERATURE_C = 25.0
@@ -33,7 +32,7 @@ class Wanted(Enum):
     HONEST = "any"
 
 
-_TWELVE, _USUAL, _MPU6050, _AT_200_HZ = Poses(), Hand(), Chip(), Sampling()
+_USUAL, _MPU6050, _AT_200_HZ = Hand(), Chip(), Sampling()
 PLAIN, SHARP, HONEST = Wanted.GOOD, Wanted.SHARP, Wanted.HONEST
 
 
@@ -54,7 +53,7 @@ class Family:
 
     name: str
     wanted: Wanted = HONEST
-    motion: Motion = _TWELVE
+    motion: Motion = poses
     hand: Hand = _USUAL
     around: tuple[Around, ...] = ()
     chip: Chip = _MPU6050
@@ -80,19 +79,19 @@ def simulate(family: Family, seed: int) -> Simulated:
     rng = np.random.default_rng([seed, zlib.crc32(family.name.encode())])
     of_sensor, of_motion, of_noise, of_faults, of_digits, of_timing = rng.spawn(6)
     truth = family.chip.draw(of_sensor, GRAVITY_MPS2)
-    course = family.motion.course(family.sampling.step_s, of_motion)
+    course = family.motion(family.sampling.step_s, of_motion)
     readings = _measured(family, truth, course, of_motion, of_noise)
     for fault in family.faults:
-        readings = fault.spoil(readings, of_faults)
+        readings = fault(readings, of_faults)
     y, clipped = np.hstack((readings.acc, readings.gyr)), np.zeros((len(readings.t), 6), bool)
     if family.chip.bits:
         counts, clipped = family.chip.counts(y)
         for digits in family.digits:
-            counts = digits.garble(counts, of_digits)
+            counts = digits(counts, of_digits)
         y = counts * family.chip.step
     t, rows = np.arange(len(y)) / family.sampling.rate_hz, np.arange(len(y))
     for timing in family.timing:
-        t, kept = timing.deliver(t, of_timing)
+        t, kept = timing(t, of_timing)
         rows = rows[kept]
     last_flat = int(np.searchsorted(readings.t[rows], 0.95 * readings.turning_share(0.0)))
     recording = Recording.from_arrays(
@@ -109,14 +108,12 @@ def simulate(family: Family, seed: int) -> Simulated:
     return Simulated(recording, readings.truth.symmetric()[0])
 
 
-def _measured(
-    family: Family, truth: SensorTruth, course: Course, of_motion: np.random.Generator, of_noise: np.random.Generator
-) -> Readings:
+def _measured(family: Family, truth: SensorTruth, course: Course, of_motion: Rng, of_noise: Rng) -> Readings:
     """What a sensor reads whose truth is D, b_a, K, b_omega and white noise."""
     sampling, omega = family.sampling, course.omega
     world = np.zeros_like(omega)
-    for around in (family.hand, *family.around):
-        push, rates = around.push(course, of_motion)
+    for around in (family.hand.push, *family.around):
+        push, rates = around(course, of_motion)
         world, omega = world + push, omega + rates
     lying = np.append(np.radians(family.lying_deg) * of_motion.uniform(-1.0, 1.0, 2), of_motion.uniform(-3.0, 3.0))
     q = attitudes(omega, sampling.step_s, rotation.exp(lying))

@@ -1,0 +1,160 @@
+"""What moves a board besides being turned: the hand that holds it, and what that hand stands in.
+
+Each is a function of the course and a generator: (n, 3) m/s^2 of the pivot in the world, z up, and (n, 3) rad/s in the
+body; 0.0 for none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mpucal.data import STANDARD_GRAVITY_MPS2, Vector
+
+from .course import FLAT_S, Course, Rng, Span, direction, within
+
+Push = tuple[Vector | float, Vector | float]
+Around = Callable[[Course, Rng], Push]
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A hand with the sensor on a lever.
+
+    lever_m : least and most distance from the pivot. wobble : relative rms of its travel while moving.
+    sway_mps2, jerks_per_s : while moving. tremor_mps2, tremor_dps : rms an axis while holding, 2 to 10 Hz.
+    passes : how often the pivot changes place, as from one hand to the other.
+    """
+
+    lever_m: Span = (0.1, 0.3)
+    wobble: float = 0.0
+    sway_mps2: float = 0.3
+    jerks_per_s: float = 0.3
+    tremor_mps2: float = 0.0
+    tremor_dps: float = 0.0
+    passes: int = 0
+
+    def push(self, course: Course, rng: Rng) -> Push:
+        """Sway and jerks while it moves, tremor while it holds."""
+        n, step_s, moving = len(course.omega), course.step_s, course.moving[:, None]
+        world = self.sway_mps2 * moving * within(n, step_s, (0.5, 4.0), rng) if self.sway_mps2 else np.zeros((n, 3))
+        for start in np.flatnonzero(rng.random(n) < self.jerks_per_s * step_s * course.moving).tolist():
+            length = min(int(rng.uniform(0.05, 0.15) / step_s), n - start)
+            pulse = np.sin(np.pi * (np.arange(length) + 0.5) / max(length, 1))
+            world[start : start + length] += rng.uniform(2.0, 6.0) * pulse[:, None] * direction(rng)
+        holding = course.after_flat[:, None] * (1.0 - moving)
+        omega: Vector | float = 0.0
+        if self.tremor_mps2 or self.tremor_dps:
+            world += self.tremor_mps2 * holding * within(n, step_s, (2.0, 10.0), rng)
+            omega = np.radians(self.tremor_dps) * holding * within(n, step_s, (2.0, 10.0), rng)
+        return world, omega
+
+    def lever(self, course: Course, rng: Rng) -> Vector:
+        """Where the sensor is from the pivot (n, 3) [m], in the body."""
+        n = len(course.omega)
+        r = np.tile(rng.uniform(*self.lever_m) * direction(rng), (n, 1))
+        if self.wobble:
+            rms = self.wobble * np.linalg.norm(r[0]) / np.sqrt(3.0)
+            r += rms * course.moving[:, None] * within(n, course.step_s, (0.05, 0.4), rng)
+        for at in rng.uniform(FLAT_S, course.t[-1], self.passes):
+            share = np.clip((course.t - at) / 0.6, 0.0, 1.0)
+            r += (share**3 * (10 - 15 * share + 6 * share**2))[:, None] * rng.uniform(*self.lever_m) * direction(rng)
+        return r
+
+
+def walking(course: Course, rng: Rng, bounce_mps2: float = 1.0) -> Push:
+    """Steps at about 2 Hz after the flat segment: bounce_mps2 up and down, half of it sideways at half the rate.
+
+    With a second harmonic, and a cadence that wanders by some per cent.
+    """
+    cadence = 2.0 * (1.0 + 0.05 * within(len(course.omega), course.step_s, (0.05, 0.3), rng)[:, 0])
+    phase = 2 * np.pi * np.cumsum(cadence) * course.step_s
+    a = np.empty((len(phase), 3))
+    a[:, 0] = 0.3 * np.sin(phase + rng.uniform(0, 6.28))
+    a[:, 1] = 0.5 * np.sin(phase / 2 + rng.uniform(0, 6.28))
+    a[:, 2] = np.sin(phase) + 0.3 * np.sin(2 * phase + rng.uniform(0, 6.28))
+    return bounce_mps2 * course.after_flat[:, None] * a, 0.0
+
+
+def vibration(
+    course: Course,
+    rng: Rng,
+    rms_mps2: float = 1.0,
+    band_hz: Span = (20.0, 80.0),
+    dps: float = 0.5,
+    flat_too: bool = False,
+) -> Push:
+    """A motor: rms_mps2 an axis within band_hz, and `dps` of rates; `flat_too`: it runs from the start."""
+    n, runs = len(course.omega), 1.0 if flat_too else course.after_flat[:, None]
+    a, w = within(n, course.step_s, band_hz, rng), within(n, course.step_s, band_hz, rng)
+    return rms_mps2 * runs * a, np.radians(dps) * runs * w
+
+
+def coning(course: Course, rng: Rng, hz: float = 5.0, dps: float = 30.0) -> Push:
+    """After the flat segment, the board's axis goes round a cone: rates of `dps` about an axis that turns at hz."""
+    axis = direction(rng)
+    e = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    e /= np.linalg.norm(e)
+    phase = 2 * np.pi * hz * course.t[:, None]
+    turning = np.cos(phase) * e + np.sin(phase) * np.cross(axis, e)
+    return 0.0, np.radians(dps) * course.after_flat[:, None] * turning
+
+
+def elevator(course: Course, rng: Rng, a_mps2: float = 1.0) -> Push:
+    """Rides up and down, a_mps2 for two seconds at either end of each; the first begins after the flat segment."""
+    a, t, up = np.zeros((len(course.omega), 3)), course.t, rng.choice([-1.0, 1.0])
+    start = FLAT_S + rng.uniform(1.0, 5.0)
+    while start < t[-1]:
+        cruise = rng.uniform(3.0, 8.0)
+        for at, sign in ((start, up), (start + 2.0 + cruise, -up)):
+            share = np.clip((t - at) / 2.0, 0.0, 1.0)
+            a[:, 2] += sign * a_mps2 * np.sin(np.pi * share) ** 2
+        start, up = start + 4.0 + cruise + rng.uniform(3.0, 6.0), -up
+    return a, 0.0
+
+
+def swing(course: Course, rng: Rng, length_m: float = 2.2, deg: float = 10.0) -> Push:
+    """Who turns the board sits in a swing: a pendulum of length_m and amplitude deg, from the flat segment's end.
+
+    Small angles: the pendulum is harmonic; the acceleration of its end is exact for that angle.
+    """
+    pulsation = np.sqrt(STANDARD_GRAVITY_MPS2 / length_m)
+    since, amplitude = np.maximum(course.t - FLAT_S, 0.0), np.radians(deg)
+    # set going within some seconds
+    grown = 1.0 - np.exp(-((since / 3.0) ** 2))
+    angle = amplitude * grown * np.sin(pulsation * since)
+    rate = np.gradient(angle, course.step_s)
+    tangential, central = length_m * np.gradient(rate, course.step_s), length_m * rate**2
+    along = tangential * np.cos(angle) - central * np.sin(angle)
+    upward = tangential * np.sin(angle) + central * np.cos(angle)
+    heading = rng.uniform(0, 2 * np.pi)
+    return np.stack((along * np.cos(heading), along * np.sin(heading), upward), axis=1), 0.0
+
+
+def carried(course: Course, rng: Rng, rms_mps2: float = 0.2, band_hz: Span = (0.1, 0.5)) -> Push:
+    """A boat, a train: slow accelerations of rms_mps2 an axis within band_hz, the flat segment included."""
+    return rms_mps2 * within(len(course.omega), course.step_s, band_hz, rng), 0.0
+
+
+def thumps(course: Course, rng: Rng, peak_mps2: float = 30.0) -> Push:
+    """The board is set down with a knock of about peak_mps2, a ring at 60 Hz, at the end of each move."""
+    ends = np.flatnonzero((course.moving[:-1] > 0.0) & (course.moving[1:] == 0.0)) + 1
+    ring = np.arange(0.0, 0.1, course.step_s)
+    shape = np.exp(-ring / 0.015) * np.sin(2 * np.pi * 60.0 * ring)
+    a = np.zeros((len(course.omega), 3))
+    for start in ends.tolist():
+        room = min(len(shape), len(a) - start)
+        a[start : start + room] += peak_mps2 * rng.uniform(0.5, 1.0) * shape[:room, None] * direction(rng)
+    return a, 0.0
+
+
+def sinking(course: Course, rng: Rng, dps: float = 0.3) -> Push:
+    """It lies on something soft: what is flat or held still leans over for some more seconds, by `dps` at first."""
+    begins = np.r_[0, np.flatnonzero((course.moving[:-1] > 0.0) & (course.moving[1:] == 0.0)) + 1]
+    omega = np.zeros((len(course.omega), 3))
+    for first, last in zip(begins.tolist(), [*begins[1:].tolist(), len(omega)], strict=True):
+        since = course.step_s * np.arange(last - first)
+        omega[first:last] += np.radians(dps) * np.exp(-since / 4.0)[:, None] * direction(rng)
+    return 0.0, omega * (course.moving == 0.0)[:, None]
