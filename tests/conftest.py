@@ -42,8 +42,9 @@ if hasattr(signal, "SIGHUP"):
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # `gate` runs the same examples every time; `search` draws others, by the seed of --hypothesis-seed (`make search`).
-# How long a busy machine takes says nothing about what is tested.
-PATIENT = {"deadline": None, "database": None, "suppress_health_check": [HealthCheck.too_slow]}
+# How long a busy machine takes says nothing about what is tested, and what a test's fixtures give is not changed.
+QUIET = [HealthCheck.too_slow, HealthCheck.function_scoped_fixture]
+PATIENT = {"deadline": None, "database": None, "suppress_health_check": QUIET}
 settings.register_profile("gate", derandomize=True, **PATIENT)
 settings.register_profile("search", print_blob=True, **PATIENT)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "gate"))

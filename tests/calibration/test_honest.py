@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.calibration import calibrate
@@ -58,7 +58,7 @@ def measured(draw):
     return recording, turned(simulated.truth, Q)
 
 
-@settings(max_examples=30, deadline=None, derandomize=True, database=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=30)
 @given(measured(), st.sampled_from(UNITS))
 def test_no_good_calibration_is_three_times_worse_than_it_claims(made, units):
     recording, truth = made

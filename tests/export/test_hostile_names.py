@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from pymavlink.mavparm import MAVParmDict
 
@@ -180,7 +180,6 @@ def test_another_is_refused(calibration, created):
         Calibration.from_document(calibration.document() | {"created": created})
 
 
-@settings(deadline=None)
 @given(st.text())
 @example("MPU-6050")
 def test_whatever_is_read_is_written_as_it_is(words):

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -17,7 +17,7 @@ def path(tmp_path):
     return tmp_path / "made.csv"
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(arrays(float, (4, 6), elements=finite), st.none() | arrays(float, 4, elements=finite))
 def test_reads_the_same_numbers_that_were_saved(save, path, values, temperature_c):
     recording = Recording.from_arrays([0.0, 0.1, 0.2, 1 / 3], values[:, :3], values[:, 3:], temperature_c=temperature_c)

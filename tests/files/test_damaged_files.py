@@ -7,7 +7,7 @@ import zipfile
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
@@ -106,7 +106,7 @@ def damaged(data, kind, place, with_):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40)
+@settings(max_examples=40)
 @given(damage=st.lists(DAMAGE, min_size=1, max_size=3))
 @example(damage=[("twice", 0.015625, b"\0"), ("gone", 0.5, b"\0")])  # of .mcap: no message is left
 def test_a_damaged_file_is_refused_or_read(suffix, damage, files, tmp_path):

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mpucal
@@ -142,7 +142,7 @@ def test_a_blob_is_no_log(tmp_path):
         mpucal.load(tmp_path / "calibration.bin")
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25)
 @given(junk=st.binary(max_size=400), cut=st.integers(0, 400))
 def test_damage_never_raises_anything_else(dataflash, tmp_path, junk, cut):
     for k in range(5):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
@@ -65,7 +65,7 @@ def path(tmp_path):
     return tmp_path / "capture.mcap"
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     st.lists(reads | writes | events, max_size=20),
     st.dictionaries(words.filter(lambda word: word != mcap.VERSION_KEY), plain),
@@ -160,7 +160,7 @@ def test_of_a_file_cut_anywhere_all_whole_chunks_are_read(path, monkeypatch):
     assert len(set(held)) == 6  # nothing, then a chunk of 26 polls more each time
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(share=st.floats(0.0, 1.0, exclude_max=True), bit=st.integers(0, 7))
 def test_a_changed_bit_is_noticed_and_what_precedes_it_is_kept(path, share, bit):
     records = polls(60)

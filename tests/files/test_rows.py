@@ -9,7 +9,7 @@ from pathlib import Path
 import hypothesis.extra.numpy as hnp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import NonSeekingReader, make_reader
 
@@ -137,7 +137,6 @@ def test_a_line_of_blanks_is_an_empty_one(cell, tmp_path):
     assert sum(map(len, open_rows(path).runs)) == len(load(path)) == 2
 
 
-@settings(deadline=None)
 @given(hnp.arrays(float, st.tuples(st.integers(1, 4), st.integers(1, 3)), elements=st.floats(allow_subnormal=True)))
 def test_text_gives_back_each_number_that_there_is(table):
     text = lines(table)

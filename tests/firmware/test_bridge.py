@@ -308,7 +308,7 @@ requests = st.one_of(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(told=st.lists(requests, max_size=30))
 def test_whatever_comes_it_sends_nothing_but_answers_and_keeps_its_blob(told, host, core):
     asking = Asking(host, core, Chip(), host.Eeprom())

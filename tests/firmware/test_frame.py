@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mpucal.sources.bridge.frame import MAX_CONTENT, MAX_ENCODED, MAX_PAYLOAD, Deframer, Frame, stuff
@@ -60,7 +60,6 @@ def test_finds_the_frames_of_every_golden_vector(path, found):
     ]
 
 
-@settings(deadline=None)
 @given(frame=frames)
 def test_encodes_as_python_does_and_decodes_what_it_encoded(frame, found, closed):
     assert closed(frame) == frame.encode()
@@ -79,7 +78,6 @@ pieces = st.one_of(
 )
 
 
-@settings(deadline=None)
 @given(data=st.lists(pieces, max_size=6).map(b"".join))
 def test_finds_the_same_frames_as_python_in_whatever_comes(data, found):
     assert found(data) == list(Deframer().feed(data))

@@ -37,7 +37,7 @@ def sphere(n, radius):
     return radius * points / np.linalg.norm(points, axis=1, keepdims=True)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(ORIENTATIONS))
 def test_a_sensor_without_cross_axis_terms_is_made_perfect(seed, number):
     rng = np.random.default_rng(seed)
@@ -50,7 +50,7 @@ def test_a_sensor_without_cross_axis_terms_is_made_perfect(seed, number):
     assert composed.residual_of(composed.correction) < 1e-9
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(ORIENTATIONS))
 def test_the_offset_is_exact_and_the_residual_what_the_worst_attitude_shows(seed, number):
     rng = np.random.default_rng(seed)

@@ -56,7 +56,7 @@ def test_errors_beyond_pymavlinks_enumeration_have_words():
     assert error_name(99) == "error 99"
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.dictionaries(st.text("ABCXYZ019_", min_size=2, max_size=16), st.floats(width=32, allow_nan=False)))
 def test_both_files_give_back_each_float32(tmp_path_factory, values):
     folder = tmp_path_factory.mktemp("parameters")

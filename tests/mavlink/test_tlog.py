@@ -4,7 +4,7 @@ import sys
 import tracemalloc
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mpucal
@@ -59,7 +59,7 @@ def test_mavlogdump_reads_it(written):
     assert done.stdout.count("RAW_IMU {") == len(records) - 1
 
 
-@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=50)
 @given(cut=st.integers(1, 400), junk=st.binary(max_size=100))
 def test_a_damaged_log_gives_what_is_whole(written, cut, junk):
     path, records = written

@@ -5,7 +5,7 @@ import time
 from contextlib import ExitStack, closing
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.page import server as module
@@ -28,7 +28,7 @@ def test_the_page_loads_nothing_from_elsewhere(server, name):
     assert b"://" not in body.replace(b'"http://www.w3.org/2000/svg"', b"")
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150)
 @given(st.data())
 def test_nobody_else_is_let_in_and_nothing_breaks(server, data):
     token, host = server.door.token.encode(), server.door.host.encode()

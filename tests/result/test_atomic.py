@@ -39,7 +39,7 @@ class Failing:
         return step
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(at=st.integers(1, 8), there_before=st.booleans())
 def test_a_fault_at_any_step_leaves_the_old_file_or_the_new_one(tmp_path_factory, at, there_before):
     path = tmp_path_factory.mktemp("faults") / "a.json"
@@ -62,7 +62,7 @@ def test_a_fault_at_any_step_leaves_the_old_file_or_the_new_one(tmp_path_factory
     assert [p.name for p in path.parent.iterdir()] == (["a.json"] if path.exists() else [])
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(at=st.integers(1, 25), there_before=st.sets(st.sampled_from("abc")))
 def test_a_fault_at_any_step_leaves_all_old_files_or_all_new_ones(tmp_path_factory, at, there_before):
     folder = tmp_path_factory.mktemp("faults")

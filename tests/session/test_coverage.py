@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mpucal.session.aims import ALL_AROUND, TILT_RAD, directions
@@ -69,7 +69,6 @@ def test_all_over_the_sphere_spread_is_one():
     assert directions_of(units).spread() == pytest.approx(1.0, abs=0.2)
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 40))
 def test_kept_directions_are_distinct_and_turning_all_changes_nothing(seed, n):
     rng = np.random.default_rng(seed)

@@ -309,7 +309,7 @@ def reboot(transport, number):
     transport.befall = befall
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(
     firmware=st.sampled_from(FIRMWARES),
     fault=st.sampled_from([lose, arm, refuse, spoil, reboot]),

@@ -227,7 +227,7 @@ def test_a_bias_that_does_not_fit_is_refused(calibration):
 ACCESSES = 700
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     model=st.sampled_from(["mpu6050", "mpu6500"]),
     corrected_before=st.booleans(),

@@ -80,7 +80,7 @@ def as_it_is(kind, now):
     return now
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(fails=st.sets(st.integers(1, 4), max_size=2), full_after=st.none() | st.integers(0, 4), memory=st.booleans())
 def test_the_old_state_or_the_new_one_and_the_files_say_which(tmp_path_factory, fails, full_after, memory):
     folder = tmp_path_factory.mktemp("faults")

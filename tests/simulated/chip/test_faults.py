@@ -149,7 +149,7 @@ places = st.builds(
 )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     faults=st.lists(places, min_size=1, max_size=2),
     model=st.sampled_from(["mpu6050", "mpu6500", "clone98"]),

@@ -1,5 +1,5 @@
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mpucal.sources.bridge.clock import WRAP_US, BridgeClock
@@ -11,7 +11,6 @@ def shown(t_ns, start_us=0):
     return (t_ns // US + start_us) % WRAP_US
 
 
-@settings(deadline=None)
 @given(
     start_us=st.integers(0, WRAP_US - 1),
     pauses_s=st.lists(st.floats(0.001, 2000.0), min_size=1, max_size=20),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.chip.config import Config
@@ -34,7 +34,7 @@ def consistent(recording, numbers):
     return bool(((steps == 1) | (recording.gap[1:] & (steps > 1))).all())
 
 
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=8)
 @given(to_host=faults, to_device=faults, rate_hz=st.sampled_from([200, 1000]))
 def test_spoiled_bytes(rig, numbers, stream, to_host, to_device, rate_hz):
     made = rig()
@@ -54,7 +54,7 @@ def test_spoiled_bytes(rig, numbers, stream, to_host, to_device, rate_hz):
     assert len(recording) > 0.5 * rate_hz
 
 
-@settings(max_examples=4, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=4)
 @given(after_ms=st.integers(0, 900), boot_ms=st.sampled_from([0, 300, 2000]), rate_hz=st.sampled_from([200, 1000]))
 def test_a_reset_of_the_bridge(rig, numbers, stream, after_ms, boot_ms, rate_hz):
     """Its clock begins anew; the chip goes on."""
@@ -189,7 +189,7 @@ def test_a_flood_is_named(rig, stream, sound_reads):
         stream(driver, 60)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(noise=st.binary(max_size=2000))
 def test_noise_before_the_hello_does_no_harm(rig, noise):
     made = rig()
@@ -246,7 +246,7 @@ def store_on(line):
     return Store(link)
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=40)
 @given(writes=st.integers(0, 3), bytes_left=st.integers(0, 230))
 def test_power_that_fails_at_any_byte_leaves_the_old_blob_or_the_new_one(rig, writes, bytes_left):
     made, memory = rig(), Memory()
@@ -266,7 +266,7 @@ def test_power_that_fails_at_any_byte_leaves_the_old_blob_or_the_new_one(rig, wr
     assert held == new if done else held in (old, new)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=25)
 @given(to_host=faults, to_device=faults)
 def test_spoiled_bytes_never_leave_a_part_of_a_blob(rig, to_host, to_device):
     made, memory = rig(), Memory()
@@ -301,7 +301,7 @@ class Reset(Mortal):
         return out
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=40)
 @given(held_before=st.booleans(), bytes_left=st.integers(0, 230), to_host=faults, to_device=faults)
 def test_the_sink_says_truly_which_calibration_is_there(rig, held_before, bytes_left, to_host, to_device):
     """Whatever byte the supply fails at, and whatever becomes of those on the line."""

@@ -103,7 +103,7 @@ class Registers:
         return 0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(told=requests)
 def test_it_answers_as_the_emulated_bridge_does(told, tmp_path_factory):
     chip = Registers()
