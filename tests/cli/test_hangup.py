@@ -2,44 +2,83 @@
 
 import os
 import pty
+import select
 import signal
 import sys
 import time
+from pathlib import Path
+
+import pytest
 
 from mpucal.files.mcap import read_capture
 from mpucal.result.calibration import Calibration
 
-PATIENCE_S = 60.0
+HELD = str(Path(__file__).with_name("held.py"))
+# how long a busy machine may take, for what takes it a second or two
+PATIENCE_S = 300.0
 
 
-def session_on_a_terminal(folder, *options):
-    """A session as the foreground of a terminal of its own: its pid and the terminal's other end."""
-    pid, terminal = pty.fork()
-    if not pid:
-        os.chdir(folder)
-        os.environ["TERM"] = "xterm"
-        words = ["session", "--rate", "50", "-o", "board", *options]
-        os.execv(sys.executable, [sys.executable, "-m", "mpucal", *words])
-    return pid, terminal
+class OnATerminal:
+    """A session as the foreground of a terminal of its own, held at a step, or run as it is."""
+
+    def __init__(self, folder, *options, held=None):
+        self._folder = folder
+        self.pid, self.terminal = pty.fork()
+        if not self.pid:
+            os.chdir(folder)
+            os.environ["TERM"] = "xterm"
+            program = ["-m", "mpucal"] if held is None else [HELD, *map(str, held)]
+            words = ["session", "--rate", "50", "--target", "quick", "-o", "board", *options]
+            os.execv(sys.executable, [sys.executable, *program, *words])
+        self._until = time.monotonic() + PATIENCE_S
+        self._seen = b""
+        self.code = None
+
+    def read_until(self, enough):
+        """What it shows is read, until `enough(all of it)`."""
+        while not enough(self._seen):
+            assert time.monotonic() < self._until, self._seen[-2000:]
+            if select.select([self.terminal], [], [], 0.01)[0]:
+                self._seen += os.read(self.terminal, 65536)
+
+    def read_until_held(self):
+        self.read_until(lambda seen: (self._folder / "held").exists())
+
+    def let_go(self):
+        (self._folder / "go").touch()
+
+    def exit_code(self):
+        while self.code is None:
+            assert time.monotonic() < self._until
+            pid, status = os.waitpid(self.pid, os.WNOHANG)
+            if pid:
+                self.code = os.waitstatus_to_exitcode(status)
+            time.sleep(0.01)
+        return self.code
 
 
-def read_until(terminal, words):
-    seen, until = b"", time.monotonic() + PATIENCE_S
-    while words not in seen:
-        assert time.monotonic() < until, seen[-2000:]
-        seen += os.read(terminal, 65536)
+@pytest.fixture
+def on_a_terminal(tmp_path):
+    begun = []
+
+    def call(*options, held=None):
+        begun.append(OnATerminal(tmp_path, *options, held=held))
+        return begun[-1]
+
+    yield call
+    for session in begun:
+        if session.code is None:
+            os.kill(session.pid, signal.SIGKILL)
+            os.waitpid(session.pid, 0)
 
 
-def exit_code(pid):
-    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-
-
-def test_a_session_ends_in_order_and_says_in_its_log_how_to_go_on(tmp_path):
-    pid, terminal = session_on_a_terminal(tmp_path, "--bus", "sim:pace=real")
-    read_until(terminal, b"flat on a firm surface")
-    time.sleep(1.0)
-    os.close(terminal)
-    assert exit_code(pid) == 4
+def test_a_session_ends_in_order_and_says_in_its_log_how_to_go_on(on_a_terminal, tmp_path):
+    session = on_a_terminal("--bus", "sim:seed=3", held=("flat", 30))
+    session.read_until(lambda seen: b"flat on a firm surface" in seen)
+    session.read_until_held()
+    os.close(session.terminal)
+    session.let_go()
+    assert session.exit_code() == 4
     log = (tmp_path / "board" / "session.log").read_text()
     assert "the terminal went away" in log
     assert log.endswith("go on with `mpucal session --resume board` when you are ready.\n")
@@ -48,12 +87,13 @@ def test_a_session_ends_in_order_and_says_in_its_log_how_to_go_on(tmp_path):
     assert capture.records[-1].t_ns > 5e8
 
 
-def test_a_session_that_keeps_going_gets_its_result(tmp_path):
-    pid, terminal = session_on_a_terminal(tmp_path, "--keep-going", "--bus", "sim:seed=3")
-    read_until(terminal, b" Hz ")  # it runs so fast that a busy machine may not paint every prompt
-    os.close(terminal)
-    os.kill(pid, signal.SIGHUP)  # the shell's, after the kernel's
-    assert exit_code(pid) == 0
+def test_a_session_that_keeps_going_gets_its_result(on_a_terminal, tmp_path):
+    session = on_a_terminal("--keep-going", "--bus", "sim:seed=3", held=("rotate", 1))
+    session.read_until_held()
+    os.close(session.terminal)
+    os.kill(session.pid, signal.SIGHUP)  # the shell's, after the kernel's
+    session.let_go()
+    assert session.exit_code() == 0
     assert Calibration.load(tmp_path / "board" / "calibration.json").verdict == "good"
     log = (tmp_path / "board" / "session.log").read_text()
     assert "the terminal went away" in log
@@ -61,9 +101,9 @@ def test_a_session_that_keeps_going_gets_its_result(tmp_path):
     assert "The calibration is good." in log
 
 
-def test_a_session_whose_terminal_goes_while_it_waits_for_its_page_goes_on(tmp_path):
-    pid, terminal = session_on_a_terminal(tmp_path, "--page", "--bus", "sim:seed=3")
-    read_until(terminal, b"Open the page")
-    os.close(terminal)
-    assert exit_code(pid) == 0
+def test_a_session_whose_terminal_goes_while_it_waits_for_its_page_goes_on(on_a_terminal, tmp_path):
+    session = on_a_terminal("--page", "--bus", "sim:seed=3,pace=fast")
+    session.read_until(lambda seen: b"Open the page" in seen)
+    os.close(session.terminal)
+    assert session.exit_code() == 0
     assert "The calibration is good." in (tmp_path / "board" / "session.log").read_text()

@@ -1,0 +1,37 @@
+"""The command line of a session that stops at a step until it may go on, so that what happens there happens in no race.
+
+    held.py STEP CALL WORDS...
+
+As `mpucal WORDS`; when samples reach STEP for the CALLth time, it makes the file `held` where it runs and waits for the
+file `go`.
+"""
+
+import sys
+import time
+from itertools import count
+from pathlib import Path
+
+from mpucal.__main__ import run
+from mpucal.session.lay_flat import LayFlat
+from mpucal.session.rotate import Rotate
+
+STEPS = {"flat": LayFlat, "rotate": Rotate}
+ASK_EVERY_S = 0.01
+
+
+def hold(step, call):
+    add, calls = step.add, count(1)
+
+    def held(self, samples):
+        if next(calls) == call:
+            Path("held").touch()
+            while not Path("go").exists():
+                time.sleep(ASK_EVERY_S)
+        return add(self, samples)
+
+    step.add = held
+
+
+if __name__ == "__main__":
+    hold(STEPS[sys.argv[1]], int(sys.argv[2]))
+    sys.exit(run(sys.argv[3:]))
