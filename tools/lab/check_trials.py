@@ -1,7 +1,7 @@
 """`mpucal check` on simulated pairs of a calibration and a check with known truth, and on halves of real recordings.
 
-python -m tools.lab check_trials --runs 500                      what is told against what happened, each as often
-python -m tools.lab check_trials --only nothing --runs 2000      false alarms
+python -m tools.lab check_trials --seeds 504                     what is told against what happened, each as often
+python -m tools.lab check_trials --only nothing --seeds 2000     false alarms
 python -m tools.lab check_trials recordings/*.npz                halves of real recordings: nothing happened
 
 A pair is an MPU-6050 in a trembling hand: twelve poses make the calibration, a flat rest and the three orientations
@@ -12,17 +12,13 @@ sensor ages by five days, as `mpucal.recheck.drift` says of an unchanged one, an
 
 from __future__ import annotations
 
-import argparse
-import json
-import os
 from collections import Counter
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 import mpucal
 from mpucal.calibration.rotation import rotation
@@ -36,15 +32,18 @@ from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario
 from tools.lab.study.sensors import hand_sensor
 
 from .halves import halves
-from .monte_carlo import in_parallel
+from .judge import rms
+from .table import grouped, show, table
+from .trials import command_line, in_parallel, names_of, save
 
 DAYS = 5.0
 TEMPERATURE_C = 25.0
 # of a turn in that motion
 MOVE_S = 1.6
-BIAS_MG = (2.0, 5.0, 10.0, 30.0)
 ASKED, ANY = "check as asked", "check"
-EVENTS = ("nothing", *(f"bias {mg:g} mg" for mg in BIAS_MG), "scale 0.3 %", "mount 1 deg", "15 degC", "another sensor")
+UNCHANGED = ("still good", "cannot be told")
+BIASES = ("bias 2 mg", "bias 5 mg", "bias 10 mg", "bias 30 mg")
+EVENTS = ("nothing", *BIASES, "scale 0.3 %", "mount 1 deg", "15 degC", "another sensor")
 
 
 @dataclass(frozen=True)
@@ -57,25 +56,27 @@ class Trial:
     what: str
     probability: float | None
     seconds: float
-    error_mg: float | None
+    error_mg: float = np.nan
 
 
 def happened(truth: SensorTruth, event: str, rng: np.random.Generator) -> tuple[SensorTruth, float]:
-    """The sensor after `event`, and its temperature."""
-    size, direction = _size(event), rng.standard_normal(3)
+    """The sensor after `event`, of any size in those units, and its temperature."""
+    direction = rng.standard_normal(3)
     direction /= np.linalg.norm(direction)
-    if event.startswith("bias"):
-        return replace(truth, b_a=truth.b_a + size * drift.MG * direction), TEMPERATURE_C
-    if event.startswith("scale"):
-        axis = np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])
-        return replace(truth, D=truth.D @ np.diag(1.0 + 0.01 * size * axis)), TEMPERATURE_C
-    if event.startswith("mount"):
-        return replace(truth, D=truth.D @ rotation(np.radians(size) * direction)), TEMPERATURE_C
-    if event.startswith("15"):
-        spread = drift.BY_TEMPERATURE["MPU-6050"].covariance() * size**2
-        return aged_by(truth, rng.multivariate_normal(np.zeros(len(spread)), spread)), TEMPERATURE_C + size
-    if event == "another sensor":
-        return hand_sensor(rng), TEMPERATURE_C
+    match event.split():
+        case ["bias", mg, "mg"]:
+            return replace(truth, b_a=truth.b_a + float(mg) * drift.MG * direction), TEMPERATURE_C
+        case ["scale", percent, "%"]:
+            axis = np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])
+            return replace(truth, D=truth.D @ np.diag(1.0 + 0.01 * float(percent) * axis)), TEMPERATURE_C
+        case ["mount", deg, "deg"]:
+            return replace(truth, D=truth.D @ rotation(np.radians(float(deg)) * direction)), TEMPERATURE_C
+        case [by_c, "degC"]:
+            spread = drift.BY_TEMPERATURE["MPU-6050"].covariance() * float(by_c) ** 2
+            theta = rng.multivariate_normal(np.zeros(len(spread)), spread)
+            return aged_by(truth, theta), TEMPERATURE_C + float(by_c)
+        case ["another", "sensor"]:
+            return hand_sensor(rng), TEMPERATURE_C
     return truth, TEMPERATURE_C
 
 
@@ -110,7 +111,7 @@ def of_pair(item: tuple[str, int], motion: str = ASKED, perfect: bool = False) -
     recording = at(hand_scenario(2 * seed + 1, motion, tremble=True, sensor=after).recording, temperature_c)
     recording = recording if perfect else imperfect(recording, of_errors)
     told = check(calibration, recording, days=DAYS)
-    error = None
+    error = np.nan
     if told.theta is not None:
         error = float(np.abs(calibration.D @ told.theta[BETA] + calibration.b_a - after.b_a).max()) / drift.MG
     return Trial(event, seed, told.verdict, told.what, told.probability, told.seconds, error)
@@ -145,61 +146,44 @@ def of_halves(path: Path, gravity: float) -> list[Trial]:
         calibration = mpucal.calibrate(one, gravity=gravity)
         if calibration.verdict != "refused":
             told = check(calibration, other, days=0.0)
-            trials.append(Trial(path.stem, number, told.verdict, told.what, told.probability, told.seconds, None))
+            trials.append(Trial(path.stem, number, told.verdict, told.what, told.probability, told.seconds))
     return trials
 
 
-def _size(event: str) -> float:
-    numbers = [word.removesuffix("degC") for word in event.replace("degC", " degC").split()]
-    return next((float(word) for word in numbers if word.replace(".", "", 1).isdigit()), 0.0)
+def events_of(names: Sequence[str], seeds: Sequence[int]) -> list[tuple[str, int]]:
+    """An event for each seed, each as often."""
+    return [(names[number % len(names)], seed) for number, seed in enumerate(seeds)]
 
 
-def table(title: str, trials: list[Trial]) -> Table:
-    """What was told, in % of the pairs of each event."""
-    told = sorted({_told(trial) for trial in trials}, key=lambda name: (name != "still good", name))
-    lines = Table("what happened", "pairs", *told, "changed %", "error mg", title=title)
-    for event in dict.fromkeys(trial.event for trial in trials):
-        of = [trial for trial in trials if trial.event == event]
-        count = Counter(_told(trial) for trial in of)
-        cells = [f"{100.0 * count[name] / len(of):.1f}" if count[name] else "" for name in told]
-        moved = sum(trial.verdict not in ("still good", "cannot be told") for trial in of)
-        errors = [trial.error_mg for trial in of if trial.error_mg is not None]
-        rms = f"{np.sqrt(np.mean(np.square(errors))):.2f}" if errors else ""
-        lines.add_row(event, str(len(of)), *cells, f"{100.0 * moved / len(of):.1f}", rms)
-    return lines
+def told_as(trials: Sequence[Trial]) -> str:
+    """What was told, and of how many %."""
+    told = Counter(trial.verdict if trial.what == "nothing" else trial.what for trial in trials)
+    return ", ".join(f"{name} {100.0 * count / len(trials):.1f}" for name, count in told.most_common())
 
 
-def _told(trial: Trial) -> str:
-    return trial.verdict if trial.what == "nothing" else f"{trial.what}"
-
-
-def arguments() -> argparse.Namespace:
-    """The command line."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("recordings", nargs="*", type=Path, help="real recordings, halved")
-    parser.add_argument("--only", action="append", choices=EVENTS, help="may be given more than once; none: all")
-    parser.add_argument("--runs", type=int, default=500, help="pairs, shared by the events")
-    parser.add_argument("--seed", type=int, default=0, help="the first of the seeds")
-    parser.add_argument("--any", action="store_true", help="any three orientations, not those that are asked for")
-    parser.add_argument("--perfect", action="store_true", help="neither the mounting nor the gyroscope errs besides")
-    parser.add_argument("--gravity", type=float, default=9.81, help="m/s^2, of the recordings")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
-    parser.add_argument("--json", type=Path, help="write the trials to this file")
-    return parser.parse_args()
+COLUMNS: dict[str, Callable[[Sequence[Trial]], object]] = {
+    "pairs": len,
+    "called changed, %": lambda of: 100.0 * float(np.mean([t.verdict not in UNCHANGED for t in of])),
+    "told as, %": told_as,
+    "error, mg": lambda of: rms([t.error_mg for t in of]),
+}
 
 
 def main() -> None:
     """Simulate or halve, check, print and save."""
-    options = arguments()
-    console = Console(width=160)
+    parser = command_line(__doc__, seeds="0:504")
+    parser.add_argument("recordings", nargs="*", type=Path, help="real recordings, halved")
+    parser.add_argument("--only", type=names_of(EVENTS), default=EVENTS, help="events, with ; between")
+    parser.add_argument("--any", action="store_true", help="any three orientations, not those that are asked for")
+    parser.add_argument("--perfect", action="store_true", help="neither the mounting nor the gyroscope errs besides")
+    parser.add_argument("--gravity", type=float, default=9.81, help="m/s^2, of the recordings")
+    options = parser.parse_args()
     if options.recordings:
         found = in_parallel(partial(of_halves, gravity=options.gravity), options.recordings, options.jobs, "halves")
         trials = [trial for of_one in found for trial in of_one]
     else:
-        events = tuple(options.only or EVENTS)
-        items = [(events[number % len(events)], options.seed + number) for number in range(options.runs)]
         one = partial(of_pair, motion=ANY if options.any else ASKED, perfect=options.perfect)
-        trials = [trial for trial in in_parallel(one, items, options.jobs, "pairs") if trial is not None]
-    console.print(table("what was told, %", trials))
-    if options.json:
-        options.json.write_text(json.dumps([asdict(trial) for trial in trials], indent=1) + "\n")
+        pairs = in_parallel(one, events_of(options.only, options.seeds), options.jobs, "pairs")
+        trials = [trial for trial in pairs if trial is not None]
+    show(table(grouped(trials, lambda trial: trial.event), COLUMNS))
+    save(options.json, trials)

@@ -3,39 +3,33 @@
 python -m tools.lab compare                                       simulated hands, against their truth
 python -m tools.lab compare recordings/*.npz                      real recordings, by their rests and magnitudes
 python -m tools.lab compare --without "the paper's algorithm"     which takes half a minute a recording
-python -m tools.lab compare --scenario pose12 --runs 20 --json compare.json
+python -m tools.lab compare --scenes '12 poses' --seeds 20 --json compare.json
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import os
 import time
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 import mpucal
-from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Vector
+from mpucal.data import STANDARD_GRAVITY_MPS2, Recording
 from mpucal.errors import MpucalError
 from mpucal.simulated.sensor import SensorTruth
 from tools.lab.study.metrics import sph_rms
-from tools.lab.study.scenarios import GRAVITY_MPS2, MOTIONS, hand_scenario
+from tools.lab.study.scenarios import GRAVITY_MPS2
 
-from .monte_carlo import in_parallel
+from .monte_carlo import SCENES
 from .rivals import Estimate, Rests, Unfit, aligned_ellipsoid, ellipsoid, imucal, six_positions
-from .tables import number
+from .table import grouped, show, table
+from .trials import command_line, in_parallel, names_of, save
 
 RAW, AUTO = "uncalibrated", "mpucal auto"
-# section 4.1, Galaxy S5, ||g|| = 9.82: mean and sd of the magnitude after calibration; nothing is printed of before
-PAPER_4_1 = {"the paper, six poses": (9.81, 0.23), "the paper, continuous": (9.80, 0.30)}
 
 
 @dataclass(frozen=True)
@@ -44,24 +38,33 @@ class Grade:
 
     Attributes
     ----------
-    why : the sentence that says why there is no result; None where there is one. note : what else to know of it.
-    sph_rms : m/s^2, against the truth, over all directions.
+    of : the scene, or the recording. why : why there is no result, or nothing. note : what else to know of it.
+    error, before : m/s^2, against the truth, over all directions, and without a calibration.
     median, mean, std : m/s^2, of the magnitude of all samples.
     rest_rms : m/s^2, of the rests' magnitudes less gravity. miss_median, miss_max : deg, by which gravity, carried from
         rest to rest by the gyroscope, misses what the accelerometer says there.
     """
 
+    of: str
     method: str
-    why: str | None = None
+    why: str = ""
     note: str = ""
     seconds: float = np.nan
-    sph_rms: float = np.nan
+    error: float = np.nan
+    before: float = np.nan
     median: float = np.nan
     mean: float = np.nan
     std: float = np.nan
     rest_rms: float = np.nan
     miss_median: float = np.nan
     miss_max: float = np.nan
+
+
+# section 4.1, Galaxy S5: mean and sd of the magnitude after calibration; nothing is printed of before
+PAPER_4_1 = (
+    Grade("the paper, gravity 9.82", "six poses", mean=9.81, std=0.23),
+    Grade("the paper, gravity 9.82", "continuous", mean=9.80, std=0.30),
+)
 
 
 def raw(recording: Recording, gravity: float) -> Estimate:
@@ -76,9 +79,8 @@ def ours(recording: Recording, gravity: float, model: str) -> Estimate:
     if not np.isfinite(result.D).all():
         raise Unfit(f"{result.verdict}: {codes}")
     chosen = f"{result.fit['model']}, " if model == "auto" else ""
-    return Estimate(
-        result.D, result.b_a, result.K, result.b_omega, f"{chosen}{result.verdict}{f' ({codes})' if codes else ''}"
-    )
+    note = f"{chosen}{result.verdict}{f' ({codes})' if codes else ''}"
+    return Estimate(result.D, result.b_a, result.K, result.b_omega, note)
 
 
 def on_rests(recording: Recording, gravity: float, fit: Callable[[Rests, float], Estimate]) -> Estimate:
@@ -98,21 +100,22 @@ METHODS: Mapping[str, Callable[[Recording, float], Estimate]] = {
 }
 
 
-def grade(method: str, recording: Recording, gravity: float, truth: SensorTruth | None) -> Grade:
+def grade(of: str, method: str, recording: Recording, gravity: float, truth: SensorTruth | None = None) -> Grade:
     """Calibrate by a method, and judge what it gives."""
     began = time.perf_counter()
     try:
         estimate = METHODS[method](recording, gravity)
     except (Unfit, MpucalError, np.linalg.LinAlgError) as error:
-        return Grade(method, why=str(error))
+        return Grade(of, method, why=str(error))
     seconds = np.nan if method == RAW else time.perf_counter() - began
-    D, b_a = estimate.D, estimate.b_a
-    a = np.linalg.norm((recording.acc - b_a) @ np.linalg.inv(D).T, axis=1)
+    a = np.linalg.norm((recording.acc - estimate.b_a) @ np.linalg.inv(estimate.D).T, axis=1)
     return Grade(
+        of,
         method,
         note=estimate.note,
         seconds=seconds,
-        sph_rms=np.nan if truth is None else sph_rms(truth, D, b_a),
+        error=np.nan if truth is None else sph_rms(truth, estimate.D, estimate.b_a),
+        before=np.nan if truth is None else sph_rms(truth, np.eye(3), np.zeros(3)),
         median=float(np.median(a)),
         mean=float(a.mean()),
         std=float(a.std()),
@@ -135,114 +138,67 @@ def _of_rests(recording: Recording, estimate: Estimate, gravity: float) -> dict[
     return known
 
 
-def of_simulated(seed: int, scenario: str, tremble: bool, methods: tuple[str, ...]) -> list[Grade]:
-    """The methods on a simulated recording."""
-    simulated = hand_scenario(seed, scenario, tremble=tremble)
-    return [grade(method, simulated.recording, GRAVITY_MPS2, simulated.truth) for method in methods]
+def of_simulated(item: tuple[str, int], methods: Sequence[str]) -> list[Grade]:
+    """The methods on the recording of a scene and a seed."""
+    scene, seed = item
+    simulated = SCENES[scene].simulate(seed)
+    return [grade(scene, method, simulated.recording, GRAVITY_MPS2, simulated.truth) for method in methods]
 
 
-def of_file(path: Path, gravity: float, methods: tuple[str, ...]) -> list[Grade]:
+def of_file(path: Path, gravity: float, methods: Sequence[str]) -> list[Grade]:
     """The methods on a recorded file."""
     recording = mpucal.load(path)
-    return [grade(method, recording, gravity, None) for method in methods]
+    return [grade(path.stem, method, recording, gravity) for method in methods]
 
 
-def simulated_table(scenario: str, runs: list[list[Grade]]) -> Table:
-    """Errors of the methods over the seeds of a scenario."""
-    table = Table("method", title=f"{scenario}, {len(runs)} seeds: sph_rms m/s²")
-    for column in ("mean", "worst", "worse than none", "no result", "ms"):
-        table.add_column(column, justify="right")
-    table.add_column("why there is none")
-    without = [run[0].sph_rms for run in runs]
-    for of in zip(*runs, strict=True):
-        method = of[0].method
-        failed = [g.why for g in of if g.why is not None]
-        errors = np.array([g.sph_rms for g in of])
-        known = errors[np.isfinite(errors)]
-        table.add_row(
-            method,
-            number(known.mean() if len(known) else None),
-            number(known.max() if len(known) else None),
-            "" if method == RAW or len(known) == 0 else str(int(np.sum(errors > without))),
-            str(len(failed) or ""),
-            _milliseconds([g.seconds for g in of]),
-            max(set(failed), key=failed.count) if failed else "",
-        )
-    return table
+def known(grades: Sequence[Grade], key: str) -> list[float]:
+    """The values of those that have one; one NaN where none has."""
+    return [value for g in grades if np.isfinite(value := getattr(g, key))] or [np.nan]
 
 
-def recorded_table(name: str, of: list[Grade]) -> Table:
-    """The methods on a real recording, whose truth nobody knows."""
-    table = Table("method", title=name)
-    for column in ("|a| median", "mean", "sd", "rests |a| - g", "gyro misses, deg (worst)", "ms"):
-        table.add_column(column, justify="right")
-    table.add_column("note")
-    for g in of:
-        cells = [f"{x:.3f}" if np.isfinite(x) else "-" for x in (g.median, g.mean, g.std)]
-        rest = f"{g.rest_rms:.4f}" if np.isfinite(g.rest_rms) else "-"
-        miss = f"{g.miss_median:.2f} ({g.miss_max:.2f})" if np.isfinite(g.miss_median) else "-"
-        table.add_row(g.method, *cells, rest, miss, _milliseconds([g.seconds]), g.why or g.note)
-    return table
+SIMULATED: Mapping[str, Callable[[Sequence[Grade]], object]] = {
+    "error, m/s²": lambda of: float(np.mean(known(of, "error"))),
+    "worst": lambda of: max(known(of, "error")),
+    "worse than none": lambda of: sum(g.error > g.before for g in of),
+    "no result": lambda of: sum(bool(g.why) for g in of),
+    "ms": lambda of: 1e3 * float(np.mean(known(of, "seconds"))),
+    "why there is none": lambda of: "; ".join(Counter(g.why for g in of if g.why)),
+}
+RECORDED: Mapping[str, Callable[[Sequence[Grade]], object]] = {
+    "|a|: median": lambda of: _digits(of[0].median),
+    "mean": lambda of: _digits(of[0].mean),
+    "sd": lambda of: _digits(of[0].std),
+    "rests |a| - g": lambda of: _digits(of[0].rest_rms, 4),
+    "gyro misses, deg": lambda of: _digits(of[0].miss_median, 2),
+    "at most": lambda of: _digits(of[0].miss_max, 2),
+    "ms": lambda of: 1e3 * of[0].seconds,
+    "note": lambda of: of[0].why or of[0].note,
+}
 
 
-def magnitudes_table(recordings: Mapping[str, list[Grade]], gravity: float) -> Table:
-    """Section 4.1: the magnitude of all samples before and after, the paper's below."""
-    table = Table("recording", title=f"section 4.1: |a| before -> after, m/s², gravity {gravity:g}")
-    for column in ("median", "mean", "sd"):
-        table.add_column(column, justify="center")
-    for name, of in recordings.items():
-        before, after = ({g.method: g for g in of}[method] for method in (RAW, AUTO))
-        pairs = [(getattr(before, key), getattr(after, key)) for key in ("median", "mean", "std")]
-        table.add_row(name, *(f"{a:.3f} -> {b:.3f}" if np.isfinite(b) else f"{a:.3f} -> -" for a, b in pairs))
-    table.add_section()
-    for name, (mean, sd) in PAPER_4_1.items():
-        table.add_row(f"{name} (gravity 9.82)", "", f"-> {mean:.2f}", f"-> {sd:.2f}")
-    return table
-
-
-def _milliseconds(seconds: Iterable[float]) -> str:
-    known: Vector = np.array([s for s in seconds if np.isfinite(s)])
-    return f"{1e3 * known.mean():.0f}" if len(known) else ""
-
-
-def arguments() -> argparse.Namespace:
-    """The command line."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("recordings", nargs="*", type=Path, help="files that mpucal reads; none: simulated hands")
-    parser.add_argument("--scenario", action="append", choices=MOTIONS, help="simulated; may be given more than once")
-    parser.add_argument("--runs", type=int, default=5, help="seeds of each scenario")
-    parser.add_argument("--seed", type=int, default=0, help="the first of the seeds")
-    parser.add_argument("--tremble", action="store_true", help="the hand trembles in its poses")
-    parser.add_argument("--without", action="append", choices=[*METHODS][2:], default=[], help="leave a method out")
-    parser.add_argument("--gravity", type=float, default=STANDARD_GRAVITY_MPS2, help="m/s^2, of the recordings")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
-    parser.add_argument("--json", type=Path, help="write the figures to this file")
-    options = parser.parse_args()
-    options.methods = tuple(method for method in METHODS if method not in options.without)
-    if not options.scenario and not options.recordings:
-        options.scenario = ["pose12", "pose6", "turns", "continuous"]
-    return options
+def _digits(value: float, digits: int = 3) -> str:
+    return f"{value:.{digits}f}" if np.isfinite(value) else ""
 
 
 def main() -> None:
     """Compare, print and save."""
-    options = arguments()
-    console = Console(width=150)
-    document: dict[str, Any] = {"simulated": {}, "recorded": {}}
-    seeds = range(options.seed, options.seed + options.runs)
-    for scenario in options.scenario or ():
-        one = partial(of_simulated, scenario=scenario, tremble=options.tremble, methods=options.methods)
-        runs = list(in_parallel(one, seeds, options.jobs, scenario))
-        console.print(simulated_table(scenario, runs))
-        document["simulated"][scenario] = [[asdict(g) for g in run] for run in runs]
+    parser = command_line(__doc__, seeds="0:5")
+    parser.add_argument("recordings", nargs="*", type=Path, help="files that mpucal reads; none: simulated hands")
+    scenes = names_of(SCENES)
+    usual = "12 poses;six faces;three turns;continuous"
+    parser.add_argument("--scenes", type=scenes, default=scenes(usual), help=f"simulated, between ; [{usual}]")
+    parser.add_argument("--without", action="append", choices=[*METHODS][2:], default=[], help="leave a method out")
+    parser.add_argument("--gravity", type=float, default=STANDARD_GRAVITY_MPS2, help="m/s^2, of the recordings")
+    options = parser.parse_args()
+    methods = tuple(method for method in METHODS if method not in options.without)
     if options.recordings:
-        one = partial(of_file, gravity=options.gravity, methods=options.methods)
-        done = in_parallel(one, options.recordings, options.jobs, "recordings")
-        recorded = dict(zip((path.stem for path in options.recordings), done, strict=True))
-        for name, of in recorded.items():
-            console.print(recorded_table(name, of))
-        console.print(magnitudes_table(recorded, options.gravity))
-        document["recorded"] = {name: [asdict(g) for g in of] for name, of in recorded.items()}
-    if options.json:
-        # a figure that nobody knows is null, not NaN
-        options.json.write_text(json.dumps(document, indent=1).replace("NaN", "null") + "\n")
+        one = partial(of_file, gravity=options.gravity, methods=methods)
+        found = [g for of in in_parallel(one, options.recordings, options.jobs, "recordings") for g in of]
+        lines, columns = grouped([*found, *PAPER_4_1], lambda g: (g.of, g.method)), RECORDED
+    else:
+        items = [(scene, seed) for scene in options.scenes for seed in options.seeds]
+        graded = in_parallel(partial(of_simulated, methods=methods), items, options.jobs, "simulations")
+        found = [g for of in graded for g in of]
+        lines, columns = grouped(found, lambda g: (g.of, g.method)), SIMULATED
+    show(table(lines, columns), width=170)
+    save(options.json, found)

@@ -1,7 +1,7 @@
 """Draw the paper's Figs. 1 to 4 with this estimator: sphere, magnitudes, Monte Carlo errors, efficiency.
 
 python -m tools.lab figures -o figures                                        all, simulated
-python -m tools.lab figures -o figures --runs 1000 --format svg
+python -m tools.lab figures -o figures --seeds 1000 --format svg
 python -m tools.lab figures -o figures --figure 2 --recording session.npz     magnitudes of real recordings
 
 Needs matplotlib (pip install 'mpucal[plot]').
@@ -10,7 +10,6 @@ Needs matplotlib (pip install 'mpucal[plot]').
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from functools import partial
 from pathlib import Path
@@ -23,8 +22,8 @@ from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from tools.lab.study.motions import FLAT_S
 from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario, paper_scenario
 
-from .monte_carlo import fit_fixed, in_parallel
-from .tables import efficiency
+from .monte_carlo import Efficiency, efficiency, fit_fixed
+from .trials import command_line, in_parallel
 
 BEFORE, AFTER, INK, FAINT = "#c8503c", "#2b6cb0", "#333333", "#b8b8b8"
 STYLE = {
@@ -152,18 +151,16 @@ def errors_over_time(plt: Any, sweeps: list[Sweep], failed: int) -> Any:
     return figure
 
 
-def bound(plt: Any, document: dict[str, Any], runs: int) -> Any:
+def bound(plt: Any, parameters: dict[str, Efficiency], runs: int) -> Any:
     """Fig. 4: root mean square errors beside the square root of the Cramér-Rao bound."""
     figure, axes = plt.subplots(figsize=(8.0, 3.2))
-    names = [f"${letter}_{{{','.join(index)}}}$" for letter, *index in (n.split("_") for n in document["parameters"])]
-    rows = document["parameters"].values()
+    names = [f"${letter}_{{{','.join(index)}}}$" for letter, *index in (n.split("_") for n in parameters)]
+    rmse, crlb = np.array(list(parameters.values())).T
     x = np.arange(len(names))
-    axes.bar(x - 0.2, [row["sqrt_crlb"] for row in rows], 0.38, color=FAINT, label="√CRLB")
-    axes.bar(x + 0.2, [row["rmse"] for row in rows], 0.38, color=AFTER, label="RMSE")
-    for at, row in zip(x, rows, strict=True):
-        axes.annotate(
-            f"{row['ratio']:.2f}", (at, max(row["rmse"], row["sqrt_crlb"])), ha="center", va="bottom", fontsize=7
-        )
+    axes.bar(x - 0.2, crlb, 0.38, color=FAINT, label="√CRLB")
+    axes.bar(x + 0.2, rmse, 0.38, color=AFTER, label="RMSE")
+    for at, ratio, top in zip(x, rmse / crlb, np.maximum(rmse, crlb), strict=True):
+        axes.annotate(f"{ratio:.2f}", (at, top), ha="center", va="bottom", fontsize=7)
     axes.set_xticks(x, [f"{k + 1}\n{name}" for k, name in enumerate(names)])
     axes.set(ylabel="D: 1; b: m/s²", title=f"RMSE and √CRLB of {runs} runs with one sensor; their ratio above")
     axes.grid(axis="x", visible=False)
@@ -180,21 +177,19 @@ def _mean_and_sd(acc: Vector) -> str:
 
 def arguments() -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser = command_line(__doc__, seeds="0:100")
     parser.add_argument("-o", "--output", type=Path, default=Path("figures"), help="folder for the pictures")
     parser.add_argument("--figure", type=int, action="append", choices=(1, 2, 3, 4), help="only this one; repeatable")
     parser.add_argument("--recording", type=Path, action="append", help="for Figs. 1 and 2, instead of simulated ones")
     parser.add_argument("--gravity", type=float, default=STANDARD_GRAVITY_MPS2, help="m/s^2, of the recordings")
-    parser.add_argument("--runs", type=int, default=100, help="of Figs. 3 and 4")
     parser.add_argument("--model", default="accel", choices=("accel", "paper"), help="of Figs. 3 and 4")
     parser.add_argument("--format", action="append", choices=("png", "svg", "pdf"), help="repeatable; png")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
     return parser.parse_args()
 
 
 def draw(plt: Any, number: int, options: argparse.Namespace) -> Any:
     """One of the paper's figures."""
-    seeds, gravity = range(options.runs), options.gravity
+    gravity = options.gravity
     recordings = [mpucal.load(path) for path in options.recording or ()]
     if not recordings and number in (1, 2):
         gravity = GRAVITY_MPS2
@@ -204,11 +199,12 @@ def draw(plt: Any, number: int, options: argparse.Namespace) -> Any:
         simulated = (hand_scenario(2, motion).recording for motion in ("pose6", "continuous"))
         return magnitudes(plt, recordings or list(simulated), gravity)
     if number == 3:
-        done = list(in_parallel(partial(sweep, model=options.model), seeds, options.jobs, "Fig. 3"))
+        done = list(in_parallel(partial(sweep, model=options.model), options.seeds, options.jobs, "Fig. 3"))
         good = [run for run in done if run is not None]
         return errors_over_time(plt, good, len(done) - len(good))
-    one = partial(fit_fixed, model=options.model, sensor_seed=0, turn_s=FLAT_S)
-    return bound(plt, efficiency(list(in_parallel(one, seeds, options.jobs, "Fig. 4"))), options.runs)
+    one = partial(fit_fixed, model=options.model)
+    fits = list(in_parallel(one, options.seeds, options.jobs, "Fig. 4"))
+    return bound(plt, efficiency(fits), len(fits))
 
 
 def main() -> int:

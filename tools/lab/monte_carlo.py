@@ -1,186 +1,253 @@
-"""Monte Carlo simulations: a table beside the paper's figures (sections 4.3 and 4.4) and for an MPU-6050 by hand.
+"""Monte Carlo simulations: an MPU-6050 by hand and the paper's sensors (sections 4.3 and 4.4), beside what is wanted.
 
-python -m tools.lab monte_carlo --all --runs 60
-python -m tools.lab monte_carlo --model accel --runs 1000
-python -m tools.lab monte_carlo --model accel --runs 1000 --crlb
-python -m tools.lab monte_carlo --scenario pose12 --model auto --runs 60 --json pose12.json
+python -m tools.lab monte_carlo --seeds 60
+python -m tools.lab monte_carlo --scenes '12 poses;continuous' --model hand --seeds 60 --json poses.json
+python -m tools.lab monte_carlo --scenes paper --seeds 1000                    beside the paper's figures
+python -m tools.lab monte_carlo --crlb --model accel --seeds 1000              one sensor, many noises
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import multiprocessing
-import os
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import NamedTuple
 
 import numpy as np
-from rich.console import Console
-from rich.progress import track
+from rich.table import Table
 
 import mpucal
 from mpucal.calibration import MODELS
-from mpucal.calibration.ekf import Ekf, specific_force
 from mpucal.calibration.fit import Fit
 from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.model_selection import fit_accel
 from mpucal.calibration.paper import fit_paper
+from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.data import Vector
 from mpucal.errors import MpucalError
-from tools.lab.study.metrics import sph_rms, tilt_errors_deg
-from tools.lab.study.scenarios import GRAVITY_MPS2, MOTIONS, Simulated, hand_scenario, paper_scenario
-from tools.lab.study.sensors import paper_sensor
+from mpucal.result.calibration import REFUSED
+from tools.lab.study.metrics import followed, sph_rms, tilts_deg
+from tools.lab.study.scenarios import GRAVITY_MPS2, Simulated, hand_scenario, paper_scenario
+from tools.lab.study.sensors import hand_sensor, paper_sensor
 
-from .tables import (
-    SCENES,
-    Run,
-    Scene,
-    accuracy_table,
-    efficiency,
-    efficiency_table,
-    goals_table,
-    summary,
-)
+from .judge import Judgement, judged
+from .table import cell, grouped, show, table
+from .trials import command_line, in_parallel, names_of, save
 
 # on data that conform to the model NIS is 3, and tens where the fit ended in a wrong optimum
 NIS_WRONG = 10.0
 FITS = {"accel": fit_accel, "paper": fit_paper}
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
-
-
-def simulate(scene: Scene, seed: int, turn_s: float) -> Simulated:
-    """The recording of a seed."""
-    if scene.scenario == "paper":
-        return paper_scenario(seed, turn_s=turn_s)
-    return hand_scenario(seed, scene.scenario, tremble=scene.tremble, delay_s=scene.delay_ms * 1e-3)
+TILTS = ("uncalibrated", "true D, b_a", "calibrated")
+# mean errors that are wanted, and means (standard deviations) of the paper's before and after [deg]
+PAPER = {"roll": ("0.345", "8.3 (7.1)", "0.32 (0.40)"), "pitch": ("0.265", "8.3 (6.9)", "0.33 (0.43)")}
 
 
-def calibrate_one(seed: int, scene: Scene, model: str, turn_s: float) -> Run:
-    """Simulate and calibrate a seed, and grade the result."""
-    simulated = simulate(scene, seed, turn_s)
-    truth = simulated.truth
-    began = time.perf_counter()
+class Scene(NamedTuple):
+    """How a seed is simulated, and what is wanted of its runs' mean error [m/s^2]; None: nothing was set."""
+
+    simulate: Callable[[int], Simulated]
+    wanted: float | None = None
+
+
+def gyro_off(seed: int) -> Simulated:
+    """The paper's scenario, with a gyroscope that is not ideal."""
+    of_sensor, of_gyro = np.random.default_rng(seed).spawn(2)
+    return paper_scenario(seed, sensor=replace(paper_sensor(of_sensor), K=hand_sensor(of_gyro).K))
+
+
+SCENES = {
+    "paper": Scene(paper_scenario),
+    "paper, gyro off": Scene(gyro_off),
+    "12 poses": Scene(partial(hand_scenario, motion="pose12"), 0.004),
+    "12 poses, trembling": Scene(partial(hand_scenario, motion="pose12", tremble=True), 0.007),
+    "9 poses": Scene(partial(hand_scenario, motion="pose9")),
+    "7 poses": Scene(partial(hand_scenario, motion="pose7")),
+    "six faces": Scene(partial(hand_scenario, motion="pose6"), 0.21),
+    "three turns": Scene(partial(hand_scenario, motion="turns"), 0.12),
+    "continuous": Scene(partial(hand_scenario, motion="continuous"), 0.037),
+    "continuous, 1 ms late": Scene(partial(hand_scenario, motion="continuous", delay_s=1e-3), 0.037),
+    "wobbling by 30 %": Scene(partial(hand_scenario, motion="wobble30"), 0.10),
+    "wobbling by 100 %": Scene(partial(hand_scenario, motion="wobble100"), 0.135),
+    "calm, 3 jerks/s": Scene(partial(hand_scenario, motion="calm jerks"), 0.0022),
+}
+
+
+@dataclass(frozen=True)
+class Run(Judgement):
+    """One simulated calibration.
+
+    Attributes
+    ----------
+    before : the error without a calibration [m/s^2]. failure : why it does not count; None where it does.
+    known_K : how many of K's six elements it claims to know.
+    roll_deg, pitch_deg : mean errors of the paper's filter with each of TILTS; none in a hand.
+    """
+
+    scene: str = ""
+    seed: int = 0
+    model: str = ""
+    failure: str | None = None
+    before: float = np.nan
+    seconds: float = 0.0
+    known_K: int = 0
+    roll_deg: tuple[float, ...] = ()
+    pitch_deg: tuple[float, ...] = ()
+
+
+def of_seed(item: tuple[str, int], model: str) -> Run:
+    """Simulate and calibrate a scene and a seed, and judge the result."""
+    scene, seed = item
+    simulated = SCENES[scene].simulate(seed)
+    truth, began = simulated.truth, time.perf_counter()
     try:
         result = mpucal.calibrate(simulated.recording, model=model, gravity=GRAVITY_MPS2)
     except MpucalError as error:
-        nothing = (np.nan,) * 3
-        return Run(seed, model, str(error), 0, np.nan, time.perf_counter() - began, np.nan, 0, *(nothing,) * 3)
+        return Run(REFUSED, scene=scene, seed=seed, model=model, failure=str(error))
     seconds = time.perf_counter() - began
-    D = np.array([np.eye(3), truth.D, result.D])
-    b_a = np.array([np.zeros(3), truth.b_a, result.b_a])
-    sph = tuple(sph_rms(truth, *sets) for sets in zip(D, b_a, strict=True))
-    fit = result.fit
-    nis = float(np.nan if fit["nis"] is None else fit["nis"])
+    of_paper = scene.startswith("paper")
+    worth, before = judged(result, (truth.D, truth.b_a), gravity=truth.gravity), sph_rms(truth, np.eye(3), np.zeros(3))
     failure = None
-    if not fit["converged"]:
+    if not result.fit["converged"]:
         failure = "not converged"
-    elif scene.scenario == "paper" and not nis < NIS_WRONG:
+    elif of_paper and not (result.fit["nis"] or np.inf) < NIS_WRONG:
         failure = "wrong optimum (NIS)"
-    elif not sph[2] < sph[0]:
+    elif not worth.error < before:
         failure = "worse than no calibration"
-    z = np.append(result.D - truth.D, result.b_a - truth.b_a) / np.append(result.D_std, result.b_a_std)
-    known_K = int(np.isfinite(result.K_std[np.triu_indices(3)]).sum())
-    roll, pitch = tilt_errors(simulated, D, b_a) if scene.scenario == "paper" else ((np.nan,) * 3,) * 2
-    rms_z = float(np.sqrt(np.mean(z * z)))
-    return Run(seed, fit["model"], failure, int(fit["iterations"]), nis, seconds, rms_z, known_K, sph, roll, pitch)
+    roll, pitch = tilts(simulated, result) if of_paper else ((), ())
+    return Run(
+        **vars(worth),
+        scene=scene,
+        seed=seed,
+        model=result.fit["model"],
+        failure=failure,
+        before=before,
+        seconds=seconds,
+        known_K=int(np.isfinite(result.K_std[np.triu_indices(3)]).sum()),
+        roll_deg=roll,
+        pitch_deg=pitch,
+    )
 
 
-def tilt_errors(simulated: Simulated, D: Vector, b_a: Vector) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Roll and pitch errors [deg] of the orientations that the EKF finds with each parameter set (b, ...)."""
-    recording = simulated.recording
+def tilts(simulated: Simulated, result: mpucal.Calibration) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Roll and pitch errors [deg] of the orientations that the paper's filter finds with each of TILTS."""
+    recording, truth = simulated.recording, simulated.truth
+    D, b_a = np.array([np.eye(3), truth.D, result.D]), np.array([np.zeros(3), truth.b_a, result.b_a])
     flat = flat_statistics(recording, recording.flat)
-    x = np.concatenate([block.x for block in Ekf.after(flat, recording, GRAVITY_MPS2).run(D, b_a)])
-    s = specific_force(x, GRAVITY_MPS2)
-    errors = [tilt_errors_deg(simulated.specific_force[flat.last :], s[:, k]) for k in range(len(D))]
-    return tuple(roll for roll, _ in errors), tuple(pitch for _, pitch in errors)
+    return tilts_deg(simulated.specific_force[flat.last :], followed(recording, flat, D, b_a, GRAVITY_MPS2))
 
 
-def fit_fixed(seed: int, model: str, sensor_seed: int, turn_s: float) -> tuple[Fit, Vector] | None:
+def successful(runs: Sequence[Run]) -> list[Run]:
+    """Those that count."""
+    return [run for run in runs if run.failure is None]
+
+
+def mean_error(runs: Sequence[Run]) -> float:
+    """Of the successful [m/s^2]."""
+    return float(np.mean([run.error for run in successful(runs)] or [np.nan]))
+
+
+def met(runs: Sequence[Run]) -> bool | None:
+    """Whether all runs of a scene succeeded with the mean error that is wanted; None where nothing is."""
+    wanted = SCENES[runs[0].scene].wanted
+    return None if wanted is None else len(successful(runs)) == len(runs) and mean_error(runs) <= wanted
+
+
+def known_z(runs: Sequence[Run]) -> list[float]:
+    """The rms z of the successful, as far as they claim uncertainties."""
+    return [run.rms_z for run in successful(runs) if np.isfinite(run.rms_z)]
+
+
+def counted(runs: Sequence[Run]) -> str:
+    """How many of each model, and of each kind of failure."""
+    return ", ".join(f"{name} {n}" for name, n in Counter(run.failure or run.model for run in runs).most_common())
+
+
+Z_COLUMNS: dict[str, Callable[[Sequence[Run]], object]] = {
+    "rms z, median": lambda runs: float(np.median(known_z(runs) or [np.nan])),
+    "worst": lambda runs: max(known_z(runs), default=None),
+    "largest |z|": lambda runs: max((float(np.abs(run.z).max()) for run in successful(runs)), default=None),
+}
+COLUMNS: dict[str, Callable[[Sequence[Run]], object]] = {
+    "uncalibrated": lambda runs: float(np.mean([run.before for run in runs])),
+    "error, m/s²": mean_error,
+    "worst error": lambda runs: max((run.error for run in successful(runs)), default=None),
+    "wanted": lambda runs: SCENES[runs[0].scene].wanted,
+    "met": lambda runs: {None: "", True: "yes", False: "[red]no[/red]"}[met(runs)],
+    **Z_COLUMNS,
+    "K known": lambda runs: float(np.mean([run.known_K for run in successful(runs)] or [np.nan])),
+    "ms": lambda runs: round(1e3 * np.mean([run.seconds for run in runs])),
+    "models, failures": counted,
+}
+
+
+def tilt_table(runs: Sequence[Run]) -> Table:
+    """Section 4.3: means (standard deviations) of the errors of roll and pitch, beside the paper's."""
+    lines = Table("deg", *TILTS, "wanted", "the paper, before", "after", title="the paper's scenario")
+    for name, beside in PAPER.items():
+        errors = np.array([getattr(run, f"{name}_deg") for run in successful(runs)])
+        means = [f"{cell(float(mean))} ({sd:.2g})" for mean, sd in zip(errors.mean(0), errors.std(0), strict=True)]
+        lines.add_row(name, *means, *beside)
+    return lines
+
+
+def fit_fixed(seed: int, model: str, sensor_seed: int = 0) -> tuple[Fit, Vector] | None:
     """Section 4.4: a fit to one sensor with a seed's noise, and its errors (12,); None if it failed."""
-    sensor = paper_sensor(np.random.default_rng(sensor_seed))
-    simulated = paper_scenario(seed, turn_s=turn_s, sensor=sensor)
+    simulated = paper_scenario(seed, sensor=paper_sensor(np.random.default_rng(sensor_seed)))
     recording = simulated.recording
     fit = FITS[model](recording, flat_statistics(recording, recording.flat), GRAVITY_MPS2)
     if not (fit.converged and fit.nis < NIS_WRONG):
         return None
-    error = np.concatenate([(fit.D - simulated.truth.D).ravel(), fit.b_a - simulated.truth.b_a])
-    return fit, error
+    return fit, np.concatenate([(fit.D - simulated.truth.D).ravel(), fit.b_a - simulated.truth.b_a])
 
 
-def in_parallel(
-    function: Callable[[Item], Result], items: Sequence[Item], jobs: int, description: str
-) -> Iterable[Result]:
-    """function(item) of every item, in order, on `jobs` processes, with a progress bar."""
-    # one thread a process: the arrays are small, and BLAS threads would only fight for the cores
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
-        results = pool.imap(function, items)
-        yield from track(results, description, len(items), console=Console(stderr=True), transient=True)
+class Efficiency(NamedTuple):
+    """Root mean square error of a parameter, and the square root of its Cramér-Rao bound."""
+
+    rmse: float
+    bound: float
 
 
-def measured(scene: Scene, options: argparse.Namespace) -> dict[str, Any]:
-    """The summary of a scene's runs, and the runs."""
-    seeds = range(options.seed, options.seed + options.runs)
-    one = partial(calibrate_one, scene=scene, model=options.model, turn_s=options.turn_s)
-    runs = list(in_parallel(one, seeds, options.jobs, f"{scene.name}, {options.model}"))
-    return {**summary(runs), "runs": [asdict(run) for run in runs]}
+def efficiency(fits: Sequence[tuple[Fit, Vector] | None]) -> dict[str, Efficiency]:
+    """RMSE against the Cramér-Rao bound of the mean Fisher information, of the 12 parameters by name."""
+    good = [pair for pair in fits if pair is not None]
+    # of D and b_a alone: the other parameters' meaning may change with the run (tilts about an estimated axis)
+    fisher = np.mean([np.linalg.inv(fit.covariance[:12, :12]) for fit, _ in good], axis=0)
+    bound = np.sqrt(np.diag(np.linalg.inv(fisher)))
+    rmse = np.sqrt(np.mean([error**2 for _, error in good], axis=0))
+    pairs = zip(rmse.tolist(), bound.tolist(), strict=True)
+    return {name: Efficiency(*pair) for name, pair in zip((*D_NAMES, *B_A_NAMES), pairs, strict=True)}
 
 
-def arguments() -> argparse.Namespace:
-    """The command line."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--scenario", choices=("paper", *MOTIONS), default="paper")
-    parser.add_argument("--all", action="store_true", help="every scenario, beside what is wanted of it")
-    parser.add_argument("--model", choices=MODELS, default="auto")
-    parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=0, help="the first of the seeds")
-    parser.add_argument("--turn-s", type=float, default=10.0, help="seconds a turn (paper)")
-    parser.add_argument("--tremble", action="store_true", help="the hand trembles in its poses")
-    parser.add_argument(
-        "--delay-ms", type=float, default=0.0, help="of the accelerometer behind the gyroscope, by hand"
-    )
-    parser.add_argument("--crlb", action="store_true", help="section 4.4: one sensor, many noises")
-    parser.add_argument("--sensor-seed", type=int, default=0, help="which sensor (--crlb)")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
-    parser.add_argument("--json", type=Path, help="write the figures to this file")
-    options = parser.parse_args()
-    if options.crlb and (options.all or options.scenario != "paper" or options.model not in FITS):
-        parser.error(f"--crlb goes with the paper's scenario and one of {', '.join(FITS)}")
-    return options
+EFFICIENCY_COLUMNS: dict[str, Callable[[Sequence[Efficiency]], float]] = {
+    "RMSE": lambda of: of[0].rmse,
+    "√CRLB": lambda of: of[0].bound,
+    "RMSE / √CRLB": lambda of: of[0].rmse / of[0].bound,
+}
 
 
 def main() -> None:
     """Run, print and save."""
-    options = arguments()
-    began = time.perf_counter()
-    # as wide as its content, whatever the terminal
-    console = Console(width=140)
-    about = f"model {options.model}, {options.runs} runs, seeds from {options.seed}"
-    document: dict[str, Any]
+    parser = command_line(__doc__, seeds="0:60")
+    parser.add_argument("--scenes", type=names_of(SCENES), default=[*SCENES], help="patterns, with ; between")
+    parser.add_argument("--model", choices=MODELS, default="auto")
+    parser.add_argument("--crlb", action="store_true", help="section 4.4: one sensor, many noises")
+    options = parser.parse_args()
+    about = f"model {options.model}, {len(options.seeds)} seeds from {options.seeds[0]}"
     if options.crlb:
-        one = partial(fit_fixed, model=options.model, sensor_seed=options.sensor_seed, turn_s=options.turn_s)
-        seeds = range(options.seed, options.seed + options.runs)
-        document = efficiency(list(in_parallel(one, seeds, options.jobs, f"one sensor, {options.model}")))
-        console.print(efficiency_table(document, f"section 4.4, {about} of one sensor"))
-    elif options.all:
-        scenes = {scene.name: measured(scene, options) for scene in SCENES}
-        document = {"scenarios": scenes}
-        console.print(goals_table(scenes, about))
-    else:
-        scene = Scene(options.scenario, options.scenario, tremble=options.tremble, delay_ms=options.delay_ms)
-        document = measured(scene, options)
-        console.print(accuracy_table(document, f"{options.scenario}, {about}", options.scenario == "paper"))
-    document["seconds"] = time.perf_counter() - began
-    Console(stderr=True).print(f"{document['seconds']:.0f} s on {options.jobs} cores")
-    if options.json:
-        settings = {key: str(value) for key, value in vars(options).items()}
-        # a figure that nobody knows is null, not NaN
-        text = json.dumps({"settings": settings, **document}, indent=1).replace("NaN", "null")
-        options.json.write_text(text + "\n")
+        if options.model not in FITS:
+            parser.error(f"--crlb goes with --model {' or '.join(FITS)}")
+        fits = list(in_parallel(partial(fit_fixed, model=options.model), options.seeds, options.jobs, "one sensor"))
+        found = efficiency(fits)
+        title = f"section 4.4, {about}, of one sensor; {fits.count(None)} failed"
+        show(table({name: [pair] for name, pair in found.items()}, EFFICIENCY_COLUMNS, title))
+        save(options.json, {name: pair._asdict() for name, pair in found.items()})
+        return
+    items = [(scene, seed) for scene in options.scenes for seed in options.seeds]
+    runs = list(in_parallel(partial(of_seed, model=options.model), items, options.jobs, "simulations"))
+    show(table(grouped(runs, lambda run: run.scene), COLUMNS, about), width=170)
+    show(table(grouped(successful(runs), lambda run: run.model), Z_COLUMNS, "claims by model"))
+    if of_paper := [run for run in runs if run.scene == "paper"]:
+        show(tilt_table(of_paper))
+    save(options.json, runs)

@@ -1,25 +1,22 @@
 """`mpucal noise` on simulated noise of known coefficients: what is found against what is true, and its intervals.
 
 python -m tools.lab noise_trials                        four kinds of axes, an hour at 100 Hz, 20 times
-python -m tools.lab noise_trials --hours 3 --runs 100
+python -m tools.lab noise_trials --hours 3 --seeds 100
 """
 
 from __future__ import annotations
 
-import argparse
-import os
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from mpucal.allan.model import NAMES, fitted
 from mpucal.allan.octaves import Octaves
-from mpucal.data import Vector
 from mpucal.simulated.noise import noise
 
-from .monte_carlo import in_parallel
+from .table import grouped, show, table
+from .trials import command_line, in_parallel, save
 
 RATE_HZ = 100.0
 # white [units/sqrt(Hz)], bias instability [units], random walk [units/sqrt(s)]
@@ -29,13 +26,14 @@ AXES = {
     "gyroscope": (6e-5, 2e-5, 1e-6),
     "gyroscope, restless": (6e-5, 1e-5, 1e-5),
 }
-
-
 CONFIDENCES = (0.68, 0.95)
 
 
-def of_seed(item: tuple[str, int], hours: float) -> Vector:
-    """(5, 3): value, low and high by confidence, of white noise, bias instability and random walk, by the truth."""
+Found = tuple[str, str, float, list[float]]
+
+
+def of_seed(item: tuple[str, int], hours: float) -> list[Found]:
+    """An axis, a coefficient, its truth, and by that: the value found, and the low and high end by confidence."""
     name, seed = item
     n = round(3600.0 * hours * RATE_HZ)
     samples = noise(np.random.default_rng([seed, *name.encode()]), n, RATE_HZ, *AXES[name])
@@ -46,25 +44,31 @@ def of_seed(item: tuple[str, int], hours: float) -> Vector:
     found = [fitted(sizes, variances[:, 0], n, 1.0 / RATE_HZ, confidence) for confidence in CONFIDENCES]
     ends = [end[:3] for one in found if one is not None for end in (one.low, one.high)]
     value = np.full(3, np.nan) if found[0] is None else found[0].value[:3]
-    return np.array([value, *ends]) / np.array(AXES[name])
+    by_truth = (np.array([value, *ends]) / np.array(AXES[name])).T.tolist()
+    return [(name, *each) for each in zip(NAMES, AXES[name], by_truth, strict=False)]
+
+
+def inside(found: Sequence[Found], low: int) -> str:
+    """How many intervals hold the truth."""
+    return f"{100.0 * np.mean([one[3][low] <= 1.0 <= one[3][low + 1] for one in found]):.0f} %"
+
+
+COLUMNS: dict[str, Callable[[Sequence[Found]], object]] = {
+    "found / true": lambda found: f"{np.mean([one[3][0] for one in found]):.3f}",
+    "rms of it": lambda found: f"{np.std([one[3][0] for one in found]):.3f}",
+    "in 68 %": partial(inside, low=1),
+    "in 95 %": partial(inside, low=3),
+    "its end / true": lambda found: f"{np.median([one[3][4] for one in found]):.2f}",
+}
 
 
 def main() -> None:
-    """Simulate, fit, compare and print."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    """Simulate, fit, compare, print and save."""
+    parser = command_line(__doc__)
     parser.add_argument("--hours", type=float, default=1.0)
-    parser.add_argument("--runs", type=int, default=20, help="seeds of each axis")
-    parser.add_argument("--seed", type=int, default=0, help="the first of the seeds")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
     options = parser.parse_args()
-    items = [(name, options.seed + run) for name in AXES for run in range(options.runs)]
-    found = list(in_parallel(partial(of_seed, hours=options.hours), items, options.jobs, "noise"))
-    lines = Table("axis", "coefficient", "true", "found / true", "rms of it", "in 68 %", "in 95 %", "its end / true")
-    for name, truth in AXES.items():
-        of = np.array([one for (axis, _), one in zip(items, found, strict=True) if axis == name])
-        for i in range(3):
-            value, *ends = of[:, :, i].T
-            inside = [f"{100.0 * np.mean((low <= 1.0) & (high >= 1.0)):.0f} %" for low, high in (ends[:2], ends[2:])]
-            cells = (f"{np.mean(value):.3f}", f"{np.std(value):.3f}", *inside, f"{np.median(ends[-1]):.2f}")
-            lines.add_row(name, NAMES[i].replace("_", " "), f"{truth[i]:g}", *cells)
-    Console(width=130).print(lines)
+    items = [(name, seed) for name in AXES for seed in options.seeds]
+    of_all = in_parallel(partial(of_seed, hours=options.hours), items, options.jobs, "noise")
+    found = [one for of in of_all for one in of]
+    show(table(grouped(found, lambda one: one[:3]), COLUMNS))
+    save(options.json, found)

@@ -1,7 +1,7 @@
 """`mpucal stream --watch` over hours of simulated use: how often it warns of a sound sensor, and when of a changed one.
 
-python -m tools.lab watch_trials --only nothing --runs 20 --hours 1        warnings that are none
-python -m tools.lab watch_trials --runs 40 --hours 0.5                     how long until a bias step is told
+python -m tools.lab watch_trials --only nothing --seeds 20 --hours 1       warnings that are none
+python -m tools.lab watch_trials --seeds 40 --hours 0.5                    how long until a bias step is told
 
 Each minute a hand takes an MPU-6050 from a table, holds it in six or eight orientations, turns it without a pause, or
 turns it while it walks, and puts it down again; it trembles all the while. The calibration is one by twelve poses five
@@ -10,17 +10,11 @@ days before, as in tools/lab/check_trials.py, and each rest's mounting gives in 
 
 from __future__ import annotations
 
-import argparse
-import json
-import os
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from mpucal.calibration.verification import FLOOR_MPS2
 from mpucal.data import Recording
@@ -28,8 +22,9 @@ from mpucal.recheck.watch import Watch
 from mpucal.simulated.sensor import SensorTruth
 from tools.lab.study.scenarios import hand_scenario
 
-from .check_trials import DAYS, EVENTS, TEMPERATURE_C, at, calibrated_and_aged, happened
-from .monte_carlo import in_parallel
+from .check_trials import DAYS, TEMPERATURE_C, at, calibrated_and_aged, events_of, happened
+from .table import grouped, show, table
+from .trials import command_line, in_parallel, names_of, save
 
 RATE_HZ = 100.0
 USES = ("pose7", "pose9", "continuous", "wobble30")
@@ -81,35 +76,32 @@ def _minutes(sensor: SensorTruth, rng: np.random.Generator, hours: float) -> Ite
         begun_s = float(minute.t[-1]) + 1.0
 
 
-def table(runs: list[Run]) -> Table:
-    """Of each event: how many were told, in how many hours, and when."""
-    lines = Table("what happened", "sensors", "hours", "told %", "warnings in 100 h", "minutes until, median", "90 %")
-    for event in dict.fromkeys(run.event for run in runs):
-        of = [run for run in runs if run.event == event]
-        hours = sum(run.told[0][1] / 3600.0 if run.told and event != "nothing" else run.hours for run in of)
-        warnings = sum(len(run.told) for run in of)
-        minutes = [run.told[0][1] / 60.0 if run.told else np.inf for run in of]
-        told = f"{100.0 * np.mean(np.isfinite(minutes)):.0f}"
-        when = [f"{x:.1f}" if np.isfinite(x) else "" for x in np.quantile(minutes, (0.5, 0.9), method="higher")]
-        rate = f"{100.0 * warnings / hours:.2f}" if event == "nothing" else ""
-        lines.add_row(event, str(len(of)), f"{hours:.1f}", told, rate, *when)
-    return lines
+def minutes_until(runs: Sequence[Run], share: float) -> str:
+    """After how many minutes that share of the sensors was told of; nothing where it never was."""
+    minutes = [run.told[0][1] / 60.0 if run.told else np.inf for run in runs]
+    told = float(np.quantile(minutes, share, method="higher"))
+    return f"{told:.1f}" if np.isfinite(told) else ""
+
+
+COLUMNS: dict[str, Callable[[Sequence[Run]], object]] = {
+    "sensors": len,
+    "told": lambda runs: sum(bool(run.told) for run in runs),
+    "warnings": lambda runs: sum(len(run.told) for run in runs),
+    "minutes until, first": partial(minutes_until, share=0.0),
+    "median": partial(minutes_until, share=0.5),
+    "90 %": partial(minutes_until, share=0.9),
+    "last": partial(minutes_until, share=1.0),
+}
 
 
 def main() -> None:
     """Simulate, watch, print and save."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--only", action="append", choices=EVENTS, help="may be given more than once")
-    parser.add_argument("--runs", type=int, default=20, help="sensors, shared by the events")
+    parser = command_line(__doc__)
+    parser.add_argument("--only", type=names_of(WATCHED), default=WATCHED, help="events, with ; between")
     parser.add_argument("--hours", type=float, default=0.5, help="of use, of each sensor")
-    parser.add_argument("--seed", type=int, default=0, help="the first of the seeds")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
-    parser.add_argument("--json", type=Path, help="write the runs to this file")
     options = parser.parse_args()
-    events = tuple(options.only or WATCHED)
-    items = [(events[number % len(events)], options.seed + number) for number in range(options.runs)]
+    items = events_of(options.only, options.seeds)
     found = in_parallel(partial(of_use, hours=options.hours), items, options.jobs, "sensors")
     runs = [run for run in found if run is not None]
-    Console(width=120).print(table(runs))
-    if options.json:
-        options.json.write_text(json.dumps([asdict(run) for run in runs], indent=1) + "\n")
+    show(table(grouped(runs, lambda run: run.event), COLUMNS, f"{options.hours:g} h each"))
+    save(options.json, runs)

@@ -10,6 +10,7 @@ from mpucal.errors import RecordingError
 from mpucal.simulated.sensor import SensorTruth, density
 from tools.lab import distorted
 from tools.lab.study.scenarios import GRAVITY_MPS2, paper_scenario
+from tools.lab.table import grouped, table
 
 
 def quaternion(R):
@@ -61,16 +62,15 @@ def test_motion_capture_says_where_gravity_is(captured_file):
 
 
 def test_a_distortion_is_found_and_its_tilt_removed(captured_file):
-    run = distorted.of_seed(0, captured_file, "auto", GRAVITY_MPS2)
-    assert run.verdict != "refused"
-    before, after, with_gyro, exact = run.sph_rms
-    assert before > 0.5
-    assert after == with_gyro < 0.1
-    assert exact < 1e-9
-    for errors in (run.roll_deg, run.pitch_deg, run.roll_turned_deg, run.pitch_turned_deg):
-        assert errors[0] > 1.0
-        assert errors[1] < 0.3
-        assert errors[3] < 0.1
+    before, after, with_gyro, exact = distorted.of_seed(0, captured_file, "auto", GRAVITY_MPS2)
+    assert "refused" not in before.told
+    assert before.error > 0.5
+    assert after.error == with_gyro.error < 0.1
+    assert exact.error < 1e-9
+    for name in ("roll_deg", "pitch_deg", "roll_turned_deg", "pitch_turned_deg"):
+        assert getattr(before, name) > 1.0
+        assert getattr(after, name) < 0.3
+        assert getattr(exact, name) < 0.1
 
 
 def test_distortions_are_drawn_within_their_limits():
@@ -90,13 +90,12 @@ def test_a_recording_without_motion_capture_is_none(tmp_path):
 
 
 def test_the_table_stands_beside_the_goals_and_the_papers():
-    four = (1.4, 0.0917, 0.0917, 0.0)
-    run = distorted.Run(0, "hand", "good", 0.05, four, *[(3.4, 0.7, 0.51, 0.6)] * 4)
+    of = distorted.Errors("desk", "calibrated", 0.0917, 0.51, 0.26, 0.51, 0.27, 0, "hand, good", 0.05)
     stream = io.StringIO()
-    Console(file=stream, width=150).print(distorted.table("desk", [run, replace(run, seed=1)]))
-    text = stream.getvalue()
-    for word in ("0.0917", "0.51 (0.51)", "0.47", "1.82", "hand, good"):
-        assert word in text
+    lines = grouped([of, replace(of, seed=1, error=0.1), *distorted.BESIDE], lambda e: (e.of, e.which))
+    Console(file=stream, width=200).print(table(lines, distorted.COLUMNS))
+    for word in ("0.0959", "0.51", "0.47", "1.82", "hand, good"):
+        assert word in stream.getvalue()
 
 
 def test_the_quaternions_of_this_test_turn_as_the_filters():

@@ -1,12 +1,12 @@
-import io
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from rich.console import Console
 
+import mpucal
 from mpucal.errors import RecordingError
 from tools.lab import halves
+from tools.lab.judge import judged
 from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario, paper_scenario
 
 
@@ -70,11 +70,10 @@ def test_backwards_the_same_sensor_is_found():
         temperature_c=np.full(len(recording) + 500, np.nan),
     )
     backwards = replace(halves.reversed_in_time(longer), flat=(0, 500))
-    fit, model = halves.estimated(backwards, "auto", GRAVITY_MPS2)
-    assert model == "accel"
-    np.testing.assert_allclose(fit.b_omega, -simulated.truth.b_omega, atol=0.02)
-    difference = halves.twelve(fit.D, fit.b_a) - halves.twelve(simulated.truth.D, simulated.truth.b_a)
-    assert halves.apart("backwards", model, difference, fit.covariance[:12, :12]).z < 2.0
+    result = mpucal.calibrate(backwards, gravity=GRAVITY_MPS2)
+    assert result.fit["model"] == "accel"
+    np.testing.assert_allclose(result.b_omega, -simulated.truth.b_omega, atol=0.02)
+    assert judged(result, (simulated.truth.D, simulated.truth.b_a)).rms_z < 2.0
 
 
 def test_a_gap_stands_on_its_other_side_backwards(poses):
@@ -86,18 +85,19 @@ def test_a_gap_stands_on_its_other_side_backwards(poses):
 
 
 def test_z_is_the_rms_in_units_of_the_claim():
-    difference = np.array([2.0] * 6 + [0.0] * 6)
-    agreement = halves.apart("desk", "hand", difference, 4.0 * np.eye(12))
-    assert agreement.z == pytest.approx(np.sqrt(0.5))
-    assert agreement.largest == pytest.approx(1.0)
+    one, other = (
+        mpucal.Calibration(D, np.zeros(3), np.full((3, 3), 0.3), np.full(3, 0.3), fit={"model": model})
+        for D, model in ((np.eye(3), "hand"), (np.eye(3) + np.triu(np.full((3, 3), 0.5)), "imu"))
+    )
+    agreement = halves.agreement("desk", one, replace(other, D_std=np.full((3, 3), 0.4), b_a_std=np.full(3, 0.4)))
+    assert agreement.model == "hand/imu"
+    assert halves.COLUMNS["rms z, worst"]([agreement]) == pytest.approx(np.sqrt(0.5))
+    assert halves.COLUMNS["largest |z|"]([agreement]) == pytest.approx(1.0)
 
 
-def test_the_table_has_a_line_a_recording_and_one_a_model():
-    runs = [halves.Agreement("desk", "hand", 0.8, 1.9), halves.Agreement("desk", "hand", 1.2, 3.1)]
-    runs.append(halves.Agreement("tray", "auto", why="tray: no second rest"))
-    stream = io.StringIO()
-    Console(file=stream, width=150).print(halves.table("halves", runs))
-    lines = [line for line in stream.getvalue().splitlines() if " hand " in line]
-    assert len(lines) == 2
-    assert all(" 2 " in line and " 1.2 " in line and " 3.1 " in line for line in lines)
-    assert "no second rest" in stream.getvalue()
+def test_a_recording_without_halves_says_why():
+    runs = [halves.Agreement("desk", "hand", (0.8,) * 12), halves.Agreement("desk", "hand", why="no second rest")]
+    told = {name: column(runs) for name, column in halves.COLUMNS.items()}
+    assert told["rms z, median"] == pytest.approx(0.8)
+    assert told["why there is none"] == "no second rest"
+    assert halves.COLUMNS["rms z, worst"](runs[1:]) is None

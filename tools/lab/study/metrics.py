@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mpucal.data import Vector
+from mpucal.calibration.ekf import Ekf, specific_force
+from mpucal.calibration.flat_segment import Flat
+from mpucal.data import Recording, Vector
 from mpucal.simulated.sensor import SensorTruth
 
 
@@ -34,3 +36,16 @@ def tilt_errors_deg(s_true: Vector, s: Vector) -> tuple[float, float]:
     seen = np.cos(pitch_true) > 0.2
     d_roll = np.abs(np.remainder(roll - roll_true + np.pi, 2.0 * np.pi) - np.pi)[seen]
     return float(np.degrees(d_roll.mean())), float(np.degrees(np.abs(pitch - pitch_true).mean()))
+
+
+def followed(recording: Recording, flat: Flat, D: Vector, b_a: Vector, gravity: float) -> Vector:
+    """Gravity (n, k, 3) [m/s^2] after the flat segment, as the paper's EKF finds it with D (k, 3, 3) and b_a (k, 3)."""
+    x = np.concatenate([block.x for block in Ekf.after(flat, recording, gravity).run(D, b_a)])
+    return specific_force(x, gravity)
+
+
+def tilts_deg(s_true: Vector, s: Vector) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """k errors of roll and of pitch [deg], as `tilt_errors_deg`, of s (n, k, 3) where s_true is known."""
+    known = np.isfinite(s_true).all(1)
+    roll, pitch = zip(*(tilt_errors_deg(s_true[known], s[known, k]) for k in range(s.shape[1])), strict=True)
+    return roll, pitch

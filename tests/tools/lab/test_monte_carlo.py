@@ -1,0 +1,68 @@
+import io
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from mpucal.calibration.fit import Fit
+from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
+from tools.lab import monte_carlo
+
+
+def run(error, failure=None, scene="12 poses", **more):
+    return monte_carlo.Run("good", error=error, z=(1.0,) * 12, scene=scene, model="hand", failure=failure, **more)
+
+
+def column(name, *runs):
+    return monte_carlo.COLUMNS[name](runs)
+
+
+def test_a_failure_is_named_and_not_among_the_successful():
+    runs = run(0.1), run(0.3), run(8.0, "not converged")
+    assert column("error, m/s²", *runs) == pytest.approx(0.2)
+    assert column("worst error", *runs) == 0.3
+    assert column("models, failures", *runs) == "hand 2, not converged 1"
+
+
+def test_runs_that_all_failed_have_no_mean():
+    failed = monte_carlo.Run("refused", scene="12 poses", failure="refused")
+    assert np.isnan(column("error, m/s²", failed)) and np.isnan(column("rms z, median", failed))
+    assert column("largest |z|", failed) is None
+
+
+@pytest.mark.parametrize(
+    ("error", "failure", "met"),
+    [(0.0039, None, True), (0.0041, None, False), (0.0039, "not converged", False)],
+    ids=["below", "above", "one run failed"],
+)
+def test_what_is_wanted_is_met_by_the_mean_of_runs_that_all_succeed(error, failure, met):
+    assert monte_carlo.met([run(error), run(error, failure)]) is met
+
+
+def test_the_papers_tilts_stand_beside_its_own():
+    stream = io.StringIO()
+    of = run(0.06, scene="paper", roll_deg=(15.0, 0.2, 0.33), pitch_deg=(9.0, 0.2, 0.27))
+    Console(file=stream, width=200).print(monte_carlo.tilt_table([of]))
+    for words in ("0.33 (0)", "8.3 (7.1)", "0.265", "0.33 (0.43)"):
+        assert words in stream.getvalue()
+
+
+def test_a_simulated_sensor_is_found_as_well_as_is_claimed():
+    found = monte_carlo.of_seed(("paper", 0), "auto")
+    assert found.failure is None and found.model == "accel" and found.known_K == 0
+    assert found.error < 0.1 < found.before
+    assert found.rms_z < 2.0
+    uncalibrated, true, calibrated = found.roll_deg
+    assert true < calibrated < uncalibrated
+
+
+def test_an_efficient_estimator_has_a_ratio_of_one():
+    sd = np.linspace(0.1, 0.5, 12)
+    rng = np.random.default_rng(0)
+    covariance = np.diag(sd**2)
+
+    def fit():
+        return Fit(np.eye(3), np.zeros(3), np.zeros(3), np.eye(3), D_NAMES + B_A_NAMES, covariance, 3, True, 3.0, 0.0)
+
+    found = monte_carlo.efficiency([(fit(), sd * rng.standard_normal(12)) for _ in range(2000)] + [None])
+    assert [pair.rmse / pair.bound for pair in found.values()] == pytest.approx([1.0] * 12, abs=0.06)
