@@ -282,6 +282,8 @@ class Schedule:
 
     def due(self, now_ns: int) -> list[Fault]:
         """Those that begin by `now_ns`, since the last call, in order."""
+        if not self._waiting:
+            return []
         due = [(at_ns, fault) for at_ns, fault in self._waiting if at_ns <= now_ns]
         self._waiting = [later for later in self._waiting if later[0] > now_ns]
         for at_ns, fault in due:

@@ -88,6 +88,10 @@ class Motion:
     hand : decides on the legs. rng : the hand's tremor, lever and clumsiness. gravity : m/s^2.
     mishaps : what befalls the sensor besides the hand's own. habits : how it shakes; of its acceleration's tremor this
         person has half to all.
+
+    Attributes
+    ----------
+    mishaps : of both, those that do anything.
     """
 
     def __init__(
@@ -99,7 +103,7 @@ class Motion:
         habits: Habits = TREMBLING,
     ) -> None:
         self._hand = hand
-        self._mishaps = (hand.mishap, *mishaps)
+        self.mishaps = tuple(mishap for mishap in (hand.mishap, *mishaps) if type(mishap) is not Mishap)
         self._gravity, self._habits = gravity, habits
         lever = rng.normal(size=3)
         self._lever_m = lever / np.linalg.norm(lever) * rng.uniform(*habits.lever_m)
@@ -129,26 +133,38 @@ class Motion:
         """
         self._extend(float(edges_s[-1]))
         felt, node = self._between(edges_s)
-        force, rate = np.hsplit(felt, 2)
+        force, rate = felt[:, :3], felt[:, 3:]
         if force_late_s:
             late, node = self._between(edges_s - abs(force_late_s))
             force, rate = (late[:, :3], rate) if force_late_s > 0.0 else (force, late[:, 3:])
         self._forget(node)
-        for mishap in self._mishaps:
+        for mishap in self.mishaps:
             force, rate = mishap.felt(force, rate, edges_s[1:])
         return force, rate
 
     def _between(self, edges_s: Vector) -> tuple[Vector, int]:
         """Mean force and rate (n, 6) between (n + 1,) times [s], and the step before the last of these."""
+        if len(edges_s) == 2:
+            # of one sample, plain numbers take half as long and give the same bits
+            begin_s, end_s = edges_s.tolist()
+            before, (after, node) = self._sum_at(begin_s)[0], self._sum_at(end_s)
+            return ((after - before) / (end_s - begin_s))[None], node
         place = np.maximum(edges_s * STEP_HZ - self._first, 0.0)
         node = np.minimum(place.astype(int), len(self._sums) - 2)
         part = (place - node)[:, None]
         sums = (1 - part) * self._sums[node] + part * self._sums[node + 1]
         return (sums[1:] - sums[:-1]) / (edges_s[1:] - edges_s[:-1])[:, None], int(node[-1])
 
+    def _sum_at(self, t_s: float) -> tuple[Vector, int]:
+        """What was felt (6,) until `t_s`, and the step before it."""
+        place = max(t_s * STEP_HZ - self._first, 0.0)
+        node = min(int(place), len(self._sums) - 2)
+        part = place - node
+        return (1 - part) * self._sums[node] + part * self._sums[node + 1], node
+
     def warmer_c(self, edges_s: Vector) -> Vector:
         """(n,) by how much the chip is warmer than at first, between (n + 1,) times [s]."""
-        return np.asarray(sum(mishap.warmer_c(edges_s[1:]) for mishap in self._mishaps))
+        return np.asarray(sum((mishap.warmer_c(edges_s[1:]) for mishap in self.mishaps), np.zeros(len(edges_s) - 1)))
 
     def attitude(self, t_s: float) -> Vector:
         """The quaternion (4,) at `t_s`, which is not before what `means` was last asked for."""
@@ -159,6 +175,8 @@ class Motion:
         return rotation.product(near[0], rotation.exp((place - node) * rotation.between(near)[0]))
 
     def _extend(self, t_s: float) -> None:
+        if self._stance.step > t_s * STEP_HZ:
+            return
         sums, attitudes = [self._sums], [self._attitudes]
         while self._stance.step <= t_s * STEP_HZ:
             felt, more = self._go_on()

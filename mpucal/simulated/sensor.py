@@ -73,7 +73,7 @@ class SensorResponse:
 
     def values(self, specific_force: Vector, omega: Vector, normal: Vector) -> Vector:
         """(n, 7) before rounding, with `normal` (n, 7) of unit deviation for its noise; see `counts`."""
-        exact = np.hstack((specific_force, omega)) @ self.matrix + self.offset
+        exact = np.concatenate((specific_force, omega), axis=1) @ self.matrix + self.offset
         return np.asarray(exact + normal * self.noise)
 
     def counts(self, specific_force: Vector, omega: Vector, rng: np.random.Generator) -> Counts:

@@ -21,6 +21,7 @@ from .models import Model
 SAMPLING = frozenset((reg.SMPLRT_DIV, reg.CONFIG, reg.PWR_MGMT_1))
 # and to one of these where it changes the rate.
 PACING = frozenset((reg.PWR_MGMT_2, reg.ACCEL_CONFIG2))
+AFTER_SAMPLE = reg.ACCEL_XOUT_H + reg.FRAME_BYTES
 
 
 class Chip:
@@ -57,8 +58,12 @@ class Chip:
         self._advance(t_ns)
         data, address = bytearray(), register
         while len(data) < count and address != reg.FIFO_R_W:
-            data.append(self._read_byte(address))
-            address = (address + 1) & 0x7F
+            if reg.ACCEL_XOUT_H <= address < AFTER_SAMPLE:
+                more = self._latest_sample()[address - reg.ACCEL_XOUT_H :][: count - len(data)]
+            else:
+                more = bytes([self._read_byte(address)])
+            data += more
+            address = (address + len(more)) & 0x7F
         return bytes(data) + self._fifo.pop(count - len(data))
 
     def write(self, register: int, data: bytes, t_ns: int) -> None:
@@ -78,8 +83,6 @@ class Chip:
         self._start_clock(t_ns)
 
     def _read_byte(self, address: int) -> int:
-        if reg.ACCEL_XOUT_H <= address < reg.ACCEL_XOUT_H + reg.FRAME_BYTES:
-            return self._latest_sample()[address - reg.ACCEL_XOUT_H]
         if address == reg.INT_STATUS:
             status, self._registers[reg.INT_STATUS] = self._registers[reg.INT_STATUS], 0
             return status

@@ -24,6 +24,9 @@ class Faults:
     def __init__(self, faults: Sequence[Fault], chip: Chip, clock: SimulatedClock, rng: np.random.Generator) -> None:
         self._faults, self._chip, self._clock, self._rng = faults, chip, clock, rng
         self._schedule = Schedule(faults)
+        self._failing = [fault for fault in faults if fault.kind.errno is not None]
+        self._flipping = [fault for fault in faults if fault.kind.flips]
+        self._altering = [fault.kind.alters for fault in faults if fault.kind.alters is not None]
         for fault in faults:
             if fault.kind.pins is not None:
                 chip.pin(*fault.kind.pins)
@@ -38,14 +41,14 @@ class Faults:
         while due := self._schedule.due(self._clock.now()):
             for fault in due:
                 self._strike(fault)
-        for kind in self._going_on():
+        for kind in self._going_on(self._failing):
             if kind.errno is not None and (not kind.share or self._rng.random() < kind.share):
                 self._clock.spend(round(kind.takes_s * 1e9))
                 raise OSError(kind.errno, os.strerror(kind.errno))
 
     def arriving(self, data: bytes) -> bytes:
         """What arrives of `data`, in either direction."""
-        share = max((kind.share for kind in self._going_on() if kind.flips), default=0.0)
+        share = max((kind.share for kind in self._going_on(self._flipping)), default=0.0)
         if not share:
             return data
         hit = self._rng.random(len(data)) < share
@@ -54,9 +57,8 @@ class Faults:
 
     def answered(self, register: int, data: bytes) -> bytes:
         """What is read instead of `data` from `register` on."""
-        for fault in self._faults:
-            if fault.kind.alters is not None:
-                data = fault.kind.alters(register, data)
+        for altered in self._altering:
+            data = altered(register, data)
         return data
 
     def words(self) -> list[str]:
@@ -70,6 +72,9 @@ class Faults:
             end_ns = max(fault.end_ns, now_ns) if math.isfinite(fault.end_ns) else now_ns
             fault.kind.strike(self._chip, now_ns, round(end_ns))
 
-    def _going_on(self) -> list[FaultKind]:
+    def _going_on(self, faults: Sequence[Fault]) -> list[FaultKind]:
+        """Of which kind those of these are that go on now."""
+        if not faults:
+            return []
         now_ns = self._clock.now()
-        return [fault.kind for fault in self._faults if fault.begin_ns <= now_ns < fault.end_ns]
+        return [fault.kind for fault in faults if fault.begin_ns <= now_ns < fault.end_ns]

@@ -38,8 +38,9 @@ class SensorFeed:
         if self._set is None or self._set[0] is not setting:
             self._set = setting, self._truth.response(setting)
         counts = self._set[1].counts(*self._motion.means(edges_s, setting.accel_lag_s), self._rng)
-        warmer = np.rint(self._motion.warmer_c(edges_s) * setting.lsb_per_c).astype(np.int16)
-        counts[:, TEMPERATURE] += warmer
+        if self._motion.mishaps:
+            warmer = np.rint(self._motion.warmer_c(edges_s) * setting.lsb_per_c).astype(np.int16)
+            counts[:, TEMPERATURE] += warmer
         return counts
 
 
