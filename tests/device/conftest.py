@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import ctypes
+import importlib.util
 import json
 import os
 import shutil
+import signal
 import struct
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +24,16 @@ HARNESS = Path(__file__).parent / "harness"
 WORDS, HEARD_AT, NOBODY_LISTENS = struct.Struct("<5q"), 8, -1
 UPTIME_NS = 900 * 10**9
 PRELOAD = "LD_PRELOAD"
+INSTALLED = Path(sys.executable).parent / "mpucal"
+# what commands import when they need it
+COMMANDS = [
+    f"mpucal.{room}" for room in ("cli", "doctor", "calibration", "chip", "files", "report", "session", "sinks")
+]
+COMMAND = "from mpucal.__main__ import main; main()"
+DEVICE = "import sys, device; device.main(*sys.argv[1:])"
+MODULE = importlib.util.spec_from_file_location("device_forks", HARNESS / "forks.py")
+forks = importlib.util.module_from_spec(MODULE)
+MODULE.loader.exec_module(forks)
 
 
 @dataclass(frozen=True)
@@ -42,25 +55,31 @@ class Device:
     Parameters
     ----------
     text : the chip, as --bus sim:... names it. clock : file and library of the time that only waiting takes.
+    devices, programs : start device.py, and what finds that device.
     """
 
-    def __init__(self, text: str, folder: Path, clock: Path) -> None:
-        self.folder, time = folder, folder / "clock"
+    def __init__(self, text: str, folder: Path, clock: Path, devices, programs) -> None:
+        self.folder, time, self.programs = folder, folder / "clock", programs
         # an uptime of a quarter of an hour: a monotonic clock does not begin at zero
         time.write_bytes(WORDS.pack(UPTIME_NS, NOBODY_LISTENS, 0, 0, 0))
         self._time = time
-        command = [sys.executable, HARNESS / "device.py", text, time]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        mocked = json.loads(self._process.stdout.readline())
+        (there, to), (out, back) = os.pipe(), os.pipe()
+        self._to, self._from, files = os.fdopen(to, "wb"), os.fdopen(out, "rb"), [there, back, sys.__stderr__.fileno()]
+        self._device = devices.start(
+            DEVICE, "device.py", text, time, folder=folder, environment=dict(os.environ), files=files
+        )
+        os.close(there)
+        os.close(back)
+        mocked = json.loads(self._from.readline())
         self.root = Path(mocked["UMOCKDEV_DIR"])
         mocked[PRELOAD] = f"{clock}:{mocked[PRELOAD]}"
         self.environment = {**os.environ, **mocked, "MPUCAL_TEST_CLOCK": str(time)}
 
     def tell(self, **what) -> None:
         """Change the device, see harness/device.py."""
-        self._process.stdin.write(json.dumps(what) + "\n")
-        self._process.stdin.flush()
-        self._process.stdout.readline()
+        self._to.write(json.dumps(what).encode() + b"\n")
+        self._to.flush()
+        self._from.readline()
 
     @contextmanager
     def but_for(self, adapter):
@@ -79,46 +98,59 @@ class Device:
         )
         return Result(done.returncode, done.stdout, done.stderr)
 
-    def mpucal(self, *words) -> Result:
+    def installed(self, *words) -> Result:
         """The installed command."""
-        return self.run(Path(sys.executable).parent / "mpucal", *words)
+        return self.run(INSTALLED, *words)
+
+    def mpucal(self, *words) -> Result:
+        """The same, in a process that need not load mpucal."""
+        with self.program(COMMAND, INSTALLED, *words) as (program, out, err), ThreadPoolExecutor(1) as reader:
+            said = reader.submit(err.read)
+            heard = out.read()
+            return Result(program.wait(), heard.decode(), said.result().decode())
+
+    @contextmanager
+    def program(self, code, *argv):
+        """Python's `code` as the main program, and its stdout and stderr."""
+        with Path(os.devnull).open() as nothing:
+            pipes = [os.pipe() for _ in range(2)]
+            files = [nothing.fileno(), *(write for _, write in pipes)]
+            program = self.programs.start(code, *argv, folder=self.folder, environment=self.environment, files=files)
+        for _, write in pipes:
+            os.close(write)
+        with os.fdopen(pipes[0][0], "rb") as out, os.fdopen(pipes[1][0], "rb") as err:
+            yield program, out, err
 
     @contextmanager
     def recording(self, *words):
         """The command `record` meanwhile, once it has the chip."""
         capture = self.folder / "held.mcap"
-        command = [Path(sys.executable).parent / "mpucal", "record", *words, "--seconds", "100000", "-o", capture]
-        with subprocess.Popen(
-            command, env=self.environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
-        ) as process:
+        command = ("record", *words, "--seconds", "100000", "-o", capture)
+        with self.program(COMMAND, INSTALLED, *command) as (program, _, err):
             try:
-                process.stderr.readline()
+                err.readline()
+                # it has the chip, and would record as fast as it can
+                os.kill(program.pid, signal.SIGSTOP)
                 yield
             finally:
-                process.kill()
+                os.kill(program.pid, signal.SIGKILL)
+                program.wait()
 
     def session(self, *words) -> Result:
         """The same, guiding the simulated hand through a session; it may fail before."""
         self._share(0, told=0, worked=0, worker=0)
-        command = [Path(sys.executable).parent / "mpucal", "session", "--bus", "/dev/i2c-1", "--json-events", *words]
-        with subprocess.Popen(
-            [str(word) for word in command],
-            env=self.environment,
-            cwd=self.folder,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-        ) as process:
-            said = b""
-            for line in process.stderr:
+        command = ("session", "--bus", "/dev/i2c-1", "--json-events", *words)
+        said = b""
+        with self.program(COMMAND, INSTALLED, *command) as (program, out, err):
+            for line in err:
                 event = json.loads(line) if line.startswith(b"{") else {}
                 if event.get("event") == "prompt":
                     self.tell(prompt={"kind": event["kind"], "down": event.get("down")})
                 said += line
                 self._share(len(said))
-            out = process.stdout.read().decode()
+            heard = out.read()
             self._share(NOBODY_LISTENS, told=0, worked=0, worker=0)
-            return Result(process.wait(), out, said.decode())
+            return Result(program.wait(), heard.decode(), said.decode())
 
     def _share(self, heard: int, **worker: int) -> None:
         """So many bytes of what the program says were heard; see harness/clock.c."""
@@ -140,15 +172,15 @@ class Device:
         (node / "clock-frequency").write_bytes(hz.to_bytes(4, "big"))
 
     def close(self) -> None:
-        self._process.stdin.close()
-        self._process.wait(timeout=30)
-        self._process.stdout.close()
+        self._to.close()
+        self._device.wait()
+        self._from.close()
         shutil.rmtree(self.root, ignore_errors=True)
 
 
 @pytest.fixture(scope="session")
-def clock(tmp_path_factory):
-    """The library of harness/clock.c, built now."""
+def clock(once):
+    """The library of harness/clock.c, built once."""
     for library in ("libumockdev.so.0", "libumockdev-preload.so.0"):
         try:
             # the second one is for other programs: found is enough
@@ -158,9 +190,19 @@ def clock(tmp_path_factory):
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("there is no C compiler for the clock of harness/clock.c")
-    built = tmp_path_factory.mktemp("clock") / "clock.so"
-    subprocess.run([compiler, "-O2", "-shared", "-fPIC", "-o", built, HARNESS / "clock.c", "-ldl"], check=True)
-    return built
+    command = [compiler, "-O2", "-shared", "-fPIC", "-o", "clock.so", HARNESS / "clock.c", "-ldl"]
+    return once("device-clock", lambda folder: subprocess.run(command, cwd=folder, check=True)) / "clock.so"
+
+
+@pytest.fixture(scope="session")
+def loaded(clock):
+    """What starts devices, and what starts the programs that find them."""
+    preloaded = f"{clock}:libumockdev-preload.so.0"
+    of_programs = {**os.environ, PRELOAD: preloaded, "MPUCAL_TEST_CLOCK": ""}
+    both = forks.Forks(dict(os.environ), "device"), forks.Forks(of_programs, *COMMANDS)
+    yield both
+    for each in both:
+        each.close()
 
 
 def _find(library):
@@ -170,12 +212,12 @@ def _find(library):
 
 
 @contextmanager
-def _devices(clock: Path):
+def _devices(clock: Path, loaded):
     made = []
 
     def make(text: str = "sim") -> Device:
         folder = Path(tempfile.mkdtemp(prefix="mpucal-device-"))
-        made.append(Device(text, folder, clock))
+        made.append(Device(text, folder, clock, *loaded))
         return made[-1]
 
     yield make
@@ -185,14 +227,14 @@ def _devices(clock: Path):
 
 
 @pytest.fixture
-def device(clock):
+def device(clock, loaded):
     """Makes a device; all are gone afterwards."""
-    with _devices(clock) as make:
+    with _devices(clock, loaded) as make:
         yield make
 
 
 @pytest.fixture(scope="module")
-def device_of_module(clock):
+def device_of_module(clock, loaded):
     """The same for a device that several tests share."""
-    with _devices(clock) as make:
+    with _devices(clock, loaded) as make:
         yield make

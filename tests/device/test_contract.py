@@ -2,7 +2,7 @@
 
 import importlib.util
 import json
-import subprocess
+import socket
 import sys
 from pathlib import Path
 
@@ -27,6 +27,9 @@ from mpucal.sources.i2c import I2cBus
 bus = I2cBus("/dev/i2c-1")
 for line in sys.stdin:
     name, *arguments = json.loads(line)
+    if name == "end":
+        print("null", flush=True)
+        break
     if name == "write":
         arguments[1] = bytes.fromhex(arguments[1])
     reply = getattr(bus, name)(*arguments)
@@ -38,13 +41,12 @@ class DistantBus:
     """The I2cBus of that process."""
 
     def __init__(self, device):
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", SERVER],
-            env=device.environment,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
+        here, there = socket.socketpair()
+        self._lines, files = here.makefile("rw"), [there.fileno(), there.fileno(), sys.__stderr__.fileno()]
+        with here, there:
+            self._program = device.programs.start(
+                SERVER, "server.py", folder=device.folder, environment=device.environment, files=files
+            )
 
     def read(self, register, count):
         data, t_ns = self._ask("read", register, count)
@@ -60,14 +62,14 @@ class DistantBus:
         self._ask("close")
 
     def end(self):
-        self._process.stdin.close()
-        assert self._process.wait(timeout=30) == 0
-        self._process.stdout.close()
+        self._ask("end")
+        self._lines.close()
+        assert self._program.wait() == 0
 
     def _ask(self, *words):
-        self._process.stdin.write(json.dumps(words) + "\n")
-        self._process.stdin.flush()
-        return json.loads(self._process.stdout.readline())
+        self._lines.write(json.dumps(words) + "\n")
+        self._lines.flush()
+        return json.loads(self._lines.readline())
 
 
 def _contract():

@@ -49,7 +49,7 @@ def test_its_bias_goes_into_the_chip_and_out_again(guided):
     assert applied == pytest.approx(b_a, abs=0.006)
     if shutil.which("i2cget"):
         assert mocked.run("i2cget", "-y", "1", "0x68", "0x77", "w").out != before
-    back = mocked.mpucal("write", "board/chip-offsets.json", "chip", "--bus", "1")
+    back = mocked.installed("write", "board/chip-offsets.json", "chip", "--bus", "1")
     assert back.code == 0, back.err
     assert f"the chip on {NODE} " in back.out
     assert mocked.run("i2cget", "-y", "1", "0x68", "0x77", "w").out == before
@@ -144,7 +144,7 @@ def test_a_clock_at_the_same_address_is_one_sentence_and_goes_on(device):
 def test_no_permission_is_one_sentence(device):
     mocked = device()
     mocked.forbid()
-    result = mocked.mpucal("session", "--bus", NODE, "-o", "x")
+    result = mocked.installed("session", "--bus", NODE, "-o", "x")
     assert result.code == 3
     assert result.err.strip() == (
         f"mpucal: no permission to use {NODE}: join the group that may: `sudo usermod -aG i2c $USER`,"
