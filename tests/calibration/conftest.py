@@ -9,7 +9,7 @@ import pytest
 
 from mpucal.data import Recording, Samples
 from mpucal.simulated.sensor import SensorTruth, density
-from tools.lab.study.scenarios import hand_scenario, paper_scenario
+from tools.lab.scenarios.recordings import hand_scenario, paper_scenario
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 G = 9.82

@@ -12,8 +12,8 @@ from mpucal.calibration import MODELS, calibrate
 from mpucal.calibration.parameters import ACCEL
 from mpucal.data import Recording, Sensor
 from mpucal.errors import MpucalError, UsageError
-from tools.lab.study.metrics import sph_rms
-from tools.lab.study.scenarios import hand_scenario, paper_scenario
+from tools.lab.judge import sph_rms
+from tools.lab.scenarios.recordings import hand_scenario, paper_scenario
 
 G = 9.82
 

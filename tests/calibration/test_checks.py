@@ -12,8 +12,8 @@ from mpucal.calibration.parameters import HAND
 from mpucal.calibration.quality import judge
 from mpucal.calibration.rotation import rotation
 from mpucal.data import Recording
-from tools.lab.study.metrics import sph_rms
-from tools.lab.study.scenarios import paper_scenario
+from tools.lab.judge import sph_rms
+from tools.lab.scenarios.recordings import paper_scenario
 
 G = 9.82
 

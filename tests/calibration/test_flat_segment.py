@@ -5,7 +5,7 @@ import pytest
 
 from mpucal.calibration.flat_segment import QUIETEST_ACC_MPS2, find_flat, flat_statistics
 from mpucal.data import Recording
-from tools.lab.study.scenarios import hand_scenario, paper_scenario
+from tools.lab.scenarios.recordings import hand_scenario, paper_scenario
 
 
 def record(acc, gyr, rate_hz=100.0):

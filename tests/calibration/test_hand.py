@@ -10,8 +10,8 @@ from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.hand import fit_hand
 from mpucal.calibration.parameters import B_A_NAMES, BY_NAME, D_NAMES, K_NAMES
 from mpucal.calibration.static_intervals import static_intervals
-from tools.lab.study.metrics import sph_rms
-from tools.lab.study.scenarios import hand_scenario
+from tools.lab.judge import sph_rms
+from tools.lab.scenarios.recordings import hand_scenario
 
 G = 9.82
 

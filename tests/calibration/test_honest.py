@@ -12,8 +12,8 @@ from mpucal.calibration import calibrate
 from mpucal.calibration.rotation import rotation
 from mpucal.data import Recording
 from mpucal.simulated.sensor import SensorTruth
-from tools.lab.study.metrics import sph_rms
-from tools.lab.study.scenarios import hand_scenario, paper_scenario
+from tools.lab.judge import sph_rms
+from tools.lab.scenarios.recordings import hand_scenario, paper_scenario
 
 G = 9.82
 SCENES = ("paper", "pose12", "pose9", "pose6", "continuous", "turns")

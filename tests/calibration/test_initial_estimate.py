@@ -12,8 +12,8 @@ from mpucal.calibration.problem import Problem, Series
 from mpucal.calibration.rotation import rotation
 from mpucal.calibration.sphere import fibonacci_sphere
 from mpucal.data import Recording
-from tools.lab.study.metrics import sph_rms
-from tools.lab.study.scenarios import paper_scenario
+from tools.lab.judge import sph_rms
+from tools.lab.scenarios.recordings import paper_scenario
 
 
 def problem_of(simulated):

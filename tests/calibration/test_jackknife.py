@@ -15,8 +15,8 @@ from mpucal.calibration.parameters import ACCEL, HAND
 from mpucal.calibration.parts import Parts
 from mpucal.calibration.preprocessing import preprocess
 from mpucal.calibration.problem import Problem, Series
-from tools.lab.study.metrics import sph_rms
-from tools.lab.study.scenarios import hand_scenario, paper_scenario
+from tools.lab.judge import sph_rms
+from tools.lab.scenarios.recordings import hand_scenario, paper_scenario
 
 G = 9.82
 

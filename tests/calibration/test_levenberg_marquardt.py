@@ -12,7 +12,7 @@ from mpucal.calibration.likelihood import evaluate
 from mpucal.calibration.parameters import ACCEL, PLACES
 from mpucal.calibration.prior import Prior, prior_of
 from mpucal.calibration.problem import Problem, Series
-from tools.lab.study.scenarios import paper_scenario
+from tools.lab.scenarios.recordings import paper_scenario
 
 NOTHING = Prior.of()
 

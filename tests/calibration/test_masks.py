@@ -8,7 +8,7 @@ from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.masks import ACC_RANGES, CLIPPED_R_SCALE, GYRO_RANGES, mask, with_masks
 from mpucal.calibration.problem import Series
 from mpucal.data import Recording
-from tools.lab.study.metrics import sph_rms
+from tools.lab.judge import sph_rms
 
 
 def noise(n=1000, seed=0, **changes):

@@ -15,8 +15,8 @@ from mpucal.calibration.paper import expand
 from mpucal.calibration.parameters import ACCEL, B_A_NAMES, BY_NAME, D_NAMES, K_NAMES
 from mpucal.calibration.prior import Prior
 from mpucal.calibration.problem import Problem, Series
-from tools.lab.study.metrics import sph_rms
-from tools.lab.study.scenarios import paper_scenario
+from tools.lab.judge import sph_rms
+from tools.lab.scenarios.recordings import paper_scenario
 
 G = 9.82
 THETA_A = (*D_NAMES, *B_A_NAMES)

@@ -10,8 +10,8 @@ from mpucal.calibration.paper import MAX_ITERATIONS, expand, fit_paper
 from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.data import Recording
 from mpucal.simulated.sensor import SensorTruth
-from tools.lab.study.metrics import sph_rms
-from tools.lab.study.scenarios import paper_scenario
+from tools.lab.judge import sph_rms
+from tools.lab.scenarios.recordings import paper_scenario
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "simulated"
 G = 9.82

@@ -14,8 +14,8 @@ from mpucal.recheck.hypotheses import NOTHING, weigh
 from mpucal.recheck.observed import changed, observe
 from mpucal.recheck.update import updated
 from mpucal.result.correlation import NAMES
-from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario
-from tools.lab.study.sensors import hand_sensor
+from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
+from tools.lab.scenarios.sensors import hand_sensor
 
 TRUTH = hand_sensor(np.random.default_rng(3)).symmetric()[0]
 CALIBRATION = mpucal.Calibration(

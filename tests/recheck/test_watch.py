@@ -10,8 +10,8 @@ import mpucal
 from mpucal.data import Sensor
 from mpucal.recheck import drift
 from mpucal.recheck.watch import RESTS, Watch
-from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario
-from tools.lab.study.sensors import hand_sensor
+from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
+from tools.lab.scenarios.sensors import hand_sensor
 
 TRUTH = hand_sensor(np.random.default_rng(3)).symmetric()[0]
 CALIBRATION = mpucal.Calibration(

@@ -39,7 +39,7 @@ from mpucal.data import Recording
 from mpucal.kernel import _kernel
 from tools.lab.hand_reference import evaluate_hand_reference
 from tools.lab.reference import evaluate_reference
-from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario, paper_scenario
+from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario, paper_scenario
 
 FLAT_S, TURNS = 10.0, 3
 # long enough for a loop's start not to count, and what the twins do in a second

@@ -15,7 +15,7 @@ from mpucal.files.folder import captures_in
 from mpucal.result.blob import Blob, BlobError
 from mpucal.result.calibration import GOOD, REFUSED, USABLE, Calibration
 from mpucal.simulated.sensor import SensorTruth
-from tools.lab.study.metrics import sph_rms
+from tools.lab.judge import sph_rms
 
 # farther from the truth than so many times what is claimed, and than what matters [m/s^2], is false
 MOST = {GOOD: 3.0, USABLE: 5.0}

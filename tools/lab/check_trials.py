@@ -27,9 +27,9 @@ from mpucal.data import Sensor, Vector
 from mpucal.recheck import check, drift
 from mpucal.recheck.observed import BETA, NONLINEAR, changed
 from mpucal.simulated.sensor import SensorTruth
-from tools.lab.study.motions import CHECK_S, FLAT_S
-from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario
-from tools.lab.study.sensors import hand_sensor
+from tools.lab.scenarios.motions import CHECK_S, FLAT_S
+from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
+from tools.lab.scenarios.sensors import hand_sensor
 
 from .halves import halves
 from .judge import rms

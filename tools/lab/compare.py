@@ -21,8 +21,8 @@ import mpucal
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording
 from mpucal.errors import MpucalError
 from mpucal.simulated.sensor import SensorTruth
-from tools.lab.study.metrics import sph_rms
-from tools.lab.study.scenarios import GRAVITY_MPS2
+from tools.lab.judge import sph_rms
+from tools.lab.scenarios.recordings import GRAVITY_MPS2
 
 from .monte_carlo import SCENES
 from .rivals import Estimate, Rests, Unfit, aligned_ellipsoid, ellipsoid, imucal, six_positions

@@ -35,7 +35,7 @@ from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.mishaps import ZeroStep
 from mpucal.simulated.sensor import SensorTruth
-from tools.lab.study.metrics import sph_rms
+from tools.lab.judge import sph_rms
 
 DAMAGES = "zero", "byte", "bits", "none"
 FAULTS = {"byte": "low_byte", "bits": "bit_errors"}

@@ -25,7 +25,7 @@ from mpucal.calibration.static_intervals import static_intervals
 from mpucal.data import Recording, Vector
 from mpucal.errors import RecordingError
 from mpucal.simulated.sensor import SensorTruth, non_orthogonality, turned
-from tools.lab.study.metrics import followed, sph_rms, tilts_deg
+from tools.lab.judge import followed, sph_rms, tilts_deg
 
 from .table import grouped, show, table
 from .trials import command_line, in_parallel, save

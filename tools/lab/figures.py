@@ -19,8 +19,8 @@ import numpy as np
 
 import mpucal
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Vector
-from tools.lab.study.motions import FLAT_S
-from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario, paper_scenario
+from tools.lab.scenarios.motions import FLAT_S
+from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario, paper_scenario
 
 from .monte_carlo import Efficiency, efficiency, fit_fixed
 from .trials import command_line, in_parallel

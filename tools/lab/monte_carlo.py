@@ -28,9 +28,9 @@ from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.data import Vector
 from mpucal.errors import MpucalError
 from mpucal.result.calibration import REFUSED
-from tools.lab.study.metrics import followed, sph_rms, tilts_deg
-from tools.lab.study.scenarios import GRAVITY_MPS2, Simulated, hand_scenario, paper_scenario
-from tools.lab.study.sensors import hand_sensor, paper_sensor
+from tools.lab.judge import followed, sph_rms, tilts_deg
+from tools.lab.scenarios.recordings import GRAVITY_MPS2, Simulated, hand_scenario, paper_scenario
+from tools.lab.scenarios.sensors import hand_sensor, paper_sensor
 
 from .judge import Judgement, judged
 from .table import cell, grouped, show, table

@@ -20,7 +20,7 @@ from mpucal.calibration.verification import FLOOR_MPS2
 from mpucal.data import Recording
 from mpucal.recheck.watch import Watch
 from mpucal.simulated.sensor import SensorTruth
-from tools.lab.study.scenarios import hand_scenario
+from tools.lab.scenarios.recordings import hand_scenario
 
 from .check_trials import DAYS, TEMPERATURE_C, at, calibrated_and_aged, events_of, happened
 from .table import grouped, show, table

@@ -10,7 +10,7 @@ from mpucal.session.events import Checked, Learnt, Tried, Wish
 from mpucal.session.live.fits import Fits, Task
 from mpucal.session.live.store import SampleStore
 from mpucal.session.plan import Plan
-from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario
+from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
 
 SENSOR = Sensor(chip="MPU-6050", rate_hz=200.0)
 NONE = Samples.empty()

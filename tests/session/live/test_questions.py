@@ -16,7 +16,7 @@ from mpucal.session.events import Ask, Wish
 from mpucal.session.live.apart import Apart
 from mpucal.session.live.questions import Here, Questions
 from mpucal.session.plan import Plan
-from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario
+from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
 
 SENSOR = Sensor(chip="MPU-6050", rate_hz=200.0)
 PLAN = Plan(gravity=GRAVITY_MPS2)

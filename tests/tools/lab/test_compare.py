@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tools.lab import compare
-from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario
+from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from mpucal.calibration.ekf import specific_force
 from mpucal.errors import RecordingError
 from mpucal.simulated.sensor import SensorTruth, density
 from tools.lab import distorted
-from tools.lab.study.scenarios import GRAVITY_MPS2, paper_scenario
+from tools.lab.scenarios.recordings import GRAVITY_MPS2, paper_scenario
 from tools.lab.table import grouped, table
 
 

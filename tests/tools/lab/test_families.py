@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
 from tools.lab import families, trials
-from tools.lab.scenarios import around, body, chip, course, delivery, family, faults, sampling, table
+from tools.lab.scenarios import around, body, course, delivery, family, faults, sampling, sensors, table
 
 STEP_S = 1.0 / 2000.0
 
@@ -94,7 +94,7 @@ def test_noise_has_the_density_that_was_asked_for():
 
 
 def test_flicker_is_as_strong_as_the_white_noise_at_its_corner():
-    truth = chip.Chip().draw(np.random.default_rng(0), 9.81)
+    truth = sensors.Chip().draw(np.random.default_rng(0), 9.81)
     n = 100_000
     quiet = faults.Readings(
         np.arange(n) / 200.0, np.zeros(n), *(np.zeros((n, 3)) for _ in range(3)), np.zeros(n), truth, (39.2, 8.7)

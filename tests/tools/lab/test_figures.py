@@ -5,7 +5,7 @@ import pytest
 
 from mpucal.calibration.rotation import rotation
 from tools.lab import figures
-from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario
+from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import mpucal
 from mpucal.errors import RecordingError
 from tools.lab import halves
 from tools.lab.judge import judged
-from tools.lab.study.scenarios import GRAVITY_MPS2, hand_scenario, paper_scenario
+from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario, paper_scenario
 
 
 @pytest.fixture(scope="module")

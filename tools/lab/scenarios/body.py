@@ -6,7 +6,7 @@ import numpy as np
 
 from mpucal.data import Vector
 from mpucal.simulated import rotation
-from tools.lab.study.shaking import lever_acceleration
+from tools.lab.scenarios.shaking import lever_acceleration
 
 # steps multiplied out one after the other in each of the blocks that go side by side
 BLOCK = 256

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from mpucal.data import Vector
 
-from .chip import Counts
 from .course import Rng
+from .sensors import Counts
 
 Written = tuple[Vector, NDArray[np.intp]]
 Digits = Callable[[Counts, Rng], Counts]

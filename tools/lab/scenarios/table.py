@@ -17,9 +17,9 @@ from mpucal.data import STANDARD_GRAVITY_MPS2
 
 from . import around, course, delivery, faults
 from .around import Hand
-from .chip import Chip
 from .family import PLAIN, SHARP, Family
 from .sampling import Sampling
+from .sensors import Chip
 
 TREMBLING = Hand(tremor_mps2=0.1, tremor_dps=0.6)
 # what turns about the sensor itself, and shakes nothing

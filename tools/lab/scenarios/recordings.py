@@ -1,0 +1,183 @@
+"""Whole recordings with known truth: the paper's simulation and an MPU-6050 by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Sensor, Vector
+from mpucal.errors import UsageError
+from mpucal.simulated.habits import Habits
+from mpucal.simulated.sensor import InSi, SensorTruth, quantised
+
+from .motions import (
+    CHECK_S,
+    FLAT_S,
+    MOVING_S,
+    as_asked,
+    attitude,
+    continuous,
+    poses,
+    six_faces,
+    three_orientations,
+    three_turns,
+)
+from .sensors import GRAVITY_MPS2, hand_sensor, paper_sensor
+from .shaking import acceleration, tremor
+
+TRUTH_HZ = 2000.0
+# one count of an MPU-6050 at 2 g and 500 deg/s; the paper's sensors are as fine as float64
+STEPS, UNQUANTISED = (2.0 * STANDARD_GRAVITY_MPS2 / 32768, float(np.radians(500.0)) / 32768), (0.0, 0.0)
+TREMOR_MPS2, TREMOR_RAD_S = 0.1, float(np.radians(1.0))
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A recording and its truth.
+
+    Attributes
+    ----------
+    truth : in the body frame in which K is symmetric, as an estimator finds it.
+    specific_force : (n, 3) m/s^2, R(x_t) g without the hand's acceleration. attitude : (n, 3, 3), R(x_t).
+    """
+
+    recording: Recording
+    truth: SensorTruth
+    specific_force: Vector
+    attitude: Vector
+
+
+_USUAL = Habits()
+_CALM = Habits(lever_m=(0.0, 0.0), sway_mps2=0.0, jerks_per_s=3.0)
+
+
+@dataclass(frozen=True)
+class _Scene:
+    motion: Callable[[Vector, np.random.Generator], tuple[Vector, Vector]]
+    habits: Habits = _USUAL
+    perfect_gyro: bool = False
+    moving_s: float = MOVING_S
+
+
+_SCENES = {
+    "pose6": _Scene(six_faces),
+    "pose7": _Scene(partial(poses, n=7)),
+    "pose9": _Scene(partial(poses, n=9)),
+    "pose12": _Scene(partial(poses, n=12)),
+    "check": _Scene(three_orientations, moving_s=CHECK_S),
+    "check as asked": _Scene(as_asked, moving_s=CHECK_S),
+    "continuous": _Scene(continuous),
+    "wobble30": _Scene(continuous, Habits(wobble=0.3)),
+    "wobble100": _Scene(continuous, Habits(wobble=1.0)),
+    "turns": _Scene(three_turns),
+    "calm jerks": _Scene(continuous, _CALM, perfect_gyro=True),
+}
+MOTIONS = tuple(name for name in _SCENES if not name.startswith("check"))
+
+
+def paper_scenario(
+    seed: int, *, rate_hz: float = 100.0, turn_s: float = 10.0, sensor: SensorTruth | None = None
+) -> Simulated:
+    """The paper's section 4.3: 10 s flat, then one complete turn about each axis, turn_s each.
+
+    sensor : drawn from the seed unless given; one given to many seeds makes section 4.4.
+    """
+    of_sensor, of_noise = np.random.default_rng(seed).spawn(2)
+    sensor = sensor or paper_sensor(of_sensor, rate_hz)
+    n_flat, n_turn = round(FLAT_S * rate_hz), round(turn_s * rate_hz)
+    omega = np.concatenate([np.zeros((n_flat, 3)), *(np.tile(e, (n_turn, 1)) for e in 2 * np.pi / turn_s * np.eye(3))])
+    R = attitude(omega, 1.0 / rate_hz)[:-1]
+    s = sensor.gravity * R[..., 2]
+    return _measured(f"paper {seed}", sensor, UNQUANTISED, rate_hz, omega, s, R, np.zeros_like(s), of_noise)
+
+
+def hand_scenario(
+    seed: int,
+    motion: str,
+    *,
+    tremble: bool = False,
+    delay_s: float = 0.0,
+    rate_hz: float = 200.0,
+    sensor: SensorTruth | None = None,
+) -> Simulated:
+    """An MPU-6050 that a hand moves after 10 s flat, for 40 s; for 15 s in the motions "check", "check as asked".
+
+    Parameters
+    ----------
+    seed : draws the sensor, the motion, the hand and the noise; each is the same whatever the other arguments.
+    motion : one of MOTIONS, or of these two. tremble : the hand trembles in the poses.
+    delay_s : how much later the accelerometer reports than the gyroscope.
+    sensor : drawn from the seed unless given.
+
+    Raises
+    ------
+    UsageError : no such motion.
+    """
+    if motion not in _SCENES:
+        raise UsageError(f"no simulated motion is called {motion!r}", f"choose one of {', '.join(MOTIONS)}")
+    scene = _SCENES[motion]
+    habits = scene.habits
+    if tremble:
+        habits = replace(habits, tremor_mps2=TREMOR_MPS2, tremor_rad_s=TREMOR_RAD_S)
+    of_sensor, of_motion, of_hand, of_tremor, of_noise = np.random.default_rng(seed).spawn(5)
+    per_sample = max(round(TRUTH_HZ / rate_hz), 1)
+    step_s = 1.0 / (rate_hz * per_sample)
+    n = round((FLAT_S + scene.moving_s) * rate_hz) * per_sample
+    t = step_s * np.arange(0.5, n)
+    omega, moving = scene.motion(t, of_motion)
+    holding = np.where(t >= FLAT_S, 1.0 - moving, 0.0)
+    a = acceleration(habits, omega, moving, holding, step_s, of_hand)
+    omega = omega + tremor(habits, holding, step_s, of_tremor)
+    tilt = np.append(np.radians(of_motion.uniform(-2.0, 2.0, 2)), 0.0)
+    R = attitude(omega, step_s, -tilt)
+    s = GRAVITY_MPS2 * 0.5 * (R[:-1, :, 2] + R[1:, :, 2])
+    # a DLPF reports the mean over a sample
+    omega, s, a = (_means(x, per_sample) for x in (omega, s, _delayed(s + a, t, delay_s) - s))
+    R = R[per_sample // 2 :: per_sample][: len(s)]
+    sensor = sensor or hand_sensor(of_sensor, scene.perfect_gyro)
+    return _measured(f"simulated {motion} {seed}", sensor, STEPS, rate_hz, omega, s, R, a, of_noise)
+
+
+def _measured(
+    name: str,
+    sensor: SensorTruth,
+    steps: tuple[float, float],
+    rate_hz: float,
+    omega: Vector,
+    s: Vector,
+    R: Vector,
+    a: Vector,
+    rng: np.random.Generator,
+) -> Simulated:
+    """What the sensor reads, in steps [m/s^2, rad/s], of the rates omega and the specific force s + a, all (n, 3)."""
+    normal = np.hstack((rng.standard_normal(s.shape), np.zeros((len(s), 1)), rng.standard_normal(s.shape)))
+    y = sensor.response(InSi(rate_hz)).values(s + a, omega, normal)
+    (acc, acc_clipped), (gyr, gyr_clipped) = quantised(y[:, :3], steps[0]), quantised(y[:, 4:], steps[1])
+    truth, Q = sensor.symmetric()
+    recording = Recording.from_arrays(
+        np.arange(len(s)) / rate_hz,
+        acc,
+        gyr,
+        flat=(0, round(FLAT_S * rate_hz)),
+        acc_clipped=acc_clipped,
+        gyr_clipped=gyr_clipped,
+        sensor=Sensor(rate_hz=rate_hz),
+        name=name,
+    )
+    return Simulated(recording, truth, s @ Q.T, Q @ R)
+
+
+def _means(x: Vector, size: int) -> Vector:
+    """Means of consecutive size rows of x (n, 3)."""
+    means: Vector = x.reshape(-1, size, 3).mean(1)
+    return means
+
+
+def _delayed(x: Vector, t: Vector, delay_s: float) -> Vector:
+    """x (n, 3) of the times t as it was delay_s before."""
+    if delay_s == 0.0:
+        return x
+    return np.stack([np.interp(t - delay_s, t, column) for column in x.T], axis=1)

@@ -1,0 +1,117 @@
+"""Sensors drawn: those of the paper's section 4.3, an MPU-6050 as they are sold, and any chip of a family."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpucal.chip.families import MPU6050
+from mpucal.data import STANDARD_GRAVITY_MPS2, Mask, Vector
+from mpucal.simulated.sensor import SensorTruth, density, non_orthogonality, turned
+
+Counts = NDArray[np.int32]
+
+GRAVITY_MPS2 = 9.82
+
+
+def paper_sensor(rng: np.random.Generator, rate_hz: float = 100.0) -> SensorTruth:
+    """A sensor of the paper's section 4.3: a gyroscope that is ideal but for its bias, an accelerometer far off.
+
+    The paper draws the noise of a sample, which is then the same at any `rate_hz`.
+    """
+    gain = rng.uniform(0.5, 1.5, 3)
+    skew, misalignment = np.radians(rng.uniform(-30, 30, 3)), np.radians(rng.uniform(-10, 10, 3))
+    return SensorTruth(
+        D=np.diag(gain) @ non_orthogonality(*skew) @ turned(-misalignment),
+        b_a=rng.uniform(-1, 1, 3),
+        K=np.eye(3),
+        b_omega=rng.uniform(-1, 1, 3),
+        gravity=GRAVITY_MPS2,
+        accel_noise_density=density(np.sqrt(rng.uniform(1e-3, 1e-1, 3)), rate_hz),
+        gyro_noise_density=density(np.sqrt(rng.uniform(1e-3, 1e-2, 3)), rate_hz),
+    )
+
+
+def hand_sensor(rng: np.random.Generator, perfect_gyro: bool = False) -> SensorTruth:
+    """An MPU-6050 as they are sold."""
+    gain = rng.uniform(0.97, 1.03, 3)
+    skew, misalignment = rng.uniform(-0.02, 0.02, 3), np.radians(rng.uniform(-2, 2, 3))
+    b_a, b_omega = rng.uniform(-0.08, 0.08, 3) * STANDARD_GRAVITY_MPS2, np.radians(rng.uniform(-20, 20, 3))
+    error = np.where(np.eye(3, dtype=bool), rng.uniform(-0.03, 0.03, (3, 3)), rng.uniform(-0.02, 0.02, (3, 3)))
+    return SensorTruth(
+        D=np.diag(gain) @ non_orthogonality(*skew) @ turned(-misalignment),
+        b_a=b_a,
+        K=np.eye(3) if perfect_gyro else np.asarray(np.linalg.inv(np.eye(3) + error)),
+        b_omega=b_omega,
+        gravity=GRAVITY_MPS2,
+        accel_noise_density=MPU6050.accel_noise_ug * 1e-6 * STANDARD_GRAVITY_MPS2,
+        gyro_noise_density=float(np.radians(MPU6050.gyro_noise_dps)),
+    )
+
+
+@dataclass(frozen=True)
+class Chip:
+    """A kind of sensor and how it is set; errors are drawn uniformly within what is given, an MPU-6050's by default.
+
+    Attributes
+    ----------
+    gain, cross, misaligned_deg, bias_mg : of the accelerometer, relative, rad, deg and mg.
+    gyro_gain, gyro_cross, gyro_bias_dps : of the gyroscope.
+    accel_noise_ug, gyro_noise_dps : densities, per sqrt(Hz); each sensor's own is 0.7 to 1.4 times that.
+    accel_range_g, gyro_range_dps, bits : as it is set; 0 bits: floating point of no limit.
+    steps : m/s^2 and rad/s of a count, where that does not follow from range and bits, as in a log of few decimals.
+    name, message : what the recording says it is, and which MAVLink message carried it.
+    """
+
+    gain: float = 0.03
+    cross: float = 0.02
+    misaligned_deg: float = 2.0
+    bias_mg: float = 80.0
+    gyro_gain: float = 0.03
+    gyro_cross: float = 0.02
+    gyro_bias_dps: float = 20.0
+    accel_noise_ug: float = 400.0
+    gyro_noise_dps: float = 0.005
+    accel_range_g: float = 4.0
+    gyro_range_dps: float = 500.0
+    bits: int = 16
+    steps: tuple[float, float] | None = None
+    name: str | None = "MPU-6050"
+    message: str | None = None
+
+    def draw(self, rng: np.random.Generator, gravity: float) -> SensorTruth:
+        """One sensor, in the gyroscope's own frame."""
+        gains = np.diag(1.0 + rng.uniform(-self.gain, self.gain, 3))
+        skew = non_orthogonality(*rng.uniform(-self.cross, self.cross, 3))
+        turn = turned(np.radians(rng.uniform(-self.misaligned_deg, self.misaligned_deg, 3)))
+        error = rng.uniform(-self.gyro_cross, self.gyro_cross, (3, 3))
+        np.fill_diagonal(error, rng.uniform(-self.gyro_gain, self.gyro_gain, 3))
+        noisy = rng.uniform(0.7, 1.4, 2)
+        return SensorTruth(
+            D=gains @ skew @ turn,
+            b_a=rng.uniform(-self.bias_mg, self.bias_mg, 3) * 1e-3 * STANDARD_GRAVITY_MPS2,
+            K=np.asarray(np.linalg.inv(np.eye(3) + error)),
+            b_omega=np.radians(rng.uniform(-self.gyro_bias_dps, self.gyro_bias_dps, 3)),
+            gravity=gravity,
+            accel_noise_density=self.accel_noise_ug * noisy[0] * 1e-6 * STANDARD_GRAVITY_MPS2,
+            gyro_noise_density=float(np.radians(self.gyro_noise_dps * noisy[1])),
+        )
+
+    @property
+    def ranges(self) -> tuple[float, float]:
+        """Full scales [m/s^2, rad/s]."""
+        return self.accel_range_g * STANDARD_GRAVITY_MPS2, float(np.radians(self.gyro_range_dps))
+
+    @property
+    def step(self) -> Vector:
+        """(6,) of a count: the accelerometer's axes [m/s^2], then the gyroscope's [rad/s]."""
+        accel, gyro = self.steps or (full / 2.0 ** (self.bits - 1) for full in self.ranges)
+        return np.repeat([accel, gyro], 3)
+
+    def counts(self, y: Vector) -> tuple[Counts, Mask]:
+        """y (n, 6) in counts, and which (n, 6) stand at the end of their range."""
+        end = 2 ** (self.bits - 1)
+        counts = np.clip(np.rint(y / self.step), -end, end - 1).astype(np.int32)
+        return counts, (counts == -end) | (counts == end - 1)

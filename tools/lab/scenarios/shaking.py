@@ -1,0 +1,69 @@
+"""What a simulated hand does to a board besides turning it, over a whole recording at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mpucal.data import Vector
+from mpucal.simulated.habits import JERK_MPS2, JERK_S, SWAY_HZ, TREMOR_HZ, Habits, swing
+
+PIVOT_HZ = (0.05, 0.4)
+
+
+def acceleration(
+    habits: Habits, omega: Vector, moving: Vector, holding: Vector, step_s: float, rng: np.random.Generator
+) -> Vector:
+    """The board's acceleration (n, 3) [m/s^2] in the body, turned by omega (n, 3) [rad/s] at steps of step_s.
+
+    moving, holding : (n,) how much the hand moves or holds a pose, 0 to 1.
+    """
+    n = len(omega)
+    a = lever_acceleration(omega, _lever(habits, moving, step_s, rng), step_s)
+    a += habits.sway_mps2 * moving[:, None] * band_noise(n, step_s, SWAY_HZ, rng)
+    a += _jerks(habits, moving, step_s, rng)
+    a += habits.tremor_mps2 * holding[:, None] * band_noise(n, step_s, TREMOR_HZ, rng)
+    return a
+
+
+def tremor(habits: Habits, holding: Vector, step_s: float, rng: np.random.Generator) -> Vector:
+    """The rates (n, 3) [rad/s] of the tremor."""
+    return habits.tremor_rad_s * holding[:, None] * band_noise(len(holding), step_s, TREMOR_HZ, rng)
+
+
+def _lever(habits: Habits, moving: Vector, step_s: float, rng: np.random.Generator) -> Vector:
+    """Where the sensor is from the pivot (n, 3) [m], in the body."""
+    direction = rng.standard_normal(3)
+    length = rng.uniform(*habits.lever_m)
+    # an rms of wobble * length over three axes
+    rms = habits.wobble * length / np.sqrt(3.0)
+    travel = rms * moving[:, None] * band_noise(len(moving), step_s, PIVOT_HZ, rng)
+    return np.asarray(length * direction / np.linalg.norm(direction) + travel)
+
+
+def _jerks(habits: Habits, moving: Vector, step_s: float, rng: np.random.Generator) -> Vector:
+    """Half sines that begin while the hand moves."""
+    n = len(moving)
+    a = np.zeros((n, 3))
+    for start in np.flatnonzero(rng.random(n) < habits.jerks_per_s * step_s * moving).tolist():
+        length = min(int(rng.uniform(*JERK_S) / step_s), n - start)
+        direction = rng.standard_normal(3)
+        direction *= rng.uniform(*JERK_MPS2) / np.linalg.norm(direction)
+        a[start : start + length] += np.sin(np.pi * (np.arange(length) + 0.5) / length)[:, None] * direction
+    return a
+
+
+def lever_acceleration(omega: Vector, r: Vector, step_s: float) -> Vector:
+    """The acceleration (n, 3) [m/s^2] in the body of a point r (n, 3) [m] of it, itself moving or not."""
+    alpha, v = np.gradient(omega, step_s, axis=0), np.gradient(r, step_s, axis=0)
+    return np.asarray(swing(alpha, omega, r, v) + np.gradient(v, step_s, axis=0))
+
+
+def band_noise(n: int, step_s: float, band_hz: tuple[float, float], rng: np.random.Generator) -> Vector:
+    """(n, 3) Gaussian noise between two frequencies, of rms 1 an axis."""
+    frequency = np.fft.rfftfreq(n, step_s)
+    band = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+    spectrum = np.zeros((len(frequency), 3), complex)
+    spectrum[band] = rng.standard_normal((band.sum(), 3)) + 1j * rng.standard_normal((band.sum(), 3))
+    noise = np.fft.irfft(spectrum, n, axis=0)
+    scaled: Vector = noise / np.sqrt((noise**2).mean(0))
+    return scaled

@@ -1,1 +1,0 @@
-"""Recordings with known truth: simulated sensors in simulated hands."""
