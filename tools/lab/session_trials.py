@@ -1,43 +1,53 @@
-"""Whole sessions on the simulated chip, one a seed: how long they take, how they end, and how right they are.
+"""Sessions on the simulated chip, one a seed: how they end, how right they are, and how long they take.
 
-python -m tools.lab session_trials --seeds 50
-python -m tools.lab session_trials --seeds 50 --hand placing random wandering --json trials.json
-python -m tools.lab session_trials --sabotage
+    python -m tools.lab session_trials hands --seeds 50 --of guided placing random wandering
+    python -m tools.lab session_trials damage --seeds 7000:7050
+    python -m tools.lab session_trials sabotage | parts | faults | recordings
 
-The hand that follows the guidance is compared with hands that turn as they like. All times are simulated seconds since
-the start.
+hands: a hand that follows the guidance, beside hands that turn as they like. sabotage: sessions that must be refused,
+each for its own reason. parts: each part of mpucal/chip/families.py, simulated by what its row says. damage: what
+nobody announces begins while the board is turned or verified: a step of 3 to 30 mg of the bias (zero; both sides count
+as true), a low byte that is lost (byte), one byte in 2,000 with a flipped bit (bits), or nothing (none). faults: each
+of mpucal/simulated/faults.py at a random moment, and a pair of them. recordings: each and every pair, in a recording
+that is calibrated afterwards, which takes a tenth of the time.
+
+An error is that of a calibrated reading, rms over all directions; claims are errors in units of what is claimed. Times
+are simulated seconds since the start. Exit code 1 where one ended as it should not.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
-import multiprocessing
-import os
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from functools import partial
-from pathlib import Path
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
 
-from mpucal.calibration import calibrate
 from mpucal.chip.config import Config
-from mpucal.chip.driver import Driver
-from mpucal.errors import Abandoned
-from mpucal.session.events import Decision, Key, Knowledge, Meter, Output, Prompt, PromptKind, Verification
+from mpucal.chip.families import PARTS
+from mpucal.data import Vector
+from mpucal.result.calibration import GOOD, REFUSED, USABLE
+from mpucal.result.error_model import MG_PER_MPS2
+from mpucal.session.events import Decision, Prompt, PromptKind, Verification
 from mpucal.session.plan import Plan
-from mpucal.session.runner import Runner
-from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.sensor import SensorTruth
-from tools.lab.study.metrics import sph_rms
+from mpucal.simulated.chip.models import MODELS
+from mpucal.simulated.faults import OF_CHIP, Fault, kinds
+from mpucal.simulated.hands import KINDS as HANDS
+from mpucal.simulated.mishaps import ZeroStep
 
+from .judge import Judgement, rms
+from .sessions import ABANDONED, NOTHING, Ear, Session, by_command, recorded, session
+from .table import grouped, show, table
+from .trials import command_line, in_parallel, save, seed_range
+
+RATE_HZ = 50.0
 # what changes while the board is turned is seen by what was turned, or by what verifies it
 CHANGED = "inconsistent", "verification_failed"
-# name: what comes after --bus, options of the chip, and which reason is to be given first
-SABOTAGE: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
+# what comes after --bus, options of the chip, and which reason is to be given first
+SABOTAGE = {
     "never still": ("sim:hand=restless", {}, ("never_still",)),
     "one orientation": ("sim:hand=still", {}, ("few_orientations",)),
     "one axis": ("sim:hand=one_axis", {}, ("few_orientations",)),
@@ -49,162 +59,218 @@ SABOTAGE: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
     "a slip": ("sim:hand=slipping", {}, CHANGED),
     "warming by 15 C": ("sim:hand=warming", {}, ("temperature_moved",)),
 }
+# of a part: its temperature, which is to be known so well, as each element of D is
+TEMPERATURE_C, NEAR_C, NEAR = 27.0, 0.3, 2e-3
+DAMAGES = {"zero": None, "byte": "low_byte", "bits": "bit_errors", "none": None}
+DAMAGED_S, STEP_MG = (12.0, 75.0), (3.0, 30.0)
+FAULTS = tuple(kinds(*OF_CHIP))
+PAIR = "a pair"
+COMBINATIONS = [*FAULTS, *map("/".join, combinations_with_replacement(FAULTS, 2))]
+CHIPS = ("mpu6050", "mpu6500", "clone98")
+FAULTY_S, RECORDED_S, POLL_S = 75, 45, 0.2
+CODES, FARTHEST_Z = (0, 3, 4, 5), 6.0
 
 
 @dataclass(frozen=True)
-class Trial:
-    """How one session ended; times in simulated seconds, NaN where it did not come so far."""
+class Ended(Judgement):
+    """How a session ended; times in simulated seconds, NaN where it did not come so far."""
 
-    seed: int
-    verdict: str
-    reasons: tuple[str, ...]
+    name: str = ""
+    seed: int = 0
+    said: str = ""
+    wrong: str = ""
     rotated_s: float = math.nan
     finished_s: float = math.nan
     prompts: int = 0
-    known: tuple[float, float, float] = (math.nan, math.nan, math.nan)
-    sph_rms: float = math.nan
-    z: tuple[float, ...] = ()
-    z_verified: tuple[float, ...] = ()
-    cautions: tuple[str, ...] = ()
-    why: tuple[str, ...] = ()
+    verified_z: tuple[float, ...] = ()
 
 
-class Witness:
-    """Hears a session, presses nothing, and remembers when what was said."""
-
-    def __init__(self) -> None:
-        self.t_s = 0.0
-        self.heard: list[tuple[float, Output]] = []
-
-    def hear(self, output: Output) -> None:
-        """Remember."""
-        if isinstance(output, Meter):
-            self.t_s = output.t_s
-        else:
-            self.heard.append((self.t_s, output))
-
-    def pressed(self) -> Sequence[Key]:
-        """Nothing."""
-        return ()
-
-    def of(self, kind: type) -> list[tuple[float, Any]]:
-        """Time and output of all of a kind."""
-        return [(t_s, output) for t_s, output in self.heard if isinstance(output, kind)]
-
-    def when(self, kind: PromptKind) -> float:
-        """When that was first asked for."""
-        return next((t_s for t_s, prompt in self.of(Prompt) if prompt.kind is kind), math.nan)
+def parts() -> dict[str, tuple[str, str]]:
+    """Of each part how --bus sim: names it: its name, and where its row is from; revision C is one more."""
+    by_family = {model.family: name for name, model in reversed(MODELS.items())}
+    found = {
+        f"{by_family[part.family]},who_am_i={who_am_i:#04x}": (part.chip, part.family.source)
+        for who_am_i, part in PARTS.items()
+    }
+    return {**found, "mpu6050c": ("MPU-6050C", PARTS[0x68].family.source)}
 
 
-def run(bus_words: str, plan: Plan, seed: int) -> Trial:
-    """One session."""
-    bus = open_simulated(bus_words, plan.gravity, seed)
-    witness = Witness()
-    runner = Runner(Driver(bus, plan.config), witness, lambda *_: None, plan, (bus.hear,))
-    try:
-        recording = runner.measure()
-    except Abandoned as error:
-        return Trial(seed, "abandoned", ("never_still",) if "not still" in str(error) else (), why=(str(error),))
-    calibration = runner.calibrate(recording, partial(calibrate, model=plan.model, gravity=plan.gravity))
-    truth = bus.truth_document() or {}
-    D, b_a = np.array(truth["D"]), np.array(truth["b_a"])
-    known = witness.of(Knowledge)[-1:]
-    rotated_s = witness.when(PromptKind.VERIFY)
-    finished_s = witness.when(PromptKind.REST)
-    return Trial(
-        seed,
-        calibration.verdict,
-        tuple(reason["code"] for reason in calibration.quality["reasons"]),
-        finished_s if math.isnan(rotated_s) else rotated_s,
-        finished_s,
-        sum(prompt.kind is PromptKind.ROTATE for _, prompt in witness.of(Prompt)),
-        tuple(max(v) for _, k in known for v in (k.gain_pct, k.misalignment_deg, k.bias_mg)) or (math.nan,) * 3,
-        sph_rms(SensorTruth(D, b_a, np.eye(3), np.zeros(3), plan.gravity), calibration.D, calibration.b_a),
-        tuple(((calibration.D - D) / calibration.D_std).ravel().tolist())
-        + tuple(((calibration.b_a - b_a) / calibration.b_a_std).tolist()),
-        tuple(
+def of_hand(name: str, seed: int) -> Ended:
+    """A session in that hand."""
+    return heard(name, f"sim:hand={name}", Plan(), seed)
+
+
+def of_sabotage(name: str, seed: int) -> Ended:
+    """One that cannot end well."""
+    words, options, reasons = SABOTAGE[name]
+    ended = heard(name, words, Plan(Config(**options)), seed)
+    first = "never_still" if "not still" in ended.said else next(iter(ended.reasons), "")
+    right = ended.verdict in (REFUSED, ABANDONED) and first in reasons
+    return replace(ended, wrong="" if right else f"not refused as {' or '.join(reasons)}")
+
+
+def heard(name: str, words: str, plan: Plan, seed: int) -> Ended:
+    """A session, and when what of it was said."""
+    ear = Ear()
+    done = session(words, plan, seed, ear)
+    rotated_s, finished_s = ear.when(PromptKind.VERIFY), ear.when(PromptKind.REST)
+    return Ended(
+        **asdict(done.judged()),
+        name=name,
+        seed=seed,
+        said=done.said or "; ".join(decision.why for decision in ear.of(Decision)),
+        rotated_s=finished_s if math.isnan(rotated_s) else rotated_s,
+        finished_s=finished_s,
+        prompts=sum(prompt.kind is PromptKind.ROTATE for prompt in ear.of(Prompt)),
+        verified_z=tuple(
             z
-            for _, v in witness.of(Verification)
+            for v in ear.of(Verification)
             for z in (v.magnitude_mps2 / v.magnitude_std_mps2, v.direction_deg / v.direction_std_deg)
         ),
-        tuple(reason["message"] for reason in calibration.quality["reasons"])
-        + tuple(decision.why for _, decision in witness.of(Decision)),
     )
 
 
-def all_of(bus_words: str, plan: Plan, seeds: Sequence[int], jobs: int) -> list[Trial]:
-    """One session a seed, side by side."""
-    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
-        return list(pool.imap(partial(run, bus_words, plan), seeds))
+def of_part(name: str, seed: int) -> Ended:
+    """A session on a part, which is to end good, under the right name and at the right temperature."""
+    words = ("--bus", f"sim:chip={name},temperature_c={TEMPERATURE_C}", "--seed", str(seed))
+    done, document = by_command(*words, "--rate", f"{RATE_HZ:g}", "--model", "hand")
+    if done.calibration is None:
+        return ended_of(name, seed, done, "no calibration")
+    (chip, source), sensor = parts()[name], document["sensor"]
+    error = float(np.abs(done.calibration.D - done.truth["D"]).max())
+    near = abs(sensor["temperature_c"] - TEMPERATURE_C) < NEAR_C and error < NEAR
+    right = near and done.calibration.verdict == GOOD and sensor["chip"] == chip
+    said = f"{sensor['chip']}, {sensor['temperature_c']:.1f} C, D within {error:.1e} ({source})"
+    return ended_of(name, seed, replace(done, said=said), "" if right else "not as its row says")
 
 
-HEAD = (
-    "hand             good       rotated [s]      finished [s]      sph_rms [m/s2]      z  z verify  asked\n"
-    "                          median (worst)    median (worst)        mean (worst)    rms       rms  median"
-)
+def of_damage(name: str, seed: int) -> Ended:
+    """A session that is damaged, and not told so."""
+    rng = np.random.default_rng([seed, list(DAMAGES).index(name)])
+    at_s, direction = round(float(rng.uniform(*DAMAGED_S)), 1), rng.normal(size=3)
+    step = direction / np.linalg.norm(direction) * math.exp(rng.uniform(*np.log(STEP_MG))) / MG_PER_MPS2
+    zero = ZeroStep(step)
+    if name == "zero":
+        zero.begin(at_s)
+    words = f"sim:fault={DAMAGES[name]}@{at_s}" if DAMAGES[name] else "sim"
+    done = session(words, Plan(Config(rate_hz=RATE_HZ)), seed, mishaps=(zero,))
+    stepped = name == "zero" and done.recording is not None and done.recording.t[-1] > at_s
+    return ended_of(name, seed, done, "", *([step] if stepped else []))
 
 
-def row(name: str, trials: Sequence[Trial]) -> str:
-    """A line of the table: medians and worst."""
-    good = sum(trial.verdict == "good" for trial in trials)
-    z = np.array([v for trial in trials for v in trial.z])
-    verified = np.array([v for trial in trials for v in trial.z_verified])
-    rotated, finished, sph = (np.array([getattr(t, k) for t in trials]) for k in ("rotated_s", "finished_s", "sph_rms"))
-    return (
-        f"{name:<12}{good:>4} of {len(trials):<3}"
-        f"{np.nanmedian(rotated):>8.1f} ({np.nanmax(rotated):>5.1f})  "
-        f"{np.nanmedian(finished):>8.1f} ({np.nanmax(finished):>5.1f})"
-        f"{np.nanmean(sph):>11.4f} ({np.nanmax(sph):.4f})"
-        f"{_rms(z):>7.2f}{_rms(verified):>10.2f}{np.median([t.prompts for t in trials]):>7.0f}"
-    )
+def of_faults(name: str, seed: int) -> Ended:
+    """A session by the command, on a chip that suffers this fault, or two that are drawn."""
+    rng = np.random.default_rng([seed, [*FAULTS, PAIR].index(name)])
+    return of_faulty(name, struck(rng, rng.choice(FAULTS, 2) if name == PAIR else [name], FAULTY_S), seed)
 
 
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.nanmean(values**2))) if len(values) else math.nan
+def of_recording(name: str, seed: int) -> Ended:
+    """A recording of a chip that suffers these faults."""
+    faults = struck(np.random.default_rng([seed, COMBINATIONS.index(name)]), name.split("/"), RECORDED_S)
+    return of_faulty(name, faults, seed, record=True)
 
 
-def sabotage(plan: Plan, seed: int) -> dict[str, Trial]:
-    """One session for each that cannot end well."""
-    found = {}
-    for name, (bus_words, options, _) in SABOTAGE.items():
-        found[name] = run(bus_words, Plan(Config(**options), plan.gravity, target=plan.target), seed)
-    return found
+def of_faulty(name: str, faults: Sequence[Fault], seed: int, model: str = "auto", record: bool = False) -> Ended:
+    """A session, or a recording, on a chip that suffers them."""
+    words = f"sim:seed={seed},chip={CHIPS[seed % len(CHIPS)]},fault={'/'.join(map(str, faults))}"
+    if record:
+        done = recorded(words, Plan(Config(rate_hz=RATE_HZ, poll_s=POLL_S), until_end=True), RECORDED_S)
+    else:
+        done, _ = by_command("--bus", words, "--rate", f"{RATE_HZ:g}", "--model", model)
+    ended = ended_of(name, seed, done, "" if done.code in CODES else f"exit code {done.code}")
+    far = ended.verdict == GOOD and max(map(abs, ended.z)) > FARTHEST_Z
+    said = " ".join([*map(str, faults), done.said])
+    return replace(ended, said=said, wrong=ended.wrong or ("called good" if far else ""))
+
+
+def struck(rng: np.random.Generator, names: Sequence[str], end_s: float) -> list[Fault]:
+    """Each at its moment."""
+    return [Fault(str(name), round(float(rng.uniform(0.0, end_s)), 2)) for name in names]
+
+
+def ended_of(name: str, seed: int, done: Session, wrong: str, *steps: Vector) -> Ended:
+    """A trace is wrong in any trial, and a good one that is farther from the truth than it claims."""
+    judgement = done.judged(*steps)
+    if "Traceback" in done.said:
+        wrong = "a trace"
+    elif judgement.verdict == GOOD and judgement.false:
+        wrong = "called good"
+    return Ended(**asdict(judgement), name=name, seed=seed, said=done.said, wrong=wrong)
+
+
+# by name: what there is to try, how, and in how many seeds unless told otherwise
+TRIALS: dict[str, tuple[Sequence[str], Callable[[str, int], Ended], str]] = {
+    "hands": (tuple(HANDS), of_hand, "50"),
+    "sabotage": (tuple(SABOTAGE), of_sabotage, "1"),
+    "parts": (tuple(parts()), of_part, "4:5"),
+    "damage": (tuple(DAMAGES), of_damage, "40"),
+    "faults": ((*FAULTS, PAIR), of_faults, "3"),
+    "recordings": (COMBINATIONS, of_recording, "1"),
+}
+
+
+def one(item: tuple[str, str, int]) -> Ended:
+    """Of a trial, one of what it tries, in a seed."""
+    trial, name, seed = item
+    return TRIALS[trial][1](name, seed)
+
+
+def typical(key: str, middle: Callable[[Sequence[float]], Any] = np.median) -> Callable[[Sequence[Ended]], str]:
+    """The median of what is known, or the mean, and the largest."""
+
+    def told(group: Sequence[Ended]) -> str:
+        known = [value for ended in group if not math.isnan(value := getattr(ended, key))]
+        return f"{middle(known):.3g} ({max(known):.3g})" if known else ""
+
+    return told
+
+
+def most_claims(verdict: str) -> Callable[[Sequence[Ended]], float]:
+    """The largest error of those with this verdict, in units of what they claim."""
+    return lambda group: max((ended.claims for ended in group if ended.verdict == verdict), default=math.nan)
+
+
+def reasons(group: Sequence[Ended]) -> str:
+    """Those that were given first, and how often."""
+    first = Counter(ended.reasons[0] for ended in group if ended.reasons)
+    return ", ".join(f"{code} {count}" for code, count in first.most_common())
+
+
+COLUMNS: dict[str, Callable[[Sequence[Ended]], Any]] = {
+    "all": len,
+    **{v: lambda g, v=v: sum(e.verdict == v for e in g) or "" for v in (GOOD, USABLE, REFUSED, ABANDONED, NOTHING)},
+    "rotated s": typical("rotated_s"),
+    "finished s": typical("finished_s"),
+    "error m/s²": typical("error", np.mean),
+    "z": lambda group: rms([z for ended in group for z in ended.z]),
+    "verified z": lambda group: rms([z for ended in group for z in ended.verified_z]),
+    "claims of good": most_claims(GOOD),
+    "of usable": most_claims(USABLE),
+    "reasons": reasons,
+}
 
 
 def main() -> int:
     """Run them; 1 where a session ended as it should not."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=50)
-    parser.add_argument("--first", type=int, default=0, help="the first seed")
-    parser.add_argument("--hand", nargs="*", default=["guided"])
-    parser.add_argument("--target", default="normal")
-    parser.add_argument("--tilt-only", action="store_true")
-    parser.add_argument("--sabotage", action="store_true", help="sessions that must be refused, each for its reason")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    parser.add_argument("--json", type=Path)
-    parser.add_argument("--verbose", action="store_true", help="a line a session")
-    arguments = parser.parse_args()
-    model = "tilt" if arguments.tilt_only else "auto"
-    plan = Plan(model=model, target=arguments.target, tilt_only=arguments.tilt_only)
-    if arguments.sabotage:
-        wrong = 0
-        for name, trial in sabotage(plan, arguments.first).items():
-            expected = SABOTAGE[name][2]
-            as_it_should = trial.verdict in ("refused", "abandoned") and trial.reasons[:1] in [(c,) for c in expected]
-            wrong += not as_it_should
-            print(f"{'ok ' if as_it_should else 'NOT'} {name:<16} {trial.verdict:<10} {', '.join(trial.reasons)}")
-            print(f"    {trial.why[0] if trial.why else ''}")
-        return min(wrong, 1)
-    seeds = range(arguments.first, arguments.first + arguments.seeds)
-    results = {hand: all_of(f"sim:hand={hand}", plan, seeds, arguments.jobs) for hand in arguments.hand}
-    if arguments.verbose:
-        for hand, trials in results.items():
-            for trial in trials:
-                print(f"{hand} {row(str(trial.seed), [trial])} {trial.verdict} {' '.join(trial.reasons)}")
-    print(HEAD)
-    for hand, trials in results.items():
-        print(row(hand, trials))
-    if arguments.json:
-        document = {hand: [asdict(trial) for trial in trials] for hand, trials in results.items()}
-        arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
-    return 0
+    parser = command_line(__doc__)
+    parser.set_defaults(seeds=None)
+    parser.add_argument("trial", choices=TRIALS)
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help="some of what it tries; default: all, or hand `guided`"
+    )
+    asked = parser.parse_args()
+    names, _, seeds = TRIALS[asked.trial]
+    chosen = asked.of or (["guided"] if asked.trial == "hands" else names)
+    if unknown := set(chosen) - set(names):
+        parser.error(f"{asked.trial} are {', '.join(names)}, and not {', '.join(unknown)}")
+    items = [(asked.trial, name, seed) for name in chosen for seed in asked.seeds or seed_range(seeds)]
+    found = []
+    for ended in in_parallel(one, items, asked.jobs, asked.trial):
+        mark = f"WRONG {ended.wrong}: " if ended.wrong else ""
+        print(
+            f"{mark}{ended.name}, seed {ended.seed}: {ended.verdict}, {ended.error:.4f} m/s² {ended.said}", flush=True
+        )
+        found.append(ended)
+    show(table(grouped(found, lambda ended: ended.name), COLUMNS))
+    save(asked.json, found)
+    return int(any(ended.wrong for ended in found))

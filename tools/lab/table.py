@@ -24,13 +24,18 @@ def grouped(rows: Iterable[Row], key: Callable[[Row], Key]) -> dict[Key, list[Ro
 def table(
     groups: Mapping[Any, Sequence[Row]], columns: Mapping[str, Callable[[Sequence[Row]], Any]], title: str | None = None
 ) -> Table:
-    """A line a group: its name, and each column's value of the rows. A tuple of names takes a column each."""
+    """A line a group: its name, and each column's value of the rows. A tuple of names takes a column each.
+
+    A column that says nothing of any group is left out.
+    """
     lines = Table(title=title)
+    told = {heading: [cell(of(rows)) for rows in groups.values()] for heading, of in columns.items()}
+    told = {heading: cells for heading, cells in told.items() if any(cells)}
     depth = max((len(_parts(name)) for name in groups), default=1)
-    for heading in [*[""] * depth, *columns]:
+    for heading in [*[""] * depth, *told]:
         lines.add_column(heading, justify="right" if heading else "left")
-    for name, rows in groups.items():
-        lines.add_row(*map(cell, _parts(name)), *(cell(of(rows)) for of in columns.values()))
+    for name, *cells in zip(groups, *told.values(), strict=True):
+        lines.add_row(*map(cell, _parts(name)), *cells)
     return lines
 
 

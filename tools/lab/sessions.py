@@ -1,0 +1,122 @@
+"""Sessions on simulated sensors for the trials: in this process, with an ear for what they say, or as the command."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass, field
+from functools import partial
+from io import StringIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from mpucal.__main__ import run
+from mpucal.calibration import calibrate
+from mpucal.chip.driver import Driver
+from mpucal.data import Recording, Vector
+from mpucal.errors import Abandoned, SourceError
+from mpucal.result.calibration import Calibration
+from mpucal.session.events import Key, Meter, Output, Prompt, PromptKind
+from mpucal.session.plan import Plan
+from mpucal.session.runner import Runner
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.mishaps import Mishap
+
+from .judge import Judgement, judged
+
+NOTHING, ABANDONED = "nothing", "abandoned"
+
+
+class Ear:
+    """Hears a session, presses nothing, and remembers when what was said."""
+
+    def __init__(self) -> None:
+        self.t_s = 0.0
+        self.heard: list[tuple[float, Output]] = []
+
+    def hear(self, output: Output) -> None:
+        """Remember."""
+        if isinstance(output, Meter):
+            self.t_s = output.t_s
+        else:
+            self.heard.append((self.t_s, output))
+
+    def pressed(self) -> Sequence[Key]:
+        """Nothing."""
+        return ()
+
+    def of(self, kind: type) -> list[Any]:
+        """All outputs of a kind."""
+        return [output for _, output in self.heard if isinstance(output, kind)]
+
+    def when(self, kind: PromptKind) -> float:
+        """When that was first asked for [s]; NaN if it never was."""
+        return next((t_s for t_s, one in self.heard if isinstance(one, Prompt) and one.kind is kind), math.nan)
+
+
+@dataclass(frozen=True)
+class Session:
+    """How one ended.
+
+    Attributes
+    ----------
+    truth : of its sensor, as truth.json has it. code, said : exit code, and the last line on stderr.
+    """
+
+    calibration: Calibration | None = None
+    truth: dict[str, Any] = field(default_factory=dict)
+    recording: Recording | None = None
+    code: int = 0
+    said: str = ""
+
+    def judged(self, *steps: Vector) -> Judgement:
+        """The calibration against the truth, before and after steps of what the accelerometer feels [m/s^2]."""
+        if self.calibration is None:
+            return Judgement(ABANDONED if self.code == Abandoned.exit_code else NOTHING)
+        D, b_a = np.array(self.truth["D"]), np.array(self.truth["b_a"])
+        # such a step is felt before D
+        return judged(self.calibration, (D, b_a), *((D, b_a + D @ step) for step in steps))
+
+
+def session(words: str, plan: Plan, seed: int, ear: Any = None, mishaps: Sequence[Mishap] = ()) -> Session:
+    """A session on `--bus words` in this process."""
+    bus = open_simulated(words, plan.gravity, seed, mishaps=mishaps)
+    runner = Runner(Driver(bus, plan.config), ear or Ear(), lambda *_: None, plan, (bus.hear,))
+    try:
+        recording = runner.measure()
+    except Abandoned as error:
+        return Session(code=error.exit_code, said=str(error))
+    found = runner.calibrate(recording, partial(calibrate, model=plan.model, gravity=plan.gravity))
+    return Session(found, bus.truth_document() or {}, recording)
+
+
+def recorded(words: str, plan: Plan, seconds: float) -> Session:
+    """So long a recording on `--bus words`, of what there is of it, calibrated afterwards."""
+    bus, said = open_simulated(words), ""
+    driver = Driver(bus, plan.config)
+    try:
+        Runner(driver, Ear(), lambda *_: None, plan, (bus.hear,)).record(seconds)
+    except SourceError as error:
+        said = str(error)
+    recording = driver.recording()
+    if len(recording) < 2:
+        return Session(code=SourceError.exit_code, said=said)
+    return Session(calibrate(recording), bus.truth_document() or {}, recording, said=said)
+
+
+def by_command(*words: str) -> tuple[Session, dict[str, Any]]:
+    """`mpucal session words --yes`, and the calibration.json that it left."""
+    with TemporaryDirectory() as place, redirect_stdout(StringIO()), redirect_stderr(StringIO()) as err:
+        folder = Path(place) / "session"
+        code = run(["session", *words, "--yes", "-o", str(folder)])
+        said = err.getvalue() if "Traceback" in err.getvalue() else (err.getvalue().splitlines() or [""])[-1]
+        file = folder / "calibration.json"
+        if not file.exists():
+            return Session(code=code, said=said), {}
+        truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+        return Session(Calibration.load(file), truth, code=code, said=said), json.loads(file.read_text())
