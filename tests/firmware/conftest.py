@@ -37,23 +37,27 @@ def host():
 
 
 @pytest.fixture(scope="session")
-def core(host, tmp_path_factory):
+def core(host, once):
     """The firmware's core as a library of this machine."""
     _need("gcc")
-    return host.build_core(tmp_path_factory.mktemp("core"))
+    return host.load_core(once("firmware-core", host.compile_core))
 
 
 @pytest.fixture(scope="session")
-def make(tmp_path_factory):
-    """Makes targets of the firmware's Makefile in a folder of its own; gives that and what was said."""
+def make(once):
+    """Makes a target of the firmware's Makefile in a folder of its own; gives that and what was said."""
     _need("avr-gcc", "make")
-    folder = tmp_path_factory.mktemp("avr")
 
-    def run(*targets):
-        words = ["make", "--no-print-directory", "-C", str(FIRMWARE), f"BUILD={folder}", *targets]
-        made = subprocess.run(words, capture_output=True, text=True, check=False)
-        assert made.returncode == 0, made.stderr
-        return folder, made.stdout
+    def run(target, *settings):
+        def build(folder):
+            words = ["make", "--no-print-directory", "-C", str(FIRMWARE), f"BUILD={folder}", *settings]
+            made = subprocess.run([*words, target.format(folder)], capture_output=True, text=True, check=False)
+            assert made.returncode == 0, made.stderr
+            (folder / "said").write_text(made.stdout)
+
+        name = "-".join((target.replace("/", "-"), *settings))
+        folder = once(f"firmware-{name}", build)
+        return folder, (folder / "said").read_text()
 
     return run
 
@@ -61,7 +65,7 @@ def make(tmp_path_factory):
 @pytest.fixture(scope="session")
 def avr_build(make):
     """The folder with the firmware for the ATmega328P, and what its build said."""
-    return make()
+    return make("all")
 
 
 @pytest.fixture(scope="session")
@@ -73,30 +77,28 @@ def sketches(make):
 
 
 @pytest.fixture(scope="session")
-def fast_build(make, tmp_path_factory):
+def fast_build(make):
     """The folder with the firmware for the ATmega328P at 500000 baud."""
-    folder = tmp_path_factory.mktemp("fast")
-    make("BAUD=500000", f"BUILD={folder}")
-    return folder
+    return make("all", "BAUD=500000")[0]
 
 
 @pytest.fixture(scope="session")
 def stock_sketches(make):
-    """The folder with the sketches as a stock Arduino IDE builds them for each board, and what the compiler said."""
+    """Builds the sketches as a stock Arduino IDE does for a board; gives their folder, with what the compiler said."""
     if not ARDUINO.exists():
         pytest.skip("needs arduino-core-avr, of the packages in tools/ci_packages.txt")
     _need("arduino-builder", "arduino-ctags")
-    return make("arduino")[0] / "stock"
+    return lambda board: make(f"{{}}/stock/{board}")[0] / "stock" / board
 
 
 @pytest.fixture(scope="session")
-def emulator(tmp_path_factory):
+def emulator(once):
     """The modules of the emulated board and of a line to it, and the board's library between them."""
     _need("gcc")
     if not SIMAVR.exists():
         pytest.skip("needs libsimavr-dev, of the packages in tools/ci_packages.txt")
     module = _module(HERE / "emulator" / "board.py")
-    library = module.build_library(tmp_path_factory.mktemp("board"))
+    library = module.load_library(once("firmware-board", module.compile_library))
     return module, library, _module(HERE / "emulator" / "port.py")
 
 

@@ -1,4 +1,4 @@
-"""The real firmware on an emulated ATmega328P, in that one's own time: registers, a minute at 1 kHz, blobs, power."""
+"""The real firmware on an emulated ATmega328P, in that one's own time: registers, streams, blobs, power."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NEW = replace(Blob.decode(OLD), b_a=(1.0, 2.0, 3.0)).encode()
 
 FLASH_LIMIT, RAM_LIMIT = 8192, 1024
 FIXED_LIMIT = 1000
-RATE_HZ, SECONDS = 1000, 60
+RATE_HZ = 1000
 
 
 class Numbers:
@@ -158,16 +158,17 @@ def test_half_a_kilohertz_fits_115200_baud(switch_on):
     assert (recording.gap.sum(), board.overruns, len(recording) > 2000) == (0, 0, True)
 
 
-def test_a_minute_at_1_khz_and_500_kbaud_loses_nothing(switch_on, fast_build):
+@pytest.mark.parametrize("seconds", [8, pytest.param(60, marks=pytest.mark.slow)])
+def test_1_khz_at_500_kbaud_loses_nothing(switch_on, fast_build, seconds):
     board, port = switch_on(_numbering, fast_build / "mpucal_bridge.elf")
     driver = Driver(BridgeBus(port), Config(rate_hz=RATE_HZ))
     driver.start()
-    while board.now_s < SECONDS + 1:
+    while board.now_s < seconds + 1:
         driver.poll()
     recording = driver.recording()
     words = np.rint(recording.acc * 8192 / 9.80665).astype(int)
     numbers = words[:, 0] * 1000 + words[:, 1]
-    assert len(numbers) >= SECONDS * RATE_HZ
+    assert len(numbers) >= seconds * RATE_HZ
     assert np.array_equal(numbers, np.arange(len(numbers)) + numbers[0])
     assert (recording.gap.sum(), board.overruns) == (0, 0)
     assert recording.rate_hz == pytest.approx(RATE_HZ, rel=1e-4)
@@ -193,7 +194,7 @@ def test_power_loss_at_any_cycle_of_a_blob_write_leaves_the_old_blob_or_the_new(
     cycles = board.cycle - began
     board.cut_power()
     rng = np.random.default_rng(torn)
-    found = [held_after(cut, torn, holds_old, switch_on, eeprom) for cut in rng.integers(0, cycles, 10)]
+    found = [held_after(cut, torn, holds_old, switch_on, eeprom) for cut in rng.integers(0, cycles, 4)]
     assert set(found) <= {OLD, NEW}
     # the last bytes that are written make the difference
     assert held_after(2 * cycles, torn, holds_old, switch_on, eeprom) == NEW

@@ -11,14 +11,16 @@ from urllib.parse import urlsplit
 import pytest
 
 FIRMWARE = Path(__file__).parents[2] / "mpucal" / "firmware"
-BOARDS = ("uno", "nano-cpu=atmega328old", "mega-cpu=atmega2560", "leonardo")
+# of the others, test_matrix.py compiles the sketches with the same core and more warnings
+OTHERS = ("nano-cpu=atmega328old", "mega-cpu=atmega2560", "leonardo")
+BOARDS = ("uno", *(pytest.param(board, marks=pytest.mark.slow) for board in OTHERS))
 SKETCHES = ("mpucal_bridge", "mpucal_corrected")
 
 
 @pytest.mark.parametrize("board", BOARDS)
 @pytest.mark.parametrize("sketch", SKETCHES)
 def test_a_stock_ide_compiles_it_without_a_warning(stock_sketches, board, sketch):
-    folder = stock_sketches / board
+    folder = stock_sketches(board)
     assert (folder / sketch / f"{sketch}.ino.hex").is_file()
     said = (folder / f"{sketch}.log").read_text().splitlines()
     # the core's own are not ours

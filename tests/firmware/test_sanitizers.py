@@ -36,13 +36,15 @@ def test_the_core_passes_its_tests_under_sanitizers(sanitized):
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
 
 
-def test_and_the_sanitizers_are_awake(sanitized, tmp_path):
+def test_and_the_sanitizers_are_awake(sanitized, host, monkeypatch, tmp_path):
+    monkeypatch.setenv("MPUCAL_SANITIZE", "1")
+    host.compile_core(tmp_path)
     too_far = "ctypes.create_string_buffer(8), 200"
     program = (
         "import ctypes, importlib.util, pathlib, sys\n"
         f"spec = importlib.util.spec_from_file_location('core', {str(HERE / 'host' / 'core.py')!r})\n"
         "core = importlib.util.module_from_spec(spec); sys.modules['core'] = core; spec.loader.exec_module(core)\n"
-        f"core.build_core(pathlib.Path({str(tmp_path)!r})).mpucal_crc16({too_far})\n"
+        f"core.load_core(pathlib.Path({str(tmp_path)!r})).mpucal_crc16({too_far})\n"
     )
     done = run(sanitized, "-c", program)
     assert done.returncode != 0

@@ -13,6 +13,7 @@ from mpucal.chip.access import Bus
 
 CPU_HZ = 16_000_000
 EEPROM_BYTES = 1024
+LIBRARY = "board.so"
 BUFFER_BYTES = 1 << 16
 
 CHIP_READ = ctypes.CFUNCTYPE(ctypes.c_uint8, ctypes.c_uint8, ctypes.c_uint64)
@@ -25,13 +26,16 @@ class Fault(IntEnum):
     SOUND, NO_ADDRESS, NO_DATA, HOLDS_BUS = range(4)
 
 
-def build_library(folder: Path) -> ctypes.CDLL:
-    """Compile board.c into `folder`, and load it."""
-    library = folder / "board.so"
+def compile_library(folder: Path) -> None:
+    """Compile board.c into `folder`."""
     source = Path(__file__).with_name("board.c")
     flags = ["-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared", "-I/usr/include/simavr"]
-    subprocess.run(["gcc", *flags, str(source), "-o", str(library), "-lsimavr", "-lelf"], check=True)
-    loaded = ctypes.CDLL(str(library))
+    subprocess.run(["gcc", *flags, str(source), "-o", str(folder / LIBRARY), "-lsimavr", "-lelf"], check=True)
+
+
+def load_library(folder: Path) -> ctypes.CDLL:
+    """What was compiled into `folder`."""
+    loaded = ctypes.CDLL(str(folder / LIBRARY))
     board, u8, u32, u64 = ctypes.c_void_p, ctypes.c_uint8, ctypes.c_uint32, ctypes.c_uint64
     prototypes = {
         "board_open": (board, [ctypes.c_char_p, ctypes.c_char_p, CHIP_READ, CHIP_WRITE]),
@@ -73,7 +77,7 @@ class Board:
 
     Parameters
     ----------
-    library : from build_library. elf : the firmware. eeprom : its file, made where it is missing.
+    library : from load_library. elf : the firmware. eeprom : its file, made where it is missing.
     chip : what is on its TWI; its time is `clock`.
     """
 

@@ -23,7 +23,7 @@ from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 
 sys.path.insert(0, str(Path(__file__).parent))
-from board import Board, BoardClock, build_library
+from board import Board, BoardClock, compile_library, load_library
 
 STEP_S = 0.001
 CHUNK_BYTES = 4096
@@ -128,8 +128,8 @@ def main() -> None:
     chip = open_simulated(options.chip, clock=clock)
     listen = listener(chip.hear)
     with tempfile.TemporaryDirectory() as folder:
-        library = build_library(Path(folder))
-        with Board(library, options.elf, options.eeprom, chip, clock) as board:
+        compile_library(Path(folder))
+        with Board(load_library(Path(folder)), options.elf, options.eeprom, chip, clock) as board:
             terminal = Terminal()
             print(terminal.name, flush=True)
             served = Served(board, terminal, options.bootloader)

@@ -11,6 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[3]
 SOURCES = ROOT / "mpucal" / "firmware" / "src"
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
+CORE = "core.so"
 SANITIZE = "MPUCAL_SANITIZE"
 SANITIZERS = ["-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 
@@ -51,14 +52,17 @@ class Stored(ctypes.Structure):
     _fields_ = (("generation", U32), ("at", U16), ("length", U16))
 
 
-def build_core(folder: Path) -> ctypes.CDLL:
-    """Compile the core into `folder`, under the sanitizers where the environment says so, and load it."""
-    library = folder / "core.so"
+def compile_core(folder: Path) -> None:
+    """Compile the core into `folder`, under the sanitizers where the environment says so."""
     flags = SANITIZERS if SANITIZE in os.environ else ["-O2"]
     sources = [*sorted(SOURCES.glob("*.c")), Path(__file__).with_name("host.c")]
-    command = ["gcc", "-std=c99", *WARNINGS, *flags, f"-I{SOURCES}", "-fPIC", "-shared", "-o", str(library)]
+    command = ["gcc", "-std=c99", *WARNINGS, *flags, f"-I{SOURCES}", "-fPIC", "-shared", "-o", str(folder / CORE)]
     subprocess.run([*command, *map(str, sources)], check=True)
-    core = ctypes.CDLL(str(library))
+
+
+def load_core(folder: Path) -> ctypes.CDLL:
+    """What was compiled into `folder`."""
+    core = ctypes.CDLL(str(folder / CORE))
     core.mpucal_slots_stored.restype = Stored
     core.mpucal_slots_open.restype = U16
     core.mpucal_slots_seal.restype = U32
@@ -98,7 +102,7 @@ class HostBridge:
 
     Parameters
     ----------
-    core : from build_core. eeprom : its memory. read, write : registers, as (address, first, data or count) to
+    core : from load_core. eeprom : its memory. read, write : registers, as (address, first, data or count) to
     (code, data) or a code.
 
     Attributes
