@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy import signal
 
-from mpucal.doctor.noise import density, trembles
+from mpucal.doctor.noise import density, periodogram, trembles
 
 RATE_HZ = 200.0
 
@@ -12,6 +13,15 @@ def white(seed, unit_rthz=0.004, seconds=20):
     """White noise of one density, (n, 3)."""
     rng = np.random.default_rng(seed)
     return rng.normal(scale=unit_rthz * np.sqrt(RATE_HZ / 2), size=(int(seconds * RATE_HZ), 3))
+
+
+@pytest.mark.parametrize("n", [400, 401])
+def test_the_spectrum_is_that_of_scipy(n):
+    values = white(0)[:n] + 9.81
+    hz, power = signal.periodogram(values, RATE_HZ, window="hann", axis=0)
+    found_hz, found = periodogram(values, RATE_HZ)
+    np.testing.assert_allclose(found_hz, hz)
+    np.testing.assert_allclose(found[1:], power[1:], rtol=1e-9)
 
 
 def test_the_density_of_white_noise_is_found():
