@@ -17,6 +17,16 @@ from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 
 
+@pytest.fixture
+def topics(examined):
+    """The findings of a chip, by their topics."""
+
+    def call(words):
+        return {finding.topic: finding for finding in examined(words)}
+
+    return call
+
+
 def findings(bus):
     bus.hear(Prompt(PromptKind.LAY_FLAT, ""))
     return {finding.topic: finding for finding in examine(bus, Config(), 3.0)}
@@ -25,7 +35,7 @@ def findings(bus):
 @pytest.mark.parametrize(
     ("chip", "place", "genuine"),
     [
-        ("mpu6050", 0x06, True),
+        ("mpu6050,rate_error_ppm=-7000", 0x06, True),
         ("mpu6050c", 0x06, True),
         ("mpu6500", 0x77, True),
         ("mpu6880", 0x77, True),
@@ -34,16 +44,16 @@ def findings(bus):
         ("clone98,who_am_i=0x68", 0x77, False),
     ],
 )
-def test_a_sound_chip_has_no_fault(chip, place, genuine):
-    told = findings(open_simulated(f"sim:seed=3,chip={chip}"))
+def test_a_sound_chip_has_no_fault(topics, chip, place, genuine):
+    told = topics(f"chip={chip}")
     assert [topic for topic, finding in told.items() if finding.mark is Mark.BAD] == []
     assert told["offset registers"].data["place"] == place
     assert (told["genuine?"].mark is Mark.OK) is genuine
     assert told["bus speed"].data["achieved_hz"] == pytest.approx(400_000, rel=0.01)
 
 
-def test_the_true_rate_is_measured():
-    told = findings(open_simulated("sim:rate_error_ppm=-7000"))
+def test_the_true_rate_is_measured(topics):
+    told = topics("chip=mpu6050,rate_error_ppm=-7000")
     assert told["sample rate"].data["rate_hz"] == pytest.approx(200 * 0.993, rel=1e-3)
     assert told["sample rate"].mark is Mark.OK
 
@@ -60,7 +70,7 @@ def test_the_true_rate_is_measured():
         ("b_a=0/0/3", "at rest", Mark.NOTE),
         ("temperature_c=90", "temperature", Mark.NOTE),
         ("hand=restless", "noise", Mark.UNKNOWN),
-        ("fault=brownout@5", "losses", Mark.BAD),
+        ("fault=brownout@6", "losses", Mark.BAD),
         ("fault=bit_errors@0", "bit errors", Mark.BAD),
         ("fault=nacks", "transfers", Mark.NOTE),
         ("fault=low_x", "dead axis", Mark.BAD),
@@ -72,14 +82,14 @@ def test_the_true_rate_is_measured():
         ("fault=stuck_temp", "dead axis", Mark.BAD),
     ],
 )
-def test_what_is_amiss_is_found(keys, topic, mark):
-    told = findings(open_simulated(f"sim:{keys}"))
+def test_what_is_amiss_is_found(topics, keys, topic, mark):
+    told = topics(keys)
     assert told[topic].mark is mark
     assert told[topic].remedy
 
 
-def test_a_board_that_is_never_put_down_is_waited_for_once():
-    told = findings(open_simulated("sim:hand=restless"))
+def test_a_board_that_is_never_put_down_is_waited_for_once(topics):
+    told = topics("hand=restless")
     assert "the board moves" in told["offset registers"].what
     assert PATIENCE * LOOKS < told["transfers"].data["transfers"] < 1.5 * PATIENCE * LOOKS
 
@@ -96,8 +106,8 @@ def test_a_board_that_is_put_down_late_is_examined_as_any():
     assert told["offset registers"].mark is Mark.OK
 
 
-def test_transfers_that_fail_now_and_then_are_counted_and_stop_nothing():
-    told = findings(open_simulated("sim:fault=nacks"))
+def test_transfers_that_fail_now_and_then_are_counted_and_stop_nothing(topics):
+    told = topics("fault=nacks")
     counted = told["transfers"].data
     assert counted["errors"] == {"not acknowledged": pytest.approx(counted["transfers"] / 50, rel=0.5)}
     assert 0 < counted["retries"] <= counted["errors"]["not acknowledged"]
@@ -114,8 +124,8 @@ def test_transfers_that_fail_now_and_then_are_counted_and_stop_nothing():
         ("stuckbit", "bits change on the bus"),
     ],
 )
-def test_what_is_no_chip_or_no_wire_is_named(fault, says):
-    *_, last = findings(open_simulated(f"sim:fault={fault}")).values()
+def test_what_is_no_chip_or_no_wire_is_named(examined, fault, says):
+    last = examined(f"fault={fault}")[-1]
     assert last.mark is Mark.BAD
     assert says in last.what
 
@@ -128,8 +138,8 @@ def test_what_is_no_chip_or_no_wire_is_named(fault, says):
         ("stuck_temp", ["the thermometer"]),
     ],
 )
-def test_a_dead_axis_is_named(fault, axes):
-    dead = [f for f in examine(still(f"sim:fault={fault}"), Config(), 3.0) if f.topic == "dead axis"]
+def test_a_dead_axis_is_named(examined, fault, axes):
+    dead = [finding for finding in examined(f"fault={fault}") if finding.topic == "dead axis"]
     assert dead[0].data["dead"] == axes
     assert "replace the chip" in dead[0].remedy
 
@@ -147,21 +157,15 @@ def test_an_axis_that_dies_midway_is_named_and_one_that_rarely_changes_is_not():
     assert [mask.tolist() for mask in live_axes(recording)] == [[True, False, True], [True, True, True]]
 
 
-def test_a_stuck_bit_is_looked_for_where_a_revision_c_shows_half_of_g():
-    told = findings(open_simulated("sim:chip=mpu6050c,fault=high_bit@0"))
+def test_a_stuck_bit_is_looked_for_where_a_revision_c_shows_half_of_g(topics):
+    told = topics("chip=mpu6050c,fault=high_bit@0")
     assert told["stuck bits"].what == "bit 12 of accelerometer y does not move"
-    assert findings(open_simulated("sim:chip=mpu6050c"))["stuck bits"].mark is Mark.OK
-
-
-def still(words):
-    bus = open_simulated(words)
-    bus.hear(Prompt(PromptKind.LAY_FLAT, ""))
-    return bus
+    assert topics("chip=mpu6050c")["stuck bits"].mark is Mark.OK
 
 
 @pytest.mark.parametrize("at_s", [0, 1, 3, 5, 6, 8])
-def test_a_wire_pulled_meanwhile_ends_it_with_a_sentence(at_s):
-    told = findings(open_simulated(f"sim:fault=unplugged@{at_s}"))
+def test_a_wire_pulled_meanwhile_ends_it_with_a_sentence(topics, at_s):
+    told = topics(f"fault=unplugged@{at_s}")
     assert list(told.values())[-1].mark is Mark.BAD
     assert "nothing answers" in list(told.values())[-1].what
     assert "genuine?" not in told

@@ -4,12 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from mpucal.chip.config import Config
-from mpucal.doctor.examine import examine
-from mpucal.errors import SourceError
-from mpucal.session.events import Prompt, PromptKind
-from mpucal.simulated.chip import open_simulated
-
 PAGE = Path(__file__).parents[2] / "docs" / "doctor.md"
 HEAD = "| trouble | reported | `--bus sim:` | the doctor says |\n|---|---|---|---|\n"
 
@@ -22,11 +16,6 @@ def rows():
 
 
 @pytest.mark.parametrize(("words", "says"), list(rows()))
-def test_the_doctor_names_it(words, says):
-    bus = open_simulated(f"sim:seed=3,{words}")
-    try:
-        bus.hear(Prompt(PromptKind.LAY_FLAT, ""))
-        told = [f"{finding.what}: {finding.remedy}" for finding in examine(bus, Config(), 5.0)]
-    except SourceError as error:
-        told = [str(error)]
+def test_the_doctor_names_it(examined, words, says):
+    told = [f"{finding.what}: {finding.remedy}" for finding in examined(words)]
     assert any(says in sentence for sentence in told), told
