@@ -27,6 +27,7 @@ from mpucal.data import Sensor, Vector
 from mpucal.recheck import check, drift
 from mpucal.recheck.observed import BETA, NONLINEAR, changed
 from mpucal.simulated.sensor import SensorTruth
+from tools.lab.scenarios.course import direction
 from tools.lab.scenarios.motions import CHECK_S, FLAT_S
 from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
 from tools.lab.scenarios.sensors import hand_sensor
@@ -61,16 +62,15 @@ class Trial:
 
 def happened(truth: SensorTruth, event: str, rng: np.random.Generator) -> tuple[SensorTruth, float]:
     """The sensor after `event`, of any size in those units, and its temperature."""
-    direction = rng.standard_normal(3)
-    direction /= np.linalg.norm(direction)
+    towards = direction(rng)
     match event.split():
         case ["bias", mg, "mg"]:
-            return replace(truth, b_a=truth.b_a + float(mg) * drift.MG * direction), TEMPERATURE_C
+            return replace(truth, b_a=truth.b_a + float(mg) * drift.MG * towards), TEMPERATURE_C
         case ["scale", percent, "%"]:
             axis = np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])
             return replace(truth, D=truth.D @ np.diag(1.0 + 0.01 * float(percent) * axis)), TEMPERATURE_C
         case ["mount", deg, "deg"]:
-            return replace(truth, D=truth.D @ rotation(np.radians(float(deg)) * direction)), TEMPERATURE_C
+            return replace(truth, D=truth.D @ rotation(np.radians(float(deg)) * towards)), TEMPERATURE_C
         case [by_c, "degC"]:
             spread = drift.BY_TEMPERATURE["MPU-6050"].covariance() * float(by_c) ** 2
             theta = rng.multivariate_normal(np.zeros(len(spread)), spread)

@@ -47,13 +47,11 @@ SMOOTH_S = 0.1
 
 
 class Sweep(NamedTuple):
-    """A Monte Carlo run over time, (n,) each: magnitudes [m/s^2] and angular errors [deg] before and after."""
+    """A Monte Carlo run over time (n,): magnitudes (2, n) [m/s^2] and angular errors (2, n) [deg] before and after."""
 
     t: Vector
-    magnitude_before: Vector
-    magnitude_after: Vector
-    angle_before: Vector
-    angle_after: Vector
+    magnitudes: Vector
+    angles: Vector
 
 
 def sweep(seed: int, model: str) -> Sweep | None:
@@ -63,8 +61,8 @@ def sweep(seed: int, model: str) -> Sweep | None:
     result = mpucal.calibrate(recording, model=model, gravity=GRAVITY_MPS2)
     if result.verdict == "refused":
         return None
-    y, y_cal = recording.acc, result.apply(recording.acc)
-    return Sweep(recording.t, *(np.linalg.norm(x, axis=1) for x in (y, y_cal)), *(angles(x, ideal) for x in (y, y_cal)))
+    both = np.array([recording.acc, result.apply(recording.acc)])
+    return Sweep(recording.t, np.linalg.norm(both, axis=2), np.array([angles(a, ideal) for a in both]))
 
 
 def angles(a: Vector, b: Vector) -> Vector:
@@ -131,9 +129,9 @@ def errors_over_time(plt: Any, sweeps: list[Sweep], failed: int) -> Any:
     figure, (top, bottom) = plt.subplots(2, 1, figsize=(8.0, 5.0), sharex=True)
     t = sweeps[0].t
     top.axhline(GRAVITY_MPS2, color=INK, linewidth=0.8)
-    for axes, pair in ((top, (1, 2)), (bottom, (3, 4))):
-        for field, colour, label in zip(pair, (BEFORE, AFTER), ("uncalibrated", "calibrated"), strict=True):
-            values = np.array([run[field] for run in sweeps])
+    for axes, runs in ((top, [run.magnitudes for run in sweeps]), (bottom, [run.angles for run in sweeps])):
+        for k, (colour, label) in enumerate(((BEFORE, "uncalibrated"), (AFTER, "calibrated"))):
+            values = np.array([run[k] for run in runs])
             mean, sd = values.mean(0), values.std(0)
             axes.fill_between(t, mean - sd, mean + sd, color=colour, alpha=0.18, linewidth=0)
             axes.plot(t, mean, color=colour, label=f"{label}: {values.mean():.2f}, sd {sd.mean():.2f}", linewidth=1.0)

@@ -31,7 +31,7 @@ class Gain(NamedTuple):
     w: float
 
 
-class HANDass:
+class Pass:
     """x = (s, p, v, a) (12,), P (12, 12) and dx (p, 12) on their way through the samples; gains may be given."""
 
     def __init__(self, problem: Problem, theta: Theta, held: list[Gain] | None = None) -> None:
@@ -134,18 +134,18 @@ class HANDass:
 
 def evaluate_hand_reference(problem: Problem, theta: Theta) -> Evaluation:
     """The same as likelihood.evaluate of all parameters, with twelve-state matrices and no structure used."""
-    done = HANDass(problem, theta)
+    done = Pass(problem, theta)
     return Evaluation(done.V, done.squares, done.gradient, done.fisher)
 
 
 def gains(problem: Problem, theta: Theta) -> list[Gain]:
     """What the filter decides at each measurement, the flat mean's first."""
-    return HANDass(problem, theta).gains
+    return Pass(problem, theta).gains
 
 
 def innovations(problem: Problem, theta: Theta, held: list[Gain]) -> Vector:
     """(n + 1, 3) m/s^2, with the gains held: the function whose derivatives the gradient is made of."""
-    return np.array(HANDass(problem, theta, held).innovations)
+    return np.array(Pass(problem, theta, held).innovations)
 
 
 def _at(values: Vector | None, i: int, otherwise: float) -> float:

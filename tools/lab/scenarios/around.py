@@ -12,43 +12,35 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpucal.data import STANDARD_GRAVITY_MPS2, Vector
+from mpucal.simulated.habits import JERK_MPS2, SWAY_HZ, TREMOR_HZ, Habits
 
 from .course import FLAT_S, Course, Rng, Span, direction, within
+from .shaking import PIVOT_HZ
 
 Push = tuple[Vector | float, Vector | float]
 Around = Callable[[Course, Rng], Push]
 
 
 @dataclass(frozen=True)
-class Hand:
-    """A hand with the sensor on a lever.
-
-    lever_m : least and most distance from the pivot. wobble : relative rms of its travel while moving.
-    sway_mps2, jerks_per_s : while moving. tremor_mps2, tremor_dps : rms an axis while holding, 2 to 10 Hz.
-    passes : how often the pivot changes place, as from one hand to the other.
-    """
+class Hand(Habits):
+    """A hand with the sensor on a lever; `passes`: how often the pivot changes place, as from one hand to the other."""
 
     lever_m: Span = (0.1, 0.3)
-    wobble: float = 0.0
-    sway_mps2: float = 0.3
-    jerks_per_s: float = 0.3
-    tremor_mps2: float = 0.0
-    tremor_dps: float = 0.0
     passes: int = 0
 
     def push(self, course: Course, rng: Rng) -> Push:
         """Sway and jerks while it moves, tremor while it holds."""
         n, step_s, moving = len(course.omega), course.step_s, course.moving[:, None]
-        world = self.sway_mps2 * moving * within(n, step_s, (0.5, 4.0), rng) if self.sway_mps2 else np.zeros((n, 3))
+        world = self.sway_mps2 * moving * within(n, step_s, SWAY_HZ, rng) if self.sway_mps2 else np.zeros((n, 3))
         for start in np.flatnonzero(rng.random(n) < self.jerks_per_s * step_s * course.moving).tolist():
             length = min(int(rng.uniform(0.05, 0.15) / step_s), n - start)
             pulse = np.sin(np.pi * (np.arange(length) + 0.5) / max(length, 1))
-            world[start : start + length] += rng.uniform(2.0, 6.0) * pulse[:, None] * direction(rng)
+            world[start : start + length] += rng.uniform(*JERK_MPS2) * pulse[:, None] * direction(rng)
         holding = course.after_flat[:, None] * (1.0 - moving)
         omega: Vector | float = 0.0
-        if self.tremor_mps2 or self.tremor_dps:
-            world += self.tremor_mps2 * holding * within(n, step_s, (2.0, 10.0), rng)
-            omega = np.radians(self.tremor_dps) * holding * within(n, step_s, (2.0, 10.0), rng)
+        if self.tremor_mps2 or self.tremor_rad_s:
+            world += self.tremor_mps2 * holding * within(n, step_s, TREMOR_HZ, rng)
+            omega = self.tremor_rad_s * holding * within(n, step_s, TREMOR_HZ, rng)
         return world, omega
 
     def lever(self, course: Course, rng: Rng) -> Vector:
@@ -57,7 +49,7 @@ class Hand:
         r = np.tile(rng.uniform(*self.lever_m) * direction(rng), (n, 1))
         if self.wobble:
             rms = self.wobble * np.linalg.norm(r[0]) / np.sqrt(3.0)
-            r += rms * course.moving[:, None] * within(n, course.step_s, (0.05, 0.4), rng)
+            r += rms * course.moving[:, None] * within(n, course.step_s, PIVOT_HZ, rng)
         for at in rng.uniform(FLAT_S, course.t[-1], self.passes):
             share = np.clip((course.t - at) / 0.6, 0.0, 1.0)
             r += (share**3 * (10 - 15 * share + 6 * share**2))[:, None] * rng.uniform(*self.lever_m) * direction(rng)

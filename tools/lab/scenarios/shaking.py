@@ -7,6 +7,8 @@ import numpy as np
 from mpucal.data import Vector
 from mpucal.simulated.habits import JERK_MPS2, JERK_S, SWAY_HZ, TREMOR_HZ, Habits, swing
 
+from .course import direction
+
 PIVOT_HZ = (0.05, 0.4)
 
 
@@ -32,12 +34,11 @@ def tremor(habits: Habits, holding: Vector, step_s: float, rng: np.random.Genera
 
 def _lever(habits: Habits, moving: Vector, step_s: float, rng: np.random.Generator) -> Vector:
     """Where the sensor is from the pivot (n, 3) [m], in the body."""
-    direction = rng.standard_normal(3)
-    length = rng.uniform(*habits.lever_m)
+    along, length = direction(rng), rng.uniform(*habits.lever_m)
     # an rms of wobble * length over three axes
     rms = habits.wobble * length / np.sqrt(3.0)
     travel = rms * moving[:, None] * band_noise(len(moving), step_s, PIVOT_HZ, rng)
-    return np.asarray(length * direction / np.linalg.norm(direction) + travel)
+    return np.asarray(length * along + travel)
 
 
 def _jerks(habits: Habits, moving: Vector, step_s: float, rng: np.random.Generator) -> Vector:
@@ -46,9 +47,8 @@ def _jerks(habits: Habits, moving: Vector, step_s: float, rng: np.random.Generat
     a = np.zeros((n, 3))
     for start in np.flatnonzero(rng.random(n) < habits.jerks_per_s * step_s * moving).tolist():
         length = min(int(rng.uniform(*JERK_S) / step_s), n - start)
-        direction = rng.standard_normal(3)
-        direction *= rng.uniform(*JERK_MPS2) / np.linalg.norm(direction)
-        a[start : start + length] += np.sin(np.pi * (np.arange(length) + 0.5) / length)[:, None] * direction
+        peak = direction(rng) * rng.uniform(*JERK_MPS2)
+        a[start : start + length] += np.sin(np.pi * (np.arange(length) + 0.5) / length)[:, None] * peak
     return a
 
 

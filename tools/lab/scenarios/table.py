@@ -21,7 +21,7 @@ from .family import PLAIN, SHARP, Family
 from .sampling import Sampling
 from .sensors import Chip
 
-TREMBLING = Hand(tremor_mps2=0.1, tremor_dps=0.6)
+TREMBLING = Hand(tremor_mps2=0.1, tremor_rad_s=math.radians(0.6))
 # what turns about the sensor itself, and shakes nothing
 STEADY = Hand(lever_m=(0.0, 0.0), sway_mps2=0.0, jerks_per_s=0.0)
 QUIET = Chip(accel_noise_ug=1.0, gyro_noise_dps=1e-4, bits=0, name=None)
