@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import pytest
@@ -35,11 +36,11 @@ def mpucal(capsys, tmp_path, monkeypatch):
 
 @pytest.fixture(scope="session")
 def process():
-    """Call it as a process of its own, in a folder."""
+    """Call it, or another program, as a process of its own in a folder."""
 
-    def call(folder: Path, *words):
+    def call(folder: Path, *words, program=("-m", "mpucal")):
         done = subprocess.run(
-            [sys.executable, "-m", "mpucal", *map(str, words)], cwd=folder, capture_output=True, text=True, check=False
+            [sys.executable, *program, *map(str, words)], cwd=folder, capture_output=True, text=True, check=False
         )
         return Result(done.returncode, done.stdout, done.stderr)
 
@@ -53,9 +54,42 @@ class Session:
 
 
 @pytest.fixture(scope="session")
-def session(tmp_path_factory, process):
-    """One whole session on the simulated chip."""
-    folder = tmp_path_factory.mktemp("session")
-    return Session(
-        folder / "board", process(folder, "session", "--bus", "sim", "--seed", "3", "--rate", "100", "-o", "board")
-    )
+def session(once, process):
+    """One whole session on the simulated chip; nothing is to be changed in its folder."""
+
+    def make(folder):
+        words = ("session", "--bus", "sim", "--seed", "3", "--rate", "100", "-o", "board")
+        (folder / "result.json").write_text(json.dumps(asdict(process(folder, *words))))
+
+    folder = once("cli-session", make)
+    return Session(folder / "board", Result(**json.loads((folder / "result.json").read_text())))
+
+
+class Served:
+    """A program of this folder that adds to mpucal's tables: a process that runs one command line after the other."""
+
+    def __init__(self, program: str) -> None:
+        words = [sys.executable, Path(__file__).with_name("served.py"), program]
+        self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def __call__(self, folder: Path, *words) -> Result:
+        assert self._process.stdin and self._process.stdout
+        print(json.dumps([str(folder), *map(str, words)]), file=self._process.stdin, flush=True)
+        return Result(*json.loads(self._process.stdout.readline()))
+
+    def end(self) -> None:
+        self._process.communicate()
+
+
+@pytest.fixture(scope="module")
+def served():
+    """served(program): see Served."""
+    begun = []
+
+    def call(program):
+        begun.append(Served(program))
+        return begun[-1]
+
+    yield call
+    for each in begun:
+        each.end()

@@ -63,6 +63,11 @@ ROW = SinkKind(
     flags=(Flag("ink", "write it in ink."),),
 )
 
-if __name__ == "__main__":
+
+def add():
     SINKS[ROW.name] = ROW
+
+
+if __name__ == "__main__":
+    add()
     sys.exit(run(sys.argv[1:]))

@@ -1,8 +1,6 @@
 """A source that is one module and one row is known to every command that takes a source."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,19 +15,19 @@ TURNTABLE = ("--turntable", "round", "--arm-length", "0.25")
 COMMANDS = ("session", "record", "stream", "write", "show", "doctor")
 
 
-def call(folder, *words):
+@pytest.fixture(scope="module")
+def call(served):
     """The command line of a program that has the row of the turntable, too."""
-    return subprocess.run(
-        [sys.executable, PROGRAM, *map(str, words)], cwd=folder, capture_output=True, text=True, check=False
-    )
+    return served(PROGRAM.stem)
 
 
 @pytest.fixture(scope="module")
-def measured(tmp_path_factory):
+def measured(tmp_path_factory, process):
     """A folder in which a session on the turntable has left its results."""
     folder = tmp_path_factory.mktemp("turntable")
-    done = call(folder, "session", *TURNTABLE, "--rate", "100", "-o", "board", "--yes")
-    assert done.returncode == 0, done.stderr
+    words = ("session", *TURNTABLE, "--rate", "50", "--target", "quick", "-o", "board", "--yes")
+    done = process(folder, *words, program=(PROGRAM,))
+    assert done.code == 0, done.err
     return folder
 
 
@@ -37,17 +35,17 @@ def test_a_session_runs_on_it_and_its_capture_names_it(measured):
     assert Calibration.load(measured / "board" / "calibration.json").quality["verdict"] == "good"
     meta = read_capture(measured / "board" / "capture.mcap").meta
     assert meta["source"] == {"turntable": "round", "arm_length": 0.25}
-    assert meta["plan"]["config"]["rate_hz"] == 100
+    assert meta["plan"]["config"]["rate_hz"] == 50
 
 
-def test_the_session_is_replayed(measured, tmp_path):
+def test_the_session_is_replayed(call, measured, tmp_path):
     done = call(tmp_path, "session", "--replay", measured / "board" / "capture.mcap", "-o", "again", "--yes")
-    assert done.returncode == 0, done.stderr
+    assert done.code == 0, done.err
     found = [Calibration.load(folder / "calibration.json").D for folder in (measured / "board", tmp_path / "again")]
     assert np.array_equal(*found)
 
 
-def test_a_session_that_broke_off_goes_on_with_it(measured, tmp_path):
+def test_a_session_that_broke_off_goes_on_with_it(call, measured, tmp_path):
     whole = read_capture(measured / "board" / "capture.mcap")
     (tmp_path / "board").mkdir()
     with CaptureWriter(tmp_path / "board" / "capture.mcap") as writer:
@@ -58,41 +56,41 @@ def test_a_session_that_broke_off_goes_on_with_it(measured, tmp_path):
             else:
                 writer.transaction(record)
     done = call(tmp_path, "session", "--resume", "board", "--yes")
-    assert done.returncode == 0, done.stderr
+    assert done.code == 0, done.err
     assert read_capture(tmp_path / "board" / "capture-2.mcap").meta["source"] == whole.meta["source"]
 
 
-def test_it_is_recorded(tmp_path):
+def test_it_is_recorded(call, tmp_path):
     done = call(tmp_path, "record", *TURNTABLE, "--seconds", "3", "-o", "walk.mcap")
-    assert done.returncode == 0, done.stderr
-    assert call(tmp_path, "show", "walk.mcap").stdout.startswith("walk.mcap: a recording.")
+    assert done.code == 0, done.err
+    assert call(tmp_path, "show", "walk.mcap").out.startswith("walk.mcap: a recording.")
 
 
-def test_it_streams(measured, tmp_path):
+def test_it_streams(call, measured, tmp_path):
     calibration = measured / "board" / "calibration.json"
     done = call(tmp_path, "stream", *TURNTABLE, "--apply", calibration, "--seconds", "2", "--json")
-    assert done.returncode == 0, done.stderr
-    at_rest = np.array([json.loads(line)["a"] for line in done.stdout.splitlines()])
+    assert done.code == 0, done.err
+    at_rest = np.array([json.loads(line)["a"] for line in done.out.splitlines()])
     assert np.linalg.norm(at_rest.mean(axis=0)) == pytest.approx(9.80665, abs=0.03)
 
 
-def test_its_chip_is_shown_and_written_to(measured, tmp_path):
-    shown = json.loads(call(tmp_path, "show", *TURNTABLE, "--json").stdout)
+def test_its_chip_is_shown_and_written_to(call, measured, tmp_path):
+    shown = json.loads(call(tmp_path, "show", *TURNTABLE, "--json").out)
     assert (shown["where"], shown["chip"]) == ("the chip on round", "MPU-6050")
     written = call(tmp_path, "write", measured / "board" / "calibration.json", "chip", *TURNTABLE, "-o", ".", "--json")
-    assert written.returncode == 0, written.stderr
-    assert json.loads(written.stdout)["written"][0]["where"] == "the chip on round"
+    assert written.code == 0, written.err
+    assert json.loads(written.out)["written"][0]["where"] == "the chip on round"
 
 
-def test_the_doctor_examines_it(tmp_path):
-    page = json.loads(call(tmp_path, "doctor", *TURNTABLE, "--seconds", "2", "--json").stdout)
+def test_the_doctor_examines_it(call, tmp_path):
+    page = json.loads(call(tmp_path, "doctor", *TURNTABLE, "--seconds", "2", "--json").out)
     assert page["source"] == "round"
     assert {"chip", "self test"} <= {finding["topic"] for finding in page["findings"]}
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_the_help_names_it(tmp_path, command):
-    said = " ".join(call(tmp_path, command, "--help").stdout.split())
+def test_the_help_names_it(call, tmp_path, command):
+    said = " ".join(call(tmp_path, command, "--help").out.split())
     assert "--turntable NAME The name of a turntable." in said
     assert "--arm-length M How far out the chip is [m]." in said
 
@@ -118,8 +116,8 @@ def test_the_help_names_it(tmp_path, command):
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_what_is_wrong_is_told_with_its_name(tmp_path, words, code, says):
+def test_what_is_wrong_is_told_with_its_name(call, tmp_path, words, code, says):
     done = call(tmp_path, *words)
-    assert done.returncode == code
-    assert says in done.stderr
+    assert done.code == code
+    assert says in done.err
     assert not list(tmp_path.iterdir())

@@ -4,6 +4,7 @@ import json
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -17,29 +18,37 @@ from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.result.calibration import Calibration
 
 STORED = Path(__file__).parents[2] / "fixtures" / "sessions" / "enter.mcap"
+HELD = Path(__file__).with_name("held.py")
 WORDS = ("session", "--json-events", "--yes")
 
 
-def interrupted(folder, sign, after_s, *options):
-    """A session that gets the signal as soon as it says that `after_s` has come; when it stopped talking."""
-    words = [sys.executable, "-m", "mpucal", *WORDS, "--bus", "sim", "--rate", "50", "-o", str(folder), *options]
-    with subprocess.Popen(words, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as program:
-        t_s, sent = 0.0, False
-        for line in program.stderr:
-            if not line.startswith("{"):
-                continue
-            t_s = max(t_s, json.loads(line).get("t_s", 0.0))
-            if t_s >= after_s and not sent:
-                program.send_signal(sign)
-                sent = True
-                if sign == signal.SIGKILL:
-                    break
-    return t_s
+def interrupted(folder, sign, held, *options):
+    """A session in `folder` that gets the signal while it is held at a step; how far it had come then [s]."""
+    said = folder / "said.jsonl"
+    with (
+        said.open("w") as stderr,
+        subprocess.Popen(
+            [sys.executable, HELD, *held, *WORDS, *options], cwd=folder, stderr=stderr, stdout=subprocess.DEVNULL
+        ) as program,
+    ):
+        while not (folder / "held").exists():
+            assert program.poll() is None
+            time.sleep(0.01)
+        program.send_signal(sign)
+        (folder / "go").touch()
+    for name in ("held", "go"):
+        (folder / name).unlink()
+    events = [json.loads(line) for line in said.read_text().splitlines() if line.startswith("{")]
+    return max(event.get("t_s", 0.0) for event in events)
 
 
-def joined(folder):
-    """One capture with the records of both."""
-    captures = [read_capture(folder / name) for name in ("capture.mcap", "capture-2.mcap")]
+def last_s(capture):
+    return read_capture(capture).records[-1].t_ns * 1e-9
+
+
+def joined(folder, names):
+    """One capture with the records of all."""
+    captures = [read_capture(folder / name) for name in names]
     path = folder.parent / "joined.mcap"
     with CaptureWriter(path) as writer:
         writer.start(captures[0].meta)
@@ -51,29 +60,30 @@ def joined(folder):
     return path
 
 
-@pytest.mark.parametrize(
-    ("sign", "after_s"),
-    [(signal.SIGKILL, 6.0), (signal.SIGINT, 34.0)],
-    ids=["killed while flat", "Ctrl-C while rotating"],
-)
-def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, tmp_path, sign, after_s):
+def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, tmp_path):
+    """Killed while flat, and stopped with Ctrl-C while rotating."""
     folder = tmp_path / "board"
-    come_to_s = interrupted(folder, sign, after_s, "--name", "Bench 7")
-    whole_s = read_capture(folder / "capture.mcap").records[-1].t_ns * 1e-9
-    assert come_to_s - whole_s < 1.0
+    words = ("--bus", "sim", "--rate", "50", "--target", "quick", "-o", "board", "--name", "Bench 7")
+    killed_s = interrupted(tmp_path, signal.SIGKILL, ("flat", "150"), *words)
+    assert killed_s > 3.0
+    assert killed_s - last_s(folder / "capture.mcap") < 1.0
+    stopped_s = interrupted(tmp_path, signal.SIGINT, ("rotate", "400"), "--resume", "board")
+    assert stopped_s > 20.0
+    assert stopped_s - last_s(folder / "capture-2.mcap") < 1.0
 
     resumed = mpucal(*WORDS, "--resume", folder)
     assert resumed.code == 0, resumed.err
-    said = [json.loads(line) for line in resumed.err.splitlines() if line.startswith("{")]
-    assert said[0]["event"] in ("note", "decision")
-    assert "the session resumes where it stopped" in resumed.err
-    prompts = [event["kind"] for event in said if event["event"] == "prompt"]
-    assert prompts[0] == ("lay_flat" if after_s < 10 else "rotate")
+    for err, begins in (((tmp_path / "said.jsonl").read_text(), "lay_flat"), (resumed.err, "rotate")):
+        said = [json.loads(line) for line in err.splitlines() if line.startswith("{")]
+        assert said[0]["event"] in ("note", "decision")
+        assert "the session resumes where it stopped" in err
+        prompts = [event["kind"] for event in said if event["event"] == "prompt"]
+        assert prompts[0] == begins
     assert prompts[-2:] == ["verify", "rest"]
 
     found = Calibration.load(folder / "calibration.json")
     assert found.extra["name"] == "Bench 7"
-    parts, unbroken = load(folder), load(joined(folder))
+    parts, unbroken = load(folder), load(joined(folder, ("capture.mcap", "capture-2.mcap", "capture-3.mcap")))
     for name in Samples.__dataclass_fields__:
         assert np.array_equal(getattr(parts, name), getattr(unbroken, name), equal_nan=name == "temperature_c")
     other = calibrate(unbroken)

@@ -32,8 +32,13 @@ ROW = SourceKind(
     doctor="mpucal.doctor.sources:examine_chip",
 )
 
+
+def add():
+    SOURCES.append(ROW)
+
+
 if __name__ == "__main__":
     # what the row names is this module, and not another copy of it
     sys.modules["turntable"] = sys.modules["__main__"]
-    SOURCES.append(ROW)
+    add()
     sys.exit(run(sys.argv[1:]))
