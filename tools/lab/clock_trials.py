@@ -1,12 +1,10 @@
 """Bridges whose clocks are off: how well their rate, K and D are found, and whether within what is claimed.
 
-python -m tools.lab clock_trials [SESSIONS [FIRST_SEED]]     -1 to +1 %, drifts of 50 ppm a minute, bursts of 1 to 16 ms
+python -m tools.lab clock_trials --seeds 5000:5200     # -1 to +1 %, drifts of 50 ppm a minute, bursts of 1 to 16 ms
 """
 
 from __future__ import annotations
 
-import multiprocessing
-import sys
 from typing import Any
 
 import numpy as np
@@ -18,6 +16,9 @@ from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.clock import FastClock
 from mpucal.sources.bridge.bus import BridgeBus
+
+from .judge import rms
+from .trials import command_line, in_parallel
 
 SECONDS, FLAT_S, MS = 75.0, 12.0, 1_000_000
 
@@ -59,11 +60,8 @@ def trial(seed: int) -> tuple[str, dict[str, list[float]]]:
 
 def main() -> None:
     """Print a line a session, and rms values of all."""
-    sessions, first = (int(word) for word in (sys.argv[1:] + ["20", "0"][len(sys.argv) - 1 :]))
-    z: dict[str, list[float]] = {"ppm": [], "K": [], "D": []}
-    with multiprocessing.Pool() as pool:
-        for line, errors in pool.imap(trial, range(first, first + sessions)):
-            print(line, flush=True)
-            for name, each in errors.items():
-                z[name] += each
-    print("rms z: " + ", ".join(f"{name} {np.sqrt(np.nanmean(np.square(each))):.2f}" for name, each in z.items()))
+    asked = command_line(__doc__).parse_args()
+    lines, errors = zip(*in_parallel(trial, asked.seeds, asked.jobs), strict=True)
+    print(*lines, sep="\n")
+    z = {name: rms([value for each in errors for value in each[name]]) for name in errors[0]}
+    print("rms z: " + ", ".join(f"{name} {value:.2f}" for name, value in z.items()))

@@ -13,40 +13,38 @@ degrees, and looks again.
 
 from __future__ import annotations
 
-import argparse
 import math
-import multiprocessing
-import os
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from mpucal.calibration import calibrate
-from mpucal.chip.driver import Driver
 from mpucal.data import Vector
-from mpucal.errors import Abandoned
 from mpucal.page.state import HOLD, state
+from mpucal.result.calibration import GOOD
 from mpucal.session.attitude import matrix
 from mpucal.session.events import Countdown, Held, Key, Meter, Output, Progress, Prompt, PromptKind
 from mpucal.session.plan import Plan
-from mpucal.session.runner import Runner
 from mpucal.session.way import WAYS
 from mpucal.simulated import rotation as quaternions
-from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.hand import MISS_RAD, ON_THE_TABLE, REACTION_S, Stance
 from mpucal.simulated.hands import KINDS, Guided
 from mpucal.simulated.legs import STEP_S, Leg
 from mpucal.terminal.view import NEAR_DEG, View
 
+from .sessions import session
+from .table import grouped, show, table
+from .trials import command_line, in_parallel
+
 BEYOND_DEG = 20.0
 COUNT = re.compile(r"(\d+) of (\d+)")
 BY_WORDS = "by words"
 LOOKS_S = 0.25
+SLOWEST = 1.2
 
 
 class ByWords(Guided):
@@ -154,46 +152,48 @@ def angle(a: Any, b: Any) -> float:
 class Trial:
     """How one session went."""
 
+    hand: str
     verdict: str
     finished_s: float
     holds: int
     wrong: Counter[str]
 
 
-def run(hand: str, seed: int) -> Trial:
-    """One session, watched."""
-    plan, watcher = Plan(), Watcher()
-    bus = open_simulated(f"sim:hand={hand}", plan.gravity, seed)
-    runner = Runner(Driver(bus, plan.config), watcher, lambda *_: None, plan, (bus.hear,))
-    try:
-        recording = runner.measure()
-    except Abandoned:
-        return Trial("abandoned", math.nan, watcher.holds, watcher.wrong)
-    verdict = runner.calibrate(recording, partial(calibrate, model=plan.model, gravity=plan.gravity)).verdict
-    return Trial(verdict, watcher.finished_s, watcher.holds, watcher.wrong)
+def run(item: tuple[str, int]) -> Trial:
+    """One session in a hand, watched."""
+    hand, seed = item
+    watcher = Watcher()
+    verdict = session(f"sim:hand={hand}", Plan(), seed, watcher).judged().verdict
+    return Trial(hand, verdict, watcher.finished_s, watcher.holds, watcher.wrong)
+
+
+def typical_s(trials: Sequence[Trial]) -> float:
+    """The median time to the verdict of good ones [s]."""
+    return float(np.median([trial.finished_s for trial in trials if trial.verdict == GOOD] or [math.nan]))
+
+
+def total_wrong(trials: Sequence[Trial]) -> Counter[str]:
+    """What was wrong, and how often."""
+    return sum((trial.wrong for trial in trials), Counter())
+
+
+COLUMNS: dict[str, Callable[[Sequence[Trial]], Any]] = {
+    "sessions": len,
+    "good": lambda trials: sum(trial.verdict == GOOD for trial in trials),
+    "median s": typical_s,
+    "holds": lambda trials: sum(trial.holds for trial in trials),
+    "wrong": lambda trials: ", ".join(f"{n} {what}" for what, n in total_wrong(trials).items()) or "nothing",
+}
 
 
 def main() -> int:
     """Run them; 1 where something was shown wrong, or words take too long."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=20)
+    parser = command_line(__doc__)
     parser.add_argument("--hand", nargs="*", default=list(KINDS), choices=list(KINDS))
-    parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    arguments = parser.parse_args()
-    finished, wrong = {}, Counter[str]()
-    with multiprocessing.get_context("fork").Pool(arguments.jobs) as pool:
-        for hand in arguments.hand:
-            trials = pool.map(partial(run, hand), range(arguments.seeds))
-            found = sum((trial.wrong for trial in trials), Counter())
-            good = [trial.finished_s for trial in trials if trial.verdict == "good"]
-            finished[hand] = float(np.median(good)) if good else math.nan
-            holds = sum(trial.holds for trial in trials)
-            said = ", ".join(f"{n} {what}" for what, n in found.items()) or "nothing wrong"
-            print(
-                f"{hand:<10} {len(good):>3} good, {finished[hand]:6.1f} s in the median; {holds} holds: {said}",
-                flush=True,
-            )
-            wrong += found
-    ratio = finished.get(BY_WORDS, math.nan) / finished.get("guided", math.nan)
+    asked = parser.parse_args()
+    found = list(in_parallel(run, product(asked.hand, asked.seeds), asked.jobs))
+    trials = grouped(found, lambda trial: trial.hand)
+    show(table(trials, COLUMNS))
+    ratio = typical_s(trials.get(BY_WORDS, [])) / typical_s(trials.get("guided", []))
     print(f"by words in {ratio:.2f} times the time of the hand that is given the orientation")
-    return 1 if wrong or ratio > 1.2 else 0
+    return 1 if total_wrong(found) or ratio > SLOWEST else 0

@@ -1,6 +1,6 @@
 """Kill sessions at random points, resume them, and compare with the same bytes unbroken.
 
-python -m tools.lab kill_trials --trials 10
+python -m tools.lab kill_trials --seeds 10
 
 Each session runs in a process of its own on the simulated chip, is killed (SIGKILL) as soon as it says that a random
 time has come, and is resumed into a second capture file. Then `mpucal calibrate` of its folder must give the D and b_a
@@ -9,13 +9,13 @@ of the session, and those of one capture that holds the records of both; and no 
 
 from __future__ import annotations
 
-import argparse
 import json
 import random
 import signal
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +27,9 @@ from mpucal.files.folder import captures_in
 from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.result.calibration import Calibration
 
-LONGEST_LOST_S = 1.0
+from .trials import command_line, in_parallel
+
+KILLED_S, LONGEST_LOST_S = (0.5, 60.0), 1.0
 
 
 def session(*words: object) -> list[str]:
@@ -62,36 +64,31 @@ def joined(folder: Path) -> Path:
     return path
 
 
-def trial(t_s: float, folder: Path, seed: int, rate_hz: float) -> tuple[float, str, bool]:
-    """Seconds lost, the verdict in the end, and whether all three ways give the same numbers."""
-    come_to_s = killed_at(t_s, folder, seed, rate_hz)
-    records = read_capture(folder / "capture.mcap").records
-    lost_s = come_to_s - (records[-1].t_ns * 1e-9 if records else 0.0)
-    resumed = subprocess.run(session("--resume", folder), capture_output=True, text=True, check=False)
-    if resumed.returncode not in (0, 5):
-        return lost_s, f"exit {resumed.returncode}: {resumed.stderr.splitlines()[-1]}", False
-    found = Calibration.load(folder / "calibration.json")
-    others = [calibrate(load(folder)), calibrate(load(joined(folder)))]
+def trial(seed: int, rate_hz: float) -> tuple[str, bool]:
+    """How one went, and whether it may go so: as much is kept as may be, and all three ways give the same numbers."""
+    t_s = random.Random(seed).uniform(*KILLED_S)
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place) / "board"
+        come_to_s = killed_at(t_s, folder, seed, rate_hz)
+        records = read_capture(folder / "capture.mcap").records
+        lost_s = max(come_to_s - (records[-1].t_ns * 1e-9 if records else 0.0), 0.0)
+        killed = f"killed at {t_s:5.1f} s: lost {lost_s:.2f} s"
+        resumed = subprocess.run(session("--resume", folder), capture_output=True, text=True, check=False)
+        if resumed.returncode not in (0, 5):
+            return f"{killed}, exit {resumed.returncode}: {resumed.stderr.splitlines()[-1]}", False
+        found = Calibration.load(folder / "calibration.json")
+        others = [calibrate(load(folder)), calibrate(load(joined(folder)))]
     same = all(np.array_equal(found.D, other.D) and np.array_equal(found.b_a, other.b_a) for other in others)
-    return lost_s, found.verdict, same
+    return f"{killed}, resumed to {found.verdict}, same bits: {same}", same and lost_s <= LONGEST_LOST_S
 
 
 def main() -> int:
     """Run them; 1 where one lost more than it may, or differs."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--trials", type=int, default=10)
-    parser.add_argument("--seed", type=int, default=1)
+    parser = command_line(__doc__, "1:11")
     parser.add_argument("--rate", type=float, default=100.0)
-    arguments = parser.parse_args()
-    times = random.Random(arguments.seed)
-    wrong = 0
-    for n in range(arguments.trials):
-        with tempfile.TemporaryDirectory() as folder:
-            t_s = times.uniform(0.5, 60.0)
-            lost_s, verdict, same = trial(t_s, Path(folder) / "board", arguments.seed + n, arguments.rate)
-        wrong += not same or lost_s > LONGEST_LOST_S
-        print(
-            f"killed at {t_s:5.1f} s: lost {max(lost_s, 0.0):.2f} s, resumed to {verdict}, same bits: {same}",
-            flush=True,
-        )
-    return min(wrong, 1)
+    asked = parser.parse_args()
+    right = True
+    for text, good in in_parallel(partial(trial, rate_hz=asked.rate), asked.seeds, asked.jobs):
+        print(text, flush=True)
+        right &= good
+    return int(not right)
