@@ -42,7 +42,7 @@ class Family:
 
     Attributes
     ----------
-    name : without a comma. wanted : of the verdicts; a false one is never right.
+    name : without a semicolon. wanted : of the verdicts; a false one is never right.
     motion : how the board is turned. hand : what holds it. around : what moves it besides.
     chip, sampling : the sensor and how it is sampled.
     faults, digits, timing : what befalls values, words and their delivery, in this order each.
