@@ -65,11 +65,19 @@ def register():
 
 
 if __name__ == "__main__":
+    import io
+    import json
+    from contextlib import redirect_stderr, redirect_stdout
+
     import made_up
     from mpucal.__main__ import run
 
     made_up.register()
-    sys.exit(run(sys.argv[1:]))
+    said = []
+    for words in json.loads(sys.argv[1]):
+        with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
+            said.append((run(words), out.getvalue(), err.getvalue()))
+    print(json.dumps(said))
 """
 
 
@@ -78,6 +86,7 @@ def folder(tmp_path_factory):
     """Where the made-up formats are, with a recording and its calibration."""
     folder = tmp_path_factory.mktemp("formats")
     (folder / "made_up.py").write_text(MADE_UP)
+    (folder / "notes.odt").write_text("hello")
     whole = mpucal.load(FIXTURE)
     table = np.column_stack([whole.t, whole.acc, whole.gyr])
     np.savetxt(folder / "walk.words", table)
@@ -87,56 +96,62 @@ def folder(tmp_path_factory):
     return folder
 
 
+CALLS = (
+    ("calibrate", "walk.words", "-o", "results", "--json"),
+    ("calibrate", str(FIXTURE), "--json"),
+    ("show", "walk.words", "--json"),
+    ("show", "walk.csv", "--json"),
+    ("show", "notes.odt"),
+    ("apply", "results/calibration.json", "walk.words", "-o", "out.words"),
+    ("apply", "results/calibration.json", "walk.csv", "-o", "ms.words"),
+    ("apply", "results/calibration.json", "walk.words", "-o", "out.txt"),
+    *((command, "--help") for command in ("calibrate", "show", "apply")),
+)
+
+
 @pytest.fixture(scope="module")
 def call(folder):
-    def call(*words):
-        return subprocess.run(
-            [sys.executable, "made_up.py", *words], cwd=folder, capture_output=True, text=True, check=False
-        )
-
-    return call
-
-
-@pytest.fixture(scope="module")
-def calibrated(call):
-    return call("calibrate", "walk.words", "-o", "results", "--json")
+    """What each of CALLS exits with and says, one after the other in a process that knows the made-up formats."""
+    words = [sys.executable, "made_up.py", json.dumps(CALLS)]
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=True)
+    said = dict(zip(CALLS, json.loads(done.stdout), strict=True))
+    return lambda *words: said[words]
 
 
-def test_it_is_calibrated(calibrated, call):
-    found = json.loads(calibrated.stdout)
-    wanted = json.loads(call("calibrate", FIXTURE, "--json").stdout)
+def test_it_is_calibrated(call):
+    found = json.loads(call("calibrate", "walk.words", "-o", "results", "--json")[1])
+    wanted = json.loads(call("calibrate", str(FIXTURE), "--json")[1])
     assert found["fit"]["samples"] == wanted["fit"]["samples"]
     np.testing.assert_allclose(found["accelerometer"]["D"], wanted["accelerometer"]["D"], atol=1e-3)
 
 
 @pytest.mark.parametrize("name", ["walk.words", "walk.csv"])
 def test_it_is_shown(call, name):
-    shown, whole = json.loads(call("show", name, "--json").stdout), mpucal.load(FIXTURE)
+    shown, whole = json.loads(call("show", name, "--json")[1]), mpucal.load(FIXTURE)
     assert shown["samples"] == len(whole)
     assert shown["seconds"] == pytest.approx(whole.t[-1] - whole.t[0])
 
 
 @pytest.mark.parametrize(("source", "target"), [("walk.words", "out.words"), ("walk.csv", "ms.words")])
-def test_it_is_applied_to_and_written(calibrated, call, folder, source, target):
-    done = call("apply", "results/calibration.json", source, "-o", target)
-    assert done.returncode == 0, done.stderr
+def test_it_is_applied_to_and_written(call, folder, source, target):
+    code, _, error = call("apply", "results/calibration.json", source, "-o", target)
+    assert code == 0, error
     acc = mpucal.Calibration.load(folder / "results" / "calibration.json").apply(mpucal.load(FIXTURE).acc)
     np.testing.assert_allclose(np.loadtxt(folder / target)[:, 1:4], acc, atol=1e-9)
 
 
 @pytest.mark.parametrize("command", ["calibrate", "show", "apply"])
 def test_the_help_names_it(call, command):
-    said = " ".join(call(command, "--help").stdout.split())
+    said = " ".join(call(command, "--help")[1].split())
     assert "a page of words (.words)" in said
     assert ("a table in ms (.csv)" in said) == (command != "apply")
 
 
-def test_errors_name_it(calibrated, call, folder):
-    (folder / "notes.odt").write_text("hello")
-    assert re.search(r"give a [^:]*\.words file or the folder", call("show", "notes.odt").stderr)
-    done = call("apply", "results/calibration.json", "walk.words", "-o", "out.txt")
-    assert done.returncode == 3
-    assert re.search(r"end it with .*\.words", done.stderr)
+def test_errors_name_it(call):
+    assert re.search(r"give a [^:]*\.words file or the folder", call("show", "notes.odt")[2])
+    code, _, error = call("apply", "results/calibration.json", "walk.words", "-o", "out.txt")
+    assert code == 3
+    assert re.search(r"end it with .*\.words", error)
 
 
 def two(path):

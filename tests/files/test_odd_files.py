@@ -71,10 +71,11 @@ def test_steps_that_no_sensor_takes(tmp_path, step):
 
 
 def test_times_in_small_integers_do_not_wrap(tmp_path, walk):
-    made = pd.DataFrame(np.column_stack([walk.acc, walk.gyr]), columns=NAMES[1:])[:4000]
-    made.insert(0, "t [ms]", (np.arange(4000) * 10 - 20_000).astype(np.int16))
+    n = 3 * len(walk)  # 42 s
+    made = pd.DataFrame(np.tile(np.column_stack([walk.acc, walk.gyr]), (3, 1)), columns=NAMES[1:])
+    made.insert(0, "t [ms]", (np.arange(n) * 10 - 20_000).astype(np.int16))
     made.to_parquet(tmp_path / "a.parquet")
-    np.testing.assert_allclose(mpucal.load(tmp_path / "a.parquet").t, np.arange(4000) / 100, atol=1e-12)
+    np.testing.assert_allclose(mpucal.load(tmp_path / "a.parquet").t, np.arange(n) / 100, atol=1e-12)
 
 
 def test_a_parquet_file_without_lines(tmp_path):

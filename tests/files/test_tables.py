@@ -109,15 +109,19 @@ DIALECTS = {
 }
 
 
-@pytest.mark.parametrize(("separator", "called"), [(",", ""), (";", "separated by semicolons"), ("\t", "by tabs")])
-@pytest.mark.parametrize("dialect", DIALECTS)
-def test_dialects_give_the_samples_that_were_written(dialect, separator, called, walk, walk_ns, assert_same, tmp_path):
+SEPARATORS = {",": "", ";": "separated by semicolons", "\t": "by tabs"}
+# each dialect with its commas; the others where there are blanks in names, brackets, dates
+SEPARATED = [(d, s) for d in DIALECTS for s in SEPARATORS if s == "," or d in ("EuRoC", "AndroSensor", "WitMotion")]
+
+
+@pytest.mark.parametrize(("dialect", "separator"), SEPARATED)
+def test_dialects_give_the_samples_that_were_written(dialect, separator, walk, walk_ns, assert_same, tmp_path):
     path = tmp_path / "walk.csv"
     DIALECTS[dialect](walk, walk_ns).to_csv(path, sep=separator, index=False)
     read = load(path)
     assert_same(read, walk, 1e-9, 1e-9, 1e-6 if dialect in ("ulog2csv", "WitMotion") else 1e-9)
     assert read.taken.startswith("Of walk.csv times in ")
-    assert called in read.taken
+    assert SEPARATORS[separator] in read.taken
 
 
 @pytest.mark.parametrize("ending", [".txt", ".tsv", ".log"])
