@@ -1,9 +1,13 @@
 """A calibration written into simulated vehicles: the new parameters or the old ones, and the exit code says which."""
 
+import copy
+import copyreg
 import os
 import re
 import signal
 from dataclasses import replace
+from functools import cache
+from struct import Struct
 from types import MappingProxyType
 
 import numpy as np
@@ -13,6 +17,7 @@ from hypothesis import strategies as st
 
 from mpucal.data import Autopilot
 from mpucal.errors import RecordingError, WriteBackError
+from mpucal.mavlink import stillness
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.document import autopilot_document
@@ -50,15 +55,35 @@ class Flying(SimulatedTransport):
         super().send(data, address)
 
 
-def vehicle_of(firmware, words=""):
-    """A vehicle that was set down, behind a locked link."""
+# pymavlink's MAVLink, which is copied with a link, holds some
+copyreg.pickle(Struct, lambda packing: (Struct, (packing.format,)))
+
+
+@cache
+def settled(firmware, words):
     vehicle = SimulatedVehicle(VehicleOptions.parse(f"sim:firmware={firmware}{words}"))
     transport = Flying(vehicle)
-    link = Link(transport, lambda t_ns, packet: None)
+    link = Link(transport, recorded_nowhere)
     link.lock(link.listen()[0])
     link.send(to_message(Heard("lay_flat", None)))
     list(link.messages(link.now_ns() + 4_000_000_000))
     return vehicle, transport, link
+
+
+def recorded_nowhere(t_ns, packet):
+    pass
+
+
+def vehicle_of(firmware, words=""):
+    """A vehicle that was set down, behind a locked link."""
+    return copy.deepcopy(settled(firmware, words))
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    """Looks at streams at rest for a fifth of the time, where what is written is looked at, and not what they show."""
+    monkeypatch.setattr(stillness, "WINDOW_NS", stillness.WINDOW_NS // 5)
+    monkeypatch.setattr(stillness, "FEWEST", stillness.FEWEST // 5)
 
 
 def calibration_of(vehicle):
@@ -120,6 +145,7 @@ def test_every_imu_reads_gravity_better_afterwards(firmware, words):
 
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
 def test_a_second_write_changes_nothing(firmware):
     vehicle, transport, link = vehicle_of(firmware, ",imus=1")
     sink = AutopilotSink(link)
@@ -130,6 +156,7 @@ def test_a_second_write_changes_nothing(firmware):
 
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
 def test_what_was_kept_is_put_back(firmware, tmp_path):
     vehicle, _, link = vehicle_of(firmware)
     sink = AutopilotSink(link)
@@ -181,6 +208,7 @@ def of_another_sensor(calibration):
     ids=lambda value: getattr(value, "__name__", None),
 )
 @pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
 def test_nothing_is_written_that_does_not_belong_there(firmware, change, why):
     vehicle, transport, link = vehicle_of(firmware, ",imus=1")
     with pytest.raises(WriteBackError, match=rf"nothing was written.*{why}"):
@@ -210,6 +238,7 @@ def test_a_vehicle_in_a_restless_hand_is_left_alone():
     assert transport.sets == 0
 
 
+@pytest.mark.usefixtures("brief")
 def test_an_imu_whose_fit_was_refused_keeps_its_parameters():
     vehicle, _, link = vehicle_of("ardupilot")
     calibration = calibration_of(vehicle)
@@ -223,6 +252,7 @@ def test_an_imu_whose_fit_was_refused_keeps_its_parameters():
 
 
 @pytest.mark.parametrize("ids", ["INS_ACC_ID=0,INS_ACC2_ID=0", "INS_ACC2_ID=4711"], ids=["none", "another's"])
+@pytest.mark.usefixtures("brief")
 def test_sensors_without_ids_of_their_own_are_given_theirs(ids):
     vehicle, _, link = vehicle_of("ardupilot", f",{ids}")
     assert vehicle.firmware.complaints() == ["PreArm: 3D Accel calibration needed"]
@@ -230,6 +260,7 @@ def test_sensors_without_ids_of_their_own_are_given_theirs(ids):
     assert vehicle.firmware.complaints() == []
 
 
+@pytest.mark.usefixtures("brief")
 def test_px4_uses_what_it_stores_though_the_change_is_small():
     # 0.004 m/s^2 from what is in use: PX4 would store it and go on as before
     vehicle, _, link = vehicle_of("px4", ",imus=1")
@@ -309,6 +340,7 @@ def reboot(transport, number):
     transport.befall = befall
 
 
+@pytest.mark.usefixtures("brief")
 @settings(max_examples=10)
 @given(
     firmware=st.sampled_from(FIRMWARES),
@@ -333,6 +365,7 @@ def test_whatever_happens_at_whichever_step_it_holds_the_old_or_the_new(firmware
 
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
 def test_a_vehicle_that_is_gone_cannot_be_put_back_and_that_is_said(firmware):
     vehicle, transport, link = vehicle_of(firmware, ",imus=1")
     calibration = calibration_of(vehicle)
@@ -349,6 +382,7 @@ def test_a_vehicle_that_is_gone_cannot_be_put_back_and_that_is_said(firmware):
 
 @pytest.mark.parametrize("words", ["", ",fault=loss"], ids=["", "one packet in five lost"])
 @pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
 def test_the_whole_d_is_kept_in_the_vehicles_storage(firmware, words):
     vehicle, _, link = vehicle_of(firmware, words)
     applied = AutopilotSink(link, store=True).write(calibration_of(vehicle))
@@ -360,6 +394,7 @@ def test_the_whole_d_is_kept_in_the_vehicles_storage(firmware, words):
         np.testing.assert_allclose(np.array(blob.D).reshape(3, 3), expected["D"], atol=1e-5)
 
 
+@pytest.mark.usefixtures("brief")
 def test_nothing_is_written_where_there_is_no_card():
     vehicle, transport, link = vehicle_of("ardupilot", ",fault=no_storage")
     with pytest.raises(WriteBackError, match=r"nothing was written.*card"):
@@ -367,6 +402,7 @@ def test_nothing_is_written_where_there_is_no_card():
     assert transport.sets == 0
 
 
+@pytest.mark.usefixtures("brief")
 def test_a_failed_write_leaves_no_file_behind():
     vehicle, _, link = vehicle_of("ardupilot", ",refuse=INS_ACCSCAL_Y")
     with pytest.raises(WriteBackError, match="old parameters are back"):
@@ -390,6 +426,7 @@ def test_px4s_slots_in_another_order_are_found_by_their_effect(words):
 
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
 def test_an_imu_that_would_not_become_better_keeps_its_parameters(firmware):
     vehicle, _, link = vehicle_of(firmware)
     sink = AutopilotSink(link)
@@ -425,6 +462,7 @@ class Killed(BaseException):
 
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGINT"])
 @pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
 def test_a_signal_in_the_middle_of_a_write_restores(firmware, name, tmp_path):
     vehicle, transport, link = vehicle_of(firmware, ",imus=1")
     old, numbers = stored(vehicle), []
@@ -451,6 +489,7 @@ def test_a_signal_in_the_middle_of_a_write_restores(firmware, name, tmp_path):
 
 @pytest.mark.parametrize("number", [1, 3, 5, 6])
 @pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.usefixtures("brief")
 def test_after_a_kill_the_next_write_finds_what_was_there(firmware, number, tmp_path):
     vehicle, transport, link = vehicle_of(firmware, ",imus=1")
     old, journal = stored(vehicle), Journal(tmp_path / "note.json")
@@ -474,6 +513,7 @@ def test_after_a_kill_the_next_write_finds_what_was_there(firmware, number, tmp_
     assert AutopilotSink(link, journal=journal).recover() is None
 
 
+@pytest.mark.usefixtures("brief")
 def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_off(tmp_path):
     vehicle, transport, link = vehicle_of("ardupilot", ",imus=1")
     journal = Journal(tmp_path / "note.json")
@@ -502,6 +542,7 @@ def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_
         ("ftp", "the address forged"),
     ],
 )
+@pytest.mark.usefixtures("brief")
 def test_nothing_is_set_that_was_not_asked_for(kind, attacker, monkeypatch):
     key = hostile.KEY if attacker == hostile.SIGNED else None
     vehicle = SimulatedVehicle(VehicleOptions.parse("sim:imus=1"), key=key)
@@ -526,6 +567,7 @@ def test_nothing_is_set_that_was_not_asked_for(kind, attacker, monkeypatch):
         assert value in (before, pytest.approx(new[name]))
 
 
+@pytest.mark.usefixtures("brief")
 def test_who_answers_in_the_vehicles_place_is_told_by_its_answers():
     vehicle, transport, link = vehicle_of("ardupilot", ",imus=1")
     impostor = dialect().MAVLink(None, 1, 1)

@@ -5,7 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.sources.bridge import frame, messages
@@ -62,6 +62,7 @@ def values(kind, draw):
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+@settings(max_examples=15)
 @given(data=st.data())
 def test_decode_is_the_inverse_of_payload(kind, data):
     message = kind(*values(kind, data.draw))
@@ -70,6 +71,7 @@ def test_decode_is_the_inverse_of_payload(kind, data):
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+@settings(max_examples=15)
 @given(data=st.data())
 def test_every_shorter_payload_is_rejected(kind, data):
     payload = kind(*values(kind, data.draw)).payload()
@@ -79,6 +81,7 @@ def test_every_shorter_payload_is_rejected(kind, data):
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS.values() if not kind.TAIL], ids=lambda kind: kind.__name__)
+@settings(max_examples=15)
 @given(data=st.data(), appended=st.binary(min_size=1, max_size=8))
 def test_fields_of_a_newer_minor_version_are_skipped(kind, data, appended):
     message = kind(*values(kind, data.draw))

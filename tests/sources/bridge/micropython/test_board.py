@@ -154,7 +154,7 @@ def test_a_write_that_power_cuts_leaves_the_old_blob(pasted, tmp_path):
 
 def session(bus, chip, folder):
     """A session on `bus` behind which `chip` is held by its hand; its verdict."""
-    opened = OpenedChip(bus, Plan(Config()), (chip.hear,), real_time=False)
+    opened = OpenedChip(bus, Plan(Config(rate_hz=50), target="quick"), (chip.hear,), real_time=False)
     with running(opened, folder / "capture.mcap", console(quiet=True)) as runner:
         recording = runner.measure()
         return runner.calibrate(recording, calibrate)
