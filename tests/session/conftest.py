@@ -81,7 +81,7 @@ def board():
     return Board()
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_board():
     return Board
 
@@ -104,6 +104,6 @@ VARIED = (
 )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def varied():
     return VARIED

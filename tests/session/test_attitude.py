@@ -1,23 +1,24 @@
 import math
-import os
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mpucal.data import Sensor
+from mpucal.data import STANDARD_GRAVITY_MPS2, Samples, Sensor
 from mpucal.session.aims import ALL_AROUND
 from mpucal.session.attitude import quaternion, straight
 from mpucal.session.events import Ask, Connected, Knowledge, Learnt, Measured, Meter, Prompt, Target, Wish
 from mpucal.session.machine import Machine
 from mpucal.session.meter import MotionWatch
 from mpucal.simulated.hands import KINDS
-from mpucal.sources.opening import open_source
+from mpucal.simulated.motion import Motion
+from mpucal.simulated.sensor import InSi, SensorTruth
 
 STILL = np.zeros(3)
-SECONDS = 60.0
+# of the simulated hands, whose mishaps come within; a poll is 50 ms long
+SECONDS, RATE_HZ, POLL = 40.0, 100.0, 5
+GYRO_RANGE_DPS = 500.0
 # what the gyroscope may have turned besides between two meters: its noise and a drift
 BEYOND_DEG = 20.0
 
@@ -26,10 +27,9 @@ def matrix(q):
     return Rotation.from_quat(q, scalar_first=True)
 
 
-@pytest.mark.parametrize("seed", range(50))
-def test_a_quaternion_is_that_of_its_matrix(seed):
-    turn = Rotation.random(random_state=seed)
-    assert np.allclose(quaternion(turn.as_matrix()), turn.as_quat(canonical=True, scalar_first=True))
+def test_a_quaternion_is_that_of_its_matrix():
+    for turn in Rotation.random(50, random_state=0):
+        assert np.allclose(quaternion(turn.as_matrix()), turn.as_quat(canonical=True, scalar_first=True))
 
 
 def test_a_half_turn_has_a_quaternion():
@@ -60,11 +60,23 @@ def learnt(down):
     return Learnt(Knowledge(0.0, three, three, three, wanted, three, three, three, 0.1, down, ""), down is not None)
 
 
-def meters(hand, seed):
-    """All meters of a simulated minute, which asks for one direction after the other."""
-    source = open_source({"bus": f"sim:hand={hand}", "seed": seed})
-    asked = iter(np.random.default_rng(seed).permutation(ALL_AROUND).tolist())
-    machine, found = Machine(), []
+def polls(motion, rng):
+    """The samples of a sensor that is moved so, a poll after the other."""
+    response = SensorTruth.draw(1).response(InSi(RATE_HZ))
+    for first in range(0, round(SECONDS * RATE_HZ), POLL):
+        edges_s = np.arange(first, first + POLL + 1) / RATE_HZ
+        values = response.values(*motion.means(edges_s), rng.standard_normal((POLL, 7)))
+        most, no = np.radians(GYRO_RANGE_DPS), np.zeros(POLL, bool)
+        gyr = np.clip(values[:, 4:], -most, most)
+        yield Samples(edges_s[1:], values[:, :3], gyr, values[:, 3], no, no, (np.abs(gyr) == most).any(axis=1))
+
+
+def meters(hand):
+    """All meters of a simulated hand that is asked for one direction after the other."""
+    of_hand, of_motion, of_noise, of_advice = np.random.default_rng(1).spawn(4)
+    motion = Motion(KINDS[hand](of_hand), of_motion, STANDARD_GRAVITY_MPS2)
+    asked = iter(of_advice.permutation(ALL_AROUND).tolist())
+    machine, found, t_s = Machine(), [], 0.0
 
     def tell(event):
         for output in machine.handle(event):
@@ -72,19 +84,17 @@ def meters(hand, seed):
                 case Meter():
                     found.append(output)
                 case Prompt():
-                    for listener in source.listeners:
-                        listener(output)
+                    motion.hear(output, t_s)
                 case Ask(wish=Wish.ADVISE):
                     tell(learnt(tuple(next(asked))))
                 case Ask(wish=Wish.KNOW):
                     tell(learnt(None))
 
-    with source.measuring(Path(os.devnull), print, "") as measuring:
-        tell(Connected(measuring.source.start()))
-        while measuring.source.now_ns() < SECONDS * 1e9 and machine.state in MEASURING:
-            samples = measuring.source.poll()
-            if len(samples):
-                tell(Measured(samples))
+    tell(Connected(Sensor(gyro_range_dps=GYRO_RANGE_DPS)))
+    for samples in polls(motion, of_noise):
+        if machine.state in MEASURING:
+            t_s = float(samples.t[-1])
+            tell(Measured(samples))
     return found
 
 
@@ -94,7 +104,7 @@ MEASURING = ("lay flat", "rotate", "verify")
 @pytest.mark.parametrize("hand", KINDS)
 def test_the_picture_does_not_jump(hand):
     """From one meter to the next it turns by no more than gravity did, or the gyroscope says."""
-    found = meters(hand, 1)
+    found = meters(hand)
     assert len(found) > 100
     for before, after in pairwise(found):
         turned = np.degrees((matrix(after.attitude) * matrix(before.attitude).inv()).magnitude())
