@@ -28,7 +28,7 @@ def periodogram(values: Vector, rate_hz: float) -> tuple[Vector, Vector]:
     power = np.abs(np.fft.rfft(window[:, None] * (values - values.mean(0)), axis=0)) ** 2
     # what is below zero, of all but zero itself and half the rate
     power[1 : (n + 1) // 2] *= 2.0
-    return np.fft.rfftfreq(n, 1.0 / rate_hz), power / (rate_hz * (window @ window))
+    return np.asarray(np.fft.rfftfreq(n, 1.0 / rate_hz), np.float64), power / (rate_hz * (window @ window))
 
 
 def trembles(values: Vector, rate_hz: float) -> bool:
