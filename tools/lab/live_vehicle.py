@@ -29,7 +29,7 @@ from typing import Any
 
 import numpy as np
 
-from mpucal.data import STANDARD_GRAVITY_MPS2, Vector
+from mpucal.data import STANDARD_GRAVITY_MPS2
 from mpucal.errors import NoAnswer
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
@@ -43,6 +43,9 @@ from mpucal.mavlink.url import parse_url
 from mpucal.simulated.hands import KINDS
 from mpucal.simulated.motion import Motion
 from mpucal.simulated.vehicle.imus import FROM_HAND, turned_over
+
+from .judge import rms
+from .vehicle_truth import off, z_of
 
 MPUCAL = Path(sys.executable).parent / "mpucal"
 # the head of what a SITL sends for each step: a magic number, its steps a second, their count
@@ -123,7 +126,6 @@ class Held:
 
     def __init__(self, parameters: Mapping[str, float]) -> None:
         self.parameters = parameters
-        self.imus = round(parameters["SIM_IMU_COUNT"])
 
     def true(self, imu: int) -> Correction:
         """The parameters that IMU `imu`, counted from 1, needs."""
@@ -131,27 +133,21 @@ class Held:
         # a scale of 0 is 1 to it
         return Correction(bias, np.where(scale == 0, 1.0, scale))
 
-    def off(self) -> tuple[float, float]:
-        """How far its parameters are from the truth at worst: offset [m/s^2], scale."""
-        offset, scale = [], []
-        for imu in range(1, self.imus + 1):
-            held, true = ardupilot_place(imu).correction(self.parameters), self.true(imu)
-            if held is not None:
-                offset.append(np.abs(held.offset - true.offset).max())
-                scale.append(np.abs(held.scale - true.scale).max())
-        return float(max(offset)), float(max(scale))
+    def off(self) -> str:
+        """How far its parameters are from the truth at worst: offset [m/s^2] and scale."""
+        imus = range(1, round(self.parameters["SIM_IMU_COUNT"]) + 1)
+        far = [off(ardupilot_place(imu), self.parameters, self.true(imu)) for imu in imus]
+        return "{:.5f} {:.6f}".format(*map(max, zip(*far, strict=True)))
 
-    def z(self, document: Mapping[str, Any]) -> Vector:
+    def z(self, document: Mapping[str, Any]) -> tuple[float, ...]:
         """(12,) of D and b_a of one IMU's document, where this is what was held while it was measured."""
         imu = int(document["autopilot"]["imu"])
         where = ardupilot_place(imu)
         R, held, true = mounting(ARDUPILOT, where, self.parameters), where.correction(self.parameters), self.true(imu)
         if R is None or held is None:
-            return np.empty(0)
-        found = document["accelerometer"]
-        truth = {"D": R @ np.diag(held.scale / true.scale) @ R.T, "b_a": R @ (held.scale * (true.offset - held.offset))}
-        parts = [(np.array(found[key]) - truth[key]) / np.array(found[f"{key}_std"]) for key in truth]
-        return np.concatenate([part.ravel() for part in parts])
+            return ()
+        D, b_a = R @ np.diag(held.scale / true.scale) @ R.T, R @ (held.scale * (true.offset - held.offset))
+        return z_of(document, {"D": D, "b_a": b_a})
 
 
 def held(url: str) -> Held:
@@ -219,10 +215,7 @@ def session(body: Body, words: list[str]) -> int:
 
 def line(code: int, before: Held, after: Held, document: Mapping[str, Any] | None) -> str:
     """What came of it."""
-    z = np.empty(0)
-    if document is not None:
-        z = np.concatenate([before.z(one) for one in (document, *document.get("others", [])) if "accelerometer" in one])
-    rms = float(np.sqrt(np.mean(z**2))) if len(z) else np.nan
+    imus = [document, *document.get("others", [])] if document else []
+    z = rms([each for one in imus if "accelerometer" in one for each in before.z(one)])
     verdict = document["quality"]["verdict"] if document else "none"
-    was, now = (f"{offset:.5f} {scale:.6f}" for offset, scale in (before.off(), after.off()))
-    return f"exit {code} {verdict}: was {was}, is {now}, z {rms:.2f}"
+    return f"exit {code} {verdict}: was {before.off()}, is {after.off()}, z {z:.2f}"

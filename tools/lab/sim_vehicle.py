@@ -100,9 +100,7 @@ class Ride:
 
     def go_on(self, until_us: int) -> None:
         """Hear what came, and live until `until_us`."""
-        if isinstance(self._port, PtyPort):
-            # a board on USB is gone while it boots
-            self._port.plug(not self._vehicle.silent)
+        self._port.plug(not self._vehicle.silent)
         for data in self._port.receive():
             self._vehicle.hear(data, self._port.datagrams)
         for data in self._line.carry([packet.data for packet in self._vehicle.go_on(until_us)]):

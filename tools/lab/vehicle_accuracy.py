@@ -1,7 +1,7 @@
 """How near sessions with simulated vehicles come to the truth, and whether their claims hold: a line a session.
 
-    python -m tools.lab vehicle_accuracy                        # 20 of ArduPilot, 10 of PX4, fresh and used in turn
-    python -m tools.lab vehicle_accuracy --ardupilot 4 --px4 2  # fewer
+    python -m tools.lab vehicle_accuracy                # 20 of ArduPilot, 10 of PX4, fresh and used in turn
+    python -m tools.lab vehicle_accuracy --seeds 0:4    # of the first four seeds, and half as many of PX4
 
 Each runs `mpucal session --mavlink sim:... --yes --no-write` as fast as it can. `offset` [m/s^2] and `scale` are how
 far the new parameters are from the sensors' truth, at worst over axes and IMUs; `z` is the rms over D and b_a of all
@@ -11,26 +11,20 @@ SCALE off, or the z of all of them is not within Z.
 
 from __future__ import annotations
 
-import argparse
-import json
-import subprocess
-import sys
-import tempfile
-from concurrent.futures import ThreadPoolExecutor
+import math
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from mpucal.data import Vector
 from mpucal.mavlink.parameters.names import place_of
+from mpucal.result.calibration import GOOD
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 
-MPUCAL = Path(sys.executable).parent / "mpucal"
-AT_ONCE = 2
+from .judge import rms
+from .sessions import by_command
+from .trials import command_line, in_parallel, save
+from .vehicle_truth import needed, off, z_of
+
 OFFSET_MPS2, SCALE, Z = 2e-3, 5e-4, (0.7, 1.3)
+FIRST_SEED = 100
 # parameters, mounting and filters of vehicles that were in use
 USED = {
     "ardupilot": (
@@ -48,87 +42,61 @@ USED = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one session; z : (n,), of all IMUs."""
+    """Of one session; z : of all IMUs."""
 
     words: str
     code: int
-    verdict: str
-    offset: float
-    scale: float
-    z: Vector
+    verdict: str = "none"
+    offset: float = math.nan
+    scale: float = math.nan
+    z: tuple[float, ...] = ()
 
     @property
     def near(self) -> bool:
         """Whether it is good, and as near as it should be; or makes no such claim."""
-        return self.verdict != "good" or (self.offset <= OFFSET_MPS2 and self.scale <= SCALE)
+        return self.verdict != GOOD or (self.offset <= OFFSET_MPS2 and self.scale <= SCALE)
 
     def __str__(self) -> str:
-        rms = float(np.sqrt(np.mean(self.z**2))) if len(self.z) else np.nan
-        numbers = f"{self.offset:9.5f} {self.scale:9.6f} {rms:6.2f}"
+        numbers = f"{self.offset:9.5f} {self.scale:9.6f} {rms(self.z):6.2f}"
         return f"{self.code:4d} {self.verdict:8} {numbers} {'  ' if self.near else '! '}{self.words}"
 
 
 def main() -> int:
     """Run them, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--ardupilot", type=int, default=20)
-    parser.add_argument("--px4", type=int, default=10)
-    arguments = parser.parse_args()
-    words = [word for name in ("ardupilot", "px4") for word in _words(name, getattr(arguments, name))]
+    asked = command_line(__doc__).parse_args()
+    words = [words_of("ardupilot", n) for n in asked.seeds]
+    words += [words_of("px4", n) for n in asked.seeds[: len(asked.seeds) // 2]]
     print("exit verdict     offset     scale      z  vehicle", flush=True)
     outcomes = []
-    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(AT_ONCE) as pool:
-        jobs = [partial(run, word, Path(folder) / str(n)) for n, word in enumerate(words)]
-        for outcome in pool.map(lambda job: job(), jobs):
-            print(outcome, flush=True)
-            outcomes.append(outcome)
-    good = [outcome for outcome in outcomes if outcome.verdict == "good"]
-    rms = float(np.sqrt(np.mean(np.concatenate([outcome.z for outcome in good]) ** 2))) if good else np.nan
-    near = sum(outcome.near for outcome in good)
-    print(
-        f"{len(good)} of {len(outcomes)} good, {near} of these within {OFFSET_MPS2} m/s^2 and {SCALE}; rms z {rms:.2f}"
-    )
-    return 0 if near == len(good) > 0 and Z[0] <= rms <= Z[1] else 1
+    for outcome in in_parallel(run, words, asked.jobs):
+        print(outcome, flush=True)
+        outcomes.append(outcome)
+    good = [outcome for outcome in outcomes if outcome.verdict == GOOD]
+    z, near = rms([each for outcome in good for each in outcome.z]), sum(outcome.near for outcome in good)
+    print(f"{len(good)} of {len(outcomes)} good, {near} of these within {OFFSET_MPS2} m/s^2 and {SCALE}; rms z {z:.2f}")
+    save(asked.json, outcomes)
+    return 0 if near == len(good) > 0 and Z[0] <= z <= Z[1] else 1
 
 
-def _words(firmware: str, count: int) -> list[str]:
+def words_of(firmware: str, n: int) -> str:
     """Every second one has been in use."""
     used = USED[firmware]
-    more = ["" if n % 2 == 0 else "," + used[n // 2 % len(used)] for n in range(count)]
-    return [f"firmware={firmware},seed={100 + n}{words}" for n, words in enumerate(more)]
+    more = "" if n % 2 == 0 else "," + used[n // 2 % len(used)]
+    return f"firmware={firmware},seed={FIRST_SEED + n}{more}"
 
 
-def run(words: str, folder: Path) -> Outcome:
+def run(words: str) -> Outcome:
     """One session."""
-    command = [str(MPUCAL), "session", "--mavlink", f"sim:{words}", "--yes", "--no-write", "-o", str(folder)]
-    done = subprocess.run(command, capture_output=True, check=False, stdin=subprocess.DEVNULL)
-    file = folder / "calibration.json"
-    if not file.exists():
-        return Outcome(words, done.returncode, "none", np.nan, np.nan, np.empty(0))
-    document = json.loads(file.read_text())
-    truth = json.loads((folder / "truth.json").read_text())
-    offset, scale = _off(words, [document, *document["others"]])
-    z = [_z(one, true) for one, true in zip([document, *document["others"]], [truth, *truth["others"]], strict=True)]
-    return Outcome(words, done.returncode, document["quality"]["verdict"], offset, scale, np.concatenate(z))
-
-
-def _off(words: str, documents: list[dict[str, Any]]) -> tuple[float, float]:
-    """How far the new parameters are from the truth at worst: offset [m/s^2], scale."""
-    vehicle = SimulatedVehicle(VehicleOptions.parse(f"sim:{words}"))
-    offset, scale = [], []
-    for document, truth in zip(documents, vehicle.imus.truths, strict=True):
-        autopilot = document["autopilot"]
+    done, document = by_command("--mavlink", f"sim:{words}", "--no-write")
+    if done.calibration is None:
+        return Outcome(words, done.code)
+    documents, truths = ([first, *first["others"]] for first in (document, done.truth))
+    z = [each for one, truth in zip(documents, truths, strict=True) for each in z_of(one, truth)]
+    far = []
+    simulated = SimulatedVehicle(VehicleOptions.parse(f"sim:{words}"))
+    for one, truth in zip(documents, simulated.imus.truths, strict=True):
+        autopilot = one["autopilot"]
         where = place_of(autopilot["firmware"], autopilot["imu"], autopilot["params_new"])
-        correction = None if where is None else where.correction(autopilot["params_new"])
-        if correction is None:
-            return np.nan, np.nan
-        offset.append(np.abs(correction.offset - truth.b_a).max())
-        scale.append(np.abs(correction.scale - np.diag(np.linalg.inv(truth.D))).max())
-    return float(max(offset)), float(max(scale))
-
-
-def _z(document: dict[str, Any], truth: dict[str, Any]) -> Vector:
-    """(12,) of D and b_a."""
-    found = document["accelerometer"]
-    parts = [(np.array(found[key]) - truth[key]) / np.array(found[f"{key}_std"]) for key in ("D", "b_a")]
-    return np.concatenate([part.ravel() for part in parts])
+        far.append(off(where, autopilot["params_new"], needed(truth)))
+    offset, scale = map(max, zip(*far, strict=True))
+    return Outcome(words, done.code, done.calibration.verdict, offset, scale, tuple(z))

@@ -9,44 +9,39 @@ import socket
 import tty
 from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
 
 from mpucal.errors import LinkError
 
 CHUNK = 65536
 
 
-class StationPort(Protocol):
-    """Where stations are.
+class StationPort:
+    """Where stations are; what is sent where none is is lost.
 
     Attributes
     ----------
     name : what a station gives to --mavlink. datagrams : what it receives comes in whole packets.
     """
 
-    name: str
-    datagrams: bool
+    name = ""
+    datagrams = False
 
     def send(self, data: bytes) -> None:
-        """To every station that is there; lost where none is."""
-        ...
+        """To every station that is there."""
 
     def receive(self) -> list[bytes]:
         """What stations sent meanwhile."""
-        ...
+        return []
+
+    def plug(self, there: bool = True) -> None:
+        """Have it there, or gone, as a board on USB is gone while it boots."""
 
     def close(self) -> None:
         """Let go of it."""
-        ...
 
 
-class UdpPort:
-    """Sends to one station's UDP port, as a vehicle's telemetry does, and hears whoever answers.
-
-    Parameters
-    ----------
-    host, port : of the station.
-    """
+class UdpPort(StationPort):
+    """Sends to one station's UDP port, as a vehicle's telemetry does, and hears whoever answers."""
 
     datagrams = True
 
@@ -74,15 +69,13 @@ class UdpPort:
         self._socket.close()
 
 
-class TcpPort:
+class TcpPort(StationPort):
     """Listens on a TCP port, as a SITL does; any number of stations.
 
     Raises
     ------
     LinkError : the port is taken.
     """
-
-    datagrams = False
 
     def __init__(self, host: str, port: int) -> None:
         try:
@@ -123,7 +116,7 @@ class TcpPort:
             channel.close()
 
 
-class PtyPort:
+class PtyPort(StationPort):
     """A pseudo-terminal, which a station opens as its serial port.
 
     Parameters
@@ -132,8 +125,6 @@ class PtyPort:
         plugged in. None: it stays.
     """
 
-    datagrams = False
-
     def __init__(self, link: Path | None = None) -> None:
         self._link = link
         self._ends: tuple[int, int] | None = None
@@ -141,7 +132,7 @@ class PtyPort:
         self.plug()
 
     def plug(self, there: bool = True) -> None:
-        """Have it there, or gone, where a link leads to it."""
+        """See StationPort; it is always there where no link leads to it."""
         if self._link is None or there == (self._ends is not None):
             return
         if there:
@@ -156,7 +147,7 @@ class PtyPort:
         return os.ttyname(slave)
 
     def send(self, data: bytes) -> None:
-        """See StationPort; what nobody reads is lost."""
+        """See StationPort."""
         if self._ends is not None:
             with suppress(OSError):
                 os.write(self._ends[0], data)

@@ -18,10 +18,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
-
-import numpy as np
 
 from mpucal.mavlink.firmwares import ARDUPILOT, PX4
 from mpucal.mavlink.link import Link
@@ -32,9 +29,12 @@ from mpucal.mavlink.url import parse_url
 from mpucal.mavlink.vehicle_source import one_of
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 
-HERE = Path(__file__).parent
+from .vehicle_truth import Off, needed, off
+
+ROOT = Path(__file__).parents[2]
 MPUCAL = Path(sys.executable).parent / "mpucal"
 AT_ONCE = 2
+FIRST_PORT = 24550
 # of what mpucal said, where it is not as expected
 LINES = 12
 # a session takes little more than a minute, of a vehicle whose time stands still where the machine is busy
@@ -100,16 +100,12 @@ def main() -> int:
     """Run the trials asked for; 1 where one ended otherwise than expected."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("words", nargs="*")
-    parser.add_argument("--first-port", type=int, default=24550, help="UDP ports from here on are used")
     arguments = parser.parse_args()
     chosen = [(n, trial) for n, trial in enumerate(TRIALS) if all(word in trial.name for word in arguments.words)]
-    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(AT_ONCE) as pool:
-        jobs = [
-            partial(run, trial, trial.port.format(arguments.first_port + n, folder=at), at)
-            for n, trial in chosen
-            for at in [Path(folder) / str(n)]
-        ]
-        results = list(pool.map(lambda job: job(), jobs))
+    with tempfile.TemporaryDirectory() as place, ThreadPoolExecutor(AT_ONCE) as pool:
+        folders = [Path(place) / str(n) for n, _ in chosen]
+        ports = [trial.port.format(FIRST_PORT + n, folder=Path(place) / str(n)) for n, trial in chosen]
+        results = list(pool.map(run, [trial for _, trial in chosen], ports, folders))
     print(f"{sum(results)} of {len(results)} ended as expected")
     return 0 if all(results) else 1
 
@@ -129,8 +125,10 @@ def run(trial: Trial, port: str, folder: Path) -> bool:
     good = done.returncode == trial.code and trial.says in done.stderr
     if trial.system is not None and trial.code == 0:
         far = apart(trial, new)
-        lines += [f"IMU {imu}: {offset:.4f} m/s^2 and {scale:.5f} off the truth" for imu, offset, scale in far]
-        good &= all(offset < OFFSET_MPS2 and scale < SCALE for _, offset, scale in far)
+        lines += [
+            f"IMU {n}: {offset:.4f} m/s^2 and {scale:.5f} off the truth" for n, (offset, scale) in enumerate(far, 1)
+        ]
+        good &= all(offset < OFFSET_MPS2 and scale < SCALE for offset, scale in far)
     elif trial.system is not None:
         lines.append("it holds its old parameters" if new == old else "IT HOLDS OTHER PARAMETERS THAN BEFORE")
         good &= new == old
@@ -143,8 +141,8 @@ def run(trial: Trial, port: str, folder: Path) -> bool:
 @contextmanager
 def vehicle(port: str, trial: Trial, tool: list[str]) -> Iterator[str]:
     """The vehicle, and the URL at which it is."""
-    command = [sys.executable, str(HERE / "sim_vehicle.py"), port, *trial.words, *tool]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    command = [sys.executable, "-m", "tools.lab", "sim_vehicle", port, *trial.words, *tool]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         try:
             yield process.stdout.readline().strip() if process.stdout else ""
         finally:
@@ -162,22 +160,14 @@ def held(trial: Trial, url: str) -> dict[str, float]:
         return read_stream_parameters(link, firmware)
 
 
-def apart(trial: Trial, parameters: Mapping[str, float]) -> list[tuple[int, float, float]]:
-    """How far they are from what its sensors need: IMU, offset [m/s^2], scale."""
+def apart(trial: Trial, parameters: Mapping[str, float]) -> list[Off]:
+    """How far the parameters of each IMU are from what its sensor needs."""
     options = VehicleOptions.parse("sim:" + ",".join(trial.words) if trial.words else "sim")
     second = (trial.system or options.system) - options.system
     simulated = SimulatedVehicle(replace(options, seed=options.seed + second))
     firmware = PX4 if simulated.firmware.bytewise else ARDUPILOT
-    far = []
-    for imu, truth in enumerate(simulated.imus.truths, start=1):
-        where = place(firmware, imu, parameters)
-        correction = None if where is None else where.correction(parameters)
-        offset, scale = np.inf, np.inf
-        if correction is not None:
-            offset = float(np.abs(correction.offset - truth.b_a).max())
-            scale = float(np.abs(correction.scale - np.diag(np.linalg.inv(truth.D))).max())
-        far.append((imu, offset, scale))
-    return far
+    truths = enumerate(simulated.imus.truths, start=1)
+    return [off(place(firmware, imu, parameters), parameters, needed(truth)) for imu, truth in truths]
 
 
 def mpucal(*words: str) -> subprocess.CompletedProcess[str]:
