@@ -8,7 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic, sleep
@@ -36,39 +36,77 @@ SETTINGS = Settings("accel", 9.80665)
 LONG_S = 60
 
 
+# loads dask once, and becomes a scheduler or a worker as often as it is told to
+PROCESSES = """
+import json, os, signal, sys
+
+import dask
+from distributed.cli import dask_scheduler, dask_worker
+
+import mpucal.batch.row
+from mpucal.calibration import calibrate
+
+children = []
+for line in sys.stdin:
+    kind, words, config = json.loads(line)
+    child = os.fork()
+    if not child:
+        dask.config.set({"distributed.worker.profile.enabled": False, **config})
+        {"scheduler": dask_scheduler, "worker": dask_worker}[kind].main(words)
+    children.append(child)
+    print(child, flush=True)
+for child in children:
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+"""
+
+
 @dataclass
 class Cluster:
+    """Where its scheduler is, and the processes of its workers."""
+
     address: str
-    workers: list[subprocess.Popen]
+    workers: list[int]
 
 
-@contextmanager
-def process(*words):
-    child = subprocess.Popen([sys.executable, "-m", *map(str, words)], stderr=subprocess.DEVNULL)
-    try:
-        yield child
-    finally:
-        child.kill()
-        child.wait()
+@pytest.fixture(scope="module")
+def process():
+    """Start a scheduler or a worker, and give its process; all of them end with the tests."""
+    words = [sys.executable, "-c", PROCESSES]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(words, text=True, **pipes) as parent:
+
+        def start(kind, *words, **config):
+            print(json.dumps([kind, list(map(str, words)), config]), file=parent.stdin, flush=True)
+            return int(parent.stdout.readline())
+
+        yield start
 
 
-@contextmanager
-def started(folder, count=2):
-    """A scheduler and workers, each a process."""
-    file = folder / "scheduler.json"
-    with ExitStack() as stack:
-        here = ("--scheduler-file", file)
-        stack.enter_context(process("distributed.cli.dask_scheduler", "--port", 0, "--no-dashboard", *here))
-        options = ("--nthreads", 1, "--no-nanny", "--no-dashboard", "--local-directory", folder)
-        workers = [stack.enter_context(process("distributed.cli.dask_worker", *here, *options)) for _ in range(count)]
+@pytest.fixture(scope="module")
+def started(process):
+    """A scheduler and workers, each a process, in a folder of their own."""
+
+    @contextmanager
+    def call(folder, count=2, **config):
+        folder.mkdir(exist_ok=True)
+        file = folder / "scheduler.json"
+        here = ("--scheduler-file", file, "--no-dashboard")
+        scheduler = process("scheduler", "--port", 0, *here, **config)
+        options = ("--nthreads", 1, "--no-nanny", "--local-directory", folder)
+        workers = [process("worker", *here, *options) for _ in range(count)]
         begun = monotonic()
         while not (file.exists() and file.stat().st_size) and monotonic() - begun < LONG_S:
             sleep(0.05)
         yield Cluster(json.loads(file.read_text())["address"], workers)
+        for child in (scheduler, *workers):
+            os.kill(child, signal.SIGKILL)
+
+    return call
 
 
 @pytest.fixture(scope="module")
-def cluster(tmp_path_factory):
+def cluster(started, tmp_path_factory):
     """One that lives on."""
     with started(tmp_path_factory.mktemp("cluster")) as cluster:
         yield cluster
@@ -87,18 +125,17 @@ def captures(tmp_path):
     return [*map(str, sorted(folder.rglob("*.mcap"))), str(folder / "none.mcap")]
 
 
-def test_a_worker_is_killed_and_then_the_scheduler(cluster, captures, tmp_path):
+def test_a_worker_is_killed_and_then_the_scheduler(started, cluster, captures, tmp_path):
     expected = table_of(row_of(path, SETTINGS) for path in captures)
     errors = [error for error in expected["error"].to_pylist() if error]
     assert len(errors) >= 2
     assert not any("bug" in error for error in errors)
     journal = Journal(tmp_path / "rows.jsonl", SETTINGS.key)
-    (tmp_path / "first").mkdir()
     with started(tmp_path / "first") as first, distributed.Client(first.address, set_as_default=False) as client:
         client.wait_for_workers(2, timeout=LONG_S)
         for progress in run(captures, client, journal, SETTINGS):
             if progress.done == 2:
-                first.workers[0].kill()
+                os.kill(first.workers[0], signal.SIGKILL)
     assert (progress.done, progress.kept) == (len(captures), 0)
     assert table_of(journal.rows(captures)).equals(expected)
     journal.close()
@@ -117,13 +154,13 @@ def test_a_worker_is_killed_and_then_the_scheduler(cluster, captures, tmp_path):
     journal.close()
 
 
-def test_the_one_that_workers_die_of_is_told_of_those_beside_it(tmp_path, monkeypatch):
+def test_the_one_that_workers_die_of_is_told_of_those_beside_it(started, tmp_path):
     """Several recordings make a task; each is tried alone after that."""
-    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "0")
     paths = [f"/none/{i}.mcap" for i in range(100)]
     paths[40] = "/none/deadly.mcap"
     journal = Journal(tmp_path / "rows.jsonl", SETTINGS.key)
-    with started(tmp_path, 3) as three, distributed.Client(three.address, set_as_default=False) as client:
+    mortal = started(tmp_path / "three", 3, **{"distributed.scheduler.allowed-failures": 0})
+    with mortal as three, distributed.Client(three.address, set_as_default=False) as client:
         client.wait_for_workers(3, timeout=LONG_S)
         client.run(_mortal)
         *_, progress = run(paths, client, journal, SETTINGS)
