@@ -19,10 +19,12 @@ class Tmux:
     """One terminal of a given size, in a server of its own."""
 
     def __init__(self, size, folder, environment):
-        self.columns, self.rows = size
         self._socket, self._folder = f"mpucal-{os.getpid()}-{next(_NUMBERS)}", folder
         told = [f"-e{name}={value}" for name, value in environment.items()]
-        self._tmux("-f/dev/null", "new-session", "-d", f"-x{self.columns}", f"-y{self.rows}", *told, "/bin/sh")
+        self._tmux("-f/dev/null", "new-session", "-d", f"-x{size[0]}", f"-y{size[1]}", *told, "/bin/sh")
+
+    def resize(self, columns, rows):
+        self._tmux("resize-window", f"-x{columns}", f"-y{rows}")
 
     def type(self, *keys):
         self._tmux("send-keys", *keys)
@@ -37,12 +39,12 @@ class Tmux:
     def is_on_the_second_screen(self):
         return self._tmux("display-message", "-p", "#{alternate_on} #{cursor_flag}").split() == ["1", "0"]
 
-    def wait_for(self, *words):
-        """The screen as soon as all of `words` are on it."""
+    def wait_for(self, *words, wide=0):
+        """The screen as soon as all of `words` are on it, and something beyond column `wide`."""
         until = time.monotonic() + PATIENCE_S
         while time.monotonic() < until:
             text = self.text()
-            if all(word in text for word in words):
+            if all(word in text for word in words) and max(map(len, text.splitlines())) > wide:
                 return text
             time.sleep(0.05)
         raise AssertionError(f"never saw {words} but:\n{text}")
@@ -73,17 +75,19 @@ def terminal(tmp_path):
 SESSION = [sys.executable, "-m", "mpucal", "session", "--bus", "sim:pace=real", "-o", "board"]
 
 
-@pytest.mark.parametrize("size", [(80, 24), (160, 50)], ids=["80x24", "160x50"])
-def test_a_session_is_shown_and_ctrl_c_leaves_the_terminal_as_it_was(terminal, size):
-    tmux = terminal(*size)
+SHOWN = ("Lay the board flat", "Hz", "°C", "still", "now", "q or Ctrl-C: stop", "mpucal: simulated chip", "██")
+
+
+def test_a_session_is_shown_and_ctrl_c_leaves_the_terminal_as_it_was(terminal):
+    tmux = terminal(80, 24)
     tmux.run(*SESSION)
-    text = tmux.wait_for(
-        "Lay the board flat", "Hz", "°C", "still", "now", "q or Ctrl-C: stop", "mpucal: simulated chip"
-    )
+    small = tmux.wait_for(*SHOWN)
+    tmux.resize(160, 50)
+    large = tmux.wait_for(*SHOWN, wide=80)
     assert tmux.is_on_the_second_screen()
-    assert any(dots in text for dots in BRAILLE)
-    assert "██" in text
-    assert max(map(len, text.splitlines())) <= size[0]
+    for text, columns in ((small, 80), (large, 160)):
+        assert any(dots in text for dots in BRAILLE)
+        assert max(map(len, text.splitlines())) <= columns
     tmux.type("C-c")
     after = tmux.wait_for("left with 4", "that was all")
     assert not tmux.is_on_the_second_screen()
@@ -94,24 +98,16 @@ def test_a_session_is_shown_and_ctrl_c_leaves_the_terminal_as_it_was(terminal, s
     assert after.split("left with 4")[1].split()[:2] == ["icanon", "echo"]
 
 
-def test_the_q_key_stops_too_and_is_not_left_for_the_shell(terminal):
-    tmux = terminal()
-    tmux.run(*SESSION)
-    tmux.wait_for("q or Ctrl-C: stop")
-    tmux.type("q")
-    after = tmux.wait_for("left with 4", "that was all")
-    assert not after.rstrip().endswith("q")
-
-
-def test_no_color_has_no_colour(terminal):
+def test_no_color_has_no_colour_and_the_q_key_stops_too_and_is_not_left_for_the_shell(terminal):
     tmux = terminal(NO_COLOR="1")
     tmux.run(*SESSION)
-    tmux.wait_for("Lay the board flat", "Hz")
+    tmux.wait_for("Lay the board flat", "Hz", "q or Ctrl-C: stop")
     coloured = tmux.text("-e")
     assert "\x1b[1m" in coloured
     assert "\x1b[3" not in coloured.replace("\x1b[39m", "")
-    tmux.type("C-c")
-    tmux.wait_for("left with 4")
+    tmux.type("q")
+    after = tmux.wait_for("left with 4", "that was all")
+    assert not after.rstrip().endswith("q")
 
 
 def test_a_dumb_terminal_gets_lines(terminal):
