@@ -2,7 +2,7 @@
 
 A check (calibration/checks/, session/live/disagreement.py) decides whether a reason holds, and fills its numbers into
 one of the row's sentences: `reason("gyro_clipped", "samples", refuse=False, count=12, share=0.01)`. A new reason is a
-row here and a check there. docs/reasons.md is made from this table by tools/make/reasons.py.
+row here and a check there. `python -m tools.make pages` makes docs/reasons.md from this table.
 """
 
 from __future__ import annotations

@@ -1,5 +1,3 @@
-import subprocess
-
 import pytest
 
 from mpucal.data import Samples, Sensor
@@ -100,8 +98,3 @@ def test_an_illegal_event_leaves_the_machine_as_it_was():
 
 def test_every_state_but_the_last_two_can_be_aborted():
     assert [state for state in State if Abort not in TRANSITIONS[state]] == [State.DONE, State.ABORTED]
-
-
-def test_the_documented_diagram_is_drawn_from_the_table(program):
-    checked = subprocess.run(program("make", "draw_session", "--check"), capture_output=True, text=True, check=False)
-    assert checked.returncode == 0, checked.stderr

@@ -53,16 +53,17 @@ def main() -> int:
     parser.add_argument("-o", dest="capture", metavar="CAPTURE.mcap", type=Path, required=True)
     parser.add_argument("--gravity", type=float, default=STANDARD_GRAVITY_MPS2, help="where it was recorded [m/s^2]")
     parser.add_argument("--model", default="auto", help="what the session shall estimate")
+    parser.add_argument("--poll", type=float, help="time between two looks into the FIFO [s]; default: the driver's")
     arguments = parser.parse_args()
     try:
-        print(make_capture(arguments.recording, arguments.capture, arguments.gravity, arguments.model))
+        print(make_capture(arguments.recording, arguments.capture, arguments.gravity, arguments.model, arguments.poll))
     except MpucalError as error:
         print(f"capture: {error}", file=sys.stderr)
         return error.exit_code
     return 0
 
 
-def make_capture(file: Path, capture: Path, gravity: float, model: str) -> str:
+def make_capture(file: Path, capture: Path, gravity: float, model: str, poll_s: float | None = None) -> str:
     """Make it; returns what was made, in a sentence.
 
     Raises
@@ -75,7 +76,7 @@ def make_capture(file: Path, capture: Path, gravity: float, model: str) -> str:
     acc, gyr = counts_of(file, recording)
     recorded_hz = (len(recording) - 1) / float(recording.t[-1] - recording.t[0])
     rate_hz = nominal_rate_hz(recorded_hz)
-    config = Config(reg.ACCEL_RANGES_G[acc.code], reg.GYRO_RANGES_DPS[gyr.code], rate_hz)
+    config = Config(reg.ACCEL_RANGES_G[acc.code], reg.GYRO_RANGES_DPS[gyr.code], rate_hz, poll_s=poll_s)
     bus = open_recorded(
         acc.counts,
         gyr.counts,

@@ -1,24 +1,17 @@
-"""Draw the rooms of mpucal and what imports what into docs/architecture.md, from the imports themselves.
-
-python -m tools.make draw_rooms            write the drawing and the table
-python -m tools.make draw_rooms --check    exit 1 where the document shows others
-"""
+"""Draws the rooms of mpucal and what imports what into docs/architecture.md, from the imports themselves."""
 
 from __future__ import annotations
 
-import argparse
 import ast
 import re
-import sys
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 import grimp
 
 ROOT = Path(__file__).parents[2]
-DOCUMENT = ROOT / "docs" / "architecture.md"
 PACKAGE = "mpucal"
-DRAWN = re.compile(r"(?<=<!-- made by tools/make/draw_rooms.py -->\n).*?(?=<!-- end -->)", re.DOTALL)
+DRAWN = re.compile(r"(?<=<!-- made by python -m tools.make pages -->\n).*?(?=<!-- end -->)", re.DOTALL)
 Arrows = dict[str, set[str]]
 
 
@@ -72,6 +65,11 @@ def drawing(imports: Arrows) -> str:
     return "\n".join([*lines, "```", "", "| room | what it holds |", "|---|---|", *rows]) + "\n\n"
 
 
+def page(old: str) -> str:
+    """The document with what the imports are now."""
+    return DRAWN.sub(lambda _: drawing(arrows()), old)
+
+
 def sentence(path: Path) -> str:
     """The first sentence of a module's docstring, or of a package's."""
     source = path / "__init__.py" if path.is_dir() else path
@@ -90,18 +88,3 @@ def _name(module: str) -> str:
 
 def _id(room: str) -> str:
     return room.strip("_")
-
-
-def main() -> int:
-    """Write or check; the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--check", action="store_true", help="write nothing")
-    arguments = parser.parse_args()
-    old = DOCUMENT.read_text(encoding="utf-8")
-    new = DRAWN.sub(lambda _: drawing(arrows()), old)
-    if not arguments.check:
-        DOCUMENT.write_text(new, encoding="utf-8")
-    elif new != old:
-        print(f"{DOCUMENT} is not drawn from the imports: run tools/make/draw_rooms.py", file=sys.stderr)
-        return 1
-    return 0

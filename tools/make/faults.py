@@ -1,4 +1,4 @@
-"""Make the captures of faulty runs anew, all from seeds: python -m tools.make faults [FOLDER].
+"""The captures of faulty runs, all from seeds, for fixtures.py.
 
 faults/NAME.mcap is what crossed the bus while the driver measured a simulated chip, ten seconds at 50 Hz, that suffered
 the fault NAME at the fifth; NAME.json beside it is what the driver made of it: what a replay must make of it too.
@@ -7,7 +7,6 @@ the fault NAME at the fifth; NAME.json beside it is what the driver made of it: 
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.faults import OF_CHIP, kinds
 from mpucal.sources.tap import Tap
 
-FOLDER = Path(__file__).parent.parent / "fixtures" / "faults"
 PLAN = Plan(Config(rate_hz=50))
 FAULT_S, END_S = 5.0, 10.0
 
@@ -61,8 +59,3 @@ def write(folder: Path) -> None:
             writer.start(PLAN.meta())
             found = made_of_it(*measured(Tap(simulated, writer)))
         (folder / f"{name}.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
-
-
-def main() -> None:
-    """Write them into FOLDER, or into the folder that is named."""
-    write(Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER)

@@ -30,7 +30,7 @@ from mpucal.terminal.lines import JsonLines
 
 from . import faults, vectors
 
-FOLDER = Path(__file__).parent.parent / "fixtures"
+FOLDER = Path(__file__).parents[2] / "fixtures"
 # named, so that what `auto` chooses is free to change without them
 MODEL = "hand"
 # what a person is asked and told, without the dials between

@@ -1,16 +1,11 @@
-"""Write docs/reasons.md from the table in mpucal/reasons.py.
-
-python -m tools.make reasons
-"""
+"""Makes docs/reasons.md from the table in mpucal/reasons.py."""
 
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 from mpucal.reasons import KINDS, Kind, Sentence
 
-PAGE = Path(__file__).parents[2] / "docs" / "reasons.md"
 HEAD = """# The reasons against a calibration
 
 The verdict of a calibration is *good* if nothing speaks against it. Otherwise `quality.reasons` in `calibration.json`
@@ -18,7 +13,7 @@ lists what does: `code`, `message` (what is wrong and what to do) and `remedy` (
 calibration makes the verdict *refused*, the others make it *usable*. Codes never change their meaning; new ones may
 come.
 
-This page is made by `python -m tools.make reasons` from the table in `mpucal/reasons.py`; … stands for a number or a
+This page is made by `python -m tools.make pages` from the table in `mpucal/reasons.py`; … stands for a number or a
 name. Every reason can be seen without a board: by a session on the simulated chip, or by spoiling a good recording:
 
     from dataclasses import replace
@@ -28,7 +23,7 @@ name. Every reason can be seen without a board: by a session on the simulated ch
 REFUSES = {"always": "It always refuses the calibration.", "never": "It never refuses the calibration."}
 
 
-def page() -> str:
+def page(_old: str) -> str:
     """The whole page."""
     overview = ["| code | what it means | refuses |", "|---|---|---|"]
     overview += [f"| [`{code}`](#{code}) | {kind.meaning} | {kind.refuses} |" for code, kind in KINDS.items()]
@@ -51,8 +46,3 @@ def _row(sentence: Sentence) -> str:
     # a | would end the cell
     cells = (re.sub(r"\{[^}]*\}", "…", text).replace("|", "\\|") for text in (sentence.what, sentence.remedy))
     return f"| {' | '.join(cells)} |"
-
-
-def main() -> None:
-    """Write the page."""
-    PAGE.write_text(page(), encoding="utf-8")

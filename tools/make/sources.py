@@ -1,25 +1,20 @@
-"""Write docs/sources.md from the table in mpucal/sources/table.py.
-
-python -m tools.make sources
-"""
+"""Makes docs/sources.md from the table in mpucal/sources/table.py."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 
 from mpucal.sources.kind import Option, SourceKind
 from mpucal.sources.table import SOURCES, unique
 
-PAGE = Path(__file__).parents[2] / "docs" / "sources.md"
 HEAD = """# Sources
 
-A command that measures takes exactly one source. This page is made by `python -m tools.make sources` from the table in
+A command that measures takes exactly one source. This page is made by `python -m tools.make pages` from the table in
 `mpucal/sources/table.py`, from which the options, their help and the messages about them are made, too.
 """
 
 
-def page() -> str:
+def page(_old: str) -> str:
     """The whole page."""
     sources = ["| source | is | its value | options beside it | commands |", "|---|---|---|---|---|"]
     options = ["| option | what it sets | default | of |", "|---|---|---|---|"]
@@ -45,8 +40,3 @@ def _listed(names: Iterable[str]) -> str:
 
 def _row(*cells: str) -> str:
     return f"| {' | '.join(cells)} |"
-
-
-def main() -> None:
-    """Write the page."""
-    PAGE.write_text(page(), encoding="utf-8")

@@ -22,7 +22,7 @@ from mpucal.result.blob import Blob
 from mpucal.sources.bridge import messages as wire
 from mpucal.sources.bridge.frame import Frame, stuff
 
-FOLDER = Path(__file__).parent.parent / "fixtures" / "vectors"
+FOLDER = Path(__file__).parents[2] / "fixtures" / "vectors"
 
 # every number is one that float32 holds exactly, so that the .json needs no tolerance
 MEASURED = Blob(
