@@ -17,6 +17,7 @@ from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.clock import FastClock
 from mpucal.simulated.chip.factory import Factory
 from mpucal.simulated.chip.models import MODELS
+from mpucal.sources.bridge import bus, link
 from mpucal.sources.bridge.bus import BridgeBus
 
 MS = 1_000_000
@@ -184,8 +185,11 @@ class OnSocket:
 
 
 @pytest.fixture
-def serve():
-    """Serves a device on a "pty" or "socket"."""
+def serve(monkeypatch):
+    """Serves a device on a "pty" or "socket"; whoever talks to it does not give it up on a busy machine."""
+    monkeypatch.setattr(link, "REPLY_NS", 20_000 * MS)
+    monkeypatch.setattr(link, "HELLO_NS", 20_000 * MS)
+    monkeypatch.setattr(bus, "GONE_NS", 20_000 * MS)
     servers = []
 
     def begin(device, clock, kind, step_ns=MS):

@@ -50,7 +50,7 @@ def test_a_program_that_runs_gives_way_and_begins_anew(raw_paste, repl):
     assert bus.read(0x75, 1).data == b"\x68"
     assert board.boots == 2
     bus.close()
-    until_s = time.monotonic() + 5
+    until_s = time.monotonic() + 60
     while board.boots < 3 and time.monotonic() < until_s:
         time.sleep(0.01)
     assert board.boots == 3
