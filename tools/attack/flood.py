@@ -25,6 +25,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+ROOT = Path(__file__).parents[2]
 INTERRUPT_S = 2.0
 GIVE_UP_S = 150.0
 LOCKED_S = 8.0
@@ -71,12 +72,17 @@ def beside(send: Callable[..., None], *arguments: object) -> Iterator[None]:
         process.join()
 
 
+def free_port() -> int:
+    """One that nobody uses now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
 @contextmanager
 def udp(send: Callable[[int], None]) -> Iterator[str]:
     """The port that is flooded, as --mavlink takes it."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     with beside(send, port):
         yield f"--mavlink=udp:127.0.0.1:{port}"
 
@@ -84,11 +90,9 @@ def udp(send: Callable[[int], None]) -> Iterator[str]:
 @contextmanager
 def locked(send: Callable[[int], None]) -> Iterator[str]:
     """The port of a simulated vehicle, which others flood once it is heard."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    words = [sys.executable, Path(__file__).parent / "sim_vehicle.py", f"udp:127.0.0.1:{port}"]
-    with subprocess.Popen(words, stdout=subprocess.DEVNULL) as vehicle:
+    port = free_port()
+    words = [sys.executable, "-m", "tools.lab", "sim_vehicle", f"udp:127.0.0.1:{port}"]
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL, cwd=ROOT) as vehicle:
         with beside(later, send, port):
             yield f"--mavlink=udp:127.0.0.1:{port}"
         vehicle.kill()

@@ -19,7 +19,7 @@ from mpucal.sources.bridge import messages as wire
 
 ROOT = Path(__file__).parents[2]
 BUILT = ROOT / "build" / "fuzz"
-SOURCES = ROOT / "tools" / "firmware" / "src"
+SOURCES = ROOT / "mpucal" / "firmware" / "src"
 HARNESS = ROOT / "tests" / "firmware" / "host" / "fuzz.c"
 MISSING = "fuzz_core.py: needs clang, and its libFuzzer (on Debian: apt install clang libclang-rt-14-dev)."
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]

@@ -20,7 +20,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import sanitized
+
+from . import sanitized
 
 TESTS = ("kernel", "files/test_csv.py", "files/test_protobuf.py", "chip/test_flips.py", "chip/test_pieces.py")
 REFUSED = (TypeError, ValueError, OverflowError, MemoryError)
@@ -191,13 +192,24 @@ def main() -> int:
     path = sanitized.BUILT / "last"
     with path.open("wb") as file:
         options = ["--seconds", asked.seconds, "--first", asked.first, "--last", file.fileno()]
-        words = [sys.executable, "-W", "ignore", __file__, *map(str, options)]
-        done = subprocess.run(words, env=environment, check=False, pass_fds=[file.fileno()])
+        words = [sys.executable, "-W", "ignore", "-m", "tools.attack", "fuzz_kernel", *map(str, options)]
+        done = subprocess.run(words, env=environment, cwd=sanitized.ROOT, check=False, pass_fds=[file.fileno()])
     if done.returncode:
         print(f"seed {path.read_text()} ended it with {done.returncode}")
         return 1
     if asked.seconds:
         tests = [str(sanitized.ROOT / "tests" / name) for name in TESTS]
-        words = [sys.executable, "-m", "pytest", "-q", "-p", "sanitized", "-p", "no:xdist", "-p", "no:cacheprovider"]
+        words = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-p",
+            "tools.attack.sanitized",
+            "-p",
+            "no:xdist",
+            "-p",
+            "no:cacheprovider",
+        ]
         return subprocess.run([*words, *tests], env=environment, check=False).returncode
     return 0

@@ -1,6 +1,6 @@
 """The compiled modules of build/asan in place of those that are installed; to be imported before mpucal.
 
-As a plugin of pytest: `-p sanitized`, with what `environment` says.
+As a plugin of pytest: `-p tools.attack.sanitized`, with what `environment` says.
 """
 
 from __future__ import annotations
@@ -31,7 +31,6 @@ def environment() -> dict[str, str]:
         subprocess.run(["gcc", f"-print-file-name={name}"], capture_output=True, text=True, check=True).stdout.strip()
         for name in ("libasan.so", "libstdc++.so")
     ]
-    paths = os.pathsep.join((str(Path(__file__).parent), str(ROOT)))
     asan = "detect_leaks=0:allocator_may_return_null=1"
     return {
         **os.environ,
@@ -39,7 +38,7 @@ def environment() -> dict[str, str]:
         "ASAN_OPTIONS": asan,
         "UBSAN_OPTIONS": "print_stacktrace=1",
         "PYTHONMALLOC": "malloc",
-        "PYTHONPATH": paths,
+        "PYTHONPATH": str(ROOT),
     }
 
 
