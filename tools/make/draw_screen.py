@@ -1,7 +1,7 @@
 """Pictures of a session's screen, from tmux: as text and SVG (as PNG too, where there is a Chromium).
 
 python -m tools.make draw_screen -o /tmp/screens                        80x24, at three times of a simulated session
-python -m tools.make draw_screen -o /tmp/screens --size 160x50 --plain  another size, without colour
+python -m tools.make draw_screen -o /tmp/screens --size 160x50          another size
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import argparse
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -21,17 +20,19 @@ from rich.console import CONSOLE_SVG_FORMAT, Console
 from rich.terminal_theme import MONOKAI
 from rich.text import Text
 
+from .browser import chromium, picture
+
 FORMAT = re.sub(r"@font-face \{\{.*?\}\}", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
-CHROMIUM = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync")
+
+BUS = "sim:pace=real,seed=3"
 
 
 class Tmux:
     """One terminal of a given size, in a server of its own."""
 
-    def __init__(self, columns: int, rows: int, words: list[str], environment: dict[str, str]) -> None:
+    def __init__(self, columns: int, rows: int, words: list[str]) -> None:
         self._socket = f"mpucal-{os.getpid()}"
-        told = [f"-e{name}={value}" for name, value in environment.items()]
-        self._tmux("new-session", "-d", "-x", str(columns), "-y", str(rows), *told, shlex.join(words) + "; sleep 9")
+        self._tmux("new-session", "-d", "-x", str(columns), "-y", str(rows), shlex.join(words) + "; sleep 9")
 
     def text(self, colours: bool) -> str:
         """What is on it, with escape codes for its colours or without."""
@@ -54,44 +55,30 @@ def drawing(ansi: str, columns: int, title: str) -> str:
         return console.export_svg(title=title, theme=MONOKAI, code_format=FORMAT)
 
 
-def picture(svg: Path, columns: int, rows: int) -> None:
-    """The drawing as a PNG beside it, where there is a Chromium."""
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        return
-    with tempfile.TemporaryDirectory() as profile:
-        size = f"--window-size={13 * columns},{25 * rows + 150}"
-        target = f"--screenshot={svg.with_suffix('.png')}"
-        words = [chromium, *CHROMIUM, "--no-first-run", f"--user-data-dir={profile}", size, target, svg.as_uri()]
-        subprocess.run(words, capture_output=True, check=True, timeout=120)
-
-
 def main() -> int:
     """Run a session, and take its pictures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="where the pictures go")
     parser.add_argument("--size", default="80x24", help="columns x rows")
-    parser.add_argument("--bus", default="sim:pace=real", help="what is calibrated")
-    parser.add_argument("--seed", default="3", help="which simulated sensor and hand")
     parser.add_argument("--at", default="8,30,45", help="after how many seconds pictures are taken")
-    parser.add_argument("--plain", action="store_true", help="without colours")
     arguments = parser.parse_args()
     columns, rows = (int(number) for number in arguments.size.split("x"))
     folder = arguments.output.resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    environment = {"NO_COLOR": "1"} if arguments.plain else {}
+    browser = chromium()
     with tempfile.TemporaryDirectory() as results:
-        command = [sys.executable, "-m", "mpucal", "session", "--bus", arguments.bus, "--seed", arguments.seed]
-        tmux = Tmux(columns, rows, [*command, "-o", f"{results}/board"], environment)
+        command = [sys.executable, "-m", "mpucal", "session", "--bus", BUS]
+        tmux = Tmux(columns, rows, [*command, "-o", f"{results}/board"])
         begun = time.monotonic()
         try:
             for at in map(float, arguments.at.split(",")):
                 time.sleep(max(begun + at - time.monotonic(), 0.0))
-                name = f"{arguments.size}{'-plain' if arguments.plain else ''}-{at:g}s"
+                name = f"{arguments.size}-{at:g}s"
                 svg = folder / f"{name}.svg"
                 svg.write_text(drawing(tmux.text(colours=True), columns, "mpucal session"), encoding="utf-8")
                 svg.with_suffix(".txt").write_text(tmux.text(colours=False), encoding="utf-8")
-                picture(svg, columns, rows)
+                if browser is not None:
+                    picture(browser, svg.as_uri(), svg.with_suffix(".png"), 13 * columns, 25 * rows + 150)
                 print(svg)
         finally:
             tmux.close()
