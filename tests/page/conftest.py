@@ -8,6 +8,24 @@ from contextlib import closing, suppress
 import pytest
 
 from mpucal.page.server import Server
+from mpucal.session.events import Countdown, Held, Meter, Prompt, PromptKind, Use
+
+FLAT, ON_ITS_SIDE = (1.0, 0.0, 0.0, 0.0), (0.5**0.5, 0.0, -(0.5**0.5), 0.0)
+TURN = Prompt(PromptKind.ROTATE, "Turn the board: side +X down, then hold it still.", (-1.0, 0.0, 0.0))
+
+
+def meter(t_s, missing_deg, turn, wanted=ON_ITS_SIDE):
+    return Meter(t_s, 0.3, False, "", (0.0, 0.0, -1.0), 5.0, 200.0, None, FLAT, missing_deg, turn, wanted)
+
+
+PHASES = {
+    "lay flat": ([Prompt(PromptKind.LAY_FLAT, "Lay it flat.")], "Lay flat", "", "wait"),
+    "turn": ([TURN, meter(1.0, 91.0, "90 deg more, roll it to the left")], "Roll it to the left", "90°", "turn"),
+    "near": ([meter(2.0, 9.0, "10 deg more, roll it to the left")], "Hold still", "9°", "hold"),
+    "hold": ([meter(3.0, 4.0, ""), Countdown(3.0, 1.2, 2.0, False)], "Hold still", "2", "hold"),
+    "taken": ([Held(4.2, Use.TAKEN, (1.0, 0.0, 0.0), "taken"), meter(4.25, 4.0, "")], "Taken", "", "yes"),
+    "seen": ([Held(6.0, Use.SEEN, (1.0, 0.0, 0.0), "seen already"), meter(6.1, 4.0, "")], "Seen already", "", "again"),
+}
 
 TOKEN = "c2VjcmV0LXRva2VuLTEyOA"
 
@@ -34,7 +52,7 @@ class Watched(Server):
         return "\r\n".join([f"{method} /{TOKEN}/{name} HTTP/1.1", f"Host: {self.door.host}", *headers, "", ""]).encode()
 
     def connect(self):
-        return socket.create_connection(("127.0.0.1", self.server_port), 10.0)
+        return socket.create_connection(("127.0.0.1", self.server_port), 60.0)
 
     def answer(self, request):
         """What comes back to these bytes, until the connection is closed."""
@@ -77,6 +95,12 @@ def serve():
     assert [server.errors for server in servers] == [[]] * len(servers)
 
 
+@pytest.fixture(scope="session")
+def phases():
+    """What a session says in each, and the headline, the number and the look of the page then."""
+    return PHASES
+
+
 @pytest.fixture
 def server(serve):
     return serve()
@@ -90,7 +114,7 @@ def tab(chromium):
     wrong = []
     tab.on("pageerror", lambda error: wrong.append(str(error)))
     tab.on("console", lambda line: wrong.append(line.text) if "Content Security Policy" in line.text else None)
-    tab.set_default_timeout(15000)
+    tab.set_default_timeout(60000)
     yield tab
     context.close()
     assert wrong == []

@@ -1,6 +1,7 @@
 """The page in a real browser, beside a session on the simulated chip."""
 
 import json
+import signal
 import subprocess
 import sys
 import threading
@@ -9,7 +10,6 @@ import pytest
 
 from mpucal.page.state import changes, state
 from mpucal.reasons import Reason
-from mpucal.session.events import Countdown, Held, Meter, Prompt, PromptKind, Use
 from mpucal.terminal.view import View
 
 # what the page showed, each time that it changed
@@ -20,28 +20,11 @@ WATCH = """() => {
   new MutationObserver(look).observe(document.body, {subtree: true, childList: true, characterData: true});
   look();
 }"""
-FLAT, ON_ITS_SIDE = (1.0, 0.0, 0.0, 0.0), (0.5**0.5, 0.0, -(0.5**0.5), 0.0)
-TURN = Prompt(PromptKind.ROTATE, "Turn the board: side +X down, then hold it still.", (-1.0, 0.0, 0.0))
-
-
-def meter(t_s, missing_deg, turn, wanted=ON_ITS_SIDE):
-    return Meter(t_s, 0.3, False, "", (0.0, 0.0, -1.0), 5.0, 200.0, None, FLAT, missing_deg, turn, wanted)
-
-
-PHASES = {
-    "lay flat": ([Prompt(PromptKind.LAY_FLAT, "Lay it flat.")], "Lay flat", "", "wait"),
-    "turn": ([TURN, meter(1.0, 91.0, "90 deg more, roll it to the left")], "Roll it to the left", "90°", "turn"),
-    "near": ([meter(2.0, 9.0, "10 deg more, roll it to the left")], "Hold still", "9°", "hold"),
-    "hold": ([meter(3.0, 4.0, ""), Countdown(3.0, 1.2, 2.0, False)], "Hold still", "2", "hold"),
-    "taken": ([Held(4.2, Use.TAKEN, (1.0, 0.0, 0.0), "taken"), meter(4.25, 4.0, "")], "Taken", "", "yes"),
-    "seen": ([Held(6.0, Use.SEEN, (1.0, 0.0, 0.0), "seen already"), meter(6.1, 4.0, "")], "Seen already", "", "again"),
-}
-
 DRAWN = """([look, number]) =>
     document.body.dataset.look === look && document.querySelector("#number").textContent === number"""
 
 
-def test_each_phase_has_its_words_its_angle_and_its_form(tab, server):
+def test_each_phase_has_its_words_its_angle_and_its_form(tab, server, phases):
     view, old = View(), {}
 
     def show(**more):
@@ -51,7 +34,7 @@ def test_each_phase_has_its_words_its_angle_and_its_form(tab, server):
         old = new
 
     tab.goto(server.url)
-    for outputs, headline, number, look in PHASES.values():
+    for outputs, headline, number, look in phases.values():
         for output in outputs:
             view = view.after(output)
         show()
@@ -94,12 +77,15 @@ def test_keys_are_shown_only_where_they_can_be_pressed(tab, serve):
 
 @pytest.fixture
 def session(tmp_path):
-    """A session with a page, as fast as it can: its process, the page's address, and the other events."""
+    """A session with a page, which goes on as fast as it can once it is woken: its process, the address, its folder."""
     words = ["session", "--bus", "sim:pace=fast", "--seed", "3", "--page", "--yes", "--json-events", "-o", "board"]
     with subprocess.Popen(
         [sys.executable, "-m", "mpucal", *words], cwd=tmp_path, stdout=-1, stderr=-1, text=True
     ) as process:
-        yield process, json.loads(process.stderr.readline())["address"], tmp_path / "board"
+        address = json.loads(process.stderr.readline())["address"]
+        # its page is there, in a process of its own
+        process.send_signal(signal.SIGSTOP)
+        yield process, address, tmp_path / "board"
         process.kill()
 
 
@@ -109,6 +95,7 @@ def test_two_browsers_follow_a_session_to_its_results(chromium, tab, session):
     tab.evaluate(WATCH)
     other = chromium.new_page(color_scheme="dark")
     other.goto(address)
+    process.send_signal(signal.SIGCONT)
     events = [json.loads(line) for line in process.stderr]
     for page in (tab, other):
         page.wait_for_selector("text=The calibration is good.")

@@ -5,11 +5,13 @@ import os
 import shutil
 import socket
 import subprocess
-import sys
 import time
 from contextlib import suppress
 
 import pytest
+
+from mpucal.page.state import changes, state
+from mpucal.terminal.view import View
 
 BROWSER = shutil.which("firefox-esr") or shutil.which("firefox")
 PREFERENCES = {
@@ -48,7 +50,7 @@ class Firefox:
             stderr=subprocess.DEVNULL,
             env={**os.environ, "HOME": str(profile), "MOZ_CRASHREPORTER_DISABLE": "1"},
         )
-        self.line = socket.create_connection(("127.0.0.1", self._port(profile)), 30.0)
+        self.line = socket.create_connection(("127.0.0.1", self._port(profile)), 120.0)
         self.answers = self.line.makefile("rb")
         self._receive()
         self.number = 0
@@ -57,7 +59,7 @@ class Firefox:
 
     def _port(self, profile):
         """Where it listens, once it does."""
-        until = time.monotonic() + 60.0
+        until = time.monotonic() + 120.0
         while time.monotonic() < until and self.process.poll() is None:
             with suppress(OSError, ValueError):
                 return int((profile / "MarionetteActivePort").read_text())
@@ -81,7 +83,7 @@ class Firefox:
         """What a script of the page returns."""
         return self.call("WebDriver:ExecuteScript", script=script, args=[])["value"]
 
-    def wait(self, script, seconds=30.0):
+    def wait(self, script, seconds=120.0):
         """Until what a script returns is true."""
         until = time.monotonic() + seconds
         while not (found := self.run(script)):
@@ -120,21 +122,18 @@ def luminance(colour):
     return sum(map(int, colour.strip("rgb()").split(","))) / 765
 
 
-def test_a_session_is_followed_to_its_end_in_the_dark(firefox, tmp_path):
-    words = ["session", "--bus", "sim:pace=fast", "--seed", "3", "--page", "--yes", "--json-events", "-o", "board"]
-    command = [sys.executable, "-m", "mpucal", *words]
-    with subprocess.Popen(command, cwd=tmp_path, stdout=-1, stderr=-1, text=True) as session:
-        firefox.call("WebDriver:Navigate", url=json.loads(session.stderr.readline())["address"])
-        firefox.run("""
-            window.shown = new Set();
-            new MutationObserver(() => shown.add(document.getElementById('headline').textContent))
-              .observe(document.body, {subtree: true, childList: true, characterData: true});
-        """)
-        events = [json.loads(line) for line in session.stderr]
-        firefox.wait("return document.body.innerText.includes('The calibration is good.')")
-        assert session.wait() == 0
-    turns = {event["turn"].rpartition(", ")[2].capitalize() for event in events if event["event"] == "meter"}
-    assert set(firefox.run("return [...shown]")) & turns
+def test_a_session_is_followed_to_its_end_in_the_dark(firefox, server, phases):
+    view = View()
+    server.latest.update({"title": "a chip", "board": "gy-521"})
+    firefox.call("WebDriver:Navigate", url=server.url)
+    for outputs, headline, number, _ in phases.values():
+        for output in outputs:
+            view = view.after(output)
+        server.latest.update(changes(state(view), {}))
+        for name, text in (("headline", headline), ("number", number)):
+            firefox.wait(f"return document.getElementById({name!r}).textContent === {json.dumps(text)}")
+    server.latest.update({"verdict": "good", "ended": True})
+    firefox.wait("return document.body.innerText.includes('The calibration is good.')")
     assert luminance(firefox.run("return getComputedStyle(document.body).backgroundColor")) < 0.1
     assert luminance(firefox.run("return getComputedStyle(document.body).color")) > 0.9
 
