@@ -19,8 +19,18 @@ from mpucal.session.lay_flat import LayFlat
 from mpucal.session.rotate import Rotate
 from mpucal.sources import i2c_errors
 
-FIXTURE = Path(__file__).parents[1] / "fixtures" / "sessions" / "mpu6500.mcap"
 INSTALLED = Path(sys.executable).parent / "mpucal"
+
+
+@pytest.fixture
+def walk(once):
+    """A capture of twenty seconds, which a session goes through to its end."""
+
+    def make(folder):
+        words = ["record", "--bus", "sim", "--rate", "25", "--seconds", "20", "-o", str(folder / "walk.mcap")]
+        assert run(words) == 0
+
+    return once("walk", make) / "walk.mcap"
 
 
 @pytest.fixture
@@ -136,9 +146,9 @@ STATES = {
 
 @pytest.mark.parametrize(("owner", "name"), STATES.values(), ids=STATES.keys())
 @pytest.mark.parametrize("times", [1, 2], ids=["once", "twice"])
-def test_ctrl_c_is_4_and_the_capture_stays_whole(mpucal, tmp_path, monkeypatch, owner, name, times):
+def test_ctrl_c_is_4_and_the_capture_stays_whole(mpucal, walk, tmp_path, monkeypatch, owner, name, times):
     monkeypatch.setattr(owner, name, interrupted(times, getattr(owner, name)))
-    code, said = mpucal("session", "--replay", FIXTURE, "-o", "board")
+    code, said = mpucal("session", "--replay", walk, "-o", "board")
     assert code == 4
     assert said.splitlines()[-1].startswith(("mpucal: the session was interrupted", "mpucal: interrupted"))
     capture = tmp_path / "board" / "capture.mcap"
@@ -147,12 +157,12 @@ def test_ctrl_c_is_4_and_the_capture_stays_whole(mpucal, tmp_path, monkeypatch, 
     assert capture.exists() == (name != "start" or times == 1)
 
 
-def test_a_full_disk_is_3_and_keeps_what_was_recorded(mpucal, tmp_path, monkeypatch):
+def test_a_full_disk_is_3_and_keeps_what_was_recorded(mpucal, walk, tmp_path, monkeypatch):
     def full(files):
         raise sink.OutputError(f"cannot write {min(files)} (No space left on device)", "make room")
 
     monkeypatch.setattr(sink, "write_together", full)
-    code, said = mpucal("session", "--replay", FIXTURE, "-o", "board")
+    code, said = mpucal("session", "--replay", walk, "-o", "board")
     assert code == 3
     assert "What was recorded is kept in board/capture.mcap.\n" in said
     assert "No space left on device" in said.splitlines()[-1]

@@ -25,6 +25,8 @@ import importlib.util
 import json
 import re
 import sys
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 from mpucal.__main__ import run
@@ -65,7 +67,10 @@ known = {Path(path).stem: load(path) for path, text in blocks.items() if text.st
 for path, text in blocks.items():
     if not text.startswith('\"\"\"'):
         add(path, text)
-sys.exit(run(sys.argv[1:]))
+for line in sys.stdin:
+    with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
+        code = run(json.loads(line))
+    print(json.dumps([code, out.getvalue(), err.getvalue()]), flush=True)
 """
 
 
@@ -73,6 +78,7 @@ sys.exit(run(sys.argv[1:]))
 def follow(tmp_path):
     """follow(recipe)(words): the command line after the recipe, in a folder with a calibration."""
     Calibration(np.diag([1.1, 1.0, 0.9]), np.array([0.5, 0.0, -0.5])).save(tmp_path / "c.json")
+    begun = []
 
     def follow(recipe):
         blocks = RECIPES[recipe]
@@ -85,16 +91,22 @@ def follow(tmp_path):
         (tmp_path / "recipe.json").write_text(json.dumps(blocks))
         (tmp_path / "program.py").write_text(PROGRAM)
 
+        program = subprocess.Popen(
+            [sys.executable, "program.py"], cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        begun.append(program)
+
         def call(*words):
-            done = subprocess.run(
-                [sys.executable, "program.py", *words], cwd=tmp_path, capture_output=True, text=True, check=False
-            )
-            assert done.returncode == 0, done.stderr
-            return done.stdout
+            print(json.dumps(words), file=program.stdin, flush=True)
+            code, out, err = json.loads(program.stdout.readline())
+            assert code == 0, err
+            return out
 
         return call
 
-    return follow
+    yield follow
+    for program in begun:
+        program.communicate()
 
 
 def test_a_sink(follow, tmp_path):

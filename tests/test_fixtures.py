@@ -1,7 +1,7 @@
 """What lies in fixtures/: complete, small, and what the tool makes."""
 
 import json
-import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ import pytest
 from mpucal.chip.driver import DRIVER_VERSION
 from mpucal.chip.records import SessionEvent
 from mpucal.files.mcap import read_capture
+from tools.make import fixtures
 
 PROJECT = Path(__file__).parents[1]
 FIXTURES = PROJECT / "fixtures"
@@ -38,8 +39,9 @@ def test_a_key_press_is_among_them():
     assert len(presses) == 2
 
 
-def test_the_tool_makes_them(program, tmp_path):
-    subprocess.run(program("make", "fixtures", tmp_path), check=True)
+def test_the_tool_makes_them(monkeypatch, tmp_path):
+    monkeypatch.setattr(sys, "argv", ["fixtures", str(tmp_path)])
+    fixtures.main()
     files = sorted(path.relative_to(FIXTURES) for path in FIXTURES.glob("*/*"))
     assert files == sorted(path.relative_to(tmp_path) for path in tmp_path.glob("*/*"))
     for path in files:

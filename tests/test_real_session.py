@@ -18,6 +18,8 @@ SHARED = PROJECT.parent / "shared"
 RECORDINGS = SHARED / "recordings"
 RECORDING = RECORDINGS / "mpu6050_session.npz"
 BROAD_HZ = 250.0
+# a session looks five times as often, for the person's sake
+SELDOM = ("--poll", 0.2)
 YARDSTICK = SHARED / "check" / "gravity_transport.py"
 
 pytestmark = pytest.mark.skipif(
@@ -52,7 +54,7 @@ def outcome(folder, *words):
 def capture(program, tmp_path_factory):
     """The recording as a register capture."""
     path = tmp_path_factory.mktemp("real") / "capture.mcap"
-    made = call(*program("make", "capture"), RECORDING, "-o", path)
+    made = call(*program("make", "capture"), RECORDING, "-o", path, *SELDOM)
     assert made.returncode == 0, made.stderr
     assert "10242 of 10245 samples, ±2 g, ±250 deg/s, 100 Hz nominal" in made.stdout
     return path
@@ -105,9 +107,9 @@ def test_what_no_pose_shows_is_not_claimed(session):
     assert session.document["accelerometer"]["b_a"][2] == pytest.approx(-1.1, abs=0.02)
 
 
-def session_of(program, folder, recording):
+def session_of(program, folder, recording, poll=SELDOM):
     """The same way for another recording."""
-    made = call(*program("make", "capture"), recording, "-o", folder / "capture.mcap", "--gravity", 9.81)
+    made = call(*program("make", "capture"), recording, "-o", folder / "capture.mcap", "--gravity", 9.81, *poll)
     assert made.returncode == 0, made.stderr
     assert "abandoned" not in made.stdout
     return outcome(folder / "board", "session", "--replay", folder / "capture.mcap")
@@ -133,7 +135,7 @@ def test_one_that_never_rests_between_is_calibrated_and_known_less_well(program,
         name: np.stack([np.interp(t, broad["t"], axis) for axis in broad[name].T], axis=1) for name in ("acc", "gyr")
     }
     np.savez(tmp_path / "broad.npz", t=t, **drawn)
-    found = session_of(program, tmp_path, tmp_path / "broad.npz")
+    found = session_of(program, tmp_path, tmp_path / "broad.npz", poll=())
     assert found.code == 0 and found.document["quality"]["verdict"] in ("good", "usable")
     assert 0.005 < max(found.document["accelerometer"]["b_a_std"]) < 0.05
 

@@ -1,4 +1,4 @@
-"""A session and its replay: the same words, the same bits."""
+"""A session and its replay: the same words, the same bits; on chips of two families."""
 
 import json
 from pathlib import Path
@@ -20,6 +20,7 @@ class Outcome:
         events = [json.loads(line) for line in err.splitlines()]
         self.said = [event for event in events if event["event"] in ("prompt", "decision")]
         document = json.loads(out)
+        self.sensor = document["sensor"]
         self.verdict = document["quality"]["verdict"]
         self.D = np.array(document["accelerometer"]["D"])
         self.b_a = np.array(document["accelerometer"]["b_a"])
@@ -53,9 +54,21 @@ def test_a_stored_session_replays(session, name):
     np.testing.assert_allclose(replayed.b_a, stored["b_a"], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize(("chip", "model"), [("mpu6050", "auto"), ("mpu6500", "accel"), ("clone98", "accel")])
-def test_a_replay_equals_its_session_to_the_last_bit(session, tmp_path, chip, model):
-    live = session("live", "--bus", f"sim:chip={chip}", "--seed", 5, "--rate", 50, "--model", model)
+@pytest.mark.parametrize(
+    ("chip", "model", "name"),
+    [("mpu6500", "hand", "MPU-6500"), ("clone98", "accel", "ICM-20689")],
+    ids=["mpu6500-hand", "clone98-accel"],
+)
+def test_a_replay_equals_its_session_to_the_last_bit(session, tmp_path, chip, model, name):
+    """That of an MPU-6050 is in tests/cli/test_session.py."""
+    bus = f"sim:chip={chip},temperature_c=27"
+    live = session("live", "--bus", bus, "--seed", 5, "--rate", 50, "--target", "quick", "--model", model)
+    assert live.sensor["chip"] == name
+    assert live.sensor["temperature_c"] == pytest.approx(27, abs=0.3)
+    if model != "accel":
+        truth = json.loads((tmp_path / "live" / "truth.json").read_text())
+        assert live.verdict == "good"
+        assert np.abs(live.D - truth["D"]).max() < 2e-3
     replayed = session("replayed", "--replay", tmp_path / "live" / "capture.mcap")
     assert without_writing(replayed.said) == without_writing(live.said)
     assert replayed.records == live.records

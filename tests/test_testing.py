@@ -16,46 +16,46 @@ from mpucal.result.session_files import CAPTURE, DOCUMENT
 PROJECT = Path(__file__).parents[1]
 PAGE = (PROJECT / "docs" / "captures-in-ci.md").read_text(encoding="utf-8")
 PYTHON = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-CAPTURES = PROJECT / "fixtures" / "sessions"
+SESSION = PROJECT / "fixtures" / "sessions" / "enter.mcap"
 
 
 @pytest.fixture
-def project(tmp_path, capsys):
+def captures(tmp_path, capsys):
+    """The page's project, with the session of one board."""
     (tmp_path / "conftest.py").write_text(PYTHON[0])
     for i, program in enumerate(PYTHON[1:]):
         (tmp_path / f"test_{i}.py").write_text(program)
-    folder = tmp_path / "captures" / "board7"
-    run(["session", "--replay", str(CAPTURES / "mpu6500.mcap"), "--yes", "--no-write", "-o", str(folder)])
+    folder = tmp_path / "captures"
+    run(["session", "--replay", str(SESSION), "--yes", "--no-write", "-o", str(folder / "board7")])
     capsys.readouterr()
     return folder
 
 
-def tried(folder):
-    words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", folder.parents[1]]
-    done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=folder.parents[1])
-    return done.returncode, done.stdout
+def test_the_page_holds_and_what_moved_or_does_not_replay_fails_with_its_sentence(captures):
+    for name in ("board8", "board9"):
+        shutil.copytree(captures / "board7", captures / name)
+    moved = json.loads((captures / "board7" / DOCUMENT.name).read_text())
+    moved["accelerometer"]["b_a"][1] += 1e-7
+    (captures / "board7" / DOCUMENT.name).write_text(json.dumps(moved))
+    cut = captures / "board9" / CAPTURE.name
+    cut.write_bytes(cut.read_bytes()[: cut.stat().st_size // 50])
+    # what the page has of one that moved, of one that did not, too
+    (captures.parent / "test_right.py").write_text(PYTHON[3].replace("board7", "board8"))
 
-
-def test_the_page_holds_and_a_calibration_that_moved_fails(project):
-    assert tried(project)[0] == 0
-    document = json.loads((project / DOCUMENT.name).read_text())
-    document["accelerometer"]["b_a"][1] += 1e-7
-    (project / DOCUMENT.name).write_text(json.dumps(document))
-    code, said = tried(project)
-    assert code == 1
-    assert "captures/board7: b_a is not what it was" in said
-    # one call has a tolerance of 1e-6
-    assert "2 failed, 1 passed" in said
-
-
-def test_a_capture_that_does_not_replay_fails_with_its_sentence(project):
-    (project.parents[1] / "test_2.py").unlink()
-    shutil.copy(CAPTURES / "enter.mcap", project / CAPTURE.name)
-    data = (project / CAPTURE.name).read_bytes()
-    (project / CAPTURE.name).write_bytes(data[: len(data) // 50])
-    code, said = tried(project)
-    assert code == 1
-    assert re.search(r"capture.mcap does not replay: mpucal: \w", said)
+    words = [sys.executable, "-m", "pytest", "-q", "-rA", "-p", "no:cacheprovider", captures.parent]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=captures.parent)
+    ended = re.findall(r"^(PASSED|FAILED) test_(\w+)\.py::\w+(\[\w+\])?", done.stdout, re.MULTILINE)
+    assert done.returncode == 1
+    assert sorted(ended) == [
+        ("FAILED", "0", "[board7]"),
+        ("FAILED", "0", "[board9]"),
+        ("FAILED", "2", ""),
+        ("PASSED", "0", "[board8]"),
+        ("PASSED", "1", ""),  # with a tolerance of 1e-6
+        ("PASSED", "right", ""),
+    ]
+    assert "captures/board7: b_a is not what it was" in done.stdout
+    assert re.search(r"board9/capture.mcap does not replay: mpucal: \w", done.stdout)
 
 
 def test_the_workflow_can_be_read():

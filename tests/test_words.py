@@ -17,7 +17,7 @@ from mpucal.terminal.view import View
 
 PROJECT = Path(__file__).parents[1]
 PAGES = [PROJECT / "README.md", *sorted((PROJECT / "docs").glob("*.md"))]
-CAPTURE = PROJECT / "fixtures" / "sessions" / "mpu6050.mcap"
+CAPTURE = PROJECT / "fixtures" / "sessions" / "enter.mcap"
 
 # what was said: what is said instead
 RETIRED = {

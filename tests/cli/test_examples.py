@@ -14,6 +14,9 @@ from mpucal.result.calibration import Calibration
 
 # what stands there for what a person has; a bridge's own tests show what it keeps
 DEVICES = {"/dev/i2c-1": "sim:seed=3", "sim": "sim:seed=3"}
+# what tests/test_readme.py runs as it stands
+ELSEWHERE = "session --bus sim"
+SHORTER = {"session": ("--rate", "50", "--target", "quick"), "record": ("--rate", "25")}
 NEEDS_A_PORT = "--serial PORT"
 
 
@@ -22,26 +25,33 @@ def examples():
     for name in COMMANDS:
         said = commands.get_command(context, name).epilog
         for number, example in enumerate(re.findall(r"`mpucal ([^`]+)`", said)):
-            if NEEDS_A_PORT not in example:
+            if NEEDS_A_PORT not in example and example != ELSEWHERE:
                 yield pytest.param(example, id=f"{name}-{number}")
 
 
-@pytest.fixture
-def belongings(session, save, tmp_path):
+@pytest.fixture(scope="module")
+def made(session, save, tmp_path_factory):
     """What the examples name: results of sessions, recordings."""
+    into = tmp_path_factory.mktemp("made")
     made = Calibration.load(session.folder / "calibration.json")
     for number, name in enumerate(("board7", "board7-today", "cold", "warm", "hot")):
-        folder = tmp_path / name
-        folder.mkdir()
+        (into / name).mkdir()
         sensor = replace(made.sensor, temperature_c=10.0 + 10.0 * number)
         replace(
             made, sensor=sensor, b_a=made.b_a + 0.01 * number, fit={**made.fit, "recording_digest": f"{number:064x}"}
-        ).save(folder / "calibration.json")
-    made.save(tmp_path / "calibration.json")
-    shutil.copy(session.folder / "capture.mcap", tmp_path)
-    (tmp_path / "line3").mkdir()
-    shutil.copy(session.folder / "capture.mcap", tmp_path / "line3")
-    save(load(session.folder), tmp_path / "walk.npz")
+        ).save(into / name / "calibration.json")
+    made.save(into / "calibration.json")
+    shutil.copy(session.folder / "capture.mcap", into)
+    (into / "line3").mkdir()
+    shutil.copy(session.folder / "capture.mcap", into / "line3")
+    save(load(session.folder), into / "walk.npz")
+    return into
+
+
+@pytest.fixture
+def belongings(made, tmp_path):
+    """A copy of it, to be changed."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
 
 
 @pytest.mark.parametrize("example", list(examples()))
@@ -51,7 +61,7 @@ def test_an_example_runs(mpucal, belongings, tmp_path, example):
         # these begin with no such folder or file
         shutil.rmtree(tmp_path / "board7")
         (tmp_path / "capture.mcap").unlink()
-    result = mpucal(*words)
+    result = mpucal(*words, *SHORTER.get(words[0], ()))
     assert result.code == 0, result.err
     assert result.out
 

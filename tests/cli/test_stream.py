@@ -86,8 +86,8 @@ def test_memory_does_not_grow(made, monkeypatch, source, seconds, kept):
 
 
 def test_a_line_comes_at_once_and_a_closed_pipe_is_no_error(made):
-    """At 10 samples a second a pipe's 8 KiB would fill in six seconds."""
-    words = ["stream", "--bus", "sim:seed=3,pace=real", "--rate", "10"]
+    """At 4 samples a second a buffer of 8 KiB would fill in a quarter of a minute, and be written as a whole."""
+    words = ["stream", "--bus", "sim:seed=3,pace=real", "--rate", "4"]
     with subprocess.Popen(
         [sys.executable, "-m", "mpucal", *words, "--apply", made],
         stdout=subprocess.PIPE,
@@ -96,9 +96,9 @@ def test_a_line_comes_at_once_and_a_closed_pipe_is_no_error(made):
         first = os.read(program.stdout.fileno(), 1 << 16)
         program.stdout.close()
         said = program.stderr.read().decode()
-        assert program.wait(20) == 0, said
+        assert program.wait(300) == 0, said
     assert first.startswith(b"t,ax,ay,az,gx,gy,gz")
-    assert len(first) < 4096
+    assert len(first) < 8192
     assert not said
 
 
@@ -106,24 +106,12 @@ def test_rests_that_contradict_the_calibration_are_told_once(mpucal, session):
     right = session.folder / "calibration.json"
     calibration = Calibration.load(right)
     replace(calibration, b_a=calibration.b_a + np.array([0.0, 0.0, 0.3])).save("wrong.json")
-    words = (
-        "stream",
-        "--bus",
-        "sim:hand=still",
-        "--seed",
-        "3",
-        "--rate",
-        "100",
-        "--seconds",
-        "60",
-        "--watch",
-        "--apply",
-    )
+    words = ("stream", "--bus", "sim:seed=3,hand=still", "--rate", "25", "--seconds", "60", "--watch", "--apply")
     assert "contradict" not in mpucal(*words, right).err
     told = mpucal(*words, "wrong.json")
     assert told.code == 0
     assert told.err.count("rests contradict the calibration (|a| has an error of up to") == 1
-    assert told.out.count("\n") > 5900
+    assert told.out.count("\n") > 1450
     (event,) = map(json.loads, mpucal(*words, "wrong.json", "--json-events").err.splitlines())
     assert (event["event"], event["code"]) == ("caution", "accelerometer_contradicted")
     assert 0.0 < event["t_s"] < 60.0

@@ -36,7 +36,9 @@ WORDS = {
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory, process):
     folder = tmp_path_factory.mktemp("vehicle")
-    result = process(folder, "session", "--mavlink", "sim:imus=1", "-o", "flown", "--json", "--yes")
+    result = process(
+        folder, "session", "--mavlink", "sim:imus=1", "--target", "quick", "-o", "flown", "--json", "--yes"
+    )
     return SimpleNamespace(folder=folder / "flown", result=result)
 
 
