@@ -111,7 +111,7 @@ class World:
         faults = _faults(blows)
         if self.bus is not None:
             self.bus.suffer(faults, blows[0].number)
-            self.bus._motion._mishaps = (*self.bus._motion._mishaps, *_befallen(blows))
+            self.bus._motion.mishaps = (*self.bus._motion.mishaps, *_befallen(blows))
         else:
             self.transport.suffer(faults)
         for blow in blows:
