@@ -19,6 +19,8 @@ Columns = NDArray[np.uint64]
 
 VARINT, BYTES = 0, 2
 LONGEST = 10
+# so many or more are faster packed by NumPy than one by one
+FEW = 100
 __all__ = ["field", "fields", "frames", "packed", "schema", "unpacked", "unzigzag", "zigzag"]
 
 # descriptor.proto: types and labels of fields
@@ -56,6 +58,8 @@ def fields(message: bytes) -> Iterator[tuple[int, int | bytes]]:
 def packed(values: ArrayLike) -> bytes:
     """(n,) whole numbers from 0 on, as varints one after the other."""
     value = np.asarray(values, np.uint64)[:, None]
+    if len(value) < FEW:
+        return _varints(value[:, 0].tolist())
     # how many bytes there are, without a logarithm that rounds
     widths = 1 + np.sum(value >= (np.uint64(1) << (np.uint64(7) * np.arange(1, LONGEST, dtype=np.uint64))), axis=1)
     widest = int(widths.max(initial=1))
@@ -94,11 +98,18 @@ def schema(package: str, messages: Mapping[str, Sequence[tuple[str, str, bool]]]
 
 
 def _varint(value: int) -> bytes:
+    return _varints([value])
+
+
+def _varints(values: list[int]) -> bytes:
     digits = bytearray()
-    while value > 127:
-        digits.append(value & 127 | 128)
-        value >>= 7
-    return bytes([*digits, value])
+    for value in values:
+        left = value
+        while left > 127:
+            digits.append(left & 127 | 128)
+            left >>= 7
+        digits.append(left)
+    return bytes(digits)
 
 
 def _read(message: bytes, at: int) -> tuple[int, int]:
