@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from contextlib import closing, redirect_stderr, redirect_stdout, suppress
 from io import StringIO
 from pathlib import Path
@@ -55,6 +56,8 @@ def load_dataflash(path: Path) -> Recording:
 
 def _fill(log: Log, path: Path) -> None:
     """Take the IMU and parameter messages, up to where the file is damaged."""
+    # its compiled indexer, which is hardly faster, prints past `redirect_stderr`
+    os.environ.setdefault("PYMAVLINK_FAST_INDEX", "0")
     DFReader = pymavlink("DFReader")
     # pymavlink raises plain Exceptions, too
     with suppress(Exception), closing(DFReader.DFReader_binary(str(path))) as reader:
