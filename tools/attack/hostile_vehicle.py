@@ -44,7 +44,8 @@ from mpucal.mavlink.tlog import read_tlog
 from mpucal.result.calibration import Calibration
 
 from ..lab.campaign import ready
-from ..lab.campaign_judge import CODES, _parts, errors, false
+from ..lab.campaign_judge import CODES, _parts, false
+from ..lab.judge import judged
 from .hostile_link import ATTACKERS, FORGED, MOST_HEARD, SIGNED, STRANGER, Attack, HostileTransport, hostile
 from .hostile_packets import KINDS
 
@@ -116,8 +117,8 @@ def judge_samples(attack: Attack) -> tuple[int, list[str]]:
     except MpucalError:
         return 0, []
     truth = HostileTransport.truths[0]
-    error, z = errors(calibration, [(np.array(truth["D"], float), np.array(truth["b_a"], float))])
-    lies = [f"{lie}: {error:.3f} m/s^2, {z:.1f} claims" for lie in false(calibration, error, z)]
+    found = judged(calibration, (np.array(truth["D"]), np.array(truth["b_a"])))
+    lies = [f"{lie}: {found.error:.3f} m/s^2, {found.claims:.1f} claims" for lie in false(found)]
     forged = attack.attacker == FORGED and attack.kind in OF_SAMPLES
     return len(lies), [] if forged else lies
 

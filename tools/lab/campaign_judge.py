@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from mpucal.errors import MpucalError
 from mpucal.files.folder import captures_in
 from mpucal.result.blob import Blob, BlobError
 from mpucal.result.calibration import GOOD, REFUSED, USABLE, Calibration
-from mpucal.simulated.sensor import SensorTruth
-from tools.lab.judge import sph_rms
 
-# farther from the truth than so many times what is claimed, and than what matters [m/s^2], is false
-MOST = {GOOD: 3.0, USABLE: 5.0}
+from .judge import MOST_CLAIMS, Judgement
+from .judge import judged as judged_against
+
+# what is false by the lab's judge is wrong only where it is farther from the truth than what matters [m/s^2]
 LEAST_ERROR = 0.1
 CODES = (0, 3, 4, 5, 6)
 WITH_RESULT = (0, 5, 6)
-G = 9.80665
 
 
 @dataclass(frozen=True)
@@ -69,28 +67,15 @@ def judged(place: Path, code: int | None, blows: Sequence[Any], world: Any) -> O
     except MpucalError as error:
         wrong += [str(error)] if document.exists() else []
         return Outcome(code, last, wrong=tuple(wrong), recorded=recorded)
-    error, z = errors(calibration, world.truths(blows, folder))
-    wrong += false(calibration, error, z)
+    judgement = judged_against(calibration, *world.truths(blows, folder))
+    wrong += false(judgement)
+    error, z = (0.0 if math.isnan(each) else each for each in (judgement.error, judgement.claims))
     return Outcome(code, last, calibration.verdict, round(error, 4), round(z, 2), tuple(wrong), recorded)
 
 
-def errors(calibration: Calibration, truths: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[float, float]:
-    """Error [m/s^2] against the nearest truth, and that in units of what is claimed; 0 of one that says nothing."""
-    if not (np.isfinite(calibration.D).all() and np.isfinite(calibration.b_a).all()):
-        return 0.0, 0.0
-    gravity = float(calibration.fit.get("gravity") or G)
-    error = min(
-        sph_rms(SensorTruth(D, b_a, np.eye(3), np.zeros(3), gravity), calibration.D, calibration.b_a)
-        for D, b_a in truths
-    )
-    claimed = (calibration.quality.get("error_std") or {}).get("rms") or 1e-9
-    return error, error / claimed
-
-
-def false(calibration: Calibration, error: float, z: float) -> list[str]:
+def false(judgement: Judgement) -> list[str]:
     """Whether it promises what it does not hold."""
-    most = MOST.get(calibration.verdict, np.inf)
-    return [f"called {calibration.verdict}"] if z > most and error > LEAST_ERROR else []
+    return [f"called {judgement.verdict}"] if judgement.false and judgement.error > LEAST_ERROR else []
 
 
 def _unfit(code: int | None, document: Path, names: set[str]) -> list[str]:
@@ -143,7 +128,7 @@ def table(outcomes: Sequence[dict[str, Any]]) -> str:
     lines = [f"{head}{'worst m/s^2':>13}{'claims':>8}{'wrong':>7}"]
     for kind, some in sorted(kinds.items()):
         counts = [sum(o.get("verdict") == verdict for o in some) for verdict in (GOOD, USABLE, REFUSED, "")]
-        promised = [o for o in some if o.get("verdict") in MOST]
+        promised = [o for o in some if o.get("verdict") in MOST_CLAIMS]
         error, z = (max((o[key] for o in promised), default=0.0) for key in ("error", "z"))
         wrong = sum(bool(o["wrong"]) for o in some)
         good, usable, refused, ended = counts
