@@ -215,8 +215,8 @@ def _real(array: NDArray[Any]) -> Vector:
     """In float64; neither times nor complex numbers are silently taken for numbers."""
     if array.dtype.kind in "mMc":
         raise TypeError("they are complex" if array.dtype.kind == "c" else "they are times")
-    # what is too large for a float64 becomes infinite
-    with np.errstate(over="ignore"):
+    # what is too large for a float64 becomes infinite, and a signalling NaN a quiet one
+    with np.errstate(over="ignore", invalid="ignore"):
         return array.astype(np.float64, copy=False)
 
 

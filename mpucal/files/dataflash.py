@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from contextlib import closing, redirect_stderr, redirect_stdout, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -56,11 +57,8 @@ def load_dataflash(path: Path) -> Recording:
 
 def _fill(log: Log, path: Path) -> None:
     """Take the IMU and parameter messages, up to where the file is damaged."""
-    # its compiled indexer, which is hardly faster, prints past `redirect_stderr`
-    os.environ.setdefault("PYMAVLINK_FAST_INDEX", "0")
-    DFReader = pymavlink("DFReader")
     # pymavlink raises plain Exceptions, too
-    with suppress(Exception), closing(DFReader.DFReader_binary(str(path))) as reader:
+    with suppress(Exception), _reader(path) as reader:
         while (message := reader.recv_match(type=[PARAMETER, *IMUS])) is not None:
             if message.get_type() == PARAMETER:
                 log.parameter(str(message.Name), float(message.Value))
@@ -68,6 +66,22 @@ def _fill(log: Log, path: Path) -> None:
             content = _reading(message)
             if content is not None:
                 log.reading(content, content.time * US)
+
+
+@contextmanager
+def _reader(path: Path) -> Iterator[Any]:
+    """pymavlink's, whose file is closed also where it fails as it begins."""
+    # its compiled indexer, which is hardly faster, prints past `redirect_stderr`
+    os.environ.setdefault("PYMAVLINK_FAST_INDEX", "0")
+    kind = pymavlink("DFReader").DFReader_binary
+    reader = kind.__new__(kind)
+    try:
+        reader.__init__(str(path))
+        yield reader
+    finally:
+        for held in ("filehandle", "data_map"):
+            if hasattr(reader, held):
+                getattr(reader, held).close()
 
 
 def _reading(message: Any) -> Reading | None:

@@ -152,8 +152,8 @@ class _Column:
     def take(self, count: int, dtype: type) -> NDArray[Any]:
         """The next `count` rows."""
         data = self._file.read(count * self._width * self.dtype.itemsize)
-        # what is too large for a float64 becomes infinite, and is refused as that
-        with np.errstate(over="ignore"):
+        # what is too large for a float64 becomes infinite, and is refused as that; so is a signalling NaN
+        with np.errstate(over="ignore", invalid="ignore"):
             return np.frombuffer(data, self.dtype).reshape(count, *self.shape[1:]).astype(dtype)
 
 

@@ -47,7 +47,8 @@ def load_parquet(path: Path, hints: Hints = NO_HINTS) -> Recording:
     place = with_gravity(accelerometers)
     acc, a = all_acc[place], accelerometers[place]
     warm = [c for c in columns if c.quantity == TEMPERATURE and arrays[c.name].dtype.kind in "iuf"]
-    temperature_c = arrays[warm[0].name].astype(float) if warm and len(a.values) == table.num_rows else None
+    with np.errstate(invalid="ignore"):
+        temperature_c = arrays[warm[0].name].astype(float) if warm and len(a.values) == table.num_rows else None
     return recording_of(a, w, hints, path.name, temperature_c, remarks(columns, acc))
 
 
@@ -61,7 +62,9 @@ def _array(column: Any, kind: Any) -> NDArray[Any]:
 
 def _stream(arrays: dict[str, NDArray[Any]], of: tuple[Column, ...], clocks: list[Column]) -> Stream:
     try:
-        values: Vector = np.column_stack([arrays[column.name].astype(float) for column in of])
+        # of a signalling NaN numpy says that it is none
+        with np.errstate(invalid="ignore"):
+            values: Vector = np.column_stack([arrays[column.name].astype(float) for column in of])
     except (TypeError, ValueError) as error:
         raise RecordingError(f"{of[0].name} and the like hold no numbers ({error})", "write numbers") from error
     values = -values if of[0].turned_around else values

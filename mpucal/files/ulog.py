@@ -110,11 +110,11 @@ def _is_fast(data: Any) -> bool:
 
 
 def _stream(data: Any, names: Iterable[str], unit: str) -> Stream:
-    values: Vector = np.column_stack([np.asarray(data[name], float) for name in names])
     # a driver that does not say when a sample was taken says 0; sensor_combined has no such field
     times = data.get("timestamp_sample", data["timestamp"])
-    # a damaged log may call them fractions, of which some are none
+    # a damaged log may call them fractions, and hold values that are none
     with np.errstate(invalid="ignore"):
+        values: Vector = np.column_stack([np.asarray(data[name], float) for name in names])
         return Stream(np.asarray(times if np.all(times) else data["timestamp"], np.int64), values, "us", unit)
 
 

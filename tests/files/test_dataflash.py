@@ -144,7 +144,7 @@ def test_a_blob_is_no_log(tmp_path):
 
 @settings(max_examples=25)
 @given(junk=st.binary(max_size=400), cut=st.integers(0, 400))
-def test_damage_never_raises_anything_else(dataflash, tmp_path, capfd, junk, cut):
+def test_damage_never_raises_anything_else(dataflash, tmp_path, junk, cut):
     for k in range(5):
         dataflash.add("IMU", 1_000_000 + 20_000 * k, 0, 0, 0, 0, 0, 0, -9.8, 0, 0, 30.0, 1, 1, 50, 50)
     whole = dataflash.bytes()
@@ -153,4 +153,15 @@ def test_damage_never_raises_anything_else(dataflash, tmp_path, capfd, junk, cut
         mpucal.load(tmp_path / "x.bin")
     except RecordingError as error:
         assert error.remedy
+
+
+def test_what_is_skipped_is_not_printed(dataflash, tmp_path, capfd):
+    for k in range(100):
+        dataflash.add("IMU", 1_000_000 + 20_000 * k, 0, 0, 0, 0, 0, 0, -9.8, 0, 0, 30.0, 1, 1, 50, 50)
+    whole = dataflash.bytes()
+    (tmp_path / "x.bin").write_bytes(whole + bytes(600) + whole)
+    assert len(mpucal.load(tmp_path / "x.bin")) == 100
+    (tmp_path / "x.bin").write_bytes(b"\xa3\x95\x80" + bytes(700))
+    with pytest.raises(RecordingError):
+        mpucal.load(tmp_path / "x.bin")
     assert capfd.readouterr() == ("", "")

@@ -133,6 +133,20 @@ def test_an_archive_with_what_no_number_holds(tmp_path, more, says):
         mpucal.load(tmp_path / "a.npz")
 
 
+SIGNALLING = np.where(np.arange(N) == 7, 0x7F800001, 0x3F800000).astype(np.uint32).view(np.float32)
+
+
+def test_a_nan_that_signals_is_a_nan(tmp_path):
+    """A float32 of which NumPy warns where it becomes a float64."""
+    acc = np.tile(SIGNALLING[:, None], (1, 3))
+    np.savez(tmp_path / "a.npz", t=TIMES, acc=acc, gyr=AT_REST[:, 3:])
+    for read in (mpucal.load, lambda path: list(open_rows(path).runs)):
+        with pytest.raises(RecordingError, match="acc is not a finite number in"):
+            read(tmp_path / "a.npz")
+    table().assign(**{"ax [m/s^2]": SIGNALLING, "temperature_c": SIGNALLING}).to_parquet(tmp_path / "a.parquet")
+    assert len(mpucal.load(tmp_path / "a.parquet", units="gyr=rad/s")) == N - 1
+
+
 def test_rows_of_an_archive_with_what_no_number_holds(tmp_path):
     huge = np.full((N, 3), np.longdouble("1e400"))
     np.savez(tmp_path / "a.npz", t=TIMES, acc=huge, gyr=AT_REST[:, 3:])
