@@ -7,7 +7,6 @@ every machine. Times are the processor's, so that what else runs counts little. 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import statistics
 import subprocess
@@ -24,8 +23,6 @@ from mpucal.session.threads import ONE_THREAD
 os.environ.update(ONE_THREAD)  # as the program does, and before NumPy or SciPy loads
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 import mpucal
 from mpucal.calibration.flat_segment import flat_statistics
@@ -40,6 +37,8 @@ from mpucal.kernel import _kernel
 from tools.lab.hand_reference import evaluate_hand_reference
 from tools.lab.reference import evaluate_reference
 from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario, paper_scenario
+from tools.lab.table import plain_table, show
+from tools.lab.trials import save
 
 FLAT_S, TURNS = 10.0, 3
 # long enough for a loop's start not to count, and what the twins do in a second
@@ -82,15 +81,14 @@ def calibrations(runs: int) -> list[dict[str, Any]]:
         estimate = choose if model == "auto" else METHODS[model]
         estimation_s = median_s(lambda e=estimate, r=recording, f=flat: e(r, f, GRAVITY_MPS2), runs)
         whole_s = median_s(lambda r=recording, m=model: mpucal.calibrate(r, model=m, gravity=GRAVITY_MPS2), runs)
+        length_s = float(recording.t[-1] - recording.t[0])
         rows.append(
             {
-                "motion": motion,
-                "seconds": float(recording.t[-1] - recording.t[0]),
-                "rate_hz": recording.rate_hz,
+                "recording": f"{motion}, {length_s:.0f} s at {recording.rate_hz:.0f} Hz",
                 "model": model if found.fit["model"] == model else f"{model}: {found.fit['model']}",
                 "iterations": found.fit["iterations"],
-                "estimation_ms": 1e3 * estimation_s,
-                "ms": 1e3 * whole_s,
+                "estimation ms": 1e3 * estimation_s,
+                "whole ms": 1e3 * whole_s,
             }
         )
     return rows
@@ -135,10 +133,10 @@ def kernel(runs: int) -> list[dict[str, Any]]:
             {
                 "parameters": parameters,
                 "filter": "hand" if hand else "exact",
-                "value_ns": ns_value,
-                "derivatives_ns": ns_all,
-                "twin_ns": ns_twin,
-                "ratio": ns_twin / ns_all,
+                "V [ns]": ns_value,
+                "V, gradient, Fisher [ns]": ns_all,
+                "the same in NumPy [ns]": ns_twin,
+                "NumPy / kernel": ns_twin / ns_all,
             }
         )
     return rows
@@ -156,8 +154,8 @@ def growth(runs: int) -> list[dict[str, Any]]:
             {
                 "samples": len(recording),
                 "ms": 1e3 * s,
-                "us_a_sample": 1e6 * s / len(recording),
-                "bytes_a_sample": whole / len(recording),
+                "µs a sample": 1e6 * s / len(recording),
+                "peak bytes a sample, verdict included": whole / len(recording),
             }
         )
     return rows
@@ -182,9 +180,9 @@ def start(runs: int) -> dict[str, Any]:
         return 1e3 * median_s(lambda: process(program), runs, children_s)
 
     return {
-        "help_ms": ms(HELP),
-        "python_ms": ms("pass"),
-        "numpy_loaded": process(HELP).stderr == "True",
+        "mpucal --help ms": ms(HELP),
+        "of which the interpreter": ms("pass"),
+        "NumPy loaded": process(HELP).stderr,
     }
 
 
@@ -194,51 +192,17 @@ def children_s() -> float:
     return spent.children_user + spent.children_system
 
 
-def tables(document: dict[str, Any]) -> list[Table]:
-    """What was measured, for a person."""
-    whole = Table("recording", title="mpucal.calibrate")
-    for column in ("model", "iterations", "estimation ms", "whole ms"):
-        whole.add_column(column, justify="left" if column == "model" else "right")
-    for row in document["calibrate"]:
-        recording = f"{row['motion']}, {row['seconds']:.0f} s at {row['rate_hz']:.0f} Hz"
-        times = f"{row['estimation_ms']:.1f}", f"{row['ms']:.1f}"
-        whole.add_row(recording, row["model"], str(row["iterations"]), *times)
-
-    step = Table("parameters", "filter", title=f"one step of the filter ({document['instruction_set']})")
-    for column in ("V [ns]", "V, gradient, Fisher [ns]", "the same in NumPy [ns]", "NumPy / kernel"):
-        step.add_column(column, justify="right")
-    for row in document["kernel"]:
-        cells = [f"{row[key]:,.0f}" for key in ("value_ns", "derivatives_ns", "twin_ns", "ratio")]
-        step.add_row(str(row["parameters"]), row["filter"], *cells)
-
-    grown = Table(title="the fit of `accel`, by the number of samples")
-    for column in ("samples", "ms", "µs a sample", "peak bytes a sample, verdict included"):
-        grown.add_column(column, justify="right")
-    for row in document["growth"]:
-        times = f"{row['ms']:.1f}", f"{row['us_a_sample']:.2f}"
-        grown.add_row(f"{row['samples']:,}", *times, f"{row['bytes_a_sample']:.0f}")
-    grown.caption = (
-        f"`mpucal --help` takes {document['start']['help_ms']:.0f} ms, of which the interpreter "
-        f"{document['start']['python_ms']:.0f}; NumPy loaded: {'yes' if document['start']['numpy_loaded'] else 'no'}"
-    )
-    return [whole, step, grown]
-
-
 def main() -> None:
     """Measure, print and save."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--runs", type=int, default=7, help="of which the median counts")
     parser.add_argument("--json", type=Path, help="write the figures to this file")
     options = parser.parse_args()
-    document = {
-        "instruction_set": _kernel.instruction_set(),
-        "calibrate": calibrations(options.runs),
-        "kernel": kernel(options.runs),
-        "growth": growth(min(options.runs, 3)),
-        "start": start(options.runs),
+    measured = {
+        "mpucal.calibrate": calibrations(options.runs),
+        f"one step of the filter ({_kernel.instruction_set()})": kernel(options.runs),
+        "the fit of `accel`, by the number of samples": growth(min(options.runs, 3)),
+        "processes": [start(options.runs)],
     }
-    console = Console(width=100)
-    for table in tables(document):
-        console.print(table)
-    if options.json:
-        options.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    show(*(plain_table(rows, title) for title, rows in measured.items()))
+    save(options.json, measured)

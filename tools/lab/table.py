@@ -39,13 +39,23 @@ def table(
     return lines
 
 
+def plain_table(rows: Sequence[Mapping[str, Any]], title: str | None = None) -> Table:
+    """A line a row, whose keys are the columns; text stands to the left."""
+    lines = Table(title=title)
+    for heading, value in rows[0].items():
+        lines.add_column(heading, justify="left" if isinstance(value, str) else "right")
+    for row in rows:
+        lines.add_row(*map(cell, row.values()))
+    return lines
+
+
 def cell(value: Any) -> str:
-    """Text of a value: three digits of a number, nothing of what is not known."""
+    """Text of a value: three digits of a number, all before the point, and nothing of what is not known."""
     match value:
         case None:
             return ""
         case float():
-            return "" if math.isnan(value) else f"{value:.3g}"
+            return "" if math.isnan(value) else f"{value:,.0f}" if 1e3 <= abs(value) < 1e9 else f"{value:.3g}"
         case _:
             return str(value)
 
