@@ -2,11 +2,14 @@
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from tools.attack import fuzz, fuzz_targets
 
 SESSION = Path(__file__).parents[3] / "fixtures" / "sessions" / "mpu6050.mcap"
 
@@ -20,36 +23,63 @@ def holds(program):
     return call
 
 
-def test_readers_refuse_mutated_bytes(holds):
-    holds("attack", "fuzz", "--seconds", "0.15")
+@pytest.fixture(scope="module")
+def targets(tmp_path_factory):
+    return fuzz_targets.targets(tmp_path_factory.mktemp("targets"))
+
+
+@pytest.fixture
+def fuzzed(targets, monkeypatch):
+    """Run fuzz.py on targets, once each with this seed, and give its exit code."""
+    monkeypatch.setattr(fuzz_targets, "targets", lambda _: targets)
+    handler = signal.getsignal(signal.SIGVTALRM)
+
+    def call(first, *names):
+        monkeypatch.setattr(sys, "argv", ["fuzz", "--first", str(first), "--seconds", "0", *names])
+        return fuzz.main()
+
+    yield call
+    signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+    signal.signal(signal.SIGVTALRM, handler)
+
+
+def test_readers_refuse_mutated_bytes(fuzzed, capsys):
+    for seed in range(1, 9):
+        assert fuzzed(seed) == 0, capsys.readouterr().out
+
+
+def test_what_is_wrong_is_told_with_its_seed(fuzzed, targets, capsys, monkeypatch):
+    monkeypatch.setitem(targets, "wrong", (int, [b"not a number"]))
+    assert fuzzed(7, "wrong") == 1
+    assert "wrong, seed 7:\nTraceback" in capsys.readouterr().out
 
 
 def test_by_coverage(holds):
     pytest.importorskip("atheris")
-    holds("attack", "fuzz", "--guided", "--seconds", "2", "bridge", "mcap's messages")
+    holds("attack", "fuzz", "--guided", "--seconds", "2", "--first", "1", "bridge", "mcap's messages")
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("clang"), reason="needs clang")
 def test_the_firmwares_core_on_hostile_requests(holds):
-    holds("attack", "fuzz_core", "--seconds", "5")
+    holds("attack", "fuzz_core", "--seconds", "5", "--first", "1")
 
 
 @pytest.mark.parametrize(("seed", "target"), [("207790003882", "npz"), ("207790000083", "dataflash")])
-def test_what_once_ended_in_a_trace(holds, seed, target):
-    holds("attack", "fuzz", "--first", seed, "--seconds", "0", target)
+def test_what_once_ended_in_a_trace(fuzzed, capsys, seed, target):
+    assert fuzzed(seed, target) == 0, capsys.readouterr().out
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux") or not shutil.which("cc"), reason="needs Linux and cc")
 def test_files_are_old_or_new_whatever_call_or_allocation_fails(holds):
-    holds("attack", "syscalls", "export", "write", "--most", "6", "--allocations", "1")
+    holds("attack", "syscalls", "export", "write", "--most", "6", "--allocations", "1", "--seed", "1")
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs /proc")
 def test_what_is_struck_ends_as_it_may(holds):
-    holds("lab", "campaign", "--sessions", "16", "--recordings", "40")
+    holds("lab", "campaign", "--sessions", "16", "--recordings", "40", "--first", "1")
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs named pipes and ulimit")
