@@ -87,7 +87,10 @@ class StillnessDetector:
         self._limits = limits
         self._acc_quiet = np.full(3, np.inf)
         self._gyr_quiet = np.full(3, np.inf)
-        self._run: list[Window] = []
+        # the windows of this run, added up one after the other
+        self._count = 0
+        self._seconds: float = 0
+        self._acc, self._gyr = np.zeros(3), np.zeros(3)
         self._number = 0
         self._bump_s = 0.0
         self._bump_rad = np.zeros(3)
@@ -97,11 +100,11 @@ class StillnessDetector:
     @property
     def seconds(self) -> float:
         """How long it has been still, a bump not counted [s]."""
-        return sum(window.end_s - window.start_s for window in self._run)
+        return self._seconds
 
     def forget(self) -> None:
         """What comes next has nothing to do with what was."""
-        self._begin([])
+        self._begin()
 
     def add(self, window: Window) -> Still | Moved:
         """What `window` shows."""
@@ -114,30 +117,39 @@ class StillnessDetector:
         stepped = self._stepped(window)
         if stepped:
             moved = Moved(self.seconds, stepped)
-            self._begin([window])
+            self._begin()
+            self._go_on(window)
             return moved
-        self._run.append(window)
+        self._go_on(window)
         self._bump_s, self._bump_rad = 0.0, np.zeros(3)
         acc, self.rest_rad_s = self._means()
         return Still(self.seconds, acc, self.rest_rad_s, self._number)
 
     def _bumped(self, window: Window, what: str) -> Moved:
         moved = Moved(self.seconds, what, lost=not window.whole)
-        if self._run:
+        if self._count:
             seconds = window.end_s - window.start_s
             self._bump_s += seconds
             self._bump_rad += (window.gyr - self._means()[1]) * seconds
             if not window.whole or self._bump_s > BUMP_S or np.abs(self._bump_rad).max() > BUMP_RAD:
-                self._begin([])
+                self._begin()
         return moved
 
-    def _begin(self, run: list[Window]) -> None:
-        self._run = run
+    def _begin(self) -> None:
+        self._count, self._seconds = 0, 0
         self._number += 1
         self._bump_s, self._bump_rad = 0.0, np.zeros(3)
 
+    def _go_on(self, window: Window) -> None:
+        """It is still in this window, too."""
+        self._acc, self._gyr = (
+            (self._acc + window.acc, self._gyr + window.gyr) if self._count else (window.acc, window.gyr)
+        )
+        self._count += 1
+        self._seconds += window.end_s - window.start_s
+
     def _means(self) -> tuple[Vector, Vector]:
-        return np.mean([w.acc for w in self._run], 0), np.mean([w.gyr for w in self._run], 0)
+        return self._acc / self._count, self._gyr / self._count
 
     def _shaken(self, window: Window) -> str:
         """What within the window says that it is not still, or nothing."""
@@ -155,7 +167,7 @@ class StillnessDetector:
 
     def _stepped(self, window: Window) -> str:
         """What between the window and the stillness before it says that it moved, or nothing."""
-        if not self._run:
+        if not self._count:
             return ""
         acc, gyr = self._means()
         acc_step, gyr_step = window.acc - acc, window.gyr - gyr

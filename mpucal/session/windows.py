@@ -56,7 +56,7 @@ class Windows:
         first = 0
         while True:
             self._full_s = float(pending.t[first]) + self._length_s - 1e-9
-            last = int(np.searchsorted(pending.t, self._full_s))
+            last = int(pending.t.searchsorted(self._full_s))
             if last == len(pending):
                 break
             windows.append(_window(pending, first, last, self._length_s, self._spread))
