@@ -27,6 +27,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,7 @@ from mpucal.result.calibration import Calibration
 
 from ..lab.campaign import ready
 from ..lab.campaign_judge import CODES, _parts, false
+from ..lab.forked import Died, Tell, forked
 from ..lab.judge import judged
 from .hostile_link import ATTACKERS, FORGED, MOST_HEARD, SIGNED, STRANGER, Attack, HostileTransport, hostile
 from .hostile_packets import KINDS
@@ -145,35 +147,19 @@ def same(file: Path, clean: Path) -> bool:
     return bool(np.array_equal(one.D, other.D) and np.array_equal(one.b_a, other.b_a))
 
 
-Task = tuple[Attack, Path | None, Path]
+def outcomes(attacks: Sequence[tuple[Attack, Path | None, Path]], jobs: int) -> Iterator[dict[str, Any]]:
+    """Of each attack, run in a process of its own, as they end."""
+    for _, told in forked([partial(alone, *each) for each in attacks], jobs):
+        died = {"sent": 0, "codes": ["?"], "unasked": 0, "fooled": 0, "ends": [], "mb": 0}
+        yield {**died, "wrong": [f"it hung, or was ended ({told.code})"]} if isinstance(told, Died) else told
 
 
-def outcomes(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Attack, dict[str, Any]]]:
-    """Of each, run in a process of its own, as they end."""
-    waiting, running = list(tasks), {}
-    while waiting or running:
-        while waiting and len(running) < jobs:
-            task = waiting.pop(0)
-            pid = os.fork()
-            if pid == 0:
-                alone(task)
-            running[pid] = task
-        pid, status, usage = os.wait3(0)
-        attack, _, place = running.pop(pid)
-        try:
-            outcome = json.loads((place / "outcome.json").read_text())
-        except FileNotFoundError:
-            wrong = [f"it hung, or was ended ({os.waitstatus_to_exitcode(status)})"]
-            outcome = {"sent": 0, "codes": ["?"], "wrong": wrong, "unasked": 0, "fooled": 0, "ends": []}
-        yield attack, {**outcome, "mb": usage.ru_maxrss // 1024}
-
-
-def alone(task: Task) -> None:
-    """Suffer it, leave what became of it, and end; a hang is ended by the kernel."""
+def alone(attack: Attack, clean: Path | None, place: Path, tell: Tell) -> None:
+    """Suffer it, and tell what became of it; a hang is ended by the kernel."""
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
     signal.alarm(WALL_S)
-    outcome = suffer(*task)
-    (task[2] / "outcome.json").write_text(json.dumps(outcome))
+    tell({**suffer(attack, clean, place), "mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024})
+    # what the session has open need not be closed in order
     os._exit(0)
 
 
@@ -205,7 +191,7 @@ def undisturbed(place: Path, attacker: str, firmware: str) -> Path:
     signed = SIGNED if attacker == SIGNED else STRANGER
     folder = place / f"{firmware} {signed}"
     if not folder.exists():
-        [(_, outcome)] = outcomes([(Attack("ids", signed, firmware, 0, 0.0), None, folder)], 1)
+        [outcome] = outcomes([(Attack("ids", signed, firmware, 0, 0.0), None, folder)], 1)
         if outcome["wrong"] or any(outcome["codes"]):
             raise SystemExit(f"{firmware} undisturbed: {outcome}")
     return folder / "out"
@@ -225,7 +211,7 @@ def campaign(asked: argparse.Namespace, place: Path, kind: str, attacker: str) -
             here = place / f"{kind}-{attacker.replace(' ', '-')}-{firmware}-{seed}"
             attack = Attack(kind, attacker, firmware, seed, asked.rate, heard[firmware])
             tasks.append((attack, clean[firmware] / "calibration.json", here))
-        done += [outcome for _, outcome in outcomes(tasks, asked.jobs)]
+        done += outcomes(tasks, asked.jobs)
     print(row(kind, attacker, done))
     wrongs = Counter(wrong for outcome in done for wrong in outcome["wrong"])
     ends = Counter(end for outcome in done for end in outcome["ends"])

@@ -48,6 +48,7 @@ from mpucal.session import results, rotate
 from .campaign_judge import Outcome, judged, table
 from .campaign_recordings import struck_recordings
 from .campaign_worlds import BRIDGE, CHIP, KINDS, VEHICLE, Blow, World
+from .forked import Died, Task, Tell, forked
 
 CASES = 16
 # a session that aims at less ends sooner: how often each, and until when faults begin
@@ -112,17 +113,18 @@ def words(number: int) -> list[str]:
 
 
 class Prefix:
-    """One session without faults, and the struck ones that leave it; `tell` hears of each."""
+    """One session without faults, and the struck ones that leave it."""
 
-    def __init__(self, number: int, cases: Sequence[Case], place: Path, tell: int) -> None:
-        self._number, self._place, self._tell = number, place, tell
+    def __init__(self, number: int, cases: Sequence[Case], place: Path) -> None:
+        self._number, self._place = number, place
         self._world = World(world_of(number))
         self._child = False
         for case in cases:
             self._world.moments.add(case.blows[0].at_s, partial(self._leave, case))
 
-    def run(self) -> None:
-        """To the end, of this process too."""
+    def run(self, tell: Tell) -> None:
+        """To the end, of this process too; `tell` hears of each."""
+        self._tell = tell
         here = self._place / "prefix"
         here.mkdir(parents=True)
         os.chdir(here)
@@ -194,7 +196,7 @@ class Prefix:
 
     def _report(self, case: Case, outcome: Outcome, cpu_s: float) -> None:
         line = {"case": case.name, "blows": [str(b) for b in case.blows], "world": self._world.kind, "cpu_s": cpu_s}
-        os.write(self._tell, (json.dumps({**line, **asdict(outcome)}) + "\n").encode())
+        self._tell({**line, **asdict(outcome)})
 
 
 def _unsynced(durable_file: durable.Durable, _file: object) -> None:
@@ -252,26 +254,10 @@ def cpu_s(pid: int) -> float:
 
 def sessions(prefixes: Sequence[tuple[int, Sequence[Case]]], jobs: int, place: Path) -> Iterator[dict]:
     """The outcomes, as they come."""
-    hear, tell = os.pipe()
-    running: set[int] = set()
-    waiting = list(prefixes)
-    with os.fdopen(hear, "r") as lines:
-        os.set_blocking(hear, False)
-        while waiting or running:
-            while waiting and len(running) < jobs:
-                number, cases = waiting.pop(0)
-                pid = os.fork()
-                if pid == 0:
-                    os.close(hear)
-                    Prefix(number, cases, place / str(number), tell).run()
-                running.add(pid)
-            pid, status = os.waitpid(-1, os.WNOHANG)
-            running.discard(pid)
-            if pid and status:
-                yield {"case": "?", "world": "?", "blows": [], "wrong": [f"a prefix ended with {status}"], "cpu_s": 0.0}
-            yield from (json.loads(line) for line in iter(lines.readline, ""))
-            time.sleep(0.02)
-    os.close(tell)
+    tasks: list[Task] = [Prefix(number, cases, place / str(number)).run for number, cases in prefixes]
+    for _, told in forked(tasks, jobs):
+        died = {"case": "?", "world": "?", "blows": [], "wrong": [f"a prefix ended with {told}"], "cpu_s": 0.0}
+        yield died if isinstance(told, Died) else told
 
 
 def main() -> int:

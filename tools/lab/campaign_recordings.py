@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import resource
 import shutil
 import signal
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from dataclasses import asdict, dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -25,9 +23,11 @@ from mpucal.files import load, open_writer
 from mpucal.files.rows import Rows
 
 from .campaign_judge import judged
+from .forked import Died, Task, Tell, forked
 
 SECONDS, MEMORY = 120, 4 << 30
 MOST_BLOWS = 4
+DIED = {"world": "?", "blows": ["?"], "cpu_s": 0.0, "verdict": ""}
 SOURCES = {
     "mcap": ["--bus", "sim:seed=4", "--rate", "25"],
     "npz": ["--bus", "sim:seed=5,chip=mpu6500", "--rate", "50"],
@@ -217,51 +217,28 @@ def one(number: int, of: dict[str, tuple[Path, SimpleNamespace]], place: Path) -
 
 def struck_recordings(first: int, count: int, jobs: int, place: Path, seconds: float) -> Iterator[dict]:
     """The outcomes, as they come; who crashes or hangs is told by number, and the others go on."""
-    of = originals(place)
-    until = time.monotonic() + seconds
-    hear, tell = os.pipe()
-    running: dict[int, int] = {}
-    at = dict.fromkeys(range(jobs), first - 1)
-    left = {j: range(first + j, first + count, jobs) for j in range(jobs)}
-    with os.fdopen(hear, "r") as lines:
-        os.set_blocking(hear, False)
-        while any(left.values()) or running:
-            for j, numbers in left.items():
-                if numbers and j not in running.values():
-                    running[_work(numbers, of, place / f"job{j}", tell, until)] = j
-                    left[j] = range(0)
-            time.sleep(0.05)
-            pid, status = os.waitpid(-1, os.WNOHANG)
-            for line in iter(lines.readline, ""):
-                told = json.loads(line)
-                if isinstance(told, int):
-                    at[(told - first) % jobs] = told
-                else:
-                    yield told
-            if pid:
-                j = running.pop(pid)
-                if status:
-                    yield {**_DIED, "case": f"r{at[j]}", "wrong": [f"died with {os.waitstatus_to_exitcode(status)}"]}
-                    left[j] = range(at[j] + jobs, first + count, jobs)
-    os.close(tell)
+    of, until = originals(place), time.monotonic() + seconds
+    left = [range(first + j, first + count, jobs) for j in range(jobs)]
+    tasks: list[Task] = [partial(work, j, left[j], of, place, until) for j in range(jobs)]
+    for task, told in forked(tasks, jobs):
+        j = task.args[0]  # type: ignore[attr-defined]
+        if isinstance(told, Died):
+            yield {**DIED, "case": f"r{left[j][0]}", "wrong": [f"died with {told.code}"]}
+            tasks.append(partial(work, j, left[j][1:], of, place, until))
+        elif isinstance(told, range):
+            left[j] = told
+        else:
+            yield told
 
 
-_DIED = {"world": "?", "blows": ["?"], "cpu_s": 0.0, "verdict": ""}
-
-
-def _work(numbers: range, of: dict, place: Path, tell: int, until: float) -> int:
-    pid = os.fork()
-    if pid:
-        return pid
+def work(j: int, numbers: range, of: dict, place: Path, until: float, tell: Tell) -> None:
+    """Strike one recording after the other; before each, those that are left are told."""
     with suppress(ValueError):
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    for number in numbers:
+    for n, number in enumerate(numbers):
         if time.monotonic() > until:
             break
-        os.write(tell, f"{number}\n".encode())
+        tell(numbers[n:])
         # of processor time: the machine may have other things to do
         signal.setitimer(signal.ITIMER_PROF, SECONDS)
-        os.write(tell, (json.dumps(one(number, of, place)) + "\n").encode())
-    sys.stdout.flush()
-    os._exit(0)
+        tell(one(number, of, place / f"job{j}"))
