@@ -6,8 +6,8 @@
 The simulated vehicle and the attacker share one link, and the packets go through the code that those of a socket do.
 The attacker sends as a stranger (an address of its own), as the vehicle (its address forged, nothing signed) and
 against signing (the address forged, both sides sign, and it has no key, but packets of an earlier session). Each run
-is a process of its own: both commands, the first with `--rate` packets a second of the vehicle's time from the lock on,
-the others with bursts of any rate and length at any time, some from before the lock on.
+is a process of its own: both commands, the first with a thousand packets a second of the vehicle's time from the lock
+on, the others with bursts of any rate and length at any time, some from before the lock on.
 
 Of a stranger, and against signing, the calibration must be the undisturbed one to the bit, and be written. Always
 wrong is an exit code that says nothing, a trace, a hang, no sentence, a file in part, a parameter set that is neither
@@ -56,6 +56,8 @@ FIRMWARES = ("ardupilot", "px4")
 # what may be taken for the vehicle's samples, where the address is forged and nothing signed
 OF_SAMPLES = ("values", "time", "replayed", "junk", "mixed")
 MOST_RUNS = 60
+# packets a second of the vehicle's time
+RATE = 1000.0
 CPU_S, WALL_S = 300, 1200
 NO_VEHICLE = 2
 QUICK = ("--rate", "50", "--target", "quick")
@@ -169,7 +171,6 @@ def main() -> int:
     parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"some of: {', '.join(KINDS)}; default: all")
     parser.add_argument("--packets", type=int, default=100_000, help="of each kind and attacker, at least")
     parser.add_argument("--runs", type=int, default=3, help="of each kind, attacker and firmware, at least")
-    parser.add_argument("--rate", type=float, default=1000.0, help="packets a second of the vehicle's time")
     parser.add_argument("--attacker", choices=ATTACKERS, action="append")
     parser.add_argument("--firmware", choices=FIRMWARES, action="append")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
@@ -209,7 +210,7 @@ def campaign(asked: argparse.Namespace, place: Path, kind: str, attacker: str) -
         tasks = []
         for firmware in firmwares:
             here = place / f"{kind}-{attacker.replace(' ', '-')}-{firmware}-{seed}"
-            attack = Attack(kind, attacker, firmware, seed, asked.rate, heard[firmware])
+            attack = Attack(kind, attacker, firmware, seed, RATE, heard[firmware])
             tasks.append((attack, clean[firmware] / "calibration.json", here))
         done += outcomes(tasks, asked.jobs)
     print(row(kind, attacker, done))

@@ -265,7 +265,6 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sessions", type=int, default=0)
     parser.add_argument("--recordings", type=int, default=0)
-    parser.add_argument("--seconds", type=float, default=float("inf"), help="begin no session after so long")
     parser.add_argument("--first", type=int, default=datetime.now(UTC).date().toordinal() * 1000)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--case", help="this one alone, PREFIX.NUMBER, or rNUMBER of a recording")
@@ -304,12 +303,9 @@ def outcomes(asked: argparse.Namespace, place: Path) -> Iterator[dict]:
         return
     if asked.case or asked.recordings:
         first, count = (int(asked.case[1:]), 1) if asked.case else (asked.first, asked.recordings)
-        yield from struck_recordings(first, count, asked.jobs, place, asked.seconds)
-    begun = time.monotonic()
+        yield from struck_recordings(first, count, asked.jobs, place)
     numbers = range(asked.first, asked.first + -(-asked.sessions // CASES))
     for at in range(0, len(numbers), 10 * asked.jobs):
-        if time.monotonic() - begun > asked.seconds:
-            return
         batch = numbers[at : at + 10 * asked.jobs]
         yield from sessions([(n, [drawn(n, k) for k in range(CASES)]) for n in batch], asked.jobs, place)
 

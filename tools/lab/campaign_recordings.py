@@ -215,29 +215,27 @@ def one(number: int, of: dict[str, tuple[Path, SimpleNamespace]], place: Path) -
     return {**line, "cpu_s": time.process_time() - begun, **asdict(outcome)}
 
 
-def struck_recordings(first: int, count: int, jobs: int, place: Path, seconds: float) -> Iterator[dict]:
+def struck_recordings(first: int, count: int, jobs: int, place: Path) -> Iterator[dict]:
     """The outcomes, as they come; who crashes or hangs is told by number, and the others go on."""
-    of, until = originals(place), time.monotonic() + seconds
+    of = originals(place)
     left = [range(first + j, first + count, jobs) for j in range(jobs)]
-    tasks: list[Task] = [partial(work, j, left[j], of, place, until) for j in range(jobs)]
+    tasks: list[Task] = [partial(work, j, left[j], of, place) for j in range(jobs)]
     for task, told in forked(tasks, jobs):
         j = task.args[0]  # type: ignore[attr-defined]
         if isinstance(told, Died):
             yield {**DIED, "case": f"r{left[j][0]}", "wrong": [f"died with {told.code}"]}
-            tasks.append(partial(work, j, left[j][1:], of, place, until))
+            tasks.append(partial(work, j, left[j][1:], of, place))
         elif isinstance(told, range):
             left[j] = told
         else:
             yield told
 
 
-def work(j: int, numbers: range, of: dict, place: Path, until: float, tell: Tell) -> None:
+def work(j: int, numbers: range, of: dict, place: Path, tell: Tell) -> None:
     """Strike one recording after the other; before each, those that are left are told."""
     with suppress(ValueError):
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     for n, number in enumerate(numbers):
-        if time.monotonic() > until:
-            break
         tell(numbers[n:])
         # of processor time: the machine may have other things to do
         signal.setitimer(signal.ITIMER_PROF, SECONDS)
