@@ -28,7 +28,7 @@ def readings(**changes):
 
 
 def test_attitude_is_what_scipy_makes_of_the_rates():
-    omega = turned_all_the_time().omega
+    omega = turned_all_the_time(1.0).omega
     expected = Rotation.identity()
     for turn in Rotation.from_rotvec(omega * STEP_S):
         expected = expected * turn
@@ -157,7 +157,7 @@ def test_every_family_gives_a_recording():
     """Of the table, but for those that take long."""
     families = [f for f in table.FAMILIES.values() if "20 minutes" not in f.name and "2 kHz" not in f.name]
     assert len({f.name for f in families}) > 70
-    for one in families[::8]:
+    for one in families[::12]:
         simulated = family.simulate(one, 0)
         assert len(simulated.recording) > 1000, one.name
         assert np.allclose(simulated.truth.K, simulated.truth.K.T), one.name
@@ -220,7 +220,7 @@ SMALL = (
 
 
 def test_no_verdict_of_a_small_set_is_false():
-    runs = [families.of_seed((name, seed)) for name in SMALL for seed in (100, 101)]
+    runs = [families.of_seed((name, 100)) for name in SMALL]
     assert not [run for run in runs if run.false or run.verdict == "crashed"]
     assert families.broken(runs) == []
 
