@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from itertools import combinations_with_replacement
 from typing import Any
 
@@ -28,7 +28,6 @@ import numpy as np
 
 from mpucal.chip.config import Config
 from mpucal.chip.families import PARTS
-from mpucal.data import Vector
 from mpucal.result.calibration import GOOD, REFUSED, USABLE
 from mpucal.result.error_model import MG_PER_MPS2
 from mpucal.session.events import Decision, Prompt, PromptKind, Verification
@@ -38,8 +37,8 @@ from mpucal.simulated.faults import OF_CHIP, Fault, kinds
 from mpucal.simulated.hands import KINDS as HANDS
 from mpucal.simulated.mishaps import ZeroStep
 
-from .judge import Judgement, rms
-from .sessions import ABANDONED, NOTHING, Ear, Session, by_command, recorded, session
+from .judge import rms
+from .sessions import ABANDONED, NOTHING, Ear, Ended, by_command, ended_of, recorded, session
 from .table import grouped, show, table
 from .trials import command_line, in_parallel, save, seed_range
 
@@ -69,20 +68,6 @@ COMBINATIONS = [*FAULTS, *map("/".join, combinations_with_replacement(FAULTS, 2)
 CHIPS = ("mpu6050", "mpu6500", "clone98")
 FAULTY_S, RECORDED_S, POLL_S = 75, 45, 0.2
 CODES, FARTHEST_Z = (0, 3, 4, 5), 6.0
-
-
-@dataclass(frozen=True)
-class Ended(Judgement):
-    """How a session ended; times in simulated seconds, NaN where it did not come so far."""
-
-    name: str = ""
-    seed: int = 0
-    said: str = ""
-    wrong: str = ""
-    rotated_s: float = math.nan
-    finished_s: float = math.nan
-    prompts: int = 0
-    verified_z: tuple[float, ...] = ()
 
 
 def parts() -> dict[str, tuple[str, str]]:
@@ -188,16 +173,6 @@ def struck(rng: np.random.Generator, names: Sequence[str], end_s: float) -> list
     return [Fault(str(name), round(float(rng.uniform(0.0, end_s)), 2)) for name in names]
 
 
-def ended_of(name: str, seed: int, done: Session, wrong: str, *steps: Vector) -> Ended:
-    """A trace is wrong in any trial, and a good one that is farther from the truth than it claims."""
-    judgement = done.judged(*steps)
-    if "Traceback" in done.said:
-        wrong = "a trace"
-    elif judgement.verdict == GOOD and judgement.false:
-        wrong = "called good"
-    return Ended(**asdict(judgement), name=name, seed=seed, said=done.said, wrong=wrong)
-
-
 # by name: what there is to try, how, and in how many seeds unless told otherwise
 TRIALS: dict[str, tuple[Sequence[str], Callable[[str, int], Ended], str]] = {
     "hands": (tuple(HANDS), of_hand, "50"),
@@ -255,9 +230,7 @@ def main() -> int:
     parser = command_line(__doc__)
     parser.set_defaults(seeds=None)
     parser.add_argument("trial", choices=TRIALS)
-    parser.add_argument(
-        "names", nargs="*", metavar="NAME", help="some of what it tries; default: all, or hand `guided`"
-    )
+    parser.add_argument("--of", nargs="+", metavar="NAME", help="some of it; default: all, or the guided hand")
     asked = parser.parse_args()
     names, _, seeds = TRIALS[asked.trial]
     chosen = asked.of or (["guided"] if asked.trial == "hands" else names)

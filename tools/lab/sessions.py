@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from io import StringIO
 from pathlib import Path
@@ -20,7 +20,7 @@ from mpucal.calibration import calibrate
 from mpucal.chip.driver import Driver
 from mpucal.data import Recording, Vector
 from mpucal.errors import Abandoned, SourceError
-from mpucal.result.calibration import Calibration
+from mpucal.result.calibration import GOOD, Calibration
 from mpucal.session.events import Key, Meter, Output, Prompt, PromptKind
 from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
@@ -81,6 +81,30 @@ class Session:
         D, b_a = np.array(self.truth["D"]), np.array(self.truth["b_a"])
         # such a step is felt before D
         return judged(self.calibration, (D, b_a), *((D, b_a + D @ step) for step in steps))
+
+
+@dataclass(frozen=True)
+class Ended(Judgement):
+    """How a session ended; times in simulated seconds, NaN where it did not come so far."""
+
+    name: str = ""
+    seed: int = 0
+    said: str = ""
+    wrong: str = ""
+    rotated_s: float = math.nan
+    finished_s: float = math.nan
+    prompts: int = 0
+    verified_z: tuple[float, ...] = ()
+
+
+def ended_of(name: str, seed: int, done: Session, wrong: str, *steps: Vector) -> Ended:
+    """A trace is wrong in any trial, and a good one that is farther from the truth than it claims."""
+    judgement = done.judged(*steps)
+    if "Traceback" in done.said:
+        wrong = "a trace"
+    elif judgement.verdict == GOOD and judgement.false:
+        wrong = "called good"
+    return Ended(**asdict(judgement), name=name, seed=seed, said=done.said, wrong=wrong)
 
 
 def session(words: str, plan: Plan, seed: int, ear: Any = None, mishaps: Sequence[Mishap] = ()) -> Session:
