@@ -5,6 +5,8 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 TESTED := $(VENV)/.tested
 export PYTHON
+# without its bytecode each start of mpucal compiles 230 modules
+unexport PYTHONDONTWRITEBYTECODE
 
 SECONDS ?= 600
 
