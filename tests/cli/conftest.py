@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -93,3 +94,35 @@ def served():
     yield call
     for each in begun:
         each.end()
+
+
+# how long a busy machine may take, for what takes it a second or two
+PATIENCE_S = 300.0
+
+
+@pytest.fixture(scope="session")
+def stopped_at():
+    """Run held.py in a folder, send its session a signal while it is held, and wait until it ended."""
+
+    def call(folder: Path, held, sign, *words):
+        said, began_s = folder / "said.txt", time.monotonic()
+        program = [sys.executable, Path(__file__).with_name("held.py"), *map(str, held)]
+        with (
+            said.open("w") as stderr,
+            subprocess.Popen([*program, *words], cwd=folder, stderr=stderr, stdout=subprocess.DEVNULL) as process,
+        ):
+            try:
+                while not (folder / "held").exists():
+                    assert process.poll() is None, said.read_text()
+                    assert time.monotonic() < began_s + PATIENCE_S, said.read_text()
+                    time.sleep(0.01)
+                process.send_signal(sign)
+                (folder / "go").touch()
+                process.wait(PATIENCE_S)
+            finally:
+                process.kill()
+        for name in ("held", "go"):
+            (folder / name).unlink()
+        return Result(process.returncode, "", said.read_text())
+
+    return call

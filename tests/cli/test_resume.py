@@ -2,9 +2,6 @@
 
 import json
 import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -18,28 +15,15 @@ from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.result.calibration import Calibration
 
 STORED = Path(__file__).parents[2] / "fixtures" / "sessions" / "enter.mcap"
-HELD = Path(__file__).with_name("held.py")
 WORDS = ("session", "--json-events", "--yes")
 
 
-def interrupted(folder, sign, held, *options):
-    """A session in `folder` that gets the signal while it is held at a step; how far it had come then [s]."""
-    said = folder / "said.jsonl"
-    with (
-        said.open("w") as stderr,
-        subprocess.Popen(
-            [sys.executable, HELD, *held, *WORDS, *options], cwd=folder, stderr=stderr, stdout=subprocess.DEVNULL
-        ) as program,
-    ):
-        while not (folder / "held").exists():
-            assert program.poll() is None
-            time.sleep(0.01)
-        program.send_signal(sign)
-        (folder / "go").touch()
-    for name in ("held", "go"):
-        (folder / name).unlink()
-    events = [json.loads(line) for line in said.read_text().splitlines() if line.startswith("{")]
-    return max(event.get("t_s", 0.0) for event in events)
+def events(err):
+    return [json.loads(line) for line in err.splitlines() if line.startswith("{")]
+
+
+def came_to_s(err):
+    return max(event.get("t_s", 0.0) for event in events(err))
 
 
 def last_s(capture):
@@ -60,21 +44,23 @@ def joined(folder, names):
     return path
 
 
-def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, tmp_path):
+def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, stopped_at, tmp_path):
     """Killed while flat, and stopped with Ctrl-C while rotating."""
     folder = tmp_path / "board"
     words = ("--bus", "sim", "--rate", "50", "--target", "quick", "-o", "board", "--name", "Bench 7")
-    killed_s = interrupted(tmp_path, signal.SIGKILL, ("flat", "150"), *words)
+    killed_s = came_to_s(stopped_at(tmp_path, ("flat", 150), signal.SIGKILL, *WORDS, *words).err)
     assert killed_s > 3.0
     assert killed_s - last_s(folder / "capture.mcap") < 1.0
-    stopped_s = interrupted(tmp_path, signal.SIGINT, ("rotate", "400"), "--resume", "board")
+    stopped = stopped_at(tmp_path, ("rotate", 400), signal.SIGINT, *WORDS, "--resume", "board")
+    assert stopped.code == 4
+    stopped_s = came_to_s(stopped.err)
     assert stopped_s > 20.0
     assert stopped_s - last_s(folder / "capture-2.mcap") < 1.0
 
     resumed = mpucal(*WORDS, "--resume", folder)
     assert resumed.code == 0, resumed.err
-    for err, begins in (((tmp_path / "said.jsonl").read_text(), "lay_flat"), (resumed.err, "rotate")):
-        said = [json.loads(line) for line in err.splitlines() if line.startswith("{")]
+    for err, begins in ((stopped.err, "lay_flat"), (resumed.err, "rotate")):
+        said = events(err)
         assert said[0]["event"] in ("note", "decision")
         assert "the session resumes where it stopped" in err
         prompts = [event["kind"] for event in said if event["event"] == "prompt"]

@@ -1,9 +1,6 @@
 import json
 import re
 import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +12,6 @@ from mpucal.chip.records import SessionEvent
 from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.result.calibration import Calibration
 
-HELD = Path(__file__).with_name("held.py")
 STORED = Path(__file__).parents[2] / "fixtures" / "sessions" / "enter.mcap"
 
 
@@ -170,21 +166,10 @@ def test_a_capture_cut_short_while_flat_is_abandoned(mpucal, session, tmp_path):
 
 
 @pytest.mark.parametrize("held", [("flat", 30), ("rotate", 30)], ids=["lay flat", "rotate"])
-def test_ctrl_c_leaves_a_whole_capture_that_replays(mpucal, tmp_path, held):
-    words = [sys.executable, HELD, *map(str, held), "session", "--bus", "sim", "--rate", "50", "-o", "board"]
-    said = tmp_path / "said.txt"
-    with (
-        said.open("w") as stderr,
-        subprocess.Popen(words, cwd=tmp_path, stderr=stderr, stdout=subprocess.DEVNULL) as program,
-    ):
-        while not (tmp_path / "held").exists():
-            assert program.poll() is None
-            time.sleep(0.01)
-        program.send_signal(signal.SIGINT)
-        (tmp_path / "go").touch()
-    lines = said.read_text().splitlines()
-    assert program.returncode == 4, lines
-    assert "the session was interrupted" in lines[-1]
+def test_ctrl_c_leaves_a_whole_capture_that_replays(mpucal, stopped_at, tmp_path, held):
+    stopped = stopped_at(tmp_path, held, signal.SIGINT, "session", "--bus", "sim", "--rate", "50", "-o", "board")
+    assert stopped.code == 4, stopped.err
+    assert "the session was interrupted" in stopped.err.splitlines()[-1]
     capture = tmp_path / "board" / "capture.mcap"
     assert read_capture(capture).recovered is None
     again = mpucal("session", "--replay", capture, "-o", "again")
