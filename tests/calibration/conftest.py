@@ -57,9 +57,9 @@ def pick():
 
 
 @cache
-def by_hand(seed, motion, **how):
-    """An MPU-6050 in a hand at 100 Hz, simulated once."""
-    return hand_scenario(seed, motion, rate_hz=100, **how)
+def by_hand(seed, motion, rate_hz=100, **how):
+    """An MPU-6050 in a hand, simulated once, as finely as a hand's jerks of 60 ms and tremor of 10 Hz need it."""
+    return hand_scenario(seed, motion, rate_hz=rate_hz, truth_hz=400, **how)
 
 
 @pytest.fixture(scope="session")

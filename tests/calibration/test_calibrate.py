@@ -2,10 +2,11 @@
 
 import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mpucal.calibration import MODELS, calibrate
@@ -56,9 +57,9 @@ def test_when_it_began_makes_no_difference(ideal):
 
 
 @pytest.mark.parametrize("prepared", ["paper", "pose12"])
-def test_jittered_times_are_measured_times(prepared):
+def test_jittered_times_are_measured_times(hand, prepared):
     """A jitter of the clock that is written down does no harm: the motion is sampled where the times say."""
-    simulated = paper_scenario(0, rate_hz=200) if prepared == "paper" else hand_scenario(1, prepared, rate_hz=200)
+    simulated = paper_scenario(0, rate_hz=200) if prepared == "paper" else hand(1, prepared, rate_hz=200)
     recording, truth = simulated.recording, simulated.truth
     rng = np.random.default_rng(0)
     # one of each two samples: 5, 10 or 15 ms apart
@@ -111,12 +112,12 @@ def test_no_such_gravity(ideal, gravity):
 
 # ---- whatever it is given
 
-SCENES = {
-    "paper": lambda: paper_scenario(1, rate_hz=25).recording,
-    "pose6": lambda: hand_scenario(1, "pose6", rate_hz=25).recording,
-    "continuous": lambda: hand_scenario(1, "continuous", rate_hz=25).recording,
-}
-MADE: dict[str, Recording] = {}
+
+@cache
+def scene(name):
+    scenario = paper_scenario(1, rate_hz=25) if name == "paper" else hand_scenario(1, name, rate_hz=25)
+    return scenario.recording
+
 
 # units that are wrong, and numbers no sensor reads
 FACTORS = (1.0, 1.0, 1.0, 1e-300, 1e-30, 1e-3, 1 / 9.80665, 57.3, 1e3, 1e11, 1e150)
@@ -126,8 +127,7 @@ ends = st.floats(0.0, 1.0)
 @st.composite
 def recordings(draw):
     """Recordings of simulated sensors, ill-treated."""
-    name = draw(st.sampled_from(sorted(SCENES)))
-    base = MADE.setdefault(name, SCENES[name]())
+    base = scene(draw(st.sampled_from(("continuous", "paper", "pose6"))))
     n, rng = len(base), np.random.default_rng(draw(st.integers(0, 2**16)))
     faster = draw(st.sampled_from((1.0, 1.0, 0.8, 4.0, 160.0)))  # 20 Hz to 4 kHz
     jitter = draw(st.sampled_from((0.0, 0.0, 0.3, 0.99)))
@@ -164,13 +164,6 @@ def recordings(draw):
     return t[kept], acc[kept], gyr[kept], flat
 
 
-@settings(
-    max_examples=50,
-    deadline=None,
-    derandomize=True,
-    database=None,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
-)
 @given(recordings(), st.sampled_from([model for model in MODELS if model != "paper"]))
 def test_whatever_is_recorded_there_is_a_verdict(arrays, model):
     try:

@@ -11,7 +11,6 @@ from mpucal.calibration.hand import fit_hand
 from mpucal.calibration.parameters import B_A_NAMES, BY_NAME, D_NAMES, K_NAMES
 from mpucal.calibration.static_intervals import static_intervals
 from tools.lab.judge import sph_rms
-from tools.lab.scenarios.recordings import hand_scenario
 
 G = 9.82
 
@@ -127,9 +126,9 @@ def test_auto_takes_it_for_a_hand(hand, motion):
     assert "expected 3" in calibration.fit["why"]
 
 
-def test_a_perfect_gyroscope_keeps_its_matrix_where_all_of_it_is_known():
-    for seed in range(3):
-        fit = fitted(hand_scenario(seed, "calm jerks", rate_hz=200).recording)
+def test_a_perfect_gyroscope_keeps_its_matrix_where_all_of_it_is_known(hand):
+    for seed in range(2):
+        fit = fitted(hand(seed, "calm jerks", rate_hz=200).recording)
         np.testing.assert_array_equal(fit.K, np.eye(3))
         assert not set(K_NAMES) & set(fit.names)
         assert np.isnan(fit.std("K_xx")).all()
@@ -196,8 +195,8 @@ def test_a_gyroscope_whose_bias_drifts_does_little(hand):
 
 
 @pytest.mark.parametrize("rate_hz", [50.0, 400.0])
-def test_the_sample_rate_hardly_matters(rate_hz):
-    run = hand_scenario(3, "pose12", rate_hz=rate_hz)
+def test_the_sample_rate_hardly_matters(hand, rate_hz):
+    run = hand(3, "pose12", rate_hz=rate_hz)
     fit = fitted(run.recording)
     assert sph_rms(run.truth, fit.D, fit.b_a) < 0.015
 

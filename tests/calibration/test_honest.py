@@ -24,7 +24,9 @@ UNITS = ((1.0, 1.0), (1 / 9.80665, 1.0), (1e3 / 9.80665, 1.0), (1.0, np.degrees(
 @cache
 def base(prepared, seed):
     """200 Hz, of which a recording takes some samples."""
-    return paper_scenario(seed, rate_hz=200) if prepared == "paper" else hand_scenario(seed, prepared, rate_hz=200)
+    if prepared == "paper":
+        return paper_scenario(seed, rate_hz=200)
+    return hand_scenario(seed, prepared, rate_hz=200, truth_hz=400)
 
 
 def turned(truth, Q):

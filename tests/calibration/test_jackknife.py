@@ -16,18 +16,18 @@ from mpucal.calibration.parts import Parts
 from mpucal.calibration.preprocessing import preprocess
 from mpucal.calibration.problem import Problem, Series
 from tools.lab.judge import sph_rms
-from tools.lab.scenarios.recordings import hand_scenario, paper_scenario
+from tools.lab.scenarios.recordings import paper_scenario
 
 G = 9.82
 
 
-def in_hand():
-    recording = hand_scenario(1, "continuous").recording
+def in_hand(hand):
+    recording = hand(1, "continuous").recording
     prepared = preprocess(recording, find_flat(recording), G)
     return prepared.white(0.3), initialise(prepared.problem, prepared.flat.b_omega)
 
 
-def in_place():
+def in_place(_):
     recording = paper_scenario(1, rate_hz=50).recording
     flat = flat_statistics(recording, find_flat(recording))
     problem = Problem(Series.after(recording, flat), flat, G)
@@ -35,8 +35,8 @@ def in_place():
 
 
 @pytest.mark.parametrize(("made", "parameters", "block"), [(in_place, ACCEL, 8), (in_hand, HAND, 16)])
-def test_the_parts_scores_sum_to_the_whole(made, parameters, block):
-    problem, theta = made()
+def test_the_parts_scores_sum_to_the_whole(hand, made, parameters, block):
+    problem, theta = made(hand)
     n = len(problem.series)
     cut = evaluate(problem, theta, parameters, np.array([n // 3, n // 2, n]))
     scores = part_scores(problem, theta, parameters, cut.to_ends)
@@ -50,14 +50,14 @@ def test_the_parts_scores_sum_to_the_whole(made, parameters, block):
 
 
 @pytest.mark.parametrize("motion", ["continuous", "pose12"])
-def test_where_the_model_holds_it_claims_no_more_than_the_model(motion):
-    inflations = [weigh(hand_scenario(seed, motion).recording, "auto", G)[0].claim.inflation for seed in range(4)]
+def test_where_the_model_holds_it_claims_no_more_than_the_model(hand, motion):
+    inflations = [weigh(hand(seed, motion).recording, "auto", G)[0].claim.inflation for seed in range(3)]
     assert np.median(inflations) < 1.3
 
 
 @pytest.mark.parametrize("seed", [1, 2, 4])
-def test_a_side_that_no_other_makes_up_for_says_little(seed):
-    claim = weigh(hand_scenario(seed, "pose7").recording, "auto", G)[0].claim
+def test_a_side_that_no_other_makes_up_for_says_little(hand, seed):
+    claim = weigh(hand(seed, "pose7").recording, "auto", G)[0].claim
     # leaving a side out moves the estimate by 15 times as much
     assert 0.0 < claim.left_out.claim() < 5.0 * claim.model
 
@@ -79,24 +79,24 @@ def test_linear_measurements_without_a_part_are_fitted_exactly():
     assert jackknife(parts, np.eye(3), G).time == pytest.approx(1.2 * np.sqrt(7.0) * np.median(d), rel=1e-9)
 
 
-def test_a_nonlinear_sensor_is_claimed_by_its_sides():
-    made = hand_scenario(3, "continuous")
+def test_a_nonlinear_sensor_is_claimed_by_its_sides(hand):
+    made = hand(3, "continuous")
     s = made.recording.acc
     bent = replace(made.recording, acc=s + 0.005 * s**2 / (2.0 * G))
     fit = calibrate(bent, gravity=G)
     assert sph_rms(made.truth, fit.D, fit.b_a) < 3.0 * fit.quality["error_std"]["rms"]
 
 
-def test_where_too_few_sides_were_down_to_be_compared_the_model_is_believed_half():
-    fit = weigh(hand_scenario(1, "continuous").recording, "hand", G)[0].fit
+def test_where_too_few_sides_were_down_to_be_compared_the_model_is_believed_half(hand):
+    fit = weigh(hand(1, "continuous").recording, "hand", G)[0].fit
     alike = np.zeros_like(fit.parts.side)
     sides = claim_of(fit, G, None, 0.0), claim_of(replace(fit, parts=replace(fit.parts, side=alike)), G, None, 0.0)
     assert sides[1].left_out.side == 0.0
     assert sides[1].floored == 2.0 * sides[0].floored
 
 
-def test_what_decided_is_in_the_document():
-    made = hand_scenario(1, "pose12")
+def test_what_decided_is_in_the_document(hand):
+    made = hand(1, "pose12")
     error = calibrate(made.recording, gravity=G).quality["error_std"]
     assert error["decided_by"] in ("model", "time", "side")
     assert error["rms"] == pytest.approx(

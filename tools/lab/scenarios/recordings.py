@@ -102,6 +102,7 @@ def hand_scenario(
     delay_s: float = 0.0,
     rate_hz: float = 200.0,
     sensor: SensorTruth | None = None,
+    truth_hz: float = TRUTH_HZ,
 ) -> Simulated:
     """An MPU-6050 that a hand moves after 10 s flat, for 40 s; for 15 s in the motions "check", "check as asked".
 
@@ -110,7 +111,7 @@ def hand_scenario(
     seed : draws the sensor, the motion, the hand and the noise; each is the same whatever the other arguments.
     motion : one of MOTIONS, or of these two. tremble : the hand trembles in the poses.
     delay_s : how much later the accelerometer reports than the gyroscope.
-    sensor : drawn from the seed unless given.
+    sensor : drawn from the seed unless given. truth_hz : how finely the hand is simulated, at least.
 
     Raises
     ------
@@ -123,7 +124,7 @@ def hand_scenario(
     if tremble:
         habits = replace(habits, tremor_mps2=TREMOR_MPS2, tremor_rad_s=TREMOR_RAD_S)
     of_sensor, of_motion, of_hand, of_tremor, of_noise = np.random.default_rng(seed).spawn(5)
-    per_sample = max(round(TRUTH_HZ / rate_hz), 1)
+    per_sample = max(round(truth_hz / rate_hz), 1)
     step_s = 1.0 / (rate_hz * per_sample)
     n = round((FLAT_S + scene.moving_s) * rate_hz) * per_sample
     t = step_s * np.arange(0.5, n)
