@@ -9,7 +9,7 @@ from mpucal.calibration.problem import Series
 from mpucal.calibration.theta import Theta
 from mpucal.kernel import _kernel
 
-N = 300
+N = 245
 
 
 @pytest.fixture(scope="session")
