@@ -335,9 +335,12 @@ def test_the_pages_have_the_same_rows():
     assert f"Formats to export to: {', '.join(others)} and {last};" in readme
 
 
-# a form that is made up, then a command
+# a form that is made up, then commands
 MADE_UP = """
+import io
+import json
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 
 from mpucal.export import forms
 from mpucal.export.losses import without_gyroscope
@@ -352,24 +355,32 @@ forms.FORMS += (
 )
 from mpucal.__main__ import run
 
-sys.exit(run(sys.argv[1:]))
+said = []
+for words in json.loads(sys.argv[1]):
+    with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
+        said.append((run(words), out.getvalue(), err.getvalue()))
+print(json.dumps(said))
 """
 
 
 def test_a_form_is_one_row(calibration, tmp_path):
     """One that is made up is known to the choices, the help, the errors and the command."""
-
-    def call(*words):
-        program = [sys.executable, "-c", MADE_UP, "export", *words]
-        return subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, check=False)
-
     calibration.save(tmp_path / "c.json")
     replace(calibration, quality={"verdict": "refused"}).save(tmp_path / "refused.json")
-    done = call("c.json", "--to", "morse", "-o", "c.txt")
-    assert (done.returncode, (tmp_path / "c.txt").read_text()) == (0, "0.31 1")
-    assert "does not correct the gyroscope" in done.stderr
-    document = json.loads(call("c.json", "--to", "morse", "--json").stdout)
+    words = (
+        ("c.json", "--to", "morse", "-o", "c.txt"),
+        ("c.json", "--to", "morse", "--json"),
+        ("--help",),
+        ("c.json", "--to", "nothing"),
+        ("refused.json", "--to", "morse"),
+    )
+    program = [sys.executable, "-c", MADE_UP, json.dumps([["export", *each] for each in words])]
+    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, check=True)
+    written, shown, helped, unknown, refused = json.loads(done.stdout)
+    assert (written[0], (tmp_path / "c.txt").read_text()) == (0, "0.31 1")
+    assert "does not correct the gyroscope" in written[2]
+    document = json.loads(shown[1])
     assert (document["to"], document["ending"], document["text"]) == ("morse", ".txt", "0.31 1")
-    assert re.search(r"morse +telegraphists", call("--help").stdout)
-    assert "'morse'" in call("c.json", "--to", "nothing").stderr
-    assert call("refused.json", "--to", "morse").returncode == RefusedError.exit_code
+    assert re.search(r"morse +telegraphists", helped[1])
+    assert "'morse'" in unknown[2]
+    assert refused[0] == RefusedError.exit_code

@@ -35,7 +35,7 @@ TEN_MG = np.array([0.0, 10.0, 0.0]) * drift.MG
 
 
 def shown(truth, seed=7, temperature_c=25.0):
-    recording = hand_scenario(seed, "check", tremble=True, sensor=truth).recording
+    recording = hand_scenario(seed, "check", tremble=True, sensor=truth, truth_hz=400).recording
     return replace(recording, flat=None, temperature_c=np.full(len(recording), temperature_c))
 
 
@@ -113,7 +113,7 @@ def test_another_chip_is_told_by_what_it_says_of_itself():
 
 
 def test_the_prior_is_the_covariance_of_the_fit():
-    recording = replace(hand_scenario(4, "pose9", rate_hz=50.0).recording, flat=None)
+    recording = replace(hand_scenario(4, "pose9", rate_hz=50.0, truth_hz=400).recording, flat=None)
     fit = mpucal.calibration.weigh(recording, "hand", GRAVITY_MPS2)[0].fit
     calibration = mpucal.calibrate(recording, "hand", GRAVITY_MPS2)
     stored = mpucal.Calibration.from_document(calibration.document())
@@ -143,9 +143,10 @@ def test_an_unchanged_sensor_is_called_changed_as_often_as_designed():
     nothing = drift.own_uncertainty(CALIBRATION) + drift.ageing(CALIBRATION, 1.0, 0.0)
     happenings = drift.happenings(CALIBRATION, 0.0)
     S = observed.J @ nothing @ observed.J.T + observed.R
-    draws = np.random.default_rng(5).multivariate_normal(np.zeros(len(S)), S, 100)
+    n = 60
+    draws = np.random.default_rng(5).multivariate_normal(np.zeros(len(S)), S, n)
     found = [weigh(replace(observed, r=r), nothing, happenings) for r in draws]
-    assert sum(w.told != NOTHING for w in found) <= 5
+    assert sum(w.told != NOTHING for w in found) <= 3
     p = np.sort([w.probability for w in found])
     # Kolmogorov and Smirnov's statistic, 1.63 at 1 %
-    assert np.sqrt(100) * np.abs(p - (np.arange(100) + 0.5) / 100).max() < 1.63
+    assert np.sqrt(n) * np.abs(p - (np.arange(n) + 0.5) / n).max() < 1.63

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.result.blob import (
@@ -27,6 +27,8 @@ PROJECT = Path(__file__).parents[2]
 VECTORS = PROJECT / "fixtures" / "vectors"
 PROTOCOL = (PROJECT / "firmware_protocol.md").read_text().split("\n## The config blob\n")[1]
 
+# each draws some sixty numbers
+some = settings(max_examples=40)
 floats = st.floats(width=32, allow_nan=False, allow_infinity=False)
 maybe = floats | st.just(math.nan)
 times = st.integers(min_value=1, max_value=253_402_300_799)  # to the end of the year 9999
@@ -73,6 +75,7 @@ def sealed(body, length=None):
     return bytes(body) + struct.pack("<I", zlib.crc32(body))
 
 
+@some
 @given(sloped())
 def test_decode_is_the_inverse_of_encode_with_a_slope(blob):
     data = blob.encode()
@@ -80,6 +83,7 @@ def test_decode_is_the_inverse_of_encode_with_a_slope(blob):
     assert plain(Blob.decode(data)) == plain(blob)
 
 
+@some
 @given(sloped(), st.sampled_from(["b_a_slope", "temperature_range_c", "temperature_c"]))
 def test_a_slope_that_cannot_be_used_is_none(blob, name):
     spoilt = (math.nan,) * 3 if name == "b_a_slope" else (math.inf, 0.0) if name == "temperature_range_c" else math.nan
@@ -93,6 +97,7 @@ def blob():
     return Blob.decode((VECTORS / "blob_measured.bin").read_bytes())
 
 
+@some
 @given(blobs())
 def test_decode_is_the_inverse_of_encode(blob):
     data = blob.encode()
@@ -100,6 +105,7 @@ def test_decode_is_the_inverse_of_encode(blob):
     assert plain(Blob.decode(data)) == plain(blob)
 
 
+@some
 @given(blobs(), st.data())
 def test_no_changed_byte_goes_unnoticed(blob, data):
     good = blob.encode()

@@ -142,7 +142,7 @@ def test_a_file_without_digest_is_read_and_doubted_and_one_whose_numbers_read_th
     assert loaded(tmp_path, json.dumps(document)) == ONE
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(at=st.integers(0, 8 * len(ONE.json()) - 1))
 def test_no_bit_that_flips_changes_a_number_without_a_word(tmp_path_factory, at):
     data = bytearray(ONE.json().encode())
