@@ -100,10 +100,10 @@ def test_what_is_simulated_walks_as_it_should_for_long():
 
 
 def test_intervals_hold_the_truth_at_their_rate():
-    """60 rests at once, of coefficients that their octaves hardly tell apart."""
+    """40 rests at once, of coefficients that their octaves hardly tell apart."""
     truth, n = np.array([1.0, 0.35, 0.01]), 2**15
-    octaves = Octaves(60)
-    octaves.add(np.stack([noise(np.random.default_rng(seed), n, 1.0, *truth) for seed in range(60)], axis=1))
+    octaves = Octaves(40)
+    octaves.add(np.stack([noise(np.random.default_rng(seed), n, 1.0, *truth) for seed in range(40)], axis=1))
     sizes, variances, _ = octaves.variances()
     for confidence in (0.68, 0.95):
         of = [fitted(sizes, each, n, 1.0, confidence) for each in variances.T]

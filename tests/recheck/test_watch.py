@@ -77,7 +77,7 @@ def test_memory_does_not_grow_while_it_lies():
     watch, weights = Watch(CALIBRATION, 1.0, 100.0), []
     tracemalloc.start()
     try:
-        for _ in range(40):
+        for _ in range(30):
             assert not watch.add(lying)
             weights.append(tracemalloc.get_traced_memory()[0])
     finally:
