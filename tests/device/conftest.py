@@ -128,9 +128,8 @@ class Device:
         command = ("record", *words, "--seconds", "100000", "-o", capture)
         with self.program(COMMAND, INSTALLED, *command) as (program, _, err):
             try:
+                # it has the chip, and records as fast as it can; stopped amid an ioctl it would block the device
                 err.readline()
-                # it has the chip, and would record as fast as it can
-                os.kill(program.pid, signal.SIGSTOP)
                 yield
             finally:
                 os.kill(program.pid, signal.SIGKILL)
