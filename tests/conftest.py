@@ -23,7 +23,7 @@ sys.path.append(str(Path(__file__).parents[1]))
 
 from mpucal.session.threads import ONE_THREAD
 
-# programs that tests start find mpucal compiled, whatever the shell asks for: compiling it takes them half a second each
+# programs that tests start find mpucal compiled, whatever the shell asks for: each would compile it for half a second
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ.update(ONE_THREAD)  # as the program does, and before NumPy or SciPy loads
 # notes of writes belong to no home; workers of xdist and what tests start inherit the folder of the first process
