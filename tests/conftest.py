@@ -64,6 +64,21 @@ def pytest_configure(config: pytest.Config) -> None:
         )
 
 
+# Files whose tests wait longest go first: a process that takes one last would work alone.
+FIRST = ("test_command.py", "test_port.py", "test_browser.py", "test_firefox.py", "test_site.py", "test_hangup.py")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Order the files; those of a file stay as they are."""
+    items.sort(key=lambda item: item.path.name not in FIRST)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """One more than there are processors: tests of bridges and browsers wait for most of their time."""
+    return (os.cpu_count() or 1) + 1
+
+
 def untracked() -> set[str]:
     """Files of the checkout that git neither tracks nor ignores; none where this is no checkout."""
     if not Path(PROJECT, ".git").exists() or shutil.which("git") is None:
