@@ -13,10 +13,10 @@ import pytest
 import mpucal
 from mpucal.__main__ import run
 from mpucal.calibration import calibrate
-from mpucal.calibration.flat_segment import find_flat, flat_statistics
 from mpucal.calibration.hand import fit_hand
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
+from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 

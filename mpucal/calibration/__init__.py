@@ -12,6 +12,7 @@ import numpy as np
 from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import WrongValue
+from ..rests.flat import Flat, find_flat, flat_statistics, tells
 from ..result import keys
 from ..result.calibration import Calibration, unknown
 from ..result.correlation import correlation_of, standard_deviations
@@ -20,7 +21,6 @@ from .checks.unusable import no_gyroscope
 from .claim import claim_of, claimed
 from .evidence import Evidence
 from .fit import Fit
-from .flat_segment import Flat, find_flat, flat_statistics, tells
 from .lone_jumps import without_lone_jumps
 from .masks import reset, with_masks
 from .model_selection import METHODS, Choice, choose

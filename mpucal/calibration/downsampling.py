@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import Mask, Recording, Vector
-from .flat_segment import Flat
+from ..rests.flat import Flat
 
 
 def downsampled(recording: Recording, flat: Flat, rate_hz: float) -> tuple[Recording, tuple[int, int]]:

@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from ..data import Recording, Vector
-from .flat_segment import Flat
+from ..rests.flat import Flat
 
 # x_0 comes from the uncalibrated mean, which misalignment and a bias of 1 m/s^2 tilt by some 10 deg.
 P_0_RAD = np.radians(10.0)

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Recording, Vector
+from ..rests.flat import Flat, find_flat, flat_statistics
+from ..rests.intervals import in_pieces, static_intervals, statistics
 from .claim import Claim
 from .fit import Fit
-from .flat_segment import Flat, find_flat, flat_statistics
 from .rotation import lengths, turned
 from .sphere import fibonacci_sphere
-from .static_intervals import in_pieces, static_intervals, statistics
 from .tilt import tilted_directions
 from .uncertainty import DIRECTIONS, Uncertainty, uncertainty
 

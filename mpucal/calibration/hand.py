@@ -13,9 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import Recording, Vector
+from ..rests.flat import Flat
+from ..rests.local_noise import louder
 from .downsampling import downsampled, means
 from .fit import Fit
-from .flat_segment import Flat
 from .gyro_matrix import WALD_99, at_prior, wald
 from .hand_noise import (
     CALM_MPS2,
@@ -30,7 +31,6 @@ from .hand_noise import (
 )
 from .initial_estimate import initialise, perfect
 from .levenberg_marquardt import Minimum, information, minimise
-from .local_noise import louder
 from .parameters import HAND
 from .parts import ends_of, parts_of
 from .preprocessing import Preprocessed, preprocess

@@ -12,8 +12,8 @@ from functools import partial
 import numpy as np
 
 from ..data import Recording, Vector
+from ..rests.flat import Flat
 from .downsampling import downsampled
-from .flat_segment import Flat
 from .hand_noise import FARTHER, FIRST_MPS2, HAND_MPS2, PIVOT_MPS2, SOME_MPS2, WHITE_MPS2, likeliest
 from .initial_estimate import initialise
 from .levenberg_marquardt import Minimum, information, minimise

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..data import STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
-from .flat_segment import Flat
+from ..rests.flat import Flat
 from .problem import Series
 from .rotation import lengths
 

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Recording
+from ..rests.flat import Flat, flat_statistics
 from .downsampling import downsampled
 from .fit import Fit
-from .flat_segment import Flat, flat_statistics
 from .gyro_matrix import WALD_99, at_prior, wald
 from .hand import fit_hand
 from .initial_estimate import initialise

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Recording, Vector
+from ..rests.flat import Flat
 from .ekf import Ekf, inverse
 from .fit import Fit
-from .flat_segment import Flat
 from .parameters import B_A_NAMES, D_NAMES
 
 MAX_ITERATIONS = 10

@@ -9,20 +9,21 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..kernel import _kernel
-from .flat_segment import Flat, flat_statistics, rounding_variance
-from .gyro_drift import without_drift
-from .local_noise import louder, noise_variance
+from ..rests.flat import Flat, flat_statistics, rounding_variance
+from ..rests.gyro_drift import without_drift
+from ..rests.intervals import Intervals, static_intervals, statistics
+from ..rests.law import carried, rate_of_rests
+from ..rests.local_noise import louder, noise_variance
 from .masks import mask
 from .prior import Prior, prior_of
 from .problem import Problem, Series
 from .rotation import lengths
-from .static_intervals import Intervals, static_intervals, statistics
 
 HUBER = 2.0
 MOVING_RAD_S = 0.3  # the rate at which a hand's acceleration is half of what it grows to
 SHAKEN_S, SHAKEN_MPS2 = 0.5, 0.3  # likewise of |y| by its standard deviation, at any rate: who walks, shakes
 SMOOTH_S = 0.02  # of the rates whose derivative is the angular acceleration
-TREMOR_PER_S, MOTION_PER_S = 20.0, 5.0  # lambda: 4.5 Hz of a tremor at rest, 1.1 Hz of a pivot
+TREMOR_PER_S, MOTION_PER_S = 20.0, 5.0  # lambda: 4.5 Hz of a tremor at rest where rests say nothing, 1.1 Hz of a pivot
 TREMOR_OF_NOISE = 0.2  # a tremor below this share of the sensor's noise is none
 CORRELATION_S = 0.2  # of the acceleration of a hand that goes from rest to rest
 FLOOR_CORRELATION_S = 0.05  # of jerks
@@ -103,9 +104,10 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
         rest[a:b] = True
     rate, alpha = _rates(recording, flat, rest)
     speed2 = np.sum(rate * rate, axis=1)
-    lam = TREMOR_PER_S if len(after) >= MANY_RESTS else MOTION_PER_S
+    acc = carried(recording, flat, runs)
+    lam = rate_of_rests(acc, recording, flat, runs, TREMOR_PER_S) if len(after) >= MANY_RESTS else MOTION_PER_S
     reset, jerk, pose = np.full(len(series), -1.0), np.zeros(len(series)), np.zeros(len(series))
-    for (a, b), variance in zip(after.tolist(), statistics(series.y, after)[1], strict=True):
+    for (a, b), variance in zip(after.tolist(), statistics(acc[flat.last :], after)[1], strict=True):
         tremor = _tremor(variance, float(loud[a:b].mean()) * flat.Sigma_a)
         reset[a], jerk[a:b] = tremor, jerk_density(tremor, lam)
         pose[a:b] = (POSE_MPS2**2 + rounding_variance(recording.sensor, variance)) * (b - a)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Sensor, Vector
-from .flat_segment import Flat
+from ..rests.flat import Flat
 from .parameters import BY_NAME, NAMES, PLACES, TABLE
 from .theta import Theta, values
 

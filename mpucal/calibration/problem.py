@@ -9,7 +9,7 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..kernel import _kernel
-from .flat_segment import Flat
+from ..rests.flat import Flat
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from itertools import compress
 import numpy as np
 
 from ..data import Recording, Vector
+from ..rests.flat import Flat
 from .fit import Fit
-from .flat_segment import Flat
 from .gyro_matrix import KNOWN, at_prior
 from .hand import ROUGHLY
 from .hand_noise import HAND_MPS2, WHITE_MPS2, likeliest

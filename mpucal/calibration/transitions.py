@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from ..data import Vector
 from ..kernel import _kernel
+from ..rests.intervals import statistics
 from .parameters import NAMES, PLACES
 from .preprocessing import POSE_MPS2, Preprocessed
 from .problem import Series
 from .rotation import cross, lengths, turned
-from .static_intervals import statistics
 from .theta import UPPER, Theta
 
 SPEED_OF_TREMOR_S = 0.04  # what a tremor's speed is to its acceleration

@@ -14,12 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Recording, Vector
+from ..rests.flat import Flat
+from ..rests.gyro_drift import without_drift
+from ..rests.intervals import static_intervals
+from ..rests.limits import ANY_HAND
 from .fit import Fit
-from .flat_segment import Flat
-from .gyro_drift import without_drift
 from .parameters import B_A_NAMES, D_NAMES, K_NAMES, Form
 from .rotation import turned
-from .static_intervals import static_intervals
 from .theta import UPPER, from_elements
 
 # What no covariance holds: a mounting is not stiffer, and the gyroscope's bias wanders while the board is turned.
@@ -70,7 +71,7 @@ class NewOrientation:
 
 def new_orientations(recording: Recording, flat: Flat, fit: Fit, gravity: float, since: int) -> list[NewOrientation]:
     """What the still intervals that begin after sample `since` say of `fit`, one after the other."""
-    runs = static_intervals(recording, flat)
+    runs = static_intervals(recording, flat, ANY_HAND)
     recording = without_drift(recording, flat, runs)
     long = [(a, b) for a, b in runs.tolist() if b - a >= LEAST_REST_S * recording.rate_hz]
     first = next((k for k, (a, _) in enumerate(long) if a >= since), len(long))

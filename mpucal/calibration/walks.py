@@ -24,7 +24,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from ..data import Recording, Vector
-from .flat_segment import Flat
+from ..rests.flat import Flat
 from .levenberg_marquardt import inverse
 from .parameters import PLACES
 from .parts import Parts

@@ -11,11 +11,11 @@ from typing import Any
 import click
 import numpy as np
 
-from ..calibration.flat_segment import find_flat
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Sensor
 from ..errors import UsageError
 from ..files import load
 from ..files.formats import readable, recognised
+from ..rests.flat import find_flat
 from ..result.blob import Blob
 from ..result.calibration import Calibration
 from ..result.journal import AT, Journal

@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..calibration.flat_segment import find_flat
 from ..data import Recording
 from ..errors import RecordingError
+from ..rests.flat import find_flat
 from .clock import US, Jump
 from .dialect import Message, Parser, dialect, header
 from .firmwares import ARDUPILOT, PX4, preferred_messages

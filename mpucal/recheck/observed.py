@@ -19,13 +19,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..calibration.flat_segment import Flat, find_flat, flat_statistics
-from ..calibration.gyro_drift import without_drift
 from ..calibration.masks import with_masks
 from ..calibration.rotation import cross, turned
-from ..calibration.static_intervals import Intervals, static_intervals
 from ..calibration.verification import BIAS_RAD_S, BLOCK_S, FLOOR_MPS2, FLOOR_RAD, LEAST_REST_S
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
+from ..rests.flat import Flat, find_flat, flat_statistics
+from ..rests.gyro_drift import without_drift
+from ..rests.intervals import Intervals, static_intervals
 from ..result.calibration import Calibration
 
 PARAMETERS = 21

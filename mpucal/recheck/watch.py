@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..calibration.static_intervals import ACC_SD_MPS2, GYRO_SD_RAD_S
 from ..calibration.verification import BIAS_RAD_S, FLOOR_MPS2
 from ..data import STANDARD_GRAVITY_MPS2, Samples, Vector
+from ..rests.intervals import ACC_SD_MPS2, GYRO_SD_RAD_S
 from ..result.calibration import Calibration
 from . import drift
 from .hypotheses import NOTHING, weigh

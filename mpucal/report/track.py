@@ -8,12 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ..calibration.flat_segment import find_flat, flat_statistics
 from ..calibration.likelihood import trace
 from ..calibration.preprocessing import Preprocessed, preprocess
-from ..calibration.static_intervals import Intervals, static_intervals
 from ..calibration.theta import Theta
 from ..data import STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
+from ..rests.flat import find_flat, flat_statistics
+from ..rests.intervals import Intervals, static_intervals
 from ..result.calibration import Calibration
 
 # The hand's acceleration while it moves, as the filter that makes the innovations is told: what hands do.

@@ -12,9 +12,9 @@ import numpy as np
 
 from ..calibration.rotation import rotation, shortest_turn
 from ..data import Samples, Vector
+from ..rests.windows import Window, Windows
 from .events import Direction, Quaternion
 from .way import UP, heading
-from .windows import Window, Windows
 
 # The rates are taken as constant for so long.
 STEP_S = 0.02

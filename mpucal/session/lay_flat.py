@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ..data import Samples
+from ..rests.stillness import ON_A_TABLE, Moved, Still, StillnessDetector
+from ..rests.windows import Windows
 from .events import Caution, Countdown, Output, Progress, Prompt, PromptKind, Rested, Stopped
-from .stillness import ON_A_TABLE, Moved, Still, StillnessDetector
-from .windows import Windows
 
 WINDOW_S = 0.5
 FLAT_S = 10.0

@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from ..data import Samples, Sensor, Vector
+from ..rests.stillness import IN_THE_HAND, Moved, StillnessDetector, StillnessLimits
+from ..rests.windows import Window, Windows
 from .attitude import Attitude, quaternion
 from .events import Caution, Direction, Meter, Output
-from .stillness import IN_THE_HAND, Moved, StillnessDetector, StillnessLimits
 from .way import Way
-from .windows import Window, Windows
 
 WINDOW_S = 0.25
 # The same caution is not said more often than this.

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Samples, Vector
+from ..rests.stillness import IN_THE_HAND, Still, StillnessDetector
+from ..rests.windows import Windows
 from .events import Countdown, Direction, Held, Use
-from .stillness import IN_THE_HAND, Still, StillnessDetector
-from .windows import Windows
 
 WINDOW_S = 0.25
 # From the prompt for the next orientation until a person moves there is another second of stillness.

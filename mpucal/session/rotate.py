@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ..data import Samples, Vector
+from ..rests.windows import Window, Windows
 from ..result.orientation import side_down, tilt_down
 from .aims import Aim, directions
 from .coverage import DISTINCT_RAD, Coverage
@@ -25,7 +26,6 @@ from .events import (
     Wish,
 )
 from .pauses import HOLD_S, Pause, Pauses, counted, held, use_of
-from .windows import Window, Windows
 
 PASS_WINDOW_S = 0.1
 # So long in one orientation is a pause.

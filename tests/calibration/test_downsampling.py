@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.downsampling import downsampled
-from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.data import Recording
+from mpucal.rests.flat import flat_statistics
 
 
 def recording_of(n, rate_hz=200.0):

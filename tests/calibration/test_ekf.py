@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.ekf import Ekf, exponential, gravity_jacobian, inverse, orientation_of, product, specific_force
-from mpucal.calibration.flat_segment import Flat
 from mpucal.calibration.rotation import rotation
 from mpucal.data import Recording
+from mpucal.rests.flat import Flat
 
 G = 9.82
 RNG = np.random.default_rng(1)

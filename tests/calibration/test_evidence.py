@@ -7,8 +7,8 @@ import pytest
 
 from mpucal.calibration.evidence import Evidence
 from mpucal.calibration.fit import Fit
-from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
+from mpucal.rests.flat import flat_statistics
 
 G = 9.82
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate
-from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.hand import fit_hand
 from mpucal.calibration.parameters import B_A_NAMES, BY_NAME, D_NAMES, K_NAMES
-from mpucal.calibration.static_intervals import static_intervals
+from mpucal.rests.flat import flat_statistics
+from mpucal.rests.intervals import static_intervals
 from tools.lab.judge import sph_rms
 
 G = 9.82

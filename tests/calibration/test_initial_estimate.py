@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate
-from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.masks import mask, with_masks
 from mpucal.calibration.model_selection import fit_accel
@@ -12,6 +11,7 @@ from mpucal.calibration.problem import Problem, Series
 from mpucal.calibration.rotation import rotation
 from mpucal.calibration.sphere import fibonacci_sphere
 from mpucal.data import Recording
+from mpucal.rests.flat import flat_statistics
 from tools.lab.judge import sph_rms
 from tools.lab.scenarios.recordings import paper_scenario
 

@@ -7,7 +7,6 @@ import pytest
 
 from mpucal.calibration import calibrate, weigh
 from mpucal.calibration.claim import claim_of
-from mpucal.calibration.flat_segment import find_flat, flat_statistics
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.jackknife import _moved, jackknife
 from mpucal.calibration.likelihood import evaluate, part_scores
@@ -15,6 +14,7 @@ from mpucal.calibration.parameters import ACCEL, HAND
 from mpucal.calibration.parts import Parts
 from mpucal.calibration.preprocessing import preprocess
 from mpucal.calibration.problem import Problem, Series
+from mpucal.rests.flat import find_flat, flat_statistics
 from tools.lab.judge import sph_rms
 from tools.lab.scenarios.recordings import paper_scenario
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.levenberg_marquardt import DECREMENT, MOST_ITERATIONS, _nearer, minimise
 from mpucal.calibration.likelihood import evaluate
 from mpucal.calibration.parameters import ACCEL, PLACES
 from mpucal.calibration.prior import Prior, prior_of
 from mpucal.calibration.problem import Problem, Series
+from mpucal.rests.flat import flat_statistics
 from tools.lab.scenarios.recordings import paper_scenario
 
 NOTHING = Prior.of()

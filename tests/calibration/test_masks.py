@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate
-from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.masks import ACC_RANGES, CLIPPED_R_SCALE, GYRO_RANGES, mask, with_masks
 from mpucal.calibration.problem import Series
 from mpucal.data import Recording
+from mpucal.rests.flat import flat_statistics
 from tools.lab.judge import sph_rms
 
 

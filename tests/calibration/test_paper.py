@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.ekf import Ekf
-from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.paper import MAX_ITERATIONS, expand, fit_paper
 from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.data import Recording
+from mpucal.rests.flat import flat_statistics
 from mpucal.simulated.sensor import SensorTruth
 from tools.lab.judge import sph_rms
 from tools.lab.scenarios.recordings import paper_scenario

@@ -5,11 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from mpucal.calibration.flat_segment import find_flat, flat_statistics
 from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.calibration.rotation import rotation
 from mpucal.calibration.tilt import BIAS_SD_MPS2, CONE_RAD, CROSS_AXIS_SD, SCALE_FACTOR_SD, fit_tilt, tilted_directions
 from mpucal.data import Recording
+from mpucal.rests.flat import find_flat, flat_statistics
 
 GRAVITY_MPS2 = 9.80665
 RATE_HZ = 100.0

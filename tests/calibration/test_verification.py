@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from mpucal.calibration.fit import Fit
-from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.calibration.verification import new_orientations
 from mpucal.data import Recording
+from mpucal.rests.flat import flat_statistics
 
 G, HZ, REST_S = 9.80665, 200.0, 3.0
 KNOWN = Fit(

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from mpucal.calibration.flat_segment import Flat
 from mpucal.calibration.parameters import NAMES
 from mpucal.calibration.problem import Series
 from mpucal.calibration.theta import Theta
 from mpucal.kernel import _kernel
+from mpucal.rests.flat import Flat
 
 N = 245
 

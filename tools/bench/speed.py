@@ -25,7 +25,6 @@ os.environ.update(ONE_THREAD)  # as the program does, and before NumPy or SciPy 
 import numpy as np
 
 import mpucal
-from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.initial_estimate import initialise
 from mpucal.calibration.likelihood import evaluate, value
 from mpucal.calibration.model_selection import METHODS, choose, fit_accel
@@ -34,6 +33,7 @@ from mpucal.calibration.problem import Problem, Series
 from mpucal.calibration.theta import Theta
 from mpucal.data import Recording
 from mpucal.kernel import _kernel
+from mpucal.rests.flat import flat_statistics
 from tools.lab.hand_reference import evaluate_hand_reference
 from tools.lab.reference import evaluate_reference
 from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario, paper_scenario

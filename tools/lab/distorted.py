@@ -19,11 +19,11 @@ import numpy as np
 
 import mpucal
 from mpucal.calibration import MODELS
-from mpucal.calibration.flat_segment import find_flat, flat_statistics
 from mpucal.calibration.masks import with_masks
-from mpucal.calibration.static_intervals import static_intervals
 from mpucal.data import Recording, Vector
 from mpucal.errors import RecordingError
+from mpucal.rests.flat import find_flat, flat_statistics
+from mpucal.rests.intervals import static_intervals
 from mpucal.simulated.sensor import SensorTruth, non_orthogonality, turned
 from tools.lab.judge import followed, sph_rms, tilts_deg
 

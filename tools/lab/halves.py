@@ -16,11 +16,11 @@ import numpy as np
 
 import mpucal
 from mpucal.calibration import MODELS
-from mpucal.calibration.flat_segment import find_flat, flat_statistics
 from mpucal.calibration.masks import with_masks
-from mpucal.calibration.static_intervals import static_intervals
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording
 from mpucal.errors import MpucalError, RecordingError
+from mpucal.rests.flat import find_flat, flat_statistics
+from mpucal.rests.intervals import static_intervals
 
 from .judge import rms
 from .table import grouped, show, table

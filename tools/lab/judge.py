@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpucal.calibration.ekf import Ekf, specific_force
-from mpucal.calibration.flat_segment import Flat
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Vector
+from mpucal.rests.flat import Flat
 from mpucal.result.calibration import GOOD, USABLE, Calibration
 from mpucal.simulated.sensor import SensorTruth
 

@@ -21,12 +21,12 @@ from rich.table import Table
 import mpucal
 from mpucal.calibration import MODELS
 from mpucal.calibration.fit import Fit
-from mpucal.calibration.flat_segment import flat_statistics
 from mpucal.calibration.model_selection import fit_accel
 from mpucal.calibration.paper import fit_paper
 from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
 from mpucal.data import Vector
 from mpucal.errors import MpucalError
+from mpucal.rests.flat import flat_statistics
 from mpucal.result.calibration import REFUSED
 from tools.lab.judge import followed, sph_rms, tilts_deg
 from tools.lab.scenarios.recordings import GRAVITY_MPS2, Simulated, hand_scenario, paper_scenario

@@ -12,11 +12,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from mpucal.calibration.flat_segment import Flat, find_flat, flat_statistics
 from mpucal.calibration.masks import with_masks
 from mpucal.calibration.rotation import cross, rotation, turned
-from mpucal.calibration.static_intervals import Intervals, static_intervals
 from mpucal.data import Recording, Vector
+from mpucal.rests.flat import Flat, find_flat, flat_statistics
+from mpucal.rests.intervals import Intervals, static_intervals
 
 FACE_RAD = np.deg2rad(25.0)  # a face may be as far from straight up: a large bias tilts what is measured
 TURN_RAD = np.deg2rad(20.0)  # a complete turn may miss 360 deg by so much

@@ -6,8 +6,8 @@ import numpy as np
 
 from ...data import Mask
 from ...reasons import Reason, reason
+from ...rests.local_noise import noise_variance
 from ..evidence import Evidence
-from ..local_noise import noise_variance
 
 WARMER_C = 5.0
 MOST_CLIPPED = 0.2

@@ -6,8 +6,8 @@ import numpy as np
 
 from ...data import Vector
 from ...reasons import Reason, reason
+from ...rests.flat import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
 from ..evidence import Evidence
-from ..flat_segment import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
 from ..rotation import lengths
 
 FEWEST_SAMPLES = 50

@@ -9,7 +9,6 @@ import numpy as np
 from ...calibration import weigh
 from ...calibration.checks import found
 from ...calibration.evidence import Evidence
-from ...calibration.flat_segment import Flat, find_flat, flat_statistics
 from ...calibration.interim import InterimEstimate, interim_estimate
 from ...calibration.masks import with_masks
 from ...calibration.next_orientation import next_orientation
@@ -17,6 +16,7 @@ from ...calibration.quality import verdict
 from ...calibration.verification import new_orientations
 from ...data import Recording, Samples, Sensor
 from ...reasons import KINDS, Reason, reason
+from ...rests.flat import Flat, find_flat, flat_statistics
 from ..aims import AIMS, directions, unseen_rad
 from ..events import Checked, Event, Learnt, Tried, Wish
 from ..plan import Plan

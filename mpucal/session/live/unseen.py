@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...calibration.evidence import Evidence
-from ...calibration.static_intervals import static_intervals
 from ...calibration.verification import NewOrientation
 from ...data import Vector
+from ...rests.intervals import static_intervals
 
 # shorter than this nobody holds a board still
 SHORTEST_REST_S = 0.5

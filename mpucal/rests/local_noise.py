@@ -13,7 +13,7 @@ from ..data import Recording, Vector
 from ..kernel import _kernel
 
 if TYPE_CHECKING:
-    from .flat_segment import Flat
+    from .flat import Flat
 
 WINDOW_S = 0.5
 ORDER, SQUARES = 4, 70.0  # of the differences: sum of the squares of 1, -4, 6, -4, 1

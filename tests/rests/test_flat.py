@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration.flat_segment import QUIETEST_ACC_MPS2, find_flat, flat_statistics
 from mpucal.data import Recording
+from mpucal.rests.flat import QUIETEST_ACC_MPS2, find_flat, flat_statistics
 from tools.lab.scenarios.recordings import paper_scenario
 
 

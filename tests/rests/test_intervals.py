@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration.flat_segment import flat_statistics
-from mpucal.calibration.gyro_drift import without_drift
-from mpucal.calibration.static_intervals import static_intervals
 from mpucal.data import Recording
+from mpucal.rests.flat import flat_statistics
+from mpucal.rests.gyro_drift import without_drift
+from mpucal.rests.intervals import static_intervals
 
 
 def found(simulated):

@@ -1,0 +1,34 @@
+"""Limits of stillness: what a short window of samples may show of a board that rests.
+
+The fit, the check of a later recording and the report ask for what a recording's own rests are like, from QUIET up to
+ANY_HAND; the verification for ANY_HAND: who was told that an orientation was held has held it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What still counts as still, beyond the sensor's own noise.
+
+    Attributes
+    ----------
+    gyro_sd, acc_sd : standard deviations within a window [rad/s], [m/s^2].
+    gyro_mean : mean rate beside the gyroscope's bias [rad/s]: a turn at a constant rate has no spread, only a mean.
+    """
+
+    gyro_sd: float
+    acc_sd: float
+    gyro_mean: float
+
+    def wider(self, gyro_sd: float) -> Limits:
+        """The same for a hand that rests with this standard deviation of its rate; its acceleration grows with it."""
+        return Limits(gyro_sd, self.acc_sd * gyro_sd / self.gyro_sd, self.gyro_mean)
+
+
+# A board on a table that hums, or in a hand whose elbow is braced.
+QUIET = Limits(gyro_sd=0.03, acc_sd=0.15, gyro_mean=0.05)
+# The most that any hand trembles (7 deg/s) in an orientation that it means to keep.
+ANY_HAND = Limits(gyro_sd=0.12, acc_sd=0.6, gyro_mean=0.12)
