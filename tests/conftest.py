@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -33,6 +34,7 @@ if "PYTEST_XDIST_WORKER" not in os.environ:
 
 from mpucal.files import open_writer
 from mpucal.files.rows import Rows
+from tools.lab.scenarios.recordings import hand_scenario
 
 PROJECT = str(Path(__file__).parents[1])
 UNTRACKED = pytest.StashKey[set[str]]()
@@ -196,3 +198,21 @@ def program():
         return [sys.executable, "-P", "-c", code, name, *map(str, words)]
 
     return call
+
+
+@cache
+def by_hand(seed, motion, rate_hz=100, **how):
+    """An MPU-6050 in a hand, simulated once, as finely as a hand's jerks of 60 ms and tremor of 10 Hz need it."""
+    return hand_scenario(seed, motion, rate_hz=rate_hz, truth_hz=400, **how)
+
+
+@pytest.fixture(scope="session")
+def hand():
+    """A factory of hand-held simulated recordings."""
+    return by_hand
+
+
+@pytest.fixture(scope="session")
+def in_hand():
+    """An MPU-6050 that a hand turned through twelve poses."""
+    return by_hand(1, "pose12")

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..calibration.verification import BIAS_RAD_S, FLOOR_MPS2
 from ..data import STANDARD_GRAVITY_MPS2, Samples, Vector
-from ..rests.intervals import ACC_SD_MPS2, GYRO_SD_RAD_S
+from ..rests.limits import QUIET
 from ..result.calibration import Calibration
 from . import drift
 from .hypotheses import NOTHING, weigh
@@ -97,7 +97,7 @@ class Watch:
     def _block(self, block: Vector) -> list[Contradiction]:
         """Half a second more."""
         mean, std = block.mean(0), block.std(0)
-        still = std[:3].max() < ACC_SD_MPS2 and not std[3:6].max() > GYRO_SD_RAD_S
+        still = std[:3].max() < QUIET.acc_sd and not std[3:6].max() > QUIET.gyro_sd
         found: list[Contradiction] = []
         if not still or (self._blocks and np.abs(mean[:3] - self._blocks[0][:3]).max() > STEP_MPS2):
             found = self._over()

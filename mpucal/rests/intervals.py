@@ -62,11 +62,21 @@ def bias_intervals(recording: Recording, flat: Flat, rests: Intervals) -> Interv
         return rests
     quiet = _intervals(recording, flat, windows, QUIET)
     quiet = quiet[quiet[:, 1] - quiet[:, 0] >= LONG_QUIET_S * recording.rate_hz]
-    # a rest holds a quiet part where one of them ends after its start and begins before its end
-    ended = np.searchsorted(quiet[:, 1], rests[:, 0], side="right")
-    begun = np.searchsorted(quiet[:, 0], rests[:, 1], side="left")
-    both = np.concatenate([quiet, rests[ended == begun]])
+    # two runs overlap where one of them ends after the other's start and begins before its end
+    apart = _ended_by(quiet, rests) == _begun_by(quiet, rests)
+    without = _ended_by(rests, quiet) == _begun_by(rests, quiet)
+    both = np.concatenate([quiet[~without], rests[apart]])
     return np.asarray(both[np.argsort(both[:, 0])])
+
+
+def _ended_by(runs: Intervals, others: Intervals) -> Intervals:
+    """(k,) how many of the runs have ended where each of the others begins."""
+    return np.searchsorted(runs[:, 1], others[:, 0], side="right")
+
+
+def _begun_by(runs: Intervals, others: Intervals) -> Intervals:
+    """(k,) how many of the runs have begun before each of the others ends."""
+    return np.searchsorted(runs[:, 0], others[:, 1], side="left")
 
 
 def learned(windows_after: Vector, speed: Vector) -> Limits:

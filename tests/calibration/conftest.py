@@ -1,7 +1,6 @@
 """Recordings whose truth is known: a sensor that is nearly ideal, the other simulator's, and those of the paper."""
 
 from dataclasses import dataclass, fields, replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 
 from mpucal.data import Recording, Samples
 from mpucal.simulated.sensor import SensorTruth, density
-from tools.lab.scenarios.recordings import hand_scenario, paper_scenario
+from tools.lab.scenarios.recordings import paper_scenario
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 G = 9.82
@@ -54,24 +53,6 @@ def ideal():
 def pick():
     """A function that keeps some of a recording's samples."""
     return samples_of
-
-
-@cache
-def by_hand(seed, motion, rate_hz=100, **how):
-    """An MPU-6050 in a hand, simulated once, as finely as a hand's jerks of 60 ms and tremor of 10 Hz need it."""
-    return hand_scenario(seed, motion, rate_hz=rate_hz, truth_hz=400, **how)
-
-
-@pytest.fixture(scope="session")
-def hand():
-    """A factory of hand-held simulated recordings."""
-    return by_hand
-
-
-@pytest.fixture(scope="session")
-def in_hand():
-    """An MPU-6050 that a hand turned through twelve poses."""
-    return by_hand(1, "pose12")
 
 
 @pytest.fixture(scope="session")
