@@ -1,0 +1,41 @@
+"""The programs of tools/: each loads, says what it is, and is listed."""
+
+import ast
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from tools import programs
+
+TOOLS = Path(programs.__file__).parent
+FOLDERS = ("attack", "bench", "lab", "make")
+PROGRAMS = [(folder, path.stem) for folder in FOLDERS for path in sorted((TOOLS / folder).glob("*.py"))]
+# they load what an extra of their own brings, or replace the compiled modules
+APART = {"sanitized", "fuzz_kernel", "syscalls", "syscalls_commands"}
+
+
+@pytest.mark.parametrize(("folder", "name"), [each for each in PROGRAMS if each[1] not in {*APART, "__main__"}])
+def test_a_program_loads(folder, name):
+    """Most are started by no test: without this one, who needs a program would be the first to miss what moved."""
+    module = import_module(f"tools.{folder}.{name}")
+    assert module.__doc__
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_a_folder_lists_its_programs(folder, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", [folder])
+    programs.run(folder)
+    listed = {line.split()[0] for line in capsys.readouterr().out.splitlines()}
+    runs = {path.stem for path in (TOOLS / folder).glob("*.py") if _has_main(path)}
+    assert listed == runs != set()
+
+
+def _has_main(path):
+    return any(isinstance(node, ast.FunctionDef) and node.name == "main" for node in ast.parse(path.read_text()).body)
+
+
+def test_a_program_that_is_not_there_is_said_so(monkeypatch):
+    monkeypatch.setattr("sys.argv", ["lab", "nonsense"])
+    with pytest.raises(SystemExit, match="has no program 'nonsense'"):
+        programs.run("lab")
