@@ -104,7 +104,10 @@ def gravity_turns(recording: Recording, runs: Intervals) -> Vector:
     n = np.maximum((last - first) // 3, 1)
     one, of_one = statistics(recording.acc, np.stack([first, first + n], axis=1))
     other, of_other = statistics(recording.acc, np.stack([last - n, last], axis=1))
-    angle2 = np.sum((other - one) ** 2 - 3.0 * (of_one + of_other) / n[:, None], axis=1) / np.sum(one**2, axis=1)
+    away2 = np.sum((other - one) ** 2 - 3.0 * (of_one + of_other) / n[:, None], axis=1)
+    size2 = np.sum(one**2, axis=1)
+    # an accelerometer that reads nothing but zeros shows no gravity that could stand still
+    angle2 = np.divide(away2, size2, out=np.full(len(size2), np.inf), where=size2 > 0.0)
     return np.asarray(np.sqrt(np.maximum(angle2, 0.0)) / (recording.t[last - n] - recording.t[first]))
 
 

@@ -68,6 +68,13 @@ def test_shorter_than_a_window_has_no_runs():
     assert static_intervals(recording, flat_statistics(recording, (0, 20))).shape == (0, 2)
 
 
+def test_zeros_of_the_accelerometer_are_no_rest():
+    gyr = 0.002 * np.random.default_rng(0).standard_normal((1500, 3))
+    recording = Recording.from_arrays(0.01 * np.arange(1500), np.zeros((1500, 3)), gyr)
+    with np.errstate(all="raise"):
+        assert len(static_intervals(recording, flat_statistics(recording, (0, 800)))) == 0
+
+
 def drifting(in_hand, drift):
     recording = in_hand.recording
     return replace(recording, gyr=recording.gyr + drift(recording.t)[:, None] * [1.0, -0.5, 0.2])
