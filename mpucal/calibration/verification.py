@@ -16,8 +16,7 @@ import numpy as np
 from ..data import Recording, Vector
 from ..rests.flat import Flat
 from ..rests.gyro_drift import without_drift
-from ..rests.intervals import static_intervals
-from ..rests.limits import ANY_HAND
+from ..rests.intervals import held_intervals
 from .fit import Fit
 from .parameters import B_A_NAMES, D_NAMES, K_NAMES, Form
 from .rotation import turned
@@ -71,7 +70,7 @@ class NewOrientation:
 
 def new_orientations(recording: Recording, flat: Flat, fit: Fit, gravity: float, since: int) -> list[NewOrientation]:
     """What the still intervals that begin after sample `since` say of `fit`, one after the other."""
-    runs = static_intervals(recording, flat, ANY_HAND)
+    runs = held_intervals(recording, flat)
     recording = without_drift(recording, flat, runs)
     long = [(a, b) for a, b in runs.tolist() if b - a >= LEAST_REST_S * recording.rate_hz]
     first = next((k for k, (a, _) in enumerate(long) if a >= since), len(long))

@@ -21,9 +21,10 @@ WINDOW_S, SHORTEST_S = 0.5, 0.3
 TRIM, LEAST_TRIM_S, MOST_TRIM_S = 0.125, 0.1, 0.25  # of a rest at either end: a hand settles, and leaves early
 TIMES_QUIET = 2.5
 TURNS_RAD_S = 0.02  # faster, the accelerometer says, it turns: neither a rest nor a bias of the gyroscope
-# A window rests as the others do within so many standard deviations of the logarithm of their spreads.
+# So many standard deviations may the logarithm of a window's spread be above the median of windows that may be rests.
 LIKE_THE_OTHERS = 2.0
-FEWEST_WINDOWS = 50
+FEWEST_S = 0.5  # of such windows
+LEAST_OF_QUIET, LEAST_OF_NOISE = 0.1, 0.5  # a smaller spread than these shares is chance
 OF_NORMAL = 1.4826  # a standard deviation beside the median of distances
 LONG_QUIET_S = 1.0  # of a rest, so long a quiet part tells the gyroscope's bias better than the whole
 
@@ -62,39 +63,43 @@ def bias_intervals(recording: Recording, flat: Flat, rests: Intervals) -> Interv
         return rests
     quiet = _intervals(recording, flat, windows, QUIET)
     quiet = quiet[quiet[:, 1] - quiet[:, 0] >= LONG_QUIET_S * recording.rate_hz]
-    # two runs overlap where one of them ends after the other's start and begins before its end
-    apart = _ended_by(quiet, rests) == _begun_by(quiet, rests)
-    without = _ended_by(rests, quiet) == _begun_by(rests, quiet)
-    both = np.concatenate([quiet[~without], rests[apart]])
+    return _and_others(quiet[~_apart(quiet, rests)], rests)
+
+
+def _and_others(runs: Intervals, others: Intervals) -> Intervals:
+    """The runs, and those of the others that overlap none of them."""
+    both = np.concatenate([runs, others[_apart(others, runs)]])
     return np.asarray(both[np.argsort(both[:, 0])])
 
 
-def _ended_by(runs: Intervals, others: Intervals) -> Intervals:
-    """(k,) how many of the runs have ended where each of the others begins."""
-    return np.searchsorted(runs[:, 1], others[:, 0], side="right")
+def _apart(runs: Intervals, others: Intervals) -> Mask:
+    """(k,) the runs that overlap none of the others: as many of these end before one begins as begin before it ends."""
+    ended = np.searchsorted(others[:, 1], runs[:, 0], side="right")
+    begun = np.searchsorted(others[:, 0], runs[:, 1], side="left")
+    return np.asarray(ended == begun)
 
 
-def _begun_by(runs: Intervals, others: Intervals) -> Intervals:
-    """(k,) how many of the runs have begun before each of the others ends."""
-    return np.searchsorted(runs[:, 0], others[:, 1], side="left")
+def held_intervals(recording: Recording, flat: Flat) -> Intervals:
+    """(k, 2) the rests, and beside them whatever a hand of any tremor may have meant to hold."""
+    return _and_others(static_intervals(recording, flat), static_intervals(recording, flat, ANY_HAND))
 
 
-def learned(windows_after: Vector, speed: Vector) -> Limits:
+def learned(spread: Vector, speed: Vector, fewest: float = 0.0) -> Limits:
     """The limits of a recording's rests, from the windows after its flat segment.
 
-    Among windows that may be rests (spread of the rate and mean rate within ANY_HAND), the logarithm of the spread has
-    a median and a spread of its own; what is likely under these rests as the others do.
+    The windows that may be rests have a spread within ANY_HAND's and a mean rate within QUIET's. The logarithms of
+    their spreads have a median and a standard deviation; the limit lies LIKE_THE_OTHERS of these above it.
 
-    windows_after : (m,) rad/s, the largest standard deviation of the rate's axes beyond noise. speed : (m,) rad/s,
-    the largest mean rate.
+    spread : (m,) rad/s, the largest standard deviation of the rate's axes beyond noise. speed : (m,) rad/s, the largest
+    mean rate beside the bias. fewest : of so few windows that may be rests nothing is learned.
     """
-    held = (windows_after < ANY_HAND.gyro_sd) & (speed < ANY_HAND.gyro_mean)
-    if np.count_nonzero(held) < FEWEST_WINDOWS:
+    held = (spread < ANY_HAND.gyro_sd) & (speed < QUIET.gyro_mean)
+    if np.count_nonzero(held) <= fewest:
         return QUIET
-    size = np.log(windows_after[held])
+    size = np.log(spread[held])
     median = np.median(size)
-    spread = OF_NORMAL * np.median(np.abs(size - median))
-    likely = float(np.exp(median + LIKE_THE_OTHERS * spread))
+    deviation = OF_NORMAL * np.median(np.abs(size - median))
+    likely = float(np.exp(median + LIKE_THE_OTHERS * deviation))
     return QUIET.wider(min(max(likely, QUIET.gyro_sd), ANY_HAND.gyro_sd))
 
 
@@ -135,8 +140,10 @@ def _windows(recording: Recording, flat: Flat) -> _Windows | None:
 def _intervals(recording: Recording, flat: Flat, windows: _Windows, limits: Limits | None) -> Intervals:
     speed = np.abs(windows.gyro_mean).max(0)
     if limits is None:
-        beyond = np.sqrt(np.maximum((windows.gyro.T - flat.Sigma_omega).max(1), 1e-10))
-        limits = learned(beyond[flat.last :], speed[flat.last :])
+        beyond = np.sqrt(np.maximum((windows.gyro.T - flat.Sigma_omega).max(1), 0.0))
+        least = max(LEAST_OF_QUIET * QUIET.gyro_sd, LEAST_OF_NOISE * float(np.sqrt(flat.Sigma_omega.max())))
+        fewest = FEWEST_S * recording.rate_hz
+        limits = learned(np.maximum(beyond[flat.last :], least), speed[flat.last :], fewest)
     gyro_limit = np.maximum(TIMES_QUIET**2 * flat.Sigma_omega, limits.gyro_sd**2)
     acc_limit = np.maximum(TIMES_QUIET**2 * flat.Sigma_a, limits.acc_sd**2)
     still = np.all(windows.gyro < gyro_limit[:, None], axis=0) & (speed < limits.gyro_mean)

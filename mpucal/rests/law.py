@@ -63,6 +63,6 @@ def rate_of_rests(acc: Vector, recording: Recording, flat: Flat, runs: Intervals
         seconds.append(blocks * n / recording.rate_hz)
     if len(kept) < FEWEST_RESTS:
         return otherwise
-    expected = mean_variance(LAMBDAS * BLOCK_S) - mean_variance(np.outer(seconds, LAMBDAS)).mean(0)
+    expected = mean_variance(LAMBDAS * n / recording.rate_hz) - mean_variance(np.outer(seconds, LAMBDAS)).mean(0)
     enough = np.flatnonzero(expected >= np.mean(kept))
     return float(LAMBDAS[enough[0] if len(enough) else -1])

@@ -1,7 +1,8 @@
 """Limits of stillness: what a short window of samples may show of a board that rests.
 
-The fit, the check of a later recording and the report ask for what a recording's own rests are like, from QUIET up to
-ANY_HAND; the verification for ANY_HAND: who was told that an orientation was held has held it.
+The fit, the check of a later recording and the report ask for what a recording's own rests are like: a spread between
+those of QUIET and ANY_HAND. The verification asks for the rest of ANY_HAND as well: an orientation that the session
+called held must be found again.
 """
 
 from __future__ import annotations

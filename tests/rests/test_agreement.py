@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 from mpucal.calibration.verification import LEAST_REST_S
 from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
-from mpucal.rests.intervals import static_intervals
-from mpucal.rests.limits import ANY_HAND
+from mpucal.rests.intervals import held_intervals
 from mpucal.session.pauses import HOLD_S, Pauses
 
 RATE_HZ, FLAT_S, MOVE_S = 100.0, 6.0, 1.0
@@ -56,7 +55,7 @@ def test_what_was_told_to_be_held_is_found_by_the_verification(tremor_dps, hertz
         for pause in pauses.add(recording.part(first, first + 20)):
             if pause.seconds >= HOLD_S:
                 told[pause.run] = pause.t_s
-    runs = static_intervals(recording, flat_statistics(recording, recording.flat), ANY_HAND)
+    runs = held_intervals(recording, flat_statistics(recording, recording.flat))
     long = recording.t[runs[runs[:, 1] - runs[:, 0] >= LEAST_REST_S * RATE_HZ]]
     for t_s in told.values():
         assert any(first <= t_s <= last + HOLD_S for first, last in long), (told, long)

@@ -89,7 +89,7 @@ def test_the_limits_are_those_of_the_recordings_rests():
     assert shaky.gyro_sd == pytest.approx(0.04 * np.exp(0.4), rel=0.1)
     assert shaky.acc_sd / QUIET.acc_sd == pytest.approx(shaky.gyro_sd / QUIET.gyro_sd)
     assert of(0.1).gyro_sd == pytest.approx(ANY_HAND.gyro_sd, rel=0.1)
-    assert learned(np.full(10, 0.1), np.zeros(10)) == QUIET
+    assert learned(np.full(10, 0.1), np.zeros(10), 50.0) == QUIET
 
 
 def test_a_hand_that_trembles_by_two_degrees_a_second_rests():
@@ -105,3 +105,17 @@ def test_a_hand_that_trembles_by_two_degrees_a_second_rests():
     runs = static_intervals(recording, flat)
     assert np.sum(runs[:, 1] - runs[:, 0] > 3.0 * RATE_HZ) == 7
     assert len(static_intervals(recording, flat, QUIET)) == 1
+
+
+@pytest.mark.parametrize(("rate_hz", "share"), [(20.0, 0.8), (50.0, 0.85), (100.0, 0.9)])
+def test_a_table_that_is_quieter_than_the_flat_segment_has_no_tremor(rate_hz, share):
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        n = int(60.0 * rate_hz)
+        gyr = 0.004 * np.sqrt(share) * rng.standard_normal((n, 3))
+        gyr[: n // 6] /= np.sqrt(share)
+        gyr[n // 2 : n // 2 + int(2.0 * rate_hz)] += 0.5
+        acc = [0.0, 0.0, 9.81] + 0.03 * rng.standard_normal((n, 3))
+        recording = Recording.from_arrays(np.arange(n) / rate_hz, acc, gyr, flat=(0, n // 6))
+        flat = flat_statistics(recording, recording.flat)
+        np.testing.assert_array_equal(static_intervals(recording, flat), static_intervals(recording, flat, QUIET))
