@@ -13,7 +13,7 @@ from .local_noise import VIBRATION, noise_variance
 
 WINDOW_S = 0.5
 SHORTEST_FLAT_S = 1.0
-SHORTEST_GIVEN_S = 0.25  # of which means over blocks, by which a fit begins, leave a variance
+SHORTEST_GIVEN_S = 0.25  # of a shorter one the block means that a fit starts from have no variance
 ENOUGH_FLAT_S = 5.0
 
 # Above these a window is not still, however noisy the quietest part of a recording is ...
