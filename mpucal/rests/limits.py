@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Limits:
-    """What still counts as still, beyond the sensor's own noise.
+    """Limits of a window at rest; a sensor that is noisier at rest has wider ones of its own.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class Limits:
     gyro_mean: float
 
     def wider(self, gyro_sd: float) -> Limits:
-        """The same for a hand that rests with this standard deviation of its rate; its acceleration grows with it."""
+        """Limits for a hand whose rate spreads up to `gyro_sd` [rad/s] at rest; acc_sd grows in proportion."""
         return Limits(gyro_sd, self.acc_sd * gyro_sd / self.gyro_sd, self.gyro_mean)
 
 

@@ -13,7 +13,7 @@ from .windows import Window
 
 @dataclass(frozen=True)
 class StillnessLimits:
-    """What still counts as still; the accelerometer's in m/s^2, the gyro's in rad/s.
+    """Limits of a still window and of the step between two; the accelerometer's in m/s^2, the gyro's in rad/s.
 
     Attributes
     ----------

@@ -35,7 +35,7 @@ class OnATerminal:
         self.code = None
 
     def read_until(self, enough):
-        """What it shows is read, until `enough(all of it)`."""
+        """Read what the terminal shows until `enough(text)` is true."""
         while not enough(self._seen):
             assert time.monotonic() < self._until, self._seen[-2000:]
             if select.select([self.terminal], [], [], 0.01)[0]:

@@ -195,7 +195,7 @@ def clock(once):
 
 @pytest.fixture(scope="session")
 def loaded(clock):
-    """What starts devices, and what starts the programs that find them."""
+    """Start two forking processes: one for devices, one for the programs that use them."""
     preloaded = f"{clock}:libumockdev-preload.so.0"
     of_programs = {**os.environ, PRELOAD: preloaded, "MPUCAL_TEST_CLOCK": ""}
     both = forks.Forks(dict(os.environ), "device"), forks.Forks(of_programs, *COMMANDS)

@@ -16,7 +16,7 @@ SECONDS = 5.0
 
 @pytest.fixture(scope="session")
 def examined(once):
-    """What the doctor finds of the chip that `words` describe, on a board that is laid flat."""
+    """Examine the chip that `words` describe, on a board that is laid flat."""
 
     def call(words):
         def make(folder):

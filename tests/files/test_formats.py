@@ -111,7 +111,7 @@ CALLS = (
 
 @pytest.fixture(scope="module")
 def call(folder):
-    """What each of CALLS exits with and says, one after the other in a process that knows the made-up formats."""
+    """Run CALLS one after the other in a process that knows the made-up formats: exit codes and messages."""
     words = [sys.executable, "made_up.py", json.dumps(CALLS)]
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=True)
     said = dict(zip(CALLS, json.loads(done.stdout), strict=True))

@@ -174,7 +174,7 @@ def _turned_around(factor: float | None) -> str:
 
 
 def is_another_range(ratio: float) -> bool:
-    """Whether what should be 1 is 0 or nearer to 2, 4, 8 or their inverses, as with another full scale of the chip."""
+    """True where a ratio that should be 1 is 0, or nearer to 2, 4, 8 or an inverse of these: another full scale."""
     return ratio == 0.0 or abs(math.log2(ratio)) > ANOTHER_RANGE
 
 
