@@ -110,7 +110,11 @@ def run(paths: Sequence[str], client: Any, journal: Journal, settings: Settings)
     send(islice(todo, UNDER_WAY))
     for future, result in results:
         task = under_way.pop(future.key)
-        if future.status in ("cancelled", "lost"):
+        if future.status == "lost":
+            # its worker died before the result was fetched; the scheduler lives
+            send([task])
+            continue
+        if future.status == "cancelled":
             raise SourceError("the scheduler was lost", "start it, and run the same again: what is done stays done")
         rows = result if future.status == "finished" else []
         if not rows and not alone:
