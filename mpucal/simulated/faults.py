@@ -280,6 +280,10 @@ class Schedule:
         timed = sorted((fault for fault in faults if fault.kind.timed), key=lambda fault: fault.at_s)
         self._waiting = [(fault.begin_ns, fault) for fault in timed]
 
+    def next_ns(self) -> float:
+        """When the next one begins; infinite where none does."""
+        return min((at_ns for at_ns, _ in self._waiting), default=math.inf)
+
     def due(self, now_ns: int) -> list[Fault]:
         """Those that begin by `now_ns`, since the last call, in order."""
         if not self._waiting:

@@ -12,6 +12,7 @@ from ...mavlink.parameters.encoding import REAL32, Parameter
 from ...mavlink.parameters.names import CUSTOM_ANGLES
 from .filter import LowPass
 from .firmware import HIGHRES_IMU, RAW_IMU, SCALED_IMUS, SYS_STATUS, Firmware
+from .imus import BLOCK
 from .options import VehicleOptions
 from .store import AXES, INT8, INT16, INT32
 
@@ -66,28 +67,31 @@ class ArduPilot(Firmware):
 
     def start(self) -> None:
         """Filters begin anew; each sensor shows its own id, whichever was saved."""
+        super().start()
         if not self._saved_ids:
             self._saved_ids = [int(self.store[stem(imu) + "_ID"]) for imu in range(self.options.imus)]
         for imu in range(self.options.imus):
             self.store[stem(imu) + "_ID"] = DEVICE_IDS[imu]
         cutoffs = (float(self.store["INS_ACCEL_FILTER"]), float(self.store["INS_GYRO_FILTER"]))
-        self._low_pass = LowPass(cutoffs, LOOP_HZ)
-        self._taken = -1
+        self._low_pass = LowPass(cutoffs, LOOP_HZ, BLOCK)
         self._ticks = 0
         self._agreed_since: int | None = None
 
-    def sense(self, raw: Vector) -> None:
+    def correct(self, raw: Vector, again: int) -> Vector:
         """(raw - OFFS) * SCAL in the sensor's axes, R_b, low pass."""
-        if self._taken != self.store.version:
-            self._taken = self.store.version
-            corrections = [self.correction(imu) for imu in range(len(raw))]
-            self._offsets, self._scales = (np.array(part) for part in zip(*corrections, strict=True))
+        corrections = [self.correction(imu) for imu in range(self.options.imus)]
+        offsets, scales = (np.array(part) for part in zip(*corrections, strict=True))
         in_sensor = raw.copy()
-        in_sensor[:, 0] = (raw[:, 0] - self._offsets) * self._scales
-        self.corrected = self._low_pass(in_sensor @ self.rotation.T)
-        self._ticks += 1
-        if self._ticks % LOOP_HZ == 0:
-            self._compare()
+        in_sensor[:, :, 0] = (raw[:, :, 0] - offsets) * scales
+        return self._low_pass(in_sensor @ self.rotation.T, again)
+
+    def feel(self, corrected: Vector) -> None:
+        """Compare the accelerometers once a second."""
+        super().feel(corrected)
+        self._ticks += len(corrected)
+        since = self._ticks % LOOP_HZ
+        if since < len(corrected):
+            self._compare(corrected[-1 - since], self._ticks - since)
 
     def message(self, message_id: int, t_us: int) -> Message | None:
         """RAW_IMU is IMU 1, corrected and filtered like the rest."""
@@ -149,15 +153,15 @@ class ArduPilot(Firmware):
             offset, scale = self.correction(imu)
             if self._saved_ids[imu] != DEVICE_IDS[imu] or not offset.any() or not scale.all():
                 return ["PreArm: 3D Accel calibration needed"]
-        since = self._compare()
+        since = self._compare(self.corrected, self._ticks)
         agree = len(self.corrected) == 1 or (since is not None and self._ticks - since >= AGREED_S * LOOP_HZ)
         return [] if agree else ["PreArm: Accels inconsistent"]
 
-    def _compare(self) -> int | None:
-        """Since which tick the accelerometers agree; None where they do not."""
-        apart = np.linalg.norm((self.corrected[:, 0] - self.corrected[0, 0]) * [1.0, 1.0, 0.5], axis=1)
+    def _compare(self, sample: Vector, tick: int) -> int | None:
+        """Since which tick the accelerometers agree, with that one's (imus, 2, 3); None where they do not."""
+        apart = np.linalg.norm((sample[:, 0] - sample[0, 0]) * [1.0, 1.0, 0.5], axis=1)
         if (apart > INCONSISTENT_MPS2[: len(apart)]).any():
             self._agreed_since = None
         elif self._agreed_since is None:
-            self._agreed_since = self._ticks
+            self._agreed_since = tick
         return self._agreed_since

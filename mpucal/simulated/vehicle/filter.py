@@ -17,23 +17,38 @@ class LowPass:
 
     Parameters
     ----------
-    cutoffs_hz : (k,) for values (..., k, 3); 0 passes everything.
+    cutoffs_hz : (k,) for values (..., k, 3); 0 passes everything. most : values that come at once.
     """
 
-    def __init__(self, cutoffs_hz: tuple[float, ...], rate_hz: float) -> None:
+    def __init__(self, cutoffs_hz: tuple[float, ...], rate_hz: float, most: int) -> None:
         made = [butterworth(cutoff, rate_hz) if cutoff > 0 else (PASSES, PASSES) for cutoff in cutoffs_hz]
         # (3, k, 1) each
         self._b, self._a = np.array(made).transpose(1, 2, 0)[..., None]
-        self._past: tuple[Vector, Vector] | None = None
+        # what one value leaves in all that follow: (most + 1, k)
+        left = [np.ones(len(made)), -self._a[1, :, 0]]
+        while len(left) <= most:
+            left.append(-self._a[1, :, 0] * left[-1] - self._a[2, :, 0] * left[-2])
+        response = np.array(left)
+        since = np.subtract.outer(np.arange(most), np.arange(most))
+        self._of_values = np.where(since[..., None] >= 0, response[since], 0.0)
+        self._of_past = np.stack((-self._a[2, :, 0] * response[:-1], response[1:]), axis=1)
+        self._states: Vector | None = None
 
-    def __call__(self, value: Vector) -> Vector:
-        """The filtered `value`; the first one has been there for ever."""
-        if self._past is None:
-            self._past = (value / self._a.sum(0),) * 2
-        one, two = self._past
-        new = value - self._a[1] * one - self._a[2] * two
-        self._past = (new, one)
-        return np.asarray(self._b[0] * new + self._b[1] * one + self._b[2] * two)
+    def __call__(self, values: Vector, again: int = 0) -> Vector:
+        """The filtered `values` (n, ..., k, 3); the first one has been there for ever.
+
+        Parameters
+        ----------
+        again : how many of the last values come once more, with others in their places.
+        """
+        n = len(values)
+        if self._states is None:
+            self._states, again = np.repeat(values[:1] / self._a.sum(0), 2, axis=0), 0
+        past = self._states[len(self._states) - again - 2 :][:2]
+        new = np.einsum("ijk,j...kc->i...kc", self._of_values[:n, :n], values)
+        new += np.einsum("ipk,p...kc->i...kc", self._of_past[:n], past)
+        states = self._states = np.concatenate((past, new))
+        return np.asarray(self._b[0] * states[2:] + self._b[1] * states[1:-1] + self._b[2] * states[:-2])
 
 
 def butterworth(cutoff_hz: float, rate_hz: float) -> tuple[Three, Three]:

@@ -11,10 +11,12 @@ from ...mavlink.dialect import Message, dialect
 from ...mavlink.parameters.encoding import Parameter
 from ...mavlink.parameters.names import CUSTOM_ANGLES
 from ...mavlink.rotation import euler, orientation
+from .imus import Imus
 from .options import VehicleOptions
 from .store import ParameterStore
 
-MILLI_G = STANDARD_GRAVITY_MPS2 / 1000
+# milli-g and mrad/s
+WHOLE = np.array([[STANDARD_GRAVITY_MPS2 / 1000], [1e-3]])
 # SCALED_IMU, SCALED_IMU2, SCALED_IMU3
 SCALED_IMUS = (26, 116, 129)
 SYS_STATUS, RAW_IMU, HIGHRES_IMU = 1, 27, 105
@@ -49,14 +51,43 @@ class Firmware(ABC):
         self.corrected = np.zeros((options.imus, 2, 3))
         self.temperature_c = 0.0
         self.armed = False
+        # samples that come next, and what they are by the corrections that are in use now
+        self._raw = self._ahead = np.empty((0, options.imus, 2, 3))
+        self._at = 0
+        self._taken = -1
 
-    @abstractmethod
     def start(self) -> None:
         """Boot: take what is stored."""
+        self._taken = -1
+
+    def sense(self, imus: Imus, ticks: int) -> None:
+        """Take so many of the samples that come, one a tick."""
+        while ticks > 0:
+            again = len(self._raw) - self._at
+            if not again:
+                self._raw, self._at = imus.next(), 0
+                self.temperature_c = imus.temperature_c
+            if not again or self._taken != self.store.version:
+                self._taken = self.store.version
+                self._raw, self._at = self._raw[self._at :], 0
+                self._ahead = self.correct(self._raw, again)
+            n = min(ticks, len(self._raw) - self._at)
+            self._at += n
+            ticks -= n
+            self.feel(self._ahead[self._at - n : self._at])
 
     @abstractmethod
-    def sense(self, raw: Vector) -> None:
-        """Correct a sample (imus, 2, 3) in the sensors' axes, a tick after the last one."""
+    def correct(self, raw: Vector, again: int) -> Vector:
+        """Samples (n, imus, 2, 3) that follow, from the sensors' axes into `corrected`.
+
+        Parameters
+        ----------
+        again : so many of them were corrected before, as the corrections were then.
+        """
+
+    def feel(self, corrected: Vector) -> None:
+        """Go on by samples (n, imus, 2, 3), one a tick."""
+        self.corrected = corrected[-1]
 
     @abstractmethod
     def message(self, message_id: int, t_us: int) -> Message | None:
@@ -96,8 +127,8 @@ class Firmware(ABC):
 
     def milli(self, imu: int) -> list[int]:
         """Its sample in whole milli-g and mrad/s, truncated toward zero."""
-        acc, gyr = self.corrected[imu]
-        return [int(value) for value in (*(acc / MILLI_G), *(gyr * 1000))]
+        whole: list[int] = (self.corrected[imu] / WHOLE).astype(int).ravel().tolist()
+        return whole
 
     def scaled_imu(self, imu: int, t_us: int) -> Message:
         """SCALED_IMU, SCALED_IMU2 or SCALED_IMU3."""

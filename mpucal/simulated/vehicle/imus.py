@@ -42,7 +42,6 @@ class Imus:
         self._setting = Setting(rate_hz, ACCEL_RANGE_G, GYRO_RANGE_DPS, lsb_per_c=333.87, zero_c=21.0)
         self._responses = [truth.response(self._setting) for truth in self.truths]
         self._sample, self._warmer_c = 0, 0.0
-        self._block = np.empty((0, options.imus, 2, 3))
 
     @property
     def temperature_c(self) -> float:
@@ -61,12 +60,12 @@ class Imus:
             self._responses[imu] = replace(true, b_omega=true.b_omega + left).response(self._setting)
 
     def next(self) -> Vector:
-        """The next sample: (imus, 2, 3), specific force [m/s^2] and rate [rad/s], in the sensors' axes."""
-        at = self._sample % BLOCK
-        if at == 0:
-            self._block = self._measured()
-        self._sample += 1
-        return np.asarray(self._block[at])
+        """The next samples: (BLOCK, imus, 2, 3), specific force [m/s^2] and rate [rad/s], in the sensors' axes."""
+        edges = (self._sample + np.arange(BLOCK + 1)) / self._rate_hz
+        self._sample += BLOCK
+        self._warmer_c = float(self._motion.warmer_c(edges)[-1])
+        force, rate = (means @ FROM_HAND @ self._rotation for means in self._motion.means(edges))
+        return np.stack([self._in_si(response, force, rate) for response in self._responses], axis=1)
 
     def truth(self, number: int, offset: Vector, scale: Vector) -> dict[str, Any]:
         """What is true of IMU `number`'s stream, in the vehicle's axes, while `offset` and `scale` are its parameters.
@@ -82,12 +81,6 @@ class Imus:
             b_omega=R @ true.b_omega,
         )
         return stream.document()
-
-    def _measured(self) -> Vector:
-        edges = (self._sample + np.arange(BLOCK + 1)) / self._rate_hz
-        self._warmer_c = float(self._motion.warmer_c(edges)[-1])
-        force, rate = (means @ FROM_HAND @ self._rotation for means in self._motion.means(edges))
-        return np.stack([self._in_si(response, force, rate) for response in self._responses], axis=1)
 
     def _in_si(self, response: SensorResponse, force: Vector, rate: Vector) -> Vector:
         counts = response.counts(force, rate, self._rng)

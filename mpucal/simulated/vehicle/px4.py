@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2, Vector
@@ -56,6 +58,7 @@ class Px4(Firmware):
 
     def start(self) -> None:
         """From the identity, what is stored is taken over where it differs enough."""
+        super().start()
         self._offset, self._scale = np.zeros((self.options.imus, 3)), np.ones((self.options.imus, 3))
         self._bias, self._gyro_bias = np.zeros(3), np.zeros(3)
         self._take_over()
@@ -76,18 +79,25 @@ class Px4(Firmware):
         ids = [self.store[f"CAL_ACC{slot}_ID"] for slot in range(SLOTS)]
         return ids.index(DEVICE_IDS[imu]) if DEVICE_IDS[imu] in ids else None
 
-    def sense(self, raw: Vector) -> None:
-        """R_b ((raw - OFF) * SCALE), and what the EKF makes of IMU 1."""
-        self.corrected[:, 0] = (raw[:, 0] - self._offset) * self._scale @ self.rotation.T
-        self.corrected[:, 1] = (raw[:, 1] - self._rates) @ self.rotation.T
-        control, rate = int(self.store["EKF2_IMU_CTRL"]), self.corrected[0, 1]
-        if control & LEARN_GYROSCOPE and np.linalg.norm(rate) < STILL_RAD_S:
-            self._gyro_bias = self._gyro_bias + (rate - self._gyro_bias) * self.tick_us * 1e-6 / LEARN_S
-        if control & LEARN_ACCELEROMETER:
-            felt = self.corrected[0, 0] - self._bias
-            missing = felt * (1 - STANDARD_GRAVITY_MPS2 / np.linalg.norm(felt))
-            learnt = self._bias + missing * self.tick_us * 1e-6 / LEARN_S
-            self._bias = np.clip(learnt, -LARGEST_BIAS_MPS2, LARGEST_BIAS_MPS2)
+    def correct(self, raw: Vector, again: int) -> Vector:
+        """R_b ((raw - OFF) * SCALE), and of rates R_b (raw - OFF)."""
+        in_sensor = np.stack(((raw[:, :, 0] - self._offset) * self._scale, raw[:, :, 1] - self._rates), axis=2)
+        return np.asarray(in_sensor @ self.rotation.T)
+
+    def feel(self, corrected: Vector) -> None:
+        """What the EKF makes of IMU 1; plain numbers take a tenth as long as arrays of three."""
+        super().feel(corrected)
+        control, share = int(self.store["EKF2_IMU_CTRL"]), self.tick_us * 1e-6 / LEARN_S
+        bias, gyro_bias = self._bias.tolist(), self._gyro_bias.tolist()
+        for acc, rate in corrected[:, 0].tolist():
+            if control & LEARN_GYROSCOPE and math.hypot(*rate) < STILL_RAD_S:
+                gyro_bias = [b + (r - b) * share for b, r in zip(gyro_bias, rate, strict=True)]
+            if control & LEARN_ACCELEROMETER:
+                felt = [a - b for a, b in zip(acc, bias, strict=True)]
+                gain = (1 - STANDARD_GRAVITY_MPS2 / math.hypot(*felt)) * share
+                learnt = [b + f * gain for b, f in zip(bias, felt, strict=True)]
+                bias = [min(max(b, -LARGEST_BIAS_MPS2), LARGEST_BIAS_MPS2) for b in learnt]
+        self._bias, self._gyro_bias = np.array(bias), np.array(gyro_bias)
 
     def message(self, message_id: int, t_us: int) -> Message | None:
         """No RAW_IMU, ever."""

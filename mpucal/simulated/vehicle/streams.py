@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 US = 1_000_000
 
 
@@ -19,6 +21,10 @@ class StreamTimes:
             return
         self._interval_us[message_id] = interval_us
         self._due_us[message_id] = now_us + interval_us
+
+    def next_us(self) -> float:
+        """When the next one is due; infinite where none is."""
+        return min((self._due_us[message_id] for message_id in self._interval_us), default=math.inf)
 
     def due(self, now_us: int, slower: int = 1) -> list[int]:
         """The messages due by `now_us`; `slower` stretches every interval."""

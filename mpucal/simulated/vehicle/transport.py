@@ -37,9 +37,8 @@ class SimulatedTransport:
 
     def receive(self, until_ns: int) -> Bytes | None:
         """See Transport."""
-        tick_us = self._vehicle.firmware.tick_us
         while not self._queue and self.now_ns() < until_ns:
-            sent = self._vehicle.go_on(self._vehicle.now_us + tick_us)
+            sent = self._vehicle.go_on_to_next(-(-(until_ns - self._begun_ns) // US))
             self._keep_pace()
             self._queue.extend(Bytes(data, ADDRESS, self.now_ns()) for data in self._line.carry([s.data for s in sent]))
         return self._queue.popleft() if self._queue else None

@@ -102,11 +102,14 @@ class SimulatedVehicle:
     def go_on(self, until_us: int) -> list[Sent]:
         """Live until `until_us`; the packets that went out since the last call."""
         while self._now_us + self.firmware.tick_us <= until_us:
-            self._now_us += self.firmware.tick_us
-            self._tick()
-        sent = list(self._out)
-        self._out.clear()
-        return sent
+            self._live(until_us)
+        return self._taken()
+
+    def go_on_to_next(self, until_us: int) -> list[Sent]:
+        """Live until it may have sent something, and no longer than the first tick from `until_us` on; see `go_on`."""
+        tick_us = self.firmware.tick_us
+        self._live(max(-(-until_us // tick_us), self._now_us // tick_us + 1) * tick_us)
+        return self._taken()
 
     def switch_on(self, store: ParameterStore) -> None:
         """Start with the parameters in `store`, and keep them there."""
@@ -128,12 +131,24 @@ class SimulatedVehicle:
         self._list: deque[str] = deque()
         self.firmware.start()
 
-    def _tick(self) -> None:
+    def _taken(self) -> list[Sent]:
+        sent = list(self._out)
+        self._out.clear()
+        return sent
+
+    def _live(self, until_us: int) -> None:
+        """Live through one tick or more, of which only the last may bring something, and none is after `until_us`."""
+        tick_us, ticks = self.firmware.tick_us, 1
+        if not (self._out or self._list):
+            due_us = min(max(self._streams.next_us(), self._silent_until_us), self._schedule.next_ns() / US)
+            due_us = min(due_us, until_us // tick_us * tick_us)
+            ticks = max(math.ceil((due_us - self._now_us) / tick_us), 1)
+        self.firmware.sense(self.imus, ticks - 1)
+        self._now_us += ticks * tick_us
         for fault in self._schedule.due(self._now_us * US):
             if fault.kind.strike is not None:
                 fault.kind.strike(self)
-        self.firmware.sense(self.imus.next())
-        self.firmware.temperature_c = self.imus.temperature_c
+        self.firmware.sense(self.imus, 1)
         if self.silent:
             return
         for message_id in self._streams.due(self._now_us, SLOWER_WHILE_BUSY if self._list else 1):

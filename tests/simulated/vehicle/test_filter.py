@@ -13,10 +13,21 @@ def test_the_coefficients_are_those_of_a_butterworth_filter(cutoff_hz, rate_hz):
 
 
 def test_each_row_is_filtered_by_its_own_cutoff():
-    steps = np.random.default_rng(1).normal(size=(50, 2, 3))
+    steps = np.random.default_rng(1).normal(size=(49, 2, 3))
     # the first one has been there for ever
     steps[0] = 0.0
-    low = LowPass((20.0, 0.0), 200.0)
-    found = np.array([low(step) for step in steps])
-    np.testing.assert_allclose(found[:, 0], lfilter(*butter(2, 20.0, fs=200.0), steps[:, 0], axis=0), atol=1e-12)
+    expected = lfilter(*butter(2, 20.0, fs=200.0), steps[:, 0], axis=0)
+    low = LowPass((20.0, 0.0), 200.0, 7)
+    found = np.concatenate([low(steps[begin : begin + 7]) for begin in range(0, 49, 7)])
+    np.testing.assert_allclose(found[:, 0], expected, atol=1e-12)
     np.testing.assert_array_equal(found[:, 1], steps[:, 1])
+
+
+def test_what_comes_again_takes_the_place_of_what_came():
+    steps = np.random.default_rng(2).normal(size=(12, 1, 3))
+    low = LowPass((20.0,), 200.0, 12)
+    expected = low(steps)
+    low = LowPass((20.0,), 200.0, 12)
+    low(np.concatenate((steps[:8], steps[:4])))
+    low(steps[8:10] + 1.0, 4)
+    np.testing.assert_allclose(np.concatenate((low(steps[8:10], 2), low(steps[10:]))), expected[8:], atol=1e-12)

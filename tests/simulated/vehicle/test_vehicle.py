@@ -127,6 +127,19 @@ def test_whole_milli_g_are_truncated_toward_zero():
             assert getattr(raw, f"{axis}gyro") == int(getattr(float_, f"{axis}gyro") * 1000)
 
 
+@pytest.mark.parametrize("words", ["fault=reboot@2", "firmware=px4,fault=autocal@2", "rotate_at=0"], ids=str)
+def test_how_its_time_is_moved_on_changes_nothing(words):
+    sent = []
+    for stops_us in (range(2_500_000, 2_500_001), range(3000, 2_500_001, 1000), (700_000, 710_100, 2_500_000)):
+        station = Station(words)
+        for message_id in (HIGHRES, RAW, SCALED, SCALED2):
+            station.interval(message_id, 100)
+        station.set("CAL_ACC0_XOFF" if "px4" in words else "INS_ACCOFFS_X", 0.25)
+        sent.append([packet for stop_us in stops_us for packet in station.vehicle.go_on(stop_us)])
+    assert sent[0] == sent[1] == sent[2]
+    assert len(sent[0]) > 300
+
+
 @pytest.mark.parametrize("words", ["", "firmware=px4", "rotation=1", "firmware=px4,rotation=12"], ids=str)
 def test_the_truth_it_tells_is_that_of_its_streams(words):
     station = Station(words)
