@@ -48,10 +48,10 @@ def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, stopped_at,
     """Killed while flat, and stopped with Ctrl-C while rotating."""
     folder = tmp_path / "board"
     words = ("--bus", "sim", "--rate", "50", "--target", "quick", "-o", "board", "--name", "Bench 7")
-    killed_s = came_to_s(stopped_at(tmp_path, ("flat", 150), signal.SIGKILL, *WORDS, *words).err)
+    killed_s = came_to_s(stopped_at(tmp_path, ("flat", 50), signal.SIGKILL, *WORDS, *words).err)
     assert killed_s > 3.0
     assert killed_s - last_s(folder / "capture.mcap") < 1.0
-    stopped = stopped_at(tmp_path, ("rotate", 400), signal.SIGINT, *WORDS, "--resume", "board")
+    stopped = stopped_at(tmp_path, ("rotate", 133), signal.SIGINT, *WORDS, "--resume", "board")
     assert stopped.code == 4
     stopped_s = came_to_s(stopped.err)
     assert stopped_s > 20.0

@@ -64,11 +64,12 @@ class Chip:
                 more = bytes([self._read_byte(address)])
             data += more
             address = (address + len(more)) & 0x7F
-        return bytes(data) + self._fifo.pop(count - len(data))
+        return bytes(data) + self._popped(count - len(data))
 
     def write(self, register: int, data: bytes, t_ns: int) -> None:
         """Write from `register` on; what no register keeps is ignored."""
         self._advance(t_ns)
+        self._collect()
         for i, value in enumerate(data):
             if register + i in self._writable:
                 self._write_byte(register + i, value, t_ns)
@@ -123,7 +124,13 @@ class Chip:
             self._fifo.clear()
         self._fifo.size = size
 
+    def _popped(self, count: int) -> bytes:
+        if len(self._fifo) < count:
+            self._collect()
+        return self._fifo.pop(count)
+
     def _latch_fifo_count(self) -> None:
+        self._collect()
         if self._ended and not len(self._fifo):
             raise EndOfCapture
         count = len(self._fifo).to_bytes(2, "big")
@@ -134,15 +141,18 @@ class Chip:
     def hurry(self, factor: float, t_ns: int) -> None:
         """Its sample clock runs `factor` times as fast from now on."""
         self._advance(t_ns)
+        self._collect()
         self._speed *= factor
         self._start_clock(t_ns)
 
     def freeze(self, until_ns: int) -> None:
         """It measures the same again and again, until then."""
+        self._collect()
         self._frozen_until_ns, self._frozen = until_ns, None
 
     def stick(self, word: int, bits: int) -> None:
         """These bits of a sample's word number `word` are 0 from now on."""
+        self._collect()
         self._stuck.append((word, bits))
 
     def pin(self, words: tuple[int, ...], count: int) -> None:
@@ -152,12 +162,13 @@ class Chip:
     def slip(self, t_ns: int) -> None:
         """Its FIFO loses a byte."""
         self._advance(t_ns)
+        self._collect()
         self._fifo.pop(1)
 
     # The sample clock.
 
     def _start_clock(self, t_ns: int) -> None:
-        self._start_ns, self._taken = t_ns, 0
+        self._start_ns, self._taken, self._collected = t_ns, 0, 0
         self._rate_hz = self._rate()
 
     def _rate(self) -> float:
@@ -179,33 +190,43 @@ class Chip:
         """Take the samples that are due."""
         if self._registers[reg.PWR_MGMT_1] & reg.PWR_MGMT_1_SLEEP:
             return
-        period_s = 1.0 / (self._rate_hz * self._speed)
-        due = int((t_ns - self._start_ns) * 1e-9 / period_s)
+        due = int((t_ns - self._start_ns) * 1e-9 / self._period_s)
         if due <= self._taken:
             return
-        sources = self._registers[reg.FIFO_EN]
-        collecting = self._registers[reg.USER_CTRL] & reg.USER_CTRL_FIFO_EN and sources
-        # what nobody can read is not measured: only the last sample where the FIFO is off
-        first = self._taken if collecting else due - 1
-        edges_s: Vector = self._start_ns * 1e-9 + period_s * np.arange(first, due + 1, dtype=np.float64)
         self._taken = due
         self._registers[reg.INT_STATUS] |= reg.INT_DATA_RDY
-        if not collecting:
-            self._unread = edges_s
-            return
-        self._collect(self._measure(edges_s), sources)
+        if not (self._registers[reg.USER_CTRL] & reg.USER_CTRL_FIFO_EN and self._registers[reg.FIFO_EN]):
+            # what nobody can read is not measured: only the last sample where the FIFO is off
+            self._unread, self._collected = self._edges_s(due - 1), due
+        elif len(self._fifo) + (due - self._collected) * reg.FRAME_BYTES > self._fifo.size:
+            self._collect()
 
-    def _collect(self, counts: Counts, sources: int) -> None:
-        self._unread = None
+    @property
+    def _period_s(self) -> float:
+        return 1.0 / (self._rate_hz * self._speed)
+
+    def _edges_s(self, first: int) -> Vector:
+        """When the samples from number `first` on began, and the last one ended."""
+        number = np.arange(first, self._taken + 1, dtype=np.float64)
+        return np.asarray(self._start_ns * 1e-9 + self._period_s * number)
+
+    def _collect(self) -> None:
+        """Measure what was taken for the FIFO: as late as nobody sees, which costs least of many samples at once."""
+        if self._collected == self._taken:
+            return
+        counts = self._measure(self._edges_s(self._collected))
+        self._unread, self._collected = None, self._taken
         if not len(counts):
             return
         words = counts.astype(">i2")
         self._latest = words[-1].tobytes()
         stop = bool(self._registers[reg.CONFIG] & reg.CONFIG_FIFO_MODE_STOP)
-        if self._fifo.push(words[:, _columns(sources, self._model.family)].tobytes(), stop):
+        columns = _columns(self._registers[reg.FIFO_EN], self._model.family)
+        if self._fifo.push(words[:, columns].tobytes(), stop):
             self._registers[reg.INT_STATUS] |= reg.INT_FIFO_OFLOW
 
     def _latest_sample(self) -> bytes:
+        self._collect()
         if self._unread is not None:
             counts = self._measure(self._unread)
             self._unread = None
