@@ -1,4 +1,4 @@
-"""Rotation matrices (3, 3): of MAV_SENSOR_ORIENTATION, of roll, pitch and yaw, of a rotation vector.
+"""Rotation matrices (3, 3): of MAV_SENSOR_ORIENTATION, of roll, pitch and yaw.
 
 scipy.spatial.transform loads where one is made.
 """
@@ -21,13 +21,6 @@ def euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Vector:
     from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to load
 
     return np.asarray(Rotation.from_euler("xyz", (roll_rad, pitch_rad, yaw_rad)).as_matrix())
-
-
-def turn(angle_rad: Vector) -> Vector:
-    """The rotation matrix (3, 3) of a rotation vector (3,) [rad]."""
-    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to load
-
-    return np.asarray(Rotation.from_rotvec(angle_rad).as_matrix())
 
 
 def orientation(number: int) -> Vector | None:

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..calibration.rotation import rotation
 from ..data import Vector
 from ..errors import LinkError
 from .dialect import Message, dialect
 from .imu import MESSAGE_ID, Reading, Stream, reading
 from .link import Link, S
 from .request import command
-from .rotation import turn
 
 WINDOW_NS, PATIENCE_NS = 2 * S, 30 * S
 FEWEST = 20
@@ -105,7 +105,7 @@ class Stillness:
         step_s = 0.0 if self._last is None else (content.time - self._last) * content.stream.unit_us * 1e-6
         self._last = content.time
         if self._gyro_bias is not None and 0 < step_s < LONGEST_STEP_S:
-            self._attitude = self._attitude @ turn((np.array(content.gyr) - self._gyro_bias) * step_s)
+            self._attitude = self._attitude @ rotation((np.array(content.gyr) - self._gyro_bias) * step_s)
 
     def _means(self) -> StillMeans:
         mean, error = {}, {}

@@ -1,11 +1,14 @@
 """A session over MAVLink writes to the autopilot it was measured on, or leaves it as it was and ends with 6."""
 
+import contextlib
+import io
 import json
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from mpucal.__main__ import run
 from mpucal.cli.destination import device
 from mpucal.errors import WriteBackError
 from mpucal.result.calibration import Calibration
@@ -34,22 +37,22 @@ WORDS = {
 
 
 @pytest.fixture(scope="module")
-def flown(tmp_path_factory, process):
-    folder = tmp_path_factory.mktemp("vehicle")
-    result = process(
-        folder, "session", "--mavlink", "sim:imus=1", "--target", "quick", "-o", "flown", "--json", "--yes"
-    )
-    return SimpleNamespace(folder=folder / "flown", result=result)
+def flown(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("vehicle") / "flown"
+    words = ["--mavlink", "sim:imus=1", "--rate", "50", "--target", "quick", "-o", str(folder), "--json", "--yes"]
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+        code = run(["session", *words])
+    return SimpleNamespace(folder=folder, code=code, out=out.getvalue(), err=err.getvalue())
 
 
 def test_the_new_parameters_are_there_and_the_files_say_so(flown):
-    assert flown.result.code == 0, flown.result.err
-    document = json.loads(flown.result.out)
+    assert flown.code == 0, flown.err
+    document = json.loads(flown.out)
     assert document == json.loads((flown.folder / "calibration.json").read_text())
     (entry,) = document["written"]
     assert entry["to"] == "autopilot"
     assert "read back and seen in its streams" in entry["what"]
-    assert "Results are written to files and the autopilot" in flown.result.err
+    assert "Results are written to files and the autopilot" in flown.err
     # of what was measured, as truth.json is; of the streams that come now, the other file
     truth = json.loads((flown.folder / "truth.json").read_text())
     measured = Calibration.load(flown.folder / "calibration.json")

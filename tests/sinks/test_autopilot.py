@@ -81,7 +81,7 @@ def vehicle_of(firmware, words=""):
 
 @pytest.fixture
 def brief(monkeypatch):
-    """Looks at streams at rest for a fifth of the time, where what is written is looked at, and not what they show."""
+    """Looks at streams at rest for a fifth of the time, where how long they are looked at decides nothing."""
     monkeypatch.setattr(stillness, "WINDOW_NS", stillness.WINDOW_NS // 5)
     monkeypatch.setattr(stillness, "FEWEST", stillness.FEWEST // 5)
 
@@ -124,7 +124,9 @@ def error_mps2(vehicle, imu=0):
 
 @pytest.mark.parametrize("words", ["", ",imus=3", ",rotation=1", ",highres=no,imus=1"], ids=str)
 @pytest.mark.parametrize("firmware", FIRMWARES)
-def test_every_imu_reads_gravity_better_afterwards(firmware, words):
+def test_every_imu_reads_gravity_better_afterwards(firmware, words, request):
+    if words:
+        request.getfixturevalue("brief")
     vehicle, _, link = vehicle_of(firmware, words)
     if "highres=no" in words and firmware == "ardupilot":
         calibration = calibration_of(vehicle)
@@ -411,6 +413,7 @@ def test_a_failed_write_leaves_no_file_behind():
 
 
 @pytest.mark.parametrize("words", ["", ",CAL_ACC0_XOFF=0.3,CAL_ACC1_ZSCALE=1.05"], ids=["new", "calibrated before"])
+@pytest.mark.usefixtures("brief")
 def test_px4s_slots_in_another_order_are_found_by_their_effect(words):
     ids = ",CAL_ACC0_ID=1310996,CAL_ACC1_ID=1310988"
     vehicle, _, link = vehicle_of("px4", ids + words)
