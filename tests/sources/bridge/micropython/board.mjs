@@ -2,8 +2,9 @@
 //
 //     node board.mjs PACKAGE      PACKAGE: the folder of @micropython/micropython-webassembly-pyscript
 //
-// Everything that MicroPython waits for is asked of the test, one byte for what, and the test answers: so its time
-// runs only as the test wants it. What the shims below stand in for is the hardware and nothing else.
+// Everything that MicroPython waits for is asked of the test, one byte for what, and the test answers, of input with all
+// that came: so its time runs only as the test wants it. What the shims below stand in for is the hardware and nothing
+// else.
 import fs from "fs";
 import { pathToFileURL } from "url";
 
@@ -32,7 +33,7 @@ SoftI2C = None
 };
 
 // collects no garbage while a program runs: the heap holds all that a session makes
-let said = [];
+let said = [], input = [];
 const asked = Buffer.alloc(512);
 
 function tell(kind, bytes = []) {
@@ -54,9 +55,17 @@ function answer(count) {
   return asked.subarray(0, count);
 }
 
+function get() {
+  if (!input.length) {
+    tell("g");
+    input = [...answer(answer(1)[0])];
+  }
+  return input.shift();
+}
+
 const board = {
-  get: () => (tell("g"), answer(1)[0]),
-  poll: () => (tell("p"), answer(1)[0]),
+  get,
+  poll: () => (input.length ? 1 : (tell("p"), answer(1)[0])),
   ticks: () => (tell("t"), answer(4).readUInt32LE()),
   moved: (words) => {
     tell("i", Buffer.from(words, "hex"));

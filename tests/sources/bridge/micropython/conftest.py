@@ -13,7 +13,8 @@ from mpucal.sources.bridge.port import Chunk
 
 ROOT = Path(__file__).parents[4]
 PACKAGE, VERSION = "@micropython/micropython-webassembly-pyscript", "1.27.0"
-STEP_NS = 1_000_000
+# how long the bridge waits between two looks, and how much of its input it is given at once
+STEP_NS, MOST = 10_000_000, 255
 TICKS = 2**30
 ENODEV = 19
 
@@ -72,7 +73,8 @@ class NodeBoard:
                 self._clock.sleep_until(until_ns)
             elif self._waits:
                 self._waits = False
-                self._answer(bytes([self._input.pop(0)]))
+                data, self._input = bytes(self._input[:MOST]), self._input[MOST:]
+                self._answer(bytes([len(data)]) + data)
             else:
                 self._serve()
 
