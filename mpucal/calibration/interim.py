@@ -31,6 +31,9 @@ ROUGHLY, MOST_ROUGHLY = 0.05, 4
 # So weak that nothing measured gives way to them, strong enough for a D of which nothing is known yet.
 D_SD, B_A_SD_MPS2 = 0.5, 5.0
 
+# A search that settled is compared with others where the recording has grown by so much since.
+GROWN = 1.25
+
 # times a pivot's travel that the covariance admits: more than a calibration's, which hears its parts as well
 DOUBT = 6.0
 
@@ -43,7 +46,7 @@ class InterimEstimate:
     ----------
     theta : the estimate. H : (p, p) its Fisher matrix with the prior's. covariance : (12, 12) of D row-major and b_a.
     problem : the series up to now. sigma : m/s^2, of the hand's acceleration while it moves.
-    converged : whether the search settled.
+    converged : whether the search settled. compared : samples of which it was the best of several.
     """
 
     theta: Theta
@@ -52,6 +55,7 @@ class InterimEstimate:
     problem: Problem
     sigma: float
     converged: bool
+    compared: int
 
     @property
     def D_std(self) -> Vector:  # noqa: N802 - the paper's letter
@@ -69,14 +73,17 @@ def interim_estimate(
 ) -> InterimEstimate:
     """What `recording` tells so far.
 
-    The search goes on from `before`, where that had settled and nothing else explains the recording better by now; else
-    it begins with a loss that finds its way from afar.
+    The search goes on from `before`, where that had settled and, asked as the recording grows, nothing else explains it
+    better; else it begins with a loss that finds its way from afar.
     """
     prepared = preprocess(*downsampled(recording, flat, FIT_HZ), gravity)
     prior = prepared.prior(D=(np.eye(3).ravel(), D_SD), b_a=(0.0, B_A_SD_MPS2))
     rough = replace(prepared.white(FIRST_MPS2), tail=0.0)
-    starts = _starts(prepared) if before is None else (*_starts(prepared), before.theta)
-    theta = min(starts, key=lambda start: value(rough, start) + prior.cost(start))
+    if before is not None and before.converged and len(recording) < GROWN * before.compared:
+        theta, compared = before.theta, before.compared
+    else:
+        starts = (*_starts(prepared), *(() if before is None else (before.theta,)))
+        theta, compared = min(starts, key=lambda start: value(rough, start) + prior.cost(start)), len(recording)
     if before is not None and before.converged and theta is before.theta:
         sigma = before.sigma
     else:
@@ -93,7 +100,7 @@ def interim_estimate(
         H = information(doubt, minimum.theta, prior)
     covariance = replace(minimum, H=H).covariance()[ACCELEROMETER, ACCELEROMETER]
     sigma = likeliest(prepared.white, SOME_MPS2, minimum.theta, max(sigma, SOME_MPS2[0]))
-    return InterimEstimate(minimum.theta, H, covariance, problem, sigma, minimum.converged)
+    return InterimEstimate(minimum.theta, H, covariance, problem, sigma, minimum.converged, compared)
 
 
 def _starts(prepared: Preprocessed) -> tuple[Theta, ...]:

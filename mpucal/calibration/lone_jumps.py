@@ -11,6 +11,8 @@ from ..data import Recording
 # A word that jumps alone: by so much [m/s^2, rad/s] at least, by so many times what its neighbours depart from theirs,
 # and they differ by so little of it.
 LEAST_JUMP, JUMPS, RETURNS = np.repeat((0.3, 0.15), 3), 8.0, 0.25
+# the samples on either side that say whether one of its words does
+BESIDE = 4
 
 
 def without_lone_jumps(recording: Recording) -> Recording:

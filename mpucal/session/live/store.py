@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from ...calibration.lone_jumps import without_lone_jumps
+from ...calibration.lone_jumps import BESIDE, without_lone_jumps
 from ...data import Mask, Recording, Samples, Sensor, Vector
 
 # Means of what comes faster: a hand does nothing that is not seen at this rate.
@@ -25,7 +25,8 @@ class SampleStore:
         self._sensor = sensor
         rate_hz = sensor.rate_hz or MOST_HZ
         self._size = max(int(rate_hz / MOST_HZ * (1.0 + 1e-6)), 1)
-        self._done = Samples.empty()
+        # what came last, as it came, the first `_lead` of it in `_done` as well: those before it, mended for good
+        self._done, self._open, self._lead = Samples.empty(), Samples.empty(), 0
         self._parts: list[Samples] = []
         self._rest = Samples.empty()
         self._torn = False
@@ -44,17 +45,25 @@ class SampleStore:
 
     def forget(self, first: int) -> None:
         """Keep those of the first so many that were added, and mark a gap before what follows."""
-        self._join()
-        self._done, self._rest, self._torn = _cut(self._done, 0, first // self._size), Samples.empty(), True
+        kept = _cut(self._mended(), 0, first // self._size)
+        self._done, self._open, self._lead = kept, Samples.empty(), 0
+        self._rest, self._torn = Samples.empty(), True
 
     def recording(self) -> Recording:
         """All of them, without the flips that the decoder saw too late."""
-        self._join()
-        return without_lone_jumps(Recording(**vars(self._done), sensor=self._sensor))
+        return Recording(**vars(self._mended()), sensor=self._sensor)
 
-    def _join(self) -> None:
-        if self._parts:
-            self._done, self._parts = Samples.joined([self._done, *self._parts]), []
+    def _mended(self) -> Samples:
+        """All, of which only the last few have not been looked at before."""
+        begin = len(self._done) - self._lead
+        self._open, self._parts = Samples.joined([self._open, *self._parts]), []
+        looked = without_lone_jumps(Recording(**vars(self._open), sensor=self._sensor))
+        news = _cut(looked, self._lead, len(looked))
+        whole = Samples.joined([self._done, news])
+        settled = max(len(whole) - BESIDE, len(self._done))
+        self._done, self._lead = _cut(whole, 0, settled), min(BESIDE, settled - begin)
+        self._open = _cut(self._open, settled - self._lead - begin, len(self._open))
+        return whole
 
 
 def _cut(samples: Samples, first: int, last: int) -> Samples:

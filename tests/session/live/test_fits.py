@@ -1,6 +1,7 @@
 """Live fits: right about what is known, and the same for the same samples."""
 
 from dataclasses import fields, replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -135,3 +136,19 @@ def test_a_flip_that_is_set_right_too_late_is_taken_away_and_no_blow(poses):
     store = SampleStore(SENSOR)
     store.add(part(replace(poses, acc=blow), 0))
     np.testing.assert_array_equal(store.recording().acc, blow)
+
+
+def test_flips_are_taken_away_however_often_somebody_looks(poses):
+    """Those at the end of what has come, too, once the samples after them are there."""
+    gyr = poses.gyr[:600].copy()
+    gyr[np.arange(50, 600, 43), 2] += 5.0
+    samples = part(replace(poses, gyr=np.concatenate((gyr, poses.gyr[600:]))), 0, 3.0)
+    once, often = SampleStore(SENSOR), SampleStore(SENSOR)
+    once.add(samples)
+    ends = [0, 1, 3, 4, 51, 52, 93, 94, 95, 97, 181, 300, 301, 525, 600]
+    for first, last in pairwise(ends):
+        often.add(Samples(*(array[first:last] for array in vars(samples).values())))
+        assert len(often.recording()) == last
+    found = once.recording()
+    assert found == often.recording()
+    assert np.abs(found.gyr - poses.gyr[:600]).max() < 1.0
