@@ -7,14 +7,13 @@ The room's axes are x to the right of whoever holds the board, y away from them 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
+from collections.abc import Iterator
 
 import numpy as np
 
-from ..calibration.rotation import rotation, shortest_turn
 from ..data import Samples, Vector
-from ..rests.windows import Window, Windows
 from .events import Direction, Quaternion
-from .way import UP, heading
 
 # The rates are taken as constant for so long.
 STEP_S = 0.02
@@ -27,18 +26,18 @@ STRAIGHTEN_RAD_S = math.radians(30.0)
 # An accelerometer that reads less falls, or is dead.
 FALLING_MPS2 = 1e-3
 # A board that lies on its component side was turned over about its x axis.
-_TURNED_OVER = np.diag([1.0, -1.0, -1.0])
+_LAID, _TURNED_OVER = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
 
 Matrix = tuple[Direction, Direction, Direction]
 
 
 class Attitude:
-    """Follows one board, a sample at a time; in plain numbers, which for one step are faster than arrays."""
+    """Follows one board, a step at a time; in plain numbers, which for one step are faster than arrays."""
 
     def __init__(self) -> None:
-        self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
+        self._q: Quaternion = _LAID
         self._begun = self._levelled = False
-        self._windows = Windows(STEP_S, spread=False)
+        self._rest = Samples.empty()
         self._bias_rad_s: Vector = np.zeros(3)
 
     def flat(self, rest_rad_s: Vector) -> None:
@@ -49,8 +48,8 @@ class Attitude:
         """Turn on by `samples`; `rest_rad_s` (3,) is what the gyroscope read at the last rest, until it was flat."""
         if not self._levelled:
             self._bias_rad_s = rest_rad_s
-        for window in self._windows.add(samples):
-            self._step(window, still)
+        for seconds, force, rate in self._steps(samples):
+            self._step(seconds, force, rate, still)
 
     @property
     def matrix(self) -> Vector:
@@ -62,28 +61,46 @@ class Attitude:
         w, x, y, z = self._q
         return (-w, -x, -y, -z) if w < 0.0 else self._q
 
-    def _step(self, window: Window, still: bool) -> None:
-        force = math.hypot(*window.acc.tolist())
+    def _steps(self, samples: Samples) -> Iterator[tuple[float, Direction, Direction]]:
+        """Of each step that `samples` complete: how long it is, and its mean force and rate."""
+        pending = Samples.joined([self._rest, samples])
+        t, cuts = pending.t.tolist(), [0]
+        while cuts[-1] < len(t) and (cut := bisect_left(t, t[cuts[-1]] + STEP_S - 1e-9)) < len(t):
+            cuts.append(cut)
+        first = cuts[-1]
+        self._rest = Samples(*(array[first:] for array in vars(pending).values()))
+        if not first:
+            return
+        counts = np.diff(cuts)[:, None]
+        force = np.add.reduceat(pending.acc[:first], cuts[:-1]) / counts
+        rate = np.add.reduceat(pending.gyr[:first], cuts[:-1]) / counts - self._bias_rad_s
+        gaps = pending.gap[cuts].tolist()
+        for i, (acc, gyr) in enumerate(zip(force.tolist(), rate.tolist(), strict=True)):
+            # nobody knows how long the last step before a gap was
+            yield STEP_S if gaps[i + 1] else t[cuts[i + 1]] - t[cuts[i]], acc, gyr
+
+    def _step(self, seconds: float, acc: Direction, rate: Direction, still: bool) -> None:
+        force = math.hypot(*acc)
         if not self._begun:
             self._begun = True
-            self._q = quaternion(straight(window.acc / force if force >= FALLING_MPS2 else UP))
+            x, y, z = acc
+            self._q = straight((x / force, y / force, z / force) if force >= FALLING_MPS2 else (0.0, 0.0, 1.0))
             return
-        seconds = window.end_s - window.start_s
-        q = _product(self._q, _turn(*((window.gyr - self._bias_rad_s) * seconds).tolist()))
+        q = _product(self._q, _turn(rate[0] * seconds, rate[1] * seconds, rate[2] * seconds))
         # where no direction is up, the gyroscope alone carries
         if force >= FALLING_MPS2:
-            x, y, z = (sum(m * a for m, a in zip(row, window.acc.tolist(), strict=True)) for row in matrix(q))
+            x, y, z = _turned(q, acc)
             aside = math.hypot(x, y)
             missing = math.atan2(aside, z)
             share = 1.0 - math.exp(-seconds / (STILL_S if still else MOVING_S))
             turn = min(share * missing, CORRECT_RAD_S * seconds) / aside if aside else 0.0
             q = _product(_turn(y * turn, -x * turn, 0.0), q)
         if still and not self._levelled:
-            now = np.array(matrix(q))
-            most, askew = STRAIGHTEN_RAD_S * seconds, heading(straight(now[2]), now)
+            most, askew = STRAIGHTEN_RAD_S * seconds, _heading(_product(straight(matrix(q)[2]), _inverse(q)))
             q = _product(_turn(0.0, 0.0, min(max(askew, -most), most)), q)
-        w, x, y, z = (part / math.hypot(*q) for part in q)
-        self._q = (w, x, y, z)
+        size = math.hypot(*q)
+        w, x, y, z = q
+        self._q = (w / size, x / size, y / size, z / size)
 
 
 def _turn(x: float, y: float, z: float) -> Quaternion:
@@ -115,10 +132,38 @@ def matrix(attitude: Quaternion) -> Matrix:
     )
 
 
-def straight(up: Vector) -> Vector:
-    """(3, 3) the attitude with the unit vector `up` (3,) of the board's axes up nearest to one laid straight."""
-    laid = np.eye(3) if up[2] >= 0.0 else _TURNED_OVER
-    return np.asarray(rotation(shortest_turn(laid @ up, UP)) @ laid)
+def _turned(attitude: Quaternion, v: Direction) -> Direction:
+    """The vector `v` of the board's axes in the room's."""
+    w, x, y, z = attitude
+    a, b, c = v
+    # v + 2 w (q x v) + 2 q x (q x v)
+    d, e, f = y * c - z * b, z * a - x * c, x * b - y * a
+    return (
+        a + 2.0 * (w * d + y * f - z * e),
+        b + 2.0 * (w * e + z * d - x * f),
+        c + 2.0 * (w * f + x * e - y * d),
+    )
+
+
+def _inverse(attitude: Quaternion) -> Quaternion:
+    w, x, y, z = attitude
+    return (w, -x, -y, -z)
+
+
+def _heading(turn: Quaternion) -> float:
+    """By how much it turns about the vertical [rad]."""
+    w, _, _, z = turn
+    return math.atan2(2.0 * w * z, w * w - z * z)
+
+
+def straight(up: Direction) -> Quaternion:
+    """The attitude with the unit vector `up` of the board's axes up nearest to one laid straight."""
+    x, y, z = up
+    laid = _LAID if z >= 0.0 else _TURNED_OVER
+    # the shortest turn to (0, 0, 1) of what points up once it is laid
+    x, y, z = _turned(laid, up)
+    size = math.hypot(1.0 + z, y, x)
+    return _product(((1.0 + z) / size, y / size, -x / size, 0.0), laid)
 
 
 def quaternion(matrix: Vector) -> Quaternion:

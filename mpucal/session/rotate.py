@@ -61,7 +61,7 @@ class Rotate:
     def __init__(self, flat: Direction, aim: Aim, until_end: bool = False, tilt_only: bool = False) -> None:
         self._aim, self._until_end, self._tilt_only = aim, until_end, tilt_only
         self._least = TILTS if tilt_only else aim.least
-        self._pauses, self._passes = Pauses(), Windows(PASS_WINDOW_S)
+        self._pauses, self._passes = Pauses(), Windows(PASS_WINDOW_S, spread=False)
         self.coverage = Coverage()
         self.coverage.pauses(np.array(flat))
         self.coverage.passes(np.array(flat))

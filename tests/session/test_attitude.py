@@ -51,7 +51,7 @@ def test_the_gyroscope_carries_the_heading(board):
 def test_a_board_is_laid_down_straight(up):
     """As `up` says, and however it was turned about the vertical as it came."""
     up = np.array(up) / np.linalg.norm(up)
-    assert np.allclose(straight(up) @ up, [0, 0, 1])
+    assert np.allclose(matrix(straight(up.tolist())).apply(up), [0, 0, 1])
 
 
 def learnt(down):

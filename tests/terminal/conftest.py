@@ -8,7 +8,7 @@ import os
 import numpy as np
 import pytest
 
-from mpucal.session.attitude import quaternion, straight
+from mpucal.session.attitude import straight
 from mpucal.session.events import (
     Caution,
     Countdown,
@@ -28,7 +28,7 @@ CORNER = (0.58, -0.57, 0.58)
 
 
 def meter(t_s, still=True, down=(0.0, 0.0, -1.0), what="", wanted=None):
-    attitude, there = (quaternion(straight(-np.array(d) / np.linalg.norm(d))) for d in (down, wanted or down))
+    attitude, there = (straight((-np.array(d) / np.linalg.norm(d)).tolist()) for d in (down, wanted or down))
     missing = (
         {} if wanted is None else {"missing_deg": 61.0, "turn": "60 deg more, roll it to the left", "wanted": there}
     )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mpucal.session.attitude import matrix, quaternion, straight
+from mpucal.session.attitude import matrix, straight
 from mpucal.terminal import board, globe, letters
 from mpucal.terminal.canvas import Canvas
 from mpucal.terminal.flat import BOARDS
@@ -36,7 +36,7 @@ def test_large_letters_differ():
 
 
 def held(down):
-    return quaternion(straight(-np.array(down, float) / np.linalg.norm(down)))
+    return straight((-np.array(down, float) / np.linalg.norm(down)).tolist())
 
 
 @pytest.mark.parametrize("seed", range(20))
