@@ -78,7 +78,8 @@ def test_keys_are_shown_only_where_they_can_be_pressed(tab, serve):
 @pytest.fixture
 def session(tmp_path):
     """A session with a page, which goes on as fast as it can once it is woken: its process, the address, its folder."""
-    words = ["session", "--bus", "sim:pace=fast", "--seed", "3", "--page", "--yes", "--json-events", "-o", "board"]
+    words = ["session", "--bus", "sim:pace=fast", "--seed", "3", "--rate", "50", "--target", "quick"]
+    words += ["--page", "--yes", "--json-events", "-o", "board"]
     with subprocess.Popen(
         [sys.executable, "-m", "mpucal", *words], cwd=tmp_path, stdout=-1, stderr=-1, text=True
     ) as process:

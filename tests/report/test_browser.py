@@ -1,62 +1,65 @@
-"""The page in a real browser, at the width of a desk and of a phone."""
+"""The page in a real browser, at the width of a desk and of a phone, and on paper."""
 
-import json
 import re
-import shutil
-import subprocess
-from html import escape, unescape
 
 import pytest
 
-BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
-FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync")
-# a window has a least width, a frame has none; the frame tells what became of the page in it
-FRAME = """<!DOCTYPE html><html><body style="margin:0">
-<iframe style="border:0;width:{width}px;height:800px" srcdoc="{page}" onload="
-  const page = this.contentDocument, root = page.documentElement;
+LOOK = """width => {
+  const page = document, root = page.documentElement;
   page.querySelectorAll('details').forEach(part => part.open = true);
-  document.body.append(JSON.stringify({{
+  return {
     wide: root.scrollWidth,
     pictures: [...page.querySelectorAll('svg')].map(svg => svg.getBoundingClientRect().width),
     sticking_out: [...page.querySelectorAll('p, li, figure, h1, h2, th')]
-      .filter(e => e.getBoundingClientRect().right > {width} && !e.closest('.wide')).length,
+      .filter(e => e.getBoundingClientRect().right > width && !e.closest('.wide')).length,
     cut: [...page.querySelectorAll('#accelerometer td')]
-      .filter(e => e.getBoundingClientRect().right > {width}).length,
+      .filter(e => e.getBoundingClientRect().right > width).length,
     decided: Math.max(...[...page.querySelectorAll('#accelerometer, .first ul')]
       .map(e => e.getBoundingClientRect().bottom)),
-    paper: getComputedStyle(page.body).backgroundColor,
-    fetched: performance.getEntriesByType('resource').length }}));"></iframe></body></html>
-"""
+    paper: getComputedStyle(page.body).backgroundColor };
+}"""
 
 
 @pytest.fixture(scope="module")
-def look(result, tmp_path_factory):
-    """What a browser makes of the page at a width."""
-    if BROWSER is None:
-        pytest.skip("there is no Chromium here")
+def page(chromium, result, tmp_path_factory):
+    """The page as a browser opens it; it keeps what it fetched."""
+    path = tmp_path_factory.mktemp("browser") / "report.html"
+    path.write_text(result.html, encoding="utf-8")
+    context = chromium.new_context()
+    page = context.new_page()
+    page.fetched = []
+    page.on("request", lambda asked: page.fetched.append(asked.url))
+    page.goto(path.as_uri())
+    yield page
+    context.close()
+
+
+@pytest.fixture
+def look(page):
+    """What the browser makes of it at a width."""
 
     def at(width):
-        folder = tmp_path_factory.mktemp("browser")
-        (folder / "frame.html").write_text(FRAME.format(width=width, page=escape(result.html)), encoding="utf-8")
-        words = [BROWSER, *FLAGS, "--no-first-run", f"--user-data-dir={folder}", "--window-size=1400,900"]
-        dom = subprocess.run(
-            [*words, "--dump-dom", (folder / "frame.html").as_uri()], capture_output=True, text=True, check=True
-        ).stdout
-        return json.loads(unescape(re.search(r'\{"wide".*?\}', dom)[0]))
+        page.set_viewport_size({"width": width, "height": 800})
+        return page.evaluate(LOOK, width)
 
     return at
 
 
 @pytest.mark.parametrize("width", [375, 1200], ids=["phone", "desk"])
-def test_nothing_sticks_out_and_all_pictures_are_seen(look, width):
+def test_nothing_sticks_out_and_all_pictures_are_seen(look, page, width):
     seen = look(width)
     assert seen["wide"] <= width
     assert seen["sticking_out"] == seen["cut"] == 0
     assert len(seen["pictures"]) == 7
     assert all(300 < picture <= 640 for picture in seen["pictures"])
     assert seen["paper"] == "rgb(255, 255, 255)"
-    assert seen["fetched"] == 0
+    assert page.fetched == [page.url]
 
 
 def test_a_desk_shows_all_that_is_to_be_decided_at_once(look):
     assert look(1280)["decided"] <= 800
+
+
+def test_prints_on_two_pages(page):
+    page.reload()  # as it is before anything in it is opened
+    assert len(re.findall(rb"/Type\s*/Page\b(?!s)", page.pdf(prefer_css_page_size=True))) == 2

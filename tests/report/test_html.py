@@ -1,6 +1,4 @@
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
@@ -216,17 +214,6 @@ def test_says_whose_calibration_it_is_of_when(calibration):
 def test_says_what_to_do_now(calibration, verdict):
     page = render(replace(calibration, quality={"verdict": verdict}))
     assert ("mpucal write" in page, "repeat the session" in page) == (verdict != "refused", verdict != "good")
-
-
-def test_prints_on_two_pages(result, tmp_path):
-    browser = shutil.which("chromium") or shutil.which("google-chrome")
-    if browser is None:
-        pytest.skip("there is no Chromium here")
-    (tmp_path / "report.html").write_text(result.html, encoding="utf-8")
-    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", f"--user-data-dir={tmp_path / 'profile'}"]
-    words = [browser, *flags, f"--print-to-pdf={tmp_path / 'report.pdf'}", (tmp_path / "report.html").as_uri()]
-    subprocess.run(words, capture_output=True, check=True)
-    assert len(re.findall(rb"/Type\s*/Page\b(?!s)", (tmp_path / "report.pdf").read_bytes())) == 2
 
 
 def test_the_page_shows_them(result):

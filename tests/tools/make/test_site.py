@@ -10,6 +10,7 @@ import pytest
 from mpucal.cli import commands
 
 PROJECT = Path(__file__).parents[3]
+DESKTOP, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
 PAGES = ("index", "notebook", "reference/commands", "reference/python")
 
 
@@ -26,30 +27,39 @@ def site(once):
     return once("site", make)
 
 
-@pytest.fixture(params=[(1280, 900), (390, 844)], ids=["desktop", "phone"])
-def page(request, chromium):
-    width, height = request.param
-    page = chromium.new_page(viewport={"width": width, "height": height})
+@pytest.fixture(scope="module")
+def page(chromium):
+    """A page that keeps what it fetched."""
+    context = chromium.new_context(reduced_motion="reduce")
+    page = context.new_page()
     page.fetched = []
     page.on("request", lambda asked: page.fetched.append(asked.url))
     yield page
-    page.close()
+    context.close()
+
+
+def from_elsewhere(page):
+    return [url for url in page.fetched if not url.startswith(("file:", "data:"))]
 
 
 @pytest.mark.parametrize("name", PAGES)
 def test_a_page_fits_and_fetches_nothing_from_elsewhere(site, page, name):
     page.goto((site / f"{name}.html").as_uri())
-    assert page.evaluate("document.documentElement.scrollWidth") <= page.viewport_size["width"]
-    assert page.evaluate("[...document.images].every((image) => image.complete && image.naturalWidth > 0)")
-    assert [url for url in page.fetched if not url.startswith(("file:", "data:"))] == []
+    for size in (DESKTOP, PHONE):
+        page.set_viewport_size(size)
+        assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+        assert page.evaluate("[...document.images].every((image) => image.complete && image.naturalWidth > 0)")
+    assert from_elsewhere(page) == []
 
 
 def test_the_search_finds(site, page):
-    page.goto((site / "reference" / "python.html").as_uri())
-    page.click(".md-search__form" if page.viewport_size["width"] > 1000 else ".md-header__button[for=__search]")
-    page.locator(".md-search__input").press_sequentially("misalignment", delay=20)
-    page.locator(".md-search-result__item a").first.wait_for()
-    assert [url for url in page.fetched if not url.startswith(("file:", "data:"))] == []
+    for size, way_in in ((DESKTOP, ".md-search__form"), (PHONE, ".md-header__button[for=__search]")):
+        page.set_viewport_size(size)
+        page.goto((site / "reference" / "python.html").as_uri())
+        page.click(way_in)
+        page.locator(".md-search__input").press_sequentially("misalignment")
+        page.locator(".md-search-result__item a").first.wait_for()
+    assert from_elsewhere(page) == []
 
 
 def test_every_command_has_its_section(site):
