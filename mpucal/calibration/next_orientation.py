@@ -6,18 +6,19 @@ A weighted A-criterion: the sum of (variance / wanted^2) over D and b_a (docs/me
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from ..data import Vector
 from .interim import InterimEstimate
+from .levenberg_marquardt import inverse
 from .likelihood import evaluate, trace
 from .parameters import ACCELEROMETER, HAND, PLACES
 from .preprocessing import CORRELATION_S, MOVING_RAD_S, POSE_MPS2, jerk_density
 from .problem import Problem, Series
-from .rotation import rotation, shortest_turn
-from .theta import Theta
+from .rotation import cross, shortest_turn
 
 # What a person does when asked for an orientation.
 MOVE_S, REST_S = 1.6, 2.0
@@ -38,62 +39,64 @@ def next_orientation(known: InterimEstimate, wanted: Vector, directions: Vector)
     wanted : (12,) standard deviations, of D row-major and b_a. directions : (k, 3) unit vectors in the body frame.
     """
     s = trace(known.problem, known.theta).s[-1]
-    here = -s / np.linalg.norm(s)
-    now = _badness(known.H, wanted)
-    best, most = 0, -np.inf
-    for i, down in enumerate(directions):
-        angle = math.acos(float(np.clip(here @ down, -1.0, 1.0)))
-        if angle < NEAR_RAD:
-            continue
-        seconds = max(MOVE_S, angle / FAST_RAD_S)
-        then = _badness(known.H + _information(_move_and_rest(known, s, down, seconds), known.theta, s), wanted)
-        gain = (math.log(now) - math.log(then)) / (seconds + REST_S)
-        if gain > most:
-            best, most = i, gain
-    return best
+    angle = np.arccos(np.clip(directions @ (-s / np.linalg.norm(s)), -1.0, 1.0))
+    there = np.flatnonzero(angle >= NEAR_RAD)
+    seconds = np.maximum(MOVE_S, angle[there] / FAST_RAD_S)
+    moves = _moves(known, s, directions[there], seconds.tolist())
+    begin = replace(known.theta, u=s / np.linalg.norm(s))
+    F = _whatever_the_pose(np.array([evaluate(move, begin, HAND).fisher for move in moves]))
+    then, now = _badness(known.H + F, wanted), _badness(known.H, wanted)
+    gain = (np.log(now) - np.log(then)) / (seconds + REST_S)
+    return int(there[np.argmax(gain)])
 
 
-def _badness(H: Vector, wanted: Vector) -> float:
-    scale = 1.0 / np.sqrt(np.diag(H))
-    variance = np.diag(np.linalg.inv(H * np.outer(scale, scale))) * scale**2
-    return float(np.sum(np.abs(variance[ACCELEROMETER]) / wanted**2))
+def _badness(H: Vector, wanted: Vector) -> Vector:
+    """(...) of Fisher matrices (..., p, p)."""
+    variance = np.diagonal(inverse(H), axis1=-2, axis2=-1)
+    return np.asarray(np.sum(np.abs(variance[..., ACCELEROMETER]) / wanted**2, axis=-1))
 
 
-def _information(problem: Problem, theta: Theta, s: Vector) -> Vector:
-    """(p, p) Fisher matrix of a problem that begins at rest with gravity s (3,), whatever the pose there."""
-    F = evaluate(problem, replace(theta, u=s / np.linalg.norm(s)), HAND).fisher
+def _whatever_the_pose(F: Vector) -> Vector:
+    """(k, p, p) Fisher matrices without what is known of the pose in which they begin."""
     pose = PLACES["tilt"]
-    F = F - F[:, pose] @ np.linalg.solve(F[pose, pose], F[pose])
-    F[:, pose] = F[pose] = 0.0
-    return F
+    F = F - F[:, :, pose] @ np.linalg.solve(F[:, pose, pose], F[:, pose])
+    F[:, :, pose] = F[:, pose] = 0.0
+    return np.asarray(F)
 
 
-def _move_and_rest(known: InterimEstimate, s: Vector, down: Vector, seconds: float) -> Problem:
-    """A rest with gravity s (3,), the shortest turn from there to `down` (3,) in so many seconds, and a rest there."""
+def _moves(known: InterimEstimate, s: Vector, directions: Vector, seconds: list[float]) -> Iterator[Problem]:
+    """To each of `directions` (k, 3) a rest with gravity s (3,), the shortest turn there in so long, and a rest."""
     problem, theta = known.problem, known.theta
     dt = float(np.median(problem.series.dt))
-    move, rest = max(round(seconds / dt), 2), max(round(REST_S / dt), 2)
-    turn = shortest_turn(s / np.linalg.norm(s), -down)
-    # s in the body's axes turns against the body
-    share = np.append(np.arange(1, move + 1) / move, np.ones(rest))
-    path = rotation(share[:, None] * turn) @ s
-    omega = np.zeros((move + rest, 3))
-    omega[:move] = -turn / (move * dt)
-    speed2 = np.sum(omega**2, axis=1)
-    moving = speed2 / (speed2 + MOVING_RAD_S**2)
-    longer = 1.0 + 2.0 * CORRELATION_S / dt
-    resting = np.arange(move + rest) >= move
-    reset = np.full(move + rest, -1.0)
-    reset[0], reset[move] = 0.0, TREMOR_MPS2
-    series = Series(
-        y=path @ theta.D.T + theta.b_a,
-        omega=omega @ np.linalg.inv(theta.K).T + theta.b_omega,
-        dt=np.full(move + rest, dt),
-        rate=omega,
-        alpha=np.zeros_like(omega),
-        r_extra=np.where(resting, POSE_MPS2**2 * rest, longer * known.sigma**2 * moving),
-        jerk=np.where(resting, jerk_density(TREMOR_MPS2, problem.lam), 0.0),
-        reset=reset,
-    )
+    rest = max(round(REST_S / dt), 2)
+    rates = np.linalg.inv(theta.K)
+    moving_noise = (1.0 + 2.0 * CORRELATION_S / dt) * known.sigma**2
     flat = replace(problem.flat, first=0, last=rest, y=theta.D @ s + theta.b_a)
-    return replace(problem, series=series, flat=flat)
+    for down, each_s in zip(directions, seconds, strict=True):
+        move = max(round(each_s / dt), 2)
+        turn = shortest_turn(s / np.linalg.norm(s), -down)
+        # s in the body's axes turns against the body, in the plane across the turn
+        angle = float(np.linalg.norm(turn))
+        across = cross(turn / angle) @ s
+        share = angle * np.minimum(np.arange(1, move + rest + 1) / move, 1.0)[:, None]
+        path = np.cos(share) * s + np.sin(share) * across
+        omega = np.zeros((move + rest, 3))
+        omega[:move] = -turn / (move * dt)
+        speed2 = (angle / (move * dt)) ** 2
+        r_extra = np.full(move + rest, POSE_MPS2**2 * rest)
+        r_extra[:move] = moving_noise * speed2 / (speed2 + MOVING_RAD_S**2)
+        jerk = np.zeros(move + rest)
+        jerk[move:] = jerk_density(TREMOR_MPS2, problem.lam)
+        reset = np.full(move + rest, -1.0)
+        reset[0], reset[move] = 0.0, TREMOR_MPS2
+        series = Series(
+            y=path @ theta.D.T + theta.b_a,
+            omega=omega @ rates.T + theta.b_omega,
+            dt=np.full(move + rest, dt),
+            rate=omega,
+            alpha=np.zeros_like(omega),
+            r_extra=r_extra,
+            jerk=jerk,
+            reset=reset,
+        )
+        yield replace(problem, series=series, flat=flat)
