@@ -7,6 +7,7 @@ correlation time; where it hardly rests, the second derivative of a position tha
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -31,6 +32,7 @@ from .hand_noise import (
 )
 from .initial_estimate import initialise, perfect
 from .levenberg_marquardt import Minimum, information, minimise
+from .likelihood import value
 from .parameters import HAND
 from .parts import ends_of, parts_of
 from .preprocessing import Preprocessed, preprocess
@@ -38,6 +40,7 @@ from .prior import Prior
 from .problem import Problem
 from .theta import Theta
 from .transitions import leverages, miss_variances, q_scale, transitions_of
+from .tremor import without_tremor
 
 SEARCH_HZ = 50.0
 ROUGHLY, MOST_ROUGHLY = 0.05, 20
@@ -62,6 +65,8 @@ def _fit_from(begin: Callable[[Problem, Vector], Theta], recording: Recording, f
     rough = means(noise_factor, recording, flat, SEARCH_HZ)
     search = _Search(preprocess(*downsampled(recording, flat, SEARCH_HZ), gravity, rough))
     theta, noise = search.run(begin(search.prepared.problem, fine.flat.b_omega))
+    if search.trembles:
+        fine = without_tremor(fine)
     if noise.kind == "white":  # means over blocks hide jerks, and with them some of the hand
         noise = Noise("white", likeliest(fine.white, CALM_MPS2, theta, noise.sigma))
     problem = _moved(noise.problem(fine), fine, theta)
@@ -126,6 +131,7 @@ class _Search:
         self.prepared = prepared
         self.prior = prepared.prior()
         self.iterations = 0
+        self.trembles = False
 
     def run(self, theta: Theta) -> tuple[Theta, Noise]:
         """First Huber's loss, which finds the way from afar; then the redescending one, and the likeliest sigma."""
@@ -139,15 +145,30 @@ class _Search:
             return theta, Noise("none", 0.0)
         noise = Noise("white", sigma)
         if not prepared.rests_often:
-            sigma = likeliest(prepared.pivot, PIVOT_MPS2, theta, PIVOT_MPS2[0])
-            theta = self._roughly(prepared.pivot(sigma), theta)
-            sigma = likeliest(prepared.pivot, PIVOT_MPS2, theta, sigma)
-            noise = Noise("pivot", farther(sigma))
+            theta, noise = self._pivoting(theta)
         for _ in range(PASSES):
-            before, theta = theta, self._roughly(_moved(noise.problem(prepared), prepared, theta), theta)
+            before, theta = theta, self._roughly(_moved(noise.problem(self.prepared), self.prepared, theta), theta)
             if theta is before:
                 break
         return theta, noise
+
+    def _pivoting(self, theta: Theta) -> tuple[Theta, Noise]:
+        """A pivot's travel, and whether the tremor has a lever arm of its own (BIC of its three components)."""
+        theta, noise = self._travel(theta)
+        one, theta = self.prepared, self._roughly(noise.problem(self.prepared), theta)
+        two = without_tremor(one)
+        there = self._roughly(noise.problem(two), theta)
+        if _likeliest_cost(two, there) + 1.5 * math.log(len(two.problem.series)) > _likeliest_cost(one, theta):
+            return theta, noise
+        self.prepared, self.trembles = two, True
+        return self._travel(there)
+
+    def _travel(self, theta: Theta) -> tuple[Theta, Noise]:
+        """The likeliest size of a pivot's travel, with theta for it."""
+        pivot = self.prepared.pivot
+        sigma = likeliest(pivot, PIVOT_MPS2, theta, PIVOT_MPS2[0])
+        theta = self._roughly(pivot(sigma), theta)
+        return theta, Noise("pivot", farther(likeliest(pivot, PIVOT_MPS2, theta, sigma)))
 
     def _roughly(self, problem: Problem, theta: Theta) -> Theta:
         minimum = _roughly(problem, theta, self.prior)
@@ -157,3 +178,8 @@ class _Search:
 
 def _roughly(problem: Problem, theta: Theta, prior: Prior, fixed: tuple[str, ...] = ()) -> Minimum:
     return minimise(problem, theta, HAND, prior, fixed, until=ROUGHLY, most=MOST_ROUGHLY, frozen=True)
+
+
+def _likeliest_cost(prepared: Preprocessed, theta: Theta) -> float:
+    """V at theta with the likeliest size of a pivot's travel."""
+    return value(prepared.pivot(likeliest(prepared.pivot, PIVOT_MPS2, theta, PIVOT_MPS2[0])), theta)

@@ -142,6 +142,22 @@ def test_what_is_not_known_of_the_gyroscope_is_not_taken_for_perfect(ideal):
         assert (fit.std(*fit.at_prior) > 0.5 * np.array(BY_NAME["K"].sd)[[1, 5]]).all()
 
 
+def test_a_tremor_about_another_joint_does_little(hand):
+    """A lever arm for both joints would be the tremor's, and wrong for the turns: a bias of |omega|^2 r."""
+    for seed in range(2):
+        run = hand(seed, "continuous")
+        recording, rng = run.recording, np.random.default_rng(seed)
+        away = np.arange(len(recording)) >= recording.flat[1] + 50
+        w = 2.0 * np.pi * rng.uniform(8.0, 12.0, (40, 3))
+        phase = w * recording.t[:, None, None] + rng.uniform(0.0, 2.0 * np.pi, (40, 3))
+        # rad: 0.5 mrad rms of each axis
+        size = 0.5e-3 * np.sqrt(2.0 / 40.0) * away[:, None]
+        rate, alpha = -size * np.sum(w * np.sin(phase), axis=1), -size * np.sum(w * w * np.cos(phase), axis=1)
+        acc = recording.acc + np.cross(alpha, [0.05, -0.06, 0.03])
+        plain, trembling = fitted(recording), fitted(replace(recording, acc=acc, gyr=recording.gyr + rate))
+        assert sph_rms(run.truth, trembling.D, trembling.b_a) < 1.5 * sph_rms(run.truth, plain.D, plain.b_a) + 0.005
+
+
 def test_jerks_do_little(hand):
     run = hand(2, "pose12")
     rng = np.random.default_rng(0)
