@@ -47,7 +47,7 @@ class EmulatedLine:
     Parameters
     ----------
     latency_ns : how long an adapter holds back what the device sends. burst_ns : it hands over what came once in
-        so long, as USB does; 0: as it comes.
+        so long, as USB does; 0: as it comes. step_ns : how often the device works.
 
     Attributes
     ----------
@@ -55,7 +55,14 @@ class EmulatedLine:
     unplugged : the port is gone while this is set. written : what the host has sent.
     """
 
-    def __init__(self, device: LineEnd, clock: SteppedClock, latency_ns: int = 1_000_000, burst_ns: int = 0) -> None:
+    def __init__(
+        self,
+        device: LineEnd,
+        clock: SteppedClock,
+        latency_ns: int = 1_000_000,
+        burst_ns: int = 0,
+        step_ns: int = STEP_NS,
+    ) -> None:
         self.name, self.bauds = "the emulated line", BAUDS[:1]
         self.device = device
         self.to_host: Spoil = _unchanged
@@ -63,6 +70,7 @@ class EmulatedLine:
         self.unplugged = False
         self.written = bytearray()
         self._clock, self._latency_ns, self._burst_ns = clock, latency_ns, burst_ns or 1
+        self._step_ns = step_ns
         self._coming: deque[Chunk] = deque()
         self._free_ns = 0
 
@@ -102,7 +110,7 @@ class EmulatedLine:
         """Nothing to let go of."""
 
     def _step(self) -> None:
-        self._clock.sleep_until(self._clock.now() + STEP_NS)
+        self._clock.sleep_until(self._clock.now() + self._step_ns)
         data = self.device.work()
         if data and not self.unplugged:
             data = self.to_host(data)

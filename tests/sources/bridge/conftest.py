@@ -73,7 +73,7 @@ def rig():
     def make(model="mpu6050", latency_ns=MS, boot_ns=0, **how):
         made = Rig(model=model, clock=FastClock(), how=how)
         made.new_chip()
-        made.line = EmulatedLine(made.new_bridge(boot_ns), made.clock, latency_ns)
+        made.line = EmulatedLine(made.new_bridge(boot_ns), made.clock, latency_ns, step_ns=MS)
         return made
 
     return make

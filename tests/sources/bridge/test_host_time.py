@@ -53,7 +53,7 @@ def recorded(tmp_path):
         def shown_since(begun):
             return lambda: shown() - begun
 
-        line = EmulatedLine(EmulatedBridge(chip, shown), clock, burst_ns=burst_ms * MS)
+        line = EmulatedLine(EmulatedBridge(chip, shown), clock, burst_ns=burst_ms * MS, step_ns=2 * MS)
         path = tmp_path / "capture.mcap"
         bus = BridgeBus(line)
         with CaptureWriter(path) as writer:

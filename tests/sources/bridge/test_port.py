@@ -42,13 +42,13 @@ def test_the_driver_runs_through_the_real_pyserial(rig, serve, numbers, stream, 
     bus = open_bridge(serve(made.line.device, made.clock, kind).name)
     driver = Driver(bus, Config(rate_hz=rate_hz))
     driver.start()
-    stream(driver, 3)
+    stream(driver, 1)
     driver.stop()
     bus.close()
     recording = driver.recording()
     assert not recording.gap.any()
     assert set(np.diff(numbers(recording))) == {1}
-    assert len(recording) > 2.5 * rate_hz
+    assert len(recording) > 0.8 * rate_hz
 
 
 def test_a_port_that_goes_away_and_comes_back(rig, serve, numbers, stream, tmp_path):
@@ -63,10 +63,10 @@ def test_a_port_that_goes_away_and_comes_back(rig, serve, numbers, stream, tmp_p
     name.unlink()
     name.symlink_to(second.name)
     first.stop()
-    stream(driver, 3)
+    stream(driver, 2)
     recording = driver.recording()
     assert recording.gap.sum() == 1
-    assert len(recording) > 400
+    assert len(recording) > 300
 
 
 def test_two_at_once(rig, serve):
