@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Vector
+from .rotation import across
 
 SWAY_HZ, TREMOR_HZ = (0.5, 4.0), (2.0, 10.0)
 # peak and duration of a jerk, half a sine
@@ -43,4 +44,4 @@ def swing(alpha: Vector, omega: Vector, r: Vector, v: Vector | float = 0.0) -> V
 
     alpha x r + omega x (omega x r + 2 v), (n, 3) m/s^2 in the body.
     """
-    return np.asarray(np.cross(alpha, r) + np.cross(omega, np.cross(omega, r) + 2.0 * v))
+    return np.asarray(across(alpha, r) + across(omega, across(omega, r) + 2.0 * v))

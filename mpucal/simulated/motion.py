@@ -19,6 +19,8 @@ from .mishaps import Mishap
 AHEAD_S = REACTION_S[0] / 2
 
 SINES = 12
+# times of one sample, and of its force that comes later
+FEW = 4
 
 
 class Wobble:
@@ -132,28 +134,30 @@ class Motion:
         force_late_s : the force is that of so much earlier than the rate; negative: the rate is.
         """
         self._extend(float(edges_s[-1]))
-        felt, node = self._between(edges_s)
-        force, rate = felt[:, :3], felt[:, 3:]
-        if force_late_s:
-            late, node = self._between(edges_s - abs(force_late_s))
-            force, rate = (late[:, :3], rate) if force_late_s > 0.0 else (force, late[:, 3:])
+        n = len(edges_s)
+        times_s = np.concatenate((edges_s, edges_s - abs(force_late_s))) if force_late_s else edges_s
+        sums, node = self._sums_at(times_s)
+        means = (sums[1:] - sums[:-1]) / (times_s[1:] - times_s[:-1])[:, None]
+        force, rate = means[: n - 1, :3], means[: n - 1, 3:]
+        if force_late_s > 0.0:
+            force = means[n:, :3]
+        elif force_late_s:
+            rate = means[n:, 3:]
         self._forget(node)
         for mishap in self.mishaps:
             force, rate = mishap.felt(force, rate, edges_s[1:])
         return force, rate
 
-    def _between(self, edges_s: Vector) -> tuple[Vector, int]:
-        """Mean force and rate (n, 6) between (n + 1,) times [s], and the step before the last of these."""
-        if len(edges_s) == 2:
+    def _sums_at(self, t_s: Vector) -> tuple[Vector, int]:
+        """What was felt (n, 6) until times (n,) [s], and the step before the last of these."""
+        if len(t_s) <= FEW:
             # of one sample, plain numbers take half as long and give the same bits
-            begin_s, end_s = edges_s.tolist()
-            before, (after, node) = self._sum_at(begin_s)[0], self._sum_at(end_s)
-            return ((after - before) / (end_s - begin_s))[None], node
-        place = np.maximum(edges_s * STEP_HZ - self._first, 0.0)
+            each = [self._sum_at(each_s) for each_s in t_s.tolist()]
+            return np.array([sums for sums, _ in each]), each[-1][1]
+        place = np.maximum(t_s * STEP_HZ - self._first, 0.0)
         node = np.minimum(place.astype(int), len(self._sums) - 2)
         part = (place - node)[:, None]
-        sums = (1 - part) * self._sums[node] + part * self._sums[node + 1]
-        return (sums[1:] - sums[:-1]) / (edges_s[1:] - edges_s[:-1])[:, None], int(node[-1])
+        return np.asarray((1 - part) * self._sums[node] + part * self._sums[node + 1]), int(node[-1])
 
     def _sum_at(self, t_s: float) -> tuple[Vector, int]:
         """What was felt (6,) until `t_s`, and the step before it."""
