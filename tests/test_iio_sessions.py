@@ -19,7 +19,7 @@ def session(capsys, *words):
 
 def test_a_session_ends_good_and_replays_to_the_bit(tmp_path, capsys):
     made, again = tmp_path / "made", tmp_path / "again"
-    words = ["--iio", "sim:temperature_c=27", "--seed", "4", "--rate", "50", "--target", "quick", "--model", "hand"]
+    words = ["--iio", "sim:temperature_c=27", "--seed", "4", "--rate", "25", "--target", "quick", "--model", "hand"]
     code, found = session(capsys, *words, "-o", str(made))
     truth = json.loads((made / "truth.json").read_text())
     assert code == 0

@@ -58,7 +58,7 @@ def test_a_chip_is_turned_on_after_a_stop(tmp_path, capsys, kind, stopped_s):
                 "--bus",
                 "sim:seed=3",
                 "--rate",
-                "50",
+                "25",
                 "--target",
                 "quick",
                 "-o",

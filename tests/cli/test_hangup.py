@@ -28,7 +28,7 @@ class OnATerminal:
             os.chdir(folder)
             os.environ["TERM"] = "xterm"
             program = ["-m", "mpucal"] if held is None else [HELD, *map(str, held)]
-            words = ["session", "--rate", "50", "--target", "quick", "-o", "board", *options]
+            words = ["session", "--rate", "25", "--target", "quick", "-o", "board", *options]
             os.execv(sys.executable, [sys.executable, *program, *words])
         self._until = time.monotonic() + PATIENCE_S
         self._seen = b""

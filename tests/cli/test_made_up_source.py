@@ -25,7 +25,7 @@ def call(served):
 def measured(tmp_path_factory, process):
     """A folder in which a session on the turntable has left its results."""
     folder = tmp_path_factory.mktemp("turntable")
-    words = ("session", *TURNTABLE, "--rate", "50", "--target", "quick", "-o", "board", "--yes")
+    words = ("session", *TURNTABLE, "--rate", "25", "--target", "quick", "-o", "board", "--yes")
     done = process(folder, *words, program=(PROGRAM,))
     assert done.code == 0, done.err
     return folder
@@ -35,7 +35,7 @@ def test_a_session_runs_on_it_and_its_capture_names_it(measured):
     assert Calibration.load(measured / "board" / "calibration.json").quality["verdict"] == "good"
     meta = read_capture(measured / "board" / "capture.mcap").meta
     assert meta["source"] == {"turntable": "round", "arm_length": 0.25}
-    assert meta["plan"]["config"]["rate_hz"] == 50
+    assert meta["plan"]["config"]["rate_hz"] == 25
 
 
 def test_the_session_is_replayed(call, measured, tmp_path):

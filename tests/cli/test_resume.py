@@ -47,7 +47,7 @@ def joined(folder, names):
 def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, stopped_at, tmp_path):
     """Killed while flat, and stopped with Ctrl-C while rotating."""
     folder = tmp_path / "board"
-    words = ("--bus", "sim", "--rate", "50", "--target", "quick", "-o", "board", "--name", "Bench 7")
+    words = ("--bus", "sim", "--rate", "25", "--target", "quick", "-o", "board", "--name", "Bench 7")
     killed_s = came_to_s(stopped_at(tmp_path, ("flat", 50), signal.SIGKILL, *WORDS, *words).err)
     assert killed_s > 3.0
     assert killed_s - last_s(folder / "capture.mcap") < 1.0
@@ -148,7 +148,7 @@ def test_a_board_that_was_never_still_is_laid_flat_again(mpucal, tmp_path):
 @pytest.mark.parametrize(
     ("words", "code", "what"),
     [
-        (["--bus", "sim:hand=restless", "--rate", "50"], 4, "the board was not still for 10 s within 60 s"),
+        (["--bus", "sim:hand=restless", "--rate", "10"], 4, "the board was not still for 10 s within 60 s"),
         (["--bus", "/dev/i2c-99"], 3, "there is no I2C bus /dev/i2c-99"),
         (["--bos", "sim"], 2, "No such option '--bos'"),
     ],
