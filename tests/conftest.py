@@ -32,6 +32,7 @@ if "PYTEST_XDIST_WORKER" not in os.environ:
     STATE = tempfile.TemporaryDirectory(prefix="mpucal-state-")
     os.environ["XDG_STATE_HOME"] = STATE.name
 
+from mpucal.__main__ import run
 from mpucal.files import open_writer
 from mpucal.files.rows import Rows
 from tools.lab.scenarios.recordings import hand_scenario
@@ -187,6 +188,17 @@ def once(tmp_path_factory):
         return folder
 
     return call
+
+
+@pytest.fixture
+def walk(once):
+    """A capture of twenty seconds, which a session goes through to its end."""
+
+    def make(folder):
+        words = ["record", "--bus", "sim", "--rate", "25", "--seconds", "20", "-o", str(folder / "walk.mcap")]
+        assert run(words) == 0
+
+    return once("walk", make) / "walk.mcap"
 
 
 @pytest.fixture(scope="session")

@@ -23,17 +23,6 @@ INSTALLED = Path(sys.executable).parent / "mpucal"
 
 
 @pytest.fixture
-def walk(once):
-    """A capture of twenty seconds, which a session goes through to its end."""
-
-    def make(folder):
-        words = ["record", "--bus", "sim", "--rate", "25", "--seconds", "20", "-o", str(folder / "walk.mcap")]
-        assert run(words) == 0
-
-    return once("walk", make) / "walk.mcap"
-
-
-@pytest.fixture
 def mpucal(capsys, tmp_path, monkeypatch):
     """Call it here, in an empty folder: exit code and what it said."""
     monkeypatch.chdir(tmp_path)

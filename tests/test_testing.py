@@ -16,17 +16,16 @@ from mpucal.result.session_files import CAPTURE, DOCUMENT
 PROJECT = Path(__file__).parents[1]
 PAGE = (PROJECT / "docs" / "captures-in-ci.md").read_text(encoding="utf-8")
 PYTHON = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-SESSION = PROJECT / "fixtures" / "sessions" / "enter.mcap"
 
 
 @pytest.fixture
-def captures(tmp_path, capsys):
-    """The page's project, with the session of one board."""
+def captures(walk, tmp_path, capsys):
+    """The page's project, with the session of one board: a short one, since it is replayed five times."""
     (tmp_path / "conftest.py").write_text(PYTHON[0])
     for i, program in enumerate(PYTHON[1:]):
         (tmp_path / f"test_{i}.py").write_text(program)
     folder = tmp_path / "captures"
-    run(["session", "--replay", str(SESSION), "--yes", "--no-write", "-o", str(folder / "board7")])
+    run(["session", "--replay", str(walk), "--yes", "--no-write", "-o", str(folder / "board7")])
     capsys.readouterr()
     return folder
 
