@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from mpucal.__main__ import run
+from tools.make.capture import make_capture
 
 PROJECT = Path(__file__).parents[1]
 SHARED = PROJECT.parent / "shared"
@@ -19,7 +20,7 @@ RECORDINGS = SHARED / "recordings"
 RECORDING = RECORDINGS / "mpu6050_session.npz"
 BROAD_HZ = 250.0
 # a session looks five times as often, for the person's sake
-SELDOM = ("--poll", 0.2)
+SELDOM_S = 0.2
 YARDSTICK = SHARED / "check" / "gravity_transport.py"
 
 pytestmark = pytest.mark.skipif(
@@ -54,7 +55,7 @@ def outcome(folder, *words):
 def capture(program, tmp_path_factory):
     """The recording as a register capture."""
     path = tmp_path_factory.mktemp("real") / "capture.mcap"
-    made = call(*program("make", "capture"), RECORDING, "-o", path, *SELDOM)
+    made = call(*program("make", "capture"), RECORDING, "-o", path, "--poll", SELDOM_S)
     assert made.returncode == 0, made.stderr
     assert "10242 of 10245 samples, ±2 g, ±250 deg/s, 100 Hz nominal" in made.stdout
     return path
@@ -107,27 +108,25 @@ def test_what_no_pose_shows_is_not_claimed(session):
     assert session.document["accelerometer"]["b_a"][2] == pytest.approx(-1.1, abs=0.02)
 
 
-def session_of(program, folder, recording, poll=SELDOM):
+def session_of(folder, recording, poll_s=SELDOM_S):
     """The same way for another recording."""
-    made = call(*program("make", "capture"), recording, "-o", folder / "capture.mcap", "--gravity", 9.81, *poll)
-    assert made.returncode == 0, made.stderr
-    assert "abandoned" not in made.stdout
+    assert "abandoned" not in make_capture(recording, folder / "capture.mcap", 9.81, "auto", poll_s)
     return outcome(folder / "board", "session", "--replay", folder / "capture.mcap")
 
 
 @pytest.mark.parametrize(
     ("name", "most_deg"), [("mpu9150_a", 0.1), pytest.param("imucal_session", 0.15, marks=pytest.mark.slow)]
 )
-def test_a_recording_whose_person_was_told_nothing_is_calibrated(program, tmp_path, name, most_deg):
+def test_a_recording_whose_person_was_told_nothing_is_calibrated(tmp_path, name, most_deg):
     """They lay flat for less than ten seconds; the MPU-9150s' show spikes to 74 m/s^2 where they were put down."""
     recording = RECORDINGS / f"{name}.npz"
-    found = session_of(program, tmp_path, recording)
+    found = session_of(tmp_path, recording)
     assert found.code == 0 and found.document["quality"]["verdict"] in ("good", "usable")
     assert transported_deg(found.file, "--trim", 0.5, "--gravity", 9.81, recording=recording) <= most_deg
 
 
 @pytest.mark.slow
-def test_one_that_never_rests_between_is_calibrated_and_known_less_well(program, tmp_path):
+def test_one_that_never_rests_between_is_calibrated_and_known_less_well(tmp_path):
     """Continuous rotation, 285.7 Hz, drawn through to a rate that the chip has."""
     broad = np.load(RECORDINGS / "broad_01.npz")
     t = np.arange(broad["t"][0], broad["t"][-1], 1.0 / BROAD_HZ)
@@ -135,15 +134,15 @@ def test_one_that_never_rests_between_is_calibrated_and_known_less_well(program,
         name: np.stack([np.interp(t, broad["t"], axis) for axis in broad[name].T], axis=1) for name in ("acc", "gyr")
     }
     np.savez(tmp_path / "broad.npz", t=t, **drawn)
-    found = session_of(program, tmp_path, tmp_path / "broad.npz", poll=())
+    found = session_of(tmp_path, tmp_path / "broad.npz", poll_s=None)
     assert found.code == 0 and found.document["quality"]["verdict"] in ("good", "usable")
     assert 0.005 < max(found.document["accelerometer"]["b_a_std"]) < 0.05
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "words"), [("mpu6050_turn90", "known to"), ("mpu6050_static", "hardly turned")])
-def test_one_that_was_hardly_turned_is_refused_for_that(program, tmp_path, name, words):
-    found = session_of(program, tmp_path, RECORDINGS / f"{name}.npz")
+def test_one_that_was_hardly_turned_is_refused_for_that(tmp_path, name, words):
+    found = session_of(tmp_path, RECORDINGS / f"{name}.npz")
     assert (found.code, found.document["quality"]["verdict"]) == (5, "refused")
     reason = found.document["quality"]["reasons"][0]
     assert reason["code"] == "few_orientations"

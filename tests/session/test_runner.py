@@ -321,7 +321,7 @@ def test_recording_ends_with_the_source():
 
 def test_poses_of_the_turning_shown_again_verify_nothing():
     bus = open_simulated("sim:hand=repeating", seed=0)
-    plan = Plan(Config(rate_hz=50))
+    plan = Plan(Config(rate_hz=25), target="quick")
     runner = Runner(Driver(bus, plan.config), Person(), lambda *_: None, plan, (bus.hear,))
     calibration = runner.calibrate(runner.measure(), calibrate)
     assert calibration.quality["verification"]["agrees"] is None
