@@ -36,13 +36,18 @@ WORDS = {
 }
 
 
-@pytest.fixture(scope="module")
-def flown(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("vehicle") / "flown"
-    words = ["--mavlink", "sim:imus=1", "--rate", "50", "--target", "quick", "-o", str(folder), "--json", "--yes"]
-    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
-        code = run(["session", *words])
-    return SimpleNamespace(folder=folder, code=code, out=out.getvalue(), err=err.getvalue())
+@pytest.fixture(scope="session")
+def flown(once):
+    """One session on the simulated vehicle, which writes to it."""
+
+    def make(folder):
+        words = ["--mavlink", "sim:imus=1", "--rate", "50", "--target", "quick", "-o", str(folder / "flown"), "--json"]
+        with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+            code = run(["session", *words, "--yes"])
+        (folder / "result.json").write_text(json.dumps({"code": code, "out": out.getvalue(), "err": err.getvalue()}))
+
+    folder = once("cli-flown", make)
+    return SimpleNamespace(folder=folder / "flown", **json.loads((folder / "result.json").read_text()))
 
 
 def test_the_new_parameters_are_there_and_the_files_say_so(flown):

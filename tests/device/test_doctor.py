@@ -30,12 +30,18 @@ def test_a_sound_chip_is_told_on_a_page(sound):
         assert words in result.out
 
 
-def test_a_chip_under_another_name_is_recognised(device):
-    result, findings = examined(device("sim:chip=clone98,who_am_i=0x68"), "--json")
+def test_a_chip_under_another_name_is_recognised_and_a_correction_in_it_noticed(device):
+    mocked = device("sim:chip=clone98,who_am_i=0x68")
+    mocked.tell(registers={str(0x77): "1234"})
+    result, findings = examined(mocked, "--json")
     assert result.code == 0
     assert "behaves as an" in findings["chip"]["what"]
     assert findings["offset registers"]["data"]["place"] == 0x77
     assert findings["genuine?"]["mark"] == "note"
+    assert findings["factory trim"]["mark"] == "note"
+    assert findings["factory trim"]["data"]["held"][0] == 0x1234
+    # it stays
+    assert mocked.run("i2cget", "-y", "1", "0x68", "0x77").out.strip() == "0x12"
 
 
 @pytest.mark.parametrize(
@@ -70,12 +76,3 @@ def test_a_slow_bus_comes_with_the_setting_that_helps(sound):
         _, findings = examined(sound, "--json")
     assert "100 kHz" in findings["adapter"]["what"]
     assert "i2c_arm_baudrate=400000" in findings["adapter"]["remedy"]
-
-
-def test_a_correction_that_somebody_wrote_is_noticed_and_stays(device):
-    mocked = device()
-    mocked.tell(registers={"6": "1234"})
-    _, findings = examined(mocked, "--json")
-    assert findings["factory trim"]["mark"] == "note"
-    assert findings["factory trim"]["data"]["held"][0] == 0x1234
-    assert mocked.run("i2cget", "-y", "1", "0x68", "0x06").out.strip() == "0x12"
