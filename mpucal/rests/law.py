@@ -36,10 +36,13 @@ def carried(recording: Recording, flat: Flat, runs: Intervals) -> Vector:
     acc = recording.acc.copy()
     steps = np.diff(recording.t, prepend=recording.t[0])[:, None] * (recording.gyr - flat.b_omega)
     path = np.cumsum(steps, axis=0)
-    for first, last in runs.tolist():
-        phi = path[first:last] - path[(first + last) // 2]
-        once = np.cross(phi, acc[first:last])
-        acc[first:last] += once + 0.5 * np.cross(phi, once)
+    # all runs at once, of which there are many
+    lengths = runs[:, 1] - runs[:, 0]
+    begins = np.cumsum(lengths) - lengths
+    at = np.arange(lengths.sum()) + np.repeat(runs[:, 0] - begins, lengths)
+    phi = path[at] - path[np.repeat((runs[:, 0] + runs[:, 1]) // 2, lengths)]
+    once = np.cross(phi, acc[at])
+    acc[at] += once + 0.5 * np.cross(phi, once)
     return acc
 
 

@@ -139,9 +139,13 @@ class Machine:
     def _measured(self, event: Measured) -> list[Output]:
         samples = event.samples
         # after so long the person begins anew what was asked for, and the time for it does, too
-        before_s = samples.t[0] if self._sampled_s is None else self._sampled_s
-        again = self._step.resumed() if np.diff(samples.t, prepend=before_s).max() > SILENT_S else []
-        self._sampled_s, self._away_s = float(samples.t[-1]), 0.0
+        first_s, last_s = float(samples.t[0]), float(samples.t[-1])
+        before_s = first_s if self._sampled_s is None else self._sampled_s
+        silent = first_s - before_s > SILENT_S or (
+            last_s - first_s > SILENT_S and float(np.diff(samples.t).max()) > SILENT_S
+        )
+        again = self._step.resumed() if silent else []
+        self._sampled_s, self._away_s = last_s, 0.0
         self._samples += len(samples)
         seen = self._watch.add(samples, self._wanted) if self._watch else []
         return [*again, *seen, *self._follow(self._step.add(samples))]

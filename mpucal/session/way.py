@@ -61,8 +61,9 @@ class Way:
         missing = math.atan2(math.hypot(x, y), -z)
         self._keep_to(math.atan2(y, x), missing, new)
         # about this axis the top goes that way
-        along = np.array([math.cos(self._toward), math.sin(self._toward), 0.0])
-        turned = rotation(math.atan2(x * along[0] + y * along[1], -z) * np.cross(UP, along)) @ attitude
+        along_x, along_y = math.cos(self._toward), math.sin(self._toward)
+        turn = math.atan2(x * along_x + y * along_y, -z)
+        turned = rotation(np.array([-turn * along_y, turn * along_x, 0.0])) @ attitude
         wanted = rotation(shortest_turn(turned @ np.asarray(down), -UP)) @ turned
         if not new:
             most = min(max(heading(wanted, self._wanted), -SLEW_RAD), SLEW_RAD)
