@@ -76,15 +76,15 @@ def test_a_session_goes_on_after_the_bus_was_held(bridge, fault):
     board, port = bridge
     driver = Driver(BridgeBus(port), Config(rate_hz=200))
     driver.start()
-    while board.now_s < 2:
+    while board.now_s < 1:
         driver.poll()
     board.fault(fault.HOLDS_BUS)
-    while board.now_s < 4:
+    while board.now_s < 2.5:
         driver.poll()
     recording = driver.recording()
     assert recording.gap.any()
-    assert recording.t[-1] - recording.t[0] > 3
-    assert len(recording) > 550
+    assert recording.t[-1] - recording.t[0] > 1.8
+    assert len(recording) > 300
 
 
 def test_a_program_that_hangs_is_started_anew(bridge, fault):

@@ -17,10 +17,11 @@ ARM = {
 RISCV = {"rv32imac": ("riscv64-unknown-elf-gcc", "-march=rv32imac", "-mabi=ilp32", "--specs=picolibc.specs")}
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror")
 PROCESSORS = AVR | ARM | RISCV
+# what a compiler warns of at -O2 hangs on its family, not on the part
+OPTIMISED = [(name, "-Os") for name in PROCESSORS] + [(next(iter(family)), "-O2") for family in (AVR, ARM, RISCV)]
 
 
-@pytest.mark.parametrize("optimised", ["-Os", "-O2"])
-@pytest.mark.parametrize("processor", PROCESSORS)
+@pytest.mark.parametrize(("processor", "optimised"), OPTIMISED)
 def test_the_core_compiles_without_a_warning(processor, optimised, tmp_path):
     compiler, *flags = PROCESSORS[processor]
     if shutil.which(compiler) is None:
