@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Literal
+from operator import attrgetter
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,6 +97,19 @@ class Accesses:
         """(n,) where they begin."""
         return self.behind - np.where(self.framed, self.moved // max(2 * self.frames.shape[1], 1), self.moved)
 
+    def alike(self, other: Accesses) -> bool:
+        """Whether both can be joined: what is numbered in them is registers, and frames are as long."""
+        plain = not (self.failures or other.failures or self.files or other.files)
+        return plain and self.frames.shape[1] == other.frames.shape[1]
+
+    @classmethod
+    def joined(cls, parts: Sequence[Accesses]) -> Accesses:
+        """All parts, one at least and all alike, one after the other."""
+        if len(parts) == 1:
+            return parts[0]
+        columns: Any = map(np.concatenate, zip(*map(_columns, parts), strict=True))
+        return cls(*columns)
+
     @classmethod
     def of(cls, transactions: Sequence[Transaction]) -> Accesses:
         """The same accesses; what was read from the FIFO is framed where all of it is whole frames."""
@@ -127,6 +141,9 @@ class Accesses:
             {i: each.error for i, each in enumerate(transactions) if each.error is not None},
             files,
         )
+
+
+_columns = attrgetter(*(f.name for f in fields(Accesses) if f.name not in ("failures", "files")))
 
 
 def _joined(transactions: Sequence[Transaction], chosen: NDArray[np.bool_]) -> bytes:

@@ -114,8 +114,8 @@ class CaptureWriter:
         with whole_file(self._path) as file:
             stream, written = _Stream(file, CLOSED_CHUNK_NS), CaptureReader(self._path)
             stream.start(self._meta)
-            for record in written:
-                stream.add(record)
+            for block in written.blocks():
+                stream.add(block)
             stream.finish()
             if written.recovered:
                 raise CaptureError(written.recovered, "keep it as it is")
@@ -147,6 +147,7 @@ class _Stream:
         self._longest_ns = longest_ns
         self._channels: dict[str, int] = {}
         self._waiting: list[Transaction] = []
+        self._blocks: list[Accesses] = []
         self._began_ns: int | None = None
         self._chunk_began_ns: int | None = None
         self._ahead_ns = 0
@@ -167,18 +168,26 @@ class _Stream:
             self._channels[topic] = self._writer.register_channel(topic, encoding, id_)
         self._writer.flush()
 
-    def add(self, record: Record) -> None:
+    def add(self, record: Record | Accesses) -> None:
+        ends = (record.t_ns[0], record.t_ns[-1]) if isinstance(record, Accesses) else (record.t_ns, record.t_ns)
+        begin_ns, t_ns = map(int, ends)
         if isinstance(record, SessionEvent):
             self._put_waiting()
-            self._put(SESSION, record.t_ns, event_message(record.name, record.data))
+            self._put(SESSION, t_ns, event_message(record.name, record.data))
+        elif isinstance(record, Accesses):
+            if self._waiting or (self._blocks and not self._blocks[-1].alike(record)):
+                self._put_waiting()
+            self._blocks.append(record)
         else:
+            if self._blocks:
+                self._put_waiting()
             self._waiting.append(record)
         if self._began_ns is None:
-            self._began_ns = record.t_ns
-        chunk_ns = min(max(CHUNK_NS, (record.t_ns - self._began_ns) // CLOSED_CHUNK_PART), self._longest_ns)
+            self._began_ns = begin_ns
+        chunk_ns = min(max(CHUNK_NS, (t_ns - self._began_ns) // CLOSED_CHUNK_PART), self._longest_ns)
         if self._chunk_began_ns is None:
-            self._chunk_began_ns = record.t_ns
-        elif record.t_ns - self._chunk_began_ns >= chunk_ns:
+            self._chunk_began_ns = begin_ns
+        if t_ns - self._chunk_began_ns >= chunk_ns:
             self._put_waiting()
             self._writer.flush()
             self._chunk_began_ns = None
@@ -189,11 +198,13 @@ class _Stream:
             self._writer.finish()
 
     def _put_waiting(self) -> None:
-        waiting, self._waiting = self._waiting, []
-        if waiting:
-            ahead_ns = (each.host_ns - each.t_ns for each in waiting if each.host_ns is not None)
-            self._ahead_ns = next(ahead_ns, self._ahead_ns)
-            self._put(BUS, waiting[0].t_ns, accesses_message(waiting))
+        if self._blocks or self._waiting:
+            accesses = Accesses.joined(self._blocks) if self._blocks else Accesses.of(self._waiting)
+            self._blocks, self._waiting = [], []
+            if accesses.heard.any():
+                first = int(accesses.heard.argmax())
+                self._ahead_ns = int(accesses.host_ns[first] - accesses.t_ns[first])
+            self._put(BUS, int(accesses.t_ns[0]), accesses_message(accesses))
 
     def _put(self, topic: str, t_ns: int, data: bytes) -> None:
         self._writer.add_message(self._channels[topic], t_ns, data, publish_time=max(t_ns + self._ahead_ns, 0))

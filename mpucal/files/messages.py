@@ -20,7 +20,7 @@ Events are JSON. So were accesses in captures of version 1, a message each.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -70,9 +70,8 @@ def event_schema() -> bytes:
     return json.dumps(_EVENT).encode()
 
 
-def accesses_message(transactions: Sequence[Transaction]) -> bytes:
+def accesses_message(a: Accesses) -> bytes:
     """Register accesses, one at least."""
-    a = Accesses.of(transactions)
     ahead = (a.host_ns - a.t_ns)[a.heard]
     columns: dict[str, bytes | int] = {
         "kind": protobuf.packed(WRITE * a.write + HEARD * a.heard + FRAMED * a.framed),

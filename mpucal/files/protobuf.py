@@ -60,14 +60,14 @@ def packed(values: ArrayLike) -> bytes:
     value = np.asarray(values, np.uint64)[:, None]
     if len(value) < FEW:
         return _varints(value[:, 0].tolist())
-    # how many bytes there are, without a logarithm that rounds
-    widths = 1 + np.sum(value >= (np.uint64(1) << (np.uint64(7) * np.arange(1, LONGEST, dtype=np.uint64))), axis=1)
-    widest = int(widths.max(initial=1))
-    column = np.arange(widest)
-    shown = column < widths[:, None]
-    digits = (value >> (np.uint64(7) * column.astype(np.uint64)) & np.uint64(127)).astype(np.uint8)
-    digits[column < widths[:, None] - 1] |= 128
-    return bytes(digits[shown])
+    widest = max(-(-int(value.max()).bit_length() // 7), 1)
+    left = value >> (np.uint64(7) * np.arange(widest + 1, dtype=np.uint64))
+    # a byte is there where something is left of the number, and says so where there is more after it
+    more = left[:, 1:] > 0
+    digits = (left[:, :-1] & np.uint64(127)).astype(np.uint8) | more * np.uint8(128)
+    shown = np.ones_like(more)
+    shown[:, 1:] = more[:, :-1]
+    return digits[shown].tobytes()
 
 
 def zigzag(values: ArrayLike) -> Columns:
