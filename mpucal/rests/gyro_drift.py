@@ -11,9 +11,8 @@ import numpy as np
 
 from ..data import Recording, Vector
 from .flat import Flat
-from .intervals import Intervals, bias_intervals, gravity_turns, statistics
+from .intervals import TELLS_BIAS_S, Intervals, bias_intervals, gravity_turns, statistics
 
-LONG_ENOUGH_FOR_BIAS_S = 0.5
 TURNING_RAD_S = 0.005  # slower, gravity wanders by a hand that settles and by noise
 TREMOR_S = 0.05  # correlation time of a hand's tremor
 RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # (rad/s)^2 a second
@@ -26,7 +25,7 @@ def without_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recordin
     that settles still turns. It is smoothed, its density the likeliest; between rests it is drawn straight.
     """
     runs = bias_intervals(recording, flat, runs)
-    runs = runs[runs[:, 1] - runs[:, 0] >= LONG_ENOUGH_FOR_BIAS_S * recording.rate_hz]
+    runs = runs[runs[:, 1] - runs[:, 0] >= TELLS_BIAS_S * recording.rate_hz]
     if len(runs) < 2:
         return recording
     first, last = runs.T

@@ -26,7 +26,8 @@ LIKE_THE_OTHERS = 2.0
 FEWEST_S = 0.5  # of such windows
 LEAST_OF_QUIET, LEAST_OF_NOISE = 0.1, 0.5  # a smaller spread than these shares is chance
 OF_NORMAL = 1.4826  # a standard deviation beside the median of distances
-LONG_QUIET_S = 1.0  # of a rest, so long a quiet part tells the gyroscope's bias better than the whole
+# So long a rest, or its quiet part, tells the gyroscope's bias: in less, a slow turn about gravity passes for it.
+TELLS_BIAS_S = 1.0
 
 Intervals = NDArray[np.intp]
 
@@ -62,7 +63,7 @@ def bias_intervals(recording: Recording, flat: Flat, rests: Intervals) -> Interv
     if windows is None:
         return rests
     quiet = _intervals(recording, flat, windows, QUIET)
-    quiet = quiet[quiet[:, 1] - quiet[:, 0] >= LONG_QUIET_S * recording.rate_hz]
+    quiet = quiet[quiet[:, 1] - quiet[:, 0] >= TELLS_BIAS_S * recording.rate_hz]
     return _and_others(quiet[~_apart(quiet, rests)], rests)
 
 
