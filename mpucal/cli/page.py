@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
-from typing import Any, TypeVar
+from contextlib import AbstractContextManager, nullcontext
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from ..page.address import HERE, Address, address
-from ..page.console import Tells, on_page
 from ..sources.opened import Opened
 from ..terminal.console import Console
 from ..terminal.flat import BOARD, BOARDS
 from .options import Parsed
+
+if TYPE_CHECKING:
+    from ..page.console import Tells
 
 F = TypeVar("F", bound=Callable[..., Any])
 UNPACED = "pace=fast"
@@ -47,7 +49,15 @@ def beside(
     as_json: bool = False,
     attended: bool = False,
 ) -> AbstractContextManager[tuple[Console, Tells]]:
-    """The terminal with a page beside it, see `on_page`; a source whose time runs ahead is shown at its own pace."""
+    """The terminal, with a page beside it where one is asked for, see `on_page`.
+
+    A source whose time runs ahead is shown at its own pace.
+    """
+    if page is None:
+        return nullcontext((terminal, lambda result, paths: None))
+    # slow to load, and most sessions are shown on none
+    from ..page.console import on_page  # noqa: PLC0415
+
     paced = not source.real_time and UNPACED not in str(options.get("bus"))
     about = {"title": title, "board": board}
     return on_page(terminal, page, about, keys, paced, as_json, attended)

@@ -18,8 +18,6 @@ from .decode import IioDecoder
 from .devices import Devices
 from .setup import Attributes, set_up
 
-IIO_VERSION = "iio 1"
-
 # so long without a sample, and the driver gives up
 DEAD_NS = 2_000_000_000
 # what one read takes from a buffer at most

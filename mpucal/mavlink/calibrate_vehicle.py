@@ -9,7 +9,6 @@ from typing import Any
 from ..calibration import calibrate
 from ..data import STANDARD_GRAVITY_MPS2, Recording
 from ..result.calibration import Calibration
-from .parameters.document import autopilot_document
 
 OTHERS, AUTOPILOT = "others", "autopilot"
 
@@ -34,5 +33,8 @@ def _one(recording: Recording, model: str, gravity: float, gravity_anyway: bool)
     calibration = calibrate(recording, model, gravity, gravity_anyway)
     if recording.autopilot is None:
         return calibration
+    # most recordings are of no vehicle
+    from .parameters.document import autopilot_document  # noqa: PLC0415
+
     extra: Mapping[str, Any] = {AUTOPILOT: autopilot_document(recording.autopilot, calibration)}
     return replace(calibration, extra={**calibration.extra, **extra})

@@ -75,27 +75,24 @@ class Beside:
 @contextmanager
 def on_page(
     console: Console,
-    where: Address | None,
+    where: Address,
     about: Mapping[str, Any],
     keys: bool = False,
     paced: bool = False,
     as_json: bool = False,
     attended: bool = False,
 ) -> Iterator[tuple[Console, Tells]]:
-    """The console with a page beside it, if one is asked for, and what tells the page the result.
+    """The console with a page beside it, and what tells the page the result.
 
     Parameters
     ----------
-    where : the page's address; None: there is none. about, keys : see Feed. paced : see Beside.
+    where : the page's address. about, keys : see Feed. paced : see Beside.
     as_json : the address is told as an event. attended : somebody at the terminal opens the page and ends it.
 
     Raises
     ------
     OutputError : the page cannot be served there.
     """
-    if where is None:
-        yield console, lambda result, paths: None
-        return
     feed = Feed(where, about, keys)
 
     def tell(result: Result, paths: Sequence[Path]) -> None:

@@ -10,7 +10,7 @@ from ..chip.config import Config, RateAlone
 from ..chip.driver import DRIVER_VERSION
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import CaptureError
-from ..iio.driver import IIO_VERSION
+from ..iio import IIO_VERSION
 from .aims import NORMAL
 
 DRIVER, PLAN = "driver", "plan"

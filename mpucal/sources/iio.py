@@ -16,8 +16,9 @@ from typing import Any
 from ..chip.access import Files, Reply
 from ..errors import BusError, UsageError
 from ..files.mcap import Capture
+from ..iio import IIO_VERSION
 from ..iio.devices import Devices
-from ..iio.driver import IIO_VERSION, IioDriver
+from ..iio.driver import IioDriver
 from ..iio.setup import LIST_BYTES, TEXT_BYTES, TRIGGERS
 from ..session.plan import DRIVER
 from .chip import OpenedChip

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..files.folder import captures_in
 from ..files.mcap import read_capture
-from ..iio.driver import IIO_VERSION
+from ..iio import IIO_VERSION
 from ..session.plan import DRIVER, Plan
 from .chip import OpenedChip
 from .iio import of_iio
