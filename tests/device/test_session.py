@@ -16,7 +16,7 @@ NODE, UPTIME_S = "/dev/i2c-1", 900
 def guided(device_of_module):
     """One whole session, and the device on which it ran."""
     mocked = device_of_module("sim:chip=mpu6500,who_am_i=0x68,seed=7")
-    return mocked, mocked.session("--rate", "50", "--target", "quick", "--yes", "-o", "board")
+    return mocked, mocked.session("--rate", "25", "--target", "quick", "--yes", "-o", "board")
 
 
 def test_a_session_ends_with_a_good_calibration_and_its_files(guided):
