@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
 
 from mpucal.calibration import weigh
 from mpucal.calibration.parts import Parts
@@ -50,6 +49,8 @@ def test_a_mount_that_slips_is_told_from_a_bias(hand):
 
 def test_the_likelihood_is_that_of_the_joint_gaussian():
     """Parts that measure theta + delta linearly: 2 log p(q)/p(0) by SciPy's density of all the measurements."""
+    from scipy.stats import multivariate_normal  # slow to import
+
     rng = np.random.default_rng(3)
     k, p, m = 5, 14, 9
     A = rng.standard_normal((k, m, p))

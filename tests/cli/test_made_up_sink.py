@@ -10,7 +10,7 @@ import pytest
 from mpucal.result.calibration import Calibration
 
 PROGRAM = Path(__file__).with_name("logbook.py")
-SIM = ("--bus", "sim:seed=3", "--rate", "50", "--target", "quick", "--yes")
+SIM = ("--bus", "sim:seed=3", "--rate", "25", "--target", "quick", "--yes")
 
 
 @pytest.fixture(scope="module")

@@ -68,7 +68,7 @@ SESSION = ((0.0, prompt("lay_flat")), (12.0, prompt("rotate")))
 
 @pytest.mark.parametrize("kind", ["guided", "random", "restless"])
 def test_the_rates_integrate_to_the_attitude(kind):
-    run = Run(kind, SESSION, 60.0)
+    run = Run(kind, SESSION, 30.0)
     R = matrix(run.first_attitude) @ turned(run.rate)
     error = R.T @ matrix(run.motion.attitude(run.end_s))
     assert np.degrees(np.arccos(min(1.0, (np.trace(error) - 1) / 2))) < 0.02
