@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Recording, Vector
 from ..rests.flat import Flat, find_flat, flat_statistics
-from ..rests.intervals import in_pieces, static_intervals, statistics
+from ..rests.intervals import RestFinder, in_pieces, statistics
 from .claim import Claim
 from .fit import Fit
 from .rotation import lengths, turned
@@ -131,7 +131,7 @@ class Evidence:
         fit, flat, r = self.fit, self.flat, self.recording
         if fit is None or flat is None or self.calibrated is None:
             return None
-        runs = static_intervals(r, flat)
+        runs = RestFinder(r, flat).alike()
         if len(runs) < FEWEST_RESTS:
             runs = in_pieces(runs, round(PIECE_S * r.rate_hz))
         if len(runs) < FEWEST_RESTS:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,8 +12,8 @@ from ..data import Recording, Vector
 from ..kernel import _kernel
 from ..rests.flat import Flat, flat_statistics, rounding_variance
 from ..rests.gyro_drift import without_drift
-from ..rests.intervals import Intervals, static_intervals, statistics
-from ..rests.law import carried, rate_of_rests
+from ..rests.intervals import Intervals, RestFinder, statistics
+from ..rests.law import carried, rate_of_rests, tremor_variance
 from ..rests.local_noise import louder, noise_variance
 from .masks import mask
 from .prior import Prior, prior_of
@@ -24,7 +25,6 @@ MOVING_RAD_S = 0.3  # the rate at which a hand's acceleration is half of what it
 SHAKEN_S, SHAKEN_MPS2 = 0.5, 0.3  # likewise of |y| by its standard deviation, at any rate: who walks, shakes
 SMOOTH_S = 0.02  # of the rates whose derivative is the angular acceleration
 TREMOR_PER_S, MOTION_PER_S = 20.0, 5.0  # lambda: 4.5 Hz of a tremor at rest where rests say nothing, 1.1 Hz of a pivot
-TREMOR_OF_NOISE = 0.2  # a tremor below this share of the sensor's noise is none
 CORRELATION_S = 0.2  # of the acceleration of a hand that goes from rest to rest
 FLOOR_CORRELATION_S = 0.05  # of jerks
 FLOOR_MPS2 = 0.12  # white acceleration that jerks leave beside the pivot's own
@@ -92,8 +92,9 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     noise : (n,) factors of Sigma_a, where a recording before downsampling gave them.
     """
     flat = flat_statistics(recording, at)
-    runs = static_intervals(recording, flat)
-    recording = without_drift(recording, flat, runs)
+    rests = RestFinder(recording, flat)
+    runs = rests.alike()
+    recording = without_drift(recording, flat, rests.telling_bias(runs))
     flat = flat_statistics(recording, at)
     loud = (louder(recording, flat) if noise is None else noise)[flat.last :]
     series = mask(Series.after(recording, flat), recording, flat)
@@ -108,7 +109,7 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     lam = rate_of_rests(acc, recording, flat, runs, TREMOR_PER_S) if len(after) >= MANY_RESTS else MOTION_PER_S
     reset, jerk, pose = np.full(len(series), -1.0), np.zeros(len(series)), np.zeros(len(series))
     for (a, b), variance in zip(after.tolist(), statistics(acc[flat.last :], after)[1], strict=True):
-        tremor = _tremor(variance, float(loud[a:b].mean()) * flat.Sigma_a)
+        tremor = math.sqrt(tremor_variance(variance, float(loud[a:b].mean()) * flat.Sigma_a))
         reset[a], jerk[a:b] = tremor, jerk_density(tremor, lam)
         pose[a:b] = (POSE_MPS2**2 + rounding_variance(recording.sensor, variance)) * (b - a)
         if b < len(series):
@@ -143,12 +144,6 @@ def _rates(recording: Recording, flat: Flat, rest: Vector) -> tuple[Vector, Vect
     alpha = np.gradient(rate, times, axis=0)
     moving = np.where(rest, 0.0, 1.0)[:, None]
     return rate[flat.last :] * moving, alpha[flat.last :] * moving
-
-
-def _tremor(variance: Vector, noise: Vector) -> float:
-    """m/s^2 by which a rest of that variance (3,) trembles beyond noise (3,); 0 for a board that lies on something."""
-    tremor = float(np.sqrt(np.maximum(np.mean(variance - 1.05 * noise), 0.0)))
-    return tremor if tremor > TREMOR_OF_NOISE * np.sqrt(noise.mean()) else 0.0
 
 
 def _shaken(recording: Recording, flat: Flat) -> Vector:

@@ -16,7 +16,7 @@ import numpy as np
 from ..data import Recording, Vector
 from ..rests.flat import Flat
 from ..rests.gyro_drift import without_drift
-from ..rests.intervals import held_intervals
+from ..rests.intervals import RestFinder
 from .fit import Fit
 from .parameters import B_A_NAMES, D_NAMES, K_NAMES, Form
 from .rotation import turned
@@ -70,8 +70,9 @@ class NewOrientation:
 
 def new_orientations(recording: Recording, flat: Flat, fit: Fit, gravity: float, since: int) -> list[NewOrientation]:
     """What the still intervals that begin after sample `since` say of `fit`, one after the other."""
-    runs = held_intervals(recording, flat)
-    recording = without_drift(recording, flat, runs)
+    rests = RestFinder(recording, flat)
+    runs = rests.held()
+    recording = without_drift(recording, flat, rests.telling_bias(runs))
     long = [(a, b) for a, b in runs.tolist() if b - a >= LEAST_REST_S * recording.rate_hz]
     first = next((k for k, (a, _) in enumerate(long) if a >= since), len(long))
     return [

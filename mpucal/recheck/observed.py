@@ -23,9 +23,9 @@ from ..calibration.masks import with_masks
 from ..calibration.rotation import cross, turned
 from ..calibration.verification import BIAS_RAD_S, BLOCK_S, FLOOR_MPS2, FLOOR_RAD, LEAST_REST_S
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
-from ..rests.flat import Flat, find_flat, flat_statistics
+from ..rests.flat import Flat, find_flat, flat_statistics, tells
 from ..rests.gyro_drift import without_drift
-from ..rests.intervals import Intervals, static_intervals
+from ..rests.intervals import Intervals, RestFinder
 from ..result.calibration import Calibration
 
 PARAMETERS = 21
@@ -88,16 +88,18 @@ def observe(recording: Recording, calibration: Calibration) -> Observed | None:
     gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
     recording = with_masks(recording)
     segment = recording.flat or find_flat(recording)
-    if segment is None:
+    if segment is None or not tells(recording, segment):
         return None
     flat = flat_statistics(recording, segment)
-    runs = static_intervals(recording, flat)
+    found = RestFinder(recording, flat)
+    runs = found.alike()
     runs = runs[runs[:, 1] - runs[:, 0] >= LEAST_REST_S * recording.rate_hz]
     if not len(runs):
         return None
     T = recording.temperature_c
     known = bool(np.isfinite(T).any())
-    rests = _Rests(without_drift(recording, flat, runs), runs, calibration, float(np.nanmean(T)) if known else None)
+    mended = without_drift(recording, flat, found.telling_bias(runs))
+    rests = _Rests(mended, runs, calibration, float(np.nanmean(T)) if known else None)
     blocks = [_Block.magnitude(rests, k, gravity) for k in range(len(runs))]
     for k in range(1, len(runs)):
         block = _Block.miss(rests, k, flat, calibration)

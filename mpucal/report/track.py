@@ -13,7 +13,7 @@ from ..calibration.preprocessing import Preprocessed, preprocess
 from ..calibration.theta import Theta
 from ..data import STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
 from ..rests.flat import find_flat, flat_statistics
-from ..rests.intervals import Intervals, static_intervals
+from ..rests.intervals import Intervals, RestFinder
 from ..result.calibration import Calibration
 
 # The hand's acceleration while it moves, as the filter that makes the innovations is told: what hands do.
@@ -56,7 +56,7 @@ class Track:
         """(k, 2) first and last + 1 of the samples of each rest."""
         if self.flat is None:
             return np.zeros((0, 2), np.intp)
-        return static_intervals(self.recording, flat_statistics(self.recording, self.flat))
+        return RestFinder(self.recording, flat_statistics(self.recording, self.flat)).alike()
 
     @cached_property
     def resting(self) -> Mask:

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..data import Recording, Sensor, Vector
-from .local_noise import VIBRATION, noise_variance
+from .limits import QUIET
+from .stillness import Detector, still_windows
+from .windows import cut
 
-WINDOW_S = 0.5
+WINDOW_S, FEWEST = 0.5, 4  # of its samples, which take longer below 8 Hz
 SHORTEST_FLAT_S = 1.0
 SHORTEST_GIVEN_S = 0.25  # of a shorter one the block means that a fit starts from have no variance
 ENOUGH_FLAT_S = 5.0
-
-# Above these a window is not still, however noisy the quietest part of a recording is ...
-GYRO_SD_MAX_RAD_S, ACC_SD_MAX_MPS2 = 0.15, 0.5
-# ... and below these it may be, however quiet: a table that hums, a hand that is braced.
-GYRO_SD_MIN_RAD_S, ACC_SD_MIN_MPS2 = 0.03, 0.15
-# Neighbouring windows of a still board agree this well beyond their noise.
-GYRO_STEP_RAD_S, ACC_STEP_MPS2 = 0.01, 0.03
 
 # In steps^2: at rest, less variance than that leaves the readings on one step or two, which no mean makes finer.
 UNVARIED, UNIFORM = 0.3, 1.0 / 12.0
@@ -64,44 +58,32 @@ class Flat:
 def find_flat(recording: Recording) -> tuple[int, int] | None:
     """(first, last + 1) of the segment that lies flat, or None where the board never lies still.
 
-    It is the earliest still run of five seconds, or else of half the length of the longest. A run is still where the
-    windows' spread is small, or is vibration alone, and their means agree: a turn at a constant rate has no variance,
-    only a mean that moves.
+    It is the earliest still run of five seconds, or else of half the length of the longest: still is what the session
+    calls still on a table, but that a bias of the gyroscope may have any size and that a bump ends a run.
     """
-    n = max(round(WINDOW_S * recording.rate_hz), 4)
-    acc, gyr = _windows(recording.acc, n), _windows(recording.gyr, n)
-    if len(acc) < 2:
+    n = samples_of_window(recording)
+    windows = cut(recording, n)
+    if len(windows) < 2:
         return None
-    acc_mean, gyr_mean = acc.mean(1), gyr.mean(1)
-    acc_sd, gyr_sd = acc.std(1), gyr.std(1)
-    vibration2 = VIBRATION * _windows(noise_variance(recording), n).mean(1)
-    quiet = ((acc_sd <= _limit(acc_sd, ACC_SD_MIN_MPS2, ACC_SD_MAX_MPS2)) | (acc_sd**2 <= vibration2)).all(1)
-    quiet &= (gyr_sd <= _limit(gyr_sd, GYRO_SD_MIN_RAD_S, GYRO_SD_MAX_RAD_S)).all(1)
-    whole = ~(_windows(recording.gap[:, None], n)[:, 1:, 0].any(1))
-    quiet &= whole
-    runs = []
-    start = 0
-    for k in range(1, len(acc) + 1):
-        if k < len(acc) and quiet[k - 1] and quiet[k] and not recording.gap[k * n]:
-            here = slice(start, k)
-            size = 4.5 * np.sqrt(1.0 / n + 1.0 / (n * (k - start)))
-            near_acc = np.abs(acc_mean[k] - acc_mean[here].mean(0)) <= ACC_STEP_MPS2 + size * acc_sd[here].mean(0)
-            near_gyr = np.abs(gyr_mean[k] - gyr_mean[here].mean(0)) <= GYRO_STEP_RAD_S + size * gyr_sd[here].mean(0)
-            if near_acc.all() and near_gyr.all():
-                continue
-        if quiet[k - 1] and k - start >= 2:
-            runs.append((start * n, k * n))
-        start = k
-    shortest = SHORTEST_FLAT_S * recording.rate_hz
-    runs = [run for run in runs if run[1] - run[0] >= shortest]
-    if not runs:
+    spreads = np.array([(window.acc_sd, window.gyr_sd) for window in windows])
+    acc_noise, gyr_noise = np.quantile(spreads, 0.05, axis=0)
+    runs: list[tuple[int, int, int]] = []
+    for run, first, last in still_windows(Detector(QUIET, (acc_noise, gyr_noise), math.inf), windows):
+        goes_on = runs and runs[-1][0] == run and runs[-1][2] == first
+        runs.append((run, runs.pop()[1] if goes_on else first, last))
+    lengths = [last - first for _, first, last in runs]
+    if max(lengths, default=0) < SHORTEST_FLAT_S * recording.rate_hz:
         return None
-    longest = max(last - first for first, last in runs)
-    enough = min(longest / 2, ENOUGH_FLAT_S * recording.rate_hz)
-    first, last = next(run for run in runs if run[1] - run[0] >= enough)
+    enough = max(min(max(lengths) / 2, ENOUGH_FLAT_S * recording.rate_hz), SHORTEST_FLAT_S * recording.rate_hz)
+    _, first, last = next(run for run, length in zip(runs, lengths, strict=True) if length >= enough)
     # the outermost windows may hold the first and last of a movement
     trim = n if last - first >= 6 * n else 0
     return first + trim, last - trim
+
+
+def samples_of_window(recording: Recording) -> int:
+    """The samples of a window in which it is told whether the board is still."""
+    return max(round(WINDOW_S * recording.rate_hz), FEWEST)
 
 
 def tells(recording: Recording, flat: tuple[int, int]) -> bool:
@@ -133,17 +115,6 @@ def rounding_variance(sensor: Sensor, variance: Vector) -> float:
     """(m/s^2)^2 of a mean acceleration at rest, however long: of readings in coarse steps, whose variance is (3,)."""
     step = sensor.steps[0]
     return UNIFORM * step**2 if (variance < UNVARIED * step**2).any() else 0.0
-
-
-def _windows(values: NDArray[Any], n: int) -> NDArray[Any]:
-    """(m, n, 3) consecutive windows of n samples; the remainder is left out."""
-    m = len(values) // n
-    return values[: m * n].reshape(m, n, values.shape[1])
-
-
-def _limit(sd: Vector, least: float, most: float) -> Vector:
-    """(3,) the largest standard deviation that still counts as quiet."""
-    return np.clip(2.5 * np.quantile(sd, 0.05, axis=0), least, most)
 
 
 def _variance(part: Vector, whole: Vector, quietest: float) -> Vector:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..data import Recording, Vector
 from .flat import Flat
-from .intervals import TELLS_BIAS_S, Intervals, bias_intervals, gravity_turns, statistics
+from .intervals import TELLS_BIAS_S, Intervals, gravity_turns, statistics
 
 TURNING_RAD_S = 0.005  # slower, gravity wanders by a hand that settles and by noise
 TREMOR_S = 0.05  # correlation time of a hand's tremor
@@ -21,10 +21,9 @@ RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # (rad/s)^2 a second
 def without_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recording:
     """The recording with its gyroscope's drift removed: in every rest, the mean rate is the flat segment's.
 
-    The bias is a random walk seen through the means of the rests, or of their quiet parts where these are long: a hand
-    that settles still turns. It is smoothed, its density the likeliest; between rests it is drawn straight.
+    The bias is a random walk seen through the means of runs at rest, its density the likeliest; between them it is
+    drawn straight.
     """
-    runs = bias_intervals(recording, flat, runs)
     runs = runs[runs[:, 1] - runs[:, 0] >= TELLS_BIAS_S * recording.rate_hz]
     if len(runs) < 2:
         return recording

@@ -1,4 +1,4 @@
-"""Where the board rests: intervals of samples in which both sensors spread as little as in this recording's rests.
+"""Intervals of samples in which the board rests: both sensors spread as little as in this recording's rests.
 
 A moving-window static detector, as in Tedaldi, Pretto, Menegatti (ICRA 2014), with the gyroscope beside the
 accelerometer, and with limits that the recording itself gives: hands tremble by 0.5 to 7 deg/s as they rest.
@@ -6,65 +6,85 @@ accelerometer, and with limits that the recording itself gives: hands tremble by
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..data import Mask, Recording, Vector
 from ..kernel import _kernel
-from .flat import Flat
-from .limits import ANY_HAND, QUIET, Limits
-from .local_noise import VIBRATION, noise_variance
+from .flat import Flat, samples_of_window
+from .limits import ANY_HAND, QUIET, TURNS_RAD_S, Limits, learned
+from .local_noise import noise_variance
+from .stillness import Detector
+from .windows import Spreads
 
-WINDOW_S, SHORTEST_S = 0.5, 0.3
+SHORTEST_S = 0.3
 TRIM, LEAST_TRIM_S, MOST_TRIM_S = 0.125, 0.1, 0.25  # of a rest at either end: a hand settles, and leaves early
-TIMES_QUIET = 2.5
-TURNS_RAD_S = 0.02  # faster, the accelerometer says, it turns: neither a rest nor a bias of the gyroscope
-# So many standard deviations may the logarithm of a window's spread be above the median of windows that may be rests.
-LIKE_THE_OTHERS = 2.0
-FEWEST_S = 0.5  # of such windows
-LEAST_OF_QUIET, LEAST_OF_NOISE = 0.1, 0.5  # a smaller spread than these shares is chance
-OF_NORMAL = 1.4826  # a standard deviation beside the median of distances
+FEWEST_S = 0.5  # of windows that may be rests, to learn from
 # So long a rest, or its quiet part, tells the gyroscope's bias: in less, a slow turn about gravity passes for it.
 TELLS_BIAS_S = 1.0
 
 Intervals = NDArray[np.intp]
 
 
-class _Windows(NamedTuple):
-    """Half-second windows, one beginning at each sample but the last ones: (3, m) each.
+class RestFinder:
+    """The runs of samples in which the board rests, (k, 2) first and last + 1, the flat segment's among them.
 
-    gyro_mean : rad/s, beside the flat segment's. gyro, acc : variances. vibration : that of the accelerometer where it
-    vibrates and does not move.
+    A sample is still where a still window covers it; runs are trimmed at both ends. The windows are those of half a
+    second that begin at each sample, judged by the detector of the session with the flat segment's noise and bias.
     """
 
-    n: int
-    gyro_mean: Vector
-    gyro: Vector
-    acc: Vector
-    vibration: Vector
+    def __init__(self, recording: Recording, flat: Flat) -> None:
+        self._recording, self._flat = recording, flat
+        self._n = samples_of_window(recording)
+        self._windows = _windows(recording, self._n)
 
+    def alike(self) -> Intervals:
+        """The rests like most of this recording's: in which the rate spreads as little as there."""
+        return self.within(self._learned())
 
-def static_intervals(recording: Recording, flat: Flat, limits: Limits | None = None) -> Intervals:
-    """(k, 2) first and last + 1 of the runs of samples in which the board rests, the flat segment's among them.
+    def held(self) -> Intervals:
+        """The rests, and beside them whatever a hand of any tremor may have meant to hold."""
+        return _and_others(self.alike(), self.within(ANY_HAND))
 
-    A half-second window is still where its spread is within the limits or near the flat segment's, or where the
-    accelerometer's is vibration alone, and its mean rate is the bias; a sample is still where a still window covers it;
-    runs are trimmed at both ends. Without `limits` they are what this recording's rests are like.
-    """
-    windows = _windows(recording, flat)
-    return np.zeros((0, 2), np.intp) if windows is None else _intervals(recording, flat, windows, limits)
+    def telling_bias(self, rests: Intervals) -> Intervals:
+        """The runs that tell the gyroscope's bias: a rest's quiet part where that is long, or all of it."""
+        quiet = self.within(QUIET)
+        quiet = quiet[quiet[:, 1] - quiet[:, 0] >= TELLS_BIAS_S * self._recording.rate_hz]
+        return _and_others(quiet[~_apart(quiet, rests)], rests)
 
+    def within(self, limits: Limits) -> Intervals:
+        """The rests within these limits."""
+        recording, flat = self._recording, self._flat
+        if self._windows is None:
+            return np.zeros((0, 2), np.intp)
+        detector = Detector(limits, (np.sqrt(flat.Sigma_a), np.sqrt(flat.Sigma_omega)), flat.b_omega)
+        covered = np.zeros(len(recording) + 1, np.intp)
+        at = np.flatnonzero(detector.shares(self._windows).level < 1.0)
+        covered[at] += 1
+        covered[at + self._n] -= 1
+        still = (np.cumsum(covered)[:-1] > 0) & ~recording.gap
+        rests = self._trimmed(_runs(still))
+        # of a run in which gravity turns, what is left without the samples in which the gyroscope says so
+        slow = np.asarray(np.all(np.abs(self._windows.gyr - flat.b_omega) < TURNS_RAD_S, axis=1))
+        still[self._n // 2 : self._n // 2 + len(slow)] &= slow
+        return _and_others(rests, self._trimmed(_runs(still)))
 
-def bias_intervals(recording: Recording, flat: Flat, rests: Intervals) -> Intervals:
-    """(k, 2) the runs that tell the gyroscope's bias: a rest's quiet part where that is long, or all of it."""
-    windows = _windows(recording, flat)
-    if windows is None:
-        return rests
-    quiet = _intervals(recording, flat, windows, QUIET)
-    quiet = quiet[quiet[:, 1] - quiet[:, 0] >= TELLS_BIAS_S * recording.rate_hz]
-    return _and_others(quiet[~_apart(quiet, rests)], rests)
+    def _trimmed(self, runs: Intervals) -> Intervals:
+        """The runs without their ends, where they are long enough and gravity stands still in them."""
+        rate = self._recording.rate_hz
+        trim = np.clip(TRIM * (runs[:, 1] - runs[:, 0]), LEAST_TRIM_S * rate, MOST_TRIM_S * rate).astype(np.intp)
+        runs = runs + np.stack([trim, -trim], axis=1)
+        runs = runs[runs[:, 1] - runs[:, 0] >= SHORTEST_S * rate]
+        return np.asarray(runs[gravity_turns(self._recording, runs) < TURNS_RAD_S])
+
+    def _learned(self) -> Limits:
+        if self._windows is None:
+            return QUIET
+        after, flat = self._windows.gyr_sd[self._flat.last :], self._flat
+        spread = np.sqrt(np.maximum((after**2 - flat.Sigma_omega).max(1), 0.0))
+        speed = np.abs(self._windows.gyr[flat.last :] - flat.b_omega).max(1)
+        noise, fewest = float(np.sqrt(flat.Sigma_omega.max())), FEWEST_S * self._recording.rate_hz
+        return learned(spread, speed, noise, fewest)
 
 
 def _and_others(runs: Intervals, others: Intervals) -> Intervals:
@@ -78,30 +98,6 @@ def _apart(runs: Intervals, others: Intervals) -> Mask:
     ended = np.searchsorted(others[:, 1], runs[:, 0], side="right")
     begun = np.searchsorted(others[:, 0], runs[:, 1], side="left")
     return np.asarray(ended == begun)
-
-
-def held_intervals(recording: Recording, flat: Flat) -> Intervals:
-    """(k, 2) the rests, and beside them whatever a hand of any tremor may have meant to hold."""
-    return _and_others(static_intervals(recording, flat), static_intervals(recording, flat, ANY_HAND))
-
-
-def learned(spread: Vector, speed: Vector, fewest: float = 0.0) -> Limits:
-    """The limits of a recording's rests, from the windows after its flat segment.
-
-    The windows that may be rests have a spread within ANY_HAND's and a mean rate within QUIET's. The logarithms of
-    their spreads have a median and a standard deviation; the limit lies LIKE_THE_OTHERS of these above it.
-
-    spread : (m,) rad/s, the largest standard deviation of the rate's axes beyond noise. speed : (m,) rad/s, the largest
-    mean rate beside the bias. fewest : of so few windows that may be rests nothing is learned.
-    """
-    held = (spread < ANY_HAND.gyro_sd) & (speed < QUIET.gyro_mean)
-    if np.count_nonzero(held) <= fewest:
-        return QUIET
-    size = np.log(spread[held])
-    median = np.median(size)
-    deviation = OF_NORMAL * np.median(np.abs(size - median))
-    likely = float(np.exp(median + LIKE_THE_OTHERS * deviation))
-    return QUIET.wider(min(max(likely, QUIET.gyro_sd), ANY_HAND.gyro_sd))
 
 
 def gravity_turns(recording: Recording, runs: Intervals) -> Vector:
@@ -128,36 +124,13 @@ def in_pieces(runs: Intervals, n: int) -> Intervals:
     return np.array(pieces, np.intp).reshape(-1, 2)
 
 
-def _windows(recording: Recording, flat: Flat) -> _Windows | None:
-    n = max(round(WINDOW_S * recording.rate_hz), 4)
+def _windows(recording: Recording, n: int) -> Spreads | None:
     if len(recording) < n:
         return None
-    mean, gyro = _kernel.moving_statistics(np.ascontiguousarray(recording.gyr), n)
-    acc = _kernel.moving_statistics(np.ascontiguousarray(recording.acc), n)[1]
-    vibration = VIBRATION * noise_variance(recording)[n // 2 : n // 2 + acc.shape[1]].T
-    return _Windows(n, (mean.T - flat.b_omega).T, gyro, acc, vibration)
-
-
-def _intervals(recording: Recording, flat: Flat, windows: _Windows, limits: Limits | None) -> Intervals:
-    speed = np.abs(windows.gyro_mean).max(0)
-    if limits is None:
-        beyond = np.sqrt(np.maximum((windows.gyro.T - flat.Sigma_omega).max(1), 0.0))
-        least = max(LEAST_OF_QUIET * QUIET.gyro_sd, LEAST_OF_NOISE * float(np.sqrt(flat.Sigma_omega.max())))
-        fewest = FEWEST_S * recording.rate_hz
-        limits = learned(np.maximum(beyond[flat.last :], least), speed[flat.last :], fewest)
-    gyro_limit = np.maximum(TIMES_QUIET**2 * flat.Sigma_omega, limits.gyro_sd**2)
-    acc_limit = np.maximum(TIMES_QUIET**2 * flat.Sigma_a, limits.acc_sd**2)
-    still = np.all(windows.gyro < gyro_limit[:, None], axis=0) & (speed < limits.gyro_mean)
-    still &= np.all(windows.acc < np.maximum(windows.vibration, acc_limit[:, None]), axis=0)
-    covered = np.zeros(len(recording) + 1, np.intp)
-    at = np.flatnonzero(still)
-    covered[at] += 1
-    covered[at + windows.n] -= 1
-    runs, rate = _runs((np.cumsum(covered)[:-1] > 0) & ~recording.gap), recording.rate_hz
-    trim = np.clip(TRIM * (runs[:, 1] - runs[:, 0]), LEAST_TRIM_S * rate, MOST_TRIM_S * rate).astype(np.intp)
-    runs = runs + np.stack([trim, -trim], axis=1)
-    runs = runs[runs[:, 1] - runs[:, 0] >= SHORTEST_S * rate]
-    return np.asarray(runs[gravity_turns(recording, runs) < TURNS_RAD_S])
+    gyr, gyr_variance = _kernel.moving_statistics(np.ascontiguousarray(recording.gyr), n)
+    acc_variance = _kernel.moving_statistics(np.ascontiguousarray(recording.acc), n)[1]
+    noise = noise_variance(recording)[n // 2 : n // 2 + acc_variance.shape[1]]
+    return Spreads(gyr.T, *(np.sqrt(np.maximum(x, 0.0)) for x in (acc_variance.T, gyr_variance.T, noise)))
 
 
 def _runs(mask: Mask) -> Intervals:

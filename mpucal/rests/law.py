@@ -20,6 +20,12 @@ LAMBDAS = np.geomspace(QUICKEST_PER_S, SLOWEST_PER_S, 28)
 TREMBLES = 0.04  # a variance below this share of the sensor's noise is none
 
 
+def tremor_variance(variance: Vector, noise: Vector) -> float:
+    """(m/s^2)^2 by which a rest of that variance (3,) trembles beyond noise (3,); 0 of a board that lies."""
+    tremor = float(np.mean(variance - 1.05 * noise))
+    return tremor if tremor > TREMBLES * float(noise.mean()) else 0.0
+
+
 def mean_variance(x: Vector) -> Vector:
     """The variance of a mean over T, as a share of the acceleration's; x = lambda T.
 
@@ -58,8 +64,8 @@ def rate_of_rests(acc: Vector, recording: Recording, flat: Flat, runs: Intervals
         if last <= flat.last or blocks < 2:
             continue
         rest = acc[first : first + blocks * n]
-        variance = float(np.mean(rest.var(0) - 1.05 * flat.Sigma_a))
-        if variance <= TREMBLES * float(flat.Sigma_a.mean()):
+        variance = tremor_variance(rest.var(0), flat.Sigma_a)
+        if not variance:
             continue
         noise = flat.Sigma_a / n * (blocks - 1) / blocks
         kept.append(float(np.mean(rest.reshape(blocks, n, 3).mean(1).var(0) - noise)) / variance)

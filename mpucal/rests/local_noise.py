@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 WINDOW_S = 0.5
 ORDER, SQUARES = 4, 70.0  # of the differences: sum of the squares of 1, -4, 6, -4, 1
-# where a window's variance is less than so many times that of its noise, the board is not moved but vibrates
-VIBRATION = 5.0
 # variances: below this a window is as loud as the flat segment, but for chance and a hand
 LOUDER = 2.0
 

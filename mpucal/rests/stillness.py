@@ -1,48 +1,41 @@
-"""Stillness detection: whether the board is still, for how long, and what moved it, from windows of samples."""
+"""Stillness detection: whether the board is still, for how long, and what moved it, from windows of samples.
+
+One detector answers for all: of one window after the other as they come, or of the windows of a whole recording.
+"""
 
 from __future__ import annotations
 
 import math
+from collections import deque
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ..data import Vector
-from .windows import Window
-
-
-@dataclass(frozen=True)
-class StillnessLimits:
-    """Limits of a still window and of the step between two; the accelerometer's in m/s^2, the gyro's in rad/s.
-
-    Attributes
-    ----------
-    acc_sd, gyr_sd : a window's standard deviations may reach this, however quiet the sensor was before.
-    acc_step, gyr_step : its means may be this far, beyond its spread, from those of the stillness before it:
-        a turn at a constant rate has no spread, only a mean that moves.
-    """
-
-    acc_sd: float
-    gyr_sd: float
-    acc_step: float
-    gyr_step: float
-
-
-# A table may hum; a hand trembles by 0.1 m/s^2 and 1 deg/s at 2 to 10 Hz.
-ON_A_TABLE = StillnessLimits(acc_sd=0.15, gyr_sd=0.03, acc_step=0.08, gyr_step=0.02)
-IN_THE_HAND = StillnessLimits(acc_sd=0.3, gyr_sd=0.06, acc_step=0.3, gyr_step=0.06)
-
-# A noisier sensor may exceed these by what its quietest window shows, up to this factor ...
-OF_QUIETEST = 2.5
-# ... but never beyond this, however noisy it is.
-ACC_SD_MAX_MPS2, GYRO_SD_MAX_RAD_S = 0.5, 0.15
+from .limits import (
+    ANY_HAND,
+    LET_GO,
+    MOST_BIAS_RAD_S,
+    NOISIEST_ACC_MPS2,
+    NOISIEST_GYRO_RAD_S,
+    QUIET,
+    TIMES_NOISE,
+    Limits,
+    learned,
+)
+from .windows import Spreads, Window, of_rows
 
 # A bump is over after so long, and has not turned the board by more than this.
 BUMP_S = 2.0
 BUMP_RAD = math.radians(3.0)
 
-# The MPU-6050's gyro may be off by 20 deg/s at rest; a board that seems to turn faster than this turns.
-GYRO_BIAS_MAX_RAD_S = math.radians(30.0)
+# A hand's limits are learned from the newest windows that may be rests: from more than the fewest.
+FEWEST_WINDOWS, NEWEST_WINDOWS = 2, 12
+
+# So many standard deviations may two means of noise be apart.
+CHANCE = 4.5
 
 AXES = "xyz"
 
@@ -72,10 +65,30 @@ class Moved:
     lost: bool = False
 
 
-class StillnessDetector:
-    """Follows one still run after another, a window at a time.
+class Shares(NamedTuple):
+    """How much of the limits windows (..., 3) use; above 1 they are not still."""
+
+    acc: Vector
+    gyr: Vector
+    turning: Vector
+
+    @property
+    def level(self) -> Vector:
+        """(...) the largest of each window."""
+        return np.asarray(np.maximum(np.maximum(self.acc, self.gyr), self.turning).max(-1))
+
+
+class Detector:
+    """Follows one still run after another, a window at a time; `shares` judges windows by themselves.
 
     A bump that leaves the board where it was pauses the run; any other movement ends it.
+
+    Parameters
+    ----------
+    limits : of a window at rest. noise : (3,) standard deviations of the accelerometer [m/s^2] and the gyroscope
+        [rad/s] at rest; None: those of the quietest window so far.
+    bias : (3,) rad/s of the gyroscope; where it is not known, how large it may be.
+    learns : the limits grow to those of a hand that trembles as this one does.
 
     Attributes
     ----------
@@ -83,10 +96,19 @@ class StillnessDetector:
     rest_rad_s : (3,) what the gyroscope read at the last stillness: its bias.
     """
 
-    def __init__(self, limits: StillnessLimits) -> None:
-        self._limits = limits
-        self._acc_quiet = np.full(3, np.inf)
-        self._gyr_quiet = np.full(3, np.inf)
+    def __init__(
+        self,
+        limits: Limits,
+        noise: tuple[Vector, Vector] | None = None,
+        bias: Vector | float = MOST_BIAS_RAD_S,
+        learns: bool = False,
+    ) -> None:
+        self._limits, self._least, self._learns = limits, limits, learns
+        self._quietest = noise is None
+        unknown: Vector = np.full(3, np.inf)
+        self._acc_noise, self._gyr_noise = noise if noise is not None else (unknown, unknown)
+        self._bias, self._turns = (np.zeros(3), bias) if isinstance(bias, float) else (bias, limits.gyro_mean)
+        self._spreads: deque[tuple[float, float]] = deque(maxlen=NEWEST_WINDOWS)
         # the windows of this run, added up one after the other
         self._count = 0
         self._seconds: float = 0
@@ -95,7 +117,25 @@ class StillnessDetector:
         self._bump_s = 0.0
         self._bump_rad = np.zeros(3)
         self.level = 0.0
-        self.rest_rad_s = np.zeros(3)
+        self.rest_rad_s = self._bias
+
+    def shares(self, windows: Spreads) -> Shares:
+        """What windows use of the limits, each by itself."""
+        acc_limit, gyr_limit = self._most
+        vibration = math.sqrt(self._limits.vibration) * windows.acc_noise
+        return Shares(
+            windows.acc_sd / np.maximum(acc_limit, vibration),
+            windows.gyr_sd / gyr_limit,
+            np.abs(windows.gyr - self._bias) / self._turns,
+        )
+
+    @property
+    def _most(self) -> tuple[Vector, Vector]:
+        """(3,) the limits of the standard deviations for this sensor."""
+        return (
+            np.maximum(self._limits.acc_sd, np.minimum(TIMES_NOISE * self._acc_noise, NOISIEST_ACC_MPS2)),
+            np.maximum(self._limits.gyro_sd, np.minimum(TIMES_NOISE * self._gyr_noise, NOISIEST_GYRO_RAD_S)),
+        )
 
     @property
     def seconds(self) -> float:
@@ -108,8 +148,11 @@ class StillnessDetector:
 
     def add(self, window: Window) -> Still | Moved:
         """What `window` shows."""
-        self._acc_quiet = np.minimum(self._acc_quiet, window.acc_sd)
-        self._gyr_quiet = np.minimum(self._gyr_quiet, window.gyr_sd)
+        if self._quietest:
+            self._acc_noise = np.minimum(self._acc_noise, window.acc_sd)
+            self._gyr_noise = np.minimum(self._gyr_noise, window.gyr_sd)
+        if self._learns:
+            self._learn(window)
         shaken = self._shaken(window)
         if shaken:
             return self._bumped(window, shaken)
@@ -124,6 +167,17 @@ class StillnessDetector:
         self._bump_s, self._bump_rad = 0.0, np.zeros(3)
         acc, self.rest_rad_s = self._means()
         return Still(self.seconds, acc, self.rest_rad_s, self._number)
+
+    def _learn(self, window: Window) -> None:
+        """Widen the limits to what a hand does that trembles as this one."""
+        beyond = math.sqrt(max(float((window.gyr_sd**2 - self._gyr_noise**2).max()), 0.0))
+        turning = float(np.abs(window.gyr - self.rest_rad_s).max())
+        if not (beyond < ANY_HAND.gyro_sd and turning < QUIET.gyro_mean):
+            return
+        self._spreads.append((beyond, turning))
+        spread, speed = np.array(self._spreads).T
+        noise = float(self._gyr_noise.max())
+        self._limits = learned(spread, speed, noise, FEWEST_WINDOWS, self._least)
 
     def _bumped(self, window: Window, what: str) -> Moved:
         moved = Moved(self.seconds, what, lost=not window.whole)
@@ -153,14 +207,12 @@ class StillnessDetector:
 
     def _shaken(self, window: Window) -> str:
         """What within the window says that it is not still, or nothing."""
-        acc = window.acc_sd / np.clip(OF_QUIETEST * self._acc_quiet, self._limits.acc_sd, ACC_SD_MAX_MPS2)
-        gyr = window.gyr_sd / np.clip(OF_QUIETEST * self._gyr_quiet, self._limits.gyr_sd, GYRO_SD_MAX_RAD_S)
-        turning = np.abs(window.gyr) / GYRO_BIAS_MAX_RAD_S
-        self.level = float(max(acc.max(), gyr.max(), turning.max()))
+        shares = acc, gyr, turning = self.shares(window)
+        self.level = float(shares.level)
         if not window.whole:
             return "samples were lost"
         if turning.max() > 1.0:
-            return _turned(window.gyr)
+            return _turned(window.gyr - self._bias)
         if gyr.max() > max(acc.max(), 1.0):
             return _turned(window.gyr_sd * np.where(gyr == gyr.max(), 1.0, 0.0))
         return _shook(window.acc_sd, acc) if acc.max() > 1.0 else ""
@@ -171,9 +223,12 @@ class StillnessDetector:
             return ""
         acc, gyr = self._means()
         acc_step, gyr_step = window.acc - acc, window.gyr - gyr
-        # a mean over a window with slow tremor in it is off by a part of that tremor
-        acc_ratio = np.abs(acc_step) / (self._limits.acc_step + window.acc_sd)
-        gyr_ratio = np.abs(gyr_step) / (self._limits.gyr_step + window.gyr_sd)
+        # a mean over a window with slow tremor in it is off by a part of that tremor, and of few samples by their noise
+        share = max(1.0, CHANCE * math.sqrt((1.0 + 1.0 / self._count) / window.count))
+        # a spike, or vibration, spreads a window further
+        acc_sd = np.minimum(window.acc_sd, self._most[0])
+        acc_ratio = np.abs(acc_step) / (self._limits.acc_step + share * acc_sd)
+        gyr_ratio = np.abs(gyr_step) / (self._limits.gyro_step + share * window.gyr_sd)
         self.level = float(max(self.level, acc_ratio.max(), gyr_ratio.max()))
         if max(acc_ratio.max(), gyr_ratio.max()) <= 1.0:
             return ""
@@ -181,6 +236,12 @@ class StillnessDetector:
             return _turned(gyr_step)
         axis = int(acc_ratio.argmax())
         return f"acceleration along {AXES[axis]} changed by {abs(acc_step[axis]):.2f} m/s²"
+
+
+def let_go(acc: Vector) -> bool:
+    """Whether an accelerometer's rows (n, 3) m/s^2 are of a board that nobody touches."""
+    silent = np.zeros(3)
+    return bool(Detector(LET_GO, (silent, silent)).shares(of_rows(acc, np.zeros_like(acc))).level < 1.0)
 
 
 def _turned(gyr: Vector) -> str:
@@ -191,3 +252,13 @@ def _turned(gyr: Vector) -> str:
 def _shook(acc_sd: Vector, ratio: Vector) -> str:
     axis = int(ratio.argmax())
     return f"shaking by {acc_sd[axis]:.2f} m/s² along {AXES[axis]}"
+
+
+def still_windows(detector: Detector, windows: Iterable[Window]) -> Iterator[tuple[int, int, int]]:
+    """Of each still window the number of its stillness, and the first and last + 1 of its samples."""
+    last = 0
+    for window in windows:
+        first, last = last, last + window.count
+        sight = detector.add(window)
+        if isinstance(sight, Still):
+            yield sight.run, first, last

@@ -8,7 +8,7 @@ from ..data import Samples
 from ..result.orientation import side_down
 from .aims import ALL_AROUND
 from .coverage import Coverage
-from .events import Caution, Direction, Finished, Output, Progress, Prompt, PromptKind, Use
+from .events import Caution, Direction, Finished, Output, Progress, Prompt, PromptKind, Rested, Use
 from .pauses import Pause, Pauses, counted, held, use_of
 
 ORIENTATIONS = 3
@@ -25,17 +25,17 @@ class Choose:
 
     Parameters
     ----------
-    flat : mean acceleration while the board lay flat [m/s^2].
+    flat : how the board lay.
 
     Attributes
     ----------
     prompt : the last one.
     """
 
-    def __init__(self, flat: Direction) -> None:
+    def __init__(self, flat: Rested) -> None:
         self._coverage = Coverage()
-        self._coverage.pauses(np.array(flat))
-        self._pauses = Pauses(CHECK_HOLD_S)
+        self._coverage.pauses(np.array(flat.acc))
+        self._pauses = Pauses(flat, CHECK_HOLD_S)
         self._begun_s: float | None = None
         self._said_s = 0.0
         self._number = 0

@@ -120,10 +120,11 @@ class Written:
 
 @dataclass(frozen=True)
 class Rested:
-    """The board lay still for long enough; `acc` is the mean acceleration meanwhile [m/s^2]."""
+    """The board lay still for long enough; `acc` [m/s^2] and `gyr` [rad/s] are the means meanwhile."""
 
     still_s: float
     acc: Direction
+    gyr: Direction
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..data import Samples
-from ..rests.stillness import ON_A_TABLE, Moved, Still, StillnessDetector
+from ..rests.limits import QUIET
+from ..rests.stillness import Detector, Moved, Still
 from ..rests.windows import Windows
 from .events import Caution, Countdown, Output, Progress, Prompt, PromptKind, Rested, Stopped
 
@@ -33,7 +36,7 @@ class LayFlat:
     def __init__(self, patient: bool = False) -> None:
         self._patient = patient
         self._windows = Windows(WINDOW_S)
-        self._stillness = StillnessDetector(ON_A_TABLE)
+        self._stillness = Detector(QUIET)
         self._still: Still | None = None
         self._begun_s: float | None = None
         self._spoke_s = 0.0
@@ -72,8 +75,8 @@ class LayFlat:
         return self._rested(self._still)
 
     def _rested(self, still: Still) -> Rested:
-        x, y, z = still.acc.tolist()
-        return Rested(still.seconds, (x, y, z))
+        x, y, z, *rates = np.concatenate([still.acc, still.gyr]).tolist()
+        return Rested(still.seconds, (x, y, z), (rates[0], rates[1], rates[2]))
 
     def _rests(self, still: Still, t_s: float) -> list[Output]:
         """Still, perhaps again, and perhaps elsewhere."""

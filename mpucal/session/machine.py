@@ -156,14 +156,16 @@ class Machine:
         return self._step.wanted if isinstance(self._step, Rotate | Choose | Verify) else None
 
     def _turn(self, flat: Rested) -> list[Output]:
-        turning = Choose(flat.acc) if self._checking else Rotate(flat.acc, self._aim, self._until_end, self._tilt_only)
+        turning = Choose(flat) if self._checking else Rotate(flat, self._aim, self._until_end, self._tilt_only)
         self._step = turning
         return [turning.prompt]
 
     def _verify(self) -> list[Output]:
         if not isinstance(self._step, Rotate):
             raise TypeError("the board is verified after it was turned")
-        verify = Verify(self._aim, self._step.coverage, self._step.directions, self._tilt_only, self._attended)
+        verify = Verify(
+            self._step.flat, self._aim, self._step.coverage, self._step.directions, self._tilt_only, self._attended
+        )
         self._step = verify
         return verify.begin()
 

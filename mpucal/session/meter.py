@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from ..data import Samples, Sensor, Vector
-from ..rests.stillness import IN_THE_HAND, Moved, StillnessDetector, StillnessLimits
+from ..rests.limits import HAND
+from ..rests.stillness import Detector, Moved
 from ..rests.windows import Window, Windows
 from .attitude import Attitude, quaternion
 from .events import Caution, Direction, Meter, Output
@@ -24,13 +25,13 @@ class MotionWatch:
 
     Parameters
     ----------
-    sensor : whose ranges are known. limits : of what counts as still.
+    sensor : whose ranges are known.
     """
 
-    def __init__(self, sensor: Sensor, limits: StillnessLimits = IN_THE_HAND) -> None:
+    def __init__(self, sensor: Sensor) -> None:
         self._sensor = sensor
         self._windows = Windows(WINDOW_S)
-        self._stillness = StillnessDetector(limits)
+        self._stillness = Detector(HAND)
         self._attitude, self._way = Attitude(), Way()
         self._still = False
         self._said_s: dict[str, float] = {}
@@ -38,7 +39,9 @@ class MotionWatch:
 
     def flat(self) -> None:
         """The board has lain flat for long enough."""
-        self._attitude.flat(self._stillness.rest_rad_s)
+        bias = self._stillness.rest_rad_s
+        self._attitude.flat(bias)
+        self._stillness = Detector(HAND, bias=bias, learns=True)
 
     def add(self, samples: Samples, wanted: Direction | None = None) -> list[Output]:
         """What `samples` show, where the unit vector `wanted` of the board's axes is to point down."""

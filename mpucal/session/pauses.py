@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Samples, Vector
-from ..rests.stillness import IN_THE_HAND, Still, StillnessDetector
+from ..rests.limits import HAND
+from ..rests.stillness import Detector, Still
 from ..rests.windows import Windows
-from .events import Countdown, Direction, Held, Use
+from .events import Countdown, Direction, Held, Rested, Use
 
 WINDOW_S = 0.25
 # From the prompt for the next orientation until a person moves there is another second of stillness.
@@ -66,12 +67,15 @@ def counted(pause: Pause, use: Use) -> list[Countdown]:
 
 
 class Pauses:
-    """Follows the stillnesses of a board in a hand, each held for `hold_s`; the one that it begins in is left out."""
+    """Follows the stillnesses of a board in a hand, each held for `hold_s`; the one that it begins in is left out.
 
-    def __init__(self, hold_s: float = HOLD_S) -> None:
+    flat : how it lay before, by which the gyroscope's bias is known.
+    """
+
+    def __init__(self, flat: Rested, hold_s: float = HOLD_S) -> None:
         self._hold_s = hold_s
         self._windows = Windows(WINDOW_S)
-        self._stillness = StillnessDetector(IN_THE_HAND)
+        self._stillness = Detector(HAND, bias=np.array(flat.gyr), learns=True)
         self._left: int | None = None
 
     def leave(self, run: int) -> None:

@@ -20,6 +20,7 @@ from .events import (
     Progress,
     Prompt,
     PromptKind,
+    Rested,
     Seen,
     Turned,
     Use,
@@ -53,20 +54,21 @@ class Rotate:
 
     Parameters
     ----------
-    flat : mean acceleration while the board lay flat [m/s^2]: the first orientation.
+    flat : how the board lay: the first orientation.
     aim : what is wanted. until_end : go on until the source ends, and ask for nothing.
     tilt_only : ask for small tilts from flat alone.
     """
 
-    def __init__(self, flat: Direction, aim: Aim, until_end: bool = False, tilt_only: bool = False) -> None:
-        self._aim, self._until_end, self._tilt_only = aim, until_end, tilt_only
+    def __init__(self, flat: Rested, aim: Aim, until_end: bool = False, tilt_only: bool = False) -> None:
+        self.flat, self._aim, self._until_end, self._tilt_only = flat, aim, until_end, tilt_only
         self._least = TILTS if tilt_only else aim.least
-        self._pauses, self._passes = Pauses(), Windows(PASS_WINDOW_S, spread=False)
+        self._pauses, self._passes = Pauses(flat), Windows(PASS_WINDOW_S, spread=False)
         self.coverage = Coverage()
-        self.coverage.pauses(np.array(flat))
-        self.coverage.passes(np.array(flat))
-        self.coverage.rests(np.array(flat))
-        x, y, z = (-np.array(flat) / np.linalg.norm(flat)).tolist()
+        acc = np.array(flat.acc)
+        self.coverage.pauses(acc)
+        self.coverage.passes(acc)
+        self.coverage.rests(acc)
+        x, y, z = (-acc / np.linalg.norm(acc)).tolist()
         self.directions = directions((x, y, z), tilt_only)
         self._knowledge: Knowledge | None = None
         self._asked = False

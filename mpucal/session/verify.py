@@ -11,7 +11,21 @@ from ..reasons import KINDS, Reason, reason
 from ..result.orientation import side_down, tilt_down
 from .aims import Aim, unseen_rad
 from .coverage import DISTINCT_RAD, Coverage
-from .events import Ask, Caution, Checked, Direction, Finished, Output, Progress, Prompt, PromptKind, Tried, Use, Wish
+from .events import (
+    Ask,
+    Caution,
+    Checked,
+    Direction,
+    Finished,
+    Output,
+    Progress,
+    Prompt,
+    PromptKind,
+    Rested,
+    Tried,
+    Use,
+    Wish,
+)
 from .pauses import HOLD_S, Pause, Pauses, counted, held, use_of
 
 PATIENCE_S = 40.0
@@ -35,7 +49,8 @@ class Verify:
 
     Parameters
     ----------
-    coverage : what the turning has shown. directions : (k, 3) that may be asked to point down.
+    flat : how the board lay. coverage : what the turning has shown.
+    directions : (k, 3) that may be asked to point down.
     attended : somebody can press keys, and is asked whether to turn it anew where that may help.
 
     Attributes
@@ -44,12 +59,18 @@ class Verify:
     """
 
     def __init__(
-        self, aim: Aim, coverage: Coverage, directions: Vector, tilt_only: bool = False, attended: bool = False
+        self,
+        flat: Rested,
+        aim: Aim,
+        coverage: Coverage,
+        directions: Vector,
+        tilt_only: bool = False,
+        attended: bool = False,
     ) -> None:
         self._aim, self._coverage, self._directions, self._tilt_only = aim, coverage, directions, tilt_only
         self._attended = attended
         self._refusal: Finished | None = None
-        self._pauses = Pauses()
+        self._pauses = Pauses(flat)
         self._number = 0
         self._asked, self._more = False, MOST_MORE
         self._begun_s: float | None = None

@@ -160,7 +160,7 @@ class Motion:
         return np.asarray((1 - part) * self._sums[node] + part * self._sums[node + 1]), int(node[-1])
 
     def _sum_at(self, t_s: float) -> tuple[Vector, int]:
-        """What was felt (6,) until `t_s`, and the step before it."""
+        """Integral of force and rate (6,) from the start to `t_s`, and the step before that."""
         place = max(t_s * STEP_HZ - self._first, 0.0)
         node = min(int(place), len(self._sums) - 2)
         part = place - node

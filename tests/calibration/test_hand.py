@@ -9,7 +9,7 @@ from mpucal.calibration import calibrate
 from mpucal.calibration.hand import fit_hand
 from mpucal.calibration.parameters import B_A_NAMES, BY_NAME, D_NAMES, K_NAMES
 from mpucal.rests.flat import flat_statistics
-from mpucal.rests.intervals import static_intervals
+from mpucal.rests.intervals import RestFinder
 from tools.lab.judge import sph_rms
 
 G = 9.82
@@ -173,7 +173,7 @@ def test_jerks_do_little(hand):
 def test_one_lost_move_does_little(hand, pick, how, k):
     run = hand(1, "pose12")
     recording = run.recording
-    runs = static_intervals(recording, flat_statistics(recording, recording.flat))
+    runs = RestFinder(recording, flat_statistics(recording, recording.flat)).alike()
     first, last = runs[k][1], runs[k + 1][0]
     if how == "left out":
         kept = np.ones(len(recording), bool)
@@ -193,7 +193,7 @@ def test_a_move_that_slipped_unseen_never_passes_for_good_unless_it_did_no_harm(
     run = hand(1, "pose12")
     recording = run.recording
     flat = flat_statistics(recording, recording.flat)
-    runs = static_intervals(recording, flat)
+    runs = RestFinder(recording, flat).alike()
     gyr, rng = recording.gyr.copy(), np.random.default_rng(0)
     slipped = slice(runs[k][1], runs[k + 1][0])
     gyr[slipped] = flat.b_omega + 0.002 * rng.standard_normal((slipped.stop - slipped.start, 3))

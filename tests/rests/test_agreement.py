@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 from mpucal.calibration.verification import LEAST_REST_S
 from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
-from mpucal.rests.intervals import held_intervals
+from mpucal.rests.intervals import RestFinder
+from mpucal.session.events import Rested
 from mpucal.session.pauses import HOLD_S, Pauses
 
 RATE_HZ, FLAT_S, MOVE_S = 100.0, 6.0, 1.0
@@ -49,15 +50,15 @@ def held_in_a_hand(tremor_rad_s, hertz, holds_s, seed):
 )
 def test_what_was_told_to_be_held_is_found_by_the_verification(tremor_dps, hertz, holds_s, seed):
     recording, starts = held_in_a_hand(np.radians(tremor_dps), hertz, holds_s, seed)
-    pauses = Pauses()
+    pauses = Pauses(Rested(FLAT_S, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0)))
     told = {}
-    for first in range(0, len(recording), 20):
+    for first in range(recording.flat[1], len(recording), 20):
         for pause in pauses.add(recording.part(first, first + 20)):
             if pause.seconds >= HOLD_S:
                 told[pause.run] = pause.t_s
-    runs = held_intervals(recording, flat_statistics(recording, recording.flat))
+    runs = RestFinder(recording, flat_statistics(recording, recording.flat)).held()
     long = recording.t[runs[runs[:, 1] - runs[:, 0] >= LEAST_REST_S * RATE_HZ]]
     for t_s in told.values():
         assert any(first <= t_s <= last + HOLD_S for first, last in long), (told, long)
-    # a hand that trembles as most do is told so, or this would show nothing
-    assert len(told) == len(starts) or tremor_dps > 2.5
+    # else this would show nothing; where a hand trembles by more than most, its first hold teaches that
+    assert len(told) >= len(starts) - (tremor_dps > 3.0)

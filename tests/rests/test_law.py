@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
-from mpucal.rests.intervals import learned, static_intervals
+from mpucal.rests.intervals import RestFinder
 from mpucal.rests.law import carried, mean_variance, rate_of_rests
-from mpucal.rests.limits import ANY_HAND, QUIET
+from mpucal.rests.limits import ANY_HAND, QUIET, learned
 
 RATE_HZ, REST_S, NOISE_MPS2 = 100.0, 3.0, 0.02
 
@@ -82,14 +82,14 @@ def test_the_limits_are_those_of_the_recordings_rests():
 
     def of(typical):
         spread = np.concatenate([typical * np.exp(0.2 * rng.standard_normal(400)), np.full(300, 1.0)])
-        return learned(spread, np.zeros(len(spread)))
+        return learned(spread, np.zeros(len(spread)), 0.0, 0.0)
 
     assert of(0.005) == QUIET
     shaky = of(0.04)
     assert shaky.gyro_sd == pytest.approx(0.04 * np.exp(0.4), rel=0.1)
     assert shaky.acc_sd / QUIET.acc_sd == pytest.approx(shaky.gyro_sd / QUIET.gyro_sd)
     assert of(0.1).gyro_sd == pytest.approx(ANY_HAND.gyro_sd, rel=0.1)
-    assert learned(np.full(10, 0.1), np.zeros(10), 50.0) == QUIET
+    assert learned(np.full(10, 0.1), np.zeros(10), 0.0, 50.0) == QUIET
 
 
 def test_a_hand_that_trembles_by_two_degrees_a_second_rests():
@@ -102,9 +102,9 @@ def test_a_hand_that_trembles_by_two_degrees_a_second_rests():
     acc = [0.0, 0.0, 9.81] + 0.05 * rng.standard_normal((4000, 3))
     recording = Recording.from_arrays(t, acc, gyr, flat=(0, 900))
     flat = flat_statistics(recording, (0, 900))
-    runs = static_intervals(recording, flat)
+    runs = RestFinder(recording, flat).alike()
     assert np.sum(runs[:, 1] - runs[:, 0] > 3.0 * RATE_HZ) == 7
-    assert len(static_intervals(recording, flat, QUIET)) == 1
+    assert len(RestFinder(recording, flat).within(QUIET)) == 1
 
 
 @pytest.mark.parametrize(("rate_hz", "share"), [(20.0, 0.8), (50.0, 0.85), (100.0, 0.9)])
@@ -118,4 +118,4 @@ def test_a_table_that_is_quieter_than_the_flat_segment_has_no_tremor(rate_hz, sh
         acc = [0.0, 0.0, 9.81] + 0.03 * rng.standard_normal((n, 3))
         recording = Recording.from_arrays(np.arange(n) / rate_hz, acc, gyr, flat=(0, n // 6))
         flat = flat_statistics(recording, recording.flat)
-        np.testing.assert_array_equal(static_intervals(recording, flat), static_intervals(recording, flat, QUIET))
+        np.testing.assert_array_equal(RestFinder(recording, flat).alike(), RestFinder(recording, flat).within(QUIET))

@@ -40,7 +40,7 @@ EVENTS = {
     "SourceEnded": SourceEnded(),
     "Fitted": Fitted("good"),
     "Written": Written(()),
-    "Rested": Rested(10.0, (0.0, 0.0, 9.8)),
+    "Rested": Rested(10.0, (0.0, 0.0, 9.8), (0.0, 0.0, 0.0)),
     "Turned": Turned("enough"),
     "Finished": Finished("verified"),
     "Stopped": Stopped("it moved", "start again"),

@@ -23,7 +23,7 @@ from mpucal.calibration.masks import with_masks
 from mpucal.data import Recording, Vector
 from mpucal.errors import RecordingError
 from mpucal.rests.flat import find_flat, flat_statistics
-from mpucal.rests.intervals import static_intervals
+from mpucal.rests.intervals import RestFinder
 from mpucal.simulated.sensor import SensorTruth, non_orthogonality, turned
 from tools.lab.judge import followed, sph_rms, tilts_deg
 
@@ -135,7 +135,7 @@ def orientations(recording: Recording, D: Vector, b_a: Vector, K: Vector, gravit
     corrected = replace(recording, gyr=recording.gyr @ K.T)
     s = followed(recording, flat, D, b_a, gravity)
     s[:, 2:3] = followed(corrected, flat_statistics(corrected, segment), D[2:3], b_a[2:3], gravity)
-    return s, int(static_intervals(recording, flat)[-1, 0]) - flat.last
+    return s, int(RestFinder(recording, flat).alike()[-1, 0]) - flat.last
 
 
 COLUMNS: dict[str, Callable[[Sequence[Errors]], object]] = {

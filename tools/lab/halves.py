@@ -20,7 +20,7 @@ from mpucal.calibration.masks import with_masks
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording
 from mpucal.errors import MpucalError, RecordingError
 from mpucal.rests.flat import find_flat, flat_statistics
-from mpucal.rests.intervals import static_intervals
+from mpucal.rests.intervals import RestFinder
 
 from .judge import rms
 from .table import grouped, show, table
@@ -60,7 +60,7 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
     flat = recording.flat or find_flat(recording)
     if flat is None:
         raise RecordingError(f"{recording.name}: no rest to begin with", "give a recording that begins at rest")
-    runs = static_intervals(recording, flat_statistics(recording, flat))
+    runs = RestFinder(recording, flat_statistics(recording, flat)).alike()
     runs = runs[runs[:, 1] - runs[:, 0] >= LEAST_REST_S * recording.rate_hz]
     n, middle = len(recording), (flat[1] + len(recording)) // 2
     inner = runs[(runs[:, 0] > flat[1]) & (np.abs(runs.mean(1) - middle) < 0.25 * n)]

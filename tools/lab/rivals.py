@@ -16,7 +16,7 @@ from mpucal.calibration.masks import with_masks
 from mpucal.calibration.rotation import cross, rotation, turned
 from mpucal.data import Recording, Vector
 from mpucal.rests.flat import Flat, find_flat, flat_statistics
-from mpucal.rests.intervals import Intervals, static_intervals
+from mpucal.rests.intervals import Intervals, RestFinder
 
 FACE_RAD = np.deg2rad(25.0)  # a face may be as far from straight up: a large bias tilts what is measured
 TURN_RAD = np.deg2rad(20.0)  # a complete turn may miss 360 deg by so much
@@ -62,7 +62,7 @@ class Rests:
         if segment is None:
             raise Unfit("never still")
         flat = flat_statistics(recording, segment)
-        runs = static_intervals(recording, flat)
+        runs = RestFinder(recording, flat).alike()
         return cls(recording, flat, runs[runs[:, 1] - runs[:, 0] >= SHORTEST_S * recording.rate_hz])
 
     @cached_property

@@ -10,7 +10,7 @@ import numpy as np
 from ...calibration.evidence import Evidence
 from ...calibration.verification import NewOrientation
 from ...data import Vector
-from ...rests.intervals import static_intervals
+from ...rests.intervals import RestFinder
 
 # shorter than this nobody holds a board still
 SHORTEST_REST_S = 0.5
@@ -32,6 +32,6 @@ def directions_seen(evidence: Evidence) -> Vector:
     if fit is None or flat is None:
         return np.zeros((0, 3))
     shortest = SHORTEST_REST_S * r.rate_hz
-    means = [r.acc[a:b].mean(0) for a, b in static_intervals(r, flat) if b - a >= shortest]
+    means = [r.acc[a:b].mean(0) for a, b in RestFinder(r, flat).alike() if b - a >= shortest]
     up = np.linalg.solve(fit.D, (np.reshape(means, (-1, 3)) - fit.b_a).T).T
     return np.asarray(-up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-9))
