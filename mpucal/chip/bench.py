@@ -11,8 +11,9 @@ from typing import Self
 
 import numpy as np
 
-from ..data import Vector
+from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import BusError, ChipError, ChipReset
+from ..rests.stillness import let_go
 from . import registers as reg
 from .port import Port
 
@@ -29,10 +30,8 @@ SETTING = {
     reg.CONFIG: DLPF_CFG,
     reg.ACCEL_CONFIG: AFS_SEL << reg.FULL_SCALE_SHIFT,
 }
-# a hand trembles by this much, a table does not; a person needs some time to put the board down
-STILL_STD_G, PATIENCE = 0.006, 40
-# a noisy chip is told from a hand by its neighbouring looks, which differ as much as any two
-NOISE_SHARE = 2.0
+# a person needs some time to put the board down
+PATIENCE = 40
 HALF_SENSITIVITY_G = 0.75
 
 
@@ -80,11 +79,10 @@ class Bench:
             # revision C of the 6050 shows half of gravity; known once, offsets may shift what is shown
             sensitivity = self._sensitivity or (0.5 if np.linalg.norm(looks.mean(0)) < HALF_SENSITIVITY_G else 1.0)
             looks /= sensitivity
-            variance, of_noise = looks.var(0), np.diff(looks, axis=0).var(0) / 2
-            if (variance < np.maximum(STILL_STD_G**2, NOISE_SHARE * of_noise)).all():
+            if let_go(looks * STANDARD_GRAVITY_MPS2):
                 self._sensitivity = self._sensitivity or sensitivity
                 return np.asarray(looks.mean(0))
-        moves_mg = 1000 * np.sqrt(variance.max())
+        moves_mg = 1000 * looks.std(0).max()
         raise ChipError(f"the board moves (by {moves_mg:.0f} mg)", "put it on a firm surface and let go of it")
 
     def _looks(self) -> Vector:

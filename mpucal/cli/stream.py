@@ -35,8 +35,6 @@ from .options import ABOVE_ZERO, check_gyroscope, check_source, source_options
 from .page import page_options
 
 EXAMPLE = "Example: `mpucal stream --bus /dev/i2c-1 --apply board7/calibration.json --seconds 10`"
-# of a source that does not say
-RATE_HZ = 200.0
 
 
 @click.command("stream", epilog=EXAMPLE)
@@ -86,7 +84,7 @@ def command(
                 text.utc_ns = time.time_ns() - round(float(samples.t[-1]) * NS)
                 sensor = measuring.source.recording().sensor
                 ready = _correction(applied, measuring.source, talk)
-                watch = Watch(ready.calibration, days_since(applied), sensor.rate_hz or RATE_HZ) if watched else None
+                watch = Watch(ready.calibration, days_since(applied)) if watched else None
             calibrated = ready.apply(samples)
             if as_json:
                 _json_lines(calibrated, text.utc_ns or 0)

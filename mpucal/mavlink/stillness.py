@@ -10,6 +10,9 @@ import numpy as np
 from ..calibration.rotation import rotation
 from ..data import Vector
 from ..errors import LinkError
+from ..rests.limits import QUIET
+from ..rests.stillness import Detector, Still
+from ..rests.windows import of_rows
 from .dialect import Message, dialect
 from .imu import MESSAGE_ID, Reading, Stream, reading
 from .link import Link, S
@@ -18,8 +21,6 @@ from .request import command
 WINDOW_NS, PATIENCE_NS = 2 * S, 30 * S
 FEWEST = 20
 INTERVAL_US = 20_000
-# what a hand that means to be still does; a vehicle that stands on something is far below
-STILL_MPS2, STILL_RAD_S = 0.3, 0.1
 LONGEST_STEP_S = 1.0
 
 
@@ -66,15 +67,17 @@ class Stillness:
         """
         end_ns = self._link.now_ns() + PATIENCE_NS
         self._ask()
-        last: StillMeans | None = None
+        # an autopilot takes the gyroscopes' biases away
+        detectors = {stream: Detector(QUIET, bias=np.zeros(3)) for stream in self._streams}
+        before: list[int | None] | None = None
         while True:
             self._window()
             missing = [stream for stream in self._streams if len(self._found[stream]) < FEWEST]
-            still = not missing and all(is_still(readings) for readings in self._found.values())
-            now = self._means() if still else None
-            if now is not None and last is not None and _agree(last, now):
+            runs = None if missing else [_run(detectors[stream], self._found[stream]) for stream in self._streams]
+            now = None if runs is None or None in runs else self._means()
+            if now is not None and runs == before:
                 return now
-            last = now
+            before = runs
             if self._link.now_ns() < end_ns:
                 if missing:
                     self._ask()
@@ -118,14 +121,10 @@ class Stillness:
         return StillMeans(mean, error, self._attitude)
 
 
-def _agree(one: StillMeans, other: StillMeans) -> bool:
-    return all(np.abs(one.mean[stream] - other.mean[stream]).max() < STILL_MPS2 / 2 for stream in one.mean)
-
-
-def is_still(readings: Sequence[Reading]) -> bool:
-    """Whether neither the acceleration nor the rate moved; a steady turn counts as moving."""
-    acc, gyr = np.array([r.acc for r in readings]), np.array([r.gyr for r in readings])
-    half = len(acc) // 2
-    drift = acc[:half].mean(axis=0) - acc[half:].mean(axis=0)
-    calm = acc.std(axis=0).max() < STILL_MPS2 and gyr.std(axis=0).max() < STILL_RAD_S
-    return bool(calm and np.abs(drift).max() < STILL_MPS2 / 2 and np.abs(gyr.mean(axis=0)).max() < STILL_RAD_S)
+def _run(detector: Detector, readings: Sequence[Reading]) -> int | None:
+    """The number of the stillness that readings show throughout, None where they moved."""
+    rows = np.array([(r.acc, r.gyr) for r in readings])
+    # in halves: what turns steadily is somewhere else in the second
+    sights = [detector.add(of_rows(half[:, 0], half[:, 1])) for half in np.array_split(rows, 2)]
+    runs = {sight.run if isinstance(sight, Still) else None for sight in sights}
+    return runs.pop() if len(runs) == 1 else None

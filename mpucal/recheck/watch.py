@@ -16,6 +16,8 @@ import numpy as np
 from ..calibration.verification import BIAS_RAD_S, FLOOR_MPS2
 from ..data import STANDARD_GRAVITY_MPS2, Samples, Vector
 from ..rests.limits import QUIET
+from ..rests.stillness import Detector, Still
+from ..rests.windows import Window, Windows
 from ..result.calibration import Calibration
 from . import drift
 from .hypotheses import NOTHING, weigh
@@ -24,8 +26,6 @@ from .observed import BETA, DELTA, PARAMETERS, Observed, of_accelerometer
 BLOCK_S = 0.5
 # of a rest: so long at least, and at most: a board that lies for hours rests many times
 LEAST_BLOCKS, MOST_BLOCKS = 5, 21
-# so far a rest's blocks may be from its first
-STEP_MPS2 = 0.1
 # the last rests, of which this many at least are needed
 RESTS, LEAST_RESTS = 16, 4
 # days of rests are looked at one by one: each may err by chance less often than a check does
@@ -63,46 +63,35 @@ class Watch:
 
     Parameters
     ----------
-    calibration : ready for these samples. days : since it was made, at the first of them. rate_hz : samples a second.
+    calibration : ready for these samples. days : since it was made, at the first of them.
     """
 
-    def __init__(self, calibration: Calibration, days: float, rate_hz: float) -> None:
+    def __init__(self, calibration: Calibration, days: float) -> None:
         self._calibration, self._days = calibration, days
         self._gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
-        self._size = max(round(BLOCK_S * rate_hz), 2)
         self._first_s: float | None = None
-        self._t_s = 0.0
-        self._held = np.zeros((0, 7))
+        self._t_s, self._temperature_c = 0.0, math.nan
+        self._windows, self._stillness, self._run = Windows(BLOCK_S), Detector(QUIET), 0
         self._blocks: list[Vector] = []
         self._rests: deque[_Rest] = deque(maxlen=RESTS)
         self._told: set[str] = set()
 
     def add(self, calibrated: Samples) -> list[Contradiction]:
         """What these samples bring to light."""
-        found: list[Contradiction] = []
         if len(calibrated):
             self._t_s = float(calibrated.t[-1])
             self._first_s = self._t_s if self._first_s is None else self._first_s
-        for part in np.split(np.arange(len(calibrated)), np.flatnonzero(calibrated.gap)):
-            if len(part) and calibrated.gap[part[0]]:
-                self._held = self._held[:0]
-                found += self._over()
-            columns = (calibrated.acc, calibrated.gyr, calibrated.temperature_c[:, None])
-            self._held = np.concatenate([self._held, np.hstack(columns)[part]])
-            while len(self._held) >= self._size:
-                block, self._held = self._held[: self._size], self._held[self._size :]
-                found += self._block(block)
-        return found
+            self._temperature_c = float(calibrated.temperature_c[-1])
+        return [each for window in self._windows.add(calibrated) for each in self._look(window)]
 
-    def _block(self, block: Vector) -> list[Contradiction]:
+    def _look(self, window: Window) -> list[Contradiction]:
         """Half a second more."""
-        mean, std = block.mean(0), block.std(0)
-        still = std[:3].max() < QUIET.acc_sd and not std[3:6].max() > QUIET.gyro_sd
-        found: list[Contradiction] = []
-        if not still or (self._blocks and np.abs(mean[:3] - self._blocks[0][:3]).max() > STEP_MPS2):
-            found = self._over()
-        if still:
-            self._blocks.append(np.append(mean, std[:3].max() ** 2 / self._size))
+        sight = self._stillness.add(window)
+        found = [] if isinstance(sight, Still) and sight.run == self._run else self._over()
+        if isinstance(sight, Still):
+            self._run = sight.run
+            within = float(window.acc_sd.max()) ** 2 / window.count
+            self._blocks.append(np.concatenate([window.acc, window.gyr, [self._temperature_c, within]]))
         if len(self._blocks) == MOST_BLOCKS:
             found += self._over()
         return found

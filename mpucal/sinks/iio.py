@@ -27,6 +27,7 @@ from ..iio.attributes import ACCEL, AXES, mount_matrix
 from ..iio.decode import IioDecoder
 from ..iio.driver import IioDriver
 from ..iio.setup import POLLED, Attributes
+from ..rests.stillness import let_go
 from ..result.atomic import write_atomically
 from ..result.calibration import REFUSED, Calibration
 from ..result.journal import Journal
@@ -38,7 +39,7 @@ from .sink import Applied
 from .table import IIO_STATE, KERNEL
 
 FORMAT, WORDS, RULE = "mpucal.iio_state", "calibbias", "rule"
-REST_NS, TRIES, FEWEST, STILL_MPS2 = 1_000_000_000, 20, 10, 0.1
+REST_NS, TRIES, FEWEST = 1_000_000_000, 20, 10
 # a measured step, as of the chip's sink
 SHIFT_G, SHIFT_SHARE = 0.006, 0.1
 CALIBBIAS = [f"{ACCEL}_{axis}_calibbias" for axis in AXES]
@@ -172,7 +173,7 @@ class KernelSink:
                 while driver.now_ns() < end_ns:
                     driver.poll()
                 acc = driver.recording().acc
-                if len(acc) > FEWEST and acc.std(axis=0).max() < STILL_MPS2:
+                if len(acc) > FEWEST and let_go(acc):
                     return np.asarray(acc.mean(axis=0), np.float64)
         finally:
             driver.stop()

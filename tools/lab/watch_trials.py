@@ -51,7 +51,7 @@ def of_use(item: tuple[str, int], hours: float) -> Run | None:
     if calibration.verdict == "refused":
         return None
     after, _ = happened(aged, event, of_event)
-    watch = Watch(calibration, DAYS, RATE_HZ)
+    watch = Watch(calibration, DAYS)
     told: list[tuple[str, float]] = []
     for samples in _minutes(after, of_errors, hours):
         acc, gyr = calibration.apply(samples.acc, samples.gyr)
