@@ -1,0 +1,137 @@
+"""Does the session, which hears a few samples at a time, call still what is a rest of the whole recording?
+
+python -m tools.lab rests                                     six recordings of each family, about 500
+python -m tools.lab rests --families 'poses*' --seeds 0:33
+
+A recording agrees where what is told to be held as its samples come, in parts of any size, is what is told of all of
+them at once, where each of these holds is a rest of the recording, and each rest that is as long was told to be held.
+The exit code is 1 where fewer agree than --least.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from mpucal.calibration.masks import with_masks
+from mpucal.data import Recording, Samples
+from mpucal.rests.flat import Flat, find_flat, flat_statistics
+from mpucal.rests.intervals import RestFinder
+from mpucal.session.events import Rested
+from mpucal.session.pauses import HOLD_S, Pauses
+
+from .scenarios.family import simulate
+from .scenarios.table import FAMILIES
+from .table import grouped, show, table
+from .trials import command_line, in_parallel, names_of, save
+
+LARGEST_PART = 60  # samples
+# so long a rest holds all windows of a hold, wherever they begin, and what is trimmed of it is beside them
+LONG_S = HOLD_S
+
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What of one recording was told live and found offline [s], and what only one of both has.
+
+    Attributes
+    ----------
+    held, rests : how many; of rests those as long as a hold. in_parts : parts and all at once say the same.
+    """
+
+    family: str
+    seed: int
+    held: int = 0
+    rests: int = 0
+    only_held: tuple[Span, ...] = ()
+    only_rests: tuple[Span, ...] = ()
+    in_parts: bool = True
+
+    @property
+    def agrees(self) -> bool:
+        """All three."""
+        return self.in_parts and not self.only_held and not self.only_rests
+
+
+def of_seed(item: tuple[str, int]) -> Found | None:
+    """Of a family's name and a seed; None where the recording has no flat segment."""
+    name, seed = item
+    return of_recording(with_masks(simulate(FAMILIES[name], seed).recording), name, seed)
+
+
+def of_recording(recording: Recording, name: str, seed: int) -> Found | None:
+    """Of a recording; the seed draws how its samples come. None where it has no flat segment, or nothing after it."""
+    segment = recording.flat or find_flat(recording)
+    if segment is None or segment[1] == len(recording):
+        return None
+    flat = flat_statistics(recording, segment)
+    after = recording.part(flat.last, len(recording))
+    ends = np.cumsum(np.random.default_rng(seed).integers(1, LARGEST_PART, len(after)))
+    parts = [after.part(first, last) for first, last in pairwise([0, *ends[ends < len(after)].tolist(), len(after)])]
+    held = _held(flat, parts)
+    runs = RestFinder(recording, flat).held()
+    found: list[Span] = [(float(recording.t[a]), float(recording.t[b - 1])) for a, b in runs if a >= flat.last]
+    rests = [rest for rest in found if rest[1] - rest[0] >= LONG_S]
+    return Found(
+        name,
+        seed,
+        len(held),
+        len(rests),
+        tuple(hold for hold in held if not _touched(hold, found)),
+        tuple(rest for rest in rests if not _touched(rest, held)),
+        held == _held(flat, [after]),
+    )
+
+
+def _held(flat: Flat, parts: Iterable[Samples]) -> list[Span]:
+    """What the session calls held for long enough, as these samples come."""
+    x, y, z, *rates = (*flat.y.tolist(), *flat.b_omega.tolist())
+    pauses = Pauses(Rested(flat.n, (x, y, z), (rates[0], rates[1], rates[2])))
+    # of the stillness that it begins in a session says nothing
+    pauses.leave(-1)
+    runs: dict[int, Span] = {}
+    for pause in (pause for samples in parts for pause in pauses.add(samples)):
+        if pause.seconds >= HOLD_S:
+            runs[pause.run] = (runs.get(pause.run, (pause.t_s - pause.seconds,))[0], pause.t_s)
+    return list(runs.values())
+
+
+def _touched(span: Span, others: Iterable[Span]) -> bool:
+    return any(first < span[1] and span[0] < last for first, last in others)
+
+
+def agreeing(found: Sequence[Found]) -> str:
+    """How many agree, of all."""
+    return f"{sum(one.agrees for one in found)} of {len(found)}"
+
+
+COLUMNS = {
+    "agree": agreeing,
+    "held": lambda found: sum(one.held for one in found),
+    "rests": lambda found: sum(one.rests for one in found),
+    "only\nheld": lambda found: sum(len(one.only_held) for one in found),
+    "only\nrests": lambda found: sum(len(one.only_rests) for one in found),
+}
+
+
+def main() -> None:
+    """Simulate, compare, print and save."""
+    parser = command_line(__doc__, seeds="0:6")
+    parser.add_argument("--families", type=names_of(FAMILIES), default=list(FAMILIES), help="patterns, with ; between")
+    parser.add_argument("--least", type=float, default=0.0, help="the share that is to agree")
+    options = parser.parse_args()
+    items = [(name, seed) for name in options.families for seed in options.seeds]
+    of_all = list(in_parallel(of_seed, items, options.jobs, "rests"))
+    found = [one for one in of_all if one is not None]
+    differ = [one for one in found if not one.agrees]
+    if differ:
+        show(table(grouped(differ, lambda one: (one.family, one.seed)), COLUMNS))
+    print(f"{agreeing(found)} agree; {len(of_all) - len(found)} more have no flat segment")
+    save(options.json, found)
+    sys.exit(len(found) - len(differ) < options.least * len(found))
