@@ -391,8 +391,8 @@ KINDS: Mapping[str, Kind] = {
         "Bits of an axis never move: a byte is lost on its way, or the sensor is broken.",
         {
             "constant": Sentence(
-                "the accelerometer reads the same on {axes} in every sample, though the board was turned: it is broken"
-                " or was not recorded",
+                "the accelerometer reads the same on {axes} {when}, though the board was turned: it is broken or was"
+                " not recorded",
                 "check its wiring and the recording",
                 True,
             ),
@@ -407,7 +407,7 @@ KINDS: Mapping[str, Kind] = {
             ),
         },
         "mpucal session --bus sim:fault=low_byte@0 --seed 1",
-        "a high bit never moves, an axis reads the same throughout, or its steps are coarser than the calibration is"
+        "a high bit never moves, an axis reads the same while the board is turned, or its steps are coarser than the calibration is"
         " sure",
         of_the_sensor=True,
     ),

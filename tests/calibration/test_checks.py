@@ -130,6 +130,22 @@ def test_rates_in_degrees(good, in_hand, flat, noise_rad_s):
         refused_for("units_suspect", other, "in deg/s;", "convert it to rad/s", "gyroscope")
 
 
+@pytest.mark.parametrize("axis", range(3))
+def test_an_axis_that_stops_midway_is_stuck(in_hand, axis):
+    recording = in_hand.recording
+    acc = recording.acc.copy()
+    acc[1900:2300, axis] = acc[1900, axis]
+    refused_for("bits_stuck", replace(recording, acc=acc), f"on {'xyz'[axis]} from 19 to 23 s, though")
+
+
+def test_an_axis_that_repeats_for_a_second_or_at_rest_is_none(in_hand):
+    recording = in_hand.recording
+    for first, last in ((1900, 2050), (0, 900)):
+        acc = recording.acc.copy()
+        acc[first:last, 2] = acc[first, 2]
+        assert "bits_stuck" not in judged(replace(recording, acc=acc)).reasons
+
+
 def test_slow_rates_in_degrees(ideal):
     slow = ideal(0, turn_s=40.0, rate_hz=20).recording
     assert np.rad2deg(np.abs(slow.gyr).max()) < 30

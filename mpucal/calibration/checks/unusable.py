@@ -16,6 +16,8 @@ SLOWEST_HZ = 5.0
 LONGEST_TO_LAY_DOWN_S = 10.0
 # from this many seconds between samples on, times are rather in microseconds, and in nanoseconds
 STEP_OF_MICROSECONDS, STEP_OF_NANOSECONDS = 60.0, 1e5
+# So long no sensor repeats a value to the last bit while it is turned: its noise alone is more.
+STUCK_S = 2.0
 FASTEST_GYRO_DPS, SELDOM = 4100.0, 0.01
 
 
@@ -90,11 +92,28 @@ def _rested_late(e: Evidence) -> bool:
 
 
 def dead_accelerometer(e: Evidence) -> Reason | None:
-    """An axis of the accelerometer that reads the same throughout."""
+    """An axis of the accelerometer that reads the same throughout, or for seconds while the others show a turn."""
     if e.flat is None:
         return None
     axes = _constant(e, e.recording.acc, e.flat.Sigma_a, QUIETEST_ACC_MPS2)
-    return reason("bits_stuck", "constant", axes=axes) if axes else None
+    if axes:
+        return reason("bits_stuck", "constant", axes=axes, when="in every sample")
+    if np.sqrt(e.flat.Sigma_a).max() <= QUIETEST_ACC_MPS2 or e.recording.sensor.message is not None:
+        return None  # computed, or rounded on its way
+    least, t = max(round(STUCK_S * e.recording.rate_hz), FEWEST_SAMPLES), e.recording.t - e.recording.t[0]
+    for axis, column in zip("xyz", e.recording.acc.T, strict=True):
+        for first, last in _repeats(column, least):
+            if np.ptp(e.recording.acc[first:last], axis=0).max() > LEAST_TURN_RAD * e.gravity:
+                when = f"from {t[first]:.0f} to {t[last - 1]:.0f} s"
+                return reason("bits_stuck", "constant", axes=axis, when=when)
+    return None
+
+
+def _repeats(column: Vector, least: int) -> list[tuple[int, int]]:
+    """First and last + 1 of the runs of at least so many samples in which a column (n,) repeats its value."""
+    same = np.concatenate([[False], np.diff(column) == 0.0, [False]])
+    edges = np.flatnonzero(same[1:] != same[:-1]).reshape(-1, 2)
+    return [(first, last + 1) for first, last in edges.tolist() if last + 1 - first >= least]
 
 
 def dead_gyroscope(e: Evidence) -> Reason | None:
