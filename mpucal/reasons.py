@@ -407,8 +407,8 @@ KINDS: Mapping[str, Kind] = {
             ),
         },
         "mpucal session --bus sim:fault=low_byte@0 --seed 1",
-        "a high bit never moves, an axis reads the same while the board is turned, or its steps are coarser than the calibration is"
-        " sure",
+        "a high bit never moves, an axis reads the same while the board is turned, or its steps are coarser than the"
+        " calibration is sure",
         of_the_sensor=True,
     ),
     "gravity_unlikely": Kind(
