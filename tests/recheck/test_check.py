@@ -105,6 +105,12 @@ def test_too_little_to_tell_says_what_was_missing():
     assert mpucal.check(CALIBRATION, moving).verdict == "cannot be told"
 
 
+def test_a_flat_segment_that_is_too_short_to_tell_noise_is_none():
+    recording = shown(TRUTH)
+    assert observe(replace(recording, flat=(0, 2)), CALIBRATION) is None
+    assert observe(replace(recording, flat=(0, 400)), CALIBRATION) is not None
+
+
 def test_another_chip_is_told_by_what_it_says_of_itself():
     known = replace(CALIBRATION, sensor=replace(CALIBRATION.sensor, who_am_i=0x68, accel_offsets=(2, 4, 6)))
     recording = shown(TRUTH)
