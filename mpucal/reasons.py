@@ -106,6 +106,7 @@ def reason(code: str, sentence: str, refuse: bool | None = None, **numbers: obje
 _LAY_IT_DOWN = "lay it on a table for ten seconds before you turn it"
 _SLOWER = "turn more slowly, or choose a larger --gyro-range"
 
+RAW = "record the raw accelerometer; on Android that is TYPE_ACCELEROMETER, on iOS CMAccelerometerData"
 WARM_VEHICLE = (
     "leave the vehicle switched on until its IMU is warm, then measure again: an autopilot that heats it (to"
     " BRD_HEAT_TARG of ArduPilot, SENS_IMU_TEMP of PX4) takes some minutes"
@@ -386,6 +387,24 @@ KINDS: Mapping[str, Kind] = {
         },
         "mpucal session --bus sim:hand=warming --seed 1",
         "it moved by more than 8 °C between laying flat and the verification",
+    ),
+    "not_raw": Kind(
+        "The accelerations were computed by a fusion filter: they are not what an accelerometer reads.",
+        {
+            "same_magnitude": Sentence(
+                "the magnitude of the accelerations stays within {spread:.1g} m/s^2 of {magnitude:.5g} m/s^2 while the"
+                " board turns by {degrees:.0f} deg: this is a fusion filter's gravity, and no accelerometer's reading",
+                RAW,
+                True,
+            ),
+            "no_gravity": Sentence(
+                "the accelerometer's median magnitude is {magnitude:.2g}: there is no gravity in it, as in a fusion"
+                " filter's linear acceleration",
+                RAW,
+                True,
+            ),
+        },
+        "mpucal.calibrate(replace(r, acc=9.81 * r.acc / np.linalg.norm(r.acc, axis=1, keepdims=True)))",
     ),
     "bits_stuck": Kind(
         "Bits of an axis never move: a byte is lost on its way, or the sensor is broken.",

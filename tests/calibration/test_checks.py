@@ -146,6 +146,19 @@ def test_an_axis_that_repeats_for_a_second_or_at_rest_is_none(in_hand):
         assert "bits_stuck" not in judged(replace(recording, acc=acc)).reasons
 
 
+@pytest.mark.parametrize("decimals", [9, 3, 2])
+def test_a_fusion_filters_gravity_is_no_accelerometers(in_hand, decimals):
+    acc = in_hand.recording.acc
+    gravity = np.round(G * acc / np.linalg.norm(acc, axis=1, keepdims=True), decimals)
+    refused_for("not_raw", replace(in_hand.recording, acc=gravity), "stays within", "raw accelerometer")
+
+
+def test_nor_is_what_it_leaves_without_gravity(in_hand):
+    acc = in_hand.recording.acc
+    linear = acc - G * acc / np.linalg.norm(acc, axis=1, keepdims=True)
+    refused_for("not_raw", replace(in_hand.recording, acc=linear), "no gravity in it")
+
+
 def test_slow_rates_in_degrees(ideal):
     slow = ideal(0, turn_s=40.0, rate_hz=20).recording
     assert np.rad2deg(np.abs(slow.gyr).max()) < 30

@@ -22,6 +22,7 @@ Check = Callable[[Evidence], Reason | None]
 UNUSABLE: tuple[Check, ...] = (
     unusable.time_unit,
     unusable.accelerometer_unit,
+    unusable.same_magnitude,
     unusable.gyroscope_unit,
     unusable.never_still,
     unusable.hardly_turned,

@@ -16,6 +16,9 @@ SLOWEST_HZ = 5.0
 LONGEST_TO_LAY_DOWN_S = 10.0
 # from this many seconds between samples on, times are rather in microseconds, and in nanoseconds
 STEP_OF_MICROSECONDS, STEP_OF_NANOSECONDS = 60.0, 1e5
+LEAST_G = 0.3  # of a magnitude in g, below which it holds no gravity
+# Gains, biases, noise and a hand's acceleration make a magnitude vary by more; so little is left of two decimals.
+LEAST_SPREAD = 4e-4
 # So long no sensor repeats a value to the last bit while it is turned: its noise alone is more.
 STUCK_S = 2.0
 FASTEST_GYRO_DPS, SELDOM = 4100.0, 0.01
@@ -39,16 +42,32 @@ def time_unit(e: Evidence) -> Reason | None:
 
 def accelerometer_unit(e: Evidence) -> Reason | None:
     """Accelerations in g or counts."""
-    acc = float(np.median(lengths(e.recording.acc)))
+    acc = _magnitude(e)
     if 0.2 * e.gravity < acc < 5.0 * e.gravity:
         return None
+    if acc < LEAST_G:
+        return reason("not_raw", "no_gravity", magnitude=acc)
     guess = "g" if acc < 5.0 else "mg" if 300.0 < acc < 1700.0 else "raw counts"
     return reason("units_suspect", "accelerometer", magnitude=acc, gravity=e.gravity, unit=guess)
 
 
+def _magnitude(e: Evidence) -> float:
+    return float(np.median(lengths(e.recording.acc)))
+
+
+def same_magnitude(e: Evidence) -> Reason | None:
+    """Accelerations whose magnitude is the same however the board lies."""
+    size = lengths(e.recording.acc)
+    if e.gravity_moved < LEAST_TURN_RAD or np.std(size) > LEAST_SPREAD * np.mean(size):
+        return None
+    degrees = np.rad2deg(e.gravity_moved)
+    return reason("not_raw", "same_magnitude", spread=np.std(size), magnitude=np.mean(size), degrees=degrees)
+
+
 def gyroscope_unit(e: Evidence) -> Reason | None:
     """Rates in deg/s or counts."""
-    if time_unit(e) is not None:  # by wrong times no rate fits how gravity turned
+    # by wrong times, or where there is no gravity, no rate fits how gravity turned
+    if time_unit(e) is not None or _magnitude(e) < LEAST_G:
         return None
     rates = np.abs(e.recording.gyr)
     if np.mean(rates > np.deg2rad(FASTEST_GYRO_DPS)) <= SELDOM and not e.turned_in_degrees:
