@@ -16,7 +16,7 @@ SLOWEST_HZ = 5.0
 LONGEST_TO_LAY_DOWN_S = 10.0
 # from this many seconds between samples on, times are rather in microseconds, and in nanoseconds
 STEP_OF_MICROSECONDS, STEP_OF_NANOSECONDS = 60.0, 1e5
-LEAST_G = 0.3  # of a magnitude in g, below which it holds no gravity
+LEAST_G = 0.5  # of a magnitude in g, below which it holds no gravity
 # Gains, biases, noise and a hand's acceleration make a magnitude vary by more; so little is left of two decimals.
 LEAST_SPREAD = 4e-4
 # So long no sensor repeats a value to the last bit while it is turned: its noise alone is more.
