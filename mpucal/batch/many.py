@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..data import STANDARD_GRAVITY_MPS2
+from ..disk.folder import Folder
 from ..errors import SourceError, UsageError
 from .journal import Journal
 from .row import Settings, rows_of
@@ -66,21 +67,18 @@ def calibrate_many(
 
     Raises
     ------
-    SourceError : the scheduler was lost. UsageError : dask.distributed or pyarrow is not installed.
+    SourceError : the scheduler was lost. OutputError : `folder` cannot be written, or another batch writes to it.
+    UsageError : dask.distributed or pyarrow is not installed.
     """
     from .table import table_of  # noqa: PLC0415
 
     names, settings = [str(path) for path in paths], Settings(model, gravity)
     with TemporaryDirectory() as temporary, local_client() if client is None else _as_is(client) as workers:
         place = Path(folder or temporary)
-        place.mkdir(parents=True, exist_ok=True)
-        journal = Journal(place / JOURNAL, settings.key)
-        try:
+        with Folder(place), closing(Journal(place / JOURNAL, settings.key)) as journal:
             for _ in run(names, workers, journal, settings):
                 pass
             return table_of(journal.rows(names))
-        finally:
-            journal.close()
 
 
 def run(paths: Sequence[str], client: Any, journal: Journal, settings: Settings) -> Iterator[Progress]:

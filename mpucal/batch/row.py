@@ -18,6 +18,7 @@ import numpy as np
 
 from .. import __version__
 from ..data import Recording
+from ..disk.whole import write_atomically
 from ..errors import MpucalError, OutputError, RecordingError
 from ..files import load
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
@@ -197,7 +198,7 @@ def put(place: str, data: bytes) -> None:
     """
     try:
         if "://" not in place:
-            Path(place).write_bytes(data)
+            write_atomically(Path(place), data)
             return
         import fsspec  # noqa: PLC0415
 

@@ -11,7 +11,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ..result.atomic import whole_file
+from ..disk.whole import whole_file
 from .row import COLUMNS, TEXTS, WHOLE
 
 # rows that are in memory at once

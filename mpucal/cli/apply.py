@@ -13,13 +13,13 @@ import click
 import numpy as np
 
 from ..data import Samples
+from ..disk.whole import check_not_among
 from ..errors import UsageError
 from ..files import open_rows, open_writer
 from ..files.csv import CsvText
 from ..files.folder import captures_in
 from ..files.formats import held_whole, writable
 from ..files.rows import Rows
-from ..result.atomic import check_not_among
 from ..result.correction import correction
 from .loading import loaded
 from .recording_options import hint_options, hints_of, say_taken

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from contextlib import closing, nullcontext
 from pathlib import Path
 
 import click
@@ -12,8 +13,9 @@ from ..batch.journal import Journal
 from ..batch.many import JOURNAL, Progress, local_client, remote_client, run
 from ..batch.paths import found
 from ..batch.row import Settings
+from ..disk.folder import Folder
+from ..disk.whole import write_atomically
 from ..errors import UsageError
-from ..session.results import make_folder
 from .options import fit_options
 from .person import say
 
@@ -48,17 +50,17 @@ def command(
     if scheduler and workers:
         raise UsageError("--workers is for this machine, and --scheduler names another's", "give one of them")
     paths = found(files)
-    make_folder(folder / REPORTS if reports else folder)
     settings = Settings(model, gravity, gravity_anyway, str((folder / REPORTS).resolve()) if reports else "")
-    journal = Journal(folder / JOURNAL, settings.key)
-    try:
+    with (
+        Folder(folder),
+        Folder(folder / REPORTS) if reports else nullcontext(),
+        closing(Journal(folder / JOURNAL, settings.key)) as journal,
+    ):
         with remote_client(scheduler) if scheduler else local_client(workers, dashboard) as client:
             if dashboard:
                 say(f"the dashboard is at {client.dashboard_link}")
             _follow(run(paths, client, journal, settings))
         _tell(folder, paths, journal)
-    finally:
-        journal.close()
     return 0
 
 
@@ -92,7 +94,6 @@ def _tell(folder: Path, paths: list[str], journal: Journal) -> None:
     # pyarrow is slow to load
     from ..batch.page import PAGE, page  # noqa: PLC0415
     from ..batch.table import write  # noqa: PLC0415
-    from ..result.atomic import write_atomically  # noqa: PLC0415
 
     parquet, text = write(folder, journal.rows(paths))
     fleet = page(parquet)

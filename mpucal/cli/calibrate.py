@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from ..disk.folder import Folder
 from ..errors import RefusedError
 from ..files import load
 from ..files.formats import readable
@@ -15,7 +16,7 @@ from ..mavlink.calibrate_vehicle import calibrate_vehicle
 from ..result.calibration import REFUSED
 from ..result.noise import Noise, with_noise
 from ..result.session_files import BLOB
-from ..session.results import make_folder, result_files, save
+from ..session.results import check_owner, result_files, save
 from .options import fit_options
 from .recording_options import hint_options, hints_of, say_taken
 from .summary import summary, written
@@ -58,8 +59,9 @@ def command(
     calibration = calibration if known is None else with_noise(calibration, known)
     paths: tuple[Path, ...] = ()
     if folder is not None:
-        make_folder(folder)
-        paths = save(folder, dict(result_files(calibration, samples)))
+        check_owner(folder, calibration, recording, f"mpucal calibrate {recording}")
+        with Folder(folder) as into:
+            paths = save(into.path, dict(result_files(calibration, samples)))
     if as_json:
         click.echo(calibration.json(), nl=False)
     else:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ from typing import Any
 import click
 
 from ..data import Recording
+from ..disk.folder import Folder
+from ..disk.whole import check_not_among
 from ..errors import UsageError
 from ..files import load
 from ..page.address import Address
@@ -23,7 +26,7 @@ from ..result.calibration import Calibration
 from ..result.clock import now
 from ..result.session_files import BLOB, DOCUMENT
 from ..session.folder import SessionFolder
-from ..session.results import make_folder, save
+from ..session.results import save
 from ..sinks.choose import chosen
 from ..sinks.record import in_file
 from ..sinks.table import SINKS
@@ -92,11 +95,14 @@ def command(
             "--to was given without -o and a source", "name the folder and the source, which is written to"
         )
     of = loaded(calibration) if folder is None else trusted(calibration, force)
-    told = partial(_told, of, folder, as_json)
+    if folder is not None:
+        for name in (BLOB.name, DOCUMENT.name):
+            check_not_among(folder / name, [calibration])
     if file is not None:
         recording = load(file, given_hints(options))
         say_taken(recording.taken)
-        return told(recording)[0].exit_code
+        with nullcontext() if folder is None else Folder(folder) as place:
+            return _told(of, place, as_json, recording)[0].exit_code
     check_source(click.get_current_context())
     # a simulated chip lives in the gravity in which it was calibrated
     options = {**options, **({"gravity": of.fit["gravity"]} if of.fit.get("gravity") else {})}
@@ -106,24 +112,28 @@ def command(
     title = source_title(options)
     terminal = console(quiet=yes, title=title, board=board)
     attended = not yes and sys.stdin.isatty() and sys.stderr.isatty()
-    with beside(terminal, page, source, options, title, board, attended=attended) as (person, tell):
-        result, files = told(_measured(source, folder, person))
+    with (
+        nullcontext() if folder is None else SessionFolder(folder, source.capture_name) as into,
+        beside(terminal, page, source, options, title, board, attended=attended) as (person, tell),
+    ):
+        result, files = _told(of, into, as_json, _measured(source, into, person))
         tell(Result(result.verdict, summary=result.page()), files)
-        if sinks and folder is not None and result.only_biases:
-            _write_back(sinks, folder, options, yes, as_json)
+        if sinks and into is not None and result.only_biases:
+            _write_back(sinks, into.path, options, yes, as_json)
     return result.exit_code
 
 
-def _told(of: Calibration, folder: Path | None, as_json: bool, recording: Recording) -> tuple[CheckResult, list[Path]]:
+def _told(
+    of: Calibration, folder: Folder | None, as_json: bool, recording: Recording
+) -> tuple[CheckResult, list[Path]]:
     """Check, print what was found, and leave its files."""
     result = check(of, recording)
     click.echo(json.dumps(result.document(), indent=2) if as_json else result.page())
-    return result, [] if folder is None else _left(folder, of, result, recording, as_json)
+    return result, [] if folder is None else _left(folder.path, of, result, recording, as_json)
 
 
-def _measured(source: Opened, folder: Path | None, person: Console) -> Recording:
+def _measured(source: Opened, into: SessionFolder | None, person: Console) -> Recording:
     """What the person showed; its capture is kept with -o."""
-    into = None if folder is None else SessionFolder(folder, source.capture_name)
     with running(source, Path(os.devnull) if into is None else into.capture, person, checking=True) as runner:
         try:
             return runner.measure()
@@ -134,7 +144,6 @@ def _measured(source: Opened, folder: Path | None, person: Console) -> Recording
 
 def _left(folder: Path, of: Calibration, result: CheckResult, recording: Recording, as_json: bool) -> list[Path]:
     """check.json, and where only the biases moved calibration.json and calibration.bin."""
-    make_folder(folder)
     files = {CHECK_FILE: (json.dumps(result.document(), indent=2) + "\n").encode()}
     if result.only_biases:
         after = updated(of, result, recording, now().isoformat())

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
+from ..disk.whole import check_not_among, write_atomically
 from ..export.forms import FORMS, form
-from ..result.atomic import check_not_among, write_atomically
 from ..result.noise import Noise, with_noise
 from .loading import loaded
 

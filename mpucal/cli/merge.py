@@ -6,10 +6,11 @@ from pathlib import Path
 
 import click
 
-from ..result.atomic import check_not_among
+from ..disk.folder import Folder
+from ..disk.whole import check_not_among
 from ..result.merge import merge
 from ..result.session_files import BLOB, DOCUMENT
-from ..session.results import make_folder, save
+from ..session.results import check_owner, save
 from .loading import force_option, trusted
 from .summary import slope, summary
 
@@ -32,8 +33,10 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, force: bool, as
             check_not_among(folder / file.name, calibrations)
     made = merge([trusted(path, force) for path in calibrations])
     if folder is not None:
-        make_folder(folder)
-        save(folder, {BLOB.name: made.calibration.blob().encode(), DOCUMENT.name: made.calibration.json().encode()})
+        check_owner(folder, made.calibration, calibrations[0], "mpucal merge ...")
+        with Folder(folder) as into:
+            document, blob = made.calibration.json().encode(), made.calibration.blob().encode()
+            save(into.path, {BLOB.name: blob, DOCUMENT.name: document})
     for sentence in (made.why, *made.remarks):
         click.echo(f"mpucal: {sentence}", err=True)
     if as_json:

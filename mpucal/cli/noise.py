@@ -15,6 +15,7 @@ import click
 
 from ..allan import NoiseMeter
 from ..data import Samples, Sensor
+from ..disk.folder import Folder
 from ..errors import EndOfCapture, UsageError
 from ..files import open_rows
 from ..report.noise import render, summary
@@ -22,7 +23,7 @@ from ..result.clock import now
 from ..result.noise import Noise
 from ..session.at_rest import put_down
 from ..session.ports import Source
-from ..session.results import make_folder, save
+from ..session.results import save
 from ..sources.opening import one_of, open_source
 from ..sources.table import kinds_meant, used_by
 from .options import ABOVE_ZERO, check_gyroscope, check_source, given, source_options
@@ -64,8 +65,8 @@ def command(file: Path | None, hours: float | None, folder: Path | None, as_json
         noise = _of_source(options, None if hours is None else 3600.0 * hours)
     click.echo(noise.json() if as_json else summary(noise), nl=not as_json)
     if folder is not None:
-        make_folder(folder)
-        save(folder, {PAGE: render(noise).encode(), DOCUMENT: noise.json().encode()})
+        with Folder(folder) as into:
+            save(into.path, {PAGE: render(noise).encode(), DOCUMENT: noise.json().encode()})
         click.echo(f"\nWritten to {folder}:\n  {DOCUMENT}, {PAGE}", err=as_json)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from ..disk.place import check_free
 from ..errors import OutputError
 from ..result.clock import stamp
 from ..sources.opening import open_source
@@ -35,8 +36,7 @@ def command(file: Path | None, seconds: float | None, **options: Any) -> None:
     suffix = Path(source.capture_name).suffix
     if file.suffix.lower() != suffix:
         raise OutputError(f"{file} does not end with {suffix}, by which other commands know a capture", f"add {suffix}")
-    if file.exists():
-        raise OutputError(f"{file} is there already", "choose another file with -o")
+    check_free(file)
     person = console(quiet=False)
     with outliving(lambda: file.with_suffix(".log"), partial(person.hung_up, stop=True)):
         with running(source, file, person) as runner:

@@ -16,8 +16,8 @@ from ..errors import MpucalError, RefusedError
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
 from ..page.address import Address
 from ..result.calibration import REFUSED, Calibration
-from ..result.session_files import CAPTURE_OF_VEHICLE, LOG
-from ..session.folder import SessionFolder
+from ..result.session_files import CAPTURE_OF_VEHICLE, DOCUMENT, LOG
+from ..session.folder import SessionFolder, check_unfinished
 from ..sinks.choose import announced, chosen
 from ..sinks.kind import SinkKind
 from ..sinks.record import in_session
@@ -88,12 +88,12 @@ def command(
     name = name or options.get(NAME)
     check_gyroscope(source.plan.config)
     title = f"{name}, {source_title(options)}" if name else source_title(options)
-    into = SessionFolder(resume or folder, source.capture_name, again=resume is not None)
-    board = board or (VEHICLE if into.capture.name == CAPTURE_OF_VEHICLE.name else BOARD)
+    board = board or (VEHICLE if source.capture_name == CAPTURE_OF_VEHICLE.name else BOARD)
     terminal = console(quiet=yes, as_json=json_events, beep=beep, title=title, board=board)
     seen = attended and sys.stderr.isatty() and not json_events
     hung_up = partial(terminal.hung_up, stop=page is None and not keep_going)
     with (
+        SessionFolder(resume or folder, source.capture_name, again=resume is not None) as into,
         outliving(lambda: into.path / LOG.name, hung_up),
         beside(terminal, page, source, options, title, board, page_keys, json_events, seen) as (person, tell),
     ):
@@ -125,6 +125,7 @@ def _opened(
         opening = {**options, "attended": attended, "writes": bool(kinds)}
         return open_source(opening, given()), kinds, options
     check_resumed(given())
+    check_unfinished(resume)
     source = open_resumed(resume)
     options = {**options, **source.live.words}
     return source, chosen(sinks, no_write, kinds_meant(options)[0]), options
@@ -149,13 +150,15 @@ def _run(
                 calibration = replace(calibration, extra={**calibration.extra, NAME: name})
             return recording, calibration, runner.write(folder.path, calibration, recording, source.truth)
     except BaseException as error:
-        if folder.capture.exists():
-            person.say(f"  What was recorded is kept in {folder.capture}{_how_to_go_on(source, folder.path, error)}.")
+        if kept := folder.kept:
+            person.say(f"  What was recorded is kept in {kept}{_how_to_go_on(source, kept.parent, error)}.")
         raise
 
 
 def _how_to_go_on(source: Opened, folder: Path, error: BaseException) -> str:
     """Who can resume is not told to start again: one advice, in the error where that has one."""
+    if (folder / DOCUMENT.name).exists():
+        return f", and the results in {folder}"
     if not source.resumable:
         return ""
     if not isinstance(error, MpucalError) or AGAIN not in error.remedy:

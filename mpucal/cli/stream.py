@@ -14,7 +14,8 @@ from typing import Any
 import click
 
 from ..data import STANDARD_GRAVITY_MPS2, Samples
-from ..errors import EndOfCapture, OutputError
+from ..disk.place import check_free
+from ..errors import EndOfCapture
 from ..files.csv import NS, CsvText
 from ..page.address import Address
 from ..page.live import live
@@ -64,8 +65,8 @@ def command(
     """
     check_source(click.get_current_context())
     applied = loaded(calibration)
-    if file is not None and file.exists():
-        raise OutputError(f"{file} is there already", "choose another file with -o")
+    if file is not None:
+        check_free(file)
     # a simulated chip lives in the gravity in which it was calibrated
     gravity = applied.fit.get("gravity") or STANDARD_GRAVITY_MPS2
     source = open_source({**options, "gravity": gravity}, until_end=True)

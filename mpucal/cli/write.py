@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ..data import STANDARD_GRAVITY_MPS2
-from ..session.results import make_folder
+from ..disk.folder import Folder
 from ..sinks.doubt import doubt
 from ..sinks.record import in_file, is_calibration
 from ..sinks.table import SINKS
@@ -43,20 +43,21 @@ def command(
     kind = SINKS[to]
     check_sink(kind, check_source(click.get_current_context()), options)
     written = trusted(calibration, force) if is_calibration(calibration) else None
-    folder = folder or calibration.parent
-    make_folder(folder)
     # a simulated chip lives in the gravity in which it was calibrated
     gravity = STANDARD_GRAVITY_MPS2 if written is None else written.fit.get("gravity") or STANDARD_GRAVITY_MPS2
-    with kind.open(device({**options, "gravity": gravity})) as sink:
+    with (
+        Folder(folder or calibration.parent) as into,
+        kind.open(device({**options, "gravity": gravity})) as sink,
+    ):
         against = doubt(written, sink) if written is not None and written.quality else None
         if against is not None:
             say(f"{against}.")
         ask(f"Write {calibration} to {sink.where}?", yes)
         if written is None:
-            click.echo(f"Done: {put_back(kind, sink, calibration, folder, say)}.")
+            click.echo(f"Done: {put_back(kind, sink, calibration, into.path, say)}.")
             return
-        path = folder / kind.after_write(calibration.stem)
-        applied = write_to(kind, sink, written, folder, in_file(path), say)
+        path = into.path / kind.after_write(calibration.stem)
+        applied = write_to(kind, sink, written, into.path, in_file(path), say)
     if as_json:
         click.echo(applied.calibration.json(), nl=False)
         return

@@ -17,8 +17,8 @@ from typing import IO
 import numpy as np
 
 from ..data import Samples, Vector
+from ..disk.whole import whole_file
 from ..errors import RecordingError
-from ..result.atomic import whole_file
 from ._text import lines, numbers
 from .rows import Rows, Write, cannot_read, checked
 from .tables.times import possible_utc_ns

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..data import Recording
 from ..errors import RecordingError
-from ..result.session_files import CAPTURE, SessionFile
+from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, SessionFile
 from . import formats
 from .rows import Rows
 
@@ -17,6 +17,11 @@ def captures_in(folder: Path, capture: SessionFile = CAPTURE) -> list[Path]:
     while (path := folder / capture.numbered(len(found) + 1)).exists():
         found.append(path)
     return found
+
+
+def all_captures_in(folder: Path) -> list[Path]:
+    """Those of either kind of session."""
+    return [*captures_in(folder), *captures_in(folder, CAPTURE_OF_VEHICLE)]
 
 
 def load_folder(folder: Path) -> Recording:

@@ -18,8 +18,8 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 from numpy.typing import NDArray
 
 from ..data import Samples, Vector
+from ..disk.whole import whole_file
 from ..errors import RecordingError
-from ..result.atomic import whole_file
 from .chunks import ChunkWriter
 from .mcap import CALIBRATED
 from .rows import Rows, Write

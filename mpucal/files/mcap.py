@@ -11,7 +11,7 @@ import json
 import os
 import struct
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Self, cast
@@ -27,9 +27,9 @@ from ..arguments import regular
 from ..chip.access import Transaction
 from ..chip.accesses import Accesses
 from ..chip.records import Record, SessionEvent
-from ..durable import Durable
+from ..disk.growing import Growing
+from ..disk.whole import whole_file
 from ..errors import CaptureError, OutputError
-from ..result.atomic import sync_folder, whole_file
 from ..strict_json import parsed_own
 from .messages import BUS, SESSION, accesses_message, accesses_schema, event_message, event_schema, records_of
 
@@ -65,16 +65,10 @@ class CaptureWriter:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self._path = Path(path)
         self._meta: Mapping[str, Any] = {}
-        try:
-            self._file = self._path.open("wb")
-        except OSError as error:
-            raise self._cannot_write(error) from error
-        sync_folder(self._path.parent)
+        self._file = Growing(Path(path))
         # the chunks' index grows by 1 MB an hour: in vain where nothing is kept
-        self._stream = _Stream(self._file, CHUNK_NS, chunked=self._path != Path(os.devnull))
-        self._durable = Durable(self._file)
+        self._stream = _Stream(cast("IO[bytes]", self._file), CHUNK_NS, chunked=self._file.kept)
 
     def start(self, meta: Mapping[str, Any]) -> None:
         """Write the head of the file: what is captured, by what and how; values of JSON's own types."""
@@ -87,7 +81,7 @@ class CaptureWriter:
         try:  # as `_writing`, in a third of its time
             self._stream.add(transaction)
         except _FAILED as error:
-            raise self._cannot_write(error) from error
+            raise self._file.failed(error) from error
 
     def event(self, name: str, t_ns: int, data: Mapping[str, Any] | None = None) -> None:
         """Keep a session event; `data` of JSON's own types."""
@@ -96,23 +90,27 @@ class CaptureWriter:
 
     def close(self) -> None:
         """Write the index, close the file, and write it anew with longer chunks where there is room for that."""
-        with self._writing(), self._file, closing(self._durable):
-            self._stream.finish()
-            self._file.flush()
-        if self._stream.started and self._path.is_file():
+        with self._writing():
+            try:
+                self._stream.finish()
+            finally:
+                path = self._file.close()
+        if self._stream.started and path is not None:
             # without it the file is as whole, and longer
             with suppress(OutputError, CaptureError, ZstdError, MemoryError):
-                self._with_longer_chunks()
+                self._with_longer_chunks(path)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: object, *_: object) -> None:
+        # what ends it by another error is told by that
+        with suppress(*(() if kind is None else (OutputError,))):
+            self.close()
 
-    def _with_longer_chunks(self) -> None:
-        with whole_file(self._path) as file:
-            stream, written = _Stream(file, CLOSED_CHUNK_NS), CaptureReader(self._path)
+    def _with_longer_chunks(self, path: Path) -> None:
+        with whole_file(path) as file:
+            stream, written = _Stream(file, CLOSED_CHUNK_NS), CaptureReader(path)
             stream.start(self._meta)
             for block in written.blocks():
                 stream.add(block)
@@ -125,13 +123,7 @@ class CaptureWriter:
         try:
             yield
         except _FAILED as error:
-            raise self._cannot_write(error) from error
-
-    def _cannot_write(self, error: Exception) -> OutputError:
-        return OutputError(
-            f"cannot write the capture {self._path} ({getattr(error, 'strerror', None) or error})",
-            "choose a place that you may write to, with room on it, with -o",
-        )
+            raise self._file.failed(error) from error
 
 
 class _Stream:

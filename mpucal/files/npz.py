@@ -28,8 +28,8 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ..data import Recording, Samples, Sensor
+from ..disk.whole import whole_file
 from ..errors import RecordingError
-from ..result.atomic import whole_file
 from ..strict_json import parsed
 from .rows import ROWS, Rows, Write, cannot_read, checked
 from .tables.times import possible_utc_ns

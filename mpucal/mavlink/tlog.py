@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import suppress
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from ..durable import Durable
+from ..disk.growing import Growing
 from ..errors import CaptureError, OutputError
-from ..result.atomic import sync_folder
 from .dialect import HEADER, LONGEST, packet_length
 
 STAMP = struct.Struct(">Q")
@@ -38,14 +37,8 @@ class TlogWriter:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
         self._flushed_ns = 0
-        try:
-            self._file = path.open("wb")
-        except OSError as error:
-            raise self._cannot_write(error) from error
-        sync_folder(self._path.parent)
-        self._durable = Durable(self._file)
+        self._file = Growing(path)
 
     def packet(self, t_ns: int, data: bytes) -> None:
         """Keep a packet."""
@@ -55,27 +48,22 @@ class TlogWriter:
                 self._file.flush()
                 self._flushed_ns = t_ns
         except OSError as error:
-            raise self._cannot_write(error) from error
+            raise self._file.failed(error) from error
 
     def close(self) -> None:
         """Write what is left."""
         try:
-            with self._file, closing(self._durable):
-                self._file.flush()
+            self._file.close()
         except OSError as error:
-            raise self._cannot_write(error) from error
+            raise self._file.failed(error) from error
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def _cannot_write(self, error: OSError) -> OutputError:
-        return OutputError(
-            f"cannot write the capture {self._path} ({error.strerror or error})",
-            "choose a place that you may write to, with room on it, with -o",
-        )
+    def __exit__(self, kind: object, *_: object) -> None:
+        # what ends it by another error is told by that
+        with suppress(*(() if kind is None else (OutputError,))):
+            self.close()
 
 
 class Tlog(NamedTuple):

@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike
 from .. import frames
 from ..arguments import a_path, content, shaped, vectors
 from ..data import Recording, Sensor, Vector
+from ..disk.whole import write_atomically
 from ..errors import RecordingError, WrongType, WrongValue
 from ..strict_json import MOST_BYTES, parsed
-from .atomic import write_atomically
 from .blob import NO_RANGE, Blob, BlobError
 from .correlation import UNCORRELATED
 from .digest import DIGEST, digest, doubt

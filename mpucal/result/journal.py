@@ -14,9 +14,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from ..disk.whole import make_folders, sync_folder, write_atomically
 from ..errors import OutputError
 from ..strict_json import parsed
-from .atomic import make_folders, sync_folder, write_atomically
 from .clock import now
 
 AT = "at"

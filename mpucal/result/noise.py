@@ -13,9 +13,9 @@ import numpy as np
 
 from ..arguments import content
 from ..data import Sensor, Vector
+from ..disk.whole import write_atomically
 from ..errors import RecordingError
 from ..strict_json import MOST_BYTES, parsed
-from .atomic import write_atomically
 from .calibration import Calibration
 
 FORMAT, VERSION = "mpucal.noise", 1

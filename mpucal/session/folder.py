@@ -2,48 +2,53 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 from ..data import Sensor
-from ..errors import OutputError
-from ..files.folder import captures_in
+from ..disk.folder import Folder, free_name
+from ..errors import OutputError, UsageError
+from ..files.folder import all_captures_in
 from ..result.clock import stamp
-from .results import make_folder
+from ..result.session_files import DOCUMENT
 
 
-class SessionFolder:
-    """A folder without a capture, made now.
+class SessionFolder(Folder):
+    """A folder without a capture and results, held until it is closed; see Folder.
 
     Parameters
     ----------
     asked : where the person wants it; None: here, under a name of its own. capture_name : the file to come in it.
     again : the folder holds earlier captures of the same session.
 
-    Attributes
-    ----------
-    path : where it is now.
-
     Raises
     ------
-    OutputError : it cannot be made, or holds a capture.
+    OutputError : it cannot be made, is another process's, or holds a capture or results.
     """
 
     def __init__(self, asked: Path | None, capture_name: str, again: bool = False) -> None:
         self._stamp = stamp()
         self._asked = asked is not None
         self._capture_name = capture_name
-        self.path = asked or Path(f"session-{self._stamp}")
-        if self.capture.exists() or (not again and captures_in(self.path)):
+        super().__init__(asked or Path(f"session-{self._stamp}"), new=asked is None)
+        held = [self.capture, self.path / DOCUMENT.name, *([] if again else all_captures_in(self.path))]
+        if there := next((file.name for file in held if file.exists()), None):
+            self.close()
             raise OutputError(
-                f"{self.path} holds a capture already, and no capture is written over",
-                "choose another folder with -o",
+                f"{asked} holds {there} already, which is not written over", "choose another folder with -o"
             )
-        make_folder(self.path)
 
     @property
     def capture(self) -> Path:
         """Where the capture goes."""
         return self.path / self._capture_name
+
+    @property
+    def kept(self) -> Path | None:
+        """The capture, where there is one."""
+        with suppress(OutputError):
+            return self.capture if self.capture.exists() else None
+        return None
 
     def settle(self, sensor: Sensor | None) -> None:
         """Give a folder that nobody named the name of its chip.
@@ -55,6 +60,13 @@ class SessionFolder:
             if not self._asked:
                 self.path.rmdir()
         elif sensor.chip and not self._asked:
-            named = Path(f"{sensor.chip.lower()}-{self._stamp}")
-            if not named.exists():
-                self.path = self.path.rename(named)
+            self.call(f"{sensor.chip.lower()}-{self._stamp}")
+
+
+def check_unfinished(folder: Path) -> None:
+    """UsageError where the session in `folder` has its results, which going on would replace."""
+    if (folder / DOCUMENT.name).exists():
+        raise UsageError(
+            f"the session in {folder} is finished",
+            f"`mpucal calibrate {folder} -o {free_name(folder)}` calibrates it again, elsewhere",
+        )

@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from ..data import Recording
-from ..errors import OutputError
+from ..disk.folder import free_name
+from ..disk.whole import take_away, write_atomically, write_together
+from ..errors import MpucalError, OutputError
+from ..files.folder import all_captures_in
 from ..report import render
-from ..result.atomic import make_folders, write_atomically, write_together
 from ..result.calibration import REFUSED, Calibration
 from ..result.session_files import DOCUMENT, REPORT, SESSION_FILES
 
@@ -81,9 +83,8 @@ def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
         try:
             write_atomically(folder / REPORT.name, files[REPORT.name])
         except OutputError as error:
-            with suppress(OSError):
-                # one that is there is of another calibration
-                (folder / REPORT.name).unlink(missing_ok=True)
+            # one that is there is of another calibration
+            take_away(folder / REPORT.name)
             raise OutputError(
                 f"{error.what}; {' and '.join(first)} are kept in {folder}",
                 f"make the report with `mpucal calibrate {folder} -o ELSEWHERE`",
@@ -91,16 +92,25 @@ def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     return tuple(folder / name for name in files)
 
 
-def make_folder(folder: Path) -> None:
-    """Make `folder` where it is missing.
+def check_owner(folder: Path, calibration: Calibration, read: Path, command: str) -> None:
+    """A folder's results are of one recording, by its digest, and beside its captures.
+
+    Parameters
+    ----------
+    read : what `calibration` was made of. command : what was called, without -o and its folder.
 
     Raises
     ------
-    OutputError : it cannot be made.
+    OutputError : `folder` is another recording's; says the command that puts the results elsewhere.
     """
-    try:
-        make_folders(folder)
-    except OSError as error:
+    captures, document = all_captures_in(folder), folder / DOCUMENT.name
+    if any(read.samefile(own) for own in (folder, *(captures if len(captures) == 1 else ())) if own.exists()):
+        return
+    owner = None
+    with suppress(MpucalError, ValueError, KeyError):
+        owner = Calibration.load(document).fit["recording_digest"]
+    if (captures or document.exists()) and owner != calibration.fit.get("recording_digest"):
         raise OutputError(
-            f"cannot make the folder {folder} ({error.strerror})", "choose another one with -o"
-        ) from error
+            f"{folder} holds {'a session' if captures else 'results'} of another recording, which stays as it is",
+            f"`{command} -o {free_name(folder)}` puts these elsewhere",
+        )

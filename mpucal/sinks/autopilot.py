@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from ..disk.whole import write_atomically
 from ..errors import LinkError, RecordingError, WriteBackError
 from ..mavlink.dialect import dialect
 from ..mavlink.firmwares import ARDUPILOT, PX4
@@ -23,7 +24,6 @@ from ..mavlink.prearm import Prearm, Watch, prearm
 from ..mavlink.request import command
 from ..mavlink.stillness import Stillness
 from ..mavlink.stream_parameters import read_stream_parameters
-from ..result.atomic import write_atomically
 from ..result.calibration import Calibration
 from ..result.journal import AT, Journal
 from ..session.at_rest import put_down

@@ -7,8 +7,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from pkgutil import resolve_name
 
+from ..disk.whole import write_atomically
 from ..errors import BusError, WriteBackError
-from ..result.atomic import write_atomically
 from ..result.blob import Blob, BlobError
 from ..result.calibration import REFUSED, Calibration
 from ..result.improvement import is_better, left_wrong

@@ -21,6 +21,7 @@ from ..chip.access import Files
 from ..chip.config import Config
 from ..chip.offsets import Words, difference
 from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..disk.whole import write_atomically
 from ..errors import ChipError, OutputError, SourceError, WriteBackError
 from ..export.linux_iio import LSB_PER_G, matrix_text, offset_words
 from ..iio.attributes import ACCEL, AXES, mount_matrix
@@ -28,7 +29,6 @@ from ..iio.decode import IioDecoder
 from ..iio.driver import IioDriver
 from ..iio.setup import POLLED, Attributes
 from ..rests.stillness import let_go
-from ..result.atomic import write_atomically
 from ..result.calibration import REFUSED, Calibration
 from ..result.journal import Journal
 from ..session.at_rest import put_down

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..arguments import content
+from ..disk.whole import write_atomically
 from ..errors import RecordingError
-from ..result.atomic import write_atomically
 from ..result.session_files import SessionFile
 from ..strict_json import MOST_BYTES, parsed
 

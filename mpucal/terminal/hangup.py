@@ -50,7 +50,7 @@ def _redirect(shown: Sequence[int], log: Path) -> None:
     if not shown:
         return
     try:
-        end = os.open(log, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        end = os.open(log, os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0), 0o644)
     except OSError:
         end = os.open(os.devnull, os.O_RDWR)
     nothing = os.open(os.devnull, os.O_RDONLY)

@@ -145,6 +145,30 @@ def test_a_refusal_leaves_an_earlier_blob_and_says_so(mpucal, tmp_path):
     np.savez(tmp_path / "flat.npz", **REFUSED["never turned"][0](turning()))
     mpucal("calibrate", "good.npz", "-o", "out")
     blob = (tmp_path / "out" / "calibration.bin").read_bytes()
+    (tmp_path / "out" / "calibration.json").unlink()
     result = mpucal("calibrate", "flat.npz", "-o", "out")
     assert "of an earlier calibration" in result.err
     assert (tmp_path / "out" / "calibration.bin").read_bytes() == blob
+
+
+def test_a_folder_is_one_recording_s(mpucal, session, tmp_path):
+    """Another recording goes neither beside a session's capture nor in the place of another one's results."""
+    np.savez(tmp_path / "walk.npz", **turning())
+    np.savez(tmp_path / "other.npz", **turning(noise=0.04))
+    assert mpucal("calibrate", "walk.npz", "-o", "out").code == 0
+    assert mpucal("calibrate", "walk.npz", "-o", "out", "--model", "accel").code == 0
+    for folder in (session.folder, tmp_path / "out"):
+        before = {path: path.read_bytes() for path in folder.iterdir()}
+        result = mpucal("calibrate", "other.npz", "-o", folder)
+        assert result.code == 3
+        assert f"`mpucal calibrate other.npz -o {folder}-2` puts these elsewhere" in result.err
+        assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_a_finished_session_is_not_gone_on_with(mpucal, session):
+    before = {path: path.read_bytes() for path in session.folder.iterdir()}
+    result = mpucal("session", "--resume", session.folder)
+    assert result.code == 2
+    assert "is finished" in result.err
+    assert f"-o {session.folder}-2" in result.err
+    assert {path: path.read_bytes() for path in session.folder.iterdir()} == before

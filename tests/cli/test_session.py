@@ -95,7 +95,7 @@ def test_no_capture_is_written_over(mpucal, session):
     before = (session.folder / "capture.mcap").read_bytes()
     result = mpucal("session", "--bus", "sim", "-o", session.folder)
     assert result.code == 3
-    assert "holds a capture already" in result.err
+    assert "holds capture.mcap already" in result.err
     assert (session.folder / "capture.mcap").read_bytes() == before
 
 

@@ -1,4 +1,5 @@
 import json
+import os
 import re
 import signal
 import subprocess
@@ -39,6 +40,7 @@ events = st.builds(SessionEvent, words, times, st.dictionaries(words, plain, max
 
 
 def write(path, records, meta=META):
+    path.unlink(missing_ok=True)
     with CaptureWriter(path) as writer:
         writer.start(meta)
         for record in records:
@@ -248,7 +250,9 @@ def test_a_folder_that_is_not_there_cannot_be_written(tmp_path):
         CaptureWriter(tmp_path / "none" / "capture.mcap")
 
 
-def test_a_full_disk_is_an_output_error():
+def test_a_full_disk_is_an_output_error(monkeypatch):
+    # the one device that is written to
+    monkeypatch.setattr(os, "devnull", "/dev/full")
     with pytest.raises(OutputError, match="No space left"), CaptureWriter("/dev/full") as writer:
         writer.start(META)
 

@@ -87,6 +87,7 @@ def test_a_place_that_cannot_be_written_to(tmp_path):
 
 def log_of(tmp_path, records):
     path = tmp_path / "made.tlog"
+    path.unlink(missing_ok=True)
     with TlogWriter(path) as writer:
         for t_s, data in records:
             writer.packet(START_NS + round(t_s * 1e9), data)

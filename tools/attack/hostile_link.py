@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 from unittest.mock import patch
 
-from mpucal import durable
+from mpucal.disk import growing
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.parameters.encoding import of_wire
 from mpucal.mavlink.transport import Bytes
@@ -130,7 +130,7 @@ def hostile(attack: Attack) -> Iterator[None]:
     HostileTransport.attack = attack
     with (
         patch("mpucal.simulated.vehicle.source.SimulatedTransport", HostileTransport),
-        patch.object(durable.Durable, "__init__", lambda self, _file: setattr(self, "close", lambda: None)),
+        patch.object(growing.Syncing, "__init__", lambda self, _file: setattr(self, "close", lambda: None)),
         patch.object(results, "report", lambda _: None),
         quick_polls(),
     ):

@@ -39,9 +39,9 @@ os.environ.update(ONE_THREAD)
 import numpy as np
 
 import mpucal
-from mpucal import durable
 from mpucal.__main__ import _keep_streams, run
 from mpucal.chip.config import MAX_FRAMES_A_POLL, Config
+from mpucal.disk import growing
 from mpucal.mavlink.dialect import dialect
 from mpucal.session import results, rotate
 
@@ -131,7 +131,7 @@ class Prefix:
         _redirect(here)
         _keep_streams()
         # a thread does not go on in a forked process
-        with self._world.opened(), patch.object(durable.Durable, "__init__", _unsynced), quick_polls():
+        with self._world.opened(), patch.object(growing.Syncing, "__init__", _unsynced), quick_polls():
             code = run(words(self._number))
         with suppress(OSError):
             sys.stdout.flush()
@@ -199,7 +199,7 @@ class Prefix:
         self._tell({**line, **asdict(outcome)})
 
 
-def _unsynced(durable_file: durable.Durable, _file: object) -> None:
+def _unsynced(durable_file: growing.Syncing, _file: object) -> None:
     durable_file.close = lambda: None
 
 

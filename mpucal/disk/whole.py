@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import secrets
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
 from ..errors import OutputError, UsageError
+from .place import mode_of_old
 
 
 def check_not_among(target: Path, inputs: Iterable[Path]) -> None:
@@ -62,10 +63,16 @@ def _held(path: Path) -> bytes | None:
         ) from error
 
 
+def take_away(path: Path) -> None:
+    """Remove a file; what is none stays."""
+    with suppress(OSError, OutputError):
+        if mode_of_old(path) is not None:
+            path.unlink()
+
+
 def _put_back(path: Path, data: bytes | None) -> None:
     if data is None:
-        if path.is_file():
-            path.unlink()
+        take_away(path)
     elif path.read_bytes() != data:
         write_atomically(path, data)
 
@@ -76,20 +83,25 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
 
     Raises
     ------
-    OutputError : the folder or file cannot be written.
+    OutputError : the folder or file cannot be written, or there is a link, device or pipe of that name.
     """
-    temporary = None
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    rights = mode_of_old(path)
+    made = False
     try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
-            temporary = Path(file.name)
+        # the umask is the person's; what is there keeps its rights
+        with temporary.open("x+b") as file:
+            made = True
+            if rights is not None:
+                temporary.chmod(rights)
             yield file
             file.flush()
             os.fsync(file.fileno())
-        temporary.chmod(0o644)
+        mode_of_old(path)
         temporary.replace(path)
         sync_folder(path.parent)
     except BaseException as error:
-        if temporary is not None:
+        if made:
             temporary.unlink(missing_ok=True)
         if not isinstance(error, OSError):
             raise

@@ -1,0 +1,66 @@
+"""A capture reaches the disk: what was synced last is all of it."""
+
+import os
+import sys
+
+import pytest
+
+from mpucal.chip.access import Transaction
+from mpucal.disk.growing import Growing
+from mpucal.disk.place import check_free
+from mpucal.errors import OutputError
+from mpucal.files.mcap import CaptureWriter
+from mpucal.mavlink.tlog import TlogWriter
+
+
+@pytest.mark.parametrize("kind", ["mcap", "tlog"])
+def test_a_capture_is_on_the_disk_once_it_is_closed(tmp_path, monkeypatch, kind):
+    synced = []
+    sync = os.fdatasync
+    monkeypatch.setattr(os, "fdatasync", lambda handle: synced.append(os.fstat(handle).st_size) or sync(handle))
+    path = tmp_path / f"capture.{kind}"
+    if kind == "mcap":
+        with CaptureWriter(path) as writer:
+            writer.start({})
+            writer.transaction(Transaction("read", 0x75, 1, b"\x68", 5))
+    else:
+        with TlogWriter(path) as writer:
+            writer.packet(1_000_000, b"packet")
+    assert synced[-1] == path.stat().st_size > 0
+
+
+@pytest.mark.parametrize("make", [lambda path: path.write_bytes(b"other"), lambda path: path.symlink_to("nothing")])
+def test_what_is_there_already_stays(tmp_path, make):
+    make(path := tmp_path / "capture.mcap")
+    with pytest.raises(OutputError, match="is there already"):
+        check_free(path)
+    with pytest.raises(OutputError, match="File exists"):
+        Growing(path)
+
+
+@pytest.mark.parametrize(
+    ("meddle", "what"),
+    [
+        (lambda path: os.truncate(path, 3), "shortened or overwritten"),
+        (lambda path: path.unlink(), "removed or replaced"),
+        (lambda path: path.unlink() or path.write_bytes(b"bytes, more"), "removed or replaced"),
+    ],
+    ids=["shortened", "removed", "replaced"],
+)
+def test_one_that_others_spoil_meanwhile_is_told(tmp_path, meddle, what):
+    file = Growing(tmp_path / "capture.mcap")
+    file.write(b"bytes")
+    file.flush()
+    meddle(file.path)
+    file.write(b", more")
+    with pytest.raises(OutputError, match=what):
+        file.close()
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not tell where a file went")
+def test_one_in_a_folder_that_is_renamed_is_found(tmp_path):
+    (tmp_path / "board").mkdir()
+    file = Growing(tmp_path / "board" / "capture.mcap")
+    file.write(b"bytes")
+    (tmp_path / "board").rename(tmp_path / "seven")
+    assert file.close() == tmp_path / "seven" / "capture.mcap"
