@@ -1,6 +1,7 @@
 """The models `accel` and `imu`, of a sensor that turns in place, and the choice among all models.
 
-The simplest model is chosen that explains the data: by the mean squared innovation, and for K by a Wald test.
+The simplest model is chosen that explains the data: by the mean squared innovation, for K by a Wald test, and for a
+lever arm by a score test.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..data import Recording
+from ..data import Recording, Vector
 from ..rests.flat import Flat, flat_statistics
 from .downsampling import downsampled
 from .fit import Fit
@@ -20,6 +21,7 @@ from .gyro_matrix import WALD_99, at_prior, wald
 from .hand import fit_hand
 from .initial_estimate import initialise
 from .levenberg_marquardt import MOST_ITERATIONS, Minimum, minimise
+from .lever import lever_arm
 from .likelihood import evaluate
 from .masks import mask
 from .paper import fit_paper
@@ -95,8 +97,8 @@ def choose(recording: Recording, flat: Flat, gravity: float) -> Choice:
     """The simplest model that explains the data.
 
     White noise and a trusted gyroscope first, then its matrix K; the same with a steadied gyroscope, and with small
-    errors of both sensors. K is kept where a Wald test tells it from the identity. Data that none of them explains were
-    measured in a hand.
+    errors of both sensors. K is kept where a Wald test tells it from the identity. Data that none of them explains, or
+    that show a lever arm, were measured in a hand.
     """
     least = np.inf
     for in_place, erring in _InPlace(recording, flat, gravity).attempts():
@@ -108,11 +110,20 @@ def choose(recording: Recording, flat: Flat, gravity: float) -> Choice:
             if parameters == ACCEL:
                 imu = in_place.with_matrix(minimum, errors)
                 minimum = minimum if imu is None else imu
-            return _chosen(in_place, minimum, errors)
+            r = in_place.lever_arm(minimum, errors)
+            if r is None:
+                return _chosen(in_place, minimum, errors)
+            why = f"the data show a lever arm of {1e3 * np.linalg.norm(r):.0f} mm"
+            return _in_a_hand(recording, flat, gravity, why)
+    return _in_a_hand(
+        recording, flat, gravity, f"white noise does not explain the data (innovations {least:.0f}, expected 3)"
+    )
+
+
+def _in_a_hand(recording: Recording, flat: Flat, gravity: float, why: str) -> Choice:
     hand = fit_hand(recording, flat, gravity)
     kept = "K" if "K_xx" in hand.names else "no K (it is not told from the identity)"
-    why = f"white noise does not explain the data (innovations {least:.0f}, expected 3): a hand's model, with {kept}"
-    return Choice(hand, "hand", why, recording)
+    return Choice(hand, "hand", f"{why}: a hand's model, with {kept}", recording)
 
 
 def _chosen(in_place: _InPlace, minimum: Minimum, errors: Errors) -> Choice:
@@ -192,6 +203,10 @@ class _InPlace:
         imu = self.minimum(IMU, near, errors)
         return imu if imu.converged and wald(imu) > WALD_99 else None
 
+    def lever_arm(self, minimum: Minimum, errors: Errors) -> Vector | None:
+        """The lever arm r (3,) [m] of a sensor that does not turn in place."""
+        return lever_arm(_erring(self._thin, errors), *self._means(SEARCH_HZ), minimum, self._prior)
+
     def as_fit(self, minimum: Minimum, errors: Errors) -> Fit:
         """With what the parts of the recording say."""
         known = at_prior(minimum.covariance()) if len(minimum.free) > ACCEL else ()
@@ -206,7 +221,9 @@ class _InPlace:
         """A long recording is searched by coarser means first, as far as they explain it."""
         theta, most, iterations = self._first, MOST_ITERATIONS, 0
         if len(self._thin.series) > MANY_MEANS:
-            coarse = minimise(self._means(COARSE_HZ), theta, parameters, self._prior, until=ROUGHLY)
+            coarse = minimise(
+                _problem(*self._means(COARSE_HZ), self._gravity), theta, parameters, self._prior, until=ROUGHLY
+            )
             if coarse.nis < EXPLAINED_NIS:
                 theta, iterations = coarse.theta, coarse.iterations
                 most = MOST_ITERATIONS if coarse.converged else 0
@@ -224,11 +241,11 @@ class _InPlace:
     @cached_property
     def _thin(self) -> Problem:
         """Means over blocks: white noise leaves little in a block beside its mean."""
-        return self._means(SEARCH_HZ)
+        return _problem(*self._means(SEARCH_HZ), self._gravity)
 
-    def _means(self, rate_hz: float) -> Problem:
+    def _means(self, rate_hz: float) -> tuple[Recording, Flat]:
         thin, at = downsampled(self.recording, self._flat, rate_hz)
-        return _problem(thin, flat_statistics(thin, at), self._gravity)
+        return thin, flat_statistics(thin, at)
 
 
 def _problem(recording: Recording, flat: Flat, gravity: float) -> Problem:

@@ -103,7 +103,8 @@ def preprocess(recording: Recording, at: tuple[int, int], gravity: float, noise:
     rest = np.zeros(len(series), bool)
     for a, b in after:
         rest[a:b] = True
-    rate, alpha = _rates(recording, flat, rest)
+    # at rest they are noise alone, and noise in a regressor pulls the lever arm to zero
+    rate, alpha = (np.where(rest[:, None], 0.0, values) for values in rates(recording, flat))
     speed2 = np.sum(rate * rate, axis=1)
     acc = carried(recording, flat, runs)
     lam = rate_of_rests(acc, recording, flat, runs, TREMOR_PER_S) if len(after) >= MANY_RESTS else MOTION_PER_S
@@ -132,18 +133,13 @@ def jerk_density(sigma: float, lam: float) -> float:
     return 16.0 * lam / 3.0 * sigma**2
 
 
-def _rates(recording: Recording, flat: Flat, rest: Vector) -> tuple[Vector, Vector]:
-    """Rate and angular acceleration (n, 3) after the flat segment; zero at rest, where they are noise alone.
-
-    Noise in a regressor pulls the lever arm to zero.
-    """
+def rates(recording: Recording, flat: Flat) -> tuple[Vector, Vector]:
+    """Rate and angular acceleration (n, 3) after the flat segment, by which a lever arm accelerates the sensor."""
     k = int(SMOOTH_S * recording.rate_hz)
     rate = _kernel.moving_mean(recording.gyr - flat.b_omega, k)
     # the times are smoothed as the rates are: those of a computer jitter
     times = _kernel.moving_mean((recording.t - recording.t[0])[:, None], k)[:, 0]
-    alpha = np.gradient(rate, times, axis=0)
-    moving = np.where(rest, 0.0, 1.0)[:, None]
-    return rate[flat.last :] * moving, alpha[flat.last :] * moving
+    return rate[flat.last :], np.gradient(rate, times, axis=0)[flat.last :]
 
 
 def _shaken(recording: Recording, flat: Flat) -> Vector:
