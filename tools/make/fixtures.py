@@ -104,6 +104,7 @@ def make_session(script: Script, capture: Path) -> dict[str, Any]:
 def without_date(dated: Path, capture: Path) -> None:
     """Write `dated` again without the time of day, so that a fixture changes only where a session does."""
     read = read_capture(dated)
+    capture.unlink(missing_ok=True)
     with CaptureWriter(capture) as writer:
         writer.start({key: value for key, value in read.meta.items() if key != "recorded"})
         for record in read.records:
