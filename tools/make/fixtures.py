@@ -104,7 +104,6 @@ def make_session(script: Script, capture: Path) -> dict[str, Any]:
 def without_date(dated: Path, capture: Path) -> None:
     """Write `dated` again without the time of day, so that a fixture changes only where a session does."""
     read = read_capture(dated)
-    capture.unlink(missing_ok=True)
     with CaptureWriter(capture) as writer:
         writer.start({key: value for key, value in read.meta.items() if key != "recorded"})
         for record in read.records:
@@ -119,6 +118,8 @@ def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
     sessions = folder / "sessions"
     sessions.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*/*.mcap"):  # a capture replaces no file
+        old.unlink()
     for name, script in SESSIONS.items():
         found = make_session(script, sessions / f"{name}.mcap")
         (sessions / f"{name}.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
