@@ -7,12 +7,11 @@ import errno
 import gc
 import io
 import os
-import re
 import sys
 from collections.abc import Sequence
 from typing import Any
 
-from .errors import Abandoned, MpucalError, OutputError, SourceError
+from .errors import Abandoned, MpucalError, OutputError, SourceError, plain
 from .session.threads import ONE_THREAD
 
 BUG = 1
@@ -24,8 +23,6 @@ UNMAPPED = "failed to map segment"
 DENIED = (*NO_ROOM, errno.EIO, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENFILE, errno.ENOMEM)
 # the commands whose capture is written as it happens
 RECORDING = ("session", "record")
-# by a terminal, beside the ends of lines
-OBEYED = re.compile("[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 # errors are events then, too
 EVENTS = "--json-events"
 
@@ -61,7 +58,7 @@ class _Plain(io.TextIOWrapper):
     """Text that a terminal only shows: what it would obey, as in the name of a file, is escaped."""
 
     def write(self, text: str) -> int:
-        return super().write(OBEYED.sub(lambda found: ascii(found[0])[1:-1], text))
+        return super().write(plain(text))
 
 
 class _Unfailing(io.FileIO):

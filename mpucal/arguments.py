@@ -192,7 +192,10 @@ def content(path: Path, most: int) -> bytes:
     except OSError as error:
         raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path") from error
     if len(data) > most:
-        raise RecordingError(f"{path} is longer than {most >> 20} MB", "give a file that mpucal wrote")
+        raise RecordingError(
+            f"{path} is longer than {most >> 20} MB" if most >> 20 else f"{path} is longer than {most} bytes",
+            "give a file that mpucal wrote",
+        )
     return data
 
 

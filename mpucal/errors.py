@@ -26,7 +26,16 @@ EndOfCapture is no error: with it a source says that its recording has ended.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+
+# by a terminal or a page, beside the ends of lines: controls, and what turns the direction of the text around
+OBEYED = re.compile("[\0-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+
+
+def plain(text: str) -> str:
+    """A text that a terminal or a page only shows: what it would obey is escaped."""
+    return OBEYED.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 def on_one_line(text: str) -> str:

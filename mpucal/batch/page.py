@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from ..data import Vector
-from ..report.elements import figure, paragraph, section, table
+from ..report.elements import escape, figure, paragraph, section, table
 from ..report.figure import BEFORE, Axes, X, Y, Z, legend, svg
 from ..report.style import CSS
 from .fleet import FAR, Parameter, parameters, repeatability, twice

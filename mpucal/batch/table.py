@@ -12,11 +12,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..disk.whole import whole_file
+from ..errors import plain
 from .row import COLUMNS, TEXTS, WHOLE
 
 # rows that are in memory at once
 GROUP = 4096
 PARQUET, CSV = "results.parquet", "results.csv"
+# what formulas begin with in one spreadsheet or another
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def schema() -> Any:
@@ -43,9 +46,18 @@ def write(folder: Path, rows: Iterator[dict[str, Any]]) -> tuple[Path, Path]:
         while group := list(islice(rows, GROUP)):
             writer.write_table(table_of(group))
             lines = _Lines()
-            csv.DictWriter(lines, COLUMNS, extrasaction="ignore", lineterminator="\n").writerows(group)
+            csv.DictWriter(lines, COLUMNS, extrasaction="ignore", lineterminator="\n").writerows(
+                {key: cell(value) for key, value in row.items()} for row in group
+            )
             plain.write("".join(lines.text).encode())
     return parquet, text
+
+
+def cell(value: Any) -> Any:
+    """A value as spreadsheets only show it: none takes a text for a formula, or turns its direction around."""
+    if not isinstance(value, str):
+        return value
+    return plain(f"'{value}" if value.startswith(FORMULA) else value)
 
 
 class _Lines:

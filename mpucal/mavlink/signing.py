@@ -6,33 +6,43 @@ import hashlib
 import re
 from pathlib import Path
 
-from ..errors import UsageError
+from ..arguments import content
+from ..errors import RecordingError, UsageError
 
 KEY_BYTES = 32
+# longer than any passphrase
+MOST_BYTES = 4096
 _HEXADECIMAL = re.compile(rb"\s*([0-9a-fA-F]{64})\s*")
 
 
 def read_key(path: Path) -> bytes:
     """The 32 bytes of a key file: as they are, as 64 hexadecimal digits, or as a passphrase's SHA-256.
 
-    Ground stations make keys of passphrases in that way.
+    Ground stations make keys of passphrases in that way. A file of 32 bytes is the key itself, unless it is a line of
+    text with its end: that is a passphrase of 31 letters, or 30. Blanks around a passphrase are no part of it.
 
     Raises
     ------
-    UsageError : the file cannot be read, or is empty.
+    UsageError : the file cannot be read, is a pipe or device, longer than MOST_BYTES, or empty.
     """
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise UsageError(
-            f"the signing key {path} cannot be read ({error.strerror})", "check --signing-key and its permissions"
-        ) from error
-    if len(content) == KEY_BYTES:
-        return content
-    digits = _HEXADECIMAL.fullmatch(content)
+        held = content(path, MOST_BYTES)
+    except RecordingError as error:
+        raise UsageError(f"the signing key cannot be used: {error.what}", "check --signing-key") from error
+    if len(held) == KEY_BYTES and not _is_line(held):
+        return held
+    digits = _HEXADECIMAL.fullmatch(held)
     if digits:
         return bytes.fromhex(digits[1].decode())
-    passphrase = content.strip()
+    passphrase = held.strip()
     if not passphrase:
         raise UsageError(f"the signing key {path} is empty", "give 32 bytes, 64 hexadecimal digits, or a passphrase")
     return hashlib.sha256(passphrase).digest()
+
+
+def _is_line(held: bytes) -> bool:
+    try:
+        text = held.decode()
+    except UnicodeDecodeError:
+        return False
+    return text.endswith("\n") and text.removesuffix("\n").removesuffix("\r").isprintable()

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from html import escape
-
 from ..chip.families import family_of
 from ..result.calibration import REFUSED, USABLE, Calibration
-from .elements import pair, quantity, section
+from .elements import escape, pair, quantity, section
 
 TO_SINKS = (
     ("a bridge's memory", "mpucal write calibration.json bridge --serial PORT"),

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from html import escape
+from html import escape as without_marks
 from typing import Any
+
+from ..errors import plain
+
+
+def escape(text: str) -> str:
+    """Text from anywhere as a page only shows it."""
+    return without_marks(plain(text))
 
 
 def section(title: str, *content: str) -> str:

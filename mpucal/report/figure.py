@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from html import escape
 
 import numpy as np
 
 from ..data import Vector
+from .elements import escape
 
 # in px; the page scales a picture to its column
 WIDTH = 420.0

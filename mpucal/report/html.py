@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from datetime import datetime
-from html import escape
 from types import MappingProxyType
 
 import numpy as np
@@ -17,7 +16,7 @@ from ..files.formats import is_of_session
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.session_files import CAPTURE
 from .decision import what_now
-from .elements import as_float, code, details, first, heading, number, pair, paragraph, quantity, section, table
+from .elements import as_float, code, details, escape, first, heading, number, pair, paragraph, quantity, section, table
 from .found import accelerometer_section, formula, gyroscope_table, is_regular, matrices, verification_section
 from .gallery import gallery
 from .style import CSS

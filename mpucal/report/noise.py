@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from html import escape
 
 import numpy as np
 
 from .. import __version__
 from ..data import STANDARD_GRAVITY_MPS2
 from ..result.noise import ACCELEROMETER, GYROSCOPE, INSTABILITY, QUANTISATION, WALK, WHITE, Noise
-from .elements import figure, paragraph, section, table
+from .elements import escape, figure, paragraph, section, table
 from .figure import INK, Axes, X, Y, Z, legend, svg
 from .style import CSS
 

@@ -28,7 +28,7 @@ from mpucal.batch.many import local_client, run
 from mpucal.batch.page import page
 from mpucal.batch.paths import found
 from mpucal.batch.row import COLUMNS, Settings, row_of
-from mpucal.batch.table import table_of, write
+from mpucal.batch.table import cell, table_of, write
 from mpucal.result.calibration import Calibration
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
@@ -271,6 +271,14 @@ def test_the_page_names_what_is_odd(tmp_path):
     ((number, rms),) = re.findall(r">b_a</th><td>(\d+)</td><td>([\d.]+)</td>", html)
     assert int(number) == 3 * 199
     assert 0.9 < float(rms) < 1.1
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [("=1+1.mcap", "'=1+1.mcap"), ("@x", "'@x"), ("a=1", "a=1"), ("a\u202eb", "a\\u202eb"), (-1.5, -1.5), (None, None)],
+)
+def test_a_spreadsheet_only_shows_a_cell(value, shown):
+    assert cell(value) == shown
 
 
 def test_in_python(cluster, captures):

@@ -1,6 +1,7 @@
 """The forms in which a key for signed packets is given."""
 
 import hashlib
+import os
 
 import pytest
 
@@ -16,8 +17,22 @@ KEY = bytes(range(32))
         (KEY, KEY),
         (KEY.hex().encode() + b"\n", KEY),
         (b"correct horse\n", hashlib.sha256(b"correct horse").digest()),
+        (b"p" * 31 + b"\n", hashlib.sha256(b"p" * 31).digest()),
+        (b"p" * 30 + b"\r\n", hashlib.sha256(b"p" * 30).digest()),
+        (b"p" * 32, b"p" * 32),
+        (bytes(range(31)) + b"\n", bytes(range(31)) + b"\n"),
+        (b"\xff" * 31 + b"\n", b"\xff" * 31 + b"\n"),
     ],
-    ids=["bytes", "hexadecimal", "passphrase"],
+    ids=[
+        "bytes",
+        "hexadecimal",
+        "passphrase",
+        "31 and newline",
+        "30 and CRLF",
+        "32 letters",
+        "bytes, 10",
+        "no text, 10",
+    ],
 )
 def test_the_forms_of_a_key(content, key, tmp_path):
     (tmp_path / "key").write_bytes(content)
@@ -28,3 +43,12 @@ def test_an_empty_key_is_refused(tmp_path):
     (tmp_path / "key").write_bytes(b" \n")
     with pytest.raises(UsageError, match="is empty"):
         read_key(tmp_path / "key")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_what_has_no_end_is_no_key(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "long").write_bytes(b"p" * 5000)
+    for path, what in ((tmp_path / "pipe", "a pipe or device"), (tmp_path / "long", "longer than 4096 bytes")):
+        with pytest.raises(UsageError, match=what):
+            read_key(path)
