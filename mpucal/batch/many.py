@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -147,7 +147,7 @@ def local_client(workers: int | None = None, dashboard: bool = False) -> Iterato
 
     Raises
     ------
-    UsageError : dask.distributed or pyarrow is not installed.
+    SourceError : they could not be started. UsageError : dask.distributed or pyarrow is not installed.
     """
     distributed = _distributed()
     import dask  # noqa: PLC0415
@@ -155,16 +155,24 @@ def local_client(workers: int | None = None, dashboard: bool = False) -> Iterato
     with (
         TemporaryDirectory(prefix="mpucal-") as scratch,
         dask.config.set(COMES_BACK),
-        distributed.LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            local_directory=scratch,
-            dashboard_address=":8787" if dashboard else ":0",
-            silence_logs="ERROR",
-        ) as cluster,
-        distributed.Client(cluster) as client,
+        ExitStack() as stack,
     ):
+        try:
+            cluster = distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                local_directory=scratch,
+                dashboard_address=":8787" if dashboard else ":0",
+                # its own lines would be of a worker that could not be started
+                silence_logs="CRITICAL",
+            )
+            client = stack.enter_context(distributed.Client(stack.enter_context(cluster)))
+        except (RuntimeError, OSError) as error:
+            raise SourceError(
+                f"the workers were ended while they started ({error})",
+                "see to it that there is memory for them, or give fewer --workers, and run the same again",
+            ) from error
         yield client
 
 

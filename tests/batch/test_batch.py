@@ -29,6 +29,7 @@ from mpucal.batch.page import page
 from mpucal.batch.paths import found
 from mpucal.batch.row import COLUMNS, Settings, row_of
 from mpucal.batch.table import cell, table_of, write
+from mpucal.errors import SourceError
 from mpucal.result.calibration import Calibration
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
@@ -271,6 +272,15 @@ def test_the_page_names_what_is_odd(tmp_path):
     ((number, rms),) = re.findall(r">b_a</th><td>(\d+)</td><td>([\d.]+)</td>", html)
     assert int(number) == 3 * 199
     assert 0.9 < float(rms) < 1.1
+
+
+def test_workers_that_are_ended_while_they_start_are_told(monkeypatch):
+    def cluster(**_):
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr(distributed, "LocalCluster", cluster)
+    with pytest.raises(SourceError, match="ended while they started"), local_client(1):
+        pass
 
 
 @pytest.mark.parametrize(

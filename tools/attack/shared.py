@@ -1,12 +1,14 @@
 """Processes that share a folder or a name, others that meddle with their files, and every output where no file is.
 
-    .venv/bin/python -m tools.attack shared [--pairs N] [--eights N] [--meddled N] [--outputs] [--seed N]
+    .venv/bin/python -m tools.attack shared [--pairs N] [--eights N] [--meddled N] [--ended N] [--outputs]
+                                           [--seed N]
 
-A race forks so many processes, which begin together: sessions and recordings of a simulated chip into one -o, into
-none, and calibrations of two recordings into one folder. Meddling renames a session's folder, cuts, removes or replaces
-its capture. An output is a device, a pipe, a link, a folder, a full or a read-only disk in the place of the file.
-It is judged whether one process at most ends well for each capture that is there, whether each capture is whole and the
-results beside it are its own, and whether all others end with a sentence. Exit code 1: what is said last was not so.
+A race forks so many processes, which begin together: sessions and recordings of a simulated chip into one -o, and into
+none. Meddling renames a session's folder, or cuts, removes or replaces its capture. Ending sends KILL, TERM, HUP or ALRM
+to a batch and to a session at any time, and counts the processes that are left of it after ten seconds. An output is a
+device, a pipe, a link or a folder in the place of the file. It is judged whether one process at most ends well for each
+capture that is there, whether each capture is whole and the results beside it are its own, and whether all others end
+with a sentence. Exit code 1: what is said last was not so.
 """
 
 from __future__ import annotations
@@ -14,7 +16,9 @@ from __future__ import annotations
 import argparse
 import os
 import random
+import signal
 import stat
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -32,9 +36,11 @@ from mpucal.result.calibration import Calibration
 
 SESSION = ("session", "--rate", "25", "--target", "quick", "--yes", "--no-write")
 RECORD = ("record", "--seconds", "2")
-# of no signal, so that a race is of starts that lie apart by up to this [s]
+# starts lie apart by up to this [s]
 APART_S = 0.02
 ENDS_S = 60.0
+# the time in which a command has all its processes, and that after which none may be left [s]
+LONGEST_START_S, LEFT_S = 4.0, 10.0
 
 
 class Process:
@@ -175,6 +181,49 @@ def _after_meddling(kind: str, code: int, said: str, folder: Path) -> str:
     return "" if code == 3 and "by another program" in said else f"exit code {code}: {said[-200:]}"
 
 
+def end(count: int, draw: random.Random, tell: Callable[[str, str], None]) -> None:
+    """So many commands with processes of their own, ended by a signal."""
+    capture = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
+    for number in range(count):
+        kind = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM)[number // 2 % 4]
+        what, words = (
+            # one with a page outlives its terminal
+            ("session", (*SESSION, "--bus", "sim:pace=real", *(["--page"] if kind != signal.SIGHUP else []))),
+            ("batch", ("batch", str(capture), "-o", "fleet", "--workers", "2")),
+        )[number % 2]
+        with TemporaryDirectory(ignore_cleanup_errors=True) as place:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "mpucal", *words],
+                cwd=place,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+            time.sleep(draw.uniform(0.2, LONGEST_START_S))
+            process.send_signal(kind)
+            until_s = time.monotonic() + LEFT_S
+            while (process.poll() is None or _of_session(process.pid)) and time.monotonic() < until_s:
+                time.sleep(0.1)
+            left = _of_session(process.pid)
+            for each in left:
+                with suppress(ProcessLookupError):
+                    os.kill(each, signal.SIGKILL)
+            process.wait()
+            tell(f"{kind.name} to {what}", f"{len(left)} processes are left" if left else "")
+
+
+def _of_session(leader: int) -> list[int]:
+    """The processes that are left of those that `leader` began, by proc(5)."""
+    found = []
+    for stat_file in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            words = stat_file.read_text().rpartition(")")[2].split()
+            if int(words[3]) == leader and words[0] != "Z":
+                found.append(int(stat_file.parent.name))
+    return found
+
+
 def outputs(tell: Callable[[str, str], None]) -> None:
     """Each command that writes, where its output is no file."""
     with TemporaryDirectory() as made:
@@ -244,7 +293,7 @@ OBSTACLES: dict[str, Callable[[Path], None]] = {
 def main() -> int:
     """Run what was asked for; 1 where something was not as it ought to be."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    for name, default in (("--pairs", 10), ("--eights", 2), ("--meddled", 10), ("--seed", 1)):
+    for name, default in (("--pairs", 10), ("--eights", 2), ("--meddled", 10), ("--ended", 0), ("--seed", 1)):
         parser.add_argument(name, type=int, default=default)
     parser.add_argument("--outputs", action="store_true")
     asked = parser.parse_args()
@@ -264,6 +313,7 @@ def main() -> int:
     races(asked.pairs, 2, draw, tell)
     races(asked.eights, 8, draw, tell)
     meddle(asked.meddled, draw, tell)
+    end(asked.ended, draw, tell)
     if asked.outputs:
         outputs(tell)
     for kind, (done, bad) in counts.items():
