@@ -24,6 +24,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STANDARD_GRAVITY_MPS2 = 9.80665
+
+# Counts at full scale, of which all of mpucal, its exports and its firmware make SI units. PS-MPU-6000A r3.4, 6.1 and
+# 6.2, and PS-MPU-9250A r1.0, 3.1 and 3.2, "Sensitivity Scale Factor": 16384 LSB/g at +-2 g and 131 LSB/(deg/s) at +-250
+# deg/s, each half of it at the next range (32.75 and 16.375 are printed as 32.8 and 16.4).
+ACCEL_COUNTS = 32768.0
+GYRO_COUNTS = 32750.0
 # names reach scripts and source code: these characters end no string and no comment there
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .:+()-]{0,63}")
 BYTE = 0xFF

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ..data import STANDARD_GRAVITY_MPS2
+from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2
 from ..errors import UsageError
 
 # the factory's self test: three bytes of each on a 6500, four packed ones on a 6050
@@ -88,9 +88,8 @@ FRAME_BYTES: Final = 2 * FRAME_WORDS
 # Full scales by FS_SEL and AFS_SEL.
 ACCEL_RANGES_G: Final = (2, 4, 8, 16)
 GYRO_RANGES_DPS: Final = (250, 500, 1000, 2000)
-ACCEL_LSB_PER_G: Final = (16384.0, 8192.0, 4096.0, 2048.0)
-# Each is half of the one before; the data sheet prints 32.8 and 16.4.
-GYRO_LSB_PER_DPS: Final = (131.0, 65.5, 32.75, 16.375)
+ACCEL_LSB_PER_G: Final = tuple(ACCEL_COUNTS / full_scale for full_scale in ACCEL_RANGES_G)
+GYRO_LSB_PER_DPS: Final = tuple(GYRO_COUNTS / full_scale for full_scale in GYRO_RANGES_DPS)
 
 # The gyroscope's offset registers: one scale at every full scale.
 GYRO_OFFSET_LSB_PER_DPS: Final = 32.75

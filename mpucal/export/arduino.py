@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..chip.families import MPU6050, family_of
+from ..data import ACCEL_COUNTS, GYRO_COUNTS
 from ..result.calibration import Calibration
 from .c_code import INCLUDES, at_temperature
 from .code import in_c
@@ -30,8 +31,8 @@ def _constants(calibration: Calibration) -> str:
     return f"""
 static const uint8_t CHIP = 0x68;
 static const uint8_t ACCEL_CONFIG = 0x{ACCEL_CONFIG[range_g]:02x}, GYRO_CONFIG = 0x{GYRO_CONFIG[range_dps]:02x};
-static const float MPS2_PER_COUNT = {range_g:g} * 9.80665f / 32768;            // +-{range_g:g} g
-static const float RAD_S_PER_COUNT = {range_dps:g} * 0.01745329252f / 32768;  // +-{range_dps:g} deg/s
+static const float MPS2_PER_COUNT = {range_g:g} * 9.80665f / {ACCEL_COUNTS:.0f};  // +-{range_g:g} g
+static const float RAD_S_PER_COUNT = {range_dps:g} * 0.01745329252f / {GYRO_COUNTS:.0f};  // +-{range_dps:g} deg/s
 static const float LSB_PER_C = {family.lsb_per_c:g}, ZERO_C = {family.zero_c:g};
 """
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..data import ACCEL_COUNTS, GYRO_COUNTS
 from ..result.calibration import Calibration
 from .code import temperatures
 
@@ -44,19 +45,19 @@ static inline int mpucal_correct_counts(const int16_t counts[3], float range_g, 
     if (!(range_g > 0.0f) || (MPUCAL_RANGE_G > 0.0f && range_g != MPUCAL_RANGE_G))
         return 0;
     for (int i = 0; i < 3; i++)
-        y[i] = (float)counts[i] * (range_g * 9.80665f / 32768.0f);
+        y[i] = (float)counts[i] * (range_g * 9.80665f / {ACCEL_COUNTS:.1f}f);
     mpucal_correct(y, a);
     return 1;
 }}
 
-/* The same of the gyroscope's counts at +-range_dps. */
+/* The same of the gyroscope's counts at +-range_dps: 131 of them are 1 deg/s at +-250 deg/s. */
 static inline int mpucal_correct_gyro_counts(const int16_t counts[3], float range_dps, float w[3])
 {{
     float y[3];
     if (!(range_dps > 0.0f) || (MPUCAL_RANGE_DPS > 0.0f && range_dps != MPUCAL_RANGE_DPS))
         return 0;
     for (int i = 0; i < 3; i++)
-        y[i] = (float)counts[i] * (range_dps * 0.01745329252f / 32768.0f);
+        y[i] = (float)counts[i] * (range_dps * 0.01745329252f / {GYRO_COUNTS:.1f}f);
     mpucal_correct_gyro(y, w);
     return 1;
 }}

@@ -6,10 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
 from ..result.calibration import Calibration
-
-COUNTS = 32768  # full scale of a 16-bit reading
 
 
 def in_c(c: Calibration) -> str:
@@ -38,7 +36,7 @@ static inline void mpucal_correct(const float y[3], float a[3])
     }}
 }}
 
-/* The rate w [rad/s] of a measured one. */
+{_about_rates(c, "/* ", " */")}
 static inline void mpucal_correct_gyro(const float y[3], float w[3])
 {{
     for (int i = 0; i < 3; i++) {{
@@ -124,8 +122,18 @@ def _about_counts(c: Calibration, begin: str, end: str) -> str:
     line = f"{begin}y: as measured, a: calibrated, both in m/s^2.{end}"
     if c.sensor.accel_range_g is None:
         return line
-    scale = c.sensor.accel_range_g * STANDARD_GRAVITY_MPS2 / COUNTS
+    scale = c.sensor.accel_range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
     return f"{line}\n{begin}At +-{c.sensor.accel_range_g:g} g one count of the chip is {scale:.9g} m/s^2.{end}"
+
+
+def _about_rates(c: Calibration, begin: str, end: str) -> str:
+    line = f"{begin}The rate w [rad/s] of a measured one.{end}"
+    range_dps = c.sensor.gyro_range_dps
+    if range_dps is None:
+        return line
+    lsb, scale = GYRO_COUNTS / range_dps, np.radians(range_dps / GYRO_COUNTS)
+    of = f"{range_dps:g} deg/s one count of the chip is {scale:.9g} rad/s, {lsb:g} LSB/(deg/s)"
+    return f"{line}\n{begin}At +-{of}; who takes another scale for y changes w by as much.{end}"
 
 
 def _joined(numbers: Iterable[str]) -> str:

@@ -1,7 +1,7 @@
 """A calibration as YAML for ESPHome: its mpu6050 sensor, and a template sensor of each calibrated axis.
 
 ESPHome sets +-2 g and +-2000 deg/s, and publishes counts * 0.000061 * 9.80665 m/s^2 and counts * 0.060975 deg/s
-(mpu6050.cpp), where one count is 1/16384 g and 2000/32768 deg/s: its numbers are made the nominal ones first.
+(mpu6050.cpp), where one count is 1/16384 g and 2000/32750 deg/s: its numbers are made the nominal ones first.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..data import Vector
+from ..data import ACCEL_COUNTS, GYRO_COUNTS, Vector
 from ..result.calibration import Calibration
 from .code import temperatures
 from .losses import head
 
-G_PER_COUNT, NOMINAL_G = 0.000061, 1 / 16384
-DPS_PER_COUNT, NOMINAL_DPS = 0.060975, 2000 / 32768
-RANGE_G = 2.0
+RANGE_G, RANGE_DPS = 2.0, 2000.0
+G_PER_COUNT, NOMINAL_G = 0.000061, RANGE_G / ACCEL_COUNTS
+DPS_PER_COUNT, NOMINAL_DPS = 0.060975, RANGE_DPS / GYRO_COUNTS
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..chip.offsets import moved
+from ..chip.registers import GYRO_OFFSET_LSB_PER_DPS
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import ChipError, WriteBackError
 from ..result.calibration import Calibration
 from .losses import head, mps2
 
 LSB_PER_G = 2048.0
-LSB_PER_DPS = 131.0 / 4.0
 WORD = 1 << 15
 
 
@@ -61,7 +61,7 @@ def _words(calibration: Calibration) -> tuple[tuple[int, int, int], tuple[int, .
         a = moved(trim, -calibration.b_a / STANDARD_GRAVITY_MPS2 * LSB_PER_G)
     except ChipError as error:
         raise WriteBackError(f"nothing was exported: {error.what}", error.remedy) from error
-    w = np.rint(-np.degrees(np.nan_to_num(calibration.b_omega)) * LSB_PER_DPS)
+    w = np.rint(-np.degrees(np.nan_to_num(calibration.b_omega)) * GYRO_OFFSET_LSB_PER_DPS)
     if np.abs(w).max() >= WORD:
         raise WriteBackError("nothing was exported: no word holds the gyroscope's bias", "check the gyroscope")
     return a, tuple(w.astype(int).tolist())

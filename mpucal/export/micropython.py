@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..data import STANDARD_GRAVITY_MPS2, Vector
+from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
 from ..result.calibration import Calibration
-from .code import COUNTS, temperatures
+from .code import temperatures
 from .losses import head
 
 
@@ -54,11 +54,11 @@ def _measured(counts, used, calibrated, unit):
 
 def apply_counts(counts, range_g, temperature_c=None):
     # the same of the chip's counts at +-range_g, to which it is set
-    return apply(_measured(counts, range_g, RANGE_G, {STANDARD_GRAVITY_MPS2 / COUNTS:.9g}), temperature_c)
+    return apply(_measured(counts, range_g, RANGE_G, {STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS:.9g}), temperature_c)
 
 
 def apply_gyro_counts(counts, range_dps):
-    return apply_gyro(_measured(counts, range_dps, RANGE_DPS, {np.radians(1) / COUNTS:.9g}))
+    return apply_gyro(_measured(counts, range_dps, RANGE_DPS, {np.radians(1) / GYRO_COUNTS:.9g}))
 """
 
 

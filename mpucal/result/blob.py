@@ -9,21 +9,26 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 MAGIC = b"MPUC"
-# a blob without b_a(T) is written as minor version 0 has it
-MAJOR, MINOR, MINOR_WITHOUT_SLOPE = 1, 1, 0
+MAJOR = 1
 MAX_LENGTH = 256
 FORMULA = "a = inv(D) @ (y - b_a + applied_b_a)"
 
-# firmware_protocol.md, "Layout", down to the last field of minor version 0; what 1 appended; then the checksum
+# firmware_protocol.md, "Layout", down to the last field of minor version 0; what 1 and 2 appended; then the checksum
 FIELDS = struct.Struct("<4s B B H 40s B 3x f f 9f 3f f Q f 3f 9f 3f")
 SLOPE = struct.Struct("<3f 2f")
+COUNTS = struct.Struct("<f")
 CHECKSUM = struct.Struct("<I")
 LENGTH = FIELDS.size + CHECKSUM.size
 LENGTH_WITH_SLOPE = LENGTH + SLOPE.size
+LENGTH_WITH_COUNTS = LENGTH_WITH_SLOPE + COUNTS.size
 HEADER_LENGTH = 8
 
 APPENDED = (("b_a_slope", 3), ("temperature_range_c", 2))
 NO_SLOPE, NO_RANGE = (0.0, 0.0, 0.0), (math.nan, math.nan)
+
+# of D's largest element, and of its determinant against the cube of that: no sensor is beyond
+LEAST_GAIN, MOST_GAIN = 1e-3, 1e3
+LEAST_DETERMINANT = 1e-6
 
 MAJOR_AT = 4
 LENGTH_AT = 6
@@ -49,6 +54,8 @@ class Blob:
     K : 9 numbers, row-major. b_omega : 3, rad/s: w = K (y - b_omega); NaN where not estimated.
     b_a_slope : 3, m/s^2 a degree Celsius: b_a(T) = b_a + b_a_slope (T - temperature_c); zeros: not known.
     temperature_range_c : 2, to which T is cut off; NaN without b_a_slope.
+    gyro_counts : counts of the gyroscope at gyro_range_dps, of which K and b_omega are; None: of minor version 0 or 1,
+        which do not say it, and which mpucal wrote of GYRO_COUNTS.
     """
 
     who_am_i: int
@@ -64,6 +71,7 @@ class Blob:
     b_omega: tuple[float, ...]
     b_a_slope: tuple[float, ...] = NO_SLOPE
     temperature_range_c: tuple[float, ...] = NO_RANGE
+    gyro_counts: float | None = None
 
     def encode(self) -> bytes:
         """The blob's bytes.
@@ -74,11 +82,11 @@ class Blob:
         """
         _check_usable(self)
         try:
-            appended = SLOPE.pack(*self.b_a_slope, *self.temperature_range_c) if any(self.b_a_slope) else b""
+            minor, appended = self._appended()
             body = FIELDS.pack(
                 MAGIC,
                 MAJOR,
-                MINOR if appended else MINOR_WITHOUT_SLOPE,
+                minor,
                 LENGTH + len(appended),
                 FORMULA.encode(),
                 self.who_am_i,
@@ -97,6 +105,13 @@ class Blob:
             raise BlobError(f"a value does not fit its field ({error})") from error
         body += appended
         return body + CHECKSUM.pack(zlib.crc32(body))
+
+    def _appended(self) -> tuple[int, bytes]:
+        """The minor version, and its fields behind those of 0."""
+        slope = SLOPE.pack(*self.b_a_slope, *self.temperature_range_c)
+        if self.gyro_counts is not None:
+            return 2, slope + COUNTS.pack(self.gyro_counts)
+        return (1, slope) if any(self.b_a_slope) else (0, b"")
 
     @classmethod
     def decode(cls, data: bytes) -> Blob:
@@ -123,6 +138,7 @@ class Blob:
             b_omega=values[30:33],
             b_a_slope=slope,
             temperature_range_c=range_c,
+            gyro_counts=_gyro_counts(data),
         )
         _check_usable(blob)
         return blob
@@ -155,6 +171,13 @@ def _slope(data: bytes, temperature_c: float) -> tuple[tuple[float, ...], tuple[
     return (values[:3], values[3:]) if usable else (NO_SLOPE, NO_RANGE)
 
 
+def _gyro_counts(data: bytes) -> float | None:
+    if len(data) < LENGTH_WITH_COUNTS:
+        return None
+    (counts,) = COUNTS.unpack_from(data, LENGTH_WITH_SLOPE - CHECKSUM.size)
+    return float(counts)
+
+
 def _check_usable(blob: Blob) -> None:
     for name, count in (("D", 9), ("b_a", 3), ("applied_b_a", 3), ("K", 9), ("b_omega", 3), *APPENDED):
         values = getattr(blob, name)
@@ -162,6 +185,20 @@ def _check_usable(blob: Blob) -> None:
             raise BlobError(f"{name} has {len(values)} numbers, not {count}")
         if name in ("D", "b_a", "applied_b_a") and not all(map(math.isfinite, values)):
             raise BlobError(f"{name} holds a number that is not finite")
+    _check_invertible(blob.D)
+    for name in ("accel_range_g", "gyro_range_dps"):
+        if not 0.0 <= getattr(blob, name) < math.inf:
+            raise BlobError(f"{name} is {getattr(blob, name)}, and neither a range nor 0")
+    if blob.gyro_counts is not None and not 0.0 < blob.gyro_counts < math.inf:
+        raise BlobError(f"gyro_counts is {blob.gyro_counts}, and no number of counts")
+
+
+def _check_invertible(D: tuple[float, ...]) -> None:
+    a, b, c, d, e, f, g, h, i = D
+    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    most = max(map(abs, D))
+    if not LEAST_GAIN <= most <= MOST_GAIN or not abs(determinant) > LEAST_DETERMINANT * most**3:
+        raise BlobError("D has no inverse")
 
 
 def _unix_seconds(created: str) -> int:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from .. import frames
 from ..arguments import a_path, content, shaped, vectors
-from ..data import Recording, Sensor, Vector
+from ..data import GYRO_COUNTS, Recording, Sensor, Vector
 from ..disk.whole import write_atomically
 from ..errors import RecordingError, WrongType, WrongValue
 from ..strict_json import MOST_BYTES, parsed
@@ -242,6 +242,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
             b_omega=tuple(self.b_omega.tolist()),
             b_a_slope=tuple(self.b_a_slope.tolist()),
             temperature_range_c=tuple(self.temperature_range_c.tolist()) if self.follows_temperature else NO_RANGE,
+            gyro_counts=GYRO_COUNTS,
         )
 
     def save(self, path: str | Path) -> None:
@@ -307,11 +308,13 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         """
         if not isinstance(blob, Blob):
             raise WrongType(f"a blob is given as {type(blob).__name__}", "give what Calibration.blob() returned")
+        # of a unit of GYRO_COUNTS one of the blob's
+        unit = GYRO_COUNTS / (blob.gyro_counts or GYRO_COUNTS)
         return cls(
             D=np.array(blob.D).reshape(3, 3),
             b_a=np.array(blob.b_a),
-            K=np.array(blob.K).reshape(3, 3),
-            b_omega=np.array(blob.b_omega),
+            K=np.array(blob.K).reshape(3, 3) * unit,
+            b_omega=np.array(blob.b_omega) / unit,
             fit=cast(Fit, {"gravity": blob.gravity}),
             sensor=Sensor(
                 who_am_i=blob.who_am_i or None,

@@ -99,7 +99,7 @@ def test_the_c_header_compiled_and_run(calibrated, samples, tmp_path, flags):
 
 
 COUNTS = np.random.default_rng(3).integers(-32768, 32768, (100, 3))
-MEASURED_A, MEASURED_W = COUNTS * (4 * STANDARD_GRAVITY_MPS2 / 32768), COUNTS * np.radians(500 / 32768)
+MEASURED_A, MEASURED_W = COUNTS * (4 * STANDARD_GRAVITY_MPS2 / 32768), COUNTS * np.radians(1 / 65.5)
 
 
 def test_the_c_header_takes_counts_of_its_range_alone(calibrated, tmp_path):
@@ -139,7 +139,7 @@ struct Bus {
     int endTransmission(bool = true) { at = sent[0]; if (length == 2) registers[at] = sent[1]; return 0; }
     int requestFrom(uint8_t, uint8_t count) { taken = 0; return count; }
     int read() {
-        if (at != 0x3B || registers[0x6B] != 0x01 || registers[0x1C] != RANGE_BITS || registers[0x1B] != 0x08)
+        if (at != 0x3B || registers[0x6B] != 0x01 || registers[0x1C] != RANGE_BITS || registers[0x1B] != RANGE_BITS)
             abort();
         uint16_t value = (uint16_t)given[taken / 2];
         return taken++ % 2 ? value & 0xFF : value >> 8;
@@ -159,7 +159,9 @@ int main() {
 
 @pytest.mark.parametrize(("range_g", "bits"), [(2.0, 0x00), (4.0, 0x08), (8.0, 0x10), (16.0, 0x18)])
 def test_the_sketch_compiled_and_run_on_a_stand_in_for_arduino(calibrated, tmp_path, range_g, bits):
-    calibrated = replace(calibrated, sensor=replace(calibrated.sensor, accel_range_g=range_g), **FOLLOWING)
+    calibrated = replace(
+        calibrated, sensor=replace(calibrated.sensor, accel_range_g=range_g, gyro_range_dps=125 * range_g), **FOLLOWING
+    )
     (tmp_path / "sketch.ino").write_text(form("arduino").export(calibrated)[0])
     (tmp_path / "Arduino.h").write_text(ARDUINO)
     (tmp_path / "Wire.h").write_text(WIRE)
@@ -167,7 +169,7 @@ def test_the_sketch_compiled_and_run_on_a_stand_in_for_arduino(calibrated, tmp_p
     run = compiled(tmp_path, "host.cpp", HOST, "-std=c++11", f"-DRANGE_BITS={bits}")
     out = run("".join(" ".join(map(str, row)) + "\n" for row in counts))
     y = counts[:, :3] * range_g * STANDARD_GRAVITY_MPS2 / 32768
-    a, w = calibrated.apply(y, counts[:, 4:] * np.radians(500 / 32768), counts[:, 3] / 340 + 36.53)
+    a, w = calibrated.apply(y, counts[:, 4:] * np.radians(range_g / 2 / 131), counts[:, 3] / 340 + 36.53)
     # it prints four digits
     assert np.abs(out[:, :3] - a).max() < 6e-5 + range_g * 1e-5
     np.testing.assert_allclose(out[:, 3:], w, atol=6e-5)

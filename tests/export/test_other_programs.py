@@ -118,7 +118,7 @@ def test_the_micropython_module_needs_nothing(calibration, samples):
     np.testing.assert_allclose([module["apply"](y) for y in samples.tolist()], a, atol=1e-6)
     np.testing.assert_allclose([module["apply_gyro"](y) for y in RATES.tolist()], w, atol=1e-6)
     counts = [100, -20000, 32767]
-    y_a, y_w = np.array(counts) * (4 * G / 32768), np.array(counts) * np.radians(500 / 32768)
+    y_a, y_w = np.array(counts) * (4 * G / 32768), np.array(counts) * np.radians(1 / 65.5)
     for T in (-20.0, 12.5, 60.0, math.nan):
         np.testing.assert_allclose(module["apply_counts"](counts, 4, T), calibration.apply(y_a, None, T), atol=1e-6)
     np.testing.assert_allclose(module["apply_gyro_counts"](counts, 500), calibration.apply(y_a, y_w)[1], atol=1e-6)
@@ -167,6 +167,6 @@ def test_esphomes_lambdas_compiled_and_fed_with_counts(calibration, tmp_path):
     said = subprocess.run([tmp_path / "program"], input=fed, capture_output=True, text=True, check=True).stdout
     out = np.array([line.split() for line in said.splitlines()], float)
     T = np.where(counts[:, 3] == 0, np.nan, counts[:, 3] / 340 + 36.53)
-    a, w = calibration.apply(counts[:, :3] * G / 16384, counts[:, 4:] * np.radians(2000 / 32768), T)
+    a, w = calibration.apply(counts[:, :3] * G / 16384, counts[:, 4:] * np.radians(1 / 16.375), T)
     np.testing.assert_allclose(out[:, :3], a, atol=2e-5)
     np.testing.assert_allclose(out[:, 3:], np.degrees(w), atol=2e-3)

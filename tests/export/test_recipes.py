@@ -39,7 +39,7 @@ LIBRARIES = {
         } sensors_event_t;
         struct { bool getEvent(sensors_event_t *a, sensors_event_t *g, sensors_event_t *t) {
             for (int i = 0; i < 3; i++) { a->acceleration.v[i] = COUNTS[i] / 16384.0f * 9.80665f;
-                g->gyro.v[i] = COUNTS[3 + i] / 65.536f * 0.017453293f; }
+                g->gyro.v[i] = COUNTS[3 + i] / 65.5f * 0.017453293f; }
             t->temperature = 30.0f; return true; }
         } mpu;""",
         (2.0, 500.0),
@@ -92,7 +92,7 @@ def test_a_recipe_compiles_and_corrects(name, calibration, tmp_path):
     words = ["g++", "-std=c++17", "-Wall", "-Werror", "-I.", "-o", "program", "main.cpp"]
     subprocess.run(words, cwd=tmp_path, check=True)
     said = subprocess.run([tmp_path / "program"], capture_output=True, text=True, check=True).stdout
-    y, y_w = np.array(COUNTS[:3]) * range_g * G / 32768, np.array(COUNTS[3:]) * np.radians(range_dps / 32768)
+    y, y_w = np.array(COUNTS[:3]) * range_g * G / 32768, np.array(COUNTS[3:]) * np.radians(range_dps / 32750)
     a, w = calibration.apply(y, y_w)
     wanted = np.concatenate([w, a]) if has_rates else a
     np.testing.assert_allclose([float(word) for word in said.split()], wanted, atol=1e-4)
@@ -119,7 +119,7 @@ def test_micropythons_recipe_runs(calibration, monkeypatch):
     names = {"i2c": SimpleNamespace(readfrom_mem=read, writeto_mem=write)}
     exec(re.search(r"```python\n# MicroPython\n(.*?)```", PAGE, re.DOTALL)[1], names)
     range_g, range_dps = 2 << (registers[reg.ACCEL_CONFIG] >> 3 & 3), 250 << (registers[reg.GYRO_CONFIG] >> 3 & 3)
-    y, y_w = np.array(COUNTS[:3]) * range_g * G / 32768, np.array(COUNTS[3:]) * np.radians(range_dps / 32768)
+    y, y_w = np.array(COUNTS[:3]) * range_g * G / 32768, np.array(COUNTS[3:]) * np.radians(range_dps / 32750)
     a, w = calibration.apply(y, y_w)
     np.testing.assert_allclose(names["a"], a, atol=1e-5)
     np.testing.assert_allclose(names["w"], w, atol=1e-5)

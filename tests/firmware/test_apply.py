@@ -66,7 +66,7 @@ def test_agrees_with_every_golden_vector(path, apply):
     wanted = json.loads(path.with_suffix(".json").read_text())
     status, _ = apply(path.read_bytes(), [0, 0, 0], accel_range_g=4.0)
     if "rejected" in wanted:
-        assert status in range(NO_BLOB, NOT_INVERTIBLE)
+        assert status in (*range(NO_BLOB, NOT_INVERTIBLE + 1), OTHER_RANGE)
         return
     assert status == OK
     blob = Blob.decode(path.read_bytes())
@@ -120,7 +120,6 @@ def test_what_hardware_subtracts_is_not_subtracted_twice(apply):
         ((0x68, 4.0), (0x70, 4.0), OTHER_CHIP),
         ((0x68, 4.0), (0x68, 2.0), OTHER_RANGE),
         ((0x68, 0.0), (0x68, 0.0), OTHER_RANGE),
-        ((0x68, float("nan")), (0x68, 0.0), OTHER_RANGE),
     ],
 )
 def test_says_where_a_blob_does_not_belong(measured, used, status, apply):
@@ -134,7 +133,12 @@ def test_says_where_a_blob_does_not_belong(measured, used, status, apply):
     ids=["zero", "ones", "tiny", "huge", "two rows alike"],
 )
 def test_a_matrix_that_cannot_be_inverted_is_refused(D, apply):
-    status, a = apply(replace(MEASURED, D=tuple(map(float, D))).encode(), [1, 2, 3])
+    body = bytearray(MEASURED.encode()[:-4])
+    body[60:96] = np.float32(D).tobytes()
+    blob = bytes(body) + struct.pack("<I", zlib.crc32(body))
+    with pytest.raises(BlobError, match="no inverse"):
+        Blob.decode(blob)
+    status, a = apply(blob, [1, 2, 3])
     assert status == NOT_INVERTIBLE
     assert np.isnan(a).all()
 
@@ -143,7 +147,7 @@ def random_blobs(rng, count):
     """(count, 256) bytes and (count,) sizes: blobs of all values, some appended to, some spoilt, some not finite."""
     data = rng.integers(0, 256, (count, MAX_LENGTH), np.uint8)
     data[:, :48] = np.frombuffer(MEASURED.encode()[:48], np.uint8)
-    data[:, 52:56] = rng.choice(np.float32([0, 2, 4, 8, 16, np.nan]), (count, 1)).view(np.uint8)
+    data[:, 52:56] = rng.choice(np.float32([0, 2, 4, 8, 16, np.nan, -4]), (count, 1)).view(np.uint8)
     # mostly unknown: a date takes Python longer than all the rest
     data[:, 112:120] = (rng.integers(0, LAST_SECOND, (count, 1)) * (rng.random((count, 1)) < 0.1)).view(np.uint8)
     for at, numbers in ((60, 9), (96, 3), (124, 3)):

@@ -69,7 +69,7 @@ def test_the_bridges_ram_is_as_stated(avr_build):
     symbols = subprocess.run(
         ["avr-nm", "-S", avr_build[0] / "mpucal_bridge.elf"], capture_output=True, text=True, check=True
     ).stdout
-    (size,) = re.findall(r"^\w+ (\w+) b bridge\b", symbols, re.MULTILINE)
+    (size,) = re.findall(r"^\w+ (\w+) [bB] bridge\b", symbols, re.MULTILINE)
     assert int(size, 16) == int(stated)
 
 
@@ -132,7 +132,7 @@ def test_the_corrected_sketch_prints_what_is_stored(switch_on, sketches):
     board.run(0.5)
     *_, line, _ = board.receive().decode().splitlines()
     words = np.array(Still.WORDS, float)
-    y, T, w = words[:3] * (4 * 9.80665 / 32768), words[3] / 340 + 36.53, words[4:] * np.radians(500 / 32768)
+    y, T, w = words[:3] * (4 * 9.80665 / 32768), words[3] / 340 + 36.53, words[4:] * np.radians(1 / 65.5)
     wanted = np.concatenate(Calibration.from_blob(Blob.decode(sloped)).apply(y, w, T))
     np.testing.assert_allclose([float(number) for number in line.split()], wanted, atol=2e-4)
 

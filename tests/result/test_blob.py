@@ -12,15 +12,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.result.blob import (
+    COUNTS,
     FIELDS,
     FORMULA,
     LENGTH,
+    LENGTH_WITH_COUNTS,
     LENGTH_WITH_SLOPE,
     MAX_LENGTH,
     SLOPE,
     Blob,
     BlobError,
 )
+from mpucal.result.calibration import Calibration
 from tools.make import vectors
 
 PROJECT = Path(__file__).parents[2]
@@ -30,6 +33,8 @@ PROTOCOL = (PROJECT / "firmware_protocol.md").read_text().split("\n## The config
 # each draws some sixty numbers
 some = settings(max_examples=40)
 floats = st.floats(width=32, allow_nan=False, allow_infinity=False)
+ranges = st.floats(0.0, 2.0**100, width=32)
+small = st.floats(-0.25, 0.25, width=32)
 maybe = floats | st.just(math.nan)
 times = st.integers(min_value=1, max_value=253_402_300_799)  # to the end of the year 9999
 
@@ -38,13 +43,17 @@ def several(count, values=floats):
     return st.tuples(*[values] * count)
 
 
+# the diagonal is more than all else of a row
+gains = several(9, small).map(lambda d: tuple((np.float32(d) + np.eye(3, dtype=np.float32).ravel()).tolist()))
+
+
 @st.composite
 def blobs(draw):
     return Blob(
         who_am_i=draw(st.integers(0, 255)),
-        accel_range_g=draw(floats),
-        gyro_range_dps=draw(floats),
-        D=draw(several(9)),
+        accel_range_g=draw(ranges),
+        gyro_range_dps=draw(ranges),
+        D=draw(gains),
         b_a=draw(several(3)),
         gravity=draw(maybe),
         temperature_c=draw(maybe),
@@ -92,6 +101,15 @@ def test_a_slope_that_cannot_be_used_is_none(blob, name):
     assert (read.D, read.b_a) == (blob.D, blob.b_a)
 
 
+@some
+@given(blobs() | sloped(), ranges.filter(bool))
+def test_decode_is_the_inverse_of_encode_with_counts(blob, counts):
+    blob = replace(blob, gyro_counts=counts)
+    data = blob.encode()
+    assert (len(data), data[5]) == (LENGTH_WITH_COUNTS, 2)
+    assert plain(Blob.decode(data)) == plain(blob)
+
+
 @pytest.fixture
 def blob():
     return Blob.decode((VECTORS / "blob_measured.bin").read_bytes())
@@ -133,9 +151,9 @@ def test_trailing_junk_is_rejected(blob):
         Blob.decode(blob.encode() + b"\0")
 
 
-@given(st.binary(max_size=MAX_LENGTH - LENGTH_WITH_SLOPE))
+@given(st.binary(max_size=MAX_LENGTH - LENGTH_WITH_COUNTS))
 def test_appended_fields_of_a_newer_minor_version_are_skipped(appended):
-    blob = Blob.decode((VECTORS / "blob_sloped.bin").read_bytes())
+    blob = Blob.decode((VECTORS / "blob_counted.bin").read_bytes())
     body = bytearray(blob.encode()[:-4] + appended)
     body[5] += 1
     assert Blob.decode(sealed(body)) == blob
@@ -185,6 +203,17 @@ def test_values_that_do_not_fit_are_refused(blob, change):
         replace(blob, **change).encode()
 
 
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -4.0])
+@pytest.mark.parametrize(("name", "at"), [("accel_range_g", 52), ("gyro_range_dps", 56), ("gyro_counts", 204)])
+def test_ranges_that_are_none_are_refused_on_both_sides(blob, name, at, bad):
+    with pytest.raises(BlobError, match=f"{name} is"):
+        replace(blob, **{name: bad}).encode()
+    body = bytearray(replace(blob, gyro_counts=32750.0).encode()[:-4])
+    struct.pack_into("<f", body, at, bad)
+    with pytest.raises(BlobError, match=f"{name} is"):
+        Blob.decode(sealed(body))
+
+
 def test_a_time_out_of_range_is_rejected(blob):
     body = bytearray(blob.encode()[:-4])
     struct.pack_into("<Q", body, 112, 2**64 - 1)
@@ -232,6 +261,9 @@ def test_golden_vector(name):
     assert plain(blob) == plain(Blob(**values))
     a = np.linalg.inv(np.reshape(blob.D, (3, 3))) @ (np.array(expected["y"]) - blob.b_a + blob.applied_b_a)
     np.testing.assert_allclose(a, expected["a"], rtol=1e-12)
+    unit = np.radians(blob.gyro_range_dps or 500.0) / 32750
+    _, w = Calibration.from_blob(blob).apply([0, 0, 0], np.array(expected["counts"]) * unit)
+    np.testing.assert_allclose(w, expected["w"], rtol=1e-12)
 
 
 def test_the_tool_writes_the_vectors_that_are_there(tmp_path):
@@ -252,14 +284,14 @@ def test_the_documents_table_is_the_codecs_format():
         code = f"{count}x" if name == "reserved" else code
         assert struct.calcsize("<" + code) == int(last or first) - int(first) + 1, name
         expected, at = f"{expected} {code}", int(last or first) + 1
-    assert expected.replace("< ", "<") == f"{FIELDS.format} {SLOPE.format[1:]}"
-    assert at + 4 == LENGTH_WITH_SLOPE
+    assert expected.replace("< ", "<") == f"{FIELDS.format} {SLOPE.format[1:]} {COUNTS.format[1:]}"
+    assert at + 4 == LENGTH_WITH_COUNTS
 
 
 def test_every_number_of_the_table_is_naturally_aligned():
     sizes = {"u8": 1, "u16": 2, "u64": 8, "f32": 4}
     rows = re.findall(r"^\| (\d+)(?:-\d+)? \| (\w+) \| (u8|u16|u64|f32)", PROTOCOL, re.M)
-    assert len(rows) == 17
+    assert len(rows) == 18
     assert [name for first, name, kind in rows if int(first) % sizes[kind]] == []
 
 

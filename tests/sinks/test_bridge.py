@@ -66,7 +66,7 @@ def test_it_is_stored_read_back_and_found_valid(calibration):
     applied = BridgeSink(store).write(calibration)
     assert store.blob == calibration.blob().encode()
     assert applied.calibration is calibration
-    assert "blob number 8 (188 bytes, CRC-32 1234abcd), read back the same, and found valid" in applied.what
+    assert "blob number 8 (212 bytes, CRC-32 1234abcd), read back the same, and found valid" in applied.what
 
 
 def test_the_old_one_is_kept_in_a_file_of_its_number(tmp_path):

@@ -18,6 +18,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from mpucal.data import GYRO_COUNTS
 from mpucal.result.blob import Blob
 from mpucal.sources.bridge import messages as wire
 from mpucal.sources.bridge.frame import Frame, stuff
@@ -54,6 +55,11 @@ SLOPED = replace(MEASURED, b_a_slope=(0.0078125, -0.001953125, 0.015625), temper
 # one degree each side of the ends, where b_a(T) stays as it is, and one between
 TEMPERATURES_C = (9.5, 40.0, 53.25)
 Y = (0.5, -1.25, 10.5)
+COUNTED = replace(SLOPED, gyro_counts=GYRO_COUNTS)
+# by libraries that divide by the range of 16 bits
+COUNTED_OTHERWISE = replace(MEASURED, gyro_counts=32768.0)
+# of the gyroscope
+COUNTS = (3000, -20000, 32767)
 
 
 def sealed(body: bytes, length: int | None = None) -> bytes:
@@ -65,8 +71,8 @@ def sealed(body: bytes, length: int | None = None) -> bytes:
 
 def accepted(blob: Blob, data: bytes | None = None) -> tuple[bytes, dict[str, Any]]:
     """A blob and what a reader finds in it; `data` are other bytes that mean the same."""
-    values = {key: plain(value) for key, value in asdict(blob).items()}
-    content = {"blob": values, "y": list(Y), "a": applied(blob, 0.0)}
+    values = {key: plain(value) for key, value in asdict(blob).items() if value is not None}
+    content = {"blob": values, "y": list(Y), "a": applied(blob, 0.0), "counts": list(COUNTS), "w": rates(blob)}
     return data or blob.encode(), content | (at_temperatures(blob) if any(blob.b_a_slope) else {})
 
 
@@ -84,6 +90,14 @@ def applied(blob: Blob, away_c: float) -> list[float]:
     y = [Fraction(y) - Fraction(b) - Fraction(s) * Fraction(away_c) + Fraction(h) for y, b, s, h in terms]
     replaced = [[[y[i] if j == k else D[i][j] for j in range(3)] for i in range(3)] for k in range(3)]
     return [float(determinant(M) / determinant(D)) for M in replaced]
+
+
+def rates(blob: Blob) -> list[float]:
+    """K (y_omega - b_omega) of COUNTS at the blob's range, 500 deg/s where it says none; rounded once, too."""
+    unit = Fraction(math.pi) / 180 * Fraction(blob.gyro_range_dps or 500.0) / Fraction(blob.gyro_counts or GYRO_COUNTS)
+    bias = [0.0 if math.isnan(value) else value for value in blob.b_omega]
+    y = [count * unit - Fraction(value) for count, value in zip(COUNTS, bias, strict=True)]
+    return [float(sum(Fraction(k) * v for k, v in zip(blob.K[at : at + 3], y, strict=True))) for at in (0, 3, 6)]
 
 
 def determinant(M: list[list[Fraction]]) -> Fraction:
@@ -108,13 +122,16 @@ def vectors() -> dict[str, tuple[bytes, dict[str, Any]]]:
     """Name -> (bytes, content of the .json)."""
     good = MEASURED.encode()
     body = good[:-4]
-    nan = struct.pack("<f", math.nan)
+    nan, minus = struct.pack("<f", math.nan), struct.pack("<f", -4.0)
+    singular = struct.pack("<9f", 1, 2, 3, 2, 4, 6, 0, 0, 1)
     return {
         "measured": accepted(MEASURED),
         "unknown": accepted(UNKNOWN),
         "applied": accepted(APPLIED),
         "sloped": accepted(SLOPED),
-        "appended": accepted(SLOPED, sealed(with_byte(SLOPED.encode()[:-4], 5, 2) + struct.pack("<2f", 1.5, -2.5))),
+        "counted": accepted(COUNTED),
+        "counted_otherwise": accepted(COUNTED_OTHERWISE),
+        "appended": accepted(COUNTED, sealed(with_byte(COUNTED.encode()[:-4], 5, 3) + struct.pack("<2f", 1.5, -2.5))),
         "slope_cut": accepted(MEASURED, sealed(with_byte(body, 5, 1) + struct.pack("<2f", 1.5, -2.5))),
         "slope_not_finite": accepted(
             MEASURED, sealed(with_byte(body, 5, 1) + struct.pack("<5f", 1, math.nan, 1, 0, 50))
@@ -125,6 +142,13 @@ def vectors() -> dict[str, tuple[bytes, dict[str, Any]]]:
         "bad_crc": (with_byte(good, 60, good[60] ^ 1), {"rejected": "the CRC-32 does not match"}),
         "cut": (good[:-1], {"rejected": "the last byte is missing"}),
         "not_finite": (sealed(body[:60] + nan + body[64:]), {"rejected": "D holds NaN"}),
+        "singular": (sealed(body[:60] + singular + body[96:]), {"rejected": "D has no inverse"}),
+        "range_not_finite": (sealed(body[:52] + nan + body[56:]), {"rejected": "accel_range_g is NaN"}),
+        "range_negative": (sealed(body[:52] + minus + body[56:]), {"rejected": "accel_range_g is -4"}),
+        "no_counts": (
+            sealed(COUNTED.encode()[:-8] + bytes(4)),
+            {"rejected": "gyro_counts is 0"},
+        ),
     }
 
 

@@ -40,9 +40,14 @@ extern "C" {
 #define MPUCAL_B_A_SLOPE_AT 184
 #define MPUCAL_RANGE_C_AT 196
 #define MPUCAL_LENGTH_WITH_SLOPE 208
+#define MPUCAL_GYRO_COUNTS_AT 204
+#define MPUCAL_LENGTH_WITH_COUNTS 212
 
+/* firmware_protocol.md, "Counts": at full scale, by the data sheet's 16384 LSB/g and 131 LSB/(deg/s). Libraries that
+ * divide by 32768 / range, such as FastIMU, differ from the latter by 0.055 %. */
+#define MPUCAL_ACCEL_COUNTS 32768.0f
+#define MPUCAL_GYRO_COUNTS 32750.0f
 #define MPUCAL_STANDARD_GRAVITY_MPS2 9.80665f
-#define MPUCAL_FULL_SCALE 32768.0f
 #define MPUCAL_RAD 0.01745329252f /* a degree */
 
 /* Why a blob is not used; the first five in the order in which firmware_protocol.md, "Reading", has them checked. */
@@ -53,15 +58,15 @@ enum mpucal_status {
     MPUCAL_BAD_LENGTH,    /* its length is out of range, or more than there is */
     MPUCAL_BAD_CRC,       /* damaged */
     MPUCAL_NOT_FINITE,    /* D, b_a or applied_b_a holds infinity or NaN */
-    MPUCAL_NOT_INVERTIBLE, /* no more than rounding is left of D's determinant */
+    MPUCAL_NOT_INVERTIBLE, /* D is beyond any sensor's, or no more than rounding is left of its determinant */
     MPUCAL_OTHER_CHIP,    /* it was measured on a chip of another WHO_AM_I */
-    MPUCAL_OTHER_RANGE,   /* it was measured at another full scale, or nobody knows at which */
+    MPUCAL_OTHER_RANGE,   /* it was measured at another full scale, at what is none, or nobody knows at which */
     MPUCAL_NOT_FIXED      /* it has no room in struct mpucal_fixed */
 };
 
 /* A calibration, ready to be applied: a = gain * counts - bias, in m/s^2. */
 struct mpucal {
-    float gain[3][3]; /* inv(D) * 9.80665 * accel_range_g / 32768 */
+    float gain[3][3]; /* inv(D) * 9.80665 * accel_range_g / MPUCAL_ACCEL_COUNTS */
     float bias[3];    /* inv(D) (b_a - applied_b_a) */
 };
 
@@ -73,7 +78,7 @@ struct mpucal_drift {
 
 /* The gyroscope's part, 48 bytes more: w = gain * counts - bias, in rad/s. */
 struct mpucal_gyro {
-    float gain[3][3]; /* K * (pi / 180) * gyro_range_dps / 32768 */
+    float gain[3][3]; /* K * (pi / 180) * gyro_range_dps / the blob's gyro_counts */
     float bias[3];    /* K b_omega; zeros where the blob has none */
 };
 
@@ -143,6 +148,41 @@ static inline uint32_t mpucal_crc32(const struct mpucal_source *blob, uint16_t c
     return ~crc;
 }
 
+/* Element (i, j) of the adjugate of D, row-major: of inv(D) but for 1 / det(D). */
+static inline float mpucal_adjugate(const float D[9], uint8_t i, uint8_t j) {
+    uint8_t p = (uint8_t)((j + 1) % 3), q = (uint8_t)((j + 2) % 3);
+    uint8_t r = (uint8_t)((i + 1) % 3), s = (uint8_t)((i + 2) % 3);
+    return D[3 * p + r] * D[3 * q + s] - D[3 * p + s] * D[3 * q + r];
+}
+
+/* D of a blob; its determinant, 0 where it is beyond any sensor's, or no more than rounding is left. */
+static inline float mpucal_read_D(const struct mpucal_source *blob, float D[9]) {
+    float det = 0.0f, most = 0.0f;
+    for (uint8_t i = 0; i < 9; i++) {
+        D[i] = mpucal_f32(blob, (uint16_t)(MPUCAL_D_AT + 4 * i));
+        most = D[i] > most ? D[i] : -D[i] > most ? -D[i] : most;
+    }
+    if (most < 1e-3f || most > 1e3f) {
+        return 0.0f;
+    }
+    for (uint8_t i = 0; i < 3; i++) {
+        det += D[i] * mpucal_adjugate(D, i, 0);
+    }
+    return (det < 0.0f ? -det : det) > 1e-6f * most * most * most ? det : 0.0f;
+}
+
+/* A full scale, or 0 for unknown. */
+static inline int mpucal_is_range(const struct mpucal_source *blob, uint16_t offset) {
+    float value = mpucal_f32(blob, offset);
+    return mpucal_is_finite(value) && value >= 0.0f;
+}
+
+/* Counts of the gyroscope at its full scale; a blob of minor version 0 or 1 does not say them. */
+static inline float mpucal_gyro_counts(const struct mpucal_source *blob) {
+    return mpucal_u16(blob, MPUCAL_LENGTH_AT) < MPUCAL_LENGTH_WITH_COUNTS ? MPUCAL_GYRO_COUNTS
+                                                                         : mpucal_f32(blob, MPUCAL_GYRO_COUNTS_AT);
+}
+
 /* firmware_protocol.md, "Reading", of the blob at the beginning of a source. */
 static inline enum mpucal_status mpucal_check(const struct mpucal_source *blob) {
     if (blob->size < MPUCAL_HEADER_LENGTH || mpucal_u32(blob, 0) != MPUCAL_MAGIC) {
@@ -163,32 +203,26 @@ static inline enum mpucal_status mpucal_check(const struct mpucal_source *blob) 
         !mpucal_all_finite(blob, MPUCAL_APPLIED_B_A_AT, 3)) {
         return MPUCAL_NOT_FINITE;
     }
+    float D[9], gyro_counts = mpucal_gyro_counts(blob);
+    if (mpucal_read_D(blob, D) == 0.0f) {
+        return MPUCAL_NOT_INVERTIBLE;
+    }
+    if (!mpucal_is_range(blob, MPUCAL_ACCEL_RANGE_G_AT) || !mpucal_is_range(blob, MPUCAL_GYRO_RANGE_DPS_AT) ||
+        !mpucal_is_finite(gyro_counts) || !(gyro_counts > 0.0f)) {
+        return MPUCAL_OTHER_RANGE;
+    }
     return MPUCAL_OK;
-}
-
-/* Element (i, j) of the adjugate of D, row-major: of inv(D) but for 1 / det(D). */
-static inline float mpucal_adjugate(const float D[9], uint8_t i, uint8_t j) {
-    uint8_t p = (uint8_t)((j + 1) % 3), q = (uint8_t)((j + 2) % 3);
-    uint8_t r = (uint8_t)((i + 1) % 3), s = (uint8_t)((i + 2) % 3);
-    return D[3 * p + r] * D[3 * q + s] - D[3 * p + s] * D[3 * q + r];
 }
 
 /* What a blob that was checked makes of counts at +-range_g. */
 static inline enum mpucal_status mpucal_prepare(struct mpucal *sensor, const struct mpucal_source *blob,
                                                 float range_g) {
-    float D[9], offset[3], det = 0.0f;
-    for (uint8_t i = 0; i < 9; i++) {
-        D[i] = mpucal_f32(blob, (uint16_t)(MPUCAL_D_AT + 4 * i));
-    }
+    float D[9], offset[3], det = mpucal_read_D(blob, D);
     for (uint8_t i = 0; i < 3; i++) {
         offset[i] = mpucal_f32(blob, (uint16_t)(MPUCAL_B_A_AT + 4 * i)) -
                     mpucal_f32(blob, (uint16_t)(MPUCAL_APPLIED_B_A_AT + 4 * i));
-        det += D[i] * mpucal_adjugate(D, i, 0);
     }
-    if (det == 0.0f || !mpucal_is_finite(det)) {
-        return MPUCAL_NOT_INVERTIBLE;
-    }
-    float mps2_per_count = MPUCAL_STANDARD_GRAVITY_MPS2 * range_g / MPUCAL_FULL_SCALE;
+    float mps2_per_count = MPUCAL_STANDARD_GRAVITY_MPS2 * range_g / MPUCAL_ACCEL_COUNTS;
     struct mpucal made = {{{0.0f}}, {0.0f}};
     int usable = 1;
     for (uint8_t i = 0; i < 3; i++) {
@@ -260,7 +294,7 @@ static inline enum mpucal_status mpucal_load_gyro(struct mpucal_gyro *gyro, cons
     if (!(range_dps > 0.0f) || (measured_at_dps > 0.0f && measured_at_dps != range_dps)) {
         return MPUCAL_OTHER_RANGE;
     }
-    float rad_s_per_count = MPUCAL_RAD * range_dps / MPUCAL_FULL_SCALE;
+    float rad_s_per_count = MPUCAL_RAD * range_dps / mpucal_gyro_counts(blob);
     int has_K = mpucal_all_finite(blob, MPUCAL_K_AT, 9), has_bias = mpucal_all_finite(blob, MPUCAL_B_OMEGA_AT, 3);
     for (uint8_t i = 0; i < 3; i++) {
         gyro->bias[i] = 0.0f;
@@ -289,22 +323,15 @@ static inline enum mpucal_status mpucal_load_drift(struct mpucal_drift *drift, c
         return status;
     }
     struct mpucal_drift made = {{0.0f, 0.0f, 0.0f}, 0.0f, 0.0f, 0.0f};
-    float at_c = mpucal_f32(blob, MPUCAL_TEMPERATURE_C_AT), D[9], slope[3], det = 0.0f;
+    float at_c = mpucal_f32(blob, MPUCAL_TEMPERATURE_C_AT), D[9], slope[3], det = mpucal_read_D(blob, D);
     if (mpucal_u16(blob, MPUCAL_LENGTH_AT) < MPUCAL_LENGTH_WITH_SLOPE || !mpucal_is_finite(at_c) ||
         !mpucal_all_finite(blob, MPUCAL_B_A_SLOPE_AT, 5) || mpucal_f32(blob, MPUCAL_RANGE_C_AT) > at_c ||
         mpucal_f32(blob, MPUCAL_RANGE_C_AT + 4) < at_c) {
         *drift = made;
         return MPUCAL_OK;
     }
-    for (uint8_t i = 0; i < 9; i++) {
-        D[i] = mpucal_f32(blob, (uint16_t)(MPUCAL_D_AT + 4 * i));
-    }
     for (uint8_t i = 0; i < 3; i++) {
         slope[i] = mpucal_f32(blob, (uint16_t)(MPUCAL_B_A_SLOPE_AT + 4 * i));
-        det += D[i] * mpucal_adjugate(D, i, 0);
-    }
-    if (det == 0.0f || !mpucal_is_finite(det)) {
-        return MPUCAL_NOT_INVERTIBLE;
     }
     for (uint8_t i = 0; i < 3; i++) {
         for (uint8_t j = 0; j < 3; j++) {
@@ -360,7 +387,7 @@ static inline enum mpucal_status mpucal_fix(struct mpucal_fixed *fixed, const fl
             if (!(size < 1.999f)) {
                 return MPUCAL_NOT_FIXED;
             }
-            most += size * MPUCAL_FULL_SCALE;
+            most += size * MPUCAL_ACCEL_COUNTS;
             int32_t units = (int32_t)(ratio * MPUCAL_FIXED_ONE * 256.0f + (ratio < 0.0f ? -0.5f : 0.5f));
             made.gain[i][j] = (int16_t)(units >> 8);
             made.fraction[i][j] = (uint8_t)(units & 0xFF);
@@ -377,13 +404,13 @@ static inline enum mpucal_status mpucal_fix(struct mpucal_fixed *fixed, const fl
 /* A calibration at +-range_g, for mpucal_apply_fixed. */
 static inline enum mpucal_status mpucal_fix_accel(struct mpucal_fixed *fixed, const struct mpucal *sensor,
                                                   float range_g) {
-    return mpucal_fix(fixed, sensor->gain, sensor->bias, MPUCAL_STANDARD_GRAVITY_MPS2 * range_g / MPUCAL_FULL_SCALE);
+    return mpucal_fix(fixed, sensor->gain, sensor->bias, MPUCAL_STANDARD_GRAVITY_MPS2 * range_g / MPUCAL_ACCEL_COUNTS);
 }
 
-/* The gyroscope's at +-range_dps. */
+/* The gyroscope's at +-range_dps, in counts of MPUCAL_GYRO_COUNTS at full scale. */
 static inline enum mpucal_status mpucal_fix_gyro(struct mpucal_fixed *fixed, const struct mpucal_gyro *gyro,
                                                  float range_dps) {
-    return mpucal_fix(fixed, gyro->gain, gyro->bias, MPUCAL_RAD * range_dps / MPUCAL_FULL_SCALE);
+    return mpucal_fix(fixed, gyro->gain, gyro->bias, MPUCAL_RAD * range_dps / MPUCAL_GYRO_COUNTS);
 }
 
 #ifdef __AVR_HAVE_MUL__

@@ -75,7 +75,15 @@ def acceptable(blob):
     if binascii.crc32(blob[:-4]) != struct.unpack("<I", blob[-4:])[0]:
         return False
     numbers = struct.unpack("<12f", blob[60:108]) + struct.unpack("<3f", blob[124:136])
-    return all(math.isfinite(number) for number in numbers)
+    if not all(math.isfinite(number) for number in numbers):
+        return False
+    a, b, c, d, e, f, g, h, i = numbers[:9]
+    most = max(abs(number) for number in numbers[:9])
+    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    if not 1e-3 <= most <= 1e3 or not abs(determinant) > 1e-6 * most * most * most:
+        return False
+    counts = struct.unpack("<f", blob[204:208])[0] if len(blob) >= 212 else 1.0
+    return all(math.isfinite(n) and n >= 0 for n in struct.unpack("<2f", blob[52:60])) and 0 < counts < math.inf
 
 
 class Failed(Exception):
