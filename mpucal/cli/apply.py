@@ -73,7 +73,8 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool, *
     if as_json:
         click.echo(json.dumps({"file": str(target), "done": done, "utc_ns": rows.utc_ns, **seen.facts()}, indent=2))
     elif target is not None:
-        click.echo(f"{target}: {seen.samples} samples, {done}.")
+        lack = f", {seen.lack} of which lack a number" if seen.lack else ""
+        click.echo(f"{target}: {seen.samples} samples{lack}, {done}.")
 
 
 def _remarks(rows: Rows) -> tuple[str, ...]:
@@ -85,19 +86,22 @@ def _remarks(rows: Rows) -> tuple[str, ...]:
 
 
 class _Seen:
-    """How many samples there were, and their mean |a|."""
+    """How many samples there were, how many lack a number, and the others' mean |a|."""
 
     def __init__(self) -> None:
-        self.samples, self._before, self._after = 0, 0.0, 0.0
+        self.samples, self.lack, self._before, self._after = 0, 0, 0.0, 0.0
 
     def add(self, before: Samples, after: Samples, magnitudes: bool) -> None:
         self.samples += len(before)
+        self.lack += int(np.isnan(after.acc[:, 0]).sum())
         # they take as long as all the rest
         if not magnitudes:
             return
-        self._before += float(np.linalg.norm(before.acc, axis=1).sum())
-        self._after += float(np.linalg.norm(after.acc, axis=1).sum())
+        there = ~np.isnan(after.acc[:, 0])
+        self._before += float(np.linalg.norm(before.acc[there], axis=1).sum())
+        self._after += float(np.linalg.norm(after.acc[there], axis=1).sum())
 
     def facts(self) -> dict[str, Any]:
-        n = max(self.samples, 1)
-        return {"samples": self.samples, "mean_before_mps2": self._before / n, "mean_after_mps2": self._after / n}
+        n = max(self.samples - self.lack, 1)
+        means = {"mean_before_mps2": self._before / n, "mean_after_mps2": self._after / n}
+        return {"samples": self.samples, "lack_a_number": self.lack, **means}

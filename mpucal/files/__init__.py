@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 
 from ..data import Recording
 from .formats import format_of, written_format
 from .hints import NO_HINTS, Hints
-from .rows import Rows, Write
+from .rows import Rows, Write, in_si
 
 
 def load(path: str | Path, hints: Hints = NO_HINTS) -> Recording:
@@ -31,13 +32,15 @@ def open_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
     """The samples of any recording that `load` reads, a run at a time.
 
     A table and an archive are read as they are gone through. A capture is gone through before, since the times of its
-    first samples are known only with its last. A vehicle's log is decoded whole.
+    first samples are known only with its last. A vehicle's log is decoded whole. Samples of a table or an archive that
+    lack a number are among them, as NaN.
 
     Raises
     ------
     RecordingError, CaptureError, ChipError : see load; a table's bad line and an odd sample when they are come to.
     """
-    return format_of(path, hints).read_rows(path, hints=hints)
+    rows = format_of(path, hints).read_rows(path, hints=hints)
+    return replace(rows, runs=in_si(rows.runs, path)) if rows.plain else rows
 
 
 def open_writer(path: Path, rows: Rows, done: str) -> AbstractContextManager[Write]:

@@ -62,7 +62,7 @@ def csv_rows(path: Path) -> Rows:
         raise RecordingError(f"{path}: its first line is empty", _REMEDY)
     begin = len(begun) - len(text.removeprefix(first).encode())
     table = _Table(path, begin, len(header), _places(header, path))
-    return Rows(checked(table.runs(), path.name), name=path.name, utc_ns=_utc_ns(header, second))
+    return Rows(checked(table.runs(), path.name), name=path.name, utc_ns=_utc_ns(header, second), plain=True)
 
 
 def _utc_ns(header: list[str], second: bytes) -> int | None:

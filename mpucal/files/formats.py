@@ -95,6 +95,14 @@ FORMATS = (
     Format(".ulg", "a log of PX4", f"{_HERE}.ulog:load_ulog", hinted=True),
     Format(".db3", "a bag of ROS 2", *_BAG, hinted=True),
     Format(".bag", "a bag of ROS 1", *_BAG, hinted=True),
+    *(
+        Format(suffix, what, f"{_HERE}.arrays:load_arrays", recognises=recognises, hinted=True, only_recognised=True)
+        for suffix, what, recognises in (
+            (".npz", "another program's archive of NumPy", f"{_HERE}.arrays:is_of_others"),
+            (".npy", "an array of NumPy", ""),
+            (".mat", "a file of MATLAB", ""),
+        )
+    ),
     Format(".npz", "a NumPy archive", f"{_HERE}.npz:load_npz", f"{_HERE}.npz:npz_rows", f"{_HERE}.npz:npz_file"),
     Format(".parquet", "a Parquet file", f"{_HERE}.parquet:load_parquet", hinted=True),
     *(

@@ -96,10 +96,10 @@ def messages(samples: Samples, noise: Vector, utc_ns: int = 0) -> tuple[NDArray[
     acc_covariance, gyr_covariance = (np.diag(np.nan_to_num(std**2)).ravel() for std in noise)
     rows["linear_acceleration_covariance"] = acc_covariance
     rows["angular_velocity_covariance"] = gyr_covariance
-    turned = np.asarray(np.isfinite(samples.gyr).all(axis=1))
-    rows["angular_velocity_covariance"][~turned, 0] = NOT_MEASURED
-    rows["angular_velocity"] = np.where(turned[:, None], samples.gyr, 0.0)
-    rows["linear_acceleration"] = samples.acc
+    for key, values in (("angular_velocity", samples.gyr), ("linear_acceleration", samples.acc)):
+        measured = np.asarray(np.isfinite(values).all(axis=1))
+        rows[f"{key}_covariance"][~measured, 0] = NOT_MEASURED
+        rows[key] = np.where(measured[:, None], values, 0.0)
     return t_ns, rows
 
 

@@ -31,7 +31,7 @@ from ..data import Recording, Samples, Sensor
 from ..disk.whole import whole_file
 from ..errors import RecordingError
 from ..strict_json import parsed
-from .rows import ROWS, Rows, Write, cannot_read, checked
+from .rows import ROWS, Rows, Write, cannot_read, checked, whole
 from .tables.times import possible_utc_ns
 
 NEEDED = ("t", "acc", "gyr")
@@ -62,18 +62,11 @@ def load_npz(path: Path) -> Recording:
     missing = [key for key in NEEDED if key not in arrays]
     if missing:
         raise RecordingError(f"{path} has no {', '.join(missing)}; it has {', '.join(arrays) or 'nothing'}", _REMEDY)
-    recording = Recording.from_arrays(
-        arrays["t"],
-        arrays["acc"],
-        arrays["gyr"],
-        _flat(arrays, path),
-        temperature_c=next((arrays[key] for key in TEMPERATURES if key in arrays), None),
-        gap=arrays.get("gap"),
-        acc_clipped=arrays.get("acc_clipped"),
-        gyr_clipped=arrays.get("gyr_clipped"),
-        sensor=_sensor(arrays, path),
-        name=path.name,
-    )
+    sensor = _sensor(arrays, path)
+    known = {key: arrays.get(key) for key in (*NEEDED, *MASKS)}
+    known["temperature_c"] = next((arrays[key] for key in TEMPERATURES if key in arrays), None)
+    made, taken = whole({**known, "flat": _flat(arrays, path)}, path.name, sensor)
+    recording = Recording.from_arrays(**made, sensor=sensor, name=path.name, taken=taken)
     return replace(recording, utc_ns=_utc_ns(arrays))
 
 
@@ -91,7 +84,7 @@ def npz_rows(path: Path) -> Rows:
     if not by_rows:
         return Rows.of(load_npz(path), done)
     runs, sensor, flat = checked(_runs(path), path.name), _sensor(small, path), _flat(small, path)
-    return Rows(runs, sensor, flat, name=path.name, done=done, utc_ns=_utc_ns(small))
+    return Rows(runs, sensor, flat, name=path.name, done=done, utc_ns=_utc_ns(small), plain=True)
 
 
 def _utc_ns(arrays: Mapping[str, Any]) -> int | None:

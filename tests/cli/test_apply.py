@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mpucal.data import STANDARD_GRAVITY_MPS2
 from mpucal.files import load
 from mpucal.result.calibration import Calibration
 
@@ -80,6 +81,45 @@ def test_a_table_goes_to_stdout(mpucal, save, session, calibration, tmp_path):
     assert "in.csv does not say the time of day" in done.err
     (tmp_path / "out.csv").write_text(done.out)
     np.testing.assert_allclose(load("out.csv").acc, formula(recording)[0], atol=1e-12)
+
+
+def test_a_table_in_g_and_degrees_comes_out_as_the_one_in_si(mpucal, save, session, calibration):
+    recording = replace(load(session.folder), utc_ns=None)
+    save(recording, "si.csv")
+    save(replace(recording, acc=recording.acc / STANDARD_GRAVITY_MPS2, gyr=np.degrees(recording.gyr)), "g.csv")
+    done = mpucal("apply", "c.json", "g.csv", "-o", "out.npz")
+    assert done.code == 0, done.err
+    assert "accelerations in g and rates in deg/s" in done.err
+    np.testing.assert_allclose(load("out.npz").acc, formula(recording)[0], atol=1e-9)
+    np.testing.assert_allclose(load("out.npz").gyr, formula(recording)[1], atol=1e-9)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".npz"])
+def test_rates_in_degrees_are_not_applied_as_radians(mpucal, save, session, calibration, ending):
+    recording = load(session.folder)
+    save(replace(recording, gyr=np.degrees(recording.gyr)), f"in{ending}")
+    done = mpucal("apply", "c.json", f"in{ending}", "-o", "out.npz")
+    assert done.code == 3
+    assert "reads gyr as of deg/s" in done.err
+    assert "say its units with --units acc=m/s^2,gyr=deg/s" in done.err
+    assert not Path("out.npz").exists()
+    assert mpucal("apply", "c.json", f"in{ending}", "-o", "out.npz", "--units", "acc=m/s^2,gyr=deg/s").code == 0
+    np.testing.assert_allclose(load("out.npz").gyr, formula(recording)[1], atol=1e-9)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".npz", ".mcap"])
+def test_a_sample_that_lacks_a_number_is_carried_through(mpucal, save, session, calibration, ending):
+    recording = load(session.folder).part(0, 500)
+    acc = recording.acc.copy()
+    acc[7, 1] = np.nan
+    save(replace(recording, acc=acc), "in.npz")
+    done = mpucal("apply", "c.json", "in.npz", "-o", f"out{ending}")
+    assert done.code == 0, done.err
+    assert "500 samples, 1 of which lack a number" in done.out
+    if ending == ".csv":
+        assert [i for i, line in enumerate(Path("out.csv").read_text().splitlines()) if "nan" in line] == [8]
+    if ending != ".mcap":
+        np.testing.assert_allclose(load(f"out{ending}").acc, np.delete(formula(recording)[0], 7, 0), atol=1e-12)
 
 
 def test_b_a_follows_the_temperature(mpucal, session, calibration):

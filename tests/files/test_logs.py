@@ -147,7 +147,11 @@ def test_its_columns_are_named(walk, assert_same, tmp_path):
     made = parquet_of(walk, when=walk.t)
     made.columns = ["when", *"abcdef"]
     made.to_parquet(tmp_path / "walk.parquet")
-    with pytest.raises(RecordingError, match="its columns are when, a, b, c, d, e, f"):
+    read = load(tmp_path / "walk.parquet")
+    assert_same(read, walk)
+    assert "read as of --columns t,ax,ay,az,gx,gy,gz" in read.taken
+    made[["when", *"adbecf"]].to_parquet(tmp_path / "walk.parquet")
+    with pytest.raises(RecordingError, match="its columns are when, a, d, b, e, c, f"):
         load(tmp_path / "walk.parquet")
     named = Hints(columns=parse_columns("t=when,ax=a,ay=b,az=c,gx=d,gy=e,gz=f"))
     assert_same(load(tmp_path / "walk.parquet", named), walk)

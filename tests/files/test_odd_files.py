@@ -140,9 +140,9 @@ def test_a_nan_that_signals_is_a_nan(tmp_path):
     """A float32 of which NumPy warns where it becomes a float64."""
     acc = np.tile(SIGNALLING[:, None], (1, 3))
     np.savez(tmp_path / "a.npz", t=TIMES, acc=acc, gyr=AT_REST[:, 3:])
-    for read in (mpucal.load, lambda path: list(open_rows(path).runs)):
-        with pytest.raises(RecordingError, match="acc is not a finite number in"):
-            read(tmp_path / "a.npz")
+    assert len(mpucal.load(tmp_path / "a.npz")) == N - 1
+    (samples,) = open_rows(tmp_path / "a.npz").runs
+    assert np.flatnonzero(np.isnan(samples.acc[:, 0])).tolist() == [7]
     table().assign(**{"ax [m/s^2]": SIGNALLING, "temperature_c": SIGNALLING}).to_parquet(tmp_path / "a.parquet")
     assert len(mpucal.load(tmp_path / "a.parquet", units="gyr=rad/s")) == N - 1
 
@@ -150,7 +150,7 @@ def test_a_nan_that_signals_is_a_nan(tmp_path):
 def test_rows_of_an_archive_with_what_no_number_holds(tmp_path):
     huge = np.full((N, 3), np.longdouble("1e400"))
     np.savez(tmp_path / "a.npz", t=TIMES, acc=huge, gyr=AT_REST[:, 3:])
-    with pytest.raises(RecordingError, match="acc is not a finite number in sample 0"):
+    with pytest.raises(RecordingError, match="lacks a number in every sample"):
         list(open_rows(tmp_path / "a.npz").runs)
 
 

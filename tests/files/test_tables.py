@@ -288,10 +288,10 @@ def test_units_that_are_none(text):
         parse_units(text)
 
 
-def test_hints_for_a_file_that_needs_none(walk, save, tmp_path):
-    save(walk, tmp_path / "walk.npz")
+def test_hints_for_a_file_that_needs_none(tmp_path):
+    (tmp_path / "walk.tlog").touch()
     with pytest.raises(UsageError, match="nothing has to be said"):
-        load(tmp_path / "walk.npz", Hints(rate_hz=100))
+        load(tmp_path / "walk.tlog", Hints(rate_hz=100))
 
 
 def test_a_bad_line_is_named(walk, walk_ns, tmp_path):

@@ -61,15 +61,17 @@ def recording_of(
     for stream, what in ((acc, "accelerations"), (gyr, "rates")):
         if len(stream.values) < 2:
             raise RecordingError(f"{name} holds the same {what} again and again, at one time", "record it again")
-    (t, of_t), (t_gyr, of_t_gyr) = (times.seconds(stream, acc, hints, name) for stream in (acc, gyr))
+    (t, gap, of_t, even), (t_gyr, gap_gyr, of_t_gyr, even_gyr) = (
+        times.seconds(stream, acc, hints, name) for stream in (acc, gyr)
+    )
     a, of_a, a_clipped = _accelerations(acc, hints, name)
     joined = ""
     if not np.array_equal(t, t_gyr):
-        kept, values, gap, joined = times.joined(t, t_gyr, gyr.values, name)
-        t, a, a_clipped = t[kept], a[kept], a_clipped[kept]
+        kept, values, lost_rates, joined = times.joined(t, t_gyr, gyr.values, gap_gyr, name)
+        t, a, a_clipped, gap = t[kept], a[kept], a_clipped[kept], gap[kept] | lost_rates
         temperature_c = None if temperature_c is None else temperature_c[kept]
     else:
-        values, gap = gyr.values, np.zeros(len(t), bool)
+        values = gyr.values
     w, of_w, w_clipped = _rates(t, a, values, gyr.unit, hints, name)
     of_times = of_t if of_t == of_t_gyr else f"{of_t} and {of_t_gyr}"
     said = [
@@ -77,6 +79,8 @@ def recording_of(
         *remarks,
         f"{again} samples that are written again were left out" if again else "",
         *(f"{count} samples whose {what} lack a number were left out" for count, what in lost if count),
+        even,
+        f"of the rates {even_gyr}" if even_gyr not in ("", even) else "",
         joined,
     ]
     recording = Recording.from_arrays(
@@ -104,7 +108,7 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
     values, said = stream.values, hints.units.get("acc", stream.unit)
     size = float(np.median(np.linalg.norm(values, axis=1)))
     seen = units.acceleration_unit(values)
-    if said == COUNTS or (not said and _are_counts(values) and (not seen or hints.accel_range_g)):
+    if said == COUNTS or (not said and are_counts(values) and (not seen or hints.accel_range_g)):
         return _scaled(values, hints, name, size)
     if not seen and size * QUANTITIES["acc"].get(said, 1.0) < units.LEAST_OF_G * STANDARD_GRAVITY_MPS2:
         raise RecordingError(
@@ -137,7 +141,7 @@ def _scaled(values: Vector, hints: Hints, name: str, size: float) -> tuple[Vecto
 def _rates(t: Vector, a: Vector, values: Vector, said: str, hints: Hints, name: str) -> tuple[Vector, str, Mask]:
     """(n, 3) rad/s, how they were taken, and (n,) whether they stood at the end of the range."""
     said = hints.units.get("gyr", said)
-    if said == COUNTS or (not said and _are_counts(values) and (hints.gyro_range_dps or hints.accel_range_g)):
+    if said == COUNTS or (not said and are_counts(values) and (hints.gyro_range_dps or hints.accel_range_g)):
         if hints.gyro_range_dps is None:
             raise RecordingError(f"{name}: rates are counts of a range that nothing says", "give --gyro-range DPS")
         scale, of = np.radians(hints.gyro_range_dps) / FULL_SCALE, f"counts of ±{hints.gyro_range_dps:g} deg/s"
@@ -178,7 +182,8 @@ def is_another_range(ratio: float) -> bool:
     return ratio == 0.0 or abs(math.log2(ratio)) > ANOTHER_RANGE
 
 
-def _are_counts(values: Vector) -> bool:
+def are_counts(values: Vector) -> bool:
+    """Whether all are whole numbers of 16 bits."""
     return bool((values == np.rint(values)).all() and np.abs(values).max() <= FULL_SCALE)
 
 

@@ -13,6 +13,7 @@ from ...errors import RecordingError
 from ..csv import COLUMNS
 from ..hints import NO_HINTS, Hints
 from ..rows import cannot_read
+from .clock import FEWEST
 from .labelled import labelled_table
 from .names import (
     ACC,
@@ -25,7 +26,7 @@ from .names import (
     three,
     threes,
 )
-from .streams import recording_of, with_gravity
+from .streams import are_counts, recording_of, with_gravity
 from .text import NS, PREAMBLE, SEPARATORS, TextTable, table_of, text_of
 from .times import Stream
 from .units import acceleration_unit
@@ -33,6 +34,8 @@ from .units import acceleration_unit
 SNIFFED = 1 << 16
 # of all lines, those without a number: more are another sensor's
 ANOTHERS = 0.1
+# m/s^2: whole numbers that are larger are counts
+LARGEST_OF_SI = 300.0
 # of Sensor Logger's one table: what has another unit on iOS, and what does not say whose sign it has
 IN_G_ON_IOS, UNTOLD = "accelerometeruncalibrated_", "totalacceleration_"
 OTHER_SIGN = "accelerations with the other sign, as iOS has them"
@@ -43,13 +46,23 @@ def is_table(path: Path) -> bool:
     try:
         with path.open("rb") as file:
             table = _table(text_of(file.read(SNIFFED), path.name), path.name)
+        return table is not None and not (_is_own(path) and _may_be_si(table))
     except (OSError, RecordingError):
         return False
-    return table is not None and not _is_own(path)
 
 
 def _table(text: str, name: str) -> TextTable | None:
     return labelled_table(text, name) or table_of(text, name)
+
+
+def _may_be_si(table: TextTable) -> bool:
+    """Whether the accelerations show no other unit than m/s^2."""
+    values = table.numbers(three(table.columns, ACC))
+    values = values[whole(values)[0]]
+    if len(values) < FEWEST:
+        return True
+    counts = are_counts(values) and float(np.median(np.abs(values).max(axis=1))) > LARGEST_OF_SI
+    return not counts and acceleration_unit(values) in ("", "m/s^2")
 
 
 def _is_own(path: Path) -> bool:

@@ -15,6 +15,7 @@ from ...data import Mask, Vector
 from ...errors import RecordingError
 from ..hints import Hints
 from . import units
+from .clock import even, period_of
 from .units import QUANTITIES, check_agrees
 
 Times = Sequence[Decimal] | NDArray[Any]
@@ -76,32 +77,32 @@ def possible_utc_ns(ns: int) -> int | None:
     return ns if UTC_NS[0] < ns < UTC_NS[1] else None
 
 
-def seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Vector, str]:
-    """Times (n,) [s] since the first stream's first, and how they were taken."""
+def seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Vector, Mask, str, str]:
+    """Times (n,) [s] since the first stream's first, gaps, how they were taken, and what is to be said of its clock."""
+    none = np.zeros(len(stream.values), bool)
     if stream.times is None or first.times is None:
         if hints.rate_hz is None:
             raise RecordingError(f"{name} holds no times", "give the rate of its samples with --rate HZ")
         places = np.arange(len(stream.values)) if stream.places is None else stream.places
-        return places / hints.rate_hz, f"a rate of {hints.rate_hz:g} Hz"
+        return places / hints.rate_hz, none, f"a rate of {hints.rate_hz:g} Hz", ""
     ticks = _since(stream.times, first.times[0])
     if not (np.abs(ticks) < units.BEYOND**2).all():
         raise RecordingError(f"{name} holds times that are none", "leave those lines out")
-    steps = np.diff(ticks)
-    # a burst of samples may come with one time
-    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    step, said = period_of(ticks), hints.units.get("t", stream.time_unit)
     how = f"their step of {step:g} reads"
-    unit = check_agrees(
-        name, "t", hints.units.get("t", stream.time_unit), hints.units.get("t", units.time_unit(step)), how
-    )
+    unit = check_agrees(name, "t", said, hints.units.get("t", units.time_unit(step, said)), how)
     t = ticks * QUANTITIES["t"][unit]
-    back = np.diff(t) <= 0
+    back = np.diff(t) < 0
     if back.any():
         at = int(back.argmax()) + 1
         raise RecordingError(
             f"{name}: time does not increase at sample {at} ({t[at - 1]:.6f} s, then {t[at]:.6f} s)",
-            "sort the samples by time and drop repeated ones",
+            "sort the samples by time, or leave out the times with --columns, and give --rate HZ",
         )
-    return t, f"times in {unit}"
+    fitted = even(t)
+    if fitted is not None:
+        return fitted.t, fitted.gap, f"times in {unit}", fitted.said
+    return t, none, f"times in {unit}", ""
 
 
 def _since(times: Times, origin: Any) -> Vector:
@@ -113,8 +114,11 @@ def _since(times: Times, origin: Any) -> Vector:
     return np.array([float(time - origin) for time in times])
 
 
-def joined(t: Vector, t_gyr: Vector, rates: Vector, name: str) -> tuple[slice, Vector, Mask, str]:
-    """Which accelerations lie within the rates' time, the rates at their times, gaps, and what to say of it."""
+def joined(t: Vector, t_gyr: Vector, rates: Vector, gap: Mask, name: str) -> tuple[slice, Vector, Mask, str]:
+    """Which accelerations lie within the rates' time, the rates at their times, gaps, and what to say of it.
+
+    gap : (n,) where rates are missing before.
+    """
     first, last = np.searchsorted(t, t_gyr[0], "left"), np.searchsorted(t, t_gyr[-1], "right")
     if last - first < 2:
         raise RecordingError(
@@ -127,7 +131,7 @@ def joined(t: Vector, t_gyr: Vector, rates: Vector, name: str) -> tuple[slice, V
     values = np.column_stack([np.interp(at, t_gyr, axis) for axis in rates.T])
     after = np.clip(np.searchsorted(t_gyr, at), 1, len(t_gyr) - 1)
     apart = t_gyr[after] - t_gyr[after - 1]
-    lost = apart > LOST_PERIODS * float(np.median(np.diff(t_gyr)))
+    lost = (apart > LOST_PERIODS * float(np.median(np.diff(t_gyr)))) | gap[after]
     nearest = np.minimum(np.abs(at - t_gyr[after - 1]), np.abs(t_gyr[after] - at))
     said = (
         f"the rates were interpolated to the times of the accelerations, from which their own lie"

@@ -1,6 +1,6 @@
 """Units: their names, what the samples themselves say of them, and whether both agree.
 
-Times are told by their steps, since a rate lies between 10 Hz and 8 kHz; accelerations by |a|, which is gravity in the
+Times are told by their steps, since a rate lies between 5 Hz and 8 kHz; accelerations by |a|, which is gravity in the
 median of a recording that was turned by hand; rates by how fast gravity turns: d(a)/dt = -w x a of a vector that
 stands still.
 """
@@ -39,13 +39,17 @@ _PLAIN = str.maketrans(
     {"²": "2", "µ": "u", "μ": "u", "°": "deg", "^": "", " ": "", "·": "", "*": "", "_": "", "⁻": "-", "¹": "1"}
 )
 
-SLOWEST_HZ, FASTEST_HZ = 10.0, 8000.0
+SLOWEST_HZ, FASTEST_HZ = 5.0, 8000.0
+# between samples of a recording that follows no turn, and may be another's all the same
+SLOW_S = 2.0
 # gains of 0.5 to 1.5 are a sensor's own
 LEAST_OF_G, MOST_OF_G = 0.45, 2.0
 LEAST_TURNED, MOST_TURNED = 0.6, 1.6
 SCATTER = 0.45
 # no unit makes such numbers of what a sensor reads, and their squares are finite
 BEYOND = 1e12
+# half of a turn's span: a recording that says how gravity turns lasts for so many
+LEAST_TURNS = 30
 # s over which gravity is seen to turn, and how much of what is seen the rates have to explain
 TURN_S, EXPLAINED = 0.2, 0.5
 
@@ -55,8 +59,10 @@ def unit_named(text: str) -> str:
     return _NAMES.get(text.strip().lower().translate(_PLAIN), "")
 
 
-def time_unit(step: float) -> str:
-    """The unit in which times lie `step` apart; empty where there is none."""
+def time_unit(step: float, said: str = "") -> str:
+    """The unit in which times lie `step` apart: the said one, where that makes a slow recording; empty of none."""
+    if said and 1 / FASTEST_HZ <= step * QUANTITIES["t"][said] <= SLOW_S:
+        return said
     units = QUANTITIES["t"].items()
     return next((unit for unit, s in units if 1 / FASTEST_HZ <= step * s <= 1 / SLOWEST_HZ), "")
 
@@ -84,7 +90,7 @@ def turned(t: Vector, acc: Vector, gyr: Vector) -> float | None:
     """
     dt = float(np.median(np.diff(t)))
     width = max(1, round(min(TURN_S / 2 / dt, len(t))))
-    if len(t) < 10 * width:
+    if len(t) < LEAST_TURNS * width:
         return None
     kernel = np.full(width, 1.0 / width)
     smooth = np.column_stack([np.convolve(column, kernel, "same") for column in acc.T])

@@ -1,0 +1,68 @@
+"""Columns without names, by physics: which three hold gravity, and which three turn it as it turns.
+
+Of three columns beside each other that keep a magnitude, the first are the accelerometer, and those whose rates turn
+these as they turn are the gyroscope; a column before both that increases evenly is the time. What physics does not
+confirm is not guessed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...data import Vector
+from ..hints import ROLES, Hints
+from .clock import period_of
+from .units import FASTEST_HZ, QUANTITIES, SCATTER, turned
+
+# of samples without times, to see what turns: another rate changes the factor, and not what is explained
+ANY_HZ = 100.0
+FEWEST, WIDEST = 300, 16
+# samples that are looked at
+LOOKED_AT = 200_000
+
+
+def guessed(table: Vector, hints: Hints) -> tuple[dict[str, int], str]:
+    """Role -> place among the columns of (n, k) numbers, and what is to be said of it; nothing where nothing fits."""
+    n, width = table.shape
+    table = table[:LOOKED_AT]
+    if n < FEWEST or not 6 <= width <= WIDEST or not np.isfinite(table).all():
+        return {}, ""
+    for at in (0, 1):
+        clock = table[:, 0] if at else None
+        if clock is not None and not _is_clock(clock):
+            continue
+        found = _sensors(table, at, _seconds(clock, len(table), hints))
+        if found:
+            order = {role: place for role, place in zip(ROLES[1:], found, strict=True)} | ({"t": 0} if at else {})
+            words = ["-"] * (max(order.values()) + 1)
+            for role, place in order.items():
+                words[place] = role
+            return order, f"its columns have no names, and read as of --columns {','.join(words)}"
+    return {}, ""
+
+
+def _is_clock(column: Vector) -> bool:
+    steps = np.diff(column)
+    return bool((steps >= 0).all() and column[-1] > column[0] and (steps > 0).mean() > 0.01)
+
+
+def _seconds(clock: Vector | None, n: int, hints: Hints) -> Vector:
+    if clock is None:
+        return np.arange(n) / (hints.rate_hz or ANY_HZ)
+    step = period_of(clock)
+    si = next((si for si in QUANTITIES["t"].values() if 1 / FASTEST_HZ <= step * si <= 1.0), 1.0 / ANY_HZ / step)
+    return np.asarray((clock - clock[0]) * si)
+
+
+def _sensors(table: Vector, first: int, t: Vector) -> list[int]:
+    """The places of ax, ay, az, gx, gy, gz; empty where no columns fit."""
+    threes = list(range(first, table.shape[1] - 2, 3))
+    for a in threes:
+        acc = table[:, a : a + 3]
+        low, size, high = np.percentile(np.linalg.norm(acc, axis=1), [25, 50, 75]).tolist()
+        if not 0.0 < high - low <= SCATTER * size:
+            continue
+        for w in threes:
+            if w != a and (turned(t, acc, table[:, w : w + 3]) or 0.0) > 0.0:
+                return [a, a + 1, a + 2, w, w + 1, w + 2]
+    return []

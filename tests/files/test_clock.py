@@ -1,0 +1,99 @@
+"""Stamps of arrival give the sensor's own clock, lost is only what is missing, and true times stay as they are."""
+
+import numpy as np
+import pytest
+
+import mpucal
+from mpucal.files.tables.clock import even, period_of
+
+HZ, N = 199.7, 8000
+TRUE = np.arange(N) / HZ
+
+
+def late(seed, s):
+    """Stamps that are late by so much on average."""
+    return np.maximum.accumulate(TRUE + np.random.default_rng(seed).exponential(s, N))
+
+
+def in_bursts(size):
+    """Samples that arrive with the last of so many."""
+    return TRUE[np.minimum((np.arange(N) // size + 1) * size - 1, N - 1)]
+
+
+def held_back():
+    """A computer that is busy for 0.3 s now and then."""
+    stamps = late(1, 1e-3)
+    for first in range(500, N - 500, 1000):
+        stamps[first : first + 60] = np.maximum(stamps[first : first + 60], stamps[first + 60])
+    return np.maximum.accumulate(stamps)
+
+
+@pytest.mark.parametrize(
+    ("stamps", "within"),
+    [
+        (late(1, 1e-3), 1e-4),
+        (late(2, 5e-3), 5e-4),
+        (in_bursts(10), 2e-3),
+        (in_bursts(32) + 2e-4 * (np.arange(N) % 32), 3e-3),
+        (np.floor(TRUE * 100) / 100, 1e-3),
+        (held_back(), 5e-4),
+    ],
+    ids=["1 ms", "5 ms", "bursts of 10", "bursts of 32", "rounded to 10 ms", "a busy computer"],
+)
+def test_what_arrives_late_was_measured_evenly(stamps, within):
+    found = even(stamps)
+    assert found.rate_hz == pytest.approx(HZ, rel=2e-4)
+    assert not found.gap.any()
+    off = found.t - TRUE
+    assert np.abs(off - np.median(off)).max() < within
+    assert "none is missing" in found.said
+
+
+def test_lost_is_what_is_missing():
+    lost = np.zeros(N, bool)
+    for first in (700, 2000, 2080, 5000):
+        lost[first : first + 5] = True
+    # and a logger that stopped for a while
+    true = TRUE + np.where(np.arange(N) >= 6500, 7.3, 0.0)
+    stamps = np.maximum.accumulate(true + np.random.default_rng(3).exponential(3e-3, N))[~lost]
+    found = even(stamps)
+    begins = [int(np.count_nonzero(~lost[:at])) for at in (705, 2005, 2085, 5005, 6500)]
+    assert np.flatnonzero(found.gap).tolist() == begins
+    off = found.t - true[~lost]
+    assert np.abs(off - np.median(off)).max() < 1.5e-3
+    assert "with 5 gaps" in found.said
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        TRUE,
+        np.round(TRUE, 3),
+        TRUE[np.random.default_rng(4).random(N) > 0.1],
+        np.cumsum((1 + np.random.default_rng(5).exponential(0.3, N)) / HZ),
+        TRUE[:50],
+    ],
+    ids=["even", "rounded to 1 ms", "some left out", "whenever a program came to it", "few"],
+)
+def test_true_times_stay(times):
+    assert even(times) is None
+
+
+def test_the_period_is_that_of_the_samples_and_not_of_the_bursts():
+    assert period_of(in_bursts(10)) == pytest.approx(1 / HZ, rel=1e-2)
+    assert period_of(TRUE) == pytest.approx(1 / HZ, rel=1e-9)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".npz", ".txt"])
+def test_a_recording_by_radio_is_the_one_by_wire(ending, walk, tmp_path):
+    """Without its clock it would be refused: nothing lies still where every other step is a gap."""
+    stamps = np.maximum.accumulate(walk.t + np.random.default_rng(6).exponential(4e-3, len(walk)))
+    if ending == ".npz":
+        np.savez(tmp_path / "walk.npz", t=stamps, acc=walk.acc, gyr=walk.gyr)
+    else:
+        table, names = np.column_stack([stamps, walk.acc, walk.gyr]), "t,ax,ay,az,gx,gy,gz"
+        np.savetxt(tmp_path / f"walk{ending}", table, delimiter=",", header=names, comments="")
+    read = mpucal.load(tmp_path / f"walk{ending}")
+    off = read.t - walk.t
+    assert np.abs(off - np.median(off)).max() < 5e-4
+    assert "stamps of arrival" in read.taken
