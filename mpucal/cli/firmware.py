@@ -23,9 +23,12 @@ BAUDS = {"uno": 115_200, "nano": 115_200, "nano-old": 57_600}
 NAMES = {
     "mega": "arduino:avr:mega",
     "leonardo": "arduino:avr:leonardo",
+    "nano-every": "arduino:megaavr:nona4809",
+    "uno-wifi": "arduino:megaavr:uno2018",
     "esp32": "esp32:esp32:esp32",
     "esp8266": "esp8266:esp8266:nodemcuv2",
-    "pico": "rp2040:rp2040:rpipico",
+    # its first option has no file system, where the calibration is to lie
+    "pico": "rp2040:rp2040:rpipico:flash=2097152_65536",
 }
 
 
@@ -74,7 +77,7 @@ def _write(folder: Path) -> None:
 def _flash(port: str, board: str) -> None:
     words = _by_avrdude(port, BAUDS[board]) if board in BAUDS else _by_arduino(port, NAMES[board])
     if shutil.which(words[0]) is None:
-        core = "" if board in BAUDS else f" and the core {NAMES[board].rpartition(':')[0]}"
+        core = "" if board in BAUDS else f" and the core {':'.join(NAMES[board].split(':')[:2])}"
         raise SourceError(f"there is no {words[0]} to write it with", f"install it{core}, then: {shlex.join(words)}")
     if subprocess.run(words, check=False).returncode:
         raise WriteBackError(

@@ -1,8 +1,9 @@
-/* Where an Arduino board keeps its blob: in the EEPROM of an AVR from MPUCAL_EEPROM_AT on, elsewhere in a file of
- * LittleFS; where the core has neither, nowhere, and a host that stores a blob is told so.
+/* Where an Arduino board keeps its blob: in the EEPROM of an AVR from MPUCAL_EEPROM_AT on, of an ESP32, ESP8266 or RP2040
+ * in a file of LittleFS; elsewhere, and in an EEPROM that is too small, nowhere, and a host that stores a blob is told so.
  *
  * For sketches, once each. The flash behind other boards' EEPROM library is erased whole before it is written, which
- * would lose both slots; LittleFS renames a file at once or not at all.
+ * would lose both slots; LittleFS renames a file at once or not at all. Each library is included by name for its cores:
+ * the Arduino IDE and arduino-cli find a library by an include that fails, and never by __has_include.
  */
 #ifndef MPUCAL_ARDUINO_H
 #define MPUCAL_ARDUINO_H
@@ -11,30 +12,56 @@
 
 #include "mpucal_slots.h"
 
-#if defined(__AVR__)
-
-#include <EEPROM.h>
-
+/* Where both slots begin, of MPUCAL_SLOTS_BYTES in all; what another sketch keeps there is overwritten. */
 #ifndef MPUCAL_EEPROM_AT
 #define MPUCAL_EEPROM_AT 0
 #endif
+
+#if defined(__AVR__)
+#include <avr/io.h>
+#if E2END + 1 >= MPUCAL_EEPROM_AT + MPUCAL_SLOTS_BYTES
+#define MPUCAL_IN_EEPROM
+#endif
+#elif defined(ESP32) || defined(ESP8266) || (defined(ARDUINO_ARCH_RP2040) && !defined(ARDUINO_ARCH_MBED))
+#define MPUCAL_IN_LITTLEFS
+#endif
+
+#if defined(MPUCAL_IN_EEPROM)
+
+#include <EEPROM.h>
 
 static uint8_t mpucalRead(uint16_t address) { return EEPROM.read((int)address + MPUCAL_EEPROM_AT); }
 static void mpucalWrite(uint16_t address, uint8_t value) { EEPROM.update((int)address + MPUCAL_EEPROM_AT, value); }
 static const struct mpucal_memory mpucalMemory = {mpucalRead, mpucalWrite, NULL};
 static inline void mpucalMemoryBegin() {}
 
-#elif __has_include(<LittleFS.h>)
+#elif defined(MPUCAL_IN_LITTLEFS)
 
 #include <LittleFS.h>
 
 static const char *const MPUCAL_FILE = "/mpucal.bin";
 static const char *const MPUCAL_NEW_FILE = "/mpucal.new";
 static uint8_t mpucalImage[MPUCAL_SLOTS_BYTES];
+static bool mpucalMounted = false;
+
+/* A flash that holds no files is formatted only where a blob is stored: reading must not take what else may be there. */
+static void mpucalMount(bool format) {
+#if defined(ESP32)
+    mpucalMounted = LittleFS.begin(format);
+#else
+    LittleFSConfig config;
+    config.setAutoFormat(format);
+    LittleFS.setConfig(config);
+    mpucalMounted = LittleFS.begin();
+#endif
+}
 
 /* What the file holds; all zeros, which is no blob, where there is none. */
 static void mpucalReload() {
     memset(mpucalImage, 0, sizeof mpucalImage);
+    if (!mpucalMounted) {
+        return;
+    }
     File file = LittleFS.open(MPUCAL_FILE, "r");
     if (file) {
         file.read(mpucalImage, sizeof mpucalImage);
@@ -43,6 +70,12 @@ static void mpucalReload() {
 }
 
 static void mpucalCommit() {
+    if (!mpucalMounted) {
+        mpucalMount(true);
+    }
+    if (!mpucalMounted) {
+        return;
+    }
     File file = LittleFS.open(MPUCAL_NEW_FILE, "w");
     if (file) {
         size_t written = file.write(mpucalImage, sizeof mpucalImage);
@@ -63,11 +96,7 @@ static void mpucalWrite(uint16_t address, uint8_t value) { mpucalImage[address] 
 static const struct mpucal_memory mpucalMemory = {mpucalRead, mpucalWrite, mpucalSave};
 
 static inline void mpucalMemoryBegin() {
-#if defined(ESP32)
-    LittleFS.begin(true); /* formats a flash that never held files */
-#else
-    LittleFS.begin();
-#endif
+    mpucalMount(false);
     mpucalReload();
 }
 

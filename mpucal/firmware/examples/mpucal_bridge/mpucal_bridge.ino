@@ -16,6 +16,10 @@
 #define MPUCAL_BAUD 115200
 #endif
 
+// Pins of the I2C bus, of a core that lets them be chosen (ESP32, ESP8266, RP2040); without these the board's own.
+// #define MPUCAL_SDA 4
+// #define MPUCAL_SCL 5
+
 const uint32_t BAUD_RATE = MPUCAL_BAUD;
 const uint32_t I2C_HZ = 400000;
 const uint32_t I2C_TIMEOUT_MS = 25;
@@ -33,7 +37,15 @@ template <typename W> static auto limitTime(W &wire, long) -> decltype(wire.setT
 template <typename W> static void limitTime(W &, ...) {}
 
 static void beginWire() {
+#if defined(MPUCAL_SDA) && defined(ARDUINO_ARCH_RP2040)
+    Wire.setSDA(MPUCAL_SDA);
+    Wire.setSCL(MPUCAL_SCL);
     Wire.begin();
+#elif defined(MPUCAL_SDA)
+    Wire.begin(MPUCAL_SDA, MPUCAL_SCL);
+#else
+    Wire.begin();
+#endif
     Wire.setClock(I2C_HZ);
     limitTime(Wire, 0);
 }
@@ -129,7 +141,7 @@ static const struct mpucal_port port = {readRegisters, writeRegisters, nowUs,   
                                         &mpucalMemory, 2,              "mpucal-ino 0.1"};
 static struct mpucal_bridge bridge;
 
-#if defined(__AVR__)
+#if defined(WDTCSR)
 // Nothing has fed it for two seconds: the program starts anew, and the host's next request is answered with NO_HELLO. No
 // reset by the watchdog itself: the boot loader of older boards leaves it on then, and is reset for ever.
 ISR(WDT_vect, ISR_NAKED) { __asm__ __volatile__("jmp 0"); }
@@ -142,6 +154,10 @@ static void watchdogBegin() {
     interrupts();
 }
 
+static void watchdogFeed() { wdt_reset(); }
+#elif defined(__AVR__)
+// A megaAVR's watchdog has no interrupt, and its boot loader no such fault.
+static void watchdogBegin() { _PROTECTED_WRITE(WDT.CTRLA, WDT_PERIOD_2KCLK_gc); }
 static void watchdogFeed() { wdt_reset(); }
 #else
 static void watchdogBegin() {}

@@ -3,7 +3,12 @@
 
 #include <mpucal_arduino.h>
 
-const uint8_t ADDRESS = 0x68;
+// 0x69 where AD0 is high.
+#ifndef MPUCAL_ADDRESS
+#define MPUCAL_ADDRESS 0x68
+#endif
+
+const uint8_t ADDRESS = MPUCAL_ADDRESS;
 const uint8_t WHO_AM_I = 0x75, PWR_MGMT_1 = 0x6B, GYRO_CONFIG = 0x1B, ACCEL_CONFIG = 0x1C, ACCEL_XOUT_H = 0x3B;
 const uint8_t CLKSEL_PLL = 0x01, AFS_4G = 0x08, FS_500DPS = 0x08;
 const float RANGE_G = 4.0f, RANGE_DPS = 500.0f;

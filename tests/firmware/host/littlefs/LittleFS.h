@@ -10,6 +10,11 @@ struct Flash {
 };
 extern Flash flash;
 
+struct LittleFSConfig {
+    bool formats = true;
+    void setAutoFormat(bool value) { formats = value; }
+};
+
 class File {
   public:
     File() = default;
@@ -28,7 +33,11 @@ class File {
 };
 
 struct FileSystem {
-    bool begin() { return true; }
+    LittleFSConfig config;
+    bool holds_files = true; // otherwise what mounts only once it is formatted, and is lost then
+    void setConfig(const LittleFSConfig &other) { config = other; }
+    bool begin() { return begin(config.formats); }
+    bool begin(bool formats) { return holds_files = holds_files || formats; }
     File open(const char *name, const char *mode) {
         bool is_there = flash.files.count(name) != 0;
         if (*mode == 'r') {

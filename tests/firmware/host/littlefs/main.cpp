@@ -23,6 +23,10 @@ static bool store(const std::string &blob) {
 
 int main(int, char **argv) {
     const std::string old_blob = contentOf(argv[1]), new_blob = contentOf(argv[2]);
+    flash = Flash{{}, 1000};
+    LittleFS.holds_files = false;
+    mpucalMemoryBegin();
+    std::printf("%s ", mpucal_slots_stored(&mpucalMemory).generation || LittleFS.holds_files ? "taken" : "untouched");
     bool stored = false;
     for (long power = 0; !stored; power++) {
         flash = Flash{{}, 1000};
