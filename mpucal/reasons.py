@@ -351,6 +351,12 @@ KINDS: Mapping[str, Kind] = {
                 "check its wiring and the recording",
                 True,
             ),
+            "range": Sentence(
+                "gravity turns {factor:g} times as far as the gyroscope says: it seems to have another range than"
+                " assumed{ranges}",
+                "say --gyro-range, or multiply its rates by {factor:g}",
+                True,
+            ),
             "scale": Sentence(
                 "the gyroscope's scale factor error is {scale:.1%} on {axis} and its cross-axis sensitivity"
                 " {cross:.1%}, more than its data sheet allows",

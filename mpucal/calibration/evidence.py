@@ -21,6 +21,9 @@ from .uncertainty import DIRECTIONS, Uncertainty, uncertainty
 HALF_SECOND = 0.5
 LEAST_MOVE_RAD = np.deg2rad(2.0)  # of gravity in half a second, above noise
 ENOUGH_MOVES = 100
+LEAST_TURN_RAD = np.deg2rad(12.0)  # of gravity between two rests, beyond what biases and skew turn it by
+OTHER_RANGES = (0.25, 0.5, 2.0, 4.0)
+CLEARLY = 3.0  # times as far the one misses where another unit or range is meant
 FAR_TOO_FAR = 20.0  # times as far as gravity: no rates in rad/s, but for turns about the vertical
 LONGEST_MOVE_S = 20.0  # over which a gyroscope still says where gravity went
 # Rests that can contradict each other; of fewer, pieces so long do.
@@ -102,28 +105,54 @@ class Evidence:
     @cached_property
     def turned_in_degrees(self) -> bool:
         """Whether gravity turns from half second to half second as the rates say in deg/s, and not as in rad/s."""
-        r, n, flat = self.recording, self._half_second, self.flat
+        r, flat = self.recording, self.flat
         if flat is None:
             small = replace(r, gyr=np.deg2rad(r.gyr))
             segment = find_flat(small)
             if segment is None:
                 return False
             flat = flat_statistics(r, segment)
-        u = _units(_means(r.acc[flat.last :], n))
-        moving = _angles(u[1:], u[:-1]) > LEAST_MOVE_RAD
-        if not moving.any():
-            return False
-        # between the middles of half seconds; as many of them tell as much as all
-        at = np.flatnonzero(moving)[:: max(np.count_nonzero(moving) // ENOUGH_MOVES, 1)]
-        steps = flat.last + n // 2 + np.arange(n)[:, None] + at * n
-        turns = (r.t[steps] - r.t[steps - 1])[:, :, None] * (r.gyr[steps] - flat.b_omega)
-        if lengths(turns.reshape(-1, 3)).sum() < FAR_TOO_FAR * _angles(u[at + 1], u[at]).sum():
-            return False
-        miss, miss_in_degrees = (
-            np.median(_angles(np.array([turned(-unit * turns[:, k]) @ u[i] for k, i in enumerate(at)]), u[at + 1]))
-            for unit in (1.0, np.deg2rad(1.0))
-        )
-        return bool(miss > 3.0 * miss_in_degrees)
+        moves = self._half_seconds(flat)
+        turns, angles = (sum(getattr(move, name) for move in moves) for name in ("turned", "angle"))
+        return turns > FAR_TOO_FAR * angles > 0.0 and _miss(moves, 1.0) > CLEARLY * _miss(moves, np.deg2rad(1.0))
+
+    def _half_seconds(self, flat: Flat) -> list[_Move]:
+        """Moves between the middles of half seconds; as many of them tell as much as all."""
+        n = self._half_second
+        u = _units(_means(self.recording.acc[flat.last :], n))
+        at = np.flatnonzero(_angles(u[1:], u[:-1]) > LEAST_MOVE_RAD)
+        at = at[:: max(len(at) // ENOUGH_MOVES, 1)]
+        middle = flat.last + n // 2
+        return [self._move(flat, u[i], u[i + 1], middle + i * n, middle + (i + 1) * n) for i in at.tolist()]
+
+    def _rest_to_rest(self, flat: Flat) -> list[_Move]:
+        """Moves from rest to rest that turn gravity far."""
+        r, runs = self.recording, RestFinder(self.recording, flat).alike()
+        u, first, last = _units(statistics(r.acc, runs)[0]), runs[1:, 0], runs[:-1, 1]
+        far = (_angles(u[1:], u[:-1]) > LEAST_TURN_RAD) & (r.t[first] - r.t[last - 1] < LONGEST_MOVE_S)
+        return [self._move(flat, u[k], u[k + 1], last[k], first[k]) for k in np.flatnonzero(far).tolist()]
+
+    @cached_property
+    def gyro_factor(self) -> float:
+        """By which power of two the rates are to be multiplied for gravity to turn as they say.
+
+        From rest to rest; where there are few, from half second to half second.
+        """
+        if self.flat is None:
+            return 1.0
+        moves = self._rest_to_rest(self.flat)
+        if len(moves) < FEWEST_RESTS:
+            moves = self._half_seconds(self.flat)
+        if len(moves) < FEWEST_RESTS:
+            return 1.0
+        factor = min((1.0, *OTHER_RANGES), key=lambda factor: _miss(moves, factor))
+        return factor if _miss(moves, 1.0) > CLEARLY * _miss(moves, factor) else 1.0
+
+    def _move(self, flat: Flat, before: Vector, after: Vector, first: int, last: int) -> _Move:
+        """With the steps that end with the samples first to last - 1."""
+        r = self.recording
+        dt = r.t[first:last] - r.t[first - 1 : last - 1]
+        return _Move(before, dt[:, None] * (r.gyr[first:last] - flat.b_omega), after)
 
     @cached_property
     def agreement(self) -> Agreement | None:
@@ -149,6 +178,30 @@ class Evidence:
             misses.append(float(np.arccos(np.clip(_units(np.array(carried)) @ there, -1.0, 1.0)).min()))
         magnitude = np.linalg.norm(poses, axis=1) - self.gravity
         return Agreement(len(runs), float(np.sqrt(np.mean(magnitude**2))), *_median_and_max(misses))
+
+
+class _Move(NamedTuple):
+    """Gravity's direction before (3,) and after (3,), and the turns (m, 3) rad between as the gyroscope says."""
+
+    before: Vector
+    turns: Vector
+    after: Vector
+
+    @property
+    def angle(self) -> float:
+        """rad from one to the other."""
+        return float(_angles(self.before[None], self.after[None])[0])
+
+    @property
+    def turned(self) -> float:
+        """rad, the sum of all turns."""
+        return float(lengths(self.turns).sum())
+
+
+def _miss(moves: list[_Move], factor: float) -> float:
+    """rad, median, by which `factor` times the rates miss where gravity turned to."""
+    carried = np.array([turned(-factor * move.turns) @ move.before for move in moves])
+    return float(np.median(_angles(carried, np.array([move.after for move in moves]))))
 
 
 def _median_and_max(values: list[float]) -> tuple[float, float]:

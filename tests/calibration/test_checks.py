@@ -159,6 +159,20 @@ def test_nor_is_what_it_leaves_without_gravity(in_hand):
     refused_for("not_raw", replace(in_hand.recording, acc=linear), "no gravity in it")
 
 
+@pytest.mark.parametrize("factor", [0.25, 0.5, 2.0, 4.0])
+@pytest.mark.parametrize("motion", ["pose12", "turns"])
+def test_a_gyroscope_of_another_range_is_named_before_the_mount_is_blamed(hand, motion, factor):
+    recording = hand(1, motion).recording
+    recording = replace(recording, gyr=factor * recording.gyr, sensor=replace(recording.sensor, gyro_range_dps=None))
+    refused_for("gyro_off", recording, f"{1.0 / factor:g} times as far as the gyroscope says", "--gyro-range")
+
+
+def test_a_known_range_is_named(in_hand):
+    recording = replace(in_hand.recording, gyr=0.5 * in_hand.recording.gyr)
+    sensor = replace(recording.sensor, gyro_range_dps=250.0, message="a log")
+    refused_for("gyro_off", replace(recording, sensor=sensor), "than assumed: ±500 deg/s, read as ±250")
+
+
 def test_slow_rates_in_degrees(ideal):
     slow = ideal(0, turn_s=40.0, rate_hz=20).recording
     assert np.rad2deg(np.abs(slow.gyr).max()) < 30

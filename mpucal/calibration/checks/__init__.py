@@ -57,9 +57,10 @@ CHECKS: tuple[Check, ...] = (
 
 def found(evidence: Evidence) -> list[Reason]:
     """All that speaks against it, what refuses it first."""
-    missing = unusable.no_gyroscope(evidence)
-    if missing is not None:
-        return [missing]
+    # of a gyroscope that is not there, or whose rates are another range's, nothing else can be said
+    nothing_else = unusable.no_gyroscope(evidence) or sensor.gyro_range(evidence)
+    if nothing_else is not None:
+        return [nothing_else]
     # a fit there is only where nothing made the recording unusable
     checks = CHECKS if evidence.fit is not None else (*UNUSABLE, *CHECKS)
     reasons = [reason for check in checks if (reason := check(evidence)) is not None]

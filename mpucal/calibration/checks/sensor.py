@@ -82,6 +82,15 @@ _SIGNED_PERMUTATIONS = [
 ]
 
 
+def gyro_range(e: Evidence) -> Reason | None:
+    """Rates that are all a power of two too small or too large for how gravity turned from rest to rest."""
+    if e.fit is None or trustworthy(e) or e.gyro_factor == 1.0:
+        return None
+    assumed = e.recording.sensor.gyro_range_dps
+    ranges = "" if assumed is None else f": ±{e.gyro_factor * assumed:g} deg/s, read as ±{assumed:g}"
+    return reason("gyro_off", "range", factor=e.gyro_factor, ranges=ranges)
+
+
 def gyro_off(e: Evidence) -> Reason | None:
     """A gyroscope beyond what its data sheet allows."""
     if e.fit is None or not trustworthy(e):
