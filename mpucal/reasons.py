@@ -219,11 +219,11 @@ KINDS: Mapping[str, Kind] = {
         turn_again=True,
     ),
     "left_handed": Kind(
-        "One or three axes of the accelerometer have the opposite sign of the gyroscope's.",
+        "Axes of the accelerometer have the opposite sign of the gyroscope's.",
         {
             "axes": Sentence(
                 "the accelerometer's axes are left-handed against the gyroscope's",
-                "change the sign of its {axes} axis",
+                "change the sign of its {axes}, or of its {others} where the board did not lie face up",
                 True,
             ),
         },

@@ -315,6 +315,17 @@ def test_a_mirrored_axis_is_named(ideal, axis):
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
+def test_of_two_mirrored_axes_those_are_named_by_which_flat_reads_up(in_hand, axis):
+    """An accelerometer of FRD axes beside a gyroscope of FLU ones, say: to change x would turn gravity upside down."""
+    signs = -np.ones(3)
+    signs[axis] = 1.0
+    recording = replace(in_hand.recording, acc=in_hand.recording.acc * signs)
+    names = " and ".join(name for name in "xyz" if name != "xyz"[axis])
+    refused_for("left_handed", recording, f"the sign of its {names} axes, or of its {'xyz'[axis]} axis where")
+    assert judged(replace(recording, acc=recording.acc * signs)).verdict == "good", "the remedy helps"
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2], ids="xyz")
 def test_a_mirrored_axis_is_named_in_a_hand(in_hand, axis):
     signs = np.ones(3)
     signs[axis] = -1.0

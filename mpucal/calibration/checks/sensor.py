@@ -6,7 +6,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from ...data import Vector
+from ...data import Mask, Vector
 from ...reasons import Reason, reason
 from ...result.error_model import sensor_axes
 from ..evidence import Evidence
@@ -66,13 +66,25 @@ def axes(e: Evidence) -> Reason | None:
     Q = U @ Vt
     if np.arccos(np.clip((np.trace(Q) - 1.0) / 2.0, -1.0, 1.0)) <= WORST_AXES_RAD:
         return None
-    # (D, u) and (-D, -u) fit equally, and D was made right-handed: a left-handed sensor shows as its mirror
-    M = max(_SIGNED_PERMUTATIONS, key=lambda M: max(np.sum(M * Q), np.sum(M * -Q)) + 0.01 * np.trace(M))
+    # (D, u) and (-D, -u) fit equally: which of them it is, what the board reads as it lies face up decides
+    M = max(_SIGNED_PERMUTATIONS, key=lambda M: float(abs(np.sum(M * Q)) + 0.01 * np.trace(M)))
+    if not _reads_up(e, M):
+        M = -M
     if (np.abs(M) == np.eye(3)).all():
-        mirrored = [axis for axis, sign in zip("xyz", np.diag(M), strict=True) if sign < 0]
-        return reason("left_handed", "axes", axes=" and ".join(mirrored))
+        return reason("left_handed", "axes", axes=_named(np.diag(M) < 0), others=_named(np.diag(M) > 0))
     order = ", ".join(("-" if row.sum() < 0 else "") + "xyz"[int(np.argmax(np.abs(row)))] for row in M)
     return reason("swapped_axes", "axes", order=order)
+
+
+def _reads_up(e: Evidence, M: Vector) -> bool:
+    """Whether the board's z, or else the greater part of its axes, reads up once the axes M (3, 3) are undone."""
+    flat = np.zeros(3) if e.flat is None else M.T @ e.flat.y
+    return bool(flat[2] > 0.0) if np.abs(flat).argmax() == 2 else bool(np.trace(M) > 0.0)
+
+
+def _named(axes: Mask) -> str:
+    names = [name for name, chosen in zip("xyz", axes, strict=True) if chosen]
+    return f"{' and '.join(names)} {'axis' if len(names) == 1 else 'axes'}"
 
 
 _SIGNED_PERMUTATIONS = [
