@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 import click
 
+from ..files.budget import MOST_MB, VARIABLE
 from ..files.hints import Hints, parse_columns, parse_units
 from .options import ABOVE_ZERO, Parsed, given
 
@@ -19,6 +21,21 @@ NAMES = {
     "gyro_range": "gyro_range_dps",
     "rate": "rate_hz",
 }
+
+
+def _allow(_context: click.Context, _option: click.Parameter, megabytes: int | None) -> None:
+    if megabytes is not None:
+        os.environ[VARIABLE] = str(megabytes)
+
+
+_MOST = click.option(
+    "--most-mb",
+    metavar="MB",
+    type=click.IntRange(1),
+    expose_value=False,
+    callback=_allow,
+    help=f"Memory that reading may take; default: ${VARIABLE}, or {MOST_MB}.",
+)
 
 
 def hint_options(*left_out: str) -> Callable[[F], F]:
@@ -49,7 +66,7 @@ def hint_options(*left_out: str) -> Callable[[F], F]:
     def decorate(command: F) -> F:
         for name, option in reversed(options.items()):
             command = command if name in left_out else option(command)
-        return command
+        return _MOST(command)
 
     return decorate
 

@@ -6,10 +6,14 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from ..data import Recording
+from ..errors import RecordingError
+from .budget import within
 from .formats import format_of, written_format
 from .hints import NO_HINTS, Hints
-from .rows import Rows, Write, in_si
+from .rows import Rows, Write, in_si, spanned
 
 
 def load(path: str | Path, hints: Hints = NO_HINTS) -> Recording:
@@ -20,12 +24,15 @@ def load(path: str | Path, hints: Hints = NO_HINTS) -> Recording:
 
     Raises
     ------
-    RecordingError : no such file, one of another kind, no recording in it, or doubtful units or columns.
+    RecordingError : no such file, one of another kind, no recording in it, doubtful units or columns, or more than may
+        be held (see budget).
     UsageError : hints for a file that needs none.
     CaptureError : a capture that cannot be read.
     ChipError : the capture of a chip that is not known.
     """
-    return format_of(Path(path), hints).read(Path(path), hints=hints)
+    with within(Path(path)):
+        recording = format_of(Path(path), hints).read(Path(path), hints=hints)
+    return recording if hints.span is None else _cut(recording, hints.span)
 
 
 def open_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
@@ -39,8 +46,18 @@ def open_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
     ------
     RecordingError, CaptureError, ChipError : see load; a table's bad line and an odd sample when they are come to.
     """
-    rows = format_of(path, hints).read_rows(path, hints=hints)
-    return replace(rows, runs=in_si(rows.runs, path)) if rows.plain else rows
+    with within(path):
+        rows = format_of(path, hints).read_rows(path, hints=hints)
+    rows = replace(rows, runs=in_si(rows.runs, path)) if rows.plain else rows
+    return rows if hints.span is None else replace(rows, runs=spanned(rows.runs, hints.span, rows.name))
+
+
+def _cut(recording: Recording, span: tuple[float, float]) -> Recording:
+    first, last = np.searchsorted(recording.t - recording.t[0], span)
+    if last - first < 2:
+        seconds = recording.t[-1] - recording.t[0]
+        raise RecordingError(f"{recording.name} lasts {seconds:.1f} s", "give a --span that lies within it")
+    return replace(recording.part(first, last), others=tuple(_cut(other, span) for other in recording.others))
 
 
 def open_writer(path: Path, rows: Rows, done: str) -> AbstractContextManager[Write]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..data import Recording, Vector
 from ..errors import RecordingError
+from .budget import afford
 from .hints import NO_HINTS, ROLES, Hints
 from .npz import DAMAGED, NEEDED
 from .rows import cannot_read
@@ -28,7 +29,8 @@ _REMEDY = "name its arrays t (n,), acc (n, 3) and gyr (n, 3), or say which is wh
 def is_of_others(path: Path) -> bool:
     """Whether an archive of NumPy lacks the names of mpucal's own."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        # numpy leaves a file open that it opened itself, and that is no archive
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             return not set(NEEDED) <= set(archive.files)
     except (OSError, *DAMAGED):
         return False
@@ -63,6 +65,7 @@ def _numpy(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
             yield from _fields(path.stem, loaded)
             return
         with loaded as archive:
+            afford(path, sum(each.file_size for each in archive.zip.infolist()))
             for name in archive.files:
                 yield from _fields(name, archive[name])
 

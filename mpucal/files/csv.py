@@ -20,6 +20,7 @@ from ..data import Samples, Vector
 from ..disk.whole import whole_file
 from ..errors import RecordingError
 from ._text import lines, numbers
+from .budget import LONGEST_LINE
 from .rows import Rows, Write, cannot_read, checked
 from .tables.times import possible_utc_ns
 
@@ -47,7 +48,7 @@ def csv_rows(path: Path) -> Rows:
     """
     try:
         with path.open("rb") as file:
-            begun, second = file.readline(), file.readline()
+            begun, second = file.readline(LONGEST_LINE), file.readline(LONGEST_LINE)
         text = begun.decode("utf-8-sig")
         # a line may end with a carriage return alone
         first = StringIO(text, newline="").readline()
@@ -105,7 +106,7 @@ class _Table:
             with self.path.open("rb") as file:
                 file.seek(self.begin)
                 line = 2
-                for block in _blocks(file):
+                for block in _blocks(file, self.path):
                     values = numbers(block, self.width, list(self.places.values()))
                     if values is None:
                         values = self._odd(block, line)
@@ -151,11 +152,18 @@ class _Table:
         return found
 
 
-def _blocks(file: IO[bytes]) -> Iterator[bytes]:
+def _blocks(file: IO[bytes], path: Path) -> Iterator[bytes]:
     """Whole lines, some BLOCK bytes at a time."""
-    while block := file.read(BLOCK) + file.readline():
+
+    def lines_on() -> bytes:
+        block = file.read(BLOCK) + file.readline(LONGEST_LINE)
+        if block.rfind(b"\n") < len(block) - LONGEST_LINE and b"\r" not in block:
+            raise RecordingError(f"{path} holds a line of more than {LONGEST_LINE >> 20} MB", "record it again")
+        return block
+
+    while block := lines_on():
         # the end of a line within quotation marks is none
-        while block.count(b'"') % 2 and (more := file.read(BLOCK) + file.readline()):
+        while block.count(b'"') % 2 and len(block) <= BLOCK + LONGEST_LINE and (more := lines_on()):
             block += more
         yield block
 

@@ -16,6 +16,7 @@ from ..arguments import regular
 from ..data import Recording
 from ..errors import OutputError, RecordingError, UsageError
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, SessionFile
+from .budget import READ, afford
 from .hints import NO_HINTS, Hints
 from .rows import Rows, Write
 
@@ -60,6 +61,8 @@ class Format:
 
     def read(self, *paths: Path, hints: Hints = NO_HINTS) -> Recording:
         """The recording, whole; see load."""
+        for path in paths:
+            afford(path, path.stat().st_size if path.is_file() else 0, READ)
         if not self.load:
             return self.read_rows(*paths).recording()
         recording: Recording = resolve_name(self.load)(*paths, *([hints] if self.hinted else []))

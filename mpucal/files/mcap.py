@@ -16,12 +16,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Self, cast
 
-from mcap.exceptions import McapError
-from mcap.records import Channel, Message, Metadata
-from mcap.stream_reader import CRCValidationError, StreamReader
+from mcap.exceptions import McapError, RecordLengthLimitExceeded
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
+from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
-from zstandard import ZstdError
+from zstandard import ZstdError, frame_content_size
 
 from ..arguments import regular
 from ..chip.access import Transaction
@@ -31,6 +32,7 @@ from ..disk.growing import Growing
 from ..disk.whole import whole_file
 from ..errors import CaptureError, OutputError
 from ..strict_json import parsed_own
+from .budget import LONGEST_CHUNK
 from .messages import BUS, SESSION, accesses_message, accesses_schema, event_message, event_schema, records_of
 
 FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 2
@@ -277,7 +279,9 @@ class CaptureReader:
         meta: Mapping[str, Any] | None = None
         whole, finished = 0, False
         stream = _Bounded(file, size)
-        items = StreamReader(cast("IO[bytes]", stream), validate_crcs=True, record_size_limit=size).records
+        items = _records(
+            StreamReader(cast("IO[bytes]", stream), emit_chunks=True, validate_crcs=True, record_size_limit=size)
+        )
         while not finished:
             try:
                 item = next(items, None)
@@ -339,6 +343,18 @@ class CaptureReader:
         if lost:
             return f"{self.name} is cut short or damaged: {held}, the {lost} bytes after them are lost."
         return f"{self.name} was never closed: its {held}, what may have followed is lost."
+
+
+def _records(reader: StreamReader) -> Iterator[McapRecord]:
+    """All records, those of a chunk once it is known to be no longer than chunks are."""
+    for record in reader.records:
+        if not isinstance(record, Chunk):
+            yield record
+            continue
+        said = frame_content_size(record.data) if record.compression == "zstd" else 0
+        if max(record.uncompressed_size, said) > LONGEST_CHUNK:
+            raise RecordLengthLimitExceeded(Opcode.CHUNK, record.uncompressed_size, LONGEST_CHUNK)
+        yield from breakup_chunk(record, validate_crc=True)
 
 
 class _Bounded:

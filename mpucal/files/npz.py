@@ -15,7 +15,7 @@ import lzma
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, fields, replace
 from pathlib import Path
@@ -31,6 +31,7 @@ from ..data import Recording, Samples, Sensor
 from ..disk.whole import whole_file
 from ..errors import RecordingError
 from ..strict_json import parsed
+from .budget import afford
 from .rows import ROWS, Rows, Write, cannot_read, checked, whole
 from .tables.times import possible_utc_ns
 
@@ -58,10 +59,11 @@ def load_npz(path: Path) -> Recording:
     """
     # no pickles: a recording must not run code
     with _opened(path) as file, np.load(file, allow_pickle=False) as archive:
-        arrays = dict(archive)
+        there = archive.files
+        arrays = _arrays(archive, path, (*NEEDED, *TEMPERATURES, *MASKS, *SMALL))
     missing = [key for key in NEEDED if key not in arrays]
     if missing:
-        raise RecordingError(f"{path} has no {', '.join(missing)}; it has {', '.join(arrays) or 'nothing'}", _REMEDY)
+        raise RecordingError(f"{path} has no {', '.join(missing)}; it has {', '.join(there) or 'nothing'}", _REMEDY)
     sensor = _sensor(arrays, path)
     known = {key: arrays.get(key) for key in (*NEEDED, *MASKS)}
     known["temperature_c"] = next((arrays[key] for key in TEMPERATURES if key in arrays), None)
@@ -78,7 +80,7 @@ def npz_rows(path: Path) -> Rows:
     RecordingError : it cannot be read, or holds no recording.
     """
     with _opened(path) as file, np.load(file, allow_pickle=False) as archive:
-        small = {key: archive[key] for key in SMALL if key in archive.files}
+        small = _arrays(archive, path, SMALL)
         by_rows = _by_rows(archive.zip)
     done = str(small.get(DONE, ""))
     if not by_rows:
@@ -90,6 +92,13 @@ def npz_rows(path: Path) -> Rows:
 def _utc_ns(arrays: Mapping[str, Any]) -> int | None:
     value = np.asarray(arrays.get(UTC, np.nan))
     return possible_utc_ns(int(value)) if value.shape == () and value.dtype.kind in "iu" else None
+
+
+def _arrays(archive: Any, path: Path, keys: Sequence[str]) -> dict[str, Any]:
+    """Those of an archive that are there, once they are known to fit the memory."""
+    found = [key for key in keys if key in archive.files]
+    afford(path, sum(each.file_size for each in archive.zip.infolist() if each.filename.removesuffix(".npy") in found))
+    return {key: archive[key] for key in found}
 
 
 @contextmanager

@@ -137,7 +137,13 @@ def _records(data: mmap) -> Iterator[Record]:
         begin = at + STAMP.size
         length = packet_length(data[begin : begin + LONGEST]) if data[begin] in HEADER else None
         if stamp_us >= LATEST_US or length is None or begin + length > len(data):
-            at += 1
+            at = _next(data, begin + 1) - STAMP.size
             continue
         yield Record(stamp_us * US, data[begin : begin + length])
         at = begin + length
+
+
+def _next(data: mmap, begin: int) -> int:
+    """Where the next packet may begin: at its first byte."""
+    found = [at for mark in HEADER if (at := data.find(bytes([mark]), begin)) >= 0]
+    return min(found, default=len(data))

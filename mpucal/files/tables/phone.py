@@ -17,6 +17,7 @@ from pathlib import Path
 from ...data import Recording
 from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
+from ..budget import afford
 from ..hints import NO_HINTS, Hints
 from ..rows import cannot_read
 from .apps import is_about, said
@@ -36,8 +37,6 @@ UNITS = {ACC: "", GYR: "rad/s"}
 SUFFIXES = (".csv", ".txt", ".tsv")
 # NotImplementedError is a RuntimeError: another way to compress
 _DAMAGE = (zipfile.BadZipFile, RuntimeError, EOFError, ValueError, zlib.error, lzma.LZMAError)
-# members of an archive are read whole
-MOST_BYTES = 1 << 30
 
 
 def is_folder_of_tables(path: Path) -> bool:
@@ -76,10 +75,7 @@ def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
     try:
         with zipfile.ZipFile(path) as archive:
             members = [member for member in archive.infolist() if _is_read(member.filename)]
-            if sum(member.file_size for member in members) > MOST_BYTES:
-                raise RecordingError(
-                    f"{path} holds more than {MOST_BYTES >> 20} MiB of tables", "unpack it, and give one"
-                )
+            afford(path, sum(member.file_size for member in members))
             texts = {member.filename: archive.read(member) for member in members}
     except OSError as error:
         raise cannot_read(path, error) from error

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...data import Mask, Recording, Vector
 from ...errors import RecordingError
+from ..budget import LONGEST_LINE
 from ..csv import COLUMNS
 from ..hints import NO_HINTS, Hints
 from ..rows import cannot_read
@@ -67,7 +68,7 @@ def _may_be_si(table: TextTable) -> bool:
 
 def _is_own(path: Path) -> bool:
     with path.open("rb") as file:
-        first = file.readline().decode("utf-8-sig", "replace").lower().partition("\r")[0]
+        first = file.readline(LONGEST_LINE).decode("utf-8-sig", "replace").lower().partition("\r")[0]
     return set(COLUMNS) <= {cell.strip().strip('"') for cell in first.split(",")}
 
 

@@ -1,0 +1,66 @@
+"""A small file that holds, or says that it holds, more than may be taken."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mpucal
+from mpucal.errors import RecordingError
+from mpucal.files import budget, mcap, open_rows
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+
+
+def archive(path, n, **more):
+    still = {"t": np.arange(n) / 100, "acc": np.tile([0.0, 0.0, 9.8], (n, 1)), "gyr": np.zeros((n, 3))}
+    np.savez_compressed(path, **still, **more)
+
+
+def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path, monkeypatch):
+    archive(tmp_path / "zeros.npz", 40_000)
+    archive(tmp_path / "more.npz", 100, more=np.zeros(200_000))
+    monkeypatch.setenv(budget.VARIABLE, "1")
+    with pytest.raises(RecordingError, match=r"holds 2 MB, and 1 MB may be taken.*--most-mb"):
+        mpucal.load(tmp_path / "zeros.npz")
+    # an array that is not asked for is not unpacked, and rows take no memory
+    assert len(mpucal.load(tmp_path / "more.npz")) == 100
+    assert sum(map(len, open_rows(tmp_path / "zeros.npz").runs)) == 40_000
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not count all memory")
+def test_what_takes_more_than_it_says_is_stopped(tmp_path, monkeypatch):
+    import resource
+
+    monkeypatch.setenv(budget.VARIABLE, "64")
+    before = resource.getrlimit(resource.RLIMIT_DATA)
+    with pytest.raises(RecordingError, match=r"a\.csv takes more than 64 MB"), budget.within(tmp_path / "a.csv"):
+        bytearray(128 << 20)
+    with budget.within(tmp_path / "a.csv"):
+        bytearray(1 << 20)
+    assert resource.getrlimit(resource.RLIMIT_DATA) == before
+
+
+def test_a_chunk_that_is_longer_than_chunks_are_is_not_unpacked(monkeypatch):
+    monkeypatch.setattr(mcap, "LONGEST_CHUNK", 1000)
+    capture = mcap.read_capture(FIXTURES / "sessions" / "enter.mcap")
+    assert "damaged" in capture.recovered
+    assert capture.records == ()
+
+
+def test_a_line_without_an_end_is_refused(tmp_path):
+    with (tmp_path / "sparse.csv").open("wb") as file:
+        file.write(b"t,ax,ay,az,gx,gy,gz\n")
+        file.truncate(8 << 20)
+    with pytest.raises(RecordingError, match="a line of more than 1 MB"):
+        list(open_rows(tmp_path / "sparse.csv").runs)
+
+
+def test_a_file_far_longer_than_memory_is_not_read_whole(tmp_path):
+    for ending in ("csv", "tlog", "ulg", "log"):
+        with (tmp_path / f"sparse.{ending}").open("wb") as file:
+            file.write(b"t,ax,ay,az,gx,gy,gz\n")
+            file.truncate(50 << 30)
+        with pytest.raises(RecordingError, match="holds 51200 MB"):
+            mpucal.load(tmp_path / f"sparse.{ending}")
