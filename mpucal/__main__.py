@@ -7,6 +7,7 @@ import errno
 import gc
 import io
 import os
+import shlex
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -116,6 +117,9 @@ def _run(arguments: Sequence[str] | None) -> int:
         if EVENTS in _words(arguments):
             return _event(error.exit_code, error.what, error.remedy)
         click.echo(f"mpucal: {error}", err=True)
+        if error.options:
+            # the whole of it, to be copied
+            click.echo(f"mpucal: try `mpucal {shlex.join(_words(arguments))} {error.options}`", err=True)
         return error.exit_code
     except SystemExit:
         # click's own end where who read the results has left: that is no error

@@ -50,12 +50,14 @@ class MpucalError(Exception):
     ----------
     what : one clause, no full stop: what happened, on what.
     remedy : one clause, no full stop: what the person can do next.
+    options : what the same command needs besides, where that is all.
     """
 
     exit_code = 1
 
-    def __init__(self, what: str, remedy: str) -> None:
+    def __init__(self, what: str, remedy: str, options: str = "") -> None:
         super().__init__(what, remedy)
+        self.options = options
         self.what = on_one_line(what)
         self.remedy = on_one_line(remedy)
 

@@ -143,7 +143,8 @@ class _Table:
         found = []
         for name, place in self.places.items():
             try:
-                found.append(float(row[place]))
+                # an empty cell is a measurement that is not there
+                found.append(float(row[place]) if row[place].strip() or name == COLUMNS[0] else np.nan)
             except ValueError as error:
                 raise RecordingError(
                     f"{self.path}: line {line}: {name} is {row[place]!r}, which is no number",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from types import MappingProxyType
 
 from .tables.units import QUANTITIES, unit_named
 
@@ -22,19 +22,21 @@ class Hints:
     columns : role (t, ax ... gz) -> a column's name, or its place from 0.
     units : quantity (t, acc, gyr) -> unit, as tables.units names it.
     accel_range_g, gyro_range_dps : full scale, of counts. rate_hz : of samples without times.
+    span : (from, to) s since the first sample, what is read of it; of any file.
     """
 
     topic: str | None = None
-    columns: Mapping[str, str | int] = field(default_factory=lambda: MappingProxyType({}))
-    units: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    columns: Mapping[str, str | int] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
     accel_range_g: float | None = None
     gyro_range_dps: float | None = None
     rate_hz: float | None = None
+    span: tuple[float, float] | None = None
 
     @property
     def given(self) -> tuple[str, ...]:
-        """The names of what is said."""
-        return tuple(f.name for f in fields(self) if getattr(self, f.name))
+        """The names of what is said of how the file is written."""
+        return tuple(f.name for f in fields(self) if getattr(self, f.name) and f.name != "span")
 
 
 NO_HINTS = Hints()
@@ -58,7 +60,7 @@ def parse_columns(text: str) -> Mapping[str, str | int]:
                 f"{item!r} is no column: give t=NAME,ax=NAME,... or the columns' order, such as t,ax,ay,az,gx,gy,gz"
             )
         found[role] = (int(name) - 1 if name.isdecimal() and int(name) else name) if equals else place
-    return MappingProxyType(found)
+    return found
 
 
 def parse_units(text: str) -> Mapping[str, str]:
@@ -76,4 +78,21 @@ def parse_units(text: str) -> Mapping[str, str]:
             known = "; ".join(f"{name} in {', '.join(units)}" for name, units in QUANTITIES.items())
             raise ValueError(f"{item!r} is no unit: {known}")
         found[quantity] = unit
-    return MappingProxyType(found)
+    return found
+
+
+def parse_span(text: str) -> tuple[float, float]:
+    """`FROM:TO`, s since the first sample; empty: from the first, to the last.
+
+    Raises
+    ------
+    ValueError : it is no such span.
+    """
+    begin, colon, end = text.partition(":")
+    try:
+        span = float(begin or 0.0), float(end or math.inf)
+    except ValueError:
+        span = 0.0, 0.0
+    if not colon or not 0.0 <= span[0] < span[1]:
+        raise ValueError(f"{text!r} is no span: give FROM:TO in s since the first sample, such as 10:95, or :95")
+    return span

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from .tables.units import QUANTITIES, acceleration_unit, rate_unit, turned
 # 16 Ki samples take 1 MB, which fits a cache; a product of more goes to BLAS's threads, and takes longer
 ROWS = 1 << 14
 SI = ("m/s^2", "rad/s")
+SAMPLE_FIELDS = tuple(f.name for f in fields(Samples))
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,8 @@ def complete(samples: Samples) -> Samples:
     if there.all():
         return samples
     gap = samples.gap | np.append(False, ~there[:-1])
-    return Samples(**{key: value[there] for key, value in (vars(samples) | {"gap": gap}).items()})
+    kept = {key: getattr(samples, key)[there] for key in SAMPLE_FIELDS}
+    return Samples(**kept | {"gap": gap[there]})
 
 
 def checked(runs: Iterator[Samples], name: str) -> Iterator[Samples]:
@@ -180,8 +182,29 @@ def in_si(runs: Iterator[Samples], path: Path) -> Iterator[Samples]:
                 raise RecordingError(
                     f"{path.name} is said to be in {' and '.join(SI)}, and reads {what}",
                     f"say its units with --units {units}",
+                    f"--units {units}",
                 )
         yield samples
+
+
+def spanned(runs: Iterator[Samples], span: tuple[float, float], name: str) -> Iterator[Samples]:
+    """The samples from span[0] to span[1] s after the first.
+
+    Raises
+    ------
+    RecordingError : there are none.
+    """
+    origin, some = None, False
+    for samples in runs:
+        origin = float(samples.t[0]) if origin is None else origin
+        first, last = np.searchsorted(samples.t - origin, span)
+        if last > first:
+            some = True
+            yield Samples(**{key: getattr(samples, key)[first:last] for key in SAMPLE_FIELDS})
+        if last < len(samples):
+            break
+    if not some:
+        raise RecordingError(f"{name} holds no samples from {span[0]:g} to {span[1]:g} s", "give a --span within it")
 
 
 def cannot_read(path: Path, error: OSError) -> RecordingError:

@@ -173,8 +173,8 @@ def test_a_size_that_is_no_gravity_says_no_unit(walk, tmp_path):
 
 
 def test_times_that_are_not_known_as_such_are_named(walk, tmp_path):
-    made(walk, walk.t).rename(columns={"time": "SampleTimeFine"}).to_csv(tmp_path / "walk.csv", index=False)
-    with pytest.raises(RecordingError, match="no times that are known as such; its columns are SampleTimeFine, ax"):
+    made(walk, walk.t).rename(columns={"time": "Ticks"}).to_csv(tmp_path / "walk.csv", index=False)
+    with pytest.raises(RecordingError, match="no times that are known as such; its columns are Ticks, ax"):
         load(tmp_path / "walk.csv")
 
 

@@ -12,11 +12,13 @@ import numpy as np
 from ...data import Vector
 from ..hints import ROLES, Hints
 from .clock import period_of
-from .units import FASTEST_HZ, QUANTITIES, SCATTER, turned
+from .units import FASTEST_HZ, QUANTITIES, signed, turned
 
 # of samples without times, to see what turns: another rate changes the factor, and not what is explained
 ANY_HZ = 100.0
 FEWEST, WIDEST = 300, 16
+# of |a| in its quartiles: gravity, with the biases of a sensor that nobody calibrated
+MOST_SCATTER = 0.75
 # samples that are looked at
 LOOKED_AT = 200_000
 
@@ -58,11 +60,11 @@ def _sensors(table: Vector, first: int, t: Vector) -> list[int]:
     """The places of ax, ay, az, gx, gy, gz; empty where no columns fit."""
     threes = list(range(first, table.shape[1] - 2, 3))
     for a in threes:
-        acc = table[:, a : a + 3]
+        acc = signed(table[:, a : a + 3])
         low, size, high = np.percentile(np.linalg.norm(acc, axis=1), [25, 50, 75]).tolist()
-        if not 0.0 < high - low <= SCATTER * size:
+        if not 0.0 < high - low <= MOST_SCATTER * size:
             continue
         for w in threes:
-            if w != a and (turned(t, acc, table[:, w : w + 3]) or 0.0) > 0.0:
+            if w != a and (turned(t, acc, signed(table[:, w : w + 3])) or 0.0) > 0.0:
                 return [a, a + 1, a + 2, w, w + 1, w + 2]
     return []

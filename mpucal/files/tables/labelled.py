@@ -7,6 +7,8 @@ import re
 from .names import ACC, GYR, column_named, columns_of, three
 from .text import PREAMBLE, TextTable
 
+# lines of a log that names all three of a sensor at once
+SNIFFED = 20_000
 # a name of one or two words, `:` or `=`, and a number; bounded, so that a long line of letters takes no long time
 _NAME, _NUMBER = (
     r"(?<!\w)((?:[A-Za-z]{1,20} )?[A-Za-z_]\w{0,40})",
@@ -18,10 +20,19 @@ _AXES = re.compile(r"^(Acceleration|Rotation) X:([^,\n]{1,30}),[ ]?Y:([^,\n]{1,3
 _TWO_LINES = re.compile(r"^(AccelerationX:[^\n]{1,90})\n(?=RotationX:)", re.MULTILINE)
 
 
+# all three of a sensor, as a log has them: `accel=(9252, -5612, -12084)`
+_THREE = re.compile(
+    r"(?<!\w)([A-Za-z_]\w{0,40})\s?[:=]\s?[(\[]([^,()\[\]\n]{1,30}),([^,()\[\]\n]{1,30}),([^,()\[\]\n]{1,30})[)\]]"
+)
+
+
 def labelled_table(text: str, name: str) -> TextTable | None:
     """The table in such lines; None where no line names all six. What stands between them is left out."""
     text = _TWO_LINES.sub(r"\1, ", _AXES.sub(r"\1X:\2, \1Y:\3, \1Z:", text))
-    for line in text.split("\n", PREAMBLE)[:PREAMBLE]:
+    text, threes = _THREE.subn(r"\1_x=\2, \1_y=\3, \1_z=\4", text)
+    # in a log they may come late
+    looked_at = SNIFFED if threes > PREAMBLE else PREAMBLE
+    for line in text.split("\n", looked_at)[:looked_at]:
         header = _names(line)
         columns = columns_of(header)
         if three(columns, ACC) and three(columns, GYR):

@@ -80,6 +80,7 @@ TIME_STEMS = {
     "headerstampsecs": "s",
     "stampsec": "s",
     "stampsecs": "s",
+    "sampletimefine": "0.1ms",
 }
 # beside whole seconds: builtin_interfaces/Time, and ROS 1's time
 NANOSECOND_STEMS = tuple(f"{of}{word}" for of in ("", "stamp", "headerstamp") for word in ("nanosec", "nsecs", "nsec"))
@@ -90,10 +91,11 @@ TEMPERATURE_STEMS = ("temperature", "temp")
 TURNED_AROUND = ("accelerometeracceleration",)
 _OF_TIME = ("", *QUANTITIES[TIME])
 _PREFIXES = ("field", "imu0", "imu1", "imu", "sensors", "sensor", "raw", "data", "phone", "body")
-_AXIS = re.compile(r"([xyz])(?:[-_ ]?axis)?\s*(?:[\[(](.*)[\])])?")
+_AXIS = re.compile(r"([xyz])(?:[-_ ]?(?:axis|value))?\s*(?:[\[(](.*)[\])])?")
 _BRACKETS = re.compile(r"(.*?)[\s_.]*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
 _UNIT_TAIL = re.compile(
-    r"(.*?[a-z\]0-9])[_ ](ns|us|ms|s|sec|g|mg|dps|mdps|mps2|m_s2|m/s2|ms2|rad_s|rads|rad|deg_s|degs|deg)"
+    r"(.*?[a-z\]0-9])[_ ](ns|us|ms|s|sec|seconds|g|gs|mg|dps|mdps|mps2|m_s2|m/s2|ms2|rad_s|rads|rad|deg_s|degs|deg"
+    r"|deg_per_s|rad_per_s)"
 )
 
 

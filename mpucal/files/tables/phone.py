@@ -30,8 +30,17 @@ from .units import QUANTITIES, acceleration_unit
 
 # a sensor's tables by their names, the one nearest to the sensor first; the unit where their program says none
 NAMES = {
-    ACC: ("accelerometeruncalibrated", "accelerometer", "acceleration", "totalacceleration", "acc", "accel", "acce"),
-    GYR: ("gyroscopeuncalibrated", "gyroscope", "gyro", "gyr", "rotationrate"),
+    ACC: (
+        "accelerometeruncalibrated",
+        "accelerometer",
+        "acceleration",
+        "totalacceleration",
+        "acc",
+        "accel",
+        "acce",
+        "accm",
+    ),
+    GYR: ("gyroscopeuncalibrated", "gyroscope", "gyro", "gyr", "gyrm", "rotationrate"),
 }
 UNITS = {ACC: "", GYR: "rad/s"}
 SUFFIXES = (".csv", ".txt", ".tsv")

@@ -13,11 +13,13 @@ from ...errors import RecordingError
 from ..hints import Hints
 from . import times, units
 from .times import Stream
-from .units import COUNTS, QUANTITIES, check_agrees
+from .units import COUNTS, FULL_SCALE, QUANTITIES, check_agrees
 
-FULL_SCALE = 32768
 # octaves: half of the way to the next range leaves room for gains of 0.7 to 1.4
 ANOTHER_RANGE = 0.5
+# of these parts, and by how many octaves what gravity says may miss one
+ACCEL_RANGES_G, GYRO_RANGES_DPS, SURE_RANGE = (2, 4, 8, 16), (125, 250, 500, 1000, 2000, 4000), 0.35
+OF_COUNTS = "in counts of"
 # |a| of gravity that alone says a unit: counts of 512 to 1 g are no mg
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
 
@@ -53,6 +55,7 @@ def recording_of(
             raise RecordingError(
                 f"{name}: sample {int(read.argmin())} has {what} that no sensor reads", "leave that sample out"
             )
+    acc, gyr = (replace(s, values=units.signed(s.values)) if s.unit in ("", COUNTS) else s for s in (acc, gyr))
     fresh = acc.fresh
     temperature_c = None if temperature_c is None else temperature_c[fresh]
     again = int((~fresh).sum())
@@ -72,7 +75,7 @@ def recording_of(
         temperature_c = None if temperature_c is None else temperature_c[kept]
     else:
         values = gyr.values
-    w, of_w, w_clipped = _rates(t, a, values, gyr.unit, hints, name)
+    w, of_w, w_clipped = _rates(t, a, values, gyr.unit, hints, name, of_counts=of_a.startswith(OF_COUNTS))
     of_times = of_t if of_t == of_t_gyr else f"{of_t} and {of_t_gyr}"
     said = [
         f"Of {name} {of_times}, accelerations {of_a} and rates {of_w} were taken as such",
@@ -122,29 +125,42 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
 
 
 def _scaled(values: Vector, hints: Hints, name: str, size: float) -> tuple[Vector, str, Mask]:
-    if hints.accel_range_g is None:
-        likely = next((g for g in (2, 4, 8, 16) if 0.75 <= size * g / FULL_SCALE <= 1.35), None)
-        reads = f" (|a| of {size:.0f} in the median reads as of ±{likely} g)" if likely else ""
+    ranges = (g for g in ACCEL_RANGES_G if LEAST_LIKELY <= size * g / FULL_SCALE <= MOST_LIKELY)
+    range_g = next(ranges, None) if hints.accel_range_g is None else hints.accel_range_g
+    if range_g is None:
         raise RecordingError(
-            f"{name}: accelerations are counts of a range that nothing says{reads}",
-            f"give --accel-range {likely or 'G'} and --gyro-range DPS",
+            f"{name}: accelerations are counts of a range that nothing says (|a| is {size:.0f} in the median)",
+            "give --accel-range G and --gyro-range DPS",
+            "--accel-range G --gyro-range DPS",
         )
-    scale = hints.accel_range_g * STANDARD_GRAVITY_MPS2 / FULL_SCALE
+    scale = range_g * STANDARD_GRAVITY_MPS2 / FULL_SCALE
     if is_another_range(size * scale / STANDARD_GRAVITY_MPS2) and "acc" not in hints.units:
         raise RecordingError(
-            f"{name}: at ±{hints.accel_range_g:g} g |a| is {size * scale:.3g} m/s^2 in the median, which is no gravity",
+            f"{name}: at ±{range_g:g} g |a| is {size * scale:.3g} m/s^2 in the median, which is no gravity",
             "give the --accel-range that the sensor had, or say --units acc=counts if it was that",
+            "--accel-range G",
         )
-    return values * scale, f"in counts of ±{hints.accel_range_g:g} g", _at_the_end(values)
+    by = "" if hints.accel_range_g else ", as |a| reads,"
+    return values * scale, f"{OF_COUNTS} ±{range_g:g} g{by}", _at_the_end(values)
 
 
-def _rates(t: Vector, a: Vector, values: Vector, said: str, hints: Hints, name: str) -> tuple[Vector, str, Mask]:
-    """(n, 3) rad/s, how they were taken, and (n,) whether they stood at the end of the range."""
+def _rates(
+    t: Vector, a: Vector, values: Vector, said: str, hints: Hints, name: str, of_counts: bool
+) -> tuple[Vector, str, Mask]:
+    """(n, 3) rad/s, how they were taken, and (n,) whether they stood at the end of the range.
+
+    of_counts : whether the accelerations are counts.
+    """
     said = hints.units.get("gyr", said)
-    if said == COUNTS or (not said and are_counts(values) and (hints.gyro_range_dps or hints.accel_range_g)):
-        if hints.gyro_range_dps is None:
-            raise RecordingError(f"{name}: rates are counts of a range that nothing says", "give --gyro-range DPS")
-        scale, of = np.radians(hints.gyro_range_dps) / FULL_SCALE, f"counts of ±{hints.gyro_range_dps:g} deg/s"
+    if said == COUNTS or (not said and are_counts(values) and (hints.gyro_range_dps or of_counts)):
+        range_dps = hints.gyro_range_dps or _gyro_range_dps(units.turned(t, a, values))
+        if range_dps is None:
+            raise RecordingError(
+                f"{name}: rates are counts of a range that nothing says, and gravity does not turn as of any",
+                "give --gyro-range DPS",
+                "--gyro-range DPS",
+            )
+        scale, of = np.radians(range_dps) / FULL_SCALE, f"counts of ±{range_dps:g} deg/s"
         factor = units.turned(t, a, values * scale)
         if factor and is_another_range(abs(factor)) and "gyr" not in hints.units:
             raise _unlike(
@@ -154,14 +170,25 @@ def _rates(t: Vector, a: Vector, values: Vector, said: str, hints: Hints, name: 
                 hints,
                 "the --gyro-range that the sensor had (this one: --units gyr=counts)",
             )
-        return values * scale, f"in {of}{_turned_around(factor)}", _at_the_end(values)
+        by = "" if hints.gyro_range_dps else ", as gravity turns,"
+        return values * scale, f"in {of}{by}{_turned_around(factor)}", _at_the_end(values)
     factor = units.turned(t, a, values)
     seen = _seen(units.rate_unit(factor), hints, "gyr")
     if factor and not seen:
-        of = said or "rad/s"
+        known = [unit for unit in QUANTITIES["gyr"] if unit != COUNTS]
+        of = said or min(known, key=lambda each: abs(math.log(abs(factor) / QUANTITIES["gyr"][each])))
         raise _unlike(name, factor / QUANTITIES["gyr"][of], of, hints, "their unit with --units gyr=UNIT")
     unit = check_agrees(name, "gyr", said, seen, "gravity turns" if seen else "how gravity turns reads")
     return values * QUANTITIES["gyr"][unit], f"in {unit}{_turned_around(factor)}", np.zeros(len(values), bool)
+
+
+def _gyro_range_dps(factor: float | None) -> float | None:
+    """The range of counts by how fast gravity turns; None where no sensor has it."""
+    if not factor:
+        return None
+    dps = math.degrees(abs(factor)) * FULL_SCALE
+    nearest = min(GYRO_RANGES_DPS, key=lambda each: abs(math.log2(dps / each)))
+    return nearest if abs(math.log2(dps / nearest)) < SURE_RANGE else None
 
 
 def _unlike(name: str, factor: float, of: str, hints: Hints, remedy: str) -> RecordingError:
@@ -169,6 +196,7 @@ def _unlike(name: str, factor: float, of: str, hints: Hints, remedy: str) -> Rec
     return RecordingError(
         f"{name}: gravity turns {abs(factor):.2g} times as fast as rates in {of} say",
         f"say {remedy}, or of the times {of_times}",
+        f"--units gyr={of}" if of in QUANTITIES["gyr"] else "",
     )
 
 

@@ -12,9 +12,10 @@ from ...data import Mask, Recording, Vector
 from ...errors import RecordingError
 from ..budget import LONGEST_LINE
 from ..csv import COLUMNS
-from ..hints import NO_HINTS, Hints
+from ..hints import NO_HINTS, ROLES, Hints
 from ..rows import cannot_read
 from .clock import FEWEST
+from .guess import guessed
 from .labelled import labelled_table
 from .names import (
     ACC,
@@ -28,11 +29,13 @@ from .names import (
     threes,
 )
 from .streams import are_counts, recording_of, with_gravity
-from .text import NS, PREAMBLE, SEPARATORS, TextTable, table_of, text_of
+from .text import NS, PREAMBLE, SEPARATORS, TextTable, numeric_table, table_of, text_of
 from .times import Stream
 from .units import acceleration_unit
 
 SNIFFED = 1 << 16
+# of both sensors
+FEWEST_COLUMNS = 6
 # of all lines, those without a number: more are another sensor's
 ANOTHERS = 0.1
 # m/s^2: whole numbers that are larger are counts
@@ -53,6 +56,10 @@ def is_table(path: Path) -> bool:
 
 
 def _table(text: str, name: str) -> TextTable | None:
+    return _named(text, name) or numeric_table(text, name, FEWEST_COLUMNS)
+
+
+def _named(text: str, name: str) -> TextTable | None:
     return labelled_table(text, name) or table_of(text, name)
 
 
@@ -84,7 +91,9 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
     except OSError as error:
         raise cannot_read(path, error) from error
     text = text_of(data, path.name)
-    table = table_of(text, path.name, list(hints.columns.values())) if hints.columns else _table(text, path.name)
+    table = table_of(text, path.name, list(hints.columns.values())) if hints.columns else _named(text, path.name)
+    if table is None and (unnamed := numeric_table(text, path.name, FEWEST_COLUMNS)) is not None:
+        return _of_unnamed(unnamed, hints)
     if table is not None and not table.rows:
         raise RecordingError(f"{path.name} holds no lines below the names of its columns", "record it again")
     if table is None:
@@ -95,10 +104,37 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
     return recording_of_table(table, hints)
 
 
+def _of_unnamed(table: TextTable, hints: Hints) -> Recording:
+    """The recording in a table without names, where physics says which column is what."""
+    width = len(table.rows[0])
+    order, said = _guessed(table, hints)
+    if not order:
+        raise RecordingError(
+            f"{table.name} names no columns, and how gravity turns does not tell them",
+            f"name its {width} columns in their order with --columns {','.join(ROLES)}, and - for one to leave out",
+            f"--columns {','.join(ROLES)}",
+        )
+    made = recording_of_table(table, replace(hints, columns=order))
+    return replace(made, taken=f"{(made.taken or '').removesuffix('.')}; {said}.")
+
+
+def _guessed(table: TextTable, hints: Hints) -> tuple[dict[str, str | int], str]:
+    """Role -> place of its columns of numbers, by physics; see guessed."""
+    width = min(map(len, table.rows))
+    places = [place for place in range(width) if table.has(Column("", place, ""))]
+    try:
+        order, said = guessed(table.numbers([Column("", place, "") for place in places]), hints)
+    except RecordingError:
+        return {}, ""
+    return {role: places[place] for role, place in order.items()}, said
+
+
 def recording_of_table(table: TextTable, hints: Hints) -> Recording:
     """The recording in a table that holds both sensors."""
     columns = chosen(table.header, hints) if hints.columns else table.columns
     all_acc, gyr = threes(columns, ACC), three(columns, GYR)
+    if not (all_acc and gyr) and not hints.columns and _guessed(table, hints)[0]:
+        return _of_unnamed(table, hints)
     if not all_acc or not gyr:
         lacks = "a gyroscope" if all_acc else "an accelerometer"
         raise RecordingError(
@@ -117,6 +153,7 @@ def recording_of_table(table: TextTable, hints: Hints) -> Recording:
             f"{table.name} holds no times that are known as such; its columns are {_listed(table.header)}",
             "name them with --columns t=NAME,ax=NAME,... and --units t=UNIT, or"
             " give the rate of its samples with --rate HZ",
+            "--rate HZ",
         )
     lost = [f"{len(table.lost)} lines that lack a number were left out"] if table.lost else []
     a, of_ios = as_of_ios(a, acc)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, time
 from decimal import Decimal, InvalidOperation
 from io import StringIO
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 
 import numpy as np
 
@@ -24,6 +24,10 @@ SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
 # lines before the header: what a sketch says at its start, `sep=;`, the settings that Betaflight's Explorer writes
 PREAMBLE = 200
 NS = 1_000_000_000
+# of a text's bytes, zeros
+MOST_NUL = 0.1
+# before the names of columns, and before a line that is no sample
+COMMENT = ("#", "%", "//")
 # of a time, as nobody has more
 DIGITS = 40
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -158,9 +162,11 @@ def text_of(data: bytes, name: str) -> str:
     if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
         # a spreadsheet's "Unicode text"; what was read of it may end within a letter
         text = data.decode("utf-16", "replace")
-    elif b"\0" in data:
+    elif data.count(b"\0") > MOST_NUL * len(data):
         raise RecordingError(f"{name} is no text", "give a table as text")
     else:
+        # a logger that was switched off, or opened its file before it wrote
+        data = data.replace(b"\0", b"")
         try:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError:
@@ -181,9 +187,10 @@ def table_of(text: str, name: str, said: Sequence[str | int] = (), bare: bool = 
     """
     begun = text.split("\n", PREAMBLE)[:PREAMBLE]
     names, places = {of for of in said if isinstance(of, str)}, [of for of in said if isinstance(of, int)]
+    above = ""
     for number, line in enumerate(begun):
         for separator in SEPARATORS:
-            cells = _cells(line, separator)
+            cells = _below(above, line, separator)
             plain = {cell.strip() for cell in cells}
             if names:
                 found = len(cells) >= len(said) and bool(
@@ -200,10 +207,38 @@ def table_of(text: str, name: str, said: Sequence[str | int] = (), bare: bool = 
                 return _read(text, name, before if len(before) == len(cells) else [], number, separator)
             if found:
                 return _read(text, name, cells, number + 1, separator)
+        above = line
     return table_of(text, name, range(len(said))) if names else None
 
 
+def _below(above: str, line: str, separator: str | None) -> list[str]:
+    """The cells of a line; of two lines of names, of which the first has a sensor's and the second its axes, both."""
+    cells, sensors = _cells(line, separator), _cells(above, separator)
+    axes = [cell.strip().lower() for cell in cells]
+    if separator is None or len(sensors) != len(cells) or not {"x", "y", "z"} <= set(axes) or not any(sensors):
+        return cells
+    of, found = "", []
+    for sensor, axis in zip(sensors, cells, strict=True):
+        of = sensor.strip() or of
+        found.append(f"{of} {axis.strip()}")
+    return found
+
+
+def numeric_table(text: str, name: str, least: int) -> TextTable | None:
+    """The table whose lines are `least` numbers or more and no header says which; None where there is none."""
+    begun = text.split("\n", PREAMBLE)[:PREAMBLE]
+    for first, (line, following) in enumerate(pairwise(begun)):
+        for separator in SEPARATORS:
+            cells, more = _cells(line, separator), _cells(following, separator)
+            if len(cells) >= least and len(more) == len(cells) and all(map(_is_number, (*cells, *more))):
+                return _read(text, name, [], first, separator)
+    return None
+
+
 def _cells(line: str, separator: str | None) -> list[str]:
+    line = line.lstrip()
+    for mark in COMMENT:
+        line = line.removeprefix(mark)
     if separator is None:
         return line.split()
     if separator not in line:
@@ -234,7 +269,8 @@ def _read(text: str, name: str, header: list[str], first: int, separator: str | 
             reader = csv.reader(source, delimiter=separator, skipinitialspace=True)
             read = ((first + reader.line_num, row) for row in reader)
         for line, row in read:
-            if any(map(str.strip, row)):
+            # a logger that was started again writes its header again
+            if any(map(str.strip, row)) and not row[0].startswith(COMMENT) and row != header:
                 rows.append(row)
                 lines.append(line)
     except csv.Error as error:

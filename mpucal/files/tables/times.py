@@ -21,7 +21,7 @@ from .units import QUANTITIES, check_agrees
 Times = Sequence[Decimal] | NDArray[Any]
 # periods between two rates over which nothing is interpolated
 LOST_PERIODS = 3.5
-NS_OF = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
+NS_OF = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1, "0.1ms": 10**5}
 # from 2001 to 2100: a time of day, and not one since a start
 UTC_NS = (10**18, 41 * 10**17)
 
@@ -82,7 +82,7 @@ def seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Vec
     none = np.zeros(len(stream.values), bool)
     if stream.times is None or first.times is None:
         if hints.rate_hz is None:
-            raise RecordingError(f"{name} holds no times", "give the rate of its samples with --rate HZ")
+            raise RecordingError(f"{name} holds no times", "give the rate of its samples with --rate HZ", "--rate HZ")
         places = np.arange(len(stream.values)) if stream.places is None else stream.places
         return places / hints.rate_hz, none, f"a rate of {hints.rate_hz:g} Hz", ""
     ticks = _since(stream.times, first.times[0])

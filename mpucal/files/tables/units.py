@@ -15,9 +15,10 @@ from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...errors import RecordingError
 
 COUNTS = "counts"
+FULL_SCALE = 32768
 # quantity -> unit -> SI
 QUANTITIES = {
-    "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "0.1ms": 1e-4},
     "acc": {"m/s^2": 1.0, "g": STANDARD_GRAVITY_MPS2, "mg": STANDARD_GRAVITY_MPS2 / 1000, COUNTS: math.nan},
     "gyr": {"rad/s": 1.0, "deg/s": math.radians(1), "mdeg/s": math.radians(1e-3), COUNTS: math.nan},
 }
@@ -29,8 +30,8 @@ _SPELLED = {
     "m/s^2": "m/s2 ms-2 m/s/s mps2 ms2 m/(s2) m/s**2 meters/second2 m/sec2",
     "g": "g gs g-force gforce gee g0",
     "mg": "mg milli-g millig",
-    "rad/s": "rad/s rads-1 radps rads rad/sec radians/s rps rad",
-    "deg/s": "deg/s degs-1 degps degs dps deg/sec degrees/s degree/s deg",
+    "rad/s": "rad/s radpers rads-1 radps rads rad/sec radians/s rps rad",
+    "deg/s": "deg/s degpers degs-1 degps degs dps deg/sec degrees/s degree/s deg",
     "mdeg/s": "mdeg/s mdps",
     COUNTS: "counts count lsb raw adc",
 }
@@ -46,6 +47,8 @@ SLOW_S = 2.0
 LEAST_OF_G, MOST_OF_G = 0.45, 2.0
 LEAST_TURNED, MOST_TURNED = 0.6, 1.6
 SCATTER = 0.45
+# what most programs write
+LIKELY = {"t": "s", "acc": "m/s^2", "gyr": "deg/s"}
 # no unit makes such numbers of what a sensor reads, and their squares are finite
 BEYOND = 1e12
 # half of a turn's span: a recording that says how gravity turns lasts for so many
@@ -79,6 +82,16 @@ def acceleration_unit(acc: Vector) -> str:
         return ""
     units = QUANTITIES["acc"].items()
     return next((unit for unit, si in units if LEAST_OF_G <= size * si / STANDARD_GRAVITY_MPS2 <= MOST_OF_G), "")
+
+
+def signed(values: Vector) -> Vector:
+    """(n, 3) counts of 16 bits with their sign: where it was not read, or a sensor counts from the lowest value on."""
+    if values.min() < 0 or not FULL_SCALE <= values.max() < 2 * FULL_SCALE or not (values == np.rint(values)).all():
+        return values
+    wrapped, shifted = np.where(values >= FULL_SCALE, values - 2 * FULL_SCALE, values), values - FULL_SCALE
+    # read wrongly, they jump from one end to the other
+    steps = [float(np.abs(np.diff(each, axis=0)).sum()) for each in (wrapped, shifted)]
+    return np.asarray(wrapped if steps[0] < steps[1] else shifted)
 
 
 def turned(t: Vector, acc: Vector, gyr: Vector) -> float | None:
@@ -124,11 +137,13 @@ def check_agrees(name: str, quantity: str, said: str, seen: str, how: str) -> st
         raise RecordingError(
             f"{name}: {quantity} is said to be in {said}, and {how} as of {seen}",
             f"say which with --units {quantity}={said} or --units {quantity}={seen}",
+            f"--units {quantity}={seen}",
         )
     if not said and not seen:
         known = ", ".join(unit for unit in QUANTITIES[quantity])
         raise RecordingError(
             f"{name}: nothing says in which unit {quantity} is, and {how} as of none",
             f"say it with --units {quantity}=UNIT, one of {known}",
+            f"--units {quantity}={LIKELY[quantity]}",
         )
     return said or seen
