@@ -410,7 +410,7 @@ KINDS: Mapping[str, Kind] = {
                 True,
             ),
         },
-        "mpucal.calibrate(replace(r, acc=9.81 * r.acc / np.linalg.norm(r.acc, axis=1, keepdims=True)))",
+        "mpucal.calibrate(replace(r, acc=9.81 * r.acc / (r.acc**2).sum(1, keepdims=True) ** 0.5))",
     ),
     "bits_stuck": Kind(
         "Bits of an axis never move: a byte is lost on its way, or the sensor is broken.",

@@ -26,6 +26,8 @@ from mpucal.session.threads import ONE_THREAD
 
 # programs that tests start find mpucal compiled, whatever the shell asks for: each would compile it for half a second
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# Debian keeps i2c-tools' programs where a user's PATH may not go
+os.environ["PATH"] = os.pathsep.join((os.environ["PATH"], "/usr/sbin", "/sbin"))
 os.environ.update(ONE_THREAD)  # as the program does, and before NumPy or SciPy loads
 # notes of writes belong to no home; workers of xdist and what tests start inherit the folder of the first process
 if "PYTEST_XDIST_WORKER" not in os.environ:
