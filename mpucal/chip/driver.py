@@ -187,7 +187,7 @@ class Driver:
         if self.flipped > MANY_FLIPPED * self._decoder.believed:
             self._say(f"{self.flipped} samples had a bit flipped on the bus and were set right: {REMEDY}")
         if self._port.tally.errors:
-            self._say(f"{self._port.tally}: {REMEDY}")
+            self._say(f"{self._port.tally}: {self._port.tally.remedy}")
 
     def _look_before_reset(self) -> None:
         # the reset reloads the factory's trim: what somebody wrote before is kept in the capture, wherever it is

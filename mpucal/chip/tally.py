@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
-from ..errors import BusError, BusHeld, NoAnswer
+from ..errors import BusError, BusHeld, LinkError, NoAnswer
 
-KINDS = {NoAnswer: "not acknowledged", BusHeld: "timed out"}
+ON_THE_LINK = "lost on the link to the board"
+KINDS = {NoAnswer: "not acknowledged", BusHeld: "timed out", LinkError: ON_THE_LINK}
 OTHER = "broken off"
 REMEDY = "shorten the wires, keep them away from motors, add pull-ups of 2.2 to 4.7 kΩ, or run the bus at 100 kHz"
+LINK_REMEDY = "not the sensor's wires are to blame: check the board's cable and supply, or the network in between"
 
 
 @dataclass
@@ -33,6 +35,12 @@ class Tally:
     def share(self) -> float:
         """Of the transfers, those that failed."""
         return self.errors.total() / max(1, self.transfers)
+
+    @property
+    def remedy(self) -> str:
+        """Of the kind that was met most."""
+        worst = self.errors.most_common(1)
+        return LINK_REMEDY if worst and worst[0][0] == ON_THE_LINK else REMEDY
 
     def __str__(self) -> str:
         """A clause, such as: 12 of 5030 transfers failed (0.24 %: 12 not acknowledged), 11 were repeated."""

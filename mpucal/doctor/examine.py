@@ -100,7 +100,7 @@ def _transfers(tally: Tally, always: bool = False) -> Iterator[Finding]:
             yield Finding("transfers", Mark.OK, str(tally), "", data)
         return
     if always or tally.share < MOST:
-        yield Finding("transfers", Mark.BAD if tally.share > MANY else Mark.NOTE, str(tally), REMEDY, data)
+        yield Finding("transfers", Mark.BAD if tally.share > MANY else Mark.NOTE, str(tally), tally.remedy, data)
 
 
 def _awake(

@@ -1,4 +1,4 @@
-"""Built as the Arduino IDE and arduino-cli build, who find a library by an include that fails: what the sketch holds."""
+"""Built as the Arduino IDE and arduino-cli build, who find a library by an include that fails: what a sketch holds."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from ...chip.access import Reply
 from ...chip.clock import look_phase
 from ...errors import BusError, NoAnswer
 from .fifo_watch import CONTROLS, FifoWatch
-from .link import MS, Answer, Link, LinkLost
+from .link import MS, Answer, Asked, Link, LinkLost
 from .link_errors import no_chip, no_reply, refused
 from .messages import (
     MAX_BURST,
@@ -37,7 +37,9 @@ from .read_ahead import ReadAhead
 
 # Four frames of 14 bytes fill one message.
 BATCH = 4
-GONE_NS = 500 * MS
+# without a message, and with the line's latency on top: a bridge that was reset says so before
+GONE_NS = 1000 * MS
+REMIND_NS = 100 * MS
 # A cable is plugged in again, and a boot loader waits for two seconds.
 RECOVER_NS = 10_000 * MS
 # An FTDI adapter hands over what came every 16 ms. What is asked in step with that is answered as late each time, or
@@ -64,6 +66,9 @@ class BridgeBus:
         self._ahead: ReadAhead | None = None
         self._lost = False
         self._asked = 0
+        # INT_ENABLE, asked for beside the stream, and what it held last
+        self._posted: Asked | None = None
+        self._enabled = 0
         self._dead: BusError | None = None
         try:
             self._address = self.link.greet(address or 0).address
@@ -93,6 +98,8 @@ class BridgeBus:
                 # a bridge makes several transfers of it, and the first may have taken bytes
                 raise BusError(error.what, error.remedy) from error
         at = reg.INT_STATUS - register
+        if ahead is not None and register == reg.INT_ENABLE and at == count - 1:
+            return self._status(ahead)
         if not 0 <= at < count:
             return self._read_now(register, count)
         if at == count - 1:
@@ -110,6 +117,8 @@ class BridgeBus:
             requests.append(Stream(0, 0))
         requests.append(Write(register, data))
         self._watch.saw_write(register, data)
+        if register <= reg.INT_ENABLE < register + len(data):
+            self._enabled = data[reg.INT_ENABLE - register]
         if controls and self._can_read_ahead:
             return self._start(*requests)
         return self._seen_from(self._ask(*requests)[-1][-1].t_ns)
@@ -148,6 +157,25 @@ class BridgeBus:
         seen_ns = self._seen_from(begun_ns)
         return Reply(b"".join(_data(answers)), seen_ns, host_ns - (begun_ns - seen_ns))
 
+    def _status(self, ahead: ReadAhead) -> Reply:
+        """INT_ENABLE to INT_STATUS while the bridge pushes.
+
+        INT_STATUS is what FRAMES say, whose bridge reads it. INT_ENABLE, 0 in a chip that was reset, was asked for a
+        poll ago: nobody waits for a reply, which may be late. Its times tell how fast the bridge's clock runs.
+        """
+        t_ns, host_ns, posted = ahead.shown_ns, None, self._posted
+        if posted is not None and posted.done:
+            answer = posted.answers[0]
+            data = b"".join(_data([answer]))
+            self._enabled = data[0] if data else self._enabled
+            host_ns = answer.host_ns - (answer.t_ns - t_ns)
+            self._posted = None
+        if self._posted is None:
+            self._step_out_of_line()
+            self._posted = self.link.post(Read(reg.INT_ENABLE, 1))
+        overflow = reg.INT_FIFO_OFLOW * ahead.take_overflow()
+        return Reply(bytes([self._enabled, 0, overflow]), t_ns, host_ns)
+
     def _judged(self, reply: Reply, at: int) -> Reply:
         """What was read, with INT_STATUS at `at`: it tells what was lost on the way to the host, too."""
         if self._ahead is not None:
@@ -174,7 +202,7 @@ class BridgeBus:
 
         The FIFO must not fill while the host waits for a reply, so all of them are sent at once.
         """
-        self._lost = False
+        self._lost, self._posted = False, None
         frame_bytes = self._watch.frame_bytes
         # before it is asked for: what it pushes may come together with its reply
         self._ahead = ReadAhead(self.link.seq_of(len(before)), frame_bytes)
@@ -189,12 +217,14 @@ class BridgeBus:
         return answers[-2][-1].t_ns
 
     def _count(self, ahead: ReadAhead) -> tuple[int, int, int]:
-        give_up_ns = self._port.now_ns() + GONE_NS
+        give_up_ns = self._port.now_ns() + GONE_NS + self.link.latency.most_ns
         while not ahead.can_count:
             try:
                 if self._port.now_ns() >= give_up_ns:
                     raise LinkLost(*no_reply(self._port.name))
-                self.link.wait(give_up_ns)
+                if self._posted is not None:
+                    self.link.remind(self._posted)
+                self.link.wait(min(give_up_ns, self._port.now_ns() + REMIND_NS))
             except BusError as error:
                 self._recover(error)
                 raise

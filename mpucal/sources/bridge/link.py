@@ -13,10 +13,11 @@ from itertools import cycle
 from typing import NamedTuple
 
 from ...chip.registers import FIFO_R_W, INT_STATUS
-from ...errors import BusError
+from ...errors import BusError, LinkError
 from .clock import BridgeClock
 from .frame import DELIMITER, Deframer, Frame
 from .greeting import Heard
+from .latency import Latency
 from .link_errors import flooded, no_reply, other_version, restarted
 from .messages import (
     MAJOR,
@@ -44,7 +45,7 @@ from .messages import (
 from .port import Chunk, Port
 
 MS = 1_000_000
-# two and a half times what a bridge takes at most
+# two and a half times what a bridge takes at most; the line's own latency comes on top
 REPLY_NS = 250 * MS
 STORE_NS = 2500 * MS
 TRIES = 3
@@ -62,7 +63,7 @@ STORING = (BlobBegin, BlobData, BlobCommit, BlobErase)
 Pushed = Callable[[int, Frames, int, int], None]
 
 
-class LinkLost(BusError):  # noqa: N818 - reads as the sentence it is
+class LinkLost(LinkError):  # noqa: N818 - reads as the sentence it is
     """The bridge does not answer, or has forgotten that it was greeted; `greet` may bring it back."""
 
 
@@ -75,15 +76,18 @@ class Answer(NamedTuple):
 
 
 @dataclass
-class _Asked:
-    """A request on its way, and what came for it."""
+class Asked:
+    """A request on its way, and what came for it; when it was sent last, and how often."""
 
     seq: int
     request: Message
     answers: list[Answer] = field(default_factory=list)
+    sent_ns: int = 0
+    sent: int = 0
 
     @property
     def done(self) -> bool:
+        """Whether all of its answer has come."""
         if not self.answers:
             return False
         last = self.answers[-1].reply
@@ -113,6 +117,7 @@ class _Asked:
         return reply.offset == held and held + len(reply.data) <= self.request.count
 
     def encoded(self) -> bytes:
+        """Its bytes on the line."""
         return Frame(self.request.TYPE, self.seq, self.request.payload()).encode()
 
 
@@ -125,17 +130,19 @@ class Link:
 
     Attributes
     ----------
-    clock : the bridge's. bridge : what it said of itself; of meaning after `greet`.
+    clock : the bridge's. bridge : what it said of itself; of meaning after `greet`. latency : how late replies come.
     """
 
     def __init__(self, port: Port, pushed: Pushed) -> None:
         self.port = port
         self.clock = BridgeClock()
+        self.latency = Latency()
         self.bridge: HelloReply
         self._pushed = pushed
         self._deframer = Deframer()
         self._seq = 0
         self._window = MIN_WINDOW
+        self._posted: list[Asked] = []
 
     def greet(self, address: int = 0, within_ns: int = GREET_NS) -> HelloReply:
         """Say HELLO until the bridge answers: an Arduino's boot loader takes two seconds.
@@ -148,7 +155,8 @@ class Link:
         ------
         BusError : nothing answers, or something that is no bridge, or one of another version.
         """
-        heard = Heard()
+        heard, said = Heard(), list[Asked]()
+        self._posted.clear()
         give_up_ns = self.port.now_ns() + within_ns
         for tried, baud in enumerate(cycle(self.port.bauds)):
             is_repl = heard.is_repl and tried >= TRIES
@@ -156,7 +164,7 @@ class Link:
                 break
             if len(self.port.bauds) > 1:
                 self.port.set_baud(baud)
-            reply = self._hello(address, heard, baud)
+            reply = self._hello(address, heard, said, baud)
             if reply is not None:
                 self.bridge, self._window = reply, max(MIN_WINDOW, reply.window)
                 return reply
@@ -171,14 +179,19 @@ class Link:
         ------
         LinkLost : the bridge does not answer, or was reset. BusError : the port is gone.
         """
-        waiting, flying = deque(self._numbered(requests)), list[_Asked]()
+        waiting, flying = deque(self._numbered(requests)), [one for one in self._posted if not one.done]
         asked = list(waiting)
-        patience_ns = STORE_NS if any(isinstance(request, STORING) for request in requests) else REPLY_NS
+        self._posted.clear()
+        stores = any(isinstance(request, STORING) for request in requests)
+        patience_ns = (STORE_NS if stores else REPLY_NS) + self.latency.most_ns
+        # what must not be asked for again is waited for as long as all tries of another take
+        if not all(one.repeatable for one in asked):
+            patience_ns *= TRIES
         tries, deadline_ns, budget = 1, self.port.now_ns() + patience_ns, LOOK_BYTES
         while waiting or flying:
             while waiting and len(flying) < self._window:
                 flying.append(waiting.popleft())
-                self.port.write(flying[-1].encoded())
+                self._send(flying[-1])
             chunk = self.port.read(deadline_ns)
             budget -= 0 if chunk is None else len(chunk.data)
             if chunk is None or not self._handle(chunk, flying):
@@ -188,10 +201,22 @@ class Link:
                 if tries == TRIES or not all(one.repeatable for one in flying):
                     raise LinkLost(*(no_reply if budget > 0 else flooded)(self.port.name))
                 tries += 1
-                self.port.write(DELIMITER + b"".join(one.encoded() for one in flying))
+                self._send(*flying, again=True)
             deadline_ns, budget = self.port.now_ns() + patience_ns, LOOK_BYTES
             flying = [one for one in flying if not one.done]
         return [one.answers for one in asked]
+
+    def post(self, request: Message) -> Asked:
+        """Send a request that does no harm when carried out twice, and wait for nothing: its answer comes by and by."""
+        (posted,) = self._numbered([request])
+        self._send(posted)
+        self._posted = [one for one in self._posted if not one.done] + [posted]
+        return posted
+
+    def remind(self, posted: Asked) -> None:
+        """Send what was posted again, if its answer is overdue."""
+        if not posted.done and self.port.now_ns() - posted.sent_ns > REPLY_NS + self.latency.most_ns:
+            self._send(posted, again=True)
 
     def seq_of(self, n: int) -> int:
         """The sequence number that the next request will have (n = 0), or one behind it."""
@@ -213,23 +238,31 @@ class Link:
         """Let go of the port."""
         self.port.close()
 
-    def _numbered(self, requests: Sequence[Message]) -> Iterator[_Asked]:
+    def _numbered(self, requests: Sequence[Message]) -> Iterator[Asked]:
         for request in requests:
             self._seq = (self._seq + 1) % 256
-            yield _Asked(self._seq, request)
+            yield Asked(self._seq, request)
 
-    def _hello(self, address: int, heard: Heard, baud: int) -> HelloReply | None:
-        (asked,) = self._numbered([Hello(address=address)])
-        self.port.write(DELIMITER + asked.encoded())
+    def _send(self, *several: Asked, again: bool = False) -> None:
+        self.port.write(DELIMITER * again + b"".join(one.encoded() for one in several))
+        for one in several:
+            one.sent_ns, one.sent = self.port.now_ns(), one.sent + 1
+
+    def _hello(self, address: int, heard: Heard, said: list[Asked], baud: int) -> HelloReply | None:
+        """Say HELLO once more; the answer to any that was said, as a line may take longer than until the next."""
+        said += self._numbered([Hello(address=address)])
+        self._send(said[-1], again=True)
         until_ns, budget = self.port.now_ns() + HELLO_NS, LOOK_BYTES
         while (chunk := self.port.read(until_ns)) is not None:
             heard.take(chunk.data, baud)
             for frame, reply in self._messages(chunk):
-                if not asked.is_answered_by(frame, reply):
+                asked = next((one for one in said if one.is_answered_by(frame, reply)), None)
+                if asked is None:
                     continue
                 if not isinstance(reply, HelloReply) or reply.major != MAJOR:
                     raise BusError(*other_version(self.port.name, reply))
                 self.clock.greeted(reply.t_us, chunk.t_ns)
+                self.latency.took(chunk.t_ns - asked.sent_ns)
                 return reply
             budget -= len(chunk.data)
             if chunk.t_ns >= until_ns or budget <= 0:
@@ -237,20 +270,22 @@ class Link:
                 break
         return None
 
-    def _handle(self, chunk: Chunk, flying: Sequence[_Asked]) -> bool:
+    def _handle(self, chunk: Chunk, flying: Sequence[Asked]) -> bool:
         """Give each message to whom it is for; whether a request was answered."""
         answered = False
         for frame, reply in self._messages(chunk):
             if isinstance(reply, Frames):
                 self._pushed(frame.seq, reply, self.clock.seen(reply.t_us, chunk.t_ns), chunk.t_ns)
                 continue
-            for one in flying:
+            for one in (*flying, *self._posted):
                 if one.is_answered_by(frame, reply):
                     if reply.status == Status.NO_HELLO:
                         # its clock began anew: the time means nothing here
                         raise LinkLost(*restarted(self.port.name))
+                    if one.sent == 1 and not one.answers and not isinstance(one.request, STORING):
+                        self.latency.took(chunk.t_ns - one.sent_ns)
                     one.answers.append(Answer(reply, self.clock.seen(reply.t_us, chunk.t_ns), chunk.t_ns))
-                    answered = True
+                    answered = answered or one in flying
         return answered
 
     def _messages(self, chunk: Chunk) -> Iterator[tuple[Frame, Reply]]:

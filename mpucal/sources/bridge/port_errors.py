@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import re
 
-from ...errors import BusError
+from ...errors import BusError, LinkError
 
 
 def opening_error(error: Exception, port: str) -> BusError:
@@ -29,9 +29,9 @@ def opening_error(error: Exception, port: str) -> BusError:
     return BusError(f"cannot open {port} ({_reason(error)})", another())
 
 
-def gone(port: str) -> BusError:
+def gone(port: str) -> LinkError:
     """The sentence of a port that was there."""
-    return BusError(f"{port} is gone", "check its cable, plug it in again, then start again")
+    return LinkError(f"{port} is gone", "check its cable, plug it in again, then start again")
 
 
 def another() -> str:

@@ -86,6 +86,11 @@ class ReadAhead:
                 break
         return len(self._shown), self._shown_t_ns, self._shown_host_ns
 
+    @property
+    def shown_ns(self) -> int:
+        """The time of what was counted last."""
+        return self._shown_t_ns
+
     def pop(self, count: int) -> tuple[bytes, int]:
         """FIFO_R_W: the oldest `count` bytes of what was counted; where it is empty, the last again."""
         data = bytes(self._shown[:count])

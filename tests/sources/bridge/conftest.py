@@ -70,10 +70,12 @@ class Booting:
 
 @pytest.fixture(scope="session")
 def rig():
-    def make(model="mpu6050", latency_ns=MS, boot_ns=0, **how):
+    def make(model="mpu6050", latency_ns=MS, boot_ns=0, line=None, **how):
         made = Rig(model=model, clock=FastClock(), how=how)
         made.new_chip()
-        made.line = EmulatedLine(made.new_bridge(boot_ns), made.clock, latency_ns, step_ns=MS)
+        made.line = EmulatedLine(
+            made.new_bridge(boot_ns), made.clock, **{"latency_ns": latency_ns, "step_ns": MS, **(line or {})}
+        )
         return made
 
     return make

@@ -7,7 +7,8 @@ from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, NoAnswer
-from mpucal.sources.bridge.messages import Feature
+from mpucal.sources.bridge.frame import Deframer
+from mpucal.sources.bridge.messages import Feature, Read
 from mpucal.sources.replay import ReplayBus
 from mpucal.sources.tap import Tap
 
@@ -155,7 +156,11 @@ def test_a_chip_that_comes_off_while_it_streams(rig, stream):
     driver = Driver(made.bus(), Config(rate_hz=200))
     driver.start()
     stream(driver, 0.5)
-    made.line.device.bridge._chip = None
+
+    def nothing(*_):
+        raise NoAnswer("nothing acknowledges", "look")
+
+    made.chip.read = made.chip.write = nothing
     with pytest.raises(NoAnswer, match="the chip no longer answers the bridge on the emulated line: check the chip's"):
         stream(driver, 5)
     assert len(driver.recording()) > 80
@@ -164,6 +169,48 @@ def test_a_chip_that_comes_off_while_it_streams(rig, stream):
 class Records(list):
     def transaction(self, transaction):
         self.append(transaction)
+
+
+def test_nothing_but_a_register_is_asked_for_beside_the_stream(rig, stream):
+    """FRAMES tell what INT_STATUS holds, whose reading would take it away from the bridge."""
+    made = rig()
+    driver = Driver(made.bus(), Config(rate_hz=200))
+    driver.start()
+    made.line.written.clear()
+    stream(driver, 2)
+    asked = {(frame.type, frame.payload) for frame in Deframer().feed(bytes(made.line.written))}
+    assert asked == {(Read.TYPE, bytes([reg.INT_ENABLE, 1]))}
+
+
+@pytest.mark.parametrize(
+    ("how", "lost"),
+    [({"burst_ns": 450 * MS}, 0.0), ({"latency_ns": 300 * MS}, 0.02), ({"latency_ns": 5 * MS}, 0.02)],
+    ids=["bursts of 0.45 s", "300 ms, and 2 % of the packets sent again", "the same on a quick line"],
+)
+def test_a_line_that_holds_replies_back_makes_no_gap(rig, numbers, stream, how, lost):
+    made = rig(line=how)
+    rng, free_ns = np.random.default_rng(1), [0]
+    step, coming = made.line._step, made.line._coming
+
+    def sent_again():
+        """As TCP does: what follows waits for what is lost."""
+        before = len(coming)
+        step()
+        if len(coming) > before:
+            free_ns[0] = max(free_ns[0], coming[-1].t_ns + 400 * MS * (rng.random() < lost))
+            coming[-1] = coming[-1]._replace(t_ns=free_ns[0])
+
+    made.line._step = sent_again
+    said = []
+    driver = Driver(made.bus(), Config(rate_hz=200), say=said.append)
+    driver.start()
+    stream(driver, 20)
+    recording = driver.recording()
+    assert recording.gap.sum() == 0
+    assert set(np.diff(numbers(recording))) == {1}
+    assert len(recording) > 3600
+    driver.stop()
+    assert [sentence for sentence in said if "failed" in sentence] == []
 
 
 def test_closing_stops_what_the_bridge_pushes(rig, stream):

@@ -1,5 +1,7 @@
 """What goes wrong on the wire: the session goes on with a marked gap, or ends with one true sentence."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.errors import BusError, MpucalError, WriteBackError
+from mpucal.errors import BusError, MpucalError, NoAnswer, WriteBackError
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
 from mpucal.simulated.bridge import EmulatedLine, Memory
@@ -98,6 +100,40 @@ def test_unplugged_and_plugged_in_again(rig, numbers, stream, chip_loses_its_sup
     assert recording.gap.sum() == 1
     assert float(np.diff(recording.t)[recording.gap[1:]][0]) > 2.9
     assert len(recording) > 350
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (
+            lambda made: setattr(made.line, "device", made.new_bridge()),
+            "lost on the link to the board.*not the sens",
+        ),
+        (lambda made: failing(made.chip, made.clock), "not acknowledged.*shorten the wires"),
+    ],
+    ids=["link", "sensor"],
+)
+def test_what_failed_is_said_of_the_link_or_of_the_sensor(rig, stream, spoil, words):
+    made, said = rig(), []
+    driver = Driver(made.bus(), Config(rate_hz=200), say=said.append)
+    driver.start()
+    stream(driver, 0.5)
+    spoil(made)
+    stream(driver, 2)
+    driver.stop()
+    assert re.search(words, said[-1])
+
+
+def failing(chip, clock):
+    """For a moment."""
+    read, ends_ns = chip.read, clock.now() + 300 * MS
+
+    def refused(*words):
+        if clock.now() < ends_ns:
+            raise NoAnswer("nothing acknowledges", "look")
+        return read(*words)
+
+    chip.read = refused
 
 
 def test_unplugged_for_good(rig, stream):

@@ -55,6 +55,7 @@ def recorded(tmp_path):
 
         line = EmulatedLine(EmulatedBridge(chip, shown), clock, burst_ns=burst_ms * MS, step_ns=2 * MS)
         path = tmp_path / "capture.mcap"
+        path.unlink(missing_ok=True)
         bus = BridgeBus(line)
         with CaptureWriter(path) as writer:
             writer.start({})
