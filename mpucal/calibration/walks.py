@@ -1,8 +1,8 @@
 """Whether the sensor changed while the board was turned: a random walk over the parts, its size by likelihood.
 
-Four things may have changed: the accelerometer's bias (a step, warming), its gains, its mount, the gyroscope's bias.
+Three things may have changed: the accelerometer's bias (a step, warming), the gyroscope's, the accelerometer's mount.
 Beside theta every part has three numbers delta_k of one of them, delta_0 ~ N(0, q) and delta_k - delta_k-1 ~ N(0, q).
-A fifth explanation is no change at all: a sensor whose bias depends on which side is down, as a nonlinear one's does;
+A fourth explanation is no change at all: a sensor whose bias depends on which side is down, as a nonlinear one's does;
 then each side has a delta ~ N(0, q) of its own.
 
 To second order all that is needed are the parts' scores. With theta eliminated and delta in independent x, the
@@ -30,13 +30,12 @@ from .parameters import PLACES
 from .parts import Parts
 from .rotation import cross
 
-What = Literal["accelerometer", "gain", "gyroscope", "mount", "side"]
+What = Literal["accelerometer", "gyroscope", "mount", "side"]
 
 TIMES = 16
-# variance of a step from part to part: (m/s^2)^2, 1, (rad/s)^2 and rad^2
+# variance of a step from part to part: (m/s^2)^2, (rad/s)^2 and rad^2
 STEPS: dict[What, Vector] = {
     "accelerometer": 10.0 ** np.arange(-8.0, -2.9, 0.5),
-    "gain": 10.0 ** np.arange(-10.0, -3.9, 0.5),
     "gyroscope": 10.0 ** np.arange(-11.0, -2.9, 0.5),
     "mount": 10.0 ** np.arange(-8.0, -1.9, 0.5),
     "side": 10.0 ** np.arange(-8.0, -0.9, 0.5),
@@ -54,7 +53,7 @@ class Walk(NamedTuple):
     ----------
     what : changed. gain : 2 log of how much likelier it is than none. q : variance of a step from part to part.
     alone : the gain where all eigenvectors are taken to be as loud as their median is.
-    delta : (k, 3) from the estimate, m/s^2, 1, rad/s or rad. t : (k,) s after the flat segment, the middles of the parts;
+    delta : (k, 3) from the estimate, m/s^2, rad/s or rad. t : (k,) s after the flat segment, the middles of the parts;
     of sides none.
     """
 
@@ -67,7 +66,7 @@ class Walk(NamedTuple):
 
     def error(self, gravity: float) -> float:
         """m/s^2 by which readings before and after are off; 0 where it is no change of the accelerometer."""
-        return 0.5 * self.size * {"accelerometer": 1.0, "gain": gravity, "mount": gravity}.get(self.what, 0.0)
+        return 0.5 * self.size * {"accelerometer": 1.0, "mount": gravity}.get(self.what, 0.0)
 
     @property
     def size(self) -> float:
@@ -120,8 +119,6 @@ def _directions(what: What, D: Vector, p: int) -> Vector:
     B = np.zeros((p, 3))
     if what == "mount":
         B[PLACES["D"]] = (D @ cross(np.eye(3))).reshape(3, 9).T
-    elif what == "gain":
-        B[PLACES["D"]] = (np.eye(3)[:, :, None] * D[:, None, :]).reshape(3, 9).T
     else:
         B[PLACES["b_omega" if what == "gyroscope" else "b_a"]] = np.eye(3)
     return B

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.calibration import calibrate, weigh
+from mpucal.calibration import weigh
 from mpucal.calibration.parts import Parts
 from mpucal.calibration.rotation import rotation
 from mpucal.calibration.walks import STEPS, Walk, _walk, likeliest_walk
@@ -37,18 +37,6 @@ def test_a_step_of_the_bias_is_found_where_it_was(hand, share):
     begin, end = walk.steepest
     flat_s = 10.0
     assert flat_s + begin - 3.0 < recording.t[at] < flat_s + end + 3.0
-
-
-def test_a_gain_that_steps_is_told_from_a_bias(hand):
-    run = hand(2, "pose12")
-    recording, acc = run.recording, run.recording.acc.copy()
-    at = np.searchsorted(recording.t, recording.t[0] + 27.0)
-    acc[at:, 2] += 0.003 * (acc[at:, 2] - run.truth.b_a[2])
-    stepped = replace(recording, acc=acc)
-    walk, calibration = walk_of(stepped), calibrate(stepped, "auto", G)
-    assert walk.what == "gain"
-    assert calibration.quality["verdict"] == "usable"
-    assert "the sensor was not the same before" in calibration.quality["reasons"][0]["message"]
 
 
 def test_a_mount_that_slips_is_told_from_a_bias(hand):

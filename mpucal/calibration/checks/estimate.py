@@ -18,7 +18,7 @@ RESTS_MPS2, RESTS_RAD = 0.08, np.deg2rad(1.5)
 HONEST_FACTOR = 5.0
 REFUSED_FACTOR = 5.0
 # by which readings are off because of a change of the bias or the mount: less is no news, and more is refused
-LEAST_CHANGE_MPS2, CHANGED_MPS2 = {"accelerometer": 0.004, "gain": 0.004, "mount": 0.02}, 0.2
+LEAST_CHANGE_MPS2, CHANGED_MPS2 = {"accelerometer": 0.004, "mount": 0.02}, 0.2
 # times the model's claim, and m/s^2, that leaving a part out says
 DISAGREE, DISAGREE_MPS2 = 4.0, 0.02
 
@@ -93,7 +93,7 @@ def inconsistent(e: Evidence) -> Reason | None:
 
 def changed_midway(e: Evidence) -> Reason | None:
     """A mount that slipped, where nothing else speaks against the estimate."""
-    change = _change_of(e, "mount") or _change_of(e, "gain")
+    change = _change_of(e, "mount")
     if change is None:
         return None
     begin, end = _since_the_start(e, change.steepest)
