@@ -12,7 +12,7 @@ from .calibration import calibrate as _calibrate
 from .data import STANDARD_GRAVITY_MPS2, Recording
 from .errors import WrongType, WrongValue
 from .files import load as _load
-from .files.hints import Hints, parse_columns, parse_units
+from .files.hints import Hints, parse_columns, parse_span, parse_units
 from .recheck import check as _check
 from .recheck.outcome import CheckResult as CheckResult  # noqa: PLC0414 - mpucal takes it from here
 from .result.calibration import Calibration
@@ -32,6 +32,7 @@ def load(
     accel_range: float | None = None,
     gyro_range: float | None = None,
     rate: float | None = None,
+    span: str = "",
 ) -> Recording:
     """The recording in a file (.mcap, .tlog, .bin of ArduPilot, .npz, .csv), or in the folder of a session.
 
@@ -43,6 +44,7 @@ def load(
     topic : of a bag. columns : of a table, "t=NAME,ax=NAME,..." or "t,ax,ay,az,gx,gy,gz".
     units : "t=ms,acc=g,gyr=deg/s".
     accel_range : g, gyro_range : deg/s, full scale of counts. rate : Hz, of samples without times.
+    span : "FROM:TO", s since the first sample: what is read of it.
 
     Raises
     ------
@@ -51,13 +53,16 @@ def load(
     UsageError : something is said of a file of which nothing has to be said.
     WrongType : `path` is no path, or a hint of another type. WrongValue : no such columns, units, range or rate.
     """
-    for name, value in (("topic", topic), ("columns", columns), ("units", units)):
+    for name, value in (("topic", topic), ("columns", columns), ("units", units), ("span", span)):
         if not isinstance(value, str | None):
             raise WrongType(f"{name} is {value!r}", "give it as text, see docs/recordings.md")
     scales = {"accel_range": accel_range, "gyro_range": gyro_range, "rate": rate}
-    checked = [None if value is None else real(value, name, UNITS[name], least=1e-9) for name, value in scales.items()]
+    full_g, full_dps, hz = (
+        None if value is None else real(value, name, UNITS[name], least=1e-9) for name, value in scales.items()
+    )
     try:
-        hints = Hints(topic, parse_columns(columns) if columns else {}, parse_units(units) if units else {}, *checked)
+        said = parse_columns(columns) if columns else {}, parse_units(units) if units else {}
+        hints = Hints(topic, *said, full_g, full_dps, hz, parse_span(span) if span else None)
     except ValueError as error:
         raise WrongValue(str(error), "see docs/recordings.md") from error
     return _load(a_path(path, "a recording"), hints)

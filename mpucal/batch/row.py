@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from fnmatch import fnmatch
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -21,6 +22,7 @@ from ..data import Recording
 from ..disk.whole import write_atomically
 from ..errors import MpucalError, OutputError, RecordingError
 from ..files import load
+from ..files.hints import NO_HINTS, Hints
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
 from ..report import render
 from ..result.calibration import Calibration
@@ -44,17 +46,31 @@ REPORT_DIGITS = 16
 
 @dataclass(frozen=True)
 class Settings:
-    """How each recording is calibrated, see mpucal.calibrate; `reports` : the folder for a page of each, or empty."""
+    """How each recording is read and calibrated, see mpucal.load and mpucal.calibrate.
+
+    Attributes
+    ----------
+    reports : the folder for a page of each, or empty. hints : of files that no pattern of `by_pattern` names.
+    """
 
     model: str
     gravity: float
     gravity_anyway: bool = False
     reports: str = ""
+    hints: Hints = NO_HINTS
+    by_pattern: tuple[tuple[str, Hints], ...] = ()
 
     @property
     def key(self) -> str:
         """What a row depends on besides its file."""
-        return f"{__version__} {self.model} {self.gravity!r} {self.gravity_anyway} {bool(self.reports)}"
+        said = f" {self.hints} {self.by_pattern}" if self.hints != NO_HINTS or self.by_pattern else ""
+        return f"{__version__} {self.model} {self.gravity!r} {self.gravity_anyway} {bool(self.reports)}{said}"
+
+    def hints_of(self, path: str) -> Hints:
+        """What is said of a file: by the first pattern that its path or its name fits."""
+        names = (path, PurePosixPath(path).name)
+        fitting = (hints for pattern, hints in self.by_pattern if any(fnmatch(name, pattern) for name in names))
+        return next(fitting, self.hints)
 
 
 def rows_of(paths: Sequence[str], settings: Settings, known: Sequence[str | None]) -> list[dict[str, Any]]:
@@ -74,7 +90,7 @@ def row_of(path: str, settings: Settings, known: str | None = None) -> dict[str,
             row["digest"] = digest_of(local)
             if row["digest"] == known:
                 return {"path": path, "digest": known}
-            recording = load(local)
+            recording = load(local, settings.hints_of(path))
             calibration = calibrate_vehicle(
                 recording, model=settings.model, gravity=settings.gravity, gravity_anyway=settings.gravity_anyway
             )

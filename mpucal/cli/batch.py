@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing, nullcontext
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -18,6 +19,7 @@ from ..disk.whole import write_atomically
 from ..errors import UsageError
 from .options import fit_options
 from .person import say
+from .recording_options import hint_options, hints_by_pattern, hints_of
 
 EXAMPLE = "Example: `mpucal batch 'line3/*.mcap' -o fleet --workers 1`"
 EVERY_S = 2.0
@@ -31,7 +33,15 @@ REPORTS = "reports"
 @click.option("--scheduler", metavar="ADDRESS", help="A dask scheduler that runs already, tcp://HOST:PORT.")
 @click.option("--dashboard", is_flag=True, help="Say where dask's dashboard is.")
 @click.option("--reports", is_flag=True, help="Write a report of each, which the page links to.")
+@click.option(
+    "--hints",
+    "by_pattern",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Lines of a pattern of files and options of those: `walk*.csv --units acc=g`.",
+)
 @fit_options
+@hint_options()
 def command(
     files: tuple[str, ...],
     folder: Path,
@@ -39,9 +49,11 @@ def command(
     scheduler: str | None,
     dashboard: bool,
     reports: bool,
+    by_pattern: Path | None,
     gravity: float,
     gravity_anyway: bool,
     model: str,
+    **hints: Any,
 ) -> int:
     """Calibrate many recordings: a table with a row for each, and a page about all of them.
 
@@ -50,7 +62,14 @@ def command(
     if scheduler and workers:
         raise UsageError("--workers is for this machine, and --scheduler names another's", "give one of them")
     paths = found(files)
-    settings = Settings(model, gravity, gravity_anyway, str((folder / REPORTS).resolve()) if reports else "")
+    settings = Settings(
+        model,
+        gravity,
+        gravity_anyway,
+        str((folder / REPORTS).resolve()) if reports else "",
+        hints_of(hints),
+        () if by_pattern is None else hints_by_pattern(by_pattern),
+    )
     with (
         Folder(folder),
         Folder(folder / REPORTS) if reports else nullcontext(),

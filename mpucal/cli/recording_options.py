@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
+from ..arguments import content
+from ..errors import UsageError
 from ..files.budget import MOST_MB, VARIABLE
-from ..files.hints import Hints, parse_columns, parse_units
+from ..files.hints import Hints, parse_columns, parse_span, parse_units
 from .options import ABOVE_ZERO, Parsed, given
 
 F = TypeVar("F", bound=Callable[..., Any])
+MOST_BYTES = 1 << 20
 NAMES = {
     "topic": "topic",
     "columns": "columns",
@@ -20,6 +25,7 @@ NAMES = {
     "accel_range": "accel_range_g",
     "gyro_range": "gyro_range_dps",
     "rate": "rate_hz",
+    "span": "span",
 }
 
 
@@ -39,7 +45,7 @@ _MOST = click.option(
 
 
 def hint_options(*left_out: str) -> Callable[[F], F]:
-    """--topic, --columns, --units, --accel-range, --gyro-range and --rate, but for those that a command has already."""
+    """What NAMES has an option for, but for those that a command has already; and --most-mb."""
     options = {
         "topic": click.option(
             "--topic", metavar="NAME", help="Topic of a bag; two, the accelerometer's first: ONE,OTHER."
@@ -61,6 +67,12 @@ def hint_options(*left_out: str) -> Callable[[F], F]:
             "--gyro-range", metavar="DPS", type=ABOVE_ZERO, help="Full scale of counts [deg/s]."
         ),
         "rate": click.option("--rate", metavar="HZ", type=ABOVE_ZERO, help="Rate of samples without times [Hz]."),
+        "span": click.option(
+            "--span",
+            metavar="FROM:TO",
+            type=Parsed(parse_span),
+            help="Read this part of a recording alone: s since its first sample; one may be left out.",
+        ),
     }
 
     def decorate(command: F) -> F:
@@ -84,6 +96,38 @@ def given_hints(options: Mapping[str, Any]) -> Hints:
     # a range is a number, which a source's option has as text
     ranges = {name: float(value) for name, value in values.items() if name in ("accel_range", "gyro_range")}
     return hints_of({**values, **ranges})
+
+
+def hints_by_pattern(path: Path) -> tuple[tuple[str, Hints], ...]:
+    """The hints of a file that has on each line a pattern of files' names and what is said of those; `#` begins a note.
+
+    Raises
+    ------
+    UsageError : it cannot be read, or a line is none; it is named by its number.
+    """
+    try:
+        lines = content(path, MOST_BYTES).decode().splitlines()
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path} is no text", "give a pattern and options on each line") from error
+    found = []
+    for number, line in enumerate(lines, 1):
+        try:
+            words = shlex.split(line, comments=True)
+            if words:
+                context = _HINTS.make_context("hints", words[1:])
+                found.append((words[0], hints_of(context.params)))
+        except (ValueError, click.ClickException) as error:
+            said = error.format_message() if isinstance(error, click.ClickException) else str(error)
+            raise UsageError(
+                f"{path}: line {number} is no pattern with options ({said})", "write it as `walk*.csv --units acc=g`"
+            ) from error
+    return tuple(found)
+
+
+@click.command(add_help_option=False)
+@hint_options()
+def _HINTS(**_hints: Any) -> None:  # noqa: N802 - a command, of which the options are read
+    """What may stand behind a pattern."""
 
 
 def say_taken(taken: str | None) -> None:

@@ -15,6 +15,7 @@ from ..data import STANDARD_GRAVITY_MPS2, Recording, Sensor
 from ..errors import UsageError
 from ..files import load
 from ..files.formats import readable, recognised
+from ..files.hints import Hints
 from ..rests.flat import find_flat
 from ..result.blob import Blob
 from ..result.calibration import Calibration
@@ -26,7 +27,7 @@ from ..sources.table import kinds_meant, used_by
 from .loading import loaded
 from .options import check_source, source_options
 from .person import say
-from .recording_options import say_taken
+from .recording_options import hint_options, hints_of, say_taken
 from .summary import formula, slope, summary
 
 EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --json`, or `mpucal show --serial PORT`"
@@ -43,6 +44,7 @@ parameters are read; nothing is written.
 @click.command("show", help=HELP, epilog=EXAMPLE)
 @click.argument("file", metavar="FILE|DIR", type=click.Path(path_type=Path), required=False)
 @source_options("show", settings=False)
+@hint_options()
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def command(file: Path | None, as_json: bool, **options: Any) -> None:
     """Show the one place that is given."""
@@ -58,7 +60,7 @@ def command(file: Path | None, as_json: bool, **options: Any) -> None:
     elif file.suffix in CALIBRATIONS and recognised(file) is None:
         _show_calibration(str(file), loaded(file), as_json)
     else:
-        _show_recording(file, as_json)
+        _show_recording(file, hints_of(options), as_json)
 
 
 def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) -> None:
@@ -85,8 +87,8 @@ def _show_calibration(where: str, calibration: Calibration, as_json: bool) -> No
     click.echo(calibration.json() if as_json else _calibration(where, calibration), nl=not as_json)
 
 
-def _show_recording(file: Path, as_json: bool) -> None:
-    recording = load(file)
+def _show_recording(file: Path, hints: Hints, as_json: bool) -> None:
+    recording = load(file, hints)
     say_taken(recording.taken)
     if recording.recovered is not None:
         click.echo(f"mpucal: {recording.recovered}", err=True)

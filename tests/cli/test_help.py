@@ -48,7 +48,7 @@ def test_says_its_version(mpucal):
 
 
 def test_the_unexpected_is_a_bug_with_a_trace(mpucal, monkeypatch):
-    monkeypatch.setattr("mpucal.cli.show.load", lambda _: 1 / 0)
+    monkeypatch.setattr("mpucal.cli.show.load", lambda *_: 1 / 0)
     result = mpucal("show", "some.npz")
     assert result.code == 1
     assert "ZeroDivisionError" in result.err
@@ -76,7 +76,7 @@ def test_a_full_disk_behind_stdout_is_3(mpucal, tmp_path, monkeypatch):
     ],
 )
 def test_what_the_computer_refuses_is_3(mpucal, monkeypatch, error, said):
-    def refused(_path):
+    def refused(*_words):
         raise error
 
     monkeypatch.setattr("mpucal.cli.show.load", refused)

@@ -52,7 +52,7 @@ def test_columns_go_by_their_names(path, text):
         pytest.param("", "is empty", id="empty"),
         pytest.param("\n\n", "is empty", id="blank"),
         pytest.param(HEADER, "holds no samples", id="header alone"),
-        pytest.param("0,1,2,3,4,5,6\n1,1,2,3,4,5,6\n", "names no columns", id="no header"),
+        pytest.param("0,1,2,3,4,5,6\n1,1,2,3,4,5,6\n", "they are unnamed: name its 7 columns", id="no header"),
         pytest.param("t,ax,ay,az,gx,gy\n", "holds no lines below", id="no gz"),
         pytest.param("t;ax;ay;az;gx;gy;gz\n0;1;2;3;4;5;6\n", "holds 1 accelerations", id="semicolons"),
         pytest.param("t,t,ax,ay,az,gx,gy,gz\n", "names t twice", id="t twice"),

@@ -39,7 +39,7 @@ def guessed(table: Vector, hints: Hints) -> tuple[dict[str, int], str]:
             words = ["-"] * (max(order.values()) + 1)
             for role, place in order.items():
                 words[place] = role
-            return order, f"its columns have no names, and read as of --columns {','.join(words)}"
+            return order, f"its columns read as of --columns {','.join(words)} by how gravity turns"
     return {}, ""
 
 

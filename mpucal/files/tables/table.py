@@ -110,7 +110,8 @@ def _of_unnamed(table: TextTable, hints: Hints) -> Recording:
     order, said = _guessed(table, hints)
     if not order:
         raise RecordingError(
-            f"{table.name} names no columns, and how gravity turns does not tell them",
+            f"{table.name} holds no columns that are known by their names or by how gravity turns; they are"
+            f" {_listed(table.header)}",
             f"name its {width} columns in their order with --columns {','.join(ROLES)}, and - for one to leave out",
             f"--columns {','.join(ROLES)}",
         )

@@ -225,13 +225,14 @@ def _below(above: str, line: str, separator: str | None) -> list[str]:
 
 
 def numeric_table(text: str, name: str, least: int) -> TextTable | None:
-    """The table whose lines are `least` numbers or more and no header says which; None where there is none."""
+    """The table whose lines are `least` numbers or more, whatever its header; None where there is none."""
     begun = text.split("\n", PREAMBLE)[:PREAMBLE]
     for first, (line, following) in enumerate(pairwise(begun)):
         for separator in SEPARATORS:
             cells, more = _cells(line, separator), _cells(following, separator)
             if len(cells) >= least and len(more) == len(cells) and all(map(_is_number, (*cells, *more))):
-                return _read(text, name, [], first, separator)
+                above = _cells(begun[first - 1], separator) if first else []
+                return _read(text, name, above if len(above) == len(cells) else [], first, separator)
     return None
 
 

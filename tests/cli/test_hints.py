@@ -1,0 +1,102 @@
+"""What is said of a recording is said alike to every command that reads one, and a refusal ends with what works."""
+
+import json
+import pickle
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mpucal as package
+from mpucal.batch.row import Settings, row_of
+from mpucal.cli.recording_options import hints_by_pattern
+from mpucal.errors import UsageError
+from mpucal.files.hints import Hints, parse_span
+from mpucal.result.calibration import Calibration
+
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
+SAID = ("--columns", "t=a,ax=b,ay=e,az=c,gx=f,gy=d,gz=g", "--units", "t=s,acc=m/s^2,gyr=rad/s")
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return package.load(FIXTURE).part(0, 3000)
+
+
+@pytest.fixture
+def table(recording, tmp_path):
+    """Its columns have other names, and stand in an order that tells nothing."""
+    r = recording
+    columns = [r.t, *r.acc[:, [0, 2]].T, r.gyr[:, 1], r.acc[:, 1], *r.gyr[:, [0, 2]].T]
+    np.savetxt(tmp_path / "odd.csv", np.column_stack(columns), delimiter=",", header="a,b,c,d,e,f,g", comments="")
+    Calibration(np.eye(3), np.zeros(3), quality={"verdict": "good", "reasons": []}).save(tmp_path / "c.json")
+    return tmp_path / "odd.csv"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("show", "odd.csv", "--json"), ("apply", "c.json", "odd.csv", "-o", "out.npz", "--json")],
+    ids=lambda w: w[0],
+)
+def test_every_command_is_told_the_columns_and_the_span(words, mpucal, table, recording):
+    assert mpucal(*words).code == 3
+    done = mpucal(*words, *SAID)
+    assert done.code == 0, done.err
+    assert json.loads(done.out)["samples"] == len(recording)
+    cut = mpucal(*words, *SAID, "--span", "2:7")
+    assert json.loads(cut.out)["samples"] == pytest.approx(5 * recording.rate_hz, abs=1)
+
+
+def test_a_batch_is_told_by_patterns(table, recording, tmp_path):
+    (tmp_path / "hints").write_text(f"# those of the old logger\n\nodd*.csv {shlex.join(SAID)}\n*.txt --rate 100\n")
+    by_pattern = hints_by_pattern(tmp_path / "hints")
+    settings = Settings("accel", 9.80665, by_pattern=by_pattern)
+    assert [pattern for pattern, _ in by_pattern] == ["odd*.csv", "*.txt"]
+    assert settings.hints_of("line3/b.txt").rate_hz == 100
+    assert settings.hints_of("b.csv") == Hints()
+    assert settings.key != Settings("accel", 9.80665).key
+    # as dask sends it to a worker
+    row = row_of(str(table), pickle.loads(pickle.dumps(settings)))
+    assert row["samples"] == len(recording)
+    assert "they are a, b, c, d, e, f, g" in row_of(str(table), Settings("accel", 9.80665))["error"]
+
+
+@pytest.mark.parametrize("line", ["*.csv --units acc=feet", "*.csv --rate", "*.csv 'open", "*.csv more"])
+def test_a_line_that_is_no_hint_is_named(line, tmp_path):
+    (tmp_path / "hints").write_text(f"*.txt --rate 100\n{line}\n")
+    with pytest.raises(UsageError, match="line 2 is no pattern with options"):
+        hints_by_pattern(tmp_path / "hints")
+
+
+def test_a_refusal_ends_with_the_whole_command_that_works(mpucal, recording, save):
+    flat = recording.part(0, 300)
+    save(replace(recording, gyr=np.degrees(recording.gyr)), "in.npz")
+    Calibration(np.eye(3), np.zeros(3), quality={"verdict": "good", "reasons": []}).save("c.json")
+    refused = mpucal("apply", "c.json", "in.npz", "-o", "out.npz")
+    assert refused.code == 3
+    command = refused.err.splitlines()[-1].removeprefix("mpucal: try `").removesuffix("`")
+    assert command == "mpucal apply c.json in.npz -o out.npz --units acc=m/s^2,gyr=deg/s"
+    assert mpucal(*shlex.split(command)[1:]).code == 0
+    names = "time,accX,accY,accZ,gyroX,gyroY,gyroZ"
+    np.savetxt("flat.csv", np.column_stack([flat.t, flat.acc, flat.gyr]), delimiter=",", header=names, comments="")
+    assert mpucal("show", "flat.csv").err.endswith("mpucal: try `mpucal show flat.csv --units gyr=deg/s`\n")
+
+
+def test_a_part_of_any_recording_is_read(recording):
+    whole, part = package.load(FIXTURE), package.load(FIXTURE, span="2:7")
+    first = int(np.searchsorted(whole.t - whole.t[0], 2.0))
+    np.testing.assert_array_equal(part.acc, whole.acc[first : first + len(part)])
+    assert part.t[-1] - whole.t[0] < 7.0
+    with pytest.raises(package.MpucalError, match="give a --span that lies within it"):
+        package.load(FIXTURE, span="2000:")
+    with pytest.raises(package.MpucalError, match="is no span"):
+        package.load(FIXTURE, span="7")
+
+
+@pytest.mark.parametrize("text", ["7", "7:2", "-1:3", "a:b", "nan:3", ""])
+def test_spans_that_are_none(text):
+    with pytest.raises(ValueError, match="is no span"):
+        parse_span(text)
+    assert parse_span(":3") == (0.0, 3.0)
