@@ -23,6 +23,7 @@ from .chip import OpenedChip
 from .claim import claim
 from .i2c_errors import nobody, opening_error, transfer_error
 from .kind import Request
+from .stamp import Stamp
 
 # AD0 low, AD0 high
 ADDRESSES = (0x68, 0x69)
@@ -59,6 +60,7 @@ class I2cBus:
 
         self._message = smbus2.i2c_msg
         self._path = f"/dev/i2c-{adapter}" if str(adapter).isdecimal() else str(adapter)
+        self._stamp = Stamp(time.monotonic_ns)
         self._smbus = smbus2.SMBus()
         try:
             with self._told(opening_error):
@@ -87,7 +89,10 @@ class I2cBus:
                 f"{self._path} moves at most {MAX_MESSAGE_BYTES} bytes at once, not {count}",
                 "read less at once",
             )
-        t_ns, data = time.monotonic_ns(), b""
+        return self._stamp.read(register, count, lambda: self._read(register, count))
+
+    def _read(self, register: int, count: int) -> bytes:
+        data = b""
         with self._told(transfer_error, self._address):
             while len(data) < count:
                 # FIFO_R_W gives the next bytes again and again, any other register is followed by the next
@@ -97,7 +102,7 @@ class I2cBus:
                 except OSError as error:
                     # what came before is gone: no transfer that nobody acknowledged
                     raise (OSError(errno.EIO, os.strerror(errno.EIO)) if data else error) from error
-        return Reply(data, t_ns)
+        return data
 
     def write(self, register: int, data: bytes) -> int:
         """Write `data` from `register` on, and return the time just before the transfer."""

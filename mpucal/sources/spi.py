@@ -29,6 +29,7 @@ from ..errors import BusError, UsageError
 from .chip import OpenedChip
 from .claim import claim
 from .kind import Request
+from .stamp import Stamp
 
 READ, MODE = 0x80, 3
 REGISTER_HZ, LEAST_DATA_HZ = 1_000_000, 8_000_000
@@ -80,18 +81,23 @@ class SpiBus:
             self._device.close()
             raise
         self._own_register = False
+        self._stamp = Stamp(time.monotonic_ns)
 
     def read(self, register: int, count: int) -> Reply:
         """`count` bytes from `register` on, in messages of up to 4095 bytes; the time is the one just before."""
-        t_ns, data = time.monotonic_ns(), b""
+        reply = self._stamp.read(register, count, lambda: self._read(register, count))
+        if register == WHO_AM_I:
+            self._knows(PARTS.get(reply.data[0]))
+        return reply._replace(data=_altered(register, reply.data, lambda held: held & ~I2C_IF_DIS))
+
+    def _read(self, register: int, count: int) -> bytes:
+        data = b""
         hz = self._data_hz if register in DATA else REGISTER_HZ
         while len(data) < count:
             place = register if register == FIFO_R_W else register + len(data)
             part = min(count - len(data), LONGEST)
             data += self._moved(bytes([READ | place]) + bytes(part), hz)[1:]
-        if register == WHO_AM_I:
-            self._knows(PARTS.get(data[0]))
-        return Reply(_altered(register, data, lambda held: held & ~I2C_IF_DIS), t_ns)
+        return data
 
     def write(self, register: int, data: bytes) -> int:
         """Write `data` from `register` on, and return the time just before the transfer."""

@@ -1,0 +1,63 @@
+"""A read that a pause of the process held up is read again: its time would be early by the pause."""
+
+from itertools import count
+
+import pytest
+
+from mpucal.chip import registers as reg
+from mpucal.sources.stamp import LATE_NS, TRIES, Stamp
+
+USUAL_NS = 400_000
+
+
+class Host:
+    """A clock, and transfers that take what they are told to, then the usual time."""
+
+    def __init__(self):
+        self.now_ns, self.takes_ns, self.read = 0, [], count()
+
+    def transfer(self):
+        self.now_ns += self.takes_ns.pop(0) if self.takes_ns else USUAL_NS
+        return bytes([next(self.read)])
+
+
+@pytest.fixture
+def host():
+    return Host()
+
+
+@pytest.fixture
+def read(host):
+    stamp = Stamp(lambda: host.now_ns)
+    read = lambda register=reg.FIFO_COUNT_H: stamp.read(register, 2, host.transfer)  # noqa: E731
+    read()
+    return read
+
+
+def test_a_read_as_usual_is_one(host, read):
+    host.takes_ns = [USUAL_NS + LATE_NS]
+    assert read() == (b"\1", USUAL_NS, None)
+    assert next(host.read) == 2
+
+
+@pytest.mark.parametrize("pauses", [1, 2])
+def test_after_a_pause_it_is_read_again(host, read, pauses):
+    host.takes_ns = [14_000_000] * pauses
+    reply = read()
+    assert reply.data == bytes([1 + pauses])
+    assert host.now_ns - reply.t_ns == USUAL_NS
+
+
+def test_of_nothing_but_pauses_the_shortest_counts(host, read):
+    host.takes_ns = [14_000_000, 5_000_000, 9_000_000]
+    assert read() == (b"\2", USUAL_NS + 14_000_000, None)
+    assert next(host.read) == 1 + TRIES
+
+
+def test_what_a_read_takes_away_is_not_read_again(host, read):
+    for register in (reg.FIFO_R_W, reg.INT_STATUS):
+        read(register)
+        host.takes_ns = [14_000_000]
+        before = next(host.read)
+        read(register)
+        assert next(host.read) == before + 2
