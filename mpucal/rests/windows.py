@@ -83,44 +83,56 @@ class Windows:
 
 def cut(recording: Recording, n: int) -> list[Window]:
     """The windows of n samples of a whole recording; what is left at its end is left out."""
-    length_s = n / recording.rate_hz
-    return [_window(recording, last - n, last, length_s, True) for last in range(n, len(recording) + 1, n)]
+    length_s, m = n / recording.rate_hz, len(recording) // n
+    acc_rows, gyr_rows = (values[: m * n].reshape(m, n, 3) for values in (recording.acc, recording.gyr))
+    gyr, acc_sd, gyr_sd, noise, acc = _of_rows(acc_rows, gyr_rows)
+    spans = (_span(recording, k * n, (k + 1) * n, length_s) for k in range(m))
+    return [Window(gyr[k], acc_sd[k], gyr_sd[k], noise[k], acc[k], *span) for k, span in enumerate(spans)]
 
 
 def of_rows(acc: Vector, gyr: Vector, start_s: float = 0.0, end_s: float = 1.0, whole: bool = True) -> Window:
     """The window of rows (n, 3) m/s^2 and rad/s."""
+    return Window(*_of_rows(acc, gyr), start_s, end_s, whole, len(acc))
+
+
+def _of_rows(acc: Vector, gyr: Vector) -> tuple[Vector, Vector, Vector, Vector, Vector]:
+    """(..., 3) of rows (..., n, 3), as a window has them: gyr, acc_sd, gyr_sd, acc_noise, acc."""
     acc_mean, gyr_mean = _mean(acc), _mean(gyr)
-    deviations = _deviation(acc, acc_mean), _deviation(gyr, gyr_mean), _noise(acc)
-    return Window(gyr_mean, *deviations, acc_mean, start_s, end_s, whole, len(acc))
+    return gyr_mean, _deviation(acc, acc_mean), _deviation(gyr, gyr_mean), _noise(acc), acc_mean
 
 
 def _window(samples: Samples, first: int, last: int, length_s: float, spread: bool) -> Window:
-    acc, gyr, start_s = samples.acc[first:last], samples.gyr[first:last], float(samples.t[first])
+    acc, gyr = samples.acc[first:last], samples.gyr[first:last]
+    rows = _of_rows(acc, gyr) if spread else (_mean(gyr), UNKNOWN, UNKNOWN, UNKNOWN, _mean(acc))
+    return Window(*rows, *_span(samples, first, last, length_s))
+
+
+def _span(samples: Samples, first: int, last: int, length_s: float) -> tuple[float, float, bool, int]:
+    """As a window has them: start_s, end_s, whole, count."""
+    start_s = float(samples.t[first])
     goes_on = last < len(samples) and not samples.gap[last]
     end_s = float(samples.t[last]) if goes_on else start_s + length_s
-    whole = not bool(samples.gap[first:last].any())
-    if spread:
-        return of_rows(acc, gyr, start_s, end_s, whole)
-    return Window(_mean(gyr), UNKNOWN, UNKNOWN, UNKNOWN, _mean(acc), start_s, end_s, whole, last - first)
+    return start_s, end_s, not bool(samples.gap[first:last].any()), last - first
 
 
 def _mean(rows: Vector) -> Vector:
-    """np.mean(rows, 0), in half its time and to the last bit."""
-    return np.asarray(np.add.reduce(rows, 0) / len(rows))
+    """np.mean(rows, -2), in half its time and to the last bit."""
+    return np.asarray(np.add.reduce(rows, -2) / rows.shape[-2])
 
 
 def _deviation(rows: Vector, mean: Vector) -> Vector:
-    """np.std(rows, 0), likewise."""
-    beside = rows - mean
-    return np.asarray(np.sqrt(np.add.reduce(beside * beside, 0) / len(rows)))
+    """np.std(rows, -2), likewise."""
+    beside = rows - mean[..., None, :]
+    return np.asarray(np.sqrt(np.add.reduce(beside * beside, -2) / rows.shape[-2]))
 
 
 def _noise(rows: Vector) -> Vector:
     """Of the median: one sample that a knock or a flipped bit throws off is no noise."""
-    if len(rows) <= ORDER:
-        return np.zeros(3)
-    sizes = np.sort(np.abs(np.diff(rows, ORDER, axis=0)), axis=0)
-    return np.asarray(sizes[len(sizes) // 2] * (OF_NORMAL / math.sqrt(SQUARES)))
+    n = rows.shape[-2] - ORDER
+    if n <= 0:
+        return np.zeros((*rows.shape[:-2], 3))
+    sizes = np.sort(np.abs(np.diff(rows, ORDER, axis=-2)), axis=-2)
+    return np.asarray(sizes[..., n // 2, :] * (OF_NORMAL / math.sqrt(SQUARES)))
 
 
 def _tail(samples: Samples, first: int) -> Samples:
