@@ -11,7 +11,7 @@ import click
 from .. import __version__
 from ..doctor.finding import Finding, Mark, failed
 from ..doctor.page import document, text
-from ..errors import SourceError
+from ..errors import SourceError, UsageError
 from ..session.at_rest import put_down
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
@@ -25,7 +25,10 @@ EXAMPLE = "Example: `mpucal doctor --bus /dev/i2c-1`, or `mpucal doctor --bus si
 @source_options("doctor")
 @click.option("--json", "as_json", is_flag=True, help="Print only the findings, as JSON.")
 @click.option("--seconds", type=Finite(2.0), default=10.0, show_default=True, help="Time to observe the samples [s].")
-def command(as_json: bool, seconds: float, **options: Any) -> int:
+@click.option(
+    "--conformance", is_flag=True, help="Examine a bridge's firmware (--serial) alone, by the protocol's talks."
+)
+def command(as_json: bool, seconds: float, conformance: bool, **options: Any) -> int:
     """Examine what is on a bus, which chip it really is and whether it works as specified; for a bug report.
 
     Keep the board still. The chip is reset; its offset registers are restored afterwards. Exit code 3: a fault was
@@ -33,7 +36,9 @@ def command(as_json: bool, seconds: float, **options: Any) -> int:
     """
     kind = check_source(click.get_current_context())
     value = options[kind.option.name]
-    findings = tuple(_shown(_findings(kind, options, seconds)))
+    if conformance and kind.option.name != "serial":
+        raise UsageError("--conformance is for the firmware of a bridge", "name its port with --serial")
+    findings = tuple(_shown(_talked(options) if conformance else _findings(kind, options, seconds)))
     tell = document if as_json else text
     click.echo(tell(str(value), __version__, findings))
     return SourceError.exit_code if any(finding.mark is Mark.BAD for finding in findings) else 0
@@ -51,6 +56,17 @@ def _shown(findings: Iterator[Finding]) -> Iterator[Finding]:
         for finding in findings:
             progress.update(line, description=f"Examining ({finding.topic}: done)")
             yield finding
+
+
+def _talked(options: Mapping[str, Any]) -> Iterator[Finding]:
+    from ..doctor.conformance import examine_conformance  # noqa: PLC0415 - loads the link, which only this needs
+    from ..sources.bridge import open_link  # noqa: PLC0415
+
+    try:
+        with open_link(options) as link:
+            yield from examine_conformance(link)
+    except SourceError as error:
+        yield failed("bridge", error)
 
 
 def _findings(kind: SourceKind, options: Mapping[str, Any], seconds: float) -> Iterator[Finding]:

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import ctypes
 import json
+import re
 from pathlib import Path
 
 import pytest
 
 from mpucal.chip.access import Reply
+from mpucal.doctor.conformance import examine_conformance
+from mpucal.doctor.finding import Mark
 from mpucal.simulated.bridge import EmulatedBridge
 from mpucal.sources.bridge import board
 from mpucal.sources.bridge import messages as wire
+from mpucal.sources.bridge.conformance import difference, talks
 from mpucal.sources.bridge.frame import Deframer, Frame
+from mpucal.sources.bridge.link import Link
 from mpucal.sources.bridge.messages import Status
+from mpucal.sources.bridge.store import Store
 
 VECTORS = Path(__file__).parents[2] / "fixtures" / "vectors"
 FIFO = {(0x72, 2): b"\x01\xf8"}
@@ -37,10 +43,14 @@ class Chip:
 def _core(request, _folder):
     host = request.getfixturevalue("host")
 
-    def read(_address, first, count):
-        return Status.OK, Chip().read(first, count).data
+    def read(address, first, count):
+        return asked(address), Chip().read(first, count).data
 
-    return host.HostBridge(request.getfixturevalue("core"), host.Eeprom(), read, lambda *_: Status.OK).receive
+    def asked(address, *_):
+        # 0 is the general call
+        return Status.OK if address == 0x68 else Status.BUS_FAILED if address == 0 else Status.NO_ANSWER
+
+    return host.HostBridge(request.getfixturevalue("core"), host.Eeprom(), read, asked).receive
 
 
 def _emulated(_request, _folder):
@@ -65,13 +75,43 @@ def test_answers_as_the_golden_talks_say(path, made, request, tmp_path):
     said = made(request, tmp_path)
     said(Frame(wire.Hello.TYPE, 0, wire.Hello().payload()).encode())
     for each in json.loads(path.read_text())["talk"]:
-        frames = [(f.type, f.seq, f.payload) for f in Deframer().feed(said(bytes.fromhex(each["host"])))]
-        due = each["bridge"] if isinstance(each["bridge"], list) else [each["bridge"]] * (each["bridge"] is not None)
-        assert len(frames) == len(due)
-        for (kind, seq, payload), wanted in zip(frames, due, strict=True):
-            content = bytes.fromhex(wanted["payload"])
-            assert (kind, seq, payload[0]) == (wanted["type"], wanted["seq"], content[0])
-            assert content[0] != Status.OK or payload[5:] == content[5:]
+        assert difference(each, Deframer().feed(said(bytes.fromhex(each["host"])))) == ""
+
+
+def test_the_package_holds_the_golden_talks():
+    assert talks() == {path.stem[5:]: json.loads(path.read_text()) for path in VECTORS.glob("talk_*.json")}
+
+
+EXCHANGE = json.loads((VECTORS / "talk_fifo_count.json").read_text())["talk"][0]
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ([], "0 replies to"),
+        ([Frame(0x82, 3, bytes(5) + b"\1\xf8")], "seq 3"),
+        ([Frame(0x82, 2, bytes([5, 0, 0, 0, 0]))], "status 5 .NO_ANSWER."),
+        ([Frame(0x82, 2, bytes(5) + b"\xf8\1")], "f801 in the reply"),
+        ([Frame(0x82, 2, bytes(5) + b"\1\xf8")] * 2, "2 replies to"),
+    ],
+)
+def test_another_answer_is_told(said, words):
+    assert re.search(words, difference(EXCHANGE, said))
+
+
+def test_the_build_for_an_uno_has_all_talks(switch_on):
+    """By `mpucal doctor --conformance`, on whatever chip there is; what it stores is erased."""
+    _, port = switch_on()
+    link = Link(port, lambda *_: None)
+    link.greet()
+    found = list(examine_conformance(link))
+    assert {finding.topic: finding.what for finding in found if finding.mark is not Mark.OK} == {}
+    assert {finding.topic for finding in found} == talks().keys()
+    Store(link).write((VECTORS / "blob_measured.bin").read_bytes())
+    # what is stored there stays
+    left_out = {finding.topic for finding in examine_conformance(link) if finding.mark is Mark.UNKNOWN}
+    assert left_out == {name for name, talk in talks().items() if "blob" in talk["needs"]}
+    assert Store(link).read() == (VECTORS / "blob_measured.bin").read_bytes()
 
 
 def test_a_narrow_clock_is_extended(tmp_path):

@@ -21,6 +21,7 @@ from typing import Any
 from mpucal.data import GYRO_COUNTS
 from mpucal.result.blob import Blob
 from mpucal.sources.bridge import messages as wire
+from mpucal.sources.bridge.conformance import TALKS as TALKS_FILE
 from mpucal.sources.bridge.frame import Frame, stuff
 
 FOLDER = Path(__file__).parents[2] / "fixtures" / "vectors"
@@ -248,7 +249,7 @@ def lines() -> dict[str, tuple[bytes, dict[str, Any]]]:
 
 
 # What a host asks of a bridge that was greeted, that stores nothing, and whose chip has 504 bytes in its FIFO: what is
-# settled, and requests with their replies' bytes behind t_us; of one that failed the status alone.
+# settled, what that needs, and requests with their replies' bytes behind t_us; of one that failed the status alone.
 
 Reply = tuple[wire.Status, bytes]
 Exchange = tuple[Frame, Reply | None]
@@ -262,30 +263,45 @@ DATA: list[Exchange] = [
     (Frame(0x13, at // 32, wire.BlobData(at, MEASURED.encode()[at : at + 32]).payload()), OK)
     for at in range(0, 188, 32)
 ]
-TALKS: dict[str, tuple[str, Talk]] = {
-    "fifo_count": ("FIFO_COUNT passes through as it is in the chip, big-endian", [READ]),
+NO_ANSWER, NO_BLOB = (wire.Status.NO_ANSWER, b""), (wire.Status.NO_BLOB, b"")
+BAD_OFFSET, NOT_BEGUN = (wire.Status.BAD_OFFSET, b""), (wire.Status.NOT_BEGUN, b"")
+
+
+def greeting(seq: int, asked: int, found: int) -> Exchange:
+    """HELLO and its reply, in which version and address are of meaning."""
+    return Frame(0x01, seq, wire.Hello(address=asked).payload()), (wire.Status.OK, wire.MAGIC + bytes([1, 0, found]))
+
+
+TALKS: dict[str, tuple[str, tuple[str, ...], Talk]] = {
+    "fifo_count": ("FIFO_COUNT passes through as it is in the chip, big-endian", ("chip",), [READ]),
     "types_from_0x80": (
         "types from 0x80 on are ignored",
+        ("chip",),
         [(Frame(0x80, 1), None), (Frame(0x81, 1, wire.Hello().payload()), None), (Frame(0xFF, 1), None), READ],
     ),
     "other_magic": (
         "a HELLO with another magic is answered with BAD_PAYLOAD, and nothing is done",
+        ("chip",),
         [(Frame(0x01, 3, b"MPUX\1\0\0"), BAD_PAYLOAD), READ],
     ),
     "stream_stop_of_one_byte": (
         "STREAM needs both bytes to stop, too",
+        ("stream",),
         [(Frame(0x05, 4, b"\0"), BAD_PAYLOAD), (Frame(0x05, 5, b"\0\0"), OK)],
     ),
     "window": (
         "a host may send MIN_WINDOW requests at once; each is answered, in their order",
+        ("chip", "stream"),
         [[READ, (Frame(0x02, 3, bytes([0x72, 2])), READ[1])], [(Frame(0x05, 4, b"\0"), BAD_PAYLOAD), READ]],
     ),
     "commit_too_early": (
         "a commit that fails leaves what was begun as it was; one that is repeated succeeds, and changes nothing",
+        ("blob",),
         [(BEGIN, OK), DATA[0], (COMMIT, (wire.Status.BAD_OFFSET, b"")), *DATA[1:], (COMMIT, FIRST), (COMMIT, FIRST)],
     ),
     "begin_of_0": (
         "a BLOB_BEGIN of 0 is taken, and its commit fails",
+        ("blob",),
         [
             (Frame(0x12, 6, b"\0\0"), OK),
             (Frame(0x14, 7, wire.BlobCommit(0, 0).payload()), (wire.Status.BAD_BLOB, b"")),
@@ -294,16 +310,74 @@ TALKS: dict[str, tuple[str, Talk]] = {
     ),
     "generation_after_erase": (
         "the generation begins at 1 again",
+        ("blob",),
         [
             *((BEGIN, OK), *DATA, (COMMIT, FIRST), (Frame(0x15, 10), OK)),
             (Frame(0x10, 11), (wire.Status.NO_BLOB, b"")),
             *((BEGIN, OK), *DATA, (COMMIT, FIRST)),
         ],
     ),
+    "begin_refused": (
+        "a BLOB_BEGIN that is refused does nothing: what was begun before goes on",
+        ("blob",),
+        [
+            *((BEGIN, OK), DATA[0], (Frame(0x12, 1, b"\xff\xff"), (wire.Status.NO_ROOM, b""))),
+            *((Frame(0x12, 2, b"\1"), BAD_PAYLOAD), *DATA[1:], (COMMIT, FIRST)),
+        ],
+    ),
+    "payload_before_state": (
+        "a payload is looked at before what is stored or begun: BAD_PAYLOAD where NO_BLOB or NOT_BEGUN applies too",
+        ("blob",),
+        [
+            (Frame(0x11, 1, b"\0\0\0"), BAD_PAYLOAD),
+            (Frame(0x11, 2, b"\0\0\1"), NO_BLOB),
+            (Frame(0x13, 3, b"\0\0"), BAD_PAYLOAD),
+            (Frame(0x13, 4, b"\0\0\1"), NOT_BEGUN),
+            (Frame(0x14, 5, bytes(5)), BAD_PAYLOAD),
+            (Frame(0x14, 6, bytes(6)), NOT_BEGUN),
+        ],
+    ),
+    "commit_of_another_length": (
+        "a commit of another length than was begun is answered with BAD_OFFSET",
+        ("blob",),
+        [
+            *((BEGIN, OK), *DATA, (Frame(0x14, 1, wire.BlobCommit(187, CRC).payload()), BAD_OFFSET)),
+            *((Frame(0x14, 2, wire.BlobCommit(189, CRC).payload()), BAD_OFFSET), (COMMIT, FIRST)),
+        ],
+    ),
+    "erase_ends_what_was_begun": (
+        "BLOB_ERASE gives up what was begun",
+        ("blob",),
+        [(BEGIN, OK), DATA[0], (Frame(0x15, 1), OK), (DATA[1][0], NOT_BEGUN), (COMMIT, NOT_BEGUN)],
+    ),
+    "address_without_a_chip": (
+        "a HELLO whose address does not answer succeeds with address 0; transfers then fail, at no address at all",
+        ("chip", "stream"),
+        [
+            greeting(1, 0x23, 0),
+            (Frame(0x02, 2, bytes([0x75, 1])), NO_ANSWER),
+            (Frame(0x03, 3, b"\x74\x46\0"), NO_ANSWER),
+            (Frame(0x04, 4, b"\x23\0"), NO_ANSWER),
+            (Frame(0x05, 5, bytes([14, 4])), OK),
+            (Frame(0x05, 6, b"\0\0"), OK),
+            greeting(7, 0, 0x68),
+            READ,
+        ],
+    ),
+    "address_beyond_7_bits": (
+        "a HELLO whose address has more than 7 bits is answered with BAD_PAYLOAD, and nothing is done",
+        ("chip",),
+        [(Frame(0x01, 1, b"MPUB\1\0\x80"), BAD_PAYLOAD), (Frame(0x01, 2, b"MPUB\1\0"), BAD_PAYLOAD), READ],
+    ),
+    "another_major": (
+        "a HELLO of another major version needs its first six bytes; the bridge stays as it was",
+        ("chip",),
+        [(Frame(0x01, 1, b"MPUB\x63\0"), (wire.Status.BAD_VERSION, b"")), READ],
+    ),
 }
 
 
-def talk(settled: str, exchanges: Talk) -> dict[str, Any]:
+def talk(settled: str, needs: tuple[str, ...], exchanges: Talk) -> dict[str, Any]:
     """A talk's JSON: requests as bytes on the line, replies as frames whose t_us is 0; a list where several are due."""
     said: list[dict[str, Any]] = []
     for exchange in exchanges:
@@ -316,7 +390,12 @@ def talk(settled: str, exchanges: Talk) -> dict[str, Any]:
         one = answers[0] if answers else None
         host = b"".join(request.encode() for request, _ in asked)
         said.append({"host": host.hex(), "bridge": answers if isinstance(exchange, list) else one})
-    return {"settled": settled, "talk": said}
+    return {"settled": settled, "needs": list(needs), "talk": said}
+
+
+def talks() -> dict[str, dict[str, Any]]:
+    """Name -> JSON."""
+    return {name: talk(*row) for name, row in TALKS.items()}
 
 
 def clock(bits: int) -> dict[str, Any]:
@@ -349,8 +428,8 @@ def write(folder: Path) -> None:
         for name, (data, content) in made.items():
             (folder / f"{prefix}_{name}.bin").write_bytes(data)
             (folder / f"{prefix}_{name}.json").write_text(json.dumps(content, indent=2) + "\n")
-    for name, (settled, exchanges) in TALKS.items():
-        (folder / f"talk_{name}.json").write_text(json.dumps(talk(settled, exchanges), indent=2) + "\n")
+    for name, content in talks().items():
+        (folder / f"talk_{name}.json").write_text(json.dumps(content, indent=2) + "\n")
     for bits in CLOCK_BITS:
         (folder / f"clock_{bits}_bits.json").write_text(json.dumps(clock(bits), indent=2) + "\n")
     for name, generations in SLOTS.items():
@@ -362,5 +441,7 @@ def write(folder: Path) -> None:
 
 
 def main() -> None:
-    """Write them into FOLDER, or into the folder that is named."""
+    """Write them into FOLDER and the talks into the package, too; or all into the folder that is named."""
     write(Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER)
+    if len(sys.argv) == 1:
+        TALKS_FILE.write_text(json.dumps(talks(), indent=1) + "\n")

@@ -40,12 +40,12 @@ static uint8_t on_begin(struct mpucal_bridge *bridge, struct mpucal_request requ
     if (request.size < 2) {
         return MPUCAL_CODE_BAD_PAYLOAD;
     }
-    bridge->stream.frame_bytes = 0;
-    bridge->new_blob.begun = 0;
-    bridge->new_blob.length = mpucal_get_u16(request.payload);
-    if (bridge->new_blob.length > MPUCAL_MAX_LENGTH) {
+    uint16_t length = mpucal_get_u16(request.payload);
+    if (length > MPUCAL_MAX_LENGTH) {
         return MPUCAL_CODE_NO_ROOM;
     }
+    bridge->stream.frame_bytes = 0;
+    bridge->new_blob.length = length;
     bridge->new_blob.at = mpucal_slots_open(bridge->port->memory);
     bridge->new_blob.come = 0;
     bridge->new_blob.begun = 1;

@@ -63,6 +63,9 @@ static uint8_t on_read(struct mpucal_bridge *bridge, struct mpucal_request reque
     if (request.size < 2 || request.payload[1] < 1 || request.payload[1] > MPUCAL_MAX_READ) {
         return MPUCAL_CODE_BAD_PAYLOAD;
     }
+    if (!bridge->address) {
+        return MPUCAL_CODE_NO_ANSWER;
+    }
     reply->body_size = request.payload[1];
     return bridge->port->read_registers(bridge->address, request.payload[0], bridge->out + BODY_AT, reply->body_size);
 }
@@ -72,6 +75,9 @@ static uint8_t on_burst(struct mpucal_bridge *bridge, struct mpucal_request requ
     uint16_t count = request.size < 3 ? 0 : mpucal_get_u16(request.payload + 1), offset = 0;
     if (count < 1 || count > MPUCAL_MAX_BURST) {
         return MPUCAL_CODE_BAD_PAYLOAD;
+    }
+    if (!bridge->address) {
+        return MPUCAL_CODE_NO_ANSWER;
     }
     uint8_t *body = bridge->out + BODY_AT;
     for (;;) {
@@ -92,6 +98,9 @@ static uint8_t on_burst(struct mpucal_bridge *bridge, struct mpucal_request requ
 static uint8_t on_write(struct mpucal_bridge *bridge, struct mpucal_request request) {
     if (request.size < 2 || request.size - 1 > MPUCAL_MAX_WRITE) {
         return MPUCAL_CODE_BAD_PAYLOAD;
+    }
+    if (!bridge->address) {
+        return MPUCAL_CODE_NO_ANSWER; /* and no general call, which address 0 is */
     }
     return bridge->port->write_registers(bridge->address, request.payload[0], request.payload + 1,
                                          (uint8_t)(request.size - 1));

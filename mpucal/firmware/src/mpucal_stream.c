@@ -50,7 +50,7 @@ static void stand(struct mpucal_bridge *bridge, uint8_t code) {
 }
 
 static uint8_t read_registers(const struct mpucal_bridge *bridge, uint8_t first, uint8_t *data, uint8_t count) {
-    return bridge->port->read_registers(bridge->address, first, data, count);
+    return bridge->address ? bridge->port->read_registers(bridge->address, first, data, count) : MPUCAL_CODE_NO_ANSWER;
 }
 
 /* Rules 1 to 3 up to the frames: whether they are to be pushed now. */

@@ -22,6 +22,9 @@ from .storage import Memory
 __all__ = ["EmulatedBridge", "EmulatedLine", "Memory"]
 
 ADDRESSES = (0x68, 0x69)
+MOST_ADDRESS = 0x7F
+# magic, major and minor
+VERSION_BYTES = 6
 NAME = b"emulated bridge"
 
 
@@ -75,8 +78,11 @@ class EmulatedBridge:
         kind = wire.REQUESTS.get(frame.type)
         if not self._greeted and kind is not wire.Hello:
             return [self._said(Status.NO_HELLO)]
+        other = kind is wire.Hello and frame.payload[4:5] != bytes([wire.MAJOR]) and len(frame.payload) >= VERSION_BYTES
         try:
-            request = None if kind is None else kind.decode(frame.payload)
+            # of another major version only these are known to stay
+            payload = frame.payload[:VERSION_BYTES] + b"\0" if other else frame.payload
+            request = None if kind is None else kind.decode(payload)
         except wire.MessageError:
             return [self._said(Status.BAD_PAYLOAD)]
         try:
@@ -99,9 +105,10 @@ class EmulatedBridge:
             case wire.Stream() if wire.Feature.STREAM in self._features:
                 return [self._stream(request, seq)]
             case wire.Message() if wire.Feature.BLOB in self._features:
-                if isinstance(request, wire.BlobBegin):
+                reply = self._keeper.answer(request, self._time())
+                if isinstance(request, wire.BlobBegin) and reply.status == Status.OK:
                     self._stop()
-                return [self._keeper.answer(request, self._time())]
+                return [reply]
         return [self._said(Status.UNKNOWN_TYPE)]
 
     def _time(self) -> int:
@@ -111,7 +118,7 @@ class EmulatedBridge:
         return Reply(status, self._time())
 
     def _hello(self, request: wire.Hello) -> Reply:
-        if request.magic != wire.MAGIC:
+        if request.magic != wire.MAGIC or (request.major == wire.MAJOR and request.address > MOST_ADDRESS):
             return self._said(Status.BAD_PAYLOAD)
         status = Status.OK if request.major == wire.MAJOR else Status.BAD_VERSION
         if status == Status.OK:
@@ -157,7 +164,7 @@ class EmulatedBridge:
             return self._said(Status.BAD_PAYLOAD)
         self._stop()
         if request.frame_bytes:
-            self._pusher = Pusher(self._bus(), seq, request, self._drops, self._now_ns)
+            self._pusher = Pusher(self._bus, seq, request, self._drops, self._now_ns)
         return wire.StreamReply(Status.OK, self._time())
 
     def _stop(self) -> None:

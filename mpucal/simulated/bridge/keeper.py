@@ -46,11 +46,11 @@ class Keeper:
         return wire.BlobStateReply(Status.OK, t_us, stored.generation, len(stored.blob), crc_of(stored.blob))
 
     def _read(self, request: wire.BlobRead, t_us: int) -> Reply:
+        if not 1 <= request.count <= wire.MAX_READ:
+            return Reply(Status.BAD_PAYLOAD, t_us)
         stored = self._storage.stored()
         if stored is None:
             return Reply(Status.NO_BLOB, t_us)
-        if not 1 <= request.count <= wire.MAX_READ:
-            return Reply(Status.BAD_PAYLOAD, t_us)
         if request.offset + request.count > len(stored.blob):
             return Reply(Status.BAD_OFFSET, t_us)
         return wire.BlobReadReply(Status.OK, t_us, stored.blob[request.offset : request.offset + request.count])
@@ -63,10 +63,10 @@ class Keeper:
         return Status.OK
 
     def _data(self, request: wire.BlobData) -> Status:
-        if self._length is None:
-            return Status.NOT_BEGUN
         if not 1 <= len(request.data) <= wire.MAX_CHUNK:
             return Status.BAD_PAYLOAD
+        if self._length is None:
+            return Status.NOT_BEGUN
         end = request.offset + len(request.data)
         if request.offset > self._arrived or end > self._length:
             return Status.BAD_OFFSET

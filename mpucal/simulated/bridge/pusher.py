@@ -19,11 +19,13 @@ class Pusher:
 
     Parameters
     ----------
-    bus : with the chip. seq, request : of the STREAM that starts it now. drops : counted before.
-    now_ns : the bridge's clock.
+    bus : gives that of the chip, or raises NoAnswer. seq, request : of the STREAM that starts it now.
+    drops : counted before. now_ns : the bridge's clock.
     """
 
-    def __init__(self, bus: Bus, seq: int, request: Stream, drops: int, now_ns: Callable[[], int]) -> None:
+    def __init__(
+        self, bus: Callable[[], Bus], seq: int, request: Stream, drops: int, now_ns: Callable[[], int]
+    ) -> None:
         self._bus, self.seq, self.drops = bus, seq, drops
         self._frame_bytes, self._batch = request.frame_bytes, request.batch
         self._index = 0
@@ -48,7 +50,7 @@ class Pusher:
 
     def _look(self, late: bool) -> Iterator[Frames]:
         t_ns = self._now_ns()
-        n = int.from_bytes(self._bus.read(reg.FIFO_COUNT_H, 2).data, "big") // self._frame_bytes
+        n = int.from_bytes(self._bus().read(reg.FIFO_COUNT_H, 2).data, "big") // self._frame_bytes
         if n > MAX_LOOK:
             yield self._stand(Status.OVERFLOW, t_ns)
             return
@@ -60,13 +62,13 @@ class Pusher:
             left -= a_message
             yield self._frames(t_ns, self._read(a_message), left)
         last = self._read(left)
-        if self._bus.read(reg.INT_STATUS, 1).data[0] & reg.INT_FIFO_OFLOW:
+        if self._bus().read(reg.INT_STATUS, 1).data[0] & reg.INT_FIFO_OFLOW:
             yield self._stand(Status.OVERFLOW, t_ns)
         else:
             yield self._frames(t_ns, last)
 
     def _read(self, frames: int) -> bytes:
-        return self._bus.read(reg.FIFO_R_W, frames * self._frame_bytes).data if frames else b""
+        return self._bus().read(reg.FIFO_R_W, frames * self._frame_bytes).data if frames else b""
 
     def _frames(self, t_ns: int, data: bytes = b"", left: int = 0) -> Frames:
         made = Frames(self._status, t_ns // US % WRAP_US, self._index, self.drops % INDEX_WRAP, left, data)

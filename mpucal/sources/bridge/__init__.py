@@ -13,7 +13,7 @@ from .micropython import MicroPythonPort
 from .port import Port, SerialPort
 from .store import Store
 
-__all__ = ["BridgeBus", "Store", "open_bridge", "open_store"]
+__all__ = ["BridgeBus", "Store", "open_bridge", "open_link", "open_store"]
 
 
 def open_bridge(text: str, address: int | None = None, pins: tuple[int | str, ...] | None = None) -> BridgeBus:
@@ -33,7 +33,14 @@ def open_bridge(text: str, address: int | None = None, pins: tuple[int | str, ..
 
 @contextmanager
 def open_store(values: Mapping[str, Any]) -> Iterator[Store]:
-    """The memory of the bridge that the options' values name, whether or not it finds a chip.
+    """The memory of the bridge that the options' values name; see open_link."""
+    with open_link(values) as link:
+        yield Store(link)
+
+
+@contextmanager
+def open_link(values: Mapping[str, Any]) -> Iterator[Link]:
+    """The bridge that the options' values name, greeted, whether or not it finds a chip.
 
     Raises
     ------
@@ -42,7 +49,7 @@ def open_store(values: Mapping[str, Any]) -> Iterator[Store]:
     with closing(_port(values["serial"], values.get("micropython"))) as port:
         link = Link(port, _unheard)
         link.greet()
-        yield Store(link)
+        yield link
 
 
 def _port(text: str, pins: tuple[int | str, ...] | None) -> Port:

@@ -178,7 +178,7 @@ class Keeper:
         """Store what was begun; returns its generation."""
         used, generation, _ = self.stored()
         generation = generation + 1 & 0xFFFFFFFF or 1
-        blob, free = bytes(self.begun), 1 - used
+        blob, free, self.begun = bytes(self.begun), 1 - used, None
         try:
             with open(self.paths[free], "wb") as file:
                 file.write(struct.pack("<II", generation, generation ^ 0xFFFFFFFF) + blob)
@@ -186,7 +186,6 @@ class Keeper:
             raise Failed(STORAGE_FAILED)
         if self.slot(free) != (generation, blob):
             raise Failed(STORAGE_FAILED)
-        self.begun = None
         return generation
 
 
@@ -203,7 +202,7 @@ class Bridge:
         self.greeted = self.left = False
         self.frame_bytes = self.batch = self.seq = self.index = self.drops = self.status = self.pushed_us = 0
         self.requests = {
-            1: ("<4sBBB", self.hello),
+            1: ("<4sBB", self.hello),
             2: ("<BB", self.read),
             3: ("<BH", self.burst),
             4: ("<B", self.write),
@@ -260,7 +259,7 @@ class Bridge:
         if len(payload) < size:
             return self.said(BAD_PAYLOAD)
         values = struct.unpack(form, payload[:size])
-        if kind in (4, 19):
+        if kind in (1, 4, 19):
             values += (payload[size:],)
         if kind == 5:
             values += (seq,)
@@ -269,11 +268,12 @@ class Bridge:
         except Failed as error:
             return self.said(error.args[0])
 
-    def hello(self, magic, major, _minor, address):
+    def hello(self, magic, major, _minor, rest):
         """Who is there."""
-        if magic != b"MPUB" or address > 127:
+        if magic != b"MPUB" or (major == 1 and not b"" < rest[:1] < b"\x80"):
             return self.said(BAD_PAYLOAD)
         if major == 1:
+            address = rest[0]
             self.greeted, self.frame_bytes, self.drops, self.keeper.begun = True, 0, 0, None
             self.chip.find((address,) if address else ADDRESSES)
         here = struct.pack("<BBBBBH", 1, 0, self.chip.address, STREAM | BLOB | LEAVE, 2, MAX_BLOB)
@@ -377,11 +377,11 @@ class Bridge:
 
     def blob_read(self, offset, count):
         """Some of it."""
+        if not 1 <= count <= MAX_READ:
+            raise Failed(BAD_PAYLOAD)
         blob = self.keeper.stored()[2]
         if blob is None:
             raise Failed(NO_BLOB)
-        if not 1 <= count <= MAX_READ:
-            raise Failed(BAD_PAYLOAD)
         if offset + count > len(blob):
             raise Failed(BAD_OFFSET)
         return self.said(OK, blob[offset : offset + count])
@@ -397,11 +397,11 @@ class Bridge:
 
     def blob_data(self, offset, data):
         """Some of it."""
+        if not 1 <= len(data) <= MAX_WRITE:
+            raise Failed(BAD_PAYLOAD)
         begun = self.keeper.begun
         if begun is None:
             raise Failed(NOT_BEGUN)
-        if not 1 <= len(data) <= MAX_WRITE:
-            raise Failed(BAD_PAYLOAD)
         if offset > len(begun) or offset + len(data) > self.length:
             raise Failed(BAD_OFFSET)
         self.keeper.begun = begun[:offset] + data + begun[offset + len(data) :]

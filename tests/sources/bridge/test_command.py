@@ -14,6 +14,7 @@ from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.bridge import EmulatedBridge, Memory
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.clock import FastClock
+from mpucal.sources.bridge.conformance import talks
 from mpucal.sources.bridge.frame import Frame
 from mpucal.sources.bridge.messages import REPLY_BIT, Hello
 
@@ -99,6 +100,15 @@ def test_the_doctor_tells_bridge_and_chip(board, mpucal):
     # what passes through a serial line does not show the speed of the bus behind it
     assert "serial line" in found
     assert "bus speed" not in found
+
+
+def test_the_doctor_holds_the_firmware_to_the_protocol(board, mpucal):
+    told = mpucal("doctor", "--serial", board.name, "--conformance", "--json")
+    assert told.code == 0, told.out
+    assert {finding["topic"]: finding["mark"] for finding in json.loads(told.out)["findings"]} == dict.fromkeys(
+        talks(), "ok"
+    )
+    assert "for the firmware of a bridge" in mpucal("doctor", "--bus", "sim", "--conformance").err
 
 
 def test_a_bias_goes_into_the_chip_behind_it_and_out_again(board, mpucal, tmp_path):
