@@ -103,8 +103,10 @@ def _of_rows(acc: Vector, gyr: Vector) -> tuple[Vector, Vector, Vector, Vector, 
 
 def _window(samples: Samples, first: int, last: int, length_s: float, spread: bool) -> Window:
     acc, gyr = samples.acc[first:last], samples.gyr[first:last]
-    rows = _of_rows(acc, gyr) if spread else (_mean(gyr), UNKNOWN, UNKNOWN, UNKNOWN, _mean(acc))
-    return Window(*rows, *_span(samples, first, last, length_s))
+    span = _span(samples, first, last, length_s)
+    if spread:
+        return of_rows(acc, gyr, *span[:3])
+    return Window(_mean(gyr), UNKNOWN, UNKNOWN, UNKNOWN, _mean(acc), *span)
 
 
 def _span(samples: Samples, first: int, last: int, length_s: float) -> tuple[float, float, bool, int]:
