@@ -12,6 +12,8 @@ from ..result import error_model
 from ..result.calibration import REFUSED, Calibration, unknown
 
 AXES = error_model.AXES
+# A standard uncertainty of so much, in each unit, says that nothing is known: no number is shown.
+NOTHING_KNOWN = {"%": 20.0, "deg": 10.0, "mg": 500.0, "deg/s": 10.0}
 
 
 @dataclass(frozen=True)
@@ -32,10 +34,11 @@ class ParameterRow:
     @property
     def cells(self) -> list[str]:
         """value ± standard uncertainty, one text an axis; empty where the row has none."""
-        return [
-            with_std(float(self.value[i]), float(self.std[i])) if axis in self.axes else ""
-            for i, axis in enumerate(AXES)
-        ]
+        return [self._cell(i) if axis in self.axes else "" for i, axis in enumerate(AXES)]
+
+    def _cell(self, axis: int) -> str:
+        value, std = float(self.value[axis]), float(self.std[axis])
+        return "unknown" if std > NOTHING_KNOWN[self.unit] else with_std(value, std)
 
 
 def accelerometer(c: Calibration) -> list[ParameterRow]:
