@@ -7,6 +7,7 @@ parameters, CAL_ACC0_XOFF and the like. Both in m/s^2, rad/s and us.
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Iterable
 from contextlib import redirect_stdout
@@ -29,6 +30,8 @@ from .tables.units import SLOWEST_HZ
 COMBINED, ACCEL, GYRO = "sensor_combined", "sensor_accel", "sensor_gyro"
 # RELATIVE_TIMESTAMP_INVALID
 INVALID = 0x7FFFFFFF
+# a message's size and type
+NO_MESSAGE, PAGE = bytes(3), 4096
 _DAMAGE = (
     ValueError,
     TypeError,
@@ -45,12 +48,16 @@ _DAMAGE = (
 class _PastTheEnd(BufferedReader):
     """A file in which a read goes on by what it asked for at the end, too.
 
-    pyulog goes back by that from a damaged message, and would read the same bytes for ever.
+    pyulog goes back by that from a damaged message, and would read the same bytes for ever. Where there is no message
+    but a page of zeros the log has ended: a hole of gigabytes, three bytes at a time, would take hours.
     """
 
     def read(self, size: int | None = -1, /) -> bytes:
         """What there is."""
         data = super().read(size)
+        if data == NO_MESSAGE and len(ahead := self.peek()) >= PAGE and not any(ahead):
+            self.seek(0, os.SEEK_END)
+            data = b""
         if size is not None and len(data) < size:
             self.seek(size - len(data), 1)
         return data

@@ -4,11 +4,11 @@
                                            [--seed N]
 
 A race forks so many processes, which begin together: sessions and recordings of a simulated chip into one -o, and into
-none. Meddling renames a session's folder, or cuts, removes or replaces its capture. Ending sends KILL, TERM, HUP or ALRM
-to a batch and to a session at any time, and counts the processes that are left of it after ten seconds. An output is a
-device, a pipe, a link or a folder in the place of the file. It is judged whether one process at most ends well for each
-capture that is there, whether each capture is whole and the results beside it are its own, and whether all others end
-with a sentence. Exit code 1: what is said last was not so.
+none. Meddling renames a session's folder, or cuts, removes or replaces its capture. Ending sends KILL, TERM, HUP or
+ALRM to a batch and to a session at any time, and counts the processes that are left of it after ten seconds. An output
+is a device, a pipe, a link or a folder in the place of the file. It is judged whether one process at most ends well
+for each capture that is there, whether each capture is whole and the results beside it are its own, and whether all
+others end with a sentence. Exit code 1: what is said last was not so.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Process:
         if self._process == 0:
             os.close(self._go)
             os.read(hold, 1)
-            _become(words, folder, self.said)
+            become(words, folder, self.said)
         os.close(hold)
 
     def go(self) -> None:
@@ -74,7 +74,8 @@ class Process:
         return -1, "it hung"
 
 
-def _become(words: Sequence[str], folder: Path, said: Path) -> None:
+def become(words: Sequence[str], folder: Path, said: Path) -> None:
+    """A command in this process, within `folder`, that says all to the file `said`; ends it."""
     os.chdir(folder)
     nothing, out = os.open(os.devnull, os.O_RDONLY), os.open(said, os.O_WRONLY | os.O_CREAT, 0o600)
     for number, handle in enumerate((nothing, out, out)):
