@@ -28,7 +28,7 @@ def read_key(path: Path) -> bytes:
     try:
         held = content(path, MOST_BYTES)
     except RecordingError as error:
-        raise UsageError(f"the signing key cannot be used: {error.what}", "check --signing-key") from error
+        raise UsageError(f"the signing key cannot be read: {error.what}", "check --signing-key") from error
     if len(held) == KEY_BYTES and not _is_line(held):
         return held
     digits = _HEXADECIMAL.fullmatch(held)
