@@ -23,6 +23,20 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
     return f"{remarks}\n#include <Wire.h>\n{INCLUDES}\n{functions}{_constants(calibration)}{_BODY}"
 
 
+def left(calibration: Calibration) -> tuple[str, ...]:
+    """What the sketch assumes where the calibration does not say it."""
+    sensor, said = calibration.sensor, ["It reads the chip at address 0x68: where AD0 is high, change CHIP to 0x69."]
+    if sensor.accel_range_g not in ACCEL_CONFIG:
+        said.append(
+            f"It sets +-{DEFAULT_RANGE_G:g} g, as the calibration names no such range: b_a and D hold for their own."
+        )
+    if sensor.gyro_range_dps not in GYRO_CONFIG:
+        said.append(f"It sets +-{DEFAULT_RANGE_DPS:g} deg/s, as the calibration names no such range.")
+    if family_of(sensor.chip) is None and calibration.follows_temperature:
+        said.append("It takes the chip's temperature for an MPU-6050's: mpucal doctor says which chip it is.")
+    return tuple(said)
+
+
 def _constants(calibration: Calibration) -> str:
     sensor = calibration.sensor
     range_g = sensor.accel_range_g if sensor.accel_range_g in ACCEL_CONFIG else DEFAULT_RANGE_G

@@ -35,13 +35,17 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
 
 
 def left(calibration: Calibration) -> tuple[str, ...]:
-    """What it is for another range."""
-    range_g = calibration.sensor.accel_range_g
-    if range_g in (None, RANGE_G):
-        return ()
-    return (
-        f"ESPHome sets +-2 g, and the calibration is of +-{range_g:g} g: what its scale differs between both is left.",
-    )
+    """What it is for other ranges."""
+    said = [
+        f"ESPHome sets +-{set_to:g} {unit}, and the calibration is of +-{of:g} {unit}: what its scale differs between"
+        f" both is left; calibrate with {option} {set_to:g}."
+        for of, set_to, unit, option in (
+            (calibration.sensor.accel_range_g, RANGE_G, "g", "--accel-range"),
+            (calibration.sensor.gyro_range_dps, RANGE_DPS, "deg/s", "--gyro-range"),
+        )
+        if of not in (None, set_to)
+    ]
+    return tuple(said)
 
 
 def _axes(

@@ -69,7 +69,7 @@ FORMS = (
         "the Arduino IDE",
         "a sketch that reads the chip over Wire, and prints accelerations and rates",
         arduino.text,
-        (in_float, with_hardware),
+        (in_float, arduino.left, with_hardware),
     ),
     Form(
         "python",

@@ -45,6 +45,9 @@ def left(calibration: Calibration) -> tuple[str, ...]:
         f"It holds offsets alone: scale factor errors and misalignments, up to {scale:.2f} % of an acceleration, stay.",
         "Call setOffsets(mpu) after each mpu.initialize() and after a reset of the chip, as its registers are volatile;"
         " their steps of 1 mg and 0.03 deg/s leave half of that.",
+        "It assumes that the accelerometer's offset registers count 2048 to 1 g: where they count 4096, as in some"
+        " MPU-6050, half of b_a stays. `mpucal doctor` measures which it is, and `mpucal write CALIBRATION chip` writes"
+        " by that.",
         f"The accelerometer's registers held {calibration.sensor.accel_offsets}, and the gyroscope's are taken to have"
         f" held 0; all of b_a, ({mps2(calibration.b_a)}) m/s^2, is in the words.",
     )

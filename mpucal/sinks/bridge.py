@@ -29,6 +29,11 @@ def open_bridge(device: Device) -> Iterator[BridgeSink]:
     BusError : no such port, no bridge on it, or one that keeps nothing.
     """
     with resolve_name(device.kind.store)(device.values) as store:
+        if store.occupied:
+            device.say(
+                f"the memory of the bridge on {store.name} holds what is no calibration, perhaps another sketch's;"
+                " storing one overwrites it (MPUCAL_EEPROM_AT in the sketch chooses another place)"
+            )
         yield BridgeSink(store)
 
 

@@ -170,3 +170,22 @@ def test_esphomes_lambdas_compiled_and_fed_with_counts(calibration, tmp_path):
     a, w = calibration.apply(counts[:, :3] * G / 16384, counts[:, 4:] * np.radians(1 / 16.375), T)
     np.testing.assert_allclose(out[:, :3], a, atol=2e-5)
     np.testing.assert_allclose(out[:, 3:], np.degrees(w), atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "words"),
+    [
+        ("i2cdevlib", {}, "count 2048 to 1 g: where they count 4096, as in some MPU-6050, half of b_a stays"),
+        (
+            "esphome",
+            {},
+            r"sets \+-2000 deg/s, and the calibration is of \+-500 deg/s.*calibrate with --gyro-range 2000",
+        ),
+        ("arduino", {}, "at address 0x68: where AD0 is high, change CHIP"),
+        ("arduino", {"accel_range_g": None}, r"sets \+-4 g, as the calibration names no such range"),
+        ("arduino", {"gyro_range_dps": None}, r"sets \+-500 deg/s, as the calibration names no such range"),
+    ],
+)
+def test_an_export_says_what_it_assumes(calibration, name, changes, words):
+    _, notes = form(name).export(replace(calibration, sensor=replace(calibration.sensor, **changes)))
+    assert re.search(words, " ".join(notes))

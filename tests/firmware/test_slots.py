@@ -152,3 +152,23 @@ def test_erased_is_erased_and_never_an_older_one(before, host, slots):
     eeprom = host.Eeprom(content)
     assert slots.erase(eeprom)
     assert slots.read(eeprom) is None
+
+
+def test_somebody_elses_bytes_are_noticed_and_a_blobs_are_not(host, core, slots):
+    def occupied(eeprom):
+        return bool(core.mpucal_slots_occupied(ctypes.byref(eeprom.memory)))
+
+    memory = ctypes.byref
+    for erased in (b"\xff", b"\x00"):
+        fresh = host.Eeprom(erased * 1024)
+        assert not occupied(fresh)
+        core.mpucal_slots_open(memory(fresh.memory))
+        assert not occupied(fresh)
+    held = host.Eeprom(holding(host, slots, OLD, NEW))
+    assert not occupied(held)
+    slots.erase(held)
+    assert not occupied(held)
+    for at, theirs in ((0, True), (SEAL_BYTES, True), (2 * SLOT_BYTES - 1, True), (2 * SLOT_BYTES, False)):
+        content = bytearray(b"\xff" * 1024)
+        content[at] = 42
+        assert occupied(host.Eeprom(bytes(content))) == theirs

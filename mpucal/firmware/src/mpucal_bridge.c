@@ -13,6 +13,7 @@
 #define NAME_BYTES 16
 #define FEATURE_STREAM 1
 #define FEATURE_BLOB 2
+#define FEATURE_OCCUPIED 8
 #define MAX_I2C_ADDRESS 0x7F
 
 /* The asked address, or with 0 the first of the chip's two, that acknowledges; 0: none. */
@@ -51,6 +52,9 @@ static uint8_t on_hello(struct mpucal_bridge *bridge, struct mpucal_request requ
     body[5] = MPUCAL_PROTOCOL_MINOR;
     body[6] = bridge->address;
     body[7] = FEATURE_STREAM | FEATURE_BLOB;
+    if (mpucal_slots_occupied(bridge->port->memory)) {
+        body[7] |= FEATURE_OCCUPIED;
+    }
     body[8] = bridge->port->window;
     mpucal_put_u16(body + 9, MPUCAL_MAX_LENGTH);
     size_t name_bytes = strlen(bridge->port->name);

@@ -103,6 +103,23 @@ int mpucal_slots_erase(const struct mpucal_memory *memory) {
     return !mpucal_slots_stored(memory).generation;
 }
 
+static int is_foreign(const struct mpucal_memory *memory, uint8_t slot) {
+    uint16_t at = generation_at(blob_at(slot));
+    if (read_u32(memory, blob_at(slot)) == MPUCAL_MAGIC) {
+        return 0;
+    }
+    for (uint16_t i = 1; i < MPUCAL_SLOT_BYTES; i++) {
+        if (memory->read((uint16_t)(at + i)) != memory->read(at)) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+int mpucal_slots_occupied(const struct mpucal_memory *memory) {
+    return is_foreign(memory, 0) || is_foreign(memory, 1);
+}
+
 /* The stored blob as a source, which reads `place`; one of no bytes where none is stored. */
 static struct mpucal_source stored_blob(const struct mpucal_memory *memory, struct place *place) {
     struct mpucal_stored stored = mpucal_slots_stored(memory);

@@ -43,6 +43,9 @@ uint32_t mpucal_slots_seal(const struct mpucal_memory *memory, uint16_t at);
 /* Break both seals, the older one first; whether no blob is stored any more. */
 int mpucal_slots_erase(const struct mpucal_memory *memory);
 
+/* Whether what lies there is neither a blob nor erased: somebody else's, which storing overwrites. */
+int mpucal_slots_occupied(const struct mpucal_memory *memory);
+
 /* Prepare to apply the stored blob, as mpucal_load does one in memory. */
 enum mpucal_status mpucal_slots_load(const struct mpucal_memory *memory, struct mpucal *sensor, uint8_t who_am_i,
                                      float accel_range_g);

@@ -128,8 +128,9 @@ class EmulatedBridge:
             self._keeper.give_up()
         room = MAX_LENGTH if wire.Feature.BLOB in self._features else 0
         identity = (wire.MAGIC, wire.MAJOR, wire.MINOR, self._chosen)
+        occupied = wire.Feature.OCCUPIED if room and self._keeper.occupied else 0
         return wire.HelloReply(
-            status, self._time(), *identity, self._features, self._window, room, NAME.ljust(16, b"\0")
+            status, self._time(), *identity, self._features | occupied, self._window, room, NAME.ljust(16, b"\0")
         )
 
     def _bus(self) -> Bus:

@@ -16,6 +16,11 @@ class Keeper:
         self._length: int | None = None
         self._arrived = 0
 
+    @property
+    def occupied(self) -> bool:
+        """Whether storing overwrites somebody else's bytes."""
+        return self._storage.occupied
+
     def give_up(self) -> None:
         """What was begun is not wanted any more."""
         self._length = None

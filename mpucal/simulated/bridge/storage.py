@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-from ...result.blob import LENGTH_AT, MAX_LENGTH, Blob, BlobError
+from ...result.blob import LENGTH_AT, MAGIC, MAX_LENGTH, Blob, BlobError
 
 HEADER = struct.Struct("<I I")
 SLOT_BYTES = HEADER.size + MAX_LENGTH
@@ -45,6 +45,12 @@ class SlotStorage:
         if len(slots) == 2 and (slots[1].generation - slots[0].generation) % WRAP < WRAP // 2:
             return slots[1]
         return slots[0] if slots else None
+
+    @property
+    def occupied(self) -> bool:
+        """Whether a slot holds what is neither a blob nor erased."""
+        slots = [bytes(self._memory.data[at : at + SLOT_BYTES]) for at in (0, SLOT_BYTES)]
+        return any(not slot[HEADER.size :].startswith(MAGIC) and len(set(slot)) > 1 for slot in slots)
 
     def begin(self) -> None:
         """Make the slot that is not in use free to be written."""

@@ -47,11 +47,12 @@ class Status(IntEnum):
 
 
 class Feature(IntFlag):
-    """What a bridge has besides register access."""
+    """What a bridge has besides register access; OCCUPIED: storing overwrites what is not a blob."""
 
     STREAM = 1
     BLOB = 2
     LEAVE = 4
+    OCCUPIED = 8
 
 
 class Message:

@@ -57,6 +57,11 @@ class Store:
         """The bridge's port."""
         return self._link.port.name
 
+    @property
+    def occupied(self) -> bool:
+        """Whether storing overwrites what somebody else keeps there."""
+        return bool(self._link.bridge.features & Feature.OCCUPIED)
+
     def greet(self) -> None:
         """Greet the bridge again, after it was lost; what it was being sent is given up."""
         self._link.greet(self._link.bridge.address)

@@ -74,8 +74,10 @@ def test_into_the_memory_and_back(board, mpucal, tmp_path):
     assert f"the bridge on {board.name} stores no calibration: store one: mpucal write" in nothing.err
     made = Calibration.load(BLOB)
     made.save("calibration.json")
+    board.memory.write(0, b"another sketch's")
     stored = mpucal("write", "calibration.json", "bridge", "--serial", board.name, "--yes")
     assert stored.code == 0, stored.err
+    assert "holds what is no calibration, perhaps another sketch's; storing one overwrites it" in stored.err
     assert "as its blob number 1 (212 bytes, CRC-32 " in stored.out
     # another bridge with the same memory: the power was off
     board.server.device = EmulatedBridge(board.chip, board.clock.now, board.memory)
