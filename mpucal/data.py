@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import frames
-from .arguments import LARGEST, column, mask, rows, seconds, stretch
+from .arguments import LARGEST, column, mask, measured, rows, seconds, stretch
 from .arguments import Mask as Mask  # noqa: PLC0414 - rooms above take them from here
 from .arguments import Vector as Vector  # noqa: PLC0414
 from .errors import WrongType, on_one_line
@@ -218,7 +218,8 @@ class Recording(Samples):
         t : (n,) s, strictly increasing, or datetime64, of which the first is 0 s.
         acc : (n, 3) m/s^2. gyr : (n, 3) rad/s.
         flat : (first, last + 1) samples that lie flat, if known.
-        temperature_c : (n,); gap, acc_clipped, gyr_clipped : (n,) bool, see Samples.
+        temperature_c : (n,), whose mean is the sensor's where that has none. gap, acc_clipped, gyr_clipped : (n,) bool,
+            see Samples.
 
         Raises
         ------
@@ -230,16 +231,21 @@ class Recording(Samples):
         t = seconds(t, name)
         n = len(t)
         acc, gyr = rows(acc, "acc", n, name), rows(gyr, "gyr", n, name)
+        warm = np.full(n, np.nan) if temperature_c is None else column(temperature_c, "temperature_c", n, name)
+        sensor = sensor or Sensor()
+        known = warm[measured(warm)]
+        if sensor.temperature_c is None and len(known):
+            sensor = replace(sensor, temperature_c=float(known.mean()))
         return cls(
             t,
             acc,
             gyr,
-            np.full(n, np.nan) if temperature_c is None else column(temperature_c, "temperature_c", n, name),
+            warm,
             mask(gap, "gap", n, name),
             mask(acc_clipped, "acc_clipped", n, name),
             mask(gyr_clipped, "gyr_clipped", n, name),
             flat=None if flat is None else stretch(flat, n, name),
-            sensor=sensor or Sensor(),
+            sensor=sensor,
             name=name,
             taken=taken,
         )

@@ -296,6 +296,11 @@ KINDS: Mapping[str, Kind] = {
                 "convert them to seconds, or say --units t=UNIT",
                 True,
             ),
+            "slow": Sentence(
+                "the samples are {step:.3g} s apart ({rate:.2g} Hz), too far to follow a turn",
+                "record at 50 Hz or more, or say --units t=UNIT if the times are no seconds",
+                True,
+            ),
             "accelerometer": Sentence(
                 "the accelerometer's median magnitude is {magnitude:.4g}, not near {gravity:.4g} m/s^2: it seems to be"
                 " in {unit}",
@@ -519,8 +524,8 @@ KINDS: Mapping[str, Kind] = {
             ),
             "sides": Sentence(
                 "the orientations contradict each other, and a calibrated reading is known to {rms:.2g} m/s^2 (1 sigma)"
-                " only: the sensor's mount slipped, or the sensor is damaged",
-                "fasten the sensor, and record again",
+                " only: {cause}",
+                "{remedy}, and record again",
                 True,
             ),
             "knock": Sentence(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from .hints import NO_HINTS, ROLES, Hints
 from .npz import DAMAGED, NEEDED
 from .rows import cannot_read
 from .tables.guess import guessed
-from .tables.names import ACC, GYR, TEMPERATURE, TIME, Column, column_named, columns_of, three, threes
+from .tables.names import ACC, GYR, TEMPERATURE, TIME, Column, celsius, column_named, columns_of, three, threes
 from .tables.streams import recording_of, with_gravity
 from .tables.table import chosen, remarks, whole
 from .tables.times import Stream
@@ -73,8 +74,13 @@ def _numpy(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
 def _matlab(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
     # scipy.io is slow to load
     from scipy.io import loadmat  # noqa: PLC0415
+    from scipy.io.matlab import MatReadError  # noqa: PLC0415
 
-    for name, value in loadmat(path, simplify_cells=True).items():
+    try:
+        found = loadmat(path, simplify_cells=True)
+    except (MatReadError, zlib.error) as error:
+        raise ValueError(str(error)) from error
+    for name, value in found.items():
         if not str(name).startswith("__"):
             yield from _within(str(name), value)
 
@@ -151,9 +157,8 @@ def recording_of_columns(arrays: Mapping[str, NDArray[Any]], hints: Hints, name:
     place = with_gravity(accelerometers)
     acc, a = all_acc[place], accelerometers[place]
     warm = [c for c in columns if c.quantity == TEMPERATURE and arrays[c.name].dtype.kind in "iuf"]
-    n = len(next(iter(arrays.values())))
     with np.errstate(invalid="ignore"):
-        temperature_c = arrays[warm[0].name].astype(float) if warm and len(a.values) == n else None
+        temperature_c = celsius(arrays[warm[0].name].astype(float)[a.there]) if warm else None
     return recording_of(a, w, hints, name, temperature_c, [*remarks(columns, acc), *filter(None, [said])])
 
 
@@ -169,7 +174,7 @@ def _stream(arrays: Mapping[str, NDArray[Any]], of: tuple[Column, ...], clocks: 
     unit = of[0].unit if len({column.unit for column in of}) == 1 else ""
     clock = min((c for c in clocks if c.of in ("", of[0].quantity)), key=lambda c: (not c.of, c.rank), default=None)
     if clock is None:
-        return Stream(None, values[there], unit=unit, places=np.flatnonzero(there), lost=lost)
+        return Stream(None, values[there], unit=unit, there=there, lost=lost)
     times, time_unit = arrays[clock.name][there], clock.unit
     if times.dtype.kind in "Mm":
         if np.isnat(times).any():
@@ -177,4 +182,4 @@ def _stream(arrays: Mapping[str, NDArray[Any]], of: tuple[Column, ...], clocks: 
         times, time_unit = times.astype(f"{times.dtype.kind}8[ns]").astype(np.int64), "ns"
     elif times.dtype.kind in "iu":
         times = times.astype(np.int64)
-    return Stream(times, values[there], time_unit, unit, lost=lost)
+    return Stream(times, values[there], time_unit, unit, there=there, lost=lost)

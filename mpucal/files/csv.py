@@ -22,6 +22,7 @@ from ..errors import RecordingError
 from ._text import lines, numbers
 from .budget import LONGEST_LINE
 from .rows import Rows, Write, cannot_read, checked
+from .tables.names import COLDEST_C, WARMEST_C, columns_of
 from .tables.times import possible_utc_ns
 
 COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
@@ -84,7 +85,8 @@ def _places(header: list[str], path: Path) -> dict[str, int]:
     if missing:
         whole = f" (it is {header[0]!r}, without a comma)" if len(header) == 1 else ""
         raise RecordingError(f"{path}: its first line names no {', '.join(missing)}{whole}", _REMEDY)
-    wanted = ALL if TEMPERATURE in header else COLUMNS
+    warm = [c.name for c in columns_of(header) if c.quantity == TEMPERATURE]
+    wanted = (*COLUMNS, *sorted(warm, key=TEMPERATURE.__ne__)[:1])
     twice = [name for name in wanted if header.count(name) > 1]
     if twice:
         raise RecordingError(f"{path}: its first line names {', '.join(twice)} twice", _REMEDY)
@@ -112,7 +114,7 @@ class _Table:
                         values = self._odd(block, line)
                     line += block.count(b"\n")
                     if len(values):
-                        yield _samples(values)
+                        yield _samples(values, sure=TEMPERATURE in self.places)
         except OSError as error:
             raise cannot_read(self.path, error) from error
 
@@ -173,9 +175,13 @@ def _no_line(path: Path, line: int, error: csv.Error) -> RecordingError:
     return RecordingError(f"{path}: line {line} is no line of a table ({error})", _REMEDY)
 
 
-def _samples(values: Vector) -> Samples:
+def _samples(values: Vector, sure: bool) -> Samples:
     n = len(values)
-    warm = values[:, 7] if values.shape[1] > 7 else np.full(n, np.nan)
+    warm = np.full(n, np.nan)
+    if values.shape[1] > len(COLUMNS):
+        # counts, or Kelvin, are no temperatures that are known
+        given = values[:, len(COLUMNS)]
+        warm = np.where(sure | (given > COLDEST_C) & (given < WARMEST_C), given, np.nan)
     no = np.zeros(n, bool)
     return Samples(values[:, 0], values[:, 1:4], values[:, 4:7], warm, no, no, no)
 

@@ -141,6 +141,13 @@ FORMATS = (
         recognises=f"{_TABLES}.phone:is_folder_of_tables",
         hinted=True,
     ),
+    Format(
+        FOLDER,
+        "a folder of recordings of one sensor",
+        f"{_HERE}.several:load_folder_of_recordings",
+        recognises=f"{_HERE}.several:is_folder_of_recordings",
+        hinted=True,
+    ),
     Format(FOLDER, "the folder of a session", f"{_HERE}.folder:load_folder", f"{_HERE}.folder:folder_rows"),
 )
 

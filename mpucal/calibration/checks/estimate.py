@@ -15,6 +15,8 @@ from ..walks import Walk
 GOOD_RMS_MPS2, USABLE_RMS_MPS2 = 0.055, 0.4
 CHANCE = 1.5  # times the model's claim: so much parts differ by chance
 RESTS_MPS2, RESTS_RAD = 0.08, np.deg2rad(1.5)
+# below which a hand turns by too much from sample to sample
+ENOUGH_HZ = 20.0
 HONEST_FACTOR = 5.0
 REFUSED_FACTOR = 5.0
 # by which readings are off because of a change of the bias or the mount: less is no news, and more is refused
@@ -136,7 +138,10 @@ def parts_disagree(e: Evidence) -> Reason | None:
     too_large = claim.inflation >= CHANCE and e.sure.rms_mps2 > GOOD_RMS_MPS2 >= claim.floored
     much = claim.inflation > DISAGREE and claim.left_out.claim() > DISAGREE_MPS2
     if _sides_contradict(e):
-        return reason("inconsistent", "sides", rms=e.sure.rms_mps2)
+        cause, remedy = "the sensor's mount slipped, or the sensor is damaged", "fasten the sensor"
+        if e.recording.rate_hz < ENOUGH_HZ:
+            cause, remedy = f"{e.recording.rate_hz:.3g} Hz are too slow to follow its turns", "sample at 50 Hz or more"
+        return reason("inconsistent", "sides", rms=e.sure.rms_mps2, cause=cause, remedy=remedy)
     if claim.by == "side":
         return None  # more orientations help, which few_orientations says
     if not too_large and not (much and claim.by == "time"):

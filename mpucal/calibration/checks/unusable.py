@@ -14,6 +14,8 @@ FEWEST_SAMPLES = 50
 LEAST_TURN_RAD = np.deg2rad(20.0)
 SLOWEST_HZ = 5.0
 LONGEST_TO_LAY_DOWN_S = 10.0
+# Times in milliseconds of any sensor lie further apart; a logger's may lie so far.
+LONGEST_STEP_S = 2.0
 # from this many seconds between samples on, times are rather in microseconds, and in nanoseconds
 STEP_OF_MICROSECONDS, STEP_OF_NANOSECONDS = 60.0, 1e5
 LEAST_G = 0.5  # of a magnitude in g, below which it holds no gravity
@@ -36,6 +38,8 @@ def time_unit(e: Evidence) -> Reason | None:
     step = 1.0 / e.recording.rate_hz
     if step < 1.0 / SLOWEST_HZ:
         return None
+    if step < LONGEST_STEP_S:
+        return reason("units_suspect", "slow", step=step, rate=1.0 / step)
     unit = "nano" if step > STEP_OF_NANOSECONDS else "micro" if step > STEP_OF_MICROSECONDS else "milli"
     return reason("units_suspect", "times", step=step, unit=unit)
 

@@ -10,6 +10,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+import numpy as np
+
+from ...data import Vector
 from .units import COUNTS, QUANTITIES, unit_named
 
 TIME, NANOSECONDS, ACC, GYR, TEMPERATURE = "t", "nanoseconds", "acc", "gyr", "temperature_c"
@@ -86,7 +89,10 @@ TIME_STEMS = {
 NANOSECOND_STEMS = tuple(f"{of}{word}" for of in ("", "stamp", "headerstamp") for word in ("nanosec", "nsecs", "nsec"))
 # each sensor's own clock: SensorLog
 OWN_TIMES = {"accelerometertimestampsincereboot": ACC, "gyrotimestampsincereboot": GYR}
-TEMPERATURE_STEMS = ("temperature", "temp")
+TEMPERATURE_STEMS = tuple(
+    f"{word}{unit}" for word in ("temperature", "temp", "imutemp") for unit in ("", "c", "celsius", "degc")
+)
+COLDEST_C, WARMEST_C = -60.0, 130.0
 # iOS counts the acceleration of gravity as a body's own: at rest it reads -1 g along what points upwards
 TURNED_AROUND = ("accelerometeracceleration",)
 _OF_TIME = ("", *QUANTITIES[TIME])
@@ -146,7 +152,7 @@ def _known(name: str, place: int, text: str, axis: int, unit: str) -> Column | N
             return Column(name, place, NANOSECONDS)
         if word in TIME_STEMS and axis < 0 and unit in _OF_TIME:
             return Column(name, place, TIME, unit=unit or TIME_STEMS[word], rank=list(TIME_STEMS).index(word))
-        if (word in (*TEMPERATURE_STEMS, "t") and unit == "C") or word == "temperaturec":
+        if (word in TEMPERATURE_STEMS and unit in ("", "C")) or (word == "t" and unit == "C"):
             return Column(name, place, TEMPERATURE)
         for of, stems in ((ACC, ACC_STEMS), (GYR, GYR_STEMS)):
             for stem, at in _axes(word, axis):
@@ -204,6 +210,12 @@ def three(columns: list[Column], quantity: str) -> tuple[Column, ...]:
     return next(iter(threes(columns, quantity)), ())
 
 
+def celsius(values: Vector) -> Vector | None:
+    """Temperatures (n,); None of what no sensor has: counts, or Kelvin."""
+    known = values[np.isfinite(values)]
+    return values if len(known) and known.min() > COLDEST_C and known.max() < WARMEST_C else None
+
+
 __all__ = [
     "ACC",
     "COUNTS",
@@ -212,6 +224,7 @@ __all__ = [
     "TEMPERATURE",
     "TIME",
     "Column",
+    "celsius",
     "column_named",
     "columns_of",
     "three",

@@ -24,6 +24,7 @@ from .names import (
     TEMPERATURE,
     TIME,
     Column,
+    celsius,
     columns_of,
     three,
     threes,
@@ -38,6 +39,9 @@ SNIFFED = 1 << 16
 FEWEST_COLUMNS = 6
 # of all lines, those without a number: more are another sensor's
 ANOTHERS = 0.1
+# words of a program's preamble -> units that its names of columns do not say
+PROGRAMS = {"MT Manager version": {"acc": "m/s^2", "gyr": "rad/s"}}
+PREAMBLE_CHARACTERS = 4096
 # m/s^2: whole numbers that are larger are counts
 LARGEST_OF_SI = 300.0
 # of Sensor Logger's one table: what has another unit on iOS, and what does not say whose sign it has
@@ -96,12 +100,19 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
         return _of_unnamed(unnamed, hints)
     if table is not None and not table.rows:
         raise RecordingError(f"{path.name} holds no lines below the names of its columns", "record it again")
+    hints = _known(text, hints)
     if table is None:
         raise RecordingError(
             f"{path.name} names no columns of an accelerometer and a gyroscope in its first {PREAMBLE} lines",
             "name them with --columns t=NAME,ax=NAME,... or --columns t,ax,ay,az,gx,gy,gz, and --units",
         )
     return recording_of_table(table, hints)
+
+
+def _known(text: str, hints: Hints) -> Hints:
+    """The hints, and what is known of the units of a program that names itself before its table."""
+    units = next((units for words, units in PROGRAMS.items() if words in text[:PREAMBLE_CHARACTERS]), {})
+    return replace(hints, units={**units, **hints.units})
 
 
 def _of_unnamed(table: TextTable, hints: Hints) -> Recording:
@@ -146,7 +157,7 @@ def recording_of_table(table: TextTable, hints: Hints) -> Recording:
     accelerometers = [stream_of(table, columns, of) for of in all_acc]
     place = with_gravity(accelerometers)
     acc, a, w = all_acc[place], accelerometers[place], stream_of(table, columns, gyr)
-    temperature_c = table.numbers(warm[:1])[:, 0] if warm and len(a.values) == len(table.rows) else None
+    temperature_c = celsius(table.numbers(warm[:1])[a.there, 0]) if warm else None
     called = SEPARATORS.get(table.separator, "names")
     separated = [] if table.separator == "," else [f"its cells are separated by {called}"]
     if w.times is None and hints.rate_hz is None:
@@ -197,12 +208,12 @@ def stream_of(table: TextTable, columns: Sequence[Column], of: Sequence[Column])
     clock = min(clocks, key=lambda c: (not c.of, c.rank), default=None)
     unit = of[0].unit if len({column.unit for column in of}) == 1 else ""
     if clock is None:
-        return Stream(None, values[there], unit=unit, places=np.flatnonzero(there), lost=lost)
+        return Stream(None, values[there], unit=unit, there=there, lost=lost)
     times, time_unit = table.times(clock), "ns" if table.is_dated(clock) else clock.unit
     if time_unit == "s" and (parts := [c for c in columns if c.quantity == NANOSECONDS]):
         times, time_unit = [s * NS + ns for s, ns in zip(times, table.times(parts[0]), strict=True)], "ns"
     kept = [time for time, is_there in zip(times, there, strict=True) if is_there]
-    return Stream(kept, values[there], time_unit, unit, lost=lost)
+    return Stream(kept, values[there], time_unit, unit, there=there, lost=lost)
 
 
 def whole(values: Vector) -> tuple[Mask, int]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import compress, pairwise
+from types import EllipsisType
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ class Stream:
     times : (n,) exact: decimals, integers or floats; None: there are none.
     values : (n, 3) as they stand in the file. time_unit, unit : as the file says them; empty where it does not.
     zero_ns : the time of day at time 0, in ns since 1970, where a file beside it says that.
-    places : (n,) of its samples among all lines, where lines that lack a number were left out. lost : how many.
+    there : of all lines, those of its samples; the others lack a number. lost : how many of them are a loss.
     """
 
     times: Times | None
@@ -43,7 +44,7 @@ class Stream:
     time_unit: str = ""
     unit: str = ""
     zero_ns: int | None = None
-    places: NDArray[np.int64] | None = None
+    there: Mask | EllipsisType = ...
     lost: int = 0
 
     def part(self, kept: Mask) -> Stream:
@@ -83,7 +84,7 @@ def seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Vec
     if stream.times is None or first.times is None:
         if hints.rate_hz is None:
             raise RecordingError(f"{name} holds no times", "give the rate of its samples with --rate HZ", "--rate HZ")
-        places = np.arange(len(stream.values)) if stream.places is None else stream.places
+        places = np.flatnonzero(np.ones(len(stream.values), bool) if stream.there is ... else stream.there)
         return places / hints.rate_hz, none, f"a rate of {hints.rate_hz:g} Hz", ""
     ticks = _since(stream.times, first.times[0])
     if not (np.abs(ticks) < units.BEYOND**2).all():

@@ -1,0 +1,208 @@
+"""Files as people keep them who never heard of mpucal: in the forms of public sources, and read at the first try."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+import mpucal
+from mpucal.data import STANDARD_GRAVITY_MPS2 as G
+from mpucal.errors import RecordingError
+
+HZ = 100.0
+COUNTS = np.r_[[16384 / G] * 3, [32768 / np.radians(500)] * 3]
+
+
+def si(walk):
+    return np.column_stack([walk.acc, walk.gyr])
+
+
+def counts(walk, g=4, dps=500):
+    return np.rint(si(walk) * np.r_[[32768 / (g * G)] * 3, [32768 / np.radians(dps)] * 3]).astype(int)
+
+
+def text(rows, separator=" "):
+    return "".join(separator.join(map(repr, row)) + "\n" for row in rows.tolist())
+
+
+def poses(walk):
+    """TUM's style, as np.savetxt writes a header."""
+    rows = np.column_stack([walk.t + 1535630275.9, si(walk), si(walk)[:, :3] * 0.01])
+    return "# time tx ty tz wx wy wz mx my mz\n" + text(rows)
+
+
+def two_lines_of_names(walk):
+    head = "Time;Reference;;;;IMU Acceleration;;;IMU Gyroscope;;\ns;W;X;Y;Z;X;Y;Z;X;Y;Z\n"
+    return head + text(np.column_stack([walk.t, np.full((len(walk), 4), 0.5), si(walk)]), ";")
+
+
+def a_log_of_a_board(walk):
+    lines = [
+        f"RAW 0x68: accel=({a}, {b}, {c}) temp_raw=4000 gyro=({d}, {e}, {f})\r\n"
+        for a, b, c, d, e, f in counts(walk).tolist()
+    ]
+    boot = "ESP-ROM:esp32c3-api1-20210207\r\nself_test accel=(17020,-1262) baseline_gyro=(645,315,-309)\r\n"
+    return boot + "".join(line if i % 40 else f"advanced fifo_end\r\n{line}" for i, line in enumerate(lines))
+
+
+def mt_manager(walk):
+    ticks = 10259826 + np.rint(walk.t * 1e4).astype(int)
+    lines = [
+        f"{16213 + i}\t{tick}\t" + "\t".join(f"{value:.9f}" for value in row) + ("\t1.0\t2.0\n" if i % 4 else "\t\t\n")
+        for i, (tick, row) in enumerate(zip(ticks.tolist(), si(walk).tolist(), strict=True))
+    ]
+    head = "PacketCounter\tSampleTimeFine\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\tRoll\tPitch\n"
+    return (
+        "// General information:\n//  MT Manager version: 2022.0.0\n// Coordinate system: ENU\n" + head + "".join(lines)
+    )
+
+
+def zeros_and_a_second_header(walk):
+    head = "timestamp_us,ax,ay,az,gx,gy,gz,temp_raw\n"
+    rows = np.column_stack([np.rint(walk.t * 1e6), counts(walk), np.full(len(walk), -1136)]).astype(int)
+    body = text(rows, ",").splitlines(keepends=True)
+    return head + "\0" * 400 + head + "".join(body)
+
+
+def without_a_sign(walk):
+    """As a program prints int16 as uint16, without names."""
+    return text(np.column_stack([np.rint(walk.t * 1000), counts(walk) % 65536, counts(walk) % 7]).astype(int), "\t")
+
+
+def from_the_lowest_on(walk):
+    return text(np.column_stack([walk.t, counts(walk) + 32768]))
+
+
+def a_rocket(walk):
+    names = ["state", "timestamp_seconds", "temperature_celsius"]
+    names += [f"raw_acceleration_{axis}_gs" for axis in "xyz"] + [
+        f"raw_angular_rate_{axis}_deg_per_s" for axis in "xyz"
+    ]
+    rows = np.column_stack([walk.t + 129.0, np.full(len(walk), 26.3), walk.acc / G, np.degrees(walk.gyr)])
+    return ",".join(names) + "\n" + "".join(f"S,{line}\n" for line in text(rows, ",").splitlines())
+
+
+FORMS = {
+    "poses.txt": poses,
+    "two lines of names.csv": two_lines_of_names,
+    "a log of a board.log": a_log_of_a_board,
+    "MT Manager.txt": mt_manager,
+    "zeros and a second header.csv": zeros_and_a_second_header,
+    "without a sign.txt": without_a_sign,
+    "from the lowest on.txt": from_the_lowest_on,
+    "a rocket.csv": a_rocket,
+}
+
+
+@pytest.fixture(scope="module")
+def even_walk(walk):
+    return replace(walk, t=np.arange(len(walk)) / HZ)
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_what_strangers_write_is_read_at_the_first_try(name, even_walk, tmp_path):
+    path = tmp_path / name
+    path.write_text(FORMS[name](even_walk))
+    read = mpucal.load(path, rate=HZ if "board" in name else None)
+    assert len(read) == len(even_walk)
+    np.testing.assert_allclose(read.t - read.t[0], even_walk.t, atol=2e-3)
+    rounded = 0.51 / COUNTS if "counts" in read.taken else np.full(6, 1e-6)
+    assert (np.abs(si(read) - si(even_walk)) < rounded * np.r_[2, 2, 2, 1, 1, 1]).all()
+
+
+def as_npy(walk, path):
+    np.save(path, np.column_stack([walk.t, si(walk)]))
+
+
+def as_fields(walk, path):
+    names = ("time_ms", "accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z", "temperature")
+    rows = np.column_stack([walk.t * 1000, si(walk), np.full(len(walk), 31.5)])
+    np.save(path, np.array([tuple(row) for row in rows], [(name, "f8") for name in names]))
+
+
+def as_other_names(walk, path):
+    np.savez(path, timestamps=walk.t * 1e6, accel=walk.acc.T / G, gyro=np.degrees(walk.gyr), serial=np.arange(5))
+
+
+def as_matlab(walk, path):
+    savemat(path, {"imu": {"time": walk.t, "acc": walk.acc, "gyro": walk.gyr}, "Fs": 100.0, "note": "a walk"})
+
+
+def as_matlabs_matrix(walk, path):
+    savemat(path, {"cal_data": np.column_stack([walk.t, counts(walk), counts(walk)[:, :3] * 0.1])})
+
+
+@pytest.mark.parametrize(
+    ("written", "suffix"),
+    [(as_npy, ".npy"), (as_fields, ".npy"), (as_other_names, ".npz"), (as_matlab, ".mat"), (as_matlabs_matrix, ".mat")],
+)
+def test_arrays_are_read_at_the_first_try(written, suffix, even_walk, tmp_path):
+    written(even_walk, tmp_path / f"walk{suffix}")
+    read = mpucal.load(tmp_path / f"walk{suffix}")
+    np.testing.assert_allclose(read.t - read.t[0], even_walk.t, atol=1e-9)
+    np.testing.assert_allclose(si(read), si(even_walk), atol=1.01 / COUNTS[0] if "counts" in read.taken else 1e-9)
+    assert read.sensor.temperature_c == (31.5 if written is as_fields else None)
+
+
+@pytest.mark.parametrize(
+    ("arrays", "says"),
+    [
+        ({"acc": np.zeros((5, 3))}, "holds no columns of a gyroscope"),
+        ({"note": "nothing"}, "holds no columns of numbers"),
+        ({"data": np.random.default_rng(0).normal(size=(900, 7))}, "holds no columns of an accelerometer"),
+    ],
+)
+def test_arrays_that_are_no_recording(arrays, says, tmp_path):
+    savemat(tmp_path / "a.mat", arrays)
+    with pytest.raises(RecordingError, match=says):
+        mpucal.load(tmp_path / "a.mat")
+
+
+@pytest.mark.parametrize("data", [b"", b"MATLAB 5.0 MAT-file", b"\x93NUMPY\x01\x00", b"PK\x03\x04 and no more"])
+@pytest.mark.parametrize("suffix", [".mat", ".npy", ".npz"])
+def test_files_of_arrays_that_are_none(data, suffix, tmp_path):
+    (tmp_path / f"a{suffix}").write_bytes(data)
+    with pytest.raises(mpucal.MpucalError):
+        mpucal.load(tmp_path / f"a{suffix}")
+
+
+def test_what_physics_does_not_confirm_is_not_guessed(even_walk, tmp_path):
+    rows = np.column_stack([even_walk.t, even_walk.acc, even_walk.gyr[::-1]])
+    (tmp_path / "walk.txt").write_text(text(rows))
+    with pytest.raises(RecordingError, match="name its 7 columns in their order"):
+        mpucal.load(tmp_path / "walk.txt")
+
+
+def test_files_of_a_folder_are_one_recording(even_walk, tmp_path):
+    for name, part in (("b.txt", even_walk.part(700, 1400)), ("a.txt", even_walk.part(0, 700))):
+        (tmp_path / name).write_text(poses(part))
+    (tmp_path / "notes.txt").write_text("turned by hand\n")
+    (tmp_path / "settings.json").write_text(json.dumps({"rate": 100}))
+    read = mpucal.load(tmp_path)
+    np.testing.assert_allclose(si(read), si(even_walk), atol=1e-9)
+    assert np.flatnonzero(read.gap).tolist() == [700]
+    assert "2 files were taken as one recording: a.txt, b.txt." in read.taken
+
+
+def test_a_temperature_is_kept_everywhere(walk, tmp_path):
+    warm = np.linspace(30.0, 32.0, len(walk))
+    made = mpucal.Recording.from_arrays(walk.t, walk.acc, walk.gyr, temperature_c=warm)
+    assert made.sensor.temperature_c == pytest.approx(31.0)
+    np.savez(tmp_path / "a.npz", t=walk.t, acc=walk.acc, gyr=walk.gyr, temperature=warm)
+    rows = np.column_stack([walk.t, si(walk), warm])
+    for name, header in (("own", "temperature_c"), ("other", "Temp (°C)"), ("bare", "temp")):
+        (tmp_path / f"{name}.csv").write_text(f"t,ax,ay,az,gx,gy,gz,{header}\n{text(rows, ',')}")
+    for name in ("a.npz", "own.csv", "other.csv"):
+        assert mpucal.load(tmp_path / name).sensor.temperature_c == pytest.approx(31.0)
+        assert mpucal.calibrate(tmp_path / name).sensor.temperature_c == pytest.approx(31.0)
+    rows[:, 7] = 4000
+    (tmp_path / "counts.csv").write_text("time,ax,ay,az,gx,gy,gz,temp\n" + text(rows, ","))
+    assert mpucal.load(tmp_path / "counts.csv").sensor.temperature_c is None
+
+
+def test_a_slow_recording_is_called_slow(even_walk, tmp_path):
+    slow = mpucal.Recording.from_arrays(np.arange(300) * 0.4, even_walk.acc[:300], even_walk.gyr[:300])
+    (reason,) = [r for r in mpucal.calibrate(slow).quality["reasons"] if r["code"] == "units_suspect"]
+    assert "0.4 s apart (2.5 Hz), too far to follow a turn" in reason["message"]
