@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..disk.place import mode_of_old
 from ..errors import OutputError
 
 
@@ -23,6 +24,7 @@ class Journal:
         # path -> where its line begins, and its file's digest
         self._known: dict[str, tuple[int, str | None]] = {}
         try:
+            mode_of_old(file)
             self._file = file.open("a+b")
             self._read()
         except OSError as error:

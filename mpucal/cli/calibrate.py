@@ -59,7 +59,7 @@ def command(
     calibration = calibration if known is None else with_noise(calibration, known)
     paths: tuple[Path, ...] = ()
     if folder is not None:
-        check_owner(folder, calibration, recording, f"mpucal calibrate {recording}")
+        check_owner(folder, calibration, recording, "calibrate", str(recording))
         with Folder(folder) as into:
             paths = save(into.path, dict(result_files(calibration, samples)))
     if as_json:

@@ -26,7 +26,7 @@ from ..result.calibration import Calibration
 from ..result.clock import now
 from ..result.session_files import BLOB, DOCUMENT
 from ..session.folder import SessionFolder
-from ..session.results import save
+from ..session.results import check_owner, save
 from ..sinks.choose import chosen
 from ..sinks.record import in_file
 from ..sinks.table import SINKS
@@ -101,6 +101,8 @@ def command(
     if file is not None:
         recording = load(file, given_hints(options))
         say_taken(recording.taken)
+        if folder is not None:
+            check_owner(folder, of, None, "check", str(calibration), str(file))
         with nullcontext() if folder is None else Folder(folder) as place:
             return _told(of, place, as_json, recording)[0].exit_code
     check_source(click.get_current_context())

@@ -33,7 +33,7 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, force: bool, as
             check_not_among(folder / file.name, calibrations)
     made = merge([trusted(path, force) for path in calibrations])
     if folder is not None:
-        check_owner(folder, made.calibration, calibrations[0], "mpucal merge ...")
+        check_owner(folder, made.calibration, None, "merge", *map(str, calibrations))
         with Folder(folder) as into:
             document, blob = made.calibration.json().encode(), made.calibration.blob().encode()
             save(into.path, {BLOB.name: blob, DOCUMENT.name: document})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -92,25 +93,27 @@ def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     return tuple(folder / name for name in files)
 
 
-def check_owner(folder: Path, calibration: Calibration, read: Path, command: str) -> None:
-    """A folder's results are of one recording, by its digest, and beside its captures.
+def check_owner(folder: Path, calibration: Calibration, read: Path | None, *words: str) -> None:
+    """A folder's results are of one recording, by its digest, and stay beside its captures.
 
     Parameters
     ----------
-    read : what `calibration` was made of. command : what was called, without -o and its folder.
+    read : the recording that `calibration` was made of; None of other calibrations. words : of the command, without -o.
 
     Raises
     ------
     OutputError : `folder` is another recording's; says the command that puts the results elsewhere.
     """
     captures, document = all_captures_in(folder), folder / DOCUMENT.name
-    if any(read.samefile(own) for own in (folder, *(captures if len(captures) == 1 else ())) if own.exists()):
+    own = (folder, *(captures if len(captures) == 1 else ()))
+    if read is not None and any(read.samefile(each) for each in own if each.exists()):
         return
     owner = None
     with suppress(MpucalError, ValueError, KeyError):
         owner = Calibration.load(document).fit["recording_digest"]
-    if (captures or document.exists()) and owner != calibration.fit.get("recording_digest"):
+    foreign = owner != calibration.fit.get("recording_digest") or (captures and read is None)
+    if foreign and (captures or document.exists()):
         raise OutputError(
             f"{folder} holds {'a session' if captures else 'results'} of another recording, which stays as it is",
-            f"`{command} -o {free_name(folder)}` puts these elsewhere",
+            f"`{shlex.join(['mpucal', *words, '-o', str(free_name(folder))])}` puts these elsewhere",
         )

@@ -1,4 +1,5 @@
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -178,6 +179,21 @@ def test_a_folder_is_one_recording_s(mpucal, session, tmp_path):
         assert result.code == 3
         assert f"`mpucal calibrate other.npz -o {folder}-2` puts these elsewhere" in result.err
         assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_what_a_check_updates_goes_beside_no_capture(mpucal, session):
+    """Also where that is of the very recording that the calibration was made of."""
+    calibration = session.folder / "calibration.json"
+    copy, words = Path("copy.json"), ("check", "copy.json", session.folder / "capture.mcap")
+    copy.write_bytes(calibration.read_bytes())
+    before = {path: path.read_bytes() for path in session.folder.iterdir()}
+    result = mpucal(*words, "-o", session.folder)
+    assert result.code == 3
+    assert f"`mpucal {' '.join(map(str, words))} -o {session.folder}-2` puts" in result.err
+    for name in ("calibration.json", "calibration.bin"):
+        result = mpucal("check", session.folder / name, session.folder, "-o", session.folder)
+        assert (result.code, "was given to be read" in result.err) == (2, True)
+    assert {path: path.read_bytes() for path in session.folder.iterdir()} == before
 
 
 def test_a_finished_session_is_not_gone_on_with(mpucal, session):
