@@ -524,8 +524,14 @@ KINDS: Mapping[str, Kind] = {
             ),
             "sides": Sentence(
                 "the orientations contradict each other, and a calibrated reading is known to {rms:.2g} m/s^2 (1 sigma)"
-                " only: {cause}",
-                "{remedy}, and record again",
+                " only: the sensor's mount slipped, or the sensor is damaged",
+                "fasten the sensor, and record again",
+                True,
+            ),
+            "slow": Sentence(
+                "the orientations contradict each other, and a calibrated reading is known to {rms:.2g} m/s^2 (1 sigma)"
+                " only: {rate:.3g} Hz are too slow to follow turns by hand",
+                "sample at 50 Hz or more, and record again",
                 True,
             ),
             "knock": Sentence(

@@ -138,10 +138,9 @@ def parts_disagree(e: Evidence) -> Reason | None:
     too_large = claim.inflation >= CHANCE and e.sure.rms_mps2 > GOOD_RMS_MPS2 >= claim.floored
     much = claim.inflation > DISAGREE and claim.left_out.claim() > DISAGREE_MPS2
     if _sides_contradict(e):
-        cause, remedy = "the sensor's mount slipped, or the sensor is damaged", "fasten the sensor"
         if e.recording.rate_hz < ENOUGH_HZ:
-            cause, remedy = f"{e.recording.rate_hz:.3g} Hz are too slow to follow its turns", "sample at 50 Hz or more"
-        return reason("inconsistent", "sides", rms=e.sure.rms_mps2, cause=cause, remedy=remedy)
+            return reason("inconsistent", "slow", rms=e.sure.rms_mps2, rate=e.recording.rate_hz)
+        return reason("inconsistent", "sides", rms=e.sure.rms_mps2)
     if claim.by == "side":
         return None  # more orientations help, which few_orientations says
     if not too_large and not (much and claim.by == "time"):
