@@ -75,7 +75,13 @@ def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) ->
         with resolve_name(kind.store)(options) as store:
             number, blob = store.take()
             where = f"blob number {number} of the bridge on {store.name}"
-            _show_calibration(where, Calibration.from_blob(Blob.decode(blob)), as_json)
+            held = Blob.decode(blob)
+            if held.gyro_counts is None:
+                say(
+                    f"{where} is of a version that does not say the unit of K: it is that of 131 counts to 1 deg/s at ±250"
+                    " deg/s, and firmware of its time corrects rates by 0.055 % too little; a newer one does it right"
+                )
+            _show_calibration(where, Calibration.from_blob(held), as_json)
         return
     from .show_device import page  # noqa: PLC0415 - a file needs no driver
 

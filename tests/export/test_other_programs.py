@@ -179,7 +179,7 @@ def test_esphomes_lambdas_compiled_and_fed_with_counts(calibration, tmp_path):
         (
             "esphome",
             {},
-            r"sets \+-2000 deg/s, and the calibration is of \+-500 deg/s.*calibrate with --gyro-range 2000",
+            r"sets \+-2000 deg/s, and the calibration is of \+-500 deg/s.*with --gyro-range 2000",
         ),
         ("arduino", {}, "at address 0x68: where AD0 is high, change CHIP"),
         ("arduino", {"accel_range_g": None}, r"sets \+-4 g, as the calibration names no such range"),

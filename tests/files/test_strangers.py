@@ -12,7 +12,7 @@ from mpucal.data import STANDARD_GRAVITY_MPS2 as G
 from mpucal.errors import RecordingError
 
 HZ = 100.0
-COUNTS = np.r_[[16384 / G] * 3, [32768 / np.radians(500)] * 3]
+COUNTS = np.r_[[16384 / G] * 3, [32750 / np.radians(500)] * 3]
 
 
 def si(walk):
@@ -20,7 +20,7 @@ def si(walk):
 
 
 def counts(walk, g=4, dps=500):
-    return np.rint(si(walk) * np.r_[[32768 / (g * G)] * 3, [32768 / np.radians(dps)] * 3]).astype(int)
+    return np.rint(si(walk) * np.r_[[32768 / (g * G)] * 3, [32750 / np.radians(dps)] * 3]).astype(int)
 
 
 def text(rows, separator=" "):

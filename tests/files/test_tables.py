@@ -14,7 +14,7 @@ from mpucal.files.hints import Hints, parse_columns, parse_units
 from mpucal.files.tables.names import column_named
 from mpucal.files.tables.units import turned, unit_named
 
-COUNTS_A, COUNTS_G = 32768 / (4 * G), 32768 / np.radians(500)
+COUNTS_A, COUNTS_G = 32768 / (4 * G), 32750 / np.radians(500)
 
 
 def frame(names, *columns):
@@ -375,7 +375,7 @@ def test_lines_that_hold_one_sensor_each(walk, assert_same, tmp_path):
 
 
 def a_g(walk):
-    scale = 16384 / G, 32768 / np.radians(250)
+    scale = 16384 / G, 32750 / np.radians(250)
     rows = np.rint(np.column_stack([walk.acc * scale[0], walk.gyr * scale[1]])).clip(-32768, 32767).astype(int)
     return "".join("a/g:\t" + "\t".join(map(str, row)) + "\r\n" for row in rows.tolist())
 
@@ -388,7 +388,7 @@ def test_what_i2cdevlibs_example_prints(ending, walk, assert_same, tmp_path):
     read = load(tmp_path / f"walk{ending}", Hints(rate_hz=rate))
     kept = ~read.gyr_clipped & ~read.acc_clipped
     np.testing.assert_allclose(read.acc[kept], steady.acc[kept], atol=0.5 * G / 16384 * 1.001)
-    np.testing.assert_allclose(read.gyr[kept], steady.gyr[kept], atol=0.5 * np.radians(250) / 32768 * 1.001)
+    np.testing.assert_allclose(read.gyr[kept], steady.gyr[kept], atol=0.5 * np.radians(250) / 32750 * 1.001)
     assert kept.mean() > 0.5
     assert "MPU6050::initialize()" in read.taken
     with pytest.raises(RecordingError, match="--rate HZ"):

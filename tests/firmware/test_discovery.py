@@ -42,7 +42,8 @@ extern Port Serial;
 WIRE_H = """#pragma once
 #include <Arduino.h>
 struct TwoWire {
-    void begin(); void setClock(uint32_t); void beginTransmission(uint8_t); uint8_t endTransmission(bool = true);
+    void begin(); void begin(int, int); void setSDA(int); void setSCL(int);
+    void setClock(uint32_t); void beginTransmission(uint8_t); uint8_t endTransmission(bool = true);
     size_t write(uint8_t); uint8_t requestFrom(uint8_t, uint8_t); int read();
 };
 extern TwoWire Wire;
@@ -62,8 +63,8 @@ LARGE = AVR | {"avr/io.h": AVR["avr/io.h"].replace("0xFF", "0x3FF")}
 # core -> what its compiler defines, what lies in its toolchain, and the symbol of the storage that the sketch holds
 CORES = {
     "esp32": ("-DESP32", {}, "LittleFS"),
-    "esp8266": ("-DESP8266", {}, "LittleFS"),
-    "rp2040": ("-DARDUINO_ARCH_RP2040", {}, "LittleFS"),
+    "esp8266": ("-DESP8266 -DMPUCAL_SDA=4 -DMPUCAL_SCL=5", {}, "LittleFS"),
+    "rp2040": ("-DARDUINO_ARCH_RP2040 -DMPUCAL_SDA=4 -DMPUCAL_SCL=5", {}, "LittleFS"),
     "mbed_rp2040": ("-DARDUINO_ARCH_RP2040 -DARDUINO_ARCH_MBED", {}, None),
     "megaavr": ("-D__AVR__", AVR, None),
     "megaavr_large": ("-D__AVR__", LARGE, "EEPROM"),

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...data import STANDARD_GRAVITY_MPS2, Mask, Recording, Sensor, Vector
+from ...data import GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Mask, Recording, Sensor, Vector
 from ...errors import RecordingError
 from ..hints import Hints
 from . import times, units
@@ -160,7 +160,7 @@ def _rates(
                 "give --gyro-range DPS",
                 "--gyro-range DPS",
             )
-        scale, of = np.radians(range_dps) / FULL_SCALE, f"counts of ±{range_dps:g} deg/s"
+        scale, of = np.radians(range_dps) / GYRO_COUNTS, f"counts of ±{range_dps:g} deg/s"
         factor = units.turned(t, a, values * scale)
         if factor and is_another_range(abs(factor)) and "gyr" not in hints.units:
             raise _unlike(

@@ -1,6 +1,7 @@
 """The command line on a board with an emulated bridge: record, store, show."""
 
 import json
+import struct
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -85,10 +86,19 @@ def test_into_the_memory_and_back(board, mpucal, tmp_path):
     assert shown.code == 0, shown.err
     kept = json.loads(shown.out)["accelerometer"]
     assert (kept["D"], kept["b_a"]) == (made.D.tolist(), made.b_a.tolist())
-    assert "blob number 1 of the bridge on" in mpucal("show", "--serial", board.name).out
+    shown = mpucal("show", "--serial", board.name)
+    assert "blob number 1 of the bridge on" in shown.out
+    assert "the unit of K" not in shown.err
     anew = mpucal("write", "calibration.json", "bridge", "--serial", board.name, "-o", "kept")
     assert "bridge-blob-1.bin" in anew.err
     assert (tmp_path / "kept" / "bridge-blob-1.bin").read_bytes() == made.blob().encode()
+
+
+def test_a_blob_of_before_says_that_its_unit_is_known(board, mpucal):
+    board.memory.write(0, struct.pack("<II", 1, 0xFFFFFFFE) + BLOB.read_bytes())
+    shown = mpucal("show", "--serial", board.name)
+    assert shown.code == 0, shown.err
+    assert "does not say the unit of K: it is that of 131 counts to 1 deg/s" in shown.err
 
 
 def test_the_doctor_tells_bridge_and_chip(board, mpucal):
