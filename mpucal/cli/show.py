@@ -78,8 +78,8 @@ def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) ->
             held = Blob.decode(blob)
             if held.gyro_counts is None:
                 say(
-                    f"{where} is of a version that does not say the unit of K: it is that of 131 counts to 1 deg/s at ±250"
-                    " deg/s, and firmware of its time corrects rates by 0.055 % too little; a newer one does it right"
+                    f"{where} is of a version that does not say the unit of K: it is that of 131 counts to 1 deg/s at"
+                    " ±250 deg/s, and rates from firmware of its time are 0.055 % too small; a newer one's are not"
                 )
             _show_calibration(where, Calibration.from_blob(held), as_json)
         return
