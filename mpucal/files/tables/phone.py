@@ -14,7 +14,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from ...data import Recording
+import numpy as np
+
+from ...data import Recording, Vector
 from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from ..budget import afford
@@ -22,11 +24,11 @@ from ..hints import NO_HINTS, Hints
 from ..rows import cannot_read
 from .apps import is_about, said
 from .names import ACC, GYR, Column, bare_axis, three
-from .streams import recording_of
+from .streams import are_counts, recording_of
 from .table import chosen, stream_of
 from .text import TextTable, table_of, text_of
 from .times import Stream
-from .units import QUANTITIES, acceleration_unit
+from .units import QUANTITIES, acceleration_unit, signed
 
 # a sensor's tables by their names, the one nearest to the sensor first; the unit where their program says none
 NAMES = {
@@ -43,7 +45,10 @@ NAMES = {
     GYR: ("gyroscopeuncalibrated", "gyroscope", "gyro", "gyr", "gyrm", "rotationrate"),
 }
 UNITS = {ACC: "", GYR: "rad/s"}
-SUFFIXES = (".csv", ".txt", ".tsv")
+# imu_tk calls tables of text .mat
+SUFFIXES = (".csv", ".txt", ".tsv", ".mat")
+# of an accelerometer's largest: whole numbers that are smaller are no counts
+FEWEST_COUNTS = 200
 # NotImplementedError is a RuntimeError: another way to compress
 _DAMAGE = (zipfile.BadZipFile, RuntimeError, EOFError, ValueError, zlib.error, lzma.LZMAError)
 
@@ -126,7 +131,7 @@ def _recording(name: str, texts: Mapping[str, bytes], hints: Hints) -> Recording
         ranks = {member: rank for member in texts if (rank := _rank(member, quantity)) is not None}
         for member in sorted(ranks, key=lambda m: (ranks[m], m)):
             stream = _stream(f"{name}/{Path(member).name}", texts[member], quantity, hints)
-            if quantity == ACC and len(stream.values) and not acceleration_unit(stream.values):
+            if quantity == ACC and len(stream.values) and not _holds_gravity(stream.values):
                 without_gravity = without_gravity or member
                 continue
             found.setdefault(quantity, (member, stream))
@@ -141,6 +146,14 @@ def _recording(name: str, texts: Mapping[str, bytes], hints: Hints) -> Recording
     acc = replace(acc, values=-acc.values if about.turned_around else acc.values, zero_ns=about.zero_ns)
     of = f"from {Path(of_acc).name} and {Path(of_gyr).name}"
     return recording_of(acc, gyr, hints, name, remarks=[of, *about.remarks])
+
+
+def _holds_gravity(values: Vector) -> bool:
+    return bool(acceleration_unit(values)) or _are_counts(values)
+
+
+def _are_counts(values: Vector) -> bool:
+    return len(values) > 0 and are_counts(signed(values)) and bool(np.abs(values).max() > FEWEST_COUNTS)
 
 
 def _stream(name: str, data: bytes, quantity: str, hints: Hints) -> Stream:
@@ -160,7 +173,9 @@ def _stream(name: str, data: bytes, quantity: str, hints: Hints) -> Stream:
         raise RecordingError(
             f"{name} holds the columns {', '.join(table.header)}, and no {quantity}", "record both sensors"
         )
-    return stream_of(table, columns, of)
+    stream = stream_of(table, columns, of)
+    # a unit that nothing says is none of counts
+    return stream if of[0].unit != UNITS[quantity] or not _are_counts(stream.values) else replace(stream, unit="")
 
 
 def _said(hints: Hints, quantity: str) -> dict[str, str | int]:

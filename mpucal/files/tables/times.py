@@ -56,11 +56,15 @@ class Stream:
 
     @property
     def fresh(self) -> Mask:
-        """(n,) whether a sample is not the one before again, as loggers write it beside another sensor's."""
+        """(n,) whether a sample is not the one before again, as loggers write it beside another sensor's.
+
+        Where samples that differ have the same time, times are rounded, and so those that do not may be two.
+        """
         again = np.zeros(len(self.values), bool)
         if self.times is not None and len(again):
-            again[1:] = [b == a for a, b in pairwise(self.times)]
-            again[1:] &= (self.values[1:] == self.values[:-1]).all(axis=1)
+            at_once = np.array([b == a for a, b in pairwise(self.times)], bool)
+            alike = (self.values[1:] == self.values[:-1]).all(axis=1)
+            again[1:] = at_once & alike & (np.count_nonzero(at_once & ~alike) <= np.count_nonzero(at_once & alike))
         return ~again
 
 
