@@ -172,8 +172,8 @@ class Prefix:
             with suppress(OSError):
                 target = str(link.readlink())
                 if target.startswith(here):
-                    at = os.lseek(handle, 0, os.SEEK_CUR)
-                    moved = os.open(place / target.removeprefix(here), os.O_RDWR | os.O_CREAT)
+                    at, there = os.lseek(handle, 0, os.SEEK_CUR), place / target.removeprefix(here)
+                    moved = os.open(there, os.O_RDONLY if there.is_dir() else os.O_RDWR | os.O_CREAT)
                     os.lseek(moved, at, os.SEEK_SET)
                     os.dup2(moved, handle)
                     os.close(moved)
