@@ -12,7 +12,7 @@ MpucalError
 │   │   ├── NoAnswer         nothing acknowledged the address, or sent a heartbeat
 │   │   ├── KeepsNothing     the bridge's firmware has no memory for a calibration
 │   │   ├── BusHeld          a wire is held low, so that every transfer takes its time-out
-│   │   └── LinkError        the link to a vehicle broke, or cannot be used
+│   │   └── LinkError        the link to a vehicle or board broke, or cannot be used
 │   └── ChipError            the chip answers, but not as its register map says
 │       ├── OddOffsets       so do its offset registers, wherever they were looked for
 │       └── ChipReset        it lost its settings while it was measured
@@ -106,7 +106,7 @@ class NoAnswer(BusError):  # noqa: N818 - reads as the sentence it is
 
 
 class LinkError(BusError):
-    """The link to a vehicle broke, or cannot be used."""
+    """The link to a vehicle or board broke, or cannot be used."""
 
 
 class KeepsNothing(BusError):  # noqa: N818 - reads as the sentence it is

@@ -8,8 +8,11 @@ import pytest
 
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
+from mpucal.doctor.conformance import examine_conformance
+from mpucal.doctor.finding import Mark
 from mpucal.errors import NoAnswer
 from mpucal.sources.bridge.bus import BridgeBus
+from mpucal.sources.bridge.conformance import talks
 from mpucal.sources.bridge.link import Link
 from mpucal.sources.bridge.micropython import PROGRAM, MicroPythonPort, reduced
 from mpucal.sources.bridge.store import Store
@@ -53,6 +56,15 @@ def test_blobs_outlive_a_reset(board):
     assert opened(second).read() == BLOB
     opened(second).erase()
     assert opened(second).read() is None
+
+
+def test_it_answers_as_the_protocol_settles(board, rig):
+    made = rig()
+    link = Link(MicroPythonPort(board(made.chip, made.clock)), lambda *_: None)
+    link.greet()
+    found = list(examine_conformance(link))
+    assert {finding.topic: finding.what for finding in found if finding.mark is not Mark.OK} == {}
+    assert {finding.topic for finding in found} == talks().keys()
 
 
 def test_no_chip(board):
