@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -75,7 +76,7 @@ class Rotate:
         self._advised_run = -1
         self._held: tuple[Pause, Use] | None = None
         self._begun_s: float | None = None
-        self._new_s = self._known_s = self._told_s = self._said_s = 0.0
+        self._t_s = self._new_s = self._known_s = self._told_s = self._said_s = 0.0
         self.prompt = self._prompt_for(self.coverage.farthest_down(self.directions))
 
     def add(self, samples: Samples) -> list[Output | Turned]:
@@ -87,7 +88,7 @@ class Rotate:
         found: list[Output | Turned] = []
         for pause in self._pauses.add(samples):
             found += self._hold(pause)
-        t_s = float(samples.t[-1])
+        self._t_s = t_s = float(samples.t[-1])
         found += self._at(t_s)
         turned = None if self._until_end else self._turned(t_s)
         return [*found, turned] if turned else found
@@ -99,7 +100,8 @@ class Rotate:
         if self._until_end:
             return found
         if advice and self._held is not None:
-            found.append(held(*self._held))
+            # said now, and not when it was counted: the time is that of the samples
+            found.append(replace(held(*self._held), t_s=self._t_s))
         if self._content():
             # tilts leave some parameters at their prior: the target does not apply to them
             what = "enough tilts seen" if self._tilt_only else "target reached"

@@ -43,7 +43,7 @@ def meter(view: View, columns: int, glyphs: Glyphs) -> Text:
     style = "green" if m.still else "yellow"
     waiting = view.waiting
     said = "still" if m.still else m.what or "moving"
-    if waiting is not None:
+    if waiting is not None and waiting.remaining_s > 0.0:
         said = f"{waiting.remaining_s:.0f} s to go{' (paused)' if waiting.paused else ''}, {said}"
     if columns < NARROW:
         return Text(f" {said}", style=style)

@@ -31,6 +31,8 @@ TOLD = {Use.TAKEN: "TAKEN", Use.USEFUL: "NOT THAT ONE, BUT USEFUL", Use.SEEN: "S
 NEAR_DEG = 15.0
 # a countdown that is not renewed for so long waits for nothing any more
 COUNTDOWN_HOLDS_S = 1.0
+# at its end the session looks at what is known now, and then says what became of the orientation
+DECIDED_S = 2.0
 # the part of gravity that an axis must carry to be named: a tilt by 30 degrees towards a corner is named by both axes
 WORTH_NAMING = 0.3
 HEADLINES = {
@@ -120,12 +122,16 @@ class View:
 
     @property
     def waiting(self) -> Countdown | None:
-        """The countdown, where one runs: until the board moves, or it was not renewed."""
-        if self.countdown is None or self.now_s is None or self.countdown.remaining_s <= 0.0:
+        """The countdown, where one runs: until the board moves or it is not renewed; at its end, until it is told of."""
+        if self.countdown is None or self.now_s is None:
             return None
-        if self.meter is not None and self.meter.t_s > self.countdown.t_s and not self.meter.still:
+        counts = self.countdown.remaining_s > 0.0
+        moved = self.meter is not None and self.meter.t_s > self.countdown.t_s and not self.meter.still
+        if counts and moved:
             return None
-        return self.countdown if self.now_s - self.countdown.t_s <= COUNTDOWN_HOLDS_S else None
+        return (
+            self.countdown if self.now_s - self.countdown.t_s <= (COUNTDOWN_HOLDS_S if counts else DECIDED_S) else None
+        )
 
     @property
     def wanted(self) -> Direction | None:
@@ -162,7 +168,7 @@ class View:
         if waiting is not None and self.prompt.kind is not PromptKind.REST and self._counts(waiting):
             word = "NEW: HOLD" if waiting.elsewhere else "HOLD"
             word = "STILL" if self.prompt.kind is PromptKind.LAY_FLAT else word
-            return Moment.COUNTING, f"{word} {math.ceil(waiting.remaining_s)}"
+            return Moment.COUNTING, f"{word} {math.ceil(waiting.remaining_s) or ''}".rstrip()
         if self.held is not None and self.now_s is not None and self.now_s - self.held.t_s < TOLD_S:
             return Moment.TOLD, TOLD[self.held.use]
         if self.wanted is None:

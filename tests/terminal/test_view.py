@@ -25,10 +25,11 @@ def test_the_headline_says_what_to_do(views):
         (Countdown(26.0, 1.3, 2.0, False), "HOLD 2"),
         (Countdown(26.0, 1.3, 2.0, False, elsewhere=True), "NEW: HOLD 2"),
         (Countdown(26.0, 1.3, 2.0, True), "ROLL LEFT 60"),
-        (Countdown(26.0, 0.0, 2.0, False), "ROLL LEFT 60"),
+        (Countdown(24.5, 0.0, 2.0, False), "HOLD"),
+        (Countdown(23.5, 0.0, 2.0, False), "ROLL LEFT 60"),
         (Countdown(20.0, 1.3, 2.0, False), "ROLL LEFT 60"),
     ],
-    ids=["not begun", "runs", "runs elsewhere", "paused", "over", "forgotten"],
+    ids=["not begun", "runs", "runs elsewhere", "paused", "over", "over without a word", "forgotten"],
 )
 def test_a_countdown_that_runs_is_the_headline(views, countdown, headline):
     view = replace(views["turned"], now_s=26.0, countdown=countdown)

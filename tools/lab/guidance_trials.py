@@ -27,14 +27,14 @@ from mpucal.data import Vector
 from mpucal.page.state import HOLD, state
 from mpucal.result.calibration import GOOD
 from mpucal.session.attitude import matrix
-from mpucal.session.events import Countdown, Held, Key, Meter, Output, Progress, Prompt, PromptKind
+from mpucal.session.events import Countdown, Held, Key, Meter, Output, Progress, Prompt, PromptKind, Use
 from mpucal.session.plan import Plan
 from mpucal.session.way import WAYS
 from mpucal.simulated import rotation as quaternions
 from mpucal.simulated.hand import MISS_RAD, ON_THE_TABLE, REACTION_S, Stance
 from mpucal.simulated.hands import KINDS, Guided
 from mpucal.simulated.legs import STEP_S, Leg
-from mpucal.terminal.view import NEAR_DEG, View
+from mpucal.terminal.view import NEAR_DEG, Moment, View
 
 from .sessions import session
 from .table import grouped, show, table
@@ -96,6 +96,8 @@ class Watcher:
         """Look."""
         before, self.view = self.view, self.view.after(output)
         shown = state(self.view)
+        if shown["moment"] in (Moment.COUNTING, Moment.TURN, Moment.NEAR):
+            self._since_counted = shown["moment"]
         match output:
             case Meter():
                 ByWords.HEADLINE, ByWords.DEGREES = shown["headline"], 5.0 * round((output.missing_deg or 0.0) / 5.0)
@@ -108,8 +110,10 @@ class Watcher:
                 self.told = self.told and not turning
                 if kind is PromptKind.REST:
                     self.finished_s = self.view.now_s or math.nan
-            case Held():
+            case Held(use=use):
                 self.told = True
+                self.wrong["wrong before taken"] += use is Use.TAKEN and self._since_counted != Moment.COUNTING
+                self.wrong["not told"] += shown["moment"] != Moment.TOLD
             case Countdown():
                 self.holds += state(before)["moment"] != "counting" == shown["moment"]
             case Progress(done=done, of=of, text=text):
@@ -133,6 +137,7 @@ class Watcher:
         self.wrong["jumps of the wanted one"] += angle(last.wanted, meter.wanted) > own + BEYOND_DEG
 
     _same: Prompt | None = None
+    _since_counted = ""
 
     def _hold(self, headline: str, meter: Meter) -> None:
         if self.view.wanted is None or meter.missing_deg is None or headline != HOLD:

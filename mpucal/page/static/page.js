@@ -115,7 +115,7 @@ function dial() {
   const { moment, meter, countdown, held, progress } = state;
   switch (moment) {
     case "counting":
-      return { look: "hold", share: countdown.remaining_s / countdown.of_s, number: String(Math.ceil(countdown.remaining_s)) };
+      return { look: "hold", share: countdown.remaining_s / countdown.of_s, number: String(Math.ceil(countdown.remaining_s) || "") };
     case "told":
       return held.use === "seen" ? { look: "again", share: 1 } : { look: "yes", share: 1 };
     case "turn":
