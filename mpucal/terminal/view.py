@@ -122,7 +122,7 @@ class View:
 
     @property
     def waiting(self) -> Countdown | None:
-        """The countdown, where one runs: until the board moves or it is not renewed; at its end, until it is told of."""
+        """The countdown that runs: until the board moves or it is not renewed; at its end, until it is told of."""
         if self.countdown is None or self.now_s is None:
             return None
         counts = self.countdown.remaining_s > 0.0
