@@ -1,7 +1,10 @@
 import json
+import os
 import re
 import signal
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +13,9 @@ from mpucal.chip.access import Transaction
 from mpucal.chip.records import SessionEvent
 from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.result.calibration import Calibration
+from mpucal.session.runner import Runner
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
 
 
 def rewritten(capture, path, records=None, **meta):
@@ -170,3 +176,28 @@ def test_a_recording_is_calibrated_and_replayed_later_unless_accesses_are_left_u
     longer = mpucal("session", "--replay", rewritten(capture, tmp_path / "long.mcap", [*capture.records, last]))
     assert longer.code == 3
     assert "1 accesses of its capture unread" in longer.err
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not tell where a folder went")
+def test_a_folder_that_is_renamed_and_a_capture_that_is_cut_meanwhile(mpucal, tmp_path, monkeypatch):
+    """The results go where the capture is, and who spoils that is told of."""
+    calibrate = Runner.calibrate
+
+    def meddled(runner, *words):
+        meddle()
+        return calibrate(runner, *words)
+
+    monkeypatch.setattr(Runner, "calibrate", meddled)
+    words = ("session", "--replay", FIXTURES / "sessions" / "enter.mcap", "--yes", "-o", "board")
+    meddle = lambda: Path("board").rename("seven")  # noqa: E731
+    renamed = mpucal(*words)
+    assert renamed.code == 0, renamed.err
+    assert str(tmp_path / "seven" / "calibration.bin") in renamed.out
+    assert {path.name for path in tmp_path.iterdir()} == {"seven"}
+    assert {"capture.mcap", "calibration.json", "report.html"} <= {path.name for path in Path("seven").iterdir()}
+
+    meddle = lambda: os.truncate("board/capture.mcap", 1000)  # noqa: E731
+    cut = mpucal(*words)
+    assert cut.code == 3
+    assert "board/capture.mcap was shortened or overwritten by another program" in cut.err
+    assert "is kept in board/capture.mcap, and the results in board" in cut.err
