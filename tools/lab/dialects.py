@@ -36,8 +36,9 @@ def walk() -> Walk:
 
 def dialects() -> dict[str, tuple[str, Write, Hints]]:
     """Name -> whose program writes it, how, and what has to be said to read it; the writers are those of the tests."""
-    tables, ros, logs, loggers = (
-        run_path(str(ROOT / "tests" / "files" / f"test_{name}.py")) for name in ("tables", "ros", "logs", "loggers")
+    tables, ros, logs, loggers, strangers = (
+        run_path(str(ROOT / "tests" / "files" / f"test_{name}.py"))
+        for name in ("tables", "ros", "logs", "loggers", "strangers")
     )
     counts = Hints(rate_hz=100.0, accel_range_g=4.0, gyro_range_dps=500.0)
 
@@ -86,6 +87,17 @@ def dialects() -> dict[str, tuple[str, Write, Hints]]:
         loggers["pair"](folder, w, ns)
         return folder
 
+    def form(name: str) -> Write:
+        def write(folder: Path, w: Walk, _ns: Any) -> Path:
+            (folder / name).write_text(strangers["FORMS"][name](w))
+            return folder / name
+
+        return write
+
+    def matrix(folder: Path, w: Walk, _ns: Any) -> Path:
+        strangers["as_matlabs_matrix"](w, folder / "walk.mat")
+        return folder / "walk.mat"
+
     def own(folder: Path, w: Walk, _ns: Any) -> Path:
         with open_writer(folder / "walk.mcap", Rows.of(w), "") as write:
             write(w)
@@ -107,6 +119,11 @@ def dialects() -> dict[str, tuple[str, Write, Hints]]:
         "lines that name each number": ("Python", labelled, NO_HINTS),
         "MPU6050_raw": ("Python", raw, counts),
         "a sketch's counts": ("NumPy", sketch, counts),
+        "a matrix of MATLAB without names": ("SciPy", matrix, NO_HINTS),
+        **{
+            Path(name).stem: ("Python", form(name), Hints(rate_hz=100.0) if "board" in name else NO_HINTS)
+            for name in strangers["FORMS"]
+        },
     }
 
 
