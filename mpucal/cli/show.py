@@ -25,9 +25,9 @@ from ..sources.kind import SourceKind
 from ..sources.opening import contents, one_of
 from ..sources.table import kinds_meant, used_by
 from .loading import loaded
-from .options import check_source, source_options
+from .options import check_source, given, source_options
 from .person import say
-from .recording_options import hint_options, hints_of, say_taken
+from .recording_options import NAMES, hint_options, hints_of, say_taken
 from .summary import formula, slope, summary
 
 EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --json`, or `mpucal show --serial PORT`"
@@ -56,7 +56,10 @@ def command(file: Path | None, as_json: bool, **options: Any) -> None:
             f"give a file, or {one_of(used_by('show'))}",
         )
     if file is None:
-        _show_device(check_source(click.get_current_context()), options, as_json)
+        if said := [spelled for name, spelled in given().items() if name in NAMES]:
+            raise UsageError(f"{' and '.join(said)} say how a file is read, and a device was given", "leave them out")
+        kept = {name: value for name, value in options.items() if name not in NAMES}
+        _show_device(check_source(click.get_current_context()), kept, as_json)
     elif file.suffix in CALIBRATIONS and recognised(file) is None:
         _show_calibration(str(file), loaded(file), as_json)
     else:

@@ -49,6 +49,12 @@ def test_every_command_is_told_the_columns_and_the_span(words, mpucal, table, re
     assert json.loads(cut.out)["samples"] == pytest.approx(5 * recording.rate_hz, abs=1)
 
 
+def test_a_device_needs_no_columns(mpucal):
+    done = mpucal("show", "--bus", "sim", "--columns", "t,ax,ay,az,gx,gy,gz", "--rate", "100")
+    assert done.code == 2
+    assert "--columns and --rate say how a file is read, and a device was given" in done.err
+
+
 def test_a_batch_is_told_by_patterns(table, recording, tmp_path):
     (tmp_path / "hints").write_text(f"# those of the old logger\n\nodd*.csv {shlex.join(SAID)}\n*.txt --rate 100\n")
     by_pattern = hints_by_pattern(tmp_path / "hints")
