@@ -14,8 +14,10 @@ from ...chip import registers as reg
 from ...chip.access import Reply
 from ...chip.clock import look_phase
 from ...errors import BusError, NoAnswer
+from .asked import Answer
+from .beside import Beside
 from .fifo_watch import CONTROLS, FifoWatch
-from .link import MS, Answer, Asked, Link, LinkLost
+from .link import MS, Link, LinkLost
 from .link_errors import no_chip, no_reply, refused
 from .messages import (
     MAX_BURST,
@@ -66,9 +68,7 @@ class BridgeBus:
         self._ahead: ReadAhead | None = None
         self._lost = False
         self._asked = 0
-        # INT_ENABLE, asked for beside the stream, and what it held last
-        self._posted: Asked | None = None
-        self._enabled = 0
+        self._beside = Beside(self.link)
         self._dead: BusError | None = None
         try:
             self._address = self.link.greet(address or 0).address
@@ -117,8 +117,7 @@ class BridgeBus:
             requests.append(Stream(0, 0))
         requests.append(Write(register, data))
         self._watch.saw_write(register, data)
-        if register <= reg.INT_ENABLE < register + len(data):
-            self._enabled = data[reg.INT_ENABLE - register]
+        self._beside.saw_write(register, data)
         if controls and self._can_read_ahead:
             return self._start(*requests)
         return self._seen_from(self._ask(*requests)[-1][-1].t_ns)
@@ -163,18 +162,13 @@ class BridgeBus:
         INT_STATUS is what FRAMES say, whose bridge reads it. INT_ENABLE, 0 in a chip that was reset, was asked for a
         poll ago: nobody waits for a reply, which may be late. Its times tell how fast the bridge's clock runs.
         """
-        t_ns, host_ns, posted = ahead.shown_ns, None, self._posted
-        if posted is not None and posted.done:
-            answer = posted.answers[0]
-            data = b"".join(_data([answer]))
-            self._enabled = data[0] if data else self._enabled
-            host_ns = answer.host_ns - (answer.t_ns - t_ns)
-            self._posted = None
-        if self._posted is None:
+        t_ns = ahead.shown_ns
+        ahead_ns = self._beside.take()
+        if not self._beside.is_asked:
             self._step_out_of_line()
-            self._posted = self.link.post(Read(reg.INT_ENABLE, 1))
+            self._beside.ask()
         overflow = reg.INT_FIFO_OFLOW * ahead.take_overflow()
-        return Reply(bytes([self._enabled, 0, overflow]), t_ns, host_ns)
+        return Reply(bytes([self._beside.held, 0, overflow]), t_ns, None if ahead_ns is None else t_ns + ahead_ns)
 
     def _judged(self, reply: Reply, at: int) -> Reply:
         """What was read, with INT_STATUS at `at`: it tells what was lost on the way to the host, too."""
@@ -202,7 +196,8 @@ class BridgeBus:
 
         The FIFO must not fill while the host waits for a reply, so all of them are sent at once.
         """
-        self._lost, self._posted = False, None
+        self._lost = False
+        self._beside.forget()
         frame_bytes = self._watch.frame_bytes
         # before it is asked for: what it pushes may come together with its reply
         self._ahead = ReadAhead(self.link.seq_of(len(before)), frame_bytes)
@@ -222,8 +217,7 @@ class BridgeBus:
             try:
                 if self._port.now_ns() >= give_up_ns:
                     raise LinkLost(*no_reply(self._port.name))
-                if self._posted is not None:
-                    self.link.remind(self._posted)
+                self._beside.remind()
                 self.link.wait(min(give_up_ns, self._port.now_ns() + REMIND_NS))
             except BusError as error:
                 self._recover(error)
