@@ -1,6 +1,6 @@
 """Small files that grow large: what reading each takes, of memory and time.
 
-    .venv/bin/python -m tools.attack large [--files N] [--seed N] [--most-mb MB]
+    .venv/bin/python -m tools.attack large [--files N] [--seed N] [--most-mb MB] [--seconds S]
 
 Archives of zeros, captures and bags with chunks that unpack to gigabytes or say so, tables that repeat a line or end
 nowhere, and logs with a hole. Each is calibrated in a process of its own; of each kind a line gives the largest peak
@@ -16,6 +16,7 @@ import struct
 import time
 import zipfile
 from collections.abc import Callable, Iterable
+from itertools import takewhile
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -37,9 +38,14 @@ LINES = {
 
 def archive(path: Path, draw: random.Random) -> None:
     """An .npz of zeros, or of a length that it has not."""
-    samples, said = draw.randrange(10_000, 3_000_000), draw.choice((1, 1, 1000))
+    samples, said, more = draw.randrange(10_000, 1_000_000), draw.choice((1, 1, 1000)), draw.choice((1, 1, 70))
     with zipfile.ZipFile(path.with_suffix(".npz"), "w", zipfile.ZIP_DEFLATED) as file:
-        for key, shape in (("t", (samples,)), ("acc", (samples, 3)), ("gyr", (samples, 3)), ("sensor", (9 * samples,))):
+        for key, shape in (
+            ("t", (samples,)),
+            ("acc", (samples, 3)),
+            ("gyr", (samples, 3)),
+            ("sensor", (more * samples,)),
+        ):
             head = {"descr": "<f8", "fortran_order": False, "shape": (shape[0] * said, *shape[1:])}
             with file.open(f"{key}.npy", "w") as member:
                 np.lib.format.write_array_header_1_0(member, head)
@@ -53,7 +59,7 @@ def phone(path: Path, draw: random.Random) -> None:
         for name in ("Accelerometer.csv", "Gyroscope.csv"):
             with file.open(name, "w") as member:
                 member.write(b"time,x,y,z\n")
-                for _ in range(draw.randrange(10, 2000)):
+                for _ in range(draw.randrange(10, 1000)):
                     member.write(line)
 
 
@@ -133,9 +139,11 @@ def main() -> int:
     parser.add_argument("--files", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--most-mb", default="512")
+    parser.add_argument("--seconds", type=float, default=3600.0, help="begin no file after these")
     asked = parser.parse_args()
     worst: dict[str, tuple[int, int, float, str]] = {}
-    for number in range(asked.files):
+    until_s = time.monotonic() + asked.seconds
+    for number in takewhile(lambda _: time.monotonic() < until_s, range(asked.files)):
         kind, draw = KINDS[number % len(KINDS)], random.Random(asked.seed * 1_000_000 + number)
         with TemporaryDirectory() as place:
             (folder := Path(place) / "here").mkdir()

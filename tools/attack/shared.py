@@ -1,7 +1,7 @@
 """Processes that share a folder or a name, others that meddle with their files, and every output where no file is.
 
     .venv/bin/python -m tools.attack shared [--pairs N] [--eights N] [--meddled N] [--ended N] [--outputs]
-                                           [--seed N]
+                                           [--seed N] [--seconds S]
 
 A race forks so many processes, which begin together: sessions and recordings of a simulated chip into one -o, and into
 none. Meddling renames a session's folder, or cuts, removes or replaces its capture. Ending sends KILL, TERM, HUP or
@@ -21,8 +21,9 @@ import stat
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from itertools import takewhile
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -122,9 +123,9 @@ def wrong(ended: Sequence[tuple[int, str]], folder: Path, most: int) -> str:
     return "" if well else "none ended well"
 
 
-def races(count: int, of: int, draw: random.Random, tell: Callable[[str, str], None]) -> None:
+def races(numbers: Iterable[int], of: int, draw: random.Random, tell: Callable[[str, str], None]) -> None:
     """So many races of so many processes."""
-    for _ in range(count):
+    for _ in numbers:
         seeds = [draw.randrange(1 << 20) for _ in range(of)]
         named = [(*SESSION, "--bus", f"sim:seed={seed}") for seed in seeds]
         for what, words, most in (
@@ -137,9 +138,9 @@ def races(count: int, of: int, draw: random.Random, tell: Callable[[str, str], N
                 tell(f"{of} {what}", wrong(race(words, folder, draw), folder, most))
 
 
-def meddle(count: int, draw: random.Random, tell: Callable[[str, str], None]) -> None:
+def meddle(numbers: Iterable[int], draw: random.Random, tell: Callable[[str, str], None]) -> None:
     """So many sessions whose files another program touches."""
-    for number in range(count):
+    for number in numbers:
         kind = ("rename", "cut", "remove", "replace", "swap")[number % 5]
         with TemporaryDirectory() as place:
             (folder := Path(place) / "here").mkdir()
@@ -182,10 +183,10 @@ def _after_meddling(kind: str, code: int, said: str, folder: Path) -> str:
     return "" if code == 3 and "by another program" in said else f"exit code {code}: {said[-200:]}"
 
 
-def end(count: int, draw: random.Random, tell: Callable[[str, str], None]) -> None:
+def end(numbers: Iterable[int], draw: random.Random, tell: Callable[[str, str], None]) -> None:
     """So many commands with processes of their own, ended by a signal."""
     capture = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
-    for number in range(count):
+    for number in numbers:
         kind = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM)[number // 2 % 4]
         what, words = (
             # one with a page outlives its terminal
@@ -212,6 +213,12 @@ def end(count: int, draw: random.Random, tell: Callable[[str, str], None]) -> No
                     os.kill(each, signal.SIGKILL)
             process.wait()
             tell(f"{kind.name} to {what}", f"{len(left)} processes are left" if left else "")
+
+
+def _until(count: int, seconds: float) -> Iterator[int]:
+    """So many numbers, or as many as there is time for."""
+    until_s = time.monotonic() + seconds
+    return takewhile(lambda _: time.monotonic() < until_s, range(count))
 
 
 def _of_session(leader: int) -> list[int]:
@@ -297,6 +304,7 @@ def main() -> int:
     for name, default in (("--pairs", 10), ("--eights", 2), ("--meddled", 10), ("--ended", 0), ("--seed", 1)):
         parser.add_argument(name, type=int, default=default)
     parser.add_argument("--outputs", action="store_true")
+    parser.add_argument("--seconds", type=float, default=3600.0, help="begin none of a kind after these")
     asked = parser.parse_args()
     draw = random.Random(asked.seed)
     counts: dict[str, tuple[int, int]] = {}
@@ -311,10 +319,10 @@ def main() -> int:
     # forked processes find it loaded
     from mpucal.cli import calibrate, record, session  # noqa: F401, PLC0415
 
-    races(asked.pairs, 2, draw, tell)
-    races(asked.eights, 8, draw, tell)
-    meddle(asked.meddled, draw, tell)
-    end(asked.ended, draw, tell)
+    races(_until(asked.pairs, asked.seconds), 2, draw, tell)
+    races(_until(asked.eights, asked.seconds), 8, draw, tell)
+    meddle(_until(asked.meddled, asked.seconds), draw, tell)
+    end(_until(asked.ended, asked.seconds), draw, tell)
     if asked.outputs:
         outputs(tell)
     for kind, (done, bad) in counts.items():
