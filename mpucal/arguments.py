@@ -21,6 +21,8 @@ SHORTEST_S, LONGEST_S = 1e-12, 1e18
 LARGEST = 1e9
 # of a local gravity [m/s^2], from small moons to centrifuges
 LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2 = 1e-3, 1e4
+# likewise from the equator's mountains to the poles, in round numbers (GRS 80: 9.780 and 9.832 at sea level)
+LEAST_ON_EARTH_MPS2, MOST_ON_EARTH_MPS2 = 9.76, 9.84
 
 Vector = NDArray[np.float64]
 Mask = NDArray[np.bool_]

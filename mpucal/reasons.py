@@ -450,7 +450,7 @@ KINDS: Mapping[str, Kind] = {
                 False,
             ),
         },
-        "mpucal session --bus sim --gravity 9.2 --seed 1",
+        "mpucal.calibrate(r, gravity=9.2)",
     ),
     "same_data": Kind(
         "Calibrations to be merged were made of the same recording: counted twice, it would seem twice as certain.",

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import click
 from click.core import ParameterSource
 
-from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
+from ..arguments import LEAST_GRAVITY_MPS2, LEAST_ON_EARTH_MPS2, MOST_GRAVITY_MPS2, MOST_ON_EARTH_MPS2
 from ..calibration import MODELS
 from ..chip.config import Config
 from ..data import STANDARD_GRAVITY_MPS2
@@ -63,6 +63,22 @@ def local_gravity(text: str) -> float:
     if not LEAST_GRAVITY_MPS2 <= gravity <= MOST_GRAVITY_MPS2:
         raise ValueError(f"{text!r} is no local gravity: give it in m/s², about 9.81.")
     return gravity
+
+
+def check_gravity(gravity: float, anyway: bool) -> None:
+    """Refuse, before a person turns a board, a gravity that no place on Earth has."""
+    if anyway or LEAST_ON_EARTH_MPS2 <= gravity <= MOST_ON_EARTH_MPS2:
+        return
+    units = {"cm/s²": 0.01, "g": STANDARD_GRAVITY_MPS2, "mg": STANDARD_GRAVITY_MPS2 / 1e3, "ft/s²": 0.3048}
+    meant = [
+        f" In {unit} it is --gravity {gravity * factor:.5g}."
+        for unit, factor in units.items()
+        if LEAST_ON_EARTH_MPS2 <= gravity * factor <= MOST_ON_EARTH_MPS2
+    ]
+    raise click.UsageError(
+        f"no place on Earth has a gravity of {gravity:g} m/s² ({LEAST_ON_EARTH_MPS2:g} to {MOST_ON_EARTH_MPS2:g})."
+        f"{''.join(meant)} Where it is meant, add --gravity-anyway."
+    )
 
 
 def source_options(name: str, settings: bool = True) -> Callable[[F], F]:

@@ -32,7 +32,7 @@ from ..terminal.console import Console, console
 from ..terminal.flat import BOARD, VEHICLE
 from ..terminal.hangup import outliving
 from .destination import device, session_sink_options
-from .options import aim_options, check_gyroscope, check_source, fit_options, given, source_options
+from .options import aim_options, check_gravity, check_gyroscope, check_source, fit_options, given, source_options
 from .page import beside, page_options
 from .person import ask, ask_in_doubt
 from .running import running
@@ -82,6 +82,7 @@ def command(
     calibration. Exit code 4: stopped before there was enough data; 5: the calibration was refused; 6: the write-back
     was refused or failed.
     """
+    check_gravity(options["gravity"], options["gravity_anyway"])
     resume: Path | None = options.pop("resume")
     attended = not yes and sys.stdin.isatty()
     source, kinds, options = _opened(resume, {**options, NAME: name}, sinks, no_write, attended)
