@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...data import STANDARD_GRAVITY_MPS2, Vector
+from ...data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
 from ...reasons import Reason, reason
 from ..evidence import Evidence
 from .unusable import dead_accelerometer, dead_gyroscope
 
 # PS-MPU-6000A r3.4, section 6: sensitivities at 16 bits
-FULL_SCALE, GYRO_LSB_PER_DPS, GYRO_DPS = 32768, 131.0, 250.0
+FULL_SCALE = 32768
 ACCEL_RANGES_G, GYRO_RANGES_DPS = (16.0, 8.0, 4.0, 2.0), (2000.0, 1000.0, 500.0, 250.0)
 # So many low bits more than those that no axis moves are dead; so many on all axes are no coarse sensor's any more.
 DEAD_BITS, DEAD_BITS_OF_ALL = 3, 7
@@ -53,8 +53,8 @@ def bits_stuck(e: Evidence) -> Reason | None:
     if dead_accelerometer(e) is not None or dead_gyroscope(e) is not None:
         return None
     acc_range, gyro_range = e.recording.sensor.accel_range_g, e.recording.sensor.gyro_range_dps
-    acc_lsbs = [g * STANDARD_GRAVITY_MPS2 / FULL_SCALE for g in ([acc_range] if acc_range else ACCEL_RANGES_G)]
-    gyr_lsbs = [np.deg2rad(w / GYRO_DPS / GYRO_LSB_PER_DPS) for w in ([gyro_range] if gyro_range else GYRO_RANGES_DPS)]
+    acc_lsbs = [g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS for g in ([acc_range] if acc_range else ACCEL_RANGES_G)]
+    gyr_lsbs = [np.deg2rad(w / GYRO_COUNTS) for w in ([gyro_range] if gyro_range else GYRO_RANGES_DPS)]
     most = MOST_MPS2 if e.sure is None else min(MOST_MPS2, HONEST_STD * e.sure.rms_mps2)
     return _stuck(e, e.recording.acc, acc_lsbs, "accelerometer", "m/s^2", most) or _stuck(
         e, e.recording.gyr, gyr_lsbs, "gyroscope", "rad/s", USABLE_RAD_S
