@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from ..data import Recording, Vector
 from ..errors import RecordingError
 from .budget import afford
 from .hints import NO_HINTS, ROLES, Hints
+from .matlab import arrays_of
 from .npz import DAMAGED, NEEDED
 from .rows import cannot_read
 from .tables.guess import guessed
@@ -45,11 +45,13 @@ def load_arrays(path: Path, hints: Hints = NO_HINTS) -> Recording:
     RecordingError : it cannot be read, or does not say all that is needed; what is missing is named.
     """
     try:
-        found = dict(_matlab(path) if path.suffix.lower() == ".mat" else _numpy(path))
+        found = dict(arrays_of(path) if path.suffix.lower() == ".mat" else _numpy(path))
     except OSError as error:
         raise cannot_read(path, error) from error
     except NotImplementedError as error:
-        raise RecordingError(f"{path} is of MATLAB 7.3, which is HDF5", "save it with save(NAME, '-v7')") from error
+        raise RecordingError(
+            f"{path} is of MATLAB 7.3, which is HDF5, or of level 4", "save it with save(NAME, '-v7')"
+        ) from error
     except DAMAGED as error:
         raise RecordingError(f"{path} is no whole file of arrays ({error})", _REMEDY) from error
     columns = _columns(found)
@@ -69,28 +71,6 @@ def _numpy(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
             afford(path, sum(each.file_size for each in archive.zip.infolist()))
             for name in archive.files:
                 yield from _fields(name, archive[name])
-
-
-def _matlab(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
-    # scipy.io is slow to load
-    from scipy.io import loadmat  # noqa: PLC0415
-    from scipy.io.matlab import MatReadError  # noqa: PLC0415
-
-    try:
-        found = loadmat(path, simplify_cells=True)
-    except (MatReadError, zlib.error) as error:
-        raise ValueError(str(error)) from error
-    for name, value in found.items():
-        if not str(name).startswith("__"):
-            yield from _within(str(name), value)
-
-
-def _within(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
-    if isinstance(value, Mapping):
-        for key, inner in value.items():
-            yield from _within(f"{name}.{key}", inner)
-    else:
-        yield name, np.asarray(value)
 
 
 def _fields(name: str, array: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]]:

@@ -127,7 +127,11 @@ def as_other_names(walk, path):
 
 
 def as_matlab(walk, path):
-    savemat(path, {"imu": {"time": walk.t, "acc": walk.acc, "gyro": walk.gyr}, "Fs": 100.0, "note": "a walk"})
+    savemat(
+        path,
+        {"imu": {"time": walk.t, "acc": walk.acc, "gyro": walk.gyr}, "Fs": 100.0, "note": "a walk"},
+        do_compression=True,
+    )
 
 
 def as_matlabs_matrix(walk, path):
@@ -166,6 +170,26 @@ def test_files_of_arrays_that_are_none(data, suffix, tmp_path):
     (tmp_path / f"a{suffix}").write_bytes(data)
     with pytest.raises(mpucal.MpucalError):
         mpucal.load(tmp_path / f"a{suffix}")
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_a_damaged_file_of_matlab_is_an_error_or_a_recording(compressed, even_walk, tmp_path):
+    """SciPy's reader crashes on some."""
+    savemat(tmp_path / "a.mat", {"imu": {"acc": even_walk.acc[:50], "t": 1}, "m": [1, 2]}, do_compression=compressed)
+    whole, rng = (tmp_path / "a.mat").read_bytes(), np.random.default_rng(2)
+    for _ in range(150):
+        damaged = bytearray(whole[: rng.integers(130, len(whole))] if rng.random() < 0.3 else whole)
+        for at in rng.integers(100, min(len(damaged), 600), 3):
+            damaged[at] = rng.integers(256)
+        (tmp_path / "a.mat").write_bytes(damaged)
+        with pytest.raises(mpucal.MpucalError):
+            mpucal.load(tmp_path / "a.mat")
+
+
+def test_a_file_of_matlab_7_3_is_named(tmp_path):
+    (tmp_path / "a.mat").write_bytes(b"MATLAB 7.3 MAT-file, Platform: PCWIN64".ljust(124) + b"\0\2IM" + bytes(400))
+    with pytest.raises(RecordingError, match=r"is of MATLAB 7\.3, which is HDF5"):
+        mpucal.load(tmp_path / "a.mat")
 
 
 def test_what_physics_does_not_confirm_is_not_guessed(even_walk, tmp_path):

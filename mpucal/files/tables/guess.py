@@ -12,7 +12,7 @@ import numpy as np
 from ...data import Vector
 from ..hints import ROLES, Hints
 from .clock import period_of
-from .units import FASTEST_HZ, QUANTITIES, signed, turned
+from .units import BEYOND, FASTEST_HZ, QUANTITIES, signed, turned
 
 # of samples without times, to see what turns: another rate changes the factor, and not what is explained
 ANY_HZ = 100.0
@@ -27,7 +27,7 @@ def guessed(table: Vector, hints: Hints) -> tuple[dict[str, int], str]:
     """Role -> place among the columns of (n, k) numbers, and what is to be said of it; nothing where nothing fits."""
     n, width = table.shape
     table = table[:LOOKED_AT]
-    if n < FEWEST or not 6 <= width <= WIDEST or not np.isfinite(table).all():
+    if n < FEWEST or not 6 <= width <= WIDEST or not (np.abs(table) < BEYOND).all():
         return {}, ""
     for at in (0, 1):
         clock = table[:, 0] if at else None
