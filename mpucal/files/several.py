@@ -63,7 +63,8 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     arrays = {f.name: getattr(whole, f.name) for f in fields(Samples)}
     arrays["gap"][starts] = True
     first = parts[0]
-    said = f"Of {path.name} {len(parts)} files were taken as one recording: {', '.join(file.name for file in files)}."
+    said = f"Of {path.name} {len(parts)} files were taken as one recording, of which nobody knows how it was turned"
+    said += f" between them: {', '.join(file.name for file in files)}."
     return Recording(
         **arrays, sensor=first.sensor, name=path.name, utc_ns=first.utc_ns, taken=f"{said} {first.taken or ''}".strip()
     )

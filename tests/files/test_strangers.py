@@ -207,7 +207,7 @@ def test_files_of_a_folder_are_one_recording(even_walk, tmp_path):
     read = mpucal.load(tmp_path)
     np.testing.assert_allclose(si(read), si(even_walk), atol=1e-9)
     assert np.flatnonzero(read.gap).tolist() == [700]
-    assert "2 files were taken as one recording: a.txt, b.txt." in read.taken
+    assert "how it was turned between them: a.txt, b.txt." in read.taken
 
 
 def test_a_temperature_is_kept_everywhere(walk, tmp_path):
