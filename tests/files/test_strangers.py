@@ -199,6 +199,13 @@ def test_what_physics_does_not_confirm_is_not_guessed(even_walk, tmp_path):
         mpucal.load(tmp_path / "walk.txt")
 
 
+def test_a_rate_that_nothing_says_is_told_about(even_walk, tmp_path):
+    table = "ax,ay,az,gx,gy,gz\n" + text(np.column_stack([even_walk.acc, np.degrees(even_walk.gyr)]), ",")
+    (tmp_path / "walk.csv").write_text(table)
+    with pytest.raises(RecordingError, match=r"the rates at about (9|10|11)\d Hz, if they are in deg/s\).*--rate HZ"):
+        mpucal.load(tmp_path / "walk.csv")
+
+
 def test_files_of_a_folder_are_one_recording(even_walk, tmp_path):
     for name, part in (("b.txt", even_walk.part(700, 1400)), ("a.txt", even_walk.part(0, 700))):
         (tmp_path / name).write_text(poses(part))

@@ -12,10 +12,8 @@ import numpy as np
 from ...data import Vector
 from ..hints import ROLES, Hints
 from .clock import period_of
-from .units import BEYOND, FASTEST_HZ, QUANTITIES, signed, turned
+from .units import ANY_HZ, BEYOND, FASTEST_HZ, QUANTITIES, signed, turned
 
-# of samples without times, to see what turns: another rate changes the factor, and not what is explained
-ANY_HZ = 100.0
 FEWEST, WIDEST = 300, 16
 # of |a| in its quartiles: gravity, with the biases of a sensor that nobody calibrated
 MOST_SCATTER = 0.75

@@ -32,7 +32,7 @@ from .names import (
 from .streams import are_counts, recording_of, with_gravity
 from .text import NS, PREAMBLE, SEPARATORS, TextTable, numeric_table, table_of, text_of
 from .times import Stream
-from .units import acceleration_unit
+from .units import acceleration_unit, likely_rates, signed
 
 SNIFFED = 1 << 16
 # of both sensors
@@ -162,7 +162,8 @@ def recording_of_table(table: TextTable, hints: Hints) -> Recording:
     separated = [] if table.separator == "," else [f"its cells are separated by {called}"]
     if w.times is None and hints.rate_hz is None:
         raise RecordingError(
-            f"{table.name} holds no times that are known as such; its columns are {_listed(table.header)}",
+            f"{table.name} holds no times that are known as such; its columns are {_listed(table.header)}"
+            f"{likely_rates(signed(a.values), signed(w.values), w.unit)}",
             "name them with --columns t=NAME,ax=NAME,... and --units t=UNIT, or"
             " give the rate of its samples with --rate HZ",
             "--rate HZ",

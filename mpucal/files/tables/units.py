@@ -47,6 +47,10 @@ SLOW_S = 2.0
 LEAST_OF_G, MOST_OF_G = 0.45, 2.0
 LEAST_TURNED, MOST_TURNED = 0.6, 1.6
 SCATTER = 0.45
+# of samples without times, to see what turns; and of most loggers
+ANY_HZ, LIKELY_HZ = 100.0, (4.0, 1100.0)
+# of a hand, and of the usual sensors
+FASTEST_RAD_S = 37.0
 # what most programs write
 LIKELY = {"t": "s", "acc": "m/s^2", "gyr": "deg/s"}
 # no unit makes such numbers of what a sensor reads, and their squares are finite
@@ -118,6 +122,20 @@ def turned(t: Vector, acc: Vector, gyr: Vector) -> float | None:
     if power == 0.0 or abs(both) < EXPLAINED * math.sqrt(power * float((seen**2).sum())):
         return None
     return both / power
+
+
+def likely_rates(acc: Vector, gyr: Vector, said: str) -> str:
+    """In words, the rate at which gravity turns as (n, 3) rates say, in the said unit or each; empty: not known."""
+    factor = turned(np.arange(len(acc)) / ANY_HZ, acc, gyr)
+    if not factor or said == COUNTS:
+        return ""
+    fastest = float(np.percentile(np.abs(gyr), 99))
+    units = [said] if said else [u for u, si in QUANTITIES["gyr"].items() if fastest * si < FASTEST_RAD_S]
+    rates = {unit: ANY_HZ * QUANTITIES["gyr"][unit] / abs(factor) for unit in units}
+    likely = [
+        f"{round(hz)} Hz, if they are in {unit}" for unit, hz in rates.items() if LIKELY_HZ[0] < hz < LIKELY_HZ[1]
+    ]
+    return f" (gravity turns with the rates at about {' or '.join(likely)})" if likely else ""
 
 
 def rate_unit(factor: float | None) -> str:
