@@ -17,6 +17,8 @@ from ..errors import RecordingError
 MOST_MB, VARIABLE = 512, "MPUCAL_MOST_MB"
 # of a file that is held whole, for each byte of memory: a log may hold far more than its IMU
 READ = 16
+# of memory for a byte of a table of text, whose cells are objects: 6 to 40
+HELD = 6
 # of a line of text
 LONGEST_LINE = 1 << 20
 # of a chunk of an MCAP file; mpucal's own are of ten seconds, 2 MB at most
@@ -32,7 +34,7 @@ def most_bytes() -> int:
 def afford(path: Path, count: int, each: int = 1) -> None:
     """RecordingError where `path` holds more bytes than `each` for each byte of memory."""
     if count > each * most_bytes():
-        raise _too_much(path, f"holds {count >> 20} MB")
+        raise _too_much(path, f"takes {count >> 20} MB")
 
 
 @contextmanager

@@ -22,7 +22,7 @@ def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path, monkeypa
     archive(tmp_path / "zeros.npz", 40_000)
     archive(tmp_path / "more.npz", 100, more=np.zeros(200_000))
     monkeypatch.setenv(budget.VARIABLE, "1")
-    with pytest.raises(RecordingError, match=r"holds 2 MB, and 1 MB may be taken.*--most-mb"):
+    with pytest.raises(RecordingError, match=r"takes 2 MB, and 1 MB may be taken.*--most-mb"):
         mpucal.load(tmp_path / "zeros.npz")
     # an array that is not asked for is not unpacked, and rows take no memory
     assert len(mpucal.load(tmp_path / "more.npz")) == 100
@@ -62,5 +62,5 @@ def test_a_file_far_longer_than_memory_is_not_read_whole(tmp_path):
         with (tmp_path / f"sparse.{ending}").open("wb") as file:
             file.write(b"t,ax,ay,az,gx,gy,gz\n")
             file.truncate(50 << 30)
-        with pytest.raises(RecordingError, match="holds 51200 MB"):
+        with pytest.raises(RecordingError, match="takes 51200 MB"):
             mpucal.load(tmp_path / f"sparse.{ending}")

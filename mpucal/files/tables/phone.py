@@ -19,7 +19,7 @@ import numpy as np
 from ...data import Recording, Vector
 from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
-from ..budget import afford
+from ..budget import HELD, afford
 from ..hints import NO_HINTS, Hints
 from ..rows import cannot_read
 from .apps import is_about, said
@@ -89,7 +89,7 @@ def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
     try:
         with zipfile.ZipFile(path) as archive:
             members = [member for member in archive.infolist() if _is_read(member.filename)]
-            afford(path, sum(member.file_size for member in members))
+            afford(path, HELD * sum(member.file_size for member in members))
             texts = {member.filename: archive.read(member) for member in members}
     except OSError as error:
         raise cannot_read(path, error) from error
