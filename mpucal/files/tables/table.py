@@ -10,7 +10,7 @@ import numpy as np
 
 from ...data import Mask, Recording, Vector
 from ...errors import RecordingError
-from ..budget import LONGEST_LINE
+from ..budget import HELD, LONGEST_LINE, afford
 from ..csv import COLUMNS
 from ..hints import NO_HINTS, ROLES, Hints
 from ..rows import cannot_read
@@ -91,6 +91,7 @@ def load_table(path: Path, hints: Hints = NO_HINTS) -> Recording:
     RecordingError : it cannot be read, or does not say all that is needed; what is missing is named.
     """
     try:
+        afford(path, HELD * path.stat().st_size)
         data = path.read_bytes()
     except OSError as error:
         raise cannot_read(path, error) from error
