@@ -99,15 +99,16 @@ def whole(arrays: Mapping[str, Any], name: str, sensor: Sensor) -> tuple[dict[st
         t, acc, gyr = (np.asarray(made[key], float) for key in ("t", "acc", "gyr"))
     if len(t) < FEWEST or not np.isfinite(t).all() or (np.diff(t) < 0).any() or not _there(acc, gyr).all():
         return made, None
+    fitted = None if sensor.message else even(t)
+    if fitted is not None:
+        t = fitted.t
+        made |= {"t": fitted.t, "gap": _marked(made.get("gap"), fitted.gap)}
+        said.append(fitted.said)
     units = (acceleration_unit(acc), rate_unit(turned(t, acc, gyr)))
     for key, unit, si in (("acc", units[0], SI[0]), ("gyr", units[1], SI[1])):
         if unit not in ("", si):
             made[key] = np.asarray(made[key], float) * QUANTITIES[key][unit]
             said.append(f"{key} reads as of {unit}, and was taken as such")
-    fitted = None if sensor.message else even(t)
-    if fitted is not None:
-        made |= {"t": fitted.t, "gap": _marked(made.get("gap"), fitted.gap)}
-        said.append(fitted.said)
     return made, f"Of {name} {'; '.join(said)}." if said else None
 
 

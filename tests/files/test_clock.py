@@ -87,7 +87,9 @@ def test_the_period_is_that_of_the_samples_and_not_of_the_bursts():
 @pytest.mark.parametrize("ending", [".csv", ".npz", ".txt"])
 def test_a_recording_by_radio_is_the_one_by_wire(ending, walk, tmp_path):
     """Without its clock it would be refused: nothing lies still where every other step is a gap."""
-    stamps = np.maximum.accumulate(walk.t + np.random.default_rng(6).exponential(4e-3, len(walk)))
+    # in bursts of four as well, each with one stamp
+    last = np.minimum((np.arange(len(walk)) // 4 + 1) * 4 - 1, len(walk) - 1)
+    stamps = np.maximum.accumulate(walk.t + np.random.default_rng(6).exponential(4e-3, len(walk)))[last]
     if ending == ".npz":
         np.savez(tmp_path / "walk.npz", t=stamps, acc=walk.acc, gyr=walk.gyr)
     else:
@@ -95,5 +97,5 @@ def test_a_recording_by_radio_is_the_one_by_wire(ending, walk, tmp_path):
         np.savetxt(tmp_path / f"walk{ending}", table, delimiter=",", header=names, comments="")
     read = mpucal.load(tmp_path / f"walk{ending}")
     off = read.t - walk.t
-    assert np.abs(off - np.median(off)).max() < 5e-4
+    assert np.abs(off - np.median(off)).max() < 2e-3
     assert "stamps of arrival" in read.taken

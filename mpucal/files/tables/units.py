@@ -105,7 +105,10 @@ def turned(t: Vector, acc: Vector, gyr: Vector) -> float | None:
     ----------
     t : (n,) s. acc : in any unit. gyr : in rad/s, if the factor is 1.
     """
-    dt = float(np.median(np.diff(t)))
+    # stamps of arrival may repeat
+    dt = float(np.median(np.diff(t))) or float(t[-1] - t[0]) / len(t)
+    if not dt > 0.0:
+        return None
     width = max(1, round(min(TURN_S / 2 / dt, len(t))))
     if len(t) < LEAST_TURNS * width:
         return None
