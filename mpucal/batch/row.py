@@ -67,7 +67,7 @@ class Settings:
         return f"{__version__} {self.model} {self.gravity!r} {self.gravity_anyway} {bool(self.reports)}{said}"
 
     def hints_of(self, path: str) -> Hints:
-        """What is said of a file: by the first pattern that its path or its name fits."""
+        """The hints for a file: those of the first pattern that its path or its name matches."""
         names = (path, PurePosixPath(path).name)
         fitting = (hints for pattern, hints in self.by_pattern if any(fnmatch(name, pattern) for name in names))
         return next(fitting, self.hints)

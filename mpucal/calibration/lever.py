@@ -1,4 +1,4 @@
-"""Whether a sensor turns in place: Rao's score test of a lever arm, at the estimate of a model that has none."""
+"""Rao's score test of a lever arm, at the estimate of a model of a sensor that turns in place."""
 
 from __future__ import annotations
 

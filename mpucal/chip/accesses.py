@@ -98,7 +98,7 @@ class Accesses:
         return self.behind - np.where(self.framed, self.moved // max(2 * self.frames.shape[1], 1), self.moved)
 
     def alike(self, other: Accesses) -> bool:
-        """Whether both can be joined: what is numbered in them is registers, and frames are as long."""
+        """True where both number registers and have frames of one length: then they can be joined."""
         plain = not (self.failures or other.failures or self.files or other.files)
         return plain and self.frames.shape[1] == other.frames.shape[1]
 

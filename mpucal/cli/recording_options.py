@@ -45,7 +45,7 @@ _MOST = click.option(
 
 
 def hint_options(*left_out: str) -> Callable[[F], F]:
-    """What NAMES has an option for, but for those that a command has already; and --most-mb."""
+    """Options for all of NAMES, but for those that a command has already, and --most-mb."""
     options = {
         "topic": click.option(
             "--topic", metavar="NAME", help="Topic of a bag; two, the accelerometer's first: ONE,OTHER."
@@ -127,7 +127,7 @@ def hints_by_pattern(path: Path) -> tuple[tuple[str, Hints], ...]:
 @click.command(add_help_option=False)
 @hint_options()
 def _HINTS(**_hints: Any) -> None:  # noqa: N802 - a command, of which the options are read
-    """What may stand behind a pattern."""
+    """Options that may follow a pattern on a line of hints."""
 
 
 def say_taken(taken: str | None) -> None:

@@ -72,7 +72,7 @@ class Growing:
             return now
 
     def failed(self, error: Exception) -> OutputError:
-        """What `error`, of any of these, means."""
+        """The error of mpucal for an `error` of the operating system while the file grows."""
         return OutputError(
             f"cannot write the capture {self.path} ({getattr(error, 'strerror', None) or error})",
             "choose a place that you may write to, with room on it, with -o",

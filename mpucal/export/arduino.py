@@ -24,7 +24,7 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
 
 
 def left(calibration: Calibration) -> tuple[str, ...]:
-    """What the sketch assumes where the calibration does not say it."""
+    """Assumptions of the sketch that the calibration leaves open."""
     sensor, said = calibration.sensor, ["It reads the chip at address 0x68: where AD0 is high, change CHIP to 0x69."]
     if sensor.accel_range_g not in ACCEL_CONFIG:
         said.append(

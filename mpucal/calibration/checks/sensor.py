@@ -77,7 +77,10 @@ def axes(e: Evidence) -> Reason | None:
 
 
 def _reads_up(e: Evidence, M: Vector) -> bool:
-    """Whether the board's z, or else the greater part of its axes, reads up once the axes M (3, 3) are undone."""
+    """True where the board, lying face up, reads +g on z once the axes M (3, 3) are undone.
+
+    Where it lay on another side, M is preferred that changes fewer signs.
+    """
     flat = np.zeros(3) if e.flat is None else M.T @ e.flat.y
     return bool(flat[2] > 0.0) if np.abs(flat).argmax() == 2 else bool(np.trace(M) > 0.0)
 
