@@ -21,7 +21,7 @@ from .uncertainty import DIRECTIONS, Uncertainty, uncertainty
 HALF_SECOND = 0.5
 LEAST_MOVE_RAD = np.deg2rad(2.0)  # of gravity in half a second, above noise
 ENOUGH_MOVES = 100
-LEAST_TURN_RAD = np.deg2rad(12.0)  # of gravity between two rests, beyond what biases and skew turn it by
+LEAST_TURN_RAD = np.deg2rad(20.0)  # of gravity, beyond what biases and skew turn it by
 OTHER_RANGES = (0.25, 0.5, 2.0, 4.0)
 CLEARLY = 3.0  # times as far the one misses where another unit or range is meant
 FAR_TOO_FAR = 20.0  # times as far as gravity: no rates in rad/s, but for turns about the vertical

@@ -12,8 +12,8 @@ from ..result import error_model
 from ..result.calibration import REFUSED, Calibration, unknown
 
 AXES = error_model.AXES
-# A standard uncertainty of so much, in each unit, says that nothing is known: no number is shown.
-NOTHING_KNOWN = {"%": 20.0, "deg": 10.0, "mg": 500.0, "deg/s": 10.0}
+# standard uncertainties from here on, in the unit that is shown, are said to be not observable
+UNKNOWN = 100.0
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class ParameterRow:
 
     def _cell(self, axis: int) -> str:
         value, std = float(self.value[axis]), float(self.std[axis])
-        return "unknown" if std > NOTHING_KNOWN[self.unit] else with_std(value, std)
+        return "not observable" if std >= UNKNOWN else with_std(value, std)
 
 
 def accelerometer(c: Calibration) -> list[ParameterRow]:

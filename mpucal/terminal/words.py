@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..report.units import UNKNOWN
 from ..session.events import Direction, Knowledge
-
-# standard uncertainties from here on are said to be not observable
-UNKNOWN = 100.0
 
 
 @dataclass(frozen=True)

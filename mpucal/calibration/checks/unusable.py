@@ -7,11 +7,10 @@ import numpy as np
 from ...data import Vector
 from ...reasons import Reason, reason
 from ...rests.flat import QUIETEST_ACC_MPS2, QUIETEST_GYRO_RAD_S
-from ..evidence import Evidence
+from ..evidence import LEAST_TURN_RAD, Evidence
 from ..rotation import lengths
 
 FEWEST_SAMPLES = 50
-LEAST_TURN_RAD = np.deg2rad(20.0)
 SLOWEST_HZ = 5.0
 LONGEST_TO_LAY_DOWN_S = 10.0
 # Times in milliseconds of any sensor lie further apart; a logger's may lie so far.
