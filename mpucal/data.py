@@ -30,6 +30,8 @@ STANDARD_GRAVITY_MPS2 = 9.80665
 # deg/s, each half of it at the next range (32.75 and 16.375 are printed as 32.8 and 16.4).
 ACCEL_COUNTS = 32768.0
 GYRO_COUNTS = 32750.0
+# ranges of the sensors that recordings are of, [g] and [deg/s]; those of a chip are in its registers
+ACCEL_RANGES_G, GYRO_RANGES_DPS = (2, 4, 8, 16), (125, 250, 500, 1000, 2000, 4000)
 # names reach scripts and source code: these characters end no string and no comment there
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .:+()-]{0,63}")
 BYTE = 0xFF

@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..data import STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
+from ..data import ACCEL_RANGES_G, GYRO_RANGES_DPS, STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
 from ..rests.flat import Flat
 from .problem import Series
 from .rotation import lengths
 
-ACC_RANGES = STANDARD_GRAVITY_MPS2 * np.array([2.0, 4.0, 8.0, 16.0])
-GYRO_RANGES = np.deg2rad([125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0])
+ACC_RANGES, GYRO_RANGES = STANDARD_GRAVITY_MPS2 * np.array(ACCEL_RANGES_G), np.deg2rad(GYRO_RANGES_DPS)
 RANGE_TOLERANCE = 2e-3
 FEWEST_AT_A_RANGE, FEWEST_ANYWHERE = 2, 8
 

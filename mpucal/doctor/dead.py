@@ -11,13 +11,11 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ..chip.registers import GYRO_LSB_PER_DPS, GYRO_RANGES_DPS
-from ..data import STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
+from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Mask, Recording, Vector
 from .finding import Finding, Mark
 
 DEAD_AXIS, STUCK_BITS = "dead axis", "stuck bits"
 REPLACE = "replace the chip; first check its supply and solder joints, and start it once more"
-FULL_SCALE = 32768
 # an axis that dies midway: for how long it stands still, and how often one that lives would have changed
 LONG_S, MANY_CHANGES = 2.0, 50.0
 
@@ -64,8 +62,8 @@ def dead_axes(recording: Recording) -> Iterator[Finding]:
 def _sensors(recording: Recording) -> Iterator[tuple[str, Vector, Mask, float | None]]:
     """Each sensor's name, values, which are clipped, and what a count is, where that is known."""
     accel_g, gyro_dps = recording.sensor.accel_range_g, recording.sensor.gyro_range_dps
-    mps2 = None if accel_g is None else accel_g * STANDARD_GRAVITY_MPS2 / FULL_SCALE
-    rad_s = None if gyro_dps is None else float(np.radians(gyro_dps / GYRO_RANGES_DPS[0] / GYRO_LSB_PER_DPS[0]))
+    mps2 = None if accel_g is None else accel_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
+    rad_s = None if gyro_dps is None else float(np.radians(gyro_dps / GYRO_COUNTS))
     yield "accelerometer", recording.acc, recording.acc_clipped, mps2
     yield "gyroscope", recording.gyr, recording.gyr_clipped, rad_s
 

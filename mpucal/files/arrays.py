@@ -53,7 +53,9 @@ def load_arrays(path: Path, hints: Hints = NO_HINTS) -> Recording:
             f"{path} is of MATLAB 7.3, which is HDF5, or of level 4", "save it with save(NAME, '-v7')"
         ) from error
     except DAMAGED as error:
-        raise RecordingError(f"{path} is no whole file of arrays ({error})", _REMEDY) from error
+        # NumPy takes what it does not know for Python's objects, and advises to run them
+        said = "damaged, or of Python's objects" if "pickle" in str(error) else error
+        raise RecordingError(f"{path} is no whole file of arrays ({said})", _REMEDY) from error
     columns = _columns(found)
     if not columns:
         raise RecordingError(f"{path.name} holds no columns of numbers", _REMEDY)

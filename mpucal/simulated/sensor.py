@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..calibration.rotation import rotation
 from ..chip.families import MPU6050, MPU6500
-from ..data import STANDARD_GRAVITY_MPS2, Mask, Vector
+from ..data import ACCEL_COUNTS, STANDARD_GRAVITY_MPS2, Mask, Vector
 
 Counts = NDArray[np.int16]
 
@@ -42,7 +42,7 @@ class Setting:
     @property
     def mps2_per_lsb(self) -> float:
         """m/s^2 of an accelerometer count, at the nominal scale."""
-        return self.accel_range_g * STANDARD_GRAVITY_MPS2 / FULL_SCALE
+        return self.accel_range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
 
     @property
     def rad_s_per_lsb(self) -> float:

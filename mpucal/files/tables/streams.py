@@ -8,7 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...data import GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Mask, Recording, Sensor, Vector
+from ...data import (
+    ACCEL_COUNTS,
+    ACCEL_RANGES_G,
+    GYRO_COUNTS,
+    GYRO_RANGES_DPS,
+    STANDARD_GRAVITY_MPS2,
+    Mask,
+    Recording,
+    Sensor,
+    Vector,
+)
 from ...errors import RecordingError
 from ..hints import Hints
 from . import times, units
@@ -18,7 +28,7 @@ from .units import COUNTS, FULL_SCALE, QUANTITIES, check_agrees
 # octaves: half of the way to the next range leaves room for gains of 0.7 to 1.4
 ANOTHER_RANGE = 0.5
 # of these parts, and by how many octaves what gravity says may miss one
-ACCEL_RANGES_G, GYRO_RANGES_DPS, SURE_RANGE = (2, 4, 8, 16), (125, 250, 500, 1000, 2000, 4000), 0.35
+SURE_RANGE = 0.35
 OF_COUNTS = "in counts of"
 # |a| of gravity that alone says a unit: counts of 512 to 1 g are no mg
 LEAST_LIKELY, MOST_LIKELY = 0.75, 1.35
@@ -125,7 +135,7 @@ def _accelerations(stream: Stream, hints: Hints, name: str) -> tuple[Vector, str
 
 
 def _scaled(values: Vector, hints: Hints, name: str, size: float) -> tuple[Vector, str, Mask]:
-    ranges = (g for g in ACCEL_RANGES_G if LEAST_LIKELY <= size * g / FULL_SCALE <= MOST_LIKELY)
+    ranges = (g for g in ACCEL_RANGES_G if LEAST_LIKELY <= size * g / ACCEL_COUNTS <= MOST_LIKELY)
     range_g = next(ranges, None) if hints.accel_range_g is None else hints.accel_range_g
     if range_g is None:
         raise RecordingError(
@@ -133,7 +143,7 @@ def _scaled(values: Vector, hints: Hints, name: str, size: float) -> tuple[Vecto
             "give --accel-range G and --gyro-range DPS",
             "--accel-range G --gyro-range DPS",
         )
-    scale = range_g * STANDARD_GRAVITY_MPS2 / FULL_SCALE
+    scale = range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
     if is_another_range(size * scale / STANDARD_GRAVITY_MPS2) and "acc" not in hints.units:
         raise RecordingError(
             f"{name}: at ±{range_g:g} g |a| is {size * scale:.3g} m/s^2 in the median, which is no gravity",
@@ -186,7 +196,7 @@ def _gyro_range_dps(factor: float | None) -> float | None:
     """The range of counts by how fast gravity turns; None where no sensor has it."""
     if not factor:
         return None
-    dps = math.degrees(abs(factor)) * FULL_SCALE
+    dps = math.degrees(abs(factor)) * GYRO_COUNTS
     nearest = min(GYRO_RANGES_DPS, key=lambda each: abs(math.log2(dps / each)))
     return nearest if abs(math.log2(dps / nearest)) < SURE_RANGE else None
 
