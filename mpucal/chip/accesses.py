@@ -73,7 +73,7 @@ class Accesses:
         (data, frames), size = self._bytes, 2 * self.frames.shape[1]
         shown = (self.write, self.heard, self.framed, self.register, self.count, self.t_ns, self.host_ns)
         rows = zip(*(column[first:last].tolist() for column in shown), strict=True)
-        places = zip(self.first[first:last].tolist(), self.behind[first:last].tolist(), strict=True)
+        places = zip(self.begin[first:last].tolist(), self.end[first:last].tolist(), strict=True)
         for i, (row, (begin, end)) in enumerate(zip(rows, places, strict=True), first):
             write, heard, framed, register, count, t_ns, host_ns = row
             moved = frames[begin * size : end * size] if framed else data[begin:end]
@@ -87,17 +87,17 @@ class Accesses:
         return self.data.tobytes(), self.frames.astype(">i2").tobytes()
 
     @cached_property
-    def behind(self) -> Whole:
+    def end(self) -> Whole:
         """(n,) where the bytes of each end: in `data`, or the row in `frames`."""
         rows = np.where(self.framed, self.moved // max(2 * self.frames.shape[1], 1), 0)
         return np.where(self.framed, np.cumsum(rows), np.cumsum(np.where(self.framed, 0, self.moved)))
 
     @cached_property
-    def first(self) -> Whole:
+    def begin(self) -> Whole:
         """(n,) where they begin."""
-        return self.behind - np.where(self.framed, self.moved // max(2 * self.frames.shape[1], 1), self.moved)
+        return self.end - np.where(self.framed, self.moved // max(2 * self.frames.shape[1], 1), self.moved)
 
-    def alike(self, other: Accesses) -> bool:
+    def can_join(self, other: Accesses) -> bool:
         """True where both number registers and have frames of one length: then they can be joined."""
         plain = not (self.failures or other.failures or self.files or other.files)
         return plain and self.frames.shape[1] == other.frames.shape[1]
@@ -111,7 +111,7 @@ class Accesses:
         return cls(*columns)
 
     @classmethod
-    def of(cls, transactions: Sequence[Transaction]) -> Accesses:
+    def from_transactions(cls, transactions: Sequence[Transaction]) -> Accesses:
         """The same accesses; what was read from the FIFO is framed where all of it is whole frames."""
         moved = np.array([len(each.data) for each in transactions], np.int64)
         write, fifo = (

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data import Vector
-from .pieces import lines, steady
+from .piecewise_rate import fit_lines, merge_equal_slopes
 
 NS = 1e-9
 
@@ -41,7 +41,7 @@ LOOK_STD_SAMPLES = 12**-0.5
 GOLDEN = (5**0.5 - 1) / 2
 
 
-def look_phase(n: int) -> float:
+def poll_phase(n: int) -> float:
     """Where look number `n` should fall, -1/2..1/2 of a sample interval about its due time.
 
     A regular look would fall at the same phase again and again where its period is a whole number of
@@ -63,7 +63,7 @@ class _Segment:
     looks_ns: array[int] = field(default_factory=lambda: array("q"))
     looked: array[int] = field(default_factory=lambda: array("q"))
 
-    def looks(self, t_ns: list[int], taken: list[int]) -> None:
+    def add_many(self, t_ns: list[int], taken: list[int]) -> None:
         self.origin_ns = self.origin_ns if self.n else t_ns[0]
         t = [each - self.origin_ns for each in t_ns]
         self.looks_ns.extend(t_ns)
@@ -129,13 +129,13 @@ class SampleClock:
         for each in self._segments:
             del each.looks_ns[:], each.looked[:]
 
-    def look(self, t_ns: int, taken: int) -> None:
+    def add(self, t_ns: int, taken: int) -> None:
         """At `t_ns` the chip had taken `taken` samples of this segment."""
-        self._segments[-1].looks([t_ns], [taken])
+        self._segments[-1].add_many([t_ns], [taken])
 
-    def looks(self, t_ns: NDArray[np.int64], taken: NDArray[np.int64]) -> None:
+    def add_many(self, t_ns: NDArray[np.int64], taken: NDArray[np.int64]) -> None:
         """The same of (n,) looks, one at least."""
-        self._segments[-1].looks(t_ns.tolist(), taken.tolist())
+        self._segments[-1].add_many(t_ns.tolist(), taken.tolist())
 
     @property
     def rate_hz(self) -> float:
@@ -158,9 +158,9 @@ class SampleClock:
             (number, line)
             for number, each in enumerate(self._segments, self._forgotten)
             if each.looks_ns
-            for line in lines(np.array(each.looks_ns) * NS, np.array(each.looked, np.float64))
+            for line in fit_lines(np.array(each.looks_ns) * NS, np.array(each.looked, np.float64))
         ]
-        rates_hz = steady([line for _, line in pieces], self._nominal_hz, RATE_TOLERANCE)
+        rates_hz = merge_equal_slopes([line for _, line in pieces], self._nominal_hz, RATE_TOLERANCE)
         begins = np.array([number * FAR + line.first for number, line in pieces])
         t_s, taken = np.array([(line.t_s, line.y) for _, line in pieces]).reshape(-1, 2).T
 
@@ -171,7 +171,7 @@ class SampleClock:
         return times_s
 
 
-def increasing(t_s: Vector, step_s: float) -> Vector:
+def make_increasing(t_s: Vector, step_s: float) -> Vector:
     """`t_s` (n,), moved on by as little as makes each at least `step_s` later than the one before."""
     if not (np.diff(t_s) < step_s).any():
         return t_s

@@ -27,7 +27,7 @@ class Config:
     Attributes
     ----------
     accel_range_g : 2, 4, 8 or 16. gyro_range_dps : 250, 500, 1000 or 2000 deg/s.
-    rate_hz : samples a second, nominally; at ACCEL_ALONE_HZ of the accelerometer alone, and past its filter.
+    rate_hz : samples a second, nominally; at ACCEL_ONLY_HZ of the accelerometer alone, and past its filter.
     dlpf : code of the low-pass filter, 0 (widest) to 6.
     poll_s : time between two looks into the FIFO; None: `period_s` as suits the rate.
 
@@ -46,7 +46,7 @@ class Config:
         _check("accelerometer range", self.accel_range_g, "g", reg.ACCEL_RANGES_G)
         _check("gyroscope range", self.gyro_range_dps, "deg/s", reg.GYRO_RANGES_DPS)
         _check("low-pass filter", self.dlpf, "", reg.DLPF_CODES)
-        if not self.accel_alone:
+        if not self.accel_only:
             reg.sample_rate_divider(self.rate_hz, self.dlpf)
         longest_s = MAX_FRAMES_A_POLL / self.rate_hz
         if not MIN_POLL_S <= self.period_s <= longest_s:
@@ -60,12 +60,12 @@ class Config:
         """Time between two looks into the FIFO: as seldom as a FIFO of 512 bytes and a host 10 ms late allow."""
         if self.poll_s is not None:
             return self.poll_s
-        return ALONE_POLL_S if self.accel_alone else FAST_POLL_S if self.rate_hz > FAST_HZ else SLOW_POLL_S
+        return ALONE_POLL_S if self.accel_only else FAST_POLL_S if self.rate_hz > FAST_HZ else SLOW_POLL_S
 
     @property
-    def accel_alone(self) -> bool:
+    def accel_only(self) -> bool:
         """Whether the gyroscope is left out."""
-        return self.rate_hz == reg.ACCEL_ALONE_HZ
+        return self.rate_hz == reg.ACCEL_ONLY_HZ
 
     def settings(self, part: Part) -> Settings:
         """The same for one part; one with less sensitivity takes the smallest range that is large enough.
@@ -79,12 +79,12 @@ class Config:
         return Settings(
             part=part,
             smplrt_div=0
-            if self.accel_alone or not part.fifo_bytes
+            if self.accel_only or not part.fifo_bytes
             else reg.sample_rate_divider(self.rate_hz, self.dlpf),
             dlpf_cfg=self.dlpf,
             fs_sel=reg.GYRO_RANGES_DPS.index(self.gyro_range_dps),
             afs_sel=next(i for i, nominal_g in enumerate(reg.ACCEL_RANGES_G) if nominal_g >= range_g),
-            accel_alone=self.accel_alone,
+            accel_only=self.accel_only,
         )
 
     def _check_part(self, part: Part) -> None:
@@ -92,18 +92,18 @@ class Config:
             what = f"this {part.chip} has no FIFO, so that each sample is read by itself"
             raise ChipError(what, f"take --rate {MOST_POLLED_HZ} or less")
         filtered_apart = part.family.has_accel_config2
-        if self.accel_alone and not filtered_apart:
+        if self.accel_only and not filtered_apart:
             raise ChipError(
                 f"the accelerometer of the {part.chip} measures {reg.MAX_RATE_HZ:g} times a second at most",
                 f"take --rate {reg.MAX_RATE_HZ:g} or less; only the MPU-6500's family is faster",
             )
         # RM-MPU-9250A, register 25: SMPLRT_DIV divides what was filtered, and that is the case for 1 to 6
-        if filtered_apart and not self.accel_alone and reg.base_rate_hz(self.dlpf) > reg.MAX_RATE_HZ:
+        if filtered_apart and not self.accel_only and reg.base_rate_hz(self.dlpf) > reg.MAX_RATE_HZ:
             what = f"the {part.chip} takes 8000 samples a second with its filter at {self.dlpf}"
             raise ChipError(what, "take 1 to 6")
 
 
-class RateAlone(Config):
+class RateOnlyConfig(Config):
     """Of a source that is no chip of ours: what is asked for is a rate, and what comes is its answer.
 
     Raises
@@ -116,7 +116,7 @@ class RateAlone(Config):
             raise UsageError(f"{self.rate_hz:g} Hz is no rate to ask for", f"take 1 to {reg.MAX_RATE_HZ:g} Hz")
 
     @property
-    def accel_alone(self) -> bool:
+    def accel_only(self) -> bool:
         """Never."""
         return False
 

@@ -14,7 +14,7 @@ from . import registers as reg
 from .access import Bus
 from .decode import Decoder
 from .families import PARTS
-from .offsets import PLACES, Block
+from .offsets import PLACES, OffsetRegisters
 from .port import Port
 
 # the accelerometer's six bytes, then the thermometer's two
@@ -41,7 +41,7 @@ def chip_contents(bus: Bus) -> dict[str, Any]:
         "asleep": asleep,
         "accel_range_g": reg.ACCEL_RANGES_G[scale],
         "gyro_range_dps": reg.GYRO_RANGES_DPS[gyro >> shift & reg.FULL_SCALE_CODES],
-        "accel_offsets": {f"0x{place[0]:02x}": list(Block.read(port, place).words) for place in PLACES},
+        "accel_offsets": {f"0x{place[0]:02x}": list(OffsetRegisters.read(port, place).words) for place in PLACES},
     }
     if asleep or part is None:
         return facts

@@ -65,55 +65,55 @@ class Decoder:
             )
         return self._evidence.part(self._held[reg.WHO_AM_I])
 
-    def saw(self, transaction: Transaction | Accesses) -> None:
+    def feed(self, transaction: Transaction | Accesses) -> None:
         """An access was made, or failed; or many were."""
         if isinstance(transaction, Accesses):
-            self._saw_many(transaction)
+            self._feed_many(transaction)
             return
         if transaction.error is not None:
             return
         if transaction.op == "read":
-            self.saw_read(transaction.register, transaction.data, transaction.t_ns, transaction.host_ns)
+            self.feed_read(transaction.register, transaction.data, transaction.t_ns, transaction.host_ns)
         else:
-            self.saw_write(transaction.register, transaction.data)
+            self.feed_write(transaction.register, transaction.data)
 
-    def _saw_many(self, accesses: Accesses) -> None:
+    def _feed_many(self, accesses: Accesses) -> None:
         """The same of many: whole polls with nothing about them are decoded at once, the others one by one."""
         at = 0
-        for first, last in stretches(accesses):
-            self._saw_each(accesses, at, first)
+        for first, last in poll_runs(accesses):
+            self._feed_each(accesses, at, first)
             at = first
             while at < last:
-                at += self._saw_polls(accesses, at, min(last, at + AT_ONCE * POLL))
+                at += self._feed_polls(accesses, at, min(last, at + AT_ONCE * POLL))
                 # the one that had something about it
-                self._saw_each(accesses, at, min(last, at + POLL))
+                self._feed_each(accesses, at, min(last, at + POLL))
                 at = min(last, at + POLL)
-        self._saw_each(accesses, at, len(accesses))
+        self._feed_each(accesses, at, len(accesses))
 
-    def saw_read(self, register: int, data: bytes, t_ns: int, host_ns: int | None = None) -> None:
+    def feed_read(self, register: int, data: bytes, t_ns: int, host_ns: int | None = None) -> None:
         """`data` was read from `register` on, at `t_ns`; `host_ns` as in Reply."""
         if self._fifo is None:
             self._hold(register, data)
-            self._evidence.saw(register, data, self._held)
+            self._evidence.observe(register, data, self._held)
         elif register == reg.FIFO_COUNT_H:
-            self._fifo.counted(t_ns, int.from_bytes(data, "big"))
+            self._fifo.set_count(t_ns, int.from_bytes(data, "big"))
         elif register == reg.FIFO_R_W:
-            self._fifo.data(data)
+            self._fifo.add_bytes(data)
         elif register in (reg.INT_STATUS, reg.INT_ENABLE) and register + len(data) > reg.INT_STATUS:
             lost = register == reg.INT_ENABLE and not data[0] & reg.INT_FIFO_OFLOW
             if host_ns is not None:
-                self._fifo.heard(t_ns, host_ns)
+                self._fifo.add_clock_pair(t_ns, host_ns)
             if self._fifo.polled:
-                self._fifo.counted(t_ns, reg.FRAME_BYTES)
-                self._fifo.data(data[reg.ACCEL_XOUT_H - register :])
+                self._fifo.set_count(t_ns, reg.FRAME_BYTES)
+                self._fifo.add_bytes(data[reg.ACCEL_XOUT_H - register :])
             overflow = bool(data[reg.INT_STATUS - register] & reg.INT_FIFO_OFLOW)
-            self.fault = self._fifo.judged(overflow and not self._fifo.polled, lost)
+            self.fault = self._fifo.finish_poll(overflow and not self._fifo.polled, lost)
         elif register == reg.TEMP_OUT_H:
-            self._fifo.temperature(int.from_bytes(data, "big", signed=True))
+            self._fifo.set_temperature(int.from_bytes(data, "big", signed=True))
         else:
             self._hold(register, data)
 
-    def saw_write(self, register: int, data: bytes) -> None:
+    def feed_write(self, register: int, data: bytes) -> None:
         """`data` was written from `register` on.
 
         Raises
@@ -139,9 +139,9 @@ class Decoder:
         return 0 if self._fifo is None else self._fifo.flipped
 
     @property
-    def believed(self) -> int:
+    def accepted(self) -> int:
         """How many frames came since the start."""
-        return 0 if self._fifo is None else self._fifo.believed
+        return 0 if self._fifo is None else self._fifo.accepted
 
     def take(self) -> Samples:
         """The samples since the last `take`, with the times that are known now."""
@@ -175,21 +175,21 @@ class Decoder:
             return Recording(**vars(empty), name=self._name)
         return replace(self._fifo.recording(self._name), sensor=self.sensor)
 
-    def _saw_each(self, accesses: Accesses, first: int, last: int) -> None:
+    def _feed_each(self, accesses: Accesses, first: int, last: int) -> None:
         for transaction in accesses.part(first, last):
-            self.saw(transaction)
+            self.feed(transaction)
 
-    def _saw_polls(self, accesses: Accesses, first: int, last: int) -> int:
+    def _feed_polls(self, accesses: Accesses, first: int, last: int) -> int:
         """How many of the accesses of whole polls first..last-1 were taken at once."""
         if self._fifo is None or accesses.frames.shape[1] != self._fifo.frame_words:
             return 0
         looks, reads, checks = (np.arange(first + i, last, POLL) for i in range(POLL))
-        frames = accesses.frames[accesses.first[reads[0]] : accesses.behind[reads[-1]]]
-        lengths = accesses.behind[reads] - accesses.first[reads]
-        polls = self._fifo.plain_polls(accesses.t_ns[looks], frames, lengths)
+        frames = accesses.frames[accesses.begin[reads[0]] : accesses.end[reads[-1]]]
+        lengths = accesses.end[reads] - accesses.begin[reads]
+        polls = self._fifo.accept_plain_polls(accesses.t_ns[looks], frames, lengths)
         heard = checks[:polls][accesses.heard[checks[:polls]]]
         if len(heard):
-            self._fifo.heard_many(accesses.t_ns[heard], accesses.host_ns[heard])
+            self._fifo.add_clock_pairs(accesses.t_ns[heard], accesses.host_ns[heard])
         if polls:
             self.fault = None
         return POLL * polls
@@ -215,7 +215,7 @@ class Decoder:
         return x, y, z
 
 
-def stretches(accesses: Accesses) -> list[tuple[int, int]]:
+def poll_runs(accesses: Accesses) -> list[tuple[int, int]]:
     """first, last + 1 of accesses that are polls one after the other: count, as many bytes, no overflow, none lost."""
     n = len(accesses) - POLL + 1
     if n < 1 or accesses.failures:
@@ -226,7 +226,7 @@ def stretches(accesses: Accesses) -> list[tuple[int, int]]:
     whole &= (register[check] == reg.INT_ENABLE) & (moved[check] == reg.INT_STATUS - reg.INT_ENABLE + 1)
     whole &= accesses.framed[read] & ~accesses.write[look] & ~accesses.write[check]
     at = np.flatnonzero(whole)
-    counts, checks = accesses.first[at], accesses.first[at + 2]
+    counts, checks = accesses.begin[at], accesses.begin[at + 2]
     counted = accesses.data[counts].astype(np.int64) << 8 | accesses.data[counts + 1]
     flags = (accesses.data[checks] & ~accesses.data[checks + 2]) & reg.INT_FIFO_OFLOW
     at = at[(counted == moved[at + 1]) & (flags > 0)]
@@ -244,7 +244,7 @@ def decode(accesses: Iterable[Transaction | Accesses], name: str = "recording") 
     """
     decoder = Decoder(name)
     for each in accesses:
-        decoder.saw(each)
+        decoder.feed(each)
     recording = decoder.recording()
     if len(recording) < 2:
         raise RecordingError(f"{name} holds {len(recording)} samples", "record for longer")

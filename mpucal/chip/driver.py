@@ -17,22 +17,22 @@ from ..data import Recording, Samples, Sensor
 from ..errors import BusError, BusHeld, ChipError, EndOfCapture
 from . import registers as reg
 from .access import Bus
-from .clock import look_phase
+from .clock import poll_phase
 from .config import Config
 from .decode import Decoder
 from .families import Part
 from .fifo import FifoFault
-from .identity import remark
+from .identity import describe_mismatch
 from .offsets import PLACES
 from .port import Port
 from .probe import probe, read_identity
 from .settings import Settings
-from .setup import configure, configured, quiet, reset, restart_fifo, wake
-from .tally import REMEDY, Tally
+from .setup import configure, is_configured, reset, restart_fifo, stop_fifo, wake
+from .transfer_stats import REMEDY, TransferStats
 
 DRIVER_VERSION = 6
 
-# so long without a sample that can be believed, and the driver gives up
+# so long without a sample that can be accepted, and the driver gives up
 DEAD_NS = 2_000_000_000
 # a host that slept for a while says nothing about the chip
 LONGEST_POLL_NS = 500_000_000
@@ -57,7 +57,7 @@ NO_FIFO = "the chip's FIFO stays empty, so that its samples are read one by one 
 
 
 class Need(Enum):
-    """What has to be done before the next samples can be believed."""
+    """What has to be done before the next samples can be accepted."""
 
     NOTHING = auto()
     RESTART = auto()
@@ -80,11 +80,11 @@ class Driver:
     ----------
     bus : where the chip is. config : how it is to measure. name : what to call its recording.
     say : is told what a person should know of this chip as it starts, and of its bus as it stops: one sentence, no full
-        stop. tally : counts the transfers.
+        stop. stats : counts the transfers.
 
     Attributes
     ----------
-    faults : how often what was read was not believed, by kind.
+    faults : how often what was read was not accepted, by kind.
     """
 
     def __init__(
@@ -93,11 +93,11 @@ class Driver:
         config: Config | None = None,
         name: str = "recording",
         say: Callable[[str], None] = lambda _sentence: None,
-        tally: Tally | None = None,
+        stats: TransferStats | None = None,
     ) -> None:
         self._say = say
         self._decoder = Decoder(name)
-        self._port = Port(bus, self._decoder, tally)
+        self._port = Port(bus, self._decoder, stats)
         self._config = config or Config()
         self._settings: Settings | None = None
         self._polls = 0
@@ -138,7 +138,7 @@ class Driver:
         configure(self._port, self._settings)
         self._restart()
         no_fifo = NO_FIFO if self._settings.polled else None
-        for sentence in filter(None, (remark(self._settings.sensor), self._correction(), no_fifo)):
+        for sentence in filter(None, (describe_mismatch(self._settings.sensor), self._correction(), no_fifo)):
             self._say(sentence)
         sensor = self._settings.sensor
         return replace(sensor, rate_hz=self._config.rate_hz) if self._settings.polled else sensor
@@ -183,11 +183,11 @@ class Driver:
     def stop(self) -> None:
         """Quiet the FIFO, if the bus still works; the chip stays awake."""
         with suppress(BusError, EndOfCapture):
-            quiet(self._port)
-        if self.flipped > MANY_FLIPPED * self._decoder.believed:
+            stop_fifo(self._port)
+        if self.flipped > MANY_FLIPPED * self._decoder.accepted:
             self._say(f"{self.flipped} samples had a bit flipped on the bus and were set right: {REMEDY}")
-        if self._port.tally.errors:
-            self._say(f"{self._port.tally}: {self._port.tally.remedy}")
+        if self._port.stats.errors:
+            self._say(f"{self._port.stats}: {self._port.stats.remedy}")
 
     def _look_before_reset(self) -> None:
         # the reset reloads the factory's trim: what somebody wrote before is kept in the capture, wherever it is
@@ -211,7 +211,7 @@ class Driver:
         )
 
     def _drain(self, settings: Settings) -> Need:
-        """Read all whole frames, and say what they need to be believed."""
+        """Read all whole frames, and say what they need to be accepted."""
         count, begun_ns = self._fifo_count(settings.frame_bytes), self._port.now_ns
         self._plan_next_poll()
         if count >= settings.part.fifo_bytes - SPARE_FRAMES * settings.frame_bytes:
@@ -220,8 +220,8 @@ class Driver:
         frames = count // settings.frame_bytes
         try:
             if frames:
-                self._port.read_away(reg.FIFO_R_W, frames * settings.frame_bytes)
-            self._port.read_away(reg.INT_ENABLE, STATUS_BYTES)
+                self._port.read_destructive(reg.FIFO_R_W, frames * settings.frame_bytes)
+            self._port.read_destructive(reg.INT_ENABLE, STATUS_BYTES)
         except BusError:
             # the bytes, or the flag, that went by are gone: a second read would begin within a frame
             return Need.RESTART
@@ -262,7 +262,7 @@ class Driver:
 
     def _recover(self, settings: Settings) -> None:
         """Start the FIFO anew; before that, set up a chip that has lost its settings or repeats itself."""
-        if self._need is not Need.SET_UP and not configured(self._port, settings):
+        if self._need is not Need.SET_UP and not is_configured(self._port, settings):
             self.faults[FifoFault.LOST] += 1
             self._need = Need.SET_UP
         if self._need is Need.SET_UP:
@@ -296,7 +296,7 @@ class Driver:
 
     def _plan_next_poll(self) -> None:
         period_s = self._config.period_s
-        in_s = period_s + look_phase(self._polls) * min(period_s, 1 / self._config.rate_hz)
+        in_s = period_s + poll_phase(self._polls) * min(period_s, 1 / self._config.rate_hz)
         self._polls += 1
         self._next_poll_ns = self._port.now_ns + round(in_s * 1e9)
 
@@ -308,7 +308,7 @@ class Driver:
     def _why_dead(self, settings: Settings) -> ChipError:
         """What two seconds without a sample come from."""
         chip = settings.part.chip
-        if not configured(self._port, settings):
+        if not is_configured(self._port, settings):
             return ChipError(
                 f"the {chip} loses its settings again and again",
                 "its supply breaks down: check the wires and connectors, then start again",
@@ -320,7 +320,7 @@ class Driver:
                 " replace the chip",
             )
         return ChipError(
-            f"the {chip} gave no sample that can be believed for {DEAD_NS * 1e-9:g} s",
+            f"the {chip} gave no sample that can be accepted for {DEAD_NS * 1e-9:g} s",
             "take its supply away for a moment, slow the bus down or the rate, and start again",
         )
 

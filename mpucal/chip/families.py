@@ -58,7 +58,7 @@ class Family:
     accel_offset_lsb_per_g : nominal scale of such a 16-bit word; bit 0 is reserved.
     gyro_range_shift : position of FS_SEL in GYRO_CONFIG.
     has_accel_config2 : the accelerometer's filter has a register of its own, ACCEL_CONFIG2, which also lets it measure
-        alone at ACCEL_ALONE_HZ.
+        alone at ACCEL_ONLY_HZ.
     packed_self_test : the factory's self-test codes are 5 bits each in SELF_TEST_ACCEL and the three registers
         after it; otherwise 8 bits each, from SELF_TEST_GYRO and from SELF_TEST_ACCEL on.
     asleep : it sleeps after power-on and reset.
@@ -278,6 +278,6 @@ def known_parts() -> str:
     return ", ".join(f"0x{value:02x} {part.chip}" for value, part in sorted(PARTS.items()))
 
 
-def of_fifo(fifo_bytes: int) -> tuple[Family, ...]:
+def families_with_fifo(fifo_bytes: int) -> tuple[Family, ...]:
     """The families whose FIFO holds `fifo_bytes`, or nearly so."""
     return tuple(family for family in FAMILIES if abs(fifo_bytes - family.fifo_bytes) <= FIFO_SLACK_BYTES)

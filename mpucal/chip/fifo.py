@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from ..data import Mask, Recording, Samples, Sensor, Vector
 from . import registers as reg
-from .clock import NS, SampleClock, Times, increasing
-from .flips import Flips
+from .bit_flips import BitFlipFilter
+from .clock import NS, SampleClock, Times, make_increasing
 from .host_clock import HostClock
-from .looked import LookedClock
+from .polled_clock import PolledClock
 from .settings import Settings
 
 Counts = NDArray[np.int16]
@@ -62,19 +62,19 @@ class Run:
 class FifoDecoder:
     """Turns what was read from the FIFO into samples; live and from a capture alike.
 
-    A poll is `counted`, then `data` if there was any, then `judged` by the overflow flag: what was read is
-    believed only then, since the FIFO may have overflowed while it was read. `reset` whenever the FIFO was.
+    A poll is `set_count`, then `data` if there was any, then `finish_poll` by the overflow flag: what was read is
+    accepted only then, since the FIFO may have overflowed while it was read. `reset` whenever the FIFO was.
     """
 
     def __init__(self, settings: Settings) -> None:
         self._settings, self._columns = settings, settings.columns
-        clock = LookedClock if settings.polled else SampleClock
-        self._clock: SampleClock | LookedClock = clock(settings.nominal_rate_hz)
+        clock = PolledClock if settings.polled else SampleClock
+        self._clock: SampleClock | PolledClock = clock(settings.nominal_rate_hz)
         self._host = HostClock()
         self._runs: list[Run] = []
         self._taken = 0
         self._begun = False
-        self._believed = self._warmth = 0
+        self._accepted = self._warmth = 0
         self._temperature: int | None = None
         self._read = 0
         self._look: tuple[int, int] | None = None
@@ -83,16 +83,16 @@ class FifoDecoder:
         self._last_t_s: float | None = None
         self._stuck_frames = max(STUCK_FRAMES, math.ceil(STUCK_S * settings.nominal_rate_hz))
         self._alike = np.zeros((0, settings.frame_words), np.int16)
-        self._flips = Flips(settings.frame_words)
+        self._flips = BitFlipFilter(settings.frame_words)
 
     @property
-    def believed(self) -> int:
-        """How many frames were believed."""
-        return self._believed
+    def accepted(self) -> int:
+        """How many frames were accepted."""
+        return self._accepted
 
     @property
     def polled(self) -> bool:
-        """Whether samples are read one by one; each is `counted`, `data` and `judged`."""
+        """Whether samples are read one by one; each is `set_count`, `data` and `finish_poll`."""
         return self._settings.polled
 
     @property
@@ -105,29 +105,29 @@ class FifoDecoder:
         """How many words had a bit flipped on their way, and were set right."""
         return self._flips.found
 
-    def temperature(self, count: int) -> None:
+    def set_temperature(self, count: int) -> None:
         """The temperature register shows `count`: what an aligned frame will show too."""
         self._temperature = count
 
-    def heard(self, t_ns: int, host_ns: int) -> None:
+    def add_clock_pair(self, t_ns: int, host_ns: int) -> None:
         """What was done at `t_ns` was heard of at `host_ns`, see Reply; by a reply that is like all others told of."""
-        self._host.saw(t_ns, host_ns)
+        self._host.add(t_ns, host_ns)
 
-    def heard_many(self, t_ns: Whole, host_ns: Whole) -> None:
+    def add_clock_pairs(self, t_ns: Whole, host_ns: Whole) -> None:
         """The same of (n,) replies."""
-        self._host.saw_many(t_ns, host_ns)
+        self._host.add_many(t_ns, host_ns)
 
-    def counted(self, t_ns: int, count_bytes: int) -> None:
+    def set_count(self, t_ns: int, count_bytes: int) -> None:
         """The FIFO held `count_bytes` at `t_ns`."""
         frames, self._odd_bytes = divmod(count_bytes, self._settings.frame_bytes)
         self._pending.clear()
         self._look = (t_ns, self._read + frames)
 
-    def data(self, data: bytes) -> None:
+    def add_bytes(self, data: bytes) -> None:
         """`data` was read from the FIFO."""
         self._pending += data
 
-    def judged(self, overflow: bool, lost: bool = False) -> FifoFault | None:
+    def finish_poll(self, overflow: bool, lost: bool = False) -> FifoFault | None:
         """Believe what the poll read, or say why not; then only a reset helps.
 
         Frames at the end that are all alike wait until one that is not follows them.
@@ -141,12 +141,12 @@ class FifoDecoder:
             return FifoFault.OVERFLOW
         if self._odd_bytes or len(data) % self._settings.frame_bytes:
             return FifoFault.MISALIGNED
-        if look is not None and isinstance(self._clock, LookedClock) and self._clock.late(look[0]):
+        if look is not None and isinstance(self._clock, PolledClock) and self._clock.is_late(look[0]):
             return FifoFault.LATE
         frames = np.frombuffer(data, ">i2").reshape(-1, self._settings.frame_words).astype(np.int16)
         # frames that wait for others, all alike, have nothing flipped
         last = self._runs[-1].frames if self._runs and not len(self._alike) else self._alike
-        kept = self._flips.mended(frames[max(DROPPED_FRAMES - self._read, 0) :], last)
+        kept = self._flips.repair(frames[max(DROPPED_FRAMES - self._read, 0) :], last)
         if not self._aligned(kept):
             return FifoFault.MISALIGNED
         self._read += len(frames)
@@ -154,12 +154,12 @@ class FifoDecoder:
         if self._stuck(kept):
             return FifoFault.STUCK
         if look is not None:
-            self._clock.look(*look)
-        self._believe(kept)
+            self._clock.add(*look)
+        self._accept(kept)
         return None
 
-    def plain_polls(self, looks_ns: Whole, frames: Counts, lengths: Whole) -> int:
-        """How many of the next polls had nothing about them, and were believed at once; the others are still to come.
+    def accept_plain_polls(self, looks_ns: Whole, frames: Counts, lengths: Whole) -> int:
+        """How many of the next polls had nothing about them, and were accepted at once; the others are still to come.
 
         Of each poll, `looks_ns` (k,) when it counted what it read, `lengths` (k,) the frames of that, one at least, of
         all `frames` (n, words): the FIFO did not overflow.
@@ -168,37 +168,37 @@ class FifoDecoder:
             return 0
         ends = np.cumsum(lengths)
         odd = (frames[1:] == frames[:-1]).all(axis=1)
-        if not self._settings.accel_alone:
+        if not self._settings.accel_only:
             warmth = frames[:, self._columns.temperature].astype(np.int64)
             before = warmth[0] if self._temperature is None else self._temperature
             odd = np.concatenate((odd, [False])) | (np.abs(np.diff(warmth, prepend=before)) > MAX_TEMPERATURE_STEP)
         plain = int(np.searchsorted(ends, np.argmax(odd), side="right")) if odd.any() else len(lengths)
-        plain = self._flips.untouched(frames[: ends[plain - 1]], lengths[:plain]) if plain else 0
+        plain = self._flips.skip_clean(frames[: ends[plain - 1]], lengths[:plain]) if plain else 0
         if not plain:
             return 0
         kept = frames[: ends[plain - 1]]
-        self._clock.looks(looks_ns[:plain], self._read + ends[:plain])
+        self._clock.add_many(looks_ns[:plain], self._read + ends[:plain])
         self._runs.append(Run(self._clock.segment, self._read, kept, gap=False))
         self._read += len(kept)
-        self._believed += len(kept)
-        if not self._settings.accel_alone:
+        self._accepted += len(kept)
+        if not self._settings.accel_only:
             self._temperature = int(warmth[len(kept) - 1])
             self._warmth += int(warmth[: len(kept)].sum())
         return plain
 
-    def _believe(self, kept: Counts) -> None:
+    def _accept(self, kept: Counts) -> None:
         """Keep all but the run of frames alike at the end, which the next poll decides on."""
         differ = np.flatnonzero((kept[1:] != kept[:-1]).any(axis=1))
         alike = len(kept) - (int(differ[-1]) + 1 if len(differ) else 0)
-        believed = len(kept) - alike if alike > 1 else len(kept)
-        self._alike = kept[believed:]
-        if believed:
+        accepted = len(kept) - alike if alike > 1 else len(kept)
+        self._alike = kept[accepted:]
+        if accepted:
             first = self._read - len(kept)
-            self._runs.append(Run(self._clock.segment, first, kept[:believed], gap=self._gap_before(first)))
+            self._runs.append(Run(self._clock.segment, first, kept[:accepted], gap=self._gap_before(first)))
             self._begun = True
-            self._believed += believed
-            if not self._settings.accel_alone:
-                self._warmth += int(kept[:believed, self._columns.temperature].sum(dtype=np.int64))
+            self._accepted += accepted
+            if not self._settings.accel_only:
+                self._warmth += int(kept[:accepted, self._columns.temperature].sum(dtype=np.int64))
 
     def _stuck(self, kept: Counts) -> bool:
         """Whether a frame repeats itself for too long."""
@@ -282,7 +282,7 @@ class FifoDecoder:
         return lambda segment, index: host_s(times_s(segment, index))
 
     def _aligned(self, frames: Counts) -> bool:
-        if not len(frames) or self._settings.accel_alone:
+        if not len(frames) or self._settings.accel_only:
             return True
         temperature = frames[:, self._columns.temperature].astype(np.int64)
         before = temperature[0] if self._temperature is None else self._temperature
@@ -300,14 +300,14 @@ class FifoDecoder:
         """The same, each later than `last_t_s`."""
         if last_t_s is None:
             return samples
-        t = increasing(np.concatenate(([last_t_s], samples.t)), LEAST_STEP / self._clock.rate_hz)[1:]
+        t = make_increasing(np.concatenate(([last_t_s], samples.t)), LEAST_STEP / self._clock.rate_hz)[1:]
         return replace(samples, t=t)
 
     def _samples(self, runs: list[Run], times_s: Times) -> Samples:
         if not runs:
             return Samples.empty()
         frames = np.concatenate([run.frames for run in runs])
-        settings, alone, n = self._settings, self._settings.accel_alone, len(frames)
+        settings, alone, n = self._settings, self._settings.accel_only, len(frames)
         gap = np.zeros(n, bool)
         gap[np.cumsum([0] + [len(run.frames) for run in runs[:-1]])] = [run.gap for run in runs]
         accel, gyro = frames[:, self._columns.accel], frames[:, self._columns.gyro]
@@ -328,14 +328,14 @@ class FifoDecoder:
     @property
     def _mean_c(self) -> float | None:
         """Of all frames; where they hold no temperature, what its register showed last."""
-        if self._settings.accel_alone:
+        if self._settings.accel_only:
             return None if self._temperature is None else float(self._celsius(self._temperature))
-        return float(self._celsius(self._warmth / self._believed))
+        return float(self._celsius(self._warmth / self._accepted))
 
     def _times_s(self, runs: list[Run], times_s: Times) -> Vector:
         segment = np.concatenate([np.full(len(run.frames), run.segment) for run in runs])
         index = np.concatenate([np.arange(run.first, run.first + len(run.frames)) for run in runs])
-        return increasing(times_s(segment, index), LEAST_STEP / self._clock.rate_hz)
+        return make_increasing(times_s(segment, index), LEAST_STEP / self._clock.rate_hz)
 
 
 def _clipped(counts: Counts) -> Mask:

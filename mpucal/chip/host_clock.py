@@ -87,7 +87,7 @@ class HostClock:
     def __bool__(self) -> bool:
         return bool(self._times)
 
-    def saw(self, t_ns: int, host_ns: int) -> None:
+    def add(self, t_ns: int, host_ns: int) -> None:
         """A reply about what happened at `t_ns` of the bus's clock came in at `host_ns`."""
         if self._times and t_ns <= self._times[-1]:
             return
@@ -95,7 +95,7 @@ class HostClock:
         self._heard.append(host_ns)
         self._estimate_if_due()
 
-    def saw_many(self, t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> None:
+    def add_many(self, t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> None:
         """The same of (n,) replies, of which one estimate is made at most."""
         latest = np.concatenate(([self._times[-1] if self._times else t_ns[0] - 1], t_ns))
         later = t_ns > np.maximum.accumulate(latest)[:-1]
@@ -123,14 +123,14 @@ class HostClock:
 
     def fit(self) -> ClockFit:
         """The parabola under all pairs; there is one at least."""
-        return fitted(np.array(self._times), np.array(self._heard))
+        return fit_pairs(np.array(self._times), np.array(self._heard))
 
     def final(self) -> Callable[[Vector], Vector]:
         """Times (n,) [s] of the bus's clock to times at the host's rate, by all pairs."""
         return self.fit().host_s if self else lambda t_s: t_s
 
 
-def fitted(t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> ClockFit:
+def fit_pairs(t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> ClockFit:
     """The parabola under (n,) times of the bus and the host."""
     first_s, last_s = int(t_ns[0]) * NS, int(t_ns[-1]) * NS
     mid_ns = (int(t_ns[0]) + int(t_ns[-1])) // 2

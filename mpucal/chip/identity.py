@@ -16,7 +16,7 @@ from dataclasses import replace
 from ..data import Sensor
 from ..errors import ChipError
 from . import registers as reg
-from .families import FIFO_SLACK_BYTES, PARTS, Family, Part, of_fifo, part_of
+from .families import FIFO_SLACK_BYTES, PARTS, Family, Part, families_with_fifo, part_of
 
 # magnitudes [g] that a board in somebody's hand shows, at half the sensitivity
 HALF_G = (0.35, 0.65)
@@ -38,7 +38,7 @@ class Behaviour:
         """The chip was reset."""
         self._was_reset = True
 
-    def saw(self, register: int, data: bytes, held: Mapping[int, int]) -> None:
+    def observe(self, register: int, data: bytes, held: Mapping[int, int]) -> None:
         """`data` was read from `register` on, while the registers were known to hold `held`."""
         if register == reg.FIFO_COUNT_H and (held.get(reg.FIFO_EN) or held.get(reg.USER_CTRL)):
             shown, before = int.from_bytes(data, "big"), self._shown_bytes
@@ -67,7 +67,9 @@ class Behaviour:
         """
         if self.fifo_bytes is None:
             return part_of(who_am_i)
-        part = replace(self._behaving(who_am_i, self.fifo_bytes), wide_fifo_bytes=self._wide_bytes(self.fifo_bytes))
+        part = replace(
+            self._part_by_behaviour(who_am_i, self.fifo_bytes), wide_fifo_bytes=self._wide_bytes(self.fifo_bytes)
+        )
         revision = part.family.half_range_revision
         if revision and self._magnitudes_g and HALF_G[0] < _median(self._magnitudes_g) < HALF_G[1]:
             return replace(part, chip=f"{part.chip}{revision}", accel_sensitivity=HALF)
@@ -78,12 +80,12 @@ class Behaviour:
         wide = self._fifo_bytes.get(True, 0)
         return wide if wide > fifo_bytes + FIFO_SLACK_BYTES else None
 
-    def _behaving(self, who_am_i: int, fifo_bytes: int) -> Part:
+    def _part_by_behaviour(self, who_am_i: int, fifo_bytes: int) -> Part:
         known = PARTS.get(who_am_i)
         if known is not None and self._fits(known.family, fifo_bytes):
             nearly = abs(fifo_bytes - known.family.fifo_bytes) <= FIFO_SLACK_BYTES
             return known if nearly else _with_fifo(known, fifo_bytes)
-        alike = max(of_fifo(fifo_bytes), key=self._likeness, default=None)
+        alike = max(families_with_fifo(fifo_bytes), key=self._similarity, default=None)
         if alike is not None:
             return Part(alike.name, who_am_i, alike)
         if known is not None:
@@ -100,7 +102,7 @@ class Behaviour:
         nearly = any(abs(fifo_bytes - size) <= FIFO_SLACK_BYTES for size in sizes)
         return nearly and self._fifo_en in (None, reg.FIFO_EN_FRAME, family.fifo_en_frame)
 
-    def _likeness(self, family: Family) -> tuple[int, int]:
+    def _similarity(self, family: Family) -> tuple[int, int]:
         """How many of the other signs speak for this row, and how near its FIFO is."""
         wide = self._wide_bytes(self.fifo_bytes or 0) or 0
         signs = (
@@ -115,7 +117,7 @@ def _with_fifo(part: Part, fifo_bytes: int) -> Part:
     return replace(part, family=replace(part.family, fifo_bytes=fifo_bytes))
 
 
-def remark(sensor: Sensor) -> str | None:
+def describe_mismatch(sensor: Sensor) -> str | None:
     """What a person should know of a chip that is not what it says it is; None of any other."""
     if sensor.chip is None or sensor.who_am_i is None:
         return None

@@ -32,7 +32,7 @@ RESTORE_WAITS_NS = tuple(1_000_000 * 4**i for i in range(7))
 
 
 @dataclass(frozen=True)
-class Block:
+class OffsetRegisters:
     """All bytes from the first offset register to the last, so that one transfer writes the three axes.
 
     Attributes
@@ -54,12 +54,12 @@ class Block:
         x, y, z = (int.from_bytes(self.data[high - self.place[0] :][:2], "big", signed=True) for high in self.place)
         return x, y, z
 
-    def with_words(self, words: Sequence[int]) -> Block:
+    def with_words(self, words: Sequence[int]) -> OffsetRegisters:
         """The same with other words; what lies between them stays."""
         data = bytearray(self.data)
         for high, word in zip(self.place, words, strict=True):
             data[high - self.place[0] : high - self.place[0] + 2] = word.to_bytes(2, "big", signed=True)
-        return Block(self.place, bytes(data))
+        return OffsetRegisters(self.place, bytes(data))
 
     def write(self, port: Port) -> bool:
         """Write it in one transfer; True where the chip then holds it. BusError where that cannot be told."""
@@ -67,7 +67,7 @@ class Block:
         return port.read(self.place[0], len(self.data)) == self.data
 
 
-def moved(words: Words, counts: Iterable[float]) -> Words:
+def shift_words(words: Words, counts: Iterable[float]) -> Words:
     """`words` moved by `counts`, rounded to what [15:1] can say; bit 0 stays as it is.
 
     Raises
@@ -85,14 +85,14 @@ def moved(words: Words, counts: Iterable[float]) -> Words:
     return x, y, z
 
 
-def difference(new: Words, old: Words) -> tuple[int, int, int]:
+def word_difference(new: Words, old: Words) -> tuple[int, int, int]:
     """By how many counts `new` acts more than `old`: bit 0 does nothing."""
     x, y, z = ((a & ~RESERVED) - (b & ~RESERVED) for a, b in zip(new, old, strict=True))
     return x, y, z
 
 
 @contextmanager
-def restored(port: Port, old: Block) -> Iterator[None]:
+def restoring(port: Port, old: OffsetRegisters) -> Iterator[None]:
     """Meanwhile other words may be written there; `old` is there again afterwards, whatever happens.
 
     Raises
@@ -105,7 +105,7 @@ def restored(port: Port, old: Block) -> Iterator[None]:
         restore(port, old)
 
 
-def restore(port: Port, old: Block) -> None:
+def restore(port: Port, old: OffsetRegisters) -> None:
     """Write `old` where it is not there, again and again for as long as a bad contact may last.
 
     Raises
@@ -114,7 +114,7 @@ def restore(port: Port, old: Block) -> None:
     """
     for wait_ns in RESTORE_WAITS_NS:
         try:
-            if Block.read(port, old.place) == old or old.write(port):
+            if OffsetRegisters.read(port, old.place) == old or old.write(port):
                 return
         except BusError:
             pass

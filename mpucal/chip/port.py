@@ -8,7 +8,7 @@ from typing import TypeVar
 from ..errors import BusError, NoAnswer
 from .access import Bus
 from .decode import Decoder
-from .tally import Tally
+from .transfer_stats import TransferStats
 
 TRIES = 3
 RETRY_NS = 1_000_000
@@ -23,11 +23,11 @@ class Port:
 
     Attributes
     ----------
-    tally : counts the transfers.
+    stats : counts the transfers.
     """
 
-    def __init__(self, bus: Bus, decoder: Decoder, tally: Tally | None = None) -> None:
-        self.tally = Tally() if tally is None else tally
+    def __init__(self, bus: Bus, decoder: Decoder, stats: TransferStats | None = None) -> None:
+        self.stats = TransferStats() if stats is None else stats
         self._bus = bus
         self._decoder = decoder
         self._now_ns = 0
@@ -41,7 +41,7 @@ class Port:
         """`count` bytes from `register` on; up to three tries."""
         return self._retried(lambda: self._read(register, count))
 
-    def read_away(self, register: int, count: int) -> bytes:
+    def read_destructive(self, register: int, count: int) -> bytes:
         """The same where reading takes something away from the chip, so that a second read gives something else.
 
         Repeated only where nothing was acknowledged: a chip is addressed before it gives its first byte.
@@ -51,7 +51,7 @@ class Port:
     def _read(self, register: int, count: int) -> bytes:
         reply = self._counted(lambda: self._bus.read(register, count))
         self._now_ns = max(self._now_ns, reply.t_ns)
-        self._decoder.saw_read(register, reply.data, reply.t_ns, reply.host_ns)
+        self._decoder.feed_read(register, reply.data, reply.t_ns, reply.host_ns)
         return reply.data
 
     def write(self, register: int, value: int) -> None:
@@ -62,7 +62,7 @@ class Port:
         """Write `data` from `register` on, in one transfer; up to three tries."""
         t_ns = self._retried(lambda: self._counted(lambda: self._bus.write(register, data)))
         self._now_ns = max(self._now_ns, t_ns)
-        self._decoder.saw_write(register, data)
+        self._decoder.feed_write(register, data)
 
     def sleep_until(self, t_ns: int) -> None:
         """Wait until the bus's clock shows `t_ns`."""
@@ -74,11 +74,11 @@ class Port:
         self.sleep_until(self._now_ns + ns)
 
     def _counted(self, access: Callable[[], T]) -> T:
-        self.tally.transfers += 1
+        self.stats.transfers += 1
         try:
             return access()
         except BusError as error:
-            self.tally.failed(error)
+            self.stats.failed(error)
             raise
 
     def _retried(self, access: Callable[[], T], of: type[BusError] = BusError) -> T:
@@ -87,5 +87,5 @@ class Port:
                 return access()
             except of:
                 self.sleep(RETRY_NS)
-                self.tally.retries += 1
+                self.stats.retries += 1
         return access()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ..errors import ChipError
 from . import registers as reg
-from .families import PARTS, known_parts, of_fifo
+from .families import PARTS, families_with_fifo, known_parts
 from .port import Port
 
 MS = 1_000_000
@@ -30,13 +30,13 @@ def read_identity(port: Port) -> int:
     ------
     ChipError : it is something else, which must not be written to.
     """
-    who_am_i = _settled(port)
+    who_am_i = _read_stable_identity(port)
     if who_am_i in PARTS:
         return who_am_i
     head = port.read(0, 7)
     power = port.read(reg.PWR_MGMT_1, 1)[0]
     count = int.from_bytes(port.read(reg.FIFO_COUNT_H, 2), "big")
-    if _shows_a_time(head):
+    if _is_clock_time(head):
         raise ChipError(
             "the chip at this address is a real-time clock (a DS1307 or DS3231), not an MPU",
             "tie the MPU's AD0 to VCC and give --address 0x69",
@@ -55,7 +55,7 @@ def read_identity(port: Port) -> int:
     return who_am_i
 
 
-def _settled(port: Port) -> int:
+def _read_stable_identity(port: Port) -> int:
     """What WHO_AM_I shows twice in a row: everything depends on it, and a bit may flip on the way."""
     before = None
     for _ in range(IDENTITY_TRIES):
@@ -76,24 +76,24 @@ def probe(port: Port) -> None:
     ------
     ChipError : its FIFO does not fill.
     """
-    full = _filled(port)
+    full = _fill_fifo(port)
     if full is None:
         raise ChipError(
             "the chip's FIFO does not fill as its register map says",
             "take its supply away for a moment; if it stays so, the chip is broken or no MPU",
         )
-    if any(family.widest_fifo_bytes for family in of_fifo(full)):
+    if any(family.widest_fifo_bytes for family in families_with_fifo(full)):
         # while the FIFO is stopped: what a change of size does to one that runs is nowhere written
         port.write(reg.ACCEL_CONFIG2, reg.FIFO_SIZE)
-        if _filled(port) is None:
+        if _fill_fifo(port) is None:
             port.write(reg.ACCEL_CONFIG2, 0)
-    if any(family.half_range_revision for family in of_fifo(full)):
+    if any(family.half_range_revision for family in families_with_fifo(full)):
         for _ in range(SIGHTS):
             port.sleep(SIGHT_NS)
             port.read(reg.ACCEL_XOUT_H, 6)
 
 
-def _filled(port: Port) -> int | None:
+def _fill_fifo(port: Port) -> int | None:
     """How many bytes the FIFO holds once they do not get more; None where they never do. Stopped before and after.
 
     0 where it stays empty.
@@ -114,7 +114,7 @@ def _filled(port: Port) -> int | None:
     return full if most else 0
 
 
-def _shows_a_time(head: bytes) -> bool:
+def _is_clock_time(head: bytes) -> bool:
     """Whether the first seven registers are seconds, minutes, hours, weekday, day, month, year, as decimal digits."""
     low = (0, 0, 0, 1, 1, 1, 0)
     high = (59, 59, 23, 7, 31, 12, 99)

@@ -97,7 +97,7 @@ GYRO_OFFSET_LSB_PER_DPS: Final = 32.75
 DLPF_CODES: Final = (0, 1, 2, 3, 4, 5, 6)
 MAX_RATE_HZ: Final = 1000.0
 # ACCEL_FCHOICE_B takes the accelerometer past its filter, and the gyroscope no longer sets the pace in standby
-ACCEL_ALONE_HZ: Final = 4000.0
+ACCEL_ONLY_HZ: Final = 4000.0
 
 
 def mps2_per_lsb(afs_sel: int) -> float:
@@ -134,6 +134,6 @@ def sample_rate_divider(rate_hz: float, dlpf_cfg: int) -> int:
         raise UsageError(
             f"the chip has no sample rate of {rate_hz:g} Hz with its low-pass filter at {dlpf_cfg}",
             f"take {nearest:g} Hz, or another {base:g} Hz / n from {base / 256:.4g} to {MAX_RATE_HZ:g} Hz, or"
-            f" {ACCEL_ALONE_HZ:g} Hz of an MPU-6500's accelerometer alone",
+            f" {ACCEL_ONLY_HZ:g} Hz of an MPU-6500's accelerometer alone",
         )
     return int(divider)

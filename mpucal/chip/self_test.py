@@ -12,9 +12,9 @@ import numpy as np
 
 from ..data import Vector
 from . import registers as reg
-from .bench import check_kept
 from .families import Part
 from .port import Port
+from .quick_measure import check_registers
 
 SETTLE_NS, LOOK_NS, LOOKS = 250_000_000, 5_000_000, 100
 
@@ -61,7 +61,7 @@ def run_self_test(port: Port, part: Part) -> SelfTest:
         port.write_block(reg.GYRO_CONFIG, held)
         port.sleep(SETTLE_NS)
     for register, value in kept:
-        check_kept(port, register, value)
+        check_registers(port, register, value)
     accel = (on - off)[:3] / (reg.ACCEL_LSB_PER_G[afs_sel] * part.accel_sensitivity)
     gyro = (on - off)[4:] / reg.GYRO_LSB_PER_DPS[FS_SEL]
     accel_g, gyro_dps = _promised(port, family.packed_self_test)

@@ -23,7 +23,7 @@ class Settings:
     ----------
     part : the chip. smplrt_div, dlpf_cfg : sample rate and low-pass filter, as registers hold them.
     fs_sel, afs_sel : full scale of gyroscope and accelerometer, 0..3.
-    accel_alone : the accelerometer at ACCEL_ALONE_HZ past its filter, the gyroscope in standby.
+    accel_only : the accelerometer at ACCEL_ONLY_HZ past its filter, the gyroscope in standby.
     """
 
     part: Part
@@ -31,7 +31,7 @@ class Settings:
     dlpf_cfg: int
     fs_sel: int
     afs_sel: int
-    accel_alone: bool = False
+    accel_only: bool = False
 
     @property
     def polled(self) -> bool:
@@ -41,17 +41,17 @@ class Settings:
     @property
     def nominal_rate_hz(self) -> float:
         """The sample rate of a chip whose clock is right; none is."""
-        return reg.ACCEL_ALONE_HZ if self.accel_alone else reg.sample_rate_hz(self.smplrt_div, self.dlpf_cfg)
+        return reg.ACCEL_ONLY_HZ if self.accel_only else reg.sample_rate_hz(self.smplrt_div, self.dlpf_cfg)
 
     @property
     def fifo_en(self) -> int:
         """What goes into the FIFO."""
-        return reg.FIFO_EN_ACCEL if self.accel_alone else self.part.family.fifo_en_frame
+        return reg.FIFO_EN_ACCEL if self.accel_only else self.part.family.fifo_en_frame
 
     @property
     def frame_words(self) -> int:
         """How many words that makes a sample."""
-        if not self.accel_alone:
+        if not self.accel_only:
             return reg.FRAME_WORDS
         return reg.ACCEL_WORDS + self.part.family.fifo_en_with_temperature
 
@@ -64,7 +64,7 @@ class Settings:
     def columns(self) -> Columns:
         """Where a frame's words lie; of the accelerometer alone, its own only."""
         columns = self.part.family.columns
-        return columns._replace(accel=slice(0, reg.ACCEL_WORDS)) if self.accel_alone else columns
+        return columns._replace(accel=slice(0, reg.ACCEL_WORDS)) if self.accel_only else columns
 
     @property
     def mps2_per_lsb(self) -> float:
@@ -78,7 +78,7 @@ class Settings:
             chip=self.part.chip,
             who_am_i=self.part.who_am_i,
             accel_range_g=reg.ACCEL_RANGES_G[self.afs_sel] / self.part.accel_sensitivity,
-            gyro_range_dps=None if self.accel_alone else float(reg.GYRO_RANGES_DPS[self.fs_sel]),
+            gyro_range_dps=None if self.accel_only else float(reg.GYRO_RANGES_DPS[self.fs_sel]),
             rate_hz=self.nominal_rate_hz,
             accel_lag_s=self.part.family.accel_lag_s(self.dlpf_cfg),
         )
@@ -86,7 +86,7 @@ class Settings:
     def registers(self) -> dict[int, int]:
         """What each register is to hold, in the order of writing."""
         values = {
-            reg.PWR_MGMT_2: reg.STANDBY_GYRO if self.accel_alone else 0,
+            reg.PWR_MGMT_2: reg.STANDBY_GYRO if self.accel_only else 0,
             # a chip that was reset meanwhile is told by it, too: it is 0 then
             reg.INT_ENABLE: reg.INT_FIFO_OFLOW,
             reg.SMPLRT_DIV: self.smplrt_div,
@@ -96,7 +96,7 @@ class Settings:
         }
         if self.part.family.has_accel_config2:
             size = reg.FIFO_SIZE if self.part.wide_fifo_bytes else 0
-            values[reg.ACCEL_CONFIG2] = size | (reg.ACCEL_FCHOICE_B if self.accel_alone else self.dlpf_cfg)
+            values[reg.ACCEL_CONFIG2] = size | (reg.ACCEL_FCHOICE_B if self.accel_only else self.dlpf_cfg)
         return values
 
     @classmethod
@@ -120,5 +120,5 @@ class Settings:
             dlpf_cfg=held[reg.CONFIG] & reg.CONFIG_DLPF_CFG,
             fs_sel=held[reg.GYRO_CONFIG] >> part.family.gyro_range_shift & reg.FULL_SCALE_CODES,
             afs_sel=held[reg.ACCEL_CONFIG] >> reg.FULL_SCALE_SHIFT & reg.FULL_SCALE_CODES,
-            accel_alone=held.get(reg.PWR_MGMT_2, 0) & reg.STANDBY_GYRO == reg.STANDBY_GYRO,
+            accel_only=held.get(reg.PWR_MGMT_2, 0) & reg.STANDBY_GYRO == reg.STANDBY_GYRO,
         )

@@ -71,7 +71,7 @@ def configure(port: Port, settings: Settings) -> None:
     port.sleep(SETTLE_NS)
 
 
-def configured(port: Port, settings: Settings) -> bool:
+def is_configured(port: Port, settings: Settings) -> bool:
     """Whether the chip still holds what `configure` wrote, and is awake."""
     awake = port.read(reg.PWR_MGMT_1, 1)[0] == reg.CLKSEL_PLL
     return awake and all(port.read(register, 1)[0] == value for register, value in settings.registers().items())
@@ -102,7 +102,7 @@ def restart_fifo(port: Port, settings: Settings) -> None:
         )
 
 
-def quiet(port: Port) -> None:
+def stop_fifo(port: Port) -> None:
     """The FIFO off; the chip stays awake."""
     port.write(reg.FIFO_EN, 0)
     port.write(reg.USER_CTRL, 0)

@@ -172,7 +172,7 @@ def check_gyroscope(config: Config) -> None:
     ------
     UsageError : it is left out.
     """
-    if config.accel_alone:
+    if config.accel_only:
         raise UsageError(
             f"at {config.rate_hz:g} Hz a chip measures with its accelerometer alone, and this needs the gyroscope",
             f"take --rate 1000 or less; `mpucal record` and `mpucal stream` do with --rate {config.rate_hz:g}",

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..chip import registers as reg
-from ..chip.bench import AFS_SEL, Bench
 from ..chip.families import Part
-from ..chip.offsets import Block, moved, restored
+from ..chip.offset_response import OffsetResponse
+from ..chip.offsets import OffsetRegisters, restoring, shift_words
 from ..chip.port import Port
-from ..chip.response import Response
+from ..chip.quick_measure import AFS_SEL, TemporaryMeasurement
 from ..data import Vector
 from .dead import REPLACE, STUCK_BITS
 from .finding import Finding, Mark
@@ -24,7 +24,9 @@ STEPS = tuple(range(8, 15))
 TOLERANCE, NEARLY = 0.02, 64.0
 
 
-def examine_bits(port: Port, bench: Bench, part: Part, response: Response) -> tuple[Finding, int]:
+def examine_bits(
+    port: Port, measurement: TemporaryMeasurement, part: Part, response: OffsetResponse
+) -> tuple[Finding, int]:
     """Which high bits of x, y and z do not move, and of how many axes; the registers hold afterwards what they held.
 
     Raises
@@ -32,16 +34,16 @@ def examine_bits(port: Port, bench: Bench, part: Part, response: Response) -> tu
     BusError : a transfer failed. ChipError : the board moves, or the old words could not be restored.
     """
     lsb_per_g = reg.ACCEL_LSB_PER_G[AFS_SEL] * part.accel_sensitivity
-    old = Block.read(port, response.place)
-    before = bench.rest()
+    old = OffsetRegisters.read(port, response.place)
+    before = measurement.rest()
     away = np.where(before > 0, 1.0, -1.0)
     missed = []
-    with restored(port, old):
+    with restoring(port, old):
         for bit in STEPS:
             step = 2.0**bit / lsb_per_g * (away if bit < STEPS[-1] else -away)
-            words = moved(old.words, step / response.g_per_lsb)
+            words = shift_words(old.words, step / response.g_per_lsb)
             old.with_words(words).write(port)
-            shown = (bench.rest() - before) * lsb_per_g
+            shown = (measurement.rest() - before) * lsb_per_g
             missed.append(_missed(shown, lsb_per_g * response.g_per_lsb * np.subtract(words, old.words)))
     worst = np.array(missed).max(0)
     data = {"missed_counts": worst.tolist()}

@@ -12,19 +12,19 @@ from contextlib import suppress
 import numpy as np
 
 from ..chip.access import Bus
-from ..chip.bench import PATIENCE, Bench
 from ..chip.config import MOST_POLLED_HZ, Config
 from ..chip.decode import Decoder
 from ..chip.driver import NO_FIFO, Driver
 from ..chip.families import PARTS, Family, Part
 from ..chip.fifo import FifoFault
-from ..chip.identity import remark
-from ..chip.offsets import PLACES, Block, restore
+from ..chip.identity import describe_mismatch
+from ..chip.offset_response import OffsetResponse, measure_offset_response
+from ..chip.offsets import PLACES, OffsetRegisters, restore
 from ..chip.port import Port
 from ..chip.probe import read_identity
-from ..chip.response import Response, measured_response
+from ..chip.quick_measure import PATIENCE, TemporaryMeasurement
 from ..chip.self_test import SelfTest, run_self_test
-from ..chip.tally import REMEDY, Tally
+from ..chip.transfer_stats import REMEDY, TransferStats
 from ..data import Sensor
 from ..errors import ChipError, ChipReset, OddOffsets, SourceError
 from .bits import examine_bits
@@ -61,30 +61,30 @@ def examine(bus: Bus, config: Config, seconds: float, way: Look = examine_speed)
     ----------
     seconds : how long to watch its stream; the board is to lie still. way : examines what leads to the chip.
     """
-    tally = Tally()
-    port = Port(bus, Decoder("doctor"), tally)
+    stats = TransferStats()
+    port = Port(bus, Decoder("doctor"), stats)
     patience = IMPATIENCE
     try:
         # a stranger is not written to
         read_identity(port)
-        olds = [Block.read(port, place) for place in PLACES]
+        olds = [OffsetRegisters.read(port, place) for place in PLACES]
         yield from way(bus)
-        with suppress(ChipError), Bench(port) as bench:
+        with suppress(ChipError), TemporaryMeasurement(port) as measurement:
             # until the board is put down; one that is not is told of later
-            bench.rest()
+            measurement.rest()
             patience = PATIENCE
     except SourceError as error:
-        yield from _transfers(tally)
+        yield from _transfers(stats)
         yield failed("chip", error)
         return
-    driver = Driver(bus, config, "doctor", tally=tally)
+    driver = Driver(bus, config, "doctor", stats=stats)
     try:
         yield from _awake(port, driver, config, seconds, olds, patience)
     except SourceError as error:
-        yield from _transfers(tally)
+        yield from _transfers(stats)
         yield failed("broken off", error)
     else:
-        yield from _transfers(tally, always=True)
+        yield from _transfers(stats, always=True)
     finally:
         driver.stop()
         with suppress(SourceError):
@@ -92,19 +92,19 @@ def examine(bus: Bus, config: Config, seconds: float, way: Look = examine_speed)
                 restore(port, old)
 
 
-def _transfers(tally: Tally, always: bool = False) -> Iterator[Finding]:
+def _transfers(stats: TransferStats, always: bool = False) -> Iterator[Finding]:
     """How many failed; not of a bus on which nothing worked."""
-    data = {"transfers": tally.transfers, "retries": tally.retries, "errors": dict(tally.errors)}
-    if not tally.errors:
+    data = {"transfers": stats.transfers, "retries": stats.retries, "errors": dict(stats.errors)}
+    if not stats.errors:
         if always:
-            yield Finding("transfers", Mark.OK, str(tally), "", data)
+            yield Finding("transfers", Mark.OK, str(stats), "", data)
         return
-    if always or tally.share < MOST:
-        yield Finding("transfers", Mark.BAD if tally.share > MANY else Mark.NOTE, str(tally), tally.remedy, data)
+    if always or stats.share < MOST:
+        yield Finding("transfers", Mark.BAD if stats.share > MANY else Mark.NOTE, str(stats), stats.remedy, data)
 
 
 def _awake(
-    port: Port, driver: Driver, config: Config, seconds: float, olds: list[Block], patience: int
+    port: Port, driver: Driver, config: Config, seconds: float, olds: list[OffsetRegisters], patience: int
 ) -> Iterator[Finding]:
     sensor = driver.start()
     part, family = driver.part, driver.part.family
@@ -140,16 +140,16 @@ def _awake(
 
 
 def _identity(sensor: Sensor) -> Finding:
-    other = remark(sensor)
+    other = describe_mismatch(sensor)
     data = {"chip": sensor.chip, "who_am_i": sensor.who_am_i, "accel_range_g": sensor.accel_range_g}
     if other is None:
         return Finding("chip", Mark.OK, f"{sensor.chip}, WHO_AM_I 0x{sensor.who_am_i or 0:02x}", "", data)
     return Finding("chip", Mark.NOTE, other, "", data)
 
 
-def _held(port: Port, family: Family, olds: list[Block]) -> Finding:
+def _held(port: Port, family: Family, olds: list[OffsetRegisters]) -> Finding:
     old = next(block for block in olds if block.place == family.accel_offset_h)
-    trim = Block.read(port, old.place).words
+    trim = OffsetRegisters.read(port, old.place).words
     data = {"held": list(old.words), "trim": list(trim), "place": old.place[0]}
     if old.words == trim:
         return Finding("factory trim", Mark.OK, f"{', '.join(map(str, trim))} at 0x{old.place[0]:02x}", "", data)
@@ -190,15 +190,15 @@ def _shifted(port: Port, part: Part, patience: int) -> Iterator[tuple[Finding, l
     """What the offset registers do, and the bits that do not move when they shift what is measured."""
     family, odd = part.family, None
     try:
-        with Bench(port, patience) as bench:
+        with TemporaryMeasurement(port, patience) as measurement:
             try:
-                response = measured_response(port, bench, family.accel_offset_h)
+                response = measure_offset_response(port, measurement, family.accel_offset_h)
                 yield _offsets(response, family)
             except OddOffsets as error:
                 # a bit that is stuck makes an axis answer oddly, too
                 lsb_per_g = family.accel_offset_lsb_per_g
-                odd, response = error, Response(family.accel_offset_h, lsb_per_g, np.full(3, 1.0 / lsb_per_g))
-            bits, axes = examine_bits(port, bench, part, response)
+                odd, response = error, OffsetResponse(family.accel_offset_h, lsb_per_g, np.full(3, 1.0 / lsb_per_g))
+            bits, axes = examine_bits(port, measurement, part, response)
     except ChipReset:
         raise
     except ChipError as error:
@@ -212,7 +212,7 @@ def _shifted(port: Port, part: Part, patience: int) -> Iterator[tuple[Finding, l
         yield bits, [STUCK_BITS] if axes else []
 
 
-def _offsets(response: Response, family: Family) -> tuple[Finding, list[str]]:
+def _offsets(response: OffsetResponse, family: Family) -> tuple[Finding, list[str]]:
     where = f"0x{response.place[0]:02x}"
     data = {"place": response.place[0], "lsb_per_g": response.lsb_per_g, "g_per_lsb": response.g_per_lsb.tolist()}
     mg = ", ".join(f"{256_000 * value:.1f}" for value in response.g_per_lsb)

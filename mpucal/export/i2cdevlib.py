@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..chip.offsets import moved
+from ..chip.offsets import shift_words
 from ..chip.registers import GYRO_OFFSET_LSB_PER_DPS
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import ChipError, WriteBackError
@@ -61,7 +61,7 @@ def _words(calibration: Calibration) -> tuple[tuple[int, int, int], tuple[int, .
             "calibrate from a capture of the chip",
         )
     try:
-        a = moved(trim, -calibration.b_a / STANDARD_GRAVITY_MPS2 * LSB_PER_G)
+        a = shift_words(trim, -calibration.b_a / STANDARD_GRAVITY_MPS2 * LSB_PER_G)
     except ChipError as error:
         raise WriteBackError(f"nothing was exported: {error.what}", error.remedy) from error
     w = np.rint(-np.degrees(np.nan_to_num(calibration.b_omega)) * GYRO_OFFSET_LSB_PER_DPS)

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..chip.families import MPU6050, PARTS
-from ..chip.offsets import moved
+from ..chip.offsets import shift_words
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError
 from ..result.calibration import Calibration
@@ -52,7 +52,7 @@ def offset_words(calibration: Calibration) -> tuple[tuple[int, int, int] | None,
     if sensor.accel_offsets is None:
         return None, "calibbias is left alone, as the calibration does not say what the factory's trim was"
     try:
-        return moved(sensor.accel_offsets, -calibration.b_a / STANDARD_GRAVITY_MPS2 * LSB_PER_G), ""
+        return shift_words(sensor.accel_offsets, -calibration.b_a / STANDARD_GRAVITY_MPS2 * LSB_PER_G), ""
     except ChipError as error:
         return None, f"calibbias is left alone: {error.what}"
 

@@ -56,7 +56,7 @@ def capture_rows(*paths: Path) -> Rows:
     session = _Accesses(paths)
     decoder, spool = Decoder(session.name), Spool()
     for access in session:
-        decoder.saw(access)
+        decoder.feed(access)
         spool.add(decoder.release())
     spool.add(decoder.release(last=True))
     if spool.frames < 2:

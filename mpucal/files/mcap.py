@@ -169,7 +169,7 @@ class _Stream:
             self._put_waiting()
             self._put(SESSION, t_ns, event_message(record.name, record.data))
         elif isinstance(record, Accesses):
-            if self._waiting or (self._blocks and not self._blocks[-1].alike(record)):
+            if self._waiting or (self._blocks and not self._blocks[-1].can_join(record)):
                 self._put_waiting()
             self._blocks.append(record)
         else:
@@ -193,7 +193,7 @@ class _Stream:
 
     def _put_waiting(self) -> None:
         if self._blocks or self._waiting:
-            accesses = Accesses.joined(self._blocks) if self._blocks else Accesses.of(self._waiting)
+            accesses = Accesses.joined(self._blocks) if self._blocks else Accesses.from_transactions(self._waiting)
             self._blocks, self._waiting = [], []
             if accesses.heard.any():
                 first = int(accesses.heard.argmax())

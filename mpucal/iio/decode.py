@@ -59,7 +59,7 @@ class IioDecoder:
         self._new: list[Samples] = []
         self.gaps = 0
 
-    def saw(self, access: Transaction) -> None:
+    def feed(self, access: Transaction) -> None:
         """An access was made, or failed."""
         if access.error is not None:
             return
@@ -278,7 +278,7 @@ def decode(accesses: Iterable[Transaction], name: str = "recording") -> Recordin
     """
     decoder = IioDecoder(name)
     for access in accesses:
-        decoder.saw(access)
+        decoder.feed(access)
     recording = decoder.recording()
     if len(recording) < 2:
         raise RecordingError(f"{name} holds {len(recording)} samples", "record for longer")

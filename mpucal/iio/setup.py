@@ -113,12 +113,12 @@ class Attributes:
         place, data = f"{self.device}/{name}", text.encode()
         t_ns = self._files.write(place, data)
         self.now_ns = max(self.now_ns, t_ns)
-        self._decoder.saw(Transaction("write", place, len(data), data, t_ns))
+        self._decoder.feed(Transaction("write", place, len(data), data, t_ns))
 
     def _bytes(self, place: str, count: int) -> bytes:
         reply = self._files.read(place, count)
         self.now_ns = max(self.now_ns, reply.t_ns)
-        self._decoder.saw(Transaction("read", place, count, reply.data, reply.t_ns))
+        self._decoder.feed(Transaction("read", place, count, reply.data, reply.t_ns))
         return reply.data
 
 

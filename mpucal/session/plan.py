@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Self
 
-from ..chip.config import Config, RateAlone
+from ..chip.config import Config, RateOnlyConfig
 from ..chip.driver import DRIVER_VERSION
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import CaptureError
@@ -15,7 +15,7 @@ from .aims import NORMAL
 
 DRIVER, PLAN = "driver", "plan"
 # by the version of the driver of a capture
-CONFIGS: Mapping[Any, type[Config]] = {DRIVER_VERSION: Config, IIO_VERSION: RateAlone}
+CONFIGS: Mapping[Any, type[Config]] = {DRIVER_VERSION: Config, IIO_VERSION: RateOnlyConfig}
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,7 @@ class Runner:
         ------
         SourceError : the source failed before the board was turned.
         """
-        if self._plan.config.accel_alone:
+        if self._plan.config.accel_only:
             return self._collect(seconds)
         self._connect()
         begun_ns = self._source.now_ns()

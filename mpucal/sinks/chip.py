@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from ..chip.access import Bus
-from ..chip.bench import Bench
 from ..chip.decode import Decoder
 from ..chip.families import PARTS
-from ..chip.offsets import PLACES, Block, Place, Words, difference, moved, restore
+from ..chip.offset_response import OffsetResponse, measure_offset_response
+from ..chip.offsets import PLACES, OffsetRegisters, Place, Words, restore, shift_words, word_difference
 from ..chip.port import Port
 from ..chip.probe import read_identity
-from ..chip.response import Response, measured_response
+from ..chip.quick_measure import TemporaryMeasurement
 from ..chip.setup import reset
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError, SourceError, WriteBackError
@@ -110,7 +110,7 @@ class ChipSink:
             olds = self._blocks()
         with self._old_or_new(olds):
             for block in wanted:
-                if Block.read(self._port, block.place) != block and not block.write(self._port):
+                if OffsetRegisters.read(self._port, block.place) != block and not block.write(self._port):
                     raise ChipError(f"the chip does not take {block.data.hex(' ')}", "check that it is the same chip")
         return f"the offset registers of {self.where} hold again what {path.name} says; {VOLATILE}"
 
@@ -130,11 +130,11 @@ class ChipSink:
             likely = self._identified(calibration)
             olds = self._blocks()
         with self._old_or_new(olds):
-            with Bench(self._port) as bench:
-                response = measured_response(self._port, bench, likely)
+            with TemporaryMeasurement(self._port) as measurement:
+                response = measure_offset_response(self._port, measurement, likely)
             reference = self._reference(calibration, response)
-            with Bench(self._port) as bench:
-                applied = self._apply(calibration, response, reference, bench)
+            with TemporaryMeasurement(self._port) as measurement:
+                applied = self._apply(calibration, response, reference, measurement)
         bias = ", ".join(f"{1000 * value:+.0f}" for value in applied / STANDARD_GRAVITY_MPS2)
         return Applied(
             replace(calibration, applied_in_hardware=applied),
@@ -142,11 +142,11 @@ class ChipSink:
             f" read back and seen in the samples; {VOLATILE}",
         )
 
-    def _blocks(self) -> tuple[Block, ...]:
-        return tuple(Block.read(self._port, place) for place in PLACES)
+    def _blocks(self) -> tuple[OffsetRegisters, ...]:
+        return tuple(OffsetRegisters.read(self._port, place) for place in PLACES)
 
     @contextmanager
-    def _old_or_new(self, olds: Sequence[Block]) -> Iterator[None]:
+    def _old_or_new(self, olds: Sequence[OffsetRegisters]) -> Iterator[None]:
         """What fails within leaves the registers as they were."""
         self._journal.begin({REGISTERS: _hex(olds)})
         try:
@@ -176,7 +176,7 @@ class ChipSink:
         by_name = named.get((calibrated.chip or "").removesuffix("C"))
         return by_name or (PARTS[who_am_i].family.accel_offset_h if who_am_i in PARTS else PLACES[0])
 
-    def _reference(self, calibration: Calibration, response: Response) -> Words:
+    def _reference(self, calibration: Calibration, response: OffsetResponse) -> Words:
         """What the registers held while b_a was measured: what they hold now, or will after a reset.
 
         Raises
@@ -184,11 +184,11 @@ class ChipSink:
         ChipError : they hold something else even then: it is another chip.
         """
         known = calibration.sensor.accel_offsets
-        held = Block.read(self._port, response.place).words
+        held = OffsetRegisters.read(self._port, response.place).words
         if known is not None and known == held:
             return held
         reset(self._port)
-        held = Block.read(self._port, response.place).words
+        held = OffsetRegisters.read(self._port, response.place).words
         if known is not None and known != held:
             raise ChipError(
                 f"the factory's trim of this chip is {held}, and {known} in the one that was calibrated",
@@ -196,17 +196,19 @@ class ChipSink:
             )
         return held
 
-    def _apply(self, calibration: Calibration, response: Response, reference: Words, bench: Bench) -> Vector:
+    def _apply(
+        self, calibration: Calibration, response: OffsetResponse, reference: Words, measurement: TemporaryMeasurement
+    ) -> Vector:
         """Write, read back, measure; (3,) m/s^2 that the registers then subtract."""
-        old = Block.read(self._port, response.place)
+        old = OffsetRegisters.read(self._port, response.place)
         counts = calibration.b_a / STANDARD_GRAVITY_MPS2 * response.lsb_per_g
-        new = old.with_words(moved(reference, -counts))
-        before = bench.rest()
+        new = old.with_words(shift_words(reference, -counts))
+        before = measurement.rest()
         _check_gravity(calibration, before, _subtracted(old.words, reference, response))
         if not new.write(self._port):
             raise ChipError("the offset registers read back other than written", "check the wires, and try again")
-        after = bench.rest()
-        expected = np.array(difference(new.words, old.words)) / response.lsb_per_g
+        after = measurement.rest()
+        expected = np.array(word_difference(new.words, old.words)) / response.lsb_per_g
         if (np.abs(after - before - expected) > SHIFT_G + SHIFT_SHARE * np.abs(expected)).any():
             raise ChipError(
                 f"the samples moved by ({_mg(after - before)}) mg where ({_mg(expected)}) were written",
@@ -235,24 +237,24 @@ def _check_gravity(calibration: Calibration, mean_g: Vector, applied_mps2: Vecto
         )
 
 
-def _subtracted(words: Words, reference: Words, response: Response) -> Vector:
+def _subtracted(words: Words, reference: Words, response: OffsetResponse) -> Vector:
     """(3,) m/s^2 that `words` take from the samples, other than `reference`; more counts add."""
-    return -np.array(difference(words, reference)) / response.lsb_per_g * STANDARD_GRAVITY_MPS2
+    return -np.array(word_difference(words, reference)) / response.lsb_per_g * STANDARD_GRAVITY_MPS2
 
 
-def _hex(blocks: Sequence[Block]) -> dict[str, str]:
+def _hex(blocks: Sequence[OffsetRegisters]) -> dict[str, str]:
     """Registers by their first address, in hexadecimal digits."""
     return {f"0x{block.place[0]:02x}": block.data.hex() for block in blocks}
 
 
-def kept_blocks(path: Path) -> list[Block]:
+def kept_blocks(path: Path) -> list[OffsetRegisters]:
     """What `keep` saved."""
     held = kept(CHIP_OFFSETS, path, FORMAT, REGISTERS)[REGISTERS]
     try:
         registers = {int(first, 0): bytes.fromhex(data) for first, data in held.items()}
     except (ValueError, TypeError, AttributeError) as error:
         raise not_kept(CHIP_OFFSETS, path, str(error)) from error
-    blocks = [Block(place, registers[place[0]]) for place in PLACES if place[0] in registers]
+    blocks = [OffsetRegisters(place, registers[place[0]]) for place in PLACES if place[0] in registers]
     if not blocks or any(len(block.data) != block.place[2] + 2 - block.place[0] for block in blocks):
         raise not_kept(CHIP_OFFSETS, path, "some are missing, or too long")
     return blocks

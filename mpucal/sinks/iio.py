@@ -19,7 +19,7 @@ import numpy as np
 
 from ..chip.access import Files
 from ..chip.config import Config
-from ..chip.offsets import Words, difference
+from ..chip.offsets import Words, word_difference
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..disk.whole import write_atomically
 from ..errors import ChipError, OutputError, SourceError, WriteBackError
@@ -140,7 +140,7 @@ class KernelSink:
         before = self._rest()
         self._set_words(words)
         after = self._rest()
-        expected = np.array(difference(words, old)) / LSB_PER_G * STANDARD_GRAVITY_MPS2
+        expected = np.array(word_difference(words, old)) / LSB_PER_G * STANDARD_GRAVITY_MPS2
         limit = SHIFT_G * STANDARD_GRAVITY_MPS2 + SHIFT_SHARE * np.abs(expected)
         if (np.abs(after - before - expected) > limit).any():
             moved, wanted = (", ".join(f"{value:+.2f}" for value in values) for values in (after - before, expected))
@@ -149,7 +149,7 @@ class KernelSink:
                 "leave the board still meanwhile; if it was, this driver writes other registers: keep to the files",
             )
         reference: Any = calibration.sensor.accel_offsets
-        return -np.array(difference(words, reference)) / LSB_PER_G * STANDARD_GRAVITY_MPS2
+        return -np.array(word_difference(words, reference)) / LSB_PER_G * STANDARD_GRAVITY_MPS2
 
     def _set_words(self, words: Words) -> None:
         for name, word in zip(CALIBBIAS, words, strict=True):

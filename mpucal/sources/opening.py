@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pkgutil import resolve_name
 from typing import Any
 
-from ..chip.config import Config, RateAlone
+from ..chip.config import Config, RateOnlyConfig
 from ..errors import CaptureError, UsageError, meant
 from ..session.plan import Plan
 from .kind import Delivers, Option, Request, SourceKind
@@ -148,7 +148,7 @@ def _plan(values: Mapping[str, Any], until_end: bool, of_a_chip: bool) -> Plan:
     UsageError : values that a chip does not have, or that contradict each other.
     """
     usual = Plan(Config())
-    config = (Config if of_a_chip else RateAlone)(
+    config = (Config if of_a_chip else RateOnlyConfig)(
         int(values.get("accel_range", usual.config.accel_range_g)),
         int(values.get("gyro_range", usual.config.gyro_range_dps)),
         values.get("rate", usual.config.rate_hz),

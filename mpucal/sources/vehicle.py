@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 from .. import __version__
-from ..chip.config import RateAlone
+from ..chip.config import RateOnlyConfig
 from ..chip.records import LATE, SessionEvent
 from ..data import Recording
 from ..errors import CaptureError, EndOfCapture, LinkError, UsageError
@@ -270,7 +270,7 @@ def open_tlog(file: Path, asked: Plan, system: int | None) -> OpenedVehicle | Op
         )
     try:
         plan = dict(head.data[PLAN])
-        made = Plan(**{**plan, "config": RateAlone(**plan["config"])})
+        made = Plan(**{**plan, "config": RateOnlyConfig(**plan["config"])})
         prepare = bool(head.data.get(PREPARE))
         return OpenedVehicle(replay, made, head.data[SYSTEM], replay=replay, recovered=tlog.recovered, prepare=prepare)
     except (KeyError, TypeError, ValueError) as error:

@@ -32,7 +32,7 @@ class NumberedFeed:
         return rows
 
 
-class WorkBench:
+class FaultyRig:
     """A chip, its bus with faults, and everything that went over the bus.
 
     `before` and `after` hold, by (op, register), what to call instead of or after an access.
@@ -92,7 +92,7 @@ def _nothing():
 @pytest.fixture(scope="session")
 def bench():
     """Makes a work bench with a chip of the given model."""
-    return WorkBench
+    return FaultyRig
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpucal.chip.clock import SampleClock, increasing, look_phase
+from mpucal.chip.clock import SampleClock, make_increasing, poll_phase
 
 POLL_S = 0.020
 
@@ -14,7 +14,7 @@ def looks(rng, rate_hz, seconds, start_s=1.0, late_s=0.001):
     Each poll is due 20 ms after the last, off by its phase, and comes up to 1 ms late.
     """
     first_s = start_s + rng.uniform(0, 1 / rate_hz)
-    phases = np.array([look_phase(n) for n in range(int(seconds / POLL_S))])
+    phases = np.array([poll_phase(n) for n in range(int(seconds / POLL_S))])
     t_s = start_s + np.cumsum(POLL_S + phases / rate_hz + rng.uniform(0, 0.001, len(phases)))
     latched_s = t_s + rng.uniform(0, late_s, len(t_s))
     taken = np.maximum(0, np.floor((latched_s - first_s) * rate_hz).astype(int) + 1)
@@ -25,7 +25,7 @@ def watched(nominal_hz, t_ns, taken):
     clock = SampleClock(nominal_hz)
     clock.begin_segment()
     for t, n in zip(t_ns, taken, strict=True):
-        clock.look(t, n)
+        clock.add(t, n)
     return clock
 
 
@@ -61,7 +61,7 @@ def test_runs_apart_share_one_rate_and_keep_their_own_offset():
         firsts.append(first_s)
         clock.begin_segment()
         for t, n in zip(t_ns, taken, strict=True):
-            clock.look(t, n)
+            clock.add(t, n)
     assert clock.rate_hz == pytest.approx(201.3, rel=200e-6)
     zeros = clock.times_s(np.arange(10), np.zeros(10, np.int64))
     assert np.allclose(zeros, firsts, atol=0.1 / 200)
@@ -84,9 +84,9 @@ def test_the_prior_is_forgotten():
 
 def test_times_out_of_order_are_moved_as_little_as_it_takes():
     t_s = np.array([1.0, 2.0, 1.5, 1.6, 3.0])
-    assert increasing(t_s, 0.1).tolist() == pytest.approx([1.0, 2.0, 2.1, 2.2, 3.0])
+    assert make_increasing(t_s, 0.1).tolist() == pytest.approx([1.0, 2.0, 2.1, 2.2, 3.0])
 
 
 def test_times_in_order_are_not_touched():
     t_s = np.random.default_rng(9).uniform(0.11, 0.3, 1000).cumsum()
-    assert increasing(t_s, 0.1) is t_s
+    assert make_increasing(t_s, 0.1) is t_s

@@ -325,7 +325,7 @@ def test_another_chip_in_its_place(bench, stream):
         stream(driver, 20)
 
 
-def test_a_sensor_that_repeats_itself_is_set_up_again_and_never_believed(bench, stream, numbers):
+def test_a_sensor_that_repeats_itself_is_set_up_again_and_never_accepted(bench, stream, numbers):
     desk = bench()
     driver = desk.driver()
     driver.start()
@@ -357,7 +357,7 @@ def test_two_seconds_without_a_sample(bench, stream, dead):
     driver.start()
     desk.before["answer", register] = answer
     desk.stall(0.8)
-    with pytest.raises(ChipError, match="no sample that can be believed for 2 s"):
+    with pytest.raises(ChipError, match="no sample that can be accepted for 2 s"):
         stream(driver, 10)
 
 

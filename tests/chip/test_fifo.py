@@ -32,7 +32,7 @@ def calm(n):
 def fresh(frames_before=DROPPED_FRAMES):
     """A decoder whose FIFO was reset at time 0, and that has read as many frames as it drops."""
     decoder = FifoDecoder(SETTINGS)
-    decoder.temperature(QUIET[3])
+    decoder.set_temperature(QUIET[3])
     decoder.reset()
     if frames_before:
         poll(decoder, packed(*calm(frames_before)), 0)
@@ -40,9 +40,9 @@ def fresh(frames_before=DROPPED_FRAMES):
 
 
 def poll(decoder, data, n, overflow=False):
-    decoder.counted(n * 4 * PERIOD_NS, len(data))
-    decoder.data(data)
-    return decoder.judged(overflow)
+    decoder.set_count(n * 4 * PERIOD_NS, len(data))
+    decoder.add_bytes(data)
+    return decoder.finish_poll(overflow)
 
 
 @given(st.lists(st.tuples(int16, int16, int16, st.integers(-2100, -1900), int16, int16, int16), min_size=1))
@@ -116,9 +116,9 @@ def test_what_cannot_be_believed_is_left_out_and_leaves_a_gap(data, overflow, fa
 
 def test_a_count_of_no_whole_number_of_frames_is_misaligned_even_where_the_values_fit():
     decoder = fresh()
-    decoder.counted(1, 2 * 14 + 4)
-    decoder.data(packed(*calm(2)))
-    assert decoder.judged(False) is FifoFault.MISALIGNED
+    decoder.set_count(1, 2 * 14 + 4)
+    decoder.add_bytes(packed(*calm(2)))
+    assert decoder.finish_poll(False) is FifoFault.MISALIGNED
 
 
 def test_a_reset_before_any_sample_leaves_no_gap():
@@ -131,8 +131,8 @@ def test_a_reset_before_any_sample_leaves_no_gap():
 
 def test_what_was_not_judged_is_not_there():
     decoder = fresh()
-    decoder.counted(0, 28)
-    decoder.data(packed(*calm(2)))
+    decoder.set_count(0, 28)
+    decoder.add_bytes(packed(*calm(2)))
     assert len(decoder.take()) == len(decoder.recording("x")) == 0
 
 
@@ -148,9 +148,9 @@ def test_provisional_times_increase_and_final_times_are_regular():
     for n in range(1, 400):
         look_ns = n * 20_000_000 + int(rng.integers(0, 4_000_000))
         size = look_ns // 4_966_000 - taken
-        decoder.counted(look_ns, size * 14)
-        decoder.data(packed(*calm(size)))
-        assert decoder.judged(False) is None
+        decoder.set_count(look_ns, size * 14)
+        decoder.add_bytes(packed(*calm(size)))
+        assert decoder.finish_poll(False) is None
         taken += size
         t.extend(decoder.take().t)
     assert (np.diff(t) > 0).all()
@@ -194,9 +194,9 @@ def test_frames_that_are_alike_for_less_long_all_arrive(runs, sizes):
     assert np.rint(np.degrees(recording.gyr[:-1, 2]) * 65.5).tolist() == [frame[6] for frame in frames[:-1]]
 
 
-def test_a_chip_that_was_reset_is_not_believed():
+def test_a_chip_that_was_reset_is_not_accepted():
     decoder = fresh()
-    decoder.counted(1, 28)
-    decoder.data(packed(*calm(2)))
-    assert decoder.judged(overflow=False, lost=True) is FifoFault.LOST
+    decoder.set_count(1, 28)
+    decoder.add_bytes(packed(*calm(2)))
+    assert decoder.finish_poll(overflow=False, lost=True) is FifoFault.LOST
     assert len(decoder.take()) == 0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpucal.chip.host_clock import RATE_STD, HostClock, fitted
+from mpucal.chip.host_clock import RATE_STD, HostClock, fit_pairs
 
 
 def pairs(rng, seconds, ppm, drift_ppm_a_minute=0.0, burst_s=0.0, a_second=10):
@@ -23,7 +23,7 @@ def pairs(rng, seconds, ppm, drift_ppm_a_minute=0.0, burst_s=0.0, a_second=10):
 @pytest.mark.parametrize(("ppm", "drift"), [(0, 0), (5000, 50), (-10000, -50), (10000, 0)])
 def test_half_a_minute_tells_the_rate_to_20_ppm(ppm, drift, burst_ms):
     rng = np.random.default_rng([abs(ppm), drift + 50, burst_ms])
-    fits = [fitted(*pairs(rng, 30, ppm, drift, burst_ms * 1e-3)) for _ in range(60)]
+    fits = [fit_pairs(*pairs(rng, 30, ppm, drift, burst_ms * 1e-3)) for _ in range(60)]
     errors = np.array([fit.ppm - ppm for fit in fits])
     claimed = np.array([fit.b_std for fit in fits]) * 1e6
     assert np.sqrt(np.mean(errors**2)) < 20
@@ -34,7 +34,7 @@ def test_times_are_those_of_the_host():
     clock = HostClock()
     t_ns, host_ns = pairs(np.random.default_rng(1), 120, 5000, 50)
     for t, host in zip(t_ns.tolist(), host_ns.tolist(), strict=True):
-        clock.saw(t, host)
+        clock.add(t, host)
     host_s = clock.final()(t_ns * 1e-9)
     np.testing.assert_allclose(np.diff(host_s[[0, -1]]), np.diff(host_ns[[0, -1]]) * 1e-9, atol=2e-3)
     assert np.ptp(host_s - host_ns * 1e-9) < 5e-3
@@ -51,14 +51,14 @@ def test_without_pairs_it_is_the_hosts():
 
 
 def test_a_few_pairs_tell_nothing():
-    fit = fitted(*pairs(np.random.default_rng(2), 1, 5000))
+    fit = fit_pairs(*pairs(np.random.default_rng(2), 1, 5000))
     assert (fit.b, fit.b_std) == (0.0, RATE_STD)
 
 
 @pytest.mark.parametrize("share", [0.5, 0.9, 1.2])
 def test_a_bridge_in_a_time_of_its_own_is_not_corrected(share):
     t_ns, host_ns = pairs(np.random.default_rng(3), 60, 0)
-    fit = fitted(t_ns, host_ns[0] + ((host_ns - host_ns[0]) * share).astype(np.int64))
+    fit = fit_pairs(t_ns, host_ns[0] + ((host_ns - host_ns[0]) * share).astype(np.int64))
     assert (fit.b, fit.b_std) == (0.0, RATE_STD)
 
 
@@ -66,7 +66,7 @@ def test_a_clock_that_began_anew_keeps_its_rate():
     rng = np.random.default_rng(4)
     t_ns, host_ns = pairs(rng, 60, 5000)
     host_ns[150:] += 900 * 10**9
-    fit = fitted(t_ns, host_ns)
+    fit = fit_pairs(t_ns, host_ns)
     assert fit.ppm == pytest.approx(5000, abs=20)
 
 
@@ -77,7 +77,7 @@ def test_a_bridge_that_was_reset_keeps_its_rate(step_ms):
     kept = np.r_[0:200, 215 : len(t_ns)]
     t_ns, host_ns = t_ns[kept], host_ns[kept]
     t_ns[200:] += step_ms * 10**6
-    fit = fitted(t_ns, host_ns)
+    fit = fit_pairs(t_ns, host_ns)
     assert fit.ppm == pytest.approx(5000, abs=max(20, 3e6 * fit.b_std))
     assert fit.b_std < 50e-6
 
@@ -88,6 +88,6 @@ def test_a_bridge_that_is_lost_now_and_then_keeps_its_rate():
     for lost in range(2000, 2400, 80):
         host_ns[lost - 20 : lost] += 300 * 10**6
     kept = np.arange(len(t_ns)) % 80 > 20
-    fit = fitted(t_ns[kept], host_ns[kept])
+    fit = fit_pairs(t_ns[kept], host_ns[kept])
     assert fit.ppm == pytest.approx(-8000, abs=4e6 * fit.b_std)
     assert fit.b_std < 500e-6

@@ -12,7 +12,7 @@ from mpucal.chip.config import Config
 from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
 from mpucal.chip.families import ICM20602, ICM20689, ICM20690, MPU6050, MPU6500, MPU6886, PARTS
-from mpucal.chip.identity import Behaviour, remark
+from mpucal.chip.identity import Behaviour, describe_mismatch
 from mpucal.data import Sensor
 from mpucal.errors import ChipError
 from mpucal.simulated.chip import open_simulated
@@ -24,19 +24,19 @@ WIDENED = FILLING | {reg.ACCEL_CONFIG2: reg.FIFO_SIZE}
 
 def evidence(fifo_bytes, widened_bytes=None, magnitude_g=None, asleep=None, fifo_en=None):
     seen = Behaviour()
-    seen.saw(reg.PWR_MGMT_1, b"\x01", {})
+    seen.observe(reg.PWR_MGMT_1, b"\x01", {})
     if asleep is not None:
         seen.reset()
-        seen.saw(reg.PWR_MGMT_1, bytes([0x40 if asleep else 0x01]), {})
+        seen.observe(reg.PWR_MGMT_1, bytes([0x40 if asleep else 0x01]), {})
     if fifo_en is not None:
-        seen.saw(reg.FIFO_EN, bytes([fifo_en]), FILLING)
+        seen.observe(reg.FIFO_EN, bytes([fifo_en]), FILLING)
     for count in (fifo_bytes // 2, fifo_bytes, fifo_bytes):
-        seen.saw(reg.FIFO_COUNT_H, count.to_bytes(2, "big"), FILLING)
+        seen.observe(reg.FIFO_COUNT_H, count.to_bytes(2, "big"), FILLING)
     for count in () if widened_bytes is None else (fifo_bytes, widened_bytes - 1, widened_bytes, widened_bytes):
-        seen.saw(reg.FIFO_COUNT_H, count.to_bytes(2, "big"), WIDENED)
+        seen.observe(reg.FIFO_COUNT_H, count.to_bytes(2, "big"), WIDENED)
     for _ in range(0 if magnitude_g is None else 5):
         axes = np.rint(np.array([0.6, 0.0, 0.8]) * magnitude_g * 16384).astype(">i2")
-        seen.saw(reg.ACCEL_XOUT_H, axes.tobytes(), {})
+        seen.observe(reg.ACCEL_XOUT_H, axes.tobytes(), {})
     return seen
 
 
@@ -83,10 +83,10 @@ def test_the_size_of_a_fifo_is_the_one_it_showed():
     assert evidence(512, 4096).part(0x70).fifo_bytes == 4096
 
 
-def test_a_size_that_does_not_settle_is_not_believed():
+def test_a_size_that_does_not_settle_is_not_accepted():
     seen = evidence(512)
     for count in (600, 3000, 1200):
-        seen.saw(reg.FIFO_COUNT_H, count.to_bytes(2, "big"), WIDENED)
+        seen.observe(reg.FIFO_COUNT_H, count.to_bytes(2, "big"), WIDENED)
     assert seen.part(0x70).fifo_bytes == 512
 
 
@@ -108,7 +108,7 @@ def test_an_unknown_chip_with_an_unknown_fifo_is_refused():
     ],
 )
 def test_what_a_person_is_told(sensor, says):
-    told = remark(sensor)
+    told = describe_mismatch(sensor)
     assert told is None if says is None else re.search(says, told)
 
 

@@ -18,7 +18,7 @@ settings = st.builds(
     dlpf_cfg=st.integers(0, 6),
     fs_sel=st.integers(0, 3),
     afs_sel=st.integers(0, 3),
-    accel_alone=st.booleans(),
+    accel_only=st.booleans(),
 )
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.chip.bench import LOOKS, PATIENCE
+from mpucal.chip.quick_measure import LOOKS, PATIENCE
 from mpucal.chip.config import Config
 from mpucal.data import Recording, Sensor
 from mpucal.doctor.dead import dead_axes, live_axes

@@ -298,7 +298,7 @@ def test_captures_of_version_1_are_read():
 @pytest.mark.parametrize("number", [5, 6], ids=["times", "times heard"])
 def test_a_message_whose_columns_do_not_fit_is_refused(path, number, monkeypatch):
     monkeypatch.setattr(mcap, "accesses_message", lambda accesses: message + protobuf.field(number, b"\2"))
-    message = accesses_message(Accesses.of(polls(3)))
+    message = accesses_message(Accesses.from_transactions(polls(3)))
     write(path, polls(3))
     with pytest.raises(CaptureError, match="none of mpucal's"):
         read_capture(path)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.chip.config import RateAlone
+from mpucal.chip.config import RateOnlyConfig
 from mpucal.chip.offsets import RESERVED
 from mpucal.data import STANDARD_GRAVITY_MPS2, Sensor
 from mpucal.errors import RecordingError, WriteBackError
@@ -31,7 +31,7 @@ def made(tmp_path):
         bus = open_simulated(f"sim:chip={chip},hand=still,seed=4,b_a=0.32/-0.11/-0.53,D=1/0/0/0/1/0/0/0/1")
         bus.hear(Prompt(PromptKind.LAY_FLAT, ""))
         files = SimulatedFiles(bus)
-        sink = KernelSink(OpenedIio(files, Plan(RateAlone(rate_hz=50)), devices=BOTH, rules=tmp_path))
+        sink = KernelSink(OpenedIio(files, Plan(RateOnlyConfig(rate_hz=50)), devices=BOTH, rules=tmp_path))
         name = {"mpu6050": "MPU-6050", "mpu6500": "MPU-6500"}[chip]
         held = Sensor(chip=name, accel_offsets=files._words()) if not sensor else Sensor(**sensor)
         return sink, files, calibration(held)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ...chip.clock import SampleClock, increasing
+from ...chip.clock import SampleClock, make_increasing
 from ...data import Mask, Vector
 
 NS = 1_000_000_000
@@ -89,11 +89,13 @@ def even(stamps: Vector) -> Even | None:
         index[first:last] = np.arange(last - first)
         in_time = first + np.flatnonzero(late[first:last] <= np.quantile(late[first:last], IN_TIME))
         clock.begin_segment()
-        clock.looks(np.rint(stamps[in_time] * NS).astype(np.int64), index[in_time] + 1)
+        clock.add_many(np.rint(stamps[in_time] * NS).astype(np.int64), index[in_time] + 1)
     t = clock.times_s(segment.astype(np.int64), index)
     late = stamps - t
     rate_hz = clock.rate_hz
-    return Even(increasing(t, LEAST_STEP / rate_hz), gap, rate_hz, float(np.sqrt(np.mean((late - late.mean()) ** 2))))
+    return Even(
+        make_increasing(t, LEAST_STEP / rate_hz), gap, rate_hz, float(np.sqrt(np.mean((late - late.mean()) ** 2)))
+    )
 
 
 def _square(values: Vector, left_out: float) -> float:

@@ -177,7 +177,7 @@ class Chip:
         if not self._model.family.has_accel_config2:
             return reg.sample_rate_hz(divider, dlpf)
         if self._in_standby() and self._registers[reg.ACCEL_CONFIG2] & reg.ACCEL_FCHOICE_B:
-            return reg.ACCEL_ALONE_HZ
+            return reg.ACCEL_ONLY_HZ
         # RM-MPU-9250A, register 25: what comes from the filter at 8 kHz is not divided
         base_hz = reg.base_rate_hz(dlpf)
         return base_hz if base_hz > reg.MAX_RATE_HZ else reg.sample_rate_hz(divider, dlpf)

@@ -17,7 +17,7 @@ from ...chip.config import Config
 from ...chip.decode import Decoder
 from ...chip.driver import Driver
 from ...chip.families import PARTS, Part
-from ...chip.offsets import Block, Words
+from ...chip.offsets import OffsetRegisters, Words
 from ...chip.port import Port
 from ...chip.probe import read_identity
 from ...chip.registers import ACCEL_LSB_PER_G, ACCEL_RANGES_G, GYRO_LSB_PER_DPS, GYRO_RANGES_DPS
@@ -152,10 +152,10 @@ class SimulatedFiles(Files):
         return int.from_bytes(reply.data, "big", signed=True)
 
     def _write_words(self, words: Words) -> None:
-        Block.read(self._port, self._place).with_words(words).write(self._port)
+        OffsetRegisters.read(self._port, self._place).with_words(words).write(self._port)
 
     def _words(self) -> Words:
-        return Block.read(self._port, self._place).words
+        return OffsetRegisters.read(self._port, self._place).words
 
 
 class _Device:

@@ -12,7 +12,7 @@ from contextlib import suppress
 
 from ...chip import registers as reg
 from ...chip.access import Reply
-from ...chip.clock import look_phase
+from ...chip.clock import poll_phase
 from ...errors import BusError, NoAnswer
 from .asked import Answer
 from .beside import Beside
@@ -145,7 +145,7 @@ class BridgeBus:
     def _step_out_of_line(self) -> None:
         """Wait for another part of HELD_NS each time, so that some reply is hardly held back."""
         self._asked += 1
-        until_ns = self._port.now_ns() + round((look_phase(self._asked) + 0.5) * HELD_NS)
+        until_ns = self._port.now_ns() + round((poll_phase(self._asked) + 0.5) * HELD_NS)
         self._wait(lambda host_ns: until_ns - host_ns)
 
     def _read_now(self, register: int, count: int) -> Reply:

@@ -16,7 +16,7 @@ def open_source(request: Request) -> OpenedChip:
     UsageError : more samples a second are asked for than a serial line moves.
     """
     config = request.plan.config
-    if config.accel_alone:
+    if config.accel_only:
         raise UsageError(
             f"a bridge does not move {config.rate_hz:g} samples a second",
             "take --rate 1000 or less, or connect the chip to an I2C bus of this computer",

@@ -23,7 +23,7 @@ START = 30.0
 BITS = (1 << np.arange(16)).astype(np.uint16)
 
 
-class Flips:
+class BitFlipFilter:
     """Follows the frames (n, words) of one stream.
 
     Attributes
@@ -40,7 +40,7 @@ class Flips:
         """What follows does not follow on what came."""
         self._before = self._before[:0]
 
-    def mended(self, frames: Counts, last: Counts) -> Counts:
+    def repair(self, frames: Counts, last: Counts) -> Counts:
         """`frames`, with what is flipped set right where both of its neighbours are known.
 
         The last of them is known only with the next: then `last`, the stored frames that end with it, is set right.
@@ -56,8 +56,8 @@ class Flips:
         self._before = run[-2:].copy()
         return run[n:]
 
-    def untouched(self, frames: Counts, lengths: NDArray[np.int64]) -> int:
-        """How many polls, of `lengths` (k,) frames each, `mended` would leave as they are; they were followed.
+    def skip_clean(self, frames: Counts, lengths: NDArray[np.int64]) -> int:
+        """How many polls, of `lengths` (k,) frames each, `repair` would leave as they are; they were followed.
 
         None where it has not seen two frames yet.
         """

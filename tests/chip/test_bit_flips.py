@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from mpucal.chip.bit_flips import BitFlipFilter, until_jumps
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.chip.flips import Flips, until_jumps
 from mpucal.simulated.chip import open_simulated
 
 NONE = np.zeros((0, 7), np.int16)
@@ -20,9 +20,9 @@ def stream(rng, n=400):
 
 def passed(frames, length):
     """The frames as they are after the polls, each of so many, and how many were set right."""
-    flips, kept = Flips(7), []
+    flips, kept = BitFlipFilter(7), []
     for first in range(0, len(frames), length):
-        kept.append(flips.mended(frames[first : first + length].copy(), kept[-1] if kept else NONE))
+        kept.append(flips.repair(frames[first : first + length].copy(), kept[-1] if kept else NONE))
     return np.concatenate(kept), flips.found
 
 

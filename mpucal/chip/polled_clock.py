@@ -14,7 +14,7 @@ from .clock import NS, Times
 LATE = 2.5
 
 
-class LookedClock:
+class PolledClock:
     """As SampleClock, where every sample was looked at by itself and its time is that look's.
 
     Parameters
@@ -43,22 +43,22 @@ class LookedClock:
         del self._t_ns[: self._begins[-1]]
         self._begins = [0]
 
-    def look(self, t_ns: int, taken: int) -> None:
+    def add(self, t_ns: int, taken: int) -> None:
         """At `t_ns` sample number `taken` of this segment, from 1, was read."""
         if taken > 1:
             self._steps += 1
             self._elapsed_ns += t_ns - self._t_ns[-1]
         self._t_ns.append(t_ns)
 
-    def late(self, t_ns: int) -> bool:
+    def is_late(self, t_ns: int) -> bool:
         """Whether samples were missed before one that is read at `t_ns`; the first two of a rate tell it."""
         within = len(self._t_ns) > self._begins[-1]
         return bool(within and self._steps) and t_ns - self._t_ns[-1] > LATE / self.rate_hz / NS
 
-    def looks(self, t_ns: NDArray[np.int64], taken: NDArray[np.int64]) -> None:
+    def add_many(self, t_ns: NDArray[np.int64], taken: NDArray[np.int64]) -> None:
         """The same of (n,) looks."""
         for each in zip(t_ns.tolist(), taken.tolist(), strict=True):
-            self.look(*each)
+            self.add(*each)
 
     @property
     def rate_hz(self) -> float:

@@ -35,7 +35,7 @@ PATIENCE = 40
 HALF_SENSITIVITY_G = 0.75
 
 
-class Bench:
+class TemporaryMeasurement:
     """For a `with` statement; what it changes is put back in the end, if the bus still works.
 
     Parameters
@@ -75,7 +75,7 @@ class Bench:
         for _ in range(self._patience):
             self._port.sleep(SETTLE_NS)
             looks = self._looks()
-            check_kept(self._port, reg.ACCEL_CONFIG, bytes([SETTING[reg.ACCEL_CONFIG]]))
+            check_registers(self._port, reg.ACCEL_CONFIG, bytes([SETTING[reg.ACCEL_CONFIG]]))
             # revision C of the 6050 shows half of gravity; known once, offsets may shift what is shown
             sensitivity = self._sensitivity or (0.5 if np.linalg.norm(looks.mean(0)) < HALF_SENSITIVITY_G else 1.0)
             looks /= sensitivity
@@ -100,7 +100,7 @@ class Bench:
                 self._port.write(register, value)
 
 
-def check_kept(port: Port, register: int, value: bytes) -> None:
+def check_registers(port: Port, register: int, value: bytes) -> None:
     """Raise ChipReset where the registers from `register` on no longer hold `value`; one bit may flip on the bus."""
     if all(port.read(register, len(value)) != value for _ in range(2)):
         raise ChipReset

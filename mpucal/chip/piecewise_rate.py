@@ -40,9 +40,9 @@ class Line:
     variance: float
 
 
-def lines(t_s: Vector, y: Vector) -> list[Line]:
+def fit_lines(t_s: Vector, y: Vector) -> list[Line]:
     """The pieces that explain the points, in order."""
-    edges = [0, *breaks(t_s, y), len(t_s)]
+    edges = [0, *find_breaks(t_s, y), len(t_s)]
     found = []
     for begin, end in pairwise(edges):
         first = (y[begin - 1] + y[begin]) / 2 if begin else 0.0
@@ -50,7 +50,7 @@ def lines(t_s: Vector, y: Vector) -> list[Line]:
     return found
 
 
-def steady(pieces: list[Line], nominal: float, tolerance: float) -> Vector:
+def merge_equal_slopes(pieces: list[Line], nominal: float, tolerance: float) -> Vector:
     """(n,) the slope of each piece; those in a row that do not differ beyond chance share one.
 
     The prior of a slope is `nominal`, within `tolerance` of itself.
@@ -86,31 +86,31 @@ def _line(first: float, t_s: Vector, y: Vector) -> Line:
     return Line(first, t_mean, y_mean, spread, product, max(left_over / max(len(t) - 2, 1), LEAST_VARIANCE))
 
 
-def breaks(t_s: Vector, y: Vector) -> list[int]:
+def find_breaks(t_s: Vector, y: Vector) -> list[int]:
     """The points, in order, with which a new line begins; `t_s` (n,) increases, y (n,)."""
     found: list[int] = []
     todo = [(0, len(t_s))]
     while todo:
         first, last = todo.pop()
-        at = _break(t_s[first:last], y[first:last])
+        at = _find_break(t_s[first:last], y[first:last])
         if at is not None:
             found.append(first + at)
             todo += [(first, first + at), (first + at, last)]
-    return _settled(t_s, y, sorted(found))
+    return _recheck_breaks(t_s, y, sorted(found))
 
 
-def _settled(t_s: Vector, y: Vector, found: list[int]) -> list[int]:
+def _recheck_breaks(t_s: Vector, y: Vector, found: list[int]) -> list[int]:
     """Each break anew between its neighbours: one that was found before they were may be off, or none."""
     kept: list[int] = []
     for following in [*found[1:], len(t_s)]:
         first = kept[-1] if kept else 0
-        at = _break(t_s[first:following], y[first:following])
+        at = _find_break(t_s[first:following], y[first:following])
         if at is not None:
             kept.append(first + at)
     return kept if found else []
 
 
-def _break(t_s: Vector, y: Vector) -> int | None:
+def _find_break(t_s: Vector, y: Vector) -> int | None:
     """Where two lines explain what one does not; None where one is enough."""
     n = len(t_s)
     if n < 2 * LEAST_POINTS or t_s[-1] - t_s[0] < 2 * LEAST_S:

@@ -15,7 +15,7 @@ LINK_REMEDY = "not the sensor's wires are to blame: check the board's cable and 
 
 
 @dataclass
-class Tally:
+class TransferStats:
     """The transfers with one chip.
 
     Attributes

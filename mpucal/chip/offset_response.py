@@ -12,9 +12,9 @@ import numpy as np
 
 from ..data import Vector
 from ..errors import ChipError, OddOffsets
-from .bench import Bench
-from .offsets import PLACES, Block, Place, difference, moved, restored
+from .offsets import PLACES, OffsetRegisters, Place, restoring, shift_words, word_difference
 from .port import Port
+from .quick_measure import TemporaryMeasurement
 
 # of different size on each axis, so that axes that are swapped show
 STEPS = (256, 320, 384)
@@ -29,7 +29,7 @@ NOTHING_G, MOVED_G = 0.03, 0.006
 
 
 @dataclass(frozen=True)
-class Response:
+class OffsetResponse:
     """What the offset registers do.
 
     Attributes
@@ -42,7 +42,7 @@ class Response:
     g_per_lsb: Vector
 
 
-def measured_response(port: Port, bench: Bench, likely: Place = PLACES[0]) -> Response:
+def measure_offset_response(port: Port, measurement: TemporaryMeasurement, likely: Place = PLACES[0]) -> OffsetResponse:
     """Try the `likely` place, then the others; the registers hold afterwards what they held before.
 
     Raises
@@ -51,23 +51,23 @@ def measured_response(port: Port, bench: Bench, likely: Place = PLACES[0]) -> Re
     ChipError : the board moves, or the old words could not be restored.
     """
     for place in sorted(PLACES, key=lambda place: place != likely):
-        old = Block.read(port, place)
+        old = OffsetRegisters.read(port, place)
         steps = [step if word < ROOM else -step for step, word in zip(STEPS, old.words, strict=True)]
-        probe = old.with_words(moved(old.words, steps))
-        before = bench.rest()
-        with restored(port, old):
+        probe = old.with_words(shift_words(old.words, steps))
+        before = measurement.rest()
+        with restoring(port, old):
             kept = probe.write(port)
-            during = bench.rest() if kept else before
+            during = measurement.rest() if kept else before
         if not kept:
             continue
-        after = bench.rest()
+        after = measurement.rest()
         if (np.abs(after - before) > MOVED_G).any():
             raise ChipError(
                 "the board moved while its offset registers were tried", "put it on a firm surface and let go of it"
             )
         shift = during - (before + after) / 2
         if (np.abs(shift) > NOTHING_G).any():
-            return _understood(place, shift / np.array(difference(probe.words, old.words)))
+            return _understood(place, shift / np.array(word_difference(probe.words, old.words)))
     raise OddOffsets(
         "the accelerometer does not answer to its offset registers, neither at "
         + " nor at ".join(f"0x{place[0]:02x}" for place in PLACES),
@@ -75,10 +75,10 @@ def measured_response(port: Port, bench: Bench, likely: Place = PLACES[0]) -> Re
     )
 
 
-def _understood(place: Place, g_per_lsb: Vector) -> Response:
+def _understood(place: Place, g_per_lsb: Vector) -> OffsetResponse:
     for scale in SCALES_LSB_PER_G:
         if (np.abs(g_per_lsb * scale - 1) < TOLERANCE).all():
-            return Response(place, scale, g_per_lsb)
+            return OffsetResponse(place, scale, g_per_lsb)
     per_256 = ", ".join(f"{256_000 * value:+.0f}" for value in g_per_lsb)
     raise OddOffsets(
         f"the offset registers at 0x{place[0]:02x} answer to 256 counts with {per_256} mg, where 125 or 62.5 are known",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mpucal.chip.clock import SampleClock
-from mpucal.chip.pieces import best_break, breaks, lines, steady
+from mpucal.chip.piecewise_rate import best_break, find_breaks, fit_lines, merge_equal_slopes
 
 
 def counted(rates_hz, each_s=20.0, seed=0, late_s=0.001):
@@ -18,30 +18,30 @@ def counted(rates_hz, each_s=20.0, seed=0, late_s=0.001):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_steady_clock_has_no_break(seed):
-    assert breaks(*counted([198.6], each_s=120.0, seed=seed, late_s=0.02)) == []
+    assert find_breaks(*counted([198.6], each_s=120.0, seed=seed, late_s=0.02)) == []
 
 
 @pytest.mark.parametrize("step", [0.999, 1.002, 1.01, 0.97])
 def test_a_break_is_found_where_it_is(step):
     t_s, y = counted([200.0, 200.0 * step])
-    (at,) = breaks(t_s, y)
+    (at,) = find_breaks(t_s, y)
     assert t_s[at] == pytest.approx(20.0, abs=0.004 / abs(step - 1))
 
 
 def test_two_breaks_are_found():
     t_s, y = counted([200.0, 202.0, 199.0])
-    assert t_s[breaks(t_s, y)] == pytest.approx([20.0, 40.0], abs=0.3)
+    assert t_s[find_breaks(t_s, y)] == pytest.approx([20.0, 40.0], abs=0.3)
 
 
 def test_few_points_have_no_break():
-    assert breaks(np.arange(10.0), np.array([0.0] * 5 + [100.0] * 5)) == []
-    assert breaks(np.zeros(0), np.zeros(0)) == []
+    assert find_breaks(np.arange(10.0), np.array([0.0] * 5 + [100.0] * 5)) == []
+    assert find_breaks(np.zeros(0), np.zeros(0)) == []
 
 
 def test_pieces_that_agree_share_a_slope():
     t_s, y = counted([201.0], each_s=60.0)
-    pieces = [line for part in np.split(np.arange(len(t_s)), 3) for line in lines(t_s[part], y[part])]
-    slopes = steady(pieces, 200.0, 0.01)
+    pieces = [line for part in np.split(np.arange(len(t_s)), 3) for line in fit_lines(t_s[part], y[part])]
+    slopes = merge_equal_slopes(pieces, 200.0, 0.01)
     assert len(set(slopes)) == 1
     assert slopes[0] == pytest.approx(201.0, rel=40e-6)
 
@@ -52,7 +52,7 @@ def test_final_times_follow_a_clock_that_changes():
     clock = SampleClock(200.0)
     clock.begin_segment()
     for t, n in zip(t_s, y, strict=True):
-        clock.look(round(t * 1e9), int(n))
+        clock.add(round(t * 1e9), int(n))
     index = np.arange(int(y[-1]))
     true = np.interp(index + 1.0, [0, 4000, 8040], [0, 20, 40])
     off_s = clock.final()(np.zeros_like(index), index) - true
@@ -66,7 +66,7 @@ def test_final_times_of_a_steady_clock_are_those_of_one_line():
     clock = SampleClock(200.0)
     clock.begin_segment()
     for t, n in zip(t_s, y, strict=True):
-        clock.look(round(t * 1e9), int(n))
+        clock.add(round(t * 1e9), int(n))
     index = np.arange(int(y[-1]))
     zeros = np.zeros_like(index)
     np.testing.assert_allclose(clock.final()(zeros, index), clock.times_s(zeros, index), rtol=0, atol=1e-9)
