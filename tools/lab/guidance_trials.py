@@ -29,7 +29,7 @@ from mpucal.result.calibration import GOOD
 from mpucal.session.attitude import matrix
 from mpucal.session.events import Countdown, Held, Key, Meter, Output, Progress, Prompt, PromptKind, Use
 from mpucal.session.plan import Plan
-from mpucal.session.way import WAYS
+from mpucal.session.turn_guide import TURN_WORDS
 from mpucal.simulated import rotation as quaternions
 from mpucal.simulated.hand import MISS_RAD, ON_THE_TABLE, REACTION_S, Stance
 from mpucal.simulated.hands import KINDS, Guided
@@ -63,14 +63,14 @@ class ByWords(Guided):
             self._room = now.attitude
         way = self.HEADLINE.lower()
         t_s = now.step * STEP_S
-        if way not in WAYS:
+        if way not in TURN_WORDS:
             self._words = ""
         elif way != self._words:
             self._words, self._due_s = way, t_s + self._rng.uniform(*REACTION_S)
         if not self._words or t_s < self._due_s:
             return self.pause(now, LOOKS_S)
         self._words = ""
-        toward = WAYS.index(way) * math.pi / 4.0
+        toward = TURN_WORDS.index(way) * math.pi / 4.0
         axis = np.array([0.0, -math.sin(toward), math.cos(toward), 0.0])
         for q in (self._room, quaternions.conjugate(now.attitude)):
             axis = quaternions.product(quaternions.product(q, axis), quaternions.conjugate(q))
