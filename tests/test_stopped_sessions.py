@@ -10,8 +10,8 @@ import mpucal
 from mpucal.__main__ import run
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.tlog import Record, Tlog
-from mpucal.mavlink.tlog_replay import Replay
-from mpucal.mavlink.transport import Clock
+from mpucal.mavlink.tlog_replay import TlogReplay
+from mpucal.mavlink.transport import SteadyClock
 from mpucal.mavlink.vehicle_source import VehicleSource
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
@@ -81,7 +81,7 @@ def test_a_chip_is_turned_on_after_a_stop(tmp_path, capsys, kind, stopped_s):
 
 
 def test_the_time_of_a_link_never_follows_who_sets_the_clock():
-    clock = Clock()
+    clock = SteadyClock()
     begun_ns = clock.now_ns()
     for jump_ns in (DAY_NS, -DAY_NS):
         with patch("time.time_ns", lambda jump_ns=jump_ns: time_ns() + jump_ns):
@@ -99,6 +99,6 @@ def test_a_program_that_stood_still_is_told_from_a_vehicle_that_was_silent():
     assert [text for text in said if "stood still for 300 s" in text]
     assert not [text for text in said if "has sent nothing" in text]
     assert source.recording().gap.sum() == 1
-    link = Link(Replay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)
+    link = Link(TlogReplay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)
     again = VehicleSource(link, 100.0, None, lambda text: None, "test")
     assert [again.start(), *(again.poll().t.tolist() for _ in range(59))] == first[:-1]

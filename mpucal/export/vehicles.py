@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..mavlink.parameters.encoding import INT32, as_float32
-from ..mavlink.parameters.plan import changes, left_out
+from ..mavlink.parameters.plan import plan_changes, refused_imus
 from ..mavlink.parameters.text import param_text, params_text
 from ..result.calibration import Calibration
 from .losses import dated
@@ -48,19 +48,19 @@ def left_by_px4(calibration: Calibration) -> tuple[str, ...]:
 def _values(calibration: Calibration, firmware: str) -> dict[str, float]:
     """The new parameters of every IMU by name, as a float32 holds them."""
     held: dict[str, float] = {}
-    for change in changes(calibration, firmware):
-        held |= {name: as_float32(value) for name, value in change.place.values(change.new).items()}
+    for change in plan_changes(calibration, firmware):
+        held |= {name: as_float32(value) for name, value in change.slot.values(change.new).items()}
     return held
 
 
 def _ids(calibration: Calibration, firmware: str) -> dict[str, float]:
     """The IDs of the sensors that were calibrated, by name; a firmware takes one without its ID for uncalibrated."""
-    of = {change.place.sensor_id: change.sensor_id for change in changes(calibration, firmware)}
+    of = {change.slot.sensor_id: change.sensor_id for change in plan_changes(calibration, firmware)}
     return {name: as_float32(value) for name, value in of.items() if value}
 
 
 def _head(calibration: Calibration, firmware: str) -> str:
-    imus = ", ".join(str(change.imu) for change in changes(calibration, firmware))
+    imus = ", ".join(str(change.imu) for change in plan_changes(calibration, firmware))
     return f"Accelerometer calibration of a {firmware} vehicle by mpucal, {dated(calibration)}: IMU {imus}"
 
 
@@ -68,16 +68,16 @@ def _left_by(calibration: Calibration, firmware: str) -> tuple[str, ...]:
     said = [
         f"IMU {change.imu}: parameters hold no cross-axis terms; |a| stays wrong by up to"
         f" {change.residual_mps2:.3f} m/s^2."
-        for change in changes(calibration, firmware)
+        for change in plan_changes(calibration, firmware)
     ]
     named = _ids(calibration, firmware)
     said += [
-        f"The vehicle did not say what {change.place.sensor_id} is, and {firmware} takes an accelerometer without it"
+        f"The vehicle did not say what {change.slot.sensor_id} is, and {firmware} takes an accelerometer without it"
         " for uncalibrated: where it is 0, calibrate with the ground station once, and load the file then."
-        for change in changes(calibration, firmware)
-        if change.place.sensor_id not in named
+        for change in plan_changes(calibration, firmware)
+        if change.slot.sensor_id not in named
     ]
-    out = left_out(calibration)
+    out = refused_imus(calibration)
     if out:
         said.append(f"IMU {', '.join(map(str, out))} is not in the file: its calibration was refused.")
     return tuple(said)

@@ -13,7 +13,7 @@ from typing import Any
 from ..arguments import LARGEST
 from ..data import Recording
 from ..errors import RecordingError
-from ..mavlink.dialect import pymavlink
+from ..mavlink.dialect import import_pymavlink
 from ..mavlink.firmwares import ARDUPILOT
 from ..mavlink.imu import DATAFLASH, Reading, Stream
 from ..mavlink.log import Log
@@ -61,11 +61,11 @@ def _fill(log: Log, path: Path) -> None:
     with suppress(Exception), _reader(path) as reader:
         while (message := reader.recv_match(type=[PARAMETER, *IMUS])) is not None:
             if message.get_type() == PARAMETER:
-                log.parameter(str(message.Name), float(message.Value))
+                log.add_parameter(str(message.Name), float(message.Value))
                 continue
             content = _reading(message)
             if content is not None:
-                log.reading(content, content.time * US)
+                log.add_reading(content, content.time * US)
 
 
 @contextmanager
@@ -73,7 +73,7 @@ def _reader(path: Path) -> Iterator[Any]:
     """pymavlink's, whose file is closed also where it fails as it begins."""
     # its compiled indexer, which is hardly faster, prints past `redirect_stderr`
     os.environ.setdefault("PYMAVLINK_FAST_INDEX", "0")
-    kind = pymavlink("DFReader").DFReader_binary
+    kind = import_pymavlink("DFReader").DFReader_binary
     reader = kind.__new__(kind)
     try:
         reader.__init__(str(path))

@@ -38,7 +38,7 @@ class VehicleClock:
         # by how much the clock ran ahead of the times of receipt at most, but for what they differ by
         self._ahead_us = 0
 
-    def us(self, raw: int, received_ns: int) -> tuple[int, Jump]:
+    def unwrap(self, raw: int, received_ns: int) -> tuple[int, Jump]:
         """The time of `raw` in us, and what the clock did before it.
 
         Parameters

@@ -31,10 +31,10 @@ def dialect() -> Any:
     ------
     UsageError : pymavlink is not installed.
     """
-    return pymavlink("dialects.v20.ardupilotmega")
+    return import_pymavlink("dialects.v20.ardupilotmega")
 
 
-def pymavlink(name: str) -> Any:
+def import_pymavlink(name: str) -> Any:
     """A module of pymavlink, which only those install who have a vehicle: half of what mpucal would weigh with it.
 
     Raises

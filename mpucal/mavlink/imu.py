@@ -15,7 +15,7 @@ from ..arguments import LARGEST
 from ..data import STANDARD_GRAVITY_MPS2
 from .dialect import Message
 
-Three = tuple[float, float, float]
+Xyz = tuple[float, float, float]
 
 ACC_LSB_MPS2 = STANDARD_GRAVITY_MPS2 / 1000.0
 GYRO_LSB_RAD_S = 1e-3
@@ -36,7 +36,7 @@ class Stream(NamedTuple):
     imu: int
 
     @property
-    def is_whole(self) -> bool:
+    def is_truncated(self) -> bool:
         """Whether its numbers are truncated to whole milli-g and mrad/s."""
         return self.name not in (HIGHRES, DATAFLASH)
 
@@ -58,8 +58,8 @@ class Reading:
 
     stream: Stream
     time: int
-    acc: Three
-    gyr: Three
+    acc: Xyz
+    gyr: Xyz
     temperature_c: float
 
 
@@ -67,7 +67,7 @@ class Reading:
 LATEST = 1 << 53
 
 
-def reading(message: Message) -> Reading | None:
+def decode_reading(message: Message) -> Reading | None:
     """The content of an IMU message; None of another one, or where it has no new accelerations and rates."""
     read = _READ.get(message.get_type())
     content = None if read is None else read(message)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from ..errors import BusError, LinkError, NoAnswer
 from .dialect import LONGEST, MAGIC, SIGNED, Message, Packet, Parser, dialect
-from .transport import STOOD_NS, Bytes, Transport
+from .transport import PAUSE_NS, ReceivedBytes, Transport
 from .vehicle import Vehicle, vehicle_of
 
 # of us: a ground station beside the usual 255, as a component that autopilots expect of one
@@ -132,7 +132,7 @@ class Link:
     def lock(self, vehicle: Vehicle) -> None:
         """Hear `vehicle` alone from now on, and send to it."""
         self._vehicle = vehicle
-        self._transport.settle(vehicle.address)
+        self._transport.restrict(vehicle.address)
         for t_ns, address, data in self._heard:
             if address in (vehicle.address, None):
                 self._record(t_ns, data)
@@ -147,7 +147,7 @@ class Link:
         """
         if self._transport.datagrams and not self._transport.outward and not self._seeking:
             self._seeking = True
-            self._transport.settle(None)
+            self._transport.restrict(None)
 
     def send(self, message: Message) -> None:
         """Send to the vehicle, and nobody else.
@@ -171,7 +171,7 @@ class Link:
             if self._seeking and self._is_back(arrived):
                 self._seeking = False
                 self._vehicle = replace(self.vehicle, address=arrived.address)
-                self._transport.settle(arrived.address)
+                self._transport.restrict(arrived.address)
             vehicle = self.vehicle
             if arrived.address != vehicle.address:
                 continue
@@ -212,7 +212,7 @@ class Link:
             if received is not None:
                 self._queue.extend(self._parsed(received))
             now_ns = self._transport.now_ns() if received is None else received.t_ns
-            if self._vehicle is not None and now_ns - until_ns > STOOD_NS:
+            if self._vehicle is not None and now_ns - until_ns > PAUSE_NS:
                 # nobody was waiting meanwhile: there is nothing to be told of that time
                 until_ns = now_ns
                 break
@@ -221,7 +221,7 @@ class Link:
                 break
         self._now_ns = max(self._now_ns, until_ns)
 
-    def _parsed(self, received: Bytes) -> list[_Arrived]:
+    def _parsed(self, received: ReceivedBytes) -> list[_Arrived]:
         if self._vehicle is not None and not self._may_be(received.address, self._vehicle.address):
             return []
         if self._transport.datagrams and received.data[:1] not in MAGIC:

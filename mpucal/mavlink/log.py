@@ -18,10 +18,10 @@ from ..rests.flat import find_flat
 from .clock import US, Jump
 from .dialect import Message, Parser, dialect, header
 from .firmwares import ARDUPILOT, PX4, preferred_messages
-from .gatherer import Gatherer, Row
-from .imu import MESSAGE_ID, Reading, reading
-from .join import BEYOND, CORRECTIONS, SETTLED_US, Segment, joined, through
-from .parameters.encoding import parameter_of
+from .imu import MESSAGE_ID, Reading, decode_reading
+from .parameters.encoding import decode_parameter
+from .segments import BEYOND, CORRECTIONS, SETTLED_US, Segment, find_recorrection, join_segments
+from .stream_buffers import Row, StreamBuffers
 from .tlog import Record
 
 # whose change alters the streams
@@ -55,43 +55,43 @@ class Log:
     def add(self, message: Message, received_ns: int) -> None:
         """Take one message: an IMU's, or a parameter's."""
         self.add_other(message)
-        content = reading(message)
+        content = decode_reading(message)
         if content is not None:
-            self.reading(content, received_ns)
+            self.add_reading(content, received_ns)
 
     def add_other(self, message: Message) -> None:
         """Take a message that is no IMU's."""
-        parameter = parameter_of(message, self.firmware == PX4)
+        parameter = decode_parameter(message, self.firmware == PX4)
         if parameter is not None:
-            self.parameter(parameter.name, float(parameter.value))
+            self.add_parameter(parameter.name, float(parameter.value))
 
-    def parameter(self, name: str, value: float) -> None:
+    def add_parameter(self, name: str, value: float) -> None:
         """A parameter as the vehicle holds it from now on; one that no firmware has is none."""
         now = self.segments[-1]
         known = now.parameters
         if NAME.fullmatch(name) is None or (name not in known and len(known) >= MOST_PARAMETERS):
             return
         if len(now) and name.startswith(SHAPING) and now.parameters.get(name, value) != value:
-            now = Segment(dict(now.parameters), now.gatherer.following())
+            now = Segment(dict(now.parameters), now.buffers.following())
             self.segments.append(now)
             self.changed.append(name)
             self._changed_ns = self._now_ns
         now.parameters[name] = value
 
-    def reading(self, content: Reading, received_ns: int) -> tuple[Row | None, Jump]:
-        """An IMU's reading, as it would be under the first parameters; and what the clock did. See Gathered.add."""
+    def add_reading(self, content: Reading, received_ns: int) -> tuple[Row | None, Jump]:
+        """An IMU's reading, as it would be under the first parameters; and what the clock did. See StreamBuffer.add."""
         self._now_ns = received_ns
         now = self.segments[-1]
-        gathered = now.gatherer.of(content.stream)
-        t_us, jump = gathered.clock.us(content.time, received_ns)
+        buffer = now.buffers.of(content.stream)
+        t_us, jump = buffer.clock.unwrap(content.time, received_ns)
         # each stream's clock tells of the same reboot
-        if jump is Jump.REBOOT and len(gathered):
-            after = now.gatherer.following() if self._over_reboots else Gatherer()
+        if jump is Jump.REBOOT and len(buffer):
+            after = now.buffers.following() if self._over_reboots else StreamBuffers()
             now = Segment(dict(now.parameters), after, rebooted=True)
             self.segments.append(now)
-            gathered = after.of(content.stream)
-            t_us = t_us if self._over_reboots else gathered.clock.us(content.time, received_ns)[0]
-        row = gathered.keep(t_us, content)
+            buffer = after.of(content.stream)
+            t_us = t_us if self._over_reboots else buffer.clock.unwrap(content.time, received_ns)[0]
+        row = buffer.keep(t_us, content)
         return (None if row is None else self._as_at_first(row)), jump
 
     def _as_at_first(self, row: Row) -> Row | None:
@@ -101,7 +101,9 @@ class Log:
         if self._now_ns - self._changed_ns < SETTLED_US * US:
             return None
         content = row.reading
-        back = through(self.firmware, content.stream.imu, self.segments[-1].parameters, self.segments[0].parameters)
+        back = find_recorrection(
+            self.firmware, content.stream.imu, self.segments[-1].parameters, self.segments[0].parameters
+        )
         if back is None:
             return row
         acc, gyr = back.acc(np.array(content.acc)).tolist(), back.gyr(np.array(content.gyr)).tolist()
@@ -111,7 +113,7 @@ class Log:
         """Let go of all readings so far, and go on under the same parameters."""
         self.segments = self.segments[-1:]
         self._changed_ns = None
-        self.segments[0].gatherer.forget()
+        self.segments[0].buffers.forget()
 
     def recording(self, name: str) -> Recording:
         """The first IMU's recording of the longest segment, with the others' in `others`.
@@ -120,11 +122,11 @@ class Log:
         ------
         RecordingError : it holds no IMU messages that tell the truth.
         """
-        longest = joined(self.segments, self.firmware, self._over_reboots)
+        longest = join_segments(self.segments, self.firmware, self._over_reboots)
         order = preferred_messages(self.firmware, longest.parameters)
-        recordings = longest.gatherer.recordings(order, name, self.firmware, longest.parameters)
+        recordings = longest.buffers.recordings(order, name, self.firmware, longest.parameters)
         if not recordings:
-            raise _no_imu(name, self.firmware, longest.gatherer)
+            raise _no_imu(name, self.firmware, longest.buffers)
         return with_others(recordings)
 
 
@@ -178,16 +180,16 @@ def _vehicles(records: Iterable[Record]) -> dict[tuple[int, int], str]:
     firmware: dict[tuple[int, int], str] = {}
     imu: set[tuple[int, int]] = set()
 
-    def telling(record: Record) -> bool:
+    def is_identifying(record: Record) -> bool:
         message_id, ids = header(record.data)
         return message_id == m.MAVLINK_MSG_ID_HEARTBEAT or (ids not in imu and message_id in IMU_MESSAGES)
 
     # most of a log is one IMU's messages: decoding the first of them is enough
-    for _, message in _messages(record for record in records if telling(record)):
+    for _, message in _messages(record for record in records if is_identifying(record)):
         ids = _sender(message)
         if message.get_type() == "HEARTBEAT" and message.autopilot != m.MAV_AUTOPILOT_INVALID:
             firmware[ids] = PX4 if message.autopilot == m.MAV_AUTOPILOT_PX4 else ARDUPILOT
-        elif ids not in imu and reading(message) is not None:
+        elif ids not in imu and decode_reading(message) is not None:
             imu.add(ids)
     return {ids: name for ids, name in firmware.items() if ids in imu} or firmware
 
@@ -199,8 +201,8 @@ def _not_one(name: str, vehicles: Mapping[tuple[int, int], str]) -> RecordingErr
     return RecordingError(f"{name} holds several vehicles: {listed}", "record the one to calibrate alone")
 
 
-def _no_imu(name: str, firmware: str, gatherer: Gatherer) -> RecordingError:
-    if firmware == PX4 and gatherer.streams:
+def _no_imu(name: str, firmware: str, buffers: StreamBuffers) -> RecordingError:
+    if firmware == PX4 and buffers.streams:
         return RecordingError(
             f"{name} holds only PX4's HIGHRES_IMU, from which the estimator's bias is subtracted already",
             "record SCALED_IMU, as `mpucal session --mavlink` does, or clear bits 0 and 1 of EKF2_IMU_CTRL before",

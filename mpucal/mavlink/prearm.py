@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ..errors import LinkError
 from .dialect import Message, dialect
+from .firmwares import PX4
 from .link import Link, S
 
 ARMED, PREARM_CHECK = 128, 0x10000000
@@ -18,7 +19,7 @@ IN_EVENTS = "its events say why, as QGroundControl shows them"
 
 
 @dataclass(frozen=True)
-class Prearm:
+class PrearmState:
     """Attributes: ready, None where it does not say; complaints, its own sentences."""
 
     ready: bool | None
@@ -30,7 +31,7 @@ class Prearm:
         return {True: "would arm", False: "would not arm", None: "does not say whether it would arm"}[self.ready]
 
 
-class Watch:
+class ArmingMonitor:
     """Hears HEARTBEATs from now on, whoever reads the link."""
 
     def __init__(self, link: Link) -> None:
@@ -59,7 +60,7 @@ class Watch:
         return self._armed
 
 
-def prearm(link: Link) -> Prearm:
+def check_prearm(link: Link) -> PrearmState:
     """Have the vehicle check itself, and hear what it says.
 
     Raises
@@ -76,14 +77,14 @@ def prearm(link: Link) -> Prearm:
             )
         for message in link.messages(link.now_ns() + COMPLAINTS_NS):
             if message.get_type() == "SYS_STATUS":
-                ready = _ready(message, vehicle.is_px4)
+                ready = _ready(message, vehicle.family == PX4)
             if message.get_type() == "STATUSTEXT" and message.text.startswith(PREFIXES):
                 complaints.append(message.text.partition(": ")[2])
         if ready is not None:
             break
-    if ready is False and not complaints and vehicle.is_px4:
+    if ready is False and not complaints and vehicle.family == PX4:
         complaints.append(IN_EVENTS)
-    return Prearm(ready, tuple(dict.fromkeys(complaints)))
+    return PrearmState(ready, tuple(dict.fromkeys(complaints)))
 
 
 def _ready(message: Message, is_px4: bool) -> bool | None:

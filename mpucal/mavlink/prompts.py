@@ -26,21 +26,21 @@ class Prompt(Protocol):
     def down(self) -> Direction | None: ...  # noqa: D102
 
 
-class Heard(NamedTuple):
+class ReceivedPrompt(NamedTuple):
     """A prompt as it arrives: its kind, and the unit vector to point down, if one is wanted."""
 
     kind: str
     down: Direction | None
 
 
-def to_message(prompt: Prompt) -> Message:
+def encode_prompt(prompt: Prompt) -> Message:
     """The STATUSTEXT that says it."""
     m = dialect()
     down = "" if prompt.down is None else ", down {:+.2f} {:+.2f} {:+.2f}".format(*prompt.down)
     return m.MAVLink_statustext_message(m.MAV_SEVERITY_INFO, f"mpucal: {prompt.kind}{down}".encode())
 
 
-def of_message(message: Message) -> Heard | None:
+def decode_prompt(message: Message) -> ReceivedPrompt | None:
     """The prompt in it, if there is one."""
     if message.get_type() != "STATUSTEXT":
         return None
@@ -48,4 +48,4 @@ def of_message(message: Message) -> Heard | None:
     if found is None:
         return None
     kind, *down = found.groups()
-    return Heard(kind, None if down[0] is None else (float(down[0]), float(down[1]), float(down[2])))
+    return ReceivedPrompt(kind, None if down[0] is None else (float(down[0]), float(down[1]), float(down[2])))

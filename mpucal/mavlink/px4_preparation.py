@@ -11,13 +11,13 @@ from collections.abc import Callable
 from ..errors import LinkError
 from .dialect import dialect
 from .firmwares import PX4
-from .imu import HIGHRES, MESSAGE_ID, reading
+from .imu import HIGHRES, MESSAGE_ID, decode_reading
 from .link import Link, S
-from .parameters.client import Parameters
+from .parameters.client import ParameterClient
 from .parameters.encoding import INT32
-from .parameters.names import all_places
-from .prompts import Heard, to_message
-from .request import command
+from .parameters.names import all_slots
+from .prompts import ReceivedPrompt, encode_prompt
+from .request import send_command
 from .stream_parameters import read_parameters
 
 AUTOCAL = "SENS_IMU_AUTOCAL"
@@ -40,22 +40,22 @@ class Preparation:
 
         Raises
         ------
-        EndOfCapture, LinkError : see Parameters.set.
+        EndOfCapture, LinkError : see ParameterClient.set.
         """
         if not self._named():
             self._name()
         if read_parameters(self._link, (AUTOCAL,), PX4).get(AUTOCAL):
             # before it is set: where the answer is lost, it may be 0 all the same
             self._held = True
-            Parameters(self._link).set(AUTOCAL, 0, INT32)
+            ParameterClient(self._link).set(AUTOCAL, 0, INT32)
             self._say(f"{AUTOCAL} is 0 for the session, and then 1 again: PX4 learns no offsets of its own meanwhile.")
 
     def _name(self) -> None:
         """Its quick calibration, once it lies level; no sensor used the offsets that this replaces."""
         vehicle = self._link.vehicle
         self._say(f"Lay {vehicle} level, top up: it names its accelerometers then, with offsets as it lies.")
-        self._link.send(to_message(Heard("lay_flat", None)))
-        command(self._link, dialect().MAV_CMD_SET_MESSAGE_INTERVAL, MESSAGE_ID[HIGHRES], LOOK_US)
+        self._link.send(encode_prompt(ReceivedPrompt("lay_flat", None)))
+        send_command(self._link, dialect().MAV_CMD_SET_MESSAGE_INTERVAL, MESSAGE_ID[HIGHRES], LOOK_US)
         end_ns = self._link.now_ns() + LEVEL_NS
         while not self._is_level():
             if self._link.now_ns() >= end_ns:
@@ -65,19 +65,19 @@ class Preparation:
                 )
                 return
         self._say("It names them now: do not touch it. Where this session writes nothing, it keeps these offsets.")
-        command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, QUICK)
+        send_command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, QUICK)
         end_ns = self._link.now_ns() + NAMED_NS
         while not self._named() and self._link.now_ns() < end_ns:
             list(self._link.messages(self._link.now_ns() + S))
 
     def _is_level(self) -> bool:
         """Whether each sample of a second has gravity along z, as where the vehicle stands on its feet."""
-        heard = [reading(message) for message in self._link.messages(self._link.now_ns() + S)]
+        heard = [decode_reading(message) for message in self._link.messages(self._link.now_ns() + S)]
         felt = [one.acc for one in heard if one is not None]
         return bool(felt) and all(math.hypot(x, y) < -z * math.tan(math.radians(LEVEL_DEG)) for x, y, z in felt)
 
     def _named(self) -> bool:
-        ids = read_parameters(self._link, [where.sensor_id for where in all_places(PX4)], PX4)
+        ids = read_parameters(self._link, [where.sensor_id for where in all_slots(PX4)], PX4)
         # one that does not answer is asked for again, and judged, with the rest
         return not ids or any(ids.values())
 
@@ -87,6 +87,6 @@ class Preparation:
             return
         self._held = False
         try:
-            Parameters(self._link).set(AUTOCAL, 1, INT32)
+            ParameterClient(self._link).set(AUTOCAL, 1, INT32)
         except LinkError:
             self._say(f"{AUTOCAL} could not be set back: set it to 1 with your ground station.")

@@ -41,7 +41,7 @@ def ask(
     return None
 
 
-def command(link: Link, number: int, *params: float, timeout_s: float = 1.0, tries: int = 3) -> int | None:
+def send_command(link: Link, number: int, *params: float, timeout_s: float = 1.0, tries: int = 3) -> int | None:
     """Send MAV_CMD `number` as COMMAND_LONG; the MAV_RESULT of its COMMAND_ACK, None where none came."""
     seven = [*params, *[0.0] * (7 - len(params))]
     vehicle = link.vehicle

@@ -26,7 +26,7 @@ class Note(NamedTuple):
     data: Mapping[str, Any]
 
 
-def to_messages(note: Note, id_: int) -> list[Message]:
+def encode_note(note: Note, id_: int) -> list[Message]:
     """The messages that hold `note`.
 
     Parameters
@@ -45,7 +45,7 @@ def to_messages(note: Note, id_: int) -> list[Message]:
     return [m.MAVLink_statustext_message(m.MAV_SEVERITY_DEBUG, chunk, id_, k) for k, chunk in enumerate(chunks)]
 
 
-class Notes:
+class NoteReader:
     """Notes from messages, as they come."""
 
     def __init__(self) -> None:

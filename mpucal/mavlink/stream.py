@@ -8,9 +8,9 @@ from collections.abc import Callable, Collection, Mapping
 from ..errors import LinkError
 from .dialect import Message, dialect
 from .firmwares import PX4, preferred_messages
-from .imu import HIGHRES, MESSAGE_ID, RAW, Stream, reading
+from .imu import HIGHRES, MESSAGE_ID, RAW, Stream, decode_reading
 from .link import Link, S
-from .request import command
+from .request import send_command
 
 US_PER_S = 1e6
 # what ArduPilot gives at a loop of 400 Hz: a rate that it denies is followed by the next lower one
@@ -119,7 +119,7 @@ class Streams:
         self._window_ns = self._link.now_ns()
 
     def _hear(self, message: Message) -> None:
-        content = reading(message)
+        content = decode_reading(message)
         if content is not None:
             self._times[content.stream].add(content.time)
 
@@ -139,7 +139,7 @@ class Streams:
         m = dialect()
         for rate_hz in (self._rate_hz, *(rate for rate in LADDER_HZ if rate < self._rate_hz)):
             self._wanted[name] = rate_hz
-            result = command(
+            result = send_command(
                 self._link,
                 m.MAV_CMD_SET_MESSAGE_INTERVAL,
                 MESSAGE_ID[name],

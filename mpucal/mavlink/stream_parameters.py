@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from .dialect import Message
 from .firmwares import EKF2_IMU_CTRL, FILTERS, PX4
 from .link import Link, S
-from .parameters.encoding import name_bytes, parameter_of
+from .parameters.encoding import decode_parameter, name_bytes
 from .parameters.names import CUSTOM_ANGLES
 
 ORIENTATION = "AHRS_ORIENTATION"
@@ -80,6 +80,6 @@ def _request(link: Link, names: Sequence[str]) -> None:
 
 
 def _take(message: Message, held: dict[str, float], names: Sequence[str], firmware: str) -> None:
-    parameter = parameter_of(message, firmware == PX4)
+    parameter = decode_parameter(message, firmware == PX4)
     if parameter is not None and parameter.name in names:
         held[parameter.name] = float(parameter.value)

@@ -8,19 +8,19 @@ from typing import NamedTuple
 
 from ..errors import EndOfCapture
 from .dialect import Packet, Parser, dialect
-from .session_events import Note, Notes, is_own
+from .session_events import Note, NoteReader, is_own
 from .tlog import Tlog
-from .transport import STOOD_NS, Bytes
+from .transport import PAUSE_NS, ReceivedBytes
 
 
-class Noted(NamedTuple):
+class TimedNote(NamedTuple):
     """A note, and when it was made [ns since 1970]."""
 
     t_ns: int
     note: Note
 
 
-class Replay:
+class TlogReplay:
     """A transport of the recorded packets; the notes among them wait for `pending`.
 
     What mpucal itself sent when it recorded is passed over.
@@ -34,8 +34,8 @@ class Replay:
         # whatever was recorded: our own heartbeats tell a vehicle that was silent from a program that stood still
         self._times_ns = [record.t_ns for record in tlog.records]
         self._parser = Parser(dialect().MAVLink(None))
-        self._notes = Notes()
-        self._pending: list[Noted] = []
+        self._notes = NoteReader()
+        self._pending: list[TimedNote] = []
         self._at = 0
         self._now_ns = tlog.records[0].t_ns
         self._end_ns = tlog.records[-1].t_ns
@@ -45,7 +45,7 @@ class Replay:
         """See Transport."""
         return self._now_ns
 
-    def receive(self, until_ns: int) -> Bytes | None:
+    def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport.
 
         Raises
@@ -58,28 +58,28 @@ class Replay:
         if ended or self._records[self._at].t_ns >= until_ns:
             at = bisect_left(self._times_ns, until_ns)
             next_ns = self._times_ns[at] if at < len(self._times_ns) else until_ns
-            self._now_ns = max(self._now_ns, next_ns if next_ns - until_ns > STOOD_NS else until_ns)
+            self._now_ns = max(self._now_ns, next_ns if next_ns - until_ns > PAUSE_NS else until_ns)
             return None
         record = self._records[self._at]
         t_ns = max(record.t_ns, self._now_ns)
         self._now_ns = t_ns
         self._at += 1
         self._pass_own()
-        return Bytes(record.data, self.name, t_ns)
+        return ReceivedBytes(record.data, self.name, t_ns)
 
     def send(self, data: bytes, address: str | None) -> None:
         """See Transport: nobody hears it."""
 
-    def settle(self, address: str | None) -> None:
+    def restrict(self, address: str | None) -> None:
         """See Transport: it holds one vehicle's packets."""
 
     def close(self) -> None:
         """See Transport."""
 
-    def pending(self, name: str) -> Sequence[Noted]:
+    def pending(self, name: str) -> Sequence[TimedNote]:
         """The notes of that name made until now that stand before the next packet, each once."""
 
-        def is_due(noted: Noted) -> bool:
+        def is_due(noted: TimedNote) -> bool:
             return noted.t_ns <= self._now_ns and noted.note.name == name
 
         pending, self._pending = self._pending, [noted for noted in self._pending if not is_due(noted)]
@@ -96,7 +96,7 @@ class Replay:
             for packet in packets:
                 note = self._notes.add(packet.message)
                 if note is not None:
-                    self._pending.append(Noted(record.t_ns, note))
+                    self._pending.append(TimedNote(record.t_ns, note))
 
 
 def _are_own(packets: Sequence[Packet]) -> bool:

@@ -7,10 +7,10 @@ from typing import NamedTuple, Protocol
 
 US = 1_000
 # who asked for bytes until a time, and gets them so much later, stood still meanwhile: SIGSTOP, a suspended computer
-STOOD_NS = 3_000_000_000
+PAUSE_NS = 3_000_000_000
 
 
-class Bytes(NamedTuple):
+class ReceivedBytes(NamedTuple):
     """Bytes that arrived: a datagram or a piece of a stream; from where, and when (ns since 1970, whole us)."""
 
     data: bytes
@@ -36,7 +36,7 @@ class Transport(Protocol):
         """ns since 1970, in whole us, as a .tlog counts; never goes back."""
         ...
 
-    def receive(self, until_ns: int) -> Bytes | None:
+    def receive(self, until_ns: int) -> ReceivedBytes | None:
         """The next bytes, waited for until `until_ns`; None where none came. EndOfCapture, LinkError."""
         ...
 
@@ -44,7 +44,7 @@ class Transport(Protocol):
         """Send to `address`, as `receive` gave it; None: to the partner of an outward transport. LinkError."""
         ...
 
-    def settle(self, address: str | None) -> None:
+    def restrict(self, address: str | None) -> None:
         """From now on hear that address alone, where the transport can see to it; None: whoever sends, as at first."""
         ...
 
@@ -53,7 +53,7 @@ class Transport(Protocol):
         ...
 
 
-class Clock:
+class SteadyClock:
     """Time of day at the start, counted on by the clock that nobody sets."""
 
     def __init__(self) -> None:

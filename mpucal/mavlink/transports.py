@@ -10,8 +10,8 @@ from contextlib import suppress
 from typing import Any
 
 from ..errors import LinkError, NoAnswer
-from .returning import Returning
-from .transport import Bytes, Clock, Transport
+from .reconnecting import ReconnectingTransport
+from .transport import ReceivedBytes, SteadyClock, Transport
 from .url import Kind, Url
 
 CHUNK = 65536
@@ -31,7 +31,7 @@ class Udp:
     datagrams = True
 
     def __init__(self, url: Url) -> None:
-        self._clock = Clock()
+        self._clock = SteadyClock()
         self.name = str(url)
         self.outward = url.kind is Kind.UDPOUT
         self._url = url
@@ -57,7 +57,7 @@ class Udp:
         """See Transport."""
         return self._clock.now_ns()
 
-    def receive(self, until_ns: int) -> Bytes | None:
+    def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport; who refuses our datagrams is not there yet."""
         if not _readable(self._socket, until_ns - self.now_ns()):
             return None
@@ -65,7 +65,7 @@ class Udp:
             data, (host, port) = self._socket.recvfrom(CHUNK)
         except (ConnectionError, BlockingIOError):
             return None
-        return Bytes(data, f"{host}:{port}", self.now_ns())
+        return ReceivedBytes(data, f"{host}:{port}", self.now_ns())
 
     def send(self, data: bytes, address: str | None) -> None:
         """See Transport; a datagram that cannot go out is lost, as any may be."""
@@ -73,7 +73,7 @@ class Udp:
         with suppress(OSError):
             self._socket.sendto(data, (host, int(port)) if address else self._partner)
 
-    def settle(self, address: str | None) -> None:
+    def restrict(self, address: str | None) -> None:
         """See Transport: a connected socket's strangers are turned away by the kernel, before they fill its buffer."""
         if address is None:
             self._socket.close()
@@ -100,7 +100,7 @@ class Tcp:
     datagrams, outward = False, True
 
     def __init__(self, url: Url) -> None:
-        self._clock = Clock()
+        self._clock = SteadyClock()
         self.name = str(url)
         try:
             self._socket = socket.create_connection((url.host, url.port), CONNECT_S)
@@ -116,7 +116,7 @@ class Tcp:
         """See Transport."""
         return self._clock.now_ns()
 
-    def receive(self, until_ns: int) -> Bytes | None:
+    def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport."""
         if not _readable(self._socket, until_ns - self.now_ns()):
             return None
@@ -126,7 +126,7 @@ class Tcp:
             raise _broken(self.name, error) from error
         if not data:
             raise LinkError(f"{self.name} closed the connection", "start it again, then the session")
-        return Bytes(data, self.name, self.now_ns())
+        return ReceivedBytes(data, self.name, self.now_ns())
 
     def send(self, data: bytes, address: str | None) -> None:
         """See Transport."""
@@ -135,7 +135,7 @@ class Tcp:
         except OSError as error:
             raise _broken(self.name, error) from error
 
-    def settle(self, address: str | None) -> None:
+    def restrict(self, address: str | None) -> None:
         """See Transport: it has one partner."""
 
     def close(self) -> None:
@@ -156,7 +156,7 @@ class Serial:
     def __init__(self, url: Url) -> None:
         import serial  # noqa: PLC0415
 
-        self._clock = Clock()
+        self._clock = SteadyClock()
         self.name = str(url)
         self._failure: Any = (OSError, serial.SerialException)
         try:
@@ -168,13 +168,13 @@ class Serial:
         """See Transport."""
         return self._clock.now_ns()
 
-    def receive(self, until_ns: int) -> Bytes | None:
+    def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport."""
         try:
             data = self._read(until_ns - self.now_ns())
         except self._failure as error:
             raise _broken(self.name, error) from error
-        return Bytes(data, self.name, self.now_ns()) if data else None
+        return ReceivedBytes(data, self.name, self.now_ns()) if data else None
 
     def _read(self, wait_ns: int) -> bytes:
         if not hasattr(self._port, "fileno"):  # Windows has no file to wait for
@@ -189,7 +189,7 @@ class Serial:
         except self._failure as error:
             raise _broken(self.name, error) from error
 
-    def settle(self, address: str | None) -> None:
+    def restrict(self, address: str | None) -> None:
         """See Transport: it has one partner."""
 
     def close(self) -> None:
@@ -205,8 +205,8 @@ def open_transport(url: Url) -> Transport:
     LinkError : it cannot be opened.
     """
     if url.kind is Kind.TCP:
-        return Returning(url, Tcp)
-    return Returning(url, Serial) if url.kind is Kind.SERIAL else Udp(url)
+        return ReconnectingTransport(url, Tcp)
+    return ReconnectingTransport(url, Serial) if url.kind is Kind.SERIAL else Udp(url)
 
 
 def _readable(channel: Any, wait_ns: int) -> bool:

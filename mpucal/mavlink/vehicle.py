@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .dialect import Message, dialect
+from .firmwares import ARDUPILOT, PX4
 
 
 @dataclass(frozen=True)
@@ -23,9 +24,9 @@ class Vehicle:
     type: int
 
     @property
-    def is_px4(self) -> bool:
-        """Whether it does as PX4 does, rather than as ArduPilot."""
-        return bool(self.autopilot == dialect().MAV_AUTOPILOT_PX4)
+    def family(self) -> str:
+        """PX4 or ARDUPILOT: the firmware whose parameters, streams and checks this vehicle has."""
+        return PX4 if self.autopilot == dialect().MAV_AUTOPILOT_PX4 else ARDUPILOT
 
     @property
     def firmware(self) -> str:

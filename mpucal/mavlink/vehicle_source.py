@@ -9,16 +9,16 @@ from ..errors import LinkError, UsageError, WriteBackError
 from .clock import Jump
 from .dialect import Message
 from .firmwares import ARDUPILOT, PX4, accel_lag_s
-from .gatherer import Row, chip, least_noise, samples_of, steps
-from .imu import Stream, reading
+from .imu import Stream, decode_reading
 from .link import Link, S
 from .log import Log
-from .parameters.names import place
+from .parameters.names import find_slot
 from .prearm import ARMED
 from .px4_preparation import Preparation
 from .stream import Streams
+from .stream_buffers import Row, chip, least_noise, samples_of, steps
 from .stream_parameters import read_stream_parameters
-from .transport import STOOD_NS
+from .transport import PAUSE_NS
 from .vehicle import Vehicle
 
 POLL_NS = S // 20
@@ -83,11 +83,11 @@ class VehicleSource:
         ------
         NoAnswer : no vehicle. UsageError : several. LinkError : it sends no accelerations, or the link broke.
         """
-        vehicle = one_of(self._link.listen(), self._system)
+        vehicle = choose_vehicle(self._link.listen(), self._system)
         # nothing is sent before the person has seen to whom
         self._say(f"This is {vehicle}; what is asked and written goes there alone.")
         self._link.lock(vehicle)
-        firmware = self._firmware = PX4 if vehicle.is_px4 else ARDUPILOT
+        firmware = self._firmware = vehicle.family
         if self._preparation is not None:
             if firmware == PX4:
                 self._preparation.prepare()
@@ -127,7 +127,7 @@ class VehicleSource:
             self._heard_ns = self._link.now_ns()
             self._received += 1
         stood_ns = self._link.now_ns() - begun_ns
-        if stood_ns > STOOD_NS:
+        if stood_ns > PAUSE_NS:
             # what came before is given first
             self._stood_ns = stood_ns
             self._heard_ns = self._sampled_ns = self._link.now_ns()
@@ -171,10 +171,10 @@ class VehicleSource:
         self._log.add_other(message)
         if message.get_type() == "HEARTBEAT":
             self._beware(bool(message.base_mode & ARMED))
-        content = reading(message)
+        content = decode_reading(message)
         if content is None:
             return
-        row, jump = self._log.reading(content, self._link.now_ns())
+        row, jump = self._log.add_reading(content, self._link.now_ns())
         self._rebooted |= jump is Jump.REBOOT
         if row is not None and content.stream == self._stream:
             self._rows.append(row)
@@ -202,7 +202,7 @@ class VehicleSource:
 
     def _check_named(self, parameters: Mapping[str, float]) -> None:
         """Before anything is turned: a PX4 that names no sensor has no place for the result."""
-        if self._firmware != PX4 or not parameters or place(PX4, 1, parameters) is not None:
+        if self._firmware != PX4 or not parameters or find_slot(PX4, 1, parameters) is not None:
             return
         what = f"{self._link.vehicle} names none of its accelerometers (all CAL_ACCn_ID are 0)"
         if self._writes:
@@ -259,7 +259,7 @@ class VehicleSource:
         self._say(f"{names[0]} was changed while it was measured{by}: what came before counts as far as it can.")
 
 
-def one_of(vehicles: tuple[Vehicle, ...], system: int | None) -> Vehicle:
+def choose_vehicle(vehicles: tuple[Vehicle, ...], system: int | None) -> Vehicle:
     """The only vehicle, or the only one of that system.
 
     Raises

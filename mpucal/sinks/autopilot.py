@@ -14,15 +14,15 @@ from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..mavlink.ftp import Storage
 from ..mavlink.link import Link, S
 from ..mavlink.parameters.applied import applied, of_imu
-from ..mavlink.parameters.client import Parameters
-from ..mavlink.parameters.names import all_places
-from ..mavlink.parameters.plan import NOTHING, Change, changes, helping, left_out, moved
+from ..mavlink.parameters.client import ParameterClient
+from ..mavlink.parameters.names import all_slots
+from ..mavlink.parameters.plan import NOTHING, Change, plan_changes, refused_imus, select_improving, swap_slots
 from ..mavlink.parameters.text import param_text, params_text, read_parameters_file
-from ..mavlink.parameters.verify import OtherPlacesError, verify
-from ..mavlink.parameters.write import NEW, OLD, Writer, is_between
-from ..mavlink.prearm import Prearm, Watch, prearm
-from ..mavlink.request import command
-from ..mavlink.stillness import Stillness
+from ..mavlink.parameters.verify import SwappedSlotsError, verify
+from ..mavlink.parameters.write import NEW, OLD, Writer, is_partial_write
+from ..mavlink.prearm import ArmingMonitor, PrearmState, check_prearm
+from ..mavlink.request import send_command
+from ..mavlink.rest_monitor import RestMonitor
 from ..mavlink.stream_parameters import read_stream_parameters
 from ..result.calibration import Calibration
 from ..result.journal import AT, Journal
@@ -73,8 +73,8 @@ class AutopilotSink:
         self._link = link
         self._journal = journal or Journal()
         self._store = store
-        self._firmware = PX4 if link.vehicle.is_px4 else ARDUPILOT
-        self._watch = Watch(link)
+        self._firmware = link.vehicle.family
+        self._watch = ArmingMonitor(link)
 
     @property
     def where(self) -> str:
@@ -92,13 +92,13 @@ class AutopilotSink:
         if left is None:
             return None
         old, new = left[OLD], left[NEW]
-        writer = Writer(self._link, self._watch, [w for w in all_places(self._firmware) if set(w.names) <= set(old)])
-        held = writer.held()
+        writer = Writer(self._link, self._watch, [w for w in all_slots(self._firmware) if set(w.names) <= set(old)])
+        held = writer.read()
         cut_off = f"a write to this vehicle was cut off at {left[AT]}"
         if held == old:
             self._journal.done()
             return None
-        if set(held) != set(old) or not is_between(held, old, new):
+        if set(held) != set(old) or not is_partial_write(held, old, new):
             self._journal.done()
             return f"{cut_off}, and {self.where} holds neither the parameters of before nor those: they are left alone"
         with interrupting():
@@ -132,21 +132,21 @@ class AutopilotSink:
         RecordingError : `kept` is no such file. WriteBackError : see Sink.
         """
         wanted = read_parameters_file(kept)
-        places = [where for where in all_places(self._firmware) if set(where.names) <= set(wanted)]
-        if not places:
+        slots = [where for where in all_slots(self._firmware) if set(where.names) <= set(wanted)]
+        if not slots:
             raise RecordingError(
                 f"{kept} holds no accelerometer parameters of {self._firmware}", "give a file that a write kept"
             )
-        writer = Writer(self._link, self._watch, places, self._journal)
+        writer = Writer(self._link, self._watch, slots, self._journal)
         with _nothing_written():
-            old = writer.held()
-        writer.write(old, {name: wanted[name] for where in places for name in where.names}, lambda: None)
+            old = writer.read()
+        writer.write(old, {name: wanted[name] for where in slots for name in where.names}, lambda: None)
         return f"{self.where} holds again what {kept.name} says, read back"
 
     def as_good(self, calibration: Calibration) -> str | None:
         """See Comparing; cross-axis residue included. One IMU whose new parameters are better is enough."""
-        planned = changes(calibration, self._firmware)
-        if any(change.helps for change in planned):
+        planned = plan_changes(calibration, self._firmware)
+        if any(change.improves for change in planned):
             return None
         old, new = (max(getattr(c, key) or 0.0 for c in planned) for key in ("residual_old_mps2", "residual_mps2"))
         return (
@@ -165,29 +165,33 @@ class AutopilotSink:
             return self._written(calibration)
         except WriteBackError as error:
             other = error.__cause__
-            if not isinstance(other, OtherPlacesError) or not self._writer.restored:
+            if not isinstance(other, SwappedSlotsError) or not self._writer.restored:
                 raise
-        return self._written(moved(calibration, other.order, self._firmware))
+        return self._written(swap_slots(calibration, other.order, self._firmware))
 
     def _written(self, calibration: Calibration) -> Applied:
-        possible = changes(calibration, self._firmware)
-        planned = helping(possible)
-        places = [change.place for change in planned]
-        writer = self._writer = Writer(self._link, self._watch, places, self._journal)
-        stillness = Stillness(self._link, [change.stream for change in planned])
+        possible = plan_changes(calibration, self._firmware)
+        planned = select_improving(possible)
+        slots = [change.slot for change in planned]
+        writer = self._writer = Writer(self._link, self._watch, slots, self._journal)
+        monitor = RestMonitor(self._link, [change.stream for change in planned])
         with _nothing_written():
             self._check(planned)
-            before = prearm(self._link)
-            old = writer.held()
-            rest = stillness.wait()
+            before = check_prearm(self._link)
+            old = writer.read()
+            rest = monitor.wait()
         if rest is None:
             raise WriteBackError(f"{NOTHING}: the vehicle did not lie still", "set it down, then write again")
-        new = {name: value for change in planned for name, value in change.place.values(change.new).items()}
+        new = {name: value for change in planned for name, value in change.slot.values(change.new).items()}
         now = applied(calibration, [change.imu for change in planned])
         with self._stored(now, planned) as paths:
-            writer.write(old, new, lambda: verify(planned, old, rest, stillness.wait()))
+            writer.write(old, new, lambda: verify(planned, old, rest, monitor.wait()))
         after = self._settled()
-        said = [*self._said(planned, before, after), *_kept(possible, planned, left_out(calibration)), *self._saves()]
+        said = [
+            *self._said(planned, before, after),
+            *_kept(possible, planned, refused_imus(calibration)),
+            *self._saves(),
+        ]
         return Applied(now, "; ".join([*said, *paths]))
 
     @contextmanager
@@ -213,8 +217,8 @@ class AutopilotSink:
         """Disarmed, and with the sensors that were calibrated."""
         if self._watch.armed:
             raise WriteBackError(f"{NOTHING}: {self.where} is armed", "disarm it, then write again")
-        known = {c.place.sensor_id: c.sensor_id for c in planned if c.sensor_id}
-        for name, held in Parameters(self._link).read(tuple(known)).items():
+        known = {c.slot.sensor_id: c.sensor_id for c in planned if c.sensor_id}
+        for name, held in ParameterClient(self._link).read(tuple(known)).items():
             # 0: the vehicle's parameters were wiped since
             if held not in (0, known[name]):
                 raise WriteBackError(
@@ -222,24 +226,24 @@ class AutopilotSink:
                     "connect the vehicle that was calibrated, or calibrate this one",
                 )
 
-    def _settled(self) -> Prearm:
+    def _settled(self) -> PrearmState:
         """How it would arm now; an ArduPilot whose saved ids are none or others' saves those of its sensors.
 
         It calls IMUs inconsistent until they have agreed for ten seconds (AP_Arming::ins_accels_consistent).
         It shows its sensors' ids all the same: AP_InertialSensor::register_accel sets them, and does not save them.
         """
-        now = prearm(self._link)
+        now = check_prearm(self._link)
         if self._firmware != ARDUPILOT:
             return now
         if any(map(UNCALIBRATED.search, now.complaints)):
-            command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, SAVE_IDS)
-            now = prearm(self._link)
+            send_command(self._link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, SAVE_IDS)
+            now = check_prearm(self._link)
         until_ns = self._link.now_ns() + AGREE_NS
         while any(map(INCONSISTENT.search, now.complaints)) and self._link.now_ns() < until_ns:
-            now = prearm(self._link)
+            now = check_prearm(self._link)
         return now
 
-    def _said(self, planned: Sequence[Change], before: Prearm, after: Prearm) -> list[str]:
+    def _said(self, planned: Sequence[Change], before: PrearmState, after: PrearmState) -> list[str]:
         imus = " and ".join(str(change.imu) for change in planned)
         residuals = ", ".join(f"{change.residual_mps2:.3f}" for change in planned)
         return [

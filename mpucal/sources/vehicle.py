@@ -13,20 +13,19 @@ from ..chip.config import RateOnlyConfig
 from ..chip.records import LATE, SessionEvent
 from ..data import Recording
 from ..errors import CaptureError, EndOfCapture, LinkError, UsageError
-from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..mavlink.link import OWN_SYSTEM, Link
 from ..mavlink.log import read_log
-from ..mavlink.prompts import to_message
+from ..mavlink.prompts import encode_prompt
 from ..mavlink.recorded_source import RecordedSource
-from ..mavlink.session_events import Note, to_messages
+from ..mavlink.session_events import Note, encode_note
 from ..mavlink.signing import read_key
 from ..mavlink.stream_parameters import read_stream_parameters
 from ..mavlink.tlog import Tlog, TlogWriter, read_tlog
-from ..mavlink.tlog_replay import Replay
+from ..mavlink.tlog_replay import TlogReplay
 from ..mavlink.transport import Transport
 from ..mavlink.transports import open_transport
 from ..mavlink.url import parse_url
-from ..mavlink.vehicle_source import VehicleSource, one_of
+from ..mavlink.vehicle_source import VehicleSource, choose_vehicle
 from ..result.session_files import CAPTURE_OF_VEHICLE
 from ..session.events import Prompt
 from ..session.plan import Plan
@@ -70,7 +69,7 @@ class OpenedVehicle:
         *,
         listeners: Sequence[Callable[[Prompt], None]] = (),
         truth: Callable[[], Mapping[str, Any]] | None = None,
-        replay: Replay | None = None,
+        replay: TlogReplay | None = None,
         recovered: str | None = None,
         real_time: bool = True,
         own_system: int = OWN_SYSTEM,
@@ -130,7 +129,7 @@ class OpenedVehicle:
             raise UsageError("a .tlog has no vehicle to write to", "give the vehicle's --mavlink URL")
         with closing(self._transport):
             link = self.link = Link(self._transport, lambda _t_ns, _packet: None, self._key, self._own_system)
-            vehicle = one_of(link.listen(), self._system)
+            vehicle = choose_vehicle(link.listen(), self._system)
             say(f"This is {vehicle}; what is asked and written goes there alone.")
             link.lock(vehicle)
             yield link
@@ -138,7 +137,7 @@ class OpenedVehicle:
     def contents(self) -> dict[str, Any]:
         """What its accelerometer parameters are now, and which vehicle it is; nothing is written."""
         with self.connected(lambda _sentence: None) as link:
-            firmware = PX4 if link.vehicle.is_px4 else ARDUPILOT
+            firmware = link.vehicle.family
             return {
                 "where": str(link.vehicle),
                 "firmware": firmware,
@@ -150,7 +149,7 @@ class OpenedVehicle:
         if self.link is not None:
             # a vehicle that is gone is no reason to keep a prompt from the person
             with suppress(LinkError):
-                self.link.send(to_message(prompt))
+                self.link.send(encode_prompt(prompt))
 
     def _was_late(self, late: bool) -> bool:
         return late if self._replay is None else bool(self._pending(LATE))
@@ -201,7 +200,7 @@ class _Noting:
 
     def keep(self, name: str, _t_ns: int, data: Mapping[str, Any]) -> None:
         """Keep an event; its time is the link's."""
-        for message in to_messages(Note(name, data), 1 + self._notes % NOTE_IDS):
+        for message in encode_note(Note(name, data), 1 + self._notes % NOTE_IDS):
             self._link.note(message)
         self._notes += 1
 
@@ -259,7 +258,7 @@ def open_tlog(file: Path, asked: Plan, system: int | None) -> OpenedVehicle | Op
     CaptureError : it cannot be read, or another version of mpucal made it. RecordingError : it holds no IMU.
     """
     tlog = read_tlog(file)
-    replay = Replay(tlog)
+    replay = TlogReplay(tlog)
     head = next((noted.note for noted in replay.pending(SESSION)), None)
     if head is None:
         return OpenedLog(tlog, read_log(tlog.records, tlog.name, system), asked)

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from mpucal.mavlink.dialect import dialect
-from mpucal.mavlink.transport import Bytes
+from mpucal.mavlink.transport import ReceivedBytes
 
 CAPTURES = Path(__file__).parents[2].parent / "shared" / "captures"
 S = 1_000_000_000
@@ -29,7 +29,7 @@ class Script:
     name = "a script"
 
     def __init__(self, arriving: Sequence[tuple[float, str, bytes]], outward: bool = False, datagrams: bool = True):
-        self.arriving = [Bytes(data, address, round(t * S)) for t, address, data in arriving]
+        self.arriving = [ReceivedBytes(data, address, round(t * S)) for t, address, data in arriving]
         self.outward, self.datagrams = outward, datagrams
         self.sent: list[tuple[float, str | None, bytes]] = []
         self.answer: Callable[[bytes], Sequence[bytes]] = lambda data: ()
@@ -38,7 +38,7 @@ class Script:
     def now_ns(self) -> int:
         return self._now_ns
 
-    def receive(self, until_ns: int) -> Bytes | None:
+    def receive(self, until_ns: int) -> ReceivedBytes | None:
         if self.arriving and self.arriving[0].t_ns < until_ns:
             received = self.arriving.pop(0)
             self._now_ns = max(self._now_ns, received.t_ns)
@@ -46,12 +46,12 @@ class Script:
         self._now_ns = max(self._now_ns, until_ns)
         return None
 
-    def settle(self, address: str | None) -> None:
+    def restrict(self, address: str | None) -> None:
         pass
 
     def send(self, data: bytes, address: str | None) -> None:
         self.sent.append((self._now_ns / S, address, data))
-        answers = [Bytes(answer, address or "vehicle:1", self._now_ns) for answer in self.answer(data)]
+        answers = [ReceivedBytes(answer, address or "vehicle:1", self._now_ns) for answer in self.answer(data)]
         self.arriving = [*answers, *self.arriving]
 
     def close(self) -> None:

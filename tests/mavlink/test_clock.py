@@ -10,7 +10,7 @@ WRAP = 1 << 32
 def run(unit_us, pairs):
     """pairs of (raw, received [s])."""
     clock = VehicleClock(unit_us)
-    return [clock.us(raw, round(received * 1e9)) for raw, received in pairs]
+    return [clock.unwrap(raw, round(received * 1e9)) for raw, received in pairs]
 
 
 @given(st.lists(st.integers(1, 60_000), min_size=1, max_size=50), st.integers(0, WRAP - 1), st.sampled_from([1, 1000]))

@@ -2,8 +2,8 @@ import pytest
 
 from mpucal.errors import BusError, LinkError, NoAnswer, UsageError
 from mpucal.mavlink.link import OWN_COMPONENT, OWN_SYSTEM, Link, S
-from mpucal.mavlink.request import ask, command
-from mpucal.mavlink.vehicle_source import one_of
+from mpucal.mavlink.request import ask, send_command
+from mpucal.mavlink.vehicle_source import choose_vehicle
 
 KEY = b"k" * 32
 HOME, STRANGER = "10.0.0.2:14555", "10.0.0.66:999"
@@ -21,7 +21,7 @@ def locked(transport, key=None):
     """A link locked to the only vehicle, and what it records."""
     record = []
     link = Link(transport, lambda t_ns, data: record.append((t_ns, data)), key)
-    link.lock(one_of(link.listen(), None))
+    link.lock(choose_vehicle(link.listen(), None))
     return link, record
 
 
@@ -67,16 +67,16 @@ def test_several_vehicles_end_with_their_list(script, station):
     transport = script(in_order(heartbeats(station(1), HOME), heartbeats(station(7, autopilot=12), STRANGER)))
     vehicles = Link(transport, lambda t_ns, data: None).listen()
     with pytest.raises(UsageError) as raised:
-        one_of(vehicles, None)
+        choose_vehicle(vehicles, None)
     assert str(raised.value) == (
         f"there are several vehicles: system 1 (ArduPilot) at {HOME}, system 7 (PX4) at {STRANGER}: "
         "choose one with --system N."
     )
-    assert one_of(vehicles, 7).address == STRANGER
+    assert choose_vehicle(vehicles, 7).address == STRANGER
     with pytest.raises(UsageError, match="no vehicle is system 9"):
-        one_of(vehicles, 9)
+        choose_vehicle(vehicles, 9)
     with pytest.raises(UsageError, match=f"at {HOME} and 92 more: choose one"):
-        one_of(vehicles[:1] * 100, None)
+        choose_vehicle(vehicles[:1] * 100, None)
 
 
 def test_a_second_vehicle_is_heard_where_the_first_comes_late(script, station):
@@ -105,7 +105,7 @@ def test_a_vehicle_that_comes_back_at_another_port_is_found_there_once_it_is_sou
 def test_one_system_at_two_addresses_is_not_guessed_at(script, station):
     transport = script(in_order(heartbeats(station(), HOME), heartbeats(station(), STRANGER)))
     with pytest.raises(UsageError, match="stop the other"):
-        one_of(Link(transport, lambda t_ns, data: None).listen(), 1)
+        choose_vehicle(Link(transport, lambda t_ns, data: None).listen(), 1)
 
 
 @pytest.mark.parametrize("key", [None, KEY], ids=["unsigned", "signed"])
@@ -244,7 +244,7 @@ def test_a_request_is_repeated_until_its_own_answer(script, station, decoded):
 
     transport.answer = answer
     link, _ = locked(transport)
-    assert command(link, 511, 27, 10_000) == 4
+    assert send_command(link, 511, 27, 10_000) == 4
     assert len(asked) == 3
 
 

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
-from mpucal.mavlink.join import through
 from mpucal.mavlink.parameters.compose import Correction, compose
-from mpucal.mavlink.parameters.names import px4_place
+from mpucal.mavlink.parameters.names import px4_slot
 from mpucal.mavlink.rotation import orientation
+from mpucal.mavlink.segments import find_recorrection
 
 ORIENTATIONS = [number for number in range(41) if orientation(number) is not None]
 
@@ -88,7 +88,7 @@ def test_the_stream_after_a_change_is_foretold():
     R = orientation(14)
     old, new = (Correction(rng.uniform(-0.5, 0.5, 3), rng.uniform(0.9, 1.1, 3)) for _ in range(2))
     f = sphere(10, STANDARD_GRAVITY_MPS2)
-    foretold = old.seen_through(new, R, stream(C, bias, old, R, f))
+    foretold = old.recorrect(new, R, stream(C, bias, old, R, f))
     np.testing.assert_allclose(foretold, stream(C, bias, new, R, f), atol=1e-12)
 
 
@@ -112,12 +112,12 @@ def test_an_orientation_without_angles_is_unknown():
 
 def test_a_sensor_that_px4_names_later_than_the_next_one_keeps_its_own_correction():
     unnamed = {"SENS_BOARD_ROT": 0.0} | {
-        name: float(name.endswith("SCALE")) for slot in range(4) for name in px4_place(slot + 1, slot).names
+        name: float(name.endswith("SCALE")) for slot in range(4) for name in px4_slot(slot + 1, slot).names
     }
     unnamed |= {f"CAL_ACC{slot}_ID": 0.0 for slot in range(4)}
     second = unnamed | {"CAL_ACC1_ID": 7.0, "CAL_ACC1_XOFF": 0.4}
     both = second | {"CAL_ACC0_ID": 5.0, "CAL_ACC0_YOFF": 0.3}
     for now, moved in ((unnamed, -0.3), (second, -0.3), (both, 0.0)):
-        assert through("PX4", 1, now, both).acc(np.zeros(3)) == pytest.approx([0.0, moved, 0.0])
-    assert through("PX4", 2, unnamed, both).acc(np.zeros(3)) == pytest.approx([-0.4, 0.0, 0.0])
-    assert through("PX4", 1, both, both | {"CAL_ACC0_ID": 9.0}) is None
+        assert find_recorrection("PX4", 1, now, both).acc(np.zeros(3)) == pytest.approx([0.0, moved, 0.0])
+    assert find_recorrection("PX4", 2, unnamed, both).acc(np.zeros(3)) == pytest.approx([-0.4, 0.0, 0.0])
+    assert find_recorrection("PX4", 1, both, both | {"CAL_ACC0_ID": 9.0}) is None

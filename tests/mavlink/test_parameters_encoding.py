@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from mpucal.errors import RecordingError
 from mpucal.mavlink.dialect import Parser, dialect
-from mpucal.mavlink.parameters.encoding import error_name, name_bytes, of_wire, to_wire
-from mpucal.mavlink.parameters.names import all_places, mounting, place
+from mpucal.mavlink.parameters.encoding import error_name, from_wire, name_bytes, to_wire
+from mpucal.mavlink.parameters.names import all_slots, find_slot, mounting
 from mpucal.mavlink.parameters.text import param_text, params_text, read_parameters_file
 
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
@@ -21,7 +21,7 @@ def sent(name, value, kind, bytewise):
     mav = dialect().MAVLink(None, 1, 1)
     message = mav.param_value_encode(name_bytes(name), to_wire(value, kind, bytewise), kind, 100, 7)
     (packet,) = Parser(dialect().MAVLink(None)).datagram(bytes(message.pack(mav)))
-    return of_wire(packet.message, bytewise)
+    return from_wire(packet.message, bytewise)
 
 
 @given(st.sampled_from(sorted(RANGES)), st.data())
@@ -92,9 +92,9 @@ def test_another_file_is_refused(tmp_path, text):
 
 def test_px4_keeps_a_sensor_in_the_slot_that_names_it():
     ids = {"CAL_ACC0_ID": 0.0, "CAL_ACC1_ID": 1310988.0, "CAL_ACC2_ID": 1310996.0}
-    assert place("PX4", 1, ids).offset[0] == "CAL_ACC1_XOFF"
-    assert place("PX4", 2, ids).scale[2] == "CAL_ACC2_ZSCALE"
-    assert place("PX4", 3, ids) is None
+    assert find_slot("PX4", 1, ids).offset[0] == "CAL_ACC1_XOFF"
+    assert find_slot("PX4", 2, ids).scale[2] == "CAL_ACC2_ZSCALE"
+    assert find_slot("PX4", 3, ids) is None
 
 
 @pytest.mark.parametrize(
@@ -103,12 +103,12 @@ def test_px4_keeps_a_sensor_in_the_slot_that_names_it():
     ids=["first", "second", "third"],
 )
 def test_ardupilots_names_count_from_the_second(firmware, imu, name):
-    assert place(firmware, imu, {}).offset[0] == name
-    assert name in [where.offset[0] for where in all_places(firmware)]
+    assert find_slot(firmware, imu, {}).offset[0] == name
+    assert name in [where.offset[0] for where in all_slots(firmware)]
 
 
 def test_the_mounting_is_that_of_the_board_unless_the_sensor_is_outside():
-    where = place("PX4", 1, {"CAL_ACC0_ID": 5.0})
+    where = find_slot("PX4", 1, {"CAL_ACC0_ID": 5.0})
     board = {"SENS_BOARD_ROT": 2.0, "CAL_ACC0_ROT": -1.0}
     np.testing.assert_allclose(mounting("PX4", where, board) @ [1, 0, 0], [0, 1, 0], atol=1e-12)
     outside = board | {"CAL_ACC0_ROT": 4.0}
@@ -118,7 +118,7 @@ def test_the_mounting_is_that_of_the_board_unless_the_sensor_is_outside():
 
 
 def test_a_custom_orientation_needs_its_angles():
-    where = place("ArduPilot", 1, {})
+    where = find_slot("ArduPilot", 1, {})
     assert mounting("ArduPilot", where, {"AHRS_ORIENTATION": 101.0}) is None
     assert mounting("ArduPilot", where, {}) is None
     angles = {"CUST_ROT1_ROLL": 0.0, "CUST_ROT1_PITCH": 0.0, "CUST_ROT1_YAW": 90.0}

@@ -3,7 +3,7 @@
 import pytest
 
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.prearm import prearm
+from mpucal.mavlink.prearm import check_prearm
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 
@@ -19,10 +19,10 @@ def px4(words=""):
 def test_px4_says_whether_it_would_arm_though_it_does_not_list_the_check(words):
     vehicle, link = px4(words)
     assert not vehicle.firmware.sys_status().onboard_control_sensors_present & 0x10000000
-    assert prearm(link).ready is not bool(words)
+    assert check_prearm(link).ready is not bool(words)
 
 
 def test_px4_that_tells_why_by_events_alone_is_said_to(monkeypatch):
     vehicle, link = px4()
     monkeypatch.setattr(vehicle.firmware, "complaints", lambda: ["in an event"])
-    assert str(prearm(link)) == "would not arm: its events say why, as QGroundControl shows them"
+    assert str(check_prearm(link)) == "would not arm: its events say why, as QGroundControl shows them"

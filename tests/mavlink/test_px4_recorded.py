@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from mpucal.cli import commands
 from mpucal.mavlink.parameters.document import NEW
-from mpucal.mavlink.parameters.names import place
+from mpucal.mavlink.parameters.names import find_slot
 
 RECORDED = Path(__file__).parent / "data" / "px4_turned.tlog"
 # of each IMU: offset [m/s^2] and scale that are right, by what fed the sensors
@@ -33,7 +33,7 @@ def documents():
 @pytest.mark.parametrize("imu", [1, 3])
 def test_parameters_are_right_in_each_sensors_own_axes(documents, imu):
     new = documents[imu][NEW]
-    found = place("PX4", imu, documents[imu]["params_old"]).correction(new)
+    found = find_slot("PX4", imu, documents[imu]["params_old"]).correction(new)
     offset, scale = TRUE[imu]
     assert found.offset == pytest.approx(np.array(offset), abs=4e-3)
     assert found.scale == pytest.approx(np.array(scale), abs=2e-3)

@@ -120,15 +120,15 @@ def test_a_parameter_that_changes_splits_a_log(station, tmp_path):
 @pytest.mark.parametrize(("name", "kept"), [("INS_POS1_X", True), ("a\x1b[2J", False), ("", False), ("Ä", False)])
 def test_what_no_firmware_calls_a_parameter_is_none(name, kept):
     log = Log("ArduPilot")
-    log.parameter(name, 1.0)
+    log.add_parameter(name, 1.0)
     assert (name in log.segments[-1].parameters) == kept
 
 
 def test_more_parameters_than_any_firmware_has_are_not_kept():
     log = Log("ArduPilot")
     for number in range(10_000):
-        log.parameter(f"P{number}", 1.0)
-    log.parameter("P1", 2.0)
+        log.add_parameter(f"P{number}", 1.0)
+    log.add_parameter("P1", 2.0)
     assert len(log.segments[-1].parameters) < 10_000
     assert log.segments[-1].parameters["P1"] == 2.0
 

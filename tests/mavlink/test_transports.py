@@ -83,14 +83,14 @@ def test_the_kernel_turns_strangers_away_once_the_vehicle_is_known(other):
     port = free_udp()
     with closing(open_transport(Url(Kind.UDP, HOST, port))) as transport:
         other.sendto(b"vehicle", (HOST, port))
-        transport.settle(soon(transport).address)
+        transport.restrict(soon(transport).address)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
             stranger.sendto(b"stranger", (HOST, port))
             other.sendto(b"again", (HOST, port))
             assert soon(transport).data == b"again"
             transport.send(b"answer", None)
             assert other.recv(99) == b"answer"
-            transport.settle(None)
+            transport.restrict(None)
             stranger.sendto(b"whoever", (HOST, port))
             assert soon(transport).data == b"whoever"
 

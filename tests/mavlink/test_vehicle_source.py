@@ -7,11 +7,11 @@ from scipy.signal import butter, group_delay
 from mpucal.errors import EndOfCapture, LinkError, UsageError, WriteBackError
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.parameters.client import Parameters
-from mpucal.mavlink.parameters.names import ardupilot_place, mounting
+from mpucal.mavlink.parameters.client import ParameterClient
+from mpucal.mavlink.parameters.names import ardupilot_slot, mounting
 from mpucal.mavlink.stream_parameters import read_stream_parameters, stream_parameter_names
 from mpucal.mavlink.tlog import Record, Tlog
-from mpucal.mavlink.tlog_replay import Replay
+from mpucal.mavlink.tlog_replay import TlogReplay
 from mpucal.mavlink.vehicle_source import VehicleSource
 from mpucal.session.plan import Plan
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
@@ -76,7 +76,7 @@ def test_the_angles_of_a_board_that_is_turned_by_its_own_are_asked_for():
     source, _, _ = opened("imus=1,rotation=101,CUST_ROT1_ROLL=180,CUST_ROT1_YAW=90")
     source.start()
     polled(source, 1)
-    R_b = mounting(ARDUPILOT, ardupilot_place(1), source.recording().autopilot.parameters)
+    R_b = mounting(ARDUPILOT, ardupilot_slot(1), source.recording().autopilot.parameters)
     # turned over its nose, then to the right: its x points to the vehicle's y, its y to x, its z up
     np.testing.assert_allclose(R_b, [[0, 1, 0], [1, 0, 0], [0, 0, -1]], atol=1e-12)
 
@@ -133,7 +133,7 @@ def test_faults_of_the_line_leave_samples_in_order(fault, seconds):
 def test_a_replay_gives_the_same_samples_poll_by_poll():
     source, record, _ = opened("highres=no,fault=loss,fault=reorder")
     first = [source.start(), *(source.poll().t.tolist() for _ in range(60))]
-    link = Link(Replay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)
+    link = Link(TlogReplay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)
     again = VehicleSource(link, 100.0, None, lambda text: None, "test")
     assert [again.start(), *(again.poll().t.tolist() for _ in range(59))] == first[:-1]
     with pytest.raises(EndOfCapture):
@@ -175,7 +175,7 @@ def test_after_a_reboot_its_streams_are_asked_for_again_and_join(words):
         # as long as the silence, and what it took to notice that the streams had ended
         assert 2.0 < one.t[before] - one.t[before - 1] < 6.0
         assert len(one) - before > 300
-    link = Link(Replay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)
+    link = Link(TlogReplay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)
     again = VehicleSource(link, 100.0, None, lambda text: None, "test")
     again.start()
     repeated = polled(again, 11)
@@ -240,7 +240,7 @@ def test_a_px4_that_was_prepared_names_its_sensors_and_holds_its_offsets():
     assert [one.autopilot.parameters["CAL_ACC1_ID"] > 0 for one in (recording, *recording.others)] == [True, True]
     source.stop()
     assert vehicle.firmware.store["SENS_IMU_AUTOCAL"] == 1
-    link = Link(Replay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)
+    link = Link(TlogReplay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)
     again = VehicleSource(link, 100.0, None, lambda text: None, "test", prepare=True)
     again.start()
     repeated = polled(again, 6)
@@ -276,14 +276,14 @@ def test_a_px4_that_does_not_lie_level_is_not_asked_to_name_its_sensors():
 
 def test_autocal_is_set_back_where_the_answer_to_holding_it_is_lost(monkeypatch):
     vehicle = SimulatedVehicle(VehicleOptions.parse("sim:firmware=px4,imus=1,hand=still"))
-    set_surely = Parameters.set
+    set_surely = ParameterClient.set
 
     def lost(self, name, value, kind):
         set_surely(self, name, value, kind)
         if value == 0:
             raise LinkError("no answer", "ask again")
 
-    monkeypatch.setattr(Parameters, "set", lost)
+    monkeypatch.setattr(ParameterClient, "set", lost)
     link = Link(SimulatedTransport(vehicle), lambda t_ns, data: None)
     source = VehicleSource(link, 100.0, None, lambda text: None, "test", prepare=True)
     with pytest.raises(LinkError):

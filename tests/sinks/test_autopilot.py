@@ -17,12 +17,12 @@ from hypothesis import strategies as st
 
 from mpucal.data import Autopilot
 from mpucal.errors import RecordingError, WriteBackError
-from mpucal.mavlink import stillness
+from mpucal.mavlink import rest_monitor
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.document import autopilot_document
-from mpucal.mavlink.prompts import Heard, to_message
-from mpucal.mavlink.transport import Bytes
+from mpucal.mavlink.prompts import ReceivedPrompt, encode_prompt
+from mpucal.mavlink.transport import ReceivedBytes
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
 from mpucal.result.journal import Journal
@@ -65,7 +65,7 @@ def settled(firmware, words):
     transport = Flying(vehicle)
     link = Link(transport, recorded_nowhere)
     link.lock(link.listen()[0])
-    link.send(to_message(Heard("lay_flat", None)))
+    link.send(encode_prompt(ReceivedPrompt("lay_flat", None)))
     list(link.messages(link.now_ns() + 4_000_000_000))
     return vehicle, transport, link
 
@@ -82,8 +82,8 @@ def vehicle_of(firmware, words=""):
 @pytest.fixture
 def brief(monkeypatch):
     """Looks at streams at rest for a fifth of the time, where how long they are looked at decides nothing."""
-    monkeypatch.setattr(stillness, "WINDOW_NS", stillness.WINDOW_NS // 5)
-    monkeypatch.setattr(stillness, "FEWEST", stillness.FEWEST // 5)
+    monkeypatch.setattr(rest_monitor, "WINDOW_NS", rest_monitor.WINDOW_NS // 5)
+    monkeypatch.setattr(rest_monitor, "FEWEST", rest_monitor.FEWEST // 5)
 
 
 def calibration_of(vehicle):
@@ -554,7 +554,7 @@ def test_nothing_is_set_that_was_not_asked_for(kind, attacker, monkeypatch):
     monkeypatch.setattr(hostile.HostileTransport, "attack", attack, raising=False)
     link = Link(hostile.HostileTransport(vehicle), lambda t_ns, data: None, key)
     link.lock(link.listen()[0])
-    link.send(to_message(Heard("lay_flat", None)))
+    link.send(encode_prompt(ReceivedPrompt("lay_flat", None)))
     list(link.messages(link.now_ns() + 4_000_000_000))
     calibration = calibration_of(vehicle)
     new, old = calibration.extra["autopilot"]["params_new"], stored(vehicle)
@@ -578,7 +578,7 @@ def test_who_answers_in_the_vehicles_place_is_told_by_its_answers():
 
     def also_answered(data, address):
         answer = impostor.param_value_encode(b"INS_ACCOFFS_Y", 0.3, 9, 9, 1)
-        transport._queue.append(Bytes(bytes(answer.pack(impostor)), ADDRESS, link.now_ns()))
+        transport._queue.append(ReceivedBytes(bytes(answer.pack(impostor)), ADDRESS, link.now_ns()))
         impostor.seq = (impostor.seq + 1) % 256
         send(data, address)
 

@@ -18,10 +18,10 @@ from mpucal.errors import LinkError
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.ftp import Payload, Storage
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.parameters.client import Parameters
-from mpucal.mavlink.prearm import Watch
+from mpucal.mavlink.parameters.client import ParameterClient
+from mpucal.mavlink.prearm import ArmingMonitor
 from mpucal.mavlink.stream_parameters import stream_parameter_names
-from mpucal.mavlink.transport import Bytes
+from mpucal.mavlink.transport import ReceivedBytes
 from mpucal.page.requests import Door
 from mpucal.page.server import Handler
 from mpucal.sources.bridge import messages as wire
@@ -181,18 +181,18 @@ class HostileVehicle:
         """Of the last packet, or later."""
         return self._t_us * 1000
 
-    def receive(self, until_ns: int) -> Bytes | None:
+    def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport; after the last packet the link is gone."""
         t_us, packet = next(self._packets, (0, b""))
         if not packet:
             raise LinkError("it says no more", "")
         self._t_us = max(self._t_us, t_us)
-        return Bytes(packet, "192.0.2.1:1", self.now_ns())
+        return ReceivedBytes(packet, "192.0.2.1:1", self.now_ns())
 
     def send(self, data: bytes, address: str | None) -> None:
         """See Transport."""
 
-    def settle(self, address: str | None) -> None:
+    def restrict(self, address: str | None) -> None:
         """See Transport."""
 
     def close(self) -> None:
@@ -204,9 +204,9 @@ def vehicle(data: bytes) -> None:
     link = Link(HostileVehicle(data), lambda t_ns, packet: None)
     found = link.listen()
     link.lock(found[0])
-    str(Watch(link).armed)
+    str(ArmingMonitor(link).armed)
     Storage(link).get("/x")
-    Parameters(link).read_surely(stream_parameter_names(link.vehicle.firmware)[:2])
+    ParameterClient(link).read_agreed(stream_parameter_names(link.vehicle.firmware)[:2])
 
 
 def vehicle_says() -> list[bytes]:

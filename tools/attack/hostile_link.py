@@ -12,8 +12,8 @@ from unittest.mock import patch
 
 from mpucal.disk import growing
 from mpucal.mavlink.dialect import Parser, dialect
-from mpucal.mavlink.parameters.encoding import of_wire
-from mpucal.mavlink.transport import Bytes
+from mpucal.mavlink.parameters.encoding import from_wire
+from mpucal.mavlink.transport import ReceivedBytes
 from mpucal.session import results
 from mpucal.simulated.vehicle import SimulatedVehicle
 from mpucal.simulated.vehicle.transport import ADDRESS, SimulatedTransport
@@ -87,19 +87,19 @@ class HostileTransport(SimulatedTransport):
         self._due = 0
         self._asked = Parser(dialect().MAVLink(None))
 
-    def settle(self, address: str | None) -> None:
+    def restrict(self, address: str | None) -> None:
         """See Transport."""
         if self._begun_us is None:
             self._begun_us = self._vehicle.now_us
 
-    def receive(self, until_ns: int) -> Bytes | None:
+    def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport."""
         attacker = self._attacker
         if self._begun_us is not None and attacker.heard:
             attacker.now_us = self._vehicle.now_us
             due = self.attack.due((attacker.now_us - self._begun_us) * 1e-6)
             for _ in range(due - self._due):
-                self._queue.appendleft(Bytes(attacker.packet(self.attack.kind), self._from, self.now_ns()))
+                self._queue.appendleft(ReceivedBytes(attacker.packet(self.attack.kind), self._from, self.now_ns()))
             self.attack.sent += due - self._due
             self._due = due
         received = super().receive(until_ns)
@@ -117,7 +117,7 @@ class HostileTransport(SimulatedTransport):
         store = self._vehicle.firmware.store
         for packet in self._asked.datagram(data):
             if packet.message.get_type() == "PARAM_SET":
-                asked = of_wire(packet.message, self._vehicle.firmware.bytewise)
+                asked = from_wire(packet.message, self._vehicle.firmware.bytewise)
                 first = next((old for name, _, old in self.attack.sets if name == asked.name), None)
                 old = float(store[asked.name]) if first is None and asked.name in store else first
                 self.attack.sets.append((asked.name, float(asked.value), float("nan") if old is None else old))

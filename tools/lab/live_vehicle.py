@@ -34,8 +34,8 @@ from mpucal.errors import NoAnswer
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.compose import Correction
-from mpucal.mavlink.parameters.names import AXES, ardupilot_place, mounting
-from mpucal.mavlink.prompts import Heard
+from mpucal.mavlink.parameters.names import AXES, ardupilot_slot, mounting
+from mpucal.mavlink.prompts import ReceivedPrompt
 from mpucal.mavlink.stream_parameters import read_parameters, read_stream_parameters
 from mpucal.mavlink.transport import Transport
 from mpucal.mavlink.transports import open_transport
@@ -81,7 +81,7 @@ class Body:
     def hear(self, kind: str, down: tuple[float, float, float] | None) -> None:
         """A prompt, whose `down` is in the vehicle's axes."""
         with self._lock:
-            self._motion.hear(Heard(kind, None if down is None else turned_over(down)), self._t_s)
+            self._motion.hear(ReceivedPrompt(kind, None if down is None else turned_over(down)), self._t_s)
 
     def _serve(self) -> None:
         answer, last = b"", -1
@@ -136,13 +136,13 @@ class Held:
     def off(self) -> str:
         """How far its parameters are from the truth at worst: offset [m/s^2] and scale."""
         imus = range(1, round(self.parameters["SIM_IMU_COUNT"]) + 1)
-        far = [off(ardupilot_place(imu), self.parameters, self.true(imu)) for imu in imus]
+        far = [off(ardupilot_slot(imu), self.parameters, self.true(imu)) for imu in imus]
         return "{:.5f} {:.6f}".format(*map(max, zip(*far, strict=True)))
 
     def z(self, document: Mapping[str, Any]) -> tuple[float, ...]:
         """(12,) of D and b_a of one IMU's document, where this is what was held while it was measured."""
         imu = int(document["autopilot"]["imu"])
-        where = ardupilot_place(imu)
+        where = ardupilot_slot(imu)
         R, held, true = mounting(ARDUPILOT, where, self.parameters), where.correction(self.parameters), self.true(imu)
         if R is None or held is None:
             return ()
@@ -187,7 +187,7 @@ def main() -> int:
     arguments = parser.parse_args()
     body = Body(arguments.port, arguments.hand, arguments.seed)
     before = held(arguments.parameters)
-    R_b = mounting(ARDUPILOT, ardupilot_place(1), before.parameters)
+    R_b = mounting(ARDUPILOT, ardupilot_slot(1), before.parameters)
     if R_b is not None:
         body.mounting = R_b
     with tempfile.TemporaryDirectory() as temporary:

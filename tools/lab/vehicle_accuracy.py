@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from mpucal.mavlink.parameters.names import place_of
+from mpucal.mavlink.parameters.names import slot_of
 from mpucal.result.calibration import GOOD
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 
@@ -96,7 +96,7 @@ def run(words: str) -> Outcome:
     simulated = SimulatedVehicle(VehicleOptions.parse(f"sim:{words}"))
     for one, truth in zip(documents, simulated.imus.truths, strict=True):
         autopilot = one["autopilot"]
-        where = place_of(autopilot["firmware"], autopilot["imu"], autopilot["params_new"])
+        where = slot_of(autopilot["firmware"], autopilot["imu"], autopilot["params_new"])
         far.append(off(where, autopilot["params_new"], needed(truth)))
     offset, scale = map(max, zip(*far, strict=True))
     return Outcome(words, done.code, done.calibration.verdict, offset, scale, tuple(z))

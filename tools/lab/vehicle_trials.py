@@ -22,11 +22,11 @@ from pathlib import Path
 
 from mpucal.mavlink.firmwares import ARDUPILOT, PX4
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.parameters.names import place
+from mpucal.mavlink.parameters.names import find_slot
 from mpucal.mavlink.stream_parameters import read_stream_parameters
 from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import parse_url
-from mpucal.mavlink.vehicle_source import one_of
+from mpucal.mavlink.vehicle_source import choose_vehicle
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 
 from .vehicle_truth import Off, needed, off
@@ -155,8 +155,8 @@ def held(trial: Trial, url: str) -> dict[str, float]:
         return {}
     with closing(open_transport(parse_url(url))) as transport:
         link = Link(transport, lambda _t_ns, _packet: None)
-        link.lock(one_of(link.listen(), trial.system))
-        firmware = PX4 if link.vehicle.is_px4 else ARDUPILOT
+        link.lock(choose_vehicle(link.listen(), trial.system))
+        firmware = link.vehicle.family
         return read_stream_parameters(link, firmware)
 
 
@@ -167,7 +167,7 @@ def apart(trial: Trial, parameters: Mapping[str, float]) -> list[Off]:
     simulated = SimulatedVehicle(replace(options, seed=options.seed + second))
     firmware = PX4 if simulated.firmware.bytewise else ARDUPILOT
     truths = enumerate(simulated.imus.truths, start=1)
-    return [off(place(firmware, imu, parameters), parameters, needed(truth)) for imu, truth in truths]
+    return [off(find_slot(firmware, imu, parameters), parameters, needed(truth)) for imu, truth in truths]
 
 
 def mpucal(*words: str) -> subprocess.CompletedProcess[str]:

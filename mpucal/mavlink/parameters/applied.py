@@ -9,7 +9,7 @@ import numpy as np
 
 from ...result.calibration import Calibration
 from .document import NEW, OLD, RESIDUAL, RESIDUAL_OLD
-from .names import place_of
+from .names import slot_of
 
 
 def applied(calibration: Calibration, imus: Collection[int]) -> Calibration:
@@ -44,12 +44,12 @@ def _one(calibration: Calibration, imus: Collection[int]) -> Calibration:
     autopilot = calibration.extra.get("autopilot", {})
     if autopilot.get("imu") not in imus:
         return calibration
-    where = place_of(autopilot["firmware"], autopilot["imu"], autopilot[NEW])
+    where = slot_of(autopilot["firmware"], autopilot["imu"], autopilot[NEW])
     old = None if where is None else where.correction(autopilot[OLD])
     new = None if where is None else where.correction(autopilot[NEW])
     if where is None or old is None or new is None:
         return calibration
-    R_b, old = np.array(autopilot["mounting"]), where.used(old)
+    R_b, old = np.array(autopilot["mounting"]), where.effective(old)
     A = R_b @ np.diag(new.scale / old.scale) @ R_b.T
     c = R_b @ (new.scale * (old.offset - new.offset))
     now = {**autopilot, OLD: {**autopilot[OLD], **autopilot[NEW]}, RESIDUAL_OLD: autopilot[RESIDUAL]}

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from ...errors import LinkError
 from ..dialect import Message
+from ..firmwares import PX4
 from ..link import Link, S
 from ..request import ask
-from .encoding import REAL32, Number, Parameter, as_float32, error_name, name_bytes, parameter_of, to_wire
+from .encoding import REAL32, Number, Parameter, as_float32, decode_parameter, error_name, name_bytes, to_wire
 
 # over a radio that loses a packet in five each way, ten tries fail once in 30,000
 TIMEOUT_S, TRIES = 0.5, 10
@@ -18,18 +19,18 @@ LATE_NS = S // 2
 
 
 @dataclass(frozen=True)
-class Refused:
+class Refusal:
     """The vehicle said no; `why` in words."""
 
     why: str
 
 
-class Parameters:
+class ParameterClient:
     """The parameters of the vehicle that `link` is locked to."""
 
     def __init__(self, link: Link) -> None:
         self._link = link
-        self._bytewise = link.vehicle.is_px4
+        self._bytewise = link.vehicle.family == PX4
         self._heard: dict[str, set[Number]] = {}
         link.subscribe(self._hear)
 
@@ -42,7 +43,7 @@ class Parameters:
         """
         return {name: self._read(name).value for name in names}
 
-    def read_surely(self, names: Sequence[str]) -> dict[str, Number]:
+    def read_agreed(self, names: Sequence[str]) -> dict[str, Number]:
         """The same, where all that is heard of each agrees: two senders as one vehicle are told by their answers.
 
         Raises
@@ -76,7 +77,7 @@ class Parameters:
             vehicle.system, vehicle.component, name_bytes(name), to_wire(wanted, kind, self._bytewise), kind
         )
 
-        def reply(received: Message) -> Parameter | Refused | None:
+        def reply(received: Message) -> Parameter | Refusal | None:
             answer = self._answer(received, name)
             # of a vector's other axes, ArduPilot echoes values from before
             return None if isinstance(answer, Parameter) and answer.value != wanted else answer
@@ -84,16 +85,16 @@ class Parameters:
         answer = ask(self._link, message, reply, TIMEOUT_S, TRIES)
         if isinstance(answer, Parameter):
             return
-        why = answer.why if isinstance(answer, Refused) else "it did not confirm it"
+        why = answer.why if isinstance(answer, Refusal) else "it did not confirm it"
         raise LinkError(f"{vehicle} did not take {name} = {value:.6g}: {why}", "see whether it is read-only there")
 
-    def differing(self, values: Mapping[str, float]) -> dict[str, Number]:
+    def find_mismatches(self, values: Mapping[str, float]) -> dict[str, Number]:
         """Those that the vehicle, read back, does not hold as given, with what it holds."""
         held = self.read(tuple(values))
         return {name: held[name] for name, value in values.items() if held[name] != as_float32(value)}
 
     def _hear(self, message: Message) -> None:
-        parameter = parameter_of(message, self._bytewise) if self._heard else None
+        parameter = decode_parameter(message, self._bytewise) if self._heard else None
         if parameter is not None and parameter.name in self._heard:
             self._heard[parameter.name].add(parameter.value)
 
@@ -103,11 +104,11 @@ class Parameters:
         answer = ask(self._link, request, lambda received: self._answer(received, name), TIMEOUT_S, TRIES)
         if isinstance(answer, Parameter):
             return answer
-        why = answer.why if isinstance(answer, Refused) else "no answer"
+        why = answer.why if isinstance(answer, Refusal) else "no answer"
         raise LinkError(f"{vehicle} does not report {name} ({why})", "check the link and the firmware's version")
 
-    def _answer(self, received: Message, name: str) -> Parameter | Refused | None:
+    def _answer(self, received: Message, name: str) -> Parameter | Refusal | None:
         if received.get_type() == "PARAM_ERROR" and received.param_id == name:
-            return Refused(error_name(received.error))
-        parameter = parameter_of(received, self._bytewise)
+            return Refusal(error_name(received.error))
+        parameter = decode_parameter(received, self._bytewise)
         return parameter if parameter is not None and parameter.name == name else None

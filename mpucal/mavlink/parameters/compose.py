@@ -29,7 +29,7 @@ class Correction:
     offset: Vector
     scale: Vector
 
-    def seen_through(self, new: Correction, R_b: Vector, y: Vector) -> Vector:
+    def recorrect(self, new: Correction, R_b: Vector, y: Vector) -> Vector:
         """What (..., 3) m/s^2 of the stream become once `new` is in this one's place."""
         s = y @ R_b / self.scale + self.offset
         return np.asarray(((s - new.offset) * new.scale) @ R_b.T)

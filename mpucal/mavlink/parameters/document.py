@@ -9,7 +9,7 @@ import numpy as np
 from ...data import STANDARD_GRAVITY_MPS2, Autopilot
 from ...result.calibration import Calibration
 from .compose import compose
-from .names import mounting, place
+from .names import find_slot, mounting
 
 OLD, NEW, RESIDUAL = "params_old", "params_new", "residual_mps2"
 RESIDUAL_OLD, UNCERTAIN = "residual_old_mps2", "uncertainty_mps2"
@@ -32,7 +32,7 @@ def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[s
         NEW: {},
         RESIDUAL: None,
     }
-    where = place(autopilot.firmware, autopilot.imu, autopilot.parameters)
+    where = find_slot(autopilot.firmware, autopilot.imu, autopilot.parameters)
     if where is None:
         return document | {"why": f"no slot of the vehicle's names the sensor of IMU {autopilot.imu}"}
     old, R_b = where.correction(autopilot.parameters), mounting(autopilot.firmware, where, autopilot.parameters)
@@ -45,12 +45,12 @@ def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[s
     if not known or np.linalg.matrix_rank(calibration.D) < 3:
         return document | {"why": "the calibration was refused"}
     gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
-    composed = compose(calibration.D, calibration.b_a, where.used(old), R_b, gravity)
-    new = where.used(composed.correction)
+    composed = compose(calibration.D, calibration.b_a, where.effective(old), R_b, gravity)
+    new = where.effective(composed.correction)
     return document | {
         NEW: where.values(new),
         RESIDUAL: composed.residual_of(new),
-        RESIDUAL_OLD: composed.residual_of(where.used(old)),
+        RESIDUAL_OLD: composed.residual_of(where.effective(old)),
         UNCERTAIN: calibration.magnitude_std,
         "turn_deg": np.degrees(composed.turn_rad).tolist(),
         "mounting": R_b.tolist(),

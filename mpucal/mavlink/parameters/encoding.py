@@ -73,7 +73,7 @@ def to_wire(value: Number, kind: int, bytewise: bool) -> float:
     return as_float32(value)
 
 
-def of_wire(message: Message, bytewise: bool) -> Parameter:
+def from_wire(message: Message, bytewise: bool) -> Parameter:
     """The parameter in a PARAM_VALUE or PARAM_SET."""
     kind = int(message.param_type)
     value: Number = float(message.param_value)
@@ -95,11 +95,11 @@ def _whole(value: float) -> Number:
     return round(value) if math.isfinite(value) else value
 
 
-def parameter_of(message: Message, bytewise: bool) -> Parameter | None:
+def decode_parameter(message: Message, bytewise: bool) -> Parameter | None:
     """The parameter in a PARAM_VALUE; None of another message, and of a value that is not finite."""
     if message.get_type() != "PARAM_VALUE":
         return None
-    parameter = of_wire(message, bytewise)
+    parameter = from_wire(message, bytewise)
     return parameter if math.isfinite(parameter.value) else None
 
 

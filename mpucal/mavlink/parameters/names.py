@@ -43,7 +43,7 @@ PX4_LIMITS = Limits(np.inf, 0.1, 3.0, 0.01)
 
 
 @dataclass(frozen=True)
-class Place:
+class Slot:
     """Where a vehicle keeps one IMU's correction.
 
     Attributes
@@ -74,7 +74,7 @@ class Place:
         """The same by name."""
         return dict(zip(self.names, (*correction.offset.tolist(), *correction.scale.tolist()), strict=True))
 
-    def used(self, correction: Correction) -> Correction:
+    def effective(self, correction: Correction) -> Correction:
         """What the firmware makes of it when it starts."""
         offset, scale = correction.offset, correction.scale
         if np.linalg.norm(offset) <= self.limits.unnoticed:
@@ -83,7 +83,7 @@ class Place:
             scale = np.ones(3)
         return Correction(offset, scale)
 
-    def beyond(self, correction: Correction) -> str | None:
+    def describe_excess(self, correction: Correction) -> str | None:
         """Which value lies beyond what the firmware accepts, in words."""
         limits = self.limits
         for name, value in self.values(correction).items():
@@ -95,46 +95,46 @@ class Place:
         return None
 
 
-def place(firmware: str, imu: int, values: Values) -> Place | None:
+def find_slot(firmware: str, imu: int, values: Values) -> Slot | None:
     """Where IMU `imu` (counted from 1) of a vehicle with these parameters has its correction.
 
     PX4 keeps it in a slot that names its sensor by id; its streams are in the order of those slots. None where no
     slot does.
     """
     if firmware != PX4:
-        return ardupilot_place(imu)
+        return ardupilot_slot(imu)
     slots = [slot for slot in range(PX4_SLOTS) if values.get(f"CAL_ACC{slot}_ID")]
-    return px4_place(imu, slots[imu - 1]) if imu <= len(slots) else None
+    return px4_slot(imu, slots[imu - 1]) if imu <= len(slots) else None
 
 
-def ardupilot_place(imu: int) -> Place:
+def ardupilot_slot(imu: int) -> Slot:
     """The place of an IMU of ArduPilot's."""
     stem = "INS_ACC" if imu == 1 else f"INS_ACC{imu}"
     offset, scale = (tuple(f"{stem}{kind}_{axis}" for axis in AXES) for kind in ("OFFS", "SCAL"))
-    return Place(imu, offset, scale, f"{stem}_ID", ARDUPILOT_LIMITS)
+    return Slot(imu, offset, scale, f"{stem}_ID", ARDUPILOT_LIMITS)
 
 
-def px4_place(imu: int, slot: int) -> Place:
+def px4_slot(imu: int, slot: int) -> Slot:
     """The place in a slot of PX4's."""
     stem = f"CAL_ACC{slot}_"
     offset, scale = (tuple(f"{stem}{axis}{kind}" for axis in AXES) for kind in ("OFF", "SCALE"))
-    return Place(imu, offset, scale, f"{stem}ID", PX4_LIMITS)
+    return Slot(imu, offset, scale, f"{stem}ID", PX4_LIMITS)
 
 
-def all_places(firmware: str) -> tuple[Place, ...]:
+def all_slots(firmware: str) -> tuple[Slot, ...]:
     """Every one that the firmware has."""
     if firmware == PX4:
-        return tuple(px4_place(slot + 1, slot) for slot in range(PX4_SLOTS))
-    return tuple(ardupilot_place(imu) for imu in range(1, ARDUPILOT_IMUS + 1))
+        return tuple(px4_slot(slot + 1, slot) for slot in range(PX4_SLOTS))
+    return tuple(ardupilot_slot(imu) for imu in range(1, ARDUPILOT_IMUS + 1))
 
 
-def place_of(firmware: str, imu: int, values: Values) -> Place | None:
+def slot_of(firmware: str, imu: int, values: Values) -> Slot | None:
     """The place that `values`, the parameters of one IMU, belong to; None where that is none."""
-    found = (where for where in all_places(firmware) if set(where.names) <= set(values))
+    found = (where for where in all_slots(firmware) if set(where.names) <= set(values))
     return next((replace(where, imu=imu) for where in found), None)
 
 
-def mounting(firmware: str, where: Place, values: Values) -> Vector | None:
+def mounting(firmware: str, where: Slot, values: Values) -> Vector | None:
     """R_b (3, 3) from the axes of the sensor at `where` to the vehicle's; None where it cannot be known."""
     if firmware != PX4:
         return _rotation("AHRS_ORIENTATION", values, CUSTOM_ANGLES)

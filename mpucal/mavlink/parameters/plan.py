@@ -15,7 +15,7 @@ from ...result.improvement import is_better
 from ..imu import MESSAGE_ID, SCALED, Stream
 from .compose import Correction
 from .document import NEW, OLD, RESIDUAL, RESIDUAL_OLD, UNCERTAIN
-from .names import Place, place_of
+from .names import Slot, slot_of
 
 NOTHING = "nothing was written"
 
@@ -33,7 +33,7 @@ class Change:
         calibration does not say. uncertainty_mps2 : standard uncertainty of |a| by the calibration.
     """
 
-    place: Place
+    slot: Slot
     old: Correction
     new: Correction
     mounting: Vector
@@ -46,17 +46,17 @@ class Change:
     @property
     def imu(self) -> int:
         """Counted from 1."""
-        return self.place.imu
+        return self.slot.imu
 
     @property
-    def helps(self) -> bool:
+    def improves(self) -> bool:
         """Whether the new parameters are predicted to be better than the old ones, cross-axis residue included."""
         if self.residual_old_mps2 is None:
             return True
         return is_better(self.residual_mps2, self.residual_old_mps2, self.uncertainty_mps2)
 
 
-def changes(calibration: Calibration, firmware: str) -> tuple[Change, ...]:
+def plan_changes(calibration: Calibration, firmware: str) -> tuple[Change, ...]:
     """A change for each IMU whose calibration holds.
 
     Raises
@@ -80,18 +80,18 @@ def changes(calibration: Calibration, firmware: str) -> tuple[Change, ...]:
         ) from error
 
 
-def helping(planned: Sequence[Change]) -> tuple[Change, ...]:
+def select_improving(planned: Sequence[Change]) -> tuple[Change, ...]:
     """Those that help; all of them where none does: that they are written then is what somebody wants."""
-    return tuple(change for change in planned if change.helps) or tuple(planned)
+    return tuple(change for change in planned if change.improves) or tuple(planned)
 
 
-def left_out(calibration: Calibration) -> tuple[int, ...]:
+def refused_imus(calibration: Calibration) -> tuple[int, ...]:
     """The IMUs, counted from 1, whose calibration was refused."""
     others = calibration.extra.get("others", [])
     return tuple(int(other["autopilot"]["imu"]) for other in others if not _holds(other) and other.get("autopilot"))
 
 
-def moved(calibration: Calibration, order: Sequence[int], firmware: str) -> Calibration:
+def swap_slots(calibration: Calibration, order: Sequence[int], firmware: str) -> Calibration:
     """The same calibration, where the parameters of IMUs lie in one another's places.
 
     With o, k what corrected the stream, o' and k' what shall, and o_p, k_p what lies in the other place: the stream was
@@ -101,13 +101,13 @@ def moved(calibration: Calibration, order: Sequence[int], firmware: str) -> Cali
     ----------
     order : for each of those `helping`, the index of the one in whose place its parameters belong.
     """
-    planned = helping(changes(calibration, firmware))
+    planned = select_improving(plan_changes(calibration, firmware))
     documents: dict[int, dict[str, Any]] = {}
     for change, index in zip(planned, order, strict=True):
         at = planned[index]
         offset = at.old.offset + change.old.scale / at.old.scale * (change.new.offset - change.old.offset)
-        new = at.place.used(Correction(offset, change.new.scale * at.old.scale / change.old.scale))
-        documents[change.imu] = {NEW: at.place.values(new)}
+        new = at.slot.effective(Correction(offset, change.new.scale * at.old.scale / change.old.scale))
+        documents[change.imu] = {NEW: at.slot.values(new)}
     extra = dict(calibration.extra)
     extra["autopilot"] = {**extra["autopilot"], **documents[planned[0].imu]}
     extra["others"] = [
@@ -141,13 +141,13 @@ def _change(autopilot: Mapping[str, Any], firmware: str) -> Change:
             f"{NOTHING}: the calibration is of {autopilot['firmware']}, and this is {firmware}",
             "connect the vehicle that was calibrated",
         )
-    where = place_of(firmware, imu, autopilot[NEW])
+    where = slot_of(firmware, imu, autopilot[NEW])
     new = None if where is None else where.correction(autopilot[NEW])
     old = None if where is None else where.correction(autopilot[OLD])
     if where is None or new is None or old is None:
         why = autopilot.get("why", "it holds no new parameters")
         raise WriteBackError(f"{NOTHING}: the calibration does not fit the vehicle ({why})", "repeat the session")
-    beyond = where.beyond(new)
+    beyond = where.describe_excess(new)
     if beyond is not None:
         raise WriteBackError(
             f"{NOTHING}: {beyond}, which {firmware} accepts of its own calibration",
@@ -157,7 +157,7 @@ def _change(autopilot: Mapping[str, Any], firmware: str) -> Change:
     name = str(autopilot["message"])
     return Change(
         where,
-        where.used(old),
+        where.effective(old),
         new,
         np.array(autopilot["mounting"]),
         Stream(name, SCALED.get(name, imu)),

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...errors import WriteBackError
-from ..stillness import StillMeans
+from ..rest_monitor import RestMeans
 from .plan import Change
 
 # a step of the stream, and what an attitude by the gyroscope is worse than one that did not change
@@ -17,7 +17,7 @@ AGREE_MPS2, SIGMAS, PER_TURN = 0.03, 3.0, 0.05
 MOST_TURNED_RAD = 0.1
 
 
-class OtherPlacesError(WriteBackError):
+class SwappedSlotsError(WriteBackError):
     """The streams show that the parameters belong to each other's IMUs.
 
     Parameters
@@ -30,7 +30,7 @@ class OtherPlacesError(WriteBackError):
         self.order = order
 
 
-def verify(planned: Sequence[Change], old: Mapping[str, float], before: StillMeans, after: StillMeans | None) -> None:
+def verify(planned: Sequence[Change], old: Mapping[str, float], before: RestMeans, after: RestMeans | None) -> None:
     """See in each stream what its new parameters must make of it.
 
     Parameters
@@ -39,7 +39,7 @@ def verify(planned: Sequence[Change], old: Mapping[str, float], before: StillMea
 
     Raises
     ------
-    OtherPlacesError : every stream shows the new parameters of another IMU. WriteBackError : one shows something else.
+    SwappedSlotsError : every stream shows the new parameters of another IMU. WriteBackError : one shows something else.
     """
     if after is None:
         raise WriteBackError("the vehicle did not lie still while its new parameters were verified", "set it down")
@@ -57,7 +57,7 @@ def verify(planned: Sequence[Change], old: Mapping[str, float], before: StillMea
     if indices in fitting:
         return
     if len(fitting) == 1:
-        raise OtherPlacesError(fitting[0])
+        raise SwappedSlotsError(fitting[0])
     worst = max(indices, key=lambda i: misses[i, i])
     raise WriteBackError(
         f"IMU {planned[worst].imu}'s stream does not show its new parameters, by {misses[worst, worst]:.3f} m/s^2 more"
@@ -70,16 +70,16 @@ def _miss(
     imu: Change,
     at: Change,
     old: Mapping[str, float],
-    before: StillMeans,
-    after: StillMeans,
+    before: RestMeans,
+    after: RestMeans,
     turned: Vector,
     angle: float,
 ) -> float:
     """By how much [m/s^2] the stream differs more than it may; not above 0 where it agrees, or shows nothing."""
-    held = at.place.correction(old)
+    held = at.slot.correction(old)
     if held is None or not held.scale.all():
         return 0.0
-    expected = at.place.used(held).seen_through(at.new, imu.mounting, before.mean[imu.stream])
+    expected = at.slot.effective(held).recorrect(at.new, imu.mounting, before.mean[imu.stream])
     apart = np.abs(after.mean[imu.stream] - turned.T @ expected)
     noise = np.hypot(before.error[imu.stream], after.error[imu.stream])
     return float((apart - AGREE_MPS2 - SIGMAS * noise).max() - PER_TURN * angle * STANDARD_GRAVITY_MPS2)

@@ -8,10 +8,10 @@ from typing import NamedTuple
 from ...errors import EndOfCapture, MpucalError, WriteBackError
 from ...result.journal import Journal
 from ..link import Link, S
-from ..prearm import Watch
-from .client import Parameters
+from ..prearm import ArmingMonitor
+from .client import ParameterClient
 from .encoding import as_float32
-from .names import Place
+from .names import Slot
 
 # PX4 takes a vector over where it differs by more than 0.01 from the one in use: the last axis goes by a detour
 DETOUR = 0.05
@@ -35,29 +35,29 @@ class Writer:
 
     Parameters
     ----------
-    watch : hears its heartbeats. places : whose parameters are written. journal : notes old and new meanwhile.
+    watch : hears its heartbeats. slots : whose parameters are written. journal : notes old and new meanwhile.
 
     Attributes
     ----------
     restored : a write failed, and the old parameters are back.
     """
 
-    def __init__(self, link: Link, watch: Watch, places: Sequence[Place], journal: Journal | None = None) -> None:
-        self._link, self._watch, self._places = link, watch, tuple(places)
-        self._parameters = Parameters(link)
+    def __init__(self, link: Link, watch: ArmingMonitor, slots: Sequence[Slot], journal: Journal | None = None) -> None:
+        self._link, self._watch, self._slots = link, watch, tuple(slots)
+        self._parameters = ParameterClient(link)
         self._journal = journal or Journal()
         self._touched: set[str] = set()
         self.restored = False
 
-    def held(self) -> dict[str, float]:
+    def read(self) -> dict[str, float]:
         """What the vehicle holds there.
 
         Raises
         ------
         LinkError : it does not say, or says two things.
         """
-        names = [name for where in self._places for name in where.names]
-        return {name: float(value) for name, value in self._parameters.read_surely(names).items()}
+        names = [name for where in self._slots for name in where.names]
+        return {name: float(value) for name, value in self._parameters.read_agreed(names).items()}
 
     def write(self, old: Mapping[str, float], new: Mapping[str, float], verify: Callable[[], None]) -> None:
         """Set what of `new` is not in `old`, read all back, `verify`; on any failure put `old` back.
@@ -82,8 +82,8 @@ class Writer:
             self._restore(old, failure)
         self._journal.done()
 
-    def _vectors(self) -> Iterator[tuple[Place, tuple[str, ...]]]:
-        for where in self._places:
+    def _vectors(self) -> Iterator[tuple[Slot, tuple[str, ...]]]:
+        for where in self._slots:
             yield where, where.offset
             yield where, where.scale
 
@@ -97,7 +97,7 @@ class Writer:
             raise WriteBackError("the vehicle was armed meanwhile", "disarm it, then write again")
 
     def _compare(self, values: Mapping[str, float]) -> None:
-        for name, held in self._parameters.differing(values).items():
+        for name, held in self._parameters.find_mismatches(values).items():
             raise WriteBackError(
                 f"{name} reads back as {held:.9g}, not {values[name]:.9g}", "see who else writes parameters"
             )
@@ -125,13 +125,13 @@ class Writer:
         raise WriteBackError(f"{what}; the old parameters are back, and read back as they were", remedy) from failure
 
 
-def is_between(held: Mapping[str, float], old: Mapping[str, float], new: Mapping[str, float]) -> bool:
+def is_partial_write(held: Mapping[str, float], old: Mapping[str, float], new: Mapping[str, float]) -> bool:
     """Whether a write from `old` to `new` that was cut off can have left this: each is one of both, or a detour."""
     reach = DETOUR * 1.01
     return all(min(abs(held[name] - old[name]), abs(held[name] - new.get(name, old[name]))) <= reach for name in old)
 
 
-def _steps(where: Place, names: Sequence[str], values: Mapping[str, float]) -> Iterator[Step]:
+def _steps(where: Slot, names: Sequence[str], values: Mapping[str, float]) -> Iterator[Step]:
     """How `names` of one vector come to `values`, which holds all of it.
 
     Where the firmware does not notice small changes, it then uses what it would use after a start.
@@ -140,7 +140,7 @@ def _steps(where: Place, names: Sequence[str], values: Mapping[str, float]) -> I
     if not where.limits.unnoticed or wanted is None or not names:
         yield from (Step(name, values[name]) for name in names)
         return
-    used = where.values(where.used(wanted))
+    used = where.values(where.effective(wanted))
     *first, last = names
     yield from (Step(name, used[name]) for name in first)
     yield Step(last, used[last] + DETOUR, TAKEN_OVER_NS)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...data import Vector
-from ...mavlink.prompts import Direction, Heard
+from ...mavlink.prompts import Direction, ReceivedPrompt
 from ..faults import mishaps
 from ..hand import HandPrompt
 from ..hands import KINDS
@@ -51,7 +51,7 @@ class Imus:
     def hear(self, prompt: HandPrompt, t_s: float) -> None:
         """The hand hears `prompt`, whose `down` is in the vehicle's axes."""
         down = prompt.down
-        self._motion.hear(Heard(str(prompt.kind), None if down is None else turned_over(down)), t_s)
+        self._motion.hear(ReceivedPrompt(str(prompt.kind), None if down is None else turned_over(down)), t_s)
 
     def restart(self) -> None:
         """The autopilot takes the gyroscopes' biases anew, and leaves a little of each."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 
-from ...mavlink.transport import US, Bytes
+from ...mavlink.transport import US, ReceivedBytes
 from .line import PacketLine
 from .vehicle import SimulatedVehicle
 
@@ -24,7 +24,7 @@ class SimulatedTransport:
         self._line = PacketLine(vehicle.options.fault, vehicle.options.seed)
         self._begun_ns = time.time_ns() // US * US
         self._begun_monotonic_ns = time.monotonic_ns()
-        self._queue: deque[Bytes] = deque()
+        self._queue: deque[ReceivedBytes] = deque()
 
     @property
     def real_time(self) -> bool:
@@ -35,19 +35,21 @@ class SimulatedTransport:
         """See Transport."""
         return self._begun_ns + self._vehicle.now_us * US
 
-    def receive(self, until_ns: int) -> Bytes | None:
+    def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport."""
         while not self._queue and self.now_ns() < until_ns:
             sent = self._vehicle.go_on_to_next(-(-(until_ns - self._begun_ns) // US))
             self._keep_pace()
-            self._queue.extend(Bytes(data, ADDRESS, self.now_ns()) for data in self._line.carry([s.data for s in sent]))
+            self._queue.extend(
+                ReceivedBytes(data, ADDRESS, self.now_ns()) for data in self._line.carry([s.data for s in sent])
+            )
         return self._queue.popleft() if self._queue else None
 
     def send(self, data: bytes, address: str | None) -> None:
         """See Transport."""
         self._vehicle.hear(data)
 
-    def settle(self, address: str | None) -> None:
+    def restrict(self, address: str | None) -> None:
         """See Transport: it is the only one."""
 
     def close(self) -> None:

@@ -12,8 +12,8 @@ from ...data import STANDARD_GRAVITY_MPS2
 from ...errors import UsageError
 from ...mavlink.dialect import Message, Parser, dialect
 from ...mavlink.ftp import Payload
-from ...mavlink.parameters.encoding import Parameter, name_bytes, of_wire, to_wire
-from ...mavlink.prompts import Heard, of_message
+from ...mavlink.parameters.encoding import Parameter, from_wire, name_bytes, to_wire
+from ...mavlink.prompts import ReceivedPrompt, decode_prompt
 from ..faults import Schedule
 from .ardupilot import ArduPilot
 from .firmware import Firmware
@@ -75,7 +75,7 @@ class SimulatedVehicle:
         self._out: deque[Sent] = deque()
         self._boot()
         if options.rotate_at is not None:
-            self.imus.hear(Heard("rotate", None), options.rotate_at)
+            self.imus.hear(ReceivedPrompt("rotate", None), options.rotate_at)
 
     @property
     def now_us(self) -> int:
@@ -193,7 +193,7 @@ class SimulatedVehicle:
         self._list = deque(self.firmware.store)
 
     def _param_set(self, message: Message) -> None:
-        for echo in self.firmware.set(of_wire(message, self.firmware.bytewise)):
+        for echo in self.firmware.set(from_wire(message, self.firmware.bytewise)):
             if isinstance(echo, Parameter):
                 self._send(self._value(echo))
             else:
@@ -248,7 +248,7 @@ class SimulatedVehicle:
         return int(dialect().MAV_RESULT_ACCEPTED)
 
     def _statustext(self, message: Message) -> None:
-        prompt = of_message(message)
+        prompt = decode_prompt(message)
         if prompt is not None:
             self.imus.hear(prompt, self._now_us / S_US)
 

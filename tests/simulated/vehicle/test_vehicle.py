@@ -9,9 +9,9 @@ import pytest
 from mpucal.errors import UsageError
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.link import Link
-from mpucal.mavlink.parameters.encoding import name_bytes, of_wire, to_wire
-from mpucal.mavlink.prompts import Heard, to_message
-from mpucal.mavlink.request import command
+from mpucal.mavlink.parameters.encoding import from_wire, name_bytes, to_wire
+from mpucal.mavlink.prompts import ReceivedPrompt, encode_prompt
+from mpucal.mavlink.request import send_command
 from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import parse_url
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
@@ -56,7 +56,7 @@ class Station:
 
     def rest(self):
         """Set it down."""
-        self.vehicle.hear(bytes(to_message(Heard("lay_flat", None)).pack(self.mav)))
+        self.vehicle.hear(bytes(encode_prompt(ReceivedPrompt("lay_flat", None)).pack(self.mav)))
         self.hear(5.0)
 
 
@@ -207,7 +207,7 @@ def test_px4s_integers_travel_by_their_bytes():
     station.say("param_request_read", 1, 1, b"CAL_ACC1_PRIO", -1)
     (value,) = [m for m in station.hear(0.01) if m.get_type() == "PARAM_VALUE"]
     assert np.isnan(value.param_value)
-    assert of_wire(value, True).value == -1
+    assert from_wire(value, True).value == -1
 
 
 @pytest.mark.parametrize(("value", "used"), [(0.009, 0.0), (0.011, 0.011)], ids=["too little", "enough"])
@@ -239,7 +239,7 @@ def test_the_hand_obeys_prompts():
         return -f / np.linalg.norm(f)
 
     assert down() @ [0, 0, 1] > 0.98
-    station.vehicle.hear(bytes(to_message(Heard("rotate", (1.0, 0.0, 0.0))).pack(station.mav)))
+    station.vehicle.hear(bytes(encode_prompt(ReceivedPrompt("rotate", (1.0, 0.0, 0.0))).pack(station.mav)))
     assert down() @ [1, 0, 0] > 0.9
 
 
@@ -258,7 +258,7 @@ def test_the_tool_puts_it_on_a_real_port(program, port, firmware):
             transport = open_transport(parse_url(url))
             link = Link(transport, lambda t_ns, packet: None)
             (vehicle,) = link.listen()
-            assert vehicle.is_px4 == (firmware == "px4")
+            assert vehicle.family.lower() == firmware
             link.close()
         finally:
             running.terminate()
@@ -267,7 +267,7 @@ def test_the_tool_puts_it_on_a_real_port(program, port, firmware):
 def test_what_a_command_opens_again_holds_its_parameters():
     values = {"mavlink": "sim:firmware=px4,imus=1,CAL_ACC0_ID=0", "kept": {}}
     with open_source(values).connected(lambda text: None) as link:
-        command(link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 4)
+        send_command(link, dialect().MAV_CMD_PREFLIGHT_CALIBRATION, 0, 0, 0, 0, 4)
     held = [open_source(each).contents()["parameters"] for each in (values, {**values, "kept": {}})]
     assert [each["CAL_ACC0_ID"] for each in held] == [DEVICE_IDS[0], 0]
     assert held[0]["CAL_ACC0_ZOFF"] != held[1]["CAL_ACC0_ZOFF"]

@@ -14,9 +14,9 @@ from ..rests.limits import QUIET
 from ..rests.stillness import Detector, Still
 from ..rests.windows import of_rows
 from .dialect import Message, dialect
-from .imu import MESSAGE_ID, Reading, Stream, reading
+from .imu import MESSAGE_ID, Reading, Stream, decode_reading
 from .link import Link, S
-from .request import command
+from .request import send_command
 
 WINDOW_NS, PATIENCE_NS = 2 * S, 30 * S
 FEWEST = 20
@@ -25,7 +25,7 @@ LONGEST_STEP_S = 1.0
 
 
 @dataclass(frozen=True)
-class StillMeans:
+class RestMeans:
     """What the streams said while the vehicle lay still.
 
     Attributes
@@ -39,7 +39,7 @@ class StillMeans:
     attitude: Vector
 
 
-class Stillness:
+class RestMonitor:
     """Watches the streams of a locked link.
 
     Parameters
@@ -56,7 +56,7 @@ class Stillness:
         self._found: dict[Stream, list[Reading]] = {}
         link.subscribe(self._hear)
 
-    def wait(self) -> StillMeans | None:
+    def wait(self) -> RestMeans | None:
         """Wait until all streams lay still for two windows, and return the second; None where they did not.
 
         Two, because a person who is told to set it down takes a second to begin.
@@ -92,14 +92,14 @@ class Stillness:
     def _ask(self) -> None:
         set_interval = dialect().MAV_CMD_SET_MESSAGE_INTERVAL
         for stream in self._streams:
-            command(self._link, set_interval, MESSAGE_ID[stream.name], INTERVAL_US, tries=5)
+            send_command(self._link, set_interval, MESSAGE_ID[stream.name], INTERVAL_US, tries=5)
 
     def _window(self) -> None:
         self._found = {stream: [] for stream in self._streams}
         list(self._link.messages(self._link.now_ns() + WINDOW_NS))
 
     def _hear(self, message: Message) -> None:
-        content = reading(message)
+        content = decode_reading(message)
         if content is None or content.stream not in self._streams:
             return
         self._found.setdefault(content.stream, []).append(content)
@@ -110,7 +110,7 @@ class Stillness:
         if self._gyro_bias is not None and 0 < step_s < LONGEST_STEP_S:
             self._attitude = self._attitude @ rotation((np.array(content.gyr) - self._gyro_bias) * step_s)
 
-    def _means(self) -> StillMeans:
+    def _means(self) -> RestMeans:
         mean, error = {}, {}
         for stream, readings in self._found.items():
             acc = np.array([r.acc for r in readings])
@@ -118,7 +118,7 @@ class Stillness:
             # a hand trembles slowly: its samples are no independent ones
             error[stream] = acc.std(axis=0) / 4
         self._gyro_bias = np.mean([r.gyr for r in self._found[self._streams[0]]], axis=0)
-        return StillMeans(mean, error, self._attitude)
+        return RestMeans(mean, error, self._attitude)
 
 
 def _run(detector: Detector, readings: Sequence[Reading]) -> int | None:

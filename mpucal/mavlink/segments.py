@@ -12,9 +12,9 @@ import numpy as np
 
 from ..data import Vector
 from .firmwares import PX4
-from .gatherer import Gatherer
 from .parameters.compose import Correction
-from .parameters.names import AXES, Place, mounting, place, px4_place
+from .parameters.names import AXES, Slot, find_slot, mounting, px4_slot
+from .stream_buffers import StreamBuffers
 
 Values = Mapping[str, float]
 
@@ -33,15 +33,15 @@ class Segment:
     """A stretch under one set of parameters, between reboots; `rebooted`: it began with one."""
 
     parameters: dict[str, float]
-    gatherer: Gatherer = field(default_factory=Gatherer)
+    buffers: StreamBuffers = field(default_factory=StreamBuffers)
     rebooted: bool = False
 
     def __len__(self) -> int:
-        return max((len(g) for g in self.gatherer.streams.values()), default=0)
+        return max((len(g) for g in self.buffers.streams.values()), default=0)
 
 
 @dataclass(frozen=True)
-class Through:
+class Recorrection:
     """What an IMU delivers, seen through another correction of the same mounting R_b.
 
     Attributes
@@ -56,14 +56,14 @@ class Through:
 
     def acc(self, acc: Vector) -> Vector:
         """(..., 3) m/s^2."""
-        return self.now.seen_through(self.then, self.R_b, acc)
+        return self.now.recorrect(self.then, self.R_b, acc)
 
     def gyr(self, gyr: Vector) -> Vector:
         """(..., 3) rad/s."""
         return np.asarray(gyr + self.rate)
 
 
-def through(firmware: str, imu: int, now: Values, then: Values) -> Through | None:
+def find_recorrection(firmware: str, imu: int, now: Values, then: Values) -> Recorrection | None:
     """From the stream of an IMU under `now` to the one under `then`; None where that is not known."""
     if any(now.get(name, value) != value for name, value in then.items() if name.startswith(BEYOND)):
         return None
@@ -77,30 +77,30 @@ def through(firmware: str, imu: int, now: Values, then: Values) -> Through | Non
     if corrections[0] is None or corrections[1] is None or R_b is None or not np.all(corrections[0].scale):
         return None
     rate = R_b @ (_gyro_offset(where, now, then) - _gyro_offset(where, then, now))
-    return Through(where.used(corrections[0]), where.used(corrections[1]), R_b, rate)
+    return Recorrection(where.effective(corrections[0]), where.effective(corrections[1]), R_b, rate)
 
 
-def _place(firmware: str, imu: int, now: Values, then: Values) -> Place | None:
+def _place(firmware: str, imu: int, now: Values, then: Values) -> Slot | None:
     """Where an IMU's correction is in both; PX4 names its sensors meanwhile in the slots of their numbers."""
     if firmware == PX4 and _ids(now) != _ids(then):
-        return px4_place(imu, imu - 1)
-    return place(firmware, imu, now)
+        return px4_slot(imu, imu - 1)
+    return find_slot(firmware, imu, now)
 
 
-def _correction(firmware: str, where: Place, values: Values) -> Correction | None:
+def _correction(firmware: str, where: Slot, values: Values) -> Correction | None:
     """Of a sensor that PX4 does not name yet, none: it delivers what it measures."""
     if firmware == PX4 and values.get(where.sensor_id) == 0:
         return Correction(np.zeros(3), np.ones(3))
     return where.correction(values)
 
 
-def _gyro_offset(where: Place, values: Values, otherwise: Values) -> Vector:
+def _gyro_offset(where: Slot, values: Values, otherwise: Values) -> Vector:
     """(3,) rad/s that PX4 subtracts; what was never told has not changed."""
     names = [where.sensor_id.replace("ACC", "GYRO").replace("ID", f"{axis}OFF") for axis in AXES]
     return np.array([values.get(name, otherwise.get(name, 0.0)) for name in names])
 
 
-def joined(segments: Sequence[Segment], firmware: str, over_reboots: bool) -> Segment:
+def join_segments(segments: Sequence[Segment], firmware: str, over_reboots: bool) -> Segment:
     """The largest part of `segments` that can be joined, as one under the parameters of its last one."""
     runs = [[segments[0]]]
     for segment in segments[1:]:
@@ -113,7 +113,7 @@ def joined(segments: Sequence[Segment], firmware: str, over_reboots: bool) -> Se
     cut = follows < len(segments) and not segments[follows].rebooted
     if len(run) == 1 and not (cut and firmware in LATE_US):
         return run[0]
-    made = Gatherer()
+    made = StreamBuffers()
     for k, segment in enumerate(run):
         before = None if k == 0 or segment.rebooted else SETTLED_US
         next_cuts = cut if segment is run[-1] else not run[k + 1].rebooted
@@ -122,24 +122,24 @@ def joined(segments: Sequence[Segment], firmware: str, over_reboots: bool) -> Se
 
 
 def _joins(one: Segment, other: Segment, firmware: str) -> bool:
-    imus = {stream.imu for segment in (one, other) for stream in segment.gatherer.streams}
+    imus = {stream.imu for segment in (one, other) for stream in segment.buffers.streams}
     if _shaping(one.parameters) == _shaping(other.parameters):
         return True
-    return all(through(firmware, imu, one.parameters, other.parameters) is not None for imu in imus)
+    return all(find_recorrection(firmware, imu, one.parameters, other.parameters) is not None for imu in imus)
 
 
 def _add(
-    made: Gatherer, segment: Segment, then: Values, firmware: str, skip_us: int | None, drop_us: int | None
+    made: StreamBuffers, segment: Segment, then: Values, firmware: str, skip_us: int | None, drop_us: int | None
 ) -> None:
     same = _shaping(segment.parameters) == _shaping(then)
-    for stream, gathered in segment.gatherer.streams.items():
-        times_us, numbers = gathered.rows()
+    for stream, buffer in segment.buffers.streams.items():
+        times_us, numbers = buffer.rows()
         if not len(times_us):
             continue
         first_us = times_us[0] + (skip_us or 0)
         kept = (times_us >= first_us) & (times_us <= times_us[-1] - (drop_us or 0))
         numbers = numbers[kept]
-        turned = None if same else through(firmware, stream.imu, segment.parameters, then)
+        turned = None if same else find_recorrection(firmware, stream.imu, segment.parameters, then)
         if turned is not None:
             numbers[:, :3], numbers[:, 3:6] = turned.acc(numbers[:, :3]), turned.gyr(numbers[:, 3:6])
         made.extend(stream, times_us[kept], numbers)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import BusError, LinkError
-from .transport import Bytes, Clock, Transport
+from .transport import ReceivedBytes, SteadyClock, Transport
 from .url import Kind, Url
 
 # between two looks for what went away
@@ -25,7 +25,7 @@ class Board(NamedTuple):
     serial_number: str
 
 
-class Returning:
+class ReconnectingTransport:
     """The transport at `url`; while it is away nothing comes, and what is sent is lost.
 
     A board on USB may come back as another port: it is looked for by the serial number that it had. See Transport.
@@ -39,7 +39,7 @@ class Returning:
 
     def __init__(self, url: Url, opener: Callable[[Url], Transport]) -> None:
         self._url, self._opener = url, opener
-        self._clock = Clock()
+        self._clock = SteadyClock()
         self._transport: Transport | None = opener(url)
         self._board = _boards().get(_device(url)) if url.kind is Kind.SERIAL else None
         self._next_look_ns = 0
@@ -49,7 +49,7 @@ class Returning:
         """See Transport."""
         return self._clock.now_ns()
 
-    def receive(self, until_ns: int) -> Bytes | None:
+    def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport."""
         if self._transport is None:
             self._look(until_ns)
@@ -61,7 +61,7 @@ class Returning:
             self._away()
             return None
         # one clock, whichever transport it is by now; and one name, by which the link is locked
-        return None if received is None else Bytes(received.data, self.name, self.now_ns())
+        return None if received is None else ReceivedBytes(received.data, self.name, self.now_ns())
 
     def send(self, data: bytes, address: str | None) -> None:
         """See Transport."""
@@ -71,7 +71,7 @@ class Returning:
             except LinkError:
                 self._away()
 
-    def settle(self, address: str | None) -> None:
+    def restrict(self, address: str | None) -> None:
         """See Transport: it has one partner."""
 
     def close(self) -> None:

@@ -39,7 +39,7 @@ class Row(NamedTuple):
 NUMBERS = 7
 
 
-class Gathered:
+class StreamBuffer:
     """What one stream delivered: 64 bytes a reading."""
 
     def __init__(self, stream: Stream, clock: VehicleClock | None = None) -> None:
@@ -55,7 +55,7 @@ class Gathered:
 
     def add(self, reading: Reading, received_ns: int) -> tuple[Row | None, Jump]:
         """Keep a reading; the row where it is newer than all before it, and what the clock did before it."""
-        t_us, jump = self.clock.us(reading.time, received_ns)
+        t_us, jump = self.clock.unwrap(reading.time, received_ns)
         return self.keep(t_us, reading), jump
 
     def keep(self, t_us: int, reading: Reading) -> Row | None:
@@ -124,36 +124,36 @@ def _samples(numbers: Vector, t_us: Vector, before_us: float | None = None) -> S
     )
 
 
-class Gatherer:
+class StreamBuffers:
     """All streams of a vehicle."""
 
     def __init__(self) -> None:
-        self.streams: dict[Stream, Gathered] = {}
+        self.streams: dict[Stream, StreamBuffer] = {}
 
     def add(self, reading: Reading, received_ns: int) -> tuple[Row | None, Jump]:
-        """See Gathered.add."""
+        """See StreamBuffer.add."""
         return self.of(reading.stream).add(reading, received_ns)
 
-    def of(self, stream: Stream) -> Gathered:
+    def of(self, stream: Stream) -> StreamBuffer:
         """What `stream` delivered."""
-        return self.streams.setdefault(stream, Gathered(stream))
+        return self.streams.setdefault(stream, StreamBuffer(stream))
 
     def extend(self, stream: Stream, times_us: Vector, numbers: Vector) -> None:
-        """See Gathered.extend."""
-        self.streams.setdefault(stream, Gathered(stream)).extend(times_us, numbers)
+        """See StreamBuffer.extend."""
+        self.streams.setdefault(stream, StreamBuffer(stream)).extend(times_us, numbers)
 
-    def following(self) -> Gatherer:
+    def following(self) -> StreamBuffers:
         """An empty one, whose clocks go on."""
-        after = Gatherer()
-        after.streams = {stream: Gathered(stream, gathered.clock) for stream, gathered in self.streams.items()}
+        after = StreamBuffers()
+        after.streams = {stream: StreamBuffer(stream, buffer.clock) for stream, buffer in self.streams.items()}
         return after
 
     def forget(self) -> None:
         """Let go of all that was kept."""
-        for gathered in self.streams.values():
-            gathered.forget()
+        for buffer in self.streams.values():
+            buffer.forget()
 
-    def chosen(self, order: Sequence[str]) -> list[Gathered]:
+    def chosen(self, order: Sequence[str]) -> list[StreamBuffer]:
         """The stream of each IMU to believe, by IMU.
 
         Parameters
@@ -175,16 +175,16 @@ class Gatherer:
         chosen = self.chosen(order)
         fine = next((g for g in chosen if g.stream.name not in SCALED), None)
         made = []
-        for gathered in chosen:
-            autopilot = Autopilot(firmware, gathered.stream.imu, gathered.stream.name, parameters)
-            made.append(_recording(gathered, fine, autopilot, name))
+        for buffer in chosen:
+            autopilot = Autopilot(firmware, buffer.stream.imu, buffer.stream.name, parameters)
+            made.append(_recording(buffer, fine, autopilot, name))
         return made
 
 
-def _recording(gathered: Gathered, fine: Gathered | None, autopilot: Autopilot, name: str) -> Recording:
-    samples = gathered.samples(None if fine is None else _finer(gathered, fine))
+def _recording(buffer: StreamBuffer, fine: StreamBuffer | None, autopilot: Autopilot, name: str) -> Recording:
+    samples = buffer.samples(None if fine is None else _finer(buffer, fine))
     known = samples.temperature_c[np.isfinite(samples.temperature_c)]
-    stream = gathered.stream
+    stream = buffer.stream
     sensor = Sensor(
         chip=chip(autopilot.firmware, stream.imu),
         rate_hz=float((len(samples) - 1) / (samples.t[-1] - samples.t[0])),
@@ -198,11 +198,11 @@ def _recording(gathered: Gathered, fine: Gathered | None, autopilot: Autopilot, 
     return Recording(**columns, sensor=sensor, name=name, autopilot=autopilot)
 
 
-def _finer(gathered: Gathered, fine: Gathered) -> Vector | None:
+def _finer(buffer: StreamBuffer, fine: StreamBuffer) -> Vector | None:
     """(n,) us in place of whole ms, of the messages that were sent in the same millisecond; None where few were."""
-    if gathered.stream.name not in SCALED:
+    if buffer.stream.name not in SCALED:
         return None
-    times, exact = gathered.times_us(), fine.times_us()
+    times, exact = buffer.times_us(), fine.times_us()
     at = np.minimum(np.searchsorted(exact, times), len(exact) - 1)
     paired = (exact[at] >= times) & (exact[at] < times + MS_US)
     if paired.mean() < PAIRED:
@@ -213,12 +213,12 @@ def _finer(gathered: Gathered, fine: Gathered) -> Vector | None:
 
 def least_noise(stream: Stream) -> tuple[float, float]:
     """m/s^2, rad/s that a sample of a stream has at least, however still it reads."""
-    return WHOLE_NOISE if stream.is_whole else (0.0, 0.0)
+    return WHOLE_NOISE if stream.is_truncated else (0.0, 0.0)
 
 
 def steps(stream: Stream) -> tuple[float, float]:
     """m/s^2, rad/s that a stream's numbers are whole multiples of; 0 for floats."""
-    return (ACC_LSB_MPS2, GYRO_LSB_RAD_S) if stream.is_whole else (0.0, 0.0)
+    return (ACC_LSB_MPS2, GYRO_LSB_RAD_S) if stream.is_truncated else (0.0, 0.0)
 
 
 def chip(firmware: str, imu: int) -> str:
