@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import gc
 import os
 import shutil
 import signal
@@ -134,6 +135,14 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     else:
         for reason, count in skipped.most_common():
             terminalreporter.write_line(f"{count} skipped: {reason}")
+
+
+@pytest.fixture
+def uncollected():
+    """Run without collection of garbage: hypothesis hooks it, and a KeyboardInterrupt raised in the hook is lost."""
+    gc.disable()
+    yield
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)

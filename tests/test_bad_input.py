@@ -137,6 +137,7 @@ STATES = {
 
 @pytest.mark.parametrize(("owner", "name"), STATES.values(), ids=STATES.keys())
 @pytest.mark.parametrize("times", [1, 2], ids=["once", "twice"])
+@pytest.mark.usefixtures("uncollected")
 def test_ctrl_c_is_4_and_the_capture_stays_whole(mpucal, walk, tmp_path, monkeypatch, owner, name, times):
     monkeypatch.setattr(owner, name, interrupted(times, getattr(owner, name)))
     code, said = mpucal("session", "--replay", walk, "-o", "board")

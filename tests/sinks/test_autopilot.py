@@ -465,7 +465,7 @@ class Killed(BaseException):
 
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGINT"])
 @pytest.mark.parametrize("firmware", FIRMWARES)
-@pytest.mark.usefixtures("brief")
+@pytest.mark.usefixtures("brief", "uncollected")
 def test_a_signal_in_the_middle_of_a_write_restores(firmware, name, tmp_path):
     vehicle, transport, link = vehicle_of(firmware, ",imus=1")
     old, numbers = stored(vehicle), []

@@ -47,6 +47,7 @@ def test_a_keyboard_that_went_away_says_nothing(keyboard, single):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.usefixtures("uncollected")
 def test_the_first_signal_is_a_key_and_the_second_interrupts(number):
     keys = Keys()
     before = signal.getsignal(number)
@@ -60,6 +61,7 @@ def test_the_first_signal_is_a_key_and_the_second_interrupts(number):
     assert signal.getsignal(number) is before
 
 
+@pytest.mark.usefixtures("uncollected")
 def test_a_signal_that_nobody_takes_interrupts():
     keys = Keys()
     with keys.listening():

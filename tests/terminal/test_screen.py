@@ -143,6 +143,7 @@ def fill(handle):
     os.write(handle, b"x" * 200_000)
 
 
+@pytest.mark.usefixtures("uncollected")
 def test_ctrl_c_is_a_key(out):
     screen = Screen(out, Keys(), UNICODE)
     with screen.listening():
