@@ -1,6 +1,6 @@
 """What can speak against a calibration: one row a reason code, with its sentences and their remedies.
 
-A check (calibration/checks/, session/live/disagreement.py) decides whether a reason holds, and fills its numbers into
+A check (calibration/checks/, session/live/verification.py) decides whether a reason holds, and fills its numbers into
 one of the row's sentences: `reason("gyro_clipped", "samples", refuse=False, count=12, share=0.01)`. A new reason is a
 row here and a check there. `python -m tools.make pages` makes docs/reasons.md from this table.
 """

@@ -12,7 +12,7 @@ from .. import __version__
 from ..doctor.finding import Finding, Mark, failed
 from ..doctor.page import document, text
 from ..errors import SourceError, UsageError
-from ..session.at_rest import put_down
+from ..session.lay_flat import put_down
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
 from .options import Finite, check_gyroscope, check_source, source_options

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..result.clock import now
-from ..session.live.apart import Apart
-from ..session.live.questions import Here
+from ..session.live.scheduler import InlineWorker
+from ..session.live.worker_process import ProcessWorker
 from ..session.runner import Runner
 from ..sources.opened import Opened
 from ..terminal.console import Console
@@ -33,6 +33,6 @@ def running(source: Opened, capture: Path, person: Console, checking: bool = Fal
             source.listeners,
             measuring.go_on,
             measuring.late,
-            Apart if source.real_time else Here,
+            ProcessWorker if source.real_time else InlineWorker,
             checking,
         )

@@ -1,1 +1,1 @@
-"""A guided session without its surroundings: what happens to it, what it answers, and what follows what."""
+"""A guided session without devices and screens: its states, events and outputs, and the fits while it goes on."""

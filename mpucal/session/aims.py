@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import product as choices
+from itertools import product
 from types import MappingProxyType
 
 import numpy as np
@@ -13,22 +13,22 @@ import numpy as np
 from ..data import Sensor, Vector
 from .events import Direction, Target
 
-_corners = np.array([c for c in choices((-1.0, 0.0, 1.0), repeat=3) if any(c)])
+_corners = np.array([c for c in product((-1.0, 0.0, 1.0), repeat=3) if any(c)])
 # (26, 3) unit vectors: the faces, edges and corners of a cube, which a person can name and find
 ALL_AROUND: Vector = _corners / np.linalg.norm(_corners, axis=1, keepdims=True)
 TILT_RAD = math.radians(30.0)
-# A verification counts orientations so far from all that the fit has seen; for tilts there is no more room.
+# An orientation verifies if it is this far from all that the fit has seen. Small tilts leave less room.
 UNSEEN_RAD, UNSEEN_TILT_RAD = math.radians(20.0), math.radians(10.0)
 
 
 @dataclass(frozen=True)
 class Aim:
-    """What a session must reach before it ends the turning.
+    """Conditions for the end of the turning, and the number of verifications.
 
     Attributes
     ----------
     target : standard uncertainties (1 sigma). least : orientations that must have been seen, whatever the target.
-    longest_s : time limit of the turning [s]. verify : new orientations that verify it.
+    longest_s : time limit of the turning [s]. verify : number of new orientations for the verification.
     """
 
     target: Target
@@ -45,28 +45,29 @@ AIMS: Mapping[str, Aim] = MappingProxyType(
     }
 )
 NORMAL = "normal"
-# of an autopilot's IMU, whose samples come filtered, in whole units or at other times than they were taken
+# A vehicle's samples are filtered, rounded, or taken at other times than they say: they need more orientations.
 LEAST_OF_VEHICLE = 14
 
 
-def aim_of(target: str, sensor: Sensor | None = None) -> Aim:
-    """The aim of that target; of a vehicle's IMU more orientations make it as good."""
+def select_aim(target: str, sensor: Sensor | None = None) -> Aim:
+    """Return the aim of a target, one of AIMS; a vehicle's IMU needs more orientations for the normal one."""
     aim = AIMS[target]
-    least = LEAST_OF_VEHICLE if target == NORMAL and sensor is not None and sensor.message else aim.least
-    return replace(aim, least=max(least, aim.least))
+    if target == NORMAL and sensor is not None and sensor.message:
+        return replace(aim, least=LEAST_OF_VEHICLE)
+    return aim
 
 
 def unseen_rad(tilt_only: bool) -> float:
-    """How far an orientation is from all that were seen, at least, if it is to verify anything."""
+    """Return the least angle [rad] from all orientations seen at which one counts for the verification."""
     return UNSEEN_TILT_RAD if tilt_only else UNSEEN_RAD
 
 
 def directions(flat_down: Direction, tilt_only: bool) -> Vector:
-    """(k, 3) unit vectors that may be asked to point down.
+    """Return unit vectors (k, 3) that the board may be asked to point down.
 
     Parameters
     ----------
-    flat_down : what points down while the board lies flat. tilt_only : no farther than a tilt from there.
+    flat_down : points down while the board lies flat. tilt_only : stay within TILT_RAD of it.
     """
     if not tilt_only:
         return ALL_AROUND

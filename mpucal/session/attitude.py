@@ -1,7 +1,7 @@
 """The board's attitude, carried from the flat rest by the gyroscope and corrected by gravity.
 
-The room's axes are x to the right of whoever holds the board, y away from them and z up. An attitude is the matrix
-(3, 3) that takes the board's axes to the room's.
+The room's axes are x to the operator's right, y away from the operator and z up. An attitude is the matrix (3, 3), or
+the unit quaternion, that takes the board's axes to the room's.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ import numpy as np
 from ..data import Samples, Vector
 from .events import Direction, Quaternion
 
-# The rates are taken as constant for so long.
+# Length of an integration step, in which the rates count as constant.
 STEP_S = 0.02
-# Gravity corrects the tilt with this time constant: at rest, and among the hand's accelerations.
+# Time constants with which gravity corrects the tilt: at rest, and among the hand's accelerations.
 STILL_S, MOVING_S = 0.2, 2.0
-# ... by at most so much a second: before there was a rest, a turning board may have been taken for one at rest.
+# Limit of that correction: before the first rest, a turning board may have been taken for one at rest.
 CORRECT_RAD_S = math.radians(60.0)
-# Until the flat rest is over, a board at rest is drawn nearer to straight by at most so much a second.
+# Until the end of the flat rest, a board at rest is turned about the vertical towards straight, at most so fast.
 STRAIGHTEN_RAD_S = math.radians(30.0)
-# An accelerometer that reads less falls, or is dead.
+# An accelerometer that reads less is in free fall, or dead.
 FALLING_MPS2 = 1e-3
 # A board that lies on its component side was turned over about its x axis.
 _LAID, _TURNED_OVER = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
@@ -32,7 +32,7 @@ Matrix = tuple[Direction, Direction, Direction]
 
 
 class Attitude:
-    """Follows one board, a step at a time; in plain numbers, which for one step are faster than arrays."""
+    """Attitude filter of one board. It computes with plain floats, which are faster than arrays for single steps."""
 
     def __init__(self) -> None:
         self._q: Quaternion = _LAID
@@ -41,11 +41,11 @@ class Attitude:
         self._bias_rad_s: Vector = np.zeros(3)
 
     def flat(self, rest_rad_s: Vector) -> None:
-        """The flat rest is over, where the gyroscope read `rest_rad_s` (3,): from now on it carries the heading."""
+        """End the flat rest, with the gyroscope's mean rates (3,) there: from now on it carries the heading."""
         self._levelled, self._bias_rad_s = True, rest_rad_s
 
     def add(self, samples: Samples, still: bool, rest_rad_s: Vector) -> None:
-        """Turn on by `samples`; `rest_rad_s` (3,) is what the gyroscope read at the last rest, until it was flat."""
+        """Integrate `samples`; `rest_rad_s` (3,), the rates at the last rest, count until the flat rest has ended."""
         if not self._levelled:
             self._bias_rad_s = rest_rad_s
         for seconds, force, rate in self._steps(samples):
@@ -53,16 +53,16 @@ class Attitude:
 
     @property
     def matrix(self) -> Vector:
-        """(3, 3), the attitude at the last sample."""
+        """Attitude at the last sample (3, 3)."""
         return np.array(matrix(self._q))
 
     def quaternion(self) -> Quaternion:
-        """The attitude as a unit quaternion (w, x, y, z) with w >= 0."""
+        """Return the attitude as a unit quaternion (w, x, y, z) with w >= 0."""
         w, x, y, z = self._q
         return (-w, -x, -y, -z) if w < 0.0 else self._q
 
     def _steps(self, samples: Samples) -> Iterator[tuple[float, Direction, Direction]]:
-        """Of each step that `samples` complete: how long it is, and its mean force and rate."""
+        """Yield the length [s], mean acceleration and mean rate of each step that `samples` complete."""
         pending = Samples.joined([self._rest, samples])
         t, cuts = pending.t.tolist(), [0]
         while cuts[-1] < len(t) and (cut := bisect_left(t, t[cuts[-1]] + STEP_S - 1e-9)) < len(t):
@@ -76,7 +76,7 @@ class Attitude:
         rate = np.add.reduceat(pending.gyr[:first], cuts[:-1]) / counts - self._bias_rad_s
         gaps = pending.gap[cuts].tolist()
         for i, (acc, gyr) in enumerate(zip(force.tolist(), rate.tolist(), strict=True)):
-            # nobody knows how long the last step before a gap was
+            # The length of the last step before a gap is unknown.
             yield STEP_S if gaps[i + 1] else t[cuts[i + 1]] - t[cuts[i]], acc, gyr
 
     def _step(self, seconds: float, acc: Direction, rate: Direction, still: bool) -> None:
@@ -87,7 +87,7 @@ class Attitude:
             self._q = straight((x / force, y / force, z / force) if force >= FALLING_MPS2 else (0.0, 0.0, 1.0))
             return
         q = _product(self._q, _turn(rate[0] * seconds, rate[1] * seconds, rate[2] * seconds))
-        # where no direction is up, the gyroscope alone carries
+        # In free fall no direction is up, and the gyroscope alone carries the attitude.
         if force >= FALLING_MPS2:
             x, y, z = _turned(q, acc)
             aside = math.hypot(x, y)
@@ -104,14 +104,14 @@ class Attitude:
 
 
 def _turn(x: float, y: float, z: float) -> Quaternion:
-    """By the rotation vector (x, y, z) [rad]."""
+    """Return the quaternion of a rotation vector [rad]."""
     half = 0.5 * math.hypot(x, y, z)
     scale = 0.5 * (math.sin(half) / half if half else 1.0)
     return (math.cos(half), scale * x, scale * y, scale * z)
 
 
 def _product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """First the turn q, then p."""
+    """Return the turn q followed by the turn p."""
     a, b, c, d = p
     w, x, y, z = q
     return (
@@ -123,7 +123,7 @@ def _product(p: Quaternion, q: Quaternion) -> Quaternion:
 
 
 def matrix(attitude: Quaternion) -> Matrix:
-    """The rotation (3, 3) of a unit quaternion (w, x, y, z)."""
+    """Return the rotation matrix (3, 3) of a unit quaternion (w, x, y, z)."""
     w, x, y, z = attitude
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -133,7 +133,7 @@ def matrix(attitude: Quaternion) -> Matrix:
 
 
 def _turned(attitude: Quaternion, v: Direction) -> Direction:
-    """The vector `v` of the board's axes in the room's."""
+    """Return the vector `v` of the board's axes in the room's."""
     w, x, y, z = attitude
     a, b, c = v
     # v + 2 w (q x v) + 2 q x (q x v)
@@ -151,23 +151,22 @@ def _inverse(attitude: Quaternion) -> Quaternion:
 
 
 def _heading(turn: Quaternion) -> float:
-    """By how much it turns about the vertical [rad]."""
+    """Return the angle by which it turns about the vertical [rad]."""
     w, _, _, z = turn
     return math.atan2(2.0 * w * z, w * w - z * z)
 
 
 def straight(up: Direction) -> Quaternion:
-    """The attitude with the unit vector `up` of the board's axes up nearest to one laid straight."""
-    x, y, z = up
-    laid = _LAID if z >= 0.0 else _TURNED_OVER
-    # the shortest turn to (0, 0, 1) of what points up once it is laid
+    """Return the attitude nearest to a board laid straight in which the unit vector `up` of its axes points up."""
+    laid = _LAID if up[2] >= 0.0 else _TURNED_OVER
+    # The shortest turn to (0, 0, 1) of the direction that points up once the board is laid.
     x, y, z = _turned(laid, up)
     size = math.hypot(1.0 + z, y, x)
     return _product(((1.0 + z) / size, y / size, -x / size, 0.0), laid)
 
 
 def quaternion(matrix: Vector) -> Quaternion:
-    """(w, x, y, z) with w >= 0 of a rotation (3, 3); its largest component comes of the diagonal (Shepperd 1978)."""
+    """Return the quaternion (w, x, y, z), w >= 0, of a rotation (3, 3); the largest component first (Shepperd 1978)."""
     m = matrix
     squares = np.array(
         [

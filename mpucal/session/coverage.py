@@ -1,6 +1,7 @@
-"""Coverage: which orientations the board has been in, how many, and whether they are spread over the sphere.
+"""Coverage: the orientations that the board has been in, and their spread over the sphere.
 
-Directions are of the raw acceleration: bias and scale factor error bend them by a few degrees, which does no harm.
+Directions are those of the raw acceleration: bias and scale factor errors bend them by a few degrees, which does no
+harm.
 """
 
 from __future__ import annotations
@@ -11,23 +12,21 @@ import numpy as np
 
 from ..data import Vector
 
-# Orientations count as different from here on: far enough for 12 of them to be far from parallel,
-# near enough for a sphere to hold some seventy.
+# Orientations this far apart count as different: 12 of them are far from parallel, and a sphere holds some seventy.
 DISTINCT_RAD = math.radians(20.0)
-# Without a pause a direction is seen only in passing, among the hand's accelerations: so many make up for a pause.
+# A direction that was only passed is disturbed by the hand's accelerations: so many count as one pause.
 PASSES_OF_A_PAUSE = 4
-
-# Rests so near one another are one.
+# Rests nearer to one another count as one.
 SAME_RAD = math.radians(2.0)
 
-# How evenly directions must be spread, against 1.0 for evenly over the whole sphere: what varied orientations
-# exceed several times, while the six faces or tilts about one axis stay below by orders of magnitude.
+# Least spread of the directions, where 1.0 is evenly over the sphere. Varied orientations exceed it several times; the
+# six faces, or tilts about one axis, stay below it by orders of magnitude.
 SPREAD = 0.05
 _UNIFORM = 2.0 / 15.0
 
 
 class Directions:
-    """Directions that differ from one another by `apart_rad`: `units`, (n, 3)."""
+    """Unit vectors that differ from one another by at least `apart_rad`: `units`, (n, 3)."""
 
     def __init__(self, apart_rad: float = DISTINCT_RAD) -> None:
         self.units = np.zeros((0, 3))
@@ -37,22 +36,26 @@ class Directions:
         return len(self.units)
 
     def add(self, unit: Vector) -> bool:
-        """Keep a unit vector (3,) unless one near it is there already; True where it was new."""
+        """Keep a unit vector (3,) unless one near it is there already; return True if it was new."""
         if self.near(unit, self._apart_rad):
             return False
         self.units = np.vstack([self.units, unit])
         return True
 
     def near(self, unit: Vector, apart_rad: float) -> bool:
-        """Whether one of them is less than `apart_rad` from a unit vector (3,)."""
+        """Return True if one of them is less than `apart_rad` from a unit vector (3,)."""
         return bool(len(self)) and float((self.units @ unit).max()) > math.cos(apart_rad)
 
-    def spread(self) -> float:
-        """How well the directions alone would determine an ellipsoid, from 0 to 1 (as all directions).
+    def farthest_down(self, candidates: Vector) -> Vector:
+        """Return that of the unit vectors (k, 3) which, pointing down, differs most from all directions here."""
+        return np.asarray(candidates[int((-candidates @ self.units.T).max(1).argmin())])
 
-        It is the smallest eigenvalue of the mean of p p', p the nine monomials of first and second degree,
-        against that of the uniform sphere (2/15). It is zero where all directions lie on a cone or a plane,
-        or on few axes, or where none tilts two axes together.
+    def spread(self) -> float:
+        """Return how well the directions alone would determine an ellipsoid, from 0 to 1 (as all directions).
+
+        It is the smallest eigenvalue of the mean of p p', p the nine monomials of first and second degree, divided by
+        that of the uniform sphere (2/15). It is zero where all directions lie on a cone or a plane, or on few axes, or
+        where none tilts two axes together.
         """
         if not len(self):
             return 0.0
@@ -61,7 +64,7 @@ class Directions:
 
 
 class Coverage:
-    """Counts the orientations in which the board paused, and those it passed."""
+    """Orientations that the board has paused in, passed, and rested in, long or short."""
 
     def __init__(self) -> None:
         self.paused = Directions()
@@ -69,46 +72,34 @@ class Coverage:
         self.rested = Directions(SAME_RAD)
 
     def passes(self, acc: Vector) -> bool:
-        """The mean acceleration (3,) [m/s^2] of a short time; True where its direction is new."""
+        """Add the mean acceleration (3,) [m/s^2] of a short time; return True if its direction is new."""
         return self.passed.add(_unit(acc))
 
     def pauses(self, acc: Vector) -> bool:
-        """The mean acceleration (3,) [m/s^2] of a pause; True where its direction is new."""
+        """Add the mean acceleration (3,) [m/s^2] of a pause; return True if its direction is new."""
         return self.paused.add(_unit(acc))
 
     def rests(self, acc: Vector) -> None:
-        """The mean acceleration (3,) [m/s^2] of a rest, long or short, in a new orientation or near another."""
+        """Add the mean acceleration (3,) [m/s^2] of a rest."""
         self.rested.add(_unit(acc))
 
     def was_near(self, acc: Vector, apart_rad: float) -> bool:
-        """Whether the board has rested less than `apart_rad` from where its mean acceleration (3,) is this."""
+        """Return True if the board has rested less than `apart_rad` from the direction of `acc` (3,)."""
         return self.rested.near(_unit(acc), apart_rad)
 
     def is_new(self, acc: Vector) -> bool:
-        """Whether a pause with the mean acceleration (3,) would be a new one."""
+        """Return True if a pause with the mean acceleration `acc` (3,) would be a new orientation."""
         return not self.paused.near(_unit(acc), DISTINCT_RAD)
 
     @property
     def number(self) -> int:
-        """How many orientations there are, by pauses or by passes, whichever is more."""
+        """Number of orientations, by pauses or by passes, whichever is more."""
         return max(len(self.paused), len(self.passed) // PASSES_OF_A_PAUSE)
-
-    def farthest_down(self, candidates: Vector) -> Vector:
-        """(3,) that of the unit vectors (k, 3) which, pointing down, is least like any pause."""
-        return _farthest(candidates, self.paused)
-
-    def farthest_from_rests(self, candidates: Vector) -> Vector:
-        """(3,) likewise of all rests."""
-        return _farthest(candidates, self.rested)
 
     @property
     def varied(self) -> bool:
-        """Whether they are spread over the sphere."""
+        """True if the orientations are spread over the sphere."""
         return max(self.paused.spread(), self.passed.spread()) >= SPREAD
-
-
-def _farthest(candidates: Vector, ups: Directions) -> Vector:
-    return np.asarray(candidates[int((-candidates @ ups.units.T).max(1).argmin())])
 
 
 def _unit(acc: Vector) -> Vector:
@@ -116,7 +107,7 @@ def _unit(acc: Vector) -> Vector:
 
 
 def _monomials(u: Vector) -> Vector:
-    """(n, 9) of (n, 3); the factor makes the second-degree ones orthogonal over the sphere."""
+    """Return (n, 9) of (n, 3); the factor makes those of second degree orthogonal over the sphere."""
     x, y, z = u.T
     r = math.sqrt(2.0)
     return np.stack([x * x, y * y, z * z, r * x * y, r * x * z, r * y * z, x, y, z], axis=1)

@@ -5,22 +5,35 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from ..data import Samples, Sensor
+import numpy as np
+
+from ..data import Samples, Sensor, Vector
 from ..reasons import Reason
 
 Direction = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
+def triple(v: Vector) -> Direction:
+    """Return an array (3,) as the plain floats that an event carries."""
+    x, y, z = np.asarray(v, float).tolist()
+    return x, y, z
+
+
+def down_of(acc: Vector) -> Direction:
+    """Return the unit vector that points down in the board's axes, from an acceleration (3,) at rest."""
+    return triple(-acc / max(float(np.linalg.norm(acc)), 1e-9))
+
+
 class Key(StrEnum):
-    """What the person can say."""
+    """Keys that a person can press, by their meaning."""
 
     ENOUGH = "enough"
     REDO = "redo"
     ABORT = "abort"
 
 
-# What happens to a session.
+# Events from outside: the source, the person and the fits.
 
 
 @dataclass(frozen=True)
@@ -39,7 +52,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Tick:
-    """The source was asked and the time is `t_s`, on the clock of the samples' times."""
+    """The source was polled at `t_s`, on the clock of the samples' times."""
 
     t_s: float
 
@@ -56,7 +69,7 @@ class Abort:
 
 @dataclass(frozen=True)
 class SourceEnded:
-    """No more samples will come; `why` is None where a recording came to its end, else what failed."""
+    """The source delivers no more samples: `why` is what failed, or None at the end of a recording."""
 
     why: str | None = None
 
@@ -68,14 +81,14 @@ class Redo:
 
 @dataclass(frozen=True)
 class Resumed:
-    """A source that had ended goes on, `gap_s` later; nobody knows what the board did meanwhile."""
+    """The source resumed after `gap_s`; the board's motion in between is unknown."""
 
     gap_s: float
 
 
 @dataclass(frozen=True)
 class Learnt:
-    """What is known by now, as it was asked for; with `advice` it says where to turn next."""
+    """The uncertainties were computed, as requested; with `advice`, also the orientation that helps most."""
 
     knowledge: Knowledge
     advice: bool
@@ -83,7 +96,7 @@ class Learnt:
 
 @dataclass(frozen=True)
 class Tried:
-    """A first calibration from the turning alone, to be verified: its verdict, and the likeliest reason against it."""
+    """The first calibration, from the turning alone, was computed: its verdict, and the likeliest reason against it."""
 
     verdict: str
     reason: Reason | None = None
@@ -91,9 +104,12 @@ class Tried:
 
 @dataclass(frozen=True)
 class Checked:
-    """What the new orientations say of the first calibration, and the reason where they do not agree.
+    """The first calibration was compared with the new orientations.
 
-    `agrees` is None where nothing was shown that says anything.
+    Attributes
+    ----------
+    found : one for each orientation. agrees : None where too little was shown to tell.
+    reason : the likeliest cause, where they do not agree.
     """
 
     found: tuple[Verification, ...]
@@ -103,7 +119,7 @@ class Checked:
 
 @dataclass(frozen=True)
 class Fitted:
-    """The final calibration is there, with its verdict: good, usable or refused."""
+    """The final calibration was computed; its verdict is good, usable or refused."""
 
     verdict: str
 
@@ -115,7 +131,7 @@ class Written:
     names: tuple[str, ...]
 
 
-# What the session itself finds in the above; they drive its table like the rest.
+# Events that the session's steps derive from the samples; the table has them like the others.
 
 
 @dataclass(frozen=True)
@@ -129,21 +145,21 @@ class Rested:
 
 @dataclass(frozen=True)
 class Turned:
-    """The board was turned enough, or as much as it will be: what follows verifies it."""
+    """The turning has ended; the verification follows."""
 
     why: str
 
 
 @dataclass(frozen=True)
 class Finished:
-    """No more is to be measured: verified, or as well as it will be."""
+    """The measuring has ended; the final calibration follows."""
 
     why: str
 
 
 @dataclass(frozen=True)
 class Stopped:
-    """The session cannot go on or shall not; `why` says what happened, `remedy` what to do next."""
+    """The session cannot go on; `why` says what happened, `remedy` what to do next."""
 
     why: str
     remedy: str
@@ -170,11 +186,11 @@ Event = (
 )
 
 
-# What the session answers.
+# Outputs.
 
 
 class PromptKind(StrEnum):
-    """What the person (or the hand that stands in for one) is to do now."""
+    """Actions that the person, or a simulated hand, is asked for."""
 
     LAY_FLAT = "lay_flat"
     ROTATE = "rotate"
@@ -185,11 +201,11 @@ class PromptKind(StrEnum):
 
 @dataclass(frozen=True)
 class Prompt:
-    """An instruction to the person: the one that holds until the next.
+    """An instruction to the person, valid until the next one.
 
     Attributes
     ----------
-    kind : what to do. text : the same in words.
+    kind : what to do. text : the instruction.
     down : unit vector in the board's axes that is to point down, where one orientation is wanted.
     """
 
@@ -200,7 +216,7 @@ class Prompt:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far the present step is: `done` of `of`, in words; `t_s` is the session's time."""
+    """Progress of the present step: `done` of `of`, and as text; `t_s` is the session's time."""
 
     t_s: float
     done: float
@@ -210,19 +226,19 @@ class Progress:
 
 @dataclass(frozen=True)
 class Meter:
-    """What the board does this moment, four times a second: for a needle and a picture, not for words.
+    """The board's motion at this moment, four times a second, for the picture and the needle.
 
     Attributes
     ----------
     level : 0 perfectly still, 1 at the limit of what counts as still, beyond it moving. still : below that limit.
-    what : what moves it most, in words; empty where it is still.
-    down : unit vector in the board's axes that points down now. turning_dps : how fast it turns [deg/s].
-    rate_hz : samples a second as they come. temperature_c : of the chip; None where it says none.
+    what : the largest motion, as text; empty while the board is still.
+    down : unit vector in the board's axes that points down now. turning_dps : rate of turning [deg/s].
+    rate_hz : samples a second as they arrive. temperature_c : of the chip; None where it has no thermometer.
     attitude : unit quaternion (w, x, y, z) that takes the board's axes to the room's: x right, y away, z up, as the
-        board lay flat before whoever holds it.
-    missing_deg : what is missing to the wanted orientation [deg]. turn : the way there in words, such as "60 deg more,
-        roll it to the left"; empty where nothing is missing. wanted : the attitude that it leads to. None, empty and
-        None where no orientation is wanted.
+        board lay flat before its operator.
+    missing_deg : angle to the wanted orientation [deg]. turn : the turn there as text, such as "60 deg more, roll it
+        to the left"; empty where nothing is missing. wanted : the attitude that it leads to. None, empty and None
+        where no orientation is wanted.
     """
 
     t_s: float
@@ -241,10 +257,10 @@ class Meter:
 
 @dataclass(frozen=True)
 class Countdown:
-    """How long the board must stay still yet, while something waits for that; `paused` by a bump.
+    """Time for which the board must still be held; `paused` while a bump disturbs it.
 
-    It starts over (`remaining_s` is `of_s` again) only where the board was moved. `elsewhere`: not in the wanted
-    orientation, but in another one that is new and useful.
+    It starts over (`remaining_s` is `of_s` again) only if the board was moved. `elsewhere`: the board is not in the
+    wanted orientation, but in another one that is new and useful.
     """
 
     t_s: float
@@ -255,7 +271,7 @@ class Countdown:
 
 
 class Use(StrEnum):
-    """Of what use an orientation was that was held."""
+    """Use of an orientation that was held: the wanted one, another new one, or one seen before."""
 
     TAKEN = "taken"
     USEFUL = "useful"
@@ -264,11 +280,11 @@ class Use(StrEnum):
 
 @dataclass(frozen=True)
 class Held:
-    """The board was held for long enough: in the wanted orientation, in another new one, or in one seen before.
+    """The board was held for long enough in one orientation.
 
     Attributes
     ----------
-    down : unit vector in the board's axes that pointed down. text : the use in words.
+    down : unit vector in the board's axes that pointed down. text : the use, as text.
     """
 
     t_s: float
@@ -279,10 +295,10 @@ class Held:
 
 @dataclass(frozen=True)
 class Caution:
-    """Something is not as it should be: `what` in one line, and what to `do` about it now.
+    """A warning: `what` is wrong, and what to `do` about it now, one line each.
 
-    `code` names its kind for those who count them: moved, trembling, too_fast, clipped, data_lost, not_turned,
-    seen_already, doubtful, knocked, refused; of a stream accelerometer_contradicted, gyroscope_contradicted.
+    `code` is its kind: moved, trembling, too_fast, clipped, data_lost, not_turned, seen_already, doubtful, knocked,
+    refused; in `mpucal stream` also accelerometer_contradicted and gyroscope_contradicted.
     """
 
     t_s: float
@@ -293,11 +309,11 @@ class Caution:
 
 @dataclass(frozen=True)
 class Seen:
-    """The board has shown one more orientation: number `number` (the flat one is the first).
+    """The board has shown a new orientation, number `number`; the flat one is number 1.
 
     Attributes
     ----------
-    down : unit vector in the board's axes that pointed down. paused : it was held; else only passed in turning.
+    down : unit vector in the board's axes that pointed down. paused : True if it was held, not only passed.
     """
 
     t_s: float
@@ -323,11 +339,11 @@ class Knowledge:
     ----------
     gain_pct, misalignment_deg, bias_mg : (x, y, z) standard uncertainties (1 sigma) of the scale factor error [%], the
         misalignment [deg] (of an axis' two the larger) and the bias [mg]. 1e3 or so: not observable yet.
-    target : what is wanted of each.
-    gain, misalignment, bias : (x, y, z) progress toward it, 0..1. overall : the least of all nine.
-    down : unit vector in the board's axes: the still orientation that would help most if it pointed down now.
-        None where every one has reached its target.
-    words : the largest uncertainty of each kind, in words.
+    target : the target of each.
+    gain, misalignment, bias : (x, y, z) progress towards the target, 0..1. overall : the least of all nine.
+    down : unit vector in the board's axes: the orientation at rest that would reduce the uncertainty most.
+        None where it was not requested.
+    words : the largest uncertainty of each kind, as text.
     doubt : one line where the data contradict each other already (a flipped axis, a wrong range), else empty.
     """
 
@@ -351,11 +367,11 @@ class Verification:
 
     Attributes
     ----------
-    number, of : which one of how many. down : unit vector in the board's axes that pointed down.
+    number, of : its number, and how many there are. down : unit vector in the board's axes that pointed down.
     magnitude_mps2, magnitude_std_mps2 : |a| - g there, and its predicted standard uncertainty.
     direction_deg, direction_std_deg : angle between gravity as predicted by the gyroscope and as measured, and its
         predicted standard uncertainty.
-    agrees : both are within four of these. text : the same in words.
+    agrees : True if both are within four of these. text : the result, as text.
     """
 
     t_s: float
@@ -372,14 +388,14 @@ class Verification:
 
 @dataclass(frozen=True)
 class Decision:
-    """The session went on to its next state, or ended: `why`, and where it ended early, what to do next."""
+    """The session went to its next state, or ended: `why`, and what to do next if it ended early."""
 
     why: str
     remedy: str = ""
 
 
-class Wish(StrEnum):
-    """What can be asked of whoever computes."""
+class FitKind(StrEnum):
+    """Fits that a session can request."""
 
     KNOW = "know"
     ADVISE = "advise"
@@ -388,24 +404,24 @@ class Wish(StrEnum):
 
 
 @dataclass(frozen=True)
-class Ask:
-    """To the session's owner: compute this of all samples so far, and bring it after `wait_s` seconds of samples more.
+class RequestFit:
+    """Command to the session's owner: compute this fit of all samples so far; answer after `wait_s` of samples more.
 
-    Always after the same number of samples, waited for if need be: so a replay equals its session.
-    KNOW and ADVISE bring Learnt, TRY brings Tried, CHECK brings Checked of the samples after the TRY.
+    The answer always comes after the same number of samples, and is waited for if necessary, so that a replay equals
+    its session. KNOW and ADVISE are answered by Learnt, TRY by Tried, CHECK by Checked of the samples after the TRY.
     """
 
-    wish: Wish
+    kind: FitKind
     wait_s: float
 
 
 @dataclass(frozen=True)
 class Forget:
-    """To the session's owner: samples number first..last-1 are not to be used; what follows them follows a gap."""
+    """Command to the session's owner: drop samples number first..last-1, and mark a gap before the next one."""
 
     first: int
     last: int
 
 
-Command = Ask | Forget
+Command = RequestFit | Forget
 Output = Prompt | Progress | Meter | Countdown | Held | Caution | Seen | Knowledge | Verification | Decision | Command

@@ -1,4 +1,4 @@
-"""The folder that a session fills: the one that was asked for, or a new one named by chip and time."""
+"""Folder of a session: the one that was asked for, or a new one named by chip and time."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from ..result.session_files import DOCUMENT
 
 
 class SessionFolder(Folder):
-    """A folder without a capture and results, held until it is closed; see Folder.
+    """Folder for one session, locked until it is closed; see Folder.
 
     Parameters
     ----------
-    asked : where the person wants it; None: here, under a name of its own. capture_name : the file to come in it.
+    asked : its path; None: a new name in the working directory. capture_name : name of the capture to come.
     again : the folder holds earlier captures of the same session.
 
     Raises
     ------
-    OutputError : it cannot be made, is another process's, or holds a capture or results.
+    OutputError : it cannot be made, another process has it, or it holds a capture or results already.
     """
 
     def __init__(self, asked: Path | None, capture_name: str, again: bool = False) -> None:
@@ -35,26 +35,23 @@ class SessionFolder(Folder):
         if there := next((file.name for file in held if file.exists()), None):
             self.close()
             raise OutputError(
-                f"{asked} holds {there} already, which is not written over", "choose another folder with -o"
+                f"{asked} holds {there} already, which is not overwritten", "choose another folder with -o"
             )
 
     @property
     def capture(self) -> Path:
-        """Where the capture goes."""
+        """Path of the capture to come."""
         return self.path / self._capture_name
 
     @property
     def kept(self) -> Path | None:
-        """The capture, where there is one."""
+        """Path of the capture, if it exists."""
         with suppress(OutputError):
             return self.capture if self.capture.exists() else None
         return None
 
     def settle(self, sensor: Sensor | None) -> None:
-        """Give a folder that nobody named the name of its chip.
-
-        Where none answered, take the capture away again, and the folder if nobody asked for it.
-        """
+        """Rename a folder without a given name after its chip; delete the capture, and it, if no chip answered."""
         if sensor is None:
             self.capture.unlink(missing_ok=True)
             if not self._asked:
@@ -64,7 +61,7 @@ class SessionFolder(Folder):
 
 
 def check_unfinished(folder: Path) -> None:
-    """UsageError where the session in `folder` has its results, which going on would replace."""
+    """Raise UsageError if the session in `folder` has its results already, which resuming would replace."""
     if (folder / DOCUMENT.name).exists():
         raise UsageError(
             f"the session in {folder} is finished",

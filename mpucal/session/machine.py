@@ -10,14 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from . import lay_flat
-from .aims import NORMAL, aim_of
-from .choose import Choose
+from .aims import NORMAL, select_aim
+from .check_poses import CheckPoses
 from .events import (
     Abort,
     Checked,
     Connected,
     Decision,
-    Direction,
     Enough,
     Event,
     Finished,
@@ -43,8 +42,10 @@ from .rotate import Rotate
 from .table import State, next_state
 from .verify import Verify
 
-# a source that is asked must answer within the first; who asks more seldom than the second was stopped meanwhile
-SILENT_S, ASKED_S = 5.0, 2.0
+# A source that is polled must answer within this time.
+SILENT_S = 5.0
+# A longer time between two polls means that the computer was stopped or suspended.
+ASKED_S = 2.0
 
 REST = Prompt(PromptKind.REST, "You can put the board down.")
 COMPUTING = Prompt(PromptKind.REST, "You can put the board down. The calibration is being computed.")
@@ -54,17 +55,17 @@ ENOUGH = "you chose to go on"
 
 
 class Machine:
-    """Leads through the states of the table, and says what the person is to do.
+    """State machine of one session.
 
     Parameters
     ----------
-    until_end : each step takes its time, and turning ends with the source.
-    target : one of AIMS. tilt_only : ask for tilts alone, of a board that cannot be turned over.
-    attended : somebody can press keys. checking : a calibration that is there is checked, and none is made.
+    until_end : no step has a time limit, and the turning ends with the source.
+    target : one of AIMS. tilt_only : ask for tilts alone, for a board that cannot be turned over.
+    attended : somebody can press keys. checking : an existing calibration is checked, and none is made.
 
     Attributes
     ----------
-    state : where the session is.
+    state : present state of the table.
     """
 
     def __init__(
@@ -77,9 +78,9 @@ class Machine:
     ) -> None:
         self.state = State.CONNECT
         self._until_end, self._target, self._tilt_only = until_end, target, tilt_only
-        self._aim = aim_of(target)
+        self._aim = select_aim(target)
         self._attended, self._checking = attended, checking
-        self._step: lay_flat.LayFlat | Rotate | Choose | Verify = lay_flat.LayFlat(patient=until_end)
+        self._step: lay_flat.LayFlat | Rotate | CheckPoses | Verify = lay_flat.LayFlat(patient=until_end)
         self._watch: MotionWatch | None = None
         self._flat: Rested | None = None
         self._samples = self._flat_samples = 0
@@ -89,15 +90,15 @@ class Machine:
 
     @property
     def checked(self) -> Checked | None:
-        """What the verification found; None where there was none."""
+        """Result of the verification; None where there was none."""
         return self._step.checked if isinstance(self._step, Verify) else None
 
     def handle(self, event: Event) -> list[Output]:
-        """Take one event, and answer it.
+        """Process one event; return the outputs.
 
         Raises
         ------
-        IllegalEvent : the event cannot happen in this state, which stays as it was.
+        IllegalEvent : the event is not legal in this state, which does not change.
         """
         before, self.state = self.state, next_state(self.state, event)
         match event:
@@ -106,7 +107,7 @@ class Machine:
             case Tick(t_s):
                 return self._tick(t_s)
             case Connected(sensor):
-                self._aim, self._watch = aim_of(self._target, sensor), MotionWatch(sensor)
+                self._aim, self._watch = select_aim(self._target, sensor), MotionWatch(sensor)
                 return [lay_flat.PROMPT]
             case Rested(still_s):
                 self._flat, self._flat_samples = event, self._samples
@@ -138,7 +139,7 @@ class Machine:
 
     def _measured(self, event: Measured) -> list[Output]:
         samples = event.samples
-        # after so long the person begins anew what was asked for, and the time for it does, too
+        # After a long silence the person starts the present prompt again, and its time limit starts again, too.
         first_s, last_s = float(samples.t[0]), float(samples.t[-1])
         before_s = first_s if self._sampled_s is None else self._sampled_s
         silent = first_s - before_s > SILENT_S or (
@@ -147,16 +148,11 @@ class Machine:
         again = self._step.resumed() if silent else []
         self._sampled_s, self._away_s = last_s, 0.0
         self._samples += len(samples)
-        seen = self._watch.add(samples, self._wanted) if self._watch else []
-        return [*again, *seen, *self._follow(self._step.add(samples))]
-
-    @property
-    def _wanted(self) -> Direction | None:
-        """What is to point down now."""
-        return self._step.wanted if isinstance(self._step, Rotate | Choose | Verify) else None
+        meters = self._watch.add(samples, self._step.wanted) if self._watch else []
+        return [*again, *meters, *self._dispatch(self._step.add(samples))]
 
     def _turn(self, flat: Rested) -> list[Output]:
-        turning = Choose(flat) if self._checking else Rotate(flat, self._aim, self._until_end, self._tilt_only)
+        turning = CheckPoses(flat) if self._checking else Rotate(flat, self._aim, self._until_end, self._tilt_only)
         self._step = turning
         return [turning.prompt]
 
@@ -170,19 +166,20 @@ class Machine:
         return verify.begin()
 
     def _answered(self, event: Learnt | Tried | Checked) -> list[Output]:
-        """What was asked for has come; an answer to a step that is over is of no use any more."""
+        """Pass the answer of a fit to the step that requested it; drop it if that step is over."""
         match event, self._step:
             case Learnt(knowledge, advice), Rotate() as rotate:
-                return self._follow(rotate.learn(knowledge, advice))
+                return self._dispatch(rotate.learn(knowledge, advice))
             case Tried(), Verify() as verify:
-                return self._follow(verify.tried(event))
+                return self._dispatch(verify.tried(event))
             case Checked(), Verify() as verify:
-                return self._follow(verify.check(event))
+                return self._dispatch(verify.check(event))
         return []
 
-    def _follow(self, found: Sequence[Output | Rested | Turned | Finished | Stopped]) -> list[Output]:
+    def _dispatch(self, items: Sequence[Output | Rested | Turned | Finished | Stopped]) -> list[Output]:
+        """Return the outputs of a step; its events change the state, and add their outputs."""
         outputs: list[Output] = []
-        for item in found:
+        for item in items:
             if isinstance(item, Rested | Turned | Finished | Stopped):
                 outputs += self.handle(item)
             else:
@@ -193,7 +190,7 @@ class Machine:
         if self._sampled_s is None:
             self._sampled_s = t_s
         if self._ticked_s is not None:
-            # a computer that was stopped or suspended did not ask
+            # While the computer was stopped or suspended, the source was not polled.
             self._away_s += max(t_s - self._ticked_s - ASKED_S, 0.0)
         self._ticked_s = t_s
         if t_s - self._sampled_s - self._away_s < SILENT_S:
@@ -214,15 +211,11 @@ class Machine:
         return []
 
     def _redo(self, state: State) -> list[Output]:
-        """Turn again; what was turned before is forgotten, the flat rest is not."""
+        """Start the turning again: its samples are dropped, those of the flat rest are kept."""
         if state not in (State.ROTATE, State.VERIFY) or self._flat is None:
             return []
-        forget = Forget(self._flat_samples, self._samples)
-        return [
-            Decision("the turning starts again; what was turned so far is discarded"),
-            forget,
-            *self._turn(self._flat),
-        ]
+        again = Decision("the turning starts again; what was turned so far is discarded")
+        return [again, Forget(self._flat_samples, self._samples), *self._turn(self._flat)]
 
     def _resumed(self, state: State) -> list[Output]:
         self._sampled_s = self._ticked_s = None
@@ -238,10 +231,5 @@ class Machine:
             return [Decision(f"{what}; calibrating with the data so far"), COMPUTING]
         if why:
             return [Decision(why), REST]
-        return [
-            Decision(
-                "the source ended before the board was turned",
-                "record it again: flat and still first, then turned through varied orientations",
-            ),
-            REST,
-        ]
+        remedy = "record it again: flat and still first, then turned through varied orientations"
+        return [Decision("the source ended before the board was turned", remedy), REST]

@@ -1,4 +1,4 @@
-"""The settings of a session (sensor, gravity, model, target), and how the head of its capture stores them."""
+"""Settings of a session (sensor, gravity, model, target), and their form in the head of its capture."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from ..iio import IIO_VERSION
 from .aims import NORMAL
 
 DRIVER, PLAN = "driver", "plan"
-# by the version of the driver of a capture
+# The class of a capture's sensor settings, by the version of the driver that recorded it.
 CONFIGS: Mapping[Any, type[Config]] = {DRIVER_VERSION: Config, IIO_VERSION: RateOnlyConfig}
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What decides, with the bytes and the keys, on all that a session does.
+    """Settings of a session: with them, the bytes and the keys of a capture decide all that it does.
 
     Attributes
     ----------
-    config : how the chip measures. gravity : local gravity [m/s^2]. model : what to estimate.
-    until_end : each step takes its time, and turning ends with the source.
-    target : how well it is to be known, one of AIMS. tilt_only : the board cannot be turned over.
-    attended : somebody can press keys. gravity_anyway : a gravity that no place on Earth has is meant.
+    config : the chip's settings. gravity : local gravity [m/s^2]. model : the parameters to estimate.
+    until_end : no step has a time limit, and the turning ends with the source.
+    target : one of AIMS. tilt_only : the board cannot be turned over.
+    attended : somebody can press keys. gravity_anyway : allow a gravity outside the range found on Earth.
     """
 
     config: Config = field(default_factory=Config)
@@ -40,27 +40,27 @@ class Plan:
     gravity_anyway: bool = False
 
     def meta(self) -> dict[str, Any]:
-        """For the head of a capture; values of JSON's own types."""
+        """Return the head of a capture, in JSON's own types."""
         return {DRIVER: DRIVER_VERSION, PLAN: asdict(self)}
 
     @classmethod
     def of_capture(cls, meta: Mapping[str, Any], name: str) -> Self:
-        """The plan by which the capture `name` was made.
+        """Return the plan of the capture `name`, from its head.
 
         Raises
         ------
-        CaptureError : another driver made it, or its head does not say how.
+        CaptureError : another version of the driver recorded it, or its head holds no plan.
         """
         version = meta.get(DRIVER)
         if version not in CONFIGS:
             raise CaptureError(
                 f"{name} was recorded by version {version} of the driver, and this is {DRIVER_VERSION}",
-                "use `mpucal calibrate` on it, which reads captures of every version",
+                "use `mpucal calibrate`, which reads captures of every version",
             )
         try:
             plan = dict(meta[PLAN])
             return cls(**{**plan, "config": CONFIGS[version](**plan["config"])})
         except (KeyError, TypeError, ValueError) as error:
             raise CaptureError(
-                f"the head of {name} does not say how it was made ({error})", "use `mpucal calibrate` on it"
+                f"the head of {name} does not hold the session's settings ({error})", "use `mpucal calibrate`"
             ) from error

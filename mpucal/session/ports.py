@@ -1,4 +1,4 @@
-"""What a session's runner meets: a source, a person, and who keeps session events in a capture."""
+"""Interfaces of a session's runner: the source, the operator, and the notes of session events in the capture."""
 
 from __future__ import annotations
 
@@ -11,65 +11,66 @@ from .events import Key, Output
 
 
 class Source(Protocol):
-    """What delivers samples: the chip's driver, over whatever bus."""
+    """Source of samples, such as a chip's driver over any bus."""
 
     def start(self) -> Sensor:
-        """Set the sensor up and begin to measure."""
+        """Set the sensor up, and start to measure."""
         ...
 
     def poll(self) -> Samples:
-        """Wait a little, and return the samples that came meanwhile; EndOfCapture if there will be none."""
+        """Wait a little, and return the samples that came meanwhile; EndOfCapture if no more will come."""
         ...
 
     def recording(self) -> Recording:
-        """All samples so far, with their final times."""
+        """Return all samples so far, with their final times."""
         ...
 
     def forget(self) -> None:
-        """Let go of all samples so far: `recording` holds what comes from now on, for hours if need be."""
+        """Drop all samples so far, so that memory lasts for hours."""
         ...
 
     def now_ns(self) -> int:
-        """The source's clock, in which the samples' times are."""
+        """Return the time of the clock that the samples' times are in."""
         ...
 
     def stop(self) -> None:
-        """Put the sensor to rest."""
+        """Stop measuring, and put the sensor to rest."""
         ...
 
 
-class Talk(Protocol):
-    """The person: who is told, and who says."""
+class Operator(Protocol):
+    """The person who follows the prompts and presses keys."""
 
     def hear(self, output: Output) -> None:
-        """Be told."""
+        """Show an output."""
         ...
 
     def pressed(self) -> Sequence[Key]:
-        """What was pressed since the last call; never waits."""
+        """Return the keys that were pressed since the last call; never waits."""
         ...
 
 
-class Replayed:
-    """The person in a capture: presses the recorded keys where they were pressed. Somebody else listens.
+class ReplayedOperator:
+    """Operator of a replay: the recorded keys are pressed in their places, and a listener gets the outputs.
 
     Parameters
     ----------
-    listener : hears, and may abort. pending : the session events of a name recorded since the last access, each once.
+    listener : gets the outputs, and may abort.
+    pending : returns the session events of a name recorded since the last access, each once.
     """
 
-    def __init__(self, listener: Talk, pending: Callable[[str], Sequence[SessionEvent]]) -> None:
+    def __init__(self, listener: Operator, pending: Callable[[str], Sequence[SessionEvent]]) -> None:
         self._listener, self._pending = listener, pending
 
     def hear(self, output: Output) -> None:
-        """Be told."""
+        """Pass an output to the listener."""
         self._listener.hear(output)
 
     def pressed(self) -> Sequence[Key]:
-        """The recorded keys, and a listener's abort."""
+        """Return the recorded keys, and the listener's abort."""
         recorded = [Key(event.data[KEY]) for event in self._pending(KEY)]
         return [*recorded, *(key for key in self._listener.pressed() if key is Key.ABORT)]
 
 
-# keeps a session event in the capture: name, time [ns], data
+# Writes a session event into the capture: name, time [ns], data.
 Note = Callable[[str, int, Mapping[str, Any]], None]

@@ -1,4 +1,4 @@
-"""The files that a calibration leaves in a folder: their content, and writing all of them or none."""
+"""Files of a calibration in a folder: their content, and writing all of them or none."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from ..result.session_files import DOCUMENT, REPORT, SESSION_FILES
 
 @dataclass(frozen=True)
 class Result:
-    """What the files are made of; truth : what a simulated sensor really is."""
+    """Source of the files; truth : the true parameters of a simulated sensor."""
 
     calibration: Calibration
     recording: Recording
     truth: Mapping[str, Any] | None
 
 
-# makes a file's content; None: there is no such file of this result
+# Makes a file's content; None: this result has no such file.
 Maker = Callable[[Result], bytes | None]
 
 
 def result_files(
     calibration: Calibration, recording: Recording, truth: Mapping[str, Any] | None = None
 ) -> Iterator[tuple[str, bytes]]:
-    """Name and content of each file that is made of a result, one at a time; truth : see Result."""
+    """Yield the name and content of each file of a result, one at a time; truth : see Result."""
     result = Result(calibration, recording, truth)
     for file in SESSION_FILES:
         if file.made_by is not None:
@@ -50,33 +50,33 @@ def result_files(
 
 
 def document(result: Result) -> bytes:
-    """calibration.json."""
+    """Return calibration.json."""
     return result.calibration.json().encode()
 
 
 def blob(result: Result) -> bytes | None:
-    """calibration.bin; none of a calibration that was refused, or whose D or b_a is not known."""
+    """Return calibration.bin; None if the calibration was refused, or its D or b_a is not known."""
     calibration = result.calibration
     known = np.isfinite(calibration.D).all() and np.isfinite(calibration.b_a).all()
     return calibration.blob().encode() if calibration.verdict != REFUSED and known else None
 
 
 def report(result: Result) -> bytes:
-    """report.html."""
+    """Return report.html."""
     return render(result.calibration, result.recording).encode()
 
 
 def simulated_truth(result: Result) -> bytes | None:
-    """truth.json; none of a real sensor."""
+    """Return truth.json; None for a real sensor."""
     return None if result.truth is None else (json.dumps(result.truth, indent=2) + "\n").encode()
 
 
 def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
-    """Write files by their names, all or none, calibration.json last; then the report, which is not worth the others.
+    """Write files by name, all or none, with calibration.json last; then the report, whose failure keeps the others.
 
     Raises
     ------
-    OutputError : the folder or one of them cannot be written; without room for the report the others are kept.
+    OutputError : the folder or a file cannot be written.
     """
     first = sorted(files.keys() - {REPORT.name}, key=lambda name: (name == DOCUMENT.name, name))
     write_together({folder / name: files[name] for name in first})
@@ -84,7 +84,7 @@ def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
         try:
             write_atomically(folder / REPORT.name, files[REPORT.name])
         except OutputError as error:
-            # one that is there is of another calibration
+            # An old report would be that of another calibration.
             take_away(folder / REPORT.name)
             raise OutputError(
                 f"{error.what}; {' and '.join(first)} are kept in {folder}",
@@ -94,15 +94,12 @@ def save(folder: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
 
 
 def check_owner(folder: Path, calibration: Calibration, read: Path | None, *words: str) -> None:
-    """A folder's results are of one recording, by its digest, and stay beside its captures.
+    """Raise OutputError if the captures or results in `folder` are those of another recording, by its digest.
 
     Parameters
     ----------
-    read : the recording that `calibration` was made of; None of other calibrations. words : of the command, without -o.
-
-    Raises
-    ------
-    OutputError : `folder` is another recording's; says the command that puts the results elsewhere.
+    read : path of the recording that `calibration` was made from; None for other calibrations.
+    words : the command line without -o, for the remedy.
     """
     captures, document = all_captures_in(folder), folder / DOCUMENT.name
     own = (folder, *(captures if len(captures) == 1 else ()))
@@ -114,6 +111,6 @@ def check_owner(folder: Path, calibration: Calibration, read: Path | None, *word
     foreign = owner != calibration.fit.get("recording_digest") or (captures and read is None)
     if foreign and (captures or document.exists()):
         raise OutputError(
-            f"{folder} holds {'a session' if captures else 'results'} of another recording, which stays as it is",
+            f"{folder} holds {'a session' if captures else 'results'} of another recording, which is not overwritten",
             f"`{shlex.join(['mpucal', *words, '-o', str(free_name(folder))])}` puts these elsewhere",
         )

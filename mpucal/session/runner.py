@@ -1,4 +1,4 @@
-"""Runs a session or a recording from its source's first byte to the files that it leaves."""
+"""Runner of a session or a recording, from its source's first byte to its files."""
 
 from __future__ import annotations
 
@@ -14,102 +14,103 @@ from ..errors import Abandoned, BusError, CaptureError, ChipError, EndOfCapture
 from ..result.calibration import Calibration
 from .dialogue import Dialogue
 from .events import Connected, Fitted, Key, Prompt, Resumed, SourceEnded, Written
-from .live.questions import Here, Questions, Worker
-from .live.verdict import verified
+from .live.scheduler import FitScheduler, InlineWorker, Worker
+from .live.verification import add_verification
 from .machine import Machine
 from .plan import Plan
-from .ports import Note, Source, Talk
+from .ports import Note, Operator, Source
 from .results import result_files, save
 from .table import State
 
 
 class Runner:
-    """Runs one session on one source; every step is asked for in the order in which it stands here.
+    """Runner of one session on one source: call measure, calibrate and write in this order, or record alone.
 
-    What reaches the machine depends on the source's bytes and the keys alone, so that a replay repeats it.
+    What reaches the state machine depends on the source's bytes and the keys alone, so that a replay repeats it.
 
     Parameters
     ----------
-    talk : the person. note : keeps a session event in the capture (name, time [ns], data).
-    plan : what the session is to do.
-    listeners : hear each prompt besides the person: the hand that turns a simulated board.
-    go_on : after the source has ended, lets it go on with the next part of what was recorded in parts: True where
-        there is one. The last part of a resumed session is the sensor itself.
-    late : whether to wait for an answer that is late now, or is not; in a replay, where its session waited.
-    hire : begins who computes the answers. checking : a calibration that is there is checked; nothing is computed
-        meanwhile.
+    operator : the person. note : writes a session event into the capture (name, time [ns], data).
+    plan : settings of the session.
+    listeners : called with each prompt, such as the hand that turns a simulated board.
+    go_on : called when the source has ended; continues with the next recorded part and returns True, if there is one.
+        The last part of a resumed session is the sensor itself.
+    late : called with True if a due answer is not there; returns True to poll the source meanwhile. In a replay it
+        returns what the recorded session did.
+    start_worker : makes the worker that executes the live fits.
+    checking : an existing calibration is checked; there are no live fits.
     """
 
     def __init__(
         self,
         source: Source,
-        talk: Talk,
+        operator: Operator,
         note: Note,
         plan: Plan | None = None,
         listeners: Sequence[Callable[[Prompt], None]] = (),
         go_on: Callable[[], bool] = lambda: False,
         late: Callable[[bool], bool] = bool,
-        hire: Callable[[Plan, Sensor], Worker] = Here,
+        start_worker: Callable[[Plan, Sensor], Worker] = InlineWorker,
         checking: bool = False,
     ) -> None:
-        self._source, self._talk, self._note = source, talk, note
+        self._source, self._operator, self._note = source, operator, note
         self._plan = plan = plan or Plan()
-        self._go_on, self._hire, self._checking = go_on, hire, checking
+        self._go_on, self._hire, self._checking = go_on, start_worker, checking
         self._machine = Machine(plan.until_end, plan.target, plan.tilt_only, plan.attended, checking)
-        self._dialogue = Dialogue(self._machine, talk, listeners, note, source.now_ns, late)
+        self._dialogue = Dialogue(self._machine, operator, listeners, note, source.now_ns, late)
         self._ended = False
         self.sensor: Sensor | None = None
 
     def measure(self) -> Recording:
-        """Connect, lay flat, rotate, verify.
+        """Connect, lay flat, rotate, verify; return the samples.
 
         Raises
         ------
-        Abandoned : the person stopped it, never held still, or the source ended before the board was turned.
+        Abandoned : the person stopped it or never held still, or the source ended before the board was turned.
         SourceError : the source failed before the board was turned, or does not replay.
         """
         try:
-            self._dialogue.ask()
+            self._dialogue.take_keys()
             self._connect()
             if self.sensor is not None and not self._checking:
-                self._dialogue.questions = Questions(self._plan, self.sensor, self._hire)
+                self._dialogue.scheduler = FitScheduler(self._plan, self.sensor, self._hire)
             while self._dialogue.measuring:
                 self._step()
         except Abandoned:
-            # a replay that is stopped by who watches it went on when it was recorded
+            # A replay that is stopped by its viewer went on when it was recorded.
             with suppress(CaptureError):
-                self._rest()
+                self._stop_source()
             raise
         finally:
-            if self._dialogue.questions is not None:
-                self._dialogue.questions.close()
-        self._rest()
-        return self._dialogue.remembered(self._source.recording())
+            if self._dialogue.scheduler is not None:
+                self._dialogue.scheduler.close()
+        self._stop_source()
+        return self._dialogue.without_forgotten(self._source.recording())
 
     def record(self, seconds: float | None) -> int:
-        """Measure for `seconds`, or until any key or the source's end; returns how many samples came.
+        """Measure for `seconds`, or until any key or the source's end; return the number of samples.
 
         Raises
         ------
         SourceError : the source failed before the board was turned.
         """
         if self._plan.config.accel_only:
-            return self._collect(seconds)
+            return self._record_accel_alone(seconds)
         self._connect()
         begun_ns = self._source.now_ns()
         long_ns = math.inf if seconds is None else seconds * 1e9
         while self._dialogue.measuring:
-            if self._talk.pressed() or self._source.now_ns() - begun_ns >= long_ns:
-                self._stop_here()
+            if self._operator.pressed() or self._source.now_ns() - begun_ns >= long_ns:
+                self._end_recording()
                 break
             self._poll()
-        self._rest()
+        self._stop_source()
         return len(self._source.recording())
 
     def calibrate(self, recording: Recording, fit: Callable[[Recording], Calibration]) -> Calibration:
-        """Fit, and join what the verification found; Abandoned where the person stopped it meanwhile."""
-        calibration = verified(fit(recording), self._machine.checked)
-        self._dialogue.ask()
+        """Fit, and add the result of the verification; Abandoned if the person stopped it meanwhile."""
+        calibration = add_verification(fit(recording), self._machine.checked)
+        self._dialogue.take_keys()
         self._dialogue.feed(Fitted(calibration.verdict))
         return calibration
 
@@ -120,7 +121,7 @@ class Runner:
         recording: Recording,
         truth: Mapping[str, Any] | None = None,
     ) -> tuple[Path, ...]:
-        """Write the results, all files or none; Abandoned where the person stopped it.
+        """Write the results, all files or none; Abandoned if the person stopped it.
 
         Raises
         ------
@@ -128,26 +129,26 @@ class Runner:
         """
         files: dict[str, bytes] = {}
         for name, data in result_files(calibration, recording, truth):
-            self._dialogue.ask()
+            self._dialogue.take_keys()
             files[name] = data
         written = save(folder, files)
-        self._dialogue.ask()
+        self._dialogue.take_keys()
         self._dialogue.feed(Written(tuple(files)))
         return written
 
-    def _collect(self, seconds: float | None) -> int:
-        """The same without a prompt: of the accelerometer alone no session is made."""
+    def _record_accel_alone(self, seconds: float | None) -> int:
+        """Record as `record` does, without prompts: there is no session of the accelerometer alone."""
         with suppress(EndOfCapture):
             self.sensor = self._source.start()
             end_ns = math.inf if seconds is None else self._source.now_ns() + seconds * 1e9
-            while self._source.now_ns() < end_ns and not self._talk.pressed():
+            while self._source.now_ns() < end_ns and not self._operator.pressed():
                 self._source.poll()
-            self._stop_here()
+            self._end_recording()
             self._source.stop()
         return len(self._source.recording())
 
-    def _stop_here(self) -> None:
-        """As by a key: a session that replays this goes on to calibrate, or has nothing to."""
+    def _end_recording(self) -> None:
+        """Write a key into the capture, so that a replay calibrates, or aborts where there is too little."""
         if self._dialogue.state is State.ROTATE:
             self._dialogue.press(Key.ENOUGH)
         else:
@@ -157,14 +158,14 @@ class Runner:
         try:
             self.sensor = self._source.start()
         except EndOfCapture:
-            self._ends(SourceEnded())
+            self._source_ended(SourceEnded())
         else:
             self._dialogue.feed(Connected(self.sensor))
 
     def _step(self) -> None:
-        """Take what came; where a session ended early, and was resumed, it goes on there."""
+        """Process keys and one poll; where a resumed session had been abandoned, continue with its next part."""
         try:
-            self._dialogue.ask()
+            self._dialogue.take_keys()
             if self._dialogue.measuring:
                 self._poll()
         except Abandoned:
@@ -175,15 +176,15 @@ class Runner:
         try:
             samples = self._source.poll()
         except EndOfCapture:
-            self._ends(SourceEnded())
+            self._source_ended(SourceEnded())
         except (BusError, ChipError) as error:
-            # a CaptureError is none of these: what does not replay is not calibrated either
-            self._ends(SourceEnded(f"{error.what}: {error.remedy}"), error)
+            # A CaptureError is not caught: a capture that does not replay is not calibrated.
+            self._source_ended(SourceEnded(f"{error.what}: {error.remedy}"), error)
         else:
             self._dialogue.arrive(samples)
 
-    def _ends(self, event: SourceEnded, error: BusError | ChipError | None = None) -> None:
-        """That was all, or all of one part: what ended that does not end a session that was resumed."""
+    def _source_ended(self, event: SourceEnded, error: BusError | ChipError | None = None) -> None:
+        """Continue with the next part of a resumed session; else tell the machine, or raise `error`."""
         self._dialogue.catch_up(wait=True)
         enough = self.sensor is not None and not self._dialogue.measuring
         if not enough and self._next_part():
@@ -196,7 +197,7 @@ class Runner:
         self._dialogue.feed(event)
 
     def _next_part(self) -> bool:
-        """Go on with the next part of a resumed session; False where there is none."""
+        """Continue with the next part of a resumed session; return False if there is none."""
         ended_ns = self._source.now_ns()
         while self._go_on():
             self._note(RESUMED, ended_ns, {})
@@ -210,9 +211,9 @@ class Runner:
             return True
         return False
 
-    def _rest(self) -> None:
+    def _stop_source(self) -> None:
         if self._ended:
             return
-        # the samples are in: a sensor that cannot be put to rest takes nothing from them
+        # The samples are safe: a sensor that cannot be put to rest does no harm to them.
         with suppress(BusError, ChipError, EndOfCapture):
             self._source.stop()

@@ -29,7 +29,7 @@ from .events import (
 
 
 class State(StrEnum):
-    """Where a session is."""
+    """States of a session."""
 
     CONNECT = "connect"
     LAY_FLAT = "lay flat"
@@ -41,77 +41,64 @@ class State(StrEnum):
     ABORTED = "aborted"
 
 
+def _stay(state: State, *events: type[Event]) -> dict[type[Event], State]:
+    """Return the rows of events that leave the session in `state`."""
+    return dict.fromkeys(events, state)
+
+
 # An event that a row does not name is illegal in that state.
 TRANSITIONS: Mapping[State, Mapping[type[Event], State]] = MappingProxyType(
     {
         State.CONNECT: {
+            **_stay(State.CONNECT, Enough, Redo),
             Connected: State.LAY_FLAT,
-            Enough: State.CONNECT,
-            Redo: State.CONNECT,
             SourceEnded: State.ABORTED,
             Abort: State.ABORTED,
         },
         State.LAY_FLAT: {
-            Measured: State.LAY_FLAT,
-            Tick: State.LAY_FLAT,
-            Resumed: State.LAY_FLAT,
-            Enough: State.LAY_FLAT,
-            Redo: State.LAY_FLAT,
+            **_stay(State.LAY_FLAT, Measured, Tick, Resumed, Enough, Redo),
             Rested: State.ROTATE,
             Stopped: State.ABORTED,
             SourceEnded: State.ABORTED,
             Abort: State.ABORTED,
         },
         State.ROTATE: {
-            Measured: State.ROTATE,
-            Tick: State.ROTATE,
-            Learnt: State.ROTATE,
-            Resumed: State.ROTATE,
-            Enough: State.ROTATE,
-            Redo: State.ROTATE,
+            **_stay(State.ROTATE, Measured, Tick, Learnt, Resumed, Enough, Redo),
             Turned: State.VERIFY,
             Finished: State.CALIBRATE,
             SourceEnded: State.CALIBRATE,
             Abort: State.ABORTED,
         },
         State.VERIFY: {
-            Measured: State.VERIFY,
-            Tick: State.VERIFY,
-            Learnt: State.VERIFY,
-            Tried: State.VERIFY,
-            Checked: State.VERIFY,
-            Resumed: State.VERIFY,
-            Enough: State.VERIFY,
+            **_stay(State.VERIFY, Measured, Tick, Learnt, Tried, Checked, Resumed, Enough),
             Redo: State.ROTATE,
             Finished: State.CALIBRATE,
             SourceEnded: State.CALIBRATE,
             Abort: State.ABORTED,
         },
         State.CALIBRATE: {
+            **_stay(State.CALIBRATE, Enough, Redo),
             Fitted: State.WRITE,
-            Enough: State.CALIBRATE,
-            Redo: State.CALIBRATE,
             Abort: State.ABORTED,
         },
         State.WRITE: {
+            **_stay(State.WRITE, Enough, Redo),
             Written: State.DONE,
-            Enough: State.WRITE,
-            Redo: State.WRITE,
             Abort: State.ABORTED,
         },
         State.DONE: {},
-        # by a board that was never still, say: there is no flat rest yet
+        # Resumed after a board that was never still, for example: there is no flat rest yet.
         State.ABORTED: {Resumed: State.LAY_FLAT},
     }
 )
 
 
 class IllegalEvent(Exception):  # noqa: N818 - named by what went wrong
-    """The machine's owner gave it an event that its state does not know: a bug of the owner."""
+    """Event that is not legal in the machine's state: a programming error of its owner."""
 
 
 def next_state(state: State, event: Event) -> State:
-    """Where `event` leads from `state`.
+    """Return the state to which `event` leads from `state`.
 
     Raises
     ------

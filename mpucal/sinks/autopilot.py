@@ -26,7 +26,7 @@ from ..mavlink.rest_monitor import RestMonitor
 from ..mavlink.stream_parameters import read_stream_parameters
 from ..result.calibration import Calibration
 from ..result.journal import AT, Journal
-from ..session.at_rest import put_down
+from ..session.lay_flat import put_down
 from ..sources.vehicle import OpenedVehicle
 from .kind import Device
 from .signals import interrupting

@@ -27,7 +27,7 @@ from ..errors import ChipError, SourceError, WriteBackError
 from ..result.calibration import REFUSED, Calibration
 from ..result.improvement import is_better
 from ..result.journal import AT, Journal
-from ..session.at_rest import put_down
+from ..session.lay_flat import put_down
 from ..sources.chip import OpenedChip
 from .kept import keep, kept, not_kept
 from .kind import Device

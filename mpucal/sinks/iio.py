@@ -31,7 +31,7 @@ from ..iio.setup import POLLED, Attributes
 from ..rests.stillness import let_go
 from ..result.calibration import REFUSED, Calibration
 from ..result.journal import Journal
-from ..session.at_rest import put_down
+from ..session.lay_flat import put_down
 from ..sources.iio import OpenedIio
 from .kept import keep, kept, not_kept
 from .kind import Device

@@ -18,7 +18,7 @@ from ..files.mcap import CaptureWriter
 from ..result.session_files import CAPTURE
 from ..session.events import Prompt
 from ..session.plan import Plan
-from ..session.ports import Replayed, Source, Talk
+from ..session.ports import Operator, ReplayedOperator, Source
 from .dated import Dated
 from .opened import Measuring, Say
 from .parts import PartsBus
@@ -71,9 +71,9 @@ class OpenedChip:
         """What measures, over `bus`; see Driver."""
         return Driver(bus, self.plan.config, name, say)
 
-    def talk(self, person: Talk) -> Talk:
+    def talk(self, person: Operator) -> Operator:
         """See Opened."""
-        return person if self.replay is None else Replayed(person, self.replay.pending_events)
+        return person if self.replay is None else ReplayedOperator(person, self.replay.pending_events)
 
     @contextmanager
     def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[Measuring]:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 from ..session.events import Prompt
 from ..session.plan import Plan
-from ..session.ports import Note, Source, Talk
+from ..session.ports import Note, Operator, Source
 
 Say = Callable[[str], None]
 
@@ -67,7 +67,7 @@ class Opened(Protocol):
     @property
     def resumable(self) -> bool: ...  # noqa: D102
 
-    def talk(self, person: Talk) -> Talk:
+    def talk(self, person: Operator) -> Operator:
         """Who presses the keys: the person, or the person in the capture."""
         ...
 

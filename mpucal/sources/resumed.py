@@ -16,7 +16,7 @@ from ..files.mcap import CaptureWriter, read_capture
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from ..session.events import Key, Output, Prompt
 from ..session.plan import Plan
-from ..session.ports import Talk
+from ..session.ports import Operator
 from .chip import SOURCE, OpenedChip
 from .dated import Dated
 from .opened import Measuring, Say
@@ -61,7 +61,7 @@ class ResumedChip:
         """See Opened; what was said before is not said again."""
         return [self._now(listener) for listener in self.live.listeners]
 
-    def talk(self, person: Talk) -> Talk:
+    def talk(self, person: Operator) -> Operator:
         """See Opened."""
         return _Later(person, self.bus)
 
@@ -101,7 +101,7 @@ class _Recorder:
 class _Later:
     """The person, who heard and pressed before what is in the captures."""
 
-    def __init__(self, person: Talk, bus: PartsBus) -> None:
+    def __init__(self, person: Operator, bus: PartsBus) -> None:
         self._person, self._bus = person, bus
 
     def hear(self, output: Output) -> None:

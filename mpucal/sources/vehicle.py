@@ -29,7 +29,7 @@ from ..mavlink.vehicle_source import VehicleSource, choose_vehicle
 from ..result.session_files import CAPTURE_OF_VEHICLE
 from ..session.events import Prompt
 from ..session.plan import Plan
-from ..session.ports import Replayed, Talk
+from ..session.ports import Operator, ReplayedOperator
 from .kind import Request
 from .opened import Measuring, Say
 
@@ -95,9 +95,9 @@ class OpenedVehicle:
         """Of the streams under the parameters that it holds by now: those to which a recording is composed."""
         return None if self._truth is None else self._truth()
 
-    def talk(self, person: Talk) -> Talk:
+    def talk(self, person: Operator) -> Operator:
         """See Opened."""
-        return person if self._replay is None else Replayed(person, self._pending)
+        return person if self._replay is None else ReplayedOperator(person, self._pending)
 
     @contextmanager
     def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[Measuring]:
@@ -178,7 +178,7 @@ class OpenedLog:
         """See Opened."""
         return self.tlog.recovered
 
-    def talk(self, person: Talk) -> Talk:
+    def talk(self, person: Operator) -> Operator:
         """See Opened."""
         return person
 

@@ -10,7 +10,7 @@ from mpucal.data import Recording
 from mpucal.rests.flat import flat_statistics
 from mpucal.rests.intervals import RestFinder
 from mpucal.session.events import Rested
-from mpucal.session.pauses import HOLD_S, Pauses
+from mpucal.session.pauses import HOLD_S, PauseDetector
 
 RATE_HZ, FLAT_S, MOVE_S = 100.0, 6.0, 1.0
 GRAVITY = np.array([0.0, 0.0, 9.81])
@@ -50,7 +50,7 @@ def held_in_a_hand(tremor_rad_s, hertz, holds_s, seed):
 )
 def test_what_was_told_to_be_held_is_found_by_the_verification(tremor_dps, hertz, holds_s, seed):
     recording, starts = held_in_a_hand(np.radians(tremor_dps), hertz, holds_s, seed)
-    pauses = Pauses(Rested(FLAT_S, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0)))
+    pauses = PauseDetector(Rested(FLAT_S, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0)))
     told = {}
     for first in range(recording.flat[1], len(recording), 20):
         for pause in pauses.add(recording.part(first, first + 20)):

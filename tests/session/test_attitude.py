@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from mpucal.data import STANDARD_GRAVITY_MPS2, Samples, Sensor
 from mpucal.session.aims import ALL_AROUND
 from mpucal.session.attitude import quaternion, straight
-from mpucal.session.events import Ask, Connected, Knowledge, Learnt, Measured, Meter, Prompt, Target, Wish
+from mpucal.session.events import Connected, FitKind, Knowledge, Learnt, Measured, Meter, Prompt, RequestFit, Target
 from mpucal.session.machine import Machine
 from mpucal.session.meter import MotionWatch
 from mpucal.simulated.hands import KINDS
@@ -85,9 +85,9 @@ def meters(hand):
                     found.append(output)
                 case Prompt():
                     motion.hear(output, t_s)
-                case Ask(wish=Wish.ADVISE):
+                case RequestFit(kind=FitKind.ADVISE):
                     tell(learnt(tuple(next(asked))))
-                case Ask(wish=Wish.KNOW):
+                case RequestFit(kind=FitKind.KNOW):
                     tell(learnt(None))
 
     tell(Connected(Sensor(gyro_range_dps=GYRO_RANGE_DPS)))

@@ -36,7 +36,7 @@ def test_the_farthest_directions_mend_them(units):
         coverage.pauses(np.array(unit, float))
     assert not coverage.varied
     for _ in range(8):
-        coverage.pauses(-coverage.farthest_down(ALL_AROUND))
+        coverage.pauses(-coverage.paused.farthest_down(ALL_AROUND))
     assert coverage.varied
     assert coverage.paused.spread() > SPREAD
 

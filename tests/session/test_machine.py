@@ -8,13 +8,13 @@ from mpucal.data import Samples, Sensor
 from mpucal.reasons import Reason
 from mpucal.session.events import (
     Abort,
-    Ask,
     Caution,
     Checked,
     Connected,
     Countdown,
     Decision,
     Enough,
+    FitKind,
     Fitted,
     Forget,
     Knowledge,
@@ -25,13 +25,13 @@ from mpucal.session.events import (
     Prompt,
     PromptKind,
     Redo,
+    RequestFit,
     Resumed,
     Seen,
     SourceEnded,
     Target,
     Tick,
     Tried,
-    Wish,
     Written,
 )
 from mpucal.session.machine import Machine
@@ -75,16 +75,16 @@ class Session:
     def give(self, event):
         outputs = self.machine.handle(event)
         self.said += outputs
-        for ask in (output for output in outputs if isinstance(output, Ask)):
-            answer = self.answer(ask.wish)
+        for ask in (output for output in outputs if isinstance(output, RequestFit)):
+            answer = self.answer(ask.kind)
             if answer is not None and self.state in MEASURING:
                 self.give(answer)
         return self
 
     def answer(self, wish):
-        if wish in (Wish.KNOW, Wish.ADVISE):
-            return None if self.overall is None else learnt(self.overall, wish is Wish.ADVISE)
-        return self.tried if wish is Wish.TRY else self.checked
+        if wish in (FitKind.KNOW, FitKind.ADVISE):
+            return None if self.overall is None else learnt(self.overall, wish is FitKind.ADVISE)
+        return self.tried if wish is FitKind.TRY else self.checked
 
     def of(self, kind):
         return [output for output in self.said if isinstance(output, kind)]
@@ -213,7 +213,7 @@ def test_asks_for_the_orientation_that_helps_most_as_soon_as_one_was_held(board,
 def test_what_is_known_is_asked_every_second(board, rotating):
     rotating.overall = 0.1
     rotating.feed(board.turn((1, 0, 0), 3.0, 6.0))
-    assert [ask.wish for ask in rotating.of(Ask)] in ([Wish.KNOW] * 5, [Wish.KNOW] * 6)
+    assert [ask.kind for ask in rotating.of(RequestFit)] in ([FitKind.KNOW] * 5, [FitKind.KNOW] * 6)
 
 
 def test_enough_orientations_and_the_target_lead_on_to_verify(board, rotating, varied):
@@ -309,7 +309,8 @@ def test_verifies_in_three_orientations_that_were_not_seen(board, verifying, var
         assert f"{number} of 3" in asked.text
         assert (-seen @ np.array(asked.down)).max() < np.cos(np.radians(25.0))
         verifying.feed(board.turn_to([-v for v in asked.down])).feed(board.still(2.0))
-    assert [ask.wish for ask in verifying.of(Ask) if ask.wish in (Wish.TRY, Wish.CHECK)] == [Wish.TRY, Wish.CHECK]
+    requested = [request.kind for request in verifying.of(RequestFit)]
+    assert [kind for kind in requested if kind in (FitKind.TRY, FitKind.CHECK)] == [FitKind.TRY, FitKind.CHECK]
     assert verifying.state is State.CALIBRATE
     assert "agree with the predicted uncertainty" in verifying.words()
     assert verifying.machine.checked.agrees
@@ -390,9 +391,9 @@ def test_who_does_not_verify_is_not_waited_for_for_ever(board, verifying):
 
 def test_what_was_shown_before_patience_ended_is_looked_at(board, verifying, varied):
     show(verifying, board, varied[9:10])
-    assert Wish.CHECK not in [ask.wish for ask in verifying.of(Ask)]
+    assert FitKind.CHECK not in [ask.kind for ask in verifying.of(RequestFit)]
     verifying.feed(board.still(41.0))
-    assert [ask.wish for ask in verifying.of(Ask)][-1] is Wish.CHECK
+    assert [ask.kind for ask in verifying.of(RequestFit)][-1] is FitKind.CHECK
     assert verifying.state is State.CALIBRATE
     assert verifying.machine.checked.agrees
 

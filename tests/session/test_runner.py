@@ -13,9 +13,9 @@ from mpucal.errors import Abandoned, BusError, CaptureError, ChipError, EndOfCap
 from mpucal.result.calibration import Calibration
 from mpucal.session import runner as module
 from mpucal.session.events import Decision, Key, Prompt, PromptKind
-from mpucal.session.live.questions import Here
+from mpucal.session.live.scheduler import InlineWorker
 from mpucal.session.plan import Plan
-from mpucal.session.ports import Replayed
+from mpucal.session.ports import ReplayedOperator
 from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
 
@@ -223,7 +223,7 @@ def test_recorded_keys_are_pressed_again_at_their_place():
         del pending[: len(due)]
         return [event for event in due if event.name == name]
 
-    replayed = Runner(again, Replayed(listener, events), Notes()).measure()
+    replayed = Runner(again, ReplayedOperator(listener, events), Notes()).measure()
     assert np.array_equal(live.t, replayed.t)
     assert listener.heard == person.heard
     assert "you chose to go on" in listener.words()
@@ -233,7 +233,7 @@ class Late:
     """Knows the same as anybody, but each answer only once the source was polled so many times more."""
 
     def __init__(self, source, polls, plan, sensor):
-        self.source, self.polls, self.here = source, polls, Here(plan, sensor)
+        self.source, self.polls, self.here = source, polls, InlineWorker(plan, sensor)
 
     def submit(self, task):
         answer, at = self.here.submit(task), self.source.polls + self.polls
@@ -247,7 +247,7 @@ class Late:
 def late_session(polls, keys=None, ends_at=170):
     """Of the same source, with answers so late."""
     source, person, notes = Source({ends_at: EndOfCapture()}), Person(keys), Notes()
-    runner = Runner(source, person, notes, hire=partial(Late, source, polls))
+    runner = Runner(source, person, notes, start_worker=partial(Late, source, polls))
     return runner.measure(), person, notes
 
 
@@ -277,7 +277,7 @@ def test_a_replay_waits_where_its_session_did(ends_at):
         pending[:] = [event for event in pending if event not in due]
         return due
 
-    runner = Runner(again, Replayed(listener, events), notes_again, late=lambda _late: bool(events("late")))
+    runner = Runner(again, ReplayedOperator(listener, events), notes_again, late=lambda _late: bool(events("late")))
     assert np.array_equal(runner.measure().t, live.t)
     assert listener.heard == person.heard
     assert notes_again == notes
@@ -287,13 +287,13 @@ def test_a_replay_waits_where_its_session_did(ends_at):
 def test_ctrl_c_does_not_wait_for_a_late_answer():
     source = Source()
     with pytest.raises(Abandoned, match="interrupted"):
-        Runner(source, Person({150: [Key.ABORT]}), Notes(), hire=partial(Late, source, 1000)).measure()
+        Runner(source, Person({150: [Key.ABORT]}), Notes(), start_worker=partial(Late, source, 1000)).measure()
     assert source.polls == 148
 
 
 def test_who_watches_a_replay_may_stop_it_but_not_steer_it():
     watcher = Person({3: [Key.ENOUGH], 5: [Key.ABORT]})
-    replayed = Replayed(watcher, lambda _name: [])
+    replayed = ReplayedOperator(watcher, lambda _name: [])
     assert [list(replayed.pressed()) for _ in range(5)] == [[], [], [], [], [Key.ABORT]]
 
 

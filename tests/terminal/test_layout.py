@@ -4,7 +4,7 @@ from dataclasses import replace
 import pytest
 
 from mpucal.session.events import Caution
-from mpucal.session.way import WAYS
+from mpucal.session.turn_guide import TURN_WORDS
 from mpucal.terminal.glyphs import ASCII, UNICODE
 from mpucal.terminal.layout import lines
 
@@ -60,7 +60,7 @@ def test_the_prompt_is_large_and_larger_on_a_large_screen(views):
     assert sum("██████" in line for line in large[2:12]) >= 6
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", TURN_WORDS)
 def test_each_way_is_said_in_large_letters(views, way):
     view = views["turned"]
     drawn = text_of(replace(view, meter=replace(view.meter, turn=f"135 deg more, {way}")))

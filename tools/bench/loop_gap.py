@@ -37,9 +37,9 @@ from mpucal.files.mcap import CaptureWriter
 from mpucal.page.address import Address
 from mpucal.page.feed import Feed
 from mpucal.session.events import Event, Key, Output
-from mpucal.session.live.apart import Apart
 from mpucal.session.live.fits import Task
-from mpucal.session.live.questions import Here, Worker
+from mpucal.session.live.scheduler import InlineWorker, Worker
+from mpucal.session.live.worker_process import ProcessWorker
 from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
@@ -68,9 +68,9 @@ class Idle:
 
 HIRED: dict[str, tuple[Hire, bool]] = {
     "without fits": (Idle, False),
-    "with fits in the loop": (Here, False),
-    "with fits apart": (Apart, False),
-    "with fits apart, and a page": (Apart, True),
+    "with fits in the loop": (InlineWorker, False),
+    "with fits apart": (ProcessWorker, False),
+    "with fits apart, and a page": (ProcessWorker, True),
 }
 READS = "import sys, urllib.request; urllib.request.urlopen(sys.argv[1] + 'events').read()"
 
@@ -150,7 +150,7 @@ def followed(page: bool) -> Iterator[Feed | None]:
         feed.close()
 
 
-def measure(rate_hz: float, seconds: float, hire: Hire, page: bool) -> Measured:
+def measure(rate_hz: float, seconds: float, start_worker: Hire, page: bool) -> Measured:
     """One session of so long."""
     chip = open_simulated("sim:pace=real", seed=1)
     bus = Timed(chip, seconds)
@@ -162,7 +162,7 @@ def measure(rate_hz: float, seconds: float, hire: Hire, page: bool) -> Measured:
     ):
         writer.start({})
         driver = Driver(Tap(bus, writer), plan.config)
-        runner = Runner(driver, Nobody(bus, feed), writer.event, plan, (chip.hear,), hire=hire)
+        runner = Runner(driver, Nobody(bus, feed), writer.event, plan, (chip.hear,), start_worker=start_worker)
         begun, used_s = time.monotonic(), _used_s()
         runner.measure()
         share = (_used_s() - used_s) / (time.monotonic() - begun)
@@ -183,8 +183,8 @@ def main() -> int:
     arguments = parser.parse_args()
     print(f"{arguments.rate:g} Hz, {arguments.seconds:g} s; a 512-byte FIFO holds", end=" ")
     print(f"{1000.0 * FIFO_FRAMES / arguments.rate:.0f} ms")
-    for name, (hire, page) in HIRED.items():
-        found = measure(arguments.rate, arguments.seconds, hire, page)
+    for name, (start_worker, page) in HIRED.items():
+        found = measure(arguments.rate, arguments.seconds, start_worker, page)
         gaps = found.gaps_ms
         print(
             f"{name}: gaps {np.median(gaps):.1f} ms in the median, "

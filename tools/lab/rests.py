@@ -22,7 +22,7 @@ from mpucal.data import Recording, Samples
 from mpucal.rests.flat import Flat, find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
 from mpucal.session.events import Rested
-from mpucal.session.pauses import HOLD_S, Pauses
+from mpucal.session.pauses import HOLD_S, PauseDetector
 
 from .scenarios.family import simulate
 from .scenarios.table import FAMILIES
@@ -92,7 +92,7 @@ def of_recording(recording: Recording, name: str, seed: int) -> Found | None:
 def _held(flat: Flat, parts: Iterable[Samples]) -> list[Span]:
     """What the session calls held for long enough, as these samples come."""
     x, y, z, *rates = (*flat.y.tolist(), *flat.b_omega.tolist())
-    pauses = Pauses(Rested(flat.n, (x, y, z), (rates[0], rates[1], rates[2])))
+    pauses = PauseDetector(Rested(flat.n, (x, y, z), (rates[0], rates[1], rates[2])))
     # of the stillness that it begins in a session says nothing
     pauses.leave(-1)
     runs: dict[int, Span] = {}

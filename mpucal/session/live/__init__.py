@@ -1,1 +1,1 @@
-"""What is computed while a session goes on: asked for and brought at fixed numbers of samples, whoever is faster."""
+"""Fits while a session goes on: requested and answered at fixed numbers of samples, so that replays repeat them."""

@@ -1,10 +1,8 @@
-"""The fits of a session, from the samples so far: what is known, a first calibration, and what verifies it."""
+"""Fits of a session, from the samples so far: uncertainties, a first calibration, and its verification."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
-
-import numpy as np
 
 from ...calibration import weigh
 from ...calibration.checks import found
@@ -18,36 +16,35 @@ from ...data import Recording, Samples, Sensor
 from ...reasons import KINDS, Reason, reason
 from ...rests.flat import Flat, find_flat, flat_statistics
 from ..aims import AIMS, directions, unseen_rad
-from ..events import Checked, Event, Learnt, Tried, Wish
+from ..events import Checked, Event, FitKind, Learnt, Tried, down_of
 from ..plan import Plan
-from .disagreement import explained, judged, much_clipped
-from .knowledge import knowledge, wanted
+from .knowledge import knowledge, target_std
 from .store import SampleStore
-from .unseen import unseen
+from .verification import explain_contradiction, is_much_clipped, judge_verification, select_unseen
 
 CONTRADICTION, CLIPPED = "inconsistent", "gyro_clipped"
 
 
 class Task(NamedTuple):
-    """What came since the last task, and what is to be done then.
+    """Work for the fits.
 
     Attributes
     ----------
-    samples : that arrived. wish : what to compute of all there are; None: nothing.
-    forget : the samples from this number on are not used, nor what was computed of them; None: all are.
+    samples : those that arrived since the last task. kind : the fit of all samples so far; None: no fit.
+    forget : drop the samples from this number on, and every fit of them; None: keep all.
     """
 
     samples: Samples
-    wish: Wish | None = None
+    kind: FitKind | None = None
     forget: int | None = None
 
 
 class Fits:
-    """Computes one task after another; the answers depend on the tasks alone.
+    """Live fits of one session; their answers depend on the tasks alone.
 
     Parameters
     ----------
-    plan : what the session is to do. sensor : what it measures with.
+    plan : the session's settings. sensor : the sensor that it measures with.
     """
 
     def __init__(self, plan: Plan, sensor: Sensor) -> None:
@@ -59,17 +56,17 @@ class Fits:
         self._since = 0
 
     def do(self, task: Task) -> Event | None:
-        """The answer to the task's wish, where there is one."""
+        """Execute a task; return the answer, or None if it asks for no fit or the board has not lain flat yet."""
         self._store.add(task.samples)
         if task.forget is not None:
             self._store.forget(task.forget)
             self._known, self._tried = None, None
-        match task.wish:
-            case Wish.KNOW | Wish.ADVISE:
-                return self._learnt(task.wish is Wish.ADVISE)
-            case Wish.TRY:
+        match task.kind:
+            case FitKind.KNOW | FitKind.ADVISE:
+                return self._learnt(task.kind is FitKind.ADVISE)
+            case FitKind.TRY:
                 return self._try()
-            case Wish.CHECK:
+            case FitKind.CHECK:
                 return self._check()
         return None
 
@@ -85,9 +82,8 @@ class Fits:
         target = AIMS[self._plan.target].target
         down = None
         if advice:
-            x, y, z = (-flat.y / np.linalg.norm(flat.y)).tolist()
-            allowed = directions((x, y, z), self._plan.tilt_only)
-            down = allowed[next_orientation(self._known, wanted(target), allowed)]
+            allowed = directions(down_of(flat.y), self._plan.tilt_only)
+            down = allowed[next_orientation(self._known, target_std(target), allowed)]
         return Learnt(knowledge(self._known, target, float(recording.t[-1]), down), advice)
 
     def _try(self) -> Event:
@@ -95,29 +91,29 @@ class Fits:
         evidence, _ = weigh(recording, self._plan.model, self._plan.gravity)
         self._tried, self._since = evidence, len(recording)
         reasons = found(evidence)
-        return Tried(verdict(reasons), _likeliest(reasons, evidence.recording))
+        return Tried(verdict(reasons), _most_specific_reason(reasons, evidence.recording))
 
     def _check(self) -> Event:
         of = AIMS[self._plan.target].verify
         evidence = self._tried
         if evidence is None or evidence.fit is None or evidence.flat is None:
             return Checked((), False, reason("verification_failed", "nothing"))
-        recording: Recording = with_masks(self._store.recording())
+        recording = with_masks(self._store.recording())
         rests = new_orientations(recording, evidence.flat, evidence.fit, self._plan.gravity, self._since)
-        new = unseen(rests, evidence, unseen_rad(self._plan.tilt_only))
+        unseen = select_unseen(rests, evidence, unseen_rad(self._plan.tilt_only))
         contradiction = next((against for against in found(evidence) if against.code == CONTRADICTION), None)
-        return judged(rests, new[:of], of, recording, contradiction)
+        return judge_verification(rests, unseen[:of], of, recording, contradiction)
 
 
-def _likeliest(reasons: list[Reason], recording: Recording) -> Reason | None:
-    """The one to be given: what is wrong with the sensor, or was not measured, contradicts itself as well."""
+def _most_specific_reason(reasons: list[Reason], recording: Recording) -> Reason | None:
+    """Return the reason to show: a fault of the sensor, or clipping, causes contradictions as well and goes first."""
 
     def rank(against: Reason) -> int:
         if KINDS[against.code].of_the_sensor:
             return 0
-        if against.code == CLIPPED and much_clipped(recording):
+        if against.code == CLIPPED and is_much_clipped(recording):
             return 1
         return 2 if against.code == CONTRADICTION else 3
 
     first = min(reasons, key=rank, default=None)
-    return explained(first, recording) if first is not None and first.code == CONTRADICTION else first
+    return explain_contradiction(first, recording) if first is not None and first.code == CONTRADICTION else first

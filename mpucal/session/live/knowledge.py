@@ -1,4 +1,4 @@
-"""The uncertainties of a live fit as an event: in %, deg and mg, and as progress toward the target."""
+"""Uncertainties of a live fit as an event: in %, deg and mg, and as progress towards the target."""
 
 from __future__ import annotations
 
@@ -7,54 +7,50 @@ import numpy as np
 from ...calibration.interim import InterimEstimate
 from ...data import Vector
 from ...result import error_model
-from ..events import Direction, Knowledge, Target
+from ..events import Knowledge, Target, triple
 
 
-def wanted(target: Target) -> Vector:
-    """(12,) the target's standard deviations, of D row-major and b_a [m/s^2]."""
+def target_std(target: Target) -> Vector:
+    """Return the target's standard deviations (12,): of D, row-major, and of b_a [m/s^2]."""
     D = np.full((3, 3), np.deg2rad(target.misalignment_deg))
     np.fill_diagonal(D, target.gain_pct / 100.0)
     return np.concatenate([D.ravel(), np.full(3, target.bias_mg / error_model.MG_PER_MPS2)])
 
 
 def knowledge(known: InterimEstimate, target: Target, t_s: float, down: Vector | None) -> Knowledge:
-    """The same in %, deg and mg, and how far that is from the target.
+    """Return the event for an estimate at time `t_s`.
 
     Parameters
     ----------
     down : (3,) the orientation that would help most, if that was asked.
     """
     D = known.theta.D
-    gain = error_model.scale_factor_error_std(known.D_std)
-    misalignment = np.nanmax(error_model.misalignment_std(D, known.D_std), axis=1)
-    bias = error_model.bias_mg(known.b_a_std)
-    wishes = ((target.gain_pct, gain), (target.misalignment_deg, misalignment), (target.bias_mg, bias))
-    progress = [np.clip(wish / np.maximum(std, 1e-9), 0.0, 1.0) for wish, std in wishes]
+    stds = (
+        error_model.scale_factor_error_std(known.D_std),
+        np.nanmax(error_model.misalignment_std(D, known.D_std), axis=1),
+        error_model.bias_mg(known.b_a_std),
+    )
+    limits = target.gain_pct, target.misalignment_deg, target.bias_mg
+    progress = [np.clip(limit / np.maximum(std, 1e-9), 0.0, 1.0) for limit, std in zip(limits, stds, strict=True)]
+    gain, misalignment, bias = (std.max() for std in stds)
     return Knowledge(
         t_s,
-        _three(gain),
-        _three(misalignment),
-        _three(bias),
+        triple(stds[0]),
+        triple(stds[1]),
+        triple(stds[2]),
         target,
-        _three(progress[0]),
-        _three(progress[1]),
-        _three(progress[2]),
+        triple(progress[0]),
+        triple(progress[1]),
+        triple(progress[2]),
         overall=float(np.min(progress)),
-        down=None if down is None else _three(down),
-        words=_words(gain, misalignment, bias),
+        down=None if down is None else triple(down),
+        words=f"scale factor error {gain:.2g} %, misalignment {misalignment:.2g} deg, bias {bias:.2g} mg (1 sigma)",
         doubt=_doubt(D, known),
     )
 
 
-def _words(gain: Vector, misalignment: Vector, bias: Vector) -> str:
-    return (
-        f"scale factor error {gain.max():.2g} %, misalignment {misalignment.max():.2g} deg, bias {bias.max():.2g} mg"
-        " (1 sigma)"
-    )
-
-
 def _doubt(D: Vector, known: InterimEstimate) -> str:
-    """What the numbers say already that no good sensor's would."""
+    """Return why no good sensor would give these numbers; empty where one might, or while D is not known well."""
     if known.D_std.max() > 0.02:
         return ""
     gains = np.diag(error_model.sensor_axes(D))
@@ -63,8 +59,3 @@ def _doubt(D: Vector, known: InterimEstimate) -> str:
     if (np.abs(np.log2(gains)) > 0.8).all():
         return f"the accelerometer reads {gains.mean():.2g} times gravity: is its range right?"
     return ""
-
-
-def _three(v: Vector) -> Direction:
-    x, y, z = np.asarray(v, float).tolist()
-    return (x, y, z)

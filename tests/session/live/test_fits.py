@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mpucal.data import Samples, Sensor
-from mpucal.session.events import Checked, Learnt, Tried, Wish
+from mpucal.session.events import Checked, FitKind, Learnt, Tried
 from mpucal.session.live.fits import Fits, Task
 from mpucal.session.live.store import SampleStore
 from mpucal.session.plan import Plan
@@ -37,7 +37,7 @@ def fits():
 def test_more_orientations_are_better_known(fits, poses):
     found = []
     for first, last in ((0, 18), (18, 26), (26, 44)):
-        found.append(fits.do(Task(part(poses, first, last), Wish.KNOW)).knowledge)
+        found.append(fits.do(Task(part(poses, first, last), FitKind.KNOW)).knowledge)
     assert [k.overall for k in found] == sorted(k.overall for k in found)
     assert max(found[0].bias_mg) > 3 * max(found[2].bias_mg)
     assert found[2].overall > 0.9
@@ -49,11 +49,11 @@ def test_the_same_tasks_give_the_same_bits_however_the_samples_come(poses):
     whole, pieces = (Fits(Plan(gravity=GRAVITY_MPS2), SENSOR) for _ in range(2))
     for second in range(22):
         pieces.do(Task(part(poses, second, second + 1)))
-    assert pieces.do(Task(NONE, Wish.ADVISE)) == whole.do(Task(part(poses, 0, 22), Wish.ADVISE))
+    assert pieces.do(Task(NONE, FitKind.ADVISE)) == whole.do(Task(part(poses, 0, 22), FitKind.ADVISE))
 
 
 def test_the_advised_orientation_is_a_turn_away(fits, poses):
-    learnt = fits.do(Task(part(poses, 0, 22), Wish.ADVISE))
+    learnt = fits.do(Task(part(poses, 0, 22), FitKind.ADVISE))
     assert isinstance(learnt, Learnt)
     assert learnt.advice
     down = np.array(learnt.knowledge.down)
@@ -63,43 +63,43 @@ def test_the_advised_orientation_is_a_turn_away(fits, poses):
 
 
 def test_a_try_and_its_check_agree_on_good_data(fits, poses):
-    tried = fits.do(Task(part(poses, 0, 32), Wish.TRY))
+    tried = fits.do(Task(part(poses, 0, 32), FitKind.TRY))
     assert isinstance(tried, Tried)
     assert tried.verdict in ("good", "usable")
-    checked = fits.do(Task(part(poses, 32), Wish.CHECK))
+    checked = fits.do(Task(part(poses, 32), FitKind.CHECK))
     assert isinstance(checked, Checked)
     assert checked.agrees, checked
     assert all(v.direction_deg < 1.0 and abs(v.magnitude_mps2) < 0.1 for v in checked.found)
 
 
 def test_what_the_fit_has_seen_verifies_nothing(fits, poses):
-    fits.do(Task(part(poses, 0, 44), Wish.TRY))
+    fits.do(Task(part(poses, 0, 44), FitKind.TRY))
     seen = part(poses, 18, 44)
     again = replace(seen, t=seen.t + 44.0 - 18.0 + 1 / 200, gap=np.arange(len(seen)) == 0)
-    checked = fits.do(Task(again, Wish.CHECK))
+    checked = fits.do(Task(again, FitKind.CHECK))
     assert (checked.found, checked.agrees) == ((), None)
     assert checked.reason.what.startswith("the board was held still in 0 of 3 orientations that the calibration has")
     assert not checked.reason.refuse
 
 
 def test_what_the_fit_has_seen_may_refute_it(fits, poses):
-    fits.do(Task(part(poses, 0, 44), Wish.TRY))
+    fits.do(Task(part(poses, 0, 44), FitKind.TRY))
     seen = part(poses, 18, 44)
     again = replace(seen, t=seen.t + 44.0 - 18.0 + 1 / 200, gap=np.arange(len(seen)) == 0, acc=1.03 * seen.acc)
-    checked = fits.do(Task(again, Wish.CHECK))
+    checked = fits.do(Task(again, FitKind.CHECK))
     assert checked.agrees is False
     assert "|a| is +0.3" in checked.reason.what
 
 
 def test_nothing_is_known_of_a_board_that_never_lay_still(fits, poses):
     rates = np.random.default_rng(1).normal(scale=2.0, size=(2000, 3))
-    assert fits.do(Task(replace(part(poses, 0, 10), gyr=rates), Wish.KNOW)) is None
+    assert fits.do(Task(replace(part(poses, 0, 10), gyr=rates), FitKind.KNOW)) is None
 
 
 def test_what_is_forgotten_is_not_computed(fits, poses):
-    fits.do(Task(part(poses, 0, 30), Wish.KNOW))
+    fits.do(Task(part(poses, 0, 30), FitKind.KNOW))
     fits.do(Task(NONE, forget=2200))
-    learnt = fits.do(Task(part(poses, 30, 34), Wish.KNOW))
+    learnt = fits.do(Task(part(poses, 30, 34), FitKind.KNOW))
     assert learnt.knowledge.overall < 0.2
 
 

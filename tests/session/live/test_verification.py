@@ -8,8 +8,7 @@ from mpucal.data import Recording, Sensor
 from mpucal.reasons import Reason
 from mpucal.result.calibration import Calibration
 from mpucal.session.events import Checked
-from mpucal.session.live.disagreement import judged
-from mpucal.session.live.verdict import verified
+from mpucal.session.live.verification import add_verification, judge_verification
 
 
 def rest(magnitude=0.0, direction=0.0, turn=(1.2, 0.0, 0.0), miss=(0.0, 0.0, 0.0), clipped=False):
@@ -69,7 +68,7 @@ TURNED = [rest(direction=0.05, turn=(0.0, 0.0, turn), miss=(0.0, 0.0, 0.04 * tur
     ],
 )
 def test_says_what_is_wrong(rests, data, contradiction, code, words):
-    checked = judged(rests, rests, 3, data, contradiction)
+    checked = judge_verification(rests, rests, 3, data, contradiction)
     assert checked.agrees == (code == "")
     if code:
         assert checked.reason.code == code
@@ -82,13 +81,13 @@ def test_says_what_is_wrong(rests, data, contradiction, code, words):
 
 def test_a_direction_that_nothing_shows_is_called_not_judged():
     lost, whole = (rest(direction=0.02, clipped=clipped) for clipped in (True, False))
-    shown = judged([lost, whole], [lost, whole], 2, recording(), None).found
+    shown = judge_verification([lost, whole], [lost, whole], 2, recording(), None).found
     assert ["(not judged: on the way samples were lost" in one.text for one in shown] == [True, False]
     assert "direction error 1.15 deg (1 sigma 0.10)" in shown[1].text
 
 
 def test_turns_that_miss_samples_blame_no_range_and_verify_nothing():
-    checked = judged([rest(clipped=True)] * 3, [rest(clipped=True)] * 3, 3, recording(), None)
+    checked = judge_verification([rest(clipped=True)] * 3, [rest(clipped=True)] * 3, 3, recording(), None)
     assert checked.agrees is None
     assert checked.reason.what.startswith("samples are missing in every turn")
     assert not checked.reason.refuse
@@ -104,7 +103,7 @@ def calibration(verdict="usable"):
 
 
 def test_a_disagreement_refuses_and_comes_first():
-    found = verified(calibration(), Checked((), False, MOVED))
+    found = add_verification(calibration(), Checked((), False, MOVED))
     assert found.verdict == "refused"
     assert [reason["code"] for reason in found.quality["reasons"]] == ["verification_failed", "few_orientations"]
     assert found.quality["reasons"][0] == MOVED.document()
@@ -113,12 +112,12 @@ def test_a_disagreement_refuses_and_comes_first():
 
 @pytest.mark.parametrize(("verdict", "then"), [("good", "usable"), ("usable", "usable"), ("refused", "refused")])
 def test_what_nothing_verified_is_usable_at_most(verdict, then):
-    found = verified(calibration(verdict), Checked((), None, MOVED))
+    found = add_verification(calibration(verdict), Checked((), None, MOVED))
     assert found.verdict == then
     assert found.quality["reasons"][0]["message"] == "it moved; fasten it"
     assert found.quality["verification"] == {"agrees": None, "orientations": []}
 
 
 def test_an_agreement_changes_no_verdict_and_none_adds_nothing():
-    assert verified(calibration(), Checked((), True)).verdict == "usable"
-    assert "verification" not in verified(calibration(), None).quality
+    assert add_verification(calibration(), Checked((), True)).verdict == "usable"
+    assert "verification" not in add_verification(calibration(), None).quality

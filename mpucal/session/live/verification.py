@@ -1,0 +1,183 @@
+"""Verification of a first calibration by new orientations: agreement, likeliest reason against it, and verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from ...calibration.evidence import Evidence
+from ...calibration.verification import NewOrientation
+from ...data import Recording, Vector
+from ...reasons import Reason, reason
+from ...rests.intervals import RestFinder
+from ...result.calibration import REFUSED, USABLE, Calibration
+from ...result.keys import Quality
+from ..events import Checked, Verification, triple
+
+AXES = "xyz"
+# A board is not held still deliberately for a shorter time.
+SHORTEST_REST_S = 0.5
+# A shorter turn shows too little of a scale factor error to blame one.
+LEAST_TURN_RAD = np.deg2rad(40.0)
+WARMER_C = 8.0
+MUCH_CLIPPED = 0.002
+_IN_DOCUMENT = "agrees", "magnitude_mps2", "magnitude_std_mps2", "direction_deg", "direction_std_deg", "down"
+
+
+def select_unseen(rests: Sequence[NewOrientation], evidence: Evidence, apart_rad: float) -> list[NewOrientation]:
+    """Return the rests that are `apart_rad` or more from every rest that the fit has seen, and from each other."""
+    known, unseen = _fitted_directions(evidence), []
+    for rest in rests:
+        if not len(known) or float((known @ rest.down).max()) <= math.cos(apart_rad):
+            known = np.vstack([known, rest.down])
+            unseen.append(rest)
+    return unseen
+
+
+def _fitted_directions(evidence: Evidence) -> Vector:
+    """Return (k, 3) unit vectors, calibrated: the direction that pointed down in each rest of the fitted recording."""
+    r, fit, flat = evidence.recording, evidence.fit, evidence.flat
+    if fit is None or flat is None:
+        return np.zeros((0, 3))
+    shortest = SHORTEST_REST_S * r.rate_hz
+    means = [r.acc[a:b].mean(0) for a, b in RestFinder(r, flat).alike() if b - a >= shortest]
+    up = np.linalg.solve(fit.D, (np.reshape(means, (-1, 3)) - fit.b_a).T).T
+    return np.asarray(-up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-9))
+
+
+def judge_verification(
+    rests: Sequence[NewOrientation],
+    unseen: Sequence[NewOrientation],
+    of: int,
+    recording: Recording,
+    contradiction: Reason | None,
+) -> Checked:
+    """Return whether the rests agree with the first calibration, and the likeliest reason where they do not.
+
+    With fewer than `of` unseen orientations nothing counts as verified, although nothing speaks against it.
+
+    Parameters
+    ----------
+    rests : all since the fit. unseen : those of them that the fit has not seen.
+    contradiction : how the rests of the turning contradict each other; None where they agree.
+    """
+    # An orientation that the fit has seen cannot verify it, but it can refute it.
+    shown = [rest for rest in rests if any(rest is other for other in unseen) or not rest.agrees]
+    t_s, number_of = float(recording.t[-1]), max(of, len(shown))
+    verifications = tuple(_verification(rest, i + 1, number_of, t_s) for i, rest in enumerate(shown))
+    against = _find_reason(rests, shown, recording, contradiction)
+    if against is None and rests and all(rest.clipped for rest in rests):
+        return Checked(verifications, None, reason("verification_failed", "lost"))
+    if against is None and len(unseen) < of:
+        return Checked(verifications, None, reason("verification_failed", "too_few", number=len(unseen), of=of))
+    return Checked(verifications, against is None, against)
+
+
+def _find_reason(
+    rests: Sequence[NewOrientation], shown: Sequence[NewOrientation], recording: Recording, contradiction: Reason | None
+) -> Reason | None:
+    """Return the reason that explains most of the disagreement; None where there is none."""
+    warmer = _temperature_change_c(recording)
+    if abs(warmer) > WARMER_C:
+        variant = "of_vehicle_since_flat" if recording.sensor.message else "since_flat"
+        return reason("temperature_moved", variant, how="rose" if warmer > 0 else "fell", change=abs(warmer))
+    if rests and all(rest.clipped for rest in rests) and recording.gyr_clipped.any():
+        return reason("gyro_clipped", "every_turn")
+    agree = all(rest.agrees for rest in shown)
+    if not agree and is_much_clipped(recording):
+        return reason("gyro_clipped", "disagreement")
+    if not rests:
+        return reason("verification_failed", "never_still")
+    if contradiction is not None:
+        return explain_contradiction(contradiction, recording)
+    return None if agree else _explain_disagreement(shown, recording)
+
+
+def explain_contradiction(contradiction: Reason, recording: Recording) -> Reason:
+    """Return a contradiction with its likeliest cause: a knock, where the accelerometer clipped."""
+    if recording.acc_clipped.any():
+        return reason("inconsistent", "knock", contradiction=contradiction.what)
+    return contradiction
+
+
+def is_much_clipped(recording: Recording) -> bool:
+    """Return True if turns beyond the gyroscope's range are frequent enough to explain a misfit."""
+    return bool(recording.gyr_clipped.mean() > MUCH_CLIPPED)
+
+
+def _explain_disagreement(rests: Sequence[NewOrientation], recording: Recording) -> Reason:
+    """Return the likeliest fault of a sensor that disagrees with its first calibration."""
+    magnitudes = [rest for rest in rests if not rest.magnitude_agrees]
+    directions = [rest for rest in rests if not rest.direction_agrees]
+    if directions and not magnitudes:
+        scale = _find_scale_error(directions)
+        if scale is not None:
+            axis, share = scale
+            return reason("verification_failed", "gyroscope", axis=axis, share=abs(share))
+        worst = max(directions, key=lambda rest: rest.direction)
+        miss, std = np.rad2deg([worst.direction, worst.direction_std])
+        return reason("verification_failed", "direction", miss=miss, std=std)
+    worst = max(magnitudes, key=lambda rest: abs(rest.magnitude))
+    knock = " after a knock" if recording.acc_clipped.any() else ""
+    return reason("verification_failed", "magnitude", error=worst.magnitude, knock=knock, std=worst.magnitude_std)
+
+
+def _find_scale_error(rests: Sequence[NewOrientation]) -> tuple[str, float] | None:
+    """Return the axis about which all turns are wrong by the same share, and the share; None if there is no such axis.
+
+    The share minimises |miss - share * turn|^2 along the axis about which the board was turned most.
+    """
+    long = [rest for rest in rests if np.linalg.norm(rest.turn) > LEAST_TURN_RAD]
+    if len(long) < 2:
+        return None
+    turn, miss = np.array([rest.turn for rest in long]), np.array([rest.miss for rest in long])
+    axis = int(np.abs(turn).sum(0).argmax())
+    share = float((turn[:, axis] @ miss[:, axis]) / (turn[:, axis] @ turn[:, axis]))
+    left = miss - share * np.outer(turn[:, axis], np.eye(3)[axis])
+    if abs(share) < 0.01 or np.linalg.norm(left) > 0.3 * np.linalg.norm(miss):
+        return None
+    return AXES[axis], share
+
+
+def _temperature_change_c(recording: Recording) -> float:
+    """Return the median of the last second minus that of the first one; 0 where the temperature is not known."""
+    known = recording.temperature_c[np.isfinite(recording.temperature_c)]
+    n = max(round(recording.rate_hz), 1)
+    return float(np.median(known[-n:]) - np.median(known[:n])) if len(known) > n else 0.0
+
+
+def _verification(rest: NewOrientation, number: int, of: int, t_s: float) -> Verification:
+    direction_deg, std_deg = np.rad2deg([rest.direction, rest.direction_std]).tolist()
+    known = f"1 sigma {std_deg:.2f}"
+    if rest.clipped:
+        known = "not judged: on the way samples were lost or the gyroscope clipped"
+    text = (
+        f"new orientation {number} of {of}: |a| error {rest.magnitude:+.3f} m/s² (1 sigma {rest.magnitude_std:.3f}),"
+        f" direction error {direction_deg:.2f} deg ({known})"
+    )
+    magnitude = rest.magnitude, rest.magnitude_std
+    return Verification(t_s, number, of, triple(rest.down), *magnitude, direction_deg, std_deg, rest.agrees, text)
+
+
+def add_verification(calibration: Calibration, checked: Checked | None) -> Calibration:
+    """Return the final calibration with `quality.verification`, its reason and its verdict.
+
+    The verdict is `refused` where the new orientations disagree, and `usable` at most where none was shown. Without a
+    verification (the source ended, the person had enough) the calibration stays as it is.
+    """
+    if checked is None:
+        return calibration
+    orientations = [{key: value for key, value in asdict(v).items() if key in _IN_DOCUMENT} for v in checked.found]
+    quality: Quality = {
+        **calibration.quality,
+        "verification": {"agrees": checked.agrees, "orientations": orientations},
+    }
+    if checked.reason is not None:
+        others = [r for r in quality["reasons"] if r["code"] != checked.reason.code]
+        refused = checked.agrees is not None or quality["verdict"] == REFUSED
+        reasons = [checked.reason.document(), *others]
+        quality = {**quality, "verdict": REFUSED if refused else USABLE, "reasons": reasons}
+    return replace(calibration, quality=quality)

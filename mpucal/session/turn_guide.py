@@ -1,0 +1,106 @@
+"""Turn instructions from the operator's viewpoint, and the attitude that they lead to."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..calibration.rotation import rotation, shortest_turn
+from ..data import Vector
+from .events import Direction
+
+UP = np.array([0.0, 0.0, 1.0])
+# The eight directions in which the board's top can be turned, anticlockwise from the right as seen from above.
+TURN_WORDS = (
+    "roll it to the right",
+    "tip it away and right",
+    "tip it away from you",
+    "tip it away and left",
+    "roll it to the left",
+    "tip it toward you and left",
+    "tip it toward you",
+    "tip it toward you and right",
+)
+ROUND_DEG = 5.0
+# A heading is kept as long as it leads this near to the wanted orientation.
+KEPT_RAD = math.radians(10.0)
+# The words are kept as long as the heading differs from theirs by no more than this.
+SAID_RAD = math.radians(30.0)
+# From one call to the next the wanted attitude turns about the vertical by no more than this.
+SLEW_RAD = math.radians(15.0)
+
+
+class Turn(NamedTuple):
+    """Turn to a wanted orientation: its angle, its words, and the attitude (3, 3) that it leads to."""
+
+    missing_deg: float
+    words: str
+    attitude: Vector
+
+
+class TurnGuide:
+    """Guide to one orientation after another.
+
+    The guide keeps to the heading that it has chosen. For a board that is nearly upside down every heading is about as
+    short, and each tremor makes another one the shortest.
+    """
+
+    def __init__(self) -> None:
+        self._to: Direction | None = None
+        self._heading = 0.0
+        self._said = 0
+        self._wanted: Vector = np.eye(3)
+
+    def turn_to(self, down: Direction, attitude: Vector) -> Turn:
+        """Return the turn of a board with this attitude (3, 3) that points the unit vector `down` of its axes down."""
+        new = down != self._to
+        x, y, z = (attitude @ np.asarray(down)).tolist()
+        missing = math.atan2(math.hypot(x, y), -z)
+        self._update_heading(math.atan2(y, x), missing, new)
+        # The turn's axis is horizontal, and at right angles to the heading of the top.
+        along_x, along_y = math.cos(self._heading), math.sin(self._heading)
+        turn = math.atan2(x * along_x + y * along_y, -z)
+        turned = rotation(np.array([-turn * along_y, turn * along_x, 0.0])) @ attitude
+        wanted = rotation(shortest_turn(turned @ np.asarray(down), -UP)) @ turned
+        if not new:
+            slew = min(max(_yaw_between(wanted, self._wanted), -SLEW_RAD), SLEW_RAD)
+            wanted = rotation(UP * slew) @ self._wanted
+        self._to, self._wanted = down, wanted
+        rounded = ROUND_DEG * round(math.degrees(missing) / ROUND_DEG)
+        words = f"{rounded:.0f} deg more, {TURN_WORDS[self._said]}" if rounded else ""
+        return Turn(math.degrees(missing), words, wanted)
+
+    def _update_heading(self, shortest: float, missing: float, new: bool) -> None:
+        """Change the heading no more than is needed to end within KEPT_RAD of the wanted orientation."""
+        if new:
+            # Upside down, any heading will do: one of the four simple ones is easy to follow.
+            simple = missing > math.pi - KEPT_RAD
+            self._heading = _angle(2 * round(shortest / (math.pi / 2.0)) if simple else _nearest(shortest))
+        aside = _wrapped(self._heading - shortest)
+        if abs(aside) > math.pi / 2.0 and missing < math.pi - KEPT_RAD:
+            aside = _wrapped(aside + math.pi)
+        reach = math.sin(KEPT_RAD) / max(math.sin(missing), 1e-9)
+        most = math.asin(reach) if reach < 1.0 else math.pi
+        self._heading = shortest + min(max(aside, -most), most)
+        if new or abs(_wrapped(self._heading - _angle(self._said))) > SAID_RAD:
+            self._said = _nearest(self._heading)
+
+
+def _yaw_between(attitude: Vector, other: Vector) -> float:
+    """Return the turn about the vertical to one attitude (3, 3) from another [rad]."""
+    turn = attitude @ other.T
+    return math.atan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])
+
+
+def _nearest(heading: float) -> int:
+    return round(heading / (math.pi / 4.0)) % len(TURN_WORDS)
+
+
+def _angle(index: int) -> float:
+    return index * math.pi / 4.0
+
+
+def _wrapped(angle: float) -> float:
+    return math.remainder(angle, 2.0 * math.pi)

@@ -1,0 +1,142 @@
+"""FitScheduler: their answers are brought at fixed numbers of samples, whoever computes them."""
+
+import os
+import signal
+import subprocess
+import sys
+from concurrent.futures import Future
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from mpucal.data import Samples, Sensor
+from mpucal.errors import Abandoned
+from mpucal.session.events import FitKind, RequestFit
+from mpucal.session.live.scheduler import FitScheduler, InlineWorker
+from mpucal.session.live.worker_process import ProcessWorker
+from mpucal.session.plan import Plan
+from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
+
+SENSOR = Sensor(chip="MPU-6050", rate_hz=200.0)
+PLAN = Plan(gravity=GRAVITY_MPS2)
+
+
+def nothing(n):
+    """n samples of no meaning."""
+    return Samples(*(np.zeros((n, 3) if field.name in ("acc", "gyr") else n) for field in fields(Samples)))
+
+
+@pytest.fixture(scope="module")
+def poses():
+    recording = hand_scenario(3, "pose12").recording
+    return Samples(*(getattr(recording, field.name)[: 200 * 22] for field in fields(Samples)))
+
+
+class Slow:
+    """Answers when it is told to."""
+
+    def __init__(self, *_plan_and_sensor):
+        self.tasks, self.answers = [], []
+
+    def submit(self, task):
+        self.tasks.append(task)
+        self.answers.append(Future())
+        return self.answers[-1]
+
+    def close(self):
+        self.tasks = None
+
+
+@pytest.fixture
+def slow():
+    return Slow()
+
+
+@pytest.fixture
+def scheduler(slow):
+    return FitScheduler(PLAN, SENSOR, lambda *_: slow)
+
+
+def test_an_answer_is_brought_after_the_asked_number_of_samples_and_no_sooner(scheduler, slow):
+    scheduler.add(nothing(1000))
+    scheduler.request(RequestFit(FitKind.KNOW, 0.5))
+    slow.answers[0].set_result("known")
+    scheduler.add(nothing(99))
+    assert not scheduler.due
+    assert scheduler.answers() == []
+    scheduler.add(nothing(1))
+    assert scheduler.due
+    assert not scheduler.late
+    assert scheduler.answers() == ["known"]
+    assert not scheduler.due
+
+
+def test_what_is_due_and_not_there_is_late(scheduler, slow):
+    scheduler.request(RequestFit(FitKind.TRY, 3.0))
+    assert not scheduler.late
+    scheduler.add(nothing(600))
+    assert scheduler.late
+    slow.answers[0].set_result("tried")
+    assert not scheduler.late
+
+
+def test_each_sample_is_told_once(scheduler, slow):
+    for n in (3, 4, 5):
+        scheduler.add(nothing(n))
+    scheduler.request(RequestFit(FitKind.KNOW, 0.5))
+    scheduler.add(nothing(6))
+    scheduler.request(RequestFit(FitKind.ADVISE, 0.5))
+    assert [len(task.samples) for task in slow.tasks] == [12, 6]
+
+
+def test_what_is_forgotten_has_no_answer(scheduler, slow):
+    scheduler.request(RequestFit(FitKind.KNOW, 0.0))
+    scheduler.forget(7)
+    assert not scheduler.due
+    assert slow.tasks[-1].forget == 7
+
+
+@pytest.fixture
+def apart():
+    worker = ProcessWorker(PLAN, SENSOR)
+    yield worker
+    worker.close()
+
+
+def ask(scheduler, samples, kind=FitKind.ADVISE):
+    scheduler.add(samples)
+    scheduler.request(RequestFit(kind, 0.0))
+    return scheduler.answers()
+
+
+def test_a_process_of_its_own_gives_the_same_bits(poses, apart):
+    found = ask(FitScheduler(PLAN, SENSOR, lambda *_: apart), poses)
+    assert found == ask(FitScheduler(PLAN, SENSOR, InlineWorker), poses)
+    assert found[0].knowledge.down is not None
+
+
+def test_a_process_that_died_is_said_and_not_waited_for(poses, apart):
+    scheduler = FitScheduler(PLAN, SENSOR, lambda *_: apart)
+    ask(scheduler, poses)
+    os.kill(apart.pid, signal.SIGKILL)
+    with pytest.raises(Abandoned, match="the process that computes the fits was killed by signal 9"):
+        ask(scheduler, poses)
+
+
+def test_what_a_fit_raises_is_raised_where_it_is_asked_for(poses, apart):
+    scheduler = FitScheduler(PLAN, SENSOR, lambda *_: apart)
+    with pytest.raises(ValueError) as raised:
+        ask(scheduler, replace(poses, acc=poses.acc[:5]))
+    assert "in the process of the fits" in raised.value.__notes__[0]
+
+
+def test_a_closed_process_is_gone(apart):
+    apart.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(apart.pid, 0)
+
+
+def test_a_process_ends_with_the_program_that_began_it():
+    command = [sys.executable, "-m", "mpucal.session.live.worker_process"]
+    assert subprocess.run(command, stdin=subprocess.DEVNULL, check=False).returncode == 0
