@@ -49,7 +49,7 @@ def test_the_gyroscope_carries_the_heading(board):
 
 @pytest.mark.parametrize("up", [(0, 0, 1), (0, 0, -1), (0.1, 0.2, -0.97)])
 def test_a_board_is_laid_down_straight(up):
-    """As `up` says, and however it was turned about the vertical as it came."""
+    """The direction `up` points up, however the board was turned about the vertical."""
     up = np.array(up) / np.linalg.norm(up)
     assert np.allclose(matrix(straight(up.tolist())).apply(up), [0, 0, 1])
 
@@ -72,7 +72,7 @@ def polls(motion, rng):
 
 
 def meters(hand):
-    """All meters of a simulated hand that is asked for one direction after the other."""
+    """Return all meters of a simulated hand that is asked for one direction after the other."""
     of_hand, of_motion, of_noise, of_advice = np.random.default_rng(1).spawn(4)
     motion = Motion(KINDS[hand](of_hand), of_motion, STANDARD_GRAVITY_MPS2)
     asked = iter(of_advice.permutation(ALL_AROUND).tolist())
@@ -103,7 +103,7 @@ MEASURING = ("lay flat", "rotate", "verify")
 
 @pytest.mark.parametrize("hand", KINDS)
 def test_the_picture_does_not_jump(hand):
-    """From one meter to the next it turns by no more than gravity did, or the gyroscope says."""
+    """The picture turns from one meter to the next by no more than gravity did, or the gyroscope says."""
     found = meters(hand)
     assert len(found) > 100
     for before, after in pairwise(found):

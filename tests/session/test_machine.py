@@ -106,18 +106,23 @@ class Session:
 
 @pytest.fixture(scope="module")
 def laid(make_board):
-    """A board that has lain flat for long enough and its session, to be taken out of these bytes."""
+    """Pickled state of a board that has lain flat for long enough, and of its session."""
     board = make_board()
     session = Session().feed(board.still(10.6))
     assert session.state is State.ROTATE
     return pickle.dumps((vars(board), session))
 
 
-@pytest.fixture
-def rotating(board, laid):
-    now, session = pickle.loads(laid)
+def restored(board, pickled):
+    """Put the board into its pickled state; return the session."""
+    now, session = pickle.loads(pickled)
     vars(board).update(now)
     return session
+
+
+@pytest.fixture
+def rotating(board, laid):
+    return restored(board, laid)
 
 
 def test_tells_to_lay_flat_then_to_rotate_after_ten_seconds_of_stillness(board):
@@ -161,17 +166,16 @@ def test_lost_samples_start_the_count_again(board):
 
 
 def test_a_slow_turn_at_a_constant_rate_is_not_stillness(board):
-    """It has no variance, only a mean that moves."""
+    """A turn at a constant rate has no variance, only a mean that moves."""
     session = Session().feed(board.turn((1, 0, 0), np.radians(30.0), 20.0))
     assert session.state is State.LAY_FLAT
 
 
-def test_a_noisy_sensor_can_be_still(make_board):
-    assert Session().feed(make_board(acc_noise=0.3, gyr_noise=0.1).still(10.6)).state is State.ROTATE
-
-
-def test_a_large_gyro_bias_is_no_turn(make_board):
-    assert Session().feed(make_board(gyr_bias=(0.35, -0.35, 0.35)).still(10.6)).state is State.ROTATE
+@pytest.mark.parametrize(
+    "sensor", [{"acc_noise": 0.3, "gyr_noise": 0.1}, {"gyr_bias": (0.35, -0.35, 0.35)}], ids=["noise", "bias"]
+)
+def test_a_noisy_sensor_and_one_with_a_large_gyro_bias_can_be_still(make_board, sensor):
+    assert Session().feed(make_board(**sensor).still(10.6)).state is State.ROTATE
 
 
 def test_never_still_for_a_minute_is_abandoned_with_a_reason(board):
@@ -241,16 +245,16 @@ def test_enough_tilts_end_the_turning_and_claim_no_target(board):
     assert "target reached" not in session.words()
 
 
-def test_the_target_alone_is_not_enough(board, rotating):
-    """The numbers may claim what they like: faces alone never tilt two axes together."""
+@pytest.mark.parametrize(
+    "ups",
+    [
+        [(1, 0, 0), (0, 1, 0), (0, 0, -1), (0, -1, 0), (-1, 0, 0), (0, 0, 1)] * 2,
+        [(0, np.sin(angle), np.cos(angle)) for angle in np.radians(np.arange(25.0, 360.0, 25.0))],
+    ],
+    ids=["faces", "tilts about one axis"],
+)
+def test_the_target_is_not_enough_without_varied_orientations(board, rotating, ups):
     rotating.overall = 1.0
-    faces = [(1, 0, 0), (0, 1, 0), (0, 0, -1), (0, -1, 0), (-1, 0, 0), (0, 0, 1)]
-    assert show(rotating, board, [*faces, *faces]).state is State.ROTATE
-
-
-def test_tilts_about_one_axis_are_never_enough(board, rotating):
-    rotating.overall = 1.0
-    ups = [(0, np.sin(angle), np.cos(angle)) for angle in np.radians(np.arange(25.0, 360.0, 25.0))]
     assert show(rotating, board, ups).state is State.ROTATE
 
 
@@ -285,9 +289,9 @@ def test_nobody_is_asked_twice_for_the_same_orientation(board, rotating, varied)
 
 @pytest.fixture(scope="module")
 def turned(make_board, laid, varied):
-    """The same, after enough orientations."""
-    board, (now, session) = make_board(), pickle.loads(laid)
-    vars(board).update(now)
+    """Pickled state of a board that has been turned enough, and of its session."""
+    board = make_board()
+    session = restored(board, laid)
     session.overall = 1.0
     show(session, board, varied[:9])
     assert session.state is State.VERIFY
@@ -296,9 +300,7 @@ def turned(make_board, laid, varied):
 
 @pytest.fixture
 def verifying(board, turned):
-    now, session = pickle.loads(turned)
-    vars(board).update(now)
-    return session
+    return restored(board, turned)
 
 
 def test_verifies_in_three_orientations_that_were_not_seen(board, verifying, varied):
@@ -495,14 +497,12 @@ def test_until_end_turns_until_the_source_ends(board, varied):
     assert session.give(SourceEnded()).state is State.CALIBRATE
 
 
-def test_a_source_that_ends_while_rotating_is_calibrated(rotating):
-    assert rotating.give(SourceEnded()).state is State.CALIBRATE
-    assert "the source ended" in rotating.words()
-
-
-def test_a_source_that_fails_while_rotating_is_calibrated_and_says_why(rotating):
-    assert rotating.give(SourceEnded("nothing answers at 0x68")).state is State.CALIBRATE
-    assert "nothing answers at 0x68" in rotating.words()
+@pytest.mark.parametrize(
+    ("why", "words"), [(None, "the source ended"), ("nothing answers at 0x68", "nothing answers at 0x68")]
+)
+def test_a_source_that_ends_or_fails_while_rotating_is_calibrated_and_says_why(rotating, why, words):
+    assert rotating.give(SourceEnded(why)).state is State.CALIBRATE
+    assert words in rotating.words()
 
 
 def test_a_source_that_ends_before_is_abandoned(board):

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -92,11 +93,15 @@ def runner_of(source, person=None, **options):
     return Runner(source, person or Person(), Notes(), **options)
 
 
-def test_runs_through_and_writes_the_results(tmp_path):
-    source, person = Source(), Person()
-    runner = runner_of(source, person)
+def calibrated(person=None, fit=fit):
+    """Return a runner that has measured, its calibration, and its recording."""
+    runner = runner_of(Source(), person)
     recording = runner.measure()
-    calibration = runner.calibrate(recording, fit)
+    return runner, runner.calibrate(recording, fit), recording
+
+
+def test_runs_through_and_writes_the_results(tmp_path):
+    runner, calibration, recording = calibrated()
     paths = runner.write(tmp_path, calibration, recording, {"D": 1})
     assert [path.name for path in paths] == ["calibration.json", "calibration.bin", "report.html", "truth.json"]
     assert json.loads((tmp_path / "calibration.json").read_text())["quality"]["verdict"] == "good"
@@ -111,20 +116,11 @@ def test_listeners_hear_the_prompts():
     assert all(isinstance(prompt, Prompt) for prompt in heard)
 
 
-def test_a_refused_calibration_has_no_blob(tmp_path):
-    runner = runner_of(Source())
-    recording = runner.measure()
-    calibration = runner.calibrate(recording, lambda r: fit(r, "refused"))
+@pytest.mark.parametrize(("verdict", "D"), [("refused", np.eye(3)), ("usable", np.full((3, 3), np.nan))])
+def test_a_refused_calibration_and_one_with_unknown_numbers_have_no_blob(tmp_path, verdict, D):
+    runner, calibration, recording = calibrated(fit=lambda r: replace(fit(r, verdict), D=D))
     paths = runner.write(tmp_path, calibration, recording)
     assert [path.name for path in paths] == ["calibration.json", "report.html"]
-
-
-def test_unknown_numbers_make_no_blob(tmp_path):
-    runner = runner_of(Source())
-    recording = runner.measure()
-    calibration = Calibration(np.full((3, 3), np.nan), np.zeros(3), quality={"verdict": "usable", "reasons": []})
-    paths = runner.write(tmp_path, runner.calibrate(recording, lambda _: calibration), recording)
-    assert "calibration.bin" not in [path.name for path in paths]
 
 
 @pytest.mark.parametrize("asked", [1, 2, 50, 150], ids=["before connecting", "connected", "lay flat", "rotate"])
@@ -152,9 +148,7 @@ def test_ctrl_c_during_the_fit_is_abandoned():
 )
 def test_ctrl_c_leaves_all_files_or_none(tmp_path, files, left):
     person = Person()
-    runner = runner_of(Source(), person)
-    recording = runner.measure()
-    calibration = runner.calibrate(recording, fit)
+    runner, calibration, recording = calibrated(person)
     person.keys = {person.asked + files: [Key.ABORT]}
     with pytest.raises(Abandoned):
         runner.write(tmp_path, calibration, recording)
@@ -201,36 +195,13 @@ def test_a_capture_that_does_not_replay_is_never_calibrated():
 
 
 def test_a_folder_that_vanished_is_an_output_error(tmp_path):
-    runner = runner_of(Source())
-    recording = runner.measure()
-    calibration = runner.calibrate(recording, fit)
+    runner, calibration, recording = calibrated()
     with pytest.raises(OutputError, match="cannot write"):
         runner.write(tmp_path / "gone", calibration, recording)
 
 
-def test_recorded_keys_are_pressed_again_at_their_place():
-    notes, person = Notes(), Person({141: [Key.ENOUGH]})
-    source = Source()
-    live = Runner(source, person, notes).measure()
-
-    again = Source()
-    listener = Person()
-    # a bus gives each recorded event once, when the accesses before it are done
-    pending = list(notes)
-
-    def events(name):
-        due = [event for event in pending if event.t_ns <= again.now_ns()]
-        del pending[: len(due)]
-        return [event for event in due if event.name == name]
-
-    replayed = Runner(again, ReplayedOperator(listener, events), Notes()).measure()
-    assert np.array_equal(live.t, replayed.t)
-    assert listener.heard == person.heard
-    assert "you chose to go on" in listener.words()
-
-
 class Late:
-    """Knows the same as anybody, but each answer only once the source was polled so many times more."""
+    """Worker whose answers are done once the source was polled so many times more."""
 
     def __init__(self, source, polls, plan, sensor):
         self.source, self.polls, self.here = source, polls, InlineWorker(plan, sensor)
@@ -245,7 +216,7 @@ class Late:
 
 
 def late_session(polls, keys=None, ends_at=170):
-    """Of the same source, with answers so late."""
+    """Measure with answers that are `polls` late; return the recording, the person and the notes."""
     source, person, notes = Source({ends_at: EndOfCapture()}), Person(keys), Notes()
     runner = Runner(source, person, notes, start_worker=partial(Late, source, polls))
     return runner.measure(), person, notes
@@ -264,14 +235,18 @@ def test_while_an_answer_is_late_the_source_goes_on_and_the_session_says_the_sam
     assert heard_late.heard == heard.heard
 
 
-@pytest.mark.parametrize("ends_at", [170, 131], ids=["in the end", "while one is late"])
-def test_a_replay_waits_where_its_session_did(ends_at):
-    # a person who has enough while an answer is late is heard in the same place
-    live, person, notes = late_session(12, {141: [Key.ENOUGH]}, ends_at)
-    assert waits(notes)
+@pytest.mark.parametrize(
+    ("polls", "ends_at"), [(0, 170), (12, 170), (12, 131)], ids=["punctual", "late", "ends while one is late"]
+)
+def test_a_replay_presses_the_keys_and_waits_where_its_session_did(polls, ends_at):
+    # A key that is pressed while an answer is late reaches the machine in the same place.
+    live, person, notes = late_session(polls, {141: [Key.ENOUGH]}, ends_at)
+    assert bool(waits(notes)) == bool(polls)
+    assert ("you chose to go on" in person.words()) == (ends_at == 170)
     again, listener = Source({ends_at: EndOfCapture()}), Person()
     pending, notes_again = list(notes), Notes()
 
+    # A bus returns each recorded event once, when the accesses before it are done.
     def events(name):
         due = [event for event in pending if event.t_ns <= again.now_ns() and event.name == name]
         pending[:] = [event for event in pending if event not in due]

@@ -1,50 +1,14 @@
+from typing import get_args
+
 import pytest
 
-from mpucal.data import Samples, Sensor
-from mpucal.session.events import (
-    Abort,
-    Checked,
-    Connected,
-    Enough,
-    Finished,
-    Fitted,
-    Knowledge,
-    Learnt,
-    Measured,
-    Redo,
-    Rested,
-    Resumed,
-    SourceEnded,
-    Stopped,
-    Target,
-    Tick,
-    Tried,
-    Turned,
-    Written,
-)
+from mpucal.data import Sensor
+from mpucal.session.events import Abort, Connected, Event, Fitted
 from mpucal.session.machine import Machine
 from mpucal.session.table import TRANSITIONS, IllegalEvent, State, next_state
 
-ONE = (1.0, 1.0, 1.0)
-EVENTS = {
-    "Connected": Connected(Sensor()),
-    "Measured": Measured(Samples.empty()),
-    "Tick": Tick(0.0),
-    "Enough": Enough(),
-    "Redo": Redo(),
-    "Abort": Abort(),
-    "Resumed": Resumed(3.0),
-    "Learnt": Learnt(Knowledge(0.0, ONE, ONE, ONE, Target(0.1, 0.05, 1.0), ONE, ONE, ONE, 1.0, None, ""), advice=True),
-    "Tried": Tried("good"),
-    "Checked": Checked((), agrees=True),
-    "SourceEnded": SourceEnded(),
-    "Fitted": Fitted("good"),
-    "Written": Written(()),
-    "Rested": Rested(10.0, (0.0, 0.0, 9.8), (0.0, 0.0, 0.0)),
-    "Turned": Turned("enough"),
-    "Finished": Finished("verified"),
-    "Stopped": Stopped("it moved", "start again"),
-}
+# The table looks at the class of an event alone.
+EVENTS = {kind.__name__: object.__new__(kind) for kind in get_args(Event)}
 
 # written out by hand: where each event leads, "" where it may not happen
 EXPECTED = {
@@ -84,7 +48,7 @@ def test_leads_where_it_should(state, event, following):
 
 
 def test_every_event_is_in_a_row():
-    assert {event.__name__ for row in TRANSITIONS.values() for event in row} == set(EVENTS)
+    assert {event.__name__ for row in TRANSITIONS.values() for event in row} == set(EVENTS) == set(EXPECTED)
 
 
 def test_an_illegal_event_leaves_the_machine_as_it_was():

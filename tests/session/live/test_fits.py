@@ -29,6 +29,11 @@ def part(recording, first_s, last_s=None):
     return Samples(*(getattr(recording, field.name)[chosen] for field in fields(Samples)))
 
 
+def after(samples, seconds):
+    """Return the samples `seconds` later, after a gap."""
+    return replace(samples, t=samples.t + seconds, gap=np.arange(len(samples)) == 0)
+
+
 @pytest.fixture
 def fits():
     return Fits(Plan(gravity=GRAVITY_MPS2), SENSOR)
@@ -74,9 +79,7 @@ def test_a_try_and_its_check_agree_on_good_data(fits, poses):
 
 def test_what_the_fit_has_seen_verifies_nothing(fits, poses):
     fits.do(Task(part(poses, 0, 44), FitKind.TRY))
-    seen = part(poses, 18, 44)
-    again = replace(seen, t=seen.t + 44.0 - 18.0 + 1 / 200, gap=np.arange(len(seen)) == 0)
-    checked = fits.do(Task(again, FitKind.CHECK))
+    checked = fits.do(Task(after(part(poses, 18, 44), 26.0 + 1 / 200), FitKind.CHECK))
     assert (checked.found, checked.agrees) == ((), None)
     assert checked.reason.what.startswith("the board was held still in 0 of 3 orientations that the calibration has")
     assert not checked.reason.refuse
@@ -84,9 +87,8 @@ def test_what_the_fit_has_seen_verifies_nothing(fits, poses):
 
 def test_what_the_fit_has_seen_may_refute_it(fits, poses):
     fits.do(Task(part(poses, 0, 44), FitKind.TRY))
-    seen = part(poses, 18, 44)
-    again = replace(seen, t=seen.t + 44.0 - 18.0 + 1 / 200, gap=np.arange(len(seen)) == 0, acc=1.03 * seen.acc)
-    checked = fits.do(Task(again, FitKind.CHECK))
+    again = after(part(poses, 18, 44), 26.0 + 1 / 200)
+    checked = fits.do(Task(replace(again, acc=1.03 * again.acc), FitKind.CHECK))
     assert checked.agrees is False
     assert "|a| is +0.3" in checked.reason.what
 
@@ -121,7 +123,7 @@ def test_faster_samples_are_averaged(rate_hz, size):
 
 
 def test_a_flip_that_is_set_right_too_late_is_taken_away_and_no_blow(poses):
-    """Of the gyroscope's sign it would be a turn by some degrees; a blow moves more than one word."""
+    """A flipped sign bit of the gyroscope would be a turn by some degrees; a blow moves more than one word."""
     at = len(poses) - 100
     flipped, blow = poses.gyr.copy(), poses.acc.copy()
     flipped[at, 1] += 8.7
@@ -139,7 +141,7 @@ def test_a_flip_that_is_set_right_too_late_is_taken_away_and_no_blow(poses):
 
 
 def test_flips_are_taken_away_however_often_somebody_looks(poses):
-    """Those at the end of what has come, too, once the samples after them are there."""
+    """A flip in the last samples is taken away once the samples after it have arrived."""
     gyr = poses.gyr[:600].copy()
     gyr[np.arange(50, 600, 43), 2] += 5.0
     samples = part(replace(poses, gyr=np.concatenate((gyr, poses.gyr[600:]))), 0, 3.0)

@@ -1,4 +1,4 @@
-"""What unseen rests are said to mean."""
+"""Reasons and verdicts that follow from rests in unseen orientations."""
 
 import numpy as np
 import pytest
