@@ -18,7 +18,7 @@ from ..errors import UsageError
 from ..files import open_rows, open_writer
 from ..files.csv import CsvText
 from ..files.folder import captures_in
-from ..files.formats import held_whole, writable
+from ..files.formats import formats_in_memory, writable_formats
 from ..files.rows import Rows
 from ..result.correction import correction
 from .loading import loaded
@@ -29,7 +29,7 @@ EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calib
 
 HELP = f"""Apply a calibration (.json or .bin) to any recording that `mpucal calibrate` reads, however long.
 
-The result is in m/s² and rad/s, in the calibration's body frame. Only {held_whole()} is loaded into memory as a whole.
+The result is in m/s² and rad/s, in the calibration's body frame. Only {formats_in_memory()} is loaded as a whole.
 """
 
 
@@ -41,7 +41,7 @@ The result is in m/s² and rad/s, in the calibration's body frame. Only {held_wh
     "target",
     metavar="FILE",
     type=click.Path(path_type=Path),
-    help=f"Output file: {writable()}, by its suffix; default: a table on stdout.",
+    help=f"Output file: {writable_formats()}, by its suffix; default: a table on stdout.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON; needs -o.")
 @hint_options()

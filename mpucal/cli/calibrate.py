@@ -11,7 +11,7 @@ import click
 from ..disk.folder import Folder
 from ..errors import RefusedError
 from ..files import load
-from ..files.formats import readable
+from ..files.formats import readable_formats
 from ..mavlink.calibrate_vehicle import calibrate_vehicle
 from ..result.calibration import REFUSED
 from ..result.noise import Noise, with_noise
@@ -24,7 +24,7 @@ from .summary import summary, written
 EXAMPLE = "Example: `mpucal calibrate capture.mcap -o results` or `mpucal calibrate walk.npz --json`"
 
 
-HELP = f"""Calibrate from {readable()}.
+HELP = f"""Calibrate from {readable_formats()}.
 
 Exit code 5: the calibration was refused, with reasons.
 """

@@ -18,7 +18,7 @@ from ..data import Samples, Sensor
 from ..disk.folder import Folder
 from ..errors import EndOfCapture, UsageError
 from ..files import open_rows
-from ..files.rows import complete
+from ..files.rows import drop_incomplete
 from ..report.noise import render, summary
 from ..result.clock import now
 from ..result.noise import Noise
@@ -76,7 +76,7 @@ def _of_file(file: Path, options: dict[str, Any]) -> Noise:
     say_taken(rows.taken)
     meter = NoiseMeter(rows.sensor)
     for samples in rows.runs:
-        meter.add(complete(samples))
+        meter.add(drop_incomplete(samples))
     return meter.result(now().isoformat())
 
 

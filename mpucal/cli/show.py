@@ -14,7 +14,7 @@ import numpy as np
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Sensor
 from ..errors import UsageError
 from ..files import load
-from ..files.formats import readable, recognised
+from ..files.formats import readable_formats, recognise
 from ..files.hints import Hints
 from ..rests.flat import find_flat
 from ..result.blob import Blob
@@ -36,7 +36,7 @@ CALIBRATIONS = (".json", ".bin")
 
 HELP = f"""Show a calibration (.json), a config blob (.bin), a recording, or what a device holds.
 
-A recording is {readable()}. Of a device, its registers, memory or
+A recording is {readable_formats()}. Of a device, its registers, memory or
 parameters are read; nothing is written.
 """
 
@@ -60,7 +60,7 @@ def command(file: Path | None, as_json: bool, **options: Any) -> None:
             raise UsageError(f"{' and '.join(said)} say how a file is read, and a device was given", "leave them out")
         kept = {name: value for name, value in options.items() if name not in NAMES}
         _show_device(check_source(click.get_current_context()), kept, as_json)
-    elif file.suffix in CALIBRATIONS and recognised(file) is None:
+    elif file.suffix in CALIBRATIONS and recognise(file) is None:
         _show_calibration(str(file), loaded(file), as_json)
     else:
         _show_recording(file, hints_of(options), as_json)

@@ -1,8 +1,7 @@
-"""How much of a recording is read and held: a file of kilobytes may say, or unpack to, gigabytes.
+"""Limits on the memory that reading a recording takes: a file of kilobytes may claim, or unpack to, gigabytes.
 
-The limit on memory is $MPUCAL_MOST_MB, or --most-mb. Where a file says beforehand how much it holds it is refused at
-once; else Linux enforces the limit while the file is read (RLIMIT_DATA, getrlimit(2)), and gives the memory of the
-program back its old limit afterwards.
+The limit is $MPUCAL_MOST_MB, or --most-mb. A file that states too large a size is refused at once; otherwise Linux
+enforces the limit while the file is read (RLIMIT_DATA, getrlimit(2)), and the old limit is restored afterwards.
 """
 
 from __future__ import annotations
@@ -15,35 +14,35 @@ from pathlib import Path
 from ..errors import RecordingError
 
 MOST_MB, VARIABLE = 512, "MPUCAL_MOST_MB"
-# of a file that is held whole, for each byte of memory: a log may hold far more than its IMU
+# bytes of a file for each allowed byte of memory: a log may hold far more than its IMU
 READ = 16
-# of memory for a byte of a table of text, whose cells are objects: 6 to 40
+# bytes of memory for a byte of a table of text, whose cells are objects: 6 to 40
 HELD = 6
-# of a line of text
+# bytes of a line of text
 LONGEST_LINE = 1 << 20
-# of a chunk of an MCAP file; mpucal's own are of ten seconds, 2 MB at most
+# bytes of a chunk of an MCAP file; those of mpucal hold ten seconds, 2 MB at most
 LONGEST_CHUNK = 64 << 20
 
 
-def most_bytes() -> int:
-    """Of memory, beside what the program has already."""
+def allowed_bytes() -> int:
+    """Return the bytes of memory that a recording may take."""
     value = os.environ.get(VARIABLE, "")
     return (int(value) if value.isdecimal() else MOST_MB) << 20
 
 
-def afford(path: Path, count: int, each: int = 1) -> None:
-    """RecordingError where `path` holds more bytes than `each` for each byte of memory."""
-    if count > each * most_bytes():
+def check_size(path: Path, count: int, each: int = 1) -> None:
+    """Raise RecordingError if `path` holds more than `each` bytes for each allowed byte of memory."""
+    if count > each * allowed_bytes():
         raise _too_much(path, f"takes {count >> 20} MB")
 
 
 @contextmanager
-def within(path: Path) -> Iterator[None]:
-    """What is read of `path` has to fit the memory that it may take.
+def limit_memory(path: Path) -> Iterator[None]:
+    """Limit the memory that the block takes to read `path`.
 
     Raises
     ------
-    RecordingError : it does not.
+    RecordingError : it needs more.
     """
     with _limited():
         try:
@@ -51,26 +50,27 @@ def within(path: Path) -> Iterator[None]:
             return
         except MemoryError:
             pass
-    raise _too_much(path, f"takes more than {most_bytes() >> 20} MB of memory")
+    raise _too_much(path, f"takes more than {allowed_bytes() >> 20} MB of memory")
 
 
 def _too_much(path: Path, what: str) -> RecordingError:
-    megabytes = most_bytes() >> 20
+    megabytes = allowed_bytes() >> 20
     return RecordingError(
-        f"{path} {what}, and {megabytes} MB may be taken", f"allow more with --most-mb, or {VARIABLE}={4 * megabytes}"
+        f"{path} {what}, but only {megabytes} MB are allowed",
+        f"allow more with --most-mb, or {VARIABLE}={4 * megabytes}",
     )
 
 
 @contextmanager
 def _limited() -> Iterator[None]:
-    """Within, this program's memory grows by what is allowed; where that cannot be asked for, by any amount."""
+    """Limit the growth of this program's memory within the block, where the system can do that."""
     before = None
     with suppress(ImportError, OSError, ValueError):
         import resource  # noqa: PLC0415 - not on Windows
 
         data = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[5]) * resource.getpagesize()
         before, hard = resource.getrlimit(resource.RLIMIT_DATA)
-        most = min((data + most_bytes(), *(limit for limit in (before, hard) if limit >= 0)))
+        most = min((data + allowed_bytes(), *(limit for limit in (before, hard) if limit >= 0)))
         resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
     try:
         yield

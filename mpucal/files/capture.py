@@ -1,7 +1,7 @@
-"""Captures decoded into samples, whole or a run at a time, without what was measured to be forgotten.
+"""Captures decoded into samples, whole or a run at a time, without the samples that the session discarded.
 
-When a capture's first sample was taken is known only with its last look at the FIFO: for runs, what the FIFO held goes
-to a temporary file meanwhile, 14 bytes a sample. Of the looks 16 bytes each stay in memory: 1.4 MB an hour.
+The time of a capture's first sample depends on its last poll of the FIFO: for runs, the frames therefore wait in a
+temporary file, 14 bytes a sample. The polls stay in memory, 16 bytes each or 1.4 MB an hour.
 """
 
 from __future__ import annotations
@@ -25,35 +25,37 @@ from ..errors import CaptureError, RecordingError
 from ..iio.decode import decode as decode_iio
 from .mcap import CaptureReader
 from .rows import ROWS, Rows
-from .tables.times import possible_utc_ns
+from .tables.times import plausible_utc_ns
 
 
 def load_capture(*paths: Path) -> Recording:
-    """The recording in the captures of one session.
+    """Return the recording in the captures of one session.
 
     Raises
     ------
     CaptureError, RecordingError, ChipError : see load.
     """
-    session = _Accesses(paths)
-    recording = decode_iio(session.one_by_one(), session.name) if _of_kernel(paths) else decode(session, session.name)
+    session = _SessionAccesses(paths)
+    recording = (
+        decode_iio(session.one_by_one(), session.name) if _is_from_kernel(paths) else decode(session, session.name)
+    )
     for first, last in sorted(session.forgotten.items(), reverse=True):
         recording = recording.without(min(max(first, 0), len(recording)), min(last, len(recording)))
     if len(recording) < 2:
-        raise RecordingError(f"{session.name} holds {len(recording)} samples that may be used", "record for longer")
+        raise RecordingError(f"{session.name} holds {len(recording)} usable samples", "record for longer")
     return replace(recording, recovered=session.recovered, utc_ns=session.utc_ns)
 
 
 def capture_rows(*paths: Path) -> Rows:
-    """The samples in the captures of one session, a run at a time.
+    """Return the samples in the captures of one session, a run at a time.
 
     Raises
     ------
     CaptureError, RecordingError, ChipError : see load.
     """
-    if _of_kernel(paths):
+    if _is_from_kernel(paths):
         return Rows.of(load_capture(*paths))
-    session = _Accesses(paths)
+    session = _SessionAccesses(paths)
     decoder, spool = Decoder(session.name), Spool()
     for access in session:
         decoder.feed(access)
@@ -66,13 +68,13 @@ def capture_rows(*paths: Path) -> Rows:
     return Rows(runs, decoder.sensor, recovered=session.recovered, name=session.name, utc_ns=session.utc_ns)
 
 
-class _Accesses:
-    """The register accesses in the captures of one session, one after the other; to be gone through once.
+class _SessionAccesses:
+    """Iterator over the register accesses in the captures of one session, once.
 
     Attributes
     ----------
-    name : of the first capture. forgotten : first -> last + 1 samples that are to be left out.
-    recovered, utc_ns : see Recording; these and `forgotten` once all accesses were read.
+    name : of the first capture. forgotten : first -> last + 1 samples that the session discarded.
+    recovered, utc_ns : see Recording. These and `forgotten` are complete when all accesses are read.
     """
 
     def __init__(self, paths: Sequence[Path]) -> None:
@@ -88,7 +90,7 @@ class _Accesses:
                 if not isinstance(record, SessionEvent):
                     yield record
                 elif record.name == UTC and self.utc_ns is None:
-                    self.utc_ns = possible_utc_ns(self._number(record, UTC) - record.t_ns)
+                    self.utc_ns = plausible_utc_ns(self._number(record, UTC) - record.t_ns)
                 elif record.name == FORGET:
                     first, last = (self._number(record, key) for key in ("first", "last"))
                     self.forgotten[first] = last
@@ -99,11 +101,12 @@ class _Accesses:
             return int(event.data[key])
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise CaptureError(
-                f"{self.name} holds an event {event.name} without a whole number {key}", "give what mpucal recorded"
+                f"{self.name} holds an event {event.name} without a whole number {key}",
+                "give a capture that mpucal recorded",
             ) from error
 
     def one_by_one(self) -> Generator[Transaction]:
-        """The same, each on its own."""
+        """Yield the accesses one by one."""
         for each in self:
             if isinstance(each, Accesses):
                 yield from each
@@ -111,23 +114,23 @@ class _Accesses:
                 yield each
 
 
-def _of_kernel(paths: Sequence[Path]) -> bool:
-    """Whether a driver of the kernel was read, whose samples have their times at once."""
-    with closing(_Accesses(paths).one_by_one()) as accesses:
+def _is_from_kernel(paths: Sequence[Path]) -> bool:
+    """Return True if a driver of the Linux kernel was read, whose samples have their final times at once."""
+    with closing(_SessionAccesses(paths).one_by_one()) as accesses:
         first = next(accesses, None)
     return first is not None and isinstance(first.register, str)
 
 
 @dataclass
 class _Piece:
-    """Runs that follow each other without a gap, of so many frames."""
+    """Consecutive runs without a gap: the first without its frames, and the number of frames."""
 
     head: Run
     frames: int
 
 
 class Spool:
-    """Frames in a file that is gone with it."""
+    """Store of frames in a temporary file, which is deleted with it."""
 
     def __init__(self) -> None:
         self.frames = 0
@@ -136,7 +139,7 @@ class Spool:
         finalize(self, self._file.close)
 
     def add(self, runs: Sequence[Run]) -> None:
-        """Keep runs, after those that are there."""
+        """Append runs."""
         for run in runs:
             self._file.write(run.frames.tobytes())
             self.frames += len(run.frames)
@@ -145,7 +148,7 @@ class Spool:
             self._pieces[-1].frames += len(run.frames)
 
     def runs(self) -> Iterator[Run]:
-        """All that was added, in runs of at most ROWS frames."""
+        """Yield all frames, in runs of at most ROWS."""
         self._file.seek(0)
         for piece in self._pieces:
             words, first = piece.head.frames.shape[1], piece.head.first
@@ -162,7 +165,7 @@ class Spool:
 
 
 def _without(runs: Iterator[Samples], forgotten: Mapping[int, int]) -> Iterator[Samples]:
-    """All samples but `first..last-1`, and a gap where they were."""
+    """Yield all samples except first..last-1, for first -> last of `forgotten`, with a gap in their place."""
     at, cut = 0, False
     for samples in runs:
         number = np.arange(at, at + len(samples))

@@ -1,7 +1,7 @@
-"""MCAP files of one channel whose messages are all of one size, written a chunk at once.
+"""Writer of MCAP files with one channel of messages of constant size, a chunk at once.
 
-mcap's own writer takes 20 us a message, one after the other; here an array is a chunk. The records are mcap's
-(https://mcap.dev/spec), but for those that repeat a thousand times in a chunk: Message and MessageIndex.
+mcap's own writer takes 20 us per message; here an array is a chunk. The records are those of the mcap library
+(https://mcap.dev/spec), except the frequent ones: Message and MessageIndex.
 """
 
 from __future__ import annotations
@@ -30,17 +30,16 @@ from zstandard import ZstdCompressor
 
 # opcode and length of a record
 RECORD_HEAD = 9
-# 1 MB where a message takes 350 bytes
+# per chunk: 1 MB if a message takes 350 bytes
 MESSAGES = 3072
 
 
 class ChunkWriter:
-    """Writes messages to `file`, from its beginning on.
+    """Writer of an MCAP file from its beginning.
 
     Parameters
     ----------
-    message : the type of a message. head : the file's first record. schema, channel : of the messages.
-    metadata : what else is said of them.
+    message : dtype of a message. head : the file's first record. schema, channel, metadata : of the messages.
     """
 
     def __init__(
@@ -66,7 +65,7 @@ class ChunkWriter:
         self._put(channel)
 
     def add(self, t_ns: NDArray[np.int64], messages: NDArray[Any]) -> None:
-        """Write messages (n,), whose times are `t_ns` (n,)."""
+        """Write messages (n,) with times `t_ns` (n,)."""
         for first in range(0, len(t_ns), MESSAGES):
             self._chunk(t_ns[first : first + MESSAGES], messages[first : first + MESSAGES])
 
@@ -78,7 +77,7 @@ class ChunkWriter:
             record.write(summary)
         start, data = self._file.tell(), summary.end()
         self._file.write(data)
-        # a reader takes 0 for a CRC that was not made
+        # 0 means no CRC
         self._put(Footer(summary_start=start, summary_offset_start=0, summary_crc=0))
         self._file.write(MCAP0_MAGIC)
 
@@ -113,7 +112,7 @@ class ChunkWriter:
         self._count += len(rows)
 
     def _index(self, t_ns: NDArray[np.int64]) -> None:
-        """A MessageIndex: time and offset within the chunk of each message."""
+        """Write a MessageIndex: the time of each message and its offset in the chunk."""
         entries = np.empty(len(t_ns), [("time", "<u8"), ("offset", "<u8")])
         entries["time"], entries["offset"] = t_ns, np.arange(len(t_ns)) * self._row.itemsize
         builder = RecordBuilder()
@@ -125,7 +124,7 @@ class ChunkWriter:
         self._file.write(builder.end())
 
     def _put(self, record: Any) -> int:
-        """Write a record, and say where it begins."""
+        """Write a record and return its offset."""
         at = self._file.tell()
         builder = RecordBuilder()
         record.write(builder)

@@ -1,6 +1,6 @@
 """Tables of text: the columns t [s], ax, ay, az [m/s^2], gx, gy, gz [rad/s], and temperature_c where it is known.
 
-Where the time of day is known, utc_s is t in seconds since 1970; a float64 has it to 0.2 us.
+If the time of day is known, the column utc_s is t in seconds since 1970; a float64 resolves it to 0.2 us.
 """
 
 from __future__ import annotations
@@ -21,71 +21,70 @@ from ..disk.whole import whole_file
 from ..errors import RecordingError
 from ._text import lines, numbers
 from .budget import LONGEST_LINE
-from .rows import Rows, Write, cannot_read, checked
-from .tables.names import COLDEST_C, WARMEST_C, columns_of
-from .tables.times import possible_utc_ns
+from .reading import reading
+from .rows import Rows, Write, check_runs
+from .tables.names import COLDEST_C, WARMEST_C, parse_header
+from .tables.times import plausible_utc_ns
 
 COLUMNS = ("t", "ax", "ay", "az", "gx", "gy", "gz")
 TEMPERATURE, UTC = "temperature_c", "utc_s"
 ALL = (*COLUMNS, TEMPERATURE)
 NS = 10**9
-# some 16000 lines
+# bytes that are parsed at once, some 16000 lines
 BLOCK = 1 << 21
 _REMEDY = (
-    f"name the columns in the first line, in any order: {','.join(COLUMNS)} (s, m/s^2, rad/s), or say which is what:"
+    f"name the columns in the first line, in any order: {','.join(COLUMNS)} (s, m/s^2, rad/s), or with"
     f" --columns t=NAME,ax=NAME,... or, in their order, --columns {','.join(COLUMNS)}"
 )
 
 
 def csv_rows(path: Path) -> Rows:
-    """The samples of a table whose first line names its columns, in any order and any case.
+    """Return the samples of a table whose first line names its columns, in any order and any case.
 
     Other columns and empty lines are ignored.
 
     Raises
     ------
-    RecordingError : it cannot be read, or its first line names no such columns; when it is come to, a bad line, which
-    is named by its number.
+    RecordingError : it cannot be read, or its first line lacks a column; of a bad line, with its number, when it is
+        read.
     """
     try:
-        with path.open("rb") as file:
+        with reading(path), path.open("rb") as file:
             begun, second = file.readline(LONGEST_LINE), file.readline(LONGEST_LINE)
         text = begun.decode("utf-8-sig")
         # a line may end with a carriage return alone
         first = StringIO(text, newline="").readline()
         header = [name.strip().lower() for name in next(csv.reader([first]), [])]
-    except OSError as error:
-        raise cannot_read(path, error) from error
     except UnicodeDecodeError as error:
-        raise RecordingError(f"{path} is no text", _REMEDY) from error
+        raise RecordingError(f"{path} is not text", _REMEDY) from error
     except csv.Error as error:
-        raise _no_line(path, 1, error) from error
+        raise _bad_line(path, 1, error) from error
     if not first.strip():
         raise RecordingError(f"{path}: its first line is empty", _REMEDY)
     begin = len(begun) - len(text.removeprefix(first).encode())
-    table = _Table(path, begin, len(header), _places(header, path))
-    return Rows(checked(table.runs(), path.name), name=path.name, utc_ns=_utc_ns(header, second), plain=True)
+    table = _Table(path, begin, len(header), _column_places(header, path))
+    return Rows(check_runs(table.runs(), path.name), name=path.name, utc_ns=_utc_ns(header, second), plain=True)
 
 
 def _utc_ns(header: list[str], second: bytes) -> int | None:
-    """The time of day at t = 0, by the line below the header; None where there is no column of it, or no number."""
+    """Return the time of day at t = 0 by the line below the header; None if the column is missing or not a number."""
     cells = second.decode(errors="replace").split(",")
     if UTC not in header or len(cells) != len(header):
         return None
     try:
         utc_s, t = (Decimal(cells[header.index(name)].strip()) for name in (UTC, "t"))
-        return possible_utc_ns(round((utc_s - t) * NS))
+        return plausible_utc_ns(round((utc_s - t) * NS))
     except (ArithmeticError, ValueError):
         return None
 
 
-def _places(header: list[str], path: Path) -> dict[str, int]:
-    """Column name -> its place, for the columns that are read."""
+def _column_places(header: list[str], path: Path) -> dict[str, int]:
+    """Return column name -> place, for the columns that are read."""
     missing = [name for name in COLUMNS if name not in header]
     if missing:
         whole = f" (it is {header[0]!r}, without a comma)" if len(header) == 1 else ""
         raise RecordingError(f"{path}: its first line names no {', '.join(missing)}{whole}", _REMEDY)
-    warm = [c.name for c in columns_of(header) if c.quantity == TEMPERATURE]
+    warm = [c.name for c in parse_header(header) if c.quantity == TEMPERATURE]
     wanted = (*COLUMNS, *sorted(warm, key=TEMPERATURE.__ne__)[:1])
     twice = [name for name in wanted if header.count(name) > 1]
     if twice:
@@ -95,7 +94,7 @@ def _places(header: list[str], path: Path) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class _Table:
-    """The lines of a table, from byte `begin` on, of `width` cells each; `places`: column name -> which cell."""
+    """The lines of a table from byte `begin` on, with `width` cells each; `places` maps column name to cell."""
 
     path: Path
     begin: int
@@ -103,40 +102,37 @@ class _Table:
     places: dict[str, int]
 
     def runs(self) -> Iterator[Samples]:
-        """The samples, a block of lines at a time."""
-        try:
-            with self.path.open("rb") as file:
-                file.seek(self.begin)
-                line = 2
-                for block in _blocks(file, self.path):
-                    values = numbers(block, self.width, list(self.places.values()))
-                    if values is None:
-                        values = self._odd(block, line)
-                    line += block.count(b"\n")
-                    if len(values):
-                        yield _samples(values, sure=TEMPERATURE in self.places)
-        except OSError as error:
-            raise cannot_read(self.path, error) from error
+        """Yield the samples, a block of lines at a time."""
+        with reading(self.path), self.path.open("rb") as file:
+            file.seek(self.begin)
+            line = 2
+            for block in _blocks(file, self.path):
+                values = numbers(block, self.width, list(self.places.values()))
+                if values is None:
+                    values = self._parse_slowly(block, line)
+                line += block.count(b"\n")
+                if len(values):
+                    yield _samples(values, sure=TEMPERATURE in self.places)
 
-    def _odd(self, block: bytes, line: int) -> Vector:
-        """(n, 7 or 8) numbers of lines, the first of which is number `line`: slowly all that Python reads.
+    def _parse_slowly(self, block: bytes, line: int) -> Vector:
+        """Return (n, 7 or 8) numbers, parsed with csv and float; `line` is the number of the first line.
 
         Raises
         ------
-        RecordingError : what is no number is named by its line.
+        RecordingError : a cell is not a number; the message names its line.
         """
         try:
             rows = csv.reader(StringIO(block.decode(), newline=""))
         except UnicodeDecodeError as error:
-            raise RecordingError(f"{self.path} is no text from line {line} on", "record it again") from error
+            raise RecordingError(f"{self.path} is not text from line {line} on", "record it again") from error
         try:
             values = [self._numbers(row, line + rows.line_num - 1) for row in rows if any(map(str.strip, row))]
         except csv.Error as error:
-            raise _no_line(self.path, line + rows.line_num - 1, error) from error
+            raise _bad_line(self.path, line + rows.line_num - 1, error) from error
         return np.array(values).reshape(-1, len(self.places))
 
     def _numbers(self, row: list[str], line: int) -> list[float]:
-        """The numbers of a row in the order of `places`."""
+        """Return the numbers of a row in the order of `places`."""
         if len(row) != self.width:
             raise RecordingError(
                 f"{self.path}: line {line} has {len(row)} values where the first line names {self.width}",
@@ -145,41 +141,41 @@ class _Table:
         found = []
         for name, place in self.places.items():
             try:
-                # an empty cell is a measurement that is not there
+                # an empty cell is a missing measurement; a time must not be missing
                 found.append(float(row[place]) if row[place].strip() or name == COLUMNS[0] else np.nan)
             except ValueError as error:
                 raise RecordingError(
-                    f"{self.path}: line {line}: {name} is {row[place]!r}, which is no number",
-                    "correct or leave out that line",
+                    f"{self.path}: line {line}: {name} is {row[place]!r}, which is not a number",
+                    "correct that line or leave it out",
                 ) from error
         return found
 
 
 def _blocks(file: IO[bytes], path: Path) -> Iterator[bytes]:
-    """Whole lines, some BLOCK bytes at a time."""
+    """Yield whole lines, some BLOCK bytes at a time."""
 
-    def lines_on() -> bytes:
+    def next_lines() -> bytes:
         block = file.read(BLOCK) + file.readline(LONGEST_LINE)
         if block.rfind(b"\n") < len(block) - LONGEST_LINE and b"\r" not in block:
             raise RecordingError(f"{path} holds a line of more than {LONGEST_LINE >> 20} MB", "record it again")
         return block
 
-    while block := lines_on():
-        # the end of a line within quotation marks is none
-        while block.count(b'"') % 2 and len(block) <= BLOCK + LONGEST_LINE and (more := lines_on()):
+    while block := next_lines():
+        # a line break within quotation marks does not end a line
+        while block.count(b'"') % 2 and len(block) <= BLOCK + LONGEST_LINE and (more := next_lines()):
             block += more
         yield block
 
 
-def _no_line(path: Path, line: int, error: csv.Error) -> RecordingError:
-    return RecordingError(f"{path}: line {line} is no line of a table ({error})", _REMEDY)
+def _bad_line(path: Path, line: int, error: csv.Error) -> RecordingError:
+    return RecordingError(f"{path}: line {line} is not a line of a table ({error})", _REMEDY)
 
 
 def _samples(values: Vector, sure: bool) -> Samples:
     n = len(values)
     warm = np.full(n, np.nan)
     if values.shape[1] > len(COLUMNS):
-        # counts, or Kelvin, are no temperatures that are known
+        # under another name than temperature_c it may be counts or Kelvin
         given = values[:, len(COLUMNS)]
         warm = np.where(sure | (given > COLDEST_C) & (given < WARMEST_C), given, np.nan)
     no = np.zeros(n, bool)
@@ -187,11 +183,11 @@ def _samples(values: Vector, sure: bool) -> Samples:
 
 
 class CsvText:
-    """Samples as lines of text, under a first line that names the columns: of what the first samples know.
+    """Encoder of samples as lines of text; the first line names the columns that the first samples have values of.
 
     Parameters
     ----------
-    put : takes the text, a run of samples at a time. utc_ns : the time of day at t = 0, where it is known.
+    put : receives the text, a run of samples at a time. utc_ns : the time of day at t = 0, if known.
     """
 
     def __init__(self, put: Callable[[bytes], object], utc_ns: int | None = None) -> None:
@@ -199,7 +195,7 @@ class CsvText:
         self._columns: list[int] = []
 
     def write(self, samples: Samples) -> None:
-        """Take a run of samples."""
+        """Encode a run of samples."""
         utc_s = np.full(len(samples), np.nan) if self.utc_ns is None else samples.t + self.utc_ns / NS
         table: Vector = np.column_stack([samples.t, samples.acc, samples.gyr, samples.temperature_c, utc_s])
         if not self._columns:
@@ -210,6 +206,6 @@ class CsvText:
 
 @contextmanager
 def csv_file(path: Path, rows: Rows, _done: str) -> Iterator[Write]:
-    """A table as a file; it has no column for the flat part, gaps, clipping and the sensor. See open_writer."""
+    """Open a table; it has no column for the flat part, gaps, clipping and the sensor. See open_writer."""
     with whole_file(path) as file:
         yield CsvText(file.write, rows.utc_ns).write

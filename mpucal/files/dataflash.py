@@ -17,34 +17,31 @@ from ..mavlink.dialect import import_pymavlink
 from ..mavlink.firmwares import ARDUPILOT
 from ..mavlink.imu import DATAFLASH, Reading, Stream
 from ..mavlink.log import Log
+from .reading import first_bytes
 
 MAGIC = b"\xa3\x95"
 PARAMETER = "PARM"
-# before ArduPilot 4.0 each IMU had a message of its own; since then `I` counts them from 0
+# before ArduPilot 4.0 each IMU had its own message; since then `I` numbers them from 0
 IMUS = {"IMU": 1, "IMU2": 2, "IMU3": 3}
 US = 1_000
 
 
 def is_dataflash(path: Path) -> bool:
-    """Whether a file begins as a dataflash log."""
-    try:
-        with path.open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC
-    except OSError:
-        return False
+    """Return True if a file begins as a dataflash log."""
+    return first_bytes(path, len(MAGIC)) == MAGIC
 
 
 def load_dataflash(path: Path) -> Recording:
-    """The recording of the vehicle's first IMU in a dataflash log, the others in its `others`.
+    """Return the recording of the vehicle's first IMU in a dataflash log, with the other IMUs in its `others`.
 
     Raises
     ------
-    RecordingError : it is none, or holds no IMU messages.
+    RecordingError : it is not a dataflash log, or holds no IMU messages.
     """
     if not is_dataflash(path):
-        raise RecordingError(f"{path} is no dataflash log", "give a .bin that ArduPilot wrote")
+        raise RecordingError(f"{path} is not a dataflash log", "give a .bin that ArduPilot wrote")
     log = Log(ARDUPILOT)
-    # the reader prints what it dislikes
+    # the reader prints its complaints
     with redirect_stderr(StringIO()), redirect_stdout(StringIO()):
         _fill(log, path)
     if not any(map(len, log.segments)):
@@ -56,8 +53,8 @@ def load_dataflash(path: Path) -> Recording:
 
 
 def _fill(log: Log, path: Path) -> None:
-    """Take the IMU and parameter messages, up to where the file is damaged."""
-    # pymavlink raises plain Exceptions, too
+    """Add the IMU and parameter messages to the log, up to the first damage of the file."""
+    # pymavlink raises bare Exceptions, too
     with suppress(Exception), _reader(path) as reader:
         while (message := reader.recv_match(type=[PARAMETER, *IMUS])) is not None:
             if message.get_type() == PARAMETER:
@@ -70,8 +67,8 @@ def _fill(log: Log, path: Path) -> None:
 
 @contextmanager
 def _reader(path: Path) -> Iterator[Any]:
-    """pymavlink's, whose file is closed also where it fails as it begins."""
-    # its compiled indexer, which is hardly faster, prints past `redirect_stderr`
+    """Open pymavlink's reader, and close its file even if its constructor fails."""
+    # its compiled indexer is hardly faster, and prints past redirect_stderr
     os.environ.setdefault("PYMAVLINK_FAST_INDEX", "0")
     kind = import_pymavlink("DFReader").DFReader_binary
     reader = kind.__new__(kind)

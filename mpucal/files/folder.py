@@ -12,7 +12,7 @@ from .rows import Rows
 
 
 def captures_in(folder: Path, capture: SessionFile = CAPTURE) -> list[Path]:
-    """All that are there, the first one first; none where that is missing."""
+    """Return the captures of one kind of session, in order; none if the first is missing."""
     found: list[Path] = []
     while (path := folder / capture.numbered(len(found) + 1)).exists():
         found.append(path)
@@ -20,18 +20,18 @@ def captures_in(folder: Path, capture: SessionFile = CAPTURE) -> list[Path]:
 
 
 def all_captures_in(folder: Path) -> list[Path]:
-    """Those of either kind of session."""
+    """Return the captures of a session of a chip and of one of a vehicle."""
     return [*captures_in(folder), *captures_in(folder, CAPTURE_OF_VEHICLE)]
 
 
 def load_folder(folder: Path) -> Recording:
-    """The recording in a session's captures; see load."""
+    """Return the recording in a session's captures; see load."""
     row, captures = _captured(folder)
     return row.read(*captures)
 
 
 def folder_rows(folder: Path) -> Rows:
-    """The samples in a session's captures; see open_rows."""
+    """Return the samples in a session's captures; see open_rows."""
     row, captures = _captured(folder)
     return row.read_rows(*captures)
 

@@ -1,7 +1,7 @@
-"""The formats of recording files, a row each; what reads or writes one is imported when such a file is met.
+"""The formats of recording files, a row each; a format's module is imported when such a file is read or written.
 
-Several rows may share a suffix: the first that recognises a file reads it, and the last of them takes what none
-recognises, to say what is wrong with it.
+Several rows may share a suffix: the first that recognises a file reads it, and the last reads a file that none
+recognises, so that its error message says what is wrong.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..arguments import regular
 from ..data import Recording
 from ..errors import OutputError, RecordingError, UsageError
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, SessionFile
-from .budget import READ, afford
+from .budget import READ, check_size
 from .hints import NO_HINTS, Hints
 from .rows import Rows, Write
 
@@ -25,18 +25,18 @@ FOLDER = "/"
 
 @dataclass(frozen=True)
 class Format:
-    """A format of recording files; its functions are named "module:attribute", and empty where there is none.
+    """A format of recording files; its functions are named "package.module:function", or empty if there is none.
 
     Attributes
     ----------
-    suffix : that its files' names end with, in lower case; FOLDER of a folder.
-    what : what a file of it holds, in words with an article.
+    suffix : of its files' names, in lower case; FOLDER for a folder.
+    what : the content of such a file, in words with an article.
     load : (path) -> Recording, the whole file. rows : (path) -> Rows, in bounded memory. One of them is enough.
     writer : (path, rows, done) -> context of a Write; see open_writer.
-    recognises : (path) -> bool, whether a file of this suffix is one. Empty: each is.
-    session : the file in which a session is captured in it; `load` and `rows` then take every part of a resumed one.
-    hinted : whether `load` and `rows` take Hints besides, and reads a file that is not recognised where some are given.
-    only_recognised : whether a file that it does not recognise is no kind of recording, whatever its suffix.
+    recognises : (path) -> bool, True if a file of this suffix is of this format. Empty: every such file is.
+    session : the capture file of sessions in this format; `load` and `rows` then take all parts of a resumed session.
+    hinted : `load` and `rows` also take Hints; with hints, this format reads files that it does not recognise.
+    only_recognised : a file that is not recognised is not a recording.
     """
 
     suffix: str
@@ -51,32 +51,32 @@ class Format:
 
     @property
     def is_read(self) -> bool:
-        """Whether there is a reader of it."""
+        """Return True if files of this format can be read."""
         return bool(self.load or self.rows)
 
-    def is_of(self, path: Path) -> bool:
-        """Whether what is at `path` is in this format, as far as that shows without reading it all."""
+    def matches(self, path: Path) -> bool:
+        """Return True if the file or folder looks like this format; it is not read to its end."""
         suffix = FOLDER if path.is_dir() else path.suffix.lower()
         return suffix == self.suffix and (not self.recognises or bool(resolve_name(self.recognises)(path)))
 
     def read(self, *paths: Path, hints: Hints = NO_HINTS) -> Recording:
-        """The recording, whole; see load."""
+        """Return the whole recording; see load."""
         for path in paths:
-            afford(path, path.stat().st_size if path.is_file() else 0, READ)
+            check_size(path, path.stat().st_size if path.is_file() else 0, READ)
         if not self.load:
             return self.read_rows(*paths).recording()
         recording: Recording = resolve_name(self.load)(*paths, *([hints] if self.hinted else []))
         return recording
 
     def read_rows(self, *paths: Path, hints: Hints = NO_HINTS) -> Rows:
-        """The recording, a run of samples at a time; see open_rows."""
+        """Return the recording a run of samples at a time; see open_rows."""
         if not self.rows:
             return Rows.of(self.read(*paths, hints=hints))
         rows: Rows = resolve_name(self.rows)(*paths, *([hints] if self.hinted else []))
         return rows
 
     def write(self, path: Path, rows: Rows, done: str) -> AbstractContextManager[Write]:
-        """A new file of it; see open_writer."""
+        """Open a new file of this format; see open_writer."""
         context: AbstractContextManager[Write] = resolve_name(self.writer)(path, rows, done)
         return context
 
@@ -144,81 +144,81 @@ FORMATS = (
     Format(
         FOLDER,
         "a folder of recordings of one sensor",
-        f"{_HERE}.several:load_folder_of_recordings",
-        recognises=f"{_HERE}.several:is_folder_of_recordings",
+        f"{_HERE}.recording_folder:load_folder_of_recordings",
+        recognises=f"{_HERE}.recording_folder:is_folder_of_recordings",
         hinted=True,
     ),
     Format(FOLDER, "the folder of a session", f"{_HERE}.folder:load_folder", f"{_HERE}.folder:folder_rows"),
 )
 
 
-def recognised(path: Path) -> Format | None:
-    """The format of a recording; None of what is none.
+def recognise(path: Path) -> Format | None:
+    """Return the format of a recording; None if the file is not a recording.
 
     Raises
     ------
     RecordingError : it is a pipe or device, whose bytes can be read once at best.
     """
     regular(path)
-    return next((row for row in FORMATS if row.is_read and row.is_of(path)), None)
+    return next((row for row in FORMATS if row.is_read and row.matches(path)), None)
 
 
 def format_of(path: Path, hints: Hints = NO_HINTS) -> Format:
-    """The format to read `path` by.
+    """Return the format to read `path` with.
 
     Raises
     ------
-    RecordingError : there is no such file, or no reader of its suffix. UsageError : its reader takes no hints.
+    RecordingError : there is no such file, or no reader for its suffix. UsageError : its reader takes no hints.
     """
     if not path.exists():
         raise RecordingError(f"there is no file {path}", "check the path")
     suffix = FOLDER if path.is_dir() else path.suffix.lower()
     of_suffix = [row for row in FORMATS if row.is_read and row.suffix == suffix]
-    found = recognised(path)
+    found = recognise(path)
     if hints.given and not (found and found.hinted):
         found = next((row for row in reversed(of_suffix) if row.hinted), found)
         if found is None or not found.hinted:
-            what = found.what if found else "no kind of recording that mpucal knows"
+            what = found.what if found else "not a recording that mpucal knows"
             raise UsageError(
-                f"{path} is {what}, of which nothing has to be said",
+                f"{path} is {what}; it needs no options on how to read it",
                 "leave out --topic, --columns, --units, --accel-range, --gyro-range and --rate",
             )
     others = [row for row in of_suffix if not row.only_recognised]
     if found is None and not others:
-        raise RecordingError(f"{path} is no kind of recording that mpucal knows", f"give {_suffixes()}")
+        raise RecordingError(f"{path} is not a recording that mpucal knows", f"give {_suffixes()}")
     return found or others[-1]
 
 
 def written_format(path: Path) -> Format:
-    """The format to write `path` in.
+    """Return the format to write `path` in.
 
     Raises
     ------
-    OutputError : there is no writer of its suffix.
+    OutputError : there is no writer for its suffix.
     """
     written = {row.suffix: row for row in FORMATS if row.writer}
     if path.suffix.lower() not in written:
-        raise OutputError(f"{path} ends with no kind of file that is written", f"end it with {', '.join(written)}")
+        raise OutputError(f"mpucal cannot write a file like {path}", f"end its name with {', '.join(written)}")
     return written[path.suffix.lower()]
 
 
 def is_of_session(name: str) -> bool:
-    """Whether a file of this name is in a format that sessions are captured in."""
+    """Return True if a file of this name is in a format of session captures."""
     return any(row.session and row.suffix == Path(name).suffix.lower() for row in FORMATS)
 
 
-def readable() -> str:
-    """All that is read, in words."""
+def readable_formats() -> str:
+    """Return the formats that can be read, as text."""
     return _listed(row for row in FORMATS if row.is_read)
 
 
-def held_whole() -> str:
-    """All of which the samples have to fit the memory, in words."""
+def formats_in_memory() -> str:
+    """Return the formats that are loaded whole into memory, as text."""
     return _listed(row for row in FORMATS if row.is_read and (row.hinted or not row.rows))
 
 
-def writable() -> str:
-    """All that is written, in words."""
+def writable_formats() -> str:
+    """Return the formats that can be written, as text."""
     return _listed(row for row in FORMATS if row.writer)
 
 

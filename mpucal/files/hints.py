@@ -1,4 +1,4 @@
-"""What a person says of a recording that does not say it itself: topic, columns, units, ranges and rate."""
+"""Hints of the user on a recording that lacks the information: topic, columns, units, ranges and rate."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ SKIPPED = ("-", "_", "")
 
 @dataclass(frozen=True)
 class Hints:
-    """What is said; None and empty where nothing is.
+    """Hints on how to read a file; None or empty if not given.
 
     Attributes
     ----------
-    topic : of a bag or a log with more than one IMU.
+    topic : in a bag or a log with more than one IMU.
     columns : role (t, ax ... gz) -> a column's name, or its place from 0.
     units : quantity (t, acc, gyr) -> unit, as tables.units names it.
-    accel_range_g, gyro_range_dps : full scale, of counts. rate_hz : of samples without times.
-    span : (from, to) s since the first sample, what is read of it; of any file.
+    accel_range_g, gyro_range_dps : full scale of counts. rate_hz : of samples without times.
+    span : (from, to) in s since the first sample, the part to read; for any file.
     """
 
     topic: str | None = None
@@ -35,7 +35,7 @@ class Hints:
 
     @property
     def given(self) -> tuple[str, ...]:
-        """The names of what is said of how the file is written."""
+        """Return the names of the hints that are given, except the span."""
         return tuple(f.name for f in fields(self) if getattr(self, f.name) and f.name != "span")
 
 
@@ -43,7 +43,7 @@ NO_HINTS = Hints()
 
 
 def parse_columns(text: str) -> Mapping[str, str | int]:
-    """`t=time_us,ax=AccX,...` by name or number from 1, or `t,ax,ay,az,gx,gy,gz` in the order of the columns.
+    """Parse `t=time_us,ax=AccX,...`, by name or number from 1, or `t,ax,ay,az,gx,gy,gz` in the order of the columns.
 
     Raises
     ------
@@ -57,14 +57,14 @@ def parse_columns(text: str) -> Mapping[str, str | int]:
             continue
         if role not in ROLES or role in found or (equals and not name):
             raise ValueError(
-                f"{item!r} is no column: give t=NAME,ax=NAME,... or the columns' order, such as t,ax,ay,az,gx,gy,gz"
+                f"{item!r} is not a column: give t=NAME,ax=NAME,... or the columns' order, such as t,ax,ay,az,gx,gy,gz"
             )
         found[role] = (int(name) - 1 if name.isdecimal() and int(name) else name) if equals else place
     return found
 
 
 def parse_units(text: str) -> Mapping[str, str]:
-    """`t=ms,acc=g,gyr=deg/s`, or some of it.
+    """Parse `t=ms,acc=g,gyr=deg/s`, or a part of it.
 
     Raises
     ------
@@ -76,17 +76,17 @@ def parse_units(text: str) -> Mapping[str, str]:
         unit = unit_named(said)
         if quantity not in QUANTITIES or unit not in QUANTITIES[quantity]:
             known = "; ".join(f"{name} in {', '.join(units)}" for name, units in QUANTITIES.items())
-            raise ValueError(f"{item!r} is no unit: {known}")
+            raise ValueError(f"{item!r} is not a unit: {known}")
         found[quantity] = unit
     return found
 
 
 def parse_span(text: str) -> tuple[float, float]:
-    """`FROM:TO`, s since the first sample; empty: from the first, to the last.
+    """Parse `FROM:TO` in s since the first sample; an empty end is that of the recording.
 
     Raises
     ------
-    ValueError : it is no such span.
+    ValueError : it is not a span.
     """
     begin, colon, end = text.partition(":")
     try:
@@ -94,5 +94,5 @@ def parse_span(text: str) -> tuple[float, float]:
     except ValueError:
         span = 0.0, 0.0
     if not colon or not 0.0 <= span[0] < span[1]:
-        raise ValueError(f"{text!r} is no span: give FROM:TO in s since the first sample, such as 10:95, or :95")
+        raise ValueError(f"{text!r} is not a span: give FROM:TO in s since the first sample, such as 10:95, or :95")
     return span

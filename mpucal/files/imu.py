@@ -26,7 +26,7 @@ from .rows import Rows, Write
 
 TOPIC, FRAME_ID = "/imu/data", "imu"
 S = 1_000_000_000
-# sensor_msgs/Imu: a first covariance of -1 says that there is no such measurement
+# sensor_msgs/Imu: a first covariance of -1 means no such measurement
 NOT_MEASURED = -1.0
 
 MESSAGE = np.dtype(
@@ -74,17 +74,15 @@ float64 z
 """
 
 
-def messages(samples: Samples, noise: Vector, utc_ns: int = 0) -> tuple[NDArray[np.int64], NDArray[Any]]:
-    """Times (n,) [ns] and messages (n,), each the CDR bytes of a sample; `noise` as of Rows, `utc_ns` is t = 0.
+def encode_messages(samples: Samples, noise: Vector, utc_ns: int = 0) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    """Return times (n,) [ns] and messages (n,), each the CDR bytes of a sample; `noise` as of Rows, `utc_ns` at t = 0.
 
     Raises
     ------
-    RecordingError : a time that no message can hold.
+    RecordingError : a time that a message cannot hold.
     """
     if not (np.isfinite(samples.t) & (samples.t >= 0.0) & (samples.t + utc_ns / S < 2.0**31 - 1)).all():
-        raise RecordingError(
-            "a time is no number of seconds from 0 to 2^31, as a message of ROS holds it", "write a .csv or .npz"
-        )
+        raise RecordingError("a message of ROS can only hold times from 0 to 2^31 s", "write a .csv or .npz")
     t_ns = np.rint(samples.t * S).astype(np.int64) + utc_ns
     rows = np.zeros(len(samples), MESSAGE)
     rows["cdr"] = np.void(b"\0\1\0\0")
@@ -92,7 +90,7 @@ def messages(samples: Samples, noise: Vector, utc_ns: int = 0) -> tuple[NDArray[
     rows["frame_id"], rows["frame_id_size"] = FRAME_ID.encode(), len(FRAME_ID) + 1
     rows["orientation"][:, 3] = 1.0
     rows["orientation_covariance"][:, 0] = NOT_MEASURED
-    # zeros: not known
+    # zeros mean that it is not known
     acc_covariance, gyr_covariance = (np.diag(np.nan_to_num(std**2)).ravel() for std in noise)
     rows["linear_acceleration_covariance"] = acc_covariance
     rows["angular_velocity_covariance"] = gyr_covariance
@@ -105,9 +103,9 @@ def messages(samples: Samples, noise: Vector, utc_ns: int = 0) -> tuple[NDArray[
 
 @contextmanager
 def imu_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
-    """An MCAP file of Imu messages on TOPIC; `done`, what was done to the samples, is its metadata. See open_writer.
+    """Open an MCAP file of Imu messages on TOPIC, with `done` as its metadata; see open_writer.
 
-    Their stamps are the time of day where it is known, as of every robot's; else the recording's own times.
+    Stamps are times of day if these are known, as on every robot, and else the recording's own times.
     """
     utc_ns = rows.utc_ns or 0
     with whole_file(path) as file:
@@ -119,5 +117,5 @@ def imu_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
             Channel(id=1, topic=TOPIC, message_encoding=MessageEncoding.CDR, metadata={}, schema_id=1),
             Metadata(CALIBRATED, {"done": done}),
         )
-        yield lambda samples: writer.add(*messages(samples, rows.noise, utc_ns))
+        yield lambda samples: writer.add(*encode_messages(samples, rows.noise, utc_ns))
         writer.finish()

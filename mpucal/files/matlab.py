@@ -1,7 +1,6 @@
-"""Arrays of a MATLAB file of level 5, as `save(NAME, '-v7')` or `'-v6'` writes it (MAT-File Format, MathWorks).
+"""Arrays of a MATLAB file of level 5, as written by `save(NAME, '-v7')` or `'-v6'` (MAT-File Format, MathWorks).
 
-SciPy's reader crashes the interpreter on damaged files, and of what such a file may hold only arrays of numbers and
-structures of them are wanted here.
+SciPy's reader crashes the interpreter on damaged files. This one reads arrays of numbers and structures of them.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .budget import most_bytes
+from .budget import allowed_bytes
 
 HEAD = 128
 ORDERS = {b"IM": "<", b"MI": ">"}
@@ -27,22 +26,22 @@ STRUCTURE, NUMBERS = 2, range(6, 16)
 DEEPEST, MOST_DIMENSIONS = 8, 8
 
 
-def arrays_of(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Name and array, of a structure's `name.field`.
+def read_matlab_arrays(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield name and array; an array in a structure is `name.field`.
 
     Raises
     ------
-    NotImplementedError : of MATLAB 7.3, or of level 4. ValueError, zlib.error : it is no whole file.
+    NotImplementedError : a file of MATLAB 7.3 or of level 4. ValueError, zlib.error : it is not a whole file.
     """
     data = memoryview(path.read_bytes())
     order = ORDERS.get(bytes(data[HEAD - 2 : HEAD]))
     if order is None or bytes(data[:10]) == b"MATLAB 7.3":
         if bytes(data[:6]) != b"MATLAB":
-            raise ValueError("it does not begin as one")
+            raise ValueError("it does not begin as a file of MATLAB")
         raise NotImplementedError("another level")
     for kind, element in _elements(data[HEAD:], order):
         if kind == COMPRESSED:
-            whole = memoryview(zlib.decompressobj().decompress(element, most_bytes()))
+            whole = memoryview(zlib.decompressobj().decompress(element, allowed_bytes()))
             for inner, matrix in _elements(whole, order):
                 yield from _matrix(matrix, order, "") if inner == MATRIX else ()
         elif kind == MATRIX:
@@ -50,11 +49,11 @@ def arrays_of(path: Path) -> Iterator[tuple[str, NDArray[Any]]]:
 
 
 def _elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
-    """The type and the data of each element."""
+    """Yield the type and the data of each element."""
     at = 0
     while at + 8 <= len(data):
         kind, size = struct.unpack_from(f"{order}II", data, at)
-        # up to four bytes stand within the tag
+        # up to four bytes of data may be in the tag
         begin = at + 8
         if kind >> 16:
             kind, size, begin = kind & 0xFFFF, kind >> 16, at + 4
@@ -66,7 +65,7 @@ def _elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
 
 
 def _matrix(data: memoryview, order: str, within: str, depth: int = 0) -> Iterator[tuple[str, NDArray[Any]]]:
-    """The arrays of a matrix: itself, or those of a structure's fields."""
+    """Yield the arrays of a matrix: itself, or those in a structure's fields."""
     parts = list(_elements(data, order))
     if len(parts) < 3 or depth > DEEPEST or len(parts[0][1]) < 4:
         return

@@ -1,8 +1,8 @@
-"""Captures as MCAP files: every register access and session event as it happened.
+"""Captures as MCAP files: every register access and session event in order.
 
-While a capture is written, half a second is a chunk with one message of register accesses. One that is closed is
-written anew with longer chunks, which take half the room and are read several times as fast: each a tenth of what
-precedes it, so that little is lost where a file is cut.
+While a capture is written, a chunk with one message of register accesses holds half a second. A closed capture is
+rewritten with longer chunks, which take half the space and are read several times as fast: each is a tenth of the part
+before it, so that little is lost if the file is cut.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ from ..disk.whole import whole_file
 from ..errors import CaptureError, OutputError
 from ..strict_json import parsed_own
 from .budget import LONGEST_CHUNK
-from .messages import BUS, SESSION, accesses_message, accesses_schema, event_message, event_schema, records_of
+from .messages import BUS, SESSION, accesses_schema, decode_message, encode_accesses, encode_event, event_schema
 
 FORMAT, VERSION_KEY, VERSION = "mpucal.capture", "capture_version", 2
-# the metadata of a file of calibrated samples, which is no capture
+# the name of the metadata in a file of calibrated samples, which is not a capture
 CALIBRATED = "mpucal.imu"
 
-# half of the second that a killed program may lose: the other half is for the wait between two records
+# half of the second that a killed program may lose; the other half may pass between two records
 CHUNK_NS = 500_000_000
-# of a closed capture: the longest, and the part of what precedes it
+# chunks of a closed capture: the longest, and the inverse share of the part before it
 CLOSED_CHUNK_NS, CLOSED_CHUNK_PART = 10_000_000_000, 10
 
-# of writing: the latter is zstd without memory. Of reading, the last two: a length that no memory holds
+# errors of writing; ZstdError: out of memory. Of reading, the last two: a length that exceeds all memory
 _FAILED = (OSError, ZstdError)
 _DAMAGE = (
     McapError,
@@ -59,7 +59,7 @@ _DAMAGE = (
 
 
 class CaptureWriter:
-    """Writes a capture as it happens; a program that is killed loses the last second at most.
+    """Writer of a capture during a session; a killed program loses the last second at most.
 
     Raises
     ------
@@ -69,36 +69,36 @@ class CaptureWriter:
     def __init__(self, path: str | Path) -> None:
         self._meta: Mapping[str, Any] = {}
         self._file = Growing(Path(path))
-        # the chunks' index grows by 1 MB an hour: in vain where nothing is kept
+        # the index of chunks grows by 1 MB an hour, which is wasted if the file is not kept
         self._stream = _Stream(cast("IO[bytes]", self._file), CHUNK_NS, chunked=self._file.kept)
 
     def start(self, meta: Mapping[str, Any]) -> None:
-        """Write the head of the file: what is captured, by what and how; values of JSON's own types."""
+        """Write the metadata: source, program and settings, values of JSON types."""
         self._meta = dict(meta)
         with self._writing():
             self._stream.start(meta)
 
     def transaction(self, transaction: Transaction) -> None:
-        """Keep a register access; the message's publish time is the host's clock."""
-        try:  # as `_writing`, in a third of its time
+        """Write a register access; the message's publish time is the host's clock."""
+        try:  # a third of the time of `with self._writing()`
             self._stream.add(transaction)
         except _FAILED as error:
             raise self._file.failed(error) from error
 
     def event(self, name: str, t_ns: int, data: Mapping[str, Any] | None = None) -> None:
-        """Keep a session event; `data` of JSON's own types."""
+        """Write a session event; `data` of JSON types."""
         with self._writing():
             self._stream.add(SessionEvent(name, t_ns, data or {}))
 
     def close(self) -> None:
-        """Write the index, close the file, and write it anew with longer chunks where there is room for that."""
+        """Write the index, close the file, and rewrite it with longer chunks if the disk has room for that."""
         with self._writing():
             try:
                 self._stream.finish()
             finally:
                 path = self._file.close()
         if self._stream.started and path is not None:
-            # without it the file is as whole, and longer
+            # the file is complete without this, only longer
             with suppress(OutputError, CaptureError, ZstdError, MemoryError):
                 self._with_longer_chunks(path)
 
@@ -106,7 +106,7 @@ class CaptureWriter:
         return self
 
     def __exit__(self, kind: object, *_: object) -> None:
-        # what ends it by another error is told by that
+        # the error that ends the block matters more
         with suppress(*(() if kind is None else (OutputError,))):
             self.close()
 
@@ -129,11 +129,11 @@ class CaptureWriter:
 
 
 class _Stream:
-    """A capture into an open file: accesses wait until there are enough of them for a message, then a chunk ends.
+    """Encoder of a capture into an open file, which gathers accesses for a message and ends chunks.
 
     Parameters
     ----------
-    longest_ns : of a chunk. chunked : whether there are any.
+    longest_ns : of a chunk. chunked : False to write no chunks.
     """
 
     def __init__(self, file: IO[bytes], longest_ns: int, chunked: bool = True) -> None:
@@ -167,7 +167,7 @@ class _Stream:
         begin_ns, t_ns = map(int, ends)
         if isinstance(record, SessionEvent):
             self._put_waiting()
-            self._put(SESSION, t_ns, event_message(record.name, record.data))
+            self._put(SESSION, t_ns, encode_event(record.name, record.data))
         elif isinstance(record, Accesses):
             if self._waiting or (self._blocks and not self._blocks[-1].can_join(record)):
                 self._put_waiting()
@@ -195,10 +195,10 @@ class _Stream:
         if self._blocks or self._waiting:
             accesses = Accesses.joined(self._blocks) if self._blocks else Accesses.from_transactions(self._waiting)
             self._blocks, self._waiting = [], []
-            if accesses.heard.any():
-                first = int(accesses.heard.argmax())
+            if accesses.has_host_ns.any():
+                first = int(accesses.has_host_ns.argmax())
                 self._ahead_ns = int(accesses.host_ns[first] - accesses.t_ns[first])
-            self._put(BUS, int(accesses.t_ns[0]), accesses_message(accesses))
+            self._put(BUS, int(accesses.t_ns[0]), encode_accesses(accesses))
 
     def _put(self, topic: str, t_ns: int, data: bytes) -> None:
         self._writer.add_message(self._channels[topic], t_ns, data, publish_time=max(t_ns + self._ahead_ns, 0))
@@ -206,13 +206,13 @@ class _Stream:
 
 @dataclass(frozen=True)
 class Capture:
-    """What a capture file holds.
+    """Content of a capture file.
 
     Attributes
     ----------
-    meta : what `CaptureWriter.start` was given. records : in the order in which they happened.
-    recovered : None, or the sentence that says how much of a damaged file this is.
-    name : what to call the file in a message.
+    meta : metadata of `CaptureWriter.start`. records : in order of time.
+    recovered : None, or a sentence on the part of a damaged file that was read.
+    name : of the file, for messages.
     """
 
     meta: Mapping[str, Any]
@@ -222,11 +222,11 @@ class Capture:
 
 
 def read_capture(path: str | Path) -> Capture:
-    """Read a capture; of a file that was cut short, all that is whole.
+    """Read a capture; of a file that was cut short, the whole part.
 
     Raises
     ------
-    CaptureError : the file cannot be read, or is no capture of mpucal.
+    CaptureError : the file cannot be read, or is not a capture of mpucal.
     """
     reader = CaptureReader(path)
     records = tuple(reader)
@@ -234,17 +234,15 @@ def read_capture(path: str | Path) -> Capture:
 
 
 class CaptureReader:
-    """The records of a capture, one after the other, as they are read; of a file that was cut short, all that is whole.
-
-    To be gone through once.
+    """Iterator over the records of a capture, once; of a file that was cut short, over the whole part.
 
     Attributes
     ----------
-    name : what to call the file in a message. meta, recovered : see Capture; once all records were read.
+    name : of the file, for messages. meta, recovered : see Capture; set when all records are read.
 
     Raises
     ------
-    CaptureError : the file cannot be read, or is no capture of mpucal; some of it only where the records come to it.
+    CaptureError : the file cannot be read, or is not a capture of mpucal; perhaps only after some records.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -262,7 +260,7 @@ class CaptureReader:
                 yield block
 
     def blocks(self) -> Iterator[Accesses | Record]:
-        """The same, register accesses as many at a time as the file has them."""
+        """Yield the records, register accesses by the block as in the file."""
         try:
             with regular(self._path).open("rb") as file:
                 yield from self._blocks(file)
@@ -278,7 +276,7 @@ class CaptureReader:
         channels: dict[int, Channel] = {}
         meta: Mapping[str, Any] | None = None
         whole, finished = 0, False
-        stream = _Bounded(file, size)
+        stream = _SizeLimitedFile(file, size)
         items = _records(
             StreamReader(cast("IO[bytes]", stream), emit_chunks=True, validate_crcs=True, record_size_limit=size)
         )
@@ -286,7 +284,7 @@ class CaptureReader:
             try:
                 item = next(items, None)
             except _DAMAGE:
-                # what was read until here is whole, and `recovered` says what is not
+                # everything read so far is whole; `recovered` tells the rest
                 break
             whole, finished = stream.at, item is None
             if isinstance(item, Metadata) and item.name == FORMAT:
@@ -294,18 +292,18 @@ class CaptureReader:
             elif isinstance(item, Metadata) and item.name == CALIBRATED:
                 raise CaptureError(
                     f"{self._path} holds samples that are calibrated already ({item.metadata.get('done')})",
-                    "give the recording that they were made of",
+                    "give the recording from which it was made",
                 )
             elif isinstance(item, Channel):
                 channels[item.id] = item
             elif isinstance(item, Message):
                 block = self._block(channels.get(item.channel_id), item)
                 if block is not None:
-                    self._counted(block)
+                    self._count_block(block)
                     yield block
         if meta is None:
             raise CaptureError(
-                f"{self._path} does not hold the head of a capture of mpucal",
+                f"{self._path} lacks the metadata of a capture",
                 "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu",
             )
         self.meta = meta
@@ -315,10 +313,10 @@ class CaptureReader:
         if channel is None:
             return None
         try:
-            return records_of(channel.topic, channel.message_encoding, message.log_time, message.data)
+            return decode_message(channel.topic, channel.message_encoding, message.log_time, message.data)
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise CaptureError(
-                f"{self._path} holds a message on {channel.topic} that is none of mpucal's ({error})",
+                f"{self._path} holds an invalid message on {channel.topic} ({error})",
                 "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu",
             ) from error
 
@@ -327,10 +325,11 @@ class CaptureReader:
             raise CaptureError(f"{self._path} is empty", "record it again")
         if magic != MCAP0_MAGIC:
             raise CaptureError(
-                f"{self._path} is no MCAP file", "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu"
+                f"{self._path} is not an MCAP file",
+                "give a capture that mpucal recorded, or a bag with sensor_msgs/Imu",
             )
 
-    def _counted(self, block: Accesses | Record) -> None:
+    def _count_block(self, block: Accesses | Record) -> None:
         if isinstance(block, Accesses):
             first_ns, self._last_ns, count = int(block.t_ns[0]), int(block.t_ns[-1]), len(block)
         else:
@@ -346,7 +345,7 @@ class CaptureReader:
 
 
 def _records(reader: StreamReader) -> Iterator[McapRecord]:
-    """All records, those of a chunk once it is known to be no longer than chunks are."""
+    """Yield all records; a chunk is unpacked only if its size is allowed."""
     for record in reader.records:
         if not isinstance(record, Chunk):
             yield record
@@ -357,19 +356,19 @@ def _records(reader: StreamReader) -> Iterator[McapRecord]:
         yield from breakup_chunk(record, validate_crc=True)
 
 
-class _Bounded:
-    """A file of `size` bytes that is not asked for more of them: a damaged length would take all memory.
+class _SizeLimitedFile:
+    """File of `size` bytes that never reads more of them, since a damaged length would take all memory.
 
     Attributes
     ----------
-    at : how many were read.
+    at : number of bytes that were read.
     """
 
     def __init__(self, file: IO[bytes], size: int) -> None:
         self._file, self._size, self.at = file, size, 0
 
     def read(self, count: int) -> bytes:
-        """At most `count` bytes; none where a damaged length makes it negative."""
+        """Return at most `count` bytes; none if a damaged length makes it negative."""
         data = self._file.read(max(0, min(count, self._size - self.at)))
         self.at += len(data)
         return data
@@ -380,10 +379,10 @@ def _meta(item: Metadata, path: Path) -> dict[str, Any]:
         meta = {key: parsed_own(value) for key, value in item.metadata.items()}
         version = int(meta.pop(VERSION_KEY))
     except (ValueError, KeyError, TypeError) as error:
-        raise CaptureError(f"the head of {path} is damaged ({error})", "record it again") from error
+        raise CaptureError(f"the metadata of {path} are damaged ({error})", "record it again") from error
     if version > VERSION:
         raise CaptureError(
-            f"{path} is a capture of version {version}, and this mpucal reads up to {VERSION}",
+            f"{path} is a capture of version {version}, but this mpucal reads versions up to {VERSION}",
             "update mpucal",
         )
     return meta

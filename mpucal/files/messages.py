@@ -1,20 +1,20 @@
-"""The messages of a capture: register accesses on BUS, many to a message, and session events on SESSION.
+"""Messages of a capture: register accesses on BUS, many to a message, and session events on SESSION.
 
-Accesses are columns, one entry an access, in Protocol Buffers' encoding; the file holds their schema too:
+A message of accesses has columns with one entry per access, in Protocol Buffers' encoding. The file holds the schema:
 
     kind         a sum of WRITE, HEARD and FRAMED
-    register     its address; from 256 on a file of a driver of the kernel: files[register - 256]
-    count        bytes asked for or given
-    moved        bytes moved
-    step_ns      the bus's clock, less that of the access before; the first as it is
-    heard_ns     of those HEARD: the host's clock less the bus's, less the same of the one before; the first as it is
-    data         the bytes moved, but of those FRAMED
-    frame_words  how many words a frame has
-    words        the frames of those FRAMED: int16, each less the same word of the frame before, modulo 2^16
-    failures     of those that failed: which (from 0), and how
+    register     address; from 256 on, a file of a kernel driver: files[register - 256]
+    count        bytes requested or given
+    moved        bytes transferred
+    step_ns      the bus's clock minus that of the access before; the first is absolute
+    heard_ns     only of HEARD: the host's clock minus the bus's, minus that of the one before; the first is absolute
+    data         the bytes transferred, except those of FRAMED
+    frame_words  number of words of a frame
+    words        the frames of FRAMED: int16, each minus the same word of the frame before, modulo 2^16
+    failures     of failed accesses: index (from 0) and error
     files        names, such as iio:device0/in_accel_scale
 
-Events are JSON. So were accesses in captures of version 1, a message each.
+Events are JSON. In captures of version 1 each access was a JSON message.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from . import protobuf
 BUS, SESSION = "/bus", "/session"
 WRITE, HEARD, FRAMED = 1, 2, 4
 
-# name, type, whether repeated; numbered from 1
+# name, type, repeated; numbered from 1
 _FAILURE = (("access", "uint32", False), *((name, "string", False) for name in Failure._fields))
 _ACCESSES = (
     ("kind", "uint32", True),
@@ -61,20 +61,20 @@ _EVENT = {
 
 
 def accesses_schema() -> bytes:
-    """The schema of the messages on BUS, a FileDescriptorSet."""
+    """Return the schema of the messages on BUS, a FileDescriptorSet."""
     return protobuf.schema("mpucal", {"Accesses": _ACCESSES, "Failure": _FAILURE})
 
 
 def event_schema() -> bytes:
-    """The schema of the messages on SESSION, a JSON Schema."""
+    """Return the schema of the messages on SESSION, a JSON Schema."""
     return json.dumps(_EVENT).encode()
 
 
-def accesses_message(a: Accesses) -> bytes:
-    """Register accesses, one at least."""
-    ahead = (a.host_ns - a.t_ns)[a.heard]
+def encode_accesses(a: Accesses) -> bytes:
+    """Encode one or more register accesses."""
+    ahead = (a.host_ns - a.t_ns)[a.has_host_ns]
     columns: dict[str, bytes | int] = {
-        "kind": protobuf.packed(WRITE * a.write + HEARD * a.heard + FRAMED * a.framed),
+        "kind": protobuf.packed(WRITE * a.write + HEARD * a.has_host_ns + FRAMED * a.framed),
         "register": protobuf.packed(a.register),
         "count": protobuf.packed(a.count),
         "moved": protobuf.packed(a.moved),
@@ -92,12 +92,12 @@ def accesses_message(a: Accesses) -> bytes:
     return message + b"".join(protobuf.field(_NUMBERS["files"], name.encode()) for name in a.files)
 
 
-def accesses_of(message: bytes) -> Accesses:
-    """The accesses of a message.
+def decode_accesses(message: bytes) -> Accesses:
+    """Decode the accesses of a message.
 
     Raises
     ------
-    ValueError, KeyError, TypeError, AttributeError : no message on BUS.
+    ValueError, KeyError, TypeError, AttributeError : it is not a message on BUS.
     """
     columns: dict[str, Any] = {"data": b"", "frame_words": 1}
     failures: dict[int, Failure] = {}
@@ -118,7 +118,7 @@ def accesses_of(message: bytes) -> Accesses:
         raise ValueError("no access")
     t_ns, is_heard = np.cumsum(protobuf.unzigzag(steps)), (kind & np.uint64(HEARD)) > 0
     if len(t_ns) != len(kind) or len(heard) != is_heard.sum():
-        raise ValueError("times that are not those of the accesses")
+        raise ValueError("numbers of times and accesses differ")
     host_ns = np.zeros(len(t_ns), np.int64)
     host_ns[is_heard] = t_ns[is_heard] + np.cumsum(protobuf.unzigzag(heard))
     return Accesses(
@@ -143,20 +143,22 @@ def _failure(message: bytes | int) -> tuple[int, Failure]:
     return int(values.get(1, 0)), Failure(*(name.decode() for name in names if isinstance(name, bytes)))
 
 
-def event_message(name: str, data: Mapping[str, Any]) -> bytes:
-    """A session event; `data` of JSON's own types."""
+def encode_event(name: str, data: Mapping[str, Any]) -> bytes:
+    """Encode a session event; `data` of JSON types."""
     return json.dumps({"name": name, "data": dict(data)}, separators=(",", ":")).encode()
 
 
-def records_of(topic: str, encoding: str, t_ns: int, message: bytes) -> Accesses | Transaction | SessionEvent | None:
-    """What a message holds; None for a topic that a newer mpucal added.
+def decode_message(
+    topic: str, encoding: str, t_ns: int, message: bytes
+) -> Accesses | Transaction | SessionEvent | None:
+    """Decode a message; None for the topic of a newer mpucal.
 
     Raises
     ------
-    ValueError, KeyError, TypeError, AttributeError : no message of that topic.
+    ValueError, KeyError, TypeError, AttributeError : it is not a message of that topic.
     """
     if topic == BUS:
-        return accesses_of(message) if encoding == MessageEncoding.Protobuf else _transaction(t_ns, message)
+        return decode_accesses(message) if encoding == MessageEncoding.Protobuf else _transaction(t_ns, message)
     if topic == SESSION:
         content = parsed_own(message)
         return SessionEvent(content["name"], t_ns, content["data"])

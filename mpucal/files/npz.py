@@ -1,11 +1,11 @@
-"""NumPy archives: `t` [s] (n,), `acc` [m/s^2] (n, 3), `gyr` [rad/s] (n, 3), and what else is known.
+"""NumPy archives: `t` [s] (n,), `acc` [m/s^2] (n, 3), `gyr` [rad/s] (n, 3), and optional arrays.
 
-That is, where it is there: `flat`, (first, last + 1) samples that lie flat, or `flat_samples`, how many do from the
-first on; `temperature_c` or `temperature`, (n,); `gap`, `acc_clipped`, `gyr_clipped`, (n,); `sensor`, a JSON object;
-`done`, what was done to calibrate the samples. Other keys are ignored.
+Optional are `flat`, (first, last + 1) samples that lie flat, or `flat_samples`, the number of them at the start;
+`temperature_c` or `temperature`, (n,); `gap`, `acc_clipped`, `gyr_clipped`, (n,); `sensor`, a JSON object; `done`, the
+processing of calibrated samples. Other keys are ignored.
 
-An archive holds one array after the other: for runs of samples they are read side by side, and written to files of
-their own first.
+An archive holds one array after the other: for runs of samples they are read side by side, and first written to
+separate files.
 """
 
 from __future__ import annotations
@@ -31,9 +31,10 @@ from ..data import Recording, Samples, Sensor
 from ..disk.whole import whole_file
 from ..errors import RecordingError
 from ..strict_json import parsed
-from .budget import afford
-from .rows import ROWS, Rows, Write, cannot_read, checked, whole
-from .tables.times import possible_utc_ns
+from .budget import check_size
+from .reading import reading
+from .rows import ROWS, Rows, Write, check_runs, normalise
+from .tables.times import plausible_utc_ns
 
 NEEDED = ("t", "acc", "gyr")
 TEMPERATURES = ("temperature_c", "temperature")
@@ -42,7 +43,7 @@ DONE = "done"
 UTC = "utc_ns"
 SMALL = ("flat", "flat_samples", "sensor", DONE, UTC)
 COPIED = 1 << 20
-# as zipfile, its decompressors and numpy put it: encrypted, of an unknown method, longer than any memory
+# errors of zipfile, its decompressors and numpy: damaged, encrypted, of an unknown method, longer than memory
 DAMAGED = (
     *(ValueError, TypeError, AttributeError, ArithmeticError, LookupError, EOFError, RuntimeError, MemoryError),
     *(SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
@@ -51,7 +52,7 @@ _REMEDY = "give an .npz with t [s] (n,), acc [m/s^2] (n, 3) and gyr [rad/s] (n, 
 
 
 def load_npz(path: Path) -> Recording:
-    """The recording in an archive.
+    """Return the recording in an archive.
 
     Raises
     ------
@@ -67,13 +68,13 @@ def load_npz(path: Path) -> Recording:
     sensor = _sensor(arrays, path)
     known = {key: arrays.get(key) for key in (*NEEDED, *MASKS)}
     known["temperature_c"] = next((arrays[key] for key in TEMPERATURES if key in arrays), None)
-    made, taken = whole({**known, "flat": _flat(arrays, path)}, path.name, sensor)
+    made, taken = normalise({**known, "flat": _flat(arrays, path)}, path.name, sensor)
     recording = Recording.from_arrays(**made, sensor=sensor, name=path.name, taken=taken)
     return replace(recording, utc_ns=_utc_ns(arrays))
 
 
 def npz_rows(path: Path) -> Rows:
-    """The samples of an archive, a run at a time.
+    """Return the samples of an archive, a run at a time.
 
     Raises
     ------
@@ -85,35 +86,35 @@ def npz_rows(path: Path) -> Rows:
     done = str(small.get(DONE, ""))
     if not by_rows:
         return Rows.of(load_npz(path), done)
-    runs, sensor, flat = checked(_runs(path), path.name), _sensor(small, path), _flat(small, path)
+    runs, sensor, flat = check_runs(_runs(path), path.name), _sensor(small, path), _flat(small, path)
     return Rows(runs, sensor, flat, name=path.name, done=done, utc_ns=_utc_ns(small), plain=True)
 
 
 def _utc_ns(arrays: Mapping[str, Any]) -> int | None:
     value = np.asarray(arrays.get(UTC, np.nan))
-    return possible_utc_ns(int(value)) if value.shape == () and value.dtype.kind in "iu" else None
+    return plausible_utc_ns(int(value)) if value.shape == () and value.dtype.kind in "iu" else None
 
 
 def _arrays(archive: Any, path: Path, keys: Sequence[str]) -> dict[str, Any]:
-    """Those of an archive that are there, once they are known to fit the memory."""
+    """Return those arrays of `keys` that an archive holds, if they fit the memory."""
     found = [key for key in keys if key in archive.files]
-    afford(path, sum(each.file_size for each in archive.zip.infolist() if each.filename.removesuffix(".npy") in found))
+    check_size(
+        path, sum(each.file_size for each in archive.zip.infolist() if each.filename.removesuffix(".npy") in found)
+    )
     return {key: archive[key] for key in found}
 
 
 @contextmanager
 def _opened(path: Path) -> Iterator[IO[bytes]]:
-    """The file of an archive; what is wrong with it becomes a RecordingError."""
+    """Open an archive; an error of the block becomes a RecordingError."""
     try:
-        with path.open("rb") as file:
+        with reading(path), path.open("rb") as file:
             if not zipfile.is_zipfile(file):
-                raise RecordingError(f"{path} is no whole NumPy archive", _REMEDY)
+                raise RecordingError(f"{path} is not a whole NumPy archive", _REMEDY)
             file.seek(0)
             yield file
-    except OSError as error:
-        raise cannot_read(path, error) from error
     except DAMAGED as error:
-        raise RecordingError(f"{path} is no whole NumPy archive ({error})", _REMEDY) from error
+        raise RecordingError(f"{path} is not a whole NumPy archive ({error})", _REMEDY) from error
 
 
 def _flat(arrays: Mapping[str, Any], path: Path) -> tuple[int, int] | None:
@@ -126,7 +127,7 @@ def _flat(arrays: Mapping[str, Any], path: Path) -> tuple[int, int] | None:
     except (ValueError, TypeError, OverflowError) as error:
         raise RecordingError(
             f"{path}: {key} is {arrays[key]}",
-            "give flat as (first, last + 1), or flat_samples as how many samples lie flat at the start",
+            "give flat as (first, last + 1), or flat_samples as the number of samples that lie flat at the start",
         ) from error
     return first, last
 
@@ -138,12 +139,12 @@ def _sensor(arrays: Mapping[str, Any], path: Path) -> Sensor:
         return Sensor.of(parsed(str(arrays["sensor"])))
     except (ValueError, AttributeError) as error:
         raise RecordingError(
-            f"{path}: sensor is no JSON object ({error})", "leave sensor out, or write it with mpucal"
+            f"{path}: sensor is not a JSON object ({error})", "leave sensor out, or write it with mpucal"
         ) from error
 
 
 class _Column:
-    """One array of the archive, read from its beginning to its end."""
+    """Array of an archive, read from its beginning to its end."""
 
     def __init__(self, file: IO[bytes]) -> None:
         version = npy.read_magic(file)
@@ -152,15 +153,15 @@ class _Column:
         self._file, self._width = file, int(np.prod(self.shape[1:]))
 
     def take(self, count: int, dtype: type) -> NDArray[Any]:
-        """The next `count` rows."""
+        """Return the next `count` rows."""
         data = self._file.read(count * self._width * self.dtype.itemsize)
-        # what is too large for a float64 becomes infinite, and is refused as that; so is a signalling NaN
+        # too large a number becomes infinite, and a signalling NaN a quiet one; both are refused later
         with np.errstate(over="ignore", invalid="ignore"):
             return np.frombuffer(data, self.dtype).reshape(count, *self.shape[1:]).astype(dtype)
 
 
 def _by_rows(archive: zipfile.ZipFile) -> bool:
-    """Whether its arrays lie there by rows, as they nearly always do; what is odd or wrong is load_npz's."""
+    """Return True if all arrays are stored by rows in the right shapes, as nearly always; else load_npz reads them."""
     shapes = {}
     for key in (*NEEDED, *TEMPERATURES, *MASKS):
         if f"{key}.npy" not in archive.namelist():
@@ -200,7 +201,7 @@ def _runs(path: Path) -> Iterator[Samples]:
 
 @contextmanager
 def npz_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
-    """An archive, not compressed, with all that is known; see open_writer."""
+    """Open an uncompressed archive with all metadata; see open_writer."""
     with ExitStack() as stack, whole_file(path) as file:
         columns = {field.name: stack.enter_context(TemporaryFile(dir=path.parent)) for field in fields(Samples)}
         count = 0
@@ -223,7 +224,7 @@ def npz_file(path: Path, rows: Rows, done: str) -> Iterator[Write]:
 
 
 def _join(archive: zipfile.ZipFile, name: str, column: IO[bytes], count: int) -> None:
-    """Put what was written to `column` into the archive."""
+    """Copy the values in the file `column` into the archive."""
     like: NDArray[Any] = getattr(Samples.empty(), name)
     described = npy.header_data_from_array_1_0(like) | {"shape": (count, *like.shape[1:])}
     column.seek(0)

@@ -1,4 +1,4 @@
-"""Parquet files, by pyarrow: a table with the columns that a table of text has."""
+"""Parquet files, by pyarrow, with the same columns as tables of text."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from numpy.typing import NDArray
 
 from ..data import Recording
 from ..errors import RecordingError
-from .arrays import recording_of_columns
-from .extras import library
+from .arrays import recording_from_arrays
 from .hints import NO_HINTS, Hints
+from .reading import import_extra
 
 
 def load_parquet(path: Path, hints: Hints = NO_HINTS) -> Recording:
-    """The recording in a Parquet file.
+    """Return the recording in a Parquet file.
 
     Raises
     ------
-    RecordingError : it cannot be read, or does not say all that is needed; what is missing is named.
+    RecordingError : it cannot be read, or does not say all that is needed; the message names what is missing.
     """
-    arrow, parquet = library("pyarrow", "parquet", path), library("pyarrow.parquet", "parquet", path)
+    arrow, parquet = (import_extra(name, "parquet", path) for name in ("pyarrow", "pyarrow.parquet"))
     try:
         table = parquet.read_table(path)
         arrays = {field.name: _array(table.column(place), field.type) for place, field in enumerate(table.schema)}
     except (arrow.ArrowException, OSError, ValueError, TypeError) as error:
-        raise RecordingError(f"{path} is no whole Parquet file ({error})", "write it again") from error
-    return recording_of_columns(arrays, hints, path.name)
+        raise RecordingError(f"{path} is not a whole Parquet file ({error})", "write it again") from error
+    return recording_from_arrays(arrays, hints, path.name)
 
 
 def _array(column: Any, kind: Any) -> NDArray[Any]:
     values = np.asarray(column.to_numpy())
     if values.dtype.kind == "M" and not getattr(kind, "tz", None):
-        # nothing says the zone: since the first of them, and no time of day
+        # without a zone they are no times of day, and count from the first
         return np.asarray((values - values[:1]).astype("timedelta64[ns]"))
     return values

@@ -1,9 +1,10 @@
-"""Protocol Buffers' wire format, as far as a capture's columns need it: packed integers to arrays and back at once.
+"""Protocol Buffers' wire format, as far as a capture needs it: arrays from packed integers, and back.
 
-A field is a key, `number << 3 | wire type`, and a varint (type 0) or a length with so many bytes (type 2). A varint is
-seven bits a byte, the lowest first, the eighth set in all but its last. Signed integers (sint) are zigzag: 0, -1, 1,
--2. `packed.cpp` unpacks them. Source: https://protobuf.dev/programming-guides/encoding, and descriptor.proto for the
-schema.
+A field is a key, `number << 3 | wire type`, and a varint (type 0) or a length and so many bytes (type 2). A varint has
+seven bits per byte, the lowest first; the eighth bit is set in all bytes but the last. Signed integers (sint) are
+zigzag: 0, -1, 1, -2. `packed.cpp` unpacks them.
+
+Source: https://protobuf.dev/programming-guides/encoding, and descriptor.proto for the schema.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ Columns = NDArray[np.uint64]
 
 VARINT, BYTES = 0, 2
 LONGEST = 10
-# so many or more are faster packed by NumPy than one by one
+# from this number on NumPy packs faster than a loop
 FEW = 100
 __all__ = ["field", "fields", "frames", "packed", "schema", "unpacked", "unzigzag", "zigzag"]
 
@@ -29,18 +30,18 @@ OPTIONAL, REPEATED = 1, 3
 
 
 def field(number: int, value: int | bytes) -> bytes:
-    """A field of a whole number from 0 on, or of bytes."""
+    """Encode a field of a whole number >= 0, or of bytes."""
     if isinstance(value, int):
         return _varint(number << 3 | VARINT) + _varint(value)
     return _varint(number << 3 | BYTES) + _varint(len(value)) + value
 
 
 def fields(message: bytes) -> Iterator[tuple[int, int | bytes]]:
-    """Number and value of each field, in their order.
+    """Yield number and value of each field, in order.
 
     Raises
     ------
-    ValueError : it is no message, or has a field of another wire type.
+    ValueError : it is not a message, or has a field of another wire type.
     """
     at = 0
     while at < len(message):
@@ -56,13 +57,13 @@ def fields(message: bytes) -> Iterator[tuple[int, int | bytes]]:
 
 
 def packed(values: ArrayLike) -> bytes:
-    """(n,) whole numbers from 0 on, as varints one after the other."""
+    """Encode (n,) whole numbers >= 0 as consecutive varints."""
     value = np.asarray(values, np.uint64)[:, None]
     if len(value) < FEW:
         return _varints(value[:, 0].tolist())
     widest = max(-(-int(value.max()).bit_length() // 7), 1)
     left = value >> (np.uint64(7) * np.arange(widest + 1, dtype=np.uint64))
-    # a byte is there where something is left of the number, and says so where there is more after it
+    # a byte is written while digits of the number are left, with bit 8 set if another byte follows
     more = left[:, 1:] > 0
     digits = (left[:, :-1] & np.uint64(127)).astype(np.uint8) | more * np.uint8(128)
     shown = np.ones_like(more)
@@ -71,18 +72,18 @@ def packed(values: ArrayLike) -> bytes:
 
 
 def zigzag(values: ArrayLike) -> Columns:
-    """(n,) signed numbers as unsigned ones, small where they are."""
+    """Return (n,) signed numbers as unsigned ones that are small for small magnitudes."""
     value = np.asarray(values, np.int64)
     return ((value << 1) ^ (value >> 63)).view(np.uint64)
 
 
 def unzigzag(values: Columns) -> NDArray[np.int64]:
-    """(n,) what `zigzag` was given."""
+    """Invert zigzag, for (n,) numbers."""
     return (values >> np.uint64(1)).view(np.int64) ^ -(values & np.uint64(1)).view(np.int64)
 
 
 def schema(package: str, messages: Mapping[str, Sequence[tuple[str, str, bool]]]) -> bytes:
-    """A FileDescriptorSet of messages, whose fields (name, type, whether repeated) are numbered from 1.
+    """Return a FileDescriptorSet of messages, whose fields (name, type, repeated) are numbered from 1.
 
     A type is one of TYPES, or the name of a message.
     """
@@ -113,7 +114,7 @@ def _varints(values: list[int]) -> bytes:
 
 
 def _read(message: bytes, at: int) -> tuple[int, int]:
-    """A varint, and where it ends."""
+    """Return a varint and the offset of its end."""
     value = 0
     for place in range(LONGEST):
         if at + place >= len(message):

@@ -1,7 +1,7 @@
 """sensor_msgs/Imu in bags of ROS, by rosbags: rosbag2 as .mcap, .db3 or a folder of them, and ROS 1's .bag.
 
-A driver that publishes the accelerometer and the gyroscope apart (RealSense: .../accel/sample, .../gyro/sample) gives
-two topics, which are joined by time. Some drivers publish g where the message's definition asks for m/s^2: |a| tells.
+A driver that publishes the accelerometer and the gyroscope separately (RealSense: .../accel/sample, .../gyro/sample)
+has two topics, which are joined by time. Some drivers publish g instead of m/s^2, which |a| shows.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from mcap.records import Metadata
 
 from ..data import Recording
 from ..errors import CaptureError, MpucalError, RecordingError
-from .extras import library
 from .hints import NO_HINTS, Hints
 from .mcap import CALIBRATED, FORMAT
+from .reading import first_bytes, import_extra
 from .rows import Rows
-from .tables.streams import recording_of
-from .tables.table import whole
+from .tables.streams import join_streams
+from .tables.table import complete_lines
 from .tables.times import Stream
 from .tables.units import COUNTS, acceleration_unit
 
@@ -32,25 +32,17 @@ IMU, IMU_OF_ROS1, ROS1 = "sensor_msgs/msg/Imu", "sensor_msgs/Imu", b"ros1"
 SNIFFED = 1 << 16
 _HEADER = struct.Struct("<8xBQI")
 S = 1_000_000_000
-# a first covariance of -1 says that there is no such measurement
+# sensor_msgs/Imu: a first covariance of -1 means no such measurement
 NOT_MEASURED = -1.0
 REMEDY = "give a bag with sensor_msgs/Imu"
 
 
 def is_mcap_of_ros(path: Path) -> bool:
-    """Whether an MCAP file begins as one of ROS, and not as a capture."""
-    begun = _begun(path)
+    """Return True if an MCAP file begins as one of ROS, and not as a capture."""
+    begun = first_bytes(path, SNIFFED)
     if len(begun) < _HEADER.size or FORMAT.encode() in begun[: _HEADER.size + 100]:
         return False
     return _profile(begun) in (b"ros2", ROS1) or IMU.encode() in begun
-
-
-def _begun(path: Path) -> bytes:
-    try:
-        with path.open("rb") as file:
-            return file.read(SNIFFED)
-    except OSError:
-        return b""
 
 
 def _profile(begun: bytes) -> bytes:
@@ -58,7 +50,7 @@ def _profile(begun: bytes) -> bytes:
 
 
 def is_folder_of_ros(path: Path) -> bool:
-    """Whether a folder is a bag of rosbag2."""
+    """Return True if a folder is a bag of rosbag2."""
     try:
         return "rosbag2_bagfile_information" in (path / "metadata.yaml").read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -66,7 +58,7 @@ def is_folder_of_ros(path: Path) -> bool:
 
 
 def bag_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
-    """The samples in a bag, to be calibrated.
+    """Return the samples of a bag that is to be calibrated.
 
     Raises
     ------
@@ -75,22 +67,22 @@ def bag_rows(path: Path, hints: Hints = NO_HINTS) -> Rows:
     done = _done(path)
     if done:
         raise CaptureError(
-            f"{path} holds samples that are calibrated already ({done})", "give the recording that they were made of"
+            f"{path} holds samples that are calibrated already ({done})", "give the recording from which it was made"
         )
     return Rows.of(load_bag(path, hints))
 
 
 def load_bag(path: Path, hints: Hints = NO_HINTS) -> Recording:
-    """The recording in a bag.
+    """Return the recording in a bag.
 
     Raises
     ------
-    RecordingError : rosbags is not installed, the bag cannot be read, holds no Imu or more than one that may be meant.
+    RecordingError : rosbags is not installed, or the bag cannot be read, or holds no Imu or several.
     """
-    highlevel, typesys = library("rosbags.highlevel", "ros", path), library("rosbags.typesys", "ros", path)
+    highlevel, typesys = (import_extra(f"rosbags.{name}", "ros", path) for name in ("highlevel", "typesys"))
     try:
-        if path.suffix.lower() == ".mcap" and _profile(_begun(path)) == ROS1:
-            topics, found = _of_ros1(path, typesys.get_typestore(typesys.Stores.ROS1_NOETIC), hints)
+        if path.suffix.lower() == ".mcap" and _profile(first_bytes(path, SNIFFED)) == ROS1:
+            topics, found = _read_ros1(path, typesys.get_typestore(typesys.Stores.ROS1_NOETIC), hints)
             return _recording(path, topics, found, hints)
         with highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)) as bag:
             topics = _chosen(path.name, [c for c in bag.connections if c.msgtype == IMU], bag.topics, hints)
@@ -100,14 +92,14 @@ def load_bag(path: Path, hints: Hints = NO_HINTS) -> Recording:
     except MpucalError:
         raise
     except Exception as error:
-        # of sqlite, yaml, lz4 and what else reads it
+        # errors of sqlite, yaml, lz4 and others
         remedy = f"give its folder, {path.parent}" if is_folder_of_ros(path.parent) else REMEDY
-        raise RecordingError(f"{path} is no whole bag ({type(error).__name__}: {error})", remedy) from error
+        raise RecordingError(f"{path} is not a whole bag ({type(error).__name__}: {error})", remedy) from error
     return _recording(path, topics, found, hints)
 
 
-def _of_ros1(path: Path, store: Any, hints: Hints) -> tuple[list[str], dict[str, _Messages]]:
-    """The messages in a bag of ROS 1 that `mcap convert` made an MCAP file; rosbags reads those of ROS 2."""
+def _read_ros1(path: Path, store: Any, hints: Hints) -> tuple[list[str], dict[str, _Messages]]:
+    """Return topics and messages of a bag of ROS 1 that `mcap convert` made an MCAP file, which rosbags cannot read."""
     with path.open("rb") as file:
         summary = make_reader(file).get_summary()
         if summary is None:
@@ -123,18 +115,17 @@ def _of_ros1(path: Path, store: Any, hints: Hints) -> tuple[list[str], dict[str,
 
 def _recording(path: Path, topics: list[str], found: dict[str, _Messages], hints: Hints) -> Recording:
     acc, gyr = found[topics[0]], found[topics[-1]]
-    remarks = [f"from {' and '.join(dict.fromkeys(topics))}", *acc.remarks, _calibrated(path)]
-    return recording_of(
-        acc.stream("acc", path.name),
-        gyr.stream("gyr", path.name),
-        hints,
-        path.name,
-        remarks=list(filter(None, remarks)),
-    )
+    done = _done(path)
+    remarks = [
+        f"from {' and '.join(dict.fromkeys(topics))}",
+        "" if acc.stamped else "times are those of receipt, as the headers hold none",
+        f"its samples are {done} already" if done else "",
+    ]
+    return join_streams(acc.stream("acc", path.name), gyr.stream("gyr", path.name), hints, path.name, remarks=remarks)
 
 
 def _chosen(name: str, connections: Iterable[Any], all_topics: Iterable[str], hints: Hints) -> list[str]:
-    """The topic of both sensors, or that of the accelerometer and that of the gyroscope."""
+    """Return the topic of both sensors, or those of the accelerometer and of the gyroscope."""
     there = list(dict.fromkeys(connection.topic for connection in connections))
     if hints.topic:
         asked = hints.topic.split(",")
@@ -151,7 +142,7 @@ def _chosen(name: str, connections: Iterable[Any], all_topics: Iterable[str], hi
     if len(there) == 2 and all(len(of) == 1 for of in apart):
         return [apart[0][0], apart[1][0]]
     if len(there) > 1:
-        raise RecordingError(f"{name} holds Imu on {', '.join(there)}", "say which with --topic")
+        raise RecordingError(f"{name} holds Imu on {', '.join(there)}", "choose one with --topic")
     return there
 
 
@@ -160,7 +151,7 @@ _WORDS = (("accel", "gyro"), ("gyro", "accel"))
 
 @dataclass
 class _Messages:
-    """The messages of a topic."""
+    """Messages of one topic."""
 
     stamps: list[int] = field(default_factory=list)
     received: list[int] = field(default_factory=list)
@@ -181,38 +172,30 @@ class _Messages:
     def stamped(self) -> bool:
         return any(self.stamps)
 
-    @property
-    def remarks(self) -> list[str]:
-        return [] if self.stamped else ["times are those of receipt, as the headers hold none"]
-
-    def _times(self, name: str) -> list[int]:
+    def stream(self, quantity: str, name: str) -> Stream:
+        """Return the samples of a quantity."""
         times = self.stamps if self.stamped else self.received
         if times and max(times) >> 63:
-            raise RecordingError(f"{name} holds times that are none", "give the bag as it was recorded")
-        return times
-
-    def stream(self, quantity: str, name: str) -> Stream:
-        """What it says of the quantity."""
+            raise RecordingError(f"{name} holds impossible times", "give the bag as it was recorded")
         values = np.array(getattr(self, quantity), float).reshape(-1, 3)
         if not self.measured[quantity]:
             raise RecordingError(
-                f"{name}: the messages say by their covariances that there is no {_NAMES[quantity]}",
+                f"{name}: by their covariances, the messages hold no {_NAMES[quantity]}",
                 "name the topics of the accelerometer and of the gyroscope with --topic ONE,OTHER",
             )
         unit = "rad/s"
         if quantity == "acc":
             seen = acceleration_unit(values) if len(values) else ""
             unit = seen if seen and seen != COUNTS else "m/s^2"
-        there, lost = whole(values)
-        times = np.array(self._times(name), np.int64)
-        return Stream(times[there], values[there], "ns", unit, lost=lost)
+        kept, lost = complete_lines(values)
+        return Stream(np.array(times, np.int64)[kept], values[kept], "ns", unit, lost=lost)
 
 
 _NAMES = {"acc": "acceleration", "gyr": "rate"}
 
 
 def _done(path: Path) -> str:
-    """What was done to the samples of a file that `mpucal apply` wrote; empty of others."""
+    """Return the processing of samples that `mpucal apply` wrote; empty for another file."""
     if path.suffix.lower() != ".mcap" or not path.is_file():
         return ""
     try:
@@ -221,8 +204,3 @@ def _done(path: Path) -> str:
     except (McapError, OSError, struct.error, ValueError):
         return ""
     return found[0].metadata.get("done", "") if found else ""
-
-
-def _calibrated(path: Path) -> str:
-    done = _done(path)
-    return f"its samples are {done} already" if done else ""

@@ -1,6 +1,6 @@
-"""What i2cdevlib's example MPU6050_raw prints: `a/g:` and six counts a line, with tabs between (MPU9150_raw: nine).
+"""Output of i2cdevlib's example MPU6050_raw: lines of `a/g:` and six counts, separated by tabs (MPU9150_raw: nine).
 
-Its MPU6050::initialize() sets +-2 g and +-250 deg/s, and the example prints no times.
+MPU6050::initialize() sets ±2 g and ±250 deg/s, and the example prints no times.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 from ..data import Recording
 from ..errors import RecordingError
 from .hints import NO_HINTS, Hints
-from .rows import cannot_read
-from .tables.streams import recording_of
+from .reading import first_bytes, reading
+from .tables.streams import join_streams
 from .tables.times import Stream
 from .tables.units import COUNTS
 
@@ -27,33 +27,27 @@ SNIFFED = 1 << 14
 
 
 def is_serial_log(path: Path) -> bool:
-    """Whether a file begins with such lines."""
-    try:
-        with path.open("rb") as file:
-            return LINE.search(file.read(SNIFFED)) is not None
-    except OSError:
-        return False
+    """Return True if a file begins with such lines."""
+    return LINE.search(first_bytes(path, SNIFFED)) is not None
 
 
 def load_serial_log(path: Path, hints: Hints = NO_HINTS) -> Recording:
-    """The recording in such lines; what stands between them is left out, and so is a last line that was cut.
+    """Return the recording in such lines; other lines are left out, and so is a torn last line.
 
     Raises
     ------
-    RecordingError : it cannot be read, holds no such lines, or nothing says the rate.
+    RecordingError : it cannot be read, holds no such lines, or the rate is not known.
     """
-    try:
+    with reading(path):
         data = path.read_bytes()
-    except OSError as error:
-        raise cannot_read(path, error) from error
     whole = data if data.endswith(b"\n") else data[: data.rfind(b"\n") + 1]
     rows = [line.split() for line in LINE.findall(whole)]
     if not rows:
-        raise RecordingError(f"{path} holds no lines of MPU6050_raw", "give what the sketch printed")
+        raise RecordingError(f"{path} holds no lines of MPU6050_raw", "give the output of that sketch")
     counts = np.array(rows, float)
     remarks = []
     if hints.accel_range_g is None and hints.gyro_range_dps is None:
         hints = replace(hints, accel_range_g=ACCEL_RANGE_G, gyro_range_dps=GYRO_RANGE_DPS)
         remarks.append("the ranges are those that MPU6050::initialize() sets")
     acc, gyr = (Stream(None, values, unit=COUNTS) for values in (counts[:, :3], counts[:, 3:]))
-    return recording_of(acc, gyr, hints, path.name, remarks=remarks)
+    return join_streams(acc, gyr, hints, path.name, remarks=remarks)

@@ -8,18 +8,18 @@ from pathlib import Path
 from ..data import Recording
 from ..mavlink.log import read_log
 from ..mavlink.tlog import TlogFile
-from .budget import afford
+from .budget import check_size
 
 
 def load_tlog(path: Path) -> Recording:
-    """The recording of the vehicle's first IMU in a .tlog, the others in its `others`.
+    """Return the recording of the vehicle's first IMU in a .tlog, with the other IMUs in its `others`.
 
     Raises
     ------
-    CaptureError : it cannot be read. RecordingError : it holds no vehicle, several, or no IMU that tells the truth.
+    CaptureError : it cannot be read. RecordingError : it holds no vehicle, several, or no usable IMU.
     """
-    # its pages are mapped, and so count
-    afford(path, path.stat().st_size)
+    # the file is mapped, and its pages count as memory
+    check_size(path, path.stat().st_size)
     file = TlogFile(path)
     recording = read_log(file, file.name)
     return replace(recording, recovered=file.recovered)

@@ -1,8 +1,8 @@
-"""PX4's logs (.ulg), by pyulog: sensor_accel and sensor_gyro where they are logged fast enough, else sensor_combined.
+"""PX4's logs (.ulg), by pyulog: sensor_accel and sensor_gyro if they are logged fast enough, else sensor_combined.
 
 Unless SDLOG_PROFILE asks for more, PX4 logs the former once a second (logged_topics.cpp) and the latter in full.
-sensor_accel and sensor_gyro are as the driver delivers them; sensor_combined is the primary sensors' by PX4's
-parameters, CAL_ACC0_XOFF and the like. Both in m/s^2, rad/s and us.
+sensor_accel and sensor_gyro are the driver's output; sensor_combined is the output of the primary sensors, corrected
+by PX4's parameters such as CAL_ACC0_XOFF. All are in m/s^2, rad/s and us.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from numpy.typing import NDArray
 
 from ..data import Recording, Vector
 from ..errors import RecordingError
-from .extras import library
 from .hints import NO_HINTS, Hints
-from .tables.streams import recording_of
+from .reading import import_extra, reading
+from .tables.streams import join_streams
 from .tables.times import Stream
 from .tables.units import SLOWEST_HZ
 
 COMBINED, ACCEL, GYRO = "sensor_combined", "sensor_accel", "sensor_gyro"
 # RELATIVE_TIMESTAMP_INVALID
 INVALID = 0x7FFFFFFF
-# a message's size and type
+# size and type of a message; bytes that are checked for zeros
 NO_MESSAGE, PAGE = bytes(3), 4096
 _DAMAGE = (
     ValueError,
@@ -46,14 +46,14 @@ _DAMAGE = (
 
 
 class _PastTheEnd(BufferedReader):
-    """A file in which a read goes on by what it asked for at the end, too.
+    """File whose position moves on by the requested size even past its end.
 
-    pyulog goes back by that from a damaged message, and would read the same bytes for ever. Where there is no message
-    but a page of zeros the log has ended: a hole of gigabytes, three bytes at a time, would take hours.
+    pyulog goes back by that size from a damaged message, and would otherwise read the same bytes for ever. A page of
+    zeros in place of a message is the end of the log: a hole of gigabytes, read by three bytes, would take hours.
     """
 
     def read(self, size: int | None = -1, /) -> bytes:
-        """What there is."""
+        """Return at most `size` bytes."""
         data = super().read(size)
         if data == NO_MESSAGE and len(ahead := self.peek()) >= PAGE and not any(ahead):
             self.seek(0, os.SEEK_END)
@@ -64,36 +64,35 @@ class _PastTheEnd(BufferedReader):
 
 
 def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
-    """The recording of the first IMU of a PX4's log, or of sensor_combined where `hints.topic` names that.
+    """Return the recording of the first IMU in a log of PX4, or of sensor_combined if `hints.topic` names that.
 
     Raises
     ------
     RecordingError : it cannot be read, or holds no such topics.
     """
-    reader = library("pyulog", "px4", path)
+    reader = import_extra("pyulog", "px4", path)
     try:
-        # it prints what it finds of damage, where results go
-        with _PastTheEnd(FileIO(path)) as file, redirect_stdout(StringIO()):
+        # pyulog prints damage to stdout, which is for results
+        with reading(path), _PastTheEnd(FileIO(path)) as file, redirect_stdout(StringIO()):
             log = reader.ULog(file, [COMBINED, ACCEL, GYRO])
-    except OSError as error:
-        raise RecordingError(f"cannot read {path} ({error.strerror or error})", "check the path") from error
+    except RecordingError:
+        raise
     except Exception as error:
-        # it raises bare Exceptions, too
-        raise RecordingError(f"{path} is no whole log of PX4 ({error})", "fetch it from the vehicle again") from error
+        # pyulog raises bare Exceptions, too
+        raise _damaged(path, error) from error
     topics = {(data.name, data.multi_id): data.data for data in log.data_list}
     if hints.topic not in (None, COMBINED, ACCEL):
-        raise RecordingError(f"{path.name} is read by {ACCEL} or {COMBINED}", f"give --topic {ACCEL} or {COMBINED}")
+        raise RecordingError(f"{path.name} is read from {ACCEL} or {COMBINED}", f"give --topic {ACCEL} or {COMBINED}")
     raw = (ACCEL, 0) in topics and (GYRO, 0) in topics
-    damage = ["it is damaged, and what is whole of it was read"] if log.file_corruption else []
+    damage = ["it is damaged, and its whole part was read"] if log.file_corruption else []
     try:
         fast = raw and all(_is_fast(topics[name, 0]) for name in (ACCEL, GYRO))
         if raw and (hints.topic == ACCEL or (hints.topic is None and (fast or (COMBINED, 0) not in topics))):
             acc, gyr = (_stream(topics[n, 0], "xyz", unit) for n, unit in ((ACCEL, "m/s^2"), (GYRO, "rad/s")))
             others = sum(name == ACCEL for name, _ in topics) - 1
             more = [f"{others} more accelerometers are in it"] if others else []
-            return recording_of(
-                acc, gyr, hints, path.name, remarks=[f"from {ACCEL} and {GYRO}, the first of each", *more, *damage]
-            )
+            remarks = [f"from {ACCEL} and {GYRO}, the first of each", *more, *damage]
+            return join_streams(acc, gyr, hints, path.name, remarks=remarks)
         if (COMBINED, 0) in topics and hints.topic != ACCEL:
             combined = topics[COMBINED, 0]
             acc = _stream(combined, [f"accelerometer_m_s2[{axis}]" for axis in range(3)], "m/s^2")
@@ -101,14 +100,18 @@ def load_ulog(path: Path, hints: Hints = NO_HINTS) -> Recording:
             acc = replace(acc, times=np.asarray(acc.times) + _later_us(combined))
             slow = [f"{ACCEL} is logged too slowly"] if raw and not fast else []
             remark = f"from {COMBINED}, which PX4 has corrected by its parameters already"
-            return recording_of(acc, gyr, hints, path.name, remarks=[remark, *slow, *damage])
+            return join_streams(acc, gyr, hints, path.name, remarks=[remark, *slow, *damage])
     except _DAMAGE as error:
-        raise RecordingError(f"{path} is no whole log of PX4 ({error})", "fetch it from the vehicle again") from error
+        raise _damaged(path, error) from error
     has = ", ".join(sorted({name for name, _ in topics})) or "none of them"
     raise RecordingError(
         f"{path.name} holds no {hints.topic or f'{ACCEL} with {GYRO}, and no {COMBINED}'}: it has {has}",
         "log them, with SDLOG_PROFILE",
     )
+
+
+def _damaged(path: Path, error: Exception) -> RecordingError:
+    return RecordingError(f"{path} is not a whole log of PX4 ({error})", "fetch it from the vehicle again")
 
 
 def _is_fast(data: Any) -> bool:
@@ -117,15 +120,15 @@ def _is_fast(data: Any) -> bool:
 
 
 def _stream(data: Any, names: Iterable[str], unit: str) -> Stream:
-    # a driver that does not say when a sample was taken says 0; sensor_combined has no such field
+    # 0 means that the driver does not know the time of the sample; sensor_combined lacks the field
     times = data.get("timestamp_sample", data["timestamp"])
-    # a damaged log may call them fractions, and hold values that are none
+    # a damaged log may hold NaN, and times of another type
     with np.errstate(invalid="ignore"):
         values: Vector = np.column_stack([np.asarray(data[name], float) for name in names])
         return Stream(np.asarray(times if np.all(times) else data["timestamp"], np.int64), values, "us", unit)
 
 
 def _later_us(combined: Any) -> NDArray[np.int64]:
-    """(n,) us by which sensor_combined's accelerations are later than its rates."""
+    """Return (n,) us by which sensor_combined's accelerations are later than its rates."""
     later = np.asarray(combined.get("accelerometer_timestamp_relative", 0), np.int64)
     return np.where(later == INVALID, 0, later)

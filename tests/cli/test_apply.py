@@ -100,7 +100,7 @@ def test_rates_in_degrees_are_not_applied_as_radians(mpucal, save, session, cali
     save(replace(recording, gyr=np.degrees(recording.gyr)), f"in{ending}")
     done = mpucal("apply", "c.json", f"in{ending}", "-o", "out.npz")
     assert done.code == 3
-    assert "reads gyr as of deg/s" in done.err
+    assert "suggest gyr in deg/s" in done.err
     assert "say its units with --units acc=m/s^2,gyr=deg/s" in done.err
     assert not Path("out.npz").exists()
     assert mpucal("apply", "c.json", f"in{ending}", "-o", "out.npz", "--units", "acc=m/s^2,gyr=deg/s").code == 0

@@ -88,10 +88,10 @@ def test_what_cannot_be_calibrated_is_refused_with_its_reason(mpucal, tmp_path, 
     [
         (
             with_(gyr=np.degrees, acc=lambda acc: acc / 9.80665),
-            "acc reads as of g, and was taken as such; gyr reads as",
+            "acc was read in g, which its values suggest; gyr was read in",
         ),
         (with_(acc=nan), "1 samples that lack a number were left out"),
-        (with_(t=lambda t: t + np.random.default_rng(1).exponential(3e-3, len(t))), "stamps of arrival, 3"),
+        (with_(t=lambda t: t + np.random.default_rng(1).exponential(3e-3, len(t))), "arrival stamps, 3"),
     ],
     ids=["g and deg/s", "NaN", "stamps of arrival"],
 )
@@ -108,7 +108,7 @@ def test_what_a_recording_lacks_is_made_up_for_and_said(mpucal, tmp_path, change
     ("file", "sentence"),
     [
         ("missing.npz", "missing.npz"),
-        ("text.mcap", "text.mcap is no MCAP file"),
+        ("text.mcap", "text.mcap is not an MCAP file"),
         ("text.npz", "text.npz"),
         ("text.docx", "text.docx"),
         (".", "capture.mcap"),
@@ -208,5 +208,5 @@ def test_a_finished_session_is_not_gone_on_with(mpucal, session):
 def test_more_memory_is_allowed_by_an_option(mpucal, tmp_path, monkeypatch):
     monkeypatch.setenv("MPUCAL_MOST_MB", "1")
     np.savez_compressed(tmp_path / "long.npz", t=np.arange(40_000) / 100, acc=np.ones((40_000, 3)), gyr=[0])
-    assert "may be taken" in mpucal("calibrate", "long.npz").err
-    assert "may be taken" not in mpucal("calibrate", "long.npz", "--most-mb", "100").err
+    assert "are allowed" in mpucal("calibrate", "long.npz").err
+    assert "are allowed" not in mpucal("calibrate", "long.npz", "--most-mb", "100").err

@@ -78,7 +78,7 @@ def test_a_replay_says_the_same_and_finds_the_same_bits(mpucal, session, tmp_pat
         (["--bus", "sim", "--tilt-only", "--model", "hand"], 2, "--model hand was given beside --tilt-only"),
         (["--bus", "/dev/i2c-99"], 3, "/dev/i2c-99"),
         (["--replay", "missing.mcap"], 3, "missing.mcap"),
-        (["--replay", "text.mcap"], 3, "text.mcap is no MCAP file"),
+        (["--replay", "text.mcap"], 3, "text.mcap is not an MCAP file"),
         (["--bus", "sim", "-o", "text.mcap/results"], 3, "cannot make the folder"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

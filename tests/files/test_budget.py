@@ -22,7 +22,7 @@ def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path, monkeypa
     archive(tmp_path / "zeros.npz", 40_000)
     archive(tmp_path / "more.npz", 100, more=np.zeros(200_000))
     monkeypatch.setenv(budget.VARIABLE, "1")
-    with pytest.raises(RecordingError, match=r"takes 2 MB, and 1 MB may be taken.*--most-mb"):
+    with pytest.raises(RecordingError, match=r"takes 2 MB, but only 1 MB are allowed.*--most-mb"):
         mpucal.load(tmp_path / "zeros.npz")
     # an array that is not asked for is not unpacked, and rows take no memory
     assert len(mpucal.load(tmp_path / "more.npz")) == 100
@@ -35,9 +35,9 @@ def test_what_takes_more_than_it_says_is_stopped(tmp_path, monkeypatch):
 
     monkeypatch.setenv(budget.VARIABLE, "64")
     before = resource.getrlimit(resource.RLIMIT_DATA)
-    with pytest.raises(RecordingError, match=r"a\.csv takes more than 64 MB"), budget.within(tmp_path / "a.csv"):
+    with pytest.raises(RecordingError, match=r"a\.csv takes more than 64 MB"), budget.limit_memory(tmp_path / "a.csv"):
         bytearray(128 << 20)
-    with budget.within(tmp_path / "a.csv"):
+    with budget.limit_memory(tmp_path / "a.csv"):
         bytearray(1 << 20)
     assert resource.getrlimit(resource.RLIMIT_DATA) == before
 

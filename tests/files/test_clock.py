@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import mpucal
-from mpucal.files.tables.clock import even, period_of
+from mpucal.files.tables.clock import fit_even_clock, period_of
 
 HZ, N = 199.7, 8000
 TRUE = np.arange(N) / HZ
@@ -41,12 +41,12 @@ def held_back():
     ids=["1 ms", "5 ms", "bursts of 10", "bursts of 32", "rounded to 10 ms", "a busy computer"],
 )
 def test_what_arrives_late_was_measured_evenly(stamps, within):
-    found = even(stamps)
+    found = fit_even_clock(stamps)
     assert found.rate_hz == pytest.approx(HZ, rel=2e-4)
     assert not found.gap.any()
     off = found.t - TRUE
     assert np.abs(off - np.median(off)).max() < within
-    assert "none is missing" in found.said
+    assert "without gaps" in found.description
 
 
 def test_lost_is_what_is_missing():
@@ -56,12 +56,12 @@ def test_lost_is_what_is_missing():
     # and a logger that stopped for a while
     true = TRUE + np.where(np.arange(N) >= 6500, 7.3, 0.0)
     stamps = np.maximum.accumulate(true + np.random.default_rng(3).exponential(3e-3, N))[~lost]
-    found = even(stamps)
+    found = fit_even_clock(stamps)
     begins = [int(np.count_nonzero(~lost[:at])) for at in (705, 2005, 2085, 5005, 6500)]
     assert np.flatnonzero(found.gap).tolist() == begins
     off = found.t - true[~lost]
     assert np.abs(off - np.median(off)).max() < 1.5e-3
-    assert "with 5 gaps" in found.said
+    assert "with 5 gaps" in found.description
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_lost_is_what_is_missing():
     ids=["even", "rounded to 1 ms", "some left out", "whenever a program came to it", "few"],
 )
 def test_true_times_stay(times):
-    assert even(times) is None
+    assert fit_even_clock(times) is None
 
 
 def test_the_period_is_that_of_the_samples_and_not_of_the_bursts():
@@ -86,7 +86,7 @@ def test_the_period_is_that_of_the_samples_and_not_of_the_bursts():
 
 @pytest.mark.parametrize("ending", [".csv", ".npz", ".txt"])
 def test_a_recording_by_radio_is_the_one_by_wire(ending, walk, tmp_path):
-    """Without its clock it would be refused: nothing lies still where every other step is a gap."""
+    """The estimated clock is needed: with a gap at every other step no rest would be found."""
     # in bursts of four as well, each with one stamp
     last = np.minimum((np.arange(len(walk)) // 4 + 1) * 4 - 1, len(walk) - 1)
     stamps = np.maximum.accumulate(walk.t + np.random.default_rng(6).exponential(4e-3, len(walk)))[last]
@@ -98,4 +98,4 @@ def test_a_recording_by_radio_is_the_one_by_wire(ending, walk, tmp_path):
     read = mpucal.load(tmp_path / f"walk{ending}")
     off = read.t - walk.t
     assert np.abs(off - np.median(off)).max() < 2e-3
-    assert "stamps of arrival" in read.taken
+    assert "arrival stamps" in read.taken

@@ -138,7 +138,7 @@ def test_a_log_without_imu_messages_says_what_to_set(dataflash, tmp_path):
 
 def test_a_blob_is_no_log(tmp_path):
     (tmp_path / "calibration.bin").write_bytes(b"MPUC" + bytes(100))
-    with pytest.raises(RecordingError, match="no dataflash log"):
+    with pytest.raises(RecordingError, match="not a dataflash log"):
         mpucal.load(tmp_path / "calibration.bin")
 
 

@@ -13,7 +13,7 @@ import mpucal
 from mpucal.data import Recording
 from mpucal.errors import RecordingError
 from mpucal.files import formats, open_rows
-from mpucal.files.formats import FORMATS, Format, readable, writable
+from mpucal.files.formats import FORMATS, Format, readable_formats, writable_formats
 
 ROOT = Path(__file__).parents[2]
 FIXTURE = ROOT / "fixtures" / "sessions" / "mpu6050.mcap"
@@ -151,7 +151,7 @@ def test_errors_name_it(call):
     assert re.search(r"give a [^:]*\.words file or the folder", call("show", "notes.odt")[2])
     code, _, error = call("apply", "results/calibration.json", "walk.words", "-o", "out.txt")
     assert code == 3
-    assert re.search(r"end it with .*\.words", error)
+    assert re.search(r"end its name with .*\.words", error)
 
 
 def two(path):
@@ -176,4 +176,5 @@ def test_what_no_dialect_recognises_is_told_by_the_last_of_its_suffix(tmp_path, 
 
 def test_the_page_names_each():
     text = " ".join((ROOT / "docs" / "recordings.md").read_text(encoding="utf-8").split())
-    assert f"`mpucal calibrate`, `show` and `apply` read {readable()}; `apply -o` writes {writable()}." in text
+    read, written = readable_formats(), writable_formats()
+    assert f"`mpucal calibrate`, `show` and `apply` read {read}; `apply -o` writes {written}." in text

@@ -87,7 +87,7 @@ def test_the_suffix_says_how_to_read(measured, save, tmp_path):
         ("none.mcap", "there is no file"),
         ("notes.odt", r"give a \.mcap, \.tlog, \.bin, \.npz, \.csv file or the folder"),
         ("none", "there is no file"),
-        ("no_ending", "no kind of recording"),
+        ("no_ending", "not a recording"),
         ("folder", r"holds no capture\.mcap"),
     ],
 )
@@ -102,5 +102,5 @@ def test_what_is_no_recording(tmp_path, name, says):
 
 def test_text_by_the_name_of_a_capture(tmp_path):
     (tmp_path / "a.mcap").write_text("t,ax,ay,az\n")
-    with pytest.raises(CaptureError, match="no MCAP file"):
+    with pytest.raises(CaptureError, match="not an MCAP file"):
         mpucal.load(tmp_path / "a.mcap")

@@ -31,7 +31,7 @@ def phone(folder, walk, walk_ns, metadata):
 def test_sensor_logger_says_by_its_metadata_which_sign_it_has(walk, walk_ns, assert_same, tmp_path):
     read = phone(tmp_path, walk, walk_ns, {"version": 3, "device name": "a, b", "platform": "ios"})
     assert_same(read, walk)
-    assert "accelerations with the other sign, as iOS has them" in read.taken
+    assert "accelerations have the opposite sign, as on iOS" in read.taken
     for others in ({"platform": "android"}, {"platform": "ios", "standardisation": "true"}):
         np.testing.assert_array_equal(phone(tmp_path, walk, walk_ns, others).acc, -walk.acc)
 
@@ -77,12 +77,12 @@ def test_samples_that_are_written_again_are_left_out(walk, walk_ns, assert_same,
     table.loc[table.index.repeat(np.where(np.arange(len(table)) % 7, 1, 2))].to_csv(tmp_path / "walk.csv", index=False)
     read = load(tmp_path / "walk.csv")
     assert_same(read, walk)
-    assert f"{-(-len(walk) // 7)} samples that are written again were left out" in read.taken
+    assert f"{-(-len(walk) // 7)} repeated samples were left out" in read.taken
     table.loc[10, "time"] = table.loc[9, "time"]
     table.to_csv(tmp_path / "walk.csv", index=False)
     again = load(tmp_path / "walk.csv")
     assert_same(again, walk, t=1e-4)
-    assert "stamps of arrival" in again.taken
+    assert "arrival stamps" in again.taken
 
 
 def test_units_in_the_line_below_the_header(walk, assert_same, tmp_path):
@@ -152,7 +152,7 @@ def test_a_rate_that_does_not_fit_is_refused(walk, tmp_path):
     made(walk).to_csv(path, index=False)
     assert len(load(path, Hints(rate_hz=rate))) == len(walk)
     for units in ({}, parse_units("acc=m/s^2")):
-        with pytest.raises(RecordingError, match=r"gravity turns 0\.\d+ times as fast .* of the times --rate HZ"):
+        with pytest.raises(RecordingError, match=r"gravity turns 0\.\d+ times as fast .* for the times --rate HZ"):
             load(path, Hints(rate_hz=rate / 4, units=units))
 
 
@@ -168,7 +168,7 @@ def test_a_size_that_is_no_gravity_says_no_unit(walk, tmp_path):
     table[["ax", "ay", "az"]] *= 512 / G
     table[["ax", "ay", "az"]] = table[["ax", "ay", "az"]].round()
     table.to_csv(tmp_path / "walk.csv", index=False)
-    with pytest.raises(RecordingError, match="nothing says in which unit acc is"):
+    with pytest.raises(RecordingError, match="the unit of acc is not known"):
         load(tmp_path / "walk.csv", Hints(units=parse_units("gyr=rad/s,t=s")))
 
 
@@ -193,12 +193,12 @@ def test_sensor_loggers_one_table(ios, walk, assert_same, tmp_path):
     sensor_loggers_one_table(walk, -1 if ios else 1, ios).to_csv(tmp_path / "one.csv", index=False)
     read = load(tmp_path / "one.csv")
     assert_same(read, walk, 1e-9, 1e-9, 1e-9)
-    assert ("the other sign, as iOS has them" in read.taken) == ios
+    assert ("the opposite sign, as on iOS" in read.taken) == ios
 
 
 def test_a_table_that_does_not_say_whose_sign_it_has_is_said(walk, assert_same, tmp_path):
     sensor_loggers_one_table(walk, 1, False, uncalibrated=False).to_csv(tmp_path / "one.csv", index=False)
-    assert "which on iOS is the other one" in load(tmp_path / "one.csv").taken
+    assert "if an iPhone recorded them, it is the opposite one" in load(tmp_path / "one.csv").taken
 
 
 def pair(folder, walk, times, order=(0, 1, 2, 3)):

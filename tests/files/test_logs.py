@@ -149,7 +149,7 @@ def test_its_columns_are_named(walk, assert_same, tmp_path):
     made.to_parquet(tmp_path / "walk.parquet")
     read = load(tmp_path / "walk.parquet")
     assert_same(read, walk)
-    assert "read as of --columns t,ax,ay,az,gx,gy,gz" in read.taken
+    assert "how gravity turns: --columns t,ax,ay,az,gx,gy,gz" in read.taken
     made[["when", *"adbecf"]].to_parquet(tmp_path / "walk.parquet")
     with pytest.raises(RecordingError, match="its columns are when, a, d, b, e, c, f"):
         load(tmp_path / "walk.parquet")
@@ -159,7 +159,7 @@ def test_its_columns_are_named(walk, assert_same, tmp_path):
 
 def test_a_parquet_file_that_is_none(tmp_path):
     (tmp_path / "walk.parquet").write_bytes(b"PAR1 and no more")
-    with pytest.raises(RecordingError, match="no whole Parquet file"):
+    with pytest.raises(RecordingError, match="not a whole Parquet file"):
         load(tmp_path / "walk.parquet")
 
 

@@ -24,7 +24,7 @@ from mpucal.errors import CaptureError, OutputError
 from mpucal.files import mcap, protobuf
 from mpucal.files.capture import capture_rows, load_capture
 from mpucal.files.mcap import CaptureWriter, read_capture
-from mpucal.files.messages import accesses_message
+from mpucal.files.messages import encode_accesses
 
 META = {"mpucal": "0.1.0", "chip": "MPU-6050", "options": {"gravity": 9.81, "seed": None}}
 
@@ -207,10 +207,10 @@ def test_a_chunk_longer_than_any_memory_is_damage(path):
     ("content", "says"),
     [
         pytest.param(b"", "is empty", id="empty"),
-        pytest.param(b"t,ax,ay,az\n0,0,0,9.8\n", "no MCAP file", id="text"),
-        pytest.param(b"\x89MCAP0\r\n", "does not hold the head", id="magic alone"),
-        pytest.param(b"\x89MCAP0\r\n" + bytes(range(256)), "does not hold the head", id="junk after the magic"),
-        pytest.param(b"\x89MCAP0\r\n\x05\x05" + bytes(29), "does not hold the head", id="a message of 5 bytes"),
+        pytest.param(b"t,ax,ay,az\n0,0,0,9.8\n", "not an MCAP file", id="text"),
+        pytest.param(b"\x89MCAP0\r\n", "lacks the metadata", id="magic alone"),
+        pytest.param(b"\x89MCAP0\r\n" + bytes(range(256)), "lacks the metadata", id="junk after the magic"),
+        pytest.param(b"\x89MCAP0\r\n\x05\x05" + bytes(29), "lacks the metadata", id="a message of 5 bytes"),
     ],
 )
 def test_what_is_no_capture_is_refused(path, content, says):
@@ -241,7 +241,7 @@ def test_an_mcap_file_of_another_program_is_refused(path):
     writer.start()
     writer.add_metadata("camera", {"lens": "wide"})
     writer.finish()
-    with pytest.raises(CaptureError, match="head of a capture"):
+    with pytest.raises(CaptureError, match="metadata of a capture"):
         read_capture(path)
 
 
@@ -297,8 +297,8 @@ def test_captures_of_version_1_are_read():
 
 @pytest.mark.parametrize("number", [5, 6], ids=["times", "times heard"])
 def test_a_message_whose_columns_do_not_fit_is_refused(path, number, monkeypatch):
-    monkeypatch.setattr(mcap, "accesses_message", lambda accesses: message + protobuf.field(number, b"\2"))
-    message = accesses_message(Accesses.from_transactions(polls(3)))
+    monkeypatch.setattr(mcap, "encode_accesses", lambda accesses: message + protobuf.field(number, b"\2"))
+    message = encode_accesses(Accesses.from_transactions(polls(3)))
     write(path, polls(3))
-    with pytest.raises(CaptureError, match="none of mpucal's"):
+    with pytest.raises(CaptureError, match="an invalid message"):
         read_capture(path)

@@ -78,8 +78,8 @@ def test_temperature_by_its_short_name(arrays, path):
         pytest.param({"flat": (40, 60)}, "does not lie within", id="flat beyond the end"),
         pytest.param({"flat_samples": np.nan}, "flat_samples is nan", id="flat NaN"),
         pytest.param({"temperature": np.zeros(3)}, "temperature_c has shape", id="temperature too short"),
-        pytest.param({"sensor": "MPU"}, "sensor is no JSON object", id="sensor no JSON"),
-        pytest.param({"sensor": "[1]"}, "sensor is no JSON object", id="sensor a list"),
+        pytest.param({"sensor": "MPU"}, "sensor is not a JSON object", id="sensor no JSON"),
+        pytest.param({"sensor": "[1]"}, "sensor is not a JSON object", id="sensor a list"),
     ],
 )
 def test_arrays_that_are_no_recording(arrays, path, change, says):
@@ -97,7 +97,7 @@ def test_files_that_are_no_archive(arrays, path, tmp_path):
     contents = [b"", b"t,acc,gyr", whole[:-30], whole[: len(whole) // 2], bytes(broken)]
     for content in [*contents, (tmp_path / "one.npy").read_bytes()]:
         path.write_bytes(content)
-        with pytest.raises(RecordingError, match="no whole NumPy archive"):
+        with pytest.raises(RecordingError, match="not a whole NumPy archive"):
             load(path)
 
 

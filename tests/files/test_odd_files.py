@@ -13,7 +13,7 @@ from mpucal.chip.records import FORGET, SessionEvent
 from mpucal.data import Samples
 from mpucal.errors import CaptureError, RecordingError
 from mpucal.files import open_rows
-from mpucal.files.imu import messages
+from mpucal.files.imu import encode_messages
 from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.files.ros import load_bag
 
@@ -33,14 +33,14 @@ def table(times=TIMES, n=N):
 def test_a_sensor_that_counts_zeros_measures_no_gravity(tmp_path):
     path = tmp_path / "dead.txt"
     path.write_text("a/g:\t0\t0\t0\t0\t0\t0\n" * N)
-    with pytest.raises(RecordingError, match=r"at ±2 g \|a\| is 0 m/s\^2 in the median, which is no gravity"):
+    with pytest.raises(RecordingError, match=r"at ±2 g the median \|a\| is 0 m/s\^2, which is not gravity"):
         mpucal.load(path, rate=100)
 
 
 @pytest.mark.parametrize("times", [0, "2026-11-22T12:00:00"])
 def test_one_line_over_and_over_is_one_sample(tmp_path, times):
     table(times).to_csv(tmp_path / "a.csv", index=False)
-    with pytest.raises(RecordingError, match="the same accelerations again and again, at one time: record it again"):
+    with pytest.raises(RecordingError, match="repeats one sample of accelerations at one time: record it again"):
         mpucal.load(tmp_path / "a.csv")
 
 
@@ -48,10 +48,13 @@ DATES = pd.Series(pd.to_datetime(np.arange(N) * 10_000_000)).to_numpy()
 NO_TIMES = {
     "none lies ahead": (np.where(np.arange(N) == 0, np.datetime64("NaT"), DATES), "t.* lacks a time"),
     "one is missing": (np.where(np.arange(N) == 7, np.datetime64("NaT"), DATES), "t.* lacks a time"),
-    "the first is infinite": (np.where(np.arange(N) == 0, np.inf, TIMES), "times that are none"),
-    "all are infinite": (np.full(N, np.inf), "the same accelerations again and again"),
-    "they overflow": (np.where(np.arange(N) == 0, -1.7e308, 1.7e308 + TIMES), "times that are none|again and again"),
-    "all are one": (np.zeros(N), "the same accelerations again and again"),
+    "the first is infinite": (np.where(np.arange(N) == 0, np.inf, TIMES), "times that are not finite"),
+    "all are infinite": (np.full(N, np.inf), "repeats one sample of accelerations"),
+    "they overflow": (
+        np.where(np.arange(N) == 0, -1.7e308, 1.7e308 + TIMES),
+        "times that are not finite|repeats one sample",
+    ),
+    "all are one": (np.zeros(N), "repeats one sample of accelerations"),
 }
 
 
@@ -90,7 +93,7 @@ def test_a_bag_without_messages(tmp_path):
 
 
 def test_times_of_receipt_beyond_any_clock(tmp_path):
-    with pytest.raises(RecordingError, match="holds times that are none"):
+    with pytest.raises(RecordingError, match="holds impossible times"):
         load_bag(bag(tmp_path / "a.mcap", range(1 << 63, (1 << 63) + N)))
 
 
@@ -165,8 +168,10 @@ def test_a_time_of_day_beyond_any_number_is_left_out(tmp_path, walk):
 
 def test_a_message_of_ros_holds_no_time_after_2038():
     samples = Samples(TIMES, AT_REST[:, :3], AT_REST[:, 3:], TIMES, *3 * [TIMES < 0])
-    with pytest.raises(RecordingError, match=r"as a message of ROS holds it: write a \.csv or \.npz"):
-        messages(samples, np.full((2, 3), np.nan), utc_ns=2_200_000_000 * 10**9)
+    with pytest.raises(
+        RecordingError, match=r"a message of ROS can only hold times from 0 to 2\^31 s: write a \.csv or \.npz"
+    ):
+        encode_messages(samples, np.full((2, 3), np.nan), utc_ns=2_200_000_000 * 10**9)
 
 
 @pytest.fixture(scope="module")
@@ -202,7 +207,7 @@ def test_samples_that_are_to_be_forgotten_and_are_not_there(capture, tmp_path, d
         with pytest.raises(CaptureError, match="an event forget without a whole number"):
             open_rows(tmp_path / "a.mcap")
     elif lost > n:
-        with pytest.raises(RecordingError, match="holds 0 samples that may be used"):
+        with pytest.raises(RecordingError, match="holds 0 usable samples"):
             mpucal.load(tmp_path / "a.mcap")
     else:
         assert len(mpucal.load(tmp_path / "a.mcap")) == n - lost

@@ -122,7 +122,7 @@ def test_two_topics_are_joined_by_time(walk, walk_ns, tmp_path):
 
 def test_of_several_topics_one_is_named(walk, walk_ns, assert_same, tmp_path):
     made = bag(tmp_path / "walk", walk, walk_ns, "mcap", (*BOTH, ("/imu/data", True, True)))
-    with pytest.raises(RecordingError, match=r"Imu on /imu/data_raw, /imu/data: say which with --topic"):
+    with pytest.raises(RecordingError, match=r"Imu on /imu/data_raw, /imu/data: choose one with --topic"):
         load(made)
     assert_same(load(made, Hints(topic="/imu/data")), walk, 0, 0)
     with pytest.raises(RecordingError, match="has no Imu on /other"):
@@ -163,5 +163,5 @@ def test_the_command_says_what_was_taken(walk, walk_ns, tmp_path, capfd):
     bag(tmp_path / "walk", walk, walk_ns, "mcap")
     assert run(["calibrate", str(tmp_path / "walk"), "--json"]) == 0
     said = capfd.readouterr()
-    assert "mpucal: Of walk times in ns" in said.err
+    assert "mpucal: walk was read with times in ns" in said.err
     assert json.loads(said.out)["fit"]["samples"] == len(walk)

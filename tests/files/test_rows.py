@@ -120,7 +120,7 @@ def test_a_sample_that_lacks_a_number_passes_through_and_is_no_part_of_a_recordi
     read, kept = load(tmp_path / f"in{kind}"), np.arange(N) != ROWS + 100
     np.testing.assert_array_equal(getattr(read, key), getattr(before, key)[kept])
     assert np.flatnonzero(read.gap).tolist() == [ROWS + 100]
-    assert read.taken == f"Of in{kind} 1 samples that lack a number were left out."
+    assert read.taken == f"in{kind}: 1 samples that lack a number were left out."
 
 
 def test_time_increases_from_run_to_run(tmp_path):

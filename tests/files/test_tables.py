@@ -11,8 +11,8 @@ from mpucal.data import STANDARD_GRAVITY_MPS2 as G
 from mpucal.errors import RecordingError, UsageError
 from mpucal.files import load
 from mpucal.files.hints import Hints, parse_columns, parse_units
-from mpucal.files.tables.names import column_named
-from mpucal.files.tables.units import turned, unit_named
+from mpucal.files.tables.names import parse_column_name
+from mpucal.files.tables.units import rate_factor, unit_named
 
 COUNTS_A, COUNTS_G = 32768 / (4 * G), 32750 / np.radians(500)
 
@@ -120,7 +120,7 @@ def test_dialects_give_the_samples_that_were_written(dialect, separator, walk, w
     DIALECTS[dialect](walk, walk_ns).to_csv(path, sep=separator, index=False)
     read = load(path)
     assert_same(read, walk, 1e-9, 1e-9, 1e-6 if dialect in ("ulog2csv", "WitMotion") else 1e-9)
-    assert read.taken.startswith("Of walk.csv times in ")
+    assert read.taken.startswith("walk.csv was read with times in ")
     assert SEPARATORS[separator] in read.taken
 
 
@@ -159,7 +159,7 @@ def test_dates_are_times(walk, walk_ns, assert_same, tmp_path):
 
 def test_ios_counts_gravity_the_other_way(walk, walk_ns, tmp_path):
     DIALECTS["SensorLog"](walk, walk_ns).to_csv(tmp_path / "walk.csv", index=False)
-    assert "the other sign, as iOS" in load(tmp_path / "walk.csv").taken
+    assert "the opposite sign, as on iOS" in load(tmp_path / "walk.csv").taken
 
 
 def test_doubtful_units_are_refused_and_can_be_said(walk, walk_ns, assert_same, tmp_path):
@@ -167,7 +167,7 @@ def test_doubtful_units_are_refused_and_can_be_said(walk, walk_ns, assert_same, 
     made = DIALECTS["EuRoC"](walk, walk_ns)
     made.iloc[:, 4:] /= G
     made.to_csv(path, index=False)
-    with pytest.raises(RecordingError, match=r"acc is said to be in m/s\^2, and .* reads as of g"):
+    with pytest.raises(RecordingError, match=r"acc is said to be in m/s\^2, but .* suggests g"):
         load(path)
     assert_same(load(path, Hints(units=parse_units("acc=g"))), walk)
 
@@ -177,7 +177,7 @@ def test_degrees_that_are_called_radians_are_refused(walk, walk_ns, assert_same,
     made = DIALECTS["Kalibr"](walk, walk_ns)
     made.iloc[:, 1:4] = np.degrees(made.iloc[:, 1:4])
     made.to_csv(path, index=False)
-    with pytest.raises(RecordingError, match="gyr is said to be in rad/s, and gravity turns as of deg/s"):
+    with pytest.raises(RecordingError, match="gyr is said to be in rad/s, but the turning of gravity suggests deg/s"):
         load(path)
     assert_same(load(path, Hints(units=parse_units("gyr=deg/s"))), walk)
 
@@ -185,7 +185,7 @@ def test_degrees_that_are_called_radians_are_refused(walk, walk_ns, assert_same,
 def test_milliseconds_that_are_called_seconds_are_refused(walk, walk_ns, assert_same, tmp_path):
     path = tmp_path / "walk.csv"
     timed("time [s]", walk.t * 1000, "ax|ay|az|gx|gy|gz", walk.acc, walk.gyr).to_csv(path, index=False)
-    with pytest.raises(RecordingError, match=r"t is said to be in s, and their step of .* reads as of ms"):
+    with pytest.raises(RecordingError, match=r"t is said to be in s, but the step of .* suggests ms"):
         load(path)
 
 
@@ -195,7 +195,7 @@ def test_rates_of_a_sensor_at_rest_need_a_unit(tmp_path):
     timed("time", np.arange(500) * 5, "accX|accY|accZ|gyroX|gyroY|gyroZ", acc, gyr).to_csv(
         tmp_path / "a.csv", index=False
     )
-    with pytest.raises(RecordingError, match="nothing says in which unit gyr is"):
+    with pytest.raises(RecordingError, match="the unit of gyr is not known"):
         load(tmp_path / "a.csv")
     assert len(load(tmp_path / "a.csv", Hints(units=parse_units("gyr=deg/s")))) == 500
 
@@ -224,12 +224,12 @@ def test_counts_need_their_ranges_and_a_rate(walk, assert_same, tmp_path):
     with pytest.raises(RecordingError, match="give the rate of its samples with --rate HZ"):
         load(path)
     seen = load(path, Hints(rate_hz=rate))
-    assert "counts of ±4 g, as |a| reads, and rates in counts of ±500 deg/s, as gravity turns" in seen.taken
+    assert "counts of ±4 g (by |a|) and rates in counts of ±500 deg/s (by how gravity turns)" in seen.taken
     assert_same(seen, steady, 0.5 / COUNTS_A, 0.5 / COUNTS_G)
     read = load(path, Hints(rate_hz=rate, accel_range_g=4, gyro_range_dps=500))
     assert_same(read, steady, 0.5 / COUNTS_A, 0.5 / COUNTS_G)
     assert (read.sensor.accel_range_g, read.sensor.gyro_range_dps) == (4, 500)
-    with pytest.raises(RecordingError, match="which is no gravity"):
+    with pytest.raises(RecordingError, match="which is not gravity"):
         load(path, Hints(rate_hz=rate, accel_range_g=2, gyro_range_dps=500))
     with pytest.raises(RecordingError, match=r"gravity turns .* as fast"):
         load(path, Hints(rate_hz=rate, accel_range_g=4, gyro_range_dps=2000))
@@ -257,7 +257,7 @@ def test_columns_are_named(names, said, walk, assert_same, tmp_path):
     path = tmp_path / "walk.csv"
     frame(names or "0|1|2|3|4|5|6", walk.t * 1000, walk.acc, walk.gyr).to_csv(path, index=False, header=bool(names))
     seen = load(path)
-    assert "read as of --columns t,ax,ay,az,gx,gy,gz" in seen.taken
+    assert "how gravity turns: --columns t,ax,ay,az,gx,gy,gz" in seen.taken
     assert_same(seen, walk, 1e-9, 1e-9, 1e-9)
     assert_same(load(path, Hints(columns=parse_columns(said))), walk, 1e-9, 1e-9, 1e-9)
 
@@ -272,25 +272,25 @@ def test_the_public_name_takes_words(walk, assert_same, tmp_path):
     path = tmp_path / "walk.csv"
     frame("a|b|c|d|e|f|g", walk.t * 1000, walk.acc / G, walk.gyr).to_csv(path, index=False)
     assert_same(mpucal.load(path, columns="t,ax,ay,az,gx,gy,gz", units="t=ms,acc=g,gyr=rad/s"), walk, 1e-9, 1e-9, 1e-9)
-    with pytest.raises(mpucal.MpucalError, match="is no unit"):
+    with pytest.raises(mpucal.MpucalError, match="is not a unit"):
         mpucal.load(path, units="acc=feet")
 
 
 @pytest.mark.parametrize("text", ["t=a,t=b", "velocity=a", "t,ax,ax", "ax="])
 def test_columns_that_say_nothing(text):
-    with pytest.raises(ValueError, match="is no column"):
+    with pytest.raises(ValueError, match="is not a column"):
         parse_columns(text)
 
 
 @pytest.mark.parametrize("text", ["acc=rad/s", "speed=m/s", "g", "acc="])
 def test_units_that_are_none(text):
-    with pytest.raises(ValueError, match="is no unit"):
+    with pytest.raises(ValueError, match="is not a unit"):
         parse_units(text)
 
 
 def test_hints_for_a_file_that_needs_none(tmp_path):
     (tmp_path / "walk.tlog").touch()
-    with pytest.raises(UsageError, match="nothing has to be said"):
+    with pytest.raises(UsageError, match="needs no options"):
         load(tmp_path / "walk.tlog", Hints(rate_hz=100))
 
 
@@ -298,7 +298,7 @@ def test_a_bad_line_is_named(walk, walk_ns, tmp_path):
     lines = DIALECTS["Kalibr"](walk, walk_ns).to_csv(index=False).splitlines()
     lines[40] = lines[40].replace(",", ",x", 1)
     (tmp_path / "walk.csv").write_text("\n".join(lines))
-    with pytest.raises(RecordingError, match=r"line 41: omega_x is 'x.*', which is no number"):
+    with pytest.raises(RecordingError, match=r"line 41: omega_x is 'x.*', which is not a number"):
         load(tmp_path / "walk.csv")
 
 
@@ -411,13 +411,13 @@ def test_what_i2cdevlibs_example_prints(ending, walk, assert_same, tmp_path):
     ],
 )
 def test_names(name, quantity, axis, unit):
-    found = column_named(name, 3)
+    found = parse_column_name(name, 3)
     assert (found.quantity, found.axis, found.unit, found.place) == (quantity, axis, unit, 3)
 
 
 @pytest.mark.parametrize("name", ["x", "roll", "GRAVITY X (m/s²)", "motionUserAccelerationX(G)", "mag_x", "w", "q_w"])
 def test_names_of_something_else(name):
-    assert column_named(name, 0) is None
+    assert parse_column_name(name, 0) is None
 
 
 @pytest.mark.parametrize(
@@ -433,4 +433,4 @@ def test_gravity_turns_as_the_rates_say():
     axis = np.array([0.6, -0.48, 0.64])
     angle, g = 2 * np.sin(t)[:, None], np.array([0.0, 0.0, G])
     acc = g * np.cos(angle) - np.cross(axis, g) * np.sin(angle) + axis * (axis @ g) * (1 - np.cos(angle))
-    assert turned(t, acc, 2 * np.cos(t)[:, None] * axis) == pytest.approx(1.0, rel=0.02)
+    assert rate_factor(t, acc, 2 * np.cos(t)[:, None] * axis) == pytest.approx(1.0, rel=0.02)

@@ -1,11 +1,11 @@
-"""The sensor's own clock behind stamps of arrival: by USB, by radio, or of a busy computer.
+"""The sensor's own clock, estimated from arrival stamps over USB, radio, or of a busy computer.
 
-A sensor measures evenly, and its samples arrive late by what the way holds back. So one line with the slope of a
-sample's period lies below all stamps of a run in which none is missing; where samples are missing, or a logger
-stopped, the next run lies later. A jump of that lower envelope is therefore a gap, and a stamp that is merely late is
-none. With gaps known, the times are those that a chip's clock has by the looks at its FIFO (chip/clock.py).
+A sensor measures evenly, and its samples arrive late by the delay of the transport. So within a run without a missing
+sample one line, with the sample period as its slope, lies below all stamps; after missing samples, or a logger's pause,
+the line lies higher. A jump of that lower envelope is therefore a gap, while a stamp that is merely late is not. With
+the gaps known, the clock is fitted as a chip's is by polls of its FIFO (chip/clock.py).
 
-Stamps that keep no such line are of a program that measured when it could: they are the samples' times.
+Stamps that follow no such line are of a program that measured when it could: they are the samples' times.
 """
 
 from __future__ import annotations
@@ -21,34 +21,34 @@ from ...data import Mask, Vector
 
 NS = 1_000_000_000
 FEWEST = 100
-# of a period: steps that vary by less are a clock's own
+# periods: steps that vary by less are a clock's own
 EVEN = 0.1
-# samples over which a period is told, whatever arrives at once, and how many such stretches there are at least
+# samples over which a period is measured, so that bursts do not matter, and the least number of such stretches
 LAG, STRETCHES = 250, 4
-# In variance a step over LAG samples exceeds that over one as often where each step varies by itself; late stamps keep
-# to their line, and bursts of m samples give m / 6.
-KEEPS_TO_A_LINE = 0.2
-# shares of such steps that pauses and delays may have made, over LAG samples and over one
+# variance of a step over LAG samples, over LAG times that of one step: 1 if each step varies by itself, and far less if
+# late stamps follow a line or come in bursts
+FOLLOWS_A_LINE = 0.2
+# shares of steps that are left out as pauses and delays, over LAG samples and over one
 OUTLIERS, SELDOM = 0.1, 0.02
-# s, of stretches of which each has a stamp that was hardly late; and samples of one at least
+# s and least number of samples of a stretch: each holds a stamp that was hardly late
 STRETCH_S, STRETCH = 0.25, 16
-# after so many the envelope's slope has settled
+# rounds after which the envelope's slope has settled
 ROUNDS = 4
-# the share of stamps that the clock is told by
+# the share of stamps, the earliest ones, to which the clock is fitted
 IN_TIME = 0.75
-# stretches within which what was held back has arrived
+# stretches within which delayed samples have arrived
 CATCHES_UP = 8
-# of a period, and of what envelopes move by: a jump by more is a gap
+# periods, and multiples of the envelope's usual move: a jump by more is a gap
 LOST, BY_CHANCE = 0.6, 6.0
-# of what stamps are rounded to
+# multiples of the stamps' resolution: a jump by more may be a gap
 ROUNDED = 1.5
-# the least step between two times, in periods: where a run began too late beside the one before
+# periods: the least step between two times, where a run seems to begin before the last one ends
 LEAST_STEP = 0.2
 
 
 @dataclass(frozen=True)
-class Even:
-    """Times by the sensor's clock: t (n,) s; gap (n,) where samples are missing before; the stamps' jitter [s]."""
+class EvenClock:
+    """Times by the sensor's clock: t (n,) s; gap (n,) where samples are missing before; rms jitter of the stamps."""
 
     t: Vector
     gap: Mask
@@ -56,24 +56,24 @@ class Even:
     jitter_s: float
 
     @property
-    def said(self) -> str:
-        """What was done, in words."""
+    def description(self) -> str:
+        """Return a remark for the user on how the times were replaced."""
         lost = int(self.gap.sum())
-        gaps = f", with {lost} gap{'s' if lost > 1 else ''}" if lost else ", and none is missing"
+        gaps = f"with {lost} gap{'s' if lost > 1 else ''}" if lost else "without gaps"
         return (
-            f"the times are stamps of arrival, {1e3 * self.jitter_s:.2g} ms (rms) about an even {self.rate_hz:.4g} Hz,"
-            f" which was taken{gaps}"
+            f"its times are arrival stamps, {1e3 * self.jitter_s:.2g} ms (rms) off, and were replaced by an even clock"
+            f" of {self.rate_hz:.4g} Hz {gaps}"
         )
 
 
 def period_of(stamps: Vector) -> float:
-    """The samples' period by (n,) stamps that may come in bursts, repeat or be late; in their unit."""
+    """Return the sample period of (n,) stamps that may come in bursts, repeat or be late, in their unit."""
     lag = min(LAG, max((len(stamps) - 1) // STRETCHES, 1))
     return float(np.median(stamps[lag:] - stamps[:-lag])) / lag if len(stamps) > 1 else 0.0
 
 
-def even(stamps: Vector) -> Even | None:
-    """The clock behind (n,) stamps [s], which do not decrease; None where the stamps are the samples' times."""
+def fit_even_clock(stamps: Vector) -> EvenClock | None:
+    """Return the clock behind (n,) stamps [s] that do not decrease; None if the stamps are the samples' times."""
     if len(stamps) < FEWEST or not (period := period_of(stamps)) > 0.0:
         return None
     off = np.diff(stamps) - period
@@ -81,7 +81,7 @@ def even(stamps: Vector) -> Even | None:
         return None
     gap, late = _gaps(stamps, period)
     lag = min(LAG, len(stamps) // STRETCHES)
-    if _square(late[lag:] - late[:-lag], OUTLIERS) > KEEPS_TO_A_LINE * lag * _square(off, SELDOM):
+    if _square(late[lag:] - late[:-lag], OUTLIERS) > FOLLOWS_A_LINE * lag * _square(off, SELDOM):
         return None
     clock, segment, index = SampleClock(1.0 / period), np.cumsum(gap), np.empty(len(stamps), np.int64)
     begins: NDArray[np.intp] = np.flatnonzero(np.append(True, gap[1:]))
@@ -89,23 +89,23 @@ def even(stamps: Vector) -> Even | None:
         index[first:last] = np.arange(last - first)
         in_time = first + np.flatnonzero(late[first:last] <= np.quantile(late[first:last], IN_TIME))
         clock.begin_segment()
-        clock.add_many(np.rint(stamps[in_time] * NS).astype(np.int64), index[in_time] + 1)
+        clock.add(np.rint(stamps[in_time] * NS).astype(np.int64), index[in_time] + 1)
     t = clock.times_s(segment.astype(np.int64), index)
     late = stamps - t
     rate_hz = clock.rate_hz
-    return Even(
+    return EvenClock(
         make_increasing(t, LEAST_STEP / rate_hz), gap, rate_hz, float(np.sqrt(np.mean((late - late.mean()) ** 2)))
     )
 
 
 def _square(values: Vector, left_out: float) -> float:
-    """The mean square of values, but for a share of the largest."""
+    """Return the mean square of values without a share of the largest."""
     squares = np.sort(values * values)
     return float(squares[: len(squares) - max(round(left_out * len(squares)), 1)].mean())
 
 
 def _gaps(stamps: Vector, period: float) -> tuple[Mask, Vector]:
-    """(n,) where samples are missing, by the jumps of the stamps' lower envelope; how late each is without them."""
+    """Return (n,) where samples are missing, by jumps of the lower envelope, and the delay (n,) of each stamp."""
     n = len(stamps)
     width = max(round(STRETCH_S / period), STRETCH)
     edges = np.arange(0, n - width // 2, width)
@@ -114,13 +114,13 @@ def _gaps(stamps: Vector, period: float) -> tuple[Mask, Vector]:
         late -= float(np.median(np.diff(np.minimum.reduceat(late, edges)))) / width * np.arange(n)
     least = np.minimum.reduceat(late, edges)
     chance = float(np.median(np.abs(np.diff(least))))
-    # what was only held back arrives in time again soon
+    # after a mere delay the next samples are soon in time again
     least = sliding_window_view(np.append(least, np.full(CATCHES_UP - 1, np.inf)), CATCHES_UP).min(1)
     moved = np.diff(least)
     limit = max(LOST * period, BY_CHANCE * chance, ROUNDED * _resolution(stamps))
     gap = np.zeros(n, bool)
     for at in np.flatnonzero(moved > limit):
-        # the envelope of the stretch in which they are missing is that of its part before
+        # in the stretch with the gap, the envelope is that of the part before it
         first, last = edges[at], min(edges[at + 1] + width, n)
         from_here = np.minimum.accumulate(late[first:last][::-1])[::-1]
         begins = first + 1 + int(np.argmax(from_here[1:] - late[first : last - 1]))
@@ -130,7 +130,7 @@ def _gaps(stamps: Vector, period: float) -> tuple[Mask, Vector]:
 
 
 def _resolution(stamps: Vector) -> float:
-    """What all stamps are multiples of, as far as their steps show; 0 where that is less than some of a step."""
+    """Return the step that all stamps are multiples of; 0 if there is none."""
     steps = np.diff(stamps)
     least = float(steps[steps > 0.0].min())
     parts = steps / least

@@ -1,8 +1,8 @@
 """Columns without names, by physics: which three hold gravity, and which three turn it as it turns.
 
-Of three columns beside each other that keep a magnitude, the first are the accelerometer, and those whose rates turn
-these as they turn are the gyroscope; a column before both that increases evenly is the time. What physics does not
-confirm is not guessed.
+The first three adjacent columns that keep a magnitude are the accelerometer; the three whose rates turn this vector as
+it turns are the gyroscope; a column before both that increases steadily is the time. Nothing is guessed that physics
+does not confirm.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ import numpy as np
 from ...data import Vector
 from ..hints import ROLES, Hints
 from .clock import period_of
-from .units import ANY_HZ, BEYOND, FASTEST_HZ, QUANTITIES, signed, turned
+from .units import ANY_HZ, BEYOND, FASTEST_HZ, QUANTITIES, rate_factor, to_signed
 
 FEWEST, WIDEST = 300, 16
-# of |a| in its quartiles: gravity, with the biases of a sensor that nobody calibrated
+# largest distance of the quartiles of |a|, over its median: gravity, with the biases of an uncalibrated sensor
 MOST_SCATTER = 0.75
-# samples that are looked at
-LOOKED_AT = 200_000
+# more samples add nothing
+MOST_SAMPLES = 200_000
 
 
-def guessed(table: Vector, hints: Hints) -> tuple[dict[str, int], str]:
-    """Role -> place among the columns of (n, k) numbers, and what is to be said of it; nothing where nothing fits."""
+def guess_columns(table: Vector, hints: Hints) -> tuple[dict[str, int], str]:
+    """Return role -> place among the columns of (n, k) numbers, and a remark; both are empty if nothing fits."""
     n, width = table.shape
-    table = table[:LOOKED_AT]
+    table = table[:MOST_SAMPLES]
     if n < FEWEST or not 6 <= width <= WIDEST or not (np.abs(table) < BEYOND).all():
         return {}, ""
     for at in (0, 1):
@@ -37,7 +37,7 @@ def guessed(table: Vector, hints: Hints) -> tuple[dict[str, int], str]:
             words = ["-"] * (max(order.values()) + 1)
             for role, place in order.items():
                 words[place] = role
-            return order, f"its columns read as of --columns {','.join(words)} by how gravity turns"
+            return order, f"its columns were guessed from how gravity turns: --columns {','.join(words)}"
     return {}, ""
 
 
@@ -55,14 +55,14 @@ def _seconds(clock: Vector | None, n: int, hints: Hints) -> Vector:
 
 
 def _sensors(table: Vector, first: int, t: Vector) -> list[int]:
-    """The places of ax, ay, az, gx, gy, gz; empty where no columns fit."""
-    threes = list(range(first, table.shape[1] - 2, 3))
-    for a in threes:
-        acc = signed(table[:, a : a + 3])
+    """Return the places of ax, ay, az, gx, gy, gz; empty if no columns fit."""
+    triples = range(first, table.shape[1] - 2, 3)
+    for a in triples:
+        acc = to_signed(table[:, a : a + 3])
         low, size, high = np.percentile(np.linalg.norm(acc, axis=1), [25, 50, 75]).tolist()
         if not 0.0 < high - low <= MOST_SCATTER * size:
             continue
-        for w in threes:
-            if w != a and (turned(t, acc, signed(table[:, w : w + 3])) or 0.0) > 0.0:
+        for w in triples:
+            if w != a and (rate_factor(t, acc, to_signed(table[:, w : w + 3])) or 0.0) > 0.0:
                 return [a, a + 1, a + 2, w, w + 1, w + 2]
     return []

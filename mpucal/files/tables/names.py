@@ -8,94 +8,53 @@ Toolbox's gFx and wx, ulog2csv's accelerometer_m_s2[0], Betaflight's gyroADC[0],
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...data import Vector
-from .units import COUNTS, QUANTITIES, unit_named
+from ...data import Mask, Vector
+from .units import QUANTITIES, unit_named
+
+Times = Sequence[Decimal] | NDArray[Any]
 
 TIME, NANOSECONDS, ACC, GYR, TEMPERATURE = "t", "nanoseconds", "acc", "gyr", "temperature_c"
-# stem -> the unit that its program writes, empty where that differs; the first known is taken where there are several
-ACC_STEMS = {
-    "accelerometeruncalibrated": "",
-    "accelerometeracceleration": "g",
-    "accelerometer": "",
-    "totalacceleration": "",
-    "acceleration": "",
-    "accel": "",
-    "accl": "",
-    "acce": "",
-    "acc": "",
-    "accs": "",
-    "ac": "",
-    "a": "",
-    "arss": "m/s^2",
-    "alpha": "m/s^2",
-    "gf": "g",
-    "accsmooth": "",
-    "linearacceleration": "",
-}
-GYR_STEMS = {
-    "gyroscopeuncalibrated": "rad/s",
-    "gyroscope": "",
-    "gyrorotation": "",
-    "gyro": "",
-    "gyr": "",
-    "gy": "",
-    "g": "",
-    "as": "",
-    "wrss": "rad/s",
-    "omega": "rad/s",
-    "w": "rad/s",
-    "angularvelocity": "rad/s",
-    "angularrate": "",
-    "gyroadc": "deg/s",
-    "rotationrate": "",
-    "motionrotationrate": "",
-    "rotation": "",
-}
-TIME_STEMS = {
-    "headerstamp": "ns",
-    "stamp": "",
-    "epoch": "",
-    "timestampsample": "us",
-    "timestamp": "",
-    "timestamps": "",
-    "time": "",
-    "times": "",
-    "t": "",
-    "ts": "",
-    "timesincestart": "",
-    "timesincestartin": "",
-    "secondselapsed": "s",
-    "elapsed": "",
-    "elapsedtime": "",
-    "seconds": "s",
-    "sec": "s",
-    "millis": "ms",
-    "micros": "us",
-    "rtctime": "",
-    "datetime": "",
-    "date": "",
-    "secs": "s",
-    "headerstampsec": "s",
-    "headerstampsecs": "s",
-    "stampsec": "s",
-    "stampsecs": "s",
-    "sampletimefine": "0.1ms",
-}
-# beside whole seconds: builtin_interfaces/Time, and ROS 1's time
+
+
+def _stems(words: str) -> dict[str, str]:
+    """Return stem -> unit of words "stem" or "stem:unit", in the order of preference."""
+    return {stem: unit for stem, _, unit in (word.partition(":") for word in words.split())}
+
+
+# a unit stands only where the program that uses the stem always writes that one
+ACC_STEMS = _stems(
+    "accelerometeruncalibrated accelerometeracceleration:g accelerometer totalacceleration acceleration accel accl"
+    " acce acc accs ac a arss:m/s^2 alpha:m/s^2 gf:g accsmooth linearacceleration"
+)
+GYR_STEMS = _stems(
+    "gyroscopeuncalibrated:rad/s gyroscope gyrorotation gyro gyr gy g as wrss:rad/s omega:rad/s w:rad/s"
+    " angularvelocity:rad/s angularrate gyroadc:deg/s rotationrate motionrotationrate rotation"
+)
+TIME_STEMS = _stems(
+    "headerstamp:ns stamp epoch timestampsample:us timestamp timestamps time times t ts timesincestart"
+    " timesincestartin secondselapsed:s elapsed elapsedtime seconds:s sec:s millis:ms micros:us rtctime datetime date"
+    " secs:s headerstampsec:s headerstampsecs:s stampsec:s stampsecs:s sampletimefine:0.1ms"
+)
+# the part below a second, in a column beside whole seconds: builtin_interfaces/Time, and ROS 1's time
 NANOSECOND_STEMS = tuple(f"{of}{word}" for of in ("", "stamp", "headerstamp") for word in ("nanosec", "nsecs", "nsec"))
-# each sensor's own clock: SensorLog
-OWN_TIMES = {"accelerometertimestampsincereboot": ACC, "gyrotimestampsincereboot": GYR}
+# SensorLog has a clock for each sensor
+SENSOR_CLOCKS = {"accelerometertimestampsincereboot": ACC, "gyrotimestampsincereboot": GYR}
 TEMPERATURE_STEMS = tuple(
     f"{word}{unit}" for word in ("temperature", "temp", "imutemp") for unit in ("", "c", "celsius", "degc")
 )
 COLDEST_C, WARMEST_C = -60.0, 130.0
-# iOS counts the acceleration of gravity as a body's own: at rest it reads -1 g along what points upwards
-TURNED_AROUND = ("accelerometeracceleration",)
-_OF_TIME = ("", *QUANTITIES[TIME])
+# iOS has the opposite sign of specific force: at rest it reads -1 g along the axis that points upwards
+FLIPPED_STEMS = ("accelerometeracceleration",)
+_TIME_UNITS = ("", *QUANTITIES[TIME])
 _PREFIXES = ("field", "imu0", "imu1", "imu", "sensors", "sensor", "raw", "data", "phone", "body")
 _AXIS = re.compile(r"([xyz])(?:[-_ ]?(?:axis|value))?\s*(?:[\[(](.*)[\])])?")
 _BRACKETS = re.compile(r"(.*?)[\s_.]*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
@@ -107,9 +66,16 @@ _UNIT_TAIL = re.compile(
 
 @dataclass(frozen=True)
 class Column:
-    """What a column holds: of `quantity` the axis 0, 1, 2; `rank` orders those of the same.
+    """A column whose name is known.
 
-    `unit` is the one that its name says, or its program's; `of` the quantity whose time it is, empty of both.
+    Attributes
+    ----------
+    name, place : as in the header; places count from 0.
+    quantity : TIME, NANOSECONDS, ACC, GYR or TEMPERATURE. axis : 0, 1, 2 of ACC and GYR.
+    unit : the one in its name, or else its program's; empty where neither is known.
+    rank : order of preference among columns of the same quantity.
+    clock_of : ACC or GYR where it is the clock of that sensor alone.
+    sign_flipped : accelerations have the opposite sign, as on iOS.
     """
 
     name: str
@@ -118,12 +84,66 @@ class Column:
     axis: int = 0
     unit: str = ""
     rank: int = 0
-    of: str = ""
-    turned_around: bool = False
+    clock_of: str = ""
+    sign_flipped: bool = False
 
 
-def column_named(name: str, place: int) -> Column | None:
-    """What the column of that name, at `place` from 0, holds; None of what is not read."""
+@dataclass(frozen=True)
+class Table(ABC):
+    """Columns of numbers under their names.
+
+    Attributes
+    ----------
+    name : of the file, for messages. header : the columns' names; empty if it has none.
+    """
+
+    name: str
+    header: list[str]
+
+    @property
+    def columns(self) -> list[Column]:
+        """Return the columns whose names are known."""
+        return parse_header(self.header)
+
+    @property
+    def remarks(self) -> list[str]:
+        """Return notes to the user on how the table was read."""
+        return []
+
+    @abstractmethod
+    def numbers(self, columns: Sequence[Column]) -> Vector:
+        """Return (n, k) numbers; NaN where a cell is empty.
+
+        Raises
+        ------
+        RecordingError : a cell is not a number.
+        """
+
+    @abstractmethod
+    def numeric_places(self) -> list[int]:
+        """Return the places of the columns that hold numbers."""
+
+    @abstractmethod
+    def clocks(self, columns: Sequence[Column]) -> list[Column]:
+        """Return those of `columns` that hold times."""
+
+    @abstractmethod
+    def times(self, column: Column, kept: Mask) -> tuple[Times, str]:
+        """Return the exact times of the lines in `kept` (n,), and their unit, empty if unknown; dates are in ns.
+
+        Raises
+        ------
+        RecordingError : one is not a time.
+        """
+
+    @property
+    def after_lost(self) -> Mask | None:
+        """Return (n,) True where rows before a row are missing; None if no row is missing."""
+        return None
+
+
+def parse_column_name(name: str, place: int) -> Column | None:
+    """Return the column of that name at `place`; None if it holds nothing that is read."""
     text, axis, unit = name.strip().lstrip("#%").strip(), -1, ""
     while match := _BRACKETS.fullmatch(text):
         text, inside = match.groups()
@@ -133,10 +153,7 @@ def column_named(name: str, place: int) -> Column | None:
             unit = "C"
         elif not (unit := unit_named(inside)):
             return None
-    return _stem(name, place, text.lower(), axis, unit)
-
-
-def _stem(name: str, place: int, text: str, axis: int, unit: str) -> Column | None:
+    text = text.lower()
     found = _known(name, place, text, axis, unit)
     if found is None and not unit and (tail := _UNIT_TAIL.fullmatch(text)):
         found = _known(name, place, tail[1], axis, unit_named(tail[2]))
@@ -144,89 +161,69 @@ def _stem(name: str, place: int, text: str, axis: int, unit: str) -> Column | No
 
 
 def _known(name: str, place: int, text: str, axis: int, unit: str) -> Column | None:
-    compact = re.sub(r"[^a-z0-9]", "", text)
-    for word in (compact, *_without_prefixes(compact)):
-        if word in OWN_TIMES and unit in _OF_TIME:
-            return Column(name, place, TIME, unit=unit or "s", of=OWN_TIMES[word])
-        if word in NANOSECOND_STEMS and not unit:
-            return Column(name, place, NANOSECONDS)
-        if word in TIME_STEMS and axis < 0 and unit in _OF_TIME:
-            return Column(name, place, TIME, unit=unit or TIME_STEMS[word], rank=list(TIME_STEMS).index(word))
-        if (word in TEMPERATURE_STEMS and unit in ("", "C")) or (word == "t" and unit == "C"):
-            return Column(name, place, TEMPERATURE)
-        for of, stems in ((ACC, ACC_STEMS), (GYR, GYR_STEMS)):
-            for stem, at in _axes(word, axis):
-                if stem in stems and unit in ("", *QUANTITIES[of]):
-                    rank, around = list(stems).index(stem), stem in TURNED_AROUND
-                    return Column(name, place, of, at, unit or stems[stem], rank, turned_around=around)
-    return None
-
-
-def _without_prefixes(word: str) -> list[str]:
-    found = []
+    """Return the column whose stem is `text`, without or with prefixes; None if no stem is known."""
+    word = re.sub(r"[^a-z0-9]", "", text)
+    words = [word]
     for prefix in _PREFIXES:
         if word.startswith(prefix) and len(word) > len(prefix):
             word = word.removeprefix(prefix)
-            found.append(word)
-    return found
+            words.append(word)
+    for word in words:
+        if word in SENSOR_CLOCKS and unit in _TIME_UNITS:
+            return Column(name, place, TIME, unit=unit or "s", clock_of=SENSOR_CLOCKS[word])
+        if word in NANOSECOND_STEMS and not unit:
+            return Column(name, place, NANOSECONDS)
+        if word in TIME_STEMS and axis < 0 and unit in _TIME_UNITS:
+            return Column(name, place, TIME, unit=unit or TIME_STEMS[word], rank=list(TIME_STEMS).index(word))
+        if (word in TEMPERATURE_STEMS and unit in ("", "C")) or (word == "t" and unit == "C"):
+            return Column(name, place, TEMPERATURE)
+        for quantity, stems in ((ACC, ACC_STEMS), (GYR, GYR_STEMS)):
+            for stem, at in _split_axis(word, axis):
+                if stem in stems and unit in ("", *QUANTITIES[quantity]):
+                    rank, flipped = list(stems).index(stem), stem in FLIPPED_STEMS
+                    return Column(name, place, quantity, at, unit or stems[stem], rank, sign_flipped=flipped)
+    return None
 
 
-def _axes(word: str, axis: int) -> list[tuple[str, int]]:
-    """(stem, axis) that a word may be made of: ax, gyroX, xacc."""
+def _split_axis(word: str, axis: int) -> list[tuple[str, int]]:
+    """Return the (stem, axis) that a word may consist of, such as ax, gyroX or xacc."""
     if axis >= 0:
         return [(word, axis)]
     found = []
-    if word[-1:] in ("x", "y", "z"):
-        found.append((word[:-1], "xyz".index(word[-1])))
-    for raw in ("raw", "adc", "lsb", "counts"):
-        if word.endswith(raw) and word.removesuffix(raw)[-1:] in ("x", "y", "z"):
-            found.append((word.removesuffix(raw)[:-1], "xyz".index(word.removesuffix(raw)[-1])))
+    for suffix in ("", "raw", "adc", "lsb", "counts"):
+        stem = word.removesuffix(suffix)
+        if word.endswith(suffix) and stem[-1:] in ("x", "y", "z"):
+            found.append((stem[:-1], "xyz".index(stem[-1])))
     if word[:1] in ("x", "y", "z"):
         found.append((word[1:], "xyz".index(word[0])))
     return found
 
 
-def bare_axis(name: str) -> tuple[int, str] | None:
-    """(axis, unit) of a column that is called x, y, z, `x-axis (g)` and the like; None of another."""
+def parse_axis_name(name: str) -> tuple[int, str] | None:
+    """Return (axis, unit) of a column called x, y, z, `x-axis (g)` and the like; None for any other."""
     found = _AXIS.fullmatch(name.strip().lower())
     return ("xyz".index(found[1]), unit_named(found[2] or "")) if found else None
 
 
-def columns_of(header: list[str]) -> list[Column]:
-    """What the columns of a header hold, those that are known."""
-    return [column for place, name in enumerate(header) if (column := column_named(name, place)) is not None]
+def parse_header(header: list[str]) -> list[Column]:
+    """Return the columns of a header whose names are known."""
+    return [column for place, name in enumerate(header) if (column := parse_column_name(name, place)) is not None]
 
 
-def threes(columns: list[Column], quantity: str) -> list[tuple[Column, ...]]:
-    """x, y, z of a quantity, of each stem that has all of them, by rank."""
+def axis_triples(columns: Sequence[Column], quantity: str) -> list[tuple[Column, ...]]:
+    """Return the x, y, z columns of a quantity, for each stem that has all three, by rank."""
     of = [column for column in columns if column.quantity == quantity]
     ranks = sorted({column.rank for column in of})
     found = [sorted((c for c in of if c.rank == rank), key=lambda c: c.axis) for rank in ranks]
     return [tuple(axes) for axes in found if [c.axis for c in axes] == [0, 1, 2]]
 
 
-def three(columns: list[Column], quantity: str) -> tuple[Column, ...]:
-    """The first of threes; empty where there are none."""
-    return next(iter(threes(columns, quantity)), ())
+def first_triple(columns: Sequence[Column], quantity: str) -> tuple[Column, ...]:
+    """Return the first of axis_triples; empty if there is none."""
+    return next(iter(axis_triples(columns, quantity)), ())
 
 
-def celsius(values: Vector) -> Vector | None:
-    """Temperatures (n,); None of what no sensor has: counts, or Kelvin."""
+def plausible_celsius(values: Vector) -> Vector | None:
+    """Return temperatures (n,); None if no sensor has them, such as counts or Kelvin."""
     known = values[np.isfinite(values)]
     return values if len(known) and known.min() > COLDEST_C and known.max() < WARMEST_C else None
-
-
-__all__ = [
-    "ACC",
-    "COUNTS",
-    "GYR",
-    "NANOSECONDS",
-    "TEMPERATURE",
-    "TIME",
-    "Column",
-    "celsius",
-    "column_named",
-    "columns_of",
-    "three",
-    "threes",
-]

@@ -1,7 +1,7 @@
 """Tables of one sensor each in a folder or a .zip: phyphox, Sensor Logger, MetaBase, ulog2csv.
 
-Sensor Logger's Accelerometer.csv is without gravity; TotalAcceleration.csv and AccelerometerUncalibrated.csv are with
-it. Of several accelerometers the one is taken that is nearest to the sensor and holds gravity.
+Sensor Logger's Accelerometer.csv excludes gravity; TotalAcceleration.csv and AccelerometerUncalibrated.csv include it.
+Of several accelerometers, the one with gravity that is nearest to the sensor's own output is read.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ import numpy as np
 from ...data import Recording, Vector
 from ...errors import RecordingError
 from ...result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
-from ..budget import HELD, afford
+from ..budget import HELD, check_size
 from ..hints import NO_HINTS, Hints
-from ..rows import cannot_read
-from .apps import is_about, said
-from .names import ACC, GYR, Column, bare_axis, three
-from .streams import are_counts, recording_of
-from .table import chosen, stream_of
-from .text import TextTable, table_of, text_of
+from ..reading import reading
+from .app_metadata import is_app_metadata, read_app_metadata
+from .names import ACC, GYR, Column, first_triple, parse_axis_name
+from .streams import are_counts, join_streams
+from .table import columns_by_hint, sensor_stream
+from .text import TextTable, decode_text, find_table
 from .times import Stream
-from .units import QUANTITIES, acceleration_unit, signed
+from .units import QUANTITIES, acceleration_unit, to_signed
 
-# a sensor's tables by their names, the one nearest to the sensor first; the unit where their program says none
+# names of a sensor's tables, the one nearest to the sensor's own output first
 NAMES = {
     ACC: (
         "accelerometeruncalibrated",
@@ -44,23 +44,24 @@ NAMES = {
     ),
     GYR: ("gyroscopeuncalibrated", "gyroscope", "gyro", "gyr", "gyrm", "rotationrate"),
 }
+# the unit of tables that name none
 UNITS = {ACC: "", GYR: "rad/s"}
-# imu_tk calls tables of text .mat
+# imu_tk names tables of text .mat
 SUFFIXES = (".csv", ".txt", ".tsv", ".mat")
-# of an accelerometer's largest: whole numbers that are smaller are no counts
+# whole numbers that are all smaller are not counts
 FEWEST_COUNTS = 200
-# NotImplementedError is a RuntimeError: another way to compress
+# RuntimeError includes NotImplementedError, of an unknown compression
 _DAMAGE = (zipfile.BadZipFile, RuntimeError, EOFError, ValueError, zlib.error, lzma.LZMAError)
 
 
 def is_folder_of_tables(path: Path) -> bool:
-    """Whether a folder holds a table of an accelerometer and one of a gyroscope, and no session."""
+    """Return True if a folder holds a table of an accelerometer and one of a gyroscope, and no session."""
     names = {child.name for child in path.iterdir()}
     return _has_both(names) and not names & {CAPTURE.name, CAPTURE_OF_VEHICLE.name}
 
 
 def is_archive_of_tables(path: Path) -> bool:
-    """Whether an archive holds them."""
+    """Return True if an archive holds a table of an accelerometer and one of a gyroscope."""
     try:
         with zipfile.ZipFile(path) as archive:
             return _has_both(archive.namelist())
@@ -69,46 +70,42 @@ def is_archive_of_tables(path: Path) -> bool:
 
 
 def load_folder_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
-    """The recording in a folder's tables.
+    """Return the recording in a folder's tables.
 
     Raises
     ------
-    RecordingError : one cannot be read, or both do not make a recording.
+    RecordingError : a table cannot be read, or the two do not make a recording.
     """
-    try:
+    with reading(path):
         files = sorted(child for child in (*path.iterdir(), *path.glob("meta/time.csv")) if child.is_file())
         names = {child: child.relative_to(path).as_posix() for child in files}
         texts = {name: child.read_bytes() for child, name in names.items() if _is_read(name)}
-    except OSError as error:
-        raise cannot_read(path, error) from error
     return _recording(path.name, texts, hints)
 
 
 def load_archive_of_tables(path: Path, hints: Hints = NO_HINTS) -> Recording:
-    """The recording in an archive's tables; see load_folder_of_tables."""
+    """Return the recording in an archive's tables; see load_folder_of_tables."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with reading(path), zipfile.ZipFile(path) as archive:
             members = [member for member in archive.infolist() if _is_read(member.filename)]
-            afford(path, HELD * sum(member.file_size for member in members))
+            check_size(path, HELD * sum(member.file_size for member in members))
             texts = {member.filename: archive.read(member) for member in members}
-    except OSError as error:
-        raise cannot_read(path, error) from error
     except _DAMAGE as error:
-        raise RecordingError(f"{path} is no whole archive ({error})", "export the recording again") from error
+        raise RecordingError(f"{path} is not a whole archive ({error})", "export the recording again") from error
     return _recording(path.name, texts, hints)
 
 
 def _is_read(name: str) -> bool:
-    return bool(_sensor(name)) or is_about(name)
+    return bool(_sensor(name)) or is_app_metadata(name)
 
 
 def _sensor(name: str) -> str:
-    """The quantity that a table of this name holds; empty of another."""
+    """Return the quantity that a table of this name holds; empty for another file."""
     return next((quantity for quantity in NAMES if _rank(name, quantity) is not None), "")
 
 
 def _rank(name: str, quantity: str) -> int | None:
-    """The place of a table among those of the quantity, by its name or a word of it; None of another."""
+    """Return the index in NAMES of a table's name or a word of it; None for another file."""
     path = Path(name)
     if path.suffix.lower() not in SUFFIXES or "meta" in path.parts[:-1] or path.name.startswith("."):
         return None
@@ -126,7 +123,7 @@ def _has_both(names: Iterable[str]) -> bool:
 def _recording(name: str, texts: Mapping[str, bytes], hints: Hints) -> Recording:
     found: dict[str, tuple[str, Stream]] = {}
     without_gravity = ""
-    about = said({member: data for member, data in texts.items() if is_about(member)})
+    metadata = read_app_metadata({member: data for member, data in texts.items() if is_app_metadata(member)})
     for quantity in NAMES:
         ranks = {member: rank for member in texts if (rank := _rank(member, quantity)) is not None}
         for member in sorted(ranks, key=lambda m: (ranks[m], m)):
@@ -137,15 +134,15 @@ def _recording(name: str, texts: Mapping[str, bytes], hints: Hints) -> Recording
             found.setdefault(quantity, (member, stream))
     if ACC not in found and without_gravity:
         raise RecordingError(
-            f"{name}: |a| of {Path(without_gravity).name} is not gravity in the median, in no unit",
+            f"{name}: the median |a| of {Path(without_gravity).name} is not gravity in any unit",
             "record the accelerometer with gravity (TotalAcceleration, AccelerometerUncalibrated)",
         )
     if set(found) < {ACC, GYR}:
-        raise RecordingError(f"{name} holds no table of both an accelerometer and a gyroscope", "record both")
+        raise RecordingError(f"{name} does not hold tables of both an accelerometer and a gyroscope", "record both")
     (of_acc, acc), (of_gyr, gyr) = found[ACC], found[GYR]
-    acc = replace(acc, values=-acc.values if about.turned_around else acc.values, zero_ns=about.zero_ns)
+    acc = replace(acc, values=-acc.values if metadata.sign_flipped else acc.values, zero_ns=metadata.zero_ns)
     of = f"from {Path(of_acc).name} and {Path(of_gyr).name}"
-    return recording_of(acc, gyr, hints, name, remarks=[of, *about.remarks])
+    return join_streams(acc, gyr, hints, name, remarks=[of, *metadata.remarks])
 
 
 def _holds_gravity(values: Vector) -> bool:
@@ -153,50 +150,50 @@ def _holds_gravity(values: Vector) -> bool:
 
 
 def _are_counts(values: Vector) -> bool:
-    return len(values) > 0 and are_counts(signed(values)) and bool(np.abs(values).max() > FEWEST_COUNTS)
+    return len(values) > 0 and are_counts(to_signed(values)) and bool(np.abs(values).max() > FEWEST_COUNTS)
 
 
 def _stream(name: str, data: bytes, quantity: str, hints: Hints) -> Stream:
-    text, said = text_of(data, name), _said(hints, quantity)
-    if said:
-        table = table_of(text, name, list(said.values()))
+    text, hinted = decode_text(data, name), _hinted_columns(hints, quantity)
+    if hinted:
+        table = find_table(text, name, list(hinted.values()))
     else:
-        table = table_of(text, name) or table_of(text, name, bare=True) or _of_four(text, name)
+        table = find_table(text, name) or find_table(text, name, bare=True) or _unnamed_table(text, name)
     if table is None or not table.rows:
         raise RecordingError(
             f"{name} names no columns x, y and z",
-            "name its columns in its first line (time, x, y, z), or say their order with --columns t,ax,ay,az",
+            "name its columns in its first line (time, x, y, z), or give their order with --columns t,ax,ay,az",
         )
-    columns = chosen(table.header, replace(hints, columns=said)) if said else table.columns
-    of = three(columns, quantity) or _bare(table, quantity)
+    columns = columns_by_hint(table.header, replace(hints, columns=hinted)) if hinted else table.columns
+    of = first_triple(columns, quantity) or _columns_without_sensor(table, quantity)
     if not of:
         raise RecordingError(
-            f"{name} holds the columns {', '.join(table.header)}, and no {quantity}", "record both sensors"
+            f"{name} holds the columns {', '.join(table.header)}, but no {quantity}", "record both sensors"
         )
-    stream = stream_of(table, columns, of)
-    # a unit that nothing says is none of counts
+    stream = sensor_stream(table, columns, of)
+    # the unit was assumed, and counts disprove it
     return stream if of[0].unit != UNITS[quantity] or not _are_counts(stream.values) else replace(stream, unit="")
 
 
-def _said(hints: Hints, quantity: str) -> dict[str, str | int]:
-    """Role -> column of one sensor's table; where the gyroscope's are not said they are as the accelerometer's."""
+def _hinted_columns(hints: Hints, quantity: str) -> dict[str, str | int]:
+    """Return role -> column of one sensor's table; the gyroscope's default to the accelerometer's."""
     letter = "a" if quantity == ACC else "g"
     of = letter if f"{letter}x" in hints.columns else "a"
     found = {role.replace(of, letter): where for role, where in hints.columns.items() if role[0] in (of, "t")}
     return found if len(found) > 1 else {}
 
 
-def _of_four(text: str, name: str) -> TextTable | None:
-    """A table of four numbers a line, as data sets have them: time, x, y, z."""
-    table = table_of(text, name, range(4))
+def _unnamed_table(text: str, name: str) -> TextTable | None:
+    """Return a table of four numbers a line, as data sets have them: time, x, y, z; None for another."""
+    table = find_table(text, name, range(4))
     if table is None or any(len(row) != 4 for row in table.rows):
         return None
     return replace(table, header=["time", "x", "y", "z"])
 
 
-def _bare(table: TextTable, quantity: str) -> tuple[Column, ...]:
-    """x, y, z where the file's name alone says of what."""
-    found = {axis[0]: (place, axis[1]) for place, name in enumerate(table.header) if (axis := bare_axis(name))}
+def _columns_without_sensor(table: TextTable, quantity: str) -> tuple[Column, ...]:
+    """Return the columns x, y, z of a table whose file name alone names the sensor; empty if there are none."""
+    found = {axis[0]: (place, axis[1]) for place, name in enumerate(table.header) if (axis := parse_axis_name(name))}
     if set(found) != {0, 1, 2}:
         return ()
     return tuple(

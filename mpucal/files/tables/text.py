@@ -1,4 +1,4 @@
-"""Tables as text: the separator, decimal commas, what stands before the header, and cells as exact numbers."""
+"""Tables as text: the separator, decimal commas, the lines before the header, and cells as exact numbers."""
 
 from __future__ import annotations
 
@@ -16,203 +16,201 @@ import numpy as np
 
 from ...data import Mask, Vector
 from ...errors import RecordingError
-from .names import Column, bare_axis, columns_of
+from .names import ACC, GYR, NANOSECONDS, TIME, Column, Table, parse_axis_name, parse_header
 from .units import unit_named
 
-# and what they are called; None: any blanks
+# separator -> its name for messages; None: any blanks
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", None: "blanks"}
-# lines before the header: what a sketch says at its start, `sep=;`, the settings that Betaflight's Explorer writes
+# lines that may precede the header: a sketch's greeting, `sep=;`, the settings that Betaflight's Explorer writes
 PREAMBLE = 200
 NS = 1_000_000_000
-# of a text's bytes, zeros
+# a file with a larger share of NUL bytes is binary
 MOST_NUL = 0.1
-# before the names of columns, and before a line that is no sample
+# a header may begin with such a mark; any other line that does is a comment
 COMMENT = ("#", "%", "//")
-# of a time, as nobody has more
-DIGITS = 40
+# exponents of numbers beyond this would take all memory as integers
+MOST_DIGITS = 40
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-# before each line, of Arduino's serial monitor
+# Arduino's serial monitor writes the time before each line
 MONITORED = re.compile(r"^\d\d:\d\d:\d\d\.\d{3} -> ", re.MULTILINE)
+_TIME_OF_DAY = re.compile(r"\d\d:\d\d:\d\d(\.\d+)?").fullmatch
 
 
 @dataclass(frozen=True)
-class TextTable:
-    """Cells of a table.
+class TextTable(Table):
+    """A table whose cells are text.
 
     Attributes
     ----------
-    header : the columns' names; empty where there are none. rows : the cells of each line that has some.
-    lines : the number of each, from 1. separator : one of SEPARATORS, between cells.
-    lost : the numbers of lines that hold a part of a row, and are left out.
+    rows : the cells of each line that is not empty. lines : the line number of each row, from 1.
+    separator : one of SEPARATORS, or `:` of labelled numbers. lost : numbers of incomplete lines, which are left out.
     """
 
-    name: str
-    header: list[str]
     rows: list[list[str]]
     lines: list[int]
     separator: str | None = ","
     lost: Sequence[int] = ()
 
     @property
-    def columns(self) -> list[Column]:
-        """What is known of its columns."""
-        return columns_of(self.header)
-
-    def has(self, column: Column) -> bool:
-        """Whether the first line of a column holds a number or a date."""
-        try:
-            return _is_number(self.rows[0][column.place])
-        except IndexError:
-            return False
+    def remarks(self) -> list[str]:
+        """See Table."""
+        called = SEPARATORS.get(self.separator, "names")
+        separated = [] if self.separator == "," else [f"its cells are separated by {called}"]
+        return [*separated, *([f"{len(self.lost)} lines that lack a number were left out"] if self.lost else [])]
 
     @property
-    def after_lost(self) -> Mask:
-        """(n,) whether lines are lost between a row and the one before."""
+    def after_lost(self) -> Mask | None:
+        """See Table."""
+        if not self.lost:
+            return None
         found = np.zeros(len(self.rows), bool)
         places = np.searchsorted(self.lines, np.array(self.lost, int))
         found[places[(places > 0) & (places < len(found))]] = True
         return found
 
-    def numbers(self, columns: Sequence[Column]) -> Vector:
-        """(n, k) numbers; an empty cell is NaN.
+    def numeric_places(self) -> list[int]:
+        """See Table; the first row decides, and a date counts as a number."""
+        return [place for place in range(min(map(len, self.rows))) if _is_number(self.rows[0][place])]
 
-        Raises
-        ------
-        RecordingError : a cell is no number; it is named by its line.
-        """
+    def clocks(self, columns: Sequence[Column]) -> list[Column]:
+        """See Table."""
+        first = self.rows[0]
+        return [c for c in columns if c.quantity == TIME and c.place < len(first) and _is_number(first[c.place])]
+
+    def numbers(self, columns: Sequence[Column]) -> Vector:
+        """See Table; the error names the line."""
         found = np.empty((len(self.rows), len(columns)))
         for j, column in enumerate(columns):
-            for i, row in enumerate(self.rows):
-                text = row[column.place].strip() if column.place < len(row) else self._short(i)
+            for i in range(len(self.rows)):
+                text = self._cell(i, column).strip()
                 try:
-                    found[i, j] = float(_point(text)) if text else np.nan
+                    found[i, j] = float(_with_point(text)) if text else np.nan
                 except ValueError as error:
-                    raise self._bad(i, column, text) from error
+                    raise self._not_a_number(i, column, text) from error
         return found
 
-    def times(self, column: Column) -> list[Decimal]:
-        """(n,) exact times; dates and times of day in ns.
+    def times(self, column: Column, kept: Mask) -> tuple[list[Decimal], str]:
+        """See Table; the error names the line. A column of nanoseconds beside whole seconds is added to these."""
+        found = self._exact(column, kept)
+        try:
+            Decimal(_with_point(self.rows[0][column.place].strip()))
+        except InvalidOperation:
+            return found, "ns"
+        parts = [c for c in self.columns if c.quantity == NANOSECONDS]
+        if column.unit != "s" or not parts:
+            return found, column.unit
+        return [s * NS + ns for s, ns in zip(found, self._exact(parts[0], kept), strict=True)], "ns"
 
-        Raises
-        ------
-        RecordingError : one is no time; it is named by its line.
-        """
+    def _exact(self, column: Column, kept: Mask) -> list[Decimal]:
         found = []
-        for i, row in enumerate(self.rows):
-            text = row[column.place] if column.place < len(row) else self._short(i)
+        for i in np.flatnonzero(kept).tolist():
+            text = self._cell(i, column)
             try:
                 found.append(_exact(text))
             except ValueError as error:
-                raise self._bad(i, column, text) from error
+                raise self._not_a_number(i, column, text) from error
         return found
 
-    def is_dated(self, column: Column) -> bool:
-        """Whether its times are dates, or times of day."""
-        try:
-            Decimal(_point(self.rows[0][column.place].strip()))
-        except InvalidOperation:
-            return True
-        return False
-
-    def _short(self, i: int) -> str:
+    def _cell(self, i: int, column: Column) -> str:
+        row = self.rows[i]
+        if column.place < len(row):
+            return row[column.place]
         raise RecordingError(
-            f"{self.name}: line {self.lines[i]} has {len(self.rows[i])} values where the first line names"
-            f" {len(self.header)}",
+            f"{self.name}: line {self.lines[i]} has {len(row)} values where the first line names {len(self.header)}",
             "complete that line or leave it out",
         )
 
-    def _bad(self, i: int, column: Column, text: str) -> RecordingError:
+    def _not_a_number(self, i: int, column: Column, text: str) -> RecordingError:
         name = column.name.strip() or f"column {column.place + 1}"
         return RecordingError(
-            f"{self.name}: line {self.lines[i]}: {name} is {text!r}, which is no number",
-            "correct or leave out that line",
+            f"{self.name}: line {self.lines[i]}: {name} is {text!r}, which is not a number",
+            "correct that line or leave it out",
         )
 
 
-_OF_DAY = re.compile(r"\d\d:\d\d:\d\d(\.\d+)?").fullmatch
-
-
-def _point(text: str) -> str:
+def _with_point(text: str) -> str:
+    """Return a number's text with a decimal point in place of a comma."""
     return text.replace(",", ".") if "," in text and "." not in text else text
 
 
 def _exact(text: str) -> Decimal:
-    """A number; of a date the ns since 1970, or since the year 1 if nothing says its zone; of a time since midnight."""
+    """Return a number, or a date's ns since 1970 (since the year 1 without a zone), or a time of day's ns."""
     text = text.strip()
     try:
-        number = Decimal(_point(text))
-        if number.is_finite() and abs(number.adjusted()) < DIGITS:
+        number = Decimal(_with_point(text))
+        if number.is_finite() and abs(number.adjusted()) < MOST_DIGITS:
             return number
     except InvalidOperation:
-        date = (
-            datetime.combine(datetime.min, time.fromisoformat(text)) if _OF_DAY(text) else datetime.fromisoformat(text)
-        )
+        if _TIME_OF_DAY(text):
+            date = datetime.combine(datetime.min, time.fromisoformat(text))
+        else:
+            date = datetime.fromisoformat(text)
         since = date - (EPOCH if date.tzinfo else datetime.min)
         return Decimal((since.days * 86400 + since.seconds) * NS + since.microseconds * 1000)
     raise ValueError(text)
 
 
-def text_of(data: bytes, name: str) -> str:
-    """A table's text.
+def decode_text(data: bytes, name: str) -> str:
+    """Return the text of a file: UTF-8, UTF-16 or Windows-1252, without NUL bytes and the serial monitor's times.
 
     Raises
     ------
-    RecordingError : it is none.
+    RecordingError : it is binary.
     """
     if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
-        # a spreadsheet's "Unicode text"; what was read of it may end within a letter
+        # a spreadsheet's "Unicode text"; the bytes that were read may end within a letter
         text = data.decode("utf-16", "replace")
     elif data.count(b"\0") > MOST_NUL * len(data):
-        raise RecordingError(f"{name} is no text", "give a table as text")
+        raise RecordingError(f"{name} is not text", "give a table as text")
     else:
-        # a logger that was switched off, or opened its file before it wrote
+        # a logger that is switched off leaves zeros, and so does one that has not written yet
         data = data.replace(b"\0", b"")
         try:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError:
-            # a spreadsheet's "m/s²" and "µs"
+            # spreadsheets write "m/s²" and "µs" so
             text = data.decode("cp1252", "replace")
     if "\n" not in text:
         text = text.replace("\r", "\n")
     return MONITORED.sub("", text) if MONITORED.match(text) else text
 
 
-def table_of(text: str, name: str, said: Sequence[str | int] = (), bare: bool = False) -> TextTable | None:
-    """The table in a text; None where no line names an accelerometer's or a gyroscope's columns.
+def find_table(text: str, name: str, wanted: Sequence[str | int] = (), bare: bool = False) -> TextTable | None:
+    """Return the table in a text; None if no line names an accelerometer's or a gyroscope's columns.
 
     Parameters
     ----------
-    said : the columns' names, of which the header has some, or their places, at which the first sample has numbers.
-    bare : take the first line with the names x, y, z for the header.
+    wanted : the columns' names, of which the header has some, or their places, where the first row has numbers.
+    bare : accept a header that names x, y and z without a sensor.
     """
     begun = text.split("\n", PREAMBLE)[:PREAMBLE]
-    names, places = {of for of in said if isinstance(of, str)}, [of for of in said if isinstance(of, int)]
+    names, places = {of for of in wanted if isinstance(of, str)}, [of for of in wanted if isinstance(of, int)]
     above = ""
     for number, line in enumerate(begun):
         for separator in SEPARATORS:
-            cells = _below(above, line, separator)
+            cells = _header_cells(above, line, separator)
             plain = {cell.strip() for cell in cells}
             if names:
-                found = len(cells) >= len(said) and bool(
+                found = len(cells) >= len(wanted) and bool(
                     names & (plain | {of.partition("(")[0].strip() for of in plain})
                 )
             elif places:
                 found = len(cells) > max(places) and all(_is_number(cells[place]) for place in places)
             elif bare:
-                found = {axis[0] for cell in cells if (axis := bare_axis(cell))} == {0, 1, 2}
+                found = {axis[0] for cell in cells if (axis := parse_axis_name(cell))} == {0, 1, 2}
             else:
-                found = len({c.axis for c in columns_of(cells) if c.quantity in ("acc", "gyr")}) == 3
+                found = len({c.axis for c in parse_header(cells) if c.quantity in (ACC, GYR)}) == 3
             if found and places and not names:
                 before = _cells(begun[number - 1], separator) if number else []
                 return _read(text, name, before if len(before) == len(cells) else [], number, separator)
             if found:
                 return _read(text, name, cells, number + 1, separator)
         above = line
-    return table_of(text, name, range(len(said))) if names else None
+    return find_table(text, name, range(len(wanted))) if names else None
 
 
-def _below(above: str, line: str, separator: str | None) -> list[str]:
-    """The cells of a line; of two lines of names, of which the first has a sensor's and the second its axes, both."""
+def _header_cells(above: str, line: str, separator: str | None) -> list[str]:
+    """Return the cells of a line; those of the line above are put before axes, where that names the sensors."""
     cells, sensors = _cells(line, separator), _cells(above, separator)
     axes = [cell.strip().lower() for cell in cells]
     if separator is None or len(sensors) != len(cells) or not {"x", "y", "z"} <= set(axes) or not any(sensors):
@@ -224,8 +222,8 @@ def _below(above: str, line: str, separator: str | None) -> list[str]:
     return found
 
 
-def numeric_table(text: str, name: str, least: int) -> TextTable | None:
-    """The table whose lines are `least` numbers or more, whatever its header; None where there is none."""
+def find_numeric_table(text: str, name: str, least: int) -> TextTable | None:
+    """Return the table whose lines hold `least` numbers or more, with any header or none; None if there is none."""
     begun = text.split("\n", PREAMBLE)[:PREAMBLE]
     for first, (line, following) in enumerate(pairwise(begun)):
         for separator in SEPARATORS:
@@ -259,6 +257,7 @@ def _is_number(cell: str) -> bool:
 
 
 def _read(text: str, name: str, header: list[str], first: int, separator: str | None) -> TextTable:
+    """Return the table below the first `first` lines."""
     rows, lines = [], []
     source = StringIO(text, newline="")
     for _ in range(first):
@@ -270,15 +269,15 @@ def _read(text: str, name: str, header: list[str], first: int, separator: str | 
             reader = csv.reader(source, delimiter=separator, skipinitialspace=True)
             read = ((first + reader.line_num, row) for row in reader)
         for line, row in read:
-            # a logger that was started again writes its header again
+            # a logger that is restarted repeats its header
             if any(map(str.strip, row)) and not row[0].startswith(COMMENT) and row != header:
                 rows.append(row)
                 lines.append(line)
     except csv.Error as error:
-        raise RecordingError(f"{name} is no table ({error})", "give a table as text") from error
+        raise RecordingError(f"{name} is not a table ({error})", "give a table as text") from error
     torn = [lines[-1]] if len(rows) > 1 and not text.endswith("\n") and len(rows[-1]) < len(rows[-2]) else []
     if torn:
-        # a logger that was switched off
+        # the logger was switched off
         rows, lines = rows[:-1], lines[:-1]
     if rows and _are_units(rows[0]):
         header = [
@@ -289,5 +288,5 @@ def _read(text: str, name: str, header: list[str], first: int, separator: str | 
 
 
 def _are_units(cells: list[str]) -> bool:
-    """Whether a line below the header says the units."""
+    """Return True if a line below the header holds the units."""
     return any(map(unit_named, cells)) and not any(_is_number(cell) for cell in cells)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import compress, pairwise
@@ -10,33 +9,32 @@ from types import EllipsisType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...data import Mask, Vector
 from ...errors import RecordingError
 from ..hints import Hints
 from . import units
-from .clock import even, period_of
-from .units import QUANTITIES, check_agrees
+from .clock import fit_even_clock, period_of
+from .names import Times
+from .units import QUANTITIES, resolve_unit
 
-Times = Sequence[Decimal] | NDArray[Any]
-# periods between two rates over which nothing is interpolated
+# periods: over a longer pause of the rates nothing is interpolated
 LOST_PERIODS = 3.5
 NS_OF = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1, "0.1ms": 10**5}
-# from 2001 to 2100: a time of day, and not one since a start
+# ns since 1970 of the years 2001 and 2100: other times are not times of day, but count from a start
 UTC_NS = (10**18, 41 * 10**17)
 
 
 @dataclass(frozen=True)
 class Stream:
-    """What one sensor measured.
+    """The samples of one sensor as they stand in a file.
 
     Attributes
     ----------
-    times : (n,) exact: decimals, integers or floats; None: there are none.
-    values : (n, 3) as they stand in the file. time_unit, unit : as the file says them; empty where it does not.
-    zero_ns : the time of day at time 0, in ns since 1970, where a file beside it says that.
-    there : of all lines, those of its samples; the others lack a number. lost : how many of them are a loss.
+    times : (n,) exact: decimals, integers or floats; None if the file has none.
+    values : (n, 3). time_unit, unit : as the file names them; empty if it does not.
+    zero_ns : the time of day at time 0, in ns since 1970, if another file tells it.
+    kept : mask of the file's lines that are its samples. lost : number of the other lines that are a loss.
     """
 
     times: Times | None
@@ -44,21 +42,21 @@ class Stream:
     time_unit: str = ""
     unit: str = ""
     zero_ns: int | None = None
-    there: Mask | EllipsisType = ...
+    kept: Mask | EllipsisType = ...
     lost: int = 0
 
-    def part(self, kept: Mask) -> Stream:
-        """Its samples where `kept` (n,) is."""
-        if self.times is None or isinstance(self.times, np.ndarray):
-            times = None if self.times is None else self.times[kept]
-            return replace(self, times=times, values=self.values[kept])
-        return replace(self, times=list(compress(self.times, kept)), values=self.values[kept])
+    def part(self, mask: Mask) -> Stream:
+        """Return the samples where `mask` (n,) is True."""
+        times = self.times
+        if times is not None:
+            times = times[mask] if isinstance(times, np.ndarray) else list(compress(times, mask))
+        return replace(self, times=times, values=self.values[mask])
 
     @property
-    def fresh(self) -> Mask:
-        """(n,) whether a sample is not the one before again, as loggers write it beside another sensor's.
+    def is_new(self) -> Mask:
+        """Return (n,) False where a sample repeats the one before, as loggers do beside a faster sensor.
 
-        Where samples that differ have the same time, times are rounded, and so those that do not may be two.
+        If many different samples share a time, times are rounded, and equal samples may be two measurements.
         """
         again = np.zeros(len(self.values), bool)
         if self.times is not None and len(again):
@@ -69,33 +67,37 @@ class Stream:
 
 
 def utc_ns(stream: Stream, of_t: str) -> int | None:
-    """The time of day of the first sample, where its time is one: ns since 1970."""
+    """Return the time of day of the first sample, ns since 1970; None if its time is not one."""
     unit = of_t.removeprefix("times in ")
     if stream.times is None or unit not in QUANTITIES["t"]:
         return None
     first = round(Decimal(str(stream.times[0])) * NS_OF[unit]) + (stream.zero_ns or 0)
-    return possible_utc_ns(first)
+    return plausible_utc_ns(first)
 
 
-def possible_utc_ns(ns: int) -> int | None:
-    """A time of day [ns since 1970]; None for one that no recording is of."""
+def plausible_utc_ns(ns: int) -> int | None:
+    """Return a time of day [ns since 1970]; None if no recording can be of it."""
     return ns if UTC_NS[0] < ns < UTC_NS[1] else None
 
 
-def seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Vector, Mask, str, str]:
-    """Times (n,) [s] since the first stream's first, gaps, how they were taken, and what is to be said of its clock."""
+def to_seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Vector, Mask, str, str]:
+    """Return times (n,) [s] since those of `first` begin, gaps (n,), how they were read, and a remark on the clock.
+
+    Raises
+    ------
+    RecordingError : the rate or unit is not known, or times are not finite or decrease.
+    """
     none = np.zeros(len(stream.values), bool)
     if stream.times is None or first.times is None:
         if hints.rate_hz is None:
             raise RecordingError(f"{name} holds no times", "give the rate of its samples with --rate HZ", "--rate HZ")
-        places = np.flatnonzero(np.ones(len(stream.values), bool) if stream.there is ... else stream.there)
+        places = np.flatnonzero(np.ones(len(stream.values), bool) if stream.kept is ... else stream.kept)
         return places / hints.rate_hz, none, f"a rate of {hints.rate_hz:g} Hz", ""
     ticks = _since(stream.times, first.times[0])
     if not (np.abs(ticks) < units.BEYOND**2).all():
-        raise RecordingError(f"{name} holds times that are none", "leave those lines out")
+        raise RecordingError(f"{name} holds times that are not finite", "leave those lines out")
     step, said = period_of(ticks), hints.units.get("t", stream.time_unit)
-    how = f"their step of {step:g} reads"
-    unit = check_agrees(name, "t", said, hints.units.get("t", units.time_unit(step, said)), how)
+    unit = resolve_unit(name, "t", said, hints.units.get("t", units.time_unit(step, said)), f"the step of {step:g}")
     t = ticks * QUANTITIES["t"][unit]
     back = np.diff(t) < 0
     if back.any():
@@ -104,25 +106,31 @@ def seconds(stream: Stream, first: Stream, hints: Hints, name: str) -> tuple[Vec
             f"{name}: time does not increase at sample {at} ({t[at - 1]:.6f} s, then {t[at]:.6f} s)",
             "sort the samples by time, or leave out the times with --columns, and give --rate HZ",
         )
-    fitted = even(t)
-    if fitted is not None:
-        return fitted.t, fitted.gap, f"times in {unit}", fitted.said
+    clock = fit_even_clock(t)
+    if clock is not None:
+        return clock.t, clock.gap, f"times in {unit}", clock.description
     return t, none, f"times in {unit}", ""
 
 
 def _since(times: Times, origin: Any) -> Vector:
-    """(n,) times without the digits that they share."""
+    """Return times (n,) since `origin` as floats."""
     if isinstance(times, np.ndarray):
-        # of infinite times `seconds` says what they are
+        # to_seconds refuses infinite times
         with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(times - origin, float)
     return np.array([float(time - origin) for time in times])
 
 
-def joined(t: Vector, t_gyr: Vector, rates: Vector, gap: Mask, name: str) -> tuple[slice, Vector, Mask, str]:
-    """Which accelerations lie within the rates' time, the rates at their times, gaps, and what to say of it.
+def interpolate_rates(t: Vector, t_gyr: Vector, rates: Vector, gap: Mask, name: str) -> tuple[slice, Vector, Mask, str]:
+    """Return the accelerations within the rates' time, the rates at their times, gaps there, and a remark.
 
-    gap : (n,) where rates are missing before.
+    Parameters
+    ----------
+    t, t_gyr : times of accelerations and rates [s]. rates : (n, 3). gap : (n,) True where rates before are missing.
+
+    Raises
+    ------
+    RecordingError : the two do not overlap in time.
     """
     first, last = np.searchsorted(t, t_gyr[0], "left"), np.searchsorted(t, t_gyr[-1], "right")
     if last - first < 2:

@@ -1,8 +1,8 @@
-"""Units: their names, what the samples themselves say of them, and whether both agree.
+"""Units: their names, the units that the samples show, and whether both agree.
 
-Times are told by their steps, since a rate lies between 5 Hz and 8 kHz; accelerations by |a|, which is gravity in the
-median of a recording that was turned by hand; rates by how fast gravity turns: d(a)/dt = -w x a of a vector that
-stands still.
+The step shows the unit of times, since sample rates lie between 5 Hz and 8 kHz; the median of |a|, which is gravity in
+a recording that was turned by hand, shows that of accelerations; and how fast gravity turns shows that of rates, since
+d(a)/dt = -w x a for a vector that is fixed in space.
 """
 
 from __future__ import annotations
@@ -41,33 +41,35 @@ _PLAIN = str.maketrans(
 )
 
 SLOWEST_HZ, FASTEST_HZ = 5.0, 8000.0
-# between samples of a recording that follows no turn, and may be another's all the same
+# s: the longest step in a named unit; such a recording is too slow to calibrate, but readable
 SLOW_S = 2.0
-# gains of 0.5 to 1.5 are a sensor's own
+# |a| / g: a sensor may have gains of 0.5 to 1.5
 LEAST_OF_G, MOST_OF_G = 0.45, 2.0
+# true over measured rate: the same gains
 LEAST_TURNED, MOST_TURNED = 0.6, 1.6
+# quartile distance of |a| over its median, beyond which it is not gravity
 SCATTER = 0.45
-# of samples without times, to see what turns; and of most loggers
+# a rate to try on samples without times, and the rates of most loggers
 ANY_HZ, LIKELY_HZ = 100.0, (4.0, 1100.0)
-# of a hand, and of the usual sensors
+# the fastest rate of a hand and of usual sensors
 FASTEST_RAD_S = 37.0
-# what most programs write
+# the units that most programs write
 LIKELY = {"t": "s", "acc": "m/s^2", "gyr": "deg/s"}
-# no unit makes such numbers of what a sensor reads, and their squares are finite
+# larger numbers are not from a sensor in any unit; their squares are finite
 BEYOND = 1e12
-# half of a turn's span: a recording that says how gravity turns lasts for so many
+# the least duration of a recording that shows how gravity turns, in halves of TURN_S
 LEAST_TURNS = 30
-# s over which gravity is seen to turn, and how much of what is seen the rates have to explain
+# s over which the change of gravity is taken, and the correlation with the rates that it needs at least
 TURN_S, EXPLAINED = 0.2, 0.5
 
 
 def unit_named(text: str) -> str:
-    """The unit that a text names; empty of none."""
+    """Return the unit that a text names, or an empty text."""
     return _NAMES.get(text.strip().lower().translate(_PLAIN), "")
 
 
 def time_unit(step: float, said: str = "") -> str:
-    """The unit in which times lie `step` apart: the said one, where that makes a slow recording; empty of none."""
+    """Return the unit of times that lie `step` apart: `said` if plausible, else by the sample rate; or empty."""
     if said and 1 / FASTEST_HZ <= step * QUANTITIES["t"][said] <= SLOW_S:
         return said
     units = QUANTITIES["t"].items()
@@ -75,7 +77,7 @@ def time_unit(step: float, said: str = "") -> str:
 
 
 def acceleration_unit(acc: Vector) -> str:
-    """The unit of (n, 3) accelerations of which the median is gravity; empty where there is none.
+    """Return the unit in which the median of (n, 3) accelerations is gravity; empty if there is none.
 
     Without gravity, |a| of a hand scatters by more than half of its median.
     """
@@ -88,22 +90,22 @@ def acceleration_unit(acc: Vector) -> str:
     return next((unit for unit, si in units if LEAST_OF_G <= size * si / STANDARD_GRAVITY_MPS2 <= MOST_OF_G), "")
 
 
-def signed(values: Vector) -> Vector:
-    """(n, 3) counts of 16 bits with their sign: where it was not read, or a sensor counts from the lowest value on."""
+def to_signed(values: Vector) -> Vector:
+    """Return (n, 3) 16-bit counts with their sign, if they were read as unsigned or count from the lowest value."""
     if values.min() < 0 or not FULL_SCALE <= values.max() < 2 * FULL_SCALE or not (values == np.rint(values)).all():
         return values
     wrapped, shifted = np.where(values >= FULL_SCALE, values - 2 * FULL_SCALE, values), values - FULL_SCALE
-    # read wrongly, they jump from one end to the other
+    # the wrong reading jumps from one end of the range to the other
     steps = [float(np.abs(np.diff(each, axis=0)).sum()) for each in (wrapped, shifted)]
     return np.asarray(wrapped if steps[0] < steps[1] else shifted)
 
 
-def turned(t: Vector, acc: Vector, gyr: Vector) -> float | None:
-    """By what (n, 3) rates have to be multiplied to turn (n, 3) accelerations as they turn; None: it cannot be told.
+def rate_factor(t: Vector, acc: Vector, gyr: Vector) -> float | None:
+    """Return the factor by which (n, 3) rates turn (n, 3) accelerations as these turn; None if it is not determined.
 
     Parameters
     ----------
-    t : (n,) s. acc : in any unit. gyr : in rad/s, if the factor is 1.
+    t : (n,) s. acc : in any unit. gyr : in rad/s if the factor is 1.
     """
     # stamps of arrival may repeat
     dt = float(np.median(np.diff(t))) or float(t[-1] - t[0]) / len(t)
@@ -127,44 +129,48 @@ def turned(t: Vector, acc: Vector, gyr: Vector) -> float | None:
     return both / power
 
 
-def likely_rates(acc: Vector, gyr: Vector, said: str) -> str:
-    """In words, the rate at which gravity turns as (n, 3) rates say, in the said unit or each; empty: not known."""
-    factor = turned(np.arange(len(acc)) / ANY_HZ, acc, gyr)
+def likely_sample_rates(acc: Vector, gyr: Vector, said: str) -> str:
+    """Return as text the sample rates at which gravity turns with (n, 3) rates, in unit `said` or any; or empty."""
+    factor = rate_factor(np.arange(len(acc)) / ANY_HZ, acc, gyr)
     if not factor or said == COUNTS:
         return ""
     fastest = float(np.percentile(np.abs(gyr), 99))
     units = [said] if said else [u for u, si in QUANTITIES["gyr"].items() if fastest * si < FASTEST_RAD_S]
     rates = {unit: ANY_HZ * QUANTITIES["gyr"][unit] / abs(factor) for unit in units}
     likely = [
-        f"{round(hz)} Hz, if they are in {unit}" for unit, hz in rates.items() if LIKELY_HZ[0] < hz < LIKELY_HZ[1]
+        f"{round(hz)} Hz if rates are in {unit}" for unit, hz in rates.items() if LIKELY_HZ[0] < hz < LIKELY_HZ[1]
     ]
-    return f" (gravity turns with the rates at about {' or '.join(likely)})" if likely else ""
+    return f" (by how gravity turns, its rate is about {' or '.join(likely)})" if likely else ""
 
 
-def rate_unit(factor: float | None) -> str:
-    """The unit of rates by what `turned` says of them; empty where that cannot be told."""
+def gyro_unit(factor: float | None) -> str:
+    """Return the unit of rates with this rate_factor; empty if there is none."""
     units = {unit: si for unit, si in QUANTITIES["gyr"].items() if unit != COUNTS}
     return next((u for u, si in units.items() if factor and LEAST_TURNED <= abs(factor / si) <= MOST_TURNED), "")
 
 
-def check_agrees(name: str, quantity: str, said: str, seen: str, how: str) -> str:
-    """The unit that was said, or else the one that was seen.
+def resolve_unit(name: str, quantity: str, said: str, seen: str, evidence: str) -> str:
+    """Return the unit that was named, or else the one that the samples show.
+
+    Parameters
+    ----------
+    said, seen : these units; empty if unknown. evidence : the observation behind `seen`, for the message.
 
     Raises
     ------
-    RecordingError : none was, or they differ.
+    RecordingError : both are unknown, or they differ.
     """
     if said and seen and said != seen:
         raise RecordingError(
-            f"{name}: {quantity} is said to be in {said}, and {how} as of {seen}",
-            f"say which with --units {quantity}={said} or --units {quantity}={seen}",
+            f"{name}: {quantity} is said to be in {said}, but {evidence} suggests {seen}",
+            f"choose one with --units {quantity}={said} or --units {quantity}={seen}",
             f"--units {quantity}={seen}",
         )
     if not said and not seen:
         known = ", ".join(unit for unit in QUANTITIES[quantity])
         raise RecordingError(
-            f"{name}: nothing says in which unit {quantity} is, and {how} as of none",
-            f"say it with --units {quantity}=UNIT, one of {known}",
+            f"{name}: the unit of {quantity} is not known, and {evidence} fits none",
+            f"name it with --units {quantity}=UNIT, one of {known}",
             f"--units {quantity}={LIKELY[quantity]}",
         )
     return said or seen

@@ -1,6 +1,6 @@
-"""Recordings of one sensor in a folder, one after the other: a file for each face, or for each time it was turned.
+"""A folder of recordings of one sensor, joined into one: a file for each side of the board, or for each turning of it.
 
-How the board was turned between two files nobody knows: a gap, long enough for an interruption.
+The motion between two files is unknown: a gap, long enough to count as an interruption.
 """
 
 from __future__ import annotations
@@ -14,33 +14,31 @@ from ..data import Recording, Samples, Vector
 from ..errors import RecordingError
 from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE, DOCUMENT
 from .hints import NO_HINTS, Hints
-from .rows import cannot_read
+from .reading import reading
 
-# of the names of files that may be such recordings, but for those of sessions
+# of files that may be such recordings
 SUFFIXES = (".csv", ".txt", ".log", ".tsv", ".npz", ".npy", ".mat", ".parquet")
 FEWEST, MOST = 2, 500
-# s between two files whose times of day nobody noted: longer than what a bus loses
-APART_S = 15.0
+# s between two files without times of day: longer than the gaps that a bus leaves
+GAP_S = 15.0
 
 
 def is_folder_of_recordings(path: Path) -> bool:
-    """Whether a folder holds several recordings, and no session."""
+    """Return True if a folder holds several recordings, and no session."""
     return len(_recordings(path)) >= FEWEST
 
 
 def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
-    """The recordings in a folder as one, in the order of their times of day, or else of their names.
+    """Return the recordings in a folder as one, in the order of their times of day, or else of their names.
 
     Raises
     ------
     RecordingError : one of them cannot be read.
     """
-    from .formats import format_of  # noqa: PLC0415 - which has a row of this
+    from .formats import format_of  # noqa: PLC0415 - its table names this module
 
-    try:
+    with reading(path):
         files = _recordings(path)
-    except OSError as error:
-        raise cannot_read(path, error) from error
     try:
         parts = [format_of(file, hints).read(file, hints=hints) for file in files]
     except RecordingError as error:
@@ -53,9 +51,9 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     for part in parts:
         since_s = 0.0 if part.utc_ns is None or len(utc_ns) < len(parts) else (part.utc_ns - utc_ns[0]) * 1e-9
         begins = part.t + since_s
-        # one that overlaps the one before cannot be of the same sensor's time
+        # times of day that overlap cannot be of one sensor's clock
         t.append(
-            begins if len(utc_ns) == len(parts) and begins[0] > end else part.t - part.t[0] + end + APART_S * bool(t)
+            begins if len(utc_ns) == len(parts) and begins[0] > end else part.t - part.t[0] + end + GAP_S * bool(t)
         )
         end = float(t[-1][-1])
     whole = Samples.joined([replace(part, t=at) for part, at in zip(parts, t, strict=True)])
@@ -63,18 +61,18 @@ def load_folder_of_recordings(path: Path, hints: Hints = NO_HINTS) -> Recording:
     arrays = {f.name: getattr(whole, f.name) for f in fields(Samples)}
     arrays["gap"][starts] = True
     first = parts[0]
-    said = f"Of {path.name} {len(parts)} files were taken as one recording, of which nobody knows how it was turned"
-    said += f" between them: {', '.join(file.name for file in files)}."
-    return Recording(
-        **arrays, sensor=first.sensor, name=path.name, utc_ns=first.utc_ns, taken=f"{said} {first.taken or ''}".strip()
+    taken = (
+        f"{path.name} was read as one recording of {len(parts)} files; how the board turned between them is unknown:"
+        f" {', '.join(file.name for file in files)}. {first.taken or ''}"
     )
+    return Recording(**arrays, sensor=first.sensor, name=path.name, utc_ns=first.utc_ns, taken=taken.strip())
 
 
 def _recordings(path: Path) -> list[Path]:
-    from .formats import recognised  # noqa: PLC0415
+    from .formats import recognise  # noqa: PLC0415
 
     files = sorted(child for child in path.iterdir() if child.is_file())
     if {file.name for file in files} & {CAPTURE.name, CAPTURE_OF_VEHICLE.name, DOCUMENT.name} or len(files) > MOST:
         return []
     found = [file for file in files if file.suffix.lower() in SUFFIXES]
-    return [file for file in found if (of := recognised(file)) is not None and (of.hinted or file.suffix == ".npz")]
+    return [file for file in found if (of := recognise(file)) is not None and (of.hinted or file.suffix == ".npz")]
