@@ -1,4 +1,4 @@
-"""What the chip's driver asks of a bus, and a record of each access."""
+"""Interface between the chip's driver and a bus, and the record of one access."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 
 class Reply(NamedTuple):
-    """Bytes read, and when.
+    """Bytes read, with the time of reading.
 
     Attributes
     ----------
-    data : what was read. t_ns : the bus's clock.
-    host_ns : the host's clock when it heard of that; None where the bus's clock is the host's.
+    data : bytes read. t_ns : time of the bus's clock.
+    host_ns : time of the host's clock when the reply arrived; None if the bus uses the host's clock.
     """
 
     data: bytes
@@ -20,55 +20,51 @@ class Reply(NamedTuple):
     host_ns: int | None = None
 
 
-class Bus(Protocol):
-    """Moves register reads and writes, and carries the time (ns, in the bus's own clock).
-
-    Linux I2C, the replay and the simulated chip are buses; so is a tap that records one of them.
-    Every method raises BusError where the transfer fails; a replay raises EndOfCapture at its end.
-    """
-
-    def read(self, register: int, count: int) -> Reply:
-        """`count` bytes from `register` on; FIFO_R_W does not auto-increment. Time: when the read began."""
-        ...
-
-    def write(self, register: int, data: bytes) -> int:
-        """Write `data` from `register` on, and return the time."""
-        ...
+class _Clocked(Protocol):
+    """Device that has a clock and can be closed."""
 
     def sleep_until(self, t_ns: int) -> None:
         """Wait until the bus's clock shows `t_ns` (a replay and a fast simulation return at once)."""
         ...
 
     def close(self) -> None:
-        """Let go of the device."""
+        """Release the device."""
         ...
 
 
-class Files(Protocol):
-    """The same of what a driver of the kernel tells in files: instead of a register the name of one.
+class Bus(_Clocked, Protocol):
+    """Transport of register reads and writes, and of the time (ns, in the bus's own clock).
+
+    Linux I2C, the replay and the simulated chip are buses; so is a tap that records one of them.
+    Every method raises BusError if the transfer fails; a replay raises EndOfCapture at its end.
+    """
+
+    def read(self, register: int, count: int) -> Reply:
+        """Read `count` bytes from `register` on. FIFO_R_W does not auto-increment. The time is the read's beginning."""
+        ...
+
+    def write(self, register: int, data: bytes) -> int:
+        """Write `data` from `register` on, and return the time."""
+        ...
+
+
+class Files(_Clocked, Protocol):
+    """Transport of the files of a kernel driver: as Bus, with the name of a file in place of a register.
 
     `iio:device0/in_accel_scale` is an attribute, `iio:device0` its buffer, `iio:device0/` the list of its attributes.
     """
 
     def read(self, register: str, count: int) -> Reply:
-        """Up to `count` bytes of a file, without waiting for any."""
+        """Read up to `count` bytes of a file without blocking."""
         ...
 
     def write(self, register: str, data: bytes) -> int:
         """Write an attribute, and return the time."""
         ...
 
-    def sleep_until(self, t_ns: int) -> None:
-        """See Bus."""
-        ...
-
-    def close(self) -> None:
-        """See Bus."""
-        ...
-
 
 class Failure(NamedTuple):
-    """The error with which a transfer failed, as plain words; `str` is its sentence."""
+    """Error of a failed transfer as plain words; `str` is its sentence."""
 
     name: str
     what: str
@@ -80,13 +76,14 @@ class Failure(NamedTuple):
 
 @dataclass(frozen=True)
 class Transaction:
-    """One register access as it happened.
+    """Register access as it happened.
 
     Attributes
     ----------
-    op : read or write. register : address, or of Files the name. data : bytes moved. t_ns : the bus's clock.
-    error : None, or how the transfer failed (then data holds what was to be written).
-    count : bytes asked for (reads) or given (writes). host_ns : of a reply, see Reply.
+    op : read or write. register : address, or the name of a file of Files. data : bytes moved.
+    t_ns : time of the bus's clock. host_ns : see Reply.
+    error : None, or the error of a failed transfer (then `data` holds the bytes of the attempted write).
+    count : bytes requested (reads) or given (writes).
     """
 
     op: Literal["read", "write"]

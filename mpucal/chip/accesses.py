@@ -1,4 +1,4 @@
-"""Many register accesses at once, as columns: what a capture holds of half a second and more."""
+"""Register accesses as columns: the form in which a capture stores half a second or more of them."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from .registers import ACCEL_WORDS, FIFO_R_W, FRAME_WORDS
 
 Whole = NDArray[np.int64]
 
-# registers have one byte
+# Register addresses are one byte: larger numbers stand for files.
 FILE = 256
 
 
 @dataclass(frozen=True)
 class Accesses:
-    """Accesses in the order in which they happened, (n,) each.
+    """Accesses in the order in which they happened, as columns (n,).
 
     Attributes
     ----------
-    write, heard, framed : bool; whether it was a write, has a `host_ns`, and has its bytes in `frames`.
-    register, count, moved : address, bytes asked for (given), bytes moved. t_ns, host_ns : see Transaction.
-    data : (bytes,) uint8 of all that are not framed. frames : (rows, words) int16 of those that are.
-    failures : of those that failed, by number. files : names; of Files, `register` is FILE + the place in them.
+    write, has_host_ns, framed : True for a write, for an access with a `host_ns`, for one whose bytes are in `frames`.
+    register, count, moved : address, bytes requested (given), bytes moved. t_ns, host_ns : see Transaction.
+    data : (bytes,) uint8 of the accesses that are not framed. frames : (rows, words) int16 of the framed ones.
+    failures : errors by the number of the access. files : names of files; `register` is FILE + the index of the name.
     """
 
     write: NDArray[np.bool_]
-    heard: NDArray[np.bool_]
+    has_host_ns: NDArray[np.bool_]
     framed: NDArray[np.bool_]
     register: Whole
     count: Whole
@@ -46,8 +46,8 @@ class Accesses:
     files: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """ValueError where the columns do not fit each other."""
-        columns = (self.heard, self.framed, self.register, self.count, self.moved, self.t_ns, self.host_ns)
+        """Raise ValueError if the columns do not fit each other."""
+        columns = (self.has_host_ns, self.framed, self.register, self.count, self.moved, self.t_ns, self.host_ns)
         if any(len(column) != len(self.write) for column in columns):
             raise ValueError("columns of different lengths")
         framed = self.moved[self.framed]
@@ -69,42 +69,47 @@ class Accesses:
         return self.part(0, len(self))
 
     def part(self, first: int, last: int) -> Iterator[Transaction]:
-        """Numbers first..last-1, one after the other."""
+        """Yield the accesses first..last-1 one by one."""
         (data, frames), size = self._bytes, 2 * self.frames.shape[1]
-        shown = (self.write, self.heard, self.framed, self.register, self.count, self.t_ns, self.host_ns)
+        shown = (self.write, self.has_host_ns, self.framed, self.register, self.count, self.t_ns, self.host_ns)
         rows = zip(*(column[first:last].tolist() for column in shown), strict=True)
         places = zip(self.begin[first:last].tolist(), self.end[first:last].tolist(), strict=True)
         for i, (row, (begin, end)) in enumerate(zip(rows, places, strict=True), first):
-            write, heard, framed, register, count, t_ns, host_ns = row
+            write, has_host_ns, framed, register, count, t_ns, host_ns = row
             moved = frames[begin * size : end * size] if framed else data[begin:end]
             op: Literal["read", "write"] = "write" if write else "read"
             place = register if register < FILE else self.files[register - FILE]
-            yield Transaction(op, place, count, moved, t_ns, self.failures.get(i), host_ns if heard else None)
+            yield Transaction(op, place, count, moved, t_ns, self.failures.get(i), host_ns if has_host_ns else None)
 
     @cached_property
     def _bytes(self) -> tuple[bytes, bytes]:
-        """`data`, and `frames` as the chip sends them."""
+        """Bytes of `data`, and of `frames` in the chip's byte order."""
         return self.data.tobytes(), self.frames.astype(">i2").tobytes()
 
     @cached_property
+    def _sizes(self) -> Whole:
+        """(n,) bytes in `data`, or rows in `frames`, of each access."""
+        return np.where(self.framed, self.moved // max(2 * self.frames.shape[1], 1), self.moved)
+
+    @cached_property
     def end(self) -> Whole:
-        """(n,) where the bytes of each end: in `data`, or the row in `frames`."""
-        rows = np.where(self.framed, self.moved // max(2 * self.frames.shape[1], 1), 0)
-        return np.where(self.framed, np.cumsum(rows), np.cumsum(np.where(self.framed, 0, self.moved)))
+        """(n,) end of each access's bytes in `data`, or of its rows in `frames`."""
+        rows, others = (np.cumsum(np.where(chosen, self._sizes, 0)) for chosen in (self.framed, ~self.framed))
+        return np.where(self.framed, rows, others)
 
     @cached_property
     def begin(self) -> Whole:
-        """(n,) where they begin."""
-        return self.end - np.where(self.framed, self.moved // max(2 * self.frames.shape[1], 1), self.moved)
+        """(n,) begin of each access's bytes in `data`, or of its rows in `frames`."""
+        return self.end - self._sizes
 
     def can_join(self, other: Accesses) -> bool:
-        """True where both number registers and have frames of one length: then they can be joined."""
+        """Return True if neither has failures or files, and both have frames of the same length."""
         plain = not (self.failures or other.failures or self.files or other.files)
         return plain and self.frames.shape[1] == other.frames.shape[1]
 
     @classmethod
     def joined(cls, parts: Sequence[Accesses]) -> Accesses:
-        """All parts, one at least and all alike, one after the other."""
+        """Concatenate one or more parts that `can_join` each other."""
         if len(parts) == 1:
             return parts[0]
         columns: Any = map(np.concatenate, zip(*map(_columns, parts), strict=True))
@@ -112,15 +117,10 @@ class Accesses:
 
     @classmethod
     def from_transactions(cls, transactions: Sequence[Transaction]) -> Accesses:
-        """The same accesses; what was read from the FIFO is framed where all of it is whole frames."""
+        """Convert single accesses; reads of the FIFO are framed if all of them are whole frames."""
         moved = np.array([len(each.data) for each in transactions], np.int64)
-        write, fifo = (
-            np.array(column, bool)
-            for column in (
-                [each.op == "write" for each in transactions],
-                [each.register == FIFO_R_W for each in transactions],
-            )
-        )
+        write = np.array([each.op == "write" for each in transactions], bool)
+        fifo = np.array([each.register == FIFO_R_W for each in transactions], bool)
         framed = fifo & ~write & (moved > 0)
         words = next((words for words in (FRAME_WORDS, ACCEL_WORDS) if not (moved[framed] % (2 * words)).any()), 0)
         framed &= words > 0

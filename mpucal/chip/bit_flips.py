@@ -1,11 +1,11 @@
-"""Frames in which a transfer flipped one bit, told from what the sensor measured, and set right.
+"""Filter that repairs bits flipped on the bus, recognised by what the sensor measured before and after.
 
 A flipped bit changes one word of one frame by a power of two, and the next frame is as the one before. A blow moves
-several words, and lasts for more than one frame behind the low-pass filter. So a word is taken for flipped where it
-jumps by T or more from the mean of its neighbours, these agree within R or a quarter of the jump, no other word of its
-frame jumps, and one bit turned back brings it within R of that mean. R is six times the median of such differences so
-far, and T six times R: smaller flips are left, since they are within what noise and motion do. `flips.cpp` finds the
-jumps and follows the median.
+several words, and lasts for more than one frame behind the low-pass filter. So a word counts as flipped if it jumps by
+T or more from the mean of its neighbours, these agree within R or a quarter of the jump, no other word of its frame
+jumps, and inverting one bit brings it within R of that mean. R is six times the running median of such differences, and
+T six times R: smaller flips are left, since they are within noise and motion. `flips.cpp` finds the jumps and follows
+the median.
 """
 
 from __future__ import annotations
@@ -18,48 +18,49 @@ from ._flips import until_jumps
 Counts = NDArray[np.int16]
 
 WITHIN, FLOOR = 6.0, 8.0
-# of the differences of a sensor in the hand [counts]
+# median difference of a sensor in the hand [counts]
 START = 30.0
 BITS = (1 << np.arange(16)).astype(np.uint16)
 
 
 class BitFlipFilter:
-    """Follows the frames (n, words) of one stream.
+    """Filter of the frames (n, words) of one stream.
 
     Attributes
     ----------
-    found : how many words were set right.
+    repaired : number of words repaired so far.
     """
 
     def __init__(self, words: int) -> None:
-        self.found = 0
+        self.repaired = 0
         self._median = np.full(words, START)
         self._before: Counts = np.zeros((0, words), np.int16)
 
-    def forget(self) -> None:
-        """What follows does not follow on what came."""
+    def reset(self) -> None:
+        """Forget the last frames: the next ones do not follow on them."""
         self._before = self._before[:0]
 
     def repair(self, frames: Counts, last: Counts) -> Counts:
-        """`frames`, with what is flipped set right where both of its neighbours are known.
+        """Return `frames` with the flipped words repaired that have a neighbour on both sides.
 
-        The last of them is known only with the next: then `last`, the stored frames that end with it, is set right.
+        The last frame has its second neighbour only in the next call, which repairs it in `last`: the stored frames
+        that end with it.
         """
         n = len(self._before)
         run = np.concatenate((self._before, frames))
         if len(run) > 2:
             _, jumps = until_jumps(run, np.array([len(run)]), self._median)
             for at, word in jumps:
-                run[at, word] = self._turned_back(run, at, word)
+                run[at, word] = self._repaired_word(run, at, word)
                 if at == n - 1 and len(last):
                     last[-1, word] = run[at, word]
         self._before = run[-2:].copy()
         return run[n:]
 
     def skip_clean(self, frames: Counts, lengths: NDArray[np.int64]) -> int:
-        """How many polls, of `lengths` (k,) frames each, `repair` would leave as they are; they were followed.
+        """Follow the leading polls, of `lengths` (k,) frames each, that `repair` would not change; return their number.
 
-        None where it has not seen two frames yet.
+        It is 0 before two frames were seen.
         """
         n = len(self._before)
         if n < 2:
@@ -67,18 +68,18 @@ class BitFlipFilter:
         run, ends = np.concatenate((self._before, frames)), n + np.cumsum(lengths)
         polls, _ = until_jumps(run, ends, trial := self._median.copy())
         if polls < len(ends):
-            # the median has moved on with the poll that has jumps
+            # The median has moved on with the poll that has jumps: follow the polls before it again.
             until_jumps(run, ends[:polls], trial := self._median.copy())
         self._median, end = trial, int(ends[polls - 1]) if polls else n
         self._before = run[end - 2 : end].copy()
         return polls
 
-    def _turned_back(self, run: Counts, at: int, word: int) -> np.int16:
-        """The word with one bit turned back, where that makes it as its neighbours; else as it is."""
+    def _repaired_word(self, run: Counts, at: int, word: int) -> np.int16:
+        """Return the word with one bit inverted if that brings it near its neighbours' mean; else unchanged."""
         mean = (float(run[at - 1, word]) + float(run[at + 1, word])) / 2
         each = (run[at, word].astype(np.uint16) ^ BITS).astype(np.int16)
         best = each[np.argmin(np.abs(each - mean))]
         if abs(best - mean) > WITHIN * self._median[word] + FLOOR:
             return np.int16(run[at, word])
-        self.found += 1
+        self.repaired += 1
         return np.int16(best)

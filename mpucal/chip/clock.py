@@ -1,14 +1,14 @@
-"""When each sample was taken: the sample index regressed on the bus's clock.
+"""Sample clock: the time of each sample, by regression of the sample index on the bus's clock.
 
-The chip samples with a clock of its own, up to 1 % off. All that is seen of it is how many samples it had
-taken by the time of each look. A look at `taken` samples finds the newest half an interval old on average, so
+The chip samples with a clock of its own, up to 1 % off. Only the number of samples that it had taken by the time of
+each look is known. A look at `taken` samples finds the newest half an interval old on average, so
 
     taken_j - 1/2 = rate (t_j - t_0),        t_i = t_0 + i / rate,
 
 with one rate for the whole recording and one t_0 for each run of samples without a gap: least squares of
 `taken` on t. The data sheet's tolerance is the prior of the rate: it holds the first second's times in
-place, and weighs less than 1e-6 after half a minute. A clock whose rate changed is one of several pieces, each
-with a rate of its own (pieces.py); that is found for the final times, not for those while samples come in.
+place, and weighs less than 1e-6 after half a minute. A clock whose rate changed is split into several pieces, each
+with a rate of its own (piecewise_rate.py), in the final times and not while samples come in.
 """
 
 from __future__ import annotations
@@ -26,33 +26,34 @@ from ..data import Vector
 from .piecewise_rate import fit_lines, merge_equal_slopes
 
 NS = 1e-9
+Whole = NDArray[np.int64]
 
 # PS-MPU-6000A r3.4, section 6.6: the PLL on a gyroscope is within 1 %.
 RATE_TOLERANCE = 0.01
 # (n,) s of samples number (n,) of segments (n,)
-Times = Callable[[NDArray[np.int64], NDArray[np.int64]], Vector]
+Times = Callable[[Whole, Whole], Vector]
 
-# More samples than any segment holds.
+# Larger than the number of samples in any segment.
 FAR = 2.0**40
 # A look falls anywhere between two samples: a uniform distribution's standard deviation.
 LOOK_STD_SAMPLES = 12**-0.5
 
-# The fractions of n times the golden ratio lie evenly between 0 and 1.
+# The fractional parts of the golden ratio's multiples lie evenly between 0 and 1.
 GOLDEN = (5**0.5 - 1) / 2
 
 
 def poll_phase(n: int) -> float:
-    """Where look number `n` should fall, -1/2..1/2 of a sample interval about its due time.
+    """Return the offset of poll number `n` from its due time, -1/2..1/2 of a sample interval.
 
-    A regular look would fall at the same phase again and again where its period is a whole number of
-    intervals, and then a rate that is off by 100 ppm is not seen for a minute.
+    Regular polls would fall at the same phase again and again if their period is a whole number of intervals; a rate
+    error of 100 ppm would then stay hidden for a minute.
     """
     return n * GOLDEN % 1 - 0.5
 
 
 @dataclass
 class _Segment:
-    """The looks at one run of samples, and sums over them; integers, so that they are exact."""
+    """Looks at one run of samples, and sums over them: integers, so that they are exact."""
 
     origin_ns: int = 0
     n: int = 0
@@ -63,7 +64,7 @@ class _Segment:
     looks_ns: array[int] = field(default_factory=lambda: array("q"))
     looked: array[int] = field(default_factory=lambda: array("q"))
 
-    def add_many(self, t_ns: list[int], taken: list[int]) -> None:
+    def add(self, t_ns: list[int], taken: list[int]) -> None:
         self.origin_ns = self.origin_ns if self.n else t_ns[0]
         t = [each - self.origin_ns for each in t_ns]
         self.looks_ns.extend(t_ns)
@@ -76,12 +77,12 @@ class _Segment:
 
     @property
     def t_mean_s(self) -> float:
-        """When it was looked at, on average; NaN if never."""
+        """Mean time of the looks; NaN without any."""
         return self.origin_ns * NS + self.t / self.n * NS if self.n else math.nan
 
     @property
     def taken_mean(self) -> float:
-        """How many samples were found, on average; NaN if never."""
+        """Mean number of samples taken at the looks; NaN without any."""
         return self.taken / self.n if self.n else math.nan
 
     @property
@@ -96,7 +97,7 @@ class _Segment:
 
 
 class SampleClock:
-    """Times of samples, in seconds of the bus's clock, better with every look.
+    """Times of samples in seconds of the bus's clock, refined by every look.
 
     Parameters
     ----------
@@ -112,48 +113,44 @@ class SampleClock:
 
     @property
     def segment(self) -> int:
-        """Which run of samples without a gap is going on."""
+        """Number of the current segment: a run of samples without a gap."""
         return self._forgotten + len(self._segments) - 1
 
     def begin_segment(self) -> None:
-        """What follows has an offset of its own: it is the first, or samples were lost before it."""
+        """Begin a segment with an offset of its own: at the start, and after samples were lost."""
         if self._segments:
             self._past_spread_s2 += self._segments[-1].spread_s2
             self._past_product_s += self._segments[-1].product_s
         self._segments.append(_Segment())
 
     def forget(self) -> None:
-        """Let go of all segments but the one that is going on, and of its single looks."""
+        """Forget all segments except the current one, and the single looks of that."""
         self._forgotten += len(self._segments[:-1])
         self._segments = self._segments[-1:]
         for each in self._segments:
             del each.looks_ns[:], each.looked[:]
 
-    def add(self, t_ns: int, taken: int) -> None:
-        """At `t_ns` the chip had taken `taken` samples of this segment."""
-        self._segments[-1].add_many([t_ns], [taken])
-
-    def add_many(self, t_ns: NDArray[np.int64], taken: NDArray[np.int64]) -> None:
-        """The same of (n,) looks, one at least."""
-        self._segments[-1].add_many(t_ns.tolist(), taken.tolist())
+    def add(self, t_ns: Whole, taken: Whole) -> None:
+        """Add one or more looks: at `t_ns` (n,) the chip had taken `taken` (n,) samples of the current segment."""
+        self._segments[-1].add(t_ns.tolist(), taken.tolist())
 
     @property
     def rate_hz(self) -> float:
-        """The sample rate, as far as it is known; once a segment has begun."""
+        """Sample rate as far as it is known; a segment must have begun."""
         prior = (LOOK_STD_SAMPLES / (RATE_TOLERANCE * self._nominal_hz)) ** 2
         spread = self._past_spread_s2 + self._segments[-1].spread_s2
         product = self._past_product_s + self._segments[-1].product_s
         return (product + prior * self._nominal_hz) / (spread + prior)
 
-    def times_s(self, segment: NDArray[np.int64], index: NDArray[np.int64]) -> Vector:
-        """Times (n,) of the samples number `index` (n,), from 0 in their `segment` (n,); each was looked at."""
+    def times_s(self, segment: Whole, index: Whole) -> Vector:
+        """Return the times (n,) of samples `index` (n,), from 0 in their `segment` (n,), which must have looks."""
         segment = segment - self._forgotten
         t_mean_s = np.array([s.t_mean_s for s in self._segments])
         taken_mean = np.array([s.taken_mean for s in self._segments])
         return np.asarray(t_mean_s[segment] + (index + 0.5 - taken_mean[segment]) / self.rate_hz, np.float64)
 
     def final(self) -> Times:
-        """`times_s` with all that is known: each piece of a clock whose rate changed keeps its own."""
+        """Return `times_s` by all looks, with a rate for each piece of a clock whose rate changed."""
         pieces = [
             (number, line)
             for number, each in enumerate(self._segments, self._forgotten)
@@ -164,7 +161,7 @@ class SampleClock:
         begins = np.array([number * FAR + line.first for number, line in pieces])
         t_s, taken = np.array([(line.t_s, line.y) for _, line in pieces]).reshape(-1, 2).T
 
-        def times_s(segment: NDArray[np.int64], index: NDArray[np.int64]) -> Vector:
+        def times_s(segment: Whole, index: Whole) -> Vector:
             at = np.searchsorted(begins, segment * FAR + index, side="right") - 1
             return np.asarray(t_s[at] + (index + 0.5 - taken[at]) / rates_hz[at], np.float64)
 
@@ -172,7 +169,7 @@ class SampleClock:
 
 
 def make_increasing(t_s: Vector, step_s: float) -> Vector:
-    """`t_s` (n,), moved on by as little as makes each at least `step_s` later than the one before."""
+    """Move the times `t_s` (n,) as little as makes each at least `step_s` later than the one before."""
     if not (np.diff(t_s) < step_s).any():
         return t_s
     ramp = step_s * np.arange(len(t_s))

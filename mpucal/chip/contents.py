@@ -1,4 +1,4 @@
-"""What a chip holds now, read from its registers as it is: nothing is reset, set up or written.
+"""Content of a chip's registers as they are: nothing is reset, set up or written.
 
 Source: RM-MPU-6000A r4.2, registers 27, 28, 59 to 66, 107 and 117.
 """
@@ -17,12 +17,11 @@ from .families import PARTS
 from .offsets import PLACES, OffsetRegisters
 from .port import Port
 
-# the accelerometer's six bytes, then the thermometer's two
-MEASURED = 0x3B
-
 
 def chip_contents(bus: Bus) -> dict[str, Any]:
-    """Identity, ranges, offset registers and, of a known chip that is awake, one sample (m/s^2, deg C); JSON types.
+    """Read identity, ranges, offset registers and, if the chip is known and awake, one sample (m/s^2, deg C).
+
+    The values are of JSON's types.
 
     Raises
     ------
@@ -45,7 +44,8 @@ def chip_contents(bus: Bus) -> dict[str, Any]:
     }
     if asleep or part is None:
         return facts
-    data = np.frombuffer(port.read(MEASURED, 8), ">i2").astype(float)
+    # The accelerometer's six bytes, then two of the temperature.
+    data = np.frombuffer(port.read(reg.ACCEL_XOUT_H, 8), ">i2").astype(float)
     acc = data[:3] / reg.ACCEL_LSB_PER_G[scale] * STANDARD_GRAVITY_MPS2 / part.accel_sensitivity
     return facts | {
         "acc_mps2": acc.tolist(),

@@ -1,4 +1,4 @@
-"""Register accesses to samples, as they happen or from a capture."""
+"""Decoder of register accesses to samples, as they happen or from a capture."""
 
 from __future__ import annotations
 
@@ -19,26 +19,25 @@ from .settings import Settings
 
 Words = tuple[int, int, int]
 
-# A poll is three accesses: count, bytes, flags. So many are looked at together: those after one that has something
-# about it are looked at again.
+# A poll is three accesses: count, bytes, flags. So many polls are checked together, and those after one that is not
+# ordinary are checked again.
 POLL, AT_ONCE = 3, 512
 
 
 class Decoder:
-    """Follows every access that succeeded, and knows from those alone what the FIFO's bytes mean.
+    """Decoder that knows the meaning of the FIFO's bytes from the successful accesses alone.
 
-    The driver feeds it what it does and a capture what was done, so that both give the same samples.
+    The driver feeds it its own accesses, and a reader those of a capture, so that both get the same samples.
 
     Attributes
     ----------
-    fault : what the last poll's INT_STATUS said against what the poll read.
+    fault : reason why the last poll was not accepted; None if it was.
     """
 
     def __init__(self, name: str) -> None:
         self._name = name
         self._held: dict[int, int] = {}
         self._evidence = Behaviour()
-        self._settings: Settings | None = None
         self._fifo: FifoDecoder | None = None
         self._before_reset: dict[int, int] = {}
         self._accel_offsets: Words | None = None
@@ -46,17 +45,17 @@ class Decoder:
 
     @property
     def corrected(self) -> tuple[Words, Words] | None:
-        """Offset words before and after the reset where they differ: somebody had corrected the accelerometer."""
+        """Offset words before and after the reset if they differ: the accelerometer had been corrected."""
         before, after = (self._words(held) for held in (self._before_reset, self._held))
         return None if before is None or after is None or before == after else (before, after)
 
     @property
     def part(self) -> Part:
-        """Which part the chip is, as it answered and behaved.
+        """Part that the chip is by its identity and behaviour.
 
         Raises
         ------
-        RecordingError : nobody asked for its identity. ChipError : no known part.
+        RecordingError : WHO_AM_I was not read. ChipError : no known part.
         """
         if reg.WHO_AM_I not in self._held:
             raise RecordingError(
@@ -66,7 +65,7 @@ class Decoder:
         return self._evidence.part(self._held[reg.WHO_AM_I])
 
     def feed(self, transaction: Transaction | Accesses) -> None:
-        """An access was made, or failed; or many were."""
+        """Take one access, which may have failed, or many."""
         if isinstance(transaction, Accesses):
             self._feed_many(transaction)
             return
@@ -78,20 +77,20 @@ class Decoder:
             self.feed_write(transaction.register, transaction.data)
 
     def _feed_many(self, accesses: Accesses) -> None:
-        """The same of many: whole polls with nothing about them are decoded at once, the others one by one."""
+        """Decode runs of ordinary polls at once, and the other accesses one by one."""
         at = 0
         for first, last in poll_runs(accesses):
             self._feed_each(accesses, at, first)
             at = first
             while at < last:
                 at += self._feed_polls(accesses, at, min(last, at + AT_ONCE * POLL))
-                # the one that had something about it
+                # The poll that was not ordinary.
                 self._feed_each(accesses, at, min(last, at + POLL))
                 at = min(last, at + POLL)
         self._feed_each(accesses, at, len(accesses))
 
     def feed_read(self, register: int, data: bytes, t_ns: int, host_ns: int | None = None) -> None:
-        """`data` was read from `register` on, at `t_ns`; `host_ns` as in Reply."""
+        """Take `data` read from `register` on at `t_ns`; `host_ns` as in Reply."""
         if self._fifo is None:
             self._hold(register, data)
             self._evidence.observe(register, data, self._held)
@@ -102,23 +101,24 @@ class Decoder:
         elif register in (reg.INT_STATUS, reg.INT_ENABLE) and register + len(data) > reg.INT_STATUS:
             lost = register == reg.INT_ENABLE and not data[0] & reg.INT_FIFO_OFLOW
             if host_ns is not None:
-                self._fifo.add_clock_pair(t_ns, host_ns)
-            if self._fifo.polled:
+                self._fifo.add_clock_pairs(np.array([t_ns]), np.array([host_ns]))
+            polled = self._fifo.settings.polled
+            if polled:
                 self._fifo.set_count(t_ns, reg.FRAME_BYTES)
                 self._fifo.add_bytes(data[reg.ACCEL_XOUT_H - register :])
             overflow = bool(data[reg.INT_STATUS - register] & reg.INT_FIFO_OFLOW)
-            self.fault = self._fifo.finish_poll(overflow and not self._fifo.polled, lost)
+            self.fault = self._fifo.finish_poll(overflow and not polled, lost)
         elif register == reg.TEMP_OUT_H:
             self._fifo.set_temperature(int.from_bytes(data, "big", signed=True))
         else:
             self._hold(register, data)
 
     def feed_write(self, register: int, data: bytes) -> None:
-        """`data` was written from `register` on.
+        """Take `data` written from `register` on.
 
         Raises
         ------
-        RecordingError : the FIFO starts with settings that nobody told, or that changed.
+        RecordingError : the FIFO starts with settings that are unknown, or that changed.
         """
         if register == reg.PWR_MGMT_1 and data[0] & reg.PWR_MGMT_1_DEVICE_RESET:
             self._evidence.reset()
@@ -130,49 +130,45 @@ class Decoder:
             self._fifo_was_reset()
 
     def provisional_ns(self, t_ns: int) -> int:
-        """`t_ns` of the bus's clock as the samples that `take` gives show it."""
+        """Convert a time of the bus's clock to the provisional times of `take`."""
         return t_ns if self._fifo is None else self._fifo.provisional_ns(t_ns)
 
     @property
-    def flipped(self) -> int:
-        """How many words of frames had a bit flipped on their way, and were set right."""
-        return 0 if self._fifo is None else self._fifo.flipped
+    def repaired(self) -> int:
+        """Number of words in which a bit flipped on the bus was repaired."""
+        return 0 if self._fifo is None else self._fifo.repaired
 
     @property
     def accepted(self) -> int:
-        """How many frames came since the start."""
+        """Number of accepted frames."""
         return 0 if self._fifo is None else self._fifo.accepted
 
     def take(self) -> Samples:
-        """The samples since the last `take`, with the times that are known now."""
+        """Return the samples since the last `take`, with provisional times."""
         return self._fifo.take() if self._fifo is not None else Samples.empty()
 
     def release(self, last: bool = False) -> list[Run]:
-        """The frames since the last time, let go of: `final` makes samples of them once there are no more.
-
-        Without those of the `last` run, whose end may yet be set right by what follows.
-        """
+        """Hand over the frames since the last call; see FifoDecoder.release."""
         return self._fifo.release(last) if self._fifo is not None else []
 
     def final(self, runs: Iterable[Run]) -> Iterator[Samples]:
-        """The samples of runs that were released, in the same order, with the best times there are."""
+        """Yield the samples of released runs, in the same order, with final times."""
         return self._fifo.final(runs) if self._fifo is not None else iter(())
 
     @property
     def sensor(self) -> Sensor:
-        """What is known of the sensor so far."""
+        """Sensor as far as it is known."""
         return replace(Sensor() if self._fifo is None else self._fifo.sensor, accel_offsets=self._accel_offsets)
 
     def forget(self) -> None:
-        """Let go of all that was taken: `recording` holds what comes from now on."""
+        """Forget all samples taken: `recording` holds those from now on."""
         if self._fifo is not None:
             self._fifo.forget()
 
     def recording(self) -> Recording:
-        """All samples so far, with the best times there are."""
+        """Return all samples with final times."""
         if self._fifo is None:
-            empty = Samples.empty()
-            return Recording(**vars(empty), name=self._name)
+            return Recording(**vars(Samples.empty()), name=self._name)
         return replace(self._fifo.recording(self._name), sensor=self.sensor)
 
     def _feed_each(self, accesses: Accesses, first: int, last: int) -> None:
@@ -180,16 +176,16 @@ class Decoder:
             self.feed(transaction)
 
     def _feed_polls(self, accesses: Accesses, first: int, last: int) -> int:
-        """How many of the accesses of whole polls first..last-1 were taken at once."""
-        if self._fifo is None or accesses.frames.shape[1] != self._fifo.frame_words:
+        """Decode the leading ordinary polls of the accesses first..last-1; return the number of their accesses."""
+        if self._fifo is None or accesses.frames.shape[1] != self._fifo.settings.frame_words:
             return 0
         looks, reads, checks = (np.arange(first + i, last, POLL) for i in range(POLL))
         frames = accesses.frames[accesses.begin[reads[0]] : accesses.end[reads[-1]]]
         lengths = accesses.end[reads] - accesses.begin[reads]
         polls = self._fifo.accept_plain_polls(accesses.t_ns[looks], frames, lengths)
-        heard = checks[:polls][accesses.heard[checks[:polls]]]
-        if len(heard):
-            self._fifo.add_clock_pairs(accesses.t_ns[heard], accesses.host_ns[heard])
+        timed = checks[:polls][accesses.has_host_ns[checks[:polls]]]
+        if len(timed):
+            self._fifo.add_clock_pairs(accesses.t_ns[timed], accesses.host_ns[timed])
         if polls:
             self.fault = None
         return POLL * polls
@@ -200,14 +196,14 @@ class Decoder:
     def _fifo_was_reset(self) -> None:
         settings = Settings.from_registers(self._held, self.part, self._name)
         if self._fifo is None:
-            self._settings, self._fifo = settings, FifoDecoder(settings)
+            self._fifo = FifoDecoder(settings)
             self._accel_offsets = self._words(self._held)
-        elif settings != self._settings:
+        elif settings != self._fifo.settings:
             raise RecordingError(f"{self._name} holds samples of two ranges or rates", "record each of them on its own")
         self._fifo.reset()
 
     def _words(self, held: Mapping[int, int]) -> Words | None:
-        """What the accelerometer's offset registers held, if that is known."""
+        """Return the accelerometer's offset words; None if not all are in `held`."""
         place = self.part.family.accel_offset_h
         if not all(high + i in held for high in place for i in (0, 1)):
             return None
@@ -216,7 +212,7 @@ class Decoder:
 
 
 def poll_runs(accesses: Accesses) -> list[tuple[int, int]]:
-    """first, last + 1 of accesses that are polls one after the other: count, as many bytes, no overflow, none lost."""
+    """Return (first, last + 1) of each run of ordinary polls: count, as many bytes, no overflow, settings kept."""
     n = len(accesses) - POLL + 1
     if n < 1 or accesses.failures:
         return []
@@ -235,12 +231,12 @@ def poll_runs(accesses: Accesses) -> list[tuple[int, int]]:
 
 
 def decode(accesses: Iterable[Transaction | Accesses], name: str = "recording") -> Recording:
-    """The samples that `accesses` carried; what was cut off at their end does no harm.
+    """Decode `accesses` to a recording; they may be cut off at the end.
 
     Raises
     ------
-    RecordingError : the FIFO starts with settings that nobody told, or there are no two samples.
-    ChipError : a chip that is not known.
+    RecordingError : the FIFO starts with unknown settings, or there are fewer than two samples.
+    ChipError : an unknown chip.
     """
     decoder = Decoder(name)
     for each in accesses:

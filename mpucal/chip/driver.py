@@ -1,7 +1,7 @@
-"""The MPU driver over any bus: identify, configure, drain the FIFO, recover.
+"""MPU driver over any bus: it identifies and configures the chip, drains its FIFO, and recovers from faults.
 
-What it accesses depends on nothing but the replies and their times, so that a replay asks for the same
-accesses. DRIVER_VERSION counts up with every change of them.
+Its accesses depend on the replies and their times alone, so that a replay makes the same accesses.
+DRIVER_VERSION counts up with every change of them.
 """
 
 from __future__ import annotations
@@ -32,32 +32,32 @@ from .transfer_stats import REMEDY, TransferStats
 
 DRIVER_VERSION = 6
 
-# so long without a sample that can be accepted, and the driver gives up
+# The driver gives up after so long without a valid sample.
 DEAD_NS = 2_000_000_000
-# a host that slept for a while says nothing about the chip
+# A longer poll counts as this long: a host that slept says nothing about the chip.
 LONGEST_POLL_NS = 500_000_000
-# what a transfer on a bus that is held takes of an adapter's time-out, which no reply tells
+# Time-out of an adapter on a bus that is held: no reply brings the time that it took.
 HELD_NS = 500_000_000
 
-# Long after a frame is written, and no whole number of sample intervals.
+# Longer than the chip takes to write a frame, and no whole number of sample intervals.
 FRAME_WRITTEN_NS = 300_000
 
-# An overflow drops the oldest bytes, so a FIFO so many frames short of full may have lost its frames' alignment.
+# An overflow drops the oldest bytes: a FIFO that is so many frames short of full may have lost the alignment.
 SPARE_FRAMES = 3
-# of the samples; jerks of a hand are taken for flipped bits four times in ten thousand
-MANY_FLIPPED = 0.001
-# a host that was late once or twice says nothing about the bus
+# Share of the samples; jerks of a hand pass for flipped bits four times in ten thousand.
+MANY_REPAIRED = 0.001
+# Fewer overflows may come from a host that was late.
 OVERFLOWS = 3
 
-# INT_ENABLE, the DMP's status and INT_STATUS in one read: INT_ENABLE is 0 in a chip that was reset meanwhile
+# INT_ENABLE, the DMP's status and INT_STATUS in one read: INT_ENABLE is 0 in a chip that was reset meanwhile.
 STATUS_BYTES = reg.INT_STATUS - reg.INT_ENABLE + 1
-# the same and a sample, of a chip without a FIFO
+# The status and a sample of a chip without a FIFO, in one read.
 SAMPLE_BYTES = reg.ACCEL_XOUT_H + reg.FRAME_BYTES - reg.INT_ENABLE
-NO_FIFO = "the chip's FIFO stays empty, so that its samples are read one by one and their times are the computer's"
+NO_FIFO = "the chip's FIFO stays empty: its samples are read one by one, with the computer's times"
 
 
 class Need(Enum):
-    """What has to be done before the next samples can be accepted."""
+    """Action that is needed before the next samples can be valid."""
 
     NOTHING = auto()
     RESTART = auto()
@@ -74,17 +74,17 @@ _CURES = {
 
 
 class Driver:
-    """One chip on one bus.
+    """Driver of one chip on one bus.
 
     Parameters
     ----------
-    bus : where the chip is. config : how it is to measure. name : what to call its recording.
-    say : is told what a person should know of this chip as it starts, and of its bus as it stops: one sentence, no full
-        stop. stats : counts the transfers.
+    bus : the chip's bus. config : how to measure. name : name of the recording. stats : counts the transfers.
+    say : called with remarks for the user on the chip at the start, and on its bus at the end: one sentence each,
+        without a full stop.
 
     Attributes
     ----------
-    faults : how often what was read was not accepted, by kind.
+    faults : number of polls that were not accepted, by reason.
     """
 
     def __init__(
@@ -108,50 +108,51 @@ class Driver:
         self._frame_ns = math.inf
 
     def now_ns(self) -> int:
-        """The bus's clock as last seen, at the host's rate as far as that is known."""
+        """Return the last time of the bus's clock, at the host's rate as far as that is known."""
         return self._decoder.provisional_ns(self._port.now_ns)
 
     @property
     def part(self) -> Part:
-        """Which part it turned out to be; once it was started."""
+        """Part that the started chip was identified as."""
         return self._running.part
 
     @property
-    def flipped(self) -> int:
-        """How many samples had a bit flipped on the bus, and were set right."""
-        return self._decoder.flipped
+    def repaired(self) -> int:
+        """Number of samples in which a bit flipped on the bus was repaired."""
+        return self._decoder.repaired
 
     def start(self) -> Sensor:
         """Identify, reset, wake and configure the chip, and start its FIFO.
 
         Raises
         ------
-        BusError : a transfer failed three times. ChipError : no known chip, or it does not keep its settings.
+        BusError : a transfer failed three times. ChipError : an unknown chip, or it does not keep its settings.
         """
         read_identity(self._port)
-        self._look_before_reset()
+        self._read_before_reset()
         reset(self._port)
-        self._look_at_offsets()
+        self._read_offsets()
         wake(self._port)
         probe(self._port)
         self._settings = self._config.settings(self._decoder.part)
         configure(self._port, self._settings)
         self._restart()
         no_fifo = NO_FIFO if self._settings.polled else None
-        for sentence in filter(None, (describe_mismatch(self._settings.sensor), self._correction(), no_fifo)):
+        for sentence in filter(None, (describe_mismatch(self._settings.sensor), self._correction_remark(), no_fifo)):
             self._say(sentence)
         sensor = self._settings.sensor
         return replace(sensor, rate_hz=self._config.rate_hz) if self._settings.polled else sensor
 
     def poll(self) -> Samples:
-        """Wait for the next poll and give the samples since the last; their times are provisional.
+        """Wait for the next poll, and return the samples since the last one with provisional times.
 
-        After an overflow, misaligned frames or a FIFO read that failed, the FIFO starts anew: a gap. So it does
-        after a reset of the chip or a sensor that repeats itself, once the chip was set up again.
+        After an overflow, misaligned frames or a failed read of the FIFO, the FIFO is restarted, which leaves a gap.
+        After a reset of the chip, or if the sensor repeats itself, the chip is set up again before that.
 
         Raises
         ------
-        BusError, ChipError : what prevented samples for two seconds. BusError : a bus too slow for the rate.
+        BusError, ChipError : the reason why no valid sample came for two seconds.
+        BusError : the bus is too slow for the rate.
         """
         begun_ns = self._port.now_ns
         running = self._running
@@ -159,7 +160,7 @@ class Driver:
         trouble: BusError | ChipError | None = None
         try:
             if self._need is Need.NOTHING:
-                self._need = self._look() if running.polled else self._drain(running)
+                self._need = self._read_samples() if running.polled else self._drain_fifo(running)
             if self._need is not Need.NOTHING:
                 self._recover(running)
         except (BusError, ChipError) as error:
@@ -169,49 +170,49 @@ class Driver:
         samples = self._decoder.take()
         self._fruitless_ns = 0 if len(samples) else self._fruitless_ns + self._spent_ns(begun_ns, trouble)
         if self._fruitless_ns > DEAD_NS:
-            raise trouble or self._why_dead(running)
+            raise trouble or self._diagnose_silence(running)
         return samples
 
     def recording(self) -> Recording:
-        """Everything so far, with the best times there are and the measured rate and temperature."""
+        """Return all samples with final times, and the measured rate and temperature."""
         return self._decoder.recording()
 
     def forget(self) -> None:
-        """Let go of all samples so far: `recording` holds what comes from now on."""
+        """Forget all samples: `recording` holds those from now on."""
         self._decoder.forget()
 
     def stop(self) -> None:
-        """Quiet the FIFO, if the bus still works; the chip stays awake."""
+        """Stop the FIFO if the bus still works; the chip stays awake."""
         with suppress(BusError, EndOfCapture):
             stop_fifo(self._port)
-        if self.flipped > MANY_FLIPPED * self._decoder.accepted:
-            self._say(f"{self.flipped} samples had a bit flipped on the bus and were set right: {REMEDY}")
+        if self.repaired > MANY_REPAIRED * self._decoder.accepted:
+            self._say(f"a bit had flipped on the bus in {self.repaired} samples, which were repaired: {REMEDY}")
         if self._port.stats.errors:
             self._say(f"{self._port.stats}: {self._port.stats.remedy}")
 
-    def _look_before_reset(self) -> None:
-        # the reset reloads the factory's trim: what somebody wrote before is kept in the capture, wherever it is
-        self._look_at_offsets()
+    def _read_before_reset(self) -> None:
+        # The reset reloads the factory's trim. These reads put earlier corrections into the capture.
+        self._read_offsets()
         self._port.read(reg.XG_OFFSET_H, 6)
         self._port.read(reg.SMPLRT_DIV, 5)
         self._port.read(reg.PWR_MGMT_1, 2)
 
-    def _look_at_offsets(self) -> None:
-        # the oldest place first: captures replay only with the same accesses
+    def _read_offsets(self) -> None:
+        # The oldest family first: a capture replays only with the same accesses.
         for first, _, last in reversed(PLACES):
             self._port.read(first, last + 2 - first)
 
-    def _correction(self) -> str | None:
+    def _correction_remark(self) -> str | None:
         if self._decoder.corrected is None:
             return None
         before, trim = self._decoder.corrected
         return (
-            f"the chip's offset registers held a correction, {before} in place of the factory's {trim}; the reset has"
-            " taken it away, and this calibration is of the chip without it"
+            f"the chip's offset registers held a correction, {before} in place of the factory trim {trim}; the reset"
+            " removed it, and this calibration is for the chip without it"
         )
 
-    def _drain(self, settings: Settings) -> Need:
-        """Read all whole frames, and say what they need to be accepted."""
+    def _drain_fifo(self, settings: Settings) -> Need:
+        """Read all whole frames; return what the chip needs next."""
         count, begun_ns = self._fifo_count(settings.frame_bytes), self._port.now_ns
         self._plan_next_poll()
         if count >= settings.part.fifo_bytes - SPARE_FRAMES * settings.frame_bytes:
@@ -223,14 +224,14 @@ class Driver:
                 self._port.read_destructive(reg.FIFO_R_W, frames * settings.frame_bytes)
             self._port.read_destructive(reg.INT_ENABLE, STATUS_BYTES)
         except BusError:
-            # the bytes, or the flag, that went by are gone: a second read would begin within a frame
+            # The bytes or the flag are gone from the chip: a second read would begin within a frame.
             return Need.RESTART
         if frames:
             self._frame_ns = min(self._frame_ns, (self._port.now_ns - begun_ns) / frames)
-        return self._judged()
+        return self._after_poll()
 
-    def _look(self) -> Need:
-        """Read samples one by one, for as long as there are polls of a FIFO apart."""
+    def _read_samples(self) -> Need:
+        """Read samples one by one for a poll's period; return what the chip needs next."""
         step_ns = round(1e9 / self._config.rate_hz)
         for _ in range(max(1, round(self._config.period_s * self._config.rate_hz))):
             self._port.sleep_until(self._next_poll_ns)
@@ -241,27 +242,27 @@ class Driver:
             self._next_poll_ns += step_ns
             if self._decoder.fault is not None:
                 break
-        return self._judged()
+        return self._after_poll()
 
-    def _judged(self) -> Need:
-        """What the last poll needs, and counts why."""
+    def _after_poll(self) -> Need:
+        """Count the last poll's fault, and return what the chip needs."""
         fault = self._decoder.fault
         if fault is not None:
             self.faults[fault] += 1
         return _CURES.get(fault, Need.SET_UP)
 
     def _check_pace(self, settings: Settings) -> None:
-        """Raise BusError where frames come faster than even the quickest look took them, and not by chance."""
+        """Raise BusError if the chip makes frames faster than the quickest read moved them, after several overflows."""
         rate_hz = settings.nominal_rate_hz
         if self.faults[FifoFault.OVERFLOW] < OVERFLOWS or self._frame_ns * rate_hz < 1e9 or self._frame_ns == math.inf:
             return
         raise BusError(
-            f"the bus moves {1e9 / self._frame_ns:.0f} samples a second, where the chip takes {rate_hz:g}",
-            "run it at 400 kHz (`dtparam=i2c_arm_baudrate=400000` on a Raspberry Pi), or take a lower --rate",
+            f"the bus moves {1e9 / self._frame_ns:.0f} samples a second, but the chip takes {rate_hz:g}",
+            "run the bus at 400 kHz (`dtparam=i2c_arm_baudrate=400000` on a Raspberry Pi), or use a lower --rate",
         )
 
     def _recover(self, settings: Settings) -> None:
-        """Start the FIFO anew; before that, set up a chip that has lost its settings or repeats itself."""
+        """Restart the FIFO; before that, set up a chip that lost its settings or repeats itself."""
         if self._need is not Need.SET_UP and not is_configured(self._port, settings):
             self.faults[FifoFault.LOST] += 1
             self._need = Need.SET_UP
@@ -274,7 +275,7 @@ class Driver:
         part = settings.part
         if answer != part.who_am_i:
             raise ChipError(
-                f"the {part.chip} answers 0x{answer:02x} to WHO_AM_I now, and 0x{part.who_am_i:02x} before",
+                f"the {part.chip} answers 0x{answer:02x} to WHO_AM_I now, and answered 0x{part.who_am_i:02x} before",
                 "check its wiring and supply, and that only one chip has its address",
             )
         reset(self._port)
@@ -289,7 +290,7 @@ class Driver:
     def _fifo_count(self, frame_bytes: int) -> int:
         count = int.from_bytes(self._port.read(reg.FIFO_COUNT_H, 2), "big")
         if count % frame_bytes:
-            # the chip is writing a frame, or has slipped
+            # The chip is writing a frame, or the FIFO has slipped.
             self._port.sleep(FRAME_WRITTEN_NS)
             count = int.from_bytes(self._port.read(reg.FIFO_COUNT_H, 2), "big")
         return count
@@ -301,31 +302,31 @@ class Driver:
         self._next_poll_ns = self._port.now_ns + round(in_s * 1e9)
 
     def _spent_ns(self, begun_ns: int, trouble: BusError | ChipError | None) -> int:
-        """How long this poll took, as far as that says something about the chip."""
+        """Return the time this poll took, as far as it counts against the chip."""
         held_ns = HELD_NS if isinstance(trouble, BusHeld) else 0
         return min(self._port.now_ns - begun_ns, LONGEST_POLL_NS) + held_ns
 
-    def _why_dead(self, settings: Settings) -> ChipError:
-        """What two seconds without a sample come from."""
+    def _diagnose_silence(self, settings: Settings) -> ChipError:
+        """Return the error that explains two seconds without a valid sample."""
         chip = settings.part.chip
         if not is_configured(self._port, settings):
             return ChipError(
-                f"the {chip} loses its settings again and again",
+                f"the {chip} lost its settings several times",
                 "its supply breaks down: check the wires and connectors, then start again",
             )
         if self.faults and self.faults.most_common(1)[0][0] is FifoFault.STUCK:
             return ChipError(
-                f"the {chip} repeats itself: nothing that it measures changes, not even its noise",
-                "take its supply away for a moment, check its solder joints and start again; if it does that again,"
+                f"the {chip} repeats one sample: not even the noise changes",
+                "switch its supply off and on, check its solder joints and start again; if it happens again,"
                 " replace the chip",
             )
         return ChipError(
-            f"the {chip} gave no sample that can be accepted for {DEAD_NS * 1e-9:g} s",
-            "take its supply away for a moment, slow the bus down or the rate, and start again",
+            f"the {chip} gave no valid sample for {DEAD_NS * 1e-9:g} s",
+            "switch its supply off and on, use a slower bus or a lower rate, and start again",
         )
 
     @property
     def _running(self) -> Settings:
         if self._settings is None:
-            raise RuntimeError("the driver polls before it was started")
+            raise RuntimeError("the driver was not started")
         return self._settings

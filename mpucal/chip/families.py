@@ -1,6 +1,6 @@
-"""The table of chips: one row for each family, with all that differs between them; the rest is in registers.py.
+"""Table of chips: one row for each family with its differences; registers.py has what they share.
 
-A chip with the same registers is one more row, or one more identity in a row. Simulated chips are made of these rows.
+A chip with the same registers is one more row, or one more identity in a row. Simulated chips use these rows too.
 
 Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4, PS-MPU-6000A r3.4, PS-MPU-9250A r1.0; each row names its own.
 """
@@ -14,12 +14,12 @@ from typing import NamedTuple
 from ..errors import ChipError
 from . import registers as reg
 
-# a full FIFO may say a frame less than it holds
+# A full FIFO may show a frame less than its size.
 FIFO_SLACK_BYTES = 16
 
 
 class WordGroup(Enum):
-    """A group of words in a FIFO frame; the value is its number of words."""
+    """Group of words in a FIFO frame: its name and its number of words."""
 
     ACCEL = "accelerometer", 3
     TEMPERATURE = "temperature", 1
@@ -27,12 +27,12 @@ class WordGroup(Enum):
 
     @property
     def words(self) -> int:
-        """How many."""
+        """Number of words."""
         return self.value[1]
 
 
 class Columns(NamedTuple):
-    """Where the groups lie in a frame of seven words."""
+    """Positions of the groups in a frame of seven words."""
 
     accel: slice
     temperature: int
@@ -41,37 +41,36 @@ class Columns(NamedTuple):
 
 @dataclass(frozen=True)
 class Family:
-    """Chips that one driver can treat alike.
+    """Family of chips that the driver treats alike.
 
     Attributes
     ----------
-    name : what a chip of unknown identity is called that behaves so.
-    parts : WHO_AM_I and name of each part.
-    source : where its differences from the others are written down.
+    name : name of a chip of unknown identity that behaves so. parts : WHO_AM_I and name of each part.
+    source : document of its differences from the others.
     fifo_bytes : size of the FIFO after a reset.
-    widest_fifo_bytes : its size with both FIFO_SIZE bits of ACCEL_CONFIG2 set; None: they do nothing.
-    frame : the order of a FIFO frame.
-    fifo_en_frame : what FIFO_EN holds for a whole frame. fifo_en_with_temperature : its bit of the accelerometer brings
-        the temperature along.
+    widest_fifo_bytes : size with both FIFO_SIZE bits of ACCEL_CONFIG2 set; None: these bits have no effect.
+    frame : order of a FIFO frame.
+    fifo_en_frame : value of FIFO_EN for a whole frame. fifo_en_with_temperature : True if its accelerometer bit adds
+        the temperature.
     lsb_per_c, zero_c : temperature is counts / lsb_per_c + zero_c.
     accel_offset_h : addresses of the high bytes of the accelerometer offsets x, y, z; the low byte follows.
     accel_offset_lsb_per_g : nominal scale of such a 16-bit word; bit 0 is reserved.
     gyro_range_shift : position of FS_SEL in GYRO_CONFIG.
-    has_accel_config2 : the accelerometer's filter has a register of its own, ACCEL_CONFIG2, which also lets it measure
-        alone at ACCEL_ONLY_HZ.
-    packed_self_test : the factory's self-test codes are 5 bits each in SELF_TEST_ACCEL and the three registers
+    has_accel_config2 : True if the accelerometer's filter has its own register, ACCEL_CONFIG2, which also lets the
+        accelerometer measure alone at ACCEL_ONLY_HZ.
+    packed_self_test : True if the factory's self-test codes are 5 bits each in SELF_TEST_ACCEL and the three registers
         after it; otherwise 8 bits each, from SELF_TEST_GYRO and from SELF_TEST_ACCEL on.
-    asleep : it sleeps after power-on and reset.
+    asleep : True if it sleeps after power-on and reset.
     fifo_reset_needs_stop : FIFO_RESET acts only while FIFO_EN of USER_CTRL is 0 (RM-MPU-6000A, register 106).
-    accel_lag_ms : by DLPF_CFG, how much longer the accelerometer's filter delays than the gyroscope's, to the
-        millisecond; empty: not told.
-    half_range_revision : letter of a revision whose accelerometer has half the sensitivity; empty where there is none.
+    accel_lag_ms : delay of the accelerometer's filter less that of the gyroscope's, by DLPF_CFG, to the millisecond;
+        empty: not documented.
+    half_range_revision : letter of a revision whose accelerometer has half the sensitivity; empty: there is none.
     accel_noise_ug, gyro_noise_dps : typical noise densities, ug/sqrt(Hz) and deg/s/sqrt(Hz).
     zero_rate_dps : tolerance of the gyroscope's output at rest, deg/s. zero_g_mg : of the accelerometer's x, y, z, mg.
     scale_percent, cross_axis_percent : tolerances of the scale factors and cross-axis sensitivities of both.
-    data_sheet : where the accelerometer's tolerances stand; empty: not at hand. nonlinearity_percent : of its range.
-    spi_data_hz : fastest SPI clock for what is measured and the FIFO; 1 MHz for all other registers.
-    zero_g_drift : how far its output at 0 g moves with temperature, in words.
+    data_sheet : document of the accelerometer's tolerances; empty: unknown. nonlinearity_percent : of its range.
+    spi_data_hz : fastest SPI clock for the data registers and the FIFO; 1 MHz for all other registers.
+    zero_g_drift : drift of the output at 0 g with temperature, in words.
     """
 
     name: str
@@ -106,7 +105,7 @@ class Family:
 
     @property
     def columns(self) -> Columns:
-        """Where the groups lie in a frame."""
+        """Positions of the groups in a frame."""
         first, at = 0, {}
         for group in self.frame:
             at[group] = slice(first, first + group.words)
@@ -114,19 +113,19 @@ class Family:
         return Columns(at[WordGroup.ACCEL], at[WordGroup.TEMPERATURE].start, at[WordGroup.GYRO])
 
     def accel_lag_s(self, dlpf_cfg: int) -> float:
-        """By how much the accelerometer lags behind the gyroscope; 0 where no document tells."""
+        """Return the time by which the accelerometer lags behind the gyroscope; 0 if not documented."""
         return 1e-3 * self.accel_lag_ms[dlpf_cfg] if dlpf_cfg < len(self.accel_lag_ms) else 0.0
 
 
 @dataclass(frozen=True)
 class Part:
-    """One chip that can be bought.
+    """Part that can be bought.
 
     Attributes
     ----------
     chip : its name. who_am_i : its answer to WHO_AM_I. family : its row of the table.
     accel_sensitivity : accelerometer counts a g, relative to the nominal; a half-range revision has 0.5.
-    wide_fifo_bytes : what its FIFO holds with both FIFO_SIZE bits set, where that is more.
+    wide_fifo_bytes : size of its FIFO with both FIFO_SIZE bits set, if that is larger.
     """
 
     chip: str
@@ -137,7 +136,7 @@ class Part:
 
     @property
     def fifo_bytes(self) -> int:
-        """Size of its FIFO as this driver configures it: the larger one; 0: it has none."""
+        """Size of its FIFO as this driver configures it: the larger one; 0: no FIFO."""
         return self.wide_fifo_bytes or self.family.fifo_bytes
 
 
@@ -252,32 +251,32 @@ PARTS = {who_am_i: Part(chip, who_am_i, family) for family in FAMILIES for who_a
 
 
 def part_of(who_am_i: int) -> Part:
-    """The part that answers `who_am_i`.
+    """Return the part that answers `who_am_i`.
 
     Raises
     ------
-    ChipError : no part of the table answers that.
+    ChipError : no known part answers that.
     """
     try:
         return PARTS[who_am_i]
     except KeyError:
         raise ChipError(
-            f"the chip answers 0x{who_am_i:02x} to WHO_AM_I, which is no part that is known here",
+            f"the chip answers 0x{who_am_i:02x} to WHO_AM_I, as no known part does",
             f"check which chip is at this address (known are {known_parts()})",
         ) from None
 
 
 def family_of(chip: str | None) -> Family | None:
-    """The family of the chip of that name; None where its data sheet is not at hand."""
+    """Return the family of the chip of that name; None if its data sheet is unknown."""
     families = (part.family for part in PARTS.values() if part.chip == chip)
     return next((family for family in families if family.data_sheet), None)
 
 
 def known_parts() -> str:
-    """All parts of the table with their identities, for a message."""
+    """Return all parts with their identities, for a message."""
     return ", ".join(f"0x{value:02x} {part.chip}" for value, part in sorted(PARTS.items()))
 
 
 def families_with_fifo(fifo_bytes: int) -> tuple[Family, ...]:
-    """The families whose FIFO holds `fifo_bytes`, or nearly so."""
+    """Return the families whose FIFO has about `fifo_bytes`."""
     return tuple(family for family in FAMILIES if abs(fifo_bytes - family.fifo_bytes) <= FIFO_SLACK_BYTES)

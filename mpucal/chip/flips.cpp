@@ -1,4 +1,4 @@
-// Words of frames that jump and come back: see flips.py, which says what is done about them.
+// Words of frames that jump and come back: bit_flips.py repairs them.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/pair.h>

@@ -1,8 +1,8 @@
-"""The rate of a bus's clock against the host's, from the times at which the host heard what happened when.
+"""Rate of a bus's clock against the host's, from pairs of (bus time, host arrival time).
 
-A reply is under way for some time, never for less than the line needs: host_i = t_i + a + delay_i, delay_i > 0. So a
-line lies under the pairs, whatever an adapter holds back. Each of a few groups of consecutive pairs gives the one that
-was least delayed. With priors of the rate's error and of its drift, the parabola
+A reply is delayed by at least the time that the line needs: host_i = t_i + a + delay_i, delay_i > 0. So a line lies
+under the pairs, whatever an adapter holds back. Each of a few groups of consecutive pairs gives the one that was least
+delayed. With priors of the rate's error and of its drift, the parabola
 
     host(t) - t = a_k + b (t - t_m) + c (t - t_m)^2
 
@@ -10,8 +10,8 @@ goes through those, b the rate error in the middle of the recording, with an a_k
 where a clock began anew, and where the bus was silent, since a bridge may have been reset then. A group's least delay
 varies as the distance of its two least delays does (Renyi's spacings), or as the residuals do where these are larger.
 
-Of use are replies alone, and of those what is asked for at times that are in step with nothing: what comes by itself
-does so at the chip's rate, and goes through an adapter's bursts later and later, as if the bridge's clock were off.
+Only replies to requests serve, made at times that are not in step with anything: data that a bridge sends by itself
+comes at the chip's rate, and drifts through an adapter's bursts as if the bridge's clock were off.
 """
 
 from __future__ import annotations
@@ -27,30 +27,32 @@ from numpy.typing import NDArray
 from ..data import Vector
 
 NS = 1e-9
+Whole = NDArray[np.int64]
 
 # A ceramic resonator is within 0.5 %, and RC oscillators within 1 %; warming moves either by some 50 ppm a minute.
 RATE_STD, DRIFT_STD_PER_S = 0.01, 100e-6 / 60
 GROUPS, LEAST_IN_GROUP, ROUNDS = 6, 3, 6
-# No clock that works is off by more: a bridge that is emulated runs in a time of its own, of which pairs say nothing.
+# No working clock is off by more. An emulated bridge runs in a time of its own, which pairs cannot correct.
 MOST = 0.03
-# what no line's delay is steadier by: a bridge looks once in so long
+# Delays scatter by at least the time between two looks of a bridge at its line.
 STEADY_S = 20e-6
-# One of the clocks began anew where host - bus moves by more, beside what the rate may be off.
+# A clock began anew if host - bus moves by more than this and what the rate may be off.
 LEAP_S = 0.5
 HELD_BACK_S = 0.05
-# what is silence, and in usual distances of pairs; a bridge that was lost is given up after 0.25 s
+# Silence: longer than both this time and so many usual distances of pairs. A lost bridge is given up after 0.25 s.
 SILENT_S, SILENT = 0.2, 4.0
-# pairs that a stream of days keeps, and by how much their number grows until the rate is estimated again
+# Pairs kept of a stream of days, and the growth of their number until the next estimate of the rate.
 KEPT, GROWTH = 20_000, 1.1
 
 
 @dataclass(frozen=True)
 class ClockFit:
-    """The parabola.
+    """Parabola under the pairs.
 
     Attributes
     ----------
-    b, c : of the formula above; 1, 1/s. b_std : of b. first_s, mid_s, last_s : of the pairs, the bus's clock.
+    b, c : coefficients of the formula above; 1, 1/s. b_std : standard deviation of b.
+    first_s, mid_s, last_s : first, middle and last time of the pairs on the bus's clock.
     """
 
     b: float
@@ -62,76 +64,68 @@ class ClockFit:
 
     @property
     def ppm(self) -> float:
-        """How fast the bus's clock runs."""
+        """Rate error of the bus's clock."""
         return (1.0 / (1.0 + self.b) - 1.0) * 1e6
 
     def slope(self, t_s: Vector | float) -> Vector | float:
-        """Of host - t at `t_s`; beyond the pairs that of their ends."""
+        """Return the slope of host - t at `t_s`; beyond the pairs, the slope at their ends."""
         return self.b + 2.0 * self.c * (np.clip(t_s, self.first_s, self.last_s) - self.mid_s)
 
     def host_s(self, t_s: Vector) -> Vector:
-        """(n,) s of the host's rate for (n,) s of the bus's clock, the same at the first pair."""
+        """Convert times (n,) [s] of the bus's clock to the host's rate; the time of the first pair stays."""
         inside = np.clip(t_s, self.first_s, self.last_s)
         parabola = [self.b * x + self.c * x * x for x in (inside - self.mid_s, self.first_s - self.mid_s)]
         return np.asarray(t_s + parabola[0] - parabola[1] + self.slope(t_s) * (t_s - inside))
 
 
 class HostClock:
-    """Gathers pairs; without any, the bus's clock is taken to be the host's."""
+    """Collector of pairs; without any, the bus's clock counts as the host's."""
 
     def __init__(self) -> None:
-        self._times, self._heard = array("q"), array("q")
+        self._bus_ns, self._host_ns = array("q"), array("q")
         self._next = GROUPS * LEAST_IN_GROUP
         self._since_s, self._shown_s, self._slope = 0.0, 0.0, 0.0
 
     def __bool__(self) -> bool:
-        return bool(self._times)
+        return bool(self._bus_ns)
 
-    def add(self, t_ns: int, host_ns: int) -> None:
-        """A reply about what happened at `t_ns` of the bus's clock came in at `host_ns`."""
-        if self._times and t_ns <= self._times[-1]:
-            return
-        self._times.append(t_ns)
-        self._heard.append(host_ns)
-        self._estimate_if_due()
-
-    def add_many(self, t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> None:
-        """The same of (n,) replies, of which one estimate is made at most."""
-        latest = np.concatenate(([self._times[-1] if self._times else t_ns[0] - 1], t_ns))
+    def add(self, t_ns: Whole, host_ns: Whole) -> None:
+        """Add replies about what happened at `t_ns` (n,) of the bus's clock, which arrived at `host_ns` (n,)."""
+        latest = np.concatenate(([self._bus_ns[-1] if self._bus_ns else t_ns[0] - 1], t_ns))
         later = t_ns > np.maximum.accumulate(latest)[:-1]
-        self._times.extend(t_ns[later].tolist())
-        self._heard.extend(host_ns[later].tolist())
+        self._bus_ns.extend(t_ns[later].tolist())
+        self._host_ns.extend(host_ns[later].tolist())
         self._estimate_if_due()
 
     def _estimate_if_due(self) -> None:
-        if len(self._times) < self._next:
+        if len(self._bus_ns) < self._next:
             return
-        self._next = int(GROWTH * len(self._times)) + 1
-        at_s = self._times[-1] * NS
+        self._next = int(GROWTH * len(self._bus_ns)) + 1
+        at_s = self._bus_ns[-1] * NS
         self._shown_s = float(self.provisional_s(at_s))
         self._since_s, self._slope = at_s, float(self.fit().slope(at_s))
 
     def provisional_s(self, t_s: Vector | float) -> Vector | float:
-        """`t_s` at the host's rate, as known now; each estimate counts from when it was made."""
+        """Convert `t_s` to the host's rate as estimated now; a new estimate applies from its own time on."""
         return self._shown_s + (t_s - self._since_s) * (1.0 + self._slope)
 
     def forget(self) -> None:
-        """Let go of what is too old to tell the rate now."""
-        if len(self._times) > KEPT:
-            del self._times[: KEPT // 2], self._heard[: KEPT // 2]
-            self._next = int(GROWTH * len(self._times)) + 1
+        """Forget pairs that are too old for the present rate."""
+        if len(self._bus_ns) > KEPT:
+            del self._bus_ns[: KEPT // 2], self._host_ns[: KEPT // 2]
+            self._next = int(GROWTH * len(self._bus_ns)) + 1
 
     def fit(self) -> ClockFit:
-        """The parabola under all pairs; there is one at least."""
-        return fit_pairs(np.array(self._times), np.array(self._heard))
+        """Fit the parabola to all pairs; there must be one."""
+        return fit_pairs(np.array(self._bus_ns), np.array(self._host_ns))
 
     def final(self) -> Callable[[Vector], Vector]:
-        """Times (n,) [s] of the bus's clock to times at the host's rate, by all pairs."""
+        """Return the function from times (n,) [s] of the bus's clock to the host's rate, by all pairs."""
         return self.fit().host_s if self else lambda t_s: t_s
 
 
-def fit_pairs(t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> ClockFit:
-    """The parabola under (n,) times of the bus and the host."""
+def fit_pairs(t_ns: Whole, host_ns: Whole) -> ClockFit:
+    """Fit the parabola under the times (n,) of the bus and the host."""
     first_s, last_s = int(t_ns[0]) * NS, int(t_ns[-1]) * NS
     mid_ns = (int(t_ns[0]) + int(t_ns[-1])) // 2
     unknown = ClockFit(0.0, 0.0, RATE_STD, first_s, mid_ns * NS, last_s)
@@ -140,7 +134,7 @@ def fit_pairs(t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> ClockFit:
         (_grouped((t_ns[run] - mid_ns) * NS), _grouped((ahead_ns[run] - ahead_ns[run][0]) * NS))
         for run in _runs(t_ns, ahead_ns)
     ]
-    # a machine that was busy once is no reason
+    # The median, since a machine that was busy once is no reason.
     if not groups or np.median([_crude_slope(t, ahead) for t, ahead in groups]) > MOST:
         return unknown
     x, H = np.zeros(2), np.eye(2)
@@ -149,8 +143,8 @@ def fit_pairs(t_ns: NDArray[np.int64], host_ns: NDArray[np.int64]) -> ClockFit:
     return ClockFit(float(x[0]), float(x[1]), float(np.sqrt(np.linalg.inv(H)[0, 0])), first_s, mid_ns * NS, last_s)
 
 
-def _runs(t_ns: NDArray[np.int64], ahead_ns: NDArray[np.int64]) -> Iterator[slice]:
-    """Those that are long enough, between silences and leaps of one of the clocks."""
+def _runs(t_ns: Whole, ahead_ns: Whole) -> Iterator[slice]:
+    """Yield the runs that are long enough, between silences and leaps of one of the clocks."""
     passed, moved = np.diff(t_ns) * NS, np.abs(np.diff(ahead_ns)) * NS
     silent_s = max(SILENT_S, SILENT * float(np.median(passed))) if len(passed) else SILENT_S
     cuts = np.flatnonzero((passed > silent_s) | (moved > LEAP_S + 2.0 * RATE_STD * passed)) + 1
@@ -160,19 +154,19 @@ def _runs(t_ns: NDArray[np.int64], ahead_ns: NDArray[np.int64]) -> Iterator[slic
 
 
 def _grouped(each: NDArray[np.floating]) -> Vector:
-    """(n,) as (GROUPS, n / GROUPS), the first few left out."""
+    """Reshape (n,) to (GROUPS, n / GROUPS), without the first few."""
     n = len(each) // GROUPS
     return np.asarray(each[-n * GROUPS :].reshape(GROUPS, n), np.float64)
 
 
 def _crude_slope(t: Vector, ahead: Vector) -> float:
-    """From the first group's median to the last's, beside what adapters hold back."""
+    """Return the slope from the first group's median to the last's, less what adapters hold back."""
     moved, passed = (float(np.median(each[-1]) - np.median(each[0])) for each in (ahead, t))
     return max(abs(moved) - HELD_BACK_S, 0.0) / passed
 
 
 def _least(t: Vector, ahead: Vector, x: Vector) -> tuple[Vector, Vector, float]:
-    """Of each group the time and `ahead` of the pair that was least delayed by (b, c) = x; the mean spacing."""
+    """Return time and `ahead` of each group's least delayed pair for (b, c) = x, and the mean spacing."""
     delay = ahead - x[0] * t - x[1] * t * t
     two = np.argpartition(delay, 1, axis=1)[:, :2]
     spacing = float(np.mean(np.diff(np.take_along_axis(delay, two, axis=1), axis=1)))
@@ -181,7 +175,7 @@ def _least(t: Vector, ahead: Vector, x: Vector) -> tuple[Vector, Vector, float]:
 
 
 def _parabola(least: list[tuple[Vector, Vector, float]], x: Vector) -> tuple[Vector, Vector]:
-    """(b, c) and their information (2, 2); each run's offset is eliminated by its means."""
+    """Solve for (b, c) and their information (2, 2); each run's offset is eliminated by its means."""
     H: Vector = np.diag([RATE_STD**-2, (0.5 * DRIFT_STD_PER_S) ** -2])
     g = np.zeros(2)
     for at, seen, spacing in least:

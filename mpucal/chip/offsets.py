@@ -1,10 +1,10 @@
-"""The accelerometer's offset registers: where they may be, what they hold, and how to write them whole.
+"""Accelerometer offset registers: their possible addresses, their content, and writing all of them in one transfer.
 
-response.py measures what a count of them does.
+offset_response.py measures the effect of a count.
 
 Source: RM-MPU-6000A (0x06, two bytes an axis, one after the other); RM-MPU-9250A r1.4, registers 119 to 126 (0x77,
-with a reserved byte after each axis). 15 bits in [15:1]; bit 0 is reserved and kept. A factory trim is in them after
-power-on, and all that is written is gone with the supply.
+with a reserved byte after each axis). 15 bits in [15:1]; bit 0 is reserved and kept. They hold the factory trim after
+power-on, and lose what was written with the supply.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from .port import Port
 Place = tuple[int, int, int]
 Words = tuple[int, int, int]
 
-# the latest of the table first
+# The last family of the table first.
 PLACES: tuple[Place, ...] = tuple(dict.fromkeys(family.accel_offset_h for family in reversed(FAMILIES)))
 
 RESERVED = 1
 LEAST, MOST = -32768, 32767
 
-# a wire that somebody touches is back within seconds
+# A wire that was touched makes contact again within seconds.
 RESTORE_WAITS_NS = tuple(1_000_000 * 4**i for i in range(7))
 
 
 @dataclass(frozen=True)
 class OffsetRegisters:
-    """All bytes from the first offset register to the last, so that one transfer writes the three axes.
+    """Bytes from the first offset register to the last, so that one transfer writes the three axes.
 
     Attributes
     ----------
-    place : addresses of the high bytes x, y, z. data : what lies there, reserved bytes between included.
+    place : addresses of the high bytes x, y, z. data : content, including reserved bytes in between.
     """
 
     place: Place
@@ -45,34 +45,39 @@ class OffsetRegisters:
 
     @classmethod
     def read(cls, port: Port, place: Place) -> Self:
-        """What the chip holds now; BusError where it cannot be read."""
+        """Read the chip's registers; raise BusError if they cannot be read."""
         return cls(place, port.read(place[0], place[2] + 2 - place[0]))
 
     @property
     def words(self) -> Words:
-        """The three axes as signed 16-bit words, reserved bit included."""
+        """Signed 16-bit words of the three axes, reserved bit included."""
         x, y, z = (int.from_bytes(self.data[high - self.place[0] :][:2], "big", signed=True) for high in self.place)
         return x, y, z
 
     def with_words(self, words: Sequence[int]) -> OffsetRegisters:
-        """The same with other words; what lies between them stays."""
+        """Return a copy with other words; the bytes in between are kept."""
         data = bytearray(self.data)
         for high, word in zip(self.place, words, strict=True):
             data[high - self.place[0] : high - self.place[0] + 2] = word.to_bytes(2, "big", signed=True)
         return OffsetRegisters(self.place, bytes(data))
 
     def write(self, port: Port) -> bool:
-        """Write it in one transfer; True where the chip then holds it. BusError where that cannot be told."""
+        """Write the registers in one transfer; return True if the chip then holds them.
+
+        Raises
+        ------
+        BusError : a transfer failed.
+        """
         port.write_block(self.place[0], self.data)
         return port.read(self.place[0], len(self.data)) == self.data
 
 
 def shift_words(words: Words, counts: Iterable[float]) -> Words:
-    """`words` moved by `counts`, rounded to what [15:1] can say; bit 0 stays as it is.
+    """Add `counts` to `words`, rounded to the resolution of [15:1]; bit 0 is kept.
 
     Raises
     ------
-    ChipError : a register cannot hold that.
+    ChipError : the sum does not fit into a register.
     """
     x, y, z = (
         (old & ~RESERVED) + 2 * round(count / 2) | (old & RESERVED) for old, count in zip(words, counts, strict=True)
@@ -80,24 +85,24 @@ def shift_words(words: Words, counts: Iterable[float]) -> Words:
     if not all(LEAST <= word <= MOST for word in (x, y, z)):
         raise ChipError(
             f"the offset registers cannot hold {x}, {y}, {z}",
-            "use the calibration's files: a bias this large does not fit beside the factory's trim",
+            "use the calibration's files: so large a bias does not fit into the registers with the factory trim",
         )
     return x, y, z
 
 
 def word_difference(new: Words, old: Words) -> tuple[int, int, int]:
-    """By how many counts `new` acts more than `old`: bit 0 does nothing."""
+    """Return by how many counts `new` acts more than `old`: bit 0 has no effect."""
     x, y, z = ((a & ~RESERVED) - (b & ~RESERVED) for a, b in zip(new, old, strict=True))
     return x, y, z
 
 
 @contextmanager
 def restoring(port: Port, old: OffsetRegisters) -> Iterator[None]:
-    """Meanwhile other words may be written there; `old` is there again afterwards, whatever happens.
+    """Restore `old` at the end of a `with` block that writes other words, however the block ends.
 
     Raises
     ------
-    ChipError : it cannot be restored.
+    ChipError : `old` cannot be restored.
     """
     try:
         yield
@@ -106,7 +111,7 @@ def restoring(port: Port, old: OffsetRegisters) -> Iterator[None]:
 
 
 def restore(port: Port, old: OffsetRegisters) -> None:
-    """Write `old` where it is not there, again and again for as long as a bad contact may last.
+    """Write `old` if the chip does not hold it, with retries for as long as a bad contact may last.
 
     Raises
     ------
@@ -121,5 +126,5 @@ def restore(port: Port, old: OffsetRegisters) -> None:
         port.sleep(wait_ns)
     raise ChipError(
         f"the accelerometer's offset registers could not be restored to {old.data.hex(' ')} at 0x{old.place[0]:02x}",
-        "take the chip's supply away for a moment: then its factory trim is back",
+        "switch the chip's supply off and on, which brings back its factory trim",
     )

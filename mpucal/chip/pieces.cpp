@@ -1,4 +1,4 @@
-// Where a straight line breaks best: see pieces.py, which says when it does.
+// Best break of a straight line: piecewise_rate.py decides whether it is one.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/tuple.h>
@@ -35,7 +35,7 @@ class LeftOver {
   double k_ = 0, st_ = 0, sy_ = 0, tt_ = 0, ty_ = 0, yy_ = 0;
 };
 
-// (at, of both, of one): the first point of the second of the two lines that leave least, what these leave, and what
+// Returns (at, of both, of one): the first point of the second of the two lines that leave least, what these leave, and what
 // one line leaves; at -1 where no place has `least` points and `least_s` on either side.
 std::tuple<std::ptrdiff_t, double, double> best_break(const Points& times, const Points& values, std::ptrdiff_t least,
                                                       double least_s) {

@@ -1,4 +1,4 @@
-"""One chip's registers over any bus: with retries of what may be repeated, and every access told to a decoder."""
+"""Access to one chip's registers over any bus, with retries; every access is fed to a decoder."""
 
 from __future__ import annotations
 
@@ -17,75 +17,70 @@ T = TypeVar("T")
 
 
 class Port:
-    """Reads and writes, each of them followed by `decoder` where it succeeded.
+    """Reads and writes of one chip, each of which `decoder` follows if it succeeded.
 
-    Every method raises BusError where a transfer failed, EndOfCapture where a replay has ended.
+    Every method raises BusError if a transfer failed, and EndOfCapture at the end of a replay.
 
     Attributes
     ----------
-    stats : counts the transfers.
+    stats : counts the transfers. now_ns : last known time of the bus's clock.
     """
 
     def __init__(self, bus: Bus, decoder: Decoder, stats: TransferStats | None = None) -> None:
         self.stats = TransferStats() if stats is None else stats
+        self.now_ns = 0
         self._bus = bus
         self._decoder = decoder
-        self._now_ns = 0
-
-    @property
-    def now_ns(self) -> int:
-        """The bus's clock as last seen."""
-        return self._now_ns
 
     def read(self, register: int, count: int) -> bytes:
-        """`count` bytes from `register` on; up to three tries."""
+        """Read `count` bytes from `register` on, in up to three tries."""
         return self._retried(lambda: self._read(register, count))
 
     def read_destructive(self, register: int, count: int) -> bytes:
-        """The same where reading takes something away from the chip, so that a second read gives something else.
+        """Read registers whose content the read removes or clears, so that a second read gives something else.
 
-        Repeated only where nothing was acknowledged: a chip is addressed before it gives its first byte.
+        It is repeated only if nothing was acknowledged: a chip is addressed before it gives its first byte.
         """
         return self._retried(lambda: self._read(register, count), NoAnswer)
 
     def _read(self, register: int, count: int) -> bytes:
         reply = self._counted(lambda: self._bus.read(register, count))
-        self._now_ns = max(self._now_ns, reply.t_ns)
+        self.now_ns = max(self.now_ns, reply.t_ns)
         self._decoder.feed_read(register, reply.data, reply.t_ns, reply.host_ns)
         return reply.data
 
     def write(self, register: int, value: int) -> None:
-        """Write one byte; up to three tries."""
+        """Write one byte, in up to three tries."""
         self.write_block(register, bytes([value]))
 
     def write_block(self, register: int, data: bytes) -> None:
-        """Write `data` from `register` on, in one transfer; up to three tries."""
+        """Write `data` from `register` on in one transfer, in up to three tries."""
         t_ns = self._retried(lambda: self._counted(lambda: self._bus.write(register, data)))
-        self._now_ns = max(self._now_ns, t_ns)
+        self.now_ns = max(self.now_ns, t_ns)
         self._decoder.feed_write(register, data)
 
     def sleep_until(self, t_ns: int) -> None:
         """Wait until the bus's clock shows `t_ns`."""
         self._bus.sleep_until(t_ns)
-        self._now_ns = max(self._now_ns, t_ns)
+        self.now_ns = max(self.now_ns, t_ns)
 
     def sleep(self, ns: int) -> None:
-        """Wait for so long."""
-        self.sleep_until(self._now_ns + ns)
+        """Wait `ns` nanoseconds of bus time."""
+        self.sleep_until(self.now_ns + ns)
 
     def _counted(self, access: Callable[[], T]) -> T:
         self.stats.transfers += 1
         try:
             return access()
         except BusError as error:
-            self.stats.failed(error)
+            self.stats.count_error(error)
             raise
 
-    def _retried(self, access: Callable[[], T], of: type[BusError] = BusError) -> T:
+    def _retried(self, access: Callable[[], T], after: type[BusError] = BusError) -> T:
         for _ in range(TRIES - 1):
             try:
                 return access()
-            except of:
+            except after:
                 self.sleep(RETRY_NS)
                 self.stats.retries += 1
         return access()

@@ -1,4 +1,4 @@
-"""The accesses that tell which chip it is: strangers are refused by reading alone, then its behaviour is tried.
+"""Accesses that identify the chip: foreign chips are refused by reading alone, then the behaviour is tested.
 
 identity.py decides from the replies, live and from a capture.
 """
@@ -10,25 +10,22 @@ from . import registers as reg
 from .families import PARTS, families_with_fifo, known_parts
 from .port import Port
 
-MS = 1_000_000
-
 # Awake after a reset a chip takes 8000 samples a second, and 293 frames fill the largest FIFO; clones may be slower.
-LOOK_NS = 15 * MS
-LOOKS = 45
+COUNT_NS, COUNTS = 15_000_000, 45
 IDENTITY_TRIES = 5
-SIGHTS, SIGHT_NS = 8, 10 * MS
+SAMPLES, SAMPLE_NS = 8, 10_000_000
 
-# What every part knows of these two: unused bits are 0.
+# In every part this bit reads 0, and the count stays below this.
 POWER_UNUSED = reg.PWR_MGMT_1_DEVICE_RESET
 FIFO_COUNT_MAX = 4096
 
 
 def read_identity(port: Port) -> int:
-    """WHO_AM_I, and where no part answers so, a look at whether this may be one at all.
+    """Read WHO_AM_I; if no part answers so, refuse a chip whose other registers are not an MPU's.
 
     Raises
     ------
-    ChipError : it is something else, which must not be written to.
+    ChipError : a foreign chip, which must not be written to.
     """
     who_am_i = _read_stable_identity(port)
     if who_am_i in PARTS:
@@ -49,14 +46,14 @@ def read_identity(port: Port) -> int:
         )
     if who_am_i in (0x00, 0xFF) or power & POWER_UNUSED or count > FIFO_COUNT_MAX:
         raise ChipError(
-            f"the chip answers 0x{who_am_i:02x} to WHO_AM_I and has no MPU's registers",
+            f"the chip answers 0x{who_am_i:02x} to WHO_AM_I and does not have an MPU's registers",
             f"check which chip is at this address (known are {known_parts()})",
         )
     return who_am_i
 
 
 def _read_stable_identity(port: Port) -> int:
-    """What WHO_AM_I shows twice in a row: everything depends on it, and a bit may flip on the way."""
+    """Read WHO_AM_I until two consecutive reads agree (bit-flip guard)."""
     before = None
     for _ in range(IDENTITY_TRIES):
         who_am_i = port.read(reg.WHO_AM_I, 1)[0]
@@ -64,46 +61,46 @@ def _read_stable_identity(port: Port) -> int:
             return who_am_i
         before = who_am_i
     raise ChipError(
-        "the chip answers something else to WHO_AM_I each time",
+        "the chip's answer to WHO_AM_I changes with each read",
         "shorten the wires, check the pull-ups, or slow the bus down",
     )
 
 
 def probe(port: Port) -> None:
-    """Fill the FIFO of a chip that was reset and is awake, if it has one, and see what it shows of gravity.
+    """Measure the FIFO's size of a chip that was reset and is awake, and read the accelerometer for its sensitivity.
 
     Raises
     ------
-    ChipError : its FIFO does not fill.
+    ChipError : the FIFO does not fill.
     """
     full = _fill_fifo(port)
     if full is None:
         raise ChipError(
             "the chip's FIFO does not fill as its register map says",
-            "take its supply away for a moment; if it stays so, the chip is broken or no MPU",
+            "switch its supply off and on; if that does not help, the chip is broken or not an MPU",
         )
     if any(family.widest_fifo_bytes for family in families_with_fifo(full)):
-        # while the FIFO is stopped: what a change of size does to one that runs is nowhere written
+        # The FIFO is stopped: no document describes a change of size while it runs.
         port.write(reg.ACCEL_CONFIG2, reg.FIFO_SIZE)
         if _fill_fifo(port) is None:
             port.write(reg.ACCEL_CONFIG2, 0)
     if any(family.half_range_revision for family in families_with_fifo(full)):
-        for _ in range(SIGHTS):
-            port.sleep(SIGHT_NS)
+        for _ in range(SAMPLES):
+            port.sleep(SAMPLE_NS)
             port.read(reg.ACCEL_XOUT_H, 6)
 
 
 def _fill_fifo(port: Port) -> int | None:
-    """How many bytes the FIFO holds once they do not get more; None where they never do. Stopped before and after.
+    """Fill the FIFO, and return the number of bytes at which it stays; 0 if it is empty, None if it never stays.
 
-    0 where it stays empty.
+    The FIFO is stopped before and after.
     """
     port.write(reg.FIFO_EN, reg.FIFO_EN_FRAME)
     port.read(reg.FIFO_EN, 1)
     port.write(reg.USER_CTRL, reg.USER_CTRL_FIFO_EN)
     full, before, most = None, 0, 0
-    for _ in range(LOOKS):
-        port.sleep(LOOK_NS)
+    for _ in range(COUNTS):
+        port.sleep(COUNT_NS)
         count = int.from_bytes(port.read(reg.FIFO_COUNT_H, 2), "big")
         if count and count == before:
             full = count
@@ -115,10 +112,10 @@ def _fill_fifo(port: Port) -> int | None:
 
 
 def _is_clock_time(head: bytes) -> bool:
-    """Whether the first seven registers are seconds, minutes, hours, weekday, day, month, year, as decimal digits."""
+    """Return True if the first seven registers are a time: second, minute, hour, weekday, day, month, year in BCD."""
     low = (0, 0, 0, 1, 1, 1, 0)
     high = (59, 59, 23, 7, 31, 12, 99)
-    # the clock's halt flag, 12 h mode and the century are flags in the upper bits
+    # The upper bits hold flags: clock halt, 12 h mode, century.
     masks = (0x7F, 0x7F, 0x3F, 0x07, 0x3F, 0x1F, 0xFF)
     for byte, mask, least, most in zip(head, masks, low, high, strict=True):
         tens, ones = divmod(byte & mask, 16)

@@ -1,6 +1,6 @@
-"""A chip made to measure for a moment and put back as it was, without the reset that would reload its trim.
+"""Measurement of the accelerometer at rest from the data registers, after which the chip is as it was before.
 
-It reads the data registers; the FIFO is not touched.
+The chip is not reset, which would reload its trim, and the FIFO is not touched.
 """
 
 from __future__ import annotations
@@ -17,12 +17,11 @@ from ..rests.stillness import let_go
 from . import registers as reg
 from .port import Port
 
-MS = 1_000_000
-WAKE_NS, SETTLE_NS = 100 * MS, 100 * MS
-LOOK_NS, LOOKS = 5 * MS, 100
+SETTLE_NS = 100_000_000
+READ_NS, READS = 5_000_000, 100
 
 AFS_SEL, DLPF_CFG, SMPLRT_DIV = 1, 3, 4
-# in the order of writing: awake first
+# In the order of writing: the chip must be awake first.
 SETTING = {
     reg.PWR_MGMT_1: reg.CLKSEL_PLL,
     reg.PWR_MGMT_2: 0,
@@ -30,77 +29,78 @@ SETTING = {
     reg.CONFIG: DLPF_CFG,
     reg.ACCEL_CONFIG: AFS_SEL << reg.FULL_SCALE_SHIFT,
 }
-# a person needs some time to put the board down
+# Tries until the board must lie still, 0.6 s each: a person needs some time to put it down.
 PATIENCE = 40
 HALF_SENSITIVITY_G = 0.75
 
 
 class TemporaryMeasurement:
-    """For a `with` statement; what it changes is put back in the end, if the bus still works.
+    """Context manager that sets the chip to measure, and restores its settings at the end if the bus still works.
 
     Parameters
     ----------
-    port : the chip's. patience : how many times to look, 0.6 s each, whether the board lies still.
+    port : of the chip. patience : number of tries until the board must lie still.
     """
 
     def __init__(self, port: Port, patience: int = PATIENCE) -> None:
         self._port = port
         self._patience = patience
-        self._held: dict[int, int] = {}
+        self._old: dict[int, int] = {}
         self._sensitivity: float | None = None
 
     def __enter__(self) -> Self:
-        self._held = {register: self._port.read(register, 1)[0] for register in SETTING}
+        self._old = {register: self._port.read(register, 1)[0] for register in SETTING}
         try:
             self._port.write(reg.PWR_MGMT_1, reg.CLKSEL_PLL)
-            self._port.sleep(WAKE_NS)
+            self._port.sleep(SETTLE_NS)
             for register, value in SETTING.items():
                 self._port.write(register, value)
             self._port.sleep(SETTLE_NS)
         except BaseException:
-            self._put_back()
+            self._restore()
             raise
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._put_back()
+        self._restore()
 
     def rest(self) -> Vector:
-        """(3,) g of the accelerometer at rest, from a hundred looks; waits for a board that moves to be put down.
+        """Measure the accelerometer at rest (3,) [g], from a hundred reads; wait for a moving board to be put down.
 
         Raises
         ------
-        BusError : a transfer failed three times. ChipReset : the chip was reset. ChipError : the board moves on and on.
+        BusError : a transfer failed three times. ChipReset : the chip was reset. ChipError : the board does not rest.
         """
         for _ in range(self._patience):
             self._port.sleep(SETTLE_NS)
-            looks = self._looks()
+            acc_g = read_counts(self._port, reg.ACCEL_WORDS) / reg.ACCEL_LSB_PER_G[AFS_SEL]
             check_registers(self._port, reg.ACCEL_CONFIG, bytes([SETTING[reg.ACCEL_CONFIG]]))
-            # revision C of the 6050 shows half of gravity; known once, offsets may shift what is shown
-            sensitivity = self._sensitivity or (0.5 if np.linalg.norm(looks.mean(0)) < HALF_SENSITIVITY_G else 1.0)
-            looks /= sensitivity
-            if let_go(looks * STANDARD_GRAVITY_MPS2):
+            # Revision C of the 6050 shows half of gravity. It is measured once, since offsets may shift the reading.
+            sensitivity = self._sensitivity or (0.5 if np.linalg.norm(acc_g.mean(0)) < HALF_SENSITIVITY_G else 1.0)
+            acc_g /= sensitivity
+            if let_go(acc_g * STANDARD_GRAVITY_MPS2):
                 self._sensitivity = self._sensitivity or sensitivity
-                return np.asarray(looks.mean(0))
-        moves_mg = 1000 * looks.std(0).max()
+                return np.asarray(acc_g.mean(0))
+        moves_mg = 1000 * acc_g.std(0).max()
         raise ChipError(f"the board moves (by {moves_mg:.0f} mg)", "put it on a firm surface and let go of it")
 
-    def _looks(self) -> Vector:
-        """(n, 3) g at the nominal sensitivity."""
-        looks = np.empty((LOOKS, 3))
-        for look in looks:
-            self._port.sleep(LOOK_NS)
-            look[:] = np.frombuffer(self._port.read(reg.ACCEL_XOUT_H, 6), ">i2")
-        return looks / reg.ACCEL_LSB_PER_G[AFS_SEL]
-
-    def _put_back(self) -> None:
-        # in the other order: asleep last
-        for register, value in reversed(self._held.items()):
+    def _restore(self) -> None:
+        # In reverse order: the chip falls asleep last.
+        for register, value in reversed(self._old.items()):
             with suppress(BusError):
                 self._port.write(register, value)
 
 
+def read_counts(port: Port, words: int) -> Vector:
+    """Read the first `words` words of a sample, the accelerometer's first; return (READS, words) counts."""
+    counts = np.empty((READS, words))
+    for row in counts:
+        port.sleep(READ_NS)
+        row[:] = np.frombuffer(port.read(reg.ACCEL_XOUT_H, 2 * words), ">i2")
+    return counts
+
+
 def check_registers(port: Port, register: int, value: bytes) -> None:
-    """Raise ChipReset where the registers from `register` on no longer hold `value`; one bit may flip on the bus."""
+    """Raise ChipReset if two reads from `register` on do not give `value`: a single one may have a bit error."""
     if all(port.read(register, len(value)) != value for _ in range(2)):
         raise ChipReset

@@ -1,7 +1,7 @@
-"""The registers that the MPU-6000 and MPU-6500 families share: addresses, bits, ranges and sample rates.
+"""Registers that the MPU-6000 and MPU-6500 families share: addresses, bits, ranges and sample rates.
 
-Source: RM-MPU-6000A r4.2 and RM-MPU-9250A r1.4 (registers), PS-MPU-6000A r3.4 (scales). What differs
-between the families is in families.py.
+Source: RM-MPU-6000A r4.2 and RM-MPU-9250A r1.4 (registers), PS-MPU-6000A r3.4 (scales). families.py has the
+differences between the families.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Final
 from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2
 from ..errors import UsageError
 
-# the factory's self test: three bytes of each on a 6500, four packed ones on a 6050
+# The factory's self-test codes: three bytes each on a 6500, four packed bytes on a 6050.
 SELF_TEST_GYRO: Final = 0x00
 SELF_TEST_ACCEL: Final = 0x0D
 XG_OFFSET_H: Final = 0x13
@@ -49,7 +49,7 @@ FULL_SCALE_CODES: Final = 0x03
 
 # ACCEL_CONFIG2 (6500 only)
 ACCEL_FCHOICE_B: Final = 0x08
-FIFO_SIZE: Final = 0xC0  # 512 bytes, doubled so many times, in chips whose FIFO grows
+FIFO_SIZE: Final = 0xC0  # 512 bytes, doubled this many times, in chips whose FIFO grows
 FIFO_SIZE_SHIFT: Final = 6
 
 # FIFO_EN
@@ -96,36 +96,36 @@ GYRO_OFFSET_LSB_PER_DPS: Final = 32.75
 
 DLPF_CODES: Final = (0, 1, 2, 3, 4, 5, 6)
 MAX_RATE_HZ: Final = 1000.0
-# ACCEL_FCHOICE_B takes the accelerometer past its filter, and the gyroscope no longer sets the pace in standby
+# ACCEL_FCHOICE_B bypasses the accelerometer's filter, and a gyroscope in standby does not set the rate.
 ACCEL_ONLY_HZ: Final = 4000.0
 
 
 def mps2_per_lsb(afs_sel: int) -> float:
-    """m/s^2 of one count at full scale AFS_SEL = 0..3."""
+    """Return the acceleration [m/s^2] of one count at full scale AFS_SEL = 0..3."""
     return STANDARD_GRAVITY_MPS2 / ACCEL_LSB_PER_G[afs_sel]
 
 
 def rad_s_per_lsb(fs_sel: int) -> float:
-    """rad/s of one count at full scale FS_SEL = 0..3."""
+    """Return the rate [rad/s] of one count at full scale FS_SEL = 0..3."""
     return math.radians(1.0) / GYRO_LSB_PER_DPS[fs_sel]
 
 
 def base_rate_hz(dlpf_cfg: int) -> float:
-    """The rate that SMPLRT_DIV divides (RM-MPU-6000A, register 25)."""
+    """Return the rate that SMPLRT_DIV divides (RM-MPU-6000A, register 25)."""
     return 1000.0 if 1 <= dlpf_cfg <= 6 else 8000.0
 
 
 def sample_rate_hz(smplrt_div: int, dlpf_cfg: int) -> float:
-    """The nominal sample rate."""
+    """Return the nominal sample rate."""
     return base_rate_hz(dlpf_cfg) / (1 + smplrt_div)
 
 
 def sample_rate_divider(rate_hz: float, dlpf_cfg: int) -> int:
-    """SMPLRT_DIV that gives `rate_hz`.
+    """Return the SMPLRT_DIV for `rate_hz`.
 
     Raises
     ------
-    UsageError : the chip has no such rate; the sentence names the nearest that it has.
+    UsageError : the chip does not have this rate; the message names the nearest that it has.
     """
     base = base_rate_hz(dlpf_cfg)
     divider = min(255, max(base / MAX_RATE_HZ - 1, round(base / rate_hz) - 1)) if rate_hz > 0 else 255
@@ -133,7 +133,7 @@ def sample_rate_divider(rate_hz: float, dlpf_cfg: int) -> int:
     if not math.isclose(nearest, rate_hz, rel_tol=1e-6):
         raise UsageError(
             f"the chip has no sample rate of {rate_hz:g} Hz with its low-pass filter at {dlpf_cfg}",
-            f"take {nearest:g} Hz, or another {base:g} Hz / n from {base / 256:.4g} to {MAX_RATE_HZ:g} Hz, or"
-            f" {ACCEL_ONLY_HZ:g} Hz of an MPU-6500's accelerometer alone",
+            f"use {nearest:g} Hz, or another {base:g} Hz / n from {base / 256:.4g} to {MAX_RATE_HZ:g} Hz, or"
+            f" {ACCEL_ONLY_HZ:g} Hz for the accelerometer of an MPU-6500 alone",
         )
     return int(divider)

@@ -1,4 +1,4 @@
-"""The factory's self test: each axis is pushed by a built-in force, and its answer compared with the factory's code.
+"""Factory self test: a built-in force pushes each axis, and the response is compared with the factory's code.
 
 Source: RM-MPU-6000A r4.2, registers 13 to 16, 27 and 28, and PS-MPU-6000A r3.4, sections 6.1 and 6.2 (within 14 %);
 for the 6500 RM-MPU-9250A r1.4, registers 0 to 15, with the limits of Linux' drivers/iio/imu/inv_mpu6050.
@@ -14,23 +14,23 @@ from ..data import Vector
 from . import registers as reg
 from .families import Part
 from .port import Port
-from .quick_measure import check_registers
+from .quick_measure import check_registers, read_counts
 
-SETTLE_NS, LOOK_NS, LOOKS = 250_000_000, 5_000_000, 100
+SETTLE_NS = 250_000_000
 
-# 6050: +-8 g and +-250 deg/s; 6500: +-2 g and +-250 deg/s
+# 6050: +-8 g and +-250 deg/s; 6500: +-2 g and +-250 deg/s.
 PACKED_AFS_SEL, AFS_SEL, FS_SEL = 2, 0, 0
 PACKED_SHARES, ACCEL_SHARES, GYRO_SHARES = (0.86, 1.14), (0.5, 1.5), (0.5, np.inf)
 
 
 @dataclass(frozen=True)
 class SelfTest:
-    """What the axes x, y, z answered.
+    """Responses of the axes x, y, z.
 
     Attributes
     ----------
-    accel_shares, gyro_shares : (3,) of what the factory's codes promise; NaN where it left no code.
-    passed : whether all lie within what the register map allows; False without codes.
+    accel_shares, gyro_shares : (3,) response divided by that of the factory's code; NaN without a code.
+    passed : True if all are within the limits of the register map; False without codes.
     """
 
     accel_shares: Vector
@@ -39,32 +39,32 @@ class SelfTest:
 
     @property
     def has_codes(self) -> bool:
-        """Whether the factory left its codes, as it does in every genuine part."""
+        """True if the chip has all codes, as every genuine part has."""
         return bool(np.isfinite([self.accel_shares, self.gyro_shares]).all())
 
 
 def run_self_test(port: Port, part: Part) -> SelfTest:
-    """Test a chip that is awake and at rest; its ranges are afterwards as before.
+    """Test a chip that is awake and at rest, and restore its ranges.
 
     Raises
     ------
     BusError : a transfer failed three times. ChipReset : the chip was reset meanwhile.
     """
-    held, family = port.read(reg.GYRO_CONFIG, 2), part.family
-    # a reset clears the first two, or puts the chip to sleep
+    ranges, family = port.read(reg.GYRO_CONFIG, 2), part.family
+    # A reset clears the first two, or puts the chip to sleep.
     kept = [(register, port.read(register, 1)) for register in (reg.CONFIG, reg.SMPLRT_DIV, reg.PWR_MGMT_1)]
     afs_sel = PACKED_AFS_SEL if family.packed_self_test else AFS_SEL
     try:
-        off = _answer(port, 0, afs_sel)
-        on = _answer(port, reg.SELF_TEST, afs_sel)
+        off = _mean_counts(port, 0, afs_sel)
+        on = _mean_counts(port, reg.SELF_TEST, afs_sel)
     finally:
-        port.write_block(reg.GYRO_CONFIG, held)
+        port.write_block(reg.GYRO_CONFIG, ranges)
         port.sleep(SETTLE_NS)
     for register, value in kept:
         check_registers(port, register, value)
     accel = (on - off)[:3] / (reg.ACCEL_LSB_PER_G[afs_sel] * part.accel_sensitivity)
     gyro = (on - off)[4:] / reg.GYRO_LSB_PER_DPS[FS_SEL]
-    accel_g, gyro_dps = _promised(port, family.packed_self_test)
+    accel_g, gyro_dps = _factory_response(port, family.packed_self_test)
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(accel_g == 0, np.nan, accel / accel_g), np.where(gyro_dps == 0, np.nan, gyro / gyro_dps)
     limits = (PACKED_SHARES, PACKED_SHARES) if family.packed_self_test else (ACCEL_SHARES, GYRO_SHARES)
@@ -72,20 +72,16 @@ def run_self_test(port: Port, part: Part) -> SelfTest:
     return SelfTest(*shares, passed=passed)
 
 
-def _answer(port: Port, test: int, afs_sel: int) -> Vector:
-    """(7,) mean counts of a sample, so set."""
+def _mean_counts(port: Port, test: int, afs_sel: int) -> Vector:
+    """Measure the mean counts (7,) of a sample with these settings."""
     gyro, accel = FS_SEL << reg.FULL_SCALE_SHIFT, afs_sel << reg.FULL_SCALE_SHIFT
     port.write_block(reg.GYRO_CONFIG, bytes([gyro | test, accel | test]))
     port.sleep(SETTLE_NS)
-    looks = np.empty((LOOKS, reg.FRAME_WORDS))
-    for look in looks:
-        port.sleep(LOOK_NS)
-        look[:] = np.frombuffer(port.read(reg.ACCEL_XOUT_H, reg.FRAME_BYTES), ">i2")
-    return np.asarray(looks.mean(0))
+    return np.asarray(read_counts(port, reg.FRAME_WORDS).mean(0))
 
 
-def _promised(port: Port, packed: bool) -> tuple[Vector, Vector]:
-    """(3,) g and (3,) deg/s that the factory measured; 0 where it left no code."""
+def _factory_response(port: Port, packed: bool) -> tuple[Vector, Vector]:
+    """Read the responses (3,) [g] and (3,) [deg/s] that the factory measured; 0 without a code."""
     if not packed:
         gyro, accel = (np.array(list(port.read(start, 3))) for start in (reg.SELF_TEST_GYRO, reg.SELF_TEST_ACCEL))
         counts = [np.where(codes == 0, 0.0, 2620.0 * 1.01 ** (codes - 1.0)) for codes in (accel, gyro)]

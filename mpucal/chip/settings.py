@@ -1,4 +1,4 @@
-"""How a chip is configured to measure: to register values and back.
+"""Settings of a chip that measures, converted to register values and back.
 
 Source: RM-MPU-6000A r4.2 registers 25 to 28, RM-MPU-9250A r1.4 register 29.
 """
@@ -17,13 +17,13 @@ from .families import Columns, Part
 
 @dataclass(frozen=True)
 class Settings:
-    """What decides on the meaning of a FIFO frame.
+    """Settings on which the meaning of a FIFO frame depends.
 
     Attributes
     ----------
     part : the chip. smplrt_div, dlpf_cfg : sample rate and low-pass filter, as registers hold them.
     fs_sel, afs_sel : full scale of gyroscope and accelerometer, 0..3.
-    accel_only : the accelerometer at ACCEL_ONLY_HZ past its filter, the gyroscope in standby.
+    accel_only : the accelerometer measures at ACCEL_ONLY_HZ without its filter; the gyroscope is in standby.
     """
 
     part: Part
@@ -35,45 +35,45 @@ class Settings:
 
     @property
     def polled(self) -> bool:
-        """Whether each sample is read by itself, from a chip without a FIFO: the newest of those that it takes."""
+        """True if the chip has no FIFO: the newest sample is read each time."""
         return not self.part.fifo_bytes
 
     @property
     def nominal_rate_hz(self) -> float:
-        """The sample rate of a chip whose clock is right; none is."""
+        """Sample rate of a chip whose clock is exact; real ones are up to 1 % off."""
         return reg.ACCEL_ONLY_HZ if self.accel_only else reg.sample_rate_hz(self.smplrt_div, self.dlpf_cfg)
 
     @property
     def fifo_en(self) -> int:
-        """What goes into the FIFO."""
+        """Value of FIFO_EN."""
         return reg.FIFO_EN_ACCEL if self.accel_only else self.part.family.fifo_en_frame
 
     @property
     def frame_words(self) -> int:
-        """How many words that makes a sample."""
+        """Number of words in a frame."""
         if not self.accel_only:
             return reg.FRAME_WORDS
         return reg.ACCEL_WORDS + self.part.family.fifo_en_with_temperature
 
     @property
     def frame_bytes(self) -> int:
-        """The same in bytes."""
+        """Number of bytes in a frame."""
         return 2 * self.frame_words
 
     @property
     def columns(self) -> Columns:
-        """Where a frame's words lie; of the accelerometer alone, its own only."""
+        """Positions of the words in a frame; for the accelerometer alone, only its own apply."""
         columns = self.part.family.columns
         return columns._replace(accel=slice(0, reg.ACCEL_WORDS)) if self.accel_only else columns
 
     @property
     def mps2_per_lsb(self) -> float:
-        """m/s^2 of one count of the accelerometer."""
+        """Acceleration [m/s^2] of one count."""
         return reg.mps2_per_lsb(self.afs_sel) / self.part.accel_sensitivity
 
     @property
     def sensor(self) -> Sensor:
-        """What is known of the sensor before it has measured."""
+        """Sensor as far as it is known before it has measured."""
         return Sensor(
             chip=self.part.chip,
             who_am_i=self.part.who_am_i,
@@ -84,10 +84,10 @@ class Settings:
         )
 
     def registers(self) -> dict[int, int]:
-        """What each register is to hold, in the order of writing."""
+        """Return the value of each register, in the order of writing."""
         values = {
             reg.PWR_MGMT_2: reg.STANDBY_GYRO if self.accel_only else 0,
-            # a chip that was reset meanwhile is told by it, too: it is 0 then
+            # It also shows a reset of the chip, which clears it.
             reg.INT_ENABLE: reg.INT_FIFO_OFLOW,
             reg.SMPLRT_DIV: self.smplrt_div,
             reg.CONFIG: self.dlpf_cfg,
@@ -101,11 +101,11 @@ class Settings:
 
     @classmethod
     def from_registers(cls, held: Mapping[int, int], part: Part, name: str = "the capture") -> Self:
-        """The settings that `held`, value by register address, means for `part`.
+        """Return the settings of `part` from `held`: values by register address.
 
         Raises
         ------
-        RecordingError : a register that matters is missing.
+        RecordingError : a register that is needed is missing.
         """
         needed = (reg.SMPLRT_DIV, reg.CONFIG, reg.GYRO_CONFIG, reg.ACCEL_CONFIG)
         missing = [f"0x{register:02x}" for register in needed if register not in held]

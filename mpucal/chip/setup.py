@@ -1,4 +1,4 @@
-"""Sets a chip up and starts its FIFO, in the order that its register map asks for.
+"""Setup of a chip and start of its FIFO, in the order of its register map.
 
 Source: RM-MPU-6000A r4.2 registers 104, 106 and 107; the start-up times of both product specifications are shorter.
 """
@@ -10,49 +10,46 @@ from . import registers as reg
 from .port import Port
 from .settings import Settings
 
-MS = 1_000_000
-RESET_NS = 100 * MS
-WAKE_NS = 100 * MS
-SETTLE_NS = 100 * MS
+STARTUP_NS = 100_000_000
 WAKE_TRIES = 5
 
 
 def reset(port: Port) -> None:
-    """All registers as after power-on, the accelerometer's factory trim too."""
+    """Reset all registers to their values after power-on, the accelerometer's factory trim included."""
     port.write(reg.PWR_MGMT_1, reg.PWR_MGMT_1_DEVICE_RESET)
-    port.sleep(RESET_NS)
-    # whether it sleeps now tells families apart
+    port.sleep(STARTUP_NS)
+    # Some families sleep now and others do not: identity.py uses this read.
     port.read(reg.PWR_MGMT_1, 1)
     port.write(reg.SIGNAL_PATH_RESET, reg.SIGNAL_PATH_RESET_ALL)
-    port.sleep(RESET_NS)
+    port.sleep(STARTUP_NS)
 
 
 def wake(port: Port) -> None:
-    """Out of sleep, on the gyroscope's clock.
+    """Wake the chip, and select the gyroscope's clock.
 
     Raises
     ------
-    ChipError : it does not wake up.
+    ChipError : the chip does not wake up.
     """
     for _ in range(WAKE_TRIES):
         port.write(reg.PWR_MGMT_1, reg.CLKSEL_PLL)
-        port.sleep(WAKE_NS)
+        port.sleep(STARTUP_NS)
         held = port.read(reg.PWR_MGMT_1, 1)[0]
         if held == reg.CLKSEL_PLL:
             return
     if not held & reg.PWR_MGMT_1_SLEEP:
         raise ChipError(
-            f"bits change on the bus (PWR_MGMT_1 reads 0x{held:02x} after 0x{reg.CLKSEL_PLL:02x} was written)",
+            f"bits flip on the bus (PWR_MGMT_1 reads 0x{held:02x} after 0x{reg.CLKSEL_PLL:02x} was written)",
             "shorten the wires, check SDA for shorts and its pull-up, or slow the bus down",
         )
     raise ChipError(
         f"the chip does not wake up (its PWR_MGMT_1 stays at 0x{held:02x})",
-        "take its supply away for a moment, and check that it gets 3.3 V",
+        "switch its supply off and on, and check that it gets 3.3 V",
     )
 
 
 def configure(port: Port, settings: Settings) -> None:
-    """Write what `settings` asks for, and read it back.
+    """Write `settings`, and read them back.
 
     Raises
     ------
@@ -68,21 +65,21 @@ def configure(port: Port, settings: Settings) -> None:
                 f"register 0x{register:02x} of the {chip} reads 0x{held:02x} after 0x{value:02x} was written",
                 "check its wiring and supply, and that no other program uses it",
             )
-    port.sleep(SETTLE_NS)
+    port.sleep(STARTUP_NS)
 
 
 def is_configured(port: Port, settings: Settings) -> bool:
-    """Whether the chip still holds what `configure` wrote, and is awake."""
+    """Return True if the chip still holds what `configure` wrote, and is awake."""
     awake = port.read(reg.PWR_MGMT_1, 1)[0] == reg.CLKSEL_PLL
     return awake and all(port.read(register, 1)[0] == value for register, value in settings.registers().items())
 
 
 def restart_fifo(port: Port, settings: Settings) -> None:
-    """Empty the FIFO, if there is one, and fill it anew; it resets only while disabled (RM-MPU-6000A r4.2, 106).
+    """Empty and start the FIFO, if there is one; it resets only while disabled (RM-MPU-6000A r4.2, register 106).
 
     Raises
     ------
-    ChipError : it does not start.
+    ChipError : the FIFO does not start.
     """
     port.write(reg.FIFO_EN, 0)
     port.write(reg.USER_CTRL, 0)
@@ -103,6 +100,6 @@ def restart_fifo(port: Port, settings: Settings) -> None:
 
 
 def stop_fifo(port: Port) -> None:
-    """The FIFO off; the chip stays awake."""
+    """Stop the FIFO; the chip stays awake."""
     port.write(reg.FIFO_EN, 0)
     port.write(reg.USER_CTRL, 0)

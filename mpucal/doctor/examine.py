@@ -99,8 +99,8 @@ def _transfers(stats: TransferStats, always: bool = False) -> Iterator[Finding]:
         if always:
             yield Finding("transfers", Mark.OK, str(stats), "", data)
         return
-    if always or stats.share < MOST:
-        yield Finding("transfers", Mark.BAD if stats.share > MANY else Mark.NOTE, str(stats), stats.remedy, data)
+    if always or stats.error_share < MOST:
+        yield Finding("transfers", Mark.BAD if stats.error_share > MANY else Mark.NOTE, str(stats), stats.remedy, data)
 
 
 def _awake(
@@ -126,9 +126,9 @@ def _awake(
         yield Finding(
             "gaps", Mark.BAD, f"{times} × {CAUSES[fault][0]}", CAUSES[fault][1], {"fault": fault, "times": times}
         )
-    if driver.flipped:
-        what = f"{driver.flipped} of {len(recording)} samples had a bit flipped on the bus, and were set right"
-        yield Finding("bit errors", Mark.BAD, what, REMEDY, {"flipped": driver.flipped, "samples": len(recording)})
+    if driver.repaired:
+        what = f"{driver.repaired} of {len(recording)} samples had a bit flipped on the bus, and were set right"
+        yield Finding("bit errors", Mark.BAD, what, REMEDY, {"flipped": driver.repaired, "samples": len(recording)})
     driver.stop()
     named = PARTS.get(sensor.who_am_i or 0)
     answers_as_it_is = named is not None and named.family.name == family.name

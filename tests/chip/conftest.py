@@ -1,14 +1,16 @@
-"""A simulated chip whose samples are numbered, on a bus that can be made to fail."""
+"""Fixtures: a simulated chip whose samples are numbered, on a bus that can be made to fail."""
 
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
+from mpucal.chip import registers as reg
 from mpucal.chip.access import Reply
 from mpucal.chip.driver import Driver
 from mpucal.data import Samples
 from mpucal.errors import BusError
+from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.bus import SimulatedBus
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.clock import FastClock
@@ -18,7 +20,7 @@ from mpucal.sources.tap import Tap
 
 
 class NumberedFeed:
-    """Samples 0, 1, 2, ... in accelerometer x; every other word is the same in all."""
+    """Samples 0, 1, 2, ... in accelerometer x; the other words are constant."""
 
     def __init__(self):
         self.next = 0
@@ -32,10 +34,11 @@ class NumberedFeed:
         return rows
 
 
-class FaultyRig:
-    """A chip, its bus with faults, and everything that went over the bus.
+class Rig:
+    """Chip, bus with faults, and a list of all transactions.
 
-    `before` and `after` hold, by (op, register), what to call instead of or after an access.
+    `before` holds, by (op, register), a function to call before an access, or at ("answer", register) one that
+    changes the bytes read.
     """
 
     def __init__(self, model="mpu6050", rate_error_ppm=3000.0):
@@ -44,6 +47,7 @@ class FaultyRig:
         self.inner = SimulatedBus(self.chip, self.clock)
         self.before: dict[tuple[str, int], Callable] = {}
         self.bus = Tap(self, self)
+        self.sleep_until, self.close = self.inner.sleep_until, self.inner.close
 
     def transaction(self, transaction):
         self.transactions.append(transaction)
@@ -58,17 +62,11 @@ class FaultyRig:
         self.before.get(("write", register), _nothing)()
         return self.inner.write(register, data)
 
-    def sleep_until(self, t_ns):
-        self.inner.sleep_until(t_ns)
-
-    def close(self):
-        self.inner.close()
-
     def driver(self, config=None):
         return Driver(self.bus, config)
 
     def fail(self, op, register, times):
-        """The next `times` accesses to `register` fail."""
+        """Make the next `times` accesses to `register` fail."""
         left = iter(range(times))
 
         def broken():
@@ -78,11 +76,16 @@ class FaultyRig:
         self.before[op, register] = broken
 
     def stall(self, seconds):
-        """The host does nothing for a while."""
+        """Hold the host up for a while."""
         self.clock.spend(round(seconds * 1e9))
 
-    def accesses(self, op):
-        return [(t.register, t.data) if op == "write" else t.register for t in self.transactions if t.op == op]
+    def slip(self, count):
+        """Take `count` bytes out of the FIFO, so that its frames are misaligned."""
+        self.stall(0.01)
+        self.inner.read(reg.FIFO_R_W, count)
+
+    def writes(self):
+        return [(t.register, t.data) for t in self.transactions if t.op == "write"]
 
 
 def _nothing():
@@ -90,14 +93,42 @@ def _nothing():
 
 
 @pytest.fixture(scope="session")
-def bench():
-    """Makes a work bench with a chip of the given model."""
-    return FaultyRig
+def rig():
+    """Makes a rig with a chip of the given model."""
+    return Rig
+
+
+@pytest.fixture(scope="session")
+def started():
+    """Makes a rig and starts its driver: (rig, driver)."""
+
+    def start(model="mpu6050", config=None, **options):
+        made = Rig(model, **options)
+        driver = made.driver(config)
+        driver.start()
+        return made, driver
+
+    return start
+
+
+@pytest.fixture(scope="session")
+def tapped():
+    """Opens a simulated chip and records its transactions: (bus, transactions)."""
+
+    class Recorder(list):
+        def transaction(self, transaction):
+            self.append(transaction)
+
+    def tap(words):
+        recorder = Recorder()
+        return Tap(open_simulated(words), recorder), recorder
+
+    return tap
 
 
 @pytest.fixture(scope="session")
 def stream():
-    """Polls a started driver for so many seconds after the first poll, and gives its samples, joined."""
+    """Polls a started driver for some seconds after the first poll, and returns its samples, joined."""
 
     def run(driver, seconds):
         parts = [driver.poll()]
@@ -111,16 +142,12 @@ def stream():
 
 @pytest.fixture(scope="session")
 def numbers():
-    """Which of the feed's samples a recording holds."""
+    """Returns the numbers of the feed's samples in a recording."""
     return lambda samples: np.rint(samples.acc[:, 0] / 9.80665 * 8192).astype(int)
 
 
 @pytest.fixture(scope="session")
 def same():
-    """Whether two recordings are equal to the last bit."""
-
-    def compare(a, b):
-        names = ("t", "acc", "gyr", "temperature_c", "gap", "acc_clipped", "gyr_clipped")
-        return a.sensor == b.sensor and all(np.array_equal(getattr(a, n), getattr(b, n)) for n in names)
-
-    return compare
+    """Compares two recordings bit by bit."""
+    names = ("t", "acc", "gyr", "temperature_c", "gap", "acc_clipped", "gyr_clipped")
+    return lambda a, b: a.sensor == b.sensor and all(np.array_equal(getattr(a, n), getattr(b, n)) for n in names)

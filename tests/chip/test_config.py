@@ -1,4 +1,4 @@
-"""What may be chosen, and what is said of the rest."""
+"""Configurations that chips have, and the refusal of others."""
 
 from dataclasses import replace
 
@@ -12,6 +12,7 @@ from mpucal.errors import UsageError
 def test_the_default_is_200_hz_at_4_g_and_500_deg_per_s():
     settings = Config().settings(part_of(0x68))
     assert (settings.smplrt_div, settings.dlpf_cfg, settings.fs_sel, settings.afs_sel) == (4, 3, 1, 1)
+    assert Config(rate_hz=1000).settings(part_of(0x70)).nominal_rate_hz == 1000
 
 
 @pytest.mark.parametrize(
@@ -25,18 +26,14 @@ def test_the_default_is_200_hz_at_4_g_and_500_deg_per_s():
         pytest.param({"poll_s": 0}, "0.001 to 0.12 s", id="polled all the time"),
     ],
 )
-def test_what_the_chip_does_not_have_is_answered_with_what_it_has(chosen, allowed):
+def test_an_impossible_value_is_refused_with_the_possible_ones(chosen, allowed):
     with pytest.raises(UsageError, match=allowed):
         Config(**chosen)
 
 
 @pytest.mark.parametrize(("asked_g", "afs_sel"), [(2, 0), (4, 0), (8, 1), (16, 2)])
-def test_half_the_sensitivity_takes_the_range_that_is_asked_for(asked_g, afs_sel):
+def test_half_the_sensitivity_still_gets_the_requested_range(asked_g, afs_sel):
     half = replace(part_of(0x68), accel_sensitivity=0.5)
     settings = Config(accel_range_g=asked_g).settings(half)
     assert settings.afs_sel == afs_sel
     assert settings.sensor.accel_range_g == max(asked_g, 4)
-
-
-def test_one_kilohertz_is_polled_in_time_by_default():
-    assert Config(rate_hz=1000).settings(part_of(0x70)).nominal_rate_hz == 1000

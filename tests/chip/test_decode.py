@@ -1,4 +1,4 @@
-"""Captured register accesses to the recording that the driver gave."""
+"""Decoder of captured register accesses against the driver's own recording."""
 
 import pytest
 
@@ -8,18 +8,23 @@ from mpucal.chip.config import Config
 from mpucal.chip.decode import Decoder, decode
 from mpucal.errors import ChipError, RecordingError
 
+MODELS = ["mpu6050", "mpu6500", "clone98"]
 
-def disturbed(bench, stream, model="mpu6050", config=None):
-    """The driver's own recording and what went over the bus, with two gaps."""
-    desk = bench(model)
-    driver = desk.driver(config)
-    driver.start()
-    stream(driver, 0.3)
-    desk.stall(2.0)
-    stream(driver, 0.3)
-    desk.fail("read", reg.FIFO_R_W, 1)
-    stream(driver, 0.3)
-    return driver, desk.transactions
+
+@pytest.fixture
+def disturbed(started, stream):
+    """Streams with two gaps: (driver, transactions)."""
+
+    def run(model="mpu6050", config=None):
+        rig, driver = started(model, config)
+        stream(driver, 0.3)
+        rig.stall(2.0)
+        stream(driver, 0.3)
+        rig.fail("read", reg.FIFO_R_W, 1)
+        stream(driver, 0.3)
+        return driver, rig.transactions
+
+    return run
 
 
 @pytest.mark.parametrize(
@@ -27,22 +32,18 @@ def disturbed(bench, stream, model="mpu6050", config=None):
     [Config(), Config(accel_range_g=16, gyro_range_dps=2000, dlpf=1), Config(rate_hz=1000, poll_s=0.01)],
     ids=["default", "wide", "fast"],
 )
-@pytest.mark.parametrize("model", ["mpu6050", "mpu6500", "clone98"])
-def test_offline_equals_live_to_the_last_bit(bench, stream, same, model, config):
-    driver, transactions = disturbed(bench, stream, model, config)
+@pytest.mark.parametrize("model", MODELS)
+def test_offline_equals_live_to_the_last_bit(disturbed, same, model, config):
+    driver, transactions = disturbed(model, config)
     decoded = decode(transactions)
     assert same(decoded, driver.recording())
     assert decoded.gap.sum() == 2
-
-
-def test_stopping_changes_nothing(bench, stream, same):
-    driver, transactions = disturbed(bench, stream)
     driver.stop()
-    assert same(decode(transactions), driver.recording())
+    assert same(decode(transactions), decoded)
 
 
-def test_a_capture_cut_anywhere_gives_what_came_before(bench, stream):
-    _, transactions = disturbed(bench, stream)
+def test_a_capture_cut_anywhere_gives_the_samples_before(disturbed):
+    _, transactions = disturbed()
     whole, last = decode(transactions), 0
     for end in range(len(transactions)):
         try:
@@ -57,45 +58,36 @@ def test_a_capture_cut_anywhere_gives_what_came_before(bench, stream):
     assert last > 0.9 * len(whole)
 
 
-def test_a_capture_without_its_beginning_says_so(bench, stream):
-    _, transactions = disturbed(bench, stream)
-    with pytest.raises(RecordingError, match=r"late does not say which chip it is \(register 0x75"):
-        decode(transactions[5:], "late")
-
-
-def test_a_capture_without_samples_says_so():
-    with pytest.raises(RecordingError, match="empty holds 0 samples"):
-        decode([], "empty")
+def test_captures_that_cannot_be_decoded_are_refused(disturbed):
+    _, transactions = disturbed()
+    _, others = disturbed(config=Config(accel_range_g=8))
+    for accesses, message in (
+        (transactions[5:], r"late does not say which chip it is \(register 0x75"),
+        ([], "late holds 0 samples"),
+        (transactions + others, "two ranges or rates"),
+    ):
+        with pytest.raises(RecordingError, match=message):
+            decode(accesses, "late")
 
 
 def without_its_probe(transactions):
-    """As the first version of the driver made it: the chip is known by its identity alone."""
+    """Remove the test of the FIFO, which the first version of the driver did not make."""
     counts = [i for i, t in enumerate(transactions) if t.register == reg.FIFO_COUNT_H]
-    started = next(i for i, t in enumerate(transactions) if t.register == reg.USER_CTRL and t.data == b"\x04")
-    return [t for i, t in enumerate(transactions) if i not in counts or i > started]
+    begun = next(i for i, t in enumerate(transactions) if t.register == reg.USER_CTRL and t.data == b"\x04")
+    return [t for i, t in enumerate(transactions) if i not in counts or i > begun]
 
 
-def test_an_older_capture_of_an_unknown_chip_says_so(bench, stream):
-    _, transactions = disturbed(bench, stream)
-    identity = Transaction("read", reg.WHO_AM_I, 1, b"\x13", 0)
+@pytest.mark.parametrize("model", MODELS)
+def test_an_older_capture_is_decoded_by_its_identity(disturbed, same, model):
+    driver, transactions = disturbed(model)
+    older = without_its_probe(transactions)
+    assert same(decode(older), driver.recording())
+    unknown = Transaction("read", reg.WHO_AM_I, 1, b"\x13", 0)
     with pytest.raises(ChipError, match="0x13"):
-        decode([identity, identity, *without_its_probe(transactions)[2:]])
+        decode([unknown, unknown, *older[2:]])
 
 
-@pytest.mark.parametrize("model", ["mpu6050", "mpu6500", "clone98"])
-def test_an_older_capture_is_decoded_by_its_identity(bench, stream, same, model):
-    driver, transactions = disturbed(bench, stream, model)
-    assert same(decode(without_its_probe(transactions)), driver.recording())
-
-
-def test_two_ranges_in_one_capture_are_refused(bench, stream):
-    _, transactions = disturbed(bench, stream)
-    _, others = disturbed(bench, stream, config=Config(accel_range_g=8))
-    with pytest.raises(RecordingError, match="two ranges or rates"):
-        decode(transactions + others)
-
-
-def test_before_the_fifo_starts_there_is_nothing():
+def test_without_a_fifo_there_are_no_samples():
     decoder = Decoder("early")
     assert len(decoder.take()) == len(decoder.recording()) == 0
     assert decoder.recording().name == "early"

@@ -1,4 +1,4 @@
-"""FIFO bytes to samples, against frames packed one by one."""
+"""FIFO decoder against frames packed one by one."""
 
 import itertools
 import struct
@@ -25,12 +25,12 @@ def packed(*frames):
 
 
 def calm(n):
-    """`n` frames of a board at rest, each a little different from the one before."""
+    """Make `n` frames of a board at rest, each a little different from the one before."""
     return [(*QUIET[:6], 7 + next(FLICKER) % 3) for _ in range(n)]
 
 
 def fresh(frames_before=DROPPED_FRAMES):
-    """A decoder whose FIFO was reset at time 0, and that has read as many frames as it drops."""
+    """Make a decoder whose FIFO was reset at time 0, and that has read as many frames as it drops."""
     decoder = FifoDecoder(SETTINGS)
     decoder.set_temperature(QUIET[3])
     decoder.reset()
@@ -50,7 +50,7 @@ def test_values_are_counts_times_nominal_scale(frames):
     decoder = fresh()
     frames = [frame for frame, _ in itertools.groupby(frames)]
     assert poll(decoder, packed(*frames), 1) is None
-    assume(not decoder.flipped)
+    assume(not decoder.repaired)
     samples = decoder.take()
     for i, (ax, ay, az, temperature, gx, gy, gz) in enumerate(frames):
         assert samples.acc[i] == pytest.approx(np.array([ax, ay, az]) / 8192 * 9.80665)
@@ -104,7 +104,7 @@ def test_misaligned_frames_are_noticed_at_the_first(shift):
         pytest.param(packed(QUIET, (*QUIET[:3], -1500, *QUIET[4:])), False, FifoFault.MISALIGNED, id="jump"),
     ],
 )
-def test_what_cannot_be_believed_is_left_out_and_leaves_a_gap(data, overflow, fault):
+def test_a_poll_that_is_not_accepted_leaves_a_gap(data, overflow, fault):
     decoder = fresh()
     poll(decoder, packed(*calm(2)), 1)
     assert poll(decoder, data, 2, overflow) is fault
@@ -114,7 +114,7 @@ def test_what_cannot_be_believed_is_left_out_and_leaves_a_gap(data, overflow, fa
     assert decoder.recording("x").gap.tolist() == [False, False, True, False, False]
 
 
-def test_a_count_of_no_whole_number_of_frames_is_misaligned_even_where_the_values_fit():
+def test_a_count_that_is_no_multiple_of_a_frame_is_misaligned():
     decoder = fresh()
     decoder.set_count(1, 2 * 14 + 4)
     decoder.add_bytes(packed(*calm(2)))
@@ -129,7 +129,7 @@ def test_a_reset_before_any_sample_leaves_no_gap():
     assert not decoder.recording("x").gap.any()
 
 
-def test_what_was_not_judged_is_not_there():
+def test_an_unfinished_poll_gives_no_samples():
     decoder = fresh()
     decoder.set_count(0, 28)
     decoder.add_bytes(packed(*calm(2)))
@@ -168,14 +168,14 @@ def test_no_samples_are_a_recording_with_the_nominal_rate():
 
 @pytest.mark.parametrize("cut", range(1, 12))
 def test_a_frame_that_repeats_itself_is_not_delivered(cut):
-    """However polls cut the run; what came before it was delivered, and after a reset there is a gap."""
+    """Frames before the run are delivered however polls cut it, and after a reset there is a gap."""
     decoder = fresh()
     before, stuck = calm(3), [(*QUIET[:6], -9)] * 12
     faults = [poll(decoder, packed(*before, *stuck[:cut]), 1)]
     if faults[0] is None:
         faults.append(poll(decoder, packed(*stuck[cut:]), 2))
     assert faults[-1] is FifoFault.STUCK
-    # the first of the run may be as true as those before it
+    # The first frame of the run may be a valid one.
     assert len(decoder.take()) == (0 if len(faults) == 1 else 4 if cut == 1 else 3)
     decoder.reset()
     poll(decoder, packed(*calm(DROPPED_FRAMES + 2)), 3)
@@ -183,7 +183,7 @@ def test_a_frame_that_repeats_itself_is_not_delivered(cut):
 
 
 @given(st.lists(st.integers(1, 9), min_size=1, max_size=12), st.lists(st.integers(1, 20), min_size=1, max_size=12))
-def test_frames_that_are_alike_for_less_long_all_arrive(runs, sizes):
+def test_shorter_runs_of_equal_frames_all_arrive(runs, sizes):
     frames = [(*QUIET[:5], n % 2, n) for n, run in enumerate(runs) for _ in range(run)] + calm(1)
     decoder, at = fresh(), 0
     for n, size in enumerate([*sizes, len(frames)]):

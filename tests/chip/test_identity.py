@@ -1,4 +1,4 @@
-"""Which chip it is by its behaviour, told from the accesses alone; and what must not be written to."""
+"""Identification of chips by their behaviour, and the refusal of foreign ones."""
 
 import itertools
 import re
@@ -11,12 +11,10 @@ from mpucal.chip.access import Reply
 from mpucal.chip.config import Config
 from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
-from mpucal.chip.families import ICM20602, ICM20689, ICM20690, MPU6050, MPU6500, MPU6886, PARTS
+from mpucal.chip.families import ICM20602, ICM20689, ICM20690, MPU6050, MPU6500, MPU6886
 from mpucal.chip.identity import Behaviour, describe_mismatch
 from mpucal.data import Sensor
 from mpucal.errors import ChipError
-from mpucal.simulated.chip import open_simulated
-from mpucal.sources.tap import Tap
 
 FILLING = {reg.FIFO_EN: reg.FIFO_EN_FRAME}
 WIDENED = FILLING | {reg.ACCEL_CONFIG2: reg.FIFO_SIZE}
@@ -55,9 +53,7 @@ def evidence(fifo_bytes, widened_bytes=None, magnitude_g=None, asleep=None, fifo
         pytest.param(0x70, evidence(512, 4096), "MPU-6500", MPU6500, id="a 6500 with a larger FIFO"),
         pytest.param(0x71, evidence(512, 4096), "MPU-9250", MPU6500, id="a 9250 with a larger FIFO"),
         pytest.param(0x71, evidence(512, 4096, asleep=True), "MPU-9250", MPU6500, id="what it answers decides"),
-        pytest.param(
-            0x68, evidence(512, 4096, asleep=True), "ICM-20689", ICM20689, id="a clone98 with a 6050's answer"
-        ),
+        pytest.param(0x68, evidence(512, 4096, asleep=True), "ICM-20689", ICM20689, id="a clone98 as a 6050"),
         pytest.param(0x68, evidence(512, 4096, asleep=False), "MPU-6500", MPU6500, id="or a 6500"),
         pytest.param(0x12, evidence(1008, fifo_en=0x18), "ICM-20602", ICM20602, id="a 20602"),
         pytest.param(0x68, evidence(1008, fifo_en=0x18), "ICM-20602", ICM20602, id="that answers as a 6050"),
@@ -76,14 +72,20 @@ def test_behaviour_decides(who_am_i, seen, chip, family):
     assert part.accel_sensitivity == (0.5 if chip.endswith("C") else 1.0)
 
 
-def test_the_size_of_a_fifo_is_the_one_it_showed():
-    assert evidence(4096).part(0x78).fifo_bytes == 4096
-    assert evidence(1008, 1008).part(0x12).fifo_bytes == 1008
-    assert evidence(512, 512).part(0x70).fifo_bytes == 512
-    assert evidence(512, 4096).part(0x70).fifo_bytes == 4096
+@pytest.mark.parametrize(
+    ("who_am_i", "sizes", "fifo_bytes"),
+    [
+        (0x78, (4096,), 4096),
+        (0x12, (1008, 1008), 1008),
+        (0x70, (512, 512), 512),
+        (0x70, (512, 4096), 4096),
+    ],
+)
+def test_the_size_of_a_fifo_is_the_one_it_showed(who_am_i, sizes, fifo_bytes):
+    assert evidence(*sizes).part(who_am_i).fifo_bytes == fifo_bytes
 
 
-def test_a_size_that_does_not_settle_is_not_accepted():
+def test_a_size_that_still_changes_does_not_count():
     seen = evidence(512)
     for count in (600, 3000, 1200):
         seen.observe(reg.FIFO_COUNT_H, count.to_bytes(2, "big"), WIDENED)
@@ -98,23 +100,20 @@ def test_an_unknown_chip_with_an_unknown_fifo_is_refused():
 @pytest.mark.parametrize(
     ("sensor", "says"),
     [
-        pytest.param(Sensor(), None, id="nobody said"),
-        pytest.param(Sensor("MPU-6050", 0x68), None, id="what it says it is"),
+        pytest.param(Sensor(), None, id="unknown sensor"),
+        pytest.param(Sensor("MPU-6050", 0x68), None, id="as it answers"),
         pytest.param(
             Sensor("MPU-6500", 0x68), "0x68 to WHO_AM_I as an MPU-6050 does, but .* as an MPU-6500", id="else"
         ),
-        pytest.param(Sensor("MPU-6500", 0x72), "0x72 to WHO_AM_I, which no part known .* as an MPU-6500", id="unknown"),
+        pytest.param(
+            Sensor("MPU-6500", 0x72), "0x72 to WHO_AM_I, as no known part does.* as an MPU-6500", id="unknown"
+        ),
         pytest.param(Sensor("MPU-6050C", 0x68), "revision C, with half the sensitivity", id="revision C"),
     ],
 )
-def test_what_a_person_is_told(sensor, says):
-    told = describe_mismatch(sensor)
-    assert told is None if says is None else re.search(says, told)
-
-
-class Kept(list):
-    def transaction(self, transaction):
-        self.append(transaction)
+def test_remark_on_a_mismatch(sensor, says):
+    remark = describe_mismatch(sensor)
+    assert remark is None if says is None else re.search(says, remark)
 
 
 @pytest.mark.parametrize(
@@ -132,11 +131,11 @@ class Kept(list):
     ],
 )
 @pytest.mark.parametrize("who_am_i", [None, 0x68, 0x72], ids=["own", "as a 6050", "unknown"])
-def test_a_simulated_chip_is_recognised_whatever_it_answers(chip, behaves, who_am_i, same):
-    """And a capture of it tells the same; gravity, temperature and rate come out as they are."""
+def test_a_simulated_chip_is_identified_whatever_it_answers(chip, behaves, who_am_i, same, tapped):
+    """Decoding its capture gives the same; gravity, temperature and rate are the simulated ones."""
     said = "" if who_am_i is None else f",who_am_i={who_am_i}"
-    bus, kept = open_simulated(f"sim:seed=4,chip={chip},noise=0,b_a=0/0/0,temperature_c=30{said}"), Kept()
-    driver = Driver(Tap(bus, kept), Config(accel_range_g=8))
+    bus, transactions = tapped(f"sim:seed=4,chip={chip},noise=0,b_a=0/0/0,temperature_c=30{said}")
+    driver = Driver(bus, Config(accel_range_g=8))
     sensor = driver.start()
     for _ in range(20):
         driver.poll()
@@ -145,11 +144,11 @@ def test_a_simulated_chip_is_recognised_whatever_it_answers(chip, behaves, who_a
     assert sensor.accel_range_g == 8
     assert np.linalg.norm(recording.acc, axis=1).mean() == pytest.approx(9.8, abs=0.5)
     assert recording.temperature_c.mean() == pytest.approx(30, abs=0.1)
-    assert same(decode(kept), recording)
+    assert same(decode(transactions), recording)
 
 
-class Stranger:
-    """A chip that is none of ours: 128 registers, as given."""
+class ForeignChip:
+    """Chip that is not an MPU: 128 registers, as given."""
 
     def __init__(self, registers):
         self.registers, self.writes = registers, 0
@@ -166,7 +165,7 @@ class Stranger:
 
 
 def clock_chip(wrap, identity=0x25):
-    """23:59:45 on Saturday the 31st of December, then memory, again and again after `wrap` registers."""
+    """Registers of 23:59:45 on Saturday, December 31st, then memory, repeated after `wrap` registers."""
     time = [0x45, 0x59, 0x23, 0x07, 0x31, 0x12, 0x99]
     registers = {i: time[i % wrap] if i % wrap < 7 else identity for i in range(128)}
     return registers | {reg.WHO_AM_I: identity, reg.FIFO_COUNT_H: 0, reg.PWR_MGMT_1: 0}
@@ -179,35 +178,29 @@ def clock_chip(wrap, identity=0x25):
             clock_chip(0x40), "is a real-time clock .*DS1307 or DS3231.*AD0 to VCC .* --address 0x69", id="RTC"
         ),
         pytest.param(clock_chip(0x13), "is a real-time clock", id="a DS3231"),
-        pytest.param(
-            {reg.WHO_AM_I: 0x61, reg.PWR_MGMT_1: 0xA5}, "0x61 to WHO_AM_I and has no MPU's", id="another chip"
-        ),
-        pytest.param({reg.WHO_AM_I: 0x61, reg.FIFO_COUNT_H: 0x80}, "0x61 to WHO_AM_I and has no MPU's", id="no FIFO"),
+        pytest.param({reg.WHO_AM_I: 0x61, reg.PWR_MGMT_1: 0xA5}, "0x61 .* does not have an MPU's", id="another chip"),
+        pytest.param({reg.WHO_AM_I: 0x61, reg.FIFO_COUNT_H: 0x80}, "0x61 .* does not have an MPU's", id="no FIFO"),
         pytest.param({}, "every register reads 0x00: SDA stays low", id="nothing but zeros"),
         pytest.param(
             dict.fromkeys(range(128), 0xFF), "every register reads 0xff: nothing drives SDA", id="nothing but ones"
         ),
     ],
 )
-def test_a_stranger_is_refused_by_reading_alone(registers, says):
-    stranger = Stranger(registers)
+def test_a_foreign_chip_is_refused_by_reading_alone(registers, says):
+    foreign = ForeignChip(registers)
     with pytest.raises(ChipError, match=says):
-        Driver(stranger).start()
-    assert stranger.writes == 0
+        Driver(foreign).start()
+    assert foreign.writes == 0
 
 
 def test_a_part_of_the_table_whose_fifo_never_fills_is_refused():
-    stranger = Stranger({reg.WHO_AM_I: 0x68, reg.PWR_MGMT_1: 0x01})
-    counts, read = itertools.count(1), stranger.read
+    foreign = ForeignChip({reg.WHO_AM_I: 0x68, reg.PWR_MGMT_1: 0x01})
+    counts, read = itertools.count(1), foreign.read
 
     def restless(register, count):
-        stranger.registers[reg.FIFO_COUNT_L] = next(counts)
+        foreign.registers[reg.FIFO_COUNT_L] = next(counts)
         return read(register, count)
 
-    stranger.read = restless
+    foreign.read = restless
     with pytest.raises(ChipError, match="FIFO does not fill as its register map says"):
-        Driver(stranger).start()
-
-
-def test_every_part_is_found_by_its_identity():
-    assert all(part.who_am_i == who_am_i for who_am_i, part in PARTS.items())
+        Driver(foreign).start()

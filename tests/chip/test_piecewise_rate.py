@@ -1,4 +1,4 @@
-"""Lines that break, against those that the points were made of."""
+"""Piecewise lines against those of which the points were made."""
 
 import numpy as np
 import pytest
@@ -16,13 +16,21 @@ def counted(rates_hz, each_s=20.0, seed=0, late_s=0.001):
     return t_s, np.floor(taken)
 
 
+def clock_of(t_s, y):
+    clock = SampleClock(200.0)
+    clock.begin_segment()
+    clock.add(np.rint(t_s * 1e9).astype(np.int64), y.astype(np.int64))
+    index = np.arange(int(y[-1]))
+    return clock, index, np.zeros_like(index)
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_a_steady_clock_has_no_break(seed):
     assert find_breaks(*counted([198.6], each_s=120.0, seed=seed, late_s=0.02)) == []
 
 
 @pytest.mark.parametrize("step", [0.999, 1.002, 1.01, 0.97])
-def test_a_break_is_found_where_it_is(step):
+def test_a_break_is_found_at_its_place(step):
     t_s, y = counted([200.0, 200.0 * step])
     (at,) = find_breaks(t_s, y)
     assert t_s[at] == pytest.approx(20.0, abs=0.004 / abs(step - 1))
@@ -38,7 +46,7 @@ def test_few_points_have_no_break():
     assert find_breaks(np.zeros(0), np.zeros(0)) == []
 
 
-def test_pieces_that_agree_share_a_slope():
+def test_pieces_with_equal_slopes_share_one():
     t_s, y = counted([201.0], each_s=60.0)
     pieces = [line for part in np.split(np.arange(len(t_s)), 3) for line in fit_lines(t_s[part], y[part])]
     slopes = merge_equal_slopes(pieces, 200.0, 0.01)
@@ -47,33 +55,22 @@ def test_pieces_that_agree_share_a_slope():
 
 
 def test_final_times_follow_a_clock_that_changes():
-    rates = (200.0, 202.0)
-    t_s, y = counted(rates, late_s=0.0)
-    clock = SampleClock(200.0)
-    clock.begin_segment()
-    for t, n in zip(t_s, y, strict=True):
-        clock.add(round(t * 1e9), int(n))
-    index = np.arange(int(y[-1]))
+    clock, index, segment = clock_of(*counted((200.0, 202.0), late_s=0.0))
     true = np.interp(index + 1.0, [0, 4000, 8040], [0, 20, 40])
-    off_s = clock.final()(np.zeros_like(index), index) - true
+    off_s = clock.final()(segment, index) - true
     assert np.abs(off_s).max() < 0.004
     assert np.abs(off_s[np.abs(index - 4000) > 100]).max() < 0.0005
-    assert np.abs(clock.times_s(np.zeros_like(index), index) - true).max() > 0.02
+    assert np.abs(clock.times_s(segment, index) - true).max() > 0.02
 
 
 def test_final_times_of_a_steady_clock_are_those_of_one_line():
-    t_s, y = counted([199.0])
-    clock = SampleClock(200.0)
-    clock.begin_segment()
-    for t, n in zip(t_s, y, strict=True):
-        clock.add(round(t * 1e9), int(n))
-    index = np.arange(int(y[-1]))
-    zeros = np.zeros_like(index)
-    np.testing.assert_allclose(clock.final()(zeros, index), clock.times_s(zeros, index), rtol=0, atol=1e-9)
+    clock, index, segment = clock_of(*counted([199.0]))
+    np.testing.assert_allclose(clock.final()(segment, index), clock.times_s(segment, index), rtol=0, atol=1e-9)
 
 
-def test_lines_through_points_that_are_not_there_are_refused():
-    with pytest.raises(ValueError, match="different lengths"):
-        best_break(np.arange(20.0), np.arange(10.0), 3, 0.0)
-    with pytest.raises(ValueError, match="one point"):
-        best_break(np.arange(20.0), np.arange(20.0), 0, -1e9)
+@pytest.mark.parametrize(
+    ("n", "least", "message"), [(10, 3, "different lengths"), (20, 0, "one point")], ids=["lengths", "no point"]
+)
+def test_impossible_points_are_refused(n, least, message):
+    with pytest.raises(ValueError, match=message):
+        best_break(np.arange(20.0), np.arange(float(n)), least, -1e9)

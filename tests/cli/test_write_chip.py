@@ -43,7 +43,7 @@ def test_it_is_said_that_it_does_not_last(mpucal, calibrated, tmp_path):
     ("bus", "words"),
     [
         ("sim:seed=4", "the offset registers are as before"),
-        ("sim:seed=3,offsets=readonly", "does not answer to its offset registers"),
+        ("sim:seed=3,offsets=readonly", "does not respond to its offset registers"),
         ("sim:seed=3,chip=mpu6500", "nothing was written"),
     ],
     ids=["other_piece", "read_only", "other_chip"],

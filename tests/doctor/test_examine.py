@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.chip.quick_measure import LOOKS, PATIENCE
+from mpucal.chip.quick_measure import PATIENCE, READS
 from mpucal.chip.config import Config
 from mpucal.data import Recording, Sensor
 from mpucal.doctor.dead import dead_axes, live_axes
@@ -91,7 +91,7 @@ def test_what_is_amiss_is_found(topics, keys, topic, mark):
 def test_a_board_that_is_never_put_down_is_waited_for_once(topics):
     told = topics("hand=restless")
     assert "the board moves" in told["offset registers"].what
-    assert PATIENCE * LOOKS < told["transfers"].data["transfers"] < 1.5 * PATIENCE * LOOKS
+    assert PATIENCE * READS < told["transfers"].data["transfers"] < 1.5 * PATIENCE * READS
 
 
 def test_a_board_that_is_put_down_late_is_examined_as_any():
@@ -102,7 +102,7 @@ def test_a_board_that_is_put_down_late_is_examined_as_any():
         if finding.topic == "chip":
             bus.hear(Prompt(PromptKind.REST, ""))
         told[finding.topic] = finding
-    assert told["transfers"].data["transfers"] > PATIENCE * LOOKS
+    assert told["transfers"].data["transfers"] > PATIENCE * READS
     assert told["offset registers"].mark is Mark.OK
 
 
@@ -121,7 +121,7 @@ def test_transfers_that_fail_now_and_then_are_counted_and_stop_nothing(topics):
         ("ones", "every register reads 0xff: nothing drives SDA"),
         ("zeros", "every register reads 0x00: SDA stays low"),
         ("rtc", "is a real-time clock"),
-        ("stuckbit", "bits change on the bus"),
+        ("stuckbit", "bits flip on the bus"),
     ],
 )
 def test_what_is_no_chip_or_no_wire_is_named(examined, fault, says):

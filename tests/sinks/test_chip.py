@@ -183,7 +183,7 @@ def test_another_file_is_not_put_back(tmp_path, text):
 @pytest.mark.parametrize(
     ("board", "changes", "words"),
     [
-        (Board(offsets="readonly"), {}, "does not answer to its offset registers"),
+        (Board(offsets="readonly"), {}, "does not respond to its offset registers"),
         (Board(), {"accel_offsets": (1, 2, 3)}, "factory's trim of this chip is .* and .1, 2, 3. in the one"),
         (Board(), {"quality": {"verdict": REFUSED}}, "nothing was written: the calibration was refused"),
         (Board(), {"extra": {"autopilot": {}}}, "nothing was written: .*autopilot"),
@@ -260,7 +260,7 @@ def test_a_fault_at_any_step_leaves_the_old_state_or_the_new(
 def test_a_wire_that_stays_pulled_is_told_with_its_remedy(calibration):
     board = Board()
     board.fails = dict.fromkeys(range(300, 100_000), False)
-    with pytest.raises(WriteBackError, match=r"could not be restored .*take the chip's supply away"):
+    with pytest.raises(WriteBackError, match=r"could not be restored .*switch the chip's supply off and on"):
         board.sink().write(calibration())
 
 
