@@ -21,7 +21,7 @@ from ..page.address import Address
 from ..page.result import Result
 from ..recheck import check
 from ..recheck.outcome import CheckResult
-from ..recheck.update import updated
+from ..recheck.update import update_biases
 from ..result.calibration import Calibration
 from ..result.clock import now
 from ..result.session_files import BLOB, DOCUMENT
@@ -148,7 +148,7 @@ def _left(folder: Path, of: Calibration, result: CheckResult, recording: Recordi
     """check.json, and where only the biases moved calibration.json and calibration.bin."""
     files = {CHECK_FILE: (json.dumps(result.document(), indent=2) + "\n").encode()}
     if result.only_biases:
-        after = updated(of, result, recording, now().isoformat())
+        after = update_biases(of, result, recording, now().isoformat())
         files |= {BLOB.name: after.blob().encode(), DOCUMENT.name: after.json().encode()}
     save(folder, files)
     click.echo(f"\nWritten to {folder}:\n  {', '.join(files)}", err=as_json)

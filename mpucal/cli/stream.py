@@ -20,7 +20,7 @@ from ..files.csv import NS, CsvText
 from ..page.address import Address
 from ..page.live import live
 from ..recheck import days_since
-from ..recheck.watch import Contradiction, Watch
+from ..recheck.watch import Contradiction, DriftMonitor
 from ..result.calibration import Calibration
 from ..result.clock import now
 from ..result.correction import Correction, correction
@@ -78,14 +78,14 @@ def command(
     capture = source.measuring(file or Path(os.devnull), talk.say, now().isoformat())
     with capture as measuring, shown as screen, suppress(KeyboardInterrupt):
         ready: Correction | None = None
-        watch: Watch | None = None
+        watch: DriftMonitor | None = None
         for samples in _polled(measuring.source, seconds):
             if ready is None:
                 # the newest sample was read just now
                 text.utc_ns = time.time_ns() - round(float(samples.t[-1]) * NS)
                 sensor = measuring.source.recording().sensor
                 ready = _correction(applied, measuring.source, talk)
-                watch = Watch(ready.calibration, days_since(applied)) if watched else None
+                watch = DriftMonitor(ready.calibration, days_since(applied)) if watched else None
             calibrated = ready.apply(samples)
             if as_json:
                 _json_lines(calibrated, text.utc_ns or 0)

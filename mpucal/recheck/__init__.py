@@ -1,4 +1,4 @@
-"""Whether a calibration is still right for its sensor: from a short recording of rests and the turns between them."""
+"""Check of a calibration against its sensor, by a short recording of rests and the turns between them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from ..data import Recording, Sensor, Vector
 from ..result.calibration import Calibration
 from ..result.correction import correction
 from . import drift
-from .hypotheses import NOTHING, Weighed, estimate, fits, weigh
-from .observed import Observed, changed, observe
+from .hypotheses import NOTHING, Comparison, compare_hypotheses, estimate, p_value
+from .observed import Observations, apply_errors, observe
 from .outcome import (
     ANOTHER_SENSOR,
     CANNOT_BE_TOLD,
@@ -26,14 +26,15 @@ from .outcome import (
 
 __all__ = ["CheckResult", "check"]
 
-# flat, and three more
+# The flat rest and three more.
 LEAST_ORIENTATIONS = 4
-# a bias that is known to no better than this is not known to be the same
+# A calibration is called still good only if the bias is known to this standard uncertainty.
 ENOUGH_MG = 2.5
-# two hypotheses nearer than this (20 to 1) are not told apart
+# Hypotheses whose log odds differ by less (20 to 1) are both named.
 NEAR = 3.0
-# what less likely a sensor shows by chance is no sensor at rest
+# Below this p-value under any hypothesis the rests contradict each other: the board was not at rest.
 CONTRADICTION = 1e-6
+# Above this p-value the change of temperature explains the observations.
 SURPRISE = 0.01
 VERDICTS = {"mount": REMOUNTED, "another sensor": ANOTHER_SENSOR}
 AGAIN = "lay the board flat for 10 s, then hold it for 2 s in three orientations 20 deg or more apart"
@@ -41,65 +42,65 @@ ANEW = "calibrate it anew, with `mpucal session`"
 
 
 def check(calibration: Calibration, recording: Recording, days: float | None = None) -> CheckResult:
-    """Whether `calibration` is still right for the sensor that made `recording`.
+    """Return whether `calibration` is still right for the sensor that made `recording`.
 
-    The prior is what the calibration says of its own uncertainty, and what unchanged sensors do as they age; what the
-    rests of the recording and the turns between them show is weighed for and against a change of the bias, of the
-    scale factors, of the mount, of the gyroscope, of the temperature, and another sensor. A sensor that did not change
-    is called changed in 1 of 100 checks.
+    The prior is the calibration's own uncertainty and the ageing of unchanged sensors. The rests of the recording, and
+    the turns between them, are the evidence for a change of the bias, of the scale factors, of the mount, of the
+    gyroscope or of the temperature, or for another sensor. A sensor that did not change is called changed in 1 of 100
+    checks.
 
     Parameters
     ----------
     calibration : of one sensor, not refused. recording : a rest, lying flat, and three or more in other orientations.
-    days : from the one to the other; None: by their dates.
+    days : time between them; None: by their dates.
 
     Raises
     ------
     UsageError : the calibration was refused, or is of samples of another kind (a chip's own, an autopilot's stream).
     """
-    of, now = calibration.sensor, recording.sensor
-    if None not in (of.who_am_i, now.who_am_i) and of.who_am_i != now.who_am_i:
-        said = f"it answers 0x{now.who_am_i:02x} to WHO_AM_I, and the calibrated one answered 0x{of.who_am_i:02x}"
-        return CheckResult(ANOTHER_SENSOR, "another sensor", said, ANEW)
-    if _trimmed_otherwise(calibration, now):
-        said = (
-            f"its offset registers hold {now.accel_offsets}, and the calibrated one's held {of.accel_offsets}:"
+    then, now = calibration.sensor, recording.sensor
+    if None not in (then.who_am_i, now.who_am_i) and then.who_am_i != now.who_am_i:
+        message = f"its WHO_AM_I is 0x{now.who_am_i:02x}, and that of the calibrated one was 0x{then.who_am_i:02x}"
+        return CheckResult(ANOTHER_SENSOR, "another sensor", message, ANEW)
+    if _is_other_chip(calibration, now):
+        message = (
+            f"its offset registers hold {now.accel_offsets}, and the calibrated one's held {then.accel_offsets}:"
             " the factory sets them for each chip"
         )
-        return CheckResult(ANOTHER_SENSOR, "another sensor", said, f"{ANEW}, or give calibration-on-chip.json")
+        return CheckResult(ANOTHER_SENSOR, "another sensor", message, f"{ANEW}, or give calibration-on-chip.json")
     ready = correction(calibration, now, recording.autopilot).calibration
     observed = observe(recording, ready)
     if observed is None:
         return CheckResult(CANNOT_BE_TOLD, NOTHING, "the board never rested", AGAIN)
-    return _weighed_up(ready, recording, observed, days_since(calibration, recording.utc_ns) if days is None else days)
+    return _assess(ready, recording, observed, days_since(calibration, recording.utc_ns) if days is None else days)
 
 
-def _weighed_up(calibration: Calibration, recording: Recording, observed: Observed, days: float) -> CheckResult:
+def _assess(calibration: Calibration, recording: Recording, observed: Observations, days: float) -> CheckResult:
     T_0, T = calibration.sensor.temperature_c, observed.temperature_c
     change_c = None if T_0 is None or T is None else T - T_0
-    happenings = drift.happenings(calibration, change_c)
+    hypotheses = drift.hypotheses(calibration, change_c)
     nothing = drift.own_uncertainty(calibration) + drift.ageing(calibration, days, change_c)
-    anything = nothing + sum(added for _, added in happenings.values())
-    if fits(observed, anything) < CONTRADICTION:
-        observed = _nearer(observed, recording, calibration, anything)
-    weighed = weigh(observed, nothing, happenings)
-    told = weighed.told
+    anything = nothing + sum(added for _, added in hypotheses.values())
+    if p_value(observed, anything) < CONTRADICTION:
+        observed = _relinearise(observed, recording, calibration, anything)
+    comparison = compare_hypotheses(observed, nothing, hypotheses)
+    likeliest = comparison.likeliest
     explains = None
-    if told != NOTHING:
-        if drift.TEMPERATURE in happenings:
-            explains = fits(observed, nothing + happenings[drift.TEMPERATURE][1]) > SURPRISE
-        P = nothing + happenings[told][1]
-        theta, covariance = estimate(_nearer(observed, recording, calibration, P), P)
+    if likeliest != NOTHING:
+        if drift.TEMPERATURE in hypotheses:
+            explains = p_value(observed, nothing + hypotheses[drift.TEMPERATURE][1]) > SURPRISE
+        P = nothing + hypotheses[likeliest][1]
+        theta, covariance = estimate(_relinearise(observed, recording, calibration, P), P)
     else:
         theta, covariance = estimate(observed, nothing)
     result = CheckResult(
-        VERDICTS.get(told, DRIFTED if told != NOTHING else STILL_GOOD),
-        told,
+        VERDICTS.get(likeliest, DRIFTED if likeliest != NOTHING else STILL_GOOD),
+        likeliest,
         "",
         changes=changes_of(calibration, theta, covariance),
-        or_also=_or_also(weighed),
-        probability=weighed.probability,
-        log_odds=weighed.log_odds,
+        or_also=_close_hypotheses(comparison),
+        probability=comparison.probability,
+        log_odds=comparison.log_odds,
         temperature_change_c=change_c,
         temperature_explains=explains,
         orientations=observed.orientations,
@@ -107,70 +108,74 @@ def _weighed_up(calibration: Calibration, recording: Recording, observed: Observ
         theta=theta,
         covariance=covariance,
     )
-    if fits(observed, anything) < CONTRADICTION:
-        said = "the rests contradict each other, whatever happened to the sensor"
-        return replace(result, verdict=CANNOT_BE_TOLD, message=said, remedy=f"away from what moves, {AGAIN}")
-    if told != NOTHING:
-        return _changed(result)
-    return _unchanged(result, changes_of(calibration, *estimate(observed, nothing + happenings["bias"][1]))["bias"])
+    if p_value(observed, anything) < CONTRADICTION:
+        message = "the rests contradict each other: no change of the sensor explains them"
+        return replace(result, verdict=CANNOT_BE_TOLD, message=message, remedy=f"away from vibration, {AGAIN}")
+    if likeliest != NOTHING:
+        return _describe_change(result)
+    return _describe_unchanged(
+        result, changes_of(calibration, *estimate(observed, nothing + hypotheses["bias"][1]))["bias"]
+    )
 
 
-def _nearer(observed: Observed, recording: Recording, calibration: Calibration, P: Vector) -> Observed:
-    """The same observations, linear about their estimate: a large change is beyond first order."""
+def _relinearise(observed: Observations, recording: Recording, calibration: Calibration, P: Vector) -> Observations:
+    """Return the observations linearised about their estimate: a large change is beyond first order."""
     theta, _ = estimate(observed, P)
-    again = observe(recording, changed(calibration, theta))
+    again = observe(recording, apply_errors(calibration, theta))
     return observed if again is None else replace(again, r=again.r + again.J @ theta)
 
 
-def _unchanged(result: CheckResult, bias: Change) -> CheckResult:
-    """Nothing speaks for a change: if enough was seen, that is good news. bias : its change by the check alone."""
+def _describe_unchanged(result: CheckResult, bias: Change) -> CheckResult:
+    """Return the result for an unchanged sensor: still good, if enough was seen to tell.
+
+    bias : its change, estimated with the prior of a changed bias.
+    """
     axis = int(np.argmax(bias.std))
     if result.orientations < LEAST_ORIENTATIONS:
-        said, remedy = f"{result.orientations} orientations were seen, and {LEAST_ORIENTATIONS} are needed", AGAIN
+        message, remedy = f"{result.orientations} orientations were seen, and {LEAST_ORIENTATIONS} are needed", AGAIN
     elif bias.std[axis] > ENOUGH_MG:
-        said = f"the bias of {'xyz'[axis]} is known to {bias.std[axis]:.1f} mg only (1 sigma)"
+        message = f"the bias of {'xyz'[axis]} is known to {bias.std[axis]:.1f} mg only (1 sigma)"
         remedy = f"hold the board in further orientations, also with side +{'XYZ'[axis]} or −{'XYZ'[axis]} down"
     else:
         far = int(np.argmax(np.abs(bias.value)))
-        within = f"{abs(bias.value[far]):.1f} mg of what it was (1 sigma {bias.std[far]:.1f})"
+        within = f"{abs(bias.value[far]):.1f} mg of the calibrated value (1 sigma {bias.std[far]:.1f})"
         return replace(result, message=f"the bias is within {within}")
-    return replace(result, verdict=CANNOT_BE_TOLD, message=said, remedy=remedy)
+    return replace(result, verdict=CANNOT_BE_TOLD, message=message, remedy=remedy)
 
 
-def _changed(result: CheckResult) -> CheckResult:
+def _describe_change(result: CheckResult) -> CheckResult:
     changes = result.changes or {}
-    also = f" (or {', or '.join(result.or_also)}: these orientations do not tell)" if result.or_also else ""
+    also = f" (or {', or '.join(result.or_also)}: these orientations cannot tell)" if result.or_also else ""
     by_T = ""
     if result.temperature_explains is not None and result.temperature_change_c is not None:
         does = "explains" if result.temperature_explains else "does not explain"
         by_T = f"; the temperature, {result.temperature_change_c:+.1f} °C since the calibration, {does} it"
     match result.what:
         case "temperature":
-            said = f"bias {changes['bias'].said()} mg{also}{by_T}"
+            message = f"bias {changes['bias'].text()} mg{also}{by_T}"
             remedy = "take the updated calibration (-o DIR), or measure b_a(T) with `mpucal merge`"
         case "another sensor":
-            said, remedy = f"more of it changed than one sensor's does{also}", ANEW
+            message, remedy = f"more has changed than does in one sensor{also}", ANEW
         case "mount":
-            said = f"the accelerometer has turned against the gyroscope by {changes['mount'].said()} deg{also}"
+            message = f"the accelerometer has turned against the gyroscope by {changes['mount'].text()} deg{also}"
             remedy = ANEW
         case what:
             change = changes[what]
-            said = f"{what} {change.said()} {change.unit}{also}{by_T}"
+            message = f"{what} {change.text()} {change.unit}{also}{by_T}"
             remedy = "take the updated calibration (-o DIR)" if result.only_biases else ANEW
-    return replace(result, message=said, remedy=remedy)
+    return replace(result, message=message, remedy=remedy)
 
 
-def _or_also(weighed: Weighed) -> tuple[str, ...]:
-    if weighed.told == NOTHING:
+def _close_hypotheses(comparison: Comparison) -> tuple[str, ...]:
+    """Return the hypotheses that are nearly as likely as the likeliest."""
+    best, log_odds = comparison.likeliest, comparison.log_odds
+    if best == NOTHING:
         return ()
-    best = weighed.log_odds[weighed.told]
-    return tuple(
-        name for name, odds in weighed.log_odds.items() if name != weighed.told and odds > max(best - NEAR, 0.0)
-    )
+    return tuple(name for name, odds in log_odds.items() if name != best and odds > max(log_odds[best] - NEAR, 0.0))
 
 
-def _trimmed_otherwise(calibration: Calibration, sensor: Sensor) -> bool:
-    """Whether the offset registers are those of another chip; their bits 0 do nothing."""
+def _is_other_chip(calibration: Calibration, sensor: Sensor) -> bool:
+    """Return True if the offset registers hold the trim of another chip; bit 0 of each is reserved."""
     held = calibration.sensor.accel_offsets, sensor.accel_offsets
     if held[0] is None or held[1] is None or np.any(calibration.applied_in_hardware):
         return False
@@ -178,7 +183,7 @@ def _trimmed_otherwise(calibration: Calibration, sensor: Sensor) -> bool:
 
 
 def days_since(calibration: Calibration, utc_ns: int | None = None) -> float:
-    """From the calibration to a time, or to now; 0 where nobody knows."""
+    """Return the days from the calibration to `utc_ns`, or to now; 0 if the calibration has no date."""
     try:
         made = datetime.fromisoformat(calibration.created)
     except ValueError:

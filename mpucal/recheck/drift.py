@@ -1,9 +1,9 @@
-"""What a calibration's numbers may be off by, beforehand: its own uncertainty, ageing, and each thing that can happen.
+"""Prior covariances of a calibration's errors theta: its own uncertainty, ageing, and each hypothesis of a change.
 
-All are standard deviations of independent parts of theta (see `observed`), as covariances (21, 21). Sources: zero-g
+All are covariances (21, 21) of theta (see `observed`), from standard deviations of independent parts. Sources: zero-g
 level, sensitivity and zero-rate output over temperature and at 25 degrees Celsius of PS-MPU-6000A r3.4 and PS-MPU-6500A
-r1.0, section 3.1 and 3.2. No data sheet of these chips states ageing. Its figures here are what one phone's sensor did
-from session to session, 1.3 to 2.2 mg with its temperature unknown, and what the simulated sensors of this program do.
+r1.0, section 3.1 and 3.2. No data sheet of these chips states ageing. Its figures here were measured on one phone's
+sensor from session to session, 1.3 to 2.2 mg with its temperature unknown, and on this program's simulated sensors.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ DEG = math.pi / 180.0
 
 @dataclass(frozen=True)
 class Spread:
-    """Standard deviations of what may differ.
+    """Standard deviations of the parts of theta.
 
     bias : m/s^2. scale, skew : of E, on and off the diagonal, symmetric. turn : rad, of the accelerometer's mount.
     gyro_bias : rad/s. gyro_scale, gyro_skew : of G.
@@ -41,7 +41,7 @@ class Spread:
     gyro_skew: float = 0.0
 
     def covariance(self) -> Vector:
-        """(21, 21) of theta."""
+        """Return the covariance (21, 21) of theta."""
         P = np.zeros((PARAMETERS, PARAMETERS))
         P[:9, :9] = np.diag(np.eye(3).ravel()) * self.scale**2
         for i, j in ((0, 1), (0, 2), (1, 2)):
@@ -55,28 +55,28 @@ class Spread:
         return P
 
 
-# what switching off and on again, and the first hours, change
+# Repeatability over a power cycle and the first hours.
 REPEATED = Spread(0.7 * MG, 3e-4, 2e-4, 0.02 * DEG, 0.3 * DEG, 5e-4, 3e-4)
-# of the bias, m/s^2 a root of a day, and its end
+# Random walk of the bias: m/s^2 in the root of a day, and its limit.
 WALK_MPS2, WALK_MOST_MPS2 = 0.1 * MG, 2.0 * MG
-# where a temperature is not known, it may have been so many degrees away
+# Standard deviation of a change of temperature that is not known.
 UNKNOWN_C = 3.0
-# a thermometer, and a chip that warms unevenly
+# A smaller change of temperature is within the thermometer's error, or that of a chip that warms unevenly.
 LEAST_C = 2.0
-# a degree Celsius, of the kind of chip
+# Change in one degree Celsius, by kind of chip.
 BY_TEMPERATURE: Mapping[str, Spread] = MappingProxyType(
     {
         "MPU-6050": Spread(0.5 * MG, 2e-4, gyro_bias=0.16 * DEG, gyro_scale=2e-4),
         "MPU-6500": Spread(1.0 * MG, 2.6e-4, gyro_bias=0.24 * DEG, gyro_scale=4e-4),
     }
 )
-# of what a fit does not say the uncertainty of
+# Factory tolerances, for parameters whose uncertainty the calibration does not state.
 TOLERANCE = Spread(80.0 * MG, 0.03, 0.02, 2.0 * DEG, 20.0 * DEG, 0.02, 0.01)
-# of a gyroscope's matrix that a fit has found to be no different from the identity
+# Standard deviation of G where the fit found no difference from the identity.
 PERFECT_GYRO = 0.003
 
-# what can happen to a sensor besides: how much it then changes, and how often of all that happens
-HAPPENINGS: Mapping[str, tuple[float, Spread]] = MappingProxyType(
+# Hypotheses of a change: the prior probability of each, given that something changed, and the size of the change.
+HYPOTHESES: Mapping[str, tuple[float, Spread]] = MappingProxyType(
     {
         "bias": (0.4, Spread(bias=20.0 * MG)),
         "scale": (0.1, Spread(scale=0.01)),
@@ -86,41 +86,41 @@ HAPPENINGS: Mapping[str, tuple[float, Spread]] = MappingProxyType(
         "another sensor": (0.2, Spread(100.0 * MG, 0.02, 0.01, 1.5 * DEG, 10.0 * DEG, 0.015, 0.012)),
     }
 )
-TEMPERATURE, OFTEN_BY_TEMPERATURE = "temperature", 0.5
+TEMPERATURE, TEMPERATURE_PRIOR = "temperature", 0.5
 
 
 def own_uncertainty(calibration: Calibration) -> Vector:
-    """(21, 21) of theta, from the standard deviations that a calibration states, and their correlation."""
+    """Return the covariance of theta that a calibration states by its standard deviations and correlation."""
     spread = np.sqrt(np.diag(TOLERANCE.covariance()))
-    # it has no spread of D, row-major, but of its symmetric and antisymmetric parts
+    # TOLERANCE is of the symmetric and antisymmetric parts of E; here its elements are needed.
     spread[E] = np.where(np.eye(3, dtype=bool), TOLERANCE.scale, TOLERANCE.skew).ravel()
     if calibration.fit.get("model") in ("accel", "paper"):
         spread[G] = PERFECT_GYRO
     std = standard_deviations(vars(calibration))
     known = np.isfinite(std)
     rho = np.where(np.outer(known, known), calibration.correlation, np.eye(PARAMETERS))
-    # rounded, or of unknown origin: without what no errors have
+    # Rounded correlations may have negative eigenvalues, which no covariance has.
     values, vectors = np.linalg.eigh(rho)
     root = to_theta(calibration) @ (np.where(known, std, spread)[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
     return np.asarray(root @ root.T)
 
 
 def to_theta(calibration: Calibration) -> Vector:
-    """(21, 21) by which small errors of D, b_a, K and b_omega, as in `mpucal.result.correlation`, make theta."""
+    """Return the matrix (21, 21) from errors of D, b_a, K, b_omega, as in `mpucal.result.correlation`, to theta."""
     A, M = calibration.inverse, np.eye(PARAMETERS)
     M[E, E], M[BETA, BETA] = np.kron(A, np.eye(3)), A
     return M
 
 
 def ageing(calibration: Calibration, days: float, change_c: float | None) -> Vector:
-    """(21, 21) of theta: what an unchanged sensor shows after `days`, at a temperature that has not moved.
+    """Return the covariance of theta of an unchanged sensor after `days`, at an unchanged temperature.
 
-    Where the change of temperature is not known, a few degrees are in it; where b_a(T) is known, its uncertainty.
+    It includes a few degrees where the change of temperature is not known, and b_a(T)'s uncertainty where that is.
     """
     P = REPEATED.covariance()
     P[BETA, BETA] += np.eye(3) * min(WALK_MPS2**2 * max(days, 0.0), WALK_MOST_MPS2**2)
     if change_c is None:
-        return P + by_temperature(calibration, UNKNOWN_C)
+        return P + temperature_covariance(calibration, UNKNOWN_C)
     if calibration.follows_temperature:
         A = calibration.inverse
         slope = np.nan_to_num(calibration.b_a_slope_std) * change_c
@@ -128,15 +128,15 @@ def ageing(calibration: Calibration, days: float, change_c: float | None) -> Vec
     return P
 
 
-def by_temperature(calibration: Calibration, change_c: float) -> Vector:
-    """(21, 21) of theta: what a data sheet lets a change of temperature do."""
+def temperature_covariance(calibration: Calibration, change_c: float) -> Vector:
+    """Return the covariance of theta by a change of temperature, from the data sheet."""
     kind = "MPU-6050" if "6050" in (calibration.sensor.chip or "6050") else "MPU-6500"
     return BY_TEMPERATURE[kind].covariance() * change_c**2
 
 
-def happenings(calibration: Calibration, change_c: float | None) -> dict[str, tuple[float, Vector]]:
-    """What can happen: of each, how often, and the covariance (21, 21) that it adds; a change of temperature, too."""
-    all_ = {name: (often, spread.covariance()) for name, (often, spread) in HAPPENINGS.items()}
+def hypotheses(calibration: Calibration, change_c: float | None) -> dict[str, tuple[float, Vector]]:
+    """Return the prior probability of each hypothesis and the covariance (21, 21) that it adds to theta."""
+    all_ = {name: (prior, spread.covariance()) for name, (prior, spread) in HYPOTHESES.items()}
     if change_c is not None and abs(change_c) >= LEAST_C:
-        all_[TEMPERATURE] = OFTEN_BY_TEMPERATURE, by_temperature(calibration, change_c)
+        all_[TEMPERATURE] = TEMPERATURE_PRIOR, temperature_covariance(calibration, change_c)
     return all_

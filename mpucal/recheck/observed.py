@@ -1,15 +1,15 @@
-"""What the rests of a recording, and the turns between them, say against a calibration, to first order.
+"""Residuals of a calibration in a recording of rests and turns, and their Jacobian: r = J theta + noise.
 
-A calibration is off by theta, 21 numbers in the body frame:
+The errors of a calibration are theta, 21 numbers in the body frame:
 
     E (9)       the accelerometer's matrix is D (I + E), row-major
     beta (3)    its bias is b_a + D beta [m/s^2]
     G (6)       the gyroscope's matrix is (I + G) K, symmetric: xx, xy, xz, yy, yz, zz
     delta (3)   its bias is b_omega + delta [rad/s]
 
-A rest's calibrated mean is then a = s + E s + beta + noise, with s gravity's reaction. Three things are observed of it:
-|a| - g; the angle by which gravity of the rest before, carried here by the gyroscope, misses a; and of the first rest
-the mean rate. They are r = J theta + noise.
+A rest's calibrated mean is then a = s + E s + beta + noise, with s gravity's reaction. The residuals r are: |a| - g of
+each rest; the angle between a and gravity as carried by the gyroscope from the rest before; and the mean rate of the
+first rest.
 """
 
 from __future__ import annotations
@@ -31,25 +31,26 @@ from ..result.calibration import Calibration
 PARAMETERS = 21
 E, BETA, G, DELTA = slice(0, 9), slice(9, 12), slice(12, 18), slice(18, 21)
 UPPER = np.triu_indices(3)
-# of a turn: a gyroscope's scale is not linear (PS-MPU-6000A r3.4, section 6.1: 0.2 % of full scale)
+# Standard deviation of a turn, relative to its angle, by the gyroscope's nonlinearity (PS-MPU-6000A r3.4, section 6.1:
+# 0.2 % of full scale).
 NONLINEAR = 0.001
-# a rest in so many blocks: a tremor comes and goes within them, a sway does not
+# A rest's variance is that of so many block means: a tremor averages out within them, a sway does not.
 BLOCKS = 4
-# a rest's own blocks are few: so many degrees of freedom of the others' mean stand beside them
+# A rest has few blocks: the mean variance of the others counts as so many degrees of freedom more.
 POOLED = 6.0
-# orientations nearer to one another are one
+# Orientations nearer to one another count as one.
 APART_RAD = math.radians(20.0)
 
 
 @dataclass(frozen=True)
-class Observed:
-    """What was observed: r = J theta + noise of covariance R.
+class Observations:
+    """Observations of a recording: r = J theta + noise of covariance R.
 
     Attributes
     ----------
     r : (m,) m/s^2 of magnitudes, rad of angles, rad/s of the rate. J : (m, 21). R : (m, m).
-    down : (k, 3) unit vectors, calibrated: what pointed down in each rest.
-    temperature_c : of the chip meanwhile, None where it said none. seconds : how long the recording is.
+    down : (k, 3) unit vectors, calibrated: the direction that pointed down in each rest.
+    temperature_c : mean of the chip's; None where it is not known. seconds : length of the recording.
     """
 
     r: Vector
@@ -61,7 +62,7 @@ class Observed:
 
     @property
     def orientations(self) -> int:
-        """How many differ by 20 deg from each other."""
+        """Number of orientations that differ by 20 deg from each other."""
         apart: list[Vector] = []
         for down in self.down:
             if all(float(down @ other) <= math.cos(APART_RAD) for other in apart):
@@ -69,8 +70,8 @@ class Observed:
         return len(apart)
 
 
-def changed(calibration: Calibration, theta: Vector) -> Calibration:
-    """The calibration of a sensor that is off by theta (21,)."""
+def apply_errors(calibration: Calibration, theta: Vector) -> Calibration:
+    """Return the calibration of a sensor whose errors are theta (21,)."""
     twist = np.zeros((3, 3))
     twist[UPPER] = theta[G]
     twist += np.triu(twist, 1).T
@@ -83,8 +84,8 @@ def changed(calibration: Calibration, theta: Vector) -> Calibration:
     )
 
 
-def observe(recording: Recording, calibration: Calibration) -> Observed | None:
-    """What a recording says against a calibration; None where the board never rests."""
+def observe(recording: Recording, calibration: Calibration) -> Observations | None:
+    """Return the observations of a recording; None if the board never rests."""
     gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
     recording = with_masks(recording)
     segment = recording.flat or find_flat(recording)
@@ -100,27 +101,20 @@ def observe(recording: Recording, calibration: Calibration) -> Observed | None:
     known = bool(np.isfinite(T).any())
     mended = without_drift(recording, flat, found.telling_bias(runs))
     rests = _Rests(mended, runs, calibration, float(np.nanmean(T)) if known else None)
-    blocks = [_Block.magnitude(rests, k, gravity) for k in range(len(runs))]
-    for k in range(1, len(runs)):
-        block = _Block.miss(rests, k, flat, calibration)
-        blocks += [block] if block is not None else []
-    blocks.append(_Block.rate(recording, runs[0].tolist(), flat, calibration, len(runs)))
-    of_rests = np.vstack([block.of_rests for block in blocks])
-    J = np.vstack([block.of_theta for block in blocks])
-    J[:, : BETA.stop] += of_rests @ np.vstack([of_accelerometer(a) for a in rests.a])
-    R = of_rests @ rests.covariance @ of_rests.T + np.diag(np.concatenate([block.variance for block in blocks]))
-    return Observed(
-        np.concatenate([block.r for block in blocks]),
-        J,
-        R,
-        -rests.unit,
-        rests.temperature_c,
-        float(recording.t[-1] - recording.t[0]),
-    )
+    parts = [_Residuals.magnitude(rests, k, gravity) for k in range(len(runs))]
+    turns = (_Residuals.direction(rests, k, flat, calibration) for k in range(1, len(runs)))
+    parts += [turn for turn in turns if turn is not None]
+    parts.append(_Residuals.rate(recording, runs[0].tolist(), flat, calibration, len(runs)))
+    J_rests = np.vstack([part.J_rests for part in parts])
+    J = np.vstack([part.J_theta for part in parts])
+    J[:, : BETA.stop] += J_rests @ np.vstack([accelerometer_jacobian(a) for a in rests.a])
+    R = J_rests @ rests.covariance @ J_rests.T + np.diag(np.concatenate([part.variance for part in parts]))
+    r, seconds = np.concatenate([part.r for part in parts]), float(recording.t[-1] - recording.t[0])
+    return Observations(r, J, R, -rests.unit, rests.temperature_c, seconds)
 
 
 class _Rests:
-    """The calibrated means (k, 3) of the rests, their covariance, and the gyroscope's steps from one to the next."""
+    """Calibrated means `a` (k, 3) of the rests, their unit vectors and norms, and the covariance (3 k, 3 k) of `a`."""
 
     def __init__(self, recording: Recording, runs: Intervals, calibration: Calibration, temperature_c: float | None):
         self.recording, self.runs, self.temperature_c = recording, runs, temperature_c
@@ -145,24 +139,25 @@ class _Rests:
 
 
 @dataclass(frozen=True)
-class _Block:
-    """Some of the observations: (q,), (q, 3 k) by the rests' means, (q, 21) by theta besides, (q,) further variance."""
+class _Residuals:
+    """Residuals r (q,), their derivatives by the k means and by theta besides, and variance (q,) besides the means'."""
 
     r: Vector
-    of_rests: Vector
-    of_theta: Vector
+    J_rests: Vector
+    J_theta: Vector
     variance: Vector
 
     @classmethod
-    def magnitude(cls, rests: _Rests, k: int, gravity: float) -> _Block:
-        of_rests = np.zeros((1, rests.a.size))
-        of_rests[0, 3 * k : 3 * k + 3] = rests.unit[k]
+    def magnitude(cls, rests: _Rests, k: int, gravity: float) -> _Residuals:
+        """Return |a| - g of rest k."""
+        J_rests = np.zeros((1, rests.a.size))
+        J_rests[0, 3 * k : 3 * k + 3] = rests.unit[k]
         r = np.array([rests.norm[k] - gravity])
-        return cls(r, of_rests, np.zeros((1, PARAMETERS)), np.array([FLOOR_MPS2**2]))
+        return cls(r, J_rests, np.zeros((1, PARAMETERS)), np.array([FLOOR_MPS2**2]))
 
     @classmethod
-    def miss(cls, rests: _Rests, k: int, flat: Flat, calibration: Calibration) -> _Block | None:
-        """Of the turn to rest k from the one before; None where the gyroscope did not see all of it."""
+    def direction(cls, rests: _Rests, k: int, flat: Flat, calibration: Calibration) -> _Residuals | None:
+        """Return the direction error of the turn to rest k; None if it clipped, or samples are missing."""
         recording = rests.recording
         (a, b), (c, d) = rests.runs[k - 1 : k + 1].tolist()
         first, last = (a + b) // 2, (c + d) // 2
@@ -175,37 +170,37 @@ class _Block:
         T = turned(-steps)
         here, there = rests.unit[k], T @ rests.unit[k - 1]
         across = np.linalg.svd(here[None])[2][1:]  # (2, 3) unit vectors at right angles to gravity
-        of_rests = np.zeros((2, rests.a.size))
+        J_rests = np.zeros((2, rests.a.size))
         for at, matrix in ((k - 1, -cross(here) @ T), (k, cross(there))):
             unit = rests.unit[at]
             of_unit = (np.eye(3) - np.outer(unit, unit)) / rests.norm[at]
-            of_rests[:, 3 * at : 3 * at + 3] = across @ matrix @ of_unit
-        of_theta = np.zeros((2, PARAMETERS))
-        of_theta[:, G] = -across @ _by_gyroscope(steps, rests.unit[k - 1], here)
+            J_rests[:, 3 * at : 3 * at + 3] = across @ matrix @ of_unit
+        J_theta = np.zeros((2, PARAMETERS))
+        J_theta[:, G] = -across @ _gyroscope_jacobian(steps, rests.unit[k - 1], here)
         noise = float(dt @ dt) * float(flat.Sigma_omega.mean()) + (BIAS_RAD_S * float(dt.sum())) ** 2
         noise += FLOOR_RAD**2 + (NONLINEAR * float(np.linalg.norm(steps, axis=1).sum())) ** 2
-        return cls(across @ np.cross(there, here), of_rests, of_theta, np.full(2, noise))
+        return cls(across @ np.cross(there, here), J_rests, J_theta, np.full(2, noise))
 
     @classmethod
-    def rate(cls, recording: Recording, run: list[int], flat: Flat, calibration: Calibration, rests: int) -> _Block:
-        """Of the first rest."""
+    def rate(cls, recording: Recording, run: list[int], flat: Flat, calibration: Calibration, rests: int) -> _Residuals:
+        """Return the mean rate of the first rest, calibrated."""
         gyr = recording.gyr[run[0] : run[1]]
-        of_theta = np.zeros((3, PARAMETERS))
-        of_theta[:, DELTA] = np.eye(3)
+        J_theta = np.zeros((3, PARAMETERS))
+        J_theta[:, DELTA] = np.eye(3)
         variance = flat.Sigma_omega / len(gyr) + BIAS_RAD_S**2
-        # a calibration without b_omega (a config blob of old) says nothing against a rate
+        # A calibration without b_omega (from an old calibration.bin) has no residual of the rate.
         r = gyr.mean(0) - calibration.b_omega
         known = np.isfinite(r)
-        return cls(r[known], np.zeros((int(known.sum()), 3 * rests)), of_theta[known], variance[known])
+        return cls(r[known], np.zeros((int(known.sum()), 3 * rests)), J_theta[known], variance[known])
 
 
-def of_accelerometer(a: Vector) -> Vector:
-    """(3, 12) of E s + beta by E, row-major, and beta."""
+def accelerometer_jacobian(a: Vector) -> Vector:
+    """Return the derivatives (3, 12) of E s + beta by E, row-major, and beta, at s = a."""
     return np.hstack([np.kron(np.eye(3), a), np.eye(3)])
 
 
-def _by_gyroscope(steps: Vector, before: Vector, here: Vector) -> Vector:
-    """(3, 6) derivatives of the miss by G, by central differences."""
+def _gyroscope_jacobian(steps: Vector, before: Vector, here: Vector) -> Vector:
+    """Return the derivatives (3, 6) of the direction error by G, by central differences."""
     columns, h = [], 1e-4
     for i, j in zip(*UPPER, strict=True):
         change = np.zeros((3, 3))

@@ -1,4 +1,4 @@
-"""What a check found, as numbers, as a document and in words."""
+"""Result of a check, as numbers, as a document and as text."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ REMOUNTED: Verdict = "remounted"
 ANOTHER_SENSOR: Verdict = "another sensor"
 CANNOT_BE_TOLD: Verdict = "cannot be told"
 EXIT_CODES: Mapping[Verdict, int] = {STILL_GOOD: 0, DRIFTED: 5, REMOUNTED: 5, ANOTHER_SENSOR: 5, CANNOT_BE_TOLD: 4}
-MENDED_BY_BIASES = ("nothing", "bias", "gyroscope's bias", "temperature")
+CORRECTED_BY_BIASES = ("nothing", "bias", "gyroscope's bias", "temperature")
 AXES = "xyz"
 
 
 @dataclass(frozen=True)
 class Change:
-    """By how much something changed: (3,) values of x, y, z with standard deviations, in `unit`."""
+    """Change of one quantity: values of x, y, z with standard deviations, in `unit`."""
 
     unit: str
     value: tuple[float, ...]
@@ -34,17 +34,12 @@ class Change:
 
     @classmethod
     def of(cls, unit: str, value: Vector, covariance: Vector, scale: float) -> Change:
-        """Of (3,) and (3, 3), times `scale`."""
+        """Return the change from a value (3,) and its covariance (3, 3), both times `scale`."""
         std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return cls(unit, tuple((scale * value).tolist()), tuple((scale * std).tolist()))
 
-    @property
-    def worst(self) -> int:
-        """The axis that changed most, in standard deviations."""
-        return int(np.argmax(np.abs(self.value) / np.maximum(self.std, 1e-12)))
-
-    def said(self) -> str:
-        """In words."""
+    def text(self) -> str:
+        """Return the values with standard deviations, without the unit."""
         return ", ".join(
             f"{axis} {value:+.2g} ± {std:.1g}" for axis, value, std in zip(AXES, self.value, self.std, strict=True)
         )
@@ -52,23 +47,21 @@ class Change:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CheckResult:  # noqa: PLW1641 - arrays have no hash either
-    """Whether a calibration is still right for its sensor.
+    """Result of `mpucal check`; two are equal if their check.json is the same.
 
     Attributes
     ----------
     verdict : still good, drifted, remounted, another sensor, or cannot be told.
     what : nothing, bias, scale, mount, gyroscope's bias, gyroscope's scale, temperature or another sensor.
-    message : the verdict in a sentence; remedy : what to do next, empty where nothing is.
-    changes : by name (bias, scale, mount, gyroscope's bias), what changed since, if that is what happened.
-    or_also : what else explains it nearly as well.
-    probability : how often a sensor to which nothing happened shows as much; None where it was not computed.
-    log_odds : logarithm of the evidence of each hypothesis against nothing.
-    temperature_change_c : since the calibration; None: not known. temperature_explains : whether that, by b_a(T) or
-        the data sheet, accounts for what was seen; None where it is not known or nothing happened.
-    orientations : how many were seen, 20 deg apart. seconds : how long the recording is.
-    theta : (21,), covariance : (21, 21), the estimate behind it, see `mpucal.recheck.observed`; None: there is none.
-
-    Results are equal whose check.json is the same.
+    message : the verdict in a sentence. remedy : what to do next; empty if nothing is to be done.
+    changes : by name (bias, scale, mount, gyroscope's bias, gyroscope's scale), estimated for this hypothesis.
+    or_also : hypotheses that explain the observations nearly as well.
+    probability : share of unchanged sensors that show as much; None where it was not computed.
+    log_odds : log odds of each hypothesis against "nothing".
+    temperature_change_c : since the calibration; None: not known. temperature_explains : True if that explains the
+        observations, by b_a(T) or the data sheet; None where it is not known or nothing changed.
+    orientations : number of orientations seen, 20 deg apart. seconds : length of the recording.
+    theta : (21,), covariance : (21, 21), the estimate, see `mpucal.recheck.observed`; None: there is none.
     """
 
     verdict: Verdict
@@ -94,23 +87,23 @@ class CheckResult:  # noqa: PLW1641 - arrays have no hash either
 
     @property
     def exit_code(self) -> int:
-        """Of `mpucal check`: 0 still good, 5 changed, 4 cannot be told."""
+        """Exit code of `mpucal check`: 0 still good, 5 changed, 4 cannot be told."""
         return EXIT_CODES[self.verdict]
 
     @property
     def only_biases(self) -> bool:
-        """Whether new biases mend what happened, or nothing did."""
-        return self.verdict in (STILL_GOOD, DRIFTED) and self.what in MENDED_BY_BIASES
+        """True if new biases are all that the calibration needs, or nothing is."""
+        return self.verdict in (STILL_GOOD, DRIFTED) and self.what in CORRECTED_BY_BIASES
 
     def document(self) -> dict[str, Any]:
-        """The content of check.json, in JSON's own types."""
+        """Return the content of check.json, in JSON's own types."""
         left_out = ("theta", "covariance", "changes")
         values = {key: value for key, value in vars(self).items() if key not in left_out}
         changes = {name: asdict(change) for name, change in (self.changes or {}).items()}
         return {"format": FORMAT, "version": VERSION, **values, "or_also": list(self.or_also), "changes": changes}
 
     def page(self) -> str:
-        """What `mpucal check` prints."""
+        """Return the text that `mpucal check` prints."""
         lines = [f"{self.verdict[0].upper()}{self.verdict[1:]}: {self.message}."]
         lines += [f"To do: {self.remedy}."] if self.remedy else []
         lines += ["", *(_row(name, change) for name, change in self.changes.items())] if self.changes else []
@@ -121,7 +114,7 @@ class CheckResult:  # noqa: PLW1641 - arrays have no hash either
 
 
 def changes_of(calibration: Calibration, theta: Vector, covariance: Vector) -> dict[str, Change]:
-    """Bias [mg], scale factor [%], mount [deg] and the gyroscope's bias [deg/s], of theta (21,) and its covariance."""
+    """Return the changes by theta (21,) and its covariance: bias [mg], scale factors [%], mount [deg], ..."""
     D, degrees = calibration.D, float(np.degrees(1.0))
     to_turn = np.zeros((3, 9))
     for axis, (i, j) in enumerate(((2, 1), (0, 2), (1, 0))):
@@ -139,4 +132,4 @@ def changes_of(calibration: Calibration, theta: Vector, covariance: Vector) -> d
 
 
 def _row(name: str, change: Change) -> str:
-    return f"  {f'{name}, {change.unit}':<26}{change.said()}"
+    return f"  {f'{name}, {change.unit}':<26}{change.text()}"

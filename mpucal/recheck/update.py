@@ -1,4 +1,4 @@
-"""A calibration whose biases moved: D and K kept, b_a and b_omega by what was known and what a check saw, together."""
+"""Update of a calibration's biases: b_a and b_omega from the calibration and a check together; D and K stay."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from ..result.calibration import Calibration
 from ..result.correction import correction
 from ..result.correlation import NAMES, correlation_of, standard_deviations
 from .drift import to_theta
-from .observed import BETA, DELTA, changed
+from .observed import BETA, DELTA, apply_errors
 from .outcome import CheckResult
 
 HISTORY = "updated_from"
 
 
-def updated(calibration: Calibration, result: CheckResult, recording: Recording, created: str) -> Calibration:
-    """The same calibration with the biases that a check found.
+def update_biases(calibration: Calibration, result: CheckResult, recording: Recording, created: str) -> Calibration:
+    """Return the calibration with the biases that a check estimated.
 
     Parameters
     ----------
@@ -28,17 +28,17 @@ def updated(calibration: Calibration, result: CheckResult, recording: Recording,
 
     Returns
     -------
-    Calibration : `extra["updated_from"]` holds what each earlier one said of the biases, the oldest first. Unless
-        b_a(T) is known, it is one of the check's temperature.
+    Calibration : `extra["updated_from"]` holds the biases of each earlier one, the oldest first. Unless b_a(T) is
+        known, its temperature is that of the check.
 
     Raises
     ------
-    RefusedError : more than the biases has changed, or it could not be told.
+    RefusedError : more than the biases has changed, or the check could not tell.
     """
     if result.theta is None or result.covariance is None or not result.only_biases:
         raise RefusedError(f"no calibration was updated: {result.message}", result.remedy)
     ready = correction(calibration, recording.sensor, recording.autopilot).calibration
-    after = changed(ready, result.theta)
+    after = apply_errors(ready, result.theta)
     T_0, change_c = ready.sensor.temperature_c, result.temperature_change_c
     T = T_0 if T_0 is None or change_c is None or ready.follows_temperature else T_0 + change_c
     errors = np.linalg.inv(to_theta(ready))

@@ -1,7 +1,7 @@
-"""Whether rests in ordinary use contradict a calibration: their magnitudes and rates, one rest at a time, for days.
+"""Monitor of a calibration in ordinary use: magnitudes and rates of rests, for days, against the calibration.
 
-A rest shows |a| - g, and the mean rate; nothing carries gravity from one rest to the next over hours, so that neither a
-mount nor a gyroscope's scale factor is seen. A rest may also be none: a vehicle that brakes evenly is as still.
+A rest shows |a| - g and the mean rate. Gravity is not carried from one rest to the next over hours, so that neither a
+mount nor a gyroscope's scale factor is observed. Some rests are not rests: a vehicle that brakes evenly looks as still.
 Therefore no single rest decides.
 """
 
@@ -20,15 +20,15 @@ from ..rests.stillness import Detector, Still
 from ..rests.windows import Window, Windows
 from ..result.calibration import Calibration
 from . import drift
-from .hypotheses import NOTHING, weigh
-from .observed import BETA, DELTA, PARAMETERS, Observed, of_accelerometer
+from .hypotheses import NOTHING, compare_hypotheses
+from .observed import BETA, DELTA, PARAMETERS, Observations, accelerometer_jacobian
 
 BLOCK_S = 0.5
-# of a rest: so long at least, and at most: a board that lies for hours rests many times
+# Blocks of a rest, at least and at most: a board that lies for hours gives many rests.
 LEAST_BLOCKS, MOST_BLOCKS = 5, 21
-# the last rests, of which this many at least are needed
+# Number of the last rests that are compared, and the least number that is needed.
 RESTS, LEAST_RESTS = 16, 4
-# days of rests are looked at one by one: each may err by chance less often than a check does
+# Days of rests are compared one by one: each comparison must give fewer false alarms than a check.
 FALSE_ALARMS = 2e-4
 DAY_S = 86400.0
 TO_DO = "see what `mpucal check` says"
@@ -47,7 +47,7 @@ class _Rest:
 
 @dataclass(frozen=True)
 class Contradiction:
-    """What rests say against a calibration, of the accelerometer or the gyroscope, at `t_s` of the samples."""
+    """Contradiction between rests and a calibration, in one `sensor`, at `t_s` of the samples."""
 
     t_s: float
     sensor: str
@@ -58,12 +58,12 @@ class Contradiction:
         return f"{self.what}: {self.do}"
 
 
-class Watch:
-    """Looks at calibrated samples as they come, in constant memory; each sensor's finding is told once.
+class DriftMonitor:
+    """Monitor of calibrated samples, in constant memory; it reports each sensor once.
 
     Parameters
     ----------
-    calibration : ready for these samples. days : since it was made, at the first of them.
+    calibration : the one that was applied. days : its age at the first sample.
     """
 
     def __init__(self, calibration: Calibration, days: float) -> None:
@@ -74,31 +74,29 @@ class Watch:
         self._windows, self._stillness, self._run = Windows(BLOCK_S), Detector(QUIET), 0
         self._blocks: list[Vector] = []
         self._rests: deque[_Rest] = deque(maxlen=RESTS)
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
     def add(self, calibrated: Samples) -> list[Contradiction]:
-        """What these samples bring to light."""
+        """Return the contradictions that these samples complete."""
         if len(calibrated):
             self._t_s = float(calibrated.t[-1])
             self._first_s = self._t_s if self._first_s is None else self._first_s
             self._temperature_c = float(calibrated.temperature_c[-1])
-        return [each for window in self._windows.add(calibrated) for each in self._look(window)]
+        return [each for window in self._windows.add(calibrated) for each in self._add_window(window)]
 
-    def _look(self, window: Window) -> list[Contradiction]:
-        """Half a second more."""
+    def _add_window(self, window: Window) -> list[Contradiction]:
         sight = self._stillness.add(window)
-        found = [] if isinstance(sight, Still) and sight.run == self._run else self._over()
+        found = [] if isinstance(sight, Still) and sight.run == self._run else self._end_rest()
         if isinstance(sight, Still):
             self._run = sight.run
             within = float(window.acc_sd.max()) ** 2 / window.count
             self._blocks.append(np.concatenate([window.acc, window.gyr, [self._temperature_c, within]]))
         if len(self._blocks) == MOST_BLOCKS:
-            found += self._over()
+            found += self._end_rest()
         return found
 
-    def _over(self) -> list[Contradiction]:
-        """A rest is over."""
-        # a hand settles, and leaves early
+    def _end_rest(self) -> list[Contradiction]:
+        # At the first and the last block a hand may still, or already, move.
         blocks, self._blocks = np.array(self._blocks[1:-1]), []
         if len(blocks) < LEAST_BLOCKS - 2:
             return []
@@ -107,49 +105,49 @@ class Watch:
         a_variance = max(float(between[:3].mean()), within) / n + FLOOR_MPS2**2
         w_variance = float(between[3:6].mean()) / n + BIAS_RAD_S**2
         self._rests.append(_Rest(blocks[:, :3].mean(0), a_variance, blocks[:, 3:6].mean(0), w_variance, blocks[-1, 6]))
-        return self._judged(list(self._rests))
+        return self._compare(list(self._rests))
 
-    def _judged(self, rests: list[_Rest]) -> list[Contradiction]:
+    def _compare(self, rests: list[_Rest]) -> list[Contradiction]:
+        """Return the contradiction of these rests, if it is beyond chance and does not rest on a single one."""
         if len(rests) < LEAST_RESTS:
             return []
         T, T_0 = rests[-1].temperature_c, self._calibration.sensor.temperature_c
         change_c = None if T_0 is None or math.isnan(T) else T - T_0
         days = self._days + (self._t_s - (self._first_s or 0.0)) / DAY_S
         nothing = drift.own_uncertainty(self._calibration) + drift.ageing(self._calibration, days, change_c)
-        happenings = drift.happenings(self._calibration, change_c)
-        observed = self._observed(rests)
-        weighed = weigh(observed, nothing, happenings)
-        what = weighed.told
-        # few orientations do not tell a bias from a scale factor
+        hypotheses = drift.hypotheses(self._calibration, change_c)
+        comparison = compare_hypotheses(self._observe(rests), nothing, hypotheses)
+        what = comparison.likeliest
+        # Few orientations cannot tell a bias from a scale factor, so only the sensor is named.
         sensor = "gyroscope" if what.startswith("gyroscope") else "accelerometer"
-        if what == NOTHING or sensor in self._told or weighed.probability > FALSE_ALARMS:
+        if what == NOTHING or sensor in self._reported or comparison.probability > FALSE_ALARMS:
             return []
         for k in range(len(rests)):
-            without = weigh(self._observed(rests[:k] + rests[k + 1 :]), nothing, happenings)
-            if without.told == NOTHING:
+            without = compare_hypotheses(self._observe(rests[:k] + rests[k + 1 :]), nothing, hypotheses)
+            if without.likeliest == NOTHING:
                 return []
-        self._told.add(sensor)
-        said = f"the last {len(rests)} rests contradict the calibration ({self._off(rests, sensor)})"
-        return [Contradiction(self._t_s, sensor, said)]
+        self._reported.add(sensor)
+        what = f"the last {len(rests)} rests contradict the calibration ({self._error_text(rests, sensor)})"
+        return [Contradiction(self._t_s, sensor, what)]
 
-    def _off(self, rests: list[_Rest], sensor: str) -> str:
+    def _error_text(self, rests: list[_Rest], sensor: str) -> str:
         if sensor == "gyroscope":
             rate = math.degrees(max(float(np.linalg.norm(rest.w)) for rest in rests))
-            return f"it turns by up to {rate:.2g} deg/s"
+            return f"the rate is up to {rate:.2g} deg/s"
         off = max((float(np.linalg.norm(rest.a)) - self._gravity for rest in rests), key=abs)
-        return f"|a| has an error of up to {off / drift.MG:+.2g} mg"
+        return f"|a| is wrong by up to {off / drift.MG:+.2g} mg"
 
-    def _observed(self, rests: list[_Rest]) -> Observed:
+    def _observe(self, rests: list[_Rest]) -> Observations:
         k, gyro = len(rests), bool(np.isfinite([rest.w for rest in rests]).all())
         a = np.array([rest.a for rest in rests])
         length = np.linalg.norm(a, axis=1)
         r, variance = length - self._gravity, [rest.a_variance for rest in rests]
         J = np.zeros((k, PARAMETERS))
-        J[:, : BETA.stop] = [one / norm @ of_accelerometer(one) for one, norm in zip(a, length, strict=True)]
-        # a calibration without b_omega says nothing against a rate
+        J[:, : BETA.stop] = [one / norm @ accelerometer_jacobian(one) for one, norm in zip(a, length, strict=True)]
+        # A calibration without b_omega has no residual of the rate.
         if gyro and np.isfinite(self._calibration.b_omega).all():
             of_rates = np.zeros((3 * k, PARAMETERS))
             of_rates[:, DELTA] = np.tile(np.eye(3), (k, 1))
             r, J = np.concatenate([r, *(rest.w for rest in rests)]), np.vstack([J, of_rates])
             variance += [rest.w_variance for rest in rests for _ in range(3)]
-        return Observed(r, J, np.diag(variance), -a / length[:, None], None, 0.0)
+        return Observations(r, J, np.diag(variance), -a / length[:, None], None, 0.0)

@@ -110,7 +110,7 @@ def test_rests_that_contradict_the_calibration_are_told_once(mpucal, session):
     assert "contradict" not in mpucal(*words, right).err
     told = mpucal(*words, "wrong.json")
     assert told.code == 0
-    assert told.err.count("rests contradict the calibration (|a| has an error of up to") == 1
+    assert told.err.count("rests contradict the calibration (|a| is wrong by up to") == 1
     assert told.out.count("\n") > 1450
     (event,) = map(json.loads, mpucal(*words, "wrong.json", "--json-events").err.splitlines())
     assert (event["event"], event["code"]) == ("caution", "accelerometer_contradicted")

@@ -25,7 +25,7 @@ from mpucal.calibration.rotation import rotation
 from mpucal.calibration.verification import BIAS_RAD_S, FLOOR_MPS2, FLOOR_RAD
 from mpucal.data import Sensor, Vector
 from mpucal.recheck import check, drift
-from mpucal.recheck.observed import BETA, NONLINEAR, changed
+from mpucal.recheck.observed import BETA, NONLINEAR, apply_errors
 from mpucal.simulated.sensor import SensorTruth
 from tools.lab.scenarios.course import direction
 from tools.lab.scenarios.motions import CHECK_S, FLAT_S
@@ -82,7 +82,7 @@ def happened(truth: SensorTruth, event: str, rng: np.random.Generator) -> tuple[
 
 def aged_by(truth: SensorTruth, theta: Vector) -> SensorTruth:
     """The sensor after a change theta (21,), see mpucal.recheck.observed."""
-    after = changed(mpucal.Calibration(truth.D, truth.b_a, K=truth.K, b_omega=truth.b_omega), theta)
+    after = apply_errors(mpucal.Calibration(truth.D, truth.b_a, K=truth.K, b_omega=truth.b_omega), theta)
     return replace(truth, D=after.D, b_a=after.b_a, K=after.K, b_omega=after.b_omega)
 
 

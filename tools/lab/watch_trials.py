@@ -18,7 +18,7 @@ import numpy as np
 
 from mpucal.calibration.verification import FLOOR_MPS2
 from mpucal.data import Recording
-from mpucal.recheck.watch import Watch
+from mpucal.recheck.watch import DriftMonitor
 from mpucal.simulated.sensor import SensorTruth
 from tools.lab.scenarios.recordings import hand_scenario
 
@@ -51,7 +51,7 @@ def of_use(item: tuple[str, int], hours: float) -> Run | None:
     if calibration.verdict == "refused":
         return None
     after, _ = happened(aged, event, of_event)
-    watch = Watch(calibration, DAYS)
+    watch = DriftMonitor(calibration, DAYS)
     told: list[tuple[str, float]] = []
     for samples in _minutes(after, of_errors, hours):
         acc, gyr = calibration.apply(samples.acc, samples.gyr)

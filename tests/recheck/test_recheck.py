@@ -1,5 +1,6 @@
-"""The hypothesis test against simulated truth, and its parts against finite differences and chance."""
+"""The check and the monitor against simulated truth, and their parts against finite differences and chance."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +11,10 @@ from mpucal.calibration.rotation import rotation
 from mpucal.data import Sensor
 from mpucal.errors import RefusedError
 from mpucal.recheck import drift
-from mpucal.recheck.hypotheses import NOTHING, weigh
-from mpucal.recheck.observed import changed, observe
-from mpucal.recheck.update import updated
+from mpucal.recheck.hypotheses import NOTHING, compare_hypotheses
+from mpucal.recheck.observed import apply_errors, observe
+from mpucal.recheck.update import update_biases
+from mpucal.recheck.watch import LEAST_RESTS, RESTS, DriftMonitor
 from mpucal.result.correlation import NAMES
 from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
 from tools.lab.scenarios.sensors import hand_sensor
@@ -50,11 +52,11 @@ HAPPENED = {
 
 
 @pytest.mark.parametrize("name", HAPPENED)
-def test_it_tells_what_happened(name):
+def test_a_check_names_the_change(name):
     truth, verdict, what = HAPPENED[name]
-    told = mpucal.check(CALIBRATION, shown(truth), days=1.0)
-    assert (told.verdict, told.what) == (verdict, what)
-    assert verdict in told.page().lower()
+    result = mpucal.check(CALIBRATION, shown(truth), days=1.0)
+    assert (result.verdict, result.what) == (verdict, what)
+    assert verdict in result.page().lower()
 
 
 def test_a_new_bias_is_estimated_and_its_history_kept():
@@ -63,11 +65,11 @@ def test_a_new_bias_is_estimated_and_its_history_kept():
     told = mpucal.check(CALIBRATION, recording, days=1.0)
     bias = told.changes["bias"]
     assert np.all(np.abs(np.array(bias.value) - [0, 10, 0]) < 4 * np.array(bias.std))
-    after = updated(CALIBRATION, told, recording, "2026-01-02T00:00:00+00:00")
+    after = update_biases(CALIBRATION, told, recording, "2026-01-02T00:00:00+00:00")
     np.testing.assert_array_equal(after.D, CALIBRATION.D)
     np.testing.assert_allclose(after.b_a, truth.b_a, atol=4 * after.b_a_std.max())
     assert mpucal.check(after, shown(truth, seed=8), days=0.0).verdict == "still good"
-    again = updated(after, mpucal.check(after, recording), recording, "2026-01-03T00:00:00+00:00")
+    again = update_biases(after, mpucal.check(after, recording), recording, "2026-01-03T00:00:00+00:00")
     history = mpucal.Calibration.from_document(again.document()).extra["updated_from"]
     assert [entry["found"] for entry in history] == ["drifted", "still good"]
     np.testing.assert_array_equal(history[0]["b_a"], CALIBRATION.b_a)
@@ -76,7 +78,7 @@ def test_a_new_bias_is_estimated_and_its_history_kept():
 def test_a_turned_mount_is_not_mended_by_biases():
     recording = shown(HAPPENED["mount"][0])
     with pytest.raises(RefusedError):
-        updated(CALIBRATION, mpucal.check(CALIBRATION, recording, days=1.0), recording, "")
+        update_biases(CALIBRATION, mpucal.check(CALIBRATION, recording, days=1.0), recording, "")
 
 
 def test_a_change_of_temperature_explains_what_the_data_sheet_allows_and_no_more():
@@ -138,8 +140,8 @@ def test_the_observations_are_linear_in_what_is_wrong():
     for i in range(21):
         theta = np.zeros(21)
         theta[i] = 1e-4 * rng.choice([-1.0, 1.0])
-        # a calibration that is wrong by theta sees a sensor that is right the other way round
-        after = observe(recording, changed(CALIBRATION, -theta))
+        # A calibration that is wrong by theta sees a right sensor as wrong by -theta.
+        after = observe(recording, apply_errors(CALIBRATION, -theta))
         np.testing.assert_allclose(after.r - before.r, before.J @ theta, atol=2e-6, err_msg=str(i))
 
 
@@ -147,12 +149,67 @@ def test_an_unchanged_sensor_is_called_changed_as_often_as_designed():
     recording = shown(TRUTH)
     observed = observe(recording, CALIBRATION)
     nothing = drift.own_uncertainty(CALIBRATION) + drift.ageing(CALIBRATION, 1.0, 0.0)
-    happenings = drift.happenings(CALIBRATION, 0.0)
+    hypotheses = drift.hypotheses(CALIBRATION, 0.0)
     S = observed.J @ nothing @ observed.J.T + observed.R
     n = 60
     draws = np.random.default_rng(5).multivariate_normal(np.zeros(len(S)), S, n)
-    found = [weigh(replace(observed, r=r), nothing, happenings) for r in draws]
-    assert sum(w.told != NOTHING for w in found) <= 3
+    found = [compare_hypotheses(replace(observed, r=r), nothing, hypotheses) for r in draws]
+    assert sum(w.likeliest != NOTHING for w in found) <= 3
     p = np.sort([w.probability for w in found])
     # Kolmogorov and Smirnov's statistic, 1.63 at 1 %
     assert np.sqrt(n) * np.abs(p - (np.arange(n) + 0.5) / n).max() < 1.63
+
+
+def monitored(truth, seed=1, spoil=lambda recording: recording):
+    """Return the contradictions in seven poses in a trembling hand, and the monitor; parts are 0.25 s long."""
+    recording = spoil(hand_scenario(seed, "pose7", tremble=True, rate_hz=100.0, sensor=truth, truth_hz=400).recording)
+    recording = replace(recording, temperature_c=np.full(len(recording), 25.0))
+    acc, gyr = CALIBRATION.apply(recording.acc, recording.gyr)
+    monitor, said = DriftMonitor(CALIBRATION, 1.0), []
+    calibrated = replace(recording, acc=acc, gyr=gyr)
+    for first in range(0, len(recording), 25):
+        said += monitor.add(calibrated.part(first, first + 25))
+    return said, monitor
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_monitor_is_silent_about_a_right_calibration(seed):
+    said, monitor = monitored(TRUTH, seed)
+    assert not said
+    assert len(monitor._rests) > LEAST_RESTS
+
+
+def test_a_monitor_reports_a_bias_that_moved_once():
+    said, _ = monitored(replace(TRUTH, b_a=TRUTH.b_a + np.array([0.0, 12.0, 0.0]) * drift.MG))
+    assert len(said) == 1
+    assert abs(float(said[0].what.split("up to ")[1].split(" mg")[0])) == pytest.approx(12.0, abs=4.0)
+
+
+def test_a_gyroscope_that_moved_is_monitored():
+    said, _ = monitored(replace(TRUTH, b_omega=TRUTH.b_omega + np.radians([0.0, 3.0, 0.0])))
+    assert "the rate is up to 3" in said[0].what
+
+
+def test_a_vehicle_that_brakes_evenly_decides_nothing():
+    def braked(recording):
+        acc = recording.acc.copy()
+        acc[(recording.t > 15.0) & (recording.t < 18.0), 0] += 0.8
+        return replace(recording, acc=acc)
+
+    assert not monitored(TRUTH, spoil=braked)[0]
+
+
+def test_memory_of_a_monitor_does_not_grow_while_the_board_lies():
+    recording = hand_scenario(0, "pose12", rate_hz=100.0, sensor=TRUTH, truth_hz=400).recording.part(0, 900)
+    acc, gyr = CALIBRATION.apply(recording.acc, recording.gyr)
+    lying = replace(recording, acc=acc, gyr=gyr)
+    monitor, weights = DriftMonitor(CALIBRATION, 1.0), []
+    tracemalloc.start()
+    try:
+        for k in range(30):
+            assert not monitor.add(replace(lying, t=lying.t + 9.0 * k))
+            weights.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert len(monitor._rests) == RESTS
+    assert max(weights[20:]) < max(weights[:20]) + 300_000
