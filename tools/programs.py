@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import ast
+import os
 import sys
 from importlib import import_module
 from pathlib import Path
+
+from mpucal.session.threads import ONE_THREAD
 
 
 def run(folder: str) -> None:
@@ -14,6 +17,8 @@ def run(folder: str) -> None:
     Raises:
         SystemExit: by the program; with a sentence where there is none of that name.
     """
+    # as mpucal does, before NumPy loads
+    os.environ.update(ONE_THREAD)
     programs = {path.stem: path for path in sorted((Path(__file__).parent / folder).glob("*.py")) if _runs(path)}
     match sys.argv[1:]:
         case [name, *arguments] if name in programs:
@@ -27,4 +32,4 @@ def run(folder: str) -> None:
 
 
 def _runs(path: Path) -> bool:
-    return "\ndef main(" in path.read_text(encoding="utf-8")
+    return any(text in path.read_text(encoding="utf-8") for text in ("\ndef main(", "\nmain = "))

@@ -10,15 +10,14 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 from unittest.mock import patch
 
-from mpucal.disk import growing
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.parameters.encoding import from_wire
 from mpucal.mavlink.transport import ReceivedBytes
 from mpucal.session import results
 from mpucal.simulated.vehicle import SimulatedVehicle
 from mpucal.simulated.vehicle.transport import ADDRESS, SimulatedTransport
+from tools.processes import quick
 
-from ..lab.campaign import quick_polls
 from .hostile_packets import Attacker
 
 STRANGER, FORGED, SIGNED = "a stranger", "the address forged", "against signing"
@@ -130,8 +129,7 @@ def hostile(attack: Attack) -> Iterator[None]:
     HostileTransport.attack = attack
     with (
         patch("mpucal.simulated.vehicle.source.SimulatedTransport", HostileTransport),
-        patch.object(growing.Syncing, "__init__", lambda self, _file: setattr(self, "close", lambda: None)),
         patch.object(results, "report", lambda _: None),
-        quick_polls(),
+        quick(),
     ):
         yield

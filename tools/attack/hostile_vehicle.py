@@ -31,23 +31,17 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mpucal.session.threads import ONE_THREAD
-
-# before NumPy loads
-os.environ.update(ONE_THREAD)
-
 import numpy as np
 
-from mpucal.__main__ import _keep_streams, run
+from mpucal.__main__ import run
 from mpucal.errors import MpucalError
 from mpucal.mavlink.parameters.write import DETOUR
 from mpucal.mavlink.tlog import read_tlog
 from mpucal.result.calibration import Calibration
+from tools.lab.campaign_judge import false, partial_files
+from tools.lab.judge import judged
+from tools.processes import CODES, Died, Ended, Tell, become, forked, ready
 
-from ..lab.campaign import ready
-from ..lab.campaign_judge import CODES, _parts, false
-from ..lab.forked import Died, Tell, forked
-from ..lab.judge import judged
 from .hostile_link import ATTACKERS, FORGED, MOST_HEARD, SIGNED, STRANGER, Attack, HostileTransport, hostile
 from .hostile_packets import KINDS
 
@@ -77,41 +71,28 @@ def commands(attack: Attack, clean: Path | None) -> Iterator[tuple[str, list[str
 def suffer(attack: Attack, clean: Path | None, place: Path) -> dict[str, Any]:
     """Run the commands here, in this process, and judge them."""
     place.mkdir(parents=True)
-    os.chdir(place)
+    become(place, place / "said")
     Path("key").write_bytes(KEY)
     os.environ["XDG_STATE_HOME"] = str(place / "state")
-    said = os.open("said", os.O_RDWR | os.O_CREAT | os.O_APPEND)
-    os.dup2(said, 1)
-    os.dup2(said, 2)
-    _keep_streams()
-    codes, wrong, lasts, unasked = [], [], [], 0
+    codes, wrong, ends, unasked = [], [], [], 0
+    allowed = (*CODES, NO_VEHICLE) if attack.early else CODES
     with hostile(attack):
         for file, words in commands(attack, clean):
             attack.draw(words[0])
-            codes.append(run(words))
-            text = Path("said").read_text("utf-8", "replace")
-            lasts.append((text.strip().splitlines() or [""])[-1])
+            done = Ended(run(words), Path("said").read_text("utf-8", "replace"))
+            codes.append(done.code)
+            ends += [f"exit {done.code}: {NUMBER.sub('N', done.last)}"] if done.code else []
             extra = not_asked(attack.sets, Path(file))
             unasked += len(extra)
             wrong += [f"{words[0]} set {extra[0]}"] if extra else []
-            wrong += unfit(attack, codes[-1], text, lasts[-1])
-    wrong += _parts(Path("out"), codes[0])
+            wrong += done.wrong(allowed)
+    wrong += partial_files(Path("out"), codes[0])
     if attack.attacker == SIGNED or (attack.attacker == STRANGER and not attack.early):
         undisturbed = clean is None or same(Path("out/calibration.json"), clean)
         wrong += [f"not as without: exit codes {codes}"] if any(codes) or not undisturbed else []
     fooled, lies = judge_samples(attack)
-    ends = [f"exit {code}: {NUMBER.sub('N', last)}" for code, last in zip(codes, lasts, strict=True) if code]
     wrong += lies
     return {"sent": attack.sent, "codes": codes, "wrong": wrong, "unasked": unasked, "fooled": fooled, "ends": ends}
-
-
-def unfit(attack: Attack, code: int, text: str, last: str) -> list[str]:
-    """What is wrong with how a command ended."""
-    if "Traceback" in text:
-        return [f"a trace ({last[:120]})"]
-    if code not in CODES and not (code == NO_VEHICLE and attack.early):
-        return [f"exit code {code} ({last[:120]})"]
-    return [f"no sentence ({last[:120]})"] if code not in (0, 5) and not last.startswith("mpucal: ") else []
 
 
 def judge_samples(attack: Attack) -> tuple[int, list[str]]:

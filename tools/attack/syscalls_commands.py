@@ -24,8 +24,7 @@ from mpucal.result.journal import Journal
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.vehicle.store import ParameterStore
 from mpucal.sinks.autopilot import CORRECTION
-
-from ..lab.campaign import quick_polls, ready
+from tools.processes import quick, ready
 
 SIM, VEHICLE = "sim:seed=3,chip=mpu6500,temperature_c=", "sim:seed=7,imus=1"
 QUICK = ["--target", "quick", "--yes"]
@@ -172,7 +171,7 @@ def _child(words: Sequence[str], folder: Path, failing: Failing, said: Path, tel
     for handle in (1, 2):
         os.dup2(os.open(said if handle == 2 else os.devnull, os.O_RDWR | os.O_CREAT | os.O_TRUNC), handle)
     _keep_streams()
-    with devices.watched(shim), quick_polls():
+    with devices.watched(shim), quick(sync=True):
         shim.syscalls_arm(str(folder).encode(), failing.call, failing.error, failing.log)
         shim.allocations_arm(failing.least, failing.allocation, failing.since)
         code = run(words)

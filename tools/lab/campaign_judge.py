@@ -1,4 +1,4 @@
-"""How a struck session or recording ended, judged against what is true of its sensor; and the table of them all."""
+"""The judge of struck sessions and recordings, against the truth of their sensor; and the table of them all."""
 
 from __future__ import annotations
 
@@ -13,73 +13,84 @@ from mpucal.errors import MpucalError
 from mpucal.files.folder import captures_in
 from mpucal.result.blob import Blob, BlobError
 from mpucal.result.calibration import GOOD, REFUSED, USABLE, Calibration
+from tools.processes import CODES, Ended
 
 from .judge import MOST_CLAIMS, Judgement
 from .judge import judged as judged_against
+from .table import Column, count, over, show, table
 
-# what is false by the lab's judge is wrong only where it is farther from the truth than what matters [m/s^2]
+# a verdict that is false by the lab's judge is wrong only where it is farther from the truth than what matters [m/s^2]
 LEAST_ERROR = 0.1
-CODES = (0, 3, 4, 5, 6)
 WITH_RESULT = (0, 5, 6)
+FOLDER = "board"
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one ended.
+    """A session or recording that was struck, and judged.
 
     Attributes
     ----------
+    case : as --case takes it. world : its kind of world, or format. blows : what struck it.
     code : exit code; below 0: the signal that ended it; None: it hung. said : its last line.
     verdict : of the calibration that it left, if any. error : of a calibrated reading, rms over the sphere [m/s^2].
     z : that in units of what is claimed. wrong : what is wrong with it. recorded : a capture is there.
     """
 
-    code: int | None
-    said: str
+    case: str
+    world: str
+    blows: tuple[str, ...] = ()
+    wrong: tuple[str, ...] = ()
+    cpu_s: float = 0.0
+    code: int | None = None
+    said: str = ""
     verdict: str = ""
     error: float = 0.0
     z: float = 0.0
-    wrong: tuple[str, ...] = ()
     recorded: bool = False
 
+    def __str__(self) -> str:
+        """Return it in a few lines, with the command that repeats it where it was wrong."""
+        lines = [f"{self.world} {' '.join(self.blows) or 'no fault'}: exit {self.code} {self.verdict}"]
+        lines.append(f"    error {self.error} m/s^2, {self.z} claims; {self.said}")
+        again = f"python -m tools.lab campaign --case {self.case} --keep /tmp/struck"
+        return "\n".join([*lines, *(f"    WRONG {wrong}: {again}" for wrong in self.wrong)])
 
-def judged(place: Path, code: int | None, blows: Sequence[Any], world: Any) -> Outcome:
-    """A session that ran in `place` and left its files in `board`."""
-    said = (place / "err").read_text("utf-8", "replace")
-    names = {blow.name for blow in blows}
-    folder = place / "board"
-    wrong = []
-    if code is None:
-        wrong.append("it hung")
-    elif code not in CODES and not (code == -9 and "killed" in names):
-        wrong.append(f"exit code {code}")
-    if "Traceback" in said:
-        wrong.append("a trace")
-    last = (said.strip().splitlines() or [""])[-1]
-    if code not in (0, 5, -9) and "deaf" not in names and not last.startswith("mpucal: "):
-        wrong.append("no sentence")
+
+def judged(case: str, place: Path, done: Ended, blows: Sequence[Any], world: Any) -> Outcome:
+    """Judge a session that ran in `place` and left its files in `board`."""
+    names, folder = {blow.name for blow in blows}, place / FOLDER
+    # one that was killed, or whose stderr was full, says nothing
+    killed = (-9,) if "killed" in names else ()
+    silent = (*CODES, *killed) if "deaf" in names else (0, 5, *killed)
     document = folder / "calibration.json"
-    wrong += _unfit(code, document, names)
-    wrong += _parts(folder, code)
-    recorded = folder.exists() and bool(captures_in(folder))
+    wrong = [
+        *done.wrong((*CODES, *killed), silent),
+        *_unfit(done.code, document, names),
+        *partial_files(folder, done.code),
+    ]
+    known: dict[str, Any] = {"verdict": ""}
     try:
         calibration = Calibration.load(document)
     except MpucalError as error:
         wrong += [str(error)] if document.exists() else []
-        return Outcome(code, last, wrong=tuple(wrong), recorded=recorded)
-    judgement = judged_against(calibration, *world.truths(blows, folder))
-    wrong += false(judgement)
-    error, z = (0.0 if math.isnan(each) else each for each in (judgement.error, judgement.claims))
-    return Outcome(code, last, calibration.verdict, round(error, 4), round(z, 2), tuple(wrong), recorded)
+    else:
+        judgement = judged_against(calibration, *world.truths(blows, folder))
+        wrong += false(judgement)
+        error, z = (0.0 if math.isnan(each) else each for each in (judgement.error, judgement.claims))
+        known = {"verdict": calibration.verdict, "error": round(error, 4), "z": round(z, 2)}
+    recorded = folder.exists() and bool(captures_in(folder))
+    faults = tuple(map(str, blows))
+    return Outcome(case, world.kind, faults, tuple(wrong), done.cpu_s, done.code, done.last, **known, recorded=recorded)
 
 
 def false(judgement: Judgement) -> list[str]:
-    """Whether it promises what it does not hold."""
+    """Return what a calibration promises and does not hold."""
     return [f"called {judgement.verdict}"] if judgement.false and judgement.error > LEAST_ERROR else []
 
 
 def _unfit(code: int | None, document: Path, names: set[str]) -> list[str]:
-    """What the files say that the exit code does not."""
+    """Return what the files say that the exit code does not."""
     if code in WITH_RESULT and not document.exists():
         return [f"exit code {code} without calibration.json"]
     if not document.exists() or code == -9:
@@ -95,12 +106,10 @@ def _unfit(code: int | None, document: Path, names: set[str]) -> list[str]:
     return []
 
 
-def _parts(folder: Path, code: int | None) -> list[str]:
-    """Files that are not whole."""
+def partial_files(folder: Path, code: int | None) -> list[str]:
+    """Return the files of a session that are not whole."""
     found = []
-    if not folder.exists():
-        return found
-    for path in folder.iterdir():
+    for path in folder.iterdir() if folder.exists() else ():
         if path.name.startswith("."):
             found += [] if code == -9 else [f"{path.name} is left"]
         try:
@@ -118,20 +127,25 @@ def _parts(folder: Path, code: int | None) -> list[str]:
     return found
 
 
-def table(outcomes: Sequence[dict[str, Any]]) -> str:
-    """By kind of fault: how they ended, and the worst error of those that were not refused."""
-    kinds: dict[str, list[dict[str, Any]]] = {}
+def largest(name: str) -> Column:
+    """Return a column of the largest figure of those that were not refused."""
+    return lambda outcomes: over(name, max)([o for o in outcomes if o.verdict in MOST_CLAIMS]) or 0.0
+
+
+COLUMNS: dict[str, Column] = {
+    "all": len,
+    **{verdict: count("verdict", verdict) for verdict in (GOOD, USABLE, REFUSED)},
+    "ended": count("verdict", ""),
+    "worst m/s²": largest("error"),
+    "claims": largest("z"),
+    "wrong": count("wrong"),
+}
+
+
+def show_outcomes(outcomes: Sequence[Outcome]) -> None:
+    """Print by kind of fault, alone or among others, how they ended, and the worst error of those not refused."""
+    kinds: dict[tuple[str, str], list[Outcome]] = {}
     for outcome in outcomes:
-        for name in sorted({blow.partition("@")[0] for blow in outcome["blows"]}):
-            kinds.setdefault(f"{outcome['world']} {name}", []).append(outcome)
-    head = f"{'fault (alone or among others)':<32}{'all':>6}{'good':>7}{'usable':>7}{'refused':>8}{'ended':>7}"
-    lines = [f"{head}{'worst m/s^2':>13}{'claims':>8}{'wrong':>7}"]
-    for kind, some in sorted(kinds.items()):
-        counts = [sum(o.get("verdict") == verdict for o in some) for verdict in (GOOD, USABLE, REFUSED, "")]
-        promised = [o for o in some if o.get("verdict") in MOST_CLAIMS]
-        error, z = (max((o[key] for o in promised), default=0.0) for key in ("error", "z"))
-        wrong = sum(bool(o["wrong"]) for o in some)
-        good, usable, refused, ended = counts
-        row = f"{kind:<32}{len(some):>6}{good:>7}{usable:>7}{refused:>8}{ended:>7}{error:>13.3f}{z:>8.1f}{wrong:>7}"
-        lines.append(row)
-    return "\n".join(lines)
+        for name in {blow.partition("@")[0] for blow in outcome.blows}:
+            kinds.setdefault((outcome.world, name), []).append(outcome)
+    show(table(dict(sorted(kinds.items())), COLUMNS))

@@ -1,4 +1,4 @@
-"""Recordings whose bytes, bits, rows and values are damaged, calibrated: for tools/lab/campaign.py --recordings."""
+"""Recordings whose bytes, bits, rows and values are damaged, calibrated: tools/lab/campaign.py --recordings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,13 +21,12 @@ from mpucal import Recording
 from mpucal.__main__ import run
 from mpucal.files import load, open_writer
 from mpucal.files.rows import Rows
+from tools.processes import Died, Ended, Task, Tell, forked
 
-from .campaign_judge import judged
-from .forked import Died, Task, Tell, forked
+from .campaign_judge import FOLDER, Outcome, judged
 
 SECONDS, MEMORY = 120, 4 << 30
 MOST_BLOWS = 4
-DIED = {"world": "?", "blows": ["?"], "cpu_s": 0.0, "verdict": ""}
 SOURCES = {
     "mcap": ["--bus", "sim:seed=4", "--rate", "25"],
     "npz": ["--bus", "sim:seed=5,chip=mpu6500", "--rate", "50"],
@@ -38,6 +37,7 @@ SOURCES = {
 ORDER = (*("mcap", "npz", "csv") * 3, "tlog")
 ODD = (np.nan, np.inf, 1e300, -1e300, 5e-324, 0.0, -32768.0, 1e19)
 Rng = np.random.Generator
+Table = list[np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -51,80 +51,80 @@ class Damage:
 
 
 def bits(data: bytearray, rng: Rng) -> None:
-    """Up to 30 bits flip."""
+    """Flip up to 30 bits."""
     for at in rng.integers(0, len(data), rng.integers(1, 31)):
         data[at] ^= 1 << rng.integers(8)
 
 
 def some_bytes(data: bytearray, rng: Rng) -> None:
-    """Up to 20 bytes are others."""
+    """Replace up to 20 bytes."""
     for at in rng.integers(0, len(data), rng.integers(1, 21)):
         data[at] = rng.integers(256)
 
 
 def cut(data: bytearray, rng: Rng) -> None:
-    """The end is missing."""
+    """Cut the end off."""
     del data[rng.integers(len(data)) :]
 
 
 def hole(data: bytearray, rng: Rng) -> None:
-    """A page that never reached the disk."""
+    """Clear a page, as if it never reached the disk."""
     at = int(rng.integers(len(data)))
     size = min(4096, len(data) - at)
     data[at : at + size] = bytes(size)
 
 
 def moved(data: bytearray, rng: Rng) -> None:
-    """A run stands in another place."""
+    """Write a run of bytes to another place."""
     a, b = rng.integers(0, len(data), 2)
     size = int(rng.integers(1, 2000))
     data[a : a + size] = data[b : b + size]
 
 
-def lost(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
-    """A run of rows is missing."""
+def lost(rows: Table, rng: Rng) -> Table:
+    """Remove a run of rows."""
     at = rng.integers(len(rows))
     return rows[:at] + rows[at + rng.integers(1, 200) :]
 
 
-def twice(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
-    """A run of rows stands there again."""
+def twice(rows: Table, rng: Rng) -> Table:
+    """Repeat a run of rows."""
     at = rng.integers(len(rows))
     return rows[:at] + rows[max(0, at - rng.integers(1, 100)) :]
 
 
-def swapped(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
-    """Two rows change places."""
+def swapped(rows: Table, rng: Rng) -> Table:
+    """Swap two rows."""
     a, b = rng.integers(0, len(rows), 2)
     rows[a], rows[b] = rows[b], rows[a]
     return rows
 
 
-def odd(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
-    """Up to 5 values are none that a sensor gives."""
+def odd(rows: Table, rng: Rng) -> Table:
+    """Set up to 5 values to what no sensor gives."""
     for at in rng.integers(0, len(rows), rng.integers(1, 6)):
         rows[at][rng.integers(len(rows[at]))] = rng.choice(ODD)
     return rows
 
 
-def spikes(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
-    """Up to 20 values of one column are far off."""
+def spikes(rows: Table, rng: Rng) -> Table:
+    """Move up to 20 values of one column far off."""
     column, size = rng.integers(1, 7), 10.0 ** rng.uniform(-1, 2)
     for at in rng.integers(0, len(rows), rng.integers(1, 21)):
         rows[at][column] += size * rng.normal()
     return rows
 
 
-def stuck(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
-    """A column repeats itself for a while."""
+def stuck(rows: Table, rng: Rng) -> Table:
+    """Repeat a value of a column for a while."""
     column, at = rng.integers(1, 7), int(rng.integers(len(rows)))
     for row in rows[at : at + int(rng.integers(2, 400))]:
         row[column] = rows[at][column]
     return rows
 
 
-def shifted(rows: list[np.ndarray], rng: Rng) -> list[np.ndarray]:
-    """The clock jumps, in either direction."""
+def shifted(rows: Table, rng: Rng) -> Table:
+    """Have the clock jump, in either direction."""
     by_s = rng.normal() * 10.0 ** rng.uniform(-2, 4)
     for row in rows[rng.integers(len(rows)) :]:
         row[0] += by_s
@@ -136,7 +136,7 @@ OF_ROWS = (lost, twice, swapped, odd, spikes, stuck, shifted)
 
 
 def originals(place: Path) -> dict[str, tuple[Path, SimpleNamespace]]:
-    """A recording in each format, and what is true of its sensor."""
+    """Record in each format, and return the file and what is true of its sensor."""
     found = {}
     for suffix, source in SOURCES.items():
         folder = place / f"of_{suffix}"
@@ -147,7 +147,7 @@ def originals(place: Path) -> dict[str, tuple[Path, SimpleNamespace]]:
         path = next(path for path in folder.iterdir() if path.name.startswith("capture"))
         if suffix not in path.name:
             path = _written(load(path), folder / f"recording.{suffix}")
-        found[suffix] = path, SimpleNamespace(truths=lambda *_, true=true: true)
+        found[suffix] = path, SimpleNamespace(kind=suffix, truths=lambda *_, true=true: true)
     return found
 
 
@@ -160,7 +160,7 @@ def _written(recording: Recording, path: Path) -> Path:
 
 
 def damaged(path: Path, number: int) -> tuple[list[Damage], bytes]:
-    """The kinds of damage by its number, and the damaged file."""
+    """Return the kinds of damage by its number, and the damaged file."""
     rng = np.random.default_rng(number)
     kinds: list[Callable] = []
     data = bytearray(path.read_bytes())
@@ -194,36 +194,32 @@ def _file(suffix: str, rows: np.ndarray) -> bytes:
     return made.getvalue()
 
 
-def one(number: int, of: dict[str, tuple[Path, SimpleNamespace]], place: Path) -> dict:
-    """The outcome of one damaged recording."""
+def strike(number: int, of: dict[str, tuple[Path, SimpleNamespace]], place: Path) -> Outcome:
+    """Damage a recording, calibrate and judge it."""
     suffix = ORDER[number % len(ORDER)]
     path, truth = of[suffix]
     kinds, data = damaged(path, number)
-    board = place / "board"
     shutil.rmtree(place, ignore_errors=True)
-    board.mkdir(parents=True)
+    (place / FOLDER).mkdir(parents=True)
     file = place / f"struck.{suffix}"
     file.write_bytes(data)
     begun = time.process_time()
     with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
         code = run(["calibrate", str(file), "--json"])
     if out.getvalue():
-        (board / "calibration.json").write_text(out.getvalue())
-    (place / "err").write_text(err.getvalue())
-    outcome = judged(place, code, kinds, truth)
-    line = {"case": f"r{number}", "blows": list(map(str, kinds)), "world": suffix}
-    return {**line, "cpu_s": time.process_time() - begun, **asdict(outcome)}
+        (place / FOLDER / "calibration.json").write_text(out.getvalue())
+    return judged(f"r{number}", place, Ended(code, err.getvalue(), time.process_time() - begun), kinds, truth)
 
 
-def struck_recordings(first: int, count: int, jobs: int, place: Path) -> Iterator[dict]:
-    """The outcomes, as they come; who crashes or hangs is told by number, and the others go on."""
+def struck_recordings(first: int, count: int, jobs: int, place: Path) -> Iterator[Outcome]:
+    """Yield the outcomes, as they come; who crashes or hangs is told by number, and the others go on."""
     of = originals(place)
     left = [range(first + j, first + count, jobs) for j in range(jobs)]
     tasks: list[Task] = [partial(work, j, left[j], of, place) for j in range(jobs)]
     for task, told in forked(tasks, jobs):
         j = task.args[0]  # type: ignore[attr-defined]
         if isinstance(told, Died):
-            yield {**DIED, "case": f"r{left[j][0]}", "wrong": [f"died with {told.code}"]}
+            yield Outcome(f"r{left[j][0]}", "?", ("?",), (f"died with {told.code}",))
             tasks.append(partial(work, j, left[j][1:], of, place))
         elif isinstance(told, range):
             left[j] = told
@@ -239,4 +235,4 @@ def work(j: int, numbers: range, of: dict, place: Path, tell: Tell) -> None:
         tell(numbers[n:])
         # of processor time: the machine may have other things to do
         signal.setitimer(signal.ITIMER_PROF, SECONDS)
-        tell(one(number, of, place / f"job{j}"))
+        tell(strike(number, of, place / f"job{j}"))

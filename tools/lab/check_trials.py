@@ -13,9 +13,8 @@ sensor ages by five days, as `mpucal.recheck.drift` says of an unchanged one, an
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,29 +26,33 @@ from mpucal.data import Sensor, Vector
 from mpucal.recheck import check, drift
 from mpucal.recheck.observed import BETA, NONLINEAR, apply_errors
 from mpucal.simulated.sensor import SensorTruth
-from tools.lab.scenarios.course import direction
-from tools.lab.scenarios.motions import CHECK_S, FLAT_S
-from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario
-from tools.lab.scenarios.sensors import hand_sensor
 
 from .halves import halves
 from .judge import rms
-from .table import grouped, show, table
-from .trials import command_line, in_parallel, names_of, save
+from .runner import Asked, Program, names_of, option
+from .scenarios.course import direction
+from .scenarios.motions import CHECK_S, FLAT_S
+from .scenarios.recordings import GRAVITY_MPS2, hand_scenario
+from .scenarios.sensors import hand_sensor
+from .table import Column, grouped, over, show, table
 
-DAYS = 5.0
-TEMPERATURE_C = 25.0
-# of a turn in that motion
+DAYS, TEMPERATURE_C = 5.0, 25.0
+# the length of a turn in that motion
 MOVE_S = 1.6
-ASKED, ANY = "check as asked", "check"
 UNCHANGED = ("still good", "cannot be told")
-BIASES = ("bias 2 mg", "bias 5 mg", "bias 10 mg", "bias 30 mg")
-EVENTS = ("nothing", *BIASES, "scale 0.3 %", "mount 1 deg", "15 degC", "another sensor")
+EVENTS = (
+    "nothing",
+    *(f"bias {mg} mg" for mg in (2, 5, 10, 30)),
+    "scale 0.3 %",
+    "mount 1 deg",
+    "15 degC",
+    "another sensor",
+)
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One pair: what happened, and what was told."""
+    """A pair: what happened, and what the check said."""
 
     event: str
     seed: int
@@ -61,7 +64,7 @@ class Trial:
 
 
 def happened(truth: SensorTruth, event: str, rng: np.random.Generator) -> tuple[SensorTruth, float]:
-    """The sensor after `event`, of any size in those units, and its temperature."""
+    """Return the sensor after `event`, of any size in those units, and its temperature."""
     towards = direction(rng)
     match event.split():
         case ["bias", mg, "mg"]:
@@ -81,13 +84,13 @@ def happened(truth: SensorTruth, event: str, rng: np.random.Generator) -> tuple[
 
 
 def aged_by(truth: SensorTruth, theta: Vector) -> SensorTruth:
-    """The sensor after a change theta (21,), see mpucal.recheck.observed."""
+    """Return the sensor after a change theta (21,), see mpucal.recheck.observed."""
     after = apply_errors(mpucal.Calibration(truth.D, truth.b_a, K=truth.K, b_omega=truth.b_omega), theta)
     return replace(truth, D=after.D, b_a=after.b_a, K=after.K, b_omega=after.b_omega)
 
 
 def imperfect(recording: mpucal.Recording, rng: np.random.Generator) -> mpucal.Recording:
-    """With a mounting that gives in each orientation, and a gyroscope that errs in each turn."""
+    """Return the recording with a mounting that gives in each orientation, and a gyroscope that errs in each turn."""
     acc, gyr, step_s = recording.acc.copy(), recording.gyr.copy(), 1.0 / recording.rate_hz
     every_s = CHECK_S / 3
     for k in range(3):
@@ -101,12 +104,34 @@ def imperfect(recording: mpucal.Recording, rng: np.random.Generator) -> mpucal.R
     return replace(recording, acc=acc, gyr=gyr)
 
 
-def of_pair(item: tuple[str, int], motion: str = ASKED, perfect: bool = False) -> Trial | None:
-    """Calibrate, let something happen, and check; None where the calibration was refused."""
-    event, seed = item
-    calibration, aged, of_event, of_errors = calibrated_and_aged(seed)
+def calibrated_and_aged(
+    seed: int,
+) -> tuple[mpucal.Calibration, SensorTruth, np.random.Generator, np.random.Generator] | None:
+    """Return a calibration by twelve poses, its sensor some days later, and what draws further events and errors.
+
+    None where the calibration was refused.
+    """
+    of_sensor, of_event, of_age, of_errors = np.random.default_rng([seed, 21]).spawn(4)
+    before = hand_scenario(2 * seed, "pose12", tremble=True, sensor=hand_sensor(of_sensor))
+    calibration = mpucal.calibrate(at(before.recording, TEMPERATURE_C), gravity=GRAVITY_MPS2)
     if calibration.verdict == "refused":
         return None
+    age = drift.ageing(calibration, DAYS, 0.0)
+    aged = aged_by(before.truth, of_age.multivariate_normal(np.zeros(len(age)), age))
+    return calibration, aged, of_event, of_errors
+
+
+def at(recording: mpucal.Recording, temperature_c: float) -> mpucal.Recording:
+    """Return the recording at a temperature, its rest to be found."""
+    sensor = Sensor(chip="MPU-6050", rate_hz=recording.sensor.rate_hz, temperature_c=temperature_c)
+    return replace(recording, sensor=sensor, temperature_c=np.full(len(recording), temperature_c), flat=None)
+
+
+def of_pair(event: str, seed: int, motion: str, perfect: bool) -> Trial | None:
+    """Calibrate, let something happen, and check; None where the calibration was refused."""
+    if (begun := calibrated_and_aged(seed)) is None:
+        return None
+    calibration, aged, of_event, of_errors = begun
     after, temperature_c = happened(aged, event, of_event)
     recording = at(hand_scenario(2 * seed + 1, motion, tremble=True, sensor=after).recording, temperature_c)
     recording = recording if perfect else imperfect(recording, of_errors)
@@ -117,26 +142,8 @@ def of_pair(item: tuple[str, int], motion: str = ASKED, perfect: bool = False) -
     return Trial(event, seed, told.verdict, told.what, told.probability, told.seconds, error)
 
 
-def calibrated_and_aged(
-    seed: int,
-) -> tuple[mpucal.Calibration, SensorTruth, np.random.Generator, np.random.Generator]:
-    """A calibration by twelve poses, its sensor some days later, and what draws further events and errors."""
-    of_sensor, of_event, of_age, of_errors = np.random.default_rng([seed, 21]).spawn(4)
-    before = hand_scenario(2 * seed, "pose12", tremble=True, sensor=hand_sensor(of_sensor))
-    calibration = mpucal.calibrate(at(before.recording, TEMPERATURE_C), gravity=GRAVITY_MPS2)
-    age = drift.ageing(calibration, DAYS, 0.0)
-    aged = aged_by(before.truth, of_age.multivariate_normal(np.zeros(len(age)), age))
-    return calibration, aged, of_event, of_errors
-
-
-def at(recording: mpucal.Recording, temperature_c: float) -> mpucal.Recording:
-    """The recording at a temperature, its rest to be found."""
-    sensor = Sensor(chip="MPU-6050", rate_hz=recording.sensor.rate_hz, temperature_c=temperature_c)
-    return replace(recording, sensor=sensor, temperature_c=np.full(len(recording), temperature_c), flat=None)
-
-
 def of_halves(path: Path, gravity: float) -> list[Trial]:
-    """Each half of a recording against the calibration of the other, as far as it is one."""
+    """Check each half of a recording against the calibration of the other, as far as it is one."""
     try:
         parts = halves(mpucal.load(path))
     except mpucal.MpucalError:
@@ -150,40 +157,42 @@ def of_halves(path: Path, gravity: float) -> list[Trial]:
     return trials
 
 
-def events_of(names: Sequence[str], seeds: Sequence[int]) -> list[tuple[str, int]]:
-    """An event for each seed, each as often."""
-    return [(names[number % len(names)], seed) for number, seed in enumerate(seeds)]
+def tried(item: Path | tuple[str, int], any: bool, perfect: bool, gravity: float) -> list[Trial] | Trial | None:
+    """Check the halves of a recording, or a simulated pair of an event and a seed."""
+    if isinstance(item, Path):
+        return of_halves(item, gravity)
+    return of_pair(*item, motion="check" if any else "check as asked", perfect=perfect)
+
+
+def events_of(asked: Asked) -> list[tuple[str, int]]:
+    """Return an event for each seed, each as often."""
+    return [(asked.only[number % len(asked.only)], seed) for number, seed in enumerate(asked.seeds)]
 
 
 def told_as(trials: Sequence[Trial]) -> str:
-    """What was told, and of how many %."""
+    """Return what was told, and of how many %."""
     told = Counter(trial.verdict if trial.what == "nothing" else trial.what for trial in trials)
     return ", ".join(f"{name} {100.0 * count / len(trials):.1f}" for name, count in told.most_common())
 
 
-COLUMNS: dict[str, Callable[[Sequence[Trial]], object]] = {
+COLUMNS: dict[str, Column] = {
     "pairs": len,
     "called changed, %": lambda of: 100.0 * float(np.mean([t.verdict not in UNCHANGED for t in of])),
     "told as, %": told_as,
-    "error, mg": lambda of: rms([t.error_mg for t in of]),
+    "error, mg": over("error_mg", rms),
 }
 
-
-def main() -> None:
-    """Simulate or halve, check, print and save."""
-    parser = command_line(__doc__, seeds="0:504")
-    parser.add_argument("recordings", nargs="*", type=Path, help="real recordings, halved")
-    parser.add_argument("--only", type=names_of(EVENTS), default=EVENTS, help="events, with ; between")
-    parser.add_argument("--any", action="store_true", help="any three orientations, not those that are asked for")
-    parser.add_argument("--perfect", action="store_true", help="neither the mounting nor the gyroscope errs besides")
-    parser.add_argument("--gravity", type=float, default=9.81, help="m/s^2, of the recordings")
-    options = parser.parse_args()
-    if options.recordings:
-        found = in_parallel(partial(of_halves, gravity=options.gravity), options.recordings, options.jobs, "halves")
-        trials = [trial for of_one in found for trial in of_one]
-    else:
-        one = partial(of_pair, motion=ANY if options.any else ASKED, perfect=options.perfect)
-        pairs = in_parallel(one, events_of(options.only, options.seeds), options.jobs, "pairs")
-        trials = [trial for trial in pairs if trial is not None]
-    show(table(grouped(trials, lambda trial: trial.event), COLUMNS))
-    save(options.json, trials)
+main = Program(
+    __doc__,
+    tried,
+    items=lambda asked: asked.recordings or events_of(asked),
+    report=lambda trials, asked: show(table(grouped(trials, "event"), COLUMNS)),
+    options=(
+        option("recordings", nargs="*", type=Path, help="real recordings, halved"),
+        option("--only", type=names_of(EVENTS), default=EVENTS, help="events, with ; between"),
+        option("--any", action="store_true", help="any three orientations, not those that are asked for"),
+        option("--perfect", action="store_true", help="neither the mounting nor the gyroscope errs besides"),
+        option("--gravity", type=float, default=9.81, help="m/s^2, of the recordings"),
+    ),
+    seeds="0:504",
+)

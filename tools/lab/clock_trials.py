@@ -1,10 +1,11 @@
-"""Bridges whose clocks are off: how well their rate, K and D are found, and whether within what is claimed.
+"""Bridges whose clocks are off: the errors of their rate, K and D, in units of what is claimed.
 
 python -m tools.lab clock_trials --seeds 5000:5200     # -1 to +1 %, drifts of 50 ppm a minute, bursts of 1 to 16 ms
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,24 @@ from mpucal.simulated.chip.clock import FastClock
 from mpucal.sources.bridge.bus import BridgeBus
 
 from .judge import rms
-from .trials import command_line, in_parallel
+from .runner import Program
+from .table import known
 
 SECONDS, FLAT_S, MS = 75.0, 12.0, 1_000_000
 
 
+@dataclass(frozen=True)
+class Found:
+    """A session in words, and the errors of rate [ppm], K and D in their standard uncertainties."""
+
+    words: str
+    ppm: float
+    K: tuple[float, ...]
+    D: tuple[float, ...]
+
+
 def recorded(seed: int, ppm: float, drift_ppm_a_minute: float, burst_ms: int) -> tuple[mpucal.Recording, Any]:
-    """A recording of a hand that is told to lay the board flat, then to turn it; and the truth."""
+    """Return a recording of a hand that is told to lay the board flat, then to turn it; and the truth."""
     clock = FastClock()
     chip = open_simulated("sim:hand=random", seed=seed, clock=clock)
 
@@ -41,27 +53,28 @@ def recorded(seed: int, ppm: float, drift_ppm_a_minute: float, burst_ms: int) ->
     return driver.recording(), chip.truth_document()
 
 
-def trial(seed: int) -> tuple[str, dict[str, list[float]]]:
-    """A line about the session, and the errors of rate [ppm], K and D in their standard uncertainties."""
+def of_seed(seed: int) -> Found:
+    """Record behind a bridge that the seed draws, calibrate and compare."""
     rng = np.random.default_rng([seed, 7])
     ppm, drift, burst_ms = rng.uniform(-1e4, 1e4), float(rng.choice([-50, 0, 50])), int(rng.choice([1, 4, 16]))
     recording, truth = recorded(seed, ppm, drift, burst_ms)
     found, sensor = mpucal.calibrate(recording, gravity=truth["gravity"]), recording.sensor
     error = (sensor.clock_ppm or 0.0) - (ppm + drift * SECONDS / 120)
     std = (sensor.clock_std or np.nan) * 1e6
-    z = {
-        "ppm": [error / std],
-        "K": np.diag((found.K - truth["K"]) / found.K_std).tolist(),
-        "D": ((found.D - truth["D"]) / found.D_std).ravel().tolist(),
-    }
-    line = f"{seed:4d}  {burst_ms:2d} ms {ppm:+7.0f} ppm: off by {error:+.2f} ({std:.2f}), {found.verdict}"
-    return line, z
+    return Found(
+        f"{seed:4d}  {burst_ms:2d} ms {ppm:+7.0f} ppm: off by {error:+.2f} ({std:.2f}), {found.verdict}",
+        error / std,
+        tuple(np.diag((found.K - truth["K"]) / found.K_std).tolist()),
+        tuple(((found.D - truth["D"]) / found.D_std).ravel().tolist()),
+    )
 
 
-def main() -> None:
-    """Print a line a session, and rms values of all."""
-    asked = command_line(__doc__).parse_args()
-    lines, errors = zip(*in_parallel(trial, asked.seeds, asked.jobs), strict=True)
-    print(*lines, sep="\n")
-    z = {name: rms([value for each in errors for value in each[name]]) for name in errors[0]}
-    print("rms z: " + ", ".join(f"{name} {value:.2f}" for name, value in z.items()))
+main = Program(
+    __doc__,
+    of_seed,
+    items=lambda asked: asked.seeds,
+    report=lambda found, asked: print(
+        "rms z: " + ", ".join(f"{name} {rms(known(found, name)):.2f}" for name in ("ppm", "K", "D"))
+    ),
+    line=lambda found: found.words,
+)

@@ -9,7 +9,6 @@ python -m tools.lab compare --scenes '12 poses' --seeds 20 --json compare.json
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -21,25 +20,25 @@ import mpucal
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording
 from mpucal.errors import MpucalError
 from mpucal.simulated.sensor import SensorTruth
-from tools.lab.judge import sph_rms
-from tools.lab.scenarios.recordings import GRAVITY_MPS2
 
+from .judge import sph_rms
 from .monte_carlo import SCENES
 from .rivals import Estimate, Rests, Unfit, aligned_ellipsoid, ellipsoid, imucal, six_positions
-from .table import grouped, show, table
-from .trials import command_line, in_parallel, names_of, save
+from .runner import Asked, Program, names_of, option
+from .scenarios.recordings import GRAVITY_MPS2
+from .table import Column, count, grouped, over, show, table
 
 RAW, AUTO = "uncalibrated", "mpucal auto"
 
 
 @dataclass(frozen=True)
 class Grade:
-    """What a method made of a recording; NaN where nobody knows.
+    """The result of a method on a recording; NaN where nobody knows.
 
     Attributes
     ----------
     of : the scene, or the recording. why : why there is no result, or nothing. note : what else to know of it.
-    error, before : m/s^2, against the truth, over all directions, and without a calibration.
+    error, before : m/s^2, against the truth, over all directions, and without a calibration. ms : the time it took.
     median, mean, std : m/s^2, of the magnitude of all samples.
     rest_rms : m/s^2, of the rests' magnitudes less gravity. miss_median, miss_max : deg, by which gravity, carried from
         rest to rest by the gyroscope, misses what the accelerometer says there.
@@ -49,7 +48,7 @@ class Grade:
     method: str
     why: str = ""
     note: str = ""
-    seconds: float = np.nan
+    ms: float = np.nan
     error: float = np.nan
     before: float = np.nan
     median: float = np.nan
@@ -59,6 +58,11 @@ class Grade:
     miss_median: float = np.nan
     miss_max: float = np.nan
 
+    @property
+    def worse(self) -> bool:
+        """Return True if it is worse than no calibration."""
+        return self.error > self.before
+
 
 # section 4.1, Galaxy S5: mean and sd of the magnitude after calibration; nothing is printed of before
 PAPER_4_1 = (
@@ -67,13 +71,8 @@ PAPER_4_1 = (
 )
 
 
-def raw(recording: Recording, gravity: float) -> Estimate:
-    """No calibration at all."""
-    return Estimate(np.eye(3), np.zeros(3), np.eye(3), np.zeros(3))
-
-
 def ours(recording: Recording, gravity: float, model: str) -> Estimate:
-    """mpucal.calibrate with a model."""
+    """Calibrate by mpucal with a model."""
     result = mpucal.calibrate(recording, model=model, gravity=gravity)
     codes = ", ".join(reason["code"] for reason in result.quality["reasons"])
     if not np.isfinite(result.D).all():
@@ -84,12 +83,12 @@ def ours(recording: Recording, gravity: float, model: str) -> Estimate:
 
 
 def on_rests(recording: Recording, gravity: float, fit: Callable[[Rests, float], Estimate]) -> Estimate:
-    """A method that sees the rests alone."""
+    """Calibrate by a method that sees the rests alone."""
     return fit(Rests.of(recording), gravity)
 
 
 METHODS: Mapping[str, Callable[[Recording, float], Estimate]] = {
-    RAW: raw,
+    RAW: lambda recording, gravity: Estimate(np.eye(3), np.zeros(3), np.eye(3), np.zeros(3)),
     AUTO: partial(ours, model="auto"),
     "mpucal accel": partial(ours, model="accel"),
     "the paper's algorithm": partial(ours, model="paper"),
@@ -107,13 +106,13 @@ def grade(of: str, method: str, recording: Recording, gravity: float, truth: Sen
         estimate = METHODS[method](recording, gravity)
     except (Unfit, MpucalError, np.linalg.LinAlgError) as error:
         return Grade(of, method, why=str(error))
-    seconds = np.nan if method == RAW else time.perf_counter() - began
+    ms = np.nan if method == RAW else 1e3 * (time.perf_counter() - began)
     a = np.linalg.norm((recording.acc - estimate.b_a) @ np.linalg.inv(estimate.D).T, axis=1)
     return Grade(
         of,
         method,
         note=estimate.note,
-        seconds=seconds,
+        ms=ms,
         error=np.nan if truth is None else sph_rms(truth, estimate.D, estimate.b_a),
         before=np.nan if truth is None else sph_rms(truth, np.eye(3), np.zeros(3)),
         median=float(np.median(a)),
@@ -131,74 +130,65 @@ def _of_rests(recording: Recording, estimate: Estimate, gravity: float) -> dict[
     if len(rests.runs) == 0:
         return {}
     s = (rests.y - estimate.b_a) @ np.linalg.inv(estimate.D).T
-    known = {"rest_rms": float(np.sqrt(np.mean((np.linalg.norm(s, axis=1) - gravity) ** 2)))}
+    found = {"rest_rms": float(np.sqrt(np.mean((np.linalg.norm(s, axis=1) - gravity) ** 2)))}
     misses = np.degrees(rests.misses_rad(estimate.D, estimate.b_a, estimate.K))
     if len(misses):
-        known |= {"miss_median": float(np.median(misses)), "miss_max": float(misses.max())}
-    return known
+        found |= {"miss_median": float(np.median(misses)), "miss_max": float(misses.max())}
+    return found
 
 
-def of_simulated(item: tuple[str, int], methods: Sequence[str]) -> list[Grade]:
-    """The methods on the recording of a scene and a seed."""
-    scene, seed = item
-    simulated = SCENES[scene].simulate(seed)
-    return [grade(scene, method, simulated.recording, GRAVITY_MPS2, simulated.truth) for method in methods]
+def graded(item: Path | tuple[str, int], without: Sequence[str], gravity: float) -> list[Grade]:
+    """Grade the methods on a recorded file, or on the recording of a scene and a seed."""
+    if isinstance(item, Path):
+        of, recording, truth = item.stem, mpucal.load(item), None
+    else:
+        simulated = SCENES[item[0]].simulate(item[1])
+        of, recording, truth, gravity = item[0], simulated.recording, simulated.truth, GRAVITY_MPS2
+    return [grade(of, method, recording, gravity, truth) for method in METHODS if method not in without]
 
 
-def of_file(path: Path, gravity: float, methods: Sequence[str]) -> list[Grade]:
-    """The methods on a recorded file."""
-    recording = mpucal.load(path)
-    return [grade(path.stem, method, recording, gravity) for method in methods]
+def digits(name: str, places: int = 3) -> Column:
+    """Return a column of the first row's figure with so many decimals."""
+    return lambda of: f"{value:.{places}f}" if np.isfinite(value := getattr(of[0], name)) else ""
 
 
-def known(grades: Sequence[Grade], key: str) -> list[float]:
-    """The values of those that have one; one NaN where none has."""
-    return [value for g in grades if np.isfinite(value := getattr(g, key))] or [np.nan]
-
-
-SIMULATED: Mapping[str, Callable[[Sequence[Grade]], object]] = {
-    "error, m/s²": lambda of: float(np.mean(known(of, "error"))),
-    "worst": lambda of: max(known(of, "error")),
-    "worse than none": lambda of: sum(g.error > g.before for g in of),
-    "no result": lambda of: sum(bool(g.why) for g in of),
-    "ms": lambda of: 1e3 * float(np.mean(known(of, "seconds"))),
-    "why there is none": lambda of: "; ".join(Counter(g.why for g in of if g.why)),
+SIMULATED: Mapping[str, Column] = {
+    "error, m/s²": over("error"),
+    "worst": over("error", max),
+    "worse than none": count("worse"),
+    "no result": count("why"),
+    "ms": over("ms"),
+    "why there is none": lambda of: "; ".join(dict.fromkeys(g.why for g in of if g.why)),
 }
-RECORDED: Mapping[str, Callable[[Sequence[Grade]], object]] = {
-    "|a|: median": lambda of: _digits(of[0].median),
-    "mean": lambda of: _digits(of[0].mean),
-    "sd": lambda of: _digits(of[0].std),
-    "rests |a| - g": lambda of: _digits(of[0].rest_rms, 4),
-    "gyro misses, deg": lambda of: _digits(of[0].miss_median, 2),
-    "at most": lambda of: _digits(of[0].miss_max, 2),
-    "ms": lambda of: 1e3 * of[0].seconds,
+RECORDED: Mapping[str, Column] = {
+    "|a|: median": digits("median"),
+    "mean": digits("mean"),
+    "sd": digits("std"),
+    "rests |a| - g": digits("rest_rms", 4),
+    "gyro misses, deg": digits("miss_median", 2),
+    "at most": digits("miss_max", 2),
+    "ms": over("ms"),
     "note": lambda of: of[0].why or of[0].note,
 }
 
 
-def _digits(value: float, digits: int = 3) -> str:
-    return f"{value:.{digits}f}" if np.isfinite(value) else ""
+def report(grades: list[Grade], asked: Asked) -> None:
+    """Print a line a method, beside the paper's of real recordings."""
+    beside = PAPER_4_1 if asked.recordings else ()
+    show(table(grouped([*grades, *beside], "of", "method"), RECORDED if asked.recordings else SIMULATED))
 
 
-def main() -> None:
-    """Compare, print and save."""
-    parser = command_line(__doc__, seeds="0:5")
-    parser.add_argument("recordings", nargs="*", type=Path, help="files that mpucal reads; none: simulated hands")
-    scenes = names_of(SCENES)
-    usual = "12 poses;six faces;three turns;continuous"
-    parser.add_argument("--scenes", type=scenes, default=scenes(usual), help=f"simulated, between ; [{usual}]")
-    parser.add_argument("--without", action="append", choices=[*METHODS][2:], default=[], help="leave a method out")
-    parser.add_argument("--gravity", type=float, default=STANDARD_GRAVITY_MPS2, help="m/s^2, of the recordings")
-    options = parser.parse_args()
-    methods = tuple(method for method in METHODS if method not in options.without)
-    if options.recordings:
-        one = partial(of_file, gravity=options.gravity, methods=methods)
-        found = [g for of in in_parallel(one, options.recordings, options.jobs, "recordings") for g in of]
-        lines, columns = grouped([*found, *PAPER_4_1], lambda g: (g.of, g.method)), RECORDED
-    else:
-        items = [(scene, seed) for scene in options.scenes for seed in options.seeds]
-        graded = in_parallel(partial(of_simulated, methods=methods), items, options.jobs, "simulations")
-        found = [g for of in graded for g in of]
-        lines, columns = grouped(found, lambda g: (g.of, g.method)), SIMULATED
-    show(table(lines, columns), width=170)
-    save(options.json, found)
+USUAL = "12 poses;six faces;three turns;continuous"
+main = Program(
+    __doc__,
+    graded,
+    items=lambda asked: asked.recordings or [(scene, seed) for scene in asked.scenes for seed in asked.seeds],
+    report=report,
+    options=(
+        option("recordings", nargs="*", type=Path, help="files that mpucal reads; none: simulated hands"),
+        option("--scenes", type=names_of(SCENES), default=USUAL, help=f"simulated, between ; [{USUAL}]"),
+        option("--without", action="append", choices=[*METHODS][2:], default=[], help="leave a method out"),
+        option("--gravity", type=float, default=STANDARD_GRAVITY_MPS2, help="m/s^2, of the recordings"),
+    ),
+    seeds="0:5",
+)

@@ -10,9 +10,7 @@ A good accelerometer is taken as perfect, and spoilt: gains by 10 %, skew by 5 d
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,10 +23,10 @@ from mpucal.errors import RecordingError
 from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
 from mpucal.simulated.sensor import SensorTruth, non_orthogonality, turned
-from tools.lab.judge import followed, sph_rms, tilts_deg
 
-from .table import grouped, show, table
-from .trials import command_line, in_parallel, save
+from .judge import followed, sph_rms, tilts_deg
+from .runner import Asked, Program, option
+from .table import Column, grouped, over, show, table
 
 GAIN, SKEW_RAD, MISALIGNMENT_RAD, BIAS_MPS2 = 0.1, np.radians(5.0), np.radians(3.0), 1.0
 SETS = ("uncalibrated", "calibrated", "with the gyroscope's K", "undistorted")
@@ -36,7 +34,7 @@ SETS = ("uncalibrated", "calibrated", "with the gyroscope's K", "undistorted")
 
 @dataclass(frozen=True)
 class Errors:
-    """What one of SETS gives with a seed's distortion of a recording.
+    """The errors of one of SETS with a seed's distortion of a recording.
 
     Attributes
     ----------
@@ -74,7 +72,7 @@ class Captured:
 
     @classmethod
     def load(cls, path: Path, gravity: float) -> Captured:
-        """Of a .npz with t, acc, gyr and quat.
+        """Load a .npz with t, acc, gyr and quat.
 
         Raises
         ------
@@ -91,7 +89,7 @@ class Captured:
 
 
 def distortion(seed: int) -> tuple[Vector, Vector]:
-    """(3, 3) and (3,) m/s^2, of a seed."""
+    """Return D (3, 3) and b_a (3,) [m/s^2] of a seed."""
     rng = np.random.default_rng(seed)
     gain = 1.0 + rng.uniform(-GAIN, GAIN, 3)
     skew = rng.uniform(-SKEW_RAD, SKEW_RAD, 3)
@@ -99,13 +97,14 @@ def distortion(seed: int) -> tuple[Vector, Vector]:
     return np.diag(gain) @ non_orthogonality(*skew) @ turned(-turn), rng.uniform(-BIAS_MPS2, BIAS_MPS2, 3)
 
 
-def of_seed(seed: int, path: Path, model: str, gravity: float) -> list[Errors]:
+def of_seed(item: tuple[Path, int], model: str, gravity: float) -> list[Errors]:
     """Distort, calibrate, and judge each of SETS by the distortion and by motion capture.
 
     Raises
     ------
     RecordingError : nothing could be estimated.
     """
+    path, seed = item
     captured = Captured.load(path, gravity)
     D_true, b_true = distortion(seed)
     recording = replace(captured.recording, acc=captured.recording.acc @ D_true.T + b_true)
@@ -124,7 +123,7 @@ def of_seed(seed: int, path: Path, model: str, gravity: float) -> list[Errors]:
 
 
 def orientations(recording: Recording, D: Vector, b_a: Vector, K: Vector, gravity: float) -> tuple[Vector, int]:
-    """(n, 4, 3) m/s^2, gravity as the paper's EKF finds it with each of SETS after the flat segment.
+    """Return gravity (n, 4, 3) [m/s^2] as the paper's EKF finds it with each of SETS after the flat segment.
 
     The number beside it counts the samples before the last rest.
     """
@@ -138,29 +137,33 @@ def orientations(recording: Recording, D: Vector, b_a: Vector, K: Vector, gravit
     return s, int(RestFinder(recording, flat).alike()[-1, 0]) - flat.last
 
 
-COLUMNS: dict[str, Callable[[Sequence[Errors]], object]] = {
-    "error, m/s²": lambda of: float(np.mean([e.error for e in of])),
-    "worst": lambda of: max(e.error for e in of),
-    "claimed": lambda of: float(np.mean([e.claim for e in of])),
-    "roll, deg": lambda of: float(np.mean([e.roll_deg for e in of])),
-    "pitch, deg": lambda of: float(np.mean([e.pitch_deg for e in of])),
-    "roll, without the rest at the end": lambda of: float(np.mean([e.roll_turned_deg for e in of])),
-    "pitch": lambda of: float(np.mean([e.pitch_turned_deg for e in of])),
+COLUMNS: dict[str, Column] = {
+    "error, m/s²": over("error"),
+    "worst": over("error", max),
+    "claimed": over("claim"),
+    "roll, deg": over("roll_deg"),
+    "pitch, deg": over("pitch_deg"),
+    "roll, without the rest at the end": over("roll_turned_deg"),
+    "pitch": over("pitch_turned_deg"),
     "verdicts": lambda of: "; ".join(sorted({e.told for e in of})),
 }
 
 
-def main() -> None:
-    """Distort, calibrate, print and save."""
-    parser = command_line(__doc__, seeds="0:4")
-    parser.add_argument("recordings", nargs="+", type=Path, help=".npz with t, acc, gyr and quat")
-    parser.add_argument("--model", choices=MODELS, default="auto")
-    parser.add_argument("--gravity", type=float, default=9.81, help="m/s^2")
-    options = parser.parse_args()
-    found: list[Errors] = []
-    for path in options.recordings:
-        one = partial(of_seed, path=path, model=options.model, gravity=options.gravity)
-        found += [errors for of in in_parallel(one, options.seeds, options.jobs, path.stem) for errors in of]
-    title = f"section 4.2: {len(options.seeds)} distortions"
-    show(table(grouped([*found, *BESIDE], lambda e: (e.of, e.which)), COLUMNS, title), width=150)
-    save(options.json, found)
+def report(found: list[Errors], asked: Asked) -> None:
+    """Print a line for each of SETS, beside what is wanted and the paper's."""
+    title = f"section 4.2: {len(asked.seeds)} distortions"
+    show(table(grouped([*found, *BESIDE], "of", "which"), COLUMNS, title))
+
+
+main = Program(
+    __doc__,
+    of_seed,
+    items=lambda asked: [(path, seed) for path in asked.recordings for seed in asked.seeds],
+    report=report,
+    options=(
+        option("recordings", nargs="+", type=Path, help=".npz with t, acc, gyr and quat"),
+        option("--model", choices=MODELS, default="auto"),
+        option("--gravity", type=float, default=9.81, help="m/s^2"),
+    ),
+    seeds="0:4",
+)

@@ -12,12 +12,9 @@ limit is broken.
 
 from __future__ import annotations
 
-import math
 import time
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -26,10 +23,10 @@ from mpucal.errors import MpucalError
 from mpucal.result.calibration import GOOD, REFUSED, USABLE
 
 from .judge import Judgement, judged, rms
+from .runner import Asked, Program, names_of, option
 from .scenarios.family import GRAVITY_MPS2, Wanted, simulate
 from .scenarios.table import FAMILIES
-from .table import grouped, show, table
-from .trials import command_line, in_parallel, names_of, save
+from .table import Column, count, frequencies, grouped, known, over, show, table
 
 GOOD_MPS2 = 0.1
 CRASHED = "crashed"
@@ -53,7 +50,7 @@ class Run(Judgement):
 
     @property
     def false(self) -> bool:
-        """Whether the verdict is."""
+        """Return True if the verdict is."""
         return super().false or (self.verdict == GOOD and not self.error <= GOOD_MPS2)
 
 
@@ -78,92 +75,93 @@ def of_seed(item: tuple[str, int], model: str = "auto") -> Run:
     return Run(**vars(worth), family=name, seed=seed, model=str(result.fit["model"]), seconds=seconds, why=why)
 
 
-def of_verdict(runs: Sequence[Run], *verdicts: str) -> list[Run]:
-    """Those with one of these verdicts."""
-    return [run for run in runs if run.verdict in verdicts]
+def used(runs: Sequence[Run]) -> list[Run]:
+    """Return those that are not refused."""
+    return [run for run in runs if run.verdict in (GOOD, USABLE)]
 
 
 def false(runs: Sequence[Run], verdict: str) -> int:
-    """How many of this verdict are false."""
-    return sum(run.false for run in of_verdict(runs, verdict))
+    """Return how many of this verdict are false."""
+    return sum(run.false and run.verdict == verdict for run in runs)
 
 
-def told(runs: Sequence[Run], what: str) -> list[float]:
-    """`error`, `claim` or `claims` of those that are not refused."""
-    return [getattr(run, what) for run in of_verdict(runs, GOOD, USABLE)]
+def of_used(name: str, make: Column) -> Column:
+    """Return a column over an attribute of those that are not refused."""
+    return lambda runs: over(name, make)(used(runs))
 
 
-def median(values: Sequence[float]) -> float:
-    """NaN of nothing."""
-    return float(np.median(values)) if values else math.nan
+def rms_claims(runs: Sequence[Run]) -> float:
+    """Return the rms of the errors in claims of those that are not refused."""
+    return rms(known(used(runs), "claims"))
 
 
-def worst_good(runs: Sequence[Run]) -> float:
-    """The largest error of a good one [m/s^2]."""
-    return max((run.error for run in of_verdict(runs, GOOD)), default=math.nan)
+def worst_good(runs: Sequence[Run]) -> float | None:
+    """Return the largest error of a good one [m/s^2]."""
+    return max((run.error for run in runs if run.verdict == GOOD), default=None)
 
 
-def reasons(runs: Sequence[Run]) -> str:
-    """The three most frequent."""
-    return ", ".join(f"{code} {n}" for code, n in Counter(c for run in runs for c in run.reasons).most_common(3))
-
-
-COLUMNS = {
-    "good": lambda runs: len(of_verdict(runs, GOOD)),
-    "usable": lambda runs: len(of_verdict(runs, USABLE)),
-    "refused": lambda runs: len(of_verdict(runs, REFUSED, CRASHED)),
+COLUMNS: dict[str, Column] = {
+    "good": count("verdict", GOOD),
+    "usable": count("verdict", USABLE),
+    "refused": count("verdict", REFUSED, CRASHED),
     "false\ngood": lambda runs: false(runs, GOOD),
     "false\nusable": lambda runs: false(runs, USABLE),
-    "rms in\nclaims": lambda runs: rms(told(runs, "claims")),
-    "most": lambda runs: max(told(runs, "claims"), default=None),
-    "median\nerror": lambda runs: median(told(runs, "error")),
-    "median\nclaim": lambda runs: median(told(runs, "claim")),
+    "rms in\nclaims": rms_claims,
+    "most": of_used("claims", max),
+    "median\nerror": of_used("error", np.median),
+    "median\nclaim": of_used("claim", np.median),
     "worst\ngood": worst_good,
-    "reasons": reasons,
+    "reasons": lambda runs: frequencies((code for run in runs for code in run.reasons), 3),
 }
 
 
 def broken(runs: Sequence[Run]) -> list[str]:
-    """The limits that the runs break, a sentence each."""
-    good, usable, crashed = (len(of_verdict(runs, verdict)) for verdict in (GOOD, USABLE, CRASHED))
+    """Return the limits that the runs break, a sentence each."""
+    good, usable, crashed = (count("verdict", verdict)(runs) for verdict in (GOOD, USABLE, CRASHED))
     found = []
     if false(runs, GOOD) > FALSE_SHARE * good:
         found.append(f"{false(runs, GOOD)} of {good} good verdicts are false, more than {100 * FALSE_SHARE:g} %")
-    if worst_good(runs) > GOOD_MPS2:
-        found.append(f"a good one is off by {worst_good(runs):.3g} m/s², more than {GOOD_MPS2:g}")
+    if (worst := worst_good(runs) or 0.0) > GOOD_MPS2:
+        found.append(f"a good one is off by {worst:.3g} m/s², more than {GOOD_MPS2:g}")
     if false(runs, USABLE):
         found.append(f"{false(runs, USABLE)} of {usable} usable verdicts are false")
     if crashed:
         found.append(f"{crashed} calibrations crashed")
-    for name, of in grouped(runs, lambda run: run.family).items():
-        wanted, good = FAMILIES[name].wanted, len(of_verdict(of, GOOD))
+    for name, of in grouped(runs, "family").items():
+        wanted, good, error = FAMILIES[name].wanted, count("verdict", GOOD)(of), COLUMNS["median\nerror"](of)
         if wanted is not Wanted.HONEST and good < GOOD_SHARE * len(of):
             found.append(f"{name}: {good} of {len(of)} are good, less than {100 * GOOD_SHARE:g} %")
-        if wanted is Wanted.SHARP and not median(told(of, "error")) <= SHARP_MPS2:
-            found.append(f"{name}: median error {median(told(of, 'error')):.2g} m/s², more than {SHARP_MPS2:g}")
+        if wanted is Wanted.SHARP and not (error is not None and error <= SHARP_MPS2):
+            found.append(f"{name}: median error {error or np.nan:.2g} m/s², more than {SHARP_MPS2:g}")
     return found
 
 
 def beside(runs: Sequence[Run]) -> dict[str, float]:
-    """The rms in claims by name of those families in which it lies outside RMS_CLAIMS."""
-    claims = {name: rms(told(of, "claims")) for name, of in grouped(runs, lambda run: run.family).items()}
+    """Return the rms in claims by name of those families in which it lies outside RMS_CLAIMS."""
+    claims = {name: rms_claims(of) for name, of in grouped(runs, "family").items()}
     return {name: x for name, x in claims.items() if x < RMS_CLAIMS[0] or x > RMS_CLAIMS[1]}
 
 
-def main() -> int:
-    """Judge, print and save."""
-    parser = command_line(__doc__, seeds="0:6")
-    parser.add_argument("--families", type=names_of(FAMILIES), default=[*FAMILIES], help="patterns, with ; between")
-    parser.add_argument("--model", default="auto")
-    options = parser.parse_args()
-    items = [(name, seed) for name in options.families for seed in options.seeds]
-    runs = list(in_parallel(partial(of_seed, model=options.model), items, options.jobs, "families"))
+def report(runs: list[Run], asked: Asked) -> int:
+    """Print a line a family, and which limits are broken; return 1 where one is."""
+    lines = {(name, FAMILIES[name].wanted.value): of for name, of in grouped(runs, "family").items()}
     title = f"{len(runs)} calibrations; errors in m/s², rms over the sphere"
-    lines = grouped(runs, lambda run: (run.family, FAMILIES[run.family].wanted.value))
-    show(table({**lines, ("all", ""): runs}, COLUMNS, title), width=170)
-    limits = broken(runs)
+    show(table({**lines, ("all", ""): runs}, COLUMNS, title))
     odd = ", ".join(f"{name} {value:.2g}" for name, value in beside(runs).items())
     print(f"rms in claims outside {RMS_CLAIMS[0]}..{RMS_CLAIMS[1]}: {odd or 'none'}")
+    limits = broken(runs)
     print("\n".join(f"BROKEN {limit}" for limit in limits) or "every limit is kept")
-    save(options.json, {"seeds": [*options.seeds], "broken": limits, "runs": runs})
-    return 1 if limits else 0
+    return int(bool(limits))
+
+
+main = Program(
+    __doc__,
+    of_seed,
+    items=lambda asked: [(name, seed) for name in asked.families for seed in asked.seeds],
+    report=report,
+    options=(
+        option("--families", type=names_of(FAMILIES), default=[*FAMILIES], help="patterns, with ; between"),
+        option("--model", default="auto"),
+    ),
+    seeds="0:6",
+)

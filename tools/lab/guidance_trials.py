@@ -1,4 +1,4 @@
-"""What a person is shown while they are guided, by hands of every kind; and a hand that has nothing but the words.
+"""The guidance that a person is shown, tried by hands of every kind, and by a hand that has nothing but the words.
 
 python -m tools.lab guidance_trials --seeds 20
 python -m tools.lab guidance_trials --seeds 20 --hand wandering
@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
@@ -36,9 +36,9 @@ from mpucal.simulated.hands import KINDS, Guided
 from mpucal.simulated.legs import STEP_S, Leg
 from mpucal.terminal.view import NEAR_DEG, Moment, View
 
+from .runner import Asked, Program, option
 from .sessions import session
-from .table import grouped, show, table
-from .trials import command_line, in_parallel
+from .table import Column, count, grouped, known, show, table
 
 BEYOND_DEG = 20.0
 COUNT = re.compile(r"(\d+) of (\d+)")
@@ -58,7 +58,7 @@ class ByWords(Guided):
         self._words, self._due_s = "", math.inf
 
     def rotate(self, now: Stance) -> Leg:
-        """By what is said, a reaction time after it was said; still where nothing is."""
+        """Turn by what is said, a reaction time after it was said; hold still where nothing is."""
         if self._room is None or now.held == ON_THE_TABLE:
             self._room = now.attitude
         way = self.HEADLINE.lower()
@@ -84,7 +84,7 @@ KINDS[BY_WORDS] = ByWords
 
 @dataclass
 class Watcher:
-    """Sees what the page shows, and counts what is wrong with it."""
+    """Looks at what the page shows, and counts what is wrong with it."""
 
     view: View = field(default_factory=View)
     wrong: Counter[str] = field(default_factory=Counter)
@@ -93,7 +93,7 @@ class Watcher:
     finished_s: float = math.nan
 
     def hear(self, output: Output) -> None:
-        """Look."""
+        """Look at what the page makes of it."""
         before, self.view = self.view, self.view.after(output)
         shown = state(self.view)
         if shown["moment"] in (Moment.COUNTING, Moment.TURN, Moment.NEAR):
@@ -121,7 +121,7 @@ class Watcher:
                 self.wrong["counts above their total"] += done > of or any(a > b for a, b in counts)
 
     def pressed(self) -> Sequence[Key]:
-        """Nothing."""
+        """Press nothing."""
         return ()
 
     def _jumps(self, before: View, meter: Meter) -> None:
@@ -148,14 +148,14 @@ class Watcher:
 
 
 def angle(a: Any, b: Any) -> float:
-    """Between two attitudes, quaternions (4,) [deg]."""
+    """Return the angle [deg] between two attitudes, quaternions (4,)."""
     turned = np.array(matrix(a)).T @ np.array(matrix(b))
     return math.degrees(math.acos(min(1.0, max(-1.0, 0.5 * (float(np.trace(turned)) - 1.0)))))
 
 
 @dataclass(frozen=True)
 class Trial:
-    """How one session went."""
+    """A session in a hand: how it ended, and what was wrong with what was shown."""
 
     hand: str
     verdict: str
@@ -164,8 +164,8 @@ class Trial:
     wrong: Counter[str]
 
 
-def run(item: tuple[str, int]) -> Trial:
-    """One session in a hand, watched."""
+def of_hand(item: tuple[str, int]) -> Trial:
+    """Watch a session in a hand."""
     hand, seed = item
     watcher = Watcher()
     verdict = session(f"sim:hand={hand}", Plan(), seed, watcher).judged().verdict
@@ -173,32 +173,37 @@ def run(item: tuple[str, int]) -> Trial:
 
 
 def typical_s(trials: Sequence[Trial]) -> float:
-    """The median time to the verdict of good ones [s]."""
-    return float(np.median([trial.finished_s for trial in trials if trial.verdict == GOOD] or [math.nan]))
+    """Return the median time to the verdict of good ones [s]."""
+    return float(np.median(known((t for t in trials if t.verdict == GOOD), "finished_s") or [math.nan]))
 
 
 def total_wrong(trials: Sequence[Trial]) -> Counter[str]:
-    """What was wrong, and how often."""
+    """Return what was wrong, and how often."""
     return sum((trial.wrong for trial in trials), Counter())
 
 
-COLUMNS: dict[str, Callable[[Sequence[Trial]], Any]] = {
+COLUMNS: dict[str, Column] = {
     "sessions": len,
-    "good": lambda trials: sum(trial.verdict == GOOD for trial in trials),
+    "good": count("verdict", GOOD),
     "median s": typical_s,
     "holds": lambda trials: sum(trial.holds for trial in trials),
     "wrong": lambda trials: ", ".join(f"{n} {what}" for what, n in total_wrong(trials).items()) or "nothing",
 }
 
 
-def main() -> int:
-    """Run them; 1 where something was shown wrong, or words take too long."""
-    parser = command_line(__doc__)
-    parser.add_argument("--hand", nargs="*", default=list(KINDS), choices=list(KINDS))
-    asked = parser.parse_args()
-    found = list(in_parallel(run, product(asked.hand, asked.seeds), asked.jobs))
-    trials = grouped(found, lambda trial: trial.hand)
-    show(table(trials, COLUMNS))
-    ratio = typical_s(trials.get(BY_WORDS, [])) / typical_s(trials.get("guided", []))
+def report(trials: list[Trial], asked: Asked) -> int:
+    """Print a line a hand; return 1 where something was shown wrong, or words take too long."""
+    by_hand = grouped(trials, "hand")
+    show(table(by_hand, COLUMNS))
+    ratio = typical_s(by_hand.get(BY_WORDS, [])) / typical_s(by_hand.get("guided", []))
     print(f"by words in {ratio:.2f} times the time of the hand that is given the orientation")
-    return 1 if total_wrong(found) or ratio > SLOWEST else 0
+    return 1 if total_wrong(trials) or ratio > SLOWEST else 0
+
+
+main = Program(
+    __doc__,
+    of_hand,
+    items=lambda asked: product(asked.hand, asked.seeds),
+    report=report,
+    options=(option("--hand", nargs="*", default=list(KINDS), choices=list(KINDS)),),
+)

@@ -7,9 +7,7 @@ Simulations are compared with their truth by monte_carlo.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +21,8 @@ from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
 
 from .judge import rms
-from .table import grouped, show, table
-from .trials import command_line, in_parallel, save
+from .runner import Asked, Program, option
+from .table import Column, grouped, over, show, table
 
 # of 12 parameters each: what an honest claim gives, and what is wanted of the median and of the worst
 WANTED = "wanted: median 0.7 to 1.3, worst 2 or less"
@@ -33,7 +31,7 @@ LEAST_REST_S = 1.0
 
 @dataclass(frozen=True)
 class Agreement:
-    """How far the estimates of two halves are apart.
+    """The difference of the estimates of two halves.
 
     name : of the recording. model : that made the estimates, or both with a stroke.
     z : (12,) differences of D row-major and b_a in units of what both claim; empty where `why` says why.
@@ -44,9 +42,14 @@ class Agreement:
     z: tuple[float, ...] = ()
     why: str = ""
 
+    @property
+    def rms_z(self) -> float:
+        """Return the rms of z; NaN where there is none."""
+        return rms(self.z)
+
 
 def halves(recording: Recording) -> tuple[Recording, Recording]:
-    """Both halves of a recording, each of which begins at rest.
+    """Return both halves of a recording, each of which begins at rest.
 
     The cut is in the middle of the rest nearest to the middle. Where the board rests only at the start and at the end,
     it is in the middle, and the second half is read backwards: gravity and accelerations are the same then, rates are
@@ -77,7 +80,7 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
 
 
 def reversed_in_time(recording: Recording) -> Recording:
-    """The same motion backwards."""
+    """Return the same motion backwards."""
     return replace(
         recording,
         t=recording.t[-1] - recording.t[::-1],
@@ -93,7 +96,7 @@ def reversed_in_time(recording: Recording) -> Recording:
 
 
 def agreement(name: str, one: mpucal.Calibration, other: mpucal.Calibration) -> Agreement:
-    """Of two calibrations of one sensor."""
+    """Compare two calibrations of one sensor."""
     difference = np.append(one.D - other.D, one.b_a - other.b_a)
     std = np.hypot(np.append(one.D_std, one.b_a_std), np.append(other.D_std, other.b_a_std))
     models = "/".join(dict.fromkeys(str(half.fit["model"]) for half in (one, other)))
@@ -103,7 +106,7 @@ def agreement(name: str, one: mpucal.Calibration, other: mpucal.Calibration) -> 
 
 
 def of_file(path: Path, model: str, gravity: float) -> Agreement:
-    """How well the halves of a recorded file agree."""
+    """Cut a recorded file, calibrate both halves and compare them."""
     try:
         one, other = (mpucal.calibrate(half, model=model, gravity=gravity) for half in halves(mpucal.load(path)))
     except MpucalError as error:
@@ -111,24 +114,29 @@ def of_file(path: Path, model: str, gravity: float) -> Agreement:
     return agreement(path.stem, one, other)
 
 
-COLUMNS: dict[str, Callable[[Sequence[Agreement]], object]] = {
+COLUMNS: dict[str, Column] = {
     "runs": len,
-    "rms z, median": lambda of: float(np.median([rms(a.z) for a in of if a.z] or [np.nan])),
-    "rms z, worst": lambda of: max((rms(a.z) for a in of if a.z), default=None),
-    "largest |z|": lambda of: max((float(np.abs(a.z).max()) for a in of if a.z), default=None),
+    "rms z, median": over("rms_z", np.median),
+    "rms z, worst": over("rms_z", max),
+    "largest |z|": over("z", lambda z: np.abs(z).max()),
     "why there is none": lambda of: next((a.why for a in of if a.why), None),
 }
 
 
-def main() -> None:
-    """Cut, estimate, compare, print and save."""
-    parser = command_line(__doc__)
-    parser.add_argument("recordings", nargs="+", type=Path, help="files that mpucal reads")
-    parser.add_argument("--model", choices=MODELS, default="auto")
-    parser.add_argument("--gravity", type=float, default=STANDARD_GRAVITY_MPS2, help="m/s^2")
-    options = parser.parse_args()
-    one = partial(of_file, model=options.model, gravity=options.gravity)
-    found = list(in_parallel(one, options.recordings, options.jobs, "halves"))
-    lines = grouped(found, lambda a: (a.name, a.model)) | grouped(found, lambda a: ("all", a.model))
-    show(table(lines, COLUMNS, f"halves of recordings; {WANTED}"))
-    save(options.json, found)
+def report(found: list[Agreement], asked: Asked) -> None:
+    """Print a line a recording, and one of all by each model."""
+    of_all = {("all", model): rows for model, rows in grouped(found, "model").items()}
+    show(table(grouped(found, "name", "model") | of_all, COLUMNS, f"halves of recordings; {WANTED}"))
+
+
+main = Program(
+    __doc__,
+    of_file,
+    items=lambda asked: asked.recordings,
+    report=report,
+    options=(
+        option("recordings", nargs="+", type=Path, help="files that mpucal reads"),
+        option("--model", choices=MODELS, default="auto"),
+        option("--gravity", type=float, default=STANDARD_GRAVITY_MPS2, help="m/s^2"),
+    ),
+)

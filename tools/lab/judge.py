@@ -1,15 +1,18 @@
-"""A calibration against the truth: how far it is off, in m/s^2 and in units of what it claims."""
+"""A calibration, or a vehicle's parameters, against the truth: the error in m/s^2, and in units of what is claimed."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from mpucal.calibration.ekf import Ekf, specific_force
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Vector
+from mpucal.mavlink.parameters.compose import Correction
+from mpucal.mavlink.parameters.names import Slot
 from mpucal.rests.flat import Flat
 from mpucal.result.calibration import GOOD, USABLE, Calibration
 from mpucal.simulated.sensor import SensorTruth
@@ -20,7 +23,7 @@ MOST_CLAIMS = {GOOD: 3.0, USABLE: 5.0}
 
 @dataclass(frozen=True)
 class Judgement:
-    """What a calibration is worth.
+    """The verdict on a calibration beside its errors.
 
     Attributes
     ----------
@@ -36,25 +39,25 @@ class Judgement:
 
     @property
     def claims(self) -> float:
-        """The error in units of the claim; infinite of one that is used and claims nothing."""
+        """Return the error in units of the claim; infinite of one that is used and claims nothing."""
         if self.claim > 0.0:
             return self.error / self.claim
         return math.inf if self.verdict in MOST_CLAIMS else math.nan
 
     @property
     def rms_z(self) -> float:
-        """Rms of z: 1 where the uncertainties are honest."""
+        """Return the rms of z: 1 where the uncertainties are honest."""
         return rms(self.z)
 
     @property
     def false(self) -> bool:
-        """Whether it is farther from the truth than a calibration of its verdict may be."""
+        """Return True if it is farther from the truth than a calibration of its verdict may be."""
         most = MOST_CLAIMS.get(self.verdict)
         return most is not None and not self.claims <= most
 
 
 def judged(calibration: Calibration, *truths: tuple[Vector, Vector], gravity: float | None = None) -> Judgement:
-    """A calibration against the nearest of the truths (D, b_a); z is of the first.
+    """Compare a calibration with the nearest of the truths (D, b_a); z is of the first.
 
     gravity : that D is in units of [m/s^2]; None: what the calibration was told.
     """
@@ -74,19 +77,19 @@ def judged(calibration: Calibration, *truths: tuple[Vector, Vector], gravity: fl
 
 
 def sphere_rms(calibration: Calibration, truth: tuple[Vector, Vector], gravity: float) -> float:
-    """Error of a calibrated reading against (D, b_a), rms over all directions of gravity [m/s^2]."""
+    """Return the error of a calibrated reading against (D, b_a), rms over all directions of gravity [m/s^2]."""
     D, b_a = (np.array(one, np.float64) for one in truth)
     return sph_rms(SensorTruth(D, b_a, np.eye(3), np.zeros(3), gravity), calibration.D, calibration.b_a)
 
 
 def rms(values: Sequence[float]) -> float:
-    """Root mean square of what is known; NaN of nothing."""
+    """Return the root mean square of what is known; NaN of nothing."""
     known = [value for value in values if not math.isnan(value)]
     return math.sqrt(sum(value * value for value in known) / len(known)) if known else math.nan
 
 
 def sph_rms(truth: SensorTruth, D: Vector, b_a: Vector) -> float:
-    """Root mean square, over all directions of gravity, of the error of a calibrated noise-free vector [m/s^2].
+    """Return the error of a calibrated noise-free vector [m/s^2], rms over all directions of gravity.
 
     The vector is inv(D) (D_true s + b_true - b_a) = s + A s + c, and the mean of |A s + c|^2 over the sphere |s| = g is
     g^2 / 3 |A|_F^2 + |c|^2.
@@ -97,12 +100,12 @@ def sph_rms(truth: SensorTruth, D: Vector, b_a: Vector) -> float:
 
 
 def roll_pitch(s: Vector) -> tuple[Vector, Vector]:
-    """Roll and pitch [rad] of specific forces (n, 3) in the body: both (n,)."""
+    """Return roll and pitch [rad] of specific forces (n, 3) in the body: both (n,)."""
     return np.arctan2(s[:, 1], s[:, 2]), np.arctan2(-s[:, 0], np.hypot(s[:, 1], s[:, 2]))
 
 
 def tilt_errors_deg(s_true: Vector, s: Vector) -> tuple[float, float]:
-    """Mean absolute errors of roll and pitch [deg] of estimated specific forces s (n, 3) against the true ones (n, 3).
+    """Return mean absolute errors of roll and pitch [deg] of specific forces s (n, 3) against the true ones (n, 3).
 
     Roll is compared where the cosine of the true pitch is above 0.2: below, near ±90 deg, a small tilt turns it by any
     angle.
@@ -114,13 +117,34 @@ def tilt_errors_deg(s_true: Vector, s: Vector) -> tuple[float, float]:
 
 
 def followed(recording: Recording, flat: Flat, D: Vector, b_a: Vector, gravity: float) -> Vector:
-    """Gravity (n, k, 3) [m/s^2] after the flat segment, as the paper's EKF finds it with D (k, 3, 3) and b_a (k, 3)."""
+    """Return gravity (n, k, 3) [m/s^2] after the flat segment by the paper's EKF with D (k, 3, 3) and b_a (k, 3)."""
     x = np.concatenate([block.x for block in Ekf.after(flat, recording, gravity).run(D, b_a)])
     return specific_force(x, gravity)
 
 
 def tilts_deg(s_true: Vector, s: Vector) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """k errors of roll and of pitch [deg], as `tilt_errors_deg`, of s (n, k, 3) where s_true is known."""
+    """Return k errors of roll and of pitch [deg], as `tilt_errors_deg`, of s (n, k, 3) where s_true is known."""
     known = np.isfinite(s_true).all(1)
     roll, pitch = zip(*(tilt_errors_deg(s_true[known], s[known, k]) for k in range(s.shape[1])), strict=True)
     return roll, pitch
+
+
+def needed(truth: SensorTruth) -> Correction:
+    """Return the parameters that a vehicle's sensor needs."""
+    return Correction(truth.b_a, np.diag(np.linalg.inv(truth.D)))
+
+
+def off(where: Slot | None, parameters: Mapping[str, float], true: Correction) -> tuple[float, float]:
+    """Return how far an IMU's parameters are from what it needs, at worst over its axes: offset [m/s^2] and scale.
+
+    Infinity where it has none.
+    """
+    held = None if where is None else where.correction(parameters)
+    if held is None:
+        return np.inf, np.inf
+    return float(np.abs(held.offset - true.offset).max()), float(np.abs(held.scale - true.scale).max())
+
+
+def z_of(document: Mapping[str, Any], truth: Mapping[str, Any]) -> tuple[float, ...]:
+    """Return (12,) of D and b_a of an IMU's document: (estimate - truth) / standard uncertainty."""
+    return judged(Calibration.from_document(document), (np.array(truth["D"]), np.array(truth["b_a"]))).z

@@ -34,7 +34,8 @@ from mpucal.errors import NoAnswer
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.compose import Correction
-from mpucal.mavlink.parameters.names import AXES, ardupilot_slot, mounting
+from mpucal.mavlink.parameters.names import mounting
+from mpucal.mavlink.parameters.names import AXES, ardupilot_slot
 from mpucal.mavlink.prompts import ReceivedPrompt
 from mpucal.mavlink.stream_parameters import read_parameters, read_stream_parameters
 from mpucal.mavlink.transport import Transport
@@ -44,8 +45,7 @@ from mpucal.simulated.hands import KINDS
 from mpucal.simulated.motion import Motion
 from mpucal.simulated.vehicle.imus import FROM_HAND, turned_over
 
-from .judge import rms
-from .vehicle_truth import off, z_of
+from .judge import off, rms, z_of
 
 MPUCAL = Path(sys.executable).parent / "mpucal"
 # the head of what a SITL sends for each step: a magic number, its steps a second, their count

@@ -9,32 +9,28 @@ python -m tools.lab monte_carlo --crlb --model accel --seeds 1000       one sens
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.table import Table
 
 import mpucal
 from mpucal.calibration import MODELS
-from mpucal.calibration.fit import Fit
 from mpucal.calibration.model_selection import fit_accel
 from mpucal.calibration.paper import fit_paper
 from mpucal.calibration.parameters import B_A_NAMES, D_NAMES
-from mpucal.data import Vector
 from mpucal.errors import MpucalError
 from mpucal.rests.flat import flat_statistics
 from mpucal.result.calibration import REFUSED
-from tools.lab.judge import followed, sph_rms, tilts_deg
-from tools.lab.scenarios.recordings import GRAVITY_MPS2, Simulated, hand_scenario, paper_scenario
-from tools.lab.scenarios.sensors import hand_sensor, paper_sensor
 
-from .judge import Judgement, judged
-from .table import cell, grouped, show, table
-from .trials import command_line, in_parallel, names_of, save
+from .judge import Judgement, followed, judged, sph_rms, tilts_deg
+from .runner import Asked, Program, names_of, option
+from .scenarios.recordings import GRAVITY_MPS2, Simulated, hand_scenario, paper_scenario
+from .scenarios.sensors import hand_sensor, paper_sensor
+from .table import Column, cell, frequencies, grouped, known, over, show, table
 
 # on data that conform to the model NIS is 3, and tens where the fit ended in a wrong optimum
 NIS_WRONG = 10.0
@@ -45,14 +41,14 @@ PAPER = {"roll": ("0.345", "8.3 (7.1)", "0.32 (0.40)"), "pitch": ("0.265", "8.3 
 
 
 class Scene(NamedTuple):
-    """How a seed is simulated, and what is wanted of its runs' mean error [m/s^2]; None: nothing was set."""
+    """A simulation of a seed, and the mean error [m/s^2] that is wanted; None: nothing was set."""
 
     simulate: Callable[[int], Simulated]
     wanted: float | None = None
 
 
 def gyro_off(seed: int) -> Simulated:
-    """The paper's scenario, with a gyroscope that is not ideal."""
+    """Simulate the paper's scenario with a gyroscope that is not ideal."""
     of_sensor, of_gyro = np.random.default_rng(seed).spawn(2)
     return paper_scenario(seed, sensor=replace(paper_sensor(of_sensor), K=hand_sensor(of_gyro).K))
 
@@ -90,7 +86,7 @@ class Run(Judgement):
     model: str = ""
     failure: str | None = None
     before: float = np.nan
-    seconds: float = 0.0
+    ms: float = 0.0
     known_K: int = 0
     roll_deg: tuple[float, ...] = ()
     pitch_deg: tuple[float, ...] = ()
@@ -105,7 +101,7 @@ def of_seed(item: tuple[str, int], model: str) -> Run:
         result = mpucal.calibrate(simulated.recording, model=model, gravity=GRAVITY_MPS2)
     except MpucalError as error:
         return Run(REFUSED, scene=scene, seed=seed, model=model, failure=str(error))
-    seconds, of_paper = time.perf_counter() - began, scene.startswith("paper")
+    ms, of_paper = 1e3 * (time.perf_counter() - began), scene.startswith("paper")
     worth, before = judged(result, (truth.D, truth.b_a), gravity=truth.gravity), sph_rms(truth, np.eye(3), np.zeros(3))
     failure = None
     if not result.fit["converged"]:
@@ -122,7 +118,7 @@ def of_seed(item: tuple[str, int], model: str) -> Run:
         model=result.fit["model"],
         failure=failure,
         before=before,
-        seconds=seconds,
+        ms=ms,
         known_K=int(np.isfinite(result.K_std[np.triu_indices(3)]).sum()),
         roll_deg=roll,
         pitch_deg=pitch,
@@ -130,7 +126,7 @@ def of_seed(item: tuple[str, int], model: str) -> Run:
 
 
 def tilts(simulated: Simulated, result: mpucal.Calibration) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Roll and pitch errors [deg] of the orientations that the paper's filter finds with each of TILTS."""
+    """Return roll and pitch errors [deg] of the orientations that the paper's filter finds with each of TILTS."""
     recording, truth = simulated.recording, simulated.truth
     D, b_a = np.array([np.eye(3), truth.D, result.D]), np.array([np.zeros(3), truth.b_a, result.b_a])
     flat = flat_statistics(recording, recording.flat)
@@ -138,67 +134,49 @@ def tilts(simulated: Simulated, result: mpucal.Calibration) -> tuple[tuple[float
 
 
 def successful(runs: Sequence[Run]) -> list[Run]:
-    """Those that count."""
+    """Return those that count."""
     return [run for run in runs if run.failure is None]
 
 
-def mean_error(runs: Sequence[Run]) -> float:
-    """Of the successful [m/s^2]."""
-    return float(np.mean([run.error for run in successful(runs)] or [np.nan]))
-
-
 def met(runs: Sequence[Run]) -> bool | None:
-    """Whether all runs of a scene succeeded with the mean error that is wanted; None where nothing is."""
+    """Return True if all runs of a scene succeeded with the mean error that is wanted; None where nothing is."""
     wanted = SCENES[runs[0].scene].wanted
-    return None if wanted is None else len(successful(runs)) == len(runs) and mean_error(runs) <= wanted
+    if wanted is None:
+        return None
+    return len(successful(runs)) == len(runs) and float(np.mean(known(runs, "error"))) <= wanted
 
 
-def known_z(runs: Sequence[Run]) -> list[float]:
-    """The rms z of the successful, as far as they claim uncertainties."""
-    return [run.rms_z for run in successful(runs) if np.isfinite(run.rms_z)]
+def of_successful(name: str, make: Column = np.mean) -> Column:
+    """Return a column over an attribute of the successful."""
+    return lambda runs: over(name, make)(successful(runs))
 
 
-def counted(runs: Sequence[Run]) -> str:
-    """How many of each model, and of each kind of failure."""
-    return ", ".join(f"{name} {n}" for name, n in Counter(run.failure or run.model for run in runs).most_common())
-
-
-Z_COLUMNS: dict[str, Callable[[Sequence[Run]], object]] = {
-    "rms z, median": lambda runs: float(np.median(known_z(runs) or [np.nan])),
-    "worst": lambda runs: max(known_z(runs), default=None),
-    "largest |z|": lambda runs: max((float(np.abs(run.z).max()) for run in successful(runs)), default=None),
+Z_COLUMNS: dict[str, Column] = {
+    "rms z, median": of_successful("rms_z", np.median),
+    "worst": of_successful("rms_z", max),
+    "largest |z|": of_successful("z", lambda z: np.abs(z).max()),
 }
-COLUMNS: dict[str, Callable[[Sequence[Run]], object]] = {
-    "uncalibrated": lambda runs: float(np.mean([run.before for run in runs])),
-    "error, m/s²": mean_error,
-    "worst error": lambda runs: max((run.error for run in successful(runs)), default=None),
+COLUMNS: dict[str, Column] = {
+    "uncalibrated": over("before"),
+    "error, m/s²": of_successful("error"),
+    "worst error": of_successful("error", max),
     "wanted": lambda runs: SCENES[runs[0].scene].wanted,
     "met": lambda runs: {None: "", True: "yes", False: "[red]no[/red]"}[met(runs)],
     **Z_COLUMNS,
-    "K known": lambda runs: float(np.mean([run.known_K for run in successful(runs)] or [np.nan])),
-    "ms": lambda runs: round(1e3 * np.mean([run.seconds for run in runs])),
-    "models, failures": counted,
+    "K known": of_successful("known_K"),
+    "ms": over("ms", lambda ms: round(np.mean(ms))),
+    "models, failures": lambda runs: frequencies(run.failure or run.model for run in runs),
 }
 
 
 def tilt_table(runs: Sequence[Run]) -> Table:
-    """Section 4.3: means (standard deviations) of the errors of roll and pitch, beside the paper's."""
+    """Return section 4.3: means (standard deviations) of the errors of roll and pitch, beside the paper's."""
     lines = Table("deg", *TILTS, "wanted", "the paper, before", "after", title="the paper's scenario")
     for name, beside in PAPER.items():
         errors = np.array([getattr(run, f"{name}_deg") for run in successful(runs)])
         means = [f"{cell(float(mean))} ({sd:.2g})" for mean, sd in zip(errors.mean(0), errors.std(0), strict=True)]
         lines.add_row(name, *means, *beside)
     return lines
-
-
-def fit_fixed(seed: int, model: str) -> tuple[Fit, Vector] | None:
-    """Section 4.4: a fit to one sensor with a seed's noise, and its errors (12,); None if it failed."""
-    simulated = paper_scenario(seed, sensor=paper_sensor(np.random.default_rng(0)))
-    recording = simulated.recording
-    fit = FITS[model](recording, flat_statistics(recording, recording.flat), GRAVITY_MPS2)
-    if not (fit.converged and fit.nis < NIS_WRONG):
-        return None
-    return fit, np.concatenate([(fit.D - simulated.truth.D).ravel(), fit.b_a - simulated.truth.b_a])
 
 
 class Efficiency(NamedTuple):
@@ -208,44 +186,81 @@ class Efficiency(NamedTuple):
     bound: float
 
 
-def efficiency(fits: Sequence[tuple[Fit, Vector] | None]) -> dict[str, Efficiency]:
-    """RMSE against the Cramér-Rao bound of the mean Fisher information, of the 12 parameters by name."""
-    good = [pair for pair in fits if pair is not None]
-    # of D and b_a alone: the other parameters' meaning may change with the run (tilts about an estimated axis)
-    fisher = np.mean([np.linalg.inv(fit.covariance[:12, :12]) for fit, _ in good], axis=0)
+@dataclass(frozen=True)
+class Fitted:
+    """A fit to one sensor: the covariance (12, 12) of D and b_a, and their errors (12,)."""
+
+    covariance: list[list[float]]
+    errors: list[float]
+
+
+def fit_fixed(seed: int, model: str) -> Fitted | None:
+    """Fit one sensor with a seed's noise, as in section 4.4; None if it failed."""
+    simulated = paper_scenario(seed, sensor=paper_sensor(np.random.default_rng(0)))
+    recording = simulated.recording
+    fit = FITS[model](recording, flat_statistics(recording, recording.flat), GRAVITY_MPS2)
+    if not (fit.converged and fit.nis < NIS_WRONG):
+        return None
+    errors = np.concatenate([(fit.D - simulated.truth.D).ravel(), fit.b_a - simulated.truth.b_a])
+    # the other parameters' meaning may change with the run (tilts about an estimated axis)
+    return Fitted(fit.covariance[:12, :12].tolist(), errors.tolist())
+
+
+def efficiency(fits: Sequence[Fitted]) -> dict[str, Efficiency]:
+    """Return RMSE against the Cramér-Rao bound of the mean Fisher information, of the 12 parameters by name."""
+    fisher = np.mean([np.linalg.inv(fit.covariance) for fit in fits], axis=0)
     bound = np.sqrt(np.diag(np.linalg.inv(fisher)))
-    rmse = np.sqrt(np.mean([error**2 for _, error in good], axis=0))
+    rmse = np.sqrt(np.mean([np.square(fit.errors) for fit in fits], axis=0))
     return dict(zip((*D_NAMES, *B_A_NAMES), map(Efficiency, rmse.tolist(), bound.tolist()), strict=True))
 
 
-EFFICIENCY_COLUMNS: dict[str, Callable[[Sequence[Efficiency]], float]] = {
+EFFICIENCY_COLUMNS: dict[str, Column] = {
     "RMSE": lambda of: of[0].rmse,
     "√CRLB": lambda of: of[0].bound,
     "RMSE / √CRLB": lambda of: of[0].rmse / of[0].bound,
 }
 
 
-def main() -> None:
-    """Run, print and save."""
-    parser = command_line(__doc__, seeds="0:60")
-    parser.add_argument("--scenes", type=names_of(SCENES), default=[*SCENES], help="patterns, with ; between")
-    parser.add_argument("--model", choices=MODELS, default="auto")
-    parser.add_argument("--crlb", action="store_true", help="section 4.4: one sensor, many noises")
-    options = parser.parse_args()
-    about = f"model {options.model}, {len(options.seeds)} seeds from {options.seeds[0]}"
-    if options.crlb:
-        if options.model not in FITS:
-            parser.error(f"--crlb goes with --model {' or '.join(FITS)}")
-        fits = list(in_parallel(partial(fit_fixed, model=options.model), options.seeds, options.jobs, "one sensor"))
-        found = efficiency(fits)
-        lines = {name: [pair] for name, pair in found.items()}
-        show(table(lines, EFFICIENCY_COLUMNS, f"section 4.4, {about}, of one sensor; {fits.count(None)} failed"))
-        save(options.json, {name: pair._asdict() for name, pair in found.items()})
+def tried(item: int | tuple[str, int], model: str) -> Fitted | Run | None:
+    """Fit one sensor with a seed's noise, or calibrate a scene and a seed."""
+    return fit_fixed(item, model) if isinstance(item, int) else of_seed(item, model)
+
+
+def items(asked: Asked) -> Sequence[int | tuple[str, int]]:
+    """Return the seeds of one sensor's noises, or the seeds of each scene.
+
+    Raises
+    ------
+    SystemExit : there is no fit of this model alone.
+    """
+    if asked.crlb and asked.model not in FITS:
+        raise SystemExit(f"--crlb goes with --model {' or '.join(FITS)}")
+    return asked.seeds if asked.crlb else [(scene, seed) for scene in asked.scenes for seed in asked.seeds]
+
+
+def report(found: list[Any], asked: Asked) -> None:
+    """Print the efficiency of the fits, or a line a scene."""
+    about = f"model {asked.model}, {len(asked.seeds)} seeds from {asked.seeds[0]}"
+    if asked.crlb:
+        failed = len(asked.seeds) - len(found)
+        lines = {name: [pair] for name, pair in efficiency(found).items()}
+        show(table(lines, EFFICIENCY_COLUMNS, f"section 4.4, {about}, of one sensor; {failed} failed"))
         return
-    items = [(scene, seed) for scene in options.scenes for seed in options.seeds]
-    runs = list(in_parallel(partial(of_seed, model=options.model), items, options.jobs, "simulations"))
-    show(table(grouped(runs, lambda run: run.scene), COLUMNS, about), width=170)
-    show(table(grouped(successful(runs), lambda run: run.model), Z_COLUMNS, "claims by model"))
-    if of_paper := [run for run in runs if run.scene == "paper"]:
+    show(table(grouped(found, "scene"), COLUMNS, about))
+    show(table(grouped(successful(found), "model"), Z_COLUMNS, "claims by model"))
+    if of_paper := [run for run in found if run.scene == "paper"]:
         show(tilt_table(of_paper))
-    save(options.json, runs)
+
+
+main = Program(
+    __doc__,
+    tried,
+    items=items,
+    report=report,
+    options=(
+        option("--scenes", type=names_of(SCENES), default=[*SCENES], help="patterns, with ; between"),
+        option("--model", choices=MODELS, default="auto"),
+        option("--crlb", action="store_true", help="section 4.4: one sensor, many noises"),
+    ),
+    seeds="0:60",
+)

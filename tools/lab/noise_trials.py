@@ -6,7 +6,8 @@ python -m tools.lab noise_trials --hours 3 --seeds 100
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -15,8 +16,8 @@ from mpucal.allan.model import NAMES, fitted
 from mpucal.allan.octaves import Octaves
 from mpucal.simulated.noise import noise
 
-from .table import grouped, show, table
-from .trials import command_line, in_parallel, save
+from .runner import Program, option
+from .table import Column, grouped, show, table
 
 RATE_HZ = 100.0
 # white [units/sqrt(Hz)], bias instability [units], random walk [units/sqrt(s)]
@@ -29,14 +30,21 @@ AXES = {
 CONFIDENCES = (0.68, 0.95)
 
 
-Found = tuple[str, str, float, list[float]]
+@dataclass(frozen=True)
+class Found:
+    """A coefficient of an axis, its truth, and by that: the value found, and the low and high end by confidence."""
+
+    axis: str
+    name: str
+    truth: float
+    by_truth: list[float]
 
 
 def of_seed(item: tuple[str, int], hours: float) -> list[Found]:
-    """An axis, a coefficient, its truth, and by that: the value found, and the low and high end by confidence."""
-    name, seed = item
+    """Simulate an axis for so long, and find its coefficients."""
+    axis, seed = item
     n = round(3600.0 * hours * RATE_HZ)
-    samples = noise(np.random.default_rng([seed, *name.encode()]), n, RATE_HZ, *AXES[name])
+    samples = noise(np.random.default_rng([seed, *axis.encode()]), n, RATE_HZ, *AXES[axis])
     octaves = Octaves(1)
     for part in np.array_split(samples[:, None], max(n // 16384, 1)):
         octaves.add(part)
@@ -44,31 +52,27 @@ def of_seed(item: tuple[str, int], hours: float) -> list[Found]:
     found = [fitted(sizes, variances[:, 0], n, 1.0 / RATE_HZ, confidence) for confidence in CONFIDENCES]
     ends = [end[:3] for one in found if one is not None for end in (one.low, one.high)]
     value = np.full(3, np.nan) if found[0] is None else found[0].value[:3]
-    by_truth = (np.array([value, *ends]) / np.array(AXES[name])).T.tolist()
-    return [(name, *each) for each in zip(NAMES, AXES[name], by_truth, strict=False)]
+    by_truth = (np.array([value, *ends]) / np.array(AXES[axis])).T.tolist()
+    return [Found(axis, *each) for each in zip(NAMES, AXES[axis], by_truth, strict=False)]
 
 
 def inside(found: Sequence[Found], low: int) -> str:
-    """How many intervals hold the truth."""
-    return f"{100.0 * np.mean([one[3][low] <= 1.0 <= one[3][low + 1] for one in found]):.0f} %"
+    """Return how many intervals hold the truth."""
+    return f"{100.0 * np.mean([one.by_truth[low] <= 1.0 <= one.by_truth[low + 1] for one in found]):.0f} %"
 
 
-COLUMNS: dict[str, Callable[[Sequence[Found]], object]] = {
-    "found / true": lambda found: f"{np.mean([one[3][0] for one in found]):.3f}",
-    "rms of it": lambda found: f"{np.std([one[3][0] for one in found]):.3f}",
+COLUMNS: dict[str, Column] = {
+    "found / true": lambda found: f"{np.mean([one.by_truth[0] for one in found]):.3f}",
+    "rms of it": lambda found: f"{np.std([one.by_truth[0] for one in found]):.3f}",
     "in 68 %": partial(inside, low=1),
     "in 95 %": partial(inside, low=3),
-    "its end / true": lambda found: f"{np.median([one[3][4] for one in found]):.2f}",
+    "its end / true": lambda found: f"{np.median([one.by_truth[4] for one in found]):.2f}",
 }
 
-
-def main() -> None:
-    """Simulate, fit, compare, print and save."""
-    parser = command_line(__doc__)
-    parser.add_argument("--hours", type=float, default=1.0)
-    options = parser.parse_args()
-    items = [(name, seed) for name in AXES for seed in options.seeds]
-    of_all = in_parallel(partial(of_seed, hours=options.hours), items, options.jobs, "noise")
-    found = [one for of in of_all for one in of]
-    show(table(grouped(found, lambda one: one[:3]), COLUMNS))
-    save(options.json, found)
+main = Program(
+    __doc__,
+    of_seed,
+    items=lambda asked: [(axis, seed) for axis in AXES for seed in asked.seeds],
+    report=lambda found, asked: show(table(grouped(found, "axis", "name", "truth"), COLUMNS)),
+    options=(option("--hours", type=float, default=1.0),),
+)

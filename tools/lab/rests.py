@@ -10,7 +10,6 @@ The exit code is 1 where fewer agree than --least.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -24,10 +23,10 @@ from mpucal.rests.intervals import RestFinder
 from mpucal.session.events import Rested
 from mpucal.session.pauses import HOLD_S, PauseDetector
 
+from .runner import Asked, Program, names_of, option
 from .scenarios.family import simulate
 from .scenarios.table import FAMILIES
 from .table import grouped, show, table
-from .trials import command_line, in_parallel, names_of, save
 
 LARGEST_PART = 60  # samples
 # so long a rest holds all windows of a hold, wherever they begin, and what is trimmed of it is beside them
@@ -38,15 +37,17 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True)
 class Found:
-    """What of one recording was told live and found offline [s], and what only one of both has.
+    """The holds told live and the rests found offline of one recording, and those [s] that only one of both has.
 
     Attributes
     ----------
+    flat : it has a flat segment, and something after it.
     held, rests : how many; of rests those as long as a hold. in_parts : parts and all at once say the same.
     """
 
     family: str
     seed: int
+    flat: bool = True
     held: int = 0
     rests: int = 0
     only_held: tuple[Span, ...] = ()
@@ -55,21 +56,21 @@ class Found:
 
     @property
     def agrees(self) -> bool:
-        """All three."""
+        """Return True if both have the same, however the samples come."""
         return self.in_parts and not self.only_held and not self.only_rests
 
 
-def of_seed(item: tuple[str, int]) -> Found | None:
-    """Of a family's name and a seed; None where the recording has no flat segment."""
+def of_seed(item: tuple[str, int]) -> Found:
+    """Compare the recording of a family's name and a seed."""
     name, seed = item
     return of_recording(with_masks(simulate(FAMILIES[name], seed).recording), name, seed)
 
 
-def of_recording(recording: Recording, name: str, seed: int) -> Found | None:
-    """Of a recording; the seed draws how its samples come. None where it has no flat segment, or nothing after it."""
+def of_recording(recording: Recording, name: str, seed: int) -> Found:
+    """Compare a recording; the seed draws how its samples come."""
     segment = recording.flat or find_flat(recording)
     if segment is None or segment[1] == len(recording):
-        return None
+        return Found(name, seed, flat=False)
     flat = flat_statistics(recording, segment)
     after = recording.part(flat.last, len(recording))
     ends = np.cumsum(np.random.default_rng(seed).integers(1, LARGEST_PART, len(after)))
@@ -81,6 +82,7 @@ def of_recording(recording: Recording, name: str, seed: int) -> Found | None:
     return Found(
         name,
         seed,
+        True,
         len(held),
         len(rests),
         tuple(hold for hold in held if not _touched(hold, found)),
@@ -90,7 +92,7 @@ def of_recording(recording: Recording, name: str, seed: int) -> Found | None:
 
 
 def _held(flat: Flat, parts: Iterable[Samples]) -> list[Span]:
-    """What the session calls held for long enough, as these samples come."""
+    """Return what the session calls held for long enough, as these samples come."""
     x, y, z, *rates = (*flat.y.tolist(), *flat.b_omega.tolist())
     pauses = PauseDetector(Rested(flat.n, (x, y, z), (rates[0], rates[1], rates[2])))
     # of the stillness that it begins in a session says nothing
@@ -107,7 +109,7 @@ def _touched(span: Span, others: Iterable[Span]) -> bool:
 
 
 def agreeing(found: Sequence[Found]) -> str:
-    """How many agree, of all."""
+    """Return how many agree, of all."""
     return f"{sum(one.agrees for one in found)} of {len(found)}"
 
 
@@ -120,18 +122,24 @@ COLUMNS = {
 }
 
 
-def main() -> None:
-    """Simulate, compare, print and save."""
-    parser = command_line(__doc__, seeds="0:6")
-    parser.add_argument("--families", type=names_of(FAMILIES), default=list(FAMILIES), help="patterns, with ; between")
-    parser.add_argument("--least", type=float, default=0.0, help="the share that is to agree")
-    options = parser.parse_args()
-    items = [(name, seed) for name in options.families for seed in options.seeds]
-    of_all = list(in_parallel(of_seed, items, options.jobs, "rests"))
-    found = [one for one in of_all if one is not None]
+def report(of_all: list[Found], asked: Asked) -> int:
+    """Print those that differ, and how many agree; return 1 where these are too few."""
+    found = [one for one in of_all if one.flat]
     differ = [one for one in found if not one.agrees]
     if differ:
-        show(table(grouped(differ, lambda one: (one.family, one.seed)), COLUMNS))
+        show(table(grouped(differ, "family", "seed"), COLUMNS))
     print(f"{agreeing(found)} agree; {len(of_all) - len(found)} more have no flat segment")
-    save(options.json, found)
-    sys.exit(len(found) - len(differ) < options.least * len(found))
+    return int(len(found) - len(differ) < asked.least * len(found))
+
+
+main = Program(
+    __doc__,
+    of_seed,
+    items=lambda asked: [(name, seed) for name in asked.families for seed in asked.seeds],
+    report=report,
+    options=(
+        option("--families", type=names_of(FAMILIES), default=list(FAMILIES), help="patterns, with ; between"),
+        option("--least", type=float, default=0.0, help="the share that is to agree"),
+    ),
+    seeds="0:6",
+)

@@ -1,4 +1,4 @@
-"""Sessions on the simulated chip, one a seed: how they end, how right they are, and how long they take.
+"""Sessions on the simulated chip, one a seed: their ends, their errors, and their times.
 
     python -m tools.lab session_trials hands --seeds 50 --of guided placing random wandering
     python -m tools.lab session_trials damage --seeds 7000:7050
@@ -18,7 +18,6 @@ are simulated seconds since the start. Exit code 1 where one ended as it should 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from itertools import combinations_with_replacement
@@ -38,9 +37,9 @@ from mpucal.simulated.hands import KINDS as HANDS
 from mpucal.simulated.mishaps import ZeroStep
 
 from .judge import rms
+from .runner import Asked, Program, option, seed_range
 from .sessions import ABANDONED, NOTHING, Ear, Ended, by_command, ended_of, recorded, session
-from .table import grouped, show, table
-from .trials import command_line, in_parallel, save, seed_range
+from .table import Column, count, frequencies, grouped, known, over, show, table
 
 RATE_HZ = 50.0
 # what changes while the board is turned is seen by what was turned, or by what verifies it
@@ -71,7 +70,7 @@ CODES, FARTHEST_Z = (0, 3, 4, 5), 6.0
 
 
 def parts() -> dict[str, tuple[str, str]]:
-    """Of each part how --bus sim: names it: its name, and where its row is from; revision C is one more."""
+    """Return each part as --bus sim: names it: its name, and where its row is from; revision C is one more."""
     by_family = {model.family: name for name, model in reversed(MODELS.items())}
     found = {
         f"{by_family[part.family]},who_am_i={who_am_i:#04x}": (part.chip, part.family.source)
@@ -81,12 +80,12 @@ def parts() -> dict[str, tuple[str, str]]:
 
 
 def of_hand(name: str, seed: int) -> Ended:
-    """A session in that hand."""
+    """Run a session in that hand."""
     return heard(name, f"sim:hand={name}", Plan(), seed)
 
 
 def of_sabotage(name: str, seed: int) -> Ended:
-    """One that cannot end well."""
+    """Run a session that cannot end well."""
     words, options, reasons = SABOTAGE[name]
     ended = heard(name, words, Plan(Config(**options)), seed)
     first = "never_still" if "not still" in ended.said else next(iter(ended.reasons), "")
@@ -95,7 +94,7 @@ def of_sabotage(name: str, seed: int) -> Ended:
 
 
 def heard(name: str, words: str, plan: Plan, seed: int) -> Ended:
-    """A session, and when what of it was said."""
+    """Run a session, and note when what was said."""
     ear = Ear()
     done = session(words, plan, seed, ear)
     rotated_s, finished_s = ear.when(PromptKind.VERIFY), ear.when(PromptKind.REST)
@@ -116,7 +115,7 @@ def heard(name: str, words: str, plan: Plan, seed: int) -> Ended:
 
 
 def of_part(name: str, seed: int) -> Ended:
-    """A session on a part, which is to end good, under the right name and at the right temperature."""
+    """Run a session on a part, which is to end good, under the right name and at the right temperature."""
     words = ("--bus", f"sim:chip={name},temperature_c={TEMPERATURE_C}", "--seed", str(seed))
     done, document = by_command(*words, "--rate", f"{RATE_HZ:g}", "--model", "hand")
     if done.calibration is None:
@@ -130,7 +129,7 @@ def of_part(name: str, seed: int) -> Ended:
 
 
 def of_damage(name: str, seed: int) -> Ended:
-    """A session that is damaged, and not told so."""
+    """Run a session that is damaged, and not told so."""
     rng = np.random.default_rng([seed, list(DAMAGES).index(name)])
     at_s, direction = round(float(rng.uniform(*DAMAGED_S)), 1), rng.normal(size=3)
     step = direction / np.linalg.norm(direction) * math.exp(rng.uniform(*np.log(STEP_MG))) / MG_PER_MPS2
@@ -144,19 +143,19 @@ def of_damage(name: str, seed: int) -> Ended:
 
 
 def of_faults(name: str, seed: int) -> Ended:
-    """A session by the command, on a chip that suffers this fault, or two that are drawn."""
+    """Run a session by the command, on a chip that suffers this fault, or two that are drawn."""
     rng = np.random.default_rng([seed, [*FAULTS, PAIR].index(name)])
     return of_faulty(name, struck(rng, rng.choice(FAULTS, 2) if name == PAIR else [name], FAULTY_S), seed)
 
 
 def of_recording(name: str, seed: int) -> Ended:
-    """A recording of a chip that suffers these faults."""
+    """Record a chip that suffers these faults."""
     faults = struck(np.random.default_rng([seed, COMBINATIONS.index(name)]), name.split("/"), RECORDED_S)
     return of_faulty(name, faults, seed, record=True)
 
 
 def of_faulty(name: str, faults: Sequence[Fault], seed: int, model: str = "auto", record: bool = False) -> Ended:
-    """A session, or a recording, on a chip that suffers them."""
+    """Run a session, or record, on a chip that suffers them."""
     words = f"sim:seed={seed},chip={CHIPS[seed % len(CHIPS)]},fault={'/'.join(map(str, faults))}"
     if record:
         done = recorded(words, Plan(Config(rate_hz=RATE_HZ, poll_s=POLL_S), until_end=True), RECORDED_S)
@@ -169,11 +168,11 @@ def of_faulty(name: str, faults: Sequence[Fault], seed: int, model: str = "auto"
 
 
 def struck(rng: np.random.Generator, names: Sequence[str], end_s: float) -> list[Fault]:
-    """Each at its moment."""
+    """Draw a moment for each."""
     return [Fault(str(name), round(float(rng.uniform(0.0, end_s)), 2)) for name in names]
 
 
-# by name: what there is to try, how, and in how many seeds unless told otherwise
+# by name: the things to try, the function that tries one, and the seeds unless told otherwise
 TRIALS: dict[str, tuple[Sequence[str], Callable[[str, int], Ended], str]] = {
     "hands": (tuple(HANDS), of_hand, "50"),
     "sabotage": (tuple(SABOTAGE), of_sabotage, "1"),
@@ -184,66 +183,71 @@ TRIALS: dict[str, tuple[Sequence[str], Callable[[str, int], Ended], str]] = {
 }
 
 
-def one(item: tuple[str, str, int]) -> Ended:
-    """Of a trial, one of what it tries, in a seed."""
+def tried(item: tuple[str, str, int]) -> Ended:
+    """Run one session of a trial."""
     trial, name, seed = item
     return TRIALS[trial][1](name, seed)
 
 
-def typical(key: str, middle: Callable[[Sequence[float]], Any] = np.median) -> Callable[[Sequence[Ended]], str]:
-    """The median of what is known, or the mean, and the largest."""
-
-    def told(group: Sequence[Ended]) -> str:
-        known = [value for ended in group if not math.isnan(value := getattr(ended, key))]
-        return f"{middle(known):.3g} ({max(known):.3g})" if known else ""
-
-    return told
+def typical(name: str, middle: Callable[[Sequence[float]], Any] = np.median) -> Column:
+    """Return a column of the median of what is known, or the mean, and the largest."""
+    return lambda group: f"{middle(values):.3g} ({max(values):.3g})" if (values := known(group, name)) else ""
 
 
-def most_claims(verdict: str) -> Callable[[Sequence[Ended]], float]:
-    """The largest error of those with this verdict, in units of what they claim."""
-    return lambda group: max((ended.claims for ended in group if ended.verdict == verdict), default=math.nan)
+def most_claims(verdict: str) -> Column:
+    """Return a column of the largest error of those with this verdict, in units of what they claim."""
+    return lambda group: over("claims", max)([ended for ended in group if ended.verdict == verdict])
 
 
-def reasons(group: Sequence[Ended]) -> str:
-    """Those that were given first, and how often."""
-    first = Counter(ended.reasons[0] for ended in group if ended.reasons)
-    return ", ".join(f"{code} {count}" for code, count in first.most_common())
-
-
-COLUMNS: dict[str, Callable[[Sequence[Ended]], Any]] = {
+COLUMNS: dict[str, Column] = {
     "all": len,
-    **{v: lambda g, v=v: sum(e.verdict == v for e in g) or "" for v in (GOOD, USABLE, REFUSED, ABANDONED, NOTHING)},
+    **{v: lambda g, v=v: count("verdict", v)(g) or "" for v in (GOOD, USABLE, REFUSED, ABANDONED, NOTHING)},
     "rotated s": typical("rotated_s"),
     "finished s": typical("finished_s"),
     "error m/s²": typical("error", np.mean),
-    "z": lambda group: rms([z for ended in group for z in ended.z]),
-    "verified z": lambda group: rms([z for ended in group for z in ended.verified_z]),
+    "z": over("z", rms),
+    "verified z": over("verified_z", rms),
     "claims of good": most_claims(GOOD),
     "of usable": most_claims(USABLE),
-    "reasons": reasons,
+    "reasons": lambda group: frequencies(ended.reasons[0] for ended in group if ended.reasons),
 }
 
 
-def main() -> int:
-    """Run them; 1 where a session ended as it should not."""
-    parser = command_line(__doc__)
-    parser.set_defaults(seeds=None)
-    parser.add_argument("trial", choices=TRIALS)
-    parser.add_argument("--of", nargs="+", metavar="NAME", help="some of it; default: all, or the guided hand")
-    asked = parser.parse_args()
+def items(asked: Asked) -> list[tuple[str, str, int]]:
+    """Return the sessions that are asked for.
+
+    Raises
+    ------
+    SystemExit : the trial has nothing of such a name.
+    """
     names, _, seeds = TRIALS[asked.trial]
     chosen = asked.of or (["guided"] if asked.trial == "hands" else names)
     if unknown := set(chosen) - set(names):
-        parser.error(f"{asked.trial} are {', '.join(names)}, and not {', '.join(unknown)}")
-    items = [(asked.trial, name, seed) for name in chosen for seed in asked.seeds or seed_range(seeds)]
-    found = []
-    for ended in in_parallel(one, items, asked.jobs, asked.trial):
-        mark = f"WRONG {ended.wrong}: " if ended.wrong else ""
-        print(
-            f"{mark}{ended.name}, seed {ended.seed}: {ended.verdict}, {ended.error:.4f} m/s² {ended.said}", flush=True
-        )
-        found.append(ended)
-    show(table(grouped(found, lambda ended: ended.name), COLUMNS))
-    save(asked.json, found)
+        raise SystemExit(f"{asked.trial} are {', '.join(names)}, and not {', '.join(unknown)}")
+    return [(asked.trial, name, seed) for name in chosen for seed in asked.seeds or seed_range(seeds)]
+
+
+def line(ended: Ended) -> str:
+    """Return how a session ended, in a line."""
+    mark = f"WRONG {ended.wrong}: " if ended.wrong else ""
+    return f"{mark}{ended.name}, seed {ended.seed}: {ended.verdict}, {ended.error:.4f} m/s² {ended.said}"
+
+
+def report(found: list[Ended], asked: Asked) -> int:
+    """Print a line for each of what was tried; return 1 where a session ended as it should not."""
+    show(table(grouped(found, "name"), COLUMNS))
     return int(any(ended.wrong for ended in found))
+
+
+main = Program(
+    __doc__,
+    tried,
+    items,
+    report,
+    options=(
+        option("trial", choices=TRIALS),
+        option("--of", nargs="+", metavar="NAME", help="some of it; default: all, or the guided hand"),
+    ),
+    seeds=None,
+    line=line,
+)

@@ -40,28 +40,28 @@ class Ear:
         self.heard: list[tuple[float, Output]] = []
 
     def hear(self, output: Output) -> None:
-        """Remember."""
+        """Keep what was said, and when."""
         if isinstance(output, Meter):
             self.t_s = output.t_s
         else:
             self.heard.append((self.t_s, output))
 
     def pressed(self) -> Sequence[Key]:
-        """Nothing."""
+        """Press nothing."""
         return ()
 
     def of(self, kind: type) -> list[Any]:
-        """All outputs of a kind."""
+        """Return all outputs of a kind."""
         return [output for _, output in self.heard if isinstance(output, kind)]
 
     def when(self, kind: PromptKind) -> float:
-        """When that was first asked for [s]; NaN if it never was."""
+        """Return when that was first asked for [s]; NaN if it never was."""
         return next((t_s for t_s, one in self.heard if isinstance(one, Prompt) and one.kind is kind), math.nan)
 
 
 @dataclass(frozen=True)
 class Session:
-    """How one ended.
+    """A session that ended.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Session:
     said: str = ""
 
     def judged(self, *steps: Vector) -> Judgement:
-        """The calibration against the truth, before and after steps of what the accelerometer feels [m/s^2]."""
+        """Compare the calibration with the truth, before and after steps of what the accelerometer feels [m/s^2]."""
         if self.calibration is None:
             return Judgement(ABANDONED if self.code == Abandoned.exit_code else NOTHING)
         D, b_a = np.array(self.truth["D"]), np.array(self.truth["b_a"])
@@ -85,7 +85,7 @@ class Session:
 
 @dataclass(frozen=True)
 class Ended(Judgement):
-    """How a session ended; times in simulated seconds, NaN where it did not come so far."""
+    """A session that was judged; times in simulated seconds, NaN where it did not come so far."""
 
     name: str = ""
     seed: int = 0
@@ -98,7 +98,7 @@ class Ended(Judgement):
 
 
 def ended_of(name: str, seed: int, done: Session, wrong: str, *steps: Vector) -> Ended:
-    """A trace is wrong in any trial, and a good one that is farther from the truth than it claims."""
+    """Judge a session: a trace is wrong in any trial, and a good one that is farther from the truth than it claims."""
     judgement = done.judged(*steps)
     if "Traceback" in done.said:
         wrong = "a trace"
@@ -108,7 +108,7 @@ def ended_of(name: str, seed: int, done: Session, wrong: str, *steps: Vector) ->
 
 
 def session(words: str, plan: Plan, seed: int, ear: Any = None, mishaps: Sequence[Mishap] = ()) -> Session:
-    """A session on `--bus words` in this process."""
+    """Run a session on `--bus words` in this process."""
     bus = open_simulated(words, plan.gravity, seed, mishaps=mishaps)
     runner = Runner(Driver(bus, plan.config), ear or Ear(), lambda *_: None, plan, (bus.hear,))
     try:
@@ -120,7 +120,7 @@ def session(words: str, plan: Plan, seed: int, ear: Any = None, mishaps: Sequenc
 
 
 def recorded(words: str, plan: Plan, seconds: float) -> Session:
-    """So long a recording on `--bus words`, of what there is of it, calibrated afterwards."""
+    """Record `--bus words` for so long, as far as it gives samples, and calibrate."""
     bus, said = open_simulated(words), ""
     driver = Driver(bus, plan.config)
     try:
@@ -134,7 +134,7 @@ def recorded(words: str, plan: Plan, seconds: float) -> Session:
 
 
 def by_command(*words: str) -> tuple[Session, dict[str, Any]]:
-    """`mpucal session words --yes`, and the calibration.json that it left."""
+    """Run `mpucal session words --yes`, and return the calibration.json that it left, too."""
     with TemporaryDirectory() as place, redirect_stdout(StringIO()), redirect_stderr(StringIO()) as err:
         folder = Path(place) / "session"
         code = run(["session", *words, "--yes", "-o", str(folder)])

@@ -1,46 +1,69 @@
-"""Tables of trials: a line for each group of them, a column for each number of a group."""
+"""Tables of trials: a line for each group of rows, a column for each figure of a group."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
-from typing import Any, TypeVar
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import attrgetter
+from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-Row = TypeVar("Row")
-Key = TypeVar("Key", bound=Hashable)
+Column = Callable[[Sequence[Any]], Any]
+WIDTH = 170
 
 
-def grouped(rows: Iterable[Row], key: Callable[[Row], Key]) -> dict[Key, list[Row]]:
-    """The rows by key, in the order in which keys come."""
-    groups: dict[Key, list[Row]] = {}
+def grouped(rows: Iterable[Any], *names: str) -> dict[Any, list[Any]]:
+    """Return the rows by these attributes, in the order in which their values come."""
+    groups: dict[Any, list[Any]] = {}
     for row in rows:
-        groups.setdefault(key(row), []).append(row)
+        groups.setdefault(attrgetter(*names)(row), []).append(row)
     return groups
 
 
-def table(
-    groups: Mapping[Any, Sequence[Row]], columns: Mapping[str, Callable[[Sequence[Row]], Any]], title: str | None = None
-) -> Table:
-    """A line a group: its name, and each column's value of the rows. A tuple of names takes a column each.
+def known(rows: Iterable[Any], name: str) -> list[float]:
+    """Return the values of an attribute that are known, of rows that have one or several each."""
+    values = [getattr(row, name) for row in rows]
+    flat = [each for value in values for each in (value if isinstance(value, tuple) else (value,))]
+    return [each for each in flat if not math.isnan(each)]
+
+
+def over(name: str, make: Callable[[list[float]], Any] = np.mean) -> Column:
+    """Return a column: what `make` makes of an attribute's known values; empty where none is known."""
+    return lambda rows: float(make(values)) if (values := known(rows, name)) else None
+
+
+def count(name: str, *wanted: Any) -> Column:
+    """Return a column: the number of rows whose attribute is one of these values, or is true where none is given."""
+    return lambda rows: sum(getattr(row, name) in wanted if wanted else bool(getattr(row, name)) for row in rows)
+
+
+def frequencies(values: Iterable[Any], most: int | None = None) -> str:
+    """Return how often each value comes, the most frequent first."""
+    return ", ".join(f"{value} {n}" for value, n in Counter(values).most_common(most))
+
+
+def table(groups: Mapping[Any, Sequence[Any]], columns: Mapping[str, Column], title: str | None = None) -> Table:
+    """Return a table with a line a group: its name, a tuple in columns of its own, and each column's figure.
 
     A column that says nothing of any group is left out.
     """
+    cells = {heading: [cell(of(rows)) for rows in groups.values()] for heading, of in columns.items()}
+    cells = {heading: texts for heading, texts in cells.items() if any(texts)}
+    names = [name if isinstance(name, tuple) else (name,) for name in groups]
     lines = Table(title=title)
-    told = {heading: [cell(of(rows)) for rows in groups.values()] for heading, of in columns.items()}
-    told = {heading: cells for heading, cells in told.items() if any(cells)}
-    depth = max((len(_parts(name)) for name in groups), default=1)
-    for heading in [*[""] * depth, *told]:
+    for heading in [*[""] * max(map(len, names), default=1), *cells]:
         lines.add_column(heading, justify="right" if heading else "left")
-    for name, *cells in zip(groups, *told.values(), strict=True):
-        lines.add_row(*map(cell, _parts(name)), *cells)
+    for name, *texts in zip(names, *cells.values(), strict=True):
+        lines.add_row(*map(cell, name), *texts)
     return lines
 
 
 def plain_table(rows: Sequence[Mapping[str, Any]], title: str | None = None) -> Table:
-    """A line a row, whose keys are the columns; text stands to the left."""
+    """Return a table with a line a row, whose keys are the columns; text stands to the left."""
     lines = Table(title=title)
     for heading, value in rows[0].items():
         lines.add_column(heading, justify="left" if isinstance(value, str) else "right")
@@ -50,7 +73,7 @@ def plain_table(rows: Sequence[Mapping[str, Any]], title: str | None = None) -> 
 
 
 def cell(value: Any) -> str:
-    """Text of a value: three digits of a number, all before the point, and nothing of what is not known."""
+    """Return the text of a value: three digits of a number, all before the point, and nothing where it is not known."""
     match value:
         case None:
             return ""
@@ -60,12 +83,7 @@ def cell(value: Any) -> str:
             return str(value)
 
 
-def show(*tables: Table, width: int = 140) -> None:
-    """Print them, as wide as their content, whatever the terminal."""
-    console = Console(width=width)
+def show(*tables: Table) -> None:
+    """Print tables as wide as their content, whatever the terminal."""
     for one in tables:
-        console.print(one)
-
-
-def _parts(name: Any) -> tuple[Any, ...]:
-    return name if isinstance(name, tuple) else (name,)
+        Console(width=WIDTH).print(one)

@@ -1,4 +1,4 @@
-"""How near sessions with simulated vehicles come to the truth, and whether their claims hold: a line a session.
+"""Sessions with simulated vehicles against the truth, and whether their claims hold: a line a session.
 
     python -m tools.lab vehicle_accuracy                # 20 of ArduPilot, 10 of PX4, fresh and used in turn
     python -m tools.lab vehicle_accuracy --seeds 0:4    # of the first four seeds, and half as many of PX4
@@ -18,10 +18,10 @@ from mpucal.mavlink.parameters.names import slot_of
 from mpucal.result.calibration import GOOD
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 
-from .judge import rms
+from .judge import needed, off, rms, z_of
+from .runner import Asked, Program
 from .sessions import by_command
-from .trials import command_line, in_parallel, save
-from .vehicle_truth import needed, off, z_of
+from .table import grouped, known, over, show, table
 
 OFFSET_MPS2, SCALE, Z = 2e-3, 5e-4, (0.7, 1.3)
 FIRST_SEED = 100
@@ -42,7 +42,7 @@ USED = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one session; z : of all IMUs."""
+    """The result of a session; z : of all IMUs."""
 
     words: str
     code: int
@@ -53,40 +53,40 @@ class Outcome:
 
     @property
     def near(self) -> bool:
-        """Whether it is good, and as near as it should be; or makes no such claim."""
+        """Return True if it is good, and as near as it should be; or makes no such claim."""
         return self.verdict != GOOD or (self.offset <= OFFSET_MPS2 and self.scale <= SCALE)
 
-    def __str__(self) -> str:
-        numbers = f"{self.offset:9.5f} {self.scale:9.6f} {rms(self.z):6.2f}"
-        return f"{self.code:4d} {self.verdict:8} {numbers} {'  ' if self.near else '! '}{self.words}"
+
+def items(asked: Asked) -> list[str]:
+    """Return the words of each seed's vehicle, and of half as many of PX4."""
+    return [
+        words_of(firmware, n)
+        for firmware, share in (("ardupilot", 1), ("px4", 2))
+        for n in asked.seeds[: len(asked.seeds) // share]
+    ]
 
 
-def main() -> int:
-    """Run them, and print the table."""
-    asked = command_line(__doc__).parse_args()
-    words = [words_of("ardupilot", n) for n in asked.seeds]
-    words += [words_of("px4", n) for n in asked.seeds[: len(asked.seeds) // 2]]
-    print("exit verdict     offset     scale      z  vehicle", flush=True)
-    outcomes = []
-    for outcome in in_parallel(run, words, asked.jobs):
-        print(outcome, flush=True)
-        outcomes.append(outcome)
+COLUMNS = {"offset": over("offset"), "scale": over("scale"), "z": over("z", rms)}
+
+
+def report(outcomes: list[Outcome], asked: Asked) -> int:
+    """Print how many are near and the rms z of all; return 1 where one is not, or claims are wrong."""
     good = [outcome for outcome in outcomes if outcome.verdict == GOOD]
-    z, near = rms([each for outcome in good for each in outcome.z]), sum(outcome.near for outcome in good)
+    show(table(grouped(outcomes, "words", "code", "verdict"), COLUMNS))
+    z, near = rms(known(good, "z")), sum(outcome.near for outcome in good)
     print(f"{len(good)} of {len(outcomes)} good, {near} of these within {OFFSET_MPS2} m/s^2 and {SCALE}; rms z {z:.2f}")
-    save(asked.json, outcomes)
     return 0 if near == len(good) > 0 and Z[0] <= z <= Z[1] else 1
 
 
 def words_of(firmware: str, n: int) -> str:
-    """Every second one has been in use."""
+    """Return the words of the n-th vehicle; every second one has been in use."""
     used = USED[firmware]
     more = "" if n % 2 == 0 else "," + used[n // 2 % len(used)]
     return f"firmware={firmware},seed={FIRST_SEED + n}{more}"
 
 
-def run(words: str) -> Outcome:
-    """One session."""
+def of_vehicle(words: str) -> Outcome:
+    """Run a session with a vehicle, and compare."""
     done, document = by_command("--mavlink", f"sim:{words}", "--no-write")
     if done.calibration is None:
         return Outcome(words, done.code)
@@ -100,3 +100,6 @@ def run(words: str) -> Outcome:
         far.append(off(where, autopilot["params_new"], needed(truth)))
     offset, scale = map(max, zip(*far, strict=True))
     return Outcome(words, done.code, done.calibration.verdict, offset, scale, tuple(z))
+
+
+main = Program(__doc__, of_vehicle, items, report)

@@ -10,7 +10,7 @@ days before, as in tools/lab/check_trials.py, and each rest's mounting gives in 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -20,11 +20,11 @@ from mpucal.calibration.verification import FLOOR_MPS2
 from mpucal.data import Recording
 from mpucal.recheck.watch import DriftMonitor
 from mpucal.simulated.sensor import SensorTruth
-from tools.lab.scenarios.recordings import hand_scenario
 
 from .check_trials import DAYS, TEMPERATURE_C, at, calibrated_and_aged, events_of, happened
-from .table import grouped, show, table
-from .trials import command_line, in_parallel, names_of, save
+from .runner import Program, names_of, option
+from .scenarios.recordings import hand_scenario
+from .table import Column, count, grouped, show, table
 
 RATE_HZ = 100.0
 USES = ("pose7", "pose9", "continuous", "wobble30")
@@ -36,7 +36,7 @@ GIVES_S = 7.0
 
 @dataclass(frozen=True)
 class Run:
-    """Hours of use: how many, what was told first of each sensor, and after how long [s]."""
+    """Hours of use: how many, and which sensor was warned of first, after how long [s]."""
 
     event: str
     seed: int
@@ -45,11 +45,11 @@ class Run:
 
 
 def of_use(item: tuple[str, int], hours: float) -> Run | None:
-    """One sensor's hours; None where its calibration was refused."""
+    """Watch one sensor for so long; None where its calibration was refused."""
     event, seed = item
-    calibration, aged, of_event, of_errors = calibrated_and_aged(seed)
-    if calibration.verdict == "refused":
+    if (begun := calibrated_and_aged(seed)) is None:
         return None
+    calibration, aged, of_event, of_errors = begun
     after, _ = happened(aged, event, of_event)
     watch = DriftMonitor(calibration, DAYS)
     told: list[tuple[str, float]] = []
@@ -62,7 +62,7 @@ def of_use(item: tuple[str, int], hours: float) -> Run | None:
 
 
 def _minutes(sensor: SensorTruth, rng: np.random.Generator, hours: float) -> Iterator[Recording]:
-    """What the sensor gives, in parts; nothing is known of what is between one minute and the next."""
+    """Yield the sensor's samples in parts; nothing is known of what is between one minute and the next."""
     begun_s, size = 0.0, round(PART_S * RATE_HZ)
     while begun_s < 3600.0 * hours:
         seed, use = int(rng.integers(2**31)), str(rng.choice(USES))
@@ -77,15 +77,15 @@ def _minutes(sensor: SensorTruth, rng: np.random.Generator, hours: float) -> Ite
 
 
 def minutes_until(runs: Sequence[Run], share: float) -> str:
-    """After how many minutes that share of the sensors was told of; nothing where it never was."""
+    """Return after how many minutes that share of the sensors was warned of; nothing where it never was."""
     minutes = [run.told[0][1] / 60.0 if run.told else np.inf for run in runs]
     told = float(np.quantile(minutes, share, method="higher"))
     return f"{told:.1f}" if np.isfinite(told) else ""
 
 
-COLUMNS: dict[str, Callable[[Sequence[Run]], object]] = {
+COLUMNS: dict[str, Column] = {
     "sensors": len,
-    "told": lambda runs: sum(bool(run.told) for run in runs),
+    "told": count("told"),
     "warnings": lambda runs: sum(len(run.told) for run in runs),
     "minutes until, first": partial(minutes_until, share=0.0),
     "median": partial(minutes_until, share=0.5),
@@ -93,15 +93,13 @@ COLUMNS: dict[str, Callable[[Sequence[Run]], object]] = {
     "last": partial(minutes_until, share=1.0),
 }
 
-
-def main() -> None:
-    """Simulate, watch, print and save."""
-    parser = command_line(__doc__)
-    parser.add_argument("--only", type=names_of(WATCHED), default=WATCHED, help="events, with ; between")
-    parser.add_argument("--hours", type=float, default=0.5, help="of use, of each sensor")
-    options = parser.parse_args()
-    items = events_of(options.only, options.seeds)
-    found = in_parallel(partial(of_use, hours=options.hours), items, options.jobs, "sensors")
-    runs = [run for run in found if run is not None]
-    show(table(grouped(runs, lambda run: run.event), COLUMNS, f"{options.hours:g} h each"))
-    save(options.json, runs)
+main = Program(
+    __doc__,
+    of_use,
+    items=events_of,
+    report=lambda runs, asked: show(table(grouped(runs, "event"), COLUMNS, f"{asked.hours:g} h each")),
+    options=(
+        option("--only", type=names_of(WATCHED), default=WATCHED, help="events, with ; between"),
+        option("--hours", type=float, default=0.5, help="of use, of each sensor"),
+    ),
+)

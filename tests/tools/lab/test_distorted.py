@@ -62,7 +62,7 @@ def test_motion_capture_says_where_gravity_is(captured_file):
 
 
 def test_a_distortion_is_found_and_its_tilt_removed(captured_file):
-    before, after, with_gyro, exact = distorted.of_seed(0, captured_file, "auto", GRAVITY_MPS2)
+    before, after, with_gyro, exact = distorted.of_seed((captured_file, 0), "auto", GRAVITY_MPS2)
     assert "refused" not in before.told
     assert before.error > 0.5
     assert after.error == with_gyro.error < 0.1
@@ -92,7 +92,7 @@ def test_a_recording_without_motion_capture_is_none(tmp_path):
 def test_the_table_stands_beside_the_goals_and_the_papers():
     of = distorted.Errors("desk", "calibrated", 0.0917, 0.51, 0.26, 0.51, 0.27, 0, "hand, good", 0.05)
     stream = io.StringIO()
-    lines = grouped([of, replace(of, seed=1, error=0.1), *distorted.BESIDE], lambda e: (e.of, e.which))
+    lines = grouped([of, replace(of, seed=1, error=0.1), *distorted.BESIDE], "of", "which")
     Console(file=stream, width=200).print(table(lines, distorted.COLUMNS))
     for word in ("0.0959", "0.51", "0.47", "1.82", "hand, good"):
         assert word in stream.getvalue()

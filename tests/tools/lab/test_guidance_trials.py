@@ -9,7 +9,7 @@ from tools.lab import guidance_trials as trials
 @pytest.mark.parametrize("hand", ["by words", "wandering"])
 def test_what_a_person_is_shown_is_right(hand):
     """A hand that has nothing but the words comes to a good end, and one that does as it likes is told so."""
-    trial = trials.run((hand, 1))
+    trial = trials.of_hand((hand, 1))
     assert (trial.verdict, +trial.wrong) == ("good", {})
     assert trial.holds >= 10
 

@@ -1,0 +1,190 @@
+"""Commands of mpucal in processes forked from this one: their files, their limits, and how they ended."""
+
+from __future__ import annotations
+
+import gc
+import multiprocessing
+import os
+import pkgutil
+import resource
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable, Container, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from importlib import import_module
+from multiprocessing.connection import wait
+from pathlib import Path
+from typing import Any, NamedTuple
+from unittest.mock import patch
+
+import mpucal
+from mpucal.__main__ import _keep_streams
+from mpucal.chip.config import MAX_FRAMES_A_POLL, Config
+from mpucal.disk import growing
+from mpucal.mavlink.dialect import dialect
+from mpucal.session import rotate
+
+# exit codes that a user of the command is told of, but for a wrong use (2)
+CODES = (0, 3, 4, 5, 6)
+CPU_S, WALL_S = 120, 600.0
+POLL_S, KNOW_EVERY_S, SELDOM = 0.5, 3.0, 8.0
+Tell = Callable[[Any], None]
+Task = Callable[[Tell], None]
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A process that ended.
+
+    Attributes
+    ----------
+    code : exit code; below 0: the signal that ended it; None: it hung. said : on stderr.
+    """
+
+    code: int | None
+    said: str
+    cpu_s: float = 0.0
+    peak_mb: int = 0
+
+    @property
+    def last(self) -> str:
+        """Return the last line that it said."""
+        return (self.said.strip().splitlines() or [""])[-1]
+
+    def wrong(self, codes: Container[int | None] = CODES, silent: Container[int | None] = (0, 5)) -> list[str]:
+        """Return what no command may do: hang, trace, end with another exit code, or fail without a sentence.
+
+        silent : exit codes that need no sentence.
+        """
+        found = ["it hung"] if self.code is None else []
+        if "Traceback" in self.said:
+            trace = self.said[self.said.find("Traceback") :].splitlines()[-4:]
+            found.append(f"a trace: {' | '.join(trace)[-300:]}")
+        elif self.code is not None and self.code not in codes:
+            found.append(f"exit code {self.code}: {self.last[-200:]}")
+        elif self.code is not None and self.code not in silent and not self.last.startswith("mpucal: "):
+            found.append(f"exit code {self.code} without a sentence: {self.last[-200:]}")
+        return found
+
+
+class Child:
+    """A function that returns an exit code, in a process of its own, which waits until it is let go.
+
+    Parameters
+    ----------
+    folder : it runs there. said : the file that becomes its stderr. cpu_s : of processor time it may use so much.
+    """
+
+    def __init__(self, call: Callable[[], int], folder: Path, said: Path, cpu_s: int = CPU_S) -> None:
+        self._said = said
+        hold, self._go = os.pipe()
+        self._pid = os.fork()
+        if self._pid == 0:
+            os.close(self._go)
+            os.read(hold, 1)
+            code = 1
+            try:
+                resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 1))
+                become(folder, said)
+                code = call()
+                sys.stdout.flush()
+            except BaseException:
+                traceback.print_exc()
+            finally:
+                os._exit(code)
+        os.close(hold)
+
+    def go(self) -> Child:
+        """Let it begin; another process forked since holds the pipe open, too."""
+        os.write(self._go, b"!")
+        os.close(self._go)
+        return self
+
+    def wait(self, wall_s: float = WALL_S) -> Ended:
+        """Wait for its end, for so long at most, and return it."""
+        return ended(self._pid, self._said, wall_s)
+
+
+def become(folder: Path, said: Path) -> None:
+    """Go on in `folder` as a command that was started there, with stderr in the file `said` and nothing to read."""
+    os.chdir(folder)
+    nothing, file = os.open(os.devnull, os.O_RDWR), os.open(said, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o644)
+    for number, handle in enumerate((nothing, nothing, file)):
+        os.dup2(handle, number)
+    os.close(nothing)
+    os.close(file)
+    _keep_streams()
+
+
+def ended(pid: int, said: Path, wall_s: float = WALL_S) -> Ended:
+    """Wait for a child, for so long at most, and return how it ended and what it said in the file `said`."""
+    until, done, hung = time.monotonic() + wall_s, 0, False
+    while not done:
+        done, status, used = os.wait4(pid, os.WNOHANG)
+        if not done and time.monotonic() > until and not hung:
+            hung = True
+            os.kill(pid, signal.SIGKILL)
+        time.sleep(0.0 if done else 0.005)
+    code = os.waitstatus_to_exitcode(status)
+    hung |= code == -signal.SIGXCPU
+    text = said.read_text("utf-8", "replace") if said.exists() else ""
+    return Ended(None if hung else code, text, used.ru_utime + used.ru_stime, used.ru_maxrss >> 10)
+
+
+class Died(NamedTuple):
+    """The end of a task that did not come to its own: its exit code, or below 0 the signal."""
+
+    code: int
+
+
+def forked(tasks: list[Task], jobs: int) -> Iterator[tuple[Task, Any]]:
+    """Run tasks in processes of their own, which may crash, hang or be killed.
+
+    Yields a task and what it told, as it comes; last a Died where it died. Tasks may be added to the list meanwhile.
+    """
+    fork, running = multiprocessing.get_context("fork"), {}
+    while tasks or running:
+        while tasks and len(running) < jobs:
+            hear, tell = fork.Pipe(duplex=False)
+            process = fork.Process(target=tasks[0], args=(tell.send,))
+            running[hear] = process, tasks.pop(0)
+            process.start()
+            tell.close()
+        for hear in wait(running):
+            process, task = running[hear]
+            try:
+                yield task, hear.recv()
+            except EOFError:
+                process.join()
+                del running[hear]
+                hear.close()
+                if process.exitcode:
+                    yield task, Died(process.exitcode)
+
+
+def ready() -> None:
+    """Load what a command loads when it needs it, so that no fork has to."""
+    for module in pkgutil.walk_packages(mpucal.__path__, "mpucal."):
+        with suppress(ImportError):
+            import_module(module.name)
+    dialect()
+    gc.freeze()
+
+
+@contextmanager
+def quick(sync: bool = False) -> Iterator[None]:
+    """Meanwhile sessions spend their time on what is tried: chips are polled and fits made as seldom as may be.
+
+    sync : captures are synced to the disk, by a thread, which does not go on in a forked process.
+    """
+    period_s = property(lambda config: min(POLL_S, MAX_FRAMES_A_POLL / config.rate_hz))
+    unsynced = patch.object(growing.Syncing, "__init__", lambda self, _file: setattr(self, "close", lambda: None))
+    with ExitStack() as stack:
+        stack.enter_context(patch.object(Config, "period_s", period_s))
+        stack.enter_context(patch.multiple(rotate, KNOW_EVERY_S=KNOW_EVERY_S, SELDOM=SELDOM))
+        if not sync:
+            stack.enter_context(unsynced)
+        yield
