@@ -31,9 +31,9 @@ from ..sinks.choose import chosen
 from ..sinks.record import in_file
 from ..sinks.table import SINKS
 from ..sinks.write_back import write_to_all
-from ..sources.opened import Opened
+from ..sources.opened_source import OpenedSource
 from ..sources.opening import one_of, open_source
-from ..sources.table import kinds_meant, source_title, used_by
+from ..sources.table import kinds_for, matching_kinds, source_title
 from ..terminal.console import Console, console
 from ..terminal.flat import BOARD, VEHICLE
 from .destination import device
@@ -84,10 +84,10 @@ def command(
     good; 5: drifted, remounted or another sensor; 4: it cannot be told, and why; 6: with -o, CALIBRATION was damaged or
     changed after it was saved.
     """
-    kinds = kinds_meant(options)
+    kinds = matching_kinds(options)
     if (file is None) == (not kinds):
         what = "a file and a source were given together" if kinds else "nothing to check it by was given"
-        raise UsageError(what, f"give a recording, or {one_of(used_by('check'))}")
+        raise UsageError(what, f"give a recording, or {one_of(kinds_for('check'))}")
     if page is not None and file is not None:
         raise UsageError("--page was given without a source", "a recording needs no guidance: leave --page away")
     if sinks and (folder is None or file is not None):
@@ -134,7 +134,7 @@ def _told(
     return result, [] if folder is None else _left(folder.path, of, result, recording, as_json)
 
 
-def _measured(source: Opened, into: SessionFolder | None, person: Console) -> Recording:
+def _measured(source: OpenedSource, into: SessionFolder | None, person: Console) -> Recording:
     """What the person showed; its capture is kept with -o."""
     with running(source, Path(os.devnull) if into is None else into.capture, person, checking=True) as runner:
         try:
@@ -158,7 +158,7 @@ def _left(folder: Path, of: Calibration, result: CheckResult, recording: Recordi
 def _write_back(sinks: tuple[str, ...], folder: Path, options: dict[str, Any], yes: bool, as_json: bool) -> None:
     """Write the updated calibration to the source's own sinks."""
     path = folder / DOCUMENT.name
-    kinds = chosen(sinks, False, kinds_meant(options)[0])
+    kinds = chosen(sinks, False, matching_kinds(options)[0])
     confirm, in_doubt = partial(ask, yes=yes), partial(ask_in_doubt, yes=yes)
     sensor, record = device(options), in_file(path)
     for applied in write_to_all(kinds, Calibration.load(path), sensor, folder, record, confirm, sinks, in_doubt):

@@ -14,7 +14,7 @@ from ..sinks.kind import Device, SinkKind
 from ..sinks.table import SINKS
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
-from ..sources.table import kinds_meant
+from ..sources.table import matching_kinds
 from .person import say
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -46,7 +46,7 @@ def sink_flags(command: F) -> F:
 
 def device(options: Mapping[str, Any]) -> Device:
     """The device that a command's source options name; its sinks' flags are among the options."""
-    kind = kinds_meant(options)[0]
+    kind = matching_kinds(options)[0]
     flags = {flag.name for kind in SINKS.values() for flag in kind.flags}
     given = frozenset(name for name in flags if options.get(name))
     return Device(kind, str(options[kind.option.name]), partial(open_source, options), say, given, options)

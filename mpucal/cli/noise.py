@@ -26,7 +26,7 @@ from ..session.lay_flat import put_down
 from ..session.ports import Source
 from ..session.results import save
 from ..sources.opening import one_of, open_source
-from ..sources.table import kinds_meant, used_by
+from ..sources.table import kinds_for, matching_kinds
 from .options import ABOVE_ZERO, check_gyroscope, check_source, given, source_options
 from .recording_options import given_hints, hint_options, say_taken
 
@@ -55,10 +55,10 @@ def command(file: Path | None, hours: float | None, folder: Path | None, as_json
     memory. Ctrl-C ends a measurement and keeps what there is. `mpucal export --noise` and `mpucal calibrate --noise`
     take noise.json.
     """
-    kinds = kinds_meant(options)
+    kinds = matching_kinds(options)
     if (file is None) == (not kinds):
         what = "a file and a source were given together" if kinds else "nothing to measure was given"
-        raise UsageError(what, f"give a recording, or {one_of(used_by('noise'))}")
+        raise UsageError(what, f"give a recording, or {one_of(kinds_for('noise'))}")
     if file is not None:
         noise = _of_file(file, options)
     else:

@@ -17,7 +17,7 @@ from ..errors import UsageError
 from ..session.aims import AIMS, NORMAL
 from ..sources import opening
 from ..sources.kind import Option, SourceKind
-from ..sources.table import SOURCES, unique, used_by
+from ..sources.table import SOURCES, kinds_for, unique
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -88,7 +88,7 @@ def source_options(name: str, settings: bool = True) -> Callable[[F], F]:
     ----------
     settings : how the sensor is set, too.
     """
-    taken = used_by(name)
+    taken = kinds_for(name)
     belonging = [option for kind in taken for option in kind.options]
     if settings:
         belonging += [option for kind in taken for option in kind.settings]
@@ -107,7 +107,7 @@ def source_options(name: str, settings: bool = True) -> Callable[[F], F]:
 def _declared(option: Option, text: str, hidden: bool = False) -> Callable[[F], F]:
     bare: dict[str, Any] = {} if option.bare is None else {"is_flag": False, "flag_value": option.bare}
     return click.option(
-        option.spelled,
+        option.flag,
         option.name,
         metavar=option.metavar,
         type=click.Choice(option.choices) if option.choices else Parsed(option.parse),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from ..page.address import HERE, Address, address
-from ..sources.opened import Opened
+from ..sources.opened_source import OpenedSource
 from ..terminal.console import Console
 from ..terminal.flat import BOARD, BOARDS
 from .options import Parsed
@@ -41,7 +41,7 @@ def page_options(command: F) -> F:
 def beside(
     terminal: Console,
     page: Address | None,
-    source: Opened,
+    source: OpenedSource,
     options: Mapping[str, Any],
     title: str,
     board: str,

@@ -10,12 +10,12 @@ from ..result.clock import now
 from ..session.live.scheduler import InlineWorker
 from ..session.live.worker_process import ProcessWorker
 from ..session.runner import Runner
-from ..sources.opened import Opened
+from ..sources.opened_source import OpenedSource
 from ..terminal.console import Console
 
 
 @contextmanager
-def running(source: Opened, capture: Path, person: Console, checking: bool = False) -> Iterator[Runner]:
+def running(source: OpenedSource, capture: Path, person: Console, checking: bool = False) -> Iterator[Runner]:
     """A runner on `source` that records into `capture`; whatever happens, both are closed; checking : see Runner.
 
     Raises

@@ -24,10 +24,10 @@ from ..sinks.record import in_session
 from ..sinks.sink import Applied
 from ..sinks.write_back import write_to_all
 from ..sources.kind import NAME
-from ..sources.opened import Opened
-from ..sources.opening import check_resumed, open_source
+from ..sources.opened_source import OpenedSource
+from ..sources.opening import check_resume_options, open_source
 from ..sources.resumed import open_resumed
-from ..sources.table import kinds_meant, source_title
+from ..sources.table import matching_kinds, source_title
 from ..terminal.console import Console, console
 from ..terminal.flat import BOARD, VEHICLE
 from ..terminal.hangup import outliving
@@ -117,7 +117,7 @@ def command(
 
 def _opened(
     resume: Path | None, options: dict[str, Any], sinks: tuple[str, ...], no_write: bool, attended: bool
-) -> tuple[Opened, tuple[SinkKind, ...], dict[str, Any]]:
+) -> tuple[OpenedSource, tuple[SinkKind, ...], dict[str, Any]]:
     """The source, the sinks that the result goes to, and the options that name the source."""
     if resume is None:
         # the write-back opens a simulated vehicle again, which then holds what it was given meanwhile
@@ -125,15 +125,15 @@ def _opened(
         kinds = chosen(sinks, no_write, check_source(click.get_current_context()))
         opening = {**options, "attended": attended, "writes": bool(kinds)}
         return open_source(opening, given()), kinds, options
-    check_resumed(given())
+    check_resume_options(given())
     check_unfinished(resume)
     source = open_resumed(resume)
     options = {**options, **source.live.words}
-    return source, chosen(sinks, no_write, kinds_meant(options)[0]), options
+    return source, chosen(sinks, no_write, matching_kinds(options)[0]), options
 
 
 def _run(
-    source: Opened, folder: SessionFolder, person: Console, announcement: str, name: str | None
+    source: OpenedSource, folder: SessionFolder, person: Console, announcement: str, name: str | None
 ) -> tuple[Recording, Calibration, tuple[Path, ...]]:
     """Measure, calibrate, write the files; whatever ends it before, the capture is kept, and the person told where."""
     plan = source.plan
@@ -156,7 +156,7 @@ def _run(
         raise
 
 
-def _how_to_go_on(source: Opened, folder: Path, error: BaseException) -> str:
+def _how_to_go_on(source: OpenedSource, folder: Path, error: BaseException) -> str:
     """Who can resume is not told to start again: one advice, in the error where that has one."""
     if (folder / DOCUMENT.name).exists():
         return f", and the results in {folder}"

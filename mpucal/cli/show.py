@@ -23,7 +23,7 @@ from ..result.journal import AT, Journal
 from ..sinks.table import SINKS
 from ..sources.kind import SourceKind
 from ..sources.opening import contents, one_of
-from ..sources.table import kinds_meant, used_by
+from ..sources.table import kinds_for, matching_kinds
 from .loading import loaded
 from .options import check_source, given, source_options
 from .person import say
@@ -48,12 +48,12 @@ parameters are read; nothing is written.
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def command(file: Path | None, as_json: bool, **options: Any) -> None:
     """Show the one place that is given."""
-    sources = kinds_meant(options)
-    places = [*(["a file"] if file is not None else []), *(kind.option.spelled for kind in sources)]
+    sources = matching_kinds(options)
+    places = [*(["a file"] if file is not None else []), *(kind.option.flag for kind in sources)]
     if len(places) != 1:
         raise UsageError(
             f"{' and '.join(places)} were given together" if places else "nothing to show was named",
-            f"give a file, or {one_of(used_by('show'))}",
+            f"give a file, or {one_of(kinds_for('show'))}",
         )
     if file is None:
         if said := [spelled for name, spelled in given().items() if name in NAMES]:
@@ -72,7 +72,7 @@ def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) ->
         if left is not None:
             say(
                 f"a write to {sink.where} was cut off at {left[AT]}: it may hold old and new values;"
-                f" the next `mpucal write CALIBRATION {sink.name} {kind.option.spelled} ...` first restores the old"
+                f" the next `mpucal write CALIBRATION {sink.name} {kind.option.flag} ...` first restores the old"
             )
     if kind.store:
         with resolve_name(kind.store)(options) as store:

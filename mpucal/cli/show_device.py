@@ -9,7 +9,7 @@ import numpy as np
 
 
 def page(facts: Mapping[str, Any]) -> str:
-    """The facts as a person reads them; see Opened.contents."""
+    """The facts as a person reads them; see OpenedSource.contents."""
     rows = _vehicle_rows(facts) if "parameters" in facts else _chip_rows(facts) if "who_am_i" in facts else dict(facts)
     rows.pop("where", None)
     wide = max(18, *(len(key) + 2 for key in rows))

@@ -12,7 +12,7 @@ from ..errors import BusError, WriteBackError
 from ..result.blob import Blob, BlobError
 from ..result.calibration import REFUSED, Calibration
 from ..result.improvement import is_better, left_wrong
-from ..sources.bridge.store import Held, Store
+from ..sources.bridge.store import BlobStore, StoredBlob
 from .kind import Device
 from .sink import Applied
 from .table import BRIDGE_BLOB
@@ -40,7 +40,7 @@ def open_bridge(device: Device) -> Iterator[BridgeSink]:
 class BridgeSink:
     """The config blob that the bridge behind `store` keeps for the firmware that uses it."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: BlobStore) -> None:
         self._store = store
         self.where = f"the bridge on {store.name}"
 
@@ -106,7 +106,7 @@ class BridgeSink:
                 "give the calibration of this chip",
             )
 
-    def _after(self, error: BusError, old: bytes | None, new: bytes) -> tuple[bytes, Held | None]:
+    def _after(self, error: BusError, old: bytes | None, new: bytes) -> tuple[bytes, StoredBlob | None]:
         """What the bridge holds after `error`, where that is the new blob.
 
         Raises

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..errors import UsageError
-from ..sources.kind import Delivers, SourceKind
+from ..sources.kind import Delivery, SourceKind
 from ..sources.opening import one_of
 from ..sources.table import SOURCES, unique
 from .kind import SinkKind
@@ -46,8 +46,8 @@ def check_behind(kind: SinkKind, source: SourceKind, given: str, otherwise: str 
     UsageError : `given`, and the source has none; give another one, `otherwise` do what that says.
     """
     if not kind.behind(source):
-        has = "has no sensor to write to" if source.delivers is Delivers.CAPTURE else f"has no {kind.name}"
-        raise UsageError(f"{given}, and {source.spelled} {has}", f"{one_of(filter(kind.behind, SOURCES))}{otherwise}")
+        has = "has no sensor to write to" if source.delivers is Delivery.CAPTURE else f"has no {kind.name}"
+        raise UsageError(f"{given}, and {source.flag} {has}", f"{one_of(filter(kind.behind, SOURCES))}{otherwise}")
 
 
 def announced(kinds: Sequence[SinkKind], no_write: bool) -> str:
@@ -66,4 +66,4 @@ def defaults() -> str:
 
 def behind(kind: SinkKind) -> list[str]:
     """The options of the sources that have the sink, as a person writes them."""
-    return [option.spelled for option in unique(source.option for source in SOURCES if kind.behind(source))]
+    return [option.flag for option in unique(source.option for source in SOURCES if kind.behind(source))]

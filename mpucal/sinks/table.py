@@ -7,7 +7,7 @@ that kind is opened.
 from __future__ import annotations
 
 from ..result.session_files import SessionFile
-from ..sources.kind import Delivers
+from ..sources.kind import Delivery
 from ..sources.table import IIO, MAVLINK
 from .kind import Effect, Flag, SinkKind
 
@@ -26,7 +26,7 @@ SINKS = {
     for kind in (
         SinkKind(
             CHIP,
-            behind=lambda source: source.delivers is Delivers.REGISTERS,
+            behind=lambda source: source.delivers is Delivery.REGISTERS,
             where="the chip's offset registers",
             holds="b_a alone, in steps of 1 mg, until the chip's supply goes",
             opener="mpucal.sinks.chip:open_chip",

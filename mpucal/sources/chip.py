@@ -19,10 +19,10 @@ from ..result.session_files import CAPTURE
 from ..session.events import Prompt
 from ..session.plan import Plan
 from ..session.ports import Operator, ReplayedOperator, Source
-from .dated import Dated
-from .opened import Measuring, Say
-from .parts import PartsBus
+from .chained_bus import ChainedBus
+from .opened_source import ActiveSource, Say
 from .tap import Tap
+from .utc_recorder import UtcRecorder
 
 # of a capture's head: what to open to go on with the session
 SOURCE = "source"
@@ -30,19 +30,19 @@ SOURCE = "source"
 
 @dataclass(frozen=True)
 class OpenedChip:
-    """A chip on a bus; see Opened.
+    """A chip on a bus; see OpenedSource.
 
     Attributes
     ----------
     bus : open. replay : the same bus where it is a replay.
-    words : what opens it again; see Request.words. real_time : see Opened.
+    words : what opens it again; see Request.words. real_time : see OpenedSource.
     """
 
     bus: Bus
     plan: Plan
     listeners: Sequence[Callable[[Prompt], None]] = ()
     truth: Mapping[str, Any] | None = None
-    replay: PartsBus | None = None
+    replay: ChainedBus | None = None
     recovered: str | None = None
     capture_name: str = CAPTURE.name
     words: Mapping[str, Any] = field(default_factory=dict)
@@ -54,7 +54,7 @@ class OpenedChip:
 
     @property
     def resumable(self) -> bool:
-        """See Opened."""
+        """See OpenedSource."""
         return bool(self.words)
 
     @property
@@ -72,20 +72,22 @@ class OpenedChip:
         return Driver(bus, self.plan.config, name, say)
 
     def talk(self, person: Operator) -> Operator:
-        """See Opened."""
+        """See OpenedSource."""
         return person if self.replay is None else ReplayedOperator(person, self.replay.pending_events)
 
     @contextmanager
-    def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[Measuring]:
-        """See Opened."""
+    def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[ActiveSource]:
+        """See OpenedSource."""
         with closing(self.bus), CaptureWriter(capture) as writer:
             writer.start({"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.source_meta()})
             pending = None if self.replay is None else self.replay.pending_events
-            driver = self.driver(Tap(self.bus, Dated(writer, pending)), capture.name, lambda text: say(f"  {text}."))
+            driver = self.driver(
+                Tap(self.bus, UtcRecorder(writer, pending)), capture.name, lambda text: say(f"  {text}.")
+            )
             if self.replay is None:
-                yield Measuring(driver, writer.event)
+                yield ActiveSource(driver, writer.event)
             else:
-                yield Measuring(driver, writer.event, self.replay.go_on, self._was_late)
+                yield ActiveSource(driver, writer.event, self.replay.go_on, self._was_late)
         if self.replay is not None and self.replay.unread():
             raise CaptureError(
                 f"the replay ended with {self.replay.unread()} accesses of its capture unread",

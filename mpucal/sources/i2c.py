@@ -20,10 +20,10 @@ from ..chip.families import PARTS
 from ..chip.registers import FIFO_R_W, WHO_AM_I
 from ..errors import BusError, NoAnswer
 from .chip import OpenedChip
-from .claim import claim
-from .i2c_errors import nobody, opening_error, transfer_error
+from .device_lock import lock_device
+from .i2c_errors import no_answer_error, opening_error, transfer_error
 from .kind import Request
-from .stamp import Stamp
+from .read_timer import ReadTimer
 
 # AD0 low, AD0 high
 ADDRESSES = (0x68, 0x69)
@@ -60,7 +60,7 @@ class I2cBus:
 
         self._message = smbus2.i2c_msg
         self._path = f"/dev/i2c-{adapter}" if str(adapter).isdecimal() else str(adapter)
-        self._stamp = Stamp(time.monotonic_ns)
+        self._stamp = ReadTimer(time.monotonic_ns)
         self._smbus = smbus2.SMBus()
         try:
             with self._told(opening_error):
@@ -72,7 +72,7 @@ class I2cBus:
             self._repeated_start = True
             self._address = self._find(ADDRESSES if address is None else (address,))
             chip = f"the chip at 0x{self._address:02x} on {self._path}"
-            claim(self._smbus.fd, chip, "end it, or take the other chip with --address", self._address)
+            lock_device(self._smbus.fd, chip, "end it, or take the other chip with --address", self._address)
         except BaseException:
             self._smbus.close()
             raise
@@ -143,7 +143,7 @@ class I2cBus:
         for failure in failures:
             if not isinstance(failure, NoAnswer):
                 raise failure
-        raise nobody(self._path, addresses)
+        raise no_answer_error(self._path, addresses)
 
     def _asked(self, address: int) -> int:
         """What answers there; one that is not acknowledged is asked again, since one in a hundred may be lost."""
@@ -160,7 +160,7 @@ class I2cBus:
         except OSError as error:
             # i2c-stub has no other number for an address where nothing is
             if error.errno == errno.ENODEV and Path(self._path).exists():
-                raise nobody(self._path, (address,)) from error
+                raise no_answer_error(self._path, (address,)) from error
             if error.errno != errno.EOPNOTSUPP:
                 raise
         # made of two messages, where the adapter moves one at a time

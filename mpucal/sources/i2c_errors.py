@@ -57,7 +57,7 @@ def transfer_error(error: OSError, path: str, address: int) -> BusError:
         what, remedy = _TRANSFER[errno.ENODEV]
         return BusError(f"{what} ({path})", remedy)
     if error.errno in (errno.EREMOTEIO, errno.ENXIO):
-        return nobody(path, (address,))
+        return no_answer_error(path, (address,))
     if error.errno == errno.ETIMEDOUT:
         return BusHeld(
             f"the I2C bus does not come free (0x{address:02x} on {path})",
@@ -74,7 +74,7 @@ def transfer_error(error: OSError, path: str, address: int) -> BusError:
     return BusError(f"{what} (0x{address:02x} on {path})", remedy.format(chip=chip))
 
 
-def nobody(path: str, addresses: tuple[int, ...]) -> NoAnswer:
+def no_answer_error(path: str, addresses: tuple[int, ...]) -> NoAnswer:
     """Nothing acknowledges any of `addresses`."""
     places = " or ".join(f"0x{address:02x}" for address in addresses)
     number = _number(path)

@@ -24,7 +24,7 @@ from ..session.plan import DRIVER
 from .chip import OpenedChip
 from .iio_errors import attribute_error, buffer_error
 from .kind import Request
-from .opened import Say
+from .opened_source import Say
 
 SYSFS, DEVICES = Path("/sys/bus/iio/devices"), Path("/dev")
 RULES = Path("/etc/udev/rules.d")
@@ -39,7 +39,7 @@ NOWHERE = Devices("", "")
 
 @dataclass(frozen=True)
 class OpenedIio(OpenedChip):
-    """One or two devices; see Opened.
+    """One or two devices; see OpenedSource.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class OpenedIio(OpenedChip):
         return IioDriver(bus, self.devices, self.plan.config, name, say, self.trigger)
 
 
-def of_iio(replay: OpenedChip, capture: Capture) -> OpenedIio:
+def iio_replay(replay: OpenedChip, capture: Capture) -> OpenedIio:
     """A replay of what is no chip's; see OpenedIio.source_meta."""
     accel, gyro, trigger = capture.meta[OF_IIO]
     held = {field.name: getattr(replay, field.name) for field in fields(OpenedChip)}

@@ -34,12 +34,12 @@ class Option:
     bare: str | None = None
 
     @property
-    def spelled(self) -> str:
+    def flag(self) -> str:
         """As a person writes it."""
         return f"--{self.name.replace('_', '-')}"
 
 
-class Delivers(Enum):
+class Delivery(Enum):
     """What comes out of a source."""
 
     REGISTERS = "a chip's registers"
@@ -55,7 +55,7 @@ class SourceKind:
     ----------
     what : of which kind it is, in words. option : names it on the command line; several kinds may share one.
     forms : what the option's value looks like, for the help.
-    opener : "module:attribute" of a function from a Request to an Opened; imported when it is called.
+    opener : "module:attribute" of a function from a Request to an OpenedSource; imported when it is called.
     delivers : a session on registers can go on after an interruption. What opens another than a capture has besides
         `contents() -> dict`: what the sensor holds now, in JSON's own types, `where` among them.
     options : belong to it, and name the source beside `option`. settings : how its sensor can be set.
@@ -65,7 +65,7 @@ class SourceKind:
     title : of a session on it; {} is the option's value.
     store : "module:attribute" of a context manager from the options' values to a memory that keeps a calibration, as
         mpucal.sources.bridge has it; empty where there is none.
-    doctor : "module:attribute" of what examines it, from an Opened and seconds to findings; empty: nothing does.
+    doctor : "module:attribute" of what examines it, from an OpenedSource and seconds to findings; empty: nothing does.
     host : the same of what examines this computer's side of it before it is opened, from the option's value.
     """
 
@@ -73,7 +73,7 @@ class SourceKind:
     option: Option
     forms: str
     opener: str
-    delivers: Delivers
+    delivers: Delivery
     options: tuple[Option, ...] = ()
     settings: tuple[Option, ...] = ()
     word: str = ""
@@ -85,18 +85,18 @@ class SourceKind:
     host: str = ""
 
     @property
-    def spelled(self) -> str:
+    def flag(self) -> str:
         """As a person writes it: `--bus sim`."""
-        beside = next((option.spelled for option in self.options if option.name == self.beside), "")
-        return " ".join(filter(None, (self.option.spelled, self.word, beside)))
+        beside = next((option.flag for option in self.options if option.name == self.beside), "")
+        return " ".join(filter(None, (self.option.flag, self.word, beside)))
 
     @property
     def commands(self) -> tuple[str, ...]:
         """Which take it."""
-        live = () if self.delivers is Delivers.CAPTURE else ("stream", "write", "show")
+        live = () if self.delivers is Delivery.CAPTURE else ("stream", "write", "show")
         return ("session", "record", "check", "noise", *live, *(("doctor",) if self.doctor else ()))
 
-    def is_meant(self, values: Mapping[str, Any]) -> bool:
+    def matches(self, values: Mapping[str, Any]) -> bool:
         """Whether the options' values name a source of this kind."""
         value = values.get(self.option.name)
         if value is None or (self.beside and values.get(self.beside) is None):

@@ -9,9 +9,9 @@ from typing import Any
 from ..chip.config import Config, RateOnlyConfig
 from ..errors import CaptureError, UsageError, meant
 from ..session.plan import Plan
-from .kind import Delivers, Option, Request, SourceKind
-from .opened import Opened
-from .table import DLPF, SOURCES, kinds_meant, unique, used_by
+from .kind import Delivery, Option, Request, SourceKind
+from .opened_source import OpenedSource
+from .table import DLPF, SOURCES, kinds_for, matching_kinds, unique
 
 # what a person may choose of a plan; a capture holds it
 OF_THE_PLAN = ("gravity", "gravity_anyway", "model", "target", "tilt_only")
@@ -29,27 +29,27 @@ def check_source(values: Mapping[str, Any], given: Mapping[str, str], command: s
     ------
     UsageError : none, several, one that the command does not take, or options that do not fit it.
     """
-    kinds = kinds_meant(values)
+    kinds = matching_kinds(values)
     if len(kinds) != 1:
-        together = " and ".join(kind.option.spelled for kind in kinds)
+        together = " and ".join(kind.option.flag for kind in kinds)
         what = f"{together} were given together" if kinds else "no source was given"
-        raise UsageError(what, one_of(used_by(command)))
+        raise UsageError(what, one_of(kinds_for(command)))
     kind = kinds[0]
     if command not in kind.commands:
-        remedy = "; ".join(filter(None, (one_of(used_by(command)), kind.instead)))
-        raise UsageError(f"{kind.spelled} was given, and `mpucal {command}` does not take it", remedy)
+        remedy = "; ".join(filter(None, (one_of(kinds_for(command)), kind.instead)))
+        raise UsageError(f"{kind.flag} was given, and `mpucal {command}` does not take it", remedy)
     word = str(values[kind.option.name]).partition(":")[0]
     if nearly := meant(word, [other.word for other in SOURCES if other.option is kind.option and other.word]):
-        raise UsageError(f"{kind.option.spelled} {word} names no source", f"{kind.forms}{nearly}")
-    if kind.delivers is not Delivers.CAPTURE:
+        raise UsageError(f"{kind.option.flag} {word} names no source", f"{kind.forms}{nearly}")
+    if kind.delivers is not Delivery.CAPTURE:
         for option in _beside(SOURCES):
             if option.name in given and option not in _beside([kind]):
-                what = f"{given[option.name]} was given beside {kind.spelled}, which has none"
+                what = f"{given[option.name]} was given beside {kind.flag}, which has none"
                 raise UsageError(what, "leave it out")
     return kind
 
 
-def check_resumed(given: Mapping[str, str]) -> None:
+def check_resume_options(given: Mapping[str, str]) -> None:
     """Beside --resume neither a source nor what its capture fixes.
 
     Raises
@@ -62,7 +62,7 @@ def check_resumed(given: Mapping[str, str]) -> None:
             raise UsageError(what, "leave it out")
 
 
-def refuse_fixed(request: Request) -> None:
+def refuse_fixed_options(request: Request) -> None:
     """Beside a capture, nothing that it fixes.
 
     Raises
@@ -72,20 +72,22 @@ def refuse_fixed(request: Request) -> None:
     for name in _fixed_by_capture():
         if name in request.given:
             raise UsageError(
-                f"{request.given[name]} was given beside {request.kind.spelled}, and the capture fixes it",
+                f"{request.given[name]} was given beside {request.kind.flag}, and the capture fixes it",
                 "leave it out, or use `mpucal calibrate` to fit the capture differently",
             )
 
 
-def open_source(values: Mapping[str, Any], given: Mapping[str, str] | None = None, until_end: bool = False) -> Opened:
+def open_source(
+    values: Mapping[str, Any], given: Mapping[str, str] | None = None, until_end: bool = False
+) -> OpenedSource:
     """The source that the options' values name; see check_source.
 
     Raises
     ------
     UsageError : values that name no such source. SourceError : it cannot be opened.
     """
-    kind = kinds_meant(values)[0]
-    opened: Opened = resolve_name(kind.opener)(
+    kind = matching_kinds(values)[0]
+    opened: OpenedSource = resolve_name(kind.opener)(
         Request(kind, values, _plan(values, until_end, _of_a_chip(kind)), given or {})
     )
     return opened
@@ -103,26 +105,26 @@ def contents(values: Mapping[str, Any]) -> dict[str, Any]:
     return facts
 
 
-def open_again(words: Mapping[str, Any], plan: Plan) -> Opened:
+def reopen_source(words: Mapping[str, Any], plan: Plan) -> OpenedSource:
     """The source of a session that goes on, by the words in its capture's head; see Request.words.
 
     Raises
     ------
     CaptureError : no such kind of source is known. SourceError : it cannot be opened.
     """
-    kinds = kinds_meant(words)
+    kinds = matching_kinds(words)
     if not kinds:
         raise CaptureError(
             f"its capture was made of a source that this mpucal does not know ({', '.join(words)})",
             "use the mpucal that recorded it, or `mpucal calibrate` on the folder",
         )
-    opened: Opened = resolve_name(kinds[0].opener)(Request(kinds[0], words, plan))
+    opened: OpenedSource = resolve_name(kinds[0].opener)(Request(kinds[0], words, plan))
     return opened
 
 
 def one_of(kinds: Iterable[SourceKind]) -> str:
     """What to do where none or the wrong one was given."""
-    *others, last = (f"{option.spelled} {option.metavar}" for option in unique(kind.option for kind in kinds))
+    *others, last = (f"{option.flag} {option.metavar}" for option in unique(kind.option for kind in kinds))
     return f"give exactly one of {', '.join(others)} and {last}" if others else f"give {last}"
 
 
@@ -137,7 +139,7 @@ def _fixed_by_capture() -> tuple[str, ...]:
 
 def _of_a_chip(kind: SourceKind) -> bool:
     """Whether more than its rate can be set."""
-    return DLPF in kind.settings or kind.delivers is Delivers.CAPTURE
+    return DLPF in kind.settings or kind.delivers is Delivery.CAPTURE
 
 
 def _plan(values: Mapping[str, Any], until_end: bool, of_a_chip: bool) -> Plan:

@@ -9,18 +9,18 @@ from ..files.folder import captures_in
 from ..files.mcap import read_capture
 from ..iio import IIO_VERSION
 from ..session.plan import DRIVER, Plan
+from .chained_bus import ChainedBus, split_at_resumes
 from .chip import OpenedChip
-from .iio import of_iio
+from .iio import iio_replay
 from .kind import Request
-from .opened import Opened
-from .opening import refuse_fixed
-from .parts import PartsBus, parts_of
+from .opened_source import OpenedSource
+from .opening import refuse_fixed_options
 from .replay import ReplayBus
 
 TLOG = ".tlog"
 
 
-def open_source(request: Request) -> Opened:
+def open_source(request: Request) -> OpenedSource:
     """A capture, or all those in the folder of a session that was resumed.
 
     Raises
@@ -30,7 +30,7 @@ def open_source(request: Request) -> Opened:
     """
     file: Path = request.value
     if file.suffix.lower() != TLOG:
-        refuse_fixed(request)
+        refuse_fixed_options(request)
         return _open_mcap(file)
     # pymavlink is slow to load, and of no use to a chip on a bus
     from .vehicle import OpenedVehicle, open_tlog  # noqa: PLC0415
@@ -38,15 +38,15 @@ def open_source(request: Request) -> Opened:
     source = open_tlog(file, replace(request.plan, until_end=True), request.values.get("system"))
     if isinstance(source, OpenedVehicle):
         # one of another ground station fixes nothing
-        refuse_fixed(request)
+        refuse_fixed_options(request)
     return source
 
 
 def _open_mcap(file: Path) -> OpenedChip:
     captures = [read_capture(path) for path in (captures_in(file) or [file])]
     name = captures[0].name
-    bus = PartsBus([ReplayBus(part, name) for part in parts_of(capture.records for capture in captures)])
+    bus = ChainedBus([ReplayBus(part, name) for part in split_at_resumes(capture.records for capture in captures)])
     recovered = [capture.recovered for capture in captures if capture.recovered]
     plan = Plan.of_capture(captures[0].meta, name)
     opened = OpenedChip(bus, plan, replay=bus, recovered=recovered[-1] if recovered else None, real_time=False)
-    return of_iio(opened, captures[0]) if captures[0].meta[DRIVER] == IIO_VERSION else opened
+    return iio_replay(opened, captures[0]) if captures[0].meta[DRIVER] == IIO_VERSION else opened

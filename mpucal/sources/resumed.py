@@ -17,25 +17,25 @@ from ..result.session_files import CAPTURE, CAPTURE_OF_VEHICLE
 from ..session.events import Key, Output, Prompt
 from ..session.plan import Plan
 from ..session.ports import Operator
+from .chained_bus import ChainedBus, ShiftedClockBus, split_at_resumes
 from .chip import SOURCE, OpenedChip
-from .dated import Dated
-from .opened import Measuring, Say
-from .opening import open_again
-from .parts import LaterBus, PartsBus, parts_of
+from .opened_source import ActiveSource, Say
+from .opening import reopen_source
 from .replay import ReplayBus
 from .tap import Tap
+from .utc_recorder import UtcRecorder
 
 
 @dataclass(frozen=True)
 class ResumedChip:
-    """What was recorded of a session, and the sensor to go on with; see Opened.
+    """What was recorded of a session, and the sensor to go on with; see OpenedSource.
 
     Attributes
     ----------
     bus : the recorded parts, then the sensor, which alone is recorded again. live : how the sensor was opened.
     """
 
-    bus: PartsBus
+    bus: ChainedBus
     live: OpenedChip
     plan: Plan
     recovered: str | None
@@ -43,36 +43,36 @@ class ResumedChip:
 
     @property
     def truth(self) -> Mapping[str, Any] | None:
-        """See Opened."""
+        """See OpenedSource."""
         return self.live.truth
 
     @property
     def real_time(self) -> bool:
-        """See Opened."""
+        """See OpenedSource."""
         return self.live.real_time
 
     @property
     def resumable(self) -> bool:
-        """See Opened."""
+        """See OpenedSource."""
         return True
 
     @property
     def listeners(self) -> Sequence[Callable[[Prompt], None]]:
-        """See Opened; what was said before is not said again."""
+        """See OpenedSource; what was said before is not said again."""
         return [self._now(listener) for listener in self.live.listeners]
 
     def talk(self, person: Operator) -> Operator:
-        """See Opened."""
+        """See OpenedSource."""
         return _Later(person, self.bus)
 
     @contextmanager
-    def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[Measuring]:
-        """See Opened."""
+    def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[ActiveSource]:
+        """See OpenedSource."""
         with closing(self.bus), CaptureWriter(capture) as writer:
             writer.start({"mpucal": __version__, "recorded": recorded, **self.plan.meta(), **self.live.source_meta()})
-            recorder = _Recorder(writer, Dated(writer), self.bus)
+            recorder = _Recorder(writer, UtcRecorder(writer), self.bus)
             driver = self.live.driver(Tap(self.bus, recorder), capture.name, lambda text: say(f"  {text}."))
-            yield Measuring(driver, recorder.event, self.bus.go_on, self._late)
+            yield ActiveSource(driver, recorder.event, self.bus.go_on, self._late)
 
     def _late(self, late: bool) -> bool:
         return bool(self.bus.pending_events(LATE)) if self.bus.replaying else late
@@ -84,7 +84,7 @@ class ResumedChip:
 class _Recorder:
     """Keeps what happens now, and not what was recorded before."""
 
-    def __init__(self, writer: CaptureWriter, dated: Dated, bus: PartsBus) -> None:
+    def __init__(self, writer: CaptureWriter, dated: UtcRecorder, bus: ChainedBus) -> None:
         self._writer, self._dated, self._bus = writer, dated, bus
 
     def transaction(self, transaction: Any) -> None:
@@ -101,7 +101,7 @@ class _Recorder:
 class _Later:
     """The person, who heard and pressed before what is in the captures."""
 
-    def __init__(self, person: Operator, bus: PartsBus) -> None:
+    def __init__(self, person: Operator, bus: ChainedBus) -> None:
         self._person, self._bus = person, bus
 
     def hear(self, output: Output) -> None:
@@ -136,15 +136,15 @@ def open_resumed(folder: Path) -> ResumedChip:
         raise UsageError(
             f"the capture in {folder} does not name a source to go on with", "use `mpucal calibrate` on the folder"
         )
-    live = open_again(source, plan)
+    live = reopen_source(source, plan)
     if not isinstance(live, OpenedChip):
         raise UsageError(f"a session on {folder}'s source cannot go on", "use `mpucal calibrate` on the folder")
-    records = parts_of((capture.records for capture in captures), more=True)
+    records = split_at_resumes((capture.records for capture in captures), more=True)
     last_ns = max((record.t_ns for part in records for record in part), default=0)
     replays = [ReplayBus(part, folder.name) for part in records]
     recovered = [capture.recovered for capture in captures if capture.recovered]
     return ResumedChip(
-        PartsBus([*replays, LaterBus(live.bus, last_ns)]),
+        ChainedBus([*replays, ShiftedClockBus(live.bus, last_ns)]),
         live,
         plan,
         recovered[-1] if recovered else None,

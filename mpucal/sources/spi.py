@@ -27,9 +27,9 @@ from ..chip.registers import (
 )
 from ..errors import BusError, UsageError
 from .chip import OpenedChip
-from .claim import claim
+from .device_lock import lock_device
 from .kind import Request
-from .stamp import Stamp
+from .read_timer import ReadTimer
 
 READ, MODE = 0x80, 3
 REGISTER_HZ, LEAST_DATA_HZ = 1_000_000, 8_000_000
@@ -72,7 +72,7 @@ class SpiBus:
         with self._told():
             self._device.open_path(self._path)
         try:
-            claim(self._device.fileno(), f"the chip on {self._path}")
+            lock_device(self._device.fileno(), f"the chip on {self._path}")
             with self._told():
                 self._device.mode = MODE
                 self._device.bits_per_word = 8
@@ -81,7 +81,7 @@ class SpiBus:
             self._device.close()
             raise
         self._own_register = False
-        self._stamp = Stamp(time.monotonic_ns)
+        self._stamp = ReadTimer(time.monotonic_ns)
 
     def read(self, register: int, count: int) -> Reply:
         """`count` bytes from `register` on, in messages of up to 4095 bytes; the time is the one just before."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..chip.registers import ACCEL_RANGES_G, DLPF_CODES, GYRO_RANGES_DPS
-from .kind import Delivers, Option, SourceKind
+from .kind import Delivery, Option, SourceKind
 
 
 def bus_name(text: str) -> str:
@@ -102,7 +102,7 @@ DLPF = Option(
 )
 ACCEL_RANGE = Option("accel_range", "±g.", choices=tuple(map(str, ACCEL_RANGES_G)), default="4")
 GYRO_RANGE = Option("gyro_range", "±deg/s.", choices=tuple(map(str, GYRO_RANGES_DPS)), default="500")
-OF_A_CHIP = (RATE, DLPF, ACCEL_RANGE, GYRO_RANGE)
+CHIP_SETTINGS = (RATE, DLPF, ACCEL_RANGE, GYRO_RANGE)
 
 SOURCES = [
     SourceKind(
@@ -110,9 +110,9 @@ SOURCES = [
         option=BUS,
         forms="/dev/i2c-N or N",
         opener="mpucal.sources.i2c:open_source",
-        delivers=Delivers.REGISTERS,
+        delivers=Delivery.REGISTERS,
         options=(ADDRESS,),
-        settings=OF_A_CHIP,
+        settings=CHIP_SETTINGS,
         doctor="mpucal.doctor.sources:examine_chip",
         host="mpucal.doctor.host:examine_host",
     ),
@@ -122,9 +122,9 @@ SOURCES = [
         word="sim",
         forms="sim[:key=value,...] for the simulated chip",
         opener="mpucal.simulated.chip.source:open_source",
-        delivers=Delivers.REGISTERS,
+        delivers=Delivery.REGISTERS,
         options=(SEED,),
-        settings=OF_A_CHIP,
+        settings=CHIP_SETTINGS,
         title="simulated chip",
         doctor="mpucal.doctor.sources:examine_chip",
     ),
@@ -134,11 +134,11 @@ SOURCES = [
         word="ftdi",
         forms="ftdi://..., a URL of pyftdi (FT232H); needs the extra usb",
         opener="mpucal.sources.usb_i2c:open_ftdi",
-        delivers=Delivers.REGISTERS,
+        delivers=Delivery.REGISTERS,
         options=(ADDRESS,),
-        settings=OF_A_CHIP,
-        doctor="mpucal.doctor.sources:examine_usb_chip",
-        host="mpucal.doctor.usb:examine_adapters",
+        settings=CHIP_SETTINGS,
+        doctor="mpucal.doctor.sources:examine_chip_alone",
+        host="mpucal.doctor.host:examine_adapters",
     ),
     SourceKind(
         what="a chip on a USB adapter",
@@ -146,20 +146,20 @@ SOURCES = [
         word="mcp2221",
         forms="mcp2221 or mcp2221:SERIAL; needs the extra usb",
         opener="mpucal.sources.usb_i2c:open_mcp2221",
-        delivers=Delivers.REGISTERS,
+        delivers=Delivery.REGISTERS,
         options=(ADDRESS,),
-        settings=OF_A_CHIP,
-        doctor="mpucal.doctor.sources:examine_usb_chip",
-        host="mpucal.doctor.usb:examine_adapters",
+        settings=CHIP_SETTINGS,
+        doctor="mpucal.doctor.sources:examine_chip_alone",
+        host="mpucal.doctor.host:examine_adapters",
     ),
     SourceKind(
         what="a chip behind a microcontroller with the bridge's firmware",
         option=SERIAL,
         forms="a board with the bridge's firmware: /dev/ttyX or COMn, or a URL such as socket://HOST:PORT",
         opener="mpucal.sources.bridge.source:open_source",
-        delivers=Delivers.REGISTERS,
+        delivers=Delivery.REGISTERS,
         options=(ADDRESS, MICROPYTHON),
-        settings=OF_A_CHIP,
+        settings=CHIP_SETTINGS,
         store="mpucal.sources.bridge:open_store",
         doctor="mpucal.doctor.sources:examine_bridge_and_chip",
     ),
@@ -168,16 +168,16 @@ SOURCES = [
         option=SPI,
         forms="/dev/spidevB.C[:HZ]; needs the extra spi",
         opener="mpucal.sources.spi:open_source",
-        delivers=Delivers.REGISTERS,
-        settings=OF_A_CHIP,
-        doctor="mpucal.doctor.sources:examine_spi_chip",
+        delivers=Delivery.REGISTERS,
+        settings=CHIP_SETTINGS,
+        doctor="mpucal.doctor.sources:examine_chip_alone",
     ),
     SourceKind(
         what="a sensor that a driver of the Linux kernel holds",
         option=IIO,
         forms="iio:deviceN, or accel=iio:deviceN,gyro=iio:deviceM",
         opener="mpucal.sources.iio:open_source",
-        delivers=Delivers.SAMPLES,
+        delivers=Delivery.SAMPLES,
         options=(TRIGGER,),
         settings=(RATE, ACCEL_RANGE, GYRO_RANGE),
         doctor="mpucal.doctor.iio:examine_iio",
@@ -188,7 +188,7 @@ SOURCES = [
         word="sim",
         forms="sim[:key=value,...] for the simulated chip behind a simulated driver",
         opener="mpucal.simulated.iio:open_source",
-        delivers=Delivers.SAMPLES,
+        delivers=Delivery.SAMPLES,
         options=(TRIGGER, SEED),
         settings=(RATE, ACCEL_RANGE, GYRO_RANGE),
         title="simulated sensor of the kernel",
@@ -199,7 +199,7 @@ SOURCES = [
         option=MAVLINK,
         forms="udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, or /dev/ttyX[:BAUD]",
         opener="mpucal.sources.vehicle:open_source",
-        delivers=Delivers.SAMPLES,
+        delivers=Delivery.SAMPLES,
         options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY, PREPARE),
         settings=(RATE,),
     ),
@@ -209,7 +209,7 @@ SOURCES = [
         word="sim",
         forms="sim[:key=value,...] for the simulated vehicle",
         opener="mpucal.simulated.vehicle.source:open_source",
-        delivers=Delivers.SAMPLES,
+        delivers=Delivery.SAMPLES,
         options=(SYSTEM, SOURCE_SYSTEM, SIGNING_KEY, PREPARE),
         settings=(RATE,),
         title="simulated vehicle",
@@ -219,31 +219,31 @@ SOURCES = [
         option=REPLAY,
         forms="a capture to run again: .mcap, .tlog, or the folder of a session",
         opener="mpucal.sources.replayed:open_source",
-        delivers=Delivers.CAPTURE,
+        delivers=Delivery.CAPTURE,
         instead="`mpucal calibrate`, `mpucal apply` and `mpucal show` read a capture",
         title="replay of {}",
     ),
 ]
 
 
-def used_by(command: str) -> list[SourceKind]:
+def kinds_for(command: str) -> list[SourceKind]:
     """The kinds of source that a command takes."""
     return [kind for kind in SOURCES if command in kind.commands]
 
 
-def kinds_meant(values: Mapping[str, Any]) -> list[SourceKind]:
+def matching_kinds(values: Mapping[str, Any]) -> list[SourceKind]:
     """The kinds that the options' values name: one for each of their options that has a value."""
     meant: dict[Option, SourceKind] = {}
     # what asks for a word or another option is meant rather than what does not
     for kind in sorted(SOURCES, key=lambda kind: bool(kind.word) + bool(kind.beside)):
-        if kind.is_meant(values):
+        if kind.matches(values):
             meant[kind.option] = kind
     return [meant[option] for option in unique(kind.option for kind in SOURCES) if option in meant]
 
 
 def source_title(values: Mapping[str, Any]) -> str:
     """The source as a person would name it; empty where the options' values name none."""
-    kinds = kinds_meant(values)
+    kinds = matching_kinds(values)
     return kinds[0].title.format(values[kinds[0].option.name]) if kinds else ""
 
 

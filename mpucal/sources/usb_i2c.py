@@ -19,7 +19,7 @@ from ..chip.registers import FIFO_R_W, WHO_AM_I
 from ..errors import BusError, NoAnswer
 from .chip import OpenedChip
 from .i2c import ADDRESSES
-from .i2c_errors import nobody
+from .i2c_errors import no_answer_error
 from .kind import Request
 
 I2C_HZ = 400_000
@@ -173,7 +173,7 @@ class UsbBus:
             except NoAnswer:
                 continue
         if not there:
-            raise nobody(self._name, addresses)
+            raise no_answer_error(self._name, addresses)
         return next((address for address, answer in there.items() if answer in PARTS), next(iter(there)))
 
     @contextmanager
@@ -181,7 +181,7 @@ class UsbBus:
         try:
             yield
         except self._adapter.missing as error:
-            raise nobody(self._name, (address,)) from error
+            raise no_answer_error(self._name, (address,)) from error
         except Exception as error:  # libusb, hidapi and both libraries have their own
             raise BusError(
                 f"a transfer over the USB adapter {self._name} failed ({error})",

@@ -25,13 +25,13 @@ from ..mavlink.tlog_replay import TlogReplay
 from ..mavlink.transport import Transport
 from ..mavlink.transports import open_transport
 from ..mavlink.url import parse_url
-from ..mavlink.vehicle_source import VehicleSource, choose_vehicle
+from ..mavlink.vehicle_source import VehicleSource, lock_to_vehicle
 from ..result.session_files import CAPTURE_OF_VEHICLE
 from ..session.events import Prompt
 from ..session.plan import Plan
 from ..session.ports import Operator, ReplayedOperator
 from .kind import Request
-from .opened import Measuring, Say
+from .opened_source import ActiveSource, Say
 
 SESSION, END = "session", "end"
 MPUCAL, RECORDED, SOURCE, PLAN, SYSTEM, PREPARE = "mpucal", "recorded", "source", "plan", "system", "prepare"
@@ -41,7 +41,7 @@ NOTE_IDS = 65535
 
 
 class OpenedVehicle:
-    """A transport to a vehicle; see Opened.
+    """A transport to a vehicle; see OpenedSource.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class OpenedVehicle:
     own_system : under which MAVLink id we speak. writes : whether the result will be written to it.
     prepare : whether a PX4 is to be made ready; see Preparation.
     truth : tells what is true of a simulated vehicle's streams now. replay : the same transport where it is a replay.
-    real_time : see Opened.
+    real_time : see OpenedSource.
 
     Attributes
     ----------
@@ -96,12 +96,12 @@ class OpenedVehicle:
         return None if self._truth is None else self._truth()
 
     def talk(self, person: Operator) -> Operator:
-        """See Opened."""
+        """See OpenedSource."""
         return person if self._replay is None else ReplayedOperator(person, self._pending)
 
     @contextmanager
-    def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[Measuring]:
-        """See Opened."""
+    def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[ActiveSource]:
+        """See OpenedSource."""
         with closing(self._transport), TlogWriter(capture) as writer:
             link = self.link = Link(self._transport, writer.packet, self._key, self._own_system)
             notes = _Noting(link)
@@ -110,7 +110,7 @@ class OpenedVehicle:
             rate_hz = self.plan.config.rate_hz
             source = VehicleSource(link, rate_hz, self._system, say, capture.name, self._writes, self._prepare)
             try:
-                yield Measuring(source, notes.keep, late=self._was_late)
+                yield ActiveSource(source, notes.keep, late=self._was_late)
             finally:
                 with suppress(EndOfCapture):
                     source.stop()
@@ -129,9 +129,7 @@ class OpenedVehicle:
             raise UsageError("a .tlog has no vehicle to write to", "give the vehicle's --mavlink URL")
         with closing(self._transport):
             link = self.link = Link(self._transport, lambda _t_ns, _packet: None, self._key, self._own_system)
-            vehicle = choose_vehicle(link.listen(), self._system)
-            say(f"This is {vehicle}; what is asked and written goes there alone.")
-            link.lock(vehicle)
+            lock_to_vehicle(link, self._system, say)
             yield link
 
     def contents(self) -> dict[str, Any]:
@@ -162,7 +160,7 @@ class OpenedVehicle:
 
 @dataclass(frozen=True)
 class OpenedLog:
-    """A .tlog of another ground station; see Opened."""
+    """A .tlog of another ground station; see OpenedSource."""
 
     tlog: Tlog
     measured: Recording
@@ -175,20 +173,20 @@ class OpenedLog:
 
     @property
     def recovered(self) -> str | None:
-        """See Opened."""
+        """See OpenedSource."""
         return self.tlog.recovered
 
     def talk(self, person: Operator) -> Operator:
-        """See Opened."""
+        """See OpenedSource."""
         return person
 
     @contextmanager
-    def measuring(self, capture: Path, _say: Say, _recorded: str) -> Iterator[Measuring]:
-        """See Opened; the capture is a copy."""
+    def measuring(self, capture: Path, _say: Say, _recorded: str) -> Iterator[ActiveSource]:
+        """See OpenedSource; the capture is a copy."""
         with TlogWriter(capture) as writer:
             for record in self.tlog.records:
                 writer.packet(record.t_ns, record.data)
-            yield Measuring(RecordedSource(self.measured), lambda _name, _t_ns, _data: None)
+            yield ActiveSource(RecordedSource(self.measured), lambda _name, _t_ns, _data: None)
 
 
 class _Noting:
@@ -214,10 +212,10 @@ def open_source(request: Request) -> OpenedVehicle:
     """
     key = signing_key(request)
     transport = open_transport(parse_url(request.value))
-    return OpenedVehicle(transport, request.plan, request.values.get("system"), key, **said_of_us(request))
+    return OpenedVehicle(transport, request.plan, request.values.get("system"), key, **link_identity(request))
 
 
-class OfUs(TypedDict):
+class LinkIdentity(TypedDict):
     """Under which system id we speak, whether the result will be written to the vehicle, and what is prepared."""
 
     own_system: int
@@ -225,7 +223,7 @@ class OfUs(TypedDict):
     prepare: bool
 
 
-def said_of_us(request: Request) -> OfUs:
+def link_identity(request: Request) -> LinkIdentity:
     """What the options say of us."""
     own = request.values.get("source_system")
     return {

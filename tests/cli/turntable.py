@@ -9,8 +9,8 @@ from mpucal.__main__ import run
 from mpucal.errors import BusError
 from mpucal.simulated.chip import open_simulated
 from mpucal.sources.chip import OpenedChip
-from mpucal.sources.kind import Delivers, Option, SourceKind
-from mpucal.sources.table import OF_A_CHIP, SOURCES
+from mpucal.sources.kind import Delivery, Option, SourceKind
+from mpucal.sources.table import CHIP_SETTINGS, SOURCES
 
 
 def open_turntable(request):
@@ -25,9 +25,9 @@ ROW = SourceKind(
     option=Option("turntable", metavar="NAME"),
     forms="the name of a turntable",
     opener="turntable:open_turntable",
-    delivers=Delivers.REGISTERS,
+    delivers=Delivery.REGISTERS,
     options=(Option("arm_length", "How far out the chip is [m].", "M", float),),
-    settings=OF_A_CHIP,
+    settings=CHIP_SETTINGS,
     title="turntable {}",
     doctor="mpucal.doctor.sources:examine_chip",
 )

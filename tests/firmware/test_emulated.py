@@ -23,7 +23,7 @@ from mpucal.simulated.chip.factory import Factory
 from mpucal.simulated.chip.models import MODELS
 from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.bridge.link import Link
-from mpucal.sources.bridge.store import Store
+from mpucal.sources.bridge.store import BlobStore
 
 ROOT = Path(__file__).parents[2]
 OLD = (ROOT / "fixtures" / "vectors" / "blob_measured.bin").read_bytes()
@@ -55,7 +55,7 @@ def _numbering(clock):
 def open_store(port):
     link = Link(port, lambda *_: None)
     link.greet()
-    return Store(link)
+    return BlobStore(link)
 
 
 def test_flash_and_ram_leave_room(avr_build):

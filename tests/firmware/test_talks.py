@@ -19,7 +19,7 @@ from mpucal.sources.bridge.conformance import difference, talks
 from mpucal.sources.bridge.frame import Deframer, Frame
 from mpucal.sources.bridge.link import Link
 from mpucal.sources.bridge.messages import Status
-from mpucal.sources.bridge.store import Store
+from mpucal.sources.bridge.store import BlobStore
 
 VECTORS = Path(__file__).parents[2] / "fixtures" / "vectors"
 FIFO = {(0x72, 2): b"\x01\xf8"}
@@ -107,11 +107,11 @@ def test_the_build_for_an_uno_has_all_talks(switch_on):
     found = list(examine_conformance(link))
     assert {finding.topic: finding.what for finding in found if finding.mark is not Mark.OK} == {}
     assert {finding.topic for finding in found} == talks().keys()
-    Store(link).write((VECTORS / "blob_measured.bin").read_bytes())
+    BlobStore(link).write((VECTORS / "blob_measured.bin").read_bytes())
     # what is stored there stays
     left_out = {finding.topic for finding in examine_conformance(link) if finding.mark is Mark.UNKNOWN}
     assert left_out == {name for name, talk in talks().items() if "blob" in talk["needs"]}
-    assert Store(link).read() == (VECTORS / "blob_measured.bin").read_bytes()
+    assert BlobStore(link).read() == (VECTORS / "blob_measured.bin").read_bytes()
 
 
 def test_a_narrow_clock_is_extended(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from mpucal.errors import BusError, WriteBackError
 from mpucal.result.calibration import Calibration
 from mpucal.sinks.bridge import BridgeSink
-from mpucal.sources.bridge.store import Held
+from mpucal.sources.bridge.store import StoredBlob
 
 OLD = b"an old blob"
 
@@ -38,7 +38,7 @@ class FakeStore:
         return self.chip
 
     def state(self):
-        return None if self.blob is None else Held(self.generation, len(self.blob), 0x1234ABCD)
+        return None if self.blob is None else StoredBlob(self.generation, len(self.blob), 0x1234ABCD)
 
     def read(self):
         return self.blob

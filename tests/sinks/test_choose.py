@@ -6,11 +6,11 @@ import pytest
 
 from mpucal.errors import UsageError
 from mpucal.sinks.choose import announced, chosen
-from mpucal.sources.table import kinds_meant
+from mpucal.sources.table import matching_kinds
 
 
 def source(name):
-    return kinds_meant({name: "x"})[0]
+    return matching_kinds({name: "x"})[0]
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, BusHeld, NoAnswer
-from mpucal.sources.claim import claim
+from mpucal.sources.device_lock import lock_device
 from mpucal.sources.i2c import I2cBus
 
 
@@ -283,14 +283,14 @@ def test_a_chip_that_another_process_uses_is_not_shared(tmp_path):
     device = tmp_path / "i2c-1"
     device.touch()
     holder = (
-        "import sys; from mpucal.sources.claim import claim; file = open(sys.argv[1], 'r+b');"
-        " claim(file.fileno(), '', address=0x68); print(flush=True); input()"
+        "import sys; from mpucal.sources.device_lock import lock_device; file = open(sys.argv[1], 'r+b');"
+        " lock_device(file.fileno(), '', address=0x68); print(flush=True); input()"
     )
     command = [sys.executable, "-c", holder, device]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other, device.open("r+b") as file:
         other.stdout.readline()
-        claim(file.fileno(), "the other chip", address=0x69)
+        lock_device(file.fileno(), "the other chip", address=0x69)
         with pytest.raises(BusError, match="another mpucal uses the chip: end it"):
-            claim(file.fileno(), "the chip", address=0x68)
+            lock_device(file.fileno(), "the chip", address=0x68)
         other.communicate(b"\n")
-        claim(file.fileno(), "the chip", address=0x68)
+        lock_device(file.fileno(), "the chip", address=0x68)

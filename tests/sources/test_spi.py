@@ -15,7 +15,7 @@ from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
 from mpucal.doctor.finding import Mark
-from mpucal.doctor.sources import examine_spi_chip
+from mpucal.doctor.sources import examine_chip_alone
 from mpucal.errors import BusError, UsageError
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
@@ -160,7 +160,7 @@ def test_a_session_ends_good_and_replays_to_the_bit(opened, monkeypatch, tmp_pat
 def test_the_doctor_examines_it(opened):
     bus, _ = opened()
     source = SimpleNamespace(bus=bus, plan=SimpleNamespace(config=Config()))
-    told = {finding.topic: finding for finding in examine_spi_chip(source, 3.0)}
+    told = {finding.topic: finding for finding in examine_chip_alone(source, 3.0)}
     assert [topic for topic, finding in told.items() if finding.mark is Mark.BAD] == []
     assert told["genuine?"].mark is Mark.OK
 

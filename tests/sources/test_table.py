@@ -9,11 +9,11 @@ import pytest
 
 from mpucal.errors import CaptureError, UsageError
 from mpucal.session.plan import Plan
-from mpucal.sources.kind import Delivers, Option
-from mpucal.sources.opening import check_source, open_again
-from mpucal.sources.table import SOURCES, kinds_meant, source_title, used_by
+from mpucal.sources.kind import Delivery, Option
+from mpucal.sources.opening import check_source, reopen_source
+from mpucal.sources.table import SOURCES, kinds_for, matching_kinds, source_title
 
-IDS = [kind.spelled for kind in SOURCES]
+IDS = [kind.flag for kind in SOURCES]
 
 
 @pytest.mark.parametrize("kind", SOURCES, ids=IDS)
@@ -25,7 +25,7 @@ def test_all_that_a_row_names_is_there(kind):
 @pytest.mark.parametrize("kind", SOURCES, ids=IDS)
 def test_a_row_is_found_by_what_a_person_writes(kind):
     values = {kind.option.name: f"{kind.word}:a=b" if kind.word else "x"}
-    assert kinds_meant(values) == [kind]
+    assert matching_kinds(values) == [kind]
 
 
 @pytest.mark.parametrize("word", ["sim", "ftdi", "mcp2221"])
@@ -36,10 +36,10 @@ def test_a_word_is_taken_in_any_case(word):
 
 
 def test_none_and_several():
-    assert kinds_meant({"bus": None, "replay": None}) == []
+    assert matching_kinds({"bus": None, "replay": None}) == []
     assert source_title({"bus": None}) == ""
-    meant = kinds_meant({"bus": "sim", "mavlink": "x", "address": None})
-    assert [kind.spelled for kind in meant] == ["--bus sim", "--mavlink"]
+    meant = matching_kinds({"bus": "sim", "mavlink": "x", "address": None})
+    assert [kind.flag for kind in meant] == ["--bus sim", "--mavlink"]
 
 
 @pytest.mark.parametrize(
@@ -60,10 +60,10 @@ def test_a_person_names_it(values, title):
 def test_a_command_takes_what_its_help_names_and_refuses_the_rest(command):
     for kind in SOURCES:
         values = {kind.option.name: kind.word or "x"}
-        if kind in used_by(command):
+        if kind in kinds_for(command):
             assert check_source(values, {}, command) is kind
         else:
-            with pytest.raises(UsageError, match=f"{kind.spelled} was given, and `mpucal {command}` does not take it"):
+            with pytest.raises(UsageError, match=f"{kind.flag} was given, and `mpucal {command}` does not take it"):
                 check_source(values, {}, command)
 
 
@@ -71,18 +71,18 @@ def test_each_option_is_refused_beside_the_sources_that_have_it_not():
     every = {option for kind in SOURCES for option in (*kind.options, *kind.settings)}
     refused = 0
     for kind in SOURCES:
-        if kind.delivers is Delivers.CAPTURE:
+        if kind.delivers is Delivery.CAPTURE:
             continue
         for option in every - {*kind.options, *kind.settings}:
             refused += 1
-            with pytest.raises(UsageError, match=f"{option.spelled} was given beside {kind.spelled}, which has none"):
-                check_source({kind.option.name: kind.word or "x"}, {option.name: option.spelled}, "session")
+            with pytest.raises(UsageError, match=f"{option.flag} was given beside {kind.flag}, which has none"):
+                check_source({kind.option.name: kind.word or "x"}, {option.name: option.flag}, "session")
     assert refused
 
 
 def test_a_capture_of_an_unknown_source_says_so():
     with pytest.raises(CaptureError, match=r"does not know \(usb\)"):
-        open_again({"usb": "/dev/usb0"}, Plan())
+        reopen_source({"usb": "/dev/usb0"}, Plan())
 
 
 def test_only_text_with_meaning_parses():
@@ -118,10 +118,10 @@ def test_kinds_of_source_share_an_option(added):
     by_option = replace(serial, what="a board without firmware", options=(beside,), beside="pins")
     added(by_word)
     added(by_option)
-    assert kinds_meant({"bus": "ch347:1", "pins": None}) == [by_word]
-    assert kinds_meant({"bus": "/dev/i2c-1", "pins": None}) == [SOURCES[0]]
-    assert kinds_meant({"serial": "x", "pins": "4,5"}) == [by_option]
-    assert kinds_meant({"serial": "x", "pins": None}) == [serial]
-    assert by_option.spelled == "--serial --pins"
+    assert matching_kinds({"bus": "ch347:1", "pins": None}) == [by_word]
+    assert matching_kinds({"bus": "/dev/i2c-1", "pins": None}) == [SOURCES[0]]
+    assert matching_kinds({"serial": "x", "pins": "4,5"}) == [by_option]
+    assert matching_kinds({"serial": "x", "pins": None}) == [serial]
+    assert by_option.flag == "--serial --pins"
     with pytest.raises(UsageError, match="--pins was given beside --bus ftdi, which has none"):
         check_source({"bus": "ftdi://1", "pins": "4,5"}, {"pins": "--pins"}, "session")

@@ -28,7 +28,7 @@ from mpucal.sources.bridge import messages as wire
 from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.bridge.frame import MAX_PAYLOAD, Deframer, Frame
 from mpucal.sources.bridge.port import Chunk
-from mpucal.sources.bridge.store import Store
+from mpucal.sources.bridge.store import BlobStore
 
 MS = 1_000_000
 # kind, sequence number, length: both as asked where they are 0
@@ -120,7 +120,7 @@ class HostileBridge:
 def bridge(data: bytes) -> None:
     """What a bridge answers to who it is, what it keeps, what a chip holds, and what it pushes."""
     bus = BridgeBus(HostileBridge(data))
-    store = Store(bus.link)
+    store = BlobStore(bus.link)
     store.who_am_i()
     store.read()
     bus.read(reg.WHO_AM_I, 1)

@@ -43,7 +43,7 @@ from mpucal.sinks.chip import REGISTERS, kept_blocks
 from mpucal.sinks.record import is_calibration
 from mpucal.sources.bridge import messages as wire
 from mpucal.sources.bridge.frame import Frame
-from mpucal.sources.parts import parts_of
+from mpucal.sources.chained_bus import split_at_resumes
 from mpucal.sources.table import SOURCES
 
 from ..lab.dialects import dialects, walk
@@ -143,7 +143,7 @@ def capture(path: Path) -> None:
             writer.add_message(channels[which], t_ns, message, t_ns)
         writer.finish()
     read = read_capture(path)
-    parts_of([read.records])
+    split_at_resumes([read.records])
     Plan.of_capture(read.meta, read.name)
     load(path)
 
@@ -175,7 +175,7 @@ def notes(path: Path) -> None:
     with suppress(MpucalError):
         kept_blocks(path)
     is_calibration(path)
-    Journal(path).left()
+    Journal(path).interrupted()
 
 
 def targets(place: Path) -> dict[str, tuple[Run, list[bytes]]]:

@@ -24,7 +24,7 @@ from mpucal.cli.running import running
 from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.session.events import Key, Output, Progress
 from mpucal.session.plan import Plan
-from mpucal.sources.opening import open_again
+from mpucal.sources.opening import reopen_source
 from mpucal.terminal.keys import Keys
 from mpucal.terminal.lines import JsonLines
 
@@ -82,7 +82,7 @@ class Typist(JsonLines):
 
 def make_session(script: Script, capture: Path) -> dict[str, Any]:
     """Run it into `capture`, and return what it said and found."""
-    source = open_again({"bus": script.bus}, Plan(script.config, model=MODEL))
+    source = reopen_source({"bus": script.bus}, Plan(script.config, model=MODEL))
     person = Typist(script.enter)
     with tempfile.TemporaryDirectory() as folder:
         dated = Path(folder) / capture.name

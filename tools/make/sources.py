@@ -23,15 +23,15 @@ def page(_old: str) -> str:
 
 
 def _source(kind: SourceKind) -> str:
-    beside = _listed(option.spelled for option in (*kind.options, *kind.settings)) or "none"
-    return _row(f"`{kind.spelled}`", kind.what, kind.forms, beside, _listed(kind.commands))
+    beside = _listed(option.flag for option in (*kind.options, *kind.settings)) or "none"
+    return _row(f"`{kind.flag}`", kind.what, kind.forms, beside, _listed(kind.commands))
 
 
 def _option(option: Option) -> str:
     value = "\\|".join(option.choices) or option.metavar
     default = "none" if option.default is None else f"{float(option.default):g}"
-    kinds = (kind.spelled for kind in SOURCES if option in (*kind.options, *kind.settings))
-    return _row(f"`{option.spelled} {value}`", option.help, default, _listed(kinds))
+    kinds = (kind.flag for kind in SOURCES if option in (*kind.options, *kind.settings))
+    return _row(f"`{option.flag} {value}`", option.help, default, _listed(kinds))
 
 
 def _listed(names: Iterable[str]) -> str:

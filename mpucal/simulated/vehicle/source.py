@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...sources.kind import Request
-from ...sources.vehicle import OpenedVehicle, said_of_us, signing_key
+from ...sources.vehicle import OpenedVehicle, link_identity, signing_key
 from . import SimulatedVehicle, VehicleOptions
 from .transport import SimulatedTransport
 
@@ -25,5 +25,5 @@ def open_source(request: Request) -> OpenedVehicle:
         key,
         truth=vehicle.truth_document,
         real_time=transport.real_time,
-        **said_of_us(request),
+        **link_identity(request),
     )

@@ -11,9 +11,9 @@ from .link import Link
 from .messages import Frames
 from .micropython import MicroPythonPort
 from .port import Port, SerialPort
-from .store import Store
+from .store import BlobStore
 
-__all__ = ["BridgeBus", "Store", "open_bridge", "open_link", "open_store"]
+__all__ = ["BlobStore", "BridgeBus", "open_bridge", "open_link", "open_store"]
 
 
 def open_bridge(text: str, address: int | None = None, pins: tuple[int | str, ...] | None = None) -> BridgeBus:
@@ -32,10 +32,10 @@ def open_bridge(text: str, address: int | None = None, pins: tuple[int | str, ..
 
 
 @contextmanager
-def open_store(values: Mapping[str, Any]) -> Iterator[Store]:
+def open_store(values: Mapping[str, Any]) -> Iterator[BlobStore]:
     """The memory of the bridge that the options' values name; see open_link."""
     with open_link(values) as link:
-        yield Store(link)
+        yield BlobStore(link)
 
 
 @contextmanager

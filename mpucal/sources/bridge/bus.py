@@ -14,9 +14,7 @@ from ...chip import registers as reg
 from ...chip.access import Reply
 from ...chip.clock import poll_phase
 from ...errors import BusError, NoAnswer
-from .asked import Answer
-from .beside import Beside
-from .fifo_watch import CONTROLS, FifoWatch
+from .fifo_tracker import CONTROLS, FifoTracker
 from .link import MS, Link, LinkLost
 from .link_errors import no_chip, no_reply, refused
 from .messages import (
@@ -34,8 +32,10 @@ from .messages import (
     Stream,
     Write,
 )
+from .pending_request import Answer
 from .port import Port
 from .read_ahead import ReadAhead
+from .reset_monitor import ResetMonitor
 
 # Four frames of 14 bytes fill one message.
 BATCH = 4
@@ -64,11 +64,11 @@ class BridgeBus:
     def __init__(self, port: Port, address: int | None = None) -> None:
         self.link = Link(port, self._pushed)
         self._port = port
-        self._watch = FifoWatch()
+        self._watch = FifoTracker()
         self._ahead: ReadAhead | None = None
         self._lost = False
         self._asked = 0
-        self._beside = Beside(self.link)
+        self._beside = ResetMonitor(self.link)
         self._dead: BusError | None = None
         try:
             self._address = self.link.greet(address or 0).address
@@ -116,8 +116,8 @@ class BridgeBus:
             self._ahead = None
             requests.append(Stream(0, 0))
         requests.append(Write(register, data))
-        self._watch.saw_write(register, data)
-        self._beside.saw_write(register, data)
+        self._watch.on_write(register, data)
+        self._beside.on_write(register, data)
         if controls and self._can_read_ahead:
             return self._start(*requests)
         return self._seen_from(self._ask(*requests)[-1][-1].t_ns)

@@ -11,10 +11,8 @@ from contextlib import suppress
 from itertools import cycle
 
 from ...errors import BusError, LinkError
-from .asked import Answer, Asked
 from .clock import BridgeClock
 from .frame import DELIMITER, Deframer, Frame
-from .greeting import Heard
 from .latency import Latency
 from .link_errors import flooded, no_reply, other_version, restarted
 from .messages import (
@@ -33,7 +31,9 @@ from .messages import (
     Status,
     answer_of,
 )
+from .pending_request import Answer, PendingRequest
 from .port import Chunk, Port
+from .port_diagnosis import PortDiagnosis
 
 MS = 1_000_000
 # two and a half times what a bridge takes at most; the line's own latency comes on top
@@ -79,7 +79,7 @@ class Link:
         self._deframer = Deframer()
         self._seq = 0
         self._window = MIN_WINDOW
-        self._posted: list[Asked] = []
+        self._posted: list[PendingRequest] = []
 
     def greet(self, address: int = 0, within_ns: int = GREET_NS) -> HelloReply:
         """Say HELLO until the bridge answers: an Arduino's boot loader takes two seconds.
@@ -92,7 +92,7 @@ class Link:
         ------
         BusError : nothing answers, or something that is no bridge, or one of another version.
         """
-        heard, said = Heard(), list[Asked]()
+        heard, said = PortDiagnosis(), list[PendingRequest]()
         self._posted.clear()
         give_up_ns = self.port.now_ns() + within_ns
         for tried, baud in enumerate(cycle(self.port.bauds)):
@@ -143,14 +143,14 @@ class Link:
             flying = [one for one in flying if not one.done]
         return [one.answers for one in asked]
 
-    def post(self, request: Message) -> Asked:
+    def post(self, request: Message) -> PendingRequest:
         """Send a request that does no harm when carried out twice, and wait for nothing: its answer comes by and by."""
         (posted,) = self._numbered([request])
         self._send(posted)
         self._posted = [one for one in self._posted if not one.done] + [posted]
         return posted
 
-    def remind(self, posted: Asked) -> None:
+    def remind(self, posted: PendingRequest) -> None:
         """Send what was posted again, if its answer is overdue."""
         if not posted.done and self.port.now_ns() - posted.sent_ns > REPLY_NS + self.latency.most_ns:
             self._send(posted, again=True)
@@ -175,17 +175,17 @@ class Link:
         """Let go of the port."""
         self.port.close()
 
-    def _numbered(self, requests: Sequence[Message]) -> Iterator[Asked]:
+    def _numbered(self, requests: Sequence[Message]) -> Iterator[PendingRequest]:
         for request in requests:
             self._seq = (self._seq + 1) % 256
-            yield Asked(self._seq, request)
+            yield PendingRequest(self._seq, request)
 
-    def _send(self, *several: Asked, again: bool = False) -> None:
+    def _send(self, *several: PendingRequest, again: bool = False) -> None:
         self.port.write(DELIMITER * again + b"".join(one.encoded() for one in several))
         for one in several:
             one.sent_ns, one.sent = self.port.now_ns(), one.sent + 1
 
-    def _hello(self, address: int, heard: Heard, said: list[Asked], baud: int) -> HelloReply | None:
+    def _hello(self, address: int, heard: PortDiagnosis, said: list[PendingRequest], baud: int) -> HelloReply | None:
         """Say HELLO once more; the answer to any that was said, as a line may take longer than until the next."""
         said += self._numbered([Hello(address=address)])
         self._send(said[-1], again=True)
@@ -207,7 +207,7 @@ class Link:
                 break
         return None
 
-    def _handle(self, chunk: Chunk, flying: Sequence[Asked]) -> bool:
+    def _handle(self, chunk: Chunk, flying: Sequence[PendingRequest]) -> bool:
         """Give each message to whom it is for; whether a request was answered."""
         answered = False
         for frame, reply in self._messages(chunk):

@@ -14,7 +14,7 @@ INDEX_WRAP = 2**16
 
 
 @dataclass(frozen=True)
-class Look:
+class FifoReading:
     """What was found in the FIFO at `t_ns`, and heard at `host_ns`; where `lost`, nothing that can be believed."""
 
     t_ns: int
@@ -34,7 +34,7 @@ class ReadAhead:
     def __init__(self, seq: int, frame_bytes: int) -> None:
         self.seq = seq
         self._frame_bytes = frame_bytes
-        self._looks: deque[Look] = deque()
+        self._looks: deque[FifoReading] = deque()
         self._begun: list[Frames] = []
         self._begun_t_ns = 0
         self._next_index = 0
@@ -55,14 +55,14 @@ class ReadAhead:
         self._begun_t_ns = t_ns
         if frames.left == 0:
             data = b"".join(part.frames for part in self._begun)
-            self._looks.append(Look(t_ns, host_ns, data, lost=False))
+            self._looks.append(FifoReading(t_ns, host_ns, data, lost=False))
             self._begun.clear()
 
     def lose(self, t_ns: int, host_ns: int) -> None:
         """Frames were lost about `t_ns`."""
         self._begun.clear()
         if not (self._looks and self._looks[-1].lost):
-            self._looks.append(Look(t_ns, host_ns, b"", lost=True))
+            self._looks.append(FifoReading(t_ns, host_ns, b"", lost=True))
 
     @property
     def can_count(self) -> bool:

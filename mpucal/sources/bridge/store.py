@@ -35,7 +35,7 @@ CRC_BYTES = 4
 
 
 @dataclass(frozen=True)
-class Held:
+class StoredBlob:
     """What the bridge says of the blob that it holds and found valid just now."""
 
     generation: int
@@ -43,7 +43,7 @@ class Held:
     crc: int
 
 
-class Store:
+class BlobStore:
     """The memory of the bridge behind `link`, which was greeted.
 
     Every method raises BusError where the bridge is lost, cannot do it, or keeps no blobs.
@@ -73,14 +73,14 @@ class Store:
         (reply,) = self._done(ReadReply, Read(WHO_AM_I, 1))
         return reply.data[0]
 
-    def state(self) -> Held | None:
+    def state(self) -> StoredBlob | None:
         """The valid blob that it holds; None: none."""
         self._check()
         reply = self._link.ask(BlobState())[0][-1].reply
         if reply.status == Status.NO_BLOB:
             return None
         said = self._expect(reply, BlobStateReply)
-        return Held(said.generation, said.length, said.crc)
+        return StoredBlob(said.generation, said.length, said.crc)
 
     def read(self) -> bytes | None:
         """The blob's bytes; None: it holds none."""
@@ -106,7 +106,7 @@ class Store:
             raise BusError(*not_readable(self.name, str(error))) from error
         return held.generation, blob
 
-    def write(self, blob: bytes) -> Held:
+    def write(self, blob: bytes) -> StoredBlob:
         """Replace what it holds by `blob`, or change nothing; returns what the bridge then says that it holds.
 
         The old one stays valid until the bridge has checked the new one.
@@ -118,7 +118,7 @@ class Store:
         for chunk in chunks:
             self._done(Reply, chunk)
         (reply,) = self._done(BlobCommitReply, BlobCommit(len(blob), crc))
-        return Held(reply.generation, len(blob), crc)
+        return StoredBlob(reply.generation, len(blob), crc)
 
     def erase(self) -> None:
         """Hold none."""

@@ -20,7 +20,7 @@ from mpucal.sinks.bridge import BridgeSink
 from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.bridge.link import Link
 from mpucal.sources.bridge.port import Chunk
-from mpucal.sources.bridge.store import Store
+from mpucal.sources.bridge.store import BlobStore
 
 MS = 1_000_000
 
@@ -107,7 +107,7 @@ def test_unplugged_and_plugged_in_again(rig, numbers, stream, chip_loses_its_sup
     [
         (
             lambda made: setattr(made.line, "device", made.new_bridge()),
-            "lost on the link to the board.*not the sens",
+            "lost on the link to the board.*the sensor.s wires are not",
         ),
         (lambda made: failing(made.chip, made.clock), "not acknowledged.*shorten the wires"),
     ],
@@ -279,7 +279,7 @@ def blob(x):
 def store_on(line):
     link = Link(line, lambda seq, frames, t_ns: None)
     link.greet()
-    return Store(link)
+    return BlobStore(link)
 
 
 @settings(max_examples=40)

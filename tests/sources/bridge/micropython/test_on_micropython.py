@@ -15,7 +15,7 @@ from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.bridge.conformance import talks
 from mpucal.sources.bridge.link import Link
 from mpucal.sources.bridge.micropython import PROGRAM, MicroPythonPort, reduced
-from mpucal.sources.bridge.store import Store
+from mpucal.sources.bridge.store import BlobStore
 
 BLOB = (Path(__file__).parents[4] / "fixtures" / "vectors" / "blob_measured.bin").read_bytes()
 
@@ -23,7 +23,7 @@ BLOB = (Path(__file__).parents[4] / "fixtures" / "vectors" / "blob_measured.bin"
 def opened(port):
     link = Link(port, lambda *_: None)
     link.greet()
-    return Store(link)
+    return BlobStore(link)
 
 
 def test_it_samples_at_one_kilohertz_and_leaves_the_repl_as_it_was(rig, board, numbers, stream):

@@ -14,7 +14,7 @@ TRIES = 3
 LATE_NS = 2_000_000
 
 
-class Stamp:
+class ReadTimer:
     """Reads with the time just before each; one that was held up is repeated, and of all tries the shortest counts.
 
     Its time is early by no more than it took longer than the shortest read of as many bytes.

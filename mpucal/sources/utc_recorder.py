@@ -14,7 +14,7 @@ class _Capture(Recorder, Protocol):
     def event(self, name: str, t_ns: int, data: Mapping[str, Any] | None = None) -> None: ...
 
 
-class Dated:
+class UtcRecorder:
     """Keeps the time of day before the first access that succeeded, then every access.
 
     Parameters

@@ -13,7 +13,7 @@ from .replay import ReplayBus
 PAUSE_NS = 1_000_000_000
 
 
-class PartsBus:
+class ChainedBus:
     """The parts of a session that was resumed; each ends with EndOfCapture, and `go_on` begins the next.
 
     Parameters
@@ -68,7 +68,7 @@ class PartsBus:
         return self._parts[self._at]
 
 
-class LaterBus:
+class ShiftedClockBus:
     """A bus whose clock goes on where an earlier one stopped.
 
     Parameters
@@ -104,7 +104,7 @@ class LaterBus:
         return t_ns + self._later_ns
 
 
-def parts_of(captures: Iterable[Sequence[Record]], more: bool = False) -> list[list[Record]]:
+def split_at_resumes(captures: Iterable[Sequence[Record]], more: bool = False) -> list[list[Record]]:
     """The records of one or several captures, cut where a session was resumed; `more`: another part will follow.
 
     Of a part that somebody stopped and another follows, what came after is left out: nothing of it was measured.

@@ -19,7 +19,7 @@ class Answer(NamedTuple):
 
 
 @dataclass
-class Asked:
+class PendingRequest:
     """A request on its way, and what came for it; when it was sent last, and how often."""
 
     seq: int

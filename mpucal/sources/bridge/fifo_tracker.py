@@ -23,7 +23,7 @@ WHOLE_FRAME = {row.fifo_en_frame: reg.FRAME_BYTES for row in FAMILIES if row.fif
 CONTROLS = frozenset((reg.FIFO_EN, reg.USER_CTRL, reg.SIGNAL_PATH_RESET, reg.PWR_MGMT_1))
 
 
-class FifoWatch:
+class FifoTracker:
     """Follows what somebody writes to a chip.
 
     Who means to drain the FIFO resets it first, so that it begins with a frame (register 106); who starts it as
@@ -34,7 +34,7 @@ class FifoWatch:
         self._held = dict.fromkeys(CONTROLS, 0)
         self._begins_with_a_frame = False
 
-    def saw_write(self, register: int, data: bytes) -> None:
+    def on_write(self, register: int, data: bytes) -> None:
         """`data` was written from `register` on."""
         for at, value in enumerate(data, register):
             if at == reg.PWR_MGMT_1 and value & reg.PWR_MGMT_1_DEVICE_RESET:

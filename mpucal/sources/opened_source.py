@@ -19,7 +19,7 @@ def never_on() -> bool:
     return False
 
 
-class Measuring(NamedTuple):
+class ActiveSource(NamedTuple):
     """A source that is being recorded.
 
     Attributes
@@ -34,7 +34,7 @@ class Measuring(NamedTuple):
     late: Callable[[bool], bool] = bool
 
 
-class Opened(Protocol):
+class OpenedSource(Protocol):
     """A source, open, and what comes with its kind.
 
     Attributes
@@ -71,7 +71,7 @@ class Opened(Protocol):
         """Who presses the keys: the person, or the person in the capture."""
         ...
 
-    def measuring(self, capture: Path, say: Say, recorded: str) -> AbstractContextManager[Measuring]:
+    def measuring(self, capture: Path, say: Say, recorded: str) -> AbstractContextManager[ActiveSource]:
         """The source, recorded into `capture`; whatever happens, both are closed.
 
         Parameters

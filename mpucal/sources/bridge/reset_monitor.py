@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from ...chip.registers import INT_ENABLE
-from .asked import Asked
 from .link import Link
 from .messages import Read, ReadReply
+from .pending_request import PendingRequest
 
 
-class Beside:
+class ResetMonitor:
     """The register of the chip behind `link`.
 
     Attributes
@@ -19,9 +19,9 @@ class Beside:
     def __init__(self, link: Link) -> None:
         self.held = 0
         self._link = link
-        self._asked: Asked | None = None
+        self._asked: PendingRequest | None = None
 
-    def saw_write(self, register: int, data: bytes) -> None:
+    def on_write(self, register: int, data: bytes) -> None:
         """`data` was written from `register` on."""
         if register <= INT_ENABLE < register + len(data):
             self.held = data[INT_ENABLE - register]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..errors import BusError
 
 
-def claim(handle: int | None, chip: str, remedy: str = "end it", address: int = 0) -> None:
+def lock_device(handle: int | None, chip: str, remedy: str = "end it", address: int = 0) -> None:
     """Keep other sessions from `chip`, behind an open device.
 
     The lock is on the byte of that address (fcntl(2)), so that two chips on one bus are two; a device that knows no

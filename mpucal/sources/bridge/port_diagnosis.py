@@ -18,7 +18,7 @@ REPLS = (b"raw REPL; CTRL-B", b"MicroPython v", b">>> ")
 CIRCUIT = b"CircuitPython"
 
 
-class Heard:
+class PortDiagnosis:
     """The bytes that came instead of a bridge's reply.
 
     Attributes

@@ -5,7 +5,7 @@ import pytest
 from mpucal.chip.access import Reply, Transaction
 from mpucal.chip.records import RESUMED, SessionEvent
 from mpucal.errors import EndOfCapture
-from mpucal.sources.parts import PAUSE_NS, LaterBus, PartsBus, parts_of
+from mpucal.sources.chained_bus import PAUSE_NS, ChainedBus, ShiftedClockBus, split_at_resumes
 from mpucal.sources.replay import ReplayBus
 
 S = 1_000_000_000
@@ -45,7 +45,7 @@ class Young:
 
 
 def test_each_part_ends_before_the_next_begins():
-    bus = PartsBus([ReplayBus([read(1), key("enough")]), ReplayBus([read(2)])])
+    bus = ChainedBus([ReplayBus([read(1), key("enough")]), ReplayBus([read(2)])])
     assert bus.read(0x75, 1).t_ns == S
     assert [found.name for found in bus.pending_events("key")] == ["key"]
     with pytest.raises(EndOfCapture):
@@ -59,7 +59,7 @@ def test_each_part_ends_before_the_next_begins():
 
 def test_only_what_was_recorded_is_replayed():
     young = Young()
-    bus = PartsBus([ReplayBus([]), young])
+    bus = ChainedBus([ReplayBus([]), young])
     assert bus.replaying
     bus.go_on()
     assert not bus.replaying
@@ -71,7 +71,7 @@ def test_only_what_was_recorded_is_replayed():
 
 def test_a_later_clock_goes_on_where_the_earlier_one_stopped():
     young = Young()
-    bus = LaterBus(young, 7 * S)
+    bus = ShiftedClockBus(young, 7 * S)
     bus.sleep_until(3 * S)
     assert young.slept_ns == []
     first_ns = bus.read(0x75, 1).t_ns
@@ -84,7 +84,7 @@ def test_a_later_clock_goes_on_where_the_earlier_one_stopped():
 def test_a_clock_that_is_later_by_itself_stays():
     young = Young()
     young.t_ns = 100 * S
-    assert LaterBus(young, 7 * S).read(0x75, 1).t_ns == young.t_ns
+    assert ShiftedClockBus(young, 7 * S).read(0x75, 1).t_ns == young.t_ns
 
 
 @pytest.mark.parametrize(
@@ -101,4 +101,4 @@ def test_a_clock_that_is_later_by_itself_stays():
     ids=["one", "two files", "one file of two", "stopped, then resumed", "stopped", "to be resumed", "another key"],
 )
 def test_captures_are_cut_where_they_were_resumed(captures, more, lengths):
-    assert [len(part) for part in parts_of(captures, more)] == lengths
+    assert [len(part) for part in split_at_resumes(captures, more)] == lengths

@@ -5,7 +5,7 @@ from itertools import count
 import pytest
 
 from mpucal.chip import registers as reg
-from mpucal.sources.stamp import LATE_NS, TRIES, Stamp
+from mpucal.sources.read_timer import LATE_NS, TRIES, ReadTimer
 
 USUAL_NS = 400_000
 
@@ -28,7 +28,7 @@ def host():
 
 @pytest.fixture
 def read(host):
-    stamp = Stamp(lambda: host.now_ns)
+    stamp = ReadTimer(lambda: host.now_ns)
     read = lambda register=reg.FIFO_COUNT_H: stamp.read(register, 2, host.transfer)  # noqa: E731
     read()
     return read
