@@ -139,7 +139,7 @@ def _calibration(evidence: Evidence, chosen: Mapping[str, str]) -> Calibration:
         b_omega=fit.b_omega,
         b_omega_std=fit.std(*B_OMEGA_NAMES),
         **common,
-    ).tellable()
+    ).drop_unserialisable()
     std = standard_deviations(vars(calibration))
     return replace(calibration, correlation=correlation_of(fit.names, fit.covariance, std))
 

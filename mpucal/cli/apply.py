@@ -20,7 +20,7 @@ from ..files.csv import CsvText
 from ..files.folder import captures_in
 from ..files.formats import formats_in_memory, writable_formats
 from ..files.rows import Rows
-from ..result.correction import correction
+from ..result.correction import make_correction
 from .loading import loaded
 from .recording_options import hint_options, hints_of, say_taken
 
@@ -55,7 +55,7 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool, *
     say_taken(rows.taken)
     if rows.done:
         raise UsageError(f"{file} is calibrated already ({rows.done})", "give the uncalibrated recording")
-    ready = correction(loaded(calibration), rows.sensor, rows.autopilot)
+    ready = make_correction(loaded(calibration), rows.sensor, rows.autopilot)
     for remark in (*ready.remarks, *_remarks(rows)):
         click.echo(f"mpucal: {remark}", err=True)
     noise = np.array([ready.calibration.noise_std, ready.calibration.gyro_noise_std])

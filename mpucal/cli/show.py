@@ -68,7 +68,7 @@ def command(file: Path | None, as_json: bool, **options: Any) -> None:
 
 def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) -> None:
     for sink in SINKS.values():
-        left = Journal.of(sink.name, options[kind.option.name]).left() if sink.behind(kind) else None
+        left = Journal.of(sink.name, options[kind.option.name]).interrupted() if sink.behind(kind) else None
         if left is not None:
             say(
                 f"a write to {sink.where} was cut off at {left[AT]}: it may hold old and new values;"

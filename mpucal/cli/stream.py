@@ -23,7 +23,7 @@ from ..recheck import days_since
 from ..recheck.watch import Contradiction, DriftMonitor
 from ..result.calibration import Calibration
 from ..result.clock import now
-from ..result.correction import Correction, correction
+from ..result.correction import Correction, make_correction
 from ..session.events import Caution
 from ..session.ports import Source
 from ..sources.opening import open_source
@@ -136,7 +136,7 @@ def _polled(source: Source, seconds: float | None) -> Iterator[Samples]:
 
 def _correction(calibration: Calibration, source: Source, talk: _Talk) -> Correction:
     recording = source.recording()
-    ready = correction(calibration, recording.sensor, recording.autopilot)
+    ready = make_correction(calibration, recording.sensor, recording.autopilot)
     for remark in ready.remarks:
         talk.say(remark)
     return ready

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..data import Recording, Sensor, Vector
 from ..result.calibration import Calibration
-from ..result.correction import correction
+from ..result.correction import make_correction
 from . import drift
 from .hypotheses import NOTHING, Comparison, compare_hypotheses, estimate, p_value
 from .observed import Observations, apply_errors, observe
@@ -68,7 +68,7 @@ def check(calibration: Calibration, recording: Recording, days: float | None = N
             " the factory sets them for each chip"
         )
         return CheckResult(ANOTHER_SENSOR, "another sensor", message, f"{ANEW}, or give calibration-on-chip.json")
-    ready = correction(calibration, now, recording.autopilot).calibration
+    ready = make_correction(calibration, now, recording.autopilot).calibration
     observed = observe(recording, ready)
     if observed is None:
         return CheckResult(CANNOT_BE_TOLD, NOTHING, "the board never rested", AGAIN)

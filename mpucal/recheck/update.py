@@ -10,7 +10,7 @@ import numpy as np
 from ..data import Recording
 from ..errors import RefusedError
 from ..result.calibration import Calibration
-from ..result.correction import correction
+from ..result.correction import make_correction
 from ..result.correlation import NAMES, correlation_of, standard_deviations
 from .drift import to_theta
 from .observed import BETA, DELTA, apply_errors
@@ -37,7 +37,7 @@ def update_biases(calibration: Calibration, result: CheckResult, recording: Reco
     """
     if result.theta is None or result.covariance is None or not result.only_biases:
         raise RefusedError(f"no calibration was updated: {result.message}", result.remedy)
-    ready = correction(calibration, recording.sensor, recording.autopilot).calibration
+    ready = make_correction(calibration, recording.sensor, recording.autopilot).calibration
     after = apply_errors(ready, result.theta)
     T_0, change_c = ready.sensor.temperature_c, result.temperature_change_c
     T = T_0 if T_0 is None or change_c is None or ready.follows_temperature else T_0 + change_c

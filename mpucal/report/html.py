@@ -166,7 +166,7 @@ def _reproduction(calibration: Calibration, recording: Recording | None) -> str:
     if recording is None or model is None or not math.isfinite(gravity):
         return ""
     # one file of a session that was resumed is not all that was recorded: its folder is
-    source = "." if CAPTURE.is_one(recording.name) else recording.name
+    source = "." if CAPTURE.matches(recording.name) else recording.name
     anyway = " --gravity-anyway" if calibration.fit.get("gravity_anyway") else ""
     lines = [f"mpucal calibrate {source} --model {model} --gravity {gravity:.9g}{anyway} -o again"]
     if is_of_session(recording.name):

@@ -130,4 +130,4 @@ def _data_sheet(noise: Noise, sensor: str) -> str:
     factor, unit = UNITS[sensor][WHITE]
     typical, found = noise.data_sheet[sensor], noise.of(sensor, WHITE)
     said = f"data sheet: {factor * typical:.3g} {unit} ({factor * typical * math.sqrt(2.0):.3g} one-sided, as printed)"
-    return f"{said}; {found / typical:.2f} times that" if noise.told(sensor, WHITE) else said
+    return f"{said}; {found / typical:.2f} times that" if noise.is_significant(sensor, WHITE) else said

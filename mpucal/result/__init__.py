@@ -1,1 +1,1 @@
-"""A calibration as a result: its files, its numbers in common units, applied, compared, merged."""
+"""A calibration as a result: its files, its numbers in common units, its application, comparison and merging."""

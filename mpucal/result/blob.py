@@ -1,4 +1,4 @@
-"""The config blob: a calibration as firmware reads it, encoded and decoded as firmware_protocol.md says."""
+"""The config blob: a calibration for firmware, encoded and decoded as firmware_protocol.md specifies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MAJOR = 1
 MAX_LENGTH = 256
 FORMULA = "a = inv(D) @ (y - b_a + applied_b_a)"
 
-# firmware_protocol.md, "Layout", down to the last field of minor version 0; what 1 and 2 appended; then the checksum
+# firmware_protocol.md, "Layout": fields of minor version 0, those appended by 1 and by 2, and the checksum
 FIELDS = struct.Struct("<4s B B H 40s B 3x f f 9f 3f f Q f 3f 9f 3f")
 SLOPE = struct.Struct("<3f 2f")
 COUNTS = struct.Struct("<f")
@@ -26,7 +26,7 @@ HEADER_LENGTH = 8
 APPENDED = (("b_a_slope", 3), ("temperature_range_c", 2))
 NO_SLOPE, NO_RANGE = (0.0, 0.0, 0.0), (math.nan, math.nan)
 
-# of D's largest element, and of its determinant against the cube of that: no sensor is beyond
+# limits of D's largest element, and of its determinant over the cube of that element
 LEAST_GAIN, MOST_GAIN = 1e-3, 1e3
 LEAST_DETERMINANT = 1e-6
 
@@ -35,27 +35,27 @@ LENGTH_AT = 6
 
 
 class BlobError(ValueError):
-    """Bytes that are no config blob, or values that none can hold."""
+    """Bytes that are not a config blob, or values that do not fit into one."""
 
 
 @dataclass(frozen=True)
 class Blob:
-    """What a config blob holds.
+    """Content of a config blob.
 
     Attributes
     ----------
     who_am_i : the chip's WHO_AM_I; 0 unknown.
     accel_range_g, gyro_range_dps : full scale; 0 unknown.
     D : 9 numbers, row-major. b_a : 3, m/s^2: a = inv(D) (y - b_a + applied_b_a).
-    gravity : m/s^2, with which D was scaled; NaN unknown.
-    temperature_c : at which it was measured; NaN unknown.
-    created : ISO 8601, without an offset read as UTC; kept in whole seconds; empty: unknown.
+    gravity : m/s^2, to which D refers; NaN unknown.
+    temperature_c : of the measurement; NaN unknown.
+    created : ISO 8601, UTC if it has no offset, in whole seconds; empty: unknown.
     applied_b_a : m/s^2 that the chip's offset registers subtract already.
-    K : 9 numbers, row-major. b_omega : 3, rad/s: w = K (y - b_omega); NaN where not estimated.
-    b_a_slope : 3, m/s^2 a degree Celsius: b_a(T) = b_a + b_a_slope (T - temperature_c); zeros: not known.
-    temperature_range_c : 2, to which T is cut off; NaN without b_a_slope.
-    gyro_counts : counts of the gyroscope at gyro_range_dps, of which K and b_omega are; None: of minor version 0 or 1,
-        which do not say it, and which mpucal wrote of GYRO_COUNTS.
+    K : 9 numbers, row-major. b_omega : 3, rad/s: w = K (y - b_omega); NaN if not estimated.
+    b_a_slope : 3, m/s^2 per degree Celsius: b_a(T) = b_a + b_a_slope (T - temperature_c); zeros: not known.
+    temperature_range_c : 2, to which T is clipped; NaN without b_a_slope.
+    gyro_counts : counts of the gyroscope at gyro_range_dps, to which K and b_omega refer; None in minor versions 0 and
+        1, which lack it and refer to GYRO_COUNTS.
     """
 
     who_am_i: int
@@ -74,7 +74,7 @@ class Blob:
     gyro_counts: float | None = None
 
     def encode(self) -> bytes:
-        """The blob's bytes.
+        """Return the blob's bytes.
 
         Raises
         ------
@@ -107,7 +107,7 @@ class Blob:
         return body + CHECKSUM.pack(zlib.crc32(body))
 
     def _appended(self) -> tuple[int, bytes]:
-        """The minor version, and its fields behind those of 0."""
+        """Return the minor version and the fields appended to those of version 0."""
         slope = SLOPE.pack(*self.b_a_slope, *self.temperature_range_c)
         if self.gyro_counts is not None:
             return 2, slope + COUNTS.pack(self.gyro_counts)
@@ -115,7 +115,7 @@ class Blob:
 
     @classmethod
     def decode(cls, data: bytes) -> Blob:
-        """The values of one whole blob; fields that a newer minor version appended are skipped.
+        """Return the values of one whole blob; fields that a newer minor version appended are skipped.
 
         Raises
         ------
@@ -145,25 +145,25 @@ class Blob:
 
 
 def _check_whole(data: bytes) -> None:
-    """The checks of firmware_protocol.md, "Reading", in its order."""
+    """Make the checks of firmware_protocol.md, "Reading", in its order."""
     if len(data) < HEADER_LENGTH:
         raise BlobError(f"{len(data)} bytes are too short for a blob")
     if not data.startswith(MAGIC):
         raise BlobError(f"it begins with {data[: len(MAGIC)]!r}, not {MAGIC!r}")
     if data[MAJOR_AT] != MAJOR:
-        raise BlobError(f"its layout has major version {data[MAJOR_AT]}, and only {MAJOR} is known here")
+        raise BlobError(f"its layout has major version {data[MAJOR_AT]}, but only {MAJOR} is known")
     length = int.from_bytes(data[LENGTH_AT : LENGTH_AT + 2], "little")
     if not LENGTH <= length <= MAX_LENGTH:
-        raise BlobError(f"it says that it is {length} bytes long, where {LENGTH} to {MAX_LENGTH} are allowed")
+        raise BlobError(f"its length field is {length}, but {LENGTH} to {MAX_LENGTH} are allowed")
     if length != len(data):
-        raise BlobError(f"it says that it is {length} bytes long and is {len(data)}")
+        raise BlobError(f"its length field is {length}, but it has {len(data)} bytes")
     (checksum,) = CHECKSUM.unpack_from(data, length - CHECKSUM.size)
     if checksum != zlib.crc32(data[: length - CHECKSUM.size]):
         raise BlobError("its checksum does not match: it is damaged")
 
 
 def _slope(data: bytes, temperature_c: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """b_a(T) and its range, where they are there and can be used."""
+    """Return b_a(T) and its range; NO_SLOPE and NO_RANGE if they are missing or unusable."""
     if len(data) < LENGTH_WITH_SLOPE:
         return NO_SLOPE, NO_RANGE
     values = SLOPE.unpack_from(data, FIELDS.size)
@@ -188,9 +188,9 @@ def _check_usable(blob: Blob) -> None:
     _check_invertible(blob.D)
     for name in ("accel_range_g", "gyro_range_dps"):
         if not 0.0 <= getattr(blob, name) < math.inf:
-            raise BlobError(f"{name} is {getattr(blob, name)}, and neither a range nor 0")
+            raise BlobError(f"{name} is {getattr(blob, name)}, which is neither a range nor 0")
     if blob.gyro_counts is not None and not 0.0 < blob.gyro_counts < math.inf:
-        raise BlobError(f"gyro_counts is {blob.gyro_counts}, and no number of counts")
+        raise BlobError(f"gyro_counts is {blob.gyro_counts}, which is not a number of counts")
 
 
 def _check_invertible(D: tuple[float, ...]) -> None:
@@ -207,7 +207,7 @@ def _unix_seconds(created: str) -> int:
     try:
         time = datetime.fromisoformat(created)
     except ValueError as error:
-        raise BlobError(f"created is no ISO 8601 time ({error})") from error
+        raise BlobError(f"created is not an ISO 8601 time ({error})") from error
     if time.tzinfo is None:
         time = time.replace(tzinfo=UTC)
     return math.floor(time.timestamp())

@@ -22,22 +22,27 @@ from ..errors import RecordingError, WrongType, WrongValue
 from ..strict_json import MOST_BYTES, parsed
 from .blob import NO_RANGE, Blob, BlobError
 from .correlation import UNCORRELATED
-from .digest import DIGEST, digest, doubt
-from .document import arguments, checked, tellable, written
+from .document import (
+    ACCELEROMETER,
+    DIGEST,
+    GYROSCOPE,
+    HARDWARE,
+    TEMPERATURE,
+    check,
+    digest,
+    digest_warning,
+    drop_unserialisable,
+    from_document,
+    to_document,
+)
 from .error_model import bias_mg, scale_factor_error
-from .frozen import FrozenDict
-from .keys import Fit, Quality, Verdict
+from .keys import Fit, FrozenDict, Quality, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SHAPES = {
-    **dict.fromkeys(("D", "D_std", "K", "K_std"), (3, 3)),
-    **dict.fromkeys(("b_a", "b_a_std", "noise_std", "b_omega", "b_omega_std", "gyro_noise_std"), (3,)),
-    **dict.fromkeys(("applied_in_hardware", "b_a_slope", "b_a_slope_std"), (3,)),
-    "temperature_range_c": (2,),
-    "correlation": (21, 21),
-}
+SHAPES = {name: shape for _, name, shape in ACCELEROMETER + TEMPERATURE + GYROSCOPE + HARDWARE}
+SHAPES["correlation"] = UNCORRELATED.shape
 F = TypeVar("F", bound=frames.Frame)
 GOOD: Verdict = "good"
 USABLE: Verdict = "usable"
@@ -45,32 +50,31 @@ REFUSED: Verdict = "refused"
 
 
 def unknown(*shape: int) -> Vector:
-    """NaN of a shape: a number that nobody knows."""
+    """Return NaN of a shape, for numbers that are not known."""
     return np.full(shape, np.nan)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:  # noqa: PLW1641 - arrays have no hash either
-    """An accelerometer's D and b_a (the paper's equation 3), how sure they are, and what they rest on.
+    """Result of a calibration: D and b_a (the paper's equation 3), their uncertainties, the fit and its quality.
 
     Attributes
     ----------
     D : (3, 3), b_a : (3,) m/s^2: y = D s + b_a; D_std, b_a_std : their standard deviations.
-    noise_std : (3,) m/s^2, the accelerometer's noise a sample.
-    K : (3, 3), b_omega : (3,) rad/s: w = K (y - b_omega); K_std, b_omega_std, gyro_noise_std : likewise.
+    noise_std : (3,) m/s^2, the accelerometer's noise of one sample.
+    K : (3, 3), b_omega : (3,) rad/s: w = K (y - b_omega); K_std, b_omega_std, gyro_noise_std : as of D and b_a.
     fit, quality : mappings with the keys of calibration.json, see result/keys.py.
-    sensor : what was calibrated.
+    sensor : the sensor that was calibrated.
     created : ISO 8601 time.
     applied_in_hardware : (3,) m/s^2 that offset registers subtract already; a consumer uses b_a minus this.
-    b_a_slope : (3,) m/s^2 a degree Celsius, of which b_a grows away from sensor.temperature_c; zeros: not known to.
-    b_a_slope_std : (3,). temperature_range_c : (2,) degrees Celsius, within which that was seen.
+    b_a_slope : (3,) m/s^2 per degree Celsius, the slope of b_a(T) from sensor.temperature_c on; zeros: not known.
+    b_a_slope_std : (3,). temperature_range_c : (2,) degrees Celsius, the range in which b_a(T) was measured.
     extra : further top-level keys of the document (name, autopilot, others, written, merged).
     correlation : (21, 21) of the errors of D row-major, b_a, K's upper triangle and b_omega, in this order; the
-        identity where it is not known.
-    doubt : why the numbers of the file that it was read from may not be those that were saved; empty where they are.
+        identity if it is not known.
+    doubt : why the numbers may not be those that were saved, by the file's digest; empty if they are.
 
-    Unknown numbers are NaN (null in the file). Calibrations are equal whose calibration.json is the same; they have no
-    hash, as their arrays have none.
+    Unknown numbers are NaN (null in the file). Calibrations with the same calibration.json are equal, and have no hash.
     """
 
     D: Vector
@@ -107,18 +111,18 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     def __repr__(self) -> str:
         gain, bias = scale_factor_error(self.D), bias_mg(self.b_a)
         numbers = [" ".join(f"{value:+.4g}" for value in values) for values in (gain, bias)]
-        said = f"scale factor error {numbers[0]} %, bias {numbers[1]} mg"
-        return f"<Calibration of {self.sensor.chip or 'an accelerometer'}: {self.verdict}; {said}>"
+        errors = f"scale factor error {numbers[0]} %, bias {numbers[1]} mg"
+        return f"<Calibration of {self.sensor.chip or 'an accelerometer'}: {self.verdict}; {errors}>"
 
     def _repr_html_(self) -> str:
         return str(resolve_name("mpucal.report.notebook:html")(self))
 
     def plot(self, recording: Recording | str | PathLike[str] | None = None) -> Figure:
-        """A figure of the parameters beside the data sheet; of a recording |a| before and after. Needs mpucal[plot].
+        """Plot the parameters beside the data sheet, and |a| of a recording before and after; needs mpucal[plot].
 
         Raises
         ------
-        ImportError : matplotlib is not installed. WrongType : no recording, nor the path of one.
+        ImportError : matplotlib is not installed. WrongType : neither a recording nor its path.
         """
         seen = None if recording is None else resolve_name("mpucal.api:recording_of")(recording)
         figure: Figure = resolve_name("mpucal.report.notebook:plot_calibration")(self, seen)
@@ -126,13 +130,13 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
 
     @property
     def follows_temperature(self) -> bool:
-        """Whether b_a(T) is known, and not b_a alone."""
+        """Return True if b_a(T) is known."""
         return bool(np.any(self.b_a_slope))
 
     def b_a_at(self, temperature_c: ArrayLike | None = None) -> Vector:
-        """b_a(T) (..., 3) m/s^2 at (...) degrees Celsius; b_a where that is NaN, None, or b_a(T) is not known.
+        """Return b_a(T) (..., 3) m/s^2 at (...) degrees Celsius; b_a if that is NaN or None, or b_a(T) is not known.
 
-        Beyond the range in which it was seen, b_a(T) stays as at its end.
+        Beyond temperature_range_c, b_a(T) is constant.
         """
         if temperature_c is None or not self.follows_temperature:
             return self.b_a
@@ -143,22 +147,22 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
 
     @property
     def inverse(self) -> Vector:
-        """inv(D) (3, 3)."""
+        """Return inv(D) (3, 3)."""
         return np.asarray(np.linalg.inv(self.D))
 
     @property
     def b_a_to_subtract(self) -> Vector:
-        """(3,) m/s^2, b_a without what the chip's offset registers subtract already."""
+        """Return b_a (3,) m/s^2 without the part that the chip's offset registers subtract already."""
         return np.asarray(self.b_a - self.applied_in_hardware)
 
     @property
     def verdict(self) -> Verdict:
-        """good, usable or refused; refused where nobody judged."""
+        """Return good, usable or refused; refused if the calibration was not judged."""
         return self.quality.get("verdict", REFUSED)
 
     @property
     def magnitude_std(self) -> float:
-        """Standard uncertainty of the calibrated |a| [m/s^2], rms over all directions; 0 where it is unknown."""
+        """Return the standard uncertainty of the calibrated |a| [m/s^2], rms over all directions; 0 if unknown."""
         std = self.quality.get("error_std", {}).get("magnitude")
         return float(std) if std is not None and math.isfinite(std) else 0.0
 
@@ -171,7 +175,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         self, acc: ArrayLike, gyr: ArrayLike, temperature_c: ArrayLike | None = None
     ) -> tuple[Vector, Vector]: ...
     def apply(self, acc: Any, gyr: ArrayLike | None = None, temperature_c: ArrayLike | None = None) -> Any:
-        """Calibrated measurements (the paper's equation 4).
+        """Return calibrated measurements (the paper's equation 4).
 
         Parameters
         ----------
@@ -186,14 +190,14 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
 
         Raises
         ------
-        WrongType, WrongValue : what is given is no such array.
+        WrongType, WrongValue : an argument is not such an array.
         """
         if frames.is_frame(acc):
             return self._applied_to_frame(acc)
         y = vectors(acc, "acc", "m/s^2")
         T = None if temperature_c is None else shaped(temperature_c, "temperature_c", y.shape[:-1], ())
         omega = None if gyr is None else shaped(vectors(gyr, "gyr", "rad/s"), "gyr", y.shape)
-        # b_a minus what the offset registers subtract: y comes from the chip with that already gone
+        # the offset registers have subtracted their part from y already
         y = y - (self.b_a_at(T) - self.applied_in_hardware)
         a: Vector = y @ self.inverse.T
         return a if omega is None else (a, self._rates(omega))
@@ -210,23 +214,23 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
     def _rates(self, omega: Vector) -> Vector:
         return np.asarray((omega - np.nan_to_num(self.b_omega)) @ self.K.T)
 
-    def tellable(self) -> Calibration:
-        """The same, in which unknown is what no reader takes: of a fit that failed."""
-        arrays: dict[str, Any] = tellable(vars(self))
+    def drop_unserialisable(self) -> Calibration:
+        """Return a copy with NaN for numbers of a failed fit that a reader of calibration.json would refuse."""
+        arrays: dict[str, Any] = drop_unserialisable(vars(self))
         return replace(self, **arrays)
 
     def document(self) -> dict[str, Any]:
-        """The content of calibration.json; NaN becomes None."""
-        return written(vars(self), self.follows_temperature)
+        """Return the content of calibration.json; NaN becomes None."""
+        return to_document(vars(self), self.follows_temperature)
 
     def json(self) -> str:
-        """The document as text, with its digest; without one where its numbers are in doubt."""
+        """Return the document as text, with its digest unless its numbers are in doubt."""
         document = self.document()
         signed = document if self.doubt else {**document, DIGEST: digest(document)}
         return json.dumps(signed, indent=2, allow_nan=False) + "\n"
 
     def blob(self) -> Blob:
-        """The config blob of this calibration, see firmware_protocol.md."""
+        """Return the config blob of this calibration; see firmware_protocol.md."""
         sensor = self.sensor
         return Blob(
             who_am_i=sensor.who_am_i or 0,
@@ -251,7 +255,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         Raises
         ------
         OutputError : the file cannot be written.
-        WrongValue : another ending. ValueError : a blob of a calibration that holds unknown numbers.
+        WrongValue : another suffix. ValueError : a blob of a calibration with unknown numbers.
         """
         path = a_path(path, "the file of a calibration")
         if path.suffix == ".json":
@@ -259,7 +263,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
         elif path.suffix == ".bin":
             write_atomically(path, self.blob().encode())
         else:
-            raise WrongValue(f"a calibration is not saved as {path.name}", "end its name with .json or .bin")
+            raise WrongValue(f"a calibration cannot be saved as {path.name}", "end its name with .json or .bin")
 
     @classmethod
     def load(cls, path: str | Path) -> Calibration:
@@ -267,7 +271,7 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
 
         Raises
         ------
-        RecordingError : no such file, or no calibration in it.
+        RecordingError : there is no such file, or no calibration in it.
         """
         path = a_path(path, "a calibration")
         data = content(path, MOST_BYTES)
@@ -275,40 +279,40 @@ class Calibration:  # noqa: PLW1641 - arrays have no hash either
             try:
                 return cls.from_blob(Blob.decode(data))
             except BlobError as error:
-                raise RecordingError(f"{path} is no config blob: {error}", "give an undamaged blob") from error
+                raise RecordingError(f"{path} is not a config blob: {error}", "give an undamaged blob") from error
         try:
-            document = checked(parsed(data))
-            return replace(cls(**arguments(document)), doubt=doubt(document))
+            document = check(parsed(data))
+            return replace(cls(**from_document(document)), doubt=digest_warning(document))
         except ValueError as error:
             raise RecordingError(f"{path} holds no calibration ({error})", "give a calibration.json") from error
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> Calibration:
-        """The inverse of `document`; unknown keys are ignored, missing ones are unknown numbers.
+        """Return the calibration of a document; unknown keys are ignored, missing ones are unknown numbers.
 
         Raises
         ------
-        WrongType : it is no mapping. WrongValue : it is no document of a calibration.
+        WrongType : it is not a mapping. WrongValue : it is not a document of a calibration.
         """
         remedy = "give what Calibration.document() returned, or load a calibration.json"
         if not isinstance(document, Mapping):
             raise WrongType(f"the document of a calibration is given as {type(document).__name__}", remedy)
         try:
-            return cls(**arguments(document))
+            return cls(**from_document(document))
         except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise WrongValue(f"this is no document of a calibration ({error})", remedy) from error
+            raise WrongValue(f"this is not a document of a calibration ({error})", remedy) from error
 
     @classmethod
     def from_blob(cls, blob: Blob) -> Calibration:
-        """A calibration of a blob's numbers; what a blob does not hold is unknown.
+        """Return the calibration in a blob; other numbers are unknown.
 
         Raises
         ------
-        WrongType : it is no blob.
+        WrongType : it is not a blob.
         """
         if not isinstance(blob, Blob):
             raise WrongType(f"a blob is given as {type(blob).__name__}", "give what Calibration.blob() returned")
-        # of a unit of GYRO_COUNTS one of the blob's
+        # K and b_omega of the blob refer to its own counts of full scale
         unit = GYRO_COUNTS / (blob.gyro_counts or GYRO_COUNTS)
         return cls(
             D=np.array(blob.D).reshape(3, 3),

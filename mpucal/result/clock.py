@@ -1,4 +1,4 @@
-"""The time of day, as files and their names say it."""
+"""Time of day for files and their names."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from datetime import UTC, datetime
 
 
 def now() -> datetime:
-    """The time of day, to the second, UTC."""
+    """Return the time of day in UTC, in whole seconds."""
     return datetime.now(UTC).replace(microsecond=0)
 
 
 def stamp() -> str:
-    """The same, for a file's name."""
+    """Return the time of day as a part of a file name."""
     return now().strftime("%Y%m%d-%H%M%S")

@@ -1,4 +1,4 @@
-"""How two calibrations differ, number by number, and whether that is more than their uncertainties."""
+"""Comparison of two calibrations: differences of their numbers, their significance, and which one is better."""
 
 from __future__ import annotations
 
@@ -8,28 +8,30 @@ from statistics import NormalDist
 
 import numpy as np
 
-from ..data import Vector
+from ..data import STANDARD_GRAVITY_MPS2, Vector
 from . import error_model
 from .calibration import GOOD, Calibration
 from .error_model import AXES
 
-# how sure "they differ" is: of two calibrations of one unchanged sensor, 1 in 100 are called different
+# of pairs of calibrations of an unchanged sensor, 1 in 100 are called different
 CONFIDENCE = 0.99
-# How much too sure a calibration with reservations may be: of one unchanged sensor, halves of a real recording with
-# such a verdict were 1.1 times as far apart as two good ones may be, and worse recordings than that one there are.
+# Factor by which the uncertainties of a calibration with reservations may be too small. Halves of a real recording with
+# this verdict, of an unchanged sensor, were 1.1 times as far apart as two good ones may be, and there are worse ones.
 RESERVED = 2.0
-# K is symmetric to rounding where the calibration was made in the body frame
+# K is symmetric to rounding if the calibration is in the body frame
 SYMMETRIC = 1e-6
 WARMER_C = 3.0
+# a covariance covers chance alone: a smaller improvement does not count
+LEAST_STD_MPS2 = 0.001
 
 
 @dataclass(frozen=True)
 class Difference:
-    """One number of B less that of A.
+    """Difference of one number, B minus A.
 
     Attributes
     ----------
-    name, unit : of the number. value, std : of the difference; std NaN where a calibration does not say.
+    name, unit : of the number. value, std : of the difference; std is NaN if a calibration lacks it.
     """
 
     name: str
@@ -39,19 +41,19 @@ class Difference:
 
     @property
     def z(self) -> float:
-        """In standard deviations; NaN where those are not known."""
+        """Return the difference in standard deviations; NaN if these are not known."""
         return self.value / self.std if self.std > 0.0 else math.nan
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two calibrations, A and B.
+    """Comparison of two calibrations, A and B.
 
     Attributes
     ----------
     numbers : the accelerometer's twelve. gyroscope : its bias, which changes from day to day.
-    remarks : what else differs, a sentence each.
-    margin : by what factor the uncertainties may be too small: 1 for two good calibrations.
+    remarks : sentences on other differences.
+    margin : factor by which the uncertainties may be too small: 1 for two good calibrations.
     """
 
     numbers: tuple[Difference, ...]
@@ -61,15 +63,15 @@ class Comparison:
 
     @property
     def limit(self) -> float:
-        """Standard deviations beyond which one of the numbers differs: Šidák's, so that CONFIDENCE holds for all."""
+        """Return the limit of |z| of one number, by Šidák's correction, so that CONFIDENCE holds for all numbers."""
         count = max(len(self._known), 1)
         return NormalDist().inv_cdf((1 + CONFIDENCE ** (1 / count)) / 2)
 
     @property
     def same(self) -> bool | None:
-        """Whether they are one sensor's, unchanged, as far as they know.
+        """Return True if they agree with one unchanged sensor, False if not.
 
-        None where that cannot be told: no uncertainty is known, or something is doubtful.
+        None if this cannot be decided: no uncertainty is known, or a difference is doubtful.
         """
         if self.changed:
             return False
@@ -77,12 +79,12 @@ class Comparison:
 
     @property
     def changed(self) -> tuple[Difference, ...]:
-        """What differs by more than the uncertainties, even if they are too small; the surest first."""
+        """Return differences that are significant even with uncertainties `margin` times larger; largest |z| first."""
         return self._beyond(self.limit * self.margin)
 
     @property
     def doubtful(self) -> tuple[Difference, ...]:
-        """What else differs by more than the uncertainties, if these are to be relied on; the surest first."""
+        """Return further differences that are significant only if the uncertainties are right; largest |z| first."""
         return self._beyond(self.limit)[len(self.changed) :]
 
     def _beyond(self, limit: float) -> tuple[Difference, ...]:
@@ -94,7 +96,7 @@ class Comparison:
 
 
 def compare(a: Calibration, b: Calibration) -> Comparison:
-    """B less A, both in the body frame, with b_a(T) at A's temperature where B has it."""
+    """Compare B with A, both in the body frame, with b_a(T) of B at A's temperature if B has it."""
     a, b = in_body_frame(a), in_body_frame(b)
     bias = b.b_a_at(a.sensor.temperature_c) - a.b_a_at(b.sensor.temperature_c if not b.follows_temperature else None)
     numbers = [
@@ -103,18 +105,18 @@ def compare(a: Calibration, b: Calibration) -> Comparison:
         *_misalignments(a, b),
     ]
     std = np.hypot(a.b_omega_std, b.b_omega_std)
-    turned = _row("gyroscope's bias", "deg/s", np.degrees(b.b_omega - a.b_omega), np.degrees(std))
+    gyroscope = _row("gyroscope's bias", "deg/s", np.degrees(b.b_omega - a.b_omega), np.degrees(std))
     margin = RESERVED if _reserved(a) or _reserved(b) else 1.0
-    return Comparison(tuple(numbers), tuple(turned), tuple(_remarks(a, b)), margin)
+    return Comparison(tuple(numbers), tuple(gyroscope), tuple(_remarks(a, b)), margin)
 
 
 def in_body_frame(c: Calibration) -> Calibration:
-    """The same in the frame in which K is symmetric: with K = U S V^T, Q = V U^T takes K to Q K and D to D Q^T."""
+    """Return the calibration in the frame where K is symmetric: K = U S V^T, Q = V U^T, K -> Q K, D -> D Q^T."""
     if not np.isfinite(c.K).all() or np.abs(c.K - c.K.T).max() < SYMMETRIC:
         return c
     U, _, Vt = np.linalg.svd(c.K)
     Q = Vt.T @ U.T
-    # the deviations are those of a frame that is a degree away at most
+    # the standard deviations are kept, since the frames are a degree apart at most
     return replace(c, D=c.D @ Q.T, K=Q @ c.K)
 
 
@@ -130,7 +132,7 @@ def _scale_factor_errors(a: Calibration, b: Calibration) -> list[Difference]:
 
 def _misalignments(a: Calibration, b: Calibration) -> list[Difference]:
     value = error_model.misalignment(b.D) - error_model.misalignment(a.D)
-    # an angle beyond a half turn is one the other way round
+    # an angle beyond half a turn is one in the other direction
     value = (value + 180.0) % 360.0 - 180.0
     std = np.hypot(*(error_model.misalignment_std(c.D, c.D_std) for c in (a, b)))
     return [
@@ -142,43 +144,69 @@ def _misalignments(a: Calibration, b: Calibration) -> list[Difference]:
 
 
 def _remarks(a: Calibration, b: Calibration) -> list[str]:
-    said = [_reservations(name, c) for name, c in (("A", a), ("B", b)) if _reserved(c)]
+    remarks = [_reservations(name, c) for name, c in (("A", a), ("B", b)) if _reserved(c)]
     if None not in (a.sensor.who_am_i, b.sensor.who_am_i) and a.sensor.who_am_i != b.sensor.who_am_i:
-        said.append(
-            f"They are of two chips: WHO_AM_I is 0x{a.sensor.who_am_i:02x} of A and 0x{b.sensor.who_am_i:02x} of B."
+        remarks.append(
+            f"They are of two chips: WHO_AM_I of A is 0x{a.sensor.who_am_i:02x}, of B 0x{b.sensor.who_am_i:02x}."
         )
     held = [c.sensor.accel_offsets for c in (a, b)]
     if None not in held and held[0] != held[1]:
-        said.append(
-            f"The offset registers held {held[0]} for A and {held[1]} for B: the biases differ by that, or it is"
-            " another chip."
+        remarks.append(
+            f"The offset registers held {held[0]} for A and {held[1]} for B: the biases differ by that, or these are"
+            " two chips."
         )
     warm = [c.sensor.temperature_c for c in (a, b)]
     if warm[0] is not None and warm[1] is not None and abs(warm[1] - warm[0]) >= WARMER_C:
-        said.append(
-            f"A was measured at {warm[0]:.1f} °C and B at {warm[1]:.1f} °C: an MPU-6050's bias moves by some 0.5 mg a"
-            " degree; `mpucal merge` makes b_a(T) of both."
+        remarks.append(
+            f"A was measured at {warm[0]:.1f} °C and B at {warm[1]:.1f} °C: an MPU-6050's bias changes by about 0.5 mg"
+            " per degree; `mpucal merge` makes b_a(T) from both."
         )
     gravity = [float(c.fit.get("gravity") or math.nan) for c in (a, b)]
     if abs(gravity[1] - gravity[0]) > 1e-6:
-        said.append(
-            f"A was fitted with a gravity of {gravity[0]:.5f} m/s² and B with {gravity[1]:.5f}: that alone makes"
-            f" {100 * (gravity[1] / gravity[0] - 1):+.3f} % of scale factor."
+        remarks.append(
+            f"A was made with a gravity of {gravity[0]:.5f} m/s² and B with {gravity[1]:.5f}: that alone changes the"
+            f" scale factors by {100 * (gravity[1] / gravity[0] - 1):+.3f} %."
         )
     old = [c.extra.get("autopilot", {}).get("params_old") for c in (a, b)]
     if old[0] != old[1]:
-        said.append("They are of streams behind other parameters of the autopilot, or one is of no autopilot.")
-    return said
+        remarks.append(
+            "They are of streams with different parameters of the autopilot, or only one is of an autopilot."
+        )
+    return remarks
 
 
 def _reserved(c: Calibration) -> bool:
-    """Whether its verdict has reservations; a blob has no verdict."""
+    """Return True if the verdict has reservations; a blob has no verdict."""
     return c.verdict != GOOD and "verdict" in c.quality
 
 
 def _reservations(name: str, c: Calibration) -> str:
     codes = ", ".join(str(reason["code"]) for reason in c.quality.get("reasons", ()))
     return (
-        f"{name} is {c.verdict} ({codes}), and its uncertainties may be too small: a difference counts from"
-        f" {RESERVED:g} times as much on."
+        f"{name} is {c.verdict} ({codes}), and its uncertainties may be too small: only differences of"
+        f" {RESERVED:g} times the usual limit count."
     )
+
+
+def is_better(new_mps2: float, old_mps2: float, std_mps2: float) -> bool:
+    """Return True if |a| is predicted to be nearer to g with the new correction.
+
+    Parameters
+    ----------
+    new_mps2, old_mps2 : largest error of |a| with each correction, if the calibration were exact.
+    std_mps2 : standard uncertainty of the calibration. It is part of both errors: the square of the old one is too
+        large by its square, and that of the new one too small.
+    """
+    std_mps2 = max(std_mps2, LEAST_STD_MPS2)
+    return old_mps2**2 - std_mps2**2 > new_mps2**2 + std_mps2**2
+
+
+def worst_magnitude_error(true: Calibration, D: Vector, b_a: Vector) -> float:
+    """Return the largest error of |a| [m/s^2] over all attitudes if D, b_a correct a sensor that `true` describes.
+
+    a = inv(D) (D_true s + b_true - b_a): the singular values of inv(D) D_true bound the effect of the scale on |a|.
+    """
+    gravity = float(true.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
+    singular = np.linalg.svd(np.linalg.solve(D, true.D), compute_uv=False)
+    bias = np.linalg.norm(np.linalg.solve(D, true.b_a - b_a))
+    return float(gravity * np.abs(singular - 1.0).max() + (bias if math.isfinite(bias) else math.inf))

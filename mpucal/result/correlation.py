@@ -1,7 +1,7 @@
-"""How the errors of a calibration's 21 numbers hang together: their correlation, as in calibration.json.
+"""Correlation of the errors of a calibration's 21 numbers, as in calibration.json.
 
 The numbers are those of NAMES: D row-major, b_a, K's upper triangle, and b_omega. With their standard deviations the
-correlation (21, 21) makes their covariance. The file holds what is below the diagonal, row by row, 210 numbers.
+correlation (21, 21) gives their covariance. The file holds the 210 numbers below the diagonal, row by row.
 """
 
 from __future__ import annotations
@@ -22,17 +22,19 @@ NAMES = (
 )
 KEY, LOWER = "correlation", np.tril_indices(len(NAMES), -1)
 _UPPER = np.triu_indices(3)
-# beyond them is nothing that another processor computes alike
+# further digits differ between processors
 DIGITS = 5
-# or not known to be correlated
+# also the value if the correlation is not known
 UNCORRELATED = np.eye(len(NAMES))
 
 
 def correlation_of(names: Sequence[str], covariance: Vector, std: Vector) -> Vector:
-    """(21, 21) of the covariance (p, p) of estimates by name, with their standard deviations (21,) in NAMES' order.
+    """Return the correlation (21, 21) from a covariance (p, p) of named estimates and standard deviations (21,).
 
-    What was not estimated, and what has no standard deviation, hangs together with nothing. The standard deviations
-    may be larger than the covariance's: then the correlations are the smaller.
+    Parameters
+    ----------
+    names : of the p estimates. std : in the order of NAMES; they may exceed those of the covariance, which makes the
+        correlations smaller. Numbers that were not estimated or have no standard deviation are uncorrelated.
     """
     of = [(at, names.index(name)) for at, name in enumerate(NAMES) if name in names and std[at] > 0.0]
     rho = UNCORRELATED.copy()
@@ -44,13 +46,13 @@ def correlation_of(names: Sequence[str], covariance: Vector, std: Vector) -> Vec
 
 
 def from_lower(values: Vector) -> Vector:
-    """(21, 21) of the (210,) below its diagonal; what is not known (NaN) is 0."""
+    """Return the correlation (21, 21) from the (210,) numbers below its diagonal; NaN becomes 0."""
     rho = np.zeros((len(NAMES), len(NAMES)))
     rho[LOWER] = np.nan_to_num(values)
     return np.asarray(rho + rho.T + UNCORRELATED)
 
 
 def standard_deviations(values: Mapping[str, Any]) -> Vector:
-    """(21,) of a Calibration's fields by name, in the order of NAMES."""
+    """Return the standard deviations (21,) of a Calibration's fields, in the order of NAMES."""
     K_std = np.asarray(values["K_std"])[_UPPER]
     return np.concatenate([np.ravel(values["D_std"]), values["b_a_std"], K_std, values["b_omega_std"]])

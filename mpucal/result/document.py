@@ -1,7 +1,14 @@
-"""calibration.json: its arrays by one table of keys, read and written by the same rows."""
+"""calibration.json: written and read by one table of keys, checked, and protected by a digest.
+
+The digest is "sha256:" and the hexadecimal SHA-256 of the document without `digest` and `created`, as JSON with sorted
+keys, without blanks, in ASCII, and with every number as Python's repr of the double: the shortest decimal digits that
+give it again. Without `created`, a replayed session has the digest of the original.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 import re
 import reprlib
@@ -18,7 +25,7 @@ from .correlation import KEY, LOWER, from_lower
 from .schema import check_document
 
 FORMAT, VERSION = "mpucal.calibration", 1
-# (key, attribute of a Calibration, shape) of the two objects
+# (key, attribute of a Calibration, shape) of each object
 ACCELEROMETER = (
     ("D", "D", (3, 3)),
     ("b_a", "b_a", (3,)),
@@ -26,7 +33,7 @@ ACCELEROMETER = (
     ("b_a_std", "b_a_std", (3,)),
     ("noise_std", "noise_std", (3,)),
 )
-# written where b_a(T) is known
+# written if b_a(T) is known
 TEMPERATURE = (
     ("b_a_slope", "b_a_slope", (3,)),
     ("b_a_slope_std", "b_a_slope_std", (3,)),
@@ -41,18 +48,19 @@ GYROSCOPE = (
 )
 HARDWARE = (("b_a", "applied_in_hardware", (3,)),)
 _NUMBERS = ACCELEROMETER + GYROSCOPE
-# of a matrix near the identity
+# the largest condition number of a matrix near the identity
 WORST_CONDITION = 1e9
 ACCELEROMETER_FORMULA = "a = inv(D) @ (y - b_a)"
 GYROSCOPE_FORMULA = "w = K @ (y - b_omega)"
-# fromisoformat takes any character between date and time
+# fromisoformat would accept any character between date and time
 DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}([T ][0-9:]{5,8}([.,][0-9]{1,9})?(Z|[+-][0-9:]{2,8})?)?")
-# top-level keys that are kept as they are
+DIGEST, CREATED = "digest", "created"
+# top-level keys that are kept unchanged
 EXTRA = ("name", "autopilot", "others", "written", "merged", "updated_from", "noise")
 
 
-def written(fields: Mapping[str, Any], follows_temperature: bool) -> dict[str, Any]:
-    """The content of calibration.json, of a Calibration's fields by name; NaN becomes None."""
+def to_document(fields: Mapping[str, Any], follows_temperature: bool) -> dict[str, Any]:
+    """Return the content of calibration.json from a Calibration's fields by name; NaN becomes None."""
     values = {
         "format": FORMAT,
         "version": VERSION,
@@ -73,17 +81,22 @@ def written(fields: Mapping[str, Any], follows_temperature: bool) -> dict[str, A
     return {key: _plain(value) for key, value in values.items()}
 
 
-def arguments(document: Mapping[str, Any]) -> dict[str, Any]:
-    """What a Calibration is made of; unknown keys are ignored, missing ones are left to its defaults.
+def _check_format(document: Mapping[str, Any]) -> None:
+    if document.get("format") != FORMAT:
+        raise ValueError(f'"format" is {reprlib.repr(document.get("format"))}, not {FORMAT!r}')
+    version = document.get("version", VERSION)
+    if isinstance(version, int) and version > VERSION:
+        raise ValueError(f"version {version} is newer than {VERSION}")
+
+
+def from_document(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arguments of a Calibration; unknown keys are ignored, missing ones get its defaults.
 
     Raises
     ------
-    ValueError, KeyError, TypeError, AttributeError : it is no such document.
+    ValueError, KeyError, TypeError, AttributeError : it is not such a document.
     """
-    if document.get("format") != FORMAT:
-        raise ValueError(f'"format" is {document.get("format")!r}, not {FORMAT!r}')
-    if document.get("version", 0) > VERSION:
-        raise ValueError(f"version {document['version']} is newer than {VERSION}")
+    _check_format(document)
     acc = document["accelerometer"]
     for key in ("D", "b_a"):
         if key not in acc:
@@ -103,34 +116,57 @@ def arguments(document: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def checked(document: Any) -> dict[str, Any]:
-    """A document that was read from a file, if it is as its schema says and its D can be inverted; others' likewise.
+def check(document: Any) -> dict[str, Any]:
+    """Return a document from a file if it satisfies its schema and D and K can be inverted, also those in `others`.
 
     Raises
     ------
-    ValueError : what is wrong.
+    ValueError : the first error.
     """
     if not isinstance(document, dict):
         raise ValueError(f"it is a {type(document).__name__}, not an object")
-    if document.get("format") != FORMAT:
-        raise ValueError(f'"format" is {reprlib.repr(document.get("format"))}, not {FORMAT!r}')
-    version = document.setdefault("version", VERSION)
-    if isinstance(version, int) and version > VERSION:
-        raise ValueError(f"version {version} is newer than {VERSION}")
+    _check_format(document)
+    document.setdefault("version", VERSION)
     check_document(document)
     for one in (document, *document.get("others", ())):
         _check_numbers(one)
     return document
 
 
-def tellable(fields: Mapping[str, Any]) -> dict[str, Vector]:
-    """A Calibration's arrays by name, without numbers and matrices that `checked` refuses: NaN in their place."""
+def digest(document: Mapping[str, Any]) -> str:
+    """Return the digest of a document, regardless of its own `digest`."""
+    text = json.dumps(
+        _doubles({key: value for key, value in document.items() if key not in (DIGEST, CREATED)}),
+        sort_keys=True,
+        separators=(",", ":"),
+    )
+    return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+def digest_warning(document: Mapping[str, Any]) -> str:
+    """Return why a document's numbers may not be those that were saved; empty if its digest matches."""
+    held = document.get(DIGEST)
+    if held is None:
+        return "it has no digest, so damage to a number in it cannot be noticed"
+    return "" if held == digest(document) else "its digest does not match: it was changed or damaged after it was saved"
+
+
+def _doubles(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _doubles(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_doubles(item) for item in value]
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+def drop_unserialisable(fields: Mapping[str, Any]) -> dict[str, Vector]:
+    """Return a Calibration's arrays by name, with NaN for numbers and matrices that `check` refuses."""
     arrays = {name: np.where(np.abs(fields[name]) <= LARGEST, fields[name], np.nan) for _, name, _ in _NUMBERS}
-    return {name: array if _is_fit(name, array) else np.full_like(array, np.nan) for name, array in arrays.items()}
+    return {name: array if _is_usable(name, array) else np.full_like(array, np.nan) for name, array in arrays.items()}
 
 
-def _is_fit(name: str, array: Vector) -> bool:
-    """Whether it is no matrix that must be inverted and cannot be; one that is not known at all need not be."""
+def _is_usable(name: str, array: Vector) -> bool:
+    """Return False for a matrix that must be inverted and cannot be; a wholly unknown one is usable."""
     if name not in ("D", "K") or np.isnan(array).all():
         return True
     return bool(np.isfinite(array).all() and np.linalg.cond(array) <= WORST_CONDITION)
@@ -145,7 +181,7 @@ def _check_numbers(document: Mapping[str, Any]) -> None:
         ("applied_in_hardware", HARDWARE),
     ):
         values = _read(document.get(key, {}), rows)
-        # farther from a sensor than anything that was ever measured: their products stay finite
+        # no sensor has larger numbers, and products of these are finite
         if any(np.nanmax(np.abs(array), initial=0.0) > LARGEST for array in values.values()):
             raise ValueError(f"{key} holds a number beyond {LARGEST:g}")
         if any(
@@ -155,7 +191,7 @@ def _check_numbers(document: Mapping[str, Any]) -> None:
         ):
             raise ValueError(f"{key} holds a standard deviation below 0")
         for name, array in values.items():
-            if not _is_fit(name, array):
+            if not _is_usable(name, array):
                 raise ValueError(f"{name} cannot be inverted")
         if np.isnan(values.get("applied_in_hardware", 0.0)).any():
             raise ValueError("applied_in_hardware holds null")
@@ -166,14 +202,14 @@ def _check_numbers(document: Mapping[str, Any]) -> None:
 
 
 def _check_slope(document: Mapping[str, Any]) -> None:
-    """b_a(T) is a line through b_a at the sensor's temperature, within a range that holds it; or there is none."""
+    """Check that b_a(T), if given, is a line through b_a at a sensor temperature within its range."""
     of = _read(document.get("accelerometer", {}), TEMPERATURE)
     if not np.any(of.get("b_a_slope", 0.0)):
         return
     T = document.get("sensor", {}).get("temperature_c")
     low, high = of.get("temperature_range_c", (np.nan, np.nan))
     if T is None or not (low <= T <= high and np.isfinite(of["b_a_slope"]).all()):
-        raise ValueError("b_a_slope is given, and not of which temperatures")
+        raise ValueError("b_a_slope is given without its temperatures")
 
 
 Rows = tuple[tuple[str, str, tuple[int, ...]], ...]
@@ -188,11 +224,11 @@ def _read(values: Mapping[str, Any], rows: Rows) -> dict[str, Vector]:
 
 
 def _date(text: Any) -> str:
-    """A time as ISO 8601 has it; "" where it is unknown."""
+    """Return a time of ISO 8601, or "" if it is unknown."""
     if text == "":
         return ""
     if not isinstance(text, str) or not DATE.fullmatch(text):
-        raise ValueError(f"created is {reprlib.repr(text)}, which is no ISO 8601 time")
+        raise ValueError(f"created is {reprlib.repr(text)}, which is not an ISO 8601 time")
     datetime.fromisoformat(text)
     return text
 
@@ -200,12 +236,12 @@ def _date(text: Any) -> str:
 def _array(values: Any, shape: tuple[int, ...]) -> Vector:
     array = np.array(values, dtype=np.float64)  # None becomes NaN
     if array.shape != shape:
-        raise ValueError(f"shape {array.shape} where {shape} belongs")
+        raise ValueError(f"an array has the shape {array.shape}, not {shape}")
     return array
 
 
 def _plain(value: Any) -> Any:
-    """JSON's own types; NaN and infinities become None."""
+    """Return a value of JSON types; NaN and infinities become None."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):

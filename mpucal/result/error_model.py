@@ -1,4 +1,4 @@
-"""Scale factor error, misalignment and bias of a sensor: the one definition of each.
+"""Scale factor error, misalignment and bias of a sensor: the single definition of each.
 
 A sensor reads y = M s + b, with s in the body frame (the one in which K is symmetric). For the accelerometer M = D and
 b = b_a; for the gyroscope M = inv(K) and b = b_omega.
@@ -7,10 +7,10 @@ b = b_a; for the gyroscope M = inv(K) and b = b_omega.
     misalignment i->j               atan2(M_ij, M_ii)          deg, i != j
     bias of axis i                  1000 b_i / 9.80665         mg (deg/s of a gyroscope)
 
-The diagonal of M holds the scale factors, and what is beside it the cross-coupling, as in P. D. Groves, Principles of
+The diagonal of M holds the scale factors and the other elements the cross-coupling, as in P. D. Groves, Principles of
 GNSS, Inertial, and Multisensor Integrated Navigation Systems, 2nd ed., section 4.4. Misalignment i->j is the angle by
-which the sensitive axis i leans towards the body's axis j. Standard deviations are the numbers' own (1 sigma), carried
-over to first order without correlations.
+which the sensitive axis i leans towards the body's axis j. Standard deviations (1 sigma) are
+propagated to first order without correlations.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ MG_PER_MPS2 = 1000.0 / STANDARD_GRAVITY_MPS2
 
 
 def scale_factor_error(M: Vector) -> Vector:
-    """(3,) % of x, y, z, of the (3, 3) matrix in y = M s + b."""
+    """Return (3,) % of x, y, z from the matrix M (3, 3)."""
     return np.asarray(100.0 * (np.diag(M) - 1.0))
 
 
 def scale_factor_error_std(M_std: Vector) -> Vector:
-    """(3,) %, of the (3, 3) standard deviations of M."""
+    """Return (3,) % from the standard deviations (3, 3) of M."""
     return np.asarray(100.0 * np.diag(M_std))
 
 
 def misalignment(M: Vector) -> Vector:
-    """(3, 3) deg: [i, j] is misalignment i->j; NaN on the diagonal."""
+    """Return (3, 3) deg, where [i, j] is misalignment i->j; NaN on the diagonal."""
     angle = np.degrees(np.arctan2(M, np.diag(M)[:, None]))
     np.fill_diagonal(angle, np.nan)
     return np.asarray(angle)
 
 
 def misalignment_std(M: Vector, M_std: Vector) -> Vector:
-    """(3, 3) deg, of `misalignment`; NaN on the diagonal."""
+    """Return the standard deviations (3, 3) of `misalignment` [deg]; NaN on the diagonal."""
     along, along_std = np.diag(M)[:, None], np.diag(M_std)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         std = np.degrees(np.hypot(along * M_std, M * along_std) / (M**2 + along**2))
@@ -50,12 +50,12 @@ def misalignment_std(M: Vector, M_std: Vector) -> Vector:
 
 
 def bias_mg(b: Vector) -> Vector:
-    """A bias, or its standard deviation, of (...) m/s^2 in mg; 1 mg is a thousandth of standard gravity."""
+    """Return a bias, or its standard deviation, (...) m/s^2 in mg; 1 mg is a thousandth of standard gravity."""
     return np.asarray(MG_PER_MPS2 * b)
 
 
 def error_before(D: Vector, b: Vector, gravity: float) -> float:
-    """rms over all orientations at rest of what D (3, 3) and b (3,) [m/s^2] leave wrong uncorrected [m/s^2].
+    """Return the rms error [m/s^2] over all orientations at rest of an uncalibrated sensor with D (3, 3) and b (3,).
 
     The mean of |(D - I) s + b|^2 over the sphere |s| = g is g^2 / 3 |D - I|_F^2 + |b|^2.
     """
@@ -63,7 +63,7 @@ def error_before(D: Vector, b: Vector, gravity: float) -> float:
 
 
 def sensor_axes(M: Vector) -> Vector:
-    """(3, 3) M as seen along the sensor's own axes: M Q^T, with Q the rotation nearest to M.
+    """Return M (3, 3) along the sensor's own axes: M Q^T, with Q the rotation nearest to M.
 
     Its diagonal holds the scale factors of a sensor whose axes are swapped, mirrored or turned against the body's.
     """

@@ -1,7 +1,7 @@
-"""A note on disk while something is written to a device: who finds it later knows that the write was cut off.
+"""A note on disk during a write to a device: if it is still there later, the write was interrupted.
 
-It lies in $XDG_STATE_HOME/mpucal (~/.local/state/mpucal, on Windows %LOCALAPPDATA%\\mpucal): the next run may be
-in another folder.
+It is in $XDG_STATE_HOME/mpucal (~/.local/state/mpucal, on Windows %LOCALAPPDATA%\\mpucal), since the next run may be in
+another folder.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ AT = "at"
 
 
 class Journal:
-    """The note of one device; without a `path` none is kept."""
+    """Note of one device; without a `path` no note is kept."""
 
     def __init__(self, path: Path | None = None) -> None:
         self._path = path
 
     @classmethod
     def of(cls, sink: str, device: str) -> Journal:
-        """That of a sink, by its name, behind the device that is spelled so on the command line."""
+        """Return the journal of a sink, by its name, and a device, by its option on the command line."""
         name = hashlib.sha256(f"{sink} {device}".encode()).hexdigest()[:16]
         return cls(_state_folder() / f"write-{name}.json")
 
     def begin(self, content: Mapping[str, Any]) -> None:
-        """Note what was there, in JSON's own types; a home that cannot be written keeps nobody from calibrating."""
+        """Note the old content of the device, of JSON types; a failure to write the note is ignored."""
         if self._path is None:
             return
         with suppress(OSError, OutputError):
             make_folders(self._path.parent)
             write_atomically(self._path, json.dumps({AT: now().isoformat(), **content}, indent=2).encode())
 
-    def done(self) -> None:
-        """The device holds one state again, the old or the new one."""
+    def end(self) -> None:
+        """Remove the note: the device is in one state again, the old or the new one."""
         if self._path is not None:
-            # a note that stays, or that a power cut brings back, would have the next write undo this one
+            # if the note stayed, or a power cut brought it back, the next write would undo this one
             try:
                 self._path.unlink(missing_ok=True)
                 sync_folder(self._path.parent)
@@ -53,8 +53,8 @@ class Journal:
                 with suppress(OutputError):
                     write_atomically(self._path, b"{}")
 
-    def left(self) -> dict[str, Any] | None:
-        """What a write that was cut off noted; None where none was."""
+    def interrupted(self) -> dict[str, Any] | None:
+        """Return the note of an interrupted write; None if there is none."""
         if self._path is None:
             return None
         try:

@@ -1,24 +1,38 @@
-"""The keys of `fit` and `quality` as types: what a type checker knows of these mappings, which nobody changes.
+"""Types of the mappings `fit` and `quality` for type checkers, and the immutable dict that holds them.
 
-They are those that `calibrate` gives. Of a config blob `quality` is empty, and `fit` has the gravity alone.
+The keys are those of a result of `calibrate`. From a config blob `quality` is empty, and `fit` has the gravity alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, NotRequired, TypedDict
 
 from ..reasons import ReasonFound
 
 if TYPE_CHECKING:
-    from typing_extensions import ReadOnly  # which type checkers bring with them
+    from typing_extensions import ReadOnly  # part of every type checker
 
 Verdict = Literal["good", "usable", "refused"]
-Number = float | None  # NaN or None (null in the file) where unknown
+Number = float | None  # NaN or None (null in the file) if unknown
+
+
+class FrozenDict(dict[str, Any]):
+    """Dict that cannot be changed (TypeError); unlike a mapping proxy it can be pickled, copied and dumped as JSON."""
+
+    def _refuse(self, *_: object, **__: object) -> NoReturn:
+        raise TypeError("this mapping cannot be changed: make a dict of it")
+
+    __setitem__ = __delitem__ = __ior__ = _refuse
+    clear = pop = popitem = setdefault = update = _refuse
+
+    def __reduce__(self) -> tuple[type[FrozenDict], tuple[dict[str, Any]]]:
+        # pickle would set the items one by one
+        return FrozenDict, (dict(self),)
 
 
 class Magnitude(TypedDict):
-    """|a| of all samples [m/s^2]."""
+    """Statistics of |a| over all samples [m/s^2]."""
 
     median: ReadOnly[Number]
     mean: ReadOnly[Number]
@@ -26,7 +40,7 @@ class Magnitude(TypedDict):
 
 
 class ErrorStd(TypedDict):
-    """Standard uncertainty of a calibrated measurement over all directions [m/s^2, deg], and what it rests on."""
+    """Standard uncertainty of a calibrated measurement over all directions [m/s^2, deg], and its parts."""
 
     rms: ReadOnly[Number]
     magnitude: ReadOnly[Number]
@@ -38,14 +52,14 @@ class ErrorStd(TypedDict):
 
 
 class Verification(TypedDict):
-    """What new orientations said; `agrees` None where none was shown."""
+    """Result of the verification in new orientations; `agrees` is None if none was shown."""
 
     agrees: ReadOnly[bool | None]
     orientations: ReadOnly[Sequence[Mapping[str, Any]]]
 
 
 class Quality(TypedDict):
-    """The `quality` of calibration.json; `verification` only of a session that has verified."""
+    """Mapping `quality` of calibration.json; `verification` only after a session's verification."""
 
     verdict: ReadOnly[Verdict]
     reasons: ReadOnly[Sequence[ReasonFound]]
@@ -56,7 +70,7 @@ class Quality(TypedDict):
 
 
 class Fit(TypedDict):
-    """The `fit` of calibration.json: the model, why that one, and what its estimation was."""
+    """Mapping `fit` of calibration.json: the model, the reason for its choice, and the course of the estimation."""
 
     model: ReadOnly[str]
     why: ReadOnly[str]

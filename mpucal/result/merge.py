@@ -1,9 +1,9 @@
-"""Calibrations of one sensor at different temperatures merged into one with b_a(T), where they support it.
+"""Calibrations of one sensor at different temperatures, merged into one with b_a(T) if the data support it.
 
-    b_a,k = b_a + slope (T_k - T_0) + e_k,    e_k of the standard deviation that calibration k says,
+    b_a,k = b_a + slope (T_k - T_0) + e_k,    e_k with the standard deviation of calibration k,
 
-a straight line an axis, by weighted least squares, T_0 the weighted mean of the T_k: there b_a and slope are
-independent. D is the weighted mean: a sensor whose D changes, too, is left with half the change at the ends.
+is a straight line for each axis, by weighted least squares. T_0 is the weighted mean of the T_k, where b_a and slope
+are independent. D is the weighted mean: if D changes too, half of its change remains at the ends.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from .calibration import REFUSED, Calibration
 from .comparison import compare, in_body_frame
 from .correlation import UNCORRELATED
 
-# so far apart at least: a chip's thermometer is good to a degree, and a day's own drift looks like a slope
+# a chip's thermometer is accurate to a degree, and over a smaller span the drift of a day looks like a slope
 LEAST_SPAN_C = 5.0
-# standard deviations: a slope is one beyond the first, and the line fits within the second
+# standard deviations: the least of a slope, and the most of the points' distances from the line
 SLOPED, FITS = 3.0, 4.0
 DIGEST = "recording_digest"
 
 
 @dataclass(frozen=True)
-class Merged:
-    """What several calibrations make together.
+class MergeResult:
+    """Result of a merge.
 
     Attributes
     ----------
-    calibration : the one. why : one sentence: whether it holds b_a(T), and what speaks for or against it.
-    remarks : what else a person should know, a sentence each.
+    calibration : the merged one. why : a sentence on whether it has b_a(T), and the reason.
+    remarks : further sentences for the user.
     """
 
     calibration: Calibration
@@ -43,30 +43,30 @@ class Merged:
     remarks: tuple[str, ...]
 
 
-def merge(calibrations: Sequence[Calibration]) -> Merged:
-    """One calibration of several, with b_a(T) where their temperatures and uncertainties support it.
+def merge(calibrations: Sequence[Calibration]) -> MergeResult:
+    """Merge calibrations into one, with b_a(T) if their temperatures and uncertainties support it.
 
     Raises
     ------
-    UsageError : fewer than two, of different sensors, or some that do not say at which temperature or how sure.
-    RefusedError : one of them was refused, or several were made of the same recording.
+    UsageError : there are fewer than two, their sensors differ, or a temperature or uncertainty is not known.
+    RefusedError : one of them was refused, or several were made from the same recording.
     """
     _check(calibrations)
     all_ = [in_body_frame(c) for c in calibrations]
     T = np.array([c.sensor.temperature_c for c in all_], float)
     b_a, weight = np.array([c.b_a for c in all_]), np.array([c.b_a_std for c in all_]) ** -2.0
-    # one T_0 for the three axes, since a blob has one
+    # the blob has one T_0 for the three axes
     T_0 = float((weight.sum(1) * T).sum() / weight.sum())
     constant = (weight * b_a).sum(0) / weight.sum(0)
     line, line_std, slope, slope_std = _line(T - T_0, b_a, weight)
     worst_constant = _worst(b_a - constant, weight)
     worst_line = _worst(b_a - line - np.outer(T - T_0, slope), weight)
-    sure = float(np.abs(slope / slope_std).max()) if np.ptp(T) >= LEAST_SPAN_C else 0.0
-    why = _against(T, sure, worst_line, worst_constant, len(all_))
-    base = _together(all_, T_0, T)
+    steepness = float(np.abs(slope / slope_std).max()) if np.ptp(T) >= LEAST_SPAN_C else 0.0
+    why = _objection(T, steepness, worst_line, worst_constant, len(all_))
+    base = _weighted_mean(all_, T_0, T)
     if why is not None:
         merged = replace(base, b_a=constant, b_a_std=weight.sum(0) ** -0.5)
-        return Merged(merged, f"The data do not support b_a(T): {why}", _remarks(all_))
+        return MergeResult(merged, f"The data do not support b_a(T): {why}", _remarks(all_))
     merged = replace(
         base,
         b_a=line,
@@ -75,46 +75,48 @@ def merge(calibrations: Sequence[Calibration]) -> Merged:
         b_a_slope_std=slope_std,
         temperature_range_c=np.array([T.min(), T.max()]),
     )
-    said = (
-        f"b_a(T) is a line from {T.min():.1f} to {T.max():.1f} °C, {sure:.0f} standard deviations steep at most; the"
-        f" calibrations lie within {worst_line:.1f} of it."
+    why = (
+        f"b_a(T) is a line from {T.min():.1f} to {T.max():.1f} °C with a slope of up to {steepness:.0f} standard"
+        f" deviations; the calibrations lie within {worst_line:.1f} of it."
     )
     if len(all_) == 2:
-        said += " Two points always lie on a line: a third temperature would show whether it is one."
-    return Merged(merged, said, _remarks(all_))
+        why += " Two points always lie on a line: calibrate at a third temperature to confirm it."
+    return MergeResult(merged, why, _remarks(all_))
 
 
 def _check(calibrations: Sequence[Calibration]) -> None:
     if len(calibrations) < 2:
-        raise UsageError("one calibration alone was given", "give two or more, made at different temperatures")
+        raise UsageError("only one calibration was given", "give two or more from different temperatures")
     if any(c.quality.get("verdict") == REFUSED for c in calibrations):
         raise RefusedError("one of the calibrations was refused", "repeat its session as its reasons say")
     _check_recordings(calibrations)
     if any(c.sensor.temperature_c is None or not _is_sure(c) for c in calibrations):
         raise UsageError(
-            "one of the calibrations does not say at which temperature it was made, or how sure it is",
+            "one of the calibrations lacks its temperature or its uncertainties",
             "give a calibration.json of a chip's session, not its blob",
         )
     if any(c.follows_temperature for c in calibrations):
-        raise UsageError("one of the calibrations is merged already", "merge those that it was made of")
+        raise UsageError("one of the calibrations is merged already", "give the calibrations that it was made from")
     if any("autopilot" in c.extra for c in calibrations):
         raise UsageError(
-            "one of the calibrations is of an autopilot's stream, whose parameters change meanwhile",
+            "one of the calibrations is of an autopilot's stream, and the autopilot's parameters may have changed",
             "use the autopilot's own temperature calibration, or a chip's session",
         )
     for name in ("who_am_i", "accel_offsets"):
         if len({value for c in calibrations if (value := getattr(c.sensor, name)) is not None}) > 1:
-            raise UsageError(f"the calibrations are of different sensors ({name} differs)", "give those of one")
+            raise UsageError(f"the calibrations are of different sensors ({name} differs)", "give those of one sensor")
     if len({c.fit.get("gravity") for c in calibrations}) > 1:
-        raise UsageError("the calibrations were fitted with different gravities", "fit them again with --gravity")
+        raise UsageError(
+            "the calibrations were made with different gravities", "calibrate again with the same --gravity"
+        )
     if len({tuple(c.applied_in_hardware) for c in calibrations}) > 1:
         raise UsageError(
-            "the calibrations say differently what the offset registers subtract", "give those made before a write"
+            "the offset registers subtract different values in the calibrations", "give those made before a write"
         )
 
 
 def _check_recordings(calibrations: Sequence[Calibration]) -> None:
-    """That no recording counts twice."""
+    """Check that no recording counts twice."""
     of = [_recordings(c) for c in calibrations]
     for i, one in enumerate(of):
         same = [i, *(k for k in range(i + 1, len(of)) if of[k] & one)]
@@ -124,7 +126,7 @@ def _check_recordings(calibrations: Sequence[Calibration]) -> None:
 
 
 def _recordings(c: Calibration) -> frozenset[str]:
-    """The digests of what it was made of; without one, its numbers stand for its recording."""
+    """Return the digests of a calibration's recordings; without a digest, its numbers identify its recording."""
     parts: Sequence[Mapping[str, Any]] = c.extra.get("merged") or [c.fit]
     digests = [str(part.get(DIGEST) or "") for part in parts]
     return frozenset(digests if all(digests) else [f"{c.D.tolist()} {c.b_a.tolist()}"])
@@ -138,7 +140,7 @@ def _is_sure(c: Calibration) -> bool:
 
 
 def _line(away: Vector, b_a: Vector, weight: Vector) -> tuple[Vector, Vector, Vector, Vector]:
-    """b_a and slope at `away` = 0, (3,) each, with their standard deviations."""
+    """Return b_a and slope at `away` = 0, (3,) each, each followed by its standard deviations."""
     values = np.zeros((4, 3))
     for i in range(3):
         w = weight[:, i]
@@ -155,25 +157,25 @@ def _worst(residual: Vector, weight: Vector) -> float:
     return float(np.abs(residual * np.sqrt(weight)).max())
 
 
-def _against(T: Vector, sure: float, worst_line: float, worst_constant: float, count: int) -> str | None:
-    """What speaks against a line, or None."""
+def _objection(T: Vector, steepness: float, worst_line: float, worst_constant: float, count: int) -> str | None:
+    """Return the reason against a line; None if there is none."""
     if np.ptp(T) < LEAST_SPAN_C:
-        return f"their temperatures span {np.ptp(T):.1f} °C, and {LEAST_SPAN_C:g} are needed."
+        return f"their temperatures span {np.ptp(T):.1f} °C, but {LEAST_SPAN_C:g} are needed."
     if worst_line > FITS and count > 2:
         return (
-            f"no line fits them, the worst is {worst_line:.1f} standard deviations off it; b_a is their mean, of which"
-            f" the worst is {worst_constant:.1f} off."
+            f"no line fits them, the worst is {worst_line:.1f} standard deviations off; b_a is their mean, with the"
+            f" worst {worst_constant:.1f} off."
         )
-    if sure < SLOPED:
-        return f"a slope is not seen ({sure:.1f} standard deviations at most); b_a is their mean."
+    if steepness < SLOPED:
+        return f"the slope is not significant ({steepness:.1f} standard deviations at most); b_a is their mean."
     return None
 
 
-def _together(all_: Sequence[Calibration], T_0: float, T: Vector) -> Calibration:
-    """What is no bias: weighted means, and which they were made of."""
+def _weighted_mean(all_: Sequence[Calibration], T_0: float, T: Vector) -> Calibration:
+    """Return the merged calibration apart from its bias: weighted means, and a list of the calibrations."""
     weight = np.array([c.D_std for c in all_]) ** -2.0
     D = (weight * np.array([c.D for c in all_])).sum(0) / weight.sum(0)
-    made_of: list[dict[str, Any]] = [
+    parts: list[dict[str, Any]] = [
         {"created": c.created, "temperature_c": float(t), "b_a": c.b_a.tolist(), DIGEST: c.fit.get(DIGEST)}
         for c, t in zip(all_, T, strict=True)
     ]
@@ -187,16 +189,16 @@ def _together(all_: Sequence[Calibration], T_0: float, T: Vector) -> Calibration
         correlation=UNCORRELATED,
         quality=worst.quality,
         sensor=replace(last.sensor, temperature_c=T_0),
-        extra={"merged": made_of},
+        extra={"merged": parts},
         doubt=next((c.doubt for c in all_ if c.doubt), ""),
     )
 
 
 def _remarks(all_: Sequence[Calibration]) -> tuple[str, ...]:
-    """Where D changed by more than its uncertainties."""
+    """Return a remark if D changed significantly."""
     coldest, warmest = (pick(all_, key=lambda c: c.sensor.temperature_c or 0.0) for pick in (min, max))
     changed = [d for d in compare(coldest, warmest).changed if d.unit != "mg"]
     if not changed:
         return ()
     named = ", ".join(f"{d.name} by {d.value:+.3f} {d.unit}" for d in changed[:3])
-    return (f"From the coldest to the warmest D changed, too ({named}): at the ends half of that is left.",)
+    return (f"D changed with temperature, too ({named}): half of that remains at the coldest and the warmest.",)

@@ -1,4 +1,4 @@
-"""noise.json: what a long rest showed of a sensor's noise."""
+"""noise.json: the noise of a sensor, from a long rest."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..strict_json import MOST_BYTES, parsed
 from .calibration import Calibration
 
 FORMAT, VERSION = "mpucal.noise", 1
-# of calibration.json
+# its key in calibration.json
 KEY = "noise"
 ACCELEROMETER, GYROSCOPE = "accelerometer", "gyroscope"
 WHITE, INSTABILITY, WALK, QUANTISATION = "white_noise", "bias_instability", "random_walk", "quantisation"
@@ -28,20 +28,20 @@ COEFFICIENTS = (WHITE, INSTABILITY, WALK, QUANTISATION)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Noise:  # noqa: PLW1641 - arrays have no hash either
-    """The noise of six axes: accelerometer x, y, z [m/s^2], gyroscope x, y, z [rad/s].
+    """Noise of six axes: accelerometer x, y, z [m/s^2], gyroscope x, y, z [rad/s].
 
     Attributes
     ----------
-    values, low, high : of each of COEFFICIENTS (6,), with the ends of its 95 % interval: white_noise N
+    values, low, high : each of COEFFICIENTS (6,), and its 95 % interval: white_noise N
         [units/sqrt(Hz), two-sided], bias_instability B [units], random_walk K [units/sqrt(s)], quantisation Q
         [units s]. NaN: not observable.
-    tau_s : (k,) s. deviations : (k, 6) overlapping Allan deviation. clusters : (k,) how many tau fit into the rest.
+    tau_s : (k,) s. deviations : (k, 6) overlapping Allan deviation. clusters : (k,) number of tau in the rest.
     sensor, samples, seconds, rate_hz : of the rest. created : ISO 8601.
-    data_sheet : white noise of the kind of chip, by sensor [units/sqrt(Hz), two-sided]; empty: no known chip.
-    suspicious : what was, a code and a sentence each.
+    data_sheet : white noise of the data sheet, by sensor [units/sqrt(Hz), two-sided]; empty: unknown chip.
+    suspicious : observations, a code and a sentence each.
     course_s, course : (m,) s, (m, 7) slow means, the temperature last; not in the file.
 
-    Noises are equal whose noise.json is the same.
+    Noises with the same noise.json are equal.
     """
 
     values: Mapping[str, Vector]
@@ -68,22 +68,22 @@ class Noise:  # noqa: PLW1641 - arrays have no hash either
         return f"<Noise of {self.sensor.chip or 'a sensor'}: white noise {white}; {self.seconds:.0f} s>"
 
     def of(self, sensor: str, coefficient: str) -> float:
-        """One number of three axes: the root of the mean of their squares; NaN where none is known."""
+        """Return the rms of a coefficient over a sensor's three axes; NaN if none is known."""
         values = self.values[coefficient][_part(sensor)]
         return float(np.sqrt(np.nanmean(values**2))) if np.isfinite(values).any() else math.nan
 
-    def told(self, sensor: str, coefficient: str) -> bool:
-        """Whether it is told from zero on all three axes."""
+    def is_significant(self, sensor: str, coefficient: str) -> bool:
+        """Return True if the coefficient is significantly non-zero on all three axes."""
         return bool(np.all(self.low[coefficient][_part(sensor)] > 0.0))
 
     def at_least(self, sensor: Sensor, rate_hz: float) -> Sensor:
-        """The sensor, of which a sample at `rate_hz` has this white noise at least, however still it reads."""
+        """Return the sensor with this white noise, of a sample at `rate_hz`, as its least noise."""
         acc, gyr = (self.of(name, WHITE) * math.sqrt(rate_hz) for name in (ACCELEROMETER, GYROSCOPE))
         least_acc, least_gyr = sensor.least_noise
         return replace(sensor, least_noise=(max(acc, least_acc), max(gyr, least_gyr)))
 
     def document(self) -> dict[str, Any]:
-        """The content of noise.json, in JSON's own types; NaN becomes None."""
+        """Return the content of noise.json in JSON types; NaN becomes None."""
 
         def of(sensor: str) -> dict[str, Any]:
             part = _part(sensor)
@@ -116,7 +116,7 @@ class Noise:  # noqa: PLW1641 - arrays have no hash either
         }
 
     def json(self) -> str:
-        """The document as text."""
+        """Return the document as text."""
         return json.dumps(self.document(), indent=2, allow_nan=False) + "\n"
 
     def save(self, path: str | Path) -> None:
@@ -134,7 +134,7 @@ class Noise:  # noqa: PLW1641 - arrays have no hash either
 
         Raises
         ------
-        RecordingError : no such file, or no noise in it.
+        RecordingError : there is no such file, or no noise in it.
         """
         try:
             return cls._of(parsed(content(Path(path), MOST_BYTES)))
@@ -173,19 +173,19 @@ class Noise:  # noqa: PLW1641 - arrays have no hash either
 
 
 def with_noise(calibration: Calibration, noise: Noise) -> Calibration:
-    """The calibration that says of its sensor's noise what a long rest showed: `extra["noise"]`, three axes as one.
+    """Return the calibration with its sensor's noise in `extra["noise"]`, as the rms over three axes.
 
-    Of a coefficient that is not told from zero, the end of its interval stands there, and its name among `at_most`.
+    A coefficient that is not significant is replaced by the upper end of its interval, and listed in `at_most`.
     """
-    said: dict[str, Any] = {"created": noise.created, "seconds": noise.seconds, "rate_hz": noise.rate_hz}
+    entry: dict[str, Any] = {"created": noise.created, "seconds": noise.seconds, "rate_hz": noise.rate_hz}
     for sensor in (ACCELEROMETER, GYROSCOPE):
         part, of = _part(sensor), {}
-        unsure = [name for name in (WHITE, INSTABILITY, WALK) if not noise.told(sensor, name)]
+        unsure = [name for name in (WHITE, INSTABILITY, WALK) if not noise.is_significant(sensor, name)]
         for name in (WHITE, INSTABILITY, WALK):
             values = (noise.high if name in unsure else noise.values)[name][part]
             of[name] = float(np.sqrt(np.mean(values**2)))
-        said[sensor] = {**of, "at_most": unsure}
-    return replace(calibration, extra={**calibration.extra, KEY: said})
+        entry[sensor] = {**of, "at_most": unsure}
+    return replace(calibration, extra={**calibration.extra, KEY: entry})
 
 
 def _part(sensor: str) -> slice:

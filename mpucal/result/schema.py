@@ -1,7 +1,7 @@
-"""calibration.json against its published schema (calibration.schema.json), by the keywords that it uses.
+"""Validator of calibration.json by its published schema (calibration.schema.json), for the keywords used there.
 
-Those are $ref within the file, type, const, enum, pattern, required, properties, additionalProperties, items, minItems
-and maxItems, as JSON Schema 2020-12 defines them; unknown keys of a document are accepted.
+These are $ref within the file, type, const, enum, pattern, required, properties, additionalProperties, items, minItems
+and maxItems of JSON Schema 2020-12; unknown keys of a document are accepted.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ _IS: Mapping[str, Callable[[Any], bool]] = {
     "number": lambda value: isinstance(value, int | float) and not isinstance(value, bool),
     "integer": lambda value: isinstance(value, int) and not isinstance(value, bool),
 }
-SHOWN = 40
+MOST_SHOWN = 40
 
 
 def check_document(document: Any) -> None:
-    """That a document, and those of a vehicle's further IMUs in it, are as the schema says.
+    """Check a document, and those of a vehicle's further IMUs in it, by the schema.
 
     Raises
     ------
-    ValueError : the first thing that is not, by its path.
+    ValueError : the first violation, with its path.
     """
     schema = _schema()
     _check(document, schema, schema, "it")
@@ -49,11 +49,11 @@ def _check(value: Any, schema: Mapping[str, Any], root: Mapping[str, Any], where
     kinds = schema.get("type", ())
     kinds = [kinds] if isinstance(kinds, str) else kinds
     if kinds and not any(_IS[kind](value) for kind in kinds):
-        raise _wrong(where, value, f"no {' or '.join(kinds)}")
+        raise _wrong(where, value, f"not of type {' or '.join(kinds)}")
     if "const" in schema and value != schema["const"]:
         raise _wrong(where, value, f"not {schema['const']!r}")
     if value not in schema.get("enum", [value]):
-        raise _wrong(where, value, f"none of {', '.join(schema['enum'])}")
+        raise _wrong(where, value, f"not one of {', '.join(schema['enum'])}")
     if isinstance(value, str) and not re.search(schema.get("pattern", ""), value):
         raise _wrong(where, value, f"not of the form {schema['pattern']}")
     if isinstance(value, Mapping):
@@ -81,4 +81,4 @@ def _check_object(value: Mapping[str, Any], schema: Mapping[str, Any], root: Map
 
 def _wrong(where: str, value: Any, what: str) -> ValueError:
     shown = repr(value)
-    return ValueError(f"{where} is {shown if len(shown) <= SHOWN else shown[:SHOWN] + '...'}, {what}")
+    return ValueError(f"{where} is {shown if len(shown) <= MOST_SHOWN else shown[:MOST_SHOWN] + '...'}, {what}")

@@ -1,6 +1,6 @@
-"""The files that a session leaves in its folder, one row each: name, what it is, and what makes it.
+"""The files that a session leaves in its folder, one row each: name, content and maker.
 
-The README's table is the same rows. A sink's files stand in the sink's own row (`mpucal/sinks/table.py`).
+The table in docs/session.md has the same rows. A sink's files are in the sink's own row (`mpucal/sinks/table.py`).
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ class SessionFile:
 
     Attributes
     ----------
-    name : of the first one; further ones are numbered. what : its content, in Markdown, for the README's table.
-    made_by : "module:attribute" of the function that makes its content of a result (see
-        `mpucal.session.results.Maker`); None where it is not made of a result.
+    name : of the first file; further ones are numbered. what : its content, in Markdown, for docs/session.md.
+    made_by : "module:function" that makes its content from a result (see `mpucal.session.results.Maker`); None if it is
+        not made from a result.
     """
 
     name: str
@@ -26,17 +26,17 @@ class SessionFile:
     made_by: str | None = None
 
     def numbered(self, number: int) -> str:
-        """Name of the file number 1, 2, ...: capture.mcap, capture-2.mcap, ..."""
+        """Return the name of file number 1, 2, ...: capture.mcap, capture-2.mcap, ..."""
         path = Path(self.name)
         return self.name if number == 1 else f"{path.stem}-{number}{path.suffix}"
 
-    def is_one(self, name: str) -> bool:
-        """Whether `name` is that of such a file, of any number."""
+    def matches(self, name: str) -> bool:
+        """Return True if `name` is the name of such a file, with any number."""
         path = Path(self.name)
         return re.fullmatch(rf"{re.escape(path.stem)}(-\d+)?{re.escape(path.suffix)}", name) is not None
 
     def free_in(self, folder: Path) -> Path:
-        """The first name that no file in `folder` has: what is there stays."""
+        """Return the first path in `folder` that does not exist yet."""
         number = 1
         while (path := folder / self.numbered(number)).exists():
             number += 1

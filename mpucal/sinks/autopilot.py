@@ -88,7 +88,7 @@ class AutopilotSink:
         ------
         LinkError : the vehicle does not say what it holds. WriteBackError : see Sink.
         """
-        left = self._journal.left()
+        left = self._journal.interrupted()
         if left is None:
             return None
         old, new = left[OLD], left[NEW]
@@ -96,14 +96,14 @@ class AutopilotSink:
         held = writer.read()
         cut_off = f"a write to this vehicle was cut off at {left[AT]}"
         if held == old:
-            self._journal.done()
+            self._journal.end()
             return None
         if set(held) != set(old) or not is_partial_write(held, old, new):
-            self._journal.done()
+            self._journal.end()
             return f"{cut_off}, and {self.where} holds neither the parameters of before nor those: they are left alone"
         with interrupting():
             writer.write(held, old, lambda: None)
-        self._journal.done()
+        self._journal.end()
         return f"{cut_off}: the parameters of before are back, read back as they were"
 
     def keep(self, folder: Path) -> tuple[Path, ...]:

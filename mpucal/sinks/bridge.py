@@ -11,7 +11,7 @@ from ..disk.whole import write_atomically
 from ..errors import BusError, WriteBackError
 from ..result.blob import Blob, BlobError
 from ..result.calibration import REFUSED, Calibration
-from ..result.improvement import is_better, left_wrong
+from ..result.comparison import is_better, worst_magnitude_error
 from ..sources.bridge.store import BlobStore, StoredBlob
 from .kind import Device
 from .sink import Applied
@@ -60,7 +60,7 @@ class BridgeSink:
             old = None if held is None else Calibration.from_blob(Blob.decode(held))
         except BlobError:
             return None
-        if old is None or is_better(0.0, left_wrong(calibration, old.D, old.b_a), calibration.magnitude_std):
+        if old is None or is_better(0.0, worst_magnitude_error(calibration, old.D, old.b_a), calibration.magnitude_std):
             return None
         return f"the calibration that {self.where} keeps is predicted to be as good"
 

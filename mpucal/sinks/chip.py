@@ -25,7 +25,7 @@ from ..chip.setup import reset
 from ..data import STANDARD_GRAVITY_MPS2, Vector
 from ..errors import ChipError, SourceError, WriteBackError
 from ..result.calibration import REFUSED, Calibration
-from ..result.improvement import is_better
+from ..result.comparison import is_better
 from ..result.journal import AT, Journal
 from ..session.lay_flat import put_down
 from ..sources.chip import OpenedChip
@@ -82,11 +82,11 @@ class ChipSink:
         ------
         SourceError : the chip cannot be read.
         """
-        left = self._journal.left()
+        left = self._journal.interrupted()
         if left is None:
             return None
         if left[REGISTERS] == _hex(self._blocks()):
-            self._journal.done()
+            self._journal.end()
             return None
         return (
             f"a write to the offset registers of {self.where} was cut off at {left[AT]}, and they hold something else"
@@ -157,11 +157,11 @@ class ChipSink:
                     restore(self._port, old)
             except SourceError as worse:
                 raise WriteBackError(f"{_what(error)}, and then {worse.what}", worse.remedy) from error
-            self._journal.done()
+            self._journal.end()
             if isinstance(error, SourceError):
                 raise WriteBackError(f"{error.what}; the offset registers are as before", error.remedy) from error
             raise
-        self._journal.done()
+        self._journal.end()
 
     def _identified(self, calibration: Calibration) -> Place:
         """Where the offset registers are by the chip's name; ChipError where it is another chip than was calibrated."""

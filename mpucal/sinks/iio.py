@@ -77,10 +77,10 @@ class KernelSink:
 
     def recover(self) -> bool:
         """Put back what an earlier write that was cut off noted; whether there was one."""
-        left = self._journal.left()
+        left = self._journal.interrupted()
         if left is not None:
             self._restore(left)
-            self._journal.done()
+            self._journal.end()
         return left is not None
 
     def keep(self, folder: Path) -> tuple[Path, ...]:
@@ -222,11 +222,11 @@ class KernelSink:
                 self._restore(held)
             except SourceError as worse:
                 raise WriteBackError(f"the write failed, and then {worse.what}", worse.remedy) from error
-            self._journal.done()
+            self._journal.end()
             if isinstance(error, SourceError):
                 raise WriteBackError(f"{error.what}; {self.where} is as before", error.remedy) from error
             raise
-        self._journal.done()
+        self._journal.end()
 
 
 def _are_words(held: Any) -> bool:

@@ -101,7 +101,7 @@ def test_rates_in_degrees_are_not_applied_as_radians(mpucal, save, session, cali
     done = mpucal("apply", "c.json", f"in{ending}", "-o", "out.npz")
     assert done.code == 3
     assert "suggest gyr in deg/s" in done.err
-    assert "say its units with --units acc=m/s^2,gyr=deg/s" in done.err
+    assert "give its units with --units acc=m/s^2,gyr=deg/s" in done.err
     assert not Path("out.npz").exists()
     assert mpucal("apply", "c.json", f"in{ending}", "-o", "out.npz", "--units", "acc=m/s^2,gyr=deg/s").code == 0
     np.testing.assert_allclose(load("out.npz").gyr, formula(recording)[1], atol=1e-9)
@@ -152,7 +152,7 @@ def test_what_is_calibrated_already_is_refused(mpucal, session, calibration, end
         ({"who_am_i": 0x70}, 2, "WHO_AM_I"),
         ({"accel_offsets": (2, 4, 6)}, 2, "offset registers held"),
         ({"accel_offsets": (2, 4, 6), "applied_in_hardware": B_A}, 0, ""),
-        ({"applied_in_hardware": B_A}, 0, "factory's trim again"),
+        ({"applied_in_hardware": B_A}, 0, "factory trim again"),
     ],
     ids=["refused", "another chip", "other registers", "registers that it knows", "registers that a reset cleared"],
 )

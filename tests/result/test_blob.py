@@ -66,7 +66,7 @@ def blobs(draw):
 
 @st.composite
 def sloped(draw):
-    """With b_a(T), which needs a temperature within its range."""
+    """Draw a blob with b_a(T), which needs a temperature within its range."""
     low, at, high = sorted(draw(several(3)))
     slope = draw(several(3).filter(any))
     return replace(draw(blobs()), temperature_c=at, b_a_slope=slope, temperature_range_c=(low, high))
@@ -147,7 +147,7 @@ def test_every_shorter_blob_is_rejected(blob):
 
 
 def test_trailing_junk_is_rejected(blob):
-    with pytest.raises(BlobError, match="188 bytes long and is 189"):
+    with pytest.raises(BlobError, match="length field is 188, but it has 189 bytes"):
         Blob.decode(blob.encode() + b"\0")
 
 
@@ -165,9 +165,9 @@ def test_appended_fields_of_a_newer_minor_version_are_skipped(appended):
         pytest.param(lambda body: sealed(b"XXXX" + body[4:]), "begins with", id="magic"),
         pytest.param(lambda body: sealed(body[:4] + b"\2" + body[5:]), "major version 2", id="newer major"),
         pytest.param(lambda body: sealed(body[:4] + b"\0" + body[5:]), "major version 0", id="major 0"),
-        pytest.param(lambda body: sealed(body[:-4]), "184 bytes long, where", id="fields missing"),
-        pytest.param(lambda body: sealed(body + bytes(80)), "268 bytes long, where", id="too long"),
-        pytest.param(lambda body: sealed(body, length=190), "190 bytes long and is 188", id="wrong length"),
+        pytest.param(lambda body: sealed(body[:-4]), "length field is 184", id="fields missing"),
+        pytest.param(lambda body: sealed(body + bytes(80)), "length field is 268", id="too long"),
+        pytest.param(lambda body: sealed(body, length=190), "length field is 190, but it has 188 bytes", id="wrong length"),
         pytest.param(lambda body: body + bytes(4), "checksum", id="no checksum"),
     ],
 )

@@ -72,7 +72,7 @@ def test_a_calibration_with_reservations_may_be_too_sure(claims, verdict, same, 
 
 
 def test_the_frame_makes_no_difference():
-    """The same sensor seen from a frame 5 deg away, with the K that says so."""
+    """Compare one sensor in two frames 5 deg apart; K holds the rotation."""
     c, s = np.cos(np.radians(5.0)), np.sin(np.radians(5.0))
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     turned = replace(TRUTH, K=R @ TRUTH.K, D=TRUTH.D @ R.T)
@@ -87,10 +87,10 @@ def test_without_uncertainties_nothing_is_claimed():
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"sensor": Sensor(who_am_i=0x70)}, "two chips"),
+        ({"sensor": Sensor(who_am_i=0x70)}, "of two chips"),
         ({"sensor": Sensor(temperature_c=40.0)}, "mpucal merge"),
         ({"sensor": Sensor(accel_offsets=(1, 2, 4))}, "offset registers"),
-        ({"fit": {"gravity": 9.81}}, r"\+0.034 % of scale factor"),
+        ({"fit": {"gravity": 9.81}}, r"scale factors by \+0.034 %"),
         ({"quality": {"verdict": "usable", "reasons": [{"code": "few_orientations", "message": ""}]}}, "B is usable"),
         ({"extra": {"autopilot": {"params_old": {"INS_ACCOFFS_X": 1.0}}}}, "parameters of the autopilot"),
     ],

@@ -1,4 +1,4 @@
-"""What a calibration must not be applied to; what it is applied to, and how, is `mpucal apply`'s tests'."""
+"""Samples to which a calibration must not be applied; tests of `mpucal apply` prove the correct application."""
 
 from types import MappingProxyType
 
@@ -8,7 +8,7 @@ import pytest
 from mpucal.data import Autopilot, Sensor
 from mpucal.errors import UsageError
 from mpucal.result.calibration import Calibration
-from mpucal.result.correction import correction
+from mpucal.result.correction import make_correction
 
 OLD, NEW = {"INS_ACCOFFS_X": 0.0}, {"INS_ACCOFFS_X": 0.3}
 VEHICLE = MappingProxyType({"autopilot": {"params_old": OLD, "params_new": NEW}})
@@ -25,17 +25,17 @@ def through(parameters):
 @pytest.mark.parametrize(
     ("calibration", "sensor", "autopilot", "says"),
     [
-        (made(Sensor(who_am_i=0x68)), Sensor(), through(OLD), "a chip's own samples, and these came through ArduPilot"),
-        (made(extra=VEHICLE), Sensor(who_am_i=0x68), None, "an autopilot's stream, and these are a chip's own samples"),
-        (made(extra=VEHICLE), Sensor(), through(NEW), "INS_ACCOFFS_X was 0.3 while .* and 0 when it was calibrated"),
+        (made(Sensor(who_am_i=0x68)), Sensor(), through(OLD), "a chip's own samples, but these came through ArduPilot"),
+        (made(extra=VEHICLE), Sensor(who_am_i=0x68), None, "an autopilot's stream, but these are a chip's own samples"),
+        (made(extra=VEHICLE), Sensor(), through(NEW), "INS_ACCOFFS_X was 0.3 while .* but 0 during the calibration"),
     ],
     ids=["a chip's to a vehicle", "a vehicle's to a chip", "other parameters"],
 )
 def test_what_does_not_belong_together_is_refused(calibration, sensor, autopilot, says):
     with pytest.raises(UsageError, match=says):
-        correction(calibration, sensor, autopilot)
+        make_correction(calibration, sensor, autopilot)
 
 
 @pytest.mark.parametrize("calibration", [made(), made(extra=VEHICLE)], ids=["of anything", "of the vehicle"])
 def test_what_nobody_can_tell_apart_is_taken(calibration):
-    assert correction(calibration, Sensor(), through(OLD)).calibration is calibration
+    assert make_correction(calibration, Sensor(), through(OLD)).calibration is calibration

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mpucal.data import Sensor
 from mpucal.errors import RecordingError, UsageError
 from mpucal.result.calibration import Calibration
-from mpucal.result.correction import correction
+from mpucal.result.correction import make_correction
 from mpucal.strict_json import parsed
 
 ONE = Calibration(
@@ -158,8 +158,8 @@ def test_no_bit_that_flips_changes_a_number_without_a_word(tmp_path_factory, at)
 def test_what_is_not_known_is_not_applied(tmp_path, unknown):
     read = loaded(tmp_path, replace(ONE, **{unknown: np.full_like(getattr(ONE, unknown), np.nan)}).json())
     assert read.verdict == "good"
-    with pytest.raises(UsageError, match="holds no D, b_a or K"):
-        correction(read, Sensor())
+    with pytest.raises(UsageError, match="lacks D, b_a or K"):
+        make_correction(read, Sensor())
 
 
 def test_a_pipe_or_device_is_no_file(tmp_path):

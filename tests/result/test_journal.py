@@ -9,14 +9,14 @@ from mpucal.result.journal import Journal
 def test_a_note_that_cannot_be_taken_away_counts_no_more(tmp_path):
     journal = Journal(tmp_path / "state" / "write.json")
     journal.begin({"old": {"A": 1.0}})
-    assert journal.left()["old"] == {"A": 1.0}
+    assert journal.interrupted()["old"] == {"A": 1.0}
     with patch.object(Path, "unlink", side_effect=OSError("Input/output error")):
-        journal.done()
-    assert journal.left() is None
+        journal.end()
+    assert journal.interrupted() is None
 
 
 def test_a_note_is_gone_after_the_write(tmp_path):
     journal = Journal(tmp_path / "write.json")
     journal.begin({"old": {}})
-    journal.done()
+    journal.end()
     assert list(tmp_path.iterdir()) == []

@@ -65,7 +65,7 @@ def test_the_merged_one_corrects_at_every_temperature(tmp_path):
     ("changes", "says"),
     [
         ({"temperatures": (20.0, 22.0, 23.0)}, "span 3.0 °C"),
-        ({"slope": np.zeros(3)}, "a slope is not seen"),
+        ({"slope": np.zeros(3)}, "the slope is not significant"),
         ({"curve": 0.001}, "no line fits"),
     ],
     ids=["too near", "flat", "curved"],
@@ -83,7 +83,7 @@ def test_what_the_data_do_not_support_is_said(changes, says):
 def test_a_gain_that_changes_is_said():
     rng = np.random.default_rng(4)
     made = merge([session(T, rng, D_slope=2e-4) for T in (5.0, 15.0, 31.0)])
-    assert "D changed, too" in made.remarks[0]
+    assert "D changed with temperature" in made.remarks[0]
 
 
 RNG = np.random.default_rng(5)
@@ -92,9 +92,9 @@ RNG = np.random.default_rng(5)
 @pytest.mark.parametrize(
     ("others", "error", "says"),
     [
-        ([], UsageError, "alone"),
+        ([], UsageError, "only one"),
         ([session(30.0, RNG, quality={"verdict": "refused"})], RefusedError, "refused"),
-        ([session(30.0, RNG, b_a_std=np.full(3, np.nan))], UsageError, "how sure"),
+        ([session(30.0, RNG, b_a_std=np.full(3, np.nan))], UsageError, "its uncertainties"),
         ([session(30.0, RNG, sensor=Sensor(who_am_i=0x70, temperature_c=30.0))], UsageError, "different sensors"),
         ([session(30.0, RNG, fit={"gravity": 9.81})], UsageError, "gravities"),
         ([session(30.0, RNG, applied_in_hardware=np.ones(3))], UsageError, "offset registers"),

@@ -157,8 +157,8 @@ def test_a_document_with_a_gain_and_a_bias_alone_is_enough():
             b'{"format": "mpucal.calibration", "accelerometer": {"D": {}, "b_a": []}}',
             "holds no calibration",
         ),
-        ("a.bin", b"", "no config blob"),
-        ("a.bin", b"MPUC" + bytes(184), "no config blob"),
+        ("a.bin", b"", "not a config blob"),
+        ("a.bin", b"MPUC" + bytes(184), "not a config blob"),
     ],
     ids=[
         "empty",

@@ -28,12 +28,12 @@ def test_each_one_is_free_until_it_is_there(tmp_path):
         names.append(path.name)
     assert names == ["capture.mcap", "capture-2.mcap", "capture-3.mcap"]
     assert names == [CAPTURE.numbered(number) for number in (1, 2, 3)]
-    assert all(map(CAPTURE.is_one, names))
+    assert all(map(CAPTURE.matches, names))
 
 
 @pytest.mark.parametrize("name", ["capture.tlog", "capture-.mcap", "capture-x.mcap", "my-capture.mcap", "captureXmcap"])
 def test_another_file_is_none(name):
-    assert not CAPTURE.is_one(name)
+    assert not CAPTURE.matches(name)
 
 
 def test_a_report_that_does_not_fit_costs_nothing_else(tmp_path):

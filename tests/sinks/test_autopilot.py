@@ -486,7 +486,7 @@ def test_a_signal_in_the_middle_of_a_write_restores(firmware, name, tmp_path):
     assert raised.value.exit_code == 6
     assert len(numbers) > 6
     assert stored(vehicle) == old
-    assert journal.left() is None
+    assert journal.interrupted() is None
     assert signal.getsignal(getattr(signal, name)) == before
 
 
@@ -506,12 +506,12 @@ def test_after_a_kill_the_next_write_finds_what_was_there(firmware, number, tmp_
     transport.befall = befall
     with pytest.raises(Killed):
         AutopilotSink(link, journal=journal).write(calibration)
-    assert journal.left() is not None
+    assert journal.interrupted() is not None
     transport.befall = lambda count, message: True
     assert (stored(vehicle) == old) is (number == 1)
     said = AutopilotSink(link, journal=journal).recover()
     assert stored(vehicle) == old
-    assert journal.left() is None
+    assert journal.interrupted() is None
     assert said is None if number == 1 else "the parameters of before are back" in said
     assert AutopilotSink(link, journal=journal).recover() is None
 

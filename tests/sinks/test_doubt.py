@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from mpucal.cli.person import ask_in_doubt
 from mpucal.errors import WriteBackError
 from mpucal.result.calibration import Calibration
-from mpucal.result.improvement import is_better, left_wrong
+from mpucal.result.comparison import is_better, worst_magnitude_error
 from mpucal.sinks.doubt import doubt
 from mpucal.sinks.kind import Device, SinkKind
 from mpucal.sinks.sink import Applied
@@ -104,7 +104,7 @@ def test_what_is_left_wrong_is_the_worst_over_attitudes(scale, bias, axis):
     points = np.vstack([np.eye(3), -np.eye(3), points])
     f = 9.8 * points / np.linalg.norm(points, axis=1, keepdims=True)
     worst = np.abs(np.linalg.norm(f @ D.T + b_a, axis=1) - 9.8).max()
-    assert worst <= left_wrong(true, np.eye(3), np.zeros(3)) + 1e-9
+    assert worst <= worst_magnitude_error(true, np.eye(3), np.zeros(3)) + 1e-9
     # along the axis of both errors the bound is met
     assert worst == pytest.approx(9.8 * abs(scale) + abs(bias), abs=0.02)
 

@@ -11,7 +11,7 @@ import numpy as np
 from ...data import Vector
 from ...errors import WriteBackError
 from ...result.calibration import REFUSED, Calibration
-from ...result.improvement import is_better
+from ...result.comparison import is_better
 from ..imu import MESSAGE_ID, SCALED, Stream
 from .compose import Correction
 from .document import NEW, OLD, RESIDUAL, RESIDUAL_OLD, UNCERTAIN

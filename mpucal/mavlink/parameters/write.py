@@ -80,7 +80,7 @@ class Writer:
             self._disarmed()
         except FAILURES as failure:
             self._restore(old, failure)
-        self._journal.done()
+        self._journal.end()
 
     def _vectors(self) -> Iterator[tuple[Slot, tuple[str, ...]]]:
         for where in self._slots:
@@ -121,7 +121,7 @@ class Writer:
                 "load the file of old parameters with your ground station before the next flight",
             ) from failure
         self.restored = True
-        self._journal.done()
+        self._journal.end()
         raise WriteBackError(f"{what}; the old parameters are back, and read back as they were", remedy) from failure
 
 
