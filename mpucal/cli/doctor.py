@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from .. import __version__
-from ..doctor.finding import Finding, Mark, failed
+from ..doctor.finding import Finding, Mark
 from ..doctor.page import document, text
 from ..errors import SourceError, UsageError
 from ..session.lay_flat import put_down
@@ -38,14 +38,13 @@ def command(as_json: bool, seconds: float, conformance: bool, **options: Any) ->
     value = options[kind.option.name]
     if conformance and kind.option.name != "serial":
         raise UsageError("--conformance is for the firmware of a bridge", "name its port with --serial")
-    findings = tuple(_shown(_talked(options) if conformance else _findings(kind, options, seconds)))
-    tell = document if as_json else text
-    click.echo(tell(str(value), __version__, findings))
+    findings = tuple(_with_spinner(_conformance(options) if conformance else _examine(kind, options, seconds)))
+    click.echo((document if as_json else text)(str(value), __version__, findings))
     return SourceError.exit_code if any(finding.mark is Mark.BAD for finding in findings) else 0
 
 
-def _shown(findings: Iterator[Finding]) -> Iterator[Finding]:
-    """The same; meanwhile a terminal shows what was looked at last, and for how long already."""
+def _with_spinner(findings: Iterator[Finding]) -> Iterator[Finding]:
+    """Yield the findings; a terminal shows the last topic and the time meanwhile."""
     from rich.console import Console  # noqa: PLC0415 - most commands need none of it
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn  # noqa: PLC0415
 
@@ -58,7 +57,7 @@ def _shown(findings: Iterator[Finding]) -> Iterator[Finding]:
             yield finding
 
 
-def _talked(options: Mapping[str, Any]) -> Iterator[Finding]:
+def _conformance(options: Mapping[str, Any]) -> Iterator[Finding]:
     from ..doctor.conformance import examine_conformance  # noqa: PLC0415 - loads the link, which only this needs
     from ..sources.bridge import open_link  # noqa: PLC0415
 
@@ -66,16 +65,16 @@ def _talked(options: Mapping[str, Any]) -> Iterator[Finding]:
         with open_link(options) as link:
             yield from examine_conformance(link)
     except SourceError as error:
-        yield failed("bridge", error)
+        yield Finding.failed("bridge", error)
 
 
-def _findings(kind: SourceKind, options: Mapping[str, Any], seconds: float) -> Iterator[Finding]:
+def _examine(kind: SourceKind, options: Mapping[str, Any], seconds: float) -> Iterator[Finding]:
     if kind.host:
         yield from resolve_name(kind.host)(options[kind.option.name])
     try:
         source = open_source(options)
     except SourceError as error:
-        yield failed("bus", error)
+        yield Finding.failed("bus", error)
         return
     check_gyroscope(source.plan.config)
     put_down(source.listeners, say)

@@ -1,1 +1,1 @@
-"""What is the matter with a chip and its bus: examined step by step, told on one page."""
+"""Diagnosis of a chip and its bus: examinations, step by step, and their findings on one page."""

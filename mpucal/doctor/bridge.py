@@ -1,21 +1,22 @@
-"""A serial bridge: what it says of itself, and how long a register takes through it."""
+"""Examination of a serial bridge: its HELLO, and the time that a read takes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from ..chip.access import Bus
 from ..sources.bridge import BridgeBus
 from ..sources.bridge.messages import Feature
-from .finding import Finding, Mark
-from .speed import LONG_BYTES, median_ms
+from .bus_speed import LONG_BYTES, median_ms
+from .finding import Finding
 
-# twice what the 16 ms latency timer of an FTDI adapter makes of it
+# Twice the time of a read with the 16 ms latency timer of an FTDI adapter.
 SLOW_MS = 35.0
 
 
 def examine_bridge(bus: Bus) -> Iterator[Finding]:
-    """What the reply to HELLO holds, and the time of a read: the bus's own speed does not show through the line.
+    """Examine the bridge's reply to HELLO and its serial line; the speed of the I2C bus behind it cannot be measured.
 
     Raises
     ------
@@ -26,7 +27,7 @@ def examine_bridge(bus: Bus) -> Iterator[Finding]:
     hello = bus.link.bridge
     pushes, stores = bool(hello.features & Feature.STREAM), bool(hello.features & Feature.BLOB)
     name = hello.name.rstrip(b"\0").decode("ascii", "replace")
-    data = {
+    data: dict[str, Any] = {
         "name": name,
         "version": f"{hello.major}.{hello.minor}",
         "address": hello.address,
@@ -36,20 +37,10 @@ def examine_bridge(bus: Bus) -> Iterator[Finding]:
     }
     keeps = f"stores {hello.blob_bytes} bytes of calibration" if stores else "stores no calibration"
     what = f"{name or 'unnamed'}, protocol {data['version']}, chip at 0x{hello.address:02x}; it {keeps}"
-    if pushes:
-        yield Finding("bridge", Mark.OK, f"{what}, and pushes samples", "", data)
-    else:
-        remedy = "keep to 200 Hz or less, or put a firmware on it that pushes samples (mpucal/firmware)"
-        yield Finding("bridge", Mark.NOTE, f"{what}, and pushes no samples", remedy, data)
-    yield _line(median_ms(bus, LONG_BYTES))
-
-
-def _line(took_ms: float) -> Finding:
-    slow = took_ms > SLOW_MS
-    return Finding(
-        "serial line",
-        Mark.NOTE if slow else Mark.OK,
-        f"a read of {LONG_BYTES} bytes takes {took_ms:.1f} ms there and back",
-        "connect it directly, without a hub or a network" if slow else "",
-        {f"read_{LONG_BYTES}_bytes_ms": took_ms},
-    )
+    remedy = "keep to 200 Hz or less, or flash a firmware that pushes samples (mpucal/firmware)"
+    yield Finding.check("bridge", pushes, f"{what}, and pushes {'' if pushes else 'no '}samples", remedy, data)
+    read_ms = median_ms(bus, LONG_BYTES)
+    what = f"a read of {LONG_BYTES} bytes takes {read_ms:.1f} ms there and back"
+    remedy = "connect it directly, without a hub or a network"
+    data = {f"read_{LONG_BYTES}_bytes_ms": read_ms}
+    yield Finding.check("serial line", read_ms <= SLOW_MS, what, remedy, data)

@@ -1,4 +1,4 @@
-"""One thing that was found out, and what it means."""
+"""Finding of the doctor: one line of its page."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Self
 
 from ..errors import SourceError
 
 
 class Mark(StrEnum):
-    """How to take a finding."""
+    """Severity of a finding."""
 
     OK = "ok"
     NOTE = "note"
@@ -22,11 +22,11 @@ class Mark(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One line of the page.
+    """Result of one check.
 
     Attributes
     ----------
-    topic : what was looked at, in a word or two. mark : how to take it. what : what was found.
+    topic : subject of the check, in a word or two. mark : severity. what : the result.
     remedy : what to do about it; empty where nothing is to be done.
     data : the numbers, in JSON's own types, units in the keys.
     """
@@ -37,17 +37,18 @@ class Finding:
     remedy: str = ""
     data: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
+    @classmethod
+    def check(
+        cls, topic: str, passed: bool, what: str, remedy: str, data: Mapping[str, Any], mark: Mark = Mark.NOTE
+    ) -> Self:
+        """Return a finding that is OK if the check `passed`; else it has the `mark` and the remedy."""
+        return cls(topic, Mark.OK if passed else mark, what, "" if passed else remedy, data)
+
+    @classmethod
+    def failed(cls, topic: str, error: SourceError) -> Self:
+        """Return the finding of a step that ended by an error."""
+        return cls(topic, Mark.BAD, error.what, error.remedy)
+
     def document(self) -> dict[str, Any]:
-        """As JSON."""
-        return {
-            "topic": self.topic,
-            "mark": self.mark.value,
-            "what": self.what,
-            "remedy": self.remedy,
-            "data": dict(self.data),
-        }
-
-
-def failed(topic: str, error: SourceError) -> Finding:
-    """A step that an error ended."""
-    return Finding(topic, Mark.BAD, error.what, error.remedy)
+        """Return the finding in JSON's own types."""
+        return {**vars(self), "data": dict(self.data)}

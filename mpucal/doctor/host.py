@@ -1,6 +1,6 @@
-"""The Linux side of an I2C bus: its device file, adapter, kernel drivers and who answers.
+"""Examination of the host's side of an I2C bus: device file, adapter, kernel drivers and addresses, or USB adapters.
 
-Source: Linux Documentation/i2c/dev-interface.rst and sysfs; i2c-tools' i2cdetect for how to ask politely.
+Source: Linux Documentation/i2c/dev-interface.rst and sysfs; addresses are probed as by i2cdetect of i2c-tools.
 """
 
 from __future__ import annotations
@@ -8,22 +8,24 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from ..chip.families import PARTS
 from ..chip.registers import WHO_AM_I
 from ..sources.i2c_errors import transfer_error
-from .finding import Finding, Mark, failed
+from ..sources.usb_i2c import adapters
+from .finding import Finding, Mark
 
 SYS = Path("/sys")
 FAST_HZ = 400_000
 FIRST, LAST = 0x08, 0x77
-# a quick write could upset these, which are EEPROMs; a read could upset the others
+# These addresses are EEPROMs', which a quick write could upset; a read could upset devices at the others.
 READ_ONLY = (*range(0x30, 0x38), *range(0x50, 0x60))
 OURS = (0x68, 0x69)
-# one slow device may hold the bus for a while; a wire that stays low does it to every address, a second each
+# One slow device holds the bus for a while; a wire that stays low times out at every address, a second each.
 HELD_IN_A_ROW = 3
 
 GUESSES = {
@@ -42,14 +44,23 @@ DTPARAM = "on a Raspberry Pi: `dtparam=i2c_arm=on,i2c_arm_baudrate=400000` in /b
 
 
 def examine_host(path: str) -> Iterator[Finding]:
-    """What can be said of `path`, an adapter's device file, before any chip on it was asked anything."""
+    """Examine `path`, an adapter's device file, and the addresses on its bus."""
     number = path.rpartition("-")[2]
     yield _device_file(Path(path))
     if not Path(path).exists():
         return
     yield from _adapter(number)
     yield from _kernel_drivers(number)
-    yield from _who_answers(path)
+    yield from _addresses(path)
+
+
+def examine_adapters(name: str) -> Iterator[Finding]:
+    """List the USB adapters that are plugged in; `name` is the one that was asked for."""
+    there = adapters()
+    for bus, what in there:
+        yield Finding("USB adapter", Mark.OK, f"{what}: --bus {bus}", "", {"bus": bus, "what": what})
+    if not there:
+        yield Finding("USB adapter", Mark.NOTE, f"none is seen beside {name}", "plug it in; see docs/boards.md")
 
 
 def _device_file(path: Path) -> Finding:
@@ -57,10 +68,9 @@ def _device_file(path: Path) -> Finding:
         about = path.stat()
     except OSError as error:
         others = ", ".join(sorted(str(other) for other in path.parent.glob("i2c-*"))) or "none"
-        return Finding(
-            "device file", Mark.BAD, f"{path}: {error.strerror}", f"enable I2C (buses there are: {others}); {DTPARAM}"
-        )
-    # not everywhere: a machine without them has no such device file
+        remedy = f"enable I2C (buses found: {others}); {DTPARAM}"
+        return Finding("device file", Mark.BAD, f"{path}: {error.strerror}", remedy)
+    # Windows has no such modules, and no such device file.
     import grp  # noqa: PLC0415
     import pwd  # noqa: PLC0415
 
@@ -75,9 +85,9 @@ def _device_file(path: Path) -> Finding:
     return Finding("device file", Mark.OK, what, "", data)
 
 
-def _name(look_up: object, number: int) -> str:
+def _name(look_up: Callable[[int], Any], number: int) -> str:
     try:
-        return str(look_up(number)[0])  # type: ignore[operator]
+        return str(look_up(number)[0])
     except KeyError:
         return str(number)
 
@@ -86,17 +96,12 @@ def _adapter(number: str) -> Iterator[Finding]:
     folder = SYS / "class" / "i2c-dev" / f"i2c-{number}"
     name = _text(folder / "name") or "unnamed"
     speed = _bytes(folder / "device" / "of_node" / "clock-frequency")
-    hz = int.from_bytes(speed, "big") if len(speed) == 4 else None
-    if hz is None:
+    if len(speed) != 4:
         yield Finding("adapter", Mark.OK, f"{name}; configured speed unknown", "", {"name": name})
-    elif hz < FAST_HZ:
-        yield Finding("adapter", Mark.NOTE, f"{name}, configured for {hz / 1000:g} kHz", DTPARAM, _of(name, hz))
-    else:
-        yield Finding("adapter", Mark.OK, f"{name}, configured for {hz / 1000:g} kHz", "", _of(name, hz))
-
-
-def _of(name: str, hz: int) -> dict[str, object]:
-    return {"name": name, "configured_hz": hz}
+        return
+    hz = int.from_bytes(speed, "big")
+    what, data = f"{name}, configured for {hz / 1000:g} kHz", {"name": name, "configured_hz": hz}
+    yield Finding.check("adapter", hz >= FAST_HZ, what, DTPARAM, data)
 
 
 def _kernel_drivers(number: str) -> Iterator[Finding]:
@@ -106,35 +111,29 @@ def _kernel_drivers(number: str) -> Iterator[Finding]:
             driver = link.readlink().name
         except OSError:
             continue
-        # a clock's own driver: to unbind it would take the computer's time away
+        mark, what = Mark.BAD, f"{driver} holds 0x{address:02x}"
+        remedy = f"remove its overlay, or: echo {number}-{address:04x} | sudo tee {link}/unbind"
+        # The driver of a real-time clock must stay: the computer takes its time from there.
         if driver.startswith("rtc-"):
-            what = f"{driver} holds 0x{address:02x}: a real-time clock is there"
-            data = {"driver": driver, "address": address}
-            yield Finding("kernel driver", Mark.NOTE, what, "tie the MPU's AD0 to VCC and give --address 0x69", data)
-            continue
-        yield Finding(
-            "kernel driver",
-            Mark.BAD,
-            f"{driver} holds 0x{address:02x}",
-            f"remove its overlay, or: echo {number}-{address:04x} | sudo tee {link}/unbind",
-            {"driver": driver, "address": address},
-        )
+            mark, what = Mark.NOTE, f"{what}: a real-time clock is there"
+            remedy = "tie the MPU's AD0 to VCC and give --address 0x69"
+        yield Finding("kernel driver", mark, what, remedy, {"driver": driver, "address": address})
 
 
-def _who_answers(path: str) -> Iterator[Finding]:
+def _addresses(path: str) -> Iterator[Finding]:
     import smbus2  # noqa: PLC0415 - only where there is an I2C bus
 
     bus = smbus2.SMBus()
     try:
         bus.open(path)
     except OSError:
-        # the device file has its own finding
+        # The device file has its own finding.
         return
     try:
         can_i2c = bool(bus.funcs & smbus2.I2cFunc.I2C)
-        found = _answers(bus)
+        found = _probe_all(bus)
     except TimeoutError as error:
-        yield failed("on the bus", transfer_error(error, path, FIRST))
+        yield Finding.failed("on the bus", transfer_error(error, path, FIRST))
         return
     finally:
         bus.close()
@@ -144,17 +143,12 @@ def _who_answers(path: str) -> Iterator[Finding]:
     ours = any(address in OURS for address in found)
     elsewhere = [] if ours else _elsewhere(path)
     remedy = f"it is on another bus: give --bus {elsewhere[0]}" if elsewhere else "check VCC, GND, SDA, SCL and AD0"
-    yield Finding(
-        "on the bus",
-        Mark.OK if ours else Mark.BAD,
-        "; ".join(words) or "nothing answers",
-        "" if ours else remedy,
-        {"addresses": sorted(found), "smbus_only": not can_i2c, "elsewhere": elsewhere},
-    )
+    data = {"addresses": sorted(found), "smbus_only": not can_i2c, "elsewhere": elsewhere}
+    yield Finding.check("on the bus", ours, "; ".join(words) or "nothing answers", remedy, data, Mark.BAD)
 
 
 def _elsewhere(path: str) -> list[str]:
-    """The other adapters beside `path` on which an MPU's identity is read at one of our addresses."""
+    """Return the other adapters beside `path` on which an MPU answers at one of our addresses."""
     import smbus2  # noqa: PLC0415
 
     found = []
@@ -162,7 +156,7 @@ def _elsewhere(path: str) -> list[str]:
         if other == Path(path):
             continue
         for address in OURS:
-            # nothing is written to a bus that nobody named; one that is not ours to open, or does not answer, is not it
+            # Nothing is written to a bus that was not named. One that cannot be opened or read does not count.
             with suppress(OSError), smbus2.SMBus(str(other)) as bus:
                 if bus.read_byte_data(address, WHO_AM_I) in PARTS:
                     found.append(str(other))
@@ -170,12 +164,12 @@ def _elsewhere(path: str) -> list[str]:
     return found
 
 
-def _answers(bus: object) -> dict[int, str]:
-    """How each address answers that does; TimeoutError where the bus is held."""
+def _probe_all(bus: Any) -> dict[int, str]:
+    """Return the answer of each address that answers; TimeoutError if a wire is held low."""
     found, held = {}, 0
     for address in range(FIRST, LAST + 1):
         try:
-            answer = _answer(bus, address)
+            answer = _probe(bus, address)
         except TimeoutError:
             held += 1
             if held == HELD_IN_A_ROW:
@@ -187,13 +181,13 @@ def _answers(bus: object) -> dict[int, str]:
     return found
 
 
-def _answer(bus: object, address: int) -> str:
-    """Empty where nothing answers; TimeoutError where the transfer did not end."""
+def _probe(bus: Any, address: int) -> str:
+    """Return "there", "busy" if a kernel driver holds the address, or "" if nothing answers; TimeoutError on a hang."""
     try:
         if address in READ_ONLY:
-            bus.read_byte(address)  # type: ignore[attr-defined]
+            bus.read_byte(address)
         else:
-            bus.write_quick(address)  # type: ignore[attr-defined]
+            bus.write_quick(address)
     except TimeoutError:
         raise
     except OSError as error:
@@ -202,8 +196,9 @@ def _answer(bus: object, address: int) -> str:
 
 
 def _guess(address: int, answer: str) -> str:
-    held = " (held by a driver of the kernel)" if answer == "busy" else ""
-    return held or (f", {GUESSES[address]}" if address in GUESSES else "")
+    if answer == "busy":
+        return " (held by a kernel driver)"
+    return f", {GUESSES[address]}" if address in GUESSES else ""
 
 
 def _text(path: Path) -> str:

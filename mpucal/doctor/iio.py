@@ -1,4 +1,4 @@
-"""A sensor that a driver of the kernel holds: what the driver says of it, and what its samples show."""
+"""Examination of a sensor with a Linux kernel (IIO) driver: its attributes and its samples."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from ..iio.decode import ENABLE
 from ..iio.driver import IioDriver
 from ..iio.setup import POLLED, TRIGGER
 from ..sources.iio import OpenedIio
-from .finding import Finding, Mark, failed
+from .finding import Finding, Mark
 from .measure import examine_stream
 
-# until a buffer runs steadily, and the board is put down
+# Time until a buffer runs steadily, and the board is put down.
 SETTLED_S = 3.0
-NO_BUFFER = "connect the chip's INT wire and name it in the device tree; without, the channels are polled"
+NO_BUFFER = "connect the chip's INT wire and name it in the device tree; without it the channels are polled"
 
 
 def examine_iio(source: OpenedIio, seconds: float) -> Iterator[Finding]:
-    """The attributes of one or two devices, then `seconds` of their samples; the board is to lie still."""
+    """Examine the attributes of one or two devices, then `seconds` of their samples; the board is to lie still."""
     driver = source.driver(source.bus, "doctor", lambda _sentence: None)
     with closing(source.bus):
         try:
             sensor = driver.start()
         except SourceError as error:
-            yield failed("kernel driver", error)
+            yield Finding.failed("kernel driver", error)
             return
         for device in source.devices.each:
             yield from _device(device, driver.texts(device), source.trigger)
         ranges = f"±{sensor.accel_range_g or 0:g} g, ±{sensor.gyro_range_dps or 0:g} deg/s"
-        yield Finding("ranges", Mark.OK, ranges if sensor.accel_range_g else "unknown: nobody says a count's bits")
+        yield Finding("ranges", Mark.OK, ranges if sensor.accel_range_g else "unknown: the driver does not state them")
         try:
-            _watch(driver, SETTLED_S)
+            _poll_for(driver, SETTLED_S)
             driver.forget()
-            _watch(driver, seconds)
+            _poll_for(driver, seconds)
         except SourceError as error:
-            yield failed("stream", error)
+            yield Finding.failed("stream", error)
             return
         finally:
             driver.stop()
@@ -47,19 +47,19 @@ def examine_iio(source: OpenedIio, seconds: float) -> Iterator[Finding]:
     rate_hz = sensor.rate_hz or source.plan.config.rate_hz
     if len(recording) > rate_hz / 2:
         part = PARTS.get(sensor.who_am_i or 0)
-        # what is polled has no rate of its own
+        # Polled channels have no rate of their own.
         nominal_hz = rate_hz if driver.buffered else recording.rate_hz
-        # a driver's stamps are as exact as its interrupts: over all of them half an interval at each end
+        # The driver's time stamps are those of its interrupts: the whole is uncertain by half an interval at each end.
         sensor = replace(recording.sensor, clock_std=0.5 / len(recording))
         yield from examine_stream(
             replace(recording, sensor=sensor), nominal_hz, seconds, None if part is None else part.family
         )
     else:
         what = f"{len(recording)} samples in {seconds:g} s"
-        yield Finding("stream", Mark.BAD, what, "see what `dmesg` says of the driver and its interrupts")
+        yield Finding("stream", Mark.BAD, what, "look in `dmesg` for the driver and its interrupts")
 
 
-def _watch(driver: IioDriver, seconds: float) -> None:
+def _poll_for(driver: IioDriver, seconds: float) -> None:
     end_ns = driver.now_ns() + round(seconds * 1e9)
     while driver.now_ns() < end_ns:
         driver.poll()
@@ -72,7 +72,6 @@ def _device(device: str, texts: dict[str, str], trigger: str | None) -> Iterator
     yield Finding(device, Mark.OK, what, "", {name: text for name, text in texts.items() if name})
     if trigger == POLLED:
         return
-    if ENABLE in texts:
-        yield Finding("buffer", Mark.OK, f"of {device}, filled by {texts.get(TRIGGER) or 'the sensor'}")
-    else:
-        yield Finding("buffer", Mark.NOTE, f"{device} has none", NO_BUFFER)
+    has_buffer = ENABLE in texts
+    what = f"of {device}, filled by {texts.get(TRIGGER) or 'the sensor'}" if has_buffer else f"{device} has none"
+    yield Finding.check("buffer", has_buffer, what, NO_BUFFER, {})

@@ -1,4 +1,4 @@
-"""The page: findings as text for a bug report, or as JSON."""
+"""Findings as one page of text for a bug report, or as JSON."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TOPIC, WIDTH = 24, 100
 
 
 def text(source: str, version: str, findings: Sequence[Finding]) -> str:
-    """One page; what needs attention begins with ! or *."""
+    """Return the page; findings that need attention begin with !, * or ?."""
     head = f"mpucal {version} doctor on {source} ({platform.machine()}, {platform.system()} {platform.release()})"
     lines = [head, ""]
     for finding in findings:
@@ -29,7 +29,7 @@ def text(source: str, version: str, findings: Sequence[Finding]) -> str:
 
 
 def document(source: str, version: str, findings: Sequence[Finding]) -> str:
-    """The same as JSON."""
+    """Return the findings as JSON."""
     fields = {
         "format": FORMAT,
         "version": VERSION,

@@ -1,4 +1,4 @@
-"""The examination of each kind of source that has one, as the table of sources names it."""
+"""Examinations by kind of source, as the table of sources names them; see examine."""
 
 from __future__ import annotations
 
@@ -12,24 +12,18 @@ from .finding import Finding
 
 
 def examine_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
-    """A chip on a bus of this computer; see examine."""
+    """Examine a chip and its I2C bus."""
     with closing(source.bus):
         yield from examine(source.bus, source.plan.config, seconds)
 
 
-def examine_spi_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
-    """A chip on an SPI bus, whose clock is as it was set; see examine."""
-    with closing(source.bus):
-        yield from examine(source.bus, source.plan.config, seconds, lambda _bus: ())
-
-
-def examine_usb_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
-    """A chip on a USB adapter, whose bus the kernel does not know; see examine."""
+def examine_chip_alone(source: OpenedChip, seconds: float) -> Iterator[Finding]:
+    """Examine a chip on an SPI bus or a USB adapter, where times of replies do not show the bus's speed."""
     with closing(source.bus):
         yield from examine(source.bus, source.plan.config, seconds, lambda _bus: ())
 
 
 def examine_bridge_and_chip(source: OpenedChip, seconds: float) -> Iterator[Finding]:
-    """A bridge's firmware, its serial line, and the chip behind it; see examine."""
+    """Examine a bridge's firmware, its serial line, and the chip behind it."""
     with closing(source.bus):
         yield from examine(source.bus, source.plan.config, seconds, examine_bridge)

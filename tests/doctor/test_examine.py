@@ -1,4 +1,4 @@
-"""The examination on the simulated chip: what each kind of chip and fault is told to be."""
+"""The examination of simulated chips: the finding of each kind of chip and fault."""
 
 import json
 from dataclasses import replace
@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpucal.chip.quick_measure import PATIENCE, READS
 from mpucal.chip.config import Config
+from mpucal.chip.quick_measure import PATIENCE, READS
 from mpucal.data import Recording, Sensor
-from mpucal.doctor.dead import dead_axes, live_axes
+from mpucal.doctor.dead_axes import dead_axes, live_axes
 from mpucal.doctor.examine import examine
 from mpucal.doctor.finding import Finding, Mark
 from mpucal.doctor.page import document, text
@@ -190,7 +190,7 @@ def test_page_and_document_hold_every_finding():
 
 @pytest.mark.parametrize(("chip", "at_s"), [("mpu6050", 7.72), ("mpu6050", 11.16), ("mpu6500", 7.72)])
 def test_a_reset_while_it_is_measured_is_no_defect_of_the_chip(chip, at_s):
-    """In the self test, and as the offset registers shift what is measured."""
+    """Each reset falls into the self test, or into the measurement with shifted offset registers."""
     told = findings(open_simulated(f"sim:chip={chip},fault=brownout@{at_s}"))
     assert "lost its settings" in told["broken off"].what
     assert "supply" in told["broken off"].remedy

@@ -1,4 +1,4 @@
-"""Who is on a bus, asked as i2cdetect asks: of an adapter whose ioctls are answered in this process."""
+"""Addresses on a bus, probed as by i2cdetect, on an adapter whose ioctls are answered in this process."""
 
 import errno
 import os
@@ -13,7 +13,7 @@ from mpucal.doctor.host import examine_host
 
 
 class Adapter:
-    """0x68 answers and nobody else; `fails` says the errno of a transfer with an address, 0 for none."""
+    """Adapter on which 0x68 alone answers; `fails` returns the errno of a transfer with an address, 0 for none."""
 
     def __init__(self, fails=lambda address: 0):
         self.fails, self.asked = fails, []
@@ -32,7 +32,7 @@ class Adapter:
 
 @pytest.fixture
 def told(monkeypatch, tmp_path):
-    """What is said of who is on the bus of an adapter."""
+    """Return the finding about the addresses on the bus of an adapter."""
     (tmp_path / "i2c-1").touch()
 
     def tell(adapter):
@@ -64,7 +64,7 @@ def test_one_slow_device_does_not_hide_the_others(told):
 
 
 def test_a_chip_on_another_bus_is_found(monkeypatch, tmp_path):
-    """Its identity is read, and nothing is written there."""
+    """The chip's identity is read, and nothing is written there."""
     for number in (1, 3, 7):
         (tmp_path / f"i2c-{number}").touch()
     opened, written = {}, []

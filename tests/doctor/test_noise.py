@@ -1,10 +1,10 @@
-"""Noise as a density: what went in comes out, through a filter too, and a hand is no noise."""
+"""Noise density: that of simulated noise is found, and a hand's tremor is not taken for noise."""
 
 import numpy as np
 import pytest
 from scipy import signal
 
-from mpucal.doctor.noise import density, periodogram, trembles
+from mpucal.doctor.noise import is_trembling, noise_density, periodogram
 
 RATE_HZ = 200.0
 
@@ -25,12 +25,12 @@ def test_the_spectrum_is_that_of_scipy(n):
 
 
 def test_the_density_of_white_noise_is_found():
-    found = np.array([density(white(seed), RATE_HZ) for seed in range(10)])
+    found = np.array([noise_density(white(seed), RATE_HZ) for seed in range(10)])
     assert found.mean() == pytest.approx(0.004, rel=0.02)
 
 
 def test_a_constant_adds_nothing():
-    assert density(white(1) + 9.81, RATE_HZ) == pytest.approx(density(white(1), RATE_HZ), rel=1e-3)
+    assert noise_density(white(1) + 9.81, RATE_HZ) == pytest.approx(noise_density(white(1), RATE_HZ), rel=1e-3)
 
 
 @pytest.mark.parametrize("tremor_mps2", [0.05, 0.1])
@@ -38,9 +38,9 @@ def test_a_hand_is_told_from_noise(tremor_mps2):
     """A hand trembles by 0.05 to 0.1 m/s^2 at 2 to 10 Hz."""
     t = np.arange(4000) / RATE_HZ
     shaking = tremor_mps2 * np.sin(2 * np.pi * 6.0 * t)[:, None] * [1.0, 0.6, 0.8]
-    assert trembles(white(2) + shaking, RATE_HZ)
+    assert is_trembling(white(2) + shaking, RATE_HZ)
 
 
 @pytest.mark.parametrize("times", [1.0, 10.0], ids=["quiet", "noisy"])
 def test_a_noisy_chip_is_no_hand(times):
-    assert not any(trembles(white(seed, 0.004 * times), RATE_HZ) for seed in range(20))
+    assert not any(is_trembling(white(seed, 0.004 * times), RATE_HZ) for seed in range(20))

@@ -1,4 +1,4 @@
-"""The troubles of the page, each on a simulated chip that has it."""
+"""Troubles of docs/doctor.md, each on a simulated chip that has it."""
 
 from pathlib import Path
 
