@@ -43,8 +43,8 @@ def test_a_session_goes_on_where_time_passed_it_by(tmp_path, capsys):
     assert sorted(steps)[-2:] == pytest.approx([*stops_s.values()], abs=2)
     assert recording.gap[1:][steps > 0.5].all()
     for stopped_s in stops_s.values():
-        assert f"stood still for {stopped_s:.0f} s, and read nothing" in said
-    assert said.index("stood still for 70 s") < said.index("ROTATE") < said.index("stood still for 90 s")
+        assert f"Reading paused for {stopped_s:.0f} s" in said
+    assert said.index("Reading paused for 70 s") < said.index("ROTATE") < said.index("Reading paused for 90 s")
 
 
 @pytest.mark.parametrize(("kind", "stopped_s"), [("CHIP", 5.0), ("BRIDGE", 300.0)])
@@ -96,7 +96,7 @@ def test_a_program_that_stood_still_is_told_from_a_vehicle_that_was_silent():
     first = [source.start(), *(source.poll().t.tolist() for _ in range(20))]
     vehicle._now_us += 300_000_000
     first += [source.poll().t.tolist() for _ in range(40)]
-    assert [text for text in said if "stood still for 300 s" in text]
+    assert [text for text in said if "Reading paused for 300 s" in text]
     assert not [text for text in said if "has sent nothing" in text]
     assert source.recording().gap.sum() == 1
     link = Link(TlogReplay(Tlog(tuple(record), "capture.tlog", None)), lambda t_ns, data: None)

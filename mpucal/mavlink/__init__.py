@@ -1,1 +1,1 @@
-"""A vehicle over MAVLink: its link, its streams and its parameters. pymavlink loads where a link is opened."""
+"""A vehicle over MAVLink: its link, its streams and its parameters. pymavlink is imported when a link is opened."""

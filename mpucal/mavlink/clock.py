@@ -1,20 +1,21 @@
-"""A vehicle's clock, unwrapped and followed through resets."""
+"""A vehicle's clock, unwrapped and followed over resets."""
 
 from __future__ import annotations
 
 from enum import Enum, auto
 
+from .transport import US
+
 WRAP = 1 << 32
-US = 1_000
 S_US = 1_000_000
-# a packet this late was overtaken by others; a clock further back was set back
+# A packet up to this late was overtaken by others; a clock further back was set back.
 LATE_US = S_US
-# the clock may run ahead of the times of receipt by this much more than before: packets pile up on a link
+# The clock may run ahead of the times of receipt by this much more than before: packets pile up on a link.
 STRAY_US = 5 * S_US
 
 
 class Jump(Enum):
-    """What the clock did."""
+    """Steps of a clock: none, back to its start by a reboot, or ahead because it was set."""
 
     NONE = auto()
     REBOOT = auto()
@@ -22,11 +23,11 @@ class Jump(Enum):
 
 
 class VehicleClock:
-    """Times of one message stream on a line that only grows but for late packets.
+    """Times of one message stream on a line that grows except for late packets.
 
     Parameters
     ----------
-    unit_us : what the stream's times count: 1 (time_usec) or 1000 (time_boot_ms).
+    unit_us : unit of the stream's times in us: 1 (time_usec) or 1000 (time_boot_ms).
     """
 
     def __init__(self, unit_us: int) -> None:
@@ -35,15 +36,15 @@ class VehicleClock:
         self._offset_us = 0
         self._latest_us = 0
         self._received_us = 0
-        # by how much the clock ran ahead of the times of receipt at most, but for what they differ by
+        # The most by which the clock was ahead of the times of receipt; both have different origins.
         self._ahead_us = 0
 
     def unwrap(self, raw: int, received_ns: int) -> tuple[int, Jump]:
-        """The time of `raw` in us, and what the clock did before it.
+        """Return the time of `raw` in us, and the clock's jump before it.
 
         Parameters
         ----------
-        raw : as the message says it. received_ns : when it arrived, any clock that goes evenly.
+        raw : time of the message. received_ns : time of receipt by any even clock.
         """
         received_us = received_ns // US
         if self._raw is None:
@@ -57,7 +58,7 @@ class VehicleClock:
             self._offset_us += WRAP * self._unit_us
             step_us = wrapped_us
         jump = Jump.NONE
-        # against all that came, not the last: what was read late, after a pause, came in a burst
+        # Compared with all packets, not with the last one: after a pause, old packets are read in a burst.
         if step_us < -LATE_US or self._latest_us + step_us - received_us > self._ahead_us + STRAY_US:
             jump = Jump.REBOOT if step_us < 0 else Jump.SET
             self._offset_us += max(passed_us, 1) - step_us

@@ -1,4 +1,4 @@
-"""pymavlink's messages, loaded when asked for, and bytes made into them."""
+"""pymavlink's messages, imported when they are first used, and a parser that makes packets of bytes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from ..errors import UsageError
 
 INSTALL = "pip install 'mpucal[mavlink]'"
-# pymavlink has no types: a message is any object with get_type() and the fields of its definition
+# pymavlink has no types: a message is any object with get_type() and the fields of its definition.
 Message = Any
 
 V1, V2 = 0xFE, 0xFD
@@ -20,12 +20,12 @@ BEGINNING = re.compile(b"[" + b"".join(MAGIC) + b"]")
 CHECKSUM, SIGNATURE = 2, 13
 SIGNED = 0x01
 FLAGS_AT = 2
-LONGEST = 10 + 255 + CHECKSUM + SIGNATURE
+LONGEST = HEADER[V2] + 255 + CHECKSUM + SIGNATURE
 
 
 @cache
 def dialect() -> Any:
-    """The module of all messages that ArduPilot and PX4 send (MAVLink 2).
+    """Return the module of all messages that ArduPilot and PX4 send (MAVLink 2).
 
     Raises
     ------
@@ -35,7 +35,7 @@ def dialect() -> Any:
 
 
 def import_pymavlink(name: str) -> Any:
-    """A module of pymavlink, which only those install who have a vehicle: half of what mpucal would weigh with it.
+    """Import a module of pymavlink, which is optional: it doubles the installed size of mpucal.
 
     Raises
     ------
@@ -57,7 +57,7 @@ class Packet(NamedTuple):
 
 
 def packet_length(data: bytes | bytearray) -> int | None:
-    """How long the packet is that begins at data[0]; None where too few bytes say so.
+    """Return the length of the packet that begins at data[0], or None if there are too few bytes to know it.
 
     MAVLink serialisation: magic, payload length, (incompatibility flags), ...
     """
@@ -67,8 +67,8 @@ def packet_length(data: bytes | bytearray) -> int | None:
     return HEADER[data[0]] + data[1] + CHECKSUM + signature
 
 
-def header(packet: bytes) -> tuple[int, tuple[int, int]]:
-    """Message id, and (system, component) of the sender, of a whole packet, whose sum is not looked at."""
+def read_header(packet: bytes) -> tuple[int, tuple[int, int]]:
+    """Return message id and (system, component) of the sender of a whole packet; its checksum is not verified."""
     at = HEADER[packet[0]]
     id_bytes = 3 if packet[0] == V2 else 1
     ids_at = at - id_bytes - 2
@@ -76,11 +76,15 @@ def header(packet: bytes) -> tuple[int, tuple[int, int]]:
 
 
 class Parser:
-    """Bytes in, whole packets out; what is damaged is left out, and the next packet found.
+    """Parser of bytes into whole packets, which skips what is damaged.
 
     Parameters
     ----------
-    mav : pymavlink's MAVLink, which checks sums and signatures.
+    mav : pymavlink's MAVLink, which verifies checksums and signatures.
+
+    Attributes
+    ----------
+    refused : number of packets with a wrong signature.
     """
 
     def __init__(self, mav: Any) -> None:
@@ -90,18 +94,18 @@ class Parser:
 
     @property
     def signed_at(self) -> int:
-        """When the newest packet was signed [10 us since 2015]; 0 where none was."""
+        """Time of the newest signature [10 us since 2015], 0 before the first."""
         return int(self._mav.signing.timestamp)
 
     def datagram(self, data: bytes) -> list[Packet]:
-        """The packets of a datagram, which holds whole packets or is damaged."""
+        """Return the packets of a datagram, which holds whole packets or is damaged."""
         self._buffer = bytearray()
         packets = self.stream(data)
         self._buffer = bytearray()
         return packets
 
     def stream(self, data: bytes) -> list[Packet]:
-        """The packets that `data`, the next bytes of a stream, complete."""
+        """Return the packets that `data`, the next bytes of a stream, complete."""
         self._buffer += data
         packets: list[Packet] = []
         at = 0
@@ -110,8 +114,8 @@ class Parser:
             length = packet_length(self._buffer[at : at + HEADER[V2]])
             if length is None or at + length > len(self._buffer):
                 break
-            packet = self._decoded(self._buffer[at : at + length])
-            # a byte that only looks like a beginning: the packet may begin within what it claimed
+            packet = self._decode(self._buffer[at : at + length])
+            # The byte may only look like a beginning: the true packet may begin within the length it announced.
             at += length if packet else 1
             packets += [packet] if packet else []
         else:
@@ -119,7 +123,7 @@ class Parser:
         del self._buffer[:at]
         return packets
 
-    def _decoded(self, data: bytearray) -> Packet | None:
+    def _decode(self, data: bytearray) -> Packet | None:
         if data[0] == V2 and data[FLAGS_AT] & ~SIGNED:
             return None
         signing = self._mav.signing
@@ -127,7 +131,7 @@ class Parser:
         try:
             message = self._mav.decode(data)
         except dialect().MAVError as error:
-            # pymavlink remembers a signature's time before it checks it: a forged one would outdate all that follow
+            # pymavlink remembers a signature's time before it verifies it: a forged one would outdate all true ones.
             signing.stream_timestamps = times
             self.refused += "signature" in str(error)
             return None

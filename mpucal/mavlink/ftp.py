@@ -1,8 +1,8 @@
-"""Whole files on a vehicle's storage, by MAVLink FTP (FILE_TRANSFER_PROTOCOL, 110).
+"""Files in a vehicle's storage, moved whole by MAVLink FTP (FILE_TRANSFER_PROTOCOL, 110).
 
 Payload: sequence u16, session u8, opcode u8, size u8, requested opcode u8, burst u8, padding, offset u32, data.
-Sizes and check sums that vehicles report are not believed: what was put is read back. Not by pymavlink's mavftp, for
-reasons that docs/architecture.md gives.
+Sizes and checksums that vehicles report are not trusted: every file is read back. docs/architecture.md says why this
+is not pymavlink's mavftp.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from enum import IntEnum
 from typing import ClassVar, Self
 
 from ..errors import LinkError
-from .dialect import Message
+from .dialect import Message, dialect
 from .link import Link
 from .request import ask
 
@@ -24,7 +24,7 @@ LARGEST = 1 << 20
 
 
 class Opcode(IntEnum):
-    """What is asked, or how it went."""
+    """Requests, and the two kinds of reply."""
 
     TERMINATE = 1
     RESET = 2
@@ -37,7 +37,7 @@ class Opcode(IntEnum):
     NAK = 129
 
 
-class Error(IntEnum):
+class ErrorCode(IntEnum):
     """The first byte of a NAK's data."""
 
     FAIL = 1
@@ -46,15 +46,15 @@ class Error(IntEnum):
     NOT_FOUND = 10
 
 
-WORDS = {
-    bytes([Error.UNKNOWN_COMMAND]): "it does not know MAVLink FTP, or has it turned off",
-    bytes([Error.NOT_FOUND]): "there is no such file or folder, and perhaps no card",
+NAK_WORDS = {
+    bytes([ErrorCode.UNKNOWN_COMMAND]): "it does not know MAVLink FTP, or has it turned off",
+    bytes([ErrorCode.NOT_FOUND]): "there is no such file or folder, and perhaps no card",
 }
 
 
 @dataclass(frozen=True)
 class Payload:
-    """The content of a FILE_TRANSFER_PROTOCOL."""
+    """Payload of a FILE_TRANSFER_PROTOCOL."""
 
     sequence: int
     session: int
@@ -67,21 +67,21 @@ class Payload:
     HEADER: ClassVar = struct.Struct("<HBBBBBxI")
 
     def encode(self) -> bytes:
-        """The 251 bytes."""
+        """Return the PAYLOAD bytes."""
         size = len(self.data) if self.size is None else self.size
         head = self.HEADER.pack(self.sequence, self.session, self.opcode, size, self.requested, 0, self.offset)
         return (head + self.data).ljust(PAYLOAD, b"\0")
 
     @classmethod
     def decode(cls, payload: bytes) -> Self:
-        """The inverse, of at least a header's bytes; data as long as its size says."""
+        """Decode at least a header's bytes; `data` has the length that `size` says."""
         sequence, session, opcode, size, requested, _, offset = cls.HEADER.unpack(payload[: cls.HEADER.size])
         data = payload[cls.HEADER.size : cls.HEADER.size + size]
         return cls(sequence, session, opcode, data, offset, size, requested)
 
 
 class Storage:
-    """The storage of the vehicle that `link` is locked to."""
+    """Storage of the vehicle that `link` is locked to."""
 
     def __init__(self, link: Link) -> None:
         self._link = link
@@ -92,7 +92,7 @@ class Storage:
 
         Raises
         ------
-        LinkError : the vehicle does not take it, or gives back another.
+        LinkError : the vehicle does not take it, or another file is read back.
         """
         self._request(path, Opcode.RESET)
         session = self._request(path, Opcode.CREATE, path.encode()).session
@@ -100,22 +100,22 @@ class Storage:
             self._request(path, Opcode.WRITE, data[at : at + MOST_DATA], session, at)
         self._request(path, Opcode.TERMINATE, session=session)
         if self.get(path) != data:
-            raise LinkError(f"{self._link.vehicle} gives back another {path} than it was given", "check its card")
+            raise LinkError(f"{self._link.vehicle} holds another {path} than was sent", "check its card")
 
     def get(self, path: str) -> bytes:
         """Read a file.
 
         Raises
         ------
-        LinkError : there is none, or it cannot be read.
+        LinkError : it does not exist, or cannot be read.
         """
         session = self._request(path, Opcode.OPEN_TO_READ, path.encode()).session
         data = b""
         while len(data) < LARGEST:
             reply = self._ask(Opcode.READ, b"", session, len(data), size=MOST_DATA)
-            if reply is not None and reply.opcode == Opcode.NAK and reply.data[:1] == bytes([Error.END_OF_FILE]):
+            if reply is not None and reply.opcode == Opcode.NAK and reply.data[:1] == bytes([ErrorCode.END_OF_FILE]):
                 break
-            part = self._granted(path, reply).data
+            part = self._acknowledged(path, reply).data
             if not part:
                 break
             data += part
@@ -132,13 +132,13 @@ class Storage:
         self._request(path, Opcode.REMOVE, path.encode())
 
     def _request(self, path: str, opcode: Opcode, data: bytes = b"", session: int = 0, offset: int = 0) -> Payload:
-        return self._granted(path, self._ask(opcode, data, session, offset))
+        return self._acknowledged(path, self._ask(opcode, data, session, offset))
 
     def _ask(self, opcode: Opcode, data: bytes, session: int, offset: int, size: int | None = None) -> Payload | None:
         self._sequence = (self._sequence + 1) % SEQUENCE
         asked = Payload(self._sequence, session, opcode, data, offset, size)
         vehicle = self._link.vehicle
-        message = self._link.mav.file_transfer_protocol_encode(
+        message = dialect().MAVLink_file_transfer_protocol_message(
             0, vehicle.system, vehicle.component, bytearray(asked.encode())
         )
 
@@ -146,16 +146,16 @@ class Storage:
             if received.get_type() != "FILE_TRANSFER_PROTOCOL":
                 return None
             answer = Payload.decode(bytes(received.payload))
-            # a reply counts on from its request, which may have been sent twice
+            # A reply's number follows its request's, which may have been sent twice.
             same = (answer.sequence - asked.sequence) % SEQUENCE == 1 and answer.requested == opcode
             return answer if same else None
 
         return ask(self._link, message, reply, TIMEOUT_S, TRIES)
 
-    def _granted(self, path: str, reply: Payload | None) -> Payload:
+    def _acknowledged(self, path: str, reply: Payload | None) -> Payload:
         if reply is not None and reply.opcode == Opcode.ACK:
             return reply
-        why = "it does not answer" if reply is None else WORDS.get(reply.data[:1], "it failed")
+        why = "it does not answer" if reply is None else NAK_WORDS.get(reply.data[:1], "it failed")
         raise LinkError(
-            f"{self._link.vehicle} does not keep {path} in its storage ({why})", "put a card into it, or leave it out"
+            f"{self._link.vehicle} does not keep {path} in its storage ({why})", "put a card into it, or omit --store"
         )

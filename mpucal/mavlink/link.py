@@ -1,7 +1,7 @@
-"""The link to one vehicle: listen, lock to it, then hear and answer it alone.
+"""The link to one vehicle: listen, lock to a vehicle, then receive from it and send to it alone.
 
-One thread: nothing arrives but in `messages`, and every message of the vehicle goes to all who subscribed, whoever
-called `messages`. The time is that of the transport, as of the last message or deadline: a replay repeats it.
+One thread: packets arrive only in `messages`, and every message of the vehicle goes to all listeners, whoever called
+`messages`. The time is the transport's, as of the last message or deadline: so a replay repeats it.
 """
 
 from __future__ import annotations
@@ -17,24 +17,26 @@ from .dialect import LONGEST, MAGIC, SIGNED, Message, Packet, Parser, dialect
 from .transport import PAUSE_NS, ReceivedBytes, Transport
 from .vehicle import Vehicle, vehicle_of
 
-# of us: a ground station beside the usual 255, as a component that autopilots expect of one
+# Our ids: a system other than the usual ground station's 255, and the component that autopilots expect of one.
 OWN_SYSTEM, OWN_COMPONENT = 254, 190
 
 S = 1_000_000_000
 LISTEN_NS, PATIENCE_NS = 2 * S, 6 * S
 HEARTBEAT_NS = S
 SEQUENCE = 256
-# more senders than a network of vehicles has; more datagrams or packets' lengths without a packet than a bad link
-# brings in six seconds, such as a serial line of 921,600 Bd that is read at another rate
-MOST_SENDERS, FLOOD = 64, 2000
-# signatures count 10 us since 2015-01-01
+# No network has so many vehicles.
+MOST_SENDERS = 64
+# No bad link brings so many datagrams, or lengths of a packet, without a packet in PATIENCE_NS; a serial line of
+# 921,600 Bd that is read at another rate does.
+FLOOD = 2000
+# Signatures count 10 us since 2015-01-01.
 SIGNING_EPOCH_NS, SIGNING_UNIT_NS = 1_420_070_400 * S, 10_000
 
 Recorder = Callable[[int, bytes], None]
 Listener = Callable[[Message], None]
 
 
-class _Arrived(NamedTuple):
+class _AddressedPacket(NamedTuple):
     t_ns: int
     address: str
     packet: Packet
@@ -45,9 +47,13 @@ class Link:
 
     Parameters
     ----------
-    transport : where the packets come from; `close` closes it.
+    transport : carries the packets; `close` closes it.
     record : keeps each packet of the vehicle and of us, with its time [ns since 1970].
     key : 32 bytes with which both sides sign, or None. own_system : our MAVLink id.
+
+    Attributes
+    ----------
+    lost : number of the vehicle's packets that were lost, by their sequence numbers.
     """
 
     def __init__(
@@ -62,9 +68,9 @@ class Link:
         if key is not None:
             self._sign(key)
         self._parsers: dict[str, Parser] = {}
-        self._queue: deque[_Arrived] = deque()
-        # until it is locked: time, from where (None: from us), bytes
-        self._heard: list[tuple[int, str | None, bytes]] = []
+        self._queue: deque[_AddressedPacket] = deque()
+        # Time, address (None: ours) and bytes of the packets before the link is locked.
+        self._before_lock: list[tuple[int, str | None, bytes]] = []
         self._listeners: list[Listener] = []
         self._vehicle: Vehicle | None = None
         self._seeking = False
@@ -76,12 +82,12 @@ class Link:
 
     @property
     def signed_only(self) -> bool:
-        """Whether the vehicle signs all that it sends, and we nothing."""
-        return self._mav.signing.secret_key is None and self._signed > 0 and not self._unsigned
+        """True if the vehicle signs all that it sends, and we have no key."""
+        return self._key is None and self._signed > 0 and not self._unsigned
 
     @property
     def vehicle(self) -> Vehicle:
-        """Whom it is locked to.
+        """The vehicle that the link is locked to.
 
         Raises
         ------
@@ -91,55 +97,44 @@ class Link:
             raise RuntimeError("the link is not locked to a vehicle yet")
         return self._vehicle
 
-    @property
-    def mav(self) -> Any:
-        """pymavlink's MAVLink, whose *_encode methods make messages."""
-        return self._mav
-
     def now_ns(self) -> int:
-        """ns since 1970: of the last message delivered, or of the deadline that passed since."""
+        """Return the time of the last message, or of the deadline that passed since [ns since 1970]."""
         return self._now_ns
 
     def subscribe(self, listener: Listener) -> None:
-        """Have `listener` called with every message of the vehicle from now on."""
+        """Call `listener` with every message of the vehicle from now on."""
         self._listeners.append(listener)
 
     def listen(self) -> tuple[Vehicle, ...]:
-        """Who sends an autopilot's HEARTBEAT within two seconds, of the first one where it comes later (within six).
+        """Return the vehicles whose HEARTBEAT comes within two seconds.
+
+        If none comes, wait for the first one for six seconds, and for others two seconds after it.
 
         Raises
         ------
-        NoAnswer : nobody does, or none whose signature holds.
+        NoAnswer : none comes. LinkError : none with a valid signature, or a flood of other bytes.
         """
         begun_ns = self._now_ns
-        vehicles = list(self._beating(begun_ns + LISTEN_NS))
+        vehicles = list(self._heartbeats(begun_ns + LISTEN_NS))
         if not vehicles:
-            vehicles = list(islice(self._beating(begun_ns + PATIENCE_NS), 1))
+            vehicles = list(islice(self._heartbeats(begun_ns + PATIENCE_NS), 1))
             if not vehicles:
-                raise self._nobody()
-            # several that are powered together come one after another
-            vehicles += self._beating(self._now_ns + LISTEN_NS)
+                raise self._no_vehicle()
+            # Vehicles that are powered together start one after another.
+            vehicles += self._heartbeats(self._now_ns + LISTEN_NS)
         return tuple({(vehicle.address, vehicle.system): vehicle for vehicle in vehicles}.values())
 
-    def _beating(self, until_ns: int) -> Iterator[Vehicle]:
-        """Who sends a HEARTBEAT, each time that it comes."""
-        for arrived in self._arrivals(until_ns):
-            self._heard.append((arrived.t_ns, arrived.address, arrived.packet.data))
-            vehicle = vehicle_of(arrived.address, arrived.packet.message)
-            if vehicle is not None:
-                yield vehicle
-
     def lock(self, vehicle: Vehicle) -> None:
-        """Hear `vehicle` alone from now on, and send to it."""
+        """Receive from `vehicle` alone from now on, and send to it."""
         self._vehicle = vehicle
         self._transport.restrict(vehicle.address)
-        for t_ns, address, data in self._heard:
+        for t_ns, address, data in self._before_lock:
             if address in (vehicle.address, None):
                 self._record(t_ns, data)
-        self._heard = []
+        self._before_lock = []
 
     def seek(self) -> None:
-        """Hear the other ports of the vehicle's host too until its heartbeat comes: who starts anew may take another.
+        """Accept the vehicle at other ports of its host until its HEARTBEAT comes: after a restart it may use another.
 
         Raises
         ------
@@ -149,8 +144,12 @@ class Link:
             self._seeking = True
             self._transport.restrict(None)
 
+    def encode(self, name: str, *fields: Any) -> Message:
+        """Return the message `name` to the vehicle; `fields` are those after target_system and target_component."""
+        return getattr(self._mav, f"{name}_encode")(self.vehicle.system, self.vehicle.component, *fields)
+
     def send(self, message: Message) -> None:
-        """Send to the vehicle, and nobody else.
+        """Send to the vehicle alone.
 
         Raises
         ------
@@ -159,16 +158,16 @@ class Link:
         self._transmit(message, self.vehicle.address)
 
     def messages(self, until_ns: int) -> Iterator[Message]:
-        """The vehicle's messages until `until_ns`; who leaves early loses none.
+        """Yield the vehicle's messages until `until_ns`; a loop that is left early loses none.
 
-        Where the program or its computer stood still meanwhile, it is later than `until_ns` afterwards.
+        If the program or its computer was suspended meanwhile, `now_ns` is later than `until_ns` afterwards.
 
         Raises
         ------
         EndOfCapture : a replay holds no more. LinkError : the link broke.
         """
         for arrived in self._arrivals(until_ns):
-            if self._seeking and self._is_back(arrived):
+            if self._seeking and self._is_same_vehicle(arrived):
                 self._seeking = False
                 self._vehicle = replace(self.vehicle, address=arrived.address)
                 self._transport.restrict(arrived.address)
@@ -185,21 +184,29 @@ class Link:
             yield message
 
     def note(self, message: Message) -> None:
-        """Keep a message in the record, under the id by which a replay knows it, and send it to nobody."""
+        """Record a message, with the sender id by which a replay knows it, without sending it."""
         own, self._mav.srcSystem = self._mav.srcSystem, OWN_SYSTEM
-        self._keep(self._packed(message))
+        self._keep(self._pack(message))
         self._mav.srcSystem = own
 
     def close(self) -> None:
         """Close the transport."""
         self._transport.close()
 
-    def _is_back(self, arrived: _Arrived) -> bool:
-        """Whether it is the vehicle's heartbeat, from its host."""
-        heard = vehicle_of(arrived.address, arrived.packet.message)
-        return heard is not None and replace(heard, address=self.vehicle.address) == self.vehicle
+    def _heartbeats(self, until_ns: int) -> Iterator[Vehicle]:
+        """Yield the sender of each HEARTBEAT."""
+        for arrived in self._arrivals(until_ns):
+            self._before_lock.append((arrived.t_ns, arrived.address, arrived.packet.data))
+            vehicle = vehicle_of(arrived.address, arrived.packet.message)
+            if vehicle is not None:
+                yield vehicle
 
-    def _arrivals(self, until_ns: int) -> Iterator[_Arrived]:
+    def _is_same_vehicle(self, arrived: _AddressedPacket) -> bool:
+        """Return True for the vehicle's HEARTBEAT, whatever its port."""
+        sender = vehicle_of(arrived.address, arrived.packet.message)
+        return sender is not None and replace(sender, address=self.vehicle.address) == self.vehicle
+
+    def _arrivals(self, until_ns: int) -> Iterator[_AddressedPacket]:
         while True:
             while self._queue and self._queue[0].t_ns < until_ns:
                 arrived = self._queue.popleft()
@@ -207,22 +214,22 @@ class Link:
                 yield arrived
             if self._queue:
                 break
-            self._beat()
+            self._send_heartbeat()
             received = self._transport.receive(min(until_ns, self._next_heartbeat_ns))
             if received is not None:
-                self._queue.extend(self._parsed(received))
+                self._queue.extend(self._parse(received))
             now_ns = self._transport.now_ns() if received is None else received.t_ns
             if self._vehicle is not None and now_ns - until_ns > PAUSE_NS:
-                # nobody was waiting meanwhile: there is nothing to be told of that time
+                # The program was suspended: the caller sees it by the time.
                 until_ns = now_ns
                 break
-            # strangers' bytes are no reason to stay longer
+            # Bytes of strangers do not prolong the wait.
             if now_ns >= until_ns and not self._queue:
                 break
         self._now_ns = max(self._now_ns, until_ns)
 
-    def _parsed(self, received: ReceivedBytes) -> list[_Arrived]:
-        if self._vehicle is not None and not self._may_be(received.address, self._vehicle.address):
+    def _parse(self, received: ReceivedBytes) -> list[_AddressedPacket]:
+        if self._vehicle is not None and not self._is_accepted(received.address, self._vehicle.address):
             return []
         if self._transport.datagrams and received.data[:1] not in MAGIC:
             self._junk += 1
@@ -232,19 +239,19 @@ class Link:
             if len(self._parsers) >= MOST_SENDERS:
                 self._junk += 1
                 return []
-            parser = self._parsers[received.address] = Parser(self._receiver())
+            parser = self._parsers[received.address] = Parser(self._new_receiver())
         parse = parser.datagram if self._transport.datagrams else parser.stream
-        packets = [_Arrived(received.t_ns, received.address, packet) for packet in parse(received.data)]
+        packets = [_AddressedPacket(received.t_ns, received.address, packet) for packet in parse(received.data)]
         if not packets:
             self._junk += 1 if self._transport.datagrams else -(-len(received.data) // LONGEST)
         return packets
 
-    def _may_be(self, address: str, known: str) -> bool:
-        """Whether the vehicle may be there: where it was, or, while it is sought, at another port of its host."""
+    def _is_accepted(self, address: str, known: str) -> bool:
+        """Return True for the vehicle's address and, while it is sought, for other ports of its host."""
         return address == known or (self._seeking and address.rpartition(":")[0] == known.rpartition(":")[0])
 
-    def _beat(self) -> None:
-        """A ground station's HEARTBEAT each second, to whom we may speak."""
+    def _send_heartbeat(self) -> None:
+        """Send a ground station's HEARTBEAT each second, once there is a partner to send to."""
         now_ns = self._transport.now_ns()
         if now_ns < self._next_heartbeat_ns:
             return
@@ -256,19 +263,19 @@ class Link:
         self._transmit(heartbeat, None if self._vehicle is None else self._vehicle.address)
 
     def _transmit(self, message: Message, address: str | None) -> None:
-        data = self._packed(message)
+        data = self._pack(message)
         self._keep(data)
         self._transport.send(data, None if self._transport.outward else address)
 
     def _keep(self, data: bytes) -> None:
         if self._vehicle is None:
-            self._heard.append((self._now_ns, None, data))
+            self._before_lock.append((self._now_ns, None, data))
         else:
             self._record(self._now_ns, data)
 
-    def _packed(self, message: Message) -> bytes:
+    def _pack(self, message: Message) -> bytes:
         if self._vehicle is not None and self._vehicle.address in self._parsers:
-            # what is a minute older than its own signatures a vehicle refuses
+            # A vehicle refuses packets that are a minute older than its own signatures.
             newest = self._parsers[self._vehicle.address].signed_at
             self._mav.signing.timestamp = max(self._mav.signing.timestamp, newest)
         data = bytes(message.pack(self._mav))
@@ -276,7 +283,7 @@ class Link:
         return data
 
     def _count(self, message: Message) -> None:
-        """Packets that are missing by their numbers; one that comes late was counted as missing before."""
+        """Count packets that are missing by their numbers; one that comes late was counted as missing before."""
         header = message.get_header()
         self._signed += header.incompat_flags & SIGNED
         self._unsigned += not header.incompat_flags & SIGNED
@@ -287,10 +294,10 @@ class Link:
         elif step:
             self.lost = max(self.lost - 1, 0)
 
-    def _receiver(self) -> Any:
-        """A MAVLink for one address, as pymavlink remembers a signature's time before it has checked the signature.
+    def _new_receiver(self) -> Any:
+        """Return a MAVLink for one address: a forged packet must not change the signature times of another address.
 
-        From 1970 on: without a battery or a satellite, a vehicle's clock goes on where it once stopped.
+        Its time begins in 1970: without a battery or satellites, a vehicle's clock goes on where it stopped.
         """
         mav = dialect().MAVLink(None, OWN_SYSTEM, OWN_COMPONENT)
         mav.signing.secret_key = self._key
@@ -301,17 +308,17 @@ class Link:
         signing.secret_key, signing.sign_outgoing, signing.link_id = key, True, OWN_COMPONENT
         signing.timestamp = (self._now_ns - SIGNING_EPOCH_NS) // SIGNING_UNIT_NS
 
-    def _nobody(self) -> BusError:
+    def _no_vehicle(self) -> BusError:
         where = self._transport.name
-        if self._mav.signing.secret_key is not None and any(parser.refused for parser in self._parsers.values()):
+        if self._key is not None and any(parser.refused for parser in self._parsers.values()):
             return LinkError(
                 f"packets arrive on {where}, and none is signed with the key of --signing-key",
-                "give the vehicle's key, or leave it out where the vehicle does not sign",
+                "give the vehicle's key, or omit it if the vehicle does not sign",
             )
         if self._junk > FLOOD:
             return LinkError(
                 f"{where} is flooded: {self._junk} pieces came within {PATIENCE_NS // S} s that are no vehicle's",
-                "stop what sends them, or have the vehicle's telemetry sent to another port",
+                "stop their sender, or have the vehicle's telemetry sent to another port",
             )
         return NoAnswer(
             f"no autopilot's heartbeat came over {where} within {PATIENCE_NS // S} s",

@@ -1,4 +1,4 @@
-"""Whether a vehicle would arm, and whether it has: what it says itself."""
+"""A vehicle's own answers: is it armed, and would it arm."""
 
 from __future__ import annotations
 
@@ -8,19 +8,25 @@ from ..errors import LinkError
 from .dialect import Message, dialect
 from .firmwares import PX4
 from .link import Link, S
+from .request import encode_command
 
 ARMED, PREARM_CHECK = 128, 0x10000000
 SYS_STATUS = 1
 HEARTBEAT_NS = 5 * S
 COMPLAINTS_NS, TRIES = 3 * S // 2, 3
 PREFIXES = ("PreArm: ", "Preflight Fail: ", "Arm: ")
-# PX4 gives most of its reasons as events (EVENT, 410), whose words its component metadata holds
+# PX4 gives most of its reasons as events (EVENT, 410), whose words are in its component metadata.
 IN_EVENTS = "its events say why, as QGroundControl shows them"
 
 
 @dataclass(frozen=True)
 class PrearmState:
-    """Attributes: ready, None where it does not say; complaints, its own sentences."""
+    """Result of a vehicle's pre-arm check.
+
+    Attributes
+    ----------
+    ready : None if the vehicle does not say. complaints : its own sentences.
+    """
 
     ready: bool | None
     complaints: tuple[str, ...]
@@ -32,20 +38,20 @@ class PrearmState:
 
 
 class ArmingMonitor:
-    """Hears HEARTBEATs from now on, whoever reads the link."""
+    """Listener to a vehicle's HEARTBEAT, whoever reads the link."""
 
     def __init__(self, link: Link) -> None:
         self._link = link
         self._armed: bool | None = None
-        link.subscribe(self._hear)
+        link.subscribe(self._on_message)
 
-    def _hear(self, message: Message) -> None:
+    def _on_message(self, message: Message) -> None:
         if message.get_type() == "HEARTBEAT":
-            self._armed = bool(message.base_mode & ARMED)
+            self._armed = is_armed(message)
 
     @property
     def armed(self) -> bool:
-        """Whether it is armed; waits for the first HEARTBEAT.
+        """True if the vehicle is armed; waits for the first HEARTBEAT.
 
         Raises
         ------
@@ -60,34 +66,37 @@ class ArmingMonitor:
         return self._armed
 
 
+def is_armed(heartbeat: Message) -> bool:
+    """Return True if a HEARTBEAT says that its sender is armed."""
+    return bool(heartbeat.base_mode & ARMED)
+
+
 def check_prearm(link: Link) -> PrearmState:
-    """Have the vehicle check itself, and hear what it says.
+    """Have the vehicle run its pre-arm checks, and collect its answers.
 
     Raises
     ------
     EndOfCapture, LinkError : see Link.messages.
     """
-    m, vehicle = dialect(), link.vehicle
+    m, is_px4 = dialect(), link.vehicle.family == PX4
     ready: bool | None = None
     complaints: list[str] = []
     for _ in range(TRIES):
         for number, param in ((m.MAV_CMD_RUN_PREARM_CHECKS, 0), (m.MAV_CMD_REQUEST_MESSAGE, SYS_STATUS)):
-            link.send(
-                link.mav.command_long_encode(vehicle.system, vehicle.component, number, 0, param, 0, 0, 0, 0, 0, 0)
-            )
+            link.send(encode_command(link, number, param))
         for message in link.messages(link.now_ns() + COMPLAINTS_NS):
             if message.get_type() == "SYS_STATUS":
-                ready = _ready(message, vehicle.family == PX4)
+                ready = _is_ready(message, is_px4)
             if message.get_type() == "STATUSTEXT" and message.text.startswith(PREFIXES):
                 complaints.append(message.text.partition(": ")[2])
         if ready is not None:
             break
-    if ready is False and not complaints and vehicle.family == PX4:
+    if ready is False and not complaints and is_px4:
         complaints.append(IN_EVENTS)
     return PrearmState(ready, tuple(dict.fromkeys(complaints)))
 
 
-def _ready(message: Message, is_px4: bool) -> bool | None:
-    """What a SYS_STATUS says; PX4 sets the check in `health` and never in `present`."""
+def _is_ready(message: Message, is_px4: bool) -> bool | None:
+    """Return the state in a SYS_STATUS, None if it lacks the check; PX4 never lists it as present."""
     known = is_px4 or message.onboard_control_sensors_present & PREARM_CHECK
     return bool(message.onboard_control_sensors_health & PREARM_CHECK) if known else None

@@ -1,7 +1,7 @@
-"""A prompt as a STATUSTEXT to the vehicle: its log then says what was done to it, and a simulated hand obeys it.
+"""Prompts as STATUSTEXT to the vehicle: its log then says what was asked, and a simulated hand obeys them.
 
-The text is `mpucal: KIND` with, where one orientation is wanted, the unit vector in the vehicle's axes that is to
-point down: `mpucal: rotate, down +0.58 -0.58 +0.58`.
+The text is `mpucal: KIND`; where one orientation is wanted, the unit vector in the vehicle's axes that is to point
+down follows: `mpucal: rotate, down +0.58 -0.58 +0.58`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Direction = tuple[float, float, float]
 
 
 class Prompt(Protocol):
-    """What a session tells the person; see session.events.Prompt."""
+    """A session's instruction to the operator; see session.events.Prompt."""
 
     @property
     def kind(self) -> str: ...  # noqa: D102
@@ -27,21 +27,21 @@ class Prompt(Protocol):
 
 
 class ReceivedPrompt(NamedTuple):
-    """A prompt as it arrives: its kind, and the unit vector to point down, if one is wanted."""
+    """A prompt as the vehicle receives it: its kind, and the unit vector to point down, if one is wanted."""
 
     kind: str
     down: Direction | None
 
 
 def encode_prompt(prompt: Prompt) -> Message:
-    """The STATUSTEXT that says it."""
+    """Return the STATUSTEXT that holds the prompt."""
     m = dialect()
     down = "" if prompt.down is None else ", down {:+.2f} {:+.2f} {:+.2f}".format(*prompt.down)
     return m.MAVLink_statustext_message(m.MAV_SEVERITY_INFO, f"mpucal: {prompt.kind}{down}".encode())
 
 
 def decode_prompt(message: Message) -> ReceivedPrompt | None:
-    """The prompt in it, if there is one."""
+    """Return the prompt in a message, None if it holds none."""
     if message.get_type() != "STATUSTEXT":
         return None
     found = _TEXT.fullmatch(message.text)

@@ -9,7 +9,7 @@ POLL_S = 0.05
 
 
 class RecordedSource:
-    """The samples of a .tlog that another ground station recorded, a twentieth of a second at a time."""
+    """Source of the samples of another ground station's .tlog, a twentieth of a second at a time."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
@@ -17,11 +17,11 @@ class RecordedSource:
         self._now_s = float(recording.t[0])
 
     def start(self) -> Sensor:
-        """What is known of the sensor."""
+        """Return the sensor of the recording."""
         return self._recording.sensor
 
     def poll(self) -> Samples:
-        """The next samples.
+        """Return the next samples.
 
         Raises
         ------
@@ -36,16 +36,16 @@ class RecordedSource:
         return Samples(*(getattr(part, name) for name in Samples.__dataclass_fields__))
 
     def recording(self) -> Recording:
-        """All of it."""
+        """Return the whole recording."""
         return self._recording
 
     def forget(self) -> None:
-        """Let go of what was polled."""
+        """Drop the samples that were polled."""
         self._recording, self._at = self._recording.part(self._at, len(self._recording)), 0
 
     def now_ns(self) -> int:
-        """The samples' clock."""
+        """Return the time of the samples' clock."""
         return round(self._now_s * 1e9)
 
     def stop(self) -> None:
-        """Nothing."""
+        """Do nothing: there is no device to stop."""

@@ -1,4 +1,4 @@
-"""A message to a vehicle and its answer, asked for again where one of them is lost."""
+"""Requests to a vehicle, which are repeated until the answer arrives."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ def ask(
 
     Parameters
     ----------
-    reply : what a message answers, None where it is no answer. timeout_s : after which it is sent again.
+    reply : returns the answer in a message, None if it holds no answer. timeout_s : after which it is sent again.
 
     Returns
     -------
-    The answer, or None where none came.
+    The answer, or None if none came.
 
     Raises
     ------
@@ -41,15 +41,17 @@ def ask(
     return None
 
 
+def encode_command(link: Link, number: int, *params: float) -> Message:
+    """Return MAV_CMD `number` with up to seven parameters as COMMAND_LONG."""
+    return link.encode("command_long", number, 0, *params, *[0.0] * (7 - len(params)))
+
+
 def send_command(link: Link, number: int, *params: float, timeout_s: float = 1.0, tries: int = 3) -> int | None:
-    """Send MAV_CMD `number` as COMMAND_LONG; the MAV_RESULT of its COMMAND_ACK, None where none came."""
-    seven = [*params, *[0.0] * (7 - len(params))]
-    vehicle = link.vehicle
-    message = link.mav.command_long_encode(vehicle.system, vehicle.component, number, 0, *seven)
+    """Send MAV_CMD `number` until it is acknowledged; return COMMAND_ACK's MAV_RESULT, None if none came."""
 
     def reply(received: Message) -> int | None:
         if received.get_type() != "COMMAND_ACK" or received.command != number:
             return None
         return None if received.result == dialect().MAV_RESULT_IN_PROGRESS else int(received.result)
 
-    return ask(link, message, reply, timeout_s, tries)
+    return ask(link, encode_command(link, number, *params), reply, timeout_s, tries)

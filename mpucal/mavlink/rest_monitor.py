@@ -1,4 +1,4 @@
-"""How a vehicle's IMUs read while it lies still, and how it was turned in between."""
+"""Mean accelerations of a vehicle's IMUs while it is at rest, and its rotation between two rests."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ LONGEST_STEP_S = 1.0
 
 @dataclass(frozen=True)
 class RestMeans:
-    """What the streams said while the vehicle lay still.
+    """The streams of a vehicle at rest.
 
     Attributes
     ----------
-    mean : (3,) m/s^2, of each stream. error : (3,), how far the mean may be off (one standard deviation).
-    attitude : (3, 3) as it ended, from the vehicle's axes to those at the start, by the first stream's gyroscope.
+    mean : (3,) m/s^2 of each stream. error : (3,) standard deviations of the means.
+    attitude : (3, 3) at the end, from the vehicle's axes to those at the start, by the first stream's gyroscope.
     """
 
     mean: dict[Stream, Vector]
@@ -40,11 +40,11 @@ class RestMeans:
 
 
 class RestMonitor:
-    """Watches the streams of a locked link.
+    """Listener to the streams of a locked link, which waits for rests.
 
     Parameters
     ----------
-    streams : one of each IMU; they are asked for, and left on.
+    streams : one of each IMU; they are requested, and left on.
     """
 
     def __init__(self, link: Link, streams: Sequence[Stream]) -> None:
@@ -53,34 +53,35 @@ class RestMonitor:
         self._attitude: Vector = np.eye(3)
         self._gyro_bias: Vector | None = None
         self._last: int | None = None
-        self._found: dict[Stream, list[Reading]] = {}
-        link.subscribe(self._hear)
+        self._window: dict[Stream, list[Reading]] = {}
+        link.subscribe(self._on_message)
 
     def wait(self) -> RestMeans | None:
-        """Wait until all streams lay still for two windows, and return the second; None where they did not.
+        """Wait until all streams were at rest for two windows; return the second, None if they were not.
 
-        Two, because a person who is told to set it down takes a second to begin.
+        There are two because an operator who is told to set the vehicle down takes a second to begin.
 
         Raises
         ------
         LinkError : a stream does not come. EndOfCapture : a replay holds no more.
         """
         end_ns = self._link.now_ns() + PATIENCE_NS
-        self._ask()
-        # an autopilot takes the gyroscopes' biases away
+        self._request()
+        # An autopilot has subtracted the gyroscopes' biases.
         detectors = {stream: Detector(QUIET, bias=np.zeros(3)) for stream in self._streams}
         before: list[int | None] | None = None
         while True:
-            self._window()
-            missing = [stream for stream in self._streams if len(self._found[stream]) < FEWEST]
-            runs = None if missing else [_run(detectors[stream], self._found[stream]) for stream in self._streams]
+            self._window = {stream: [] for stream in self._streams}
+            list(self._link.messages(self._link.now_ns() + WINDOW_NS))
+            missing = [stream for stream in self._streams if len(self._window[stream]) < FEWEST]
+            runs = None if missing else [_rest_number(detectors[s], self._window[s]) for s in self._streams]
             now = None if runs is None or None in runs else self._means()
             if now is not None and runs == before:
                 return now
             before = runs
             if self._link.now_ns() < end_ns:
                 if missing:
-                    self._ask()
+                    self._request()
                 continue
             if not missing:
                 return None
@@ -89,20 +90,16 @@ class RestMonitor:
                 "check the link, and that no other ground station lowers its rates",
             )
 
-    def _ask(self) -> None:
+    def _request(self) -> None:
         set_interval = dialect().MAV_CMD_SET_MESSAGE_INTERVAL
         for stream in self._streams:
             send_command(self._link, set_interval, MESSAGE_ID[stream.name], INTERVAL_US, tries=5)
 
-    def _window(self) -> None:
-        self._found = {stream: [] for stream in self._streams}
-        list(self._link.messages(self._link.now_ns() + WINDOW_NS))
-
-    def _hear(self, message: Message) -> None:
+    def _on_message(self, message: Message) -> None:
         content = decode_reading(message)
         if content is None or content.stream not in self._streams:
             return
-        self._found.setdefault(content.stream, []).append(content)
+        self._window.setdefault(content.stream, []).append(content)
         if content.stream != self._streams[0]:
             return
         step_s = 0.0 if self._last is None else (content.time - self._last) * content.stream.unit_us * 1e-6
@@ -112,19 +109,19 @@ class RestMonitor:
 
     def _means(self) -> RestMeans:
         mean, error = {}, {}
-        for stream, readings in self._found.items():
+        for stream, readings in self._window.items():
             acc = np.array([r.acc for r in readings])
             mean[stream] = acc.mean(axis=0)
-            # a hand trembles slowly: its samples are no independent ones
+            # A hand trembles slowly: its samples are not independent.
             error[stream] = acc.std(axis=0) / 4
-        self._gyro_bias = np.mean([r.gyr for r in self._found[self._streams[0]]], axis=0)
+        self._gyro_bias = np.mean([r.gyr for r in self._window[self._streams[0]]], axis=0)
         return RestMeans(mean, error, self._attitude)
 
 
-def _run(detector: Detector, readings: Sequence[Reading]) -> int | None:
-    """The number of the stillness that readings show throughout, None where they moved."""
+def _rest_number(detector: Detector, readings: Sequence[Reading]) -> int | None:
+    """Return the detector's number of the rest that lasts throughout `readings`, None if they moved."""
     rows = np.array([(r.acc, r.gyr) for r in readings])
-    # in halves: what turns steadily is somewhere else in the second
+    # By halves: a steady rotation is in another orientation in the second.
     sights = [detector.add(of_rows(half[:, 0], half[:, 1])) for half in np.array_split(rows, 2)]
     runs = {sight.run if isinstance(sight, Still) else None for sight in sights}
     return runs.pop() if len(runs) == 1 else None

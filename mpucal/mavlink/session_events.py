@@ -1,7 +1,7 @@
-"""A session's own events as STATUSTEXT messages of its own ids, so that any tool opens the .tlog.
+"""A session's events as STATUSTEXT messages with ids of their own, so that any tool opens the .tlog.
 
-The text is `mpucal ` and a JSON object; STATUSTEXT (253) holds 50 characters, and chunks of one `id` what is longer.
-A chunk of less than 50 characters is the last one.
+The text is `mpucal ` and a JSON object; STATUSTEXT (253) holds 50 characters, and chunks of one `id` hold what is
+longer. A chunk of less than 50 characters is the last one.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ MOST_CHUNKS = 256
 
 
 class Note(NamedTuple):
-    """An event's name and what belongs to it, of JSON's own types."""
+    """An event's name and its data, of JSON's own types."""
 
     name: str
     data: Mapping[str, Any]
 
 
 def encode_note(note: Note, id_: int) -> list[Message]:
-    """The messages that hold `note`.
+    """Return the messages that hold `note`.
 
     Parameters
     ----------
@@ -46,14 +46,14 @@ def encode_note(note: Note, id_: int) -> list[Message]:
 
 
 class NoteReader:
-    """Notes from messages, as they come."""
+    """Decoder of notes, which takes the messages as they come."""
 
     def __init__(self) -> None:
         self._id: int | None = None
         self._chunks: list[bytes] = []
 
     def add(self, message: Message) -> Note | None:
-        """The note that `message` completes, if it does."""
+        """Return the note that `message` completes, None if it completes none."""
         if message.get_type() != "STATUSTEXT" or not is_own(message):
             return None
         text = message.text if isinstance(message.text, bytes) else message.text.encode()
@@ -63,15 +63,15 @@ class NoteReader:
             self._id = None
             return None
         self._chunks.append(text)
-        return _note(b"".join(self._chunks)) if len(text) < CHUNK else None
+        return _decode(b"".join(self._chunks)) if len(text) < CHUNK else None
 
 
 def is_own(message: Message) -> bool:
-    """Whether it has the ids under which mpucal speaks."""
+    """Return True if the sender's ids are mpucal's."""
     return bool((message.get_srcSystem(), message.get_srcComponent()) == (OWN_SYSTEM, OWN_COMPONENT))
 
 
-def _note(text: bytes) -> Note | None:
+def _decode(text: bytes) -> Note | None:
     if not text.startswith(PREFIX):
         return None
     try:

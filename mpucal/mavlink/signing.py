@@ -1,4 +1,4 @@
-"""The key of MAVLink 2 signing, from a file."""
+"""Key of MAVLink 2 signing, read from a file."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from ..arguments import content
 from ..errors import RecordingError, UsageError
 
 KEY_BYTES = 32
-# longer than any passphrase
+# No passphrase is longer.
 MOST_BYTES = 4096
 _HEXADECIMAL = re.compile(rb"\s*([0-9a-fA-F]{64})\s*")
 
 
 def read_key(path: Path) -> bytes:
-    """The 32 bytes of a key file: as they are, as 64 hexadecimal digits, or as a passphrase's SHA-256.
+    """Return the key in a file: its 32 bytes, its 64 hexadecimal digits, or the SHA-256 of its passphrase.
 
-    Ground stations make keys of passphrases in that way. A file of 32 bytes is the key itself, unless it is a line of
-    text with its end: that is a passphrase of 31 letters, or 30. Blanks around a passphrase are no part of it.
+    Ground stations hash passphrases in the same way. A file of 32 bytes is the key itself, unless it is a line of
+    text with its end: a passphrase of 31 or 30 letters. White space around a passphrase is ignored.
 
     Raises
     ------

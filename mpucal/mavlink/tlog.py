@@ -1,4 +1,4 @@
-"""The .tlog that ground stations write: repeated [8 bytes big-endian, us since 1970] + packet."""
+"""The .tlog format of ground stations: repeated [8 bytes big-endian, us since 1970] + packet."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from typing import NamedTuple, Self
 
 from ..disk.growing import Growing
 from ..errors import CaptureError, OutputError
-from .dialect import HEADER, LONGEST, packet_length
+from .dialect import BEGINNING, HEADER, LONGEST, packet_length
+from .transport import US
 
 STAMP = struct.Struct(">Q")
-US = 1_000
-# later than any clock, and earlier than nearly all bytes that are no time
+# No clock is later, and nearly all bytes that are not a time are.
 LATEST_US = 1 << 52
 FLUSH_NS = 500_000_000
 
@@ -29,7 +29,7 @@ class Record(NamedTuple):
 
 
 class TlogWriter:
-    """Writes each packet as it comes; a program that is killed loses the last second at most.
+    """Writer of packets as they come; a killed program loses the last second at most.
 
     Raises
     ------
@@ -41,7 +41,7 @@ class TlogWriter:
         self._file = Growing(path)
 
     def packet(self, t_ns: int, data: bytes) -> None:
-        """Keep a packet."""
+        """Write a packet."""
         try:
             self._file.write(STAMP.pack(t_ns // US) + data)
             if t_ns - self._flushed_ns >= FLUSH_NS:
@@ -51,7 +51,7 @@ class TlogWriter:
             raise self._file.failed(error) from error
 
     def close(self) -> None:
-        """Write what is left."""
+        """Write what is left, and close the file."""
         try:
             self._file.close()
         except OSError as error:
@@ -61,17 +61,17 @@ class TlogWriter:
         return self
 
     def __exit__(self, kind: object, *_: object) -> None:
-        # what ends it by another error is told by that
+        # An error that already ends the program is not hidden by one of closing.
         with suppress(*(() if kind is None else (OutputError,))):
             self.close()
 
 
 class Tlog(NamedTuple):
-    """What a .tlog holds.
+    """Content of a .tlog.
 
     Attributes
     ----------
-    records : in the order in which they stand. name : what to call the file.
+    records : in their order. name : of the file.
     recovered : None, or the sentence that says how much of it is damaged.
     """
 
@@ -81,7 +81,7 @@ class Tlog(NamedTuple):
 
 
 def read_tlog(path: Path) -> Tlog:
-    """Read a .tlog; what is damaged in it is left out.
+    """Read a .tlog; damaged parts are skipped.
 
     Raises
     ------
@@ -93,15 +93,15 @@ def read_tlog(path: Path) -> Tlog:
 
 
 class TlogFile:
-    """The records of a .tlog, read as they are gone through, as often as that; what is damaged is left out.
+    """The records of a .tlog, read from the file at each iteration; damaged parts are skipped.
 
     Attributes
     ----------
-    name, recovered : see Tlog; the latter once all records were read.
+    name, recovered : see Tlog; `recovered` is set by the end of an iteration.
 
     Raises
     ------
-    CaptureError : where records are asked for, it cannot be read, or holds no packet.
+    CaptureError : in an iteration, if it cannot be read, or holds no packet.
     """
 
     def __init__(self, path: Path) -> None:
@@ -114,7 +114,7 @@ class TlogFile:
         try:
             with self._path.open("rb") as file:
                 size = os.fstat(file.fileno()).st_size
-                # what has no bytes cannot be mapped
+                # An empty file cannot be mapped.
                 if size:
                     with mmap(file.fileno(), 0, access=ACCESS_READ) as data:
                         for record in _records(data):
@@ -137,13 +137,13 @@ def _records(data: mmap) -> Iterator[Record]:
         begin = at + STAMP.size
         length = packet_length(data[begin : begin + LONGEST]) if data[begin] in HEADER else None
         if stamp_us >= LATEST_US or length is None or begin + length > len(data):
-            at = _next(data, begin + 1) - STAMP.size
+            at = _next_beginning(data, begin + 1) - STAMP.size
             continue
         yield Record(stamp_us * US, data[begin : begin + length])
         at = begin + length
 
 
-def _next(data: mmap, begin: int) -> int:
-    """Where the next packet may begin: at its first byte."""
-    found = [at for mark in HEADER if (at := data.find(bytes([mark]), begin)) >= 0]
-    return min(found, default=len(data))
+def _next_beginning(data: mmap, begin: int) -> int:
+    # Only its position leaves this function: a match object would keep the file mapped.
+    found = BEGINNING.search(data, begin)
+    return len(data) if found is None else found.start()

@@ -1,4 +1,4 @@
-"""A .tlog in place of a vehicle: the packets come again at their times, and what we send goes nowhere."""
+"""Replay of a .tlog in place of a vehicle: the packets come again at their times, and nothing is sent."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..errors import EndOfCapture
-from .dialect import Packet, Parser, dialect
+from .dialect import Parser, dialect
 from .session_events import Note, NoteReader, is_own
 from .tlog import Tlog
 from .transport import PAUSE_NS, ReceivedBytes
@@ -21,9 +21,9 @@ class TimedNote(NamedTuple):
 
 
 class TlogReplay:
-    """A transport of the recorded packets; the notes among them wait for `pending`.
+    """Transport of the recorded packets, which keeps the notes among them for `pending`.
 
-    What mpucal itself sent when it recorded is passed over.
+    The packets that mpucal itself sent are skipped.
     """
 
     datagrams, outward = True, False
@@ -31,7 +31,7 @@ class TlogReplay:
     def __init__(self, tlog: Tlog) -> None:
         self.name = tlog.name
         self._records = tlog.records
-        # whatever was recorded: our own heartbeats tell a vehicle that was silent from a program that stood still
+        # Times of all packets: our own heartbeats show that a vehicle was silent, and the program was not suspended.
         self._times_ns = [record.t_ns for record in tlog.records]
         self._parser = Parser(dialect().MAVLink(None))
         self._notes = NoteReader()
@@ -39,7 +39,7 @@ class TlogReplay:
         self._at = 0
         self._now_ns = tlog.records[0].t_ns
         self._end_ns = tlog.records[-1].t_ns
-        self._pass_own()
+        self._skip_own()
 
     def now_ns(self) -> int:
         """See Transport."""
@@ -64,20 +64,20 @@ class TlogReplay:
         t_ns = max(record.t_ns, self._now_ns)
         self._now_ns = t_ns
         self._at += 1
-        self._pass_own()
+        self._skip_own()
         return ReceivedBytes(record.data, self.name, t_ns)
 
     def send(self, data: bytes, address: str | None) -> None:
-        """See Transport: nobody hears it."""
+        """Do nothing: no vehicle is there."""
 
     def restrict(self, address: str | None) -> None:
-        """See Transport: it holds one vehicle's packets."""
-
-    def close(self) -> None:
         """See Transport."""
 
+    def close(self) -> None:
+        """Do nothing: no file is open."""
+
     def pending(self, name: str) -> Sequence[TimedNote]:
-        """The notes of that name made until now that stand before the next packet, each once."""
+        """Return the notes of that name made until now that stand before the next packet, each once."""
 
         def is_due(noted: TimedNote) -> bool:
             return noted.t_ns <= self._now_ns and noted.note.name == name
@@ -85,19 +85,15 @@ class TlogReplay:
         pending, self._pending = self._pending, [noted for noted in self._pending if not is_due(noted)]
         return [noted for noted in pending if is_due(noted)]
 
-    def _pass_own(self) -> None:
-        """Go on to the next packet that is not of mpucal."""
+    def _skip_own(self) -> None:
+        """Move on to the next packet that is not mpucal's."""
         while self._at < len(self._records):
             record = self._records[self._at]
             packets = self._parser.datagram(record.data)
-            if not _are_own(packets):
+            if not packets or not all(is_own(packet.message) for packet in packets):
                 return
             self._at += 1
             for packet in packets:
                 note = self._notes.add(packet.message)
                 if note is not None:
                     self._pending.append(TimedNote(record.t_ns, note))
-
-
-def _are_own(packets: Sequence[Packet]) -> bool:
-    return bool(packets) and all(is_own(packet.message) for packet in packets)

@@ -1,4 +1,7 @@
-"""The protocol of what moves a link's bytes and has the clock: UDP, TCP, serial, a .tlog, a simulated vehicle."""
+"""The transport protocol: a transport moves a link's bytes and has its clock.
+
+UDP, TCP, a serial line, a .tlog that is replayed and a simulated vehicle are transports.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,12 @@ import time
 from typing import NamedTuple, Protocol
 
 US = 1_000
-# who asked for bytes until a time, and gets them so much later, stood still meanwhile: SIGSTOP, a suspended computer
+# A receive that ends so long after its deadline was interrupted: SIGSTOP, or a suspended computer.
 PAUSE_NS = 3_000_000_000
 
 
 class ReceivedBytes(NamedTuple):
-    """Bytes that arrived: a datagram or a piece of a stream; from where, and when (ns since 1970, whole us)."""
+    """A datagram or a piece of a stream, its sender's address, and when it arrived [ns since 1970, whole us]."""
 
     data: bytes
     address: str
@@ -19,13 +22,13 @@ class ReceivedBytes(NamedTuple):
 
 
 class Transport(Protocol):
-    """Moves bytes, and has the clock.
+    """Carrier of a link's bytes.
 
     Attributes
     ----------
-    name : where it leads, in words.
-    datagrams : bytes come in datagrams of whole packets; else as a stream.
-    outward : it leads to one partner that the person named, who may be spoken to at once.
+    name : the other end, as messages call it.
+    datagrams : bytes come in datagrams of whole packets; otherwise as a stream.
+    outward : it leads to one partner that the user named, to whom we may send before anything is received.
     """
 
     name: str
@@ -33,32 +36,39 @@ class Transport(Protocol):
     outward: bool
 
     def now_ns(self) -> int:
-        """ns since 1970, in whole us, as a .tlog counts; never goes back."""
+        """Return the time in ns since 1970, in whole us as in a .tlog; it never decreases."""
         ...
 
     def receive(self, until_ns: int) -> ReceivedBytes | None:
-        """The next bytes, waited for until `until_ns`; None where none came. EndOfCapture, LinkError."""
+        """Return the next bytes, or None if none come until `until_ns`. Raises EndOfCapture or LinkError."""
         ...
 
     def send(self, data: bytes, address: str | None) -> None:
-        """Send to `address`, as `receive` gave it; None: to the partner of an outward transport. LinkError."""
+        """Send to an address as `receive` gave it; None is the partner of an outward transport. Raises LinkError."""
         ...
 
     def restrict(self, address: str | None) -> None:
-        """From now on hear that address alone, where the transport can see to it; None: whoever sends, as at first."""
+        """Accept bytes from that address alone, None: from everybody. A transport with one partner ignores it."""
         ...
 
     def close(self) -> None:
-        """Let go of it."""
+        """Release what the transport holds open."""
         ...
 
 
 class SteadyClock:
-    """Time of day at the start, counted on by the clock that nobody sets."""
+    """Time of day at the start, counted on by the monotonic clock, which nobody sets."""
 
     def __init__(self) -> None:
         self._offset_ns = time.time_ns() - time.monotonic_ns()
 
     def now_ns(self) -> int:
-        """ns since 1970, in whole us."""
+        """Return ns since 1970, in whole us."""
         return (self._offset_ns + time.monotonic_ns()) // US * US
+
+
+class OnePartner(SteadyClock):
+    """Base of the transports of this computer that lead to one partner."""
+
+    def restrict(self, address: str | None) -> None:
+        """See Transport."""

@@ -1,4 +1,4 @@
-"""Bytes to and from a vehicle over UDP, TCP or a serial line, with the time."""
+"""Transports over UDP, TCP and serial lines."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from typing import Any
 
 from ..errors import LinkError, NoAnswer
 from .reconnecting import ReconnectingTransport
-from .transport import ReceivedBytes, SteadyClock, Transport
+from .transport import OnePartner, ReceivedBytes, SteadyClock, Transport
 from .url import Kind, Url
 
 CHUNK = 65536
 CONNECT_S = 5.0
-# what a busy second of three IMUs may pile up while a fit runs
+# Three IMUs may pile this up in a second in which a fit keeps the processor busy.
 RECEIVE_BUFFER = 4 << 20
 
 
-class Udp:
-    """A UDP socket: listening for whoever sends, or speaking to one partner.
+class Udp(SteadyClock):
+    """UDP socket, which listens to every sender or speaks to one partner.
 
     Raises
     ------
-    LinkError : the port is taken, or there is no such host.
+    LinkError : the port is taken, or the host is unknown.
     """
 
     datagrams = True
 
     def __init__(self, url: Url) -> None:
-        self._clock = SteadyClock()
+        super().__init__()
         self.name = str(url)
         self.outward = url.kind is Kind.UDPOUT
         self._url = url
@@ -48,17 +48,8 @@ class Udp:
             self._socket.close()
             raise _cannot_open(self._url, error) from error
 
-    @property
-    def port(self) -> int:
-        """Our own port."""
-        return int(self._socket.getsockname()[1])
-
-    def now_ns(self) -> int:
-        """See Transport."""
-        return self._clock.now_ns()
-
     def receive(self, until_ns: int) -> ReceivedBytes | None:
-        """See Transport; who refuses our datagrams is not there yet."""
+        """See Transport. A partner that refuses our datagrams is not there yet."""
         if not _readable(self._socket, until_ns - self.now_ns()):
             return None
         try:
@@ -68,39 +59,37 @@ class Udp:
         return ReceivedBytes(data, f"{host}:{port}", self.now_ns())
 
     def send(self, data: bytes, address: str | None) -> None:
-        """See Transport; a datagram that cannot go out is lost, as any may be."""
-        host, _, port = (address or "").rpartition(":")
+        """See Transport. A datagram that cannot be sent is lost, as any datagram may be."""
         with suppress(OSError):
-            self._socket.sendto(data, (host, int(port)) if address else self._partner)
+            self._socket.sendto(data, _host_port(address) if address else self._partner)
 
     def restrict(self, address: str | None) -> None:
-        """See Transport: a connected socket's strangers are turned away by the kernel, before they fill its buffer."""
+        """See Transport. The kernel drops other senders' datagrams before they fill a connected socket's buffer."""
         if address is None:
             self._socket.close()
             self._open()
             return
-        host, _, port = address.rpartition(":")
         with suppress(OSError):
-            self._socket.connect((host, int(port)))
-            self._partner = (host, int(port))
+            self._socket.connect(_host_port(address))
+            self._partner = _host_port(address)
 
     def close(self) -> None:
         """See Transport."""
         self._socket.close()
 
 
-class Tcp:
-    """A TCP connection to a vehicle or a router.
+class Tcp(OnePartner):
+    """TCP connection to a vehicle or a router.
 
     Raises
     ------
-    NoAnswer : nobody listens there. LinkError : there is no such host.
+    NoAnswer : nobody listens there. LinkError : the host is unknown.
     """
 
     datagrams, outward = False, True
 
     def __init__(self, url: Url) -> None:
-        self._clock = SteadyClock()
+        super().__init__()
         self.name = str(url)
         try:
             self._socket = socket.create_connection((url.host, url.port), CONNECT_S)
@@ -112,10 +101,6 @@ class Tcp:
             raise _cannot_open(url, error) from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
-    def now_ns(self) -> int:
-        """See Transport."""
-        return self._clock.now_ns()
-
     def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport."""
         if not _readable(self._socket, until_ns - self.now_ns()):
@@ -125,7 +110,7 @@ class Tcp:
         except OSError as error:
             raise _broken(self.name, error) from error
         if not data:
-            raise LinkError(f"{self.name} closed the connection", "start it again, then the session")
+            raise LinkError(f"{self.name} closed the connection", "restart it, then the session")
         return ReceivedBytes(data, self.name, self.now_ns())
 
     def send(self, data: bytes, address: str | None) -> None:
@@ -135,20 +120,17 @@ class Tcp:
         except OSError as error:
             raise _broken(self.name, error) from error
 
-    def restrict(self, address: str | None) -> None:
-        """See Transport: it has one partner."""
-
     def close(self) -> None:
         """See Transport."""
         self._socket.close()
 
 
-class Serial:
-    """A serial line: an autopilot's USB port, a telemetry radio.
+class Serial(OnePartner):
+    """Serial line: an autopilot's USB port or a telemetry radio.
 
     Raises
     ------
-    LinkError : no such device, or no permission.
+    LinkError : there is no such device, or no permission to open it.
     """
 
     datagrams, outward = False, True
@@ -156,17 +138,13 @@ class Serial:
     def __init__(self, url: Url) -> None:
         import serial  # noqa: PLC0415
 
-        self._clock = SteadyClock()
+        super().__init__()
         self.name = str(url)
         self._failure: Any = (OSError, serial.SerialException)
         try:
             self._port = serial.Serial(url.host, url.port, timeout=0, write_timeout=1.0, exclusive=True)
         except (OSError, ValueError) as error:
             raise _cannot_open(url, error) from error
-
-    def now_ns(self) -> int:
-        """See Transport."""
-        return self._clock.now_ns()
 
     def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport."""
@@ -177,7 +155,7 @@ class Serial:
         return ReceivedBytes(data, self.name, self.now_ns()) if data else None
 
     def _read(self, wait_ns: int) -> bytes:
-        if not hasattr(self._port, "fileno"):  # Windows has no file to wait for
+        if not hasattr(self._port, "fileno"):  # Windows has no file descriptor to wait for.
             self._port.timeout = max(wait_ns, 0) * 1e-9
             return bytes(self._port.read(max(1, self._port.in_waiting)))
         return bytes(self._port.read(CHUNK)) if _readable(self._port, wait_ns) else b""
@@ -189,16 +167,13 @@ class Serial:
         except self._failure as error:
             raise _broken(self.name, error) from error
 
-    def restrict(self, address: str | None) -> None:
-        """See Transport: it has one partner."""
-
     def close(self) -> None:
         """See Transport."""
         self._port.close()
 
 
 def open_transport(url: Url) -> Transport:
-    """What a URL names, open; a connection or a device that goes away is opened again.
+    """Open the transport that a URL names; a connection or a device that goes away is opened again.
 
     Raises
     ------
@@ -209,6 +184,11 @@ def open_transport(url: Url) -> Transport:
     return ReconnectingTransport(url, Serial) if url.kind is Kind.SERIAL else Udp(url)
 
 
+def _host_port(address: str) -> tuple[str, int]:
+    host, _, port = address.rpartition(":")
+    return host, int(port)
+
+
 def _readable(channel: Any, wait_ns: int) -> bool:
     return bool(select.select([channel], [], [], max(wait_ns, 0) * 1e-9)[0])
 
@@ -217,14 +197,14 @@ def _cannot_open(url: Url, error: Exception) -> LinkError:
     remedy = "check that it is plugged in, that no other program uses it, and that you may open it"
     if url.kind is not Kind.SERIAL:
         remedy = "check host and port, and that no other ground station listens there"
-    return LinkError(f"{url} cannot be opened ({_why(error)})", remedy)
+    return LinkError(f"{url} cannot be opened ({_cause(error)})", remedy)
 
 
 def _broken(name: str, error: Exception) -> LinkError:
-    return LinkError(f"the link over {name} broke ({_why(error)})", "check cable and power, then start again")
+    return LinkError(f"the link over {name} broke ({_cause(error)})", "check cable and power, then start again")
 
 
-def _why(error: Exception) -> str:
+def _cause(error: Exception) -> str:
     number = getattr(error, "errno", None)
     if number in (errno.EAGAIN, errno.EBUSY):
         return "another program uses it"

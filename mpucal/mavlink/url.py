@@ -1,4 +1,4 @@
-"""Where a vehicle is, in a URL's words: udp:14550, tcp:HOST:PORT, a serial device."""
+"""URLs of vehicles: udp:14550, tcp:HOST:PORT, a serial device."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from ..errors import UsageError
 
 FORMS = "udp:PORT, udp:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, or a serial device such as /dev/ttyACM0:115200"
 EVERYWHERE = "0.0.0.0"
-USB_BAUD = 115200  # what a USB port ignores, and a telemetry port of neither autopilot uses
+USB_BAUD = 115200  # USB ports ignore it; neither autopilot has it as the default of a telemetry port.
 PORTS = range(1, 65536)
 
 
 class Kind(StrEnum):
-    """How the bytes move."""
+    """Kinds of transport."""
 
     UDP = "udp"
     UDPOUT = "udpout"
@@ -28,8 +28,8 @@ class Url:
 
     Attributes
     ----------
-    kind : how the bytes move. host : whom to ask, or (UDP) which of our addresses listens; a serial device's path.
-    port : UDP's or TCP's port, or a serial device's baud.
+    kind : of transport. host : the partner, our listening address (UDP), or the path of a serial device.
+    port : of UDP or TCP; the baud rate of a serial device.
     """
 
     kind: Kind
@@ -41,41 +41,35 @@ class Url:
 
 
 def parse_url(text: str) -> Url:
-    """The words of --mavlink.
+    """Parse the value of --mavlink.
 
     Raises
     ------
-    UsageError : none of FORMS.
+    UsageError : it has none of FORMS.
     """
     head, _, rest = text.partition(":")
     if head in (Kind.UDP, Kind.UDPOUT, Kind.TCP):
         host, _, port = rest.rpartition(":")
         if rest and not host and not rest.isdecimal():
-            raise _wrong(text, "it names no port")
+            raise _not_understood(text, "it names no port")
         if not host and head == Kind.UDP:
             host = EVERYWHERE
-        return Url(Kind(head), _host(host, text), _port(port, text))
+        if not (port.isascii() and port.isdecimal() and int(port) in PORTS):
+            raise _not_understood(text, f"{port!r} is not a port" if host else "it names no host")
+        return _url(Kind(head), host, int(port), text)
     if text.startswith(("/", "serial:")):
         device, _, baud = text.removeprefix("serial:").partition(":")
-        if not baud:
-            return Url(Kind.SERIAL, _host(device, text), USB_BAUD)
-        if not baud.isdecimal() or not int(baud):
-            raise _wrong(text, f"{baud!r} is no baud rate")
-        return Url(Kind.SERIAL, _host(device, text), int(baud))
-    raise _wrong(text, "no known form")
+        if baud and not (baud.isdecimal() and int(baud)):
+            raise _not_understood(text, f"{baud!r} is not a baud rate")
+        return _url(Kind.SERIAL, device, int(baud) if baud else USB_BAUD, text)
+    raise _not_understood(text, "no known form")
 
 
-def _host(host: str, text: str) -> str:
+def _url(kind: Kind, host: str, port: int, text: str) -> Url:
     if not host:
-        raise _wrong(text, "it names no host")
-    return host
+        raise _not_understood(text, "it names no host")
+    return Url(kind, host, port)
 
 
-def _port(port: str, text: str) -> int:
-    if not (port.isascii() and port.isdecimal() and int(port) in PORTS):
-        raise _wrong(text, f"{port!r} is no port")
-    return int(port)
-
-
-def _wrong(text: str, why: str) -> UsageError:
+def _not_understood(text: str, why: str) -> UsageError:
     return UsageError(f"--mavlink {text} cannot be understood ({why})", f"give {FORMS}")

@@ -1,4 +1,4 @@
-"""Who sends an autopilot's HEARTBEAT, and from where."""
+"""A vehicle as its HEARTBEAT describes it."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from .firmwares import ARDUPILOT, PX4
 
 @dataclass(frozen=True)
 class Vehicle:
-    """Who sent an autopilot's HEARTBEAT.
+    """Sender of an autopilot's HEARTBEAT.
 
     Attributes
     ----------
-    address : from where. system, component : MAVLink ids. autopilot : MAV_AUTOPILOT. type : MAV_TYPE.
+    address : of its packets. system, component : MAVLink ids. autopilot : MAV_AUTOPILOT. type : MAV_TYPE.
     """
 
     address: str
@@ -30,16 +30,16 @@ class Vehicle:
 
     @property
     def firmware(self) -> str:
-        """The autopilot's name."""
-        names = {dialect().MAV_AUTOPILOT_PX4: "PX4", dialect().MAV_AUTOPILOT_ARDUPILOTMEGA: "ArduPilot"}
-        return names.get(self.autopilot, f"autopilot {self.autopilot}")
+        """The autopilot's name, or its number where it is neither ArduPilot nor PX4."""
+        known = (dialect().MAV_AUTOPILOT_PX4, dialect().MAV_AUTOPILOT_ARDUPILOTMEGA)
+        return self.family if self.autopilot in known else f"autopilot {self.autopilot}"
 
     def __str__(self) -> str:
         return f"system {self.system} ({self.firmware}) at {self.address}"
 
 
 def vehicle_of(address: str, message: Message) -> Vehicle | None:
-    """Whose HEARTBEAT a message from `address` is, where it is an autopilot's."""
+    """Return the sender of a message from `address` if the message is an autopilot's HEARTBEAT."""
     m = dialect()
     if message.get_type() != "HEARTBEAT" or message.autopilot == m.MAV_AUTOPILOT_INVALID:
         return None

@@ -13,10 +13,10 @@ from ..mavlink.dialect import dialect
 from ..mavlink.firmwares import ARDUPILOT, PX4
 from ..mavlink.ftp import Storage
 from ..mavlink.link import Link, S
-from ..mavlink.parameters.applied import applied, of_imu
 from ..mavlink.parameters.client import ParameterClient
-from ..mavlink.parameters.names import all_slots
+from ..mavlink.parameters.document import adapt_to_write, select_imu
 from ..mavlink.parameters.plan import NOTHING, Change, plan_changes, refused_imus, select_improving, swap_slots
+from ..mavlink.parameters.slots import all_slots
 from ..mavlink.parameters.text import param_text, params_text, read_parameters_file
 from ..mavlink.parameters.verify import SwappedSlotsError, verify
 from ..mavlink.parameters.write import NEW, OLD, Writer, is_partial_write
@@ -183,7 +183,7 @@ class AutopilotSink:
         if rest is None:
             raise WriteBackError(f"{NOTHING}: the vehicle did not lie still", "set it down, then write again")
         new = {name: value for change in planned for name, value in change.slot.values(change.new).items()}
-        now = applied(calibration, [change.imu for change in planned])
+        now = adapt_to_write(calibration, [change.imu for change in planned])
         with self._stored(now, planned) as paths:
             writer.write(old, new, lambda: verify(planned, old, rest, monitor.wait()))
         after = self._settled()
@@ -201,7 +201,7 @@ class AutopilotSink:
             yield []
             return
         storage = Storage(self._link)
-        files = {FILE.format(FOLDERS[self._firmware], change.imu): of_imu(now, change.imu) for change in planned}
+        files = {FILE.format(FOLDERS[self._firmware], change.imu): select_imu(now, change.imu) for change in planned}
         with _nothing_written():
             for path, calibration in files.items():
                 storage.put(path, calibration.blob().encode())

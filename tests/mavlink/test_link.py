@@ -252,6 +252,6 @@ def test_a_request_that_nobody_answers_gives_none(script, station):
     transport = script(heartbeats(station(), HOME, 20))
     link, _ = locked(transport)
     before_ns = link.now_ns()
-    request = link.mav.param_request_read_encode(1, 1, b"NO_SUCH", -1)
+    request = link.encode("param_request_read", b"NO_SUCH", -1)
     assert ask(link, request, lambda message: None, timeout_s=0.5, tries=4) is None
     assert link.now_ns() - before_ns == 2 * S

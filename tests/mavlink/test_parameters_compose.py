@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
 from mpucal.mavlink.parameters.compose import Correction, compose
-from mpucal.mavlink.parameters.names import px4_slot
-from mpucal.mavlink.rotation import orientation
+from mpucal.mavlink.parameters.mounting import orientation_matrix
+from mpucal.mavlink.parameters.slots import px4_slot
 from mpucal.mavlink.segments import find_recorrection
 
-ORIENTATIONS = [number for number in range(41) if orientation(number) is not None]
+ORIENTATIONS = [number for number in range(41) if orientation_matrix(number) is not None]
 
 
 def sensor(rng, cross):
@@ -41,7 +41,7 @@ def sphere(n, radius):
 @given(st.integers(0, 2**32 - 1), st.sampled_from(ORIENTATIONS))
 def test_a_sensor_without_cross_axis_terms_is_made_perfect(seed, number):
     rng = np.random.default_rng(seed)
-    R = orientation(number)
+    R = orientation_matrix(number)
     C, bias = sensor(rng, cross=0.0)
     old = Correction(rng.uniform(-0.5, 0.5, 3), rng.uniform(0.9, 1.1, 3))
     composed = compose(*calibrated(C, bias, old, R), old, R, STANDARD_GRAVITY_MPS2)
@@ -54,7 +54,7 @@ def test_a_sensor_without_cross_axis_terms_is_made_perfect(seed, number):
 @given(st.integers(0, 2**32 - 1), st.sampled_from(ORIENTATIONS))
 def test_the_offset_is_exact_and_the_residual_what_the_worst_attitude_shows(seed, number):
     rng = np.random.default_rng(seed)
-    R = orientation(number)
+    R = orientation_matrix(number)
     C, bias = sensor(rng, cross=0.02)
     old = Correction(rng.uniform(-0.5, 0.5, 3), rng.uniform(0.9, 1.1, 3))
     composed = compose(*calibrated(C, bias, old, R), old, R, STANDARD_GRAVITY_MPS2)
@@ -85,7 +85,7 @@ def test_what_is_only_turned_is_said_and_not_written():
 def test_the_stream_after_a_change_is_foretold():
     rng = np.random.default_rng(5)
     C, bias = sensor(rng, cross=0.02)
-    R = orientation(14)
+    R = orientation_matrix(14)
     old, new = (Correction(rng.uniform(-0.5, 0.5, 3), rng.uniform(0.9, 1.1, 3)) for _ in range(2))
     f = sphere(10, STANDARD_GRAVITY_MPS2)
     foretold = old.recorrect(new, R, stream(C, bias, old, R, f))
@@ -102,12 +102,12 @@ def test_orientations_are_pymavlinks_euler_angles(number):
     expected = rotmat.Matrix3()
     expected.from_euler(*(np.radians(angles.get(axis, 0.0)) for axis in ("ROLL", "PITCH", "YAW")))
     rows = [[v.x, v.y, v.z] for v in (expected.a, expected.b, expected.c)]
-    np.testing.assert_allclose(orientation(number), rows, atol=1e-12)
+    np.testing.assert_allclose(orientation_matrix(number), rows, atol=1e-12)
 
 
 def test_an_orientation_without_angles_is_unknown():
-    assert orientation(100) is None
-    assert orientation(77) is None
+    assert orientation_matrix(100) is None
+    assert orientation_matrix(77) is None
 
 
 def test_a_sensor_that_px4_names_later_than_the_next_one_keeps_its_own_correction():

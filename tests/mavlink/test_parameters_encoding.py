@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from mpucal.errors import RecordingError
 from mpucal.mavlink.dialect import Parser, dialect
 from mpucal.mavlink.parameters.encoding import error_name, from_wire, name_bytes, to_wire
-from mpucal.mavlink.parameters.names import all_slots, find_slot, mounting
+from mpucal.mavlink.parameters.mounting import mounting
+from mpucal.mavlink.parameters.slots import all_slots, find_slot
 from mpucal.mavlink.parameters.text import param_text, params_text, read_parameters_file
 
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
@@ -52,7 +53,7 @@ def test_a_name_of_sixteen_letters_has_no_end_mark():
 
 
 def test_errors_beyond_pymavlinks_enumeration_have_words():
-    assert error_name(7) == "its type is another"
+    assert error_name(7) == "it has another type"
     assert error_name(99) == "error 99"
 
 

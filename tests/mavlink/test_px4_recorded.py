@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from mpucal.cli import commands
 from mpucal.mavlink.parameters.document import NEW
-from mpucal.mavlink.parameters.names import find_slot
+from mpucal.mavlink.parameters.slots import find_slot
 
 RECORDED = Path(__file__).parent / "data" / "px4_turned.tlog"
 # of each IMU: offset [m/s^2] and scale that are right, by what fed the sensors

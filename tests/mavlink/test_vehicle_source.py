@@ -8,7 +8,8 @@ from mpucal.errors import EndOfCapture, LinkError, UsageError, WriteBackError
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.client import ParameterClient
-from mpucal.mavlink.parameters.names import ardupilot_slot, mounting
+from mpucal.mavlink.parameters.mounting import mounting
+from mpucal.mavlink.parameters.slots import ardupilot_slot
 from mpucal.mavlink.stream_parameters import read_stream_parameters, stream_parameter_names
 from mpucal.mavlink.tlog import Record, Tlog
 from mpucal.mavlink.tlog_replay import TlogReplay
@@ -269,7 +270,7 @@ def test_a_px4_that_does_not_lie_level_is_not_asked_to_name_its_sensors():
     said = []
     link = Link(SimulatedTransport(vehicle), lambda t_ns, data: None)
     VehicleSource(link, 100.0, None, said.append, "test", prepare=True).start()
-    assert [text for text in said if "was not seen to lie level" in text]
+    assert [text for text in said if "did not lie level" in text]
     assert vehicle.firmware.store["CAL_ACC0_ID"] == 0
     assert not np.any(vehicle.firmware.store.vector("CAL_ACC0_", "OFF"))
 

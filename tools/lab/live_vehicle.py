@@ -34,8 +34,7 @@ from mpucal.errors import NoAnswer
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.compose import Correction
-from mpucal.mavlink.parameters.names import mounting
-from mpucal.mavlink.parameters.names import AXES, ardupilot_slot
+from mpucal.mavlink.parameters.slots import AXES, ardupilot_slot, mounting
 from mpucal.mavlink.prompts import ReceivedPrompt
 from mpucal.mavlink.stream_parameters import read_parameters, read_stream_parameters
 from mpucal.mavlink.transport import Transport

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from mpucal.mavlink.parameters.names import slot_of
+from mpucal.mavlink.parameters.slots import slot_of
 from mpucal.result.calibration import GOOD
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 

@@ -1,1 +1,1 @@
-"""An autopilot's parameters: how they travel, what they do to a stream, what a calibration makes of them."""
+"""An autopilot's parameters: how they travel, their effect on a stream, and the values that a calibration gives."""

@@ -12,30 +12,30 @@ from ..link import Link, S
 from ..request import ask
 from .encoding import REAL32, Number, Parameter, as_float32, decode_parameter, error_name, name_bytes, to_wire
 
-# over a radio that loses a packet in five each way, ten tries fail once in 30,000
+# Over a radio that loses one packet in five each way, ten tries fail once in 30,000.
 TIMEOUT_S, TRIES = 0.5, 10
-# how late an answer may come that another was faster than
+# A second answer may come this much later than the first.
 LATE_NS = S // 2
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """The vehicle said no; `why` in words."""
+    """The vehicle's refusal, with its reason in words."""
 
     why: str
 
 
 class ParameterClient:
-    """The parameters of the vehicle that `link` is locked to."""
+    """Client of the parameters of the vehicle that `link` is locked to."""
 
     def __init__(self, link: Link) -> None:
         self._link = link
         self._bytewise = link.vehicle.family == PX4
-        self._heard: dict[str, set[Number]] = {}
-        link.subscribe(self._hear)
+        self._received: dict[str, set[Number]] = {}
+        link.subscribe(self._on_message)
 
     def read(self, names: Sequence[str]) -> dict[str, Number]:
-        """The values of all of `names`.
+        """Return the values of all of `names`.
 
         Raises
         ------
@@ -44,68 +44,69 @@ class ParameterClient:
         return {name: self._read(name).value for name in names}
 
     def read_agreed(self, names: Sequence[str]) -> dict[str, Number]:
-        """The same, where all that is heard of each agrees: two senders as one vehicle are told by their answers.
+        """Return the values of all of `names` if all answers agree: two senders with one vehicle's id do not.
 
         Raises
         ------
         LinkError : one does not come, or comes with two values. EndOfCapture : a replay holds no more.
         """
-        self._heard = {name: set() for name in names}
+        self._received = {name: set() for name in names}
         for _ in range(2):
             held = self.read(names)
         list(self._link.messages(self._link.now_ns() + LATE_NS))
-        heard, self._heard = self._heard, {}
-        for name, values in heard.items():
+        received, self._received = self._received, {}
+        for name, values in received.items():
             if len(values) > 1:
                 some = " and ".join(f"{value:.6g}" for value in sorted(values)[:2])
                 raise LinkError(
-                    f"{self._link.vehicle} is heard to hold {name} = {some}",
-                    "see who else writes parameters or answers as this vehicle; signing (--signing-key) shuts them out",
+                    f"{self._link.vehicle} answers {name} = {some}",
+                    "find out who else writes parameters or answers as this vehicle; signing (--signing-key) excludes"
+                    " them",
                 )
         return held
 
     def set(self, name: str, value: float, kind: int = REAL32) -> None:
-        """Set one, and wait until the vehicle says that it has this value.
+        """Set one, and wait until the vehicle confirms this value.
 
         Raises
         ------
-        LinkError : it refused, or said nothing, or something else. EndOfCapture : a replay holds no more.
+        LinkError : it refused, or confirmed nothing, or another value. EndOfCapture : a replay holds no more.
         """
         wanted = as_float32(value) if kind == REAL32 else value
-        vehicle = self._link.vehicle
-        message = self._link.mav.param_set_encode(
-            vehicle.system, vehicle.component, name_bytes(name), to_wire(wanted, kind, self._bytewise), kind
-        )
+        message = self._link.encode("param_set", name_bytes(name), to_wire(wanted, kind, self._bytewise), kind)
 
         def reply(received: Message) -> Parameter | Refusal | None:
             answer = self._answer(received, name)
-            # of a vector's other axes, ArduPilot echoes values from before
+            # ArduPilot echoes earlier values of a vector's other axes.
             return None if isinstance(answer, Parameter) and answer.value != wanted else answer
 
         answer = ask(self._link, message, reply, TIMEOUT_S, TRIES)
         if isinstance(answer, Parameter):
             return
         why = answer.why if isinstance(answer, Refusal) else "it did not confirm it"
-        raise LinkError(f"{vehicle} did not take {name} = {value:.6g}: {why}", "see whether it is read-only there")
+        raise LinkError(
+            f"{self._link.vehicle} did not take {name} = {value:.6g}: {why}", "check whether it is read-only there"
+        )
 
     def find_mismatches(self, values: Mapping[str, float]) -> dict[str, Number]:
-        """Those that the vehicle, read back, does not hold as given, with what it holds."""
+        """Read `values` back; return those that the vehicle holds otherwise, as it holds them."""
         held = self.read(tuple(values))
         return {name: held[name] for name, value in values.items() if held[name] != as_float32(value)}
 
-    def _hear(self, message: Message) -> None:
-        parameter = decode_parameter(message, self._bytewise) if self._heard else None
-        if parameter is not None and parameter.name in self._heard:
-            self._heard[parameter.name].add(parameter.value)
+    def _on_message(self, message: Message) -> None:
+        parameter = decode_parameter(message, self._bytewise) if self._received else None
+        if parameter is not None and parameter.name in self._received:
+            self._received[parameter.name].add(parameter.value)
 
     def _read(self, name: str) -> Parameter:
-        vehicle = self._link.vehicle
-        request = self._link.mav.param_request_read_encode(vehicle.system, vehicle.component, name_bytes(name), -1)
+        request = self._link.encode("param_request_read", name_bytes(name), -1)
         answer = ask(self._link, request, lambda received: self._answer(received, name), TIMEOUT_S, TRIES)
         if isinstance(answer, Parameter):
             return answer
         why = answer.why if isinstance(answer, Refusal) else "no answer"
-        raise LinkError(f"{vehicle} does not report {name} ({why})", "check the link and the firmware's version")
+        raise LinkError(
+            f"{self._link.vehicle} does not report {name} ({why})", "check the link and the firmware's version"
+        )
 
     def _answer(self, received: Message, name: str) -> Parameter | Refusal | None:
         if received.get_type() == "PARAM_ERROR" and received.param_id == name:

@@ -1,7 +1,9 @@
-"""What calibration.json says of an autopilot: old parameters, new ones, and what they leave."""
+"""The entries `autopilot` and `others` of a vehicle's calibration.json."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,20 +11,22 @@ import numpy as np
 from ...data import STANDARD_GRAVITY_MPS2, Autopilot
 from ...result.calibration import Calibration
 from .compose import compose
-from .names import find_slot, mounting
+from .mounting import mounting
+from .slots import find_slot, slot_of
 
+AUTOPILOT, OTHERS = "autopilot", "others"
 OLD, NEW, RESIDUAL = "params_old", "params_new", "residual_mps2"
 RESIDUAL_OLD, UNCERTAIN = "residual_old_mps2", "uncertainty_mps2"
 
 
 def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[str, Any]:
-    """The document's `autopilot` of one IMU.
+    """Return the entry `autopilot` of one IMU.
 
     Its keys: firmware, imu (from 1), message (the stream it was fitted to), params_old and params_new by name,
-    residual_mps2 (by how much |a| stays wrong at worst), residual_old_mps2 (the same with the old parameters),
+    residual_mps2 (greatest error of |a| that is left), residual_old_mps2 (the same with the old parameters),
     uncertainty_mps2 (standard uncertainty of |a| by the calibration), turn_deg (the rotation that parameters do not
-    hold), and mounting (R_b by row). Where the vehicle did not tell what is needed, params_new is empty, and `why`
-    says what.
+    hold), and mounting (R_b by row). If the vehicle did not tell what is needed, params_new is empty, and `why` says
+    what is missing.
     """
     document: dict[str, Any] = {
         "firmware": autopilot.firmware,
@@ -32,26 +36,70 @@ def autopilot_document(autopilot: Autopilot, calibration: Calibration) -> dict[s
         NEW: {},
         RESIDUAL: None,
     }
-    where = find_slot(autopilot.firmware, autopilot.imu, autopilot.parameters)
-    if where is None:
-        return document | {"why": f"no slot of the vehicle's names the sensor of IMU {autopilot.imu}"}
-    old, R_b = where.correction(autopilot.parameters), mounting(autopilot.firmware, where, autopilot.parameters)
+    slot = find_slot(autopilot.firmware, autopilot.imu, autopilot.parameters)
+    if slot is None:
+        return document | {"why": f"no slot of the vehicle names the sensor of IMU {autopilot.imu}"}
+    old, R_b = slot.correction(autopilot.parameters), mounting(autopilot.firmware, slot, autopilot.parameters)
     if old is None or R_b is None:
-        missing = "values of " + where.names[0] + " and the like" if old is None else "board rotation"
+        missing = "values of " + slot.names[0] + " and the like" if old is None else "board rotation"
         return document | {"why": f"the recording does not hold the vehicle's {missing}"}
     if not np.all(old.scale):
-        return document | {"why": f"{where.scale[0]} and the like are 0: IMU {autopilot.imu} streams nothing yet"}
+        return document | {"why": f"{slot.scale[0]} and the like are 0: IMU {autopilot.imu} streams nothing yet"}
     known = np.isfinite(calibration.D).all() and np.isfinite(calibration.b_a).all()
     if not known or np.linalg.matrix_rank(calibration.D) < 3:
         return document | {"why": "the calibration was refused"}
     gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
-    composed = compose(calibration.D, calibration.b_a, where.effective(old), R_b, gravity)
-    new = where.effective(composed.correction)
+    old = slot.effective(old)
+    composed = compose(calibration.D, calibration.b_a, old, R_b, gravity)
+    new = slot.effective(composed.correction)
     return document | {
-        NEW: where.values(new),
+        NEW: slot.values(new),
         RESIDUAL: composed.residual_of(new),
-        RESIDUAL_OLD: composed.residual_of(where.effective(old)),
+        RESIDUAL_OLD: composed.residual_of(old),
         UNCERTAIN: calibration.magnitude_std,
         "turn_deg": np.degrees(composed.turn_rad).tolist(),
         "mounting": R_b.tolist(),
     }
+
+
+def select_imu(calibration: Calibration, imu: int) -> Calibration:
+    """Return the calibration of one IMU, counted from 1.
+
+    Raises
+    ------
+    KeyError : it holds none.
+    """
+    if calibration.extra.get(AUTOPILOT, {}).get("imu") == imu:
+        return calibration
+    for other in calibration.extra.get(OTHERS, []):
+        if other.get(AUTOPILOT, {}).get("imu") == imu:
+            return Calibration.from_document(other)
+    raise KeyError(imu)
+
+
+def adapt_to_write(calibration: Calibration, imus: Collection[int]) -> Calibration:
+    """Return the calibration of the streams once the new parameters of `imus` (from 1) are in place.
+
+    The streams are then y' = A y + c of the y that was calibrated, so D' = A D and b_a' = A b_a + c.
+    """
+    extra = dict(calibration.extra)
+    if OTHERS in extra:
+        extra[OTHERS] = [_adapt(Calibration.from_document(o), imus).document() for o in extra[OTHERS]]
+    return _adapt(replace(calibration, extra=extra), imus)
+
+
+def _adapt(calibration: Calibration, imus: Collection[int]) -> Calibration:
+    autopilot = calibration.extra.get(AUTOPILOT, {})
+    if autopilot.get("imu") not in imus:
+        return calibration
+    slot = slot_of(autopilot["firmware"], autopilot["imu"], autopilot[NEW])
+    old = None if slot is None else slot.correction(autopilot[OLD])
+    new = None if slot is None else slot.correction(autopilot[NEW])
+    if slot is None or old is None or new is None:
+        return calibration
+    R_b, old = np.array(autopilot["mounting"]), slot.effective(old)
+    A = R_b @ np.diag(new.scale / old.scale) @ R_b.T
+    c = R_b @ (new.scale * (old.offset - new.offset))
+    now = {**autopilot, OLD: {**autopilot[OLD], **autopilot[NEW]}, RESIDUAL_OLD: autopilot[RESIDUAL]}
+    extra = {**calibration.extra, AUTOPILOT: now}
+    return replace(calibration, D=A @ calibration.D, b_a=A @ calibration.b_a + c, extra=extra)

@@ -1,4 +1,4 @@
-"""A parameter's value in PARAM_VALUE and PARAM_SET, which carry a float whatever the type is."""
+"""Encoding of a parameter in PARAM_VALUE and PARAM_SET, which carry a float whatever its type is."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Number = int | float
 FLOAT32 = struct.Struct("<f")
 NAME_BYTES = 16
 
-# MAV_PARAM_TYPE -> how PX4 lays the value's bytes into the float's
+# MAV_PARAM_TYPE -> PX4's layout of the value's bytes in the float's bytes
 BYTEWISE = {
     1: struct.Struct("<Bxxx"),
     2: struct.Struct("<bxxx"),
@@ -26,7 +26,7 @@ BYTEWISE = {
 }
 INT32, REAL32 = 6, 9
 
-# MAV_PARAM_ERROR, of which pymavlink's enumeration lacks the end
+# MAV_PARAM_ERROR; pymavlink's enumeration lacks the end.
 ERRORS = {
     1: "it does not exist",
     2: "the value is out of range",
@@ -34,14 +34,14 @@ ERRORS = {
     4: "no such component",
     5: "it is read-only",
     6: "its type is not supported",
-    7: "its type is another",
+    7: "it has another type",
     8: "it cannot be read",
 }
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter as a vehicle holds it.
+    """A parameter as a vehicle holds it.
 
     Attributes
     ----------
@@ -57,16 +57,16 @@ class Parameter:
 
 
 def as_float32(value: float) -> float:
-    """The float32 nearest to `value`: what a vehicle can hold and echo."""
+    """Return the float32 nearest to `value`, which a vehicle can hold and echo."""
     return float(np.float32(value))
 
 
 def to_wire(value: Number, kind: int, bytewise: bool) -> float:
-    """The float that carries `value` of MAV_PARAM_TYPE `kind`.
+    """Return the float that carries `value` of MAV_PARAM_TYPE `kind`.
 
     Parameters
     ----------
-    bytewise : the bytes of an integer travel as they are (PX4); else its value does (ArduPilot).
+    bytewise : PX4 sends the bytes of an integer; otherwise its value is sent (ArduPilot).
     """
     if bytewise and kind in BYTEWISE:
         return float(FLOAT32.unpack(BYTEWISE[kind].pack(int(value)))[0])
@@ -74,29 +74,27 @@ def to_wire(value: Number, kind: int, bytewise: bool) -> float:
 
 
 def from_wire(message: Message, bytewise: bool) -> Parameter:
-    """The parameter in a PARAM_VALUE or PARAM_SET."""
+    """Return the parameter in a PARAM_VALUE or PARAM_SET."""
     kind = int(message.param_type)
     value: Number = float(message.param_value)
-    if kind in BYTEWISE:
-        value = BYTEWISE[kind].unpack(wire_bytes(message))[0] if bytewise else _whole(value)
+    if kind in BYTEWISE and bytewise:
+        value = BYTEWISE[kind].unpack(_wire_bytes(message))[0]
+    elif kind in BYTEWISE and math.isfinite(value):
+        value = round(value)
     index, count = getattr(message, "param_index", -1), getattr(message, "param_count", 0)
     return Parameter(str(message.param_id), value, kind, int(index), int(count))
 
 
-def wire_bytes(message: Message) -> bytes:
-    """The four bytes of param_value, which is first in the payload; a float of Python's may lose a NaN's."""
+def _wire_bytes(message: Message) -> bytes:
+    """Return the bytes of param_value, the payload's first field; as a float of Python a NaN may lose its bits."""
     packet = bytes(message.get_msgbuf())
     at = HEADER[packet[0]]
-    # MAVLink 2 leaves out the zeros at the payload's end
+    # MAVLink 2 omits the zeros at the payload's end.
     return packet[at : at + min(packet[1], FLOAT32.size)].ljust(FLOAT32.size, b"\0")
 
 
-def _whole(value: float) -> Number:
-    return round(value) if math.isfinite(value) else value
-
-
 def decode_parameter(message: Message, bytewise: bool) -> Parameter | None:
-    """The parameter in a PARAM_VALUE; None of another message, and of a value that is not finite."""
+    """Return the parameter in a PARAM_VALUE, None for another message or a value that is not finite."""
     if message.get_type() != "PARAM_VALUE":
         return None
     parameter = from_wire(message, bytewise)
@@ -104,10 +102,10 @@ def decode_parameter(message: Message, bytewise: bool) -> Parameter | None:
 
 
 def name_bytes(name: str) -> bytes:
-    """A param_id: 16 bytes, with no NUL where the name fills them."""
+    """Return a param_id: up to 16 bytes, without a NUL if the name fills them."""
     return name.encode("ascii")[:NAME_BYTES]
 
 
 def error_name(number: int) -> str:
-    """What a PARAM_ERROR's MAV_PARAM_ERROR means, in words."""
+    """Return the meaning of a MAV_PARAM_ERROR in words."""
     return ERRORS.get(number, f"error {number}")

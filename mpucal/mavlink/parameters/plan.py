@@ -1,4 +1,4 @@
-"""What is to be written to a vehicle for a calibration, or why nothing is."""
+"""The parameter changes that a calibration asks for, or the reason why nothing is written."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from ...result.calibration import REFUSED, Calibration
 from ...result.comparison import is_better
 from ..imu import MESSAGE_ID, SCALED, Stream
 from .compose import Correction
-from .document import NEW, OLD, RESIDUAL, RESIDUAL_OLD, UNCERTAIN
-from .names import Slot, slot_of
+from .document import AUTOPILOT, NEW, OLD, OTHERS, RESIDUAL, RESIDUAL_OLD, UNCERTAIN
+from .slots import Slot, slot_of
 
 NOTHING = "nothing was written"
 
 
 @dataclass(frozen=True)
 class Change:
-    """What becomes of one IMU's parameters.
+    """The change of one IMU's parameters.
 
     Attributes
     ----------
-    place : their names. old : what corrected the stream that was calibrated. new : what is to be written.
-    mounting : R_b (3, 3). stream : where its effect shows.
-    sensor_id : of the sensor that was calibrated; None where the vehicle did not say.
-    residual_mps2 : by how much |a| stays wrong at worst. residual_old_mps2 : the same as it is now; None where the
-        calibration does not say. uncertainty_mps2 : standard uncertainty of |a| by the calibration.
+    slot : their names. old : the correction of the stream that was calibrated. new : to be written.
+    mounting : R_b (3, 3). stream : shows the effect.
+    sensor_id : of the sensor that was calibrated; None if the vehicle did not say.
+    residual_mps2 : greatest error of |a| that is left. residual_old_mps2 : the same with the old parameters; None if
+        the calibration does not say. uncertainty_mps2 : standard uncertainty of |a| by the calibration.
     """
 
     slot: Slot
@@ -45,61 +45,62 @@ class Change:
 
     @property
     def imu(self) -> int:
-        """Counted from 1."""
+        """Number of the IMU, counted from 1."""
         return self.slot.imu
 
     @property
     def improves(self) -> bool:
-        """Whether the new parameters are predicted to be better than the old ones, cross-axis residue included."""
+        """True if the new parameters are predicted to be better than the old ones, cross-axis residue included."""
         if self.residual_old_mps2 is None:
             return True
         return is_better(self.residual_mps2, self.residual_old_mps2, self.uncertainty_mps2)
 
 
 def plan_changes(calibration: Calibration, firmware: str) -> tuple[Change, ...]:
-    """A change for each IMU whose calibration holds.
+    """Return a change for each IMU whose calibration was not refused.
 
     Raises
     ------
     WriteBackError : the calibration is refused, of no vehicle, of another firmware, or beyond the firmware's limits.
     """
-    # a config blob says nothing of its quality: what was refused has none
+    # A config blob has no verdict; a refused calibration has no blob.
     if calibration.quality.get("verdict") == REFUSED:
         raise WriteBackError(f"{NOTHING}: the calibration was refused", "repeat the session")
-    of_first = calibration.extra.get("autopilot")
+    of_first = calibration.extra.get(AUTOPILOT)
     if not of_first:
         raise WriteBackError(f"{NOTHING}: the calibration is of no vehicle", "give one made with --mavlink")
     try:
-        others = [other for other in calibration.extra.get("others", []) if _holds(other)]
-        return tuple(_change(of, firmware) for of in (of_first, *(other["autopilot"] for other in others)))
+        others = [other for other in calibration.extra.get(OTHERS, []) if _is_writable(other)]
+        return tuple(_change(of, firmware) for of in (of_first, *(other[AUTOPILOT] for other in others)))
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise WriteBackError(
-            f"{NOTHING}: what the calibration says of its vehicle is not what a session writes"
+            f"{NOTHING}: the calibration's entry of its vehicle is not one that a session writes"
             f" ({type(error).__name__}: {error})",
             "give the calibration.json of a session",
         ) from error
 
 
 def select_improving(planned: Sequence[Change]) -> tuple[Change, ...]:
-    """Those that help; all of them where none does: that they are written then is what somebody wants."""
+    """Return the changes that improve; all of them if none does: who writes such a calibration wants them all."""
     return tuple(change for change in planned if change.improves) or tuple(planned)
 
 
 def refused_imus(calibration: Calibration) -> tuple[int, ...]:
-    """The IMUs, counted from 1, whose calibration was refused."""
-    others = calibration.extra.get("others", [])
-    return tuple(int(other["autopilot"]["imu"]) for other in others if not _holds(other) and other.get("autopilot"))
+    """Return the IMUs, counted from 1, whose calibration was refused."""
+    others = calibration.extra.get(OTHERS, [])
+    return tuple(int(other[AUTOPILOT]["imu"]) for other in others if not _is_writable(other) and other.get(AUTOPILOT))
 
 
 def swap_slots(calibration: Calibration, order: Sequence[int], firmware: str) -> Calibration:
-    """The same calibration, where the parameters of IMUs lie in one another's places.
+    """Return the calibration with each IMU's parameters in the slot that acts on it.
 
-    With o, k what corrected the stream, o' and k' what shall, and o_p, k_p what lies in the other place: the stream was
-    corrected by o_p and k_p all the time, so that o_p + (k / k_p) (o' - o) and k' k_p / k belong there.
+    With o, k the correction under which the stream was calibrated, o' and k' the new one, and o_p, k_p the old one in
+    the other slot: the stream was corrected by o_p and k_p all the time, so that o_p + (k / k_p) (o' - o) and
+    k' k_p / k belong there.
 
     Parameters
     ----------
-    order : for each of those `helping`, the index of the one in whose place its parameters belong.
+    order : for each of the improving changes, the index of the one into whose slot its parameters belong.
     """
     planned = select_improving(plan_changes(calibration, firmware))
     documents: dict[int, dict[str, Any]] = {}
@@ -109,59 +110,55 @@ def swap_slots(calibration: Calibration, order: Sequence[int], firmware: str) ->
         new = at.slot.effective(Correction(offset, change.new.scale * at.old.scale / change.old.scale))
         documents[change.imu] = {NEW: at.slot.values(new)}
     extra = dict(calibration.extra)
-    extra["autopilot"] = {**extra["autopilot"], **documents[planned[0].imu]}
-    extra["others"] = [
-        {**other, "autopilot": {**other["autopilot"], **documents.get(other["autopilot"]["imu"], {})}}
-        for other in extra.get("others", [])
+    extra[AUTOPILOT] = {**extra[AUTOPILOT], **documents[planned[0].imu]}
+    extra[OTHERS] = [
+        {**other, AUTOPILOT: {**other[AUTOPILOT], **documents.get(other[AUTOPILOT]["imu"], {})}}
+        for other in extra.get(OTHERS, [])
     ]
     return replace(calibration, extra=extra)
 
 
-def _holds(document: Mapping[str, Any]) -> bool:
+def _is_writable(document: Mapping[str, Any]) -> bool:
     verdict = document.get("quality", {}).get("verdict", REFUSED)
-    return verdict != REFUSED and bool(document.get("autopilot", {}).get(NEW))
+    return verdict != REFUSED and bool(document.get(AUTOPILOT, {}).get(NEW))
 
 
-def _check_holds(autopilot: Mapping[str, Any], *keys: str) -> None:
-    lacking = [key for key in keys if autopilot.get(key) is None or (key == "message" and not _is_message(autopilot))]
-    if lacking:
-        raise WriteBackError(f"{NOTHING}: the calibration has no {lacking[0]} of the vehicle", "give a session's own")
-
-
-def _is_message(autopilot: Mapping[str, Any]) -> bool:
-    name = autopilot["message"]
-    return isinstance(name, str) and name in MESSAGE_ID
+def _require(autopilot: Mapping[str, Any], *keys: str) -> None:
+    for key in keys:
+        value = autopilot.get(key)
+        if value is None or (key == "message" and not (isinstance(value, str) and value in MESSAGE_ID)):
+            raise WriteBackError(f"{NOTHING}: the calibration has no {key} of the vehicle", "give a session's own")
 
 
 def _change(autopilot: Mapping[str, Any], firmware: str) -> Change:
-    _check_holds(autopilot, "imu", "firmware", OLD)
+    _require(autopilot, "imu", "firmware", OLD)
     imu = int(autopilot["imu"])
     if autopilot["firmware"] != firmware:
         raise WriteBackError(
             f"{NOTHING}: the calibration is of {autopilot['firmware']}, and this is {firmware}",
             "connect the vehicle that was calibrated",
         )
-    where = slot_of(firmware, imu, autopilot[NEW])
-    new = None if where is None else where.correction(autopilot[NEW])
-    old = None if where is None else where.correction(autopilot[OLD])
-    if where is None or new is None or old is None:
+    slot = slot_of(firmware, imu, autopilot[NEW])
+    new = None if slot is None else slot.correction(autopilot[NEW])
+    old = None if slot is None else slot.correction(autopilot[OLD])
+    if slot is None or new is None or old is None:
         why = autopilot.get("why", "it holds no new parameters")
         raise WriteBackError(f"{NOTHING}: the calibration does not fit the vehicle ({why})", "repeat the session")
-    beyond = where.describe_excess(new)
-    if beyond is not None:
+    excess = slot.describe_excess(new)
+    if excess is not None:
         raise WriteBackError(
-            f"{NOTHING}: {beyond}, which {firmware} accepts of its own calibration",
+            f"{NOTHING}: {excess}, which {firmware} accepts of its own calibration",
             "check that the vehicle was turned to every side, and the sensor",
         )
-    _check_holds(autopilot, "message", "mounting", RESIDUAL)
+    _require(autopilot, "message", "mounting", RESIDUAL)
     name = str(autopilot["message"])
     return Change(
-        where,
-        where.effective(old),
+        slot,
+        slot.effective(old),
         new,
         np.array(autopilot["mounting"]),
         Stream(name, SCALED.get(name, imu)),
-        autopilot[OLD].get(where.sensor_id),
+        autopilot[OLD].get(slot.sensor_id),
         float(autopilot[RESIDUAL]),
         autopilot.get(RESIDUAL_OLD),
         float(autopilot.get(UNCERTAIN) or 0.0),

@@ -1,7 +1,7 @@
-"""Parameters in the text files of ground stations.
+"""Parameter files of ground stations.
 
-`.param` is what Mission Planner and MAVProxy load: `NAME,VALUE` a line. `.params` is QGroundControl's: vehicle,
-component, name, value and MAV_PARAM_TYPE, with tabs between. Both take lines that begin with # as remarks.
+Mission Planner and MAVProxy load `.param`: `NAME,VALUE` a line. QGroundControl loads `.params`: vehicle, component,
+name, value and MAV_PARAM_TYPE, separated by tabs. In both, lines that begin with # are remarks.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ PARAMS_COLUMNS = 5
 
 
 def param_text(values: Mapping[str, float], remarks: Iterable[str] = ()) -> str:
-    """A .param file; floats with the nine digits that make the same float32 again."""
+    """Return a .param file; its floats have the nine digits that identify a float32."""
     lines = [f"# {remark}" for remark in remarks]
     return "\n".join([*lines, *(f"{name},{_digits(value)}" for name, value in values.items())]) + "\n"
 
@@ -29,7 +29,7 @@ def params_text(
     component: int = 1,
     types: Mapping[str, int] | None = None,
 ) -> str:
-    """A .params file; `types` are MAV_PARAM_TYPE where they are not floats."""
+    """Return a .params file; `types` holds the MAV_PARAM_TYPE of parameters that are not floats."""
     lines = [f"# {remark}" for remark in remarks]
     lines += ["#", "# Vehicle-Id Component-Id Name Value Type"]
     kinds = types or {}
@@ -39,7 +39,7 @@ def params_text(
 
 
 def read_parameters_file(path: Path) -> dict[str, float]:
-    """The values in either kind of file, by name.
+    """Return the values in either kind of file, by name.
 
     Raises
     ------
@@ -48,13 +48,13 @@ def read_parameters_file(path: Path) -> dict[str, float]:
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
         rows = [re.split(r"[\s,]+", line.strip()) for line in lines if line.strip() and not line.startswith("#")]
-        # QGroundControl's rows begin with vehicle and component
+        # QGroundControl's rows begin with vehicle and component.
         pairs = [row[2:4] if len(row) == PARAMS_COLUMNS else row for row in rows]
         return {name: as_float32(float(value)) for name, value in pairs}
     except OSError as error:
         raise RecordingError(f"cannot read {path} ({error.strerror})", "check the path") from error
     except ValueError as error:
-        raise RecordingError(f"{path} is no file of parameters ({error})", "give a .param or .params file") from error
+        raise RecordingError(f"{path} is not a parameter file ({error})", "give a .param or .params file") from error
 
 
 def _digits(value: float) -> str:

@@ -1,4 +1,4 @@
-"""Verify new parameters by what the streams of a vehicle that lies still make of them."""
+"""Verification of new parameters by the streams of a vehicle at rest."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from ...errors import WriteBackError
 from ..rest_monitor import RestMeans
 from .plan import Change
 
-# a step of the stream, and what an attitude by the gyroscope is worse than one that did not change
+# Tolerances: a step of the stream; standard deviations of the means; part of an attitude change by the gyroscope.
 AGREE_MPS2, SIGMAS, PER_TURN = 0.03, 3.0, 0.05
 MOST_TURNED_RAD = 0.1
 
 
 class SwappedSlotsError(WriteBackError):
-    """The streams show that the parameters belong to each other's IMUs.
+    """The streams show that the parameters act on one another's IMUs.
 
     Parameters
     ----------
-    order : for each change, the index of the one in whose place its IMU's parameters are.
+    order : for each change, the index of the one whose slot acts on its IMU.
     """
 
     def __init__(self, order: tuple[int, ...]) -> None:
@@ -31,15 +31,15 @@ class SwappedSlotsError(WriteBackError):
 
 
 def verify(planned: Sequence[Change], old: Mapping[str, float], before: RestMeans, after: RestMeans | None) -> None:
-    """See in each stream what its new parameters must make of it.
+    """Check that each stream changed as its new parameters must change it.
 
     Parameters
     ----------
-    old : what the vehicle held before, by name. before, after : how it rested then, and how it rests now.
+    old : the vehicle's parameters before the write, by name. before, after : its streams at rest then and now.
 
     Raises
     ------
-    SwappedSlotsError : every stream shows the new parameters of another IMU. WriteBackError : one shows something else.
+    SwappedSlotsError : every stream shows the new parameters of another IMU. WriteBackError : a stream shows neither.
     """
     if after is None:
         raise WriteBackError("the vehicle did not lie still while its new parameters were verified", "set it down")
@@ -48,10 +48,21 @@ def verify(planned: Sequence[Change], old: Mapping[str, float], before: RestMean
     if angle > MOST_TURNED_RAD:
         raise WriteBackError(
             f"the vehicle was turned by {np.degrees(angle):.0f} deg while its new parameters were verified",
-            "set it down, let go of it, and write again",
+            "set it down, do not touch it, and write again",
         )
-    # by how much each IMU's stream (row) misses what each place's parameters (column) would make of it
-    misses = np.array([[_miss(imu, at, old, before, after, turned, angle) for at in planned] for imu in planned])
+
+    def excess(imu: Change, at: Change) -> float:
+        """Return by how much [m/s^2] the stream of `imu` misses the prediction of slot `at` beyond the tolerances."""
+        held = at.slot.correction(old)
+        if held is None or not held.scale.all():
+            return 0.0
+        expected = at.slot.effective(held).recorrect(at.new, imu.mounting, before.mean[imu.stream])
+        apart: Vector = np.abs(after.mean[imu.stream] - turned.T @ expected)
+        noise = np.hypot(before.error[imu.stream], after.error[imu.stream])
+        return float((apart - AGREE_MPS2 - SIGMAS * noise).max() - PER_TURN * angle * STANDARD_GRAVITY_MPS2)
+
+    # Rows: the IMUs' streams; columns: the slots.
+    misses = np.array([[excess(imu, at) for at in planned] for imu in planned])
     indices = tuple(range(len(planned)))
     fitting = [order for order in permutations(indices) if all(misses[i, order[i]] <= 0 for i in indices)]
     if indices in fitting:
@@ -64,22 +75,3 @@ def verify(planned: Sequence[Change], old: Mapping[str, float], before: RestMean
         " than it may differ",
         "check that nobody else writes parameters, and how they say it is mounted, then calibrate again",
     )
-
-
-def _miss(
-    imu: Change,
-    at: Change,
-    old: Mapping[str, float],
-    before: RestMeans,
-    after: RestMeans,
-    turned: Vector,
-    angle: float,
-) -> float:
-    """By how much [m/s^2] the stream differs more than it may; not above 0 where it agrees, or shows nothing."""
-    held = at.slot.correction(old)
-    if held is None or not held.scale.all():
-        return 0.0
-    expected = at.slot.effective(held).recorrect(at.new, imu.mounting, before.mean[imu.stream])
-    apart = np.abs(after.mean[imu.stream] - turned.T @ expected)
-    noise = np.hypot(before.error[imu.stream], after.error[imu.stream])
-    return float((apart - AGREE_MPS2 - SIGMAS * noise).max() - PER_TURN * angle * STANDARD_GRAVITY_MPS2)

@@ -11,19 +11,19 @@ from ..link import Link, S
 from ..prearm import ArmingMonitor
 from .client import ParameterClient
 from .encoding import as_float32
-from .names import Slot
+from .slots import Slot
 
-# PX4 takes a vector over where it differs by more than 0.01 from the one in use: the last axis goes by a detour
+# PX4 takes a vector over if it differs by more than 0.01 from the one in use: the last axis is set off by this first.
 DETOUR = 0.05
 TAKEN_OVER_NS = S // 4
-# of the journal
+# Keys of the journal
 OLD, NEW = "old", "new"
 
 FAILURES = (MpucalError, EndOfCapture, KeyboardInterrupt, MemoryError)
 
 
 class Step(NamedTuple):
-    """Set `name` to `value`, then wait for `wait_ns`."""
+    """Set parameter `name` to `value`, then wait for `wait_ns`."""
 
     name: str
     value: float
@@ -31,87 +31,89 @@ class Step(NamedTuple):
 
 
 class Writer:
-    """Writes to the vehicle that `link` is locked to, while it is disarmed.
+    """Writer to the vehicle that `link` is locked to, while it is disarmed.
 
     Parameters
     ----------
-    watch : hears its heartbeats. slots : whose parameters are written. journal : notes old and new meanwhile.
+    monitor : says whether it is armed. slots : to be written. journal : keeps old and new values meanwhile.
 
     Attributes
     ----------
-    restored : a write failed, and the old parameters are back.
+    restored : True after a write that failed and whose old parameters are back.
     """
 
-    def __init__(self, link: Link, watch: ArmingMonitor, slots: Sequence[Slot], journal: Journal | None = None) -> None:
-        self._link, self._watch, self._slots = link, watch, tuple(slots)
+    def __init__(
+        self, link: Link, monitor: ArmingMonitor, slots: Sequence[Slot], journal: Journal | None = None
+    ) -> None:
+        self._link, self._monitor, self._slots = link, monitor, tuple(slots)
         self._parameters = ParameterClient(link)
         self._journal = journal or Journal()
         self._touched: set[str] = set()
         self.restored = False
 
     def read(self) -> dict[str, float]:
-        """What the vehicle holds there.
+        """Return the vehicle's values of all slots.
 
         Raises
         ------
-        LinkError : it does not say, or says two things.
+        LinkError : it does not answer, or with two values.
         """
-        names = [name for where in self._slots for name in where.names]
+        names = [name for slot in self._slots for name in slot.names]
         return {name: float(value) for name, value in self._parameters.read_agreed(names).items()}
 
     def write(self, old: Mapping[str, float], new: Mapping[str, float], verify: Callable[[], None]) -> None:
-        """Set what of `new` is not in `old`, read all back, `verify`; on any failure put `old` back.
+        """Set the values of `new` that differ from `old`, read all back, `verify`; restore `old` on any failure.
 
         Raises
         ------
-        WriteBackError : it failed; what it says ends with what the vehicle holds now.
+        WriteBackError : it failed; the message ends with the values that the vehicle has now.
         """
-        if self._watch.armed:
+        if self._monitor.armed:
             raise WriteBackError("the vehicle is armed, so nothing was written", "disarm it, then write again")
         self._journal.begin({OLD: dict(old), NEW: dict(new)})
         try:
-            for where, names in self._vectors():
+            for slot, names in self._vectors():
                 if any(as_float32(new[name]) != old[name] for name in names):
-                    for step in _steps(where, names, new):
-                        self._disarmed()
+                    for step in _steps(slot, names, new):
+                        self._check_disarmed()
                         self._set(step)
             self._compare(new)
             verify()
-            self._disarmed()
+            self._check_disarmed()
         except FAILURES as failure:
             self._restore(old, failure)
         self._journal.end()
 
     def _vectors(self) -> Iterator[tuple[Slot, tuple[str, ...]]]:
-        for where in self._slots:
-            yield where, where.offset
-            yield where, where.scale
+        for slot in self._slots:
+            yield slot, slot.offset
+            yield slot, slot.scale
 
     def _set(self, step: Step) -> None:
         self._parameters.set(step.name, step.value)
         self._touched.add(step.name)
         list(self._link.messages(self._link.now_ns() + step.wait_ns))
 
-    def _disarmed(self) -> None:
-        if self._watch.armed:
+    def _check_disarmed(self) -> None:
+        if self._monitor.armed:
             raise WriteBackError("the vehicle was armed meanwhile", "disarm it, then write again")
 
     def _compare(self, values: Mapping[str, float]) -> None:
         for name, held in self._parameters.find_mismatches(values).items():
             raise WriteBackError(
-                f"{name} reads back as {held:.9g}, not {values[name]:.9g}", "see who else writes parameters"
+                f"{name} reads back as {held:.9g}, not {values[name]:.9g}", "find out who else writes parameters"
             )
 
     def _restore(self, old: Mapping[str, float], failure: BaseException) -> None:
-        """Put `old` back, armed or not: half a correction is worse than either; then raise."""
+        """Restore `old`, even while armed: half a correction is worse than either; then raise."""
         what = failure.what if isinstance(failure, MpucalError) else "the write was interrupted"
         remedy = failure.remedy if isinstance(failure, MpucalError) else "start again"
         try:
-            for where, names in self._vectors():
+            for slot, names in self._vectors():
                 held = self._parameters.read(names)
-                # one that was refused holds its old value, and would be refused again
+                # A parameter that was refused holds its old value, and would be refused again.
                 changed = [name for name in names if name in self._touched or held[name] != old[name]]
-                for step in _steps(where, changed, old):
+                for step in _steps(slot, changed, old):
                     self._set(step)
             self._compare(old)
         except FAILURES as second:
@@ -126,21 +128,21 @@ class Writer:
 
 
 def is_partial_write(held: Mapping[str, float], old: Mapping[str, float], new: Mapping[str, float]) -> bool:
-    """Whether a write from `old` to `new` that was cut off can have left this: each is one of both, or a detour."""
+    """Return True if an interrupted write from `old` to `new` can have left `held`: each is one of both, or off it."""
     reach = DETOUR * 1.01
     return all(min(abs(held[name] - old[name]), abs(held[name] - new.get(name, old[name]))) <= reach for name in old)
 
 
-def _steps(where: Slot, names: Sequence[str], values: Mapping[str, float]) -> Iterator[Step]:
-    """How `names` of one vector come to `values`, which holds all of it.
+def _steps(slot: Slot, names: Sequence[str], values: Mapping[str, float]) -> Iterator[Step]:
+    """Yield the steps that set `names` of one vector to `values`, which holds all of it.
 
-    Where the firmware does not notice small changes, it then uses what it would use after a start.
+    If the firmware ignores small changes, the steps have it use the same values at once as after a start.
     """
-    wanted = where.correction(values)
-    if not where.limits.unnoticed or wanted is None or not names:
+    wanted = slot.correction(values)
+    if not slot.limits.unnoticed or wanted is None or not names:
         yield from (Step(name, values[name]) for name in names)
         return
-    used = where.values(where.effective(wanted))
+    used = slot.values(slot.effective(wanted))
     *first, last = names
     yield from (Step(name, used[name]) for name in first)
     yield Step(last, used[last] + DETOUR, TAKEN_OVER_NS)

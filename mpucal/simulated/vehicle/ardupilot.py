@@ -9,7 +9,7 @@ import numpy as np
 from ...data import Vector
 from ...mavlink.dialect import Message, dialect
 from ...mavlink.parameters.encoding import REAL32, Parameter
-from ...mavlink.parameters.names import CUSTOM_ANGLES
+from ...mavlink.parameters.mounting import CUSTOM_ANGLES
 from .filter import LowPass
 from .firmware import HIGHRES_IMU, RAW_IMU, SCALED_IMUS, SYS_STATUS, Firmware
 from .imus import BLOCK

@@ -9,8 +9,7 @@ import numpy as np
 from ...data import STANDARD_GRAVITY_MPS2, Vector
 from ...mavlink.dialect import Message, dialect
 from ...mavlink.parameters.encoding import Parameter
-from ...mavlink.parameters.names import CUSTOM_ANGLES
-from ...mavlink.rotation import euler, orientation
+from ...mavlink.parameters.mounting import CUSTOM_ANGLES, euler_matrix, orientation_matrix
 from .imus import Imus
 from .options import VehicleOptions
 from .store import ParameterStore
@@ -153,6 +152,6 @@ def mounted(options: VehicleOptions) -> Vector:
     """R_b (3, 3) of a board that is turned by a known orientation, or by angles of its own."""
     if options.rotation in CUSTOM_ANGLES:
         degrees = [options.parameters.get(name, 0.0) for name in CUSTOM_ANGLES[options.rotation]]
-        return euler(*np.radians(degrees).tolist())
-    rotation = orientation(options.rotation)
+        return euler_matrix(degrees)
+    rotation = orientation_matrix(options.rotation)
     return np.eye(3) if rotation is None else rotation

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Self
 
-from ...mavlink.parameters.names import CUSTOM_ANGLES
+from ...mavlink.parameters.mounting import CUSTOM_ANGLES
 from ..faults import OF_VEHICLE, Fault, Where
 from ..hands import KINDS
 from ..words import FAULT, Parser, at_least, faults, one_of, parsed, whole

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...mavlink.ftp import MOST_DATA, Error, Opcode, Payload
+from ...mavlink.ftp import MOST_DATA, ErrorCode, Opcode, Payload
 
 SEQUENCE = 1 << 16
 
@@ -27,42 +27,42 @@ class Card:
         if self._last is not None and self._last.sequence == sequence:
             return self._last
         given = self._do(asked)
-        if isinstance(given, Error):
+        if isinstance(given, ErrorCode):
             reply = Payload(sequence, asked.session, Opcode.NAK, bytes([given]), asked.offset, None, asked.opcode)
         else:
             reply = Payload(sequence, asked.session, Opcode.ACK, given, asked.offset, None, asked.opcode)
         self._last = reply
         return reply
 
-    def _do(self, asked: Payload) -> bytes | Error:
+    def _do(self, asked: Payload) -> bytes | ErrorCode:
         path = asked.data.decode("ascii", "replace")
         if asked.opcode in (Opcode.RESET, Opcode.TERMINATE):
             self._open = None
             return b""
         if asked.opcode == Opcode.CREATE:
             if self._folder is None or not path.startswith(self._folder):
-                return Error.NOT_FOUND
+                return ErrorCode.NOT_FOUND
             self.files[path], self._open = b"", path
             return b""
         if asked.opcode in (Opcode.OPEN_TO_READ, Opcode.REMOVE):
             return self._existing(path, asked.opcode)
         if asked.opcode in (Opcode.READ, Opcode.WRITE) and self._open is not None:
             return self._move(self._open, asked)
-        return Error.FAIL
+        return ErrorCode.FAIL
 
-    def _existing(self, path: str, opcode: int) -> bytes | Error:
+    def _existing(self, path: str, opcode: int) -> bytes | ErrorCode:
         if path not in self.files:
-            return Error.NOT_FOUND
+            return ErrorCode.NOT_FOUND
         if opcode == Opcode.REMOVE:
             del self.files[path]
             return b""
         self._open = path
         return len(self.files[path]).to_bytes(4, "little")
 
-    def _move(self, path: str, asked: Payload) -> bytes | Error:
+    def _move(self, path: str, asked: Payload) -> bytes | ErrorCode:
         held, at = self.files[path], asked.offset
         if asked.opcode == Opcode.WRITE:
             self.files[path] = held[:at].ljust(at, b"\0") + asked.data + held[at + len(asked.data) :]
             return b""
         part = held[at : at + min(asked.size or MOST_DATA, MOST_DATA)]
-        return part or Error.END_OF_FILE
+        return part or ErrorCode.END_OF_FILE
