@@ -103,6 +103,9 @@ def reason(code: str, sentence: str, refuse: bool | None = None, **numbers: obje
     return Reason(code, row.what.format(**numbers), row.remedy.format(**numbers), decided)
 
 
+# after a reason against the gyroscope, where an estimate is possible without it
+OF_RESTS = ": D and b_a are estimated from the rests alone, in the accelerometer's own axes"
+
 _LAY_IT_DOWN = "lay it on a table for ten seconds before you turn it"
 _SLOWER = "turn more slowly, or choose a larger --gyro-range"
 
@@ -362,6 +365,11 @@ KINDS: Mapping[str, Kind] = {
                 "say --gyro-range, or multiply its rates by {factor:g}",
                 True,
             ),
+            "contradicts": Sentence(
+                "from rest to rest gravity ends {degrees:.0f} degrees from where the gyroscope's rates lead it",
+                "check the gyroscope's axes, unit, range and times, and that the turns between the rests are recorded",
+                True,
+            ),
             "scale": Sentence(
                 "the gyroscope's scale factor error is {scale:.1%} on {axis} and its cross-axis sensitivity"
                 " {cross:.1%}, more than its data sheet allows",
@@ -370,7 +378,7 @@ KINDS: Mapping[str, Kind] = {
             ),
         },
         "mpucal.calibrate(replace(r, gyr=1.1 * r.gyr))",
-        "it did not measure; where its scale factors are off they are estimated, and the calibration is usable",
+        "it did not measure, or contradicts the rests, and these are too few to do without it",
     ),
     "temperature_moved": Kind(
         "The chip warmed or cooled while it was measured, and its biases moved with it.",

@@ -12,11 +12,12 @@ import numpy as np
 from ..arguments import LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Vector
 from ..errors import WrongValue
+from ..reasons import OF_RESTS, Reason
 from ..rests.flat import Flat, find_flat, flat_statistics, tells
 from ..result import keys
 from ..result.calibration import Calibration, unknown
 from ..result.correlation import correlation_of, standard_deviations
-from .checks import unusable_for_a_fit
+from .checks import found, gyroscope_at_fault, unusable_for_a_fit
 from .checks.unusable import no_gyroscope
 from .claim import claim_of, claimed
 from .evidence import Evidence
@@ -27,12 +28,14 @@ from .model_selection import METHODS, Choice, choose
 from .parameters import B_A_NAMES, B_OMEGA_NAMES, BY_NAME, D_NAMES
 from .quality import judge
 from .recording_digest import recording_digest
+from .static import fit_static
 from .theta import from_elements
 from .walks import Walk, likeliest_walk, without_walk
 
 __all__ = ["MODELS", "calibrate", "weigh"]
 
 MODELS = ("auto", *METHODS)
+NOTHING = {"why": "nothing could be estimated"}
 # Each walk is what is left of a drift after the one before; it must make the recording as much likelier.
 MOST_WALKS, LEAST_GAIN = 3, 10.0
 
@@ -54,14 +57,15 @@ def calibrate(
     ------
     WrongValue : no such model, or a gravity that is none.
     """
-    evidence, chosen = weigh(recording, model, gravity)
-    return _calibration(replace(evidence, gravity_anyway=gravity_anyway), chosen)
+    return _calibration(*weigh(recording, model, gravity, gravity_anyway))
 
 
 def weigh(
-    recording: Recording, model: str = "auto", gravity: float = STANDARD_GRAVITY_MPS2
+    recording: Recording, model: str = "auto", gravity: float = STANDARD_GRAVITY_MPS2, gravity_anyway: bool = False
 ) -> tuple[Evidence, Mapping[str, str]]:
-    """The same estimate as what it rests on: evidence, with the fit and its covariance, and the model and why.
+    """Estimate as `calibrate` does; return the evidence, with the fit and its covariance, and the model and why.
+
+    Where the gyroscope is at fault and the rests suffice, the estimate is of the rests alone.
 
     Raises
     ------
@@ -71,9 +75,30 @@ def weigh(
         raise WrongValue(f"there is no model {model!r}", f"choose one of {', '.join(MODELS)}")
     if not LEAST_GRAVITY_MPS2 <= gravity <= MOST_GRAVITY_MPS2:
         raise WrongValue(f"gravity is {gravity}", "give the local gravity in m/s^2, about 9.81")
-    before = Evidence(recording, gravity, None, None, model)
-    if no_gyroscope(before) is not None:
-        return before, {"model": model, "why": "nothing could be estimated"}
+    before = Evidence(recording, gravity, None, None, model, gravity_anyway=gravity_anyway)
+    estimate = _with_gyroscope(before) if no_gyroscope(before) is None else (before, NOTHING | {"model": model})
+    at_fault = gyroscope_at_fault(estimate[0]) if model == "auto" else None
+    of_rests = None if at_fault is None else _of_rests(before, at_fault)
+    return of_rests or estimate
+
+
+def _of_rests(before: Evidence, at_fault: Reason) -> tuple[Evidence, Mapping[str, str]] | None:
+    """The estimate from the rests alone; None where they do not suffice."""
+    recording = with_masks(before.recording)
+    segment = recording.flat or find_flat(recording)
+    if segment is None or not tells(recording, segment):
+        return None
+    flat = flat_statistics(recording, segment)
+    fit = fit_static(recording, flat, before.gravity)
+    usable = replace(at_fault, what=at_fault.what + OF_RESTS, refuse=False)
+    evidence = replace(before, recording=recording, flat=flat, fit=fit, model="static", gyroscope=usable)
+    if any(reason.refuse for reason in found(evidence)):
+        return None
+    return evidence, {"model": "static", "why": "the gyroscope is at fault, and the rests are enough without it"}
+
+
+def _with_gyroscope(before: Evidence) -> tuple[Evidence, Mapping[str, str]]:
+    recording, gravity, model = before.recording, before.gravity, before.model
     # an acceleration that jumps alone may be a knock, which the fit weighs itself
     recording = replace(with_masks(recording), gyr=without_lone_jumps(recording).gyr)
     segment = recording.flat or find_flat(recording)
@@ -81,12 +106,12 @@ def weigh(
     over = None if flat is None else reset(recording, flat)
     if over is not None:
         recording = recording.part(0, over)
-    before = Evidence(recording, gravity, flat, None, model)
+    before = replace(before, recording=recording, flat=flat)
     if flat is None or unusable_for_a_fit(before):
-        return before, {"model": model, "why": "nothing could be estimated"}
+        return before, NOTHING | {"model": model}
     choice, walk = _fit(recording, flat, gravity, model)
     claim = claim_of(choice.fit, gravity, walk, choice.walked)
-    evidence = Evidence(recording, gravity, flat, claimed(choice.fit, claim).right_handed(), choice.model, claim)
+    evidence = replace(before, fit=claimed(choice.fit, claim).right_handed(), model=choice.model, claim=claim)
     left_out = f"; the board was back at once at {recording.t[-1]:.1f} s, and what follows is left out"
     return evidence, {"model": choice.model, "why": choice.why + (left_out if over is not None else "")}
 

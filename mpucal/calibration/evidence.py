@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data import Recording, Vector
+from ..reasons import Reason
 from ..rests.flat import Flat, find_flat, flat_statistics
 from ..rests.intervals import RestFinder, in_pieces, statistics
 from .claim import Claim
@@ -25,6 +26,7 @@ LEAST_TURN_RAD = np.deg2rad(20.0)  # of gravity, beyond what biases and skew tur
 OTHER_RANGES = (0.25, 0.5, 2.0, 4.0)
 CLEARLY = 3.0  # times as far the one misses where another unit or range is meant
 FAR_TOO_FAR = 20.0  # times as far as gravity: no rates in rad/s, but for turns about the vertical
+MOST_MISS_RAD = np.deg2rad(7.5)  # of gravity from rest to rest; biases and skew of any sensor make it less
 LONGEST_MOVE_S = 20.0  # over which a gyroscope still says where gravity went
 # Rests that can contradict each other; of fewer, pieces so long do.
 FEWEST_RESTS, PIECE_S = 3, 3.0
@@ -48,6 +50,7 @@ class Evidence:
     """A recording and what an estimator made of it; flat and fit are None where it did not get so far.
 
     gravity_anyway : its caller stands by a gravity [m/s^2] that no place on Earth has.
+    gyroscope : why the estimate is of the rests alone; None where it is not, or where that was asked for.
     """
 
     recording: Recording
@@ -57,6 +60,7 @@ class Evidence:
     model: str
     claim: Claim | None = None
     gravity_anyway: bool = False
+    gyroscope: Reason | None = None
 
     @cached_property
     def sure(self) -> Uncertainty | None:
@@ -66,7 +70,8 @@ class Evidence:
             return None
         if abs(np.linalg.det(fit.D)) < 1e-6:
             return None
-        return uncertainty(fit.D, fit.covariance[:12, :12], self.gravity, self._shown)
+        sure = uncertainty(fit.D, fit.covariance[:12, :12], self.gravity, self._shown)
+        return sure if sure.rms_mps2 > 0.0 else None  # the inverse of a singular H is no covariance
 
     @property
     def _shown(self) -> Vector | None:
@@ -125,11 +130,11 @@ class Evidence:
         middle = flat.last + n // 2
         return [self._move(flat, u[i], u[i + 1], middle + i * n, middle + (i + 1) * n) for i in at.tolist()]
 
-    def _rest_to_rest(self, flat: Flat) -> list[_Move]:
-        """Moves from rest to rest that turn gravity far."""
+    def _rest_to_rest(self, flat: Flat, longest_s: float = LONGEST_MOVE_S) -> list[_Move]:
+        """Return the moves from rest to rest that turn gravity far and take no longer than `longest_s`."""
         r, runs = self.recording, RestFinder(self.recording, flat).alike()
         u, first, last = _units(statistics(r.acc, runs)[0]), runs[1:, 0], runs[:-1, 1]
-        far = (_angles(u[1:], u[:-1]) > LEAST_TURN_RAD) & (r.t[first] - r.t[last - 1] < LONGEST_MOVE_S)
+        far = (_angles(u[1:], u[:-1]) > LEAST_TURN_RAD) & (r.t[first] - r.t[last - 1] < longest_s)
         return [self._move(flat, u[k], u[k + 1], last[k], first[k]) for k in np.flatnonzero(far).tolist()]
 
     @cached_property
@@ -146,7 +151,14 @@ class Evidence:
         if len(moves) < FEWEST_RESTS:
             return 1.0
         factor = min((1.0, *OTHER_RANGES), key=lambda factor: _miss(moves, factor))
-        return factor if _miss(moves, 1.0) > CLEARLY * _miss(moves, factor) else 1.0
+        miss = _miss(moves, factor)
+        return factor if miss < MOST_MISS_RAD and _miss(moves, 1.0) > CLEARLY * miss else 1.0
+
+    @cached_property
+    def gyro_miss(self) -> float:
+        """rad, median, from where the rates lead gravity to where it is at the next rest; 0 of too few rests."""
+        moves = [] if self.flat is None else self._rest_to_rest(self.flat, np.inf)
+        return _miss(moves, 1.0) if len(moves) >= FEWEST_RESTS else 0.0
 
     def _move(self, flat: Flat, before: Vector, after: Vector, first: int, last: int) -> _Move:
         """With the steps that end with the samples first to last - 1."""
@@ -169,7 +181,7 @@ class Evidence:
         misses = []
         for k in range(len(runs) - 1):
             a, b = runs[k][1] - 1, runs[k + 1][0]
-            if r.t[b] - r.t[a] > LONGEST_MOVE_S:
+            if r.t[b] - r.t[a] > LONGEST_MOVE_S or self.model == "static":
                 continue
             dt, there = np.diff(r.t[a : b + 1])[:, None], _units(poses[k + 1][None])[0]
             # by the two rests' own rates, which know a drift, or by the estimate: a turn about the vertical looks still

@@ -18,8 +18,8 @@ BESIDE = 4
 def without_lone_jumps(recording: Recording) -> Recording:
     """The recording with the mean of its neighbours for a word that jumps alone and is back with the next sample.
 
-    Bits that a transfer flipped (chip/bit_flips.py sets the last frame of a poll right with the next poll only), and what
-    else spoils a word in a file.
+    Bits that a transfer flipped (chip/bit_flips.py sets the last frame of a poll right with the next poll only), and
+    what else spoils a word in a file.
     """
     words = np.hstack((recording.acc, recording.gyr))
     before, after = words[:-2], words[2:]

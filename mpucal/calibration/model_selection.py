@@ -30,6 +30,7 @@ from .parts import ends_of, parts_of
 from .prior import prior_of
 from .problem import Problem, Series
 from .rotation import lengths
+from .static import fit_static
 from .theta import Theta
 from .tilt import fit_tilt
 from .walks import likeliest_walk, without_walk
@@ -90,6 +91,7 @@ METHODS: Mapping[str, Callable[[Recording, Flat, float], Fit]] = {
     "accel": fit_accel,
     "paper": fit_paper,
     "tilt": fit_tilt,
+    "static": fit_static,
 }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -62,7 +62,7 @@ def find_flat(recording: Recording) -> tuple[int, int] | None:
     calls still on a table, but that a bias of the gyroscope may have any size and that a bump ends a run.
     """
     n = samples_of_window(recording)
-    windows = cut(recording, n)
+    windows = cut(with_rates(recording), n)
     if len(windows) < 2:
         return None
     spreads = np.array([(window.acc_sd, window.gyr_sd) for window in windows])
@@ -79,6 +79,12 @@ def find_flat(recording: Recording) -> tuple[int, int] | None:
     # the outermost windows may hold the first and last of a movement
     trim = n if last - first >= 6 * n else 0
     return first + trim, last - trim
+
+
+def with_rates(recording: Recording) -> Recording:
+    """Return the recording with rates of zero where it has none: the accelerometer alone then says what rests."""
+    known = np.isfinite(recording.gyr)
+    return recording if known.all() else replace(recording, gyr=np.where(known, recording.gyr, 0.0))
 
 
 def samples_of_window(recording: Recording) -> int:
@@ -98,6 +104,7 @@ def flat_statistics(recording: Recording, flat: tuple[int, int]) -> Flat:
     below a step, not absent. Nor is it below what the recording's source knows to be least.
     """
     first, last = flat
+    recording = with_rates(recording)
     least_acc, least_gyr = recording.sensor.least_noise
     acc, gyr = recording.acc[first:last], recording.gyr[first:last]
     return Flat(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..data import Mask, Recording, Vector
 from ..kernel import _kernel
-from .flat import Flat, samples_of_window
+from .flat import Flat, samples_of_window, with_rates
 from .limits import ANY_HAND, QUIET, TURNS_RAD_S, Limits, learned
 from .local_noise import noise_variance
 from .stillness import Detector
@@ -19,6 +19,7 @@ from .windows import Spreads
 
 SHORTEST_S = 0.3
 TRIM, LEAST_TRIM_S, MOST_TRIM_S = 0.125, 0.1, 0.25  # of a rest at either end: a hand settles, and leaves early
+FEW = 0.25  # of the windows that hold a sample
 FEWEST_S = 0.5  # of windows that may be rests, to learn from
 # So long a rest, or its quiet part, tells the gyroscope's bias: in less, a slow turn about gravity passes for it.
 TELLS_BIAS_S = 1.0
@@ -34,6 +35,7 @@ class RestFinder:
     """
 
     def __init__(self, recording: Recording, flat: Flat) -> None:
+        recording = with_rates(recording)
         self._recording, self._flat = recording, flat
         self._n = samples_of_window(recording)
         self._windows = _windows(recording, self._n)
@@ -58,11 +60,17 @@ class RestFinder:
         if self._windows is None:
             return np.zeros((0, 2), np.intp)
         detector = Detector(limits, (np.sqrt(flat.Sigma_a), np.sqrt(flat.Sigma_omega)), flat.b_omega)
-        covered = np.zeros(len(recording) + 1, np.intp)
         at = np.flatnonzero(detector.shares(self._windows).level < 1.0)
-        covered[at] += 1
-        covered[at + self._n] -= 1
-        still = (np.cumsum(covered)[:-1] > 0) & ~recording.gap
+        changes = np.zeros(len(recording) + 1, np.intp)
+        changes[at] += 1
+        changes[at + self._n] -= 1
+        covered = np.cumsum(changes)[:-1]
+        still = (covered > 0) & ~recording.gap
+        # where readings step from one rest to another, few still windows hold samples of both
+        few = (covered < FEW * self._n) & still
+        for first, last in _runs(few).tolist():
+            if few[first - 1] < still[first - 1] and few[last % len(few)] < still[last % len(few)]:
+                still[first:last] = False
         rests = self._trimmed(_runs(still))
         # of a run in which gravity turns, what is left without the samples in which the gyroscope says so
         slow = np.asarray(np.all(np.abs(self._windows.gyr - flat.b_omega) < TURNS_RAD_S, axis=1))

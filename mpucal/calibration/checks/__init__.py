@@ -54,16 +54,38 @@ CHECKS: tuple[Check, ...] = (
     estimate.parts_disagree,
 )
 
+# what is asked of an estimate from the rests alone: neither gaps nor the gyroscope spoil it
+OF_GYROSCOPE = (unusable.gyroscope_unit, unusable.dead_gyroscope)
+OF_RESTS: tuple[Check, ...] = tuple(
+    check
+    for check in CHECKS
+    if check
+    not in (recording.gyro_clipped, recording.data_lost, sensor.axes, sensor.gyro_off, clock.clock_off, clock.apart)
+)
+
+
+def gyroscope_at_fault(evidence: Evidence) -> Reason | None:
+    """Return why the gyroscope cannot be used: none recorded, dead, of another range, or contradicted by the rests."""
+    for check in (unusable.no_gyroscope, unusable.dead_gyroscope, sensor.gyro_range, sensor.gyro_contradicts):
+        if (at_fault := check(evidence)) is not None:
+            return at_fault
+    return None
+
 
 def found(evidence: Evidence) -> list[Reason]:
-    """All that speaks against it, what refuses it first."""
-    # of a gyroscope that is not there, or whose rates are another range's, nothing else can be said
-    nothing_else = unusable.no_gyroscope(evidence) or sensor.gyro_range(evidence)
-    if nothing_else is not None:
-        return [nothing_else]
-    # a fit there is only where nothing made the recording unusable
-    checks = CHECKS if evidence.fit is not None else (*UNUSABLE, *CHECKS)
-    reasons = [reason for check in checks if (reason := check(evidence)) is not None]
+    """Return all that speaks against an estimate, what refuses it first."""
+    if evidence.model == "static":
+        # unusable accelerations are unusable without a gyroscope, too
+        checks = (*(check for check in UNUSABLE if check not in OF_GYROSCOPE), *OF_RESTS)
+        reasons = [] if evidence.gyroscope is None else [evidence.gyroscope]
+    else:
+        # of a gyroscope that is not there, or whose rates are another range's, nothing else can be said
+        nothing_else = unusable.no_gyroscope(evidence) or sensor.gyro_range(evidence)
+        if nothing_else is not None:
+            return [nothing_else]
+        # a fit there is only where nothing made the recording unusable
+        checks, reasons = CHECKS if evidence.fit is not None else (*UNUSABLE, *CHECKS), []
+    reasons += [reason for check in checks if (reason := check(evidence)) is not None]
     return sorted(reasons, key=lambda reason: not reason.refuse)
 
 

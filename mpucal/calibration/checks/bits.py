@@ -91,7 +91,8 @@ def _counts(values: Vector, lsb: float) -> Counts | None:
     """(n, 3) the counts of which `values` were made; None where they are no whole numbers of 16 bits."""
     scaled = values / lsb
     counts = np.rint(scaled)
-    if np.abs(scaled - counts).max() > EXACTLY or np.abs(counts).max() > FULL_SCALE:
+    # rates that were not measured are NaN
+    if not (np.abs(scaled - counts).max() <= EXACTLY and np.abs(counts).max() <= FULL_SCALE):
         return None
     return counts.astype(np.int64)
 

@@ -9,7 +9,7 @@ import numpy as np
 from ...data import Mask, Vector
 from ...reasons import Reason, reason
 from ...result.error_model import sensor_axes
-from ..evidence import Evidence
+from ..evidence import MOST_MISS_RAD, Evidence
 from .estimate import USABLE_RMS_MPS2, inconsistent
 
 WORST_AXES_RAD = np.deg2rad(60.0)
@@ -104,6 +104,13 @@ def gyro_range(e: Evidence) -> Reason | None:
     assumed = e.recording.sensor.gyro_range_dps
     ranges = "" if assumed is None else f": ±{e.gyro_factor * assumed:g} deg/s, read as ±{assumed:g}"
     return reason("gyro_off", "range", factor=e.gyro_factor, ranges=ranges)
+
+
+def gyro_contradicts(e: Evidence) -> Reason | None:
+    """Rates that lead gravity far away from where it is at the next rest."""
+    if e.fit is None or trustworthy(e) or not e.gyro_miss > MOST_MISS_RAD:
+        return None
+    return reason("gyro_off", "contradicts", degrees=np.rad2deg(e.gyro_miss))
 
 
 def gyro_off(e: Evidence) -> Reason | None:

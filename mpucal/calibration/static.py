@@ -1,0 +1,105 @@
+"""The multi-position calibration: D and b_a by the magnitude of gravity at rest, without the gyroscope.
+
+Source: Frosio, Pedersini, Borghese, IEEE TIM 58 (2009), equation 5. D is symmetric, nine parameters in all: without a
+gyroscope the orientation of the accelerometer on its board is not observable.
+"""
+
+from __future__ import annotations
+
+from itertools import compress
+
+import numpy as np
+
+from ..data import Recording, Vector
+from ..rests.flat import Flat
+from ..rests.intervals import RestFinder, statistics
+from ..rests.law import mean_variance, rate_of_rests, tremor_variance
+from .fit import Fit
+from .gyro_matrix import KNOWN
+from .parameters import B_A_NAMES, D_NAMES, Form
+from .preprocessing import POSE_MPS2, TREMOR_PER_S
+from .theta import UPPER, from_elements
+
+# PS-MPU-6000A r3.4, section 6.2: +-3 % of scale factor, +-2 % across axes, both taken as uniform
+SCALE_FACTOR_SD, CROSS_AXIS_SD, BIAS_SD_MPS2 = 0.02, 0.012, 0.5
+PRIOR_SD = np.append(np.where(np.eye(3) > 0, SCALE_FACTOR_SD, CROSS_AXIS_SD)[UPPER], np.full(3, BIAS_SD_MPS2))
+# (12, 9) D row-major and b_a by the upper triangle of D and b_a
+ALL_OF_NINE = np.zeros((12, 9))
+ALL_OF_NINE[[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11], [0, 1, 2, 1, 3, 4, 2, 4, 5, 6, 7, 8]] = 1.0
+MOST_ITERATIONS, ROUNDS, SETTLED = 30, 8, 1e-9
+# m/s^2 that every rest may be off by, beside its noise and tremor: the least of these that explains the residuals
+SPREADS_MPS2 = np.append(0.0, np.geomspace(1e-4, 1.0, 80))
+# times the standard deviation, at most, where few residuals are left to tell the spread
+HONEST = 2.5
+
+
+def fit_static(recording: Recording, flat: Flat, gravity: float) -> Fit:
+    """Estimate D (symmetric) and b_a from the rests of a recording; the gyroscope says only where these are.
+
+    K is the identity, b_omega the flat segment's mean. Elements of which the rests say little keep the data sheet's
+    tolerance (`Fit.at_prior`).
+    """
+    y, variance = _rests(recording, flat)
+    start = x = np.append(np.eye(3)[UPPER], np.zeros(3))
+    extra, iterations, settled = SPREADS_MPS2[-1], 0, False
+    while True:
+        e, J, along = _residuals(x, y, gravity, variance)
+        weight = 1.0 / (along + extra**2)
+        weighted = J * weight[:, None]
+        information = weighted.T @ J
+        covariance = np.linalg.inv(information + np.diag(PRIOR_SD**-2.0))
+        left = len(y) - float(np.sum(covariance * information))  # degrees of freedom
+        if settled or iterations == MOST_ITERATIONS:
+            break
+        step = covariance @ (weighted.T @ e + (start - x) / PRIOR_SD**2)
+        x, iterations = x + step, iterations + 1
+        if iterations <= ROUNDS:  # the spread goes from one step of its scale to the next and back near the end
+            extra = _spread(e - J @ step, along, left)
+        settled = iterations > ROUNDS and bool(np.abs(step / PRIOR_SD).max() < SETTLED)
+    doubt = min(left / (left - 2.0), HONEST**2) if left > 2.0 else HONEST**2
+    covariance = np.linalg.inv(information / doubt + np.diag(PRIOR_SD**-2.0))
+    unknown = np.sqrt(np.diag(covariance)) > KNOWN * PRIOR_SD
+    return Fit(
+        D=from_elements(Form.SYMMETRIC, x[:6]),
+        b_a=x[6:],
+        b_omega=flat.b_omega,
+        K=np.eye(3),
+        names=D_NAMES + B_A_NAMES,
+        covariance=ALL_OF_NINE @ covariance @ ALL_OF_NINE.T,
+        iterations=iterations,
+        converged=settled,
+        nis=3.0 * float(weight @ (e * e)) / max(left, 1.0),
+        V=0.5 * float(weight @ (e * e)),
+        at_prior=tuple(compress(D_NAMES + B_A_NAMES, ALL_OF_NINE @ unknown > 0.0)),
+    )
+
+
+def _rests(recording: Recording, flat: Flat) -> tuple[Vector, Vector]:
+    """(k, 3) mean accelerations of the rests, and (k,) the variance of a mean beside its noise."""
+    runs = RestFinder(recording, flat).alike()
+    y, spread = statistics(recording.acc, runs)
+    lam = rate_of_rests(recording.acc, recording, flat, runs, TREMOR_PER_S)
+    seconds = (runs[:, 1] - runs[:, 0]) / recording.rate_hz
+    tremor = np.array([tremor_variance(of_one, flat.Sigma_a) for of_one in spread])
+    noise = flat.Sigma_a.mean() / (runs[:, 1] - runs[:, 0])
+    return y, POSE_MPS2**2 + noise + tremor * mean_variance(lam * seconds)
+
+
+def _residuals(x: Vector, y: Vector, gravity: float, variance: Vector) -> tuple[Vector, Vector, Vector]:
+    """(k,) what |s| lacks of gravity, s = inv(D) (y - b_a), its (k, 9) derivatives, and (k,) its variance."""
+    inverse = np.linalg.inv(from_elements(Form.SYMMETRIC, x[:6]))
+    s = (y - x[6:]) @ inverse
+    length = np.linalg.norm(s, axis=1)
+    v = (s / length[:, None]) @ inverse
+    by_D = v[:, :, None] * s[:, None, :]
+    J = -np.hstack([by_D.reshape(-1, 9), v]) @ ALL_OF_NINE
+    return gravity - length, J, variance * np.sum(v * v, axis=1)
+
+
+def _spread(e: Vector, variance: Vector, left: float) -> float:
+    """Return the least spread that explains residuals (k,) with `left` degrees of freedom; 0 where none is left."""
+    if left < 1.0:
+        return 0.0
+    chi2 = np.sum(e**2 / (variance + SPREADS_MPS2[:, None] ** 2), axis=1)
+    enough = np.flatnonzero(chi2 <= left)
+    return float(SPREADS_MPS2[enough[0] if len(enough) else -1])

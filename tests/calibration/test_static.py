@@ -1,0 +1,77 @@
+"""The multi-position calibration against the truth, a least-squares ellipsoid of SciPy's, and faces of a box."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import polar
+from scipy.optimize import least_squares
+
+from mpucal import Recording, calibrate
+from mpucal.rests.flat import find_flat, flat_statistics
+from mpucal.rests.intervals import RestFinder, statistics
+
+G = 9.82
+FACES = np.vstack([np.eye(3), -np.eye(3)])
+
+
+def sigmas(calibration, D, b_a):
+    """(12,) errors in units of their standard deviations; D is known up to a rotation."""
+    symmetric = polar(D, "left")[1]
+    return np.append((calibration.D - symmetric) / calibration.D_std, (calibration.b_a - b_a) / calibration.b_a_std)
+
+
+@pytest.mark.parametrize("seed", range(60, 66))
+def test_it_finds_the_truth_where_the_gyroscope_is_at_fault(hand, seed):
+    made = hand(seed, "pose12")
+    calibration = calibrate(replace(made.recording, gyr=np.zeros_like(made.recording.gyr)), "auto", G)
+    assert (calibration.verdict, calibration.fit["model"]) == ("usable", "static")
+    assert np.abs(sigmas(calibration, made.truth.D, made.truth.b_a)).max() < 4.0
+    assert calibration.quality["error_std"]["rms"] < 0.03
+    assert np.isnan(calibration.K_std).all()
+
+
+def test_it_is_an_ellipsoid_through_the_rests(hand):
+    recording = hand(66, "pose12").recording
+    calibration = calibrate(recording, "static", G)
+    runs = RestFinder(recording, flat_statistics(recording, find_flat(recording))).alike()
+    means = statistics(recording.acc, runs)[0]
+
+    def residuals(x):
+        D = np.array([[x[0], x[1], x[2]], [x[1], x[3], x[4]], [x[2], x[4], x[5]]])
+        return np.linalg.norm((means - x[6:]) @ np.linalg.inv(D), axis=1) - G
+
+    x = least_squares(residuals, [1, 0, 0, 1, 0, 1, 0, 0, 0]).x
+    away = np.append(calibration.D[np.triu_indices(3)] - x[:6], calibration.b_a - x[6:])
+    std = np.append(calibration.D_std[np.triu_indices(3)], calibration.b_a_std)
+    assert np.abs(away / std).max() < 1.0
+
+
+@pytest.mark.parametrize("gap_s", [0.0, 3.0, 30.0])
+def test_six_faces_that_were_joined_give_biases_and_scale_factors(gap_s):
+    rng = np.random.default_rng(7)
+    D, b_a = np.diag([1.015, 0.985, 1.01]), np.array([0.3, -0.2, 0.4])
+    n = 500
+    acc = np.concatenate([G * D @ face + b_a + rng.normal(0.0, 0.03, (n, 3)) for face in FACES[[5, *range(5)]]])
+    gyr = rng.normal(0.0, 0.002, acc.shape)
+    t = 0.01 * np.arange(len(acc)) + gap_s * (np.arange(len(acc)) // n)
+    calibration = calibrate(Recording.from_arrays(t, acc, gyr), "auto", G)
+    assert (calibration.verdict, calibration.fit["model"]) == ("usable", "static")
+    assert calibration.fit["at_prior"] == ["D_xy", "D_xz", "D_yx", "D_yz", "D_zx", "D_zy"]
+    np.testing.assert_allclose(np.diag(calibration.D), np.diag(D), atol=1e-3)
+    np.testing.assert_allclose(calibration.b_a, b_a, atol=0.01)
+    assert {reason["code"] for reason in calibration.quality["reasons"]} == {"gyro_off", "few_orientations"}
+
+
+def test_an_accelerometer_alone_is_calibrated_by_its_rests(hand):
+    made = hand(67, "pose12")
+    alone = replace(made.recording, gyr=np.full_like(made.recording.gyr, np.nan))
+    calibration = calibrate(alone, "auto", G)
+    assert (calibration.verdict, calibration.fit["model"]) == ("usable", "static")
+    assert np.abs(sigmas(calibration, made.truth.D, made.truth.b_a)).max() < 4.0
+
+
+def test_rests_that_differ_little_are_refused(hand):
+    recording = hand(68, "turns").recording.part(0, 2000)
+    calibration = calibrate(replace(recording, gyr=np.zeros_like(recording.gyr)), "auto", G)
+    assert calibration.verdict == "refused"
