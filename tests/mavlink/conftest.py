@@ -1,4 +1,4 @@
-"""A link over simulated time, and packets of a vehicle."""
+"""Fixtures: a link over simulated time, packets of a vehicle, and a link to the simulated vehicle."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from types import SimpleNamespace
 import pytest
 
 from mpucal.mavlink.dialect import dialect
+from mpucal.mavlink.link import Link
+from mpucal.mavlink.tlog import Record
 from mpucal.mavlink.transport import ReceivedBytes
+from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
+from mpucal.simulated.vehicle.transport import SimulatedTransport
 
 CAPTURES = Path(__file__).parents[2].parent / "shared" / "captures"
 S = 1_000_000_000
@@ -23,7 +27,7 @@ def captures() -> Path:
 
 
 class Script:
-    """A transport that plays (time [s], address, data), and keeps what is sent."""
+    """Transport that plays (time [s], address, data), and keeps the packets that are sent."""
 
     datagrams = True
     name = "a script"
@@ -65,7 +69,7 @@ def script() -> type[Script]:
 
 @pytest.fixture(scope="session")
 def station():
-    """station(system) makes packets: heartbeat(), raw(t_us), message(name, **fields)."""
+    """station(system) makes packets: heartbeat(), raw(t_us), message(name, *fields)."""
 
     def make(system: int = 1, component: int = 1, autopilot: int = 3, key: bytes | None = None):
         m = dialect()
@@ -94,6 +98,21 @@ def station():
 
 @pytest.fixture(scope="session")
 def decoded():
-    """decoded(data): the message in a packet."""
+    """decoded(data) returns the message in a packet."""
     mav = dialect().MAVLink(None)
     return lambda data: mav.decode(bytearray(data))
+
+
+@pytest.fixture
+def simulated():
+    """simulated(words) returns a simulated vehicle, a link to it, and the packets that the link records."""
+
+    def make(words: str = "", lock: bool = True, **options):
+        vehicle = SimulatedVehicle(VehicleOptions.parse(f"sim:{words}" if words else "sim"))
+        record: list[Record] = []
+        link = Link(SimulatedTransport(vehicle), lambda t_ns, data: record.append(Record(t_ns, data)), **options)
+        if lock:
+            link.lock(link.listen()[0])
+        return SimpleNamespace(vehicle=vehicle, link=link, record=record)
+
+    return make

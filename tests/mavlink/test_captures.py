@@ -15,7 +15,7 @@ AXES = "XYZ"
 
 @pytest.fixture(scope="module")
 def replayed(tmp_path_factory):
-    """replayed(path): what `mpucal session --replay` leaves, run once a path."""
+    """replayed(path) returns the result and the folder of `mpucal session --replay`, run once a path."""
     done = {}
 
     def run(path):
@@ -33,27 +33,20 @@ def of_imu(folder, imu):
     return document if imu == 1 else {"format": document["format"], **document["others"][imu - 2]}
 
 
-@pytest.mark.parametrize("imu", [1, 2])
-def test_both_imus_meet_their_truth(captures, replayed, imu):
+@pytest.mark.parametrize(("imu", "prefix"), [(1, "INS_ACC"), (2, "INS_ACC2")])
+def test_both_imus_meet_their_truth_and_keep_the_logs_parameters(captures, replayed, imu, prefix):
     result, folder = replayed(captures / "ardupilot_two_imus.tlog")
     assert result.exception is None, result.output
     truth = json.loads((captures / "ardupilot_two_imus.json").read_text())["params"]
     document = of_imu(folder, imu)
-    new, prefix = document["autopilot"]["params_new"], "INS_ACC" if imu == 1 else f"INS_ACC{imu}"
+    old, new = document["autopilot"]["params_old"], document["autopilot"]["params_new"]
     for axis in AXES:
-        assert new[f"{prefix}OFFS_{axis}"] == pytest.approx(truth[f"SIM_ACC{imu}_BIAS_{axis}"], abs=2e-3)
-        assert new[f"{prefix}SCAL_{axis}"] == pytest.approx(truth[f"SIM_ACC{imu}_SCAL_{axis}"], abs=2e-4)
+        offset, scale = f"{prefix}OFFS_{axis}", f"{prefix}SCAL_{axis}"
+        assert new[offset] == pytest.approx(truth[f"SIM_ACC{imu}_BIAS_{axis}"], abs=2e-3)
+        assert new[scale] == pytest.approx(truth[f"SIM_ACC{imu}_SCAL_{axis}"], abs=2e-4)
+        assert (old[offset], old[scale]) == pytest.approx((truth[offset], truth[scale]))
     D = Calibration.from_document(document).D
     assert np.abs(D - np.diag(np.diag(D))).max() < 1.5e-3
-
-
-def test_the_parameters_of_the_log_are_the_old_ones(captures, replayed):
-    _, folder = replayed(captures / "ardupilot_two_imus.tlog")
-    truth = json.loads((captures / "ardupilot_two_imus.json").read_text())["params"]
-    for imu, prefix in ((1, "INS_ACC"), (2, "INS_ACC2")):
-        old = of_imu(folder, imu)["autopilot"]["params_old"]
-        names = [f"{prefix}{kind}_{axis}" for kind in ("OFFS", "SCAL") for axis in AXES]
-        assert {name: old[name] for name in names} == pytest.approx({name: truth[name] for name in names})
 
 
 def test_the_replayed_capture_is_the_log_itself(captures, replayed):
