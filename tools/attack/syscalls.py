@@ -38,10 +38,9 @@ from mpucal.files import load
 from mpucal.result.blob import Blob
 
 from .disk_model import Call, Disk, logged
-from .syscalls_commands import STATE, WORDS, Ended, Failing, ended, prepared
+from .syscalls_commands import STATE, WORDS, Failed, Failing, prepared, run_failing
 
 SHIM = Path(__file__).with_suffix(".c")
-CODES = (0, 3, 4, 5, 6)
 DISK = (errno.EIO, errno.ENOSPC, errno.EDQUOT)
 REFUSED = (errno.EROFS, errno.EACCES)
 ERRORS = {
@@ -73,12 +72,12 @@ Whole = Callable[[str, bytes], bool]
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Content by name, of what lies below."""
+    """Return the content of each file below, by name."""
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def either(old: Files, new: Files, placed: Mapping[str, Sequence[bytes]]) -> Whole:
-    """Whether a file is as before, or as the command makes it (one after the other, before and after a write-back).
+    """Return a test: a file is as before, or as the command makes it, at first or after a write-back.
 
     A temporary file, and a note of a write, is no result.
     """
@@ -105,7 +104,7 @@ def either(old: Files, new: Files, placed: Mapping[str, Sequence[bytes]]) -> Who
 
 
 def spoilt(found: Files, whole: Whole) -> Iterator[str]:
-    """Those that are neither old nor new."""
+    """Yield those that are neither old nor new."""
     for name, data in found.items():
         try:
             fit = whole(name, data)
@@ -116,7 +115,7 @@ def spoilt(found: Files, whole: Whole) -> Iterator[str]:
 
 
 def noted(found: Files) -> bool:
-    """Whether a note of a write is there that can be read."""
+    """Return True if a note of a write is there that can be read."""
     return any(
         "old" in (said := json.loads(data)) or "registers" in said
         for name, data in found.items()
@@ -132,7 +131,7 @@ class Trial:
         self._anew()
         self.old = files(self._here)
         with (start.parent / "log").open("w+b", buffering=0) as log:
-            done = ended(self._words, self._here, Failing(least=LEAST_BYTES, log=log.fileno()))
+            done = run_failing(self._words, self._here, Failing(least=LEAST_BYTES, log=log.fileno()))
             log.seek(0)
             self.log = list(logged(log.read(), str(self._here)))
         assert done.code == 0, done.said
@@ -144,26 +143,21 @@ class Trial:
         self.whole = either(self.old, self.new, disk.placed)
 
     def failed(self, failing: Failing) -> tuple[str, list[str]]:
-        """How the command ends where this fails, and what was wrong."""
+        """Run the command where this fails, and return how it ends and what was wrong."""
         self._anew()
-        done = ended(self._words, self._here, failing)
+        done = run_failing(self._words, self._here, failing)
         if (done.crashed or "").startswith(NUMPY):
             return "NumPy crashed", []
         return f"exit {done.code}", list(self._wrong(done, files(self._here), failing.call))
 
-    def _wrong(self, done: Ended, now: Files, call: int) -> Iterator[str]:
-        last = (done.said.strip().splitlines() or [""])[-1]
-        if done.code not in CODES or "Traceback" in done.said:
-            trace = done.said[done.said.find("Traceback") :].splitlines()[-4:-1] if "Traceback" in done.said else ()
-            yield f"exit {done.code}: {done.crashed or last} {' | '.join(trace)}"
-        elif done.code not in (0, 5) and not last.startswith("mpucal: "):
-            yield f"exit {done.code} without a sentence: {last}"
+    def _wrong(self, done: Failed, now: Files, call: int) -> Iterator[str]:
+        yield from (f"{each} {done.crashed or ''}" for each in done.wrong())
         # an old report beside a new calibration would be another's
         yield from (f"{name} is gone" for name in self.old.keys() - now.keys() if not name.endswith("report.html"))
         yield from (f"{name} is neither old nor new" for name in spoilt(now, self.whole))
         if done.code == 0:
             yield from (f"exit 0 without {name}" for name in self.new.keys() - now.keys())
-        told = noted(now) or "put back what was there" in last
+        told = noted(now) or "put back what was there" in done.last
         if told != (done.changed and done.code != 0):
             yield f"exit {done.code}, device {'changed' if done.changed else 'as before'}, told: {told}"
         for name in (name for name in self.new.keys() - self.old.keys() if name.endswith(CAPTURES)):
@@ -176,7 +170,7 @@ class Trial:
                     yield f"exit {done.code}, and what was recorded is lost: {error}"
 
     def cut_off(self, rng: random.Random, looked: Sequence[int]) -> tuple[int, list[str]]:
-        """How many cuts were looked at, of those after entries of the log, and what was wrong."""
+        """Cut the power after these entries of the log, and return the number of cuts and what was wrong."""
         disk, wrong, cuts = Disk(self.old), [], 0
         states = [call.data for call in self.log if call.op == "d"]
         state = b""
@@ -205,7 +199,7 @@ class Trial:
 
 
 def sampled(calls: Sequence[Call], each: bool) -> list[int]:
-    """Indices of calls: of each kind the first, second, middle and last; or all."""
+    """Return indices of calls: of each kind the first, second, middle and last; or all."""
     kinds = defaultdict(list)
     for i, call in enumerate(calls):
         kinds[call.op, TEMPORARY.sub(r"\1\2~", call.path)].append(i)
@@ -214,7 +208,7 @@ def sampled(calls: Sequence[Call], each: bool) -> list[int]:
 
 
 def tried(name: str, start: Path, asked: argparse.Namespace) -> Iterator[str]:
-    """What was wrong with a command; a line of the table is printed."""
+    """Try a command, print its line of the table, and yield what was wrong."""
     rng = random.Random(f"{name} {asked.seed}")
     trial = Trial(name, start)
     todo = [
@@ -275,7 +269,7 @@ def main() -> int:
 
 
 def preloaded() -> int:
-    """The same with the shim."""
+    """Run this program again with the shim."""
     with TemporaryDirectory() as place:
         library = Path(place) / "syscalls.so"
         subprocess.run(["cc", "-O1", "-shared", "-fPIC", "-o", library, SHIM, "-ldl"], check=True)

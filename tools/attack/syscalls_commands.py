@@ -1,4 +1,4 @@
-"""The commands of syscalls.py, run in a child of the shim's, with what their simulated device then holds."""
+"""The commands of syscalls.py, run in a child of the shim's, and the state of their simulated device."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import ctypes
 import os
 import re
 import shutil
-import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -17,14 +17,14 @@ from unittest.mock import patch
 
 import numpy as np
 
-from mpucal.__main__ import _keep_streams, run
+from mpucal.__main__ import run
 from mpucal.chip.offsets import PLACES
 from mpucal.files import load
 from mpucal.result.journal import Journal
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.vehicle.store import ParameterStore
 from mpucal.sinks.autopilot import CORRECTION
-from tools.processes import quick, ready
+from tools.processes import Child, Ended, quick, ready
 
 SIM, VEHICLE = "sim:seed=3,chip=mpu6500,temperature_c=", "sim:seed=7,imus=1"
 QUICK = ["--target", "quick", "--yes"]
@@ -55,7 +55,7 @@ STATE = ".state"
 
 @dataclass(frozen=True)
 class Failing:
-    """What is to fail in a run.
+    """A failure that is to happen in a run.
 
     Attributes
     ----------
@@ -72,24 +72,21 @@ class Failing:
 
 
 @dataclass(frozen=True)
-class Ended:
-    """How a command ended.
+class Failed(Ended):
+    """A command that ended; its exit code is 128 + signal where it crashed, and its stack is in what it said.
 
     Attributes
     ----------
-    code : exit code; 128 + signal where it crashed. said : on stderr; a crash with its stack.
     allocations : so many counted. changed : its device holds something else than before the write.
     """
 
-    code: int
-    said: str
-    allocations: int
-    changed: bool
+    allocations: int = 0
+    changed: bool = False
 
     @property
     def crashed(self) -> str | None:
-        """The library that crashed, or called what did."""
-        libraries = re.findall(r"^(\S+)\(", self.said, re.MULTILINE) if self.code > SIGNAL else []
+        """Return the library that crashed, or called what did."""
+        libraries = re.findall(r"^(\S+)\(", self.said, re.MULTILINE) if (self.code or 0) > SIGNAL else []
         return next((Path(each).name for each in libraries if not OUTER.search(each)), None)
 
 
@@ -107,7 +104,7 @@ class Devices:
         self.before: str | None = None
 
     def state(self) -> str:
-        """What is to last of them: offset registers, parameters that correct samples."""
+        """Return what is to last of them: offset registers, parameters that correct samples."""
         words = [bytes(chip._registers[place[0] : place[2] + 2]).hex() for chip in self._chips for place in PLACES]
         return " ".join(
             [*words, *(f"{name}={store[name]}" for store in self._stores for name in store if CORRECTION.search(name))]
@@ -142,35 +139,20 @@ class Devices:
             yield
 
 
-def ended(words: Sequence[str], folder: Path, failing: Failing = Failing()) -> Ended:
-    """Run a command in `folder`."""
-    said = folder.parent / "said"
+def run_failing(words: Sequence[str], folder: Path, failing: Failing = Failing()) -> Failed:
+    """Run a command in `folder`, where this fails."""
     hear, tell = os.pipe()
-    pid = os.fork()
-    if pid == 0:
-        code = 1
-        try:
-            code = _child(words, folder, failing, said, tell)
-        except BaseException:
-            traceback.print_exc()
-        finally:
-            os._exit(code)
+    done = Child(partial(_armed, words, folder, failing, tell), folder, folder.parent / "said").go().wait()
     os.close(tell)
-    told = os.read(hear, 100).decode().split()
+    allocations, changed = map(int, os.read(hear, 100).decode().split() or (0, 0))
     os.close(hear)
-    _, status = os.waitpid(pid, 0)
-    allocations, changed = map(int, told or (0, 0))
-    return Ended(os.waitstatus_to_exitcode(status), said.read_text("utf-8", "replace"), allocations, bool(changed))
+    return Failed(**vars(done), allocations=allocations, changed=bool(changed))
 
 
-def _child(words: Sequence[str], folder: Path, failing: Failing, said: Path, tell: int) -> int:
+def _armed(words: Sequence[str], folder: Path, failing: Failing, tell: int) -> int:
     shim, devices = ctypes.CDLL(None), Devices()
     shim.allocations_arm.argtypes = (ctypes.c_size_t, ctypes.c_int, ctypes.c_int)
-    os.chdir(folder)
     os.environ["XDG_STATE_HOME"] = str(folder / STATE)
-    for handle in (1, 2):
-        os.dup2(os.open(said if handle == 2 else os.devnull, os.O_RDWR | os.O_CREAT | os.O_TRUNC), handle)
-    _keep_streams()
     with devices.watched(shim), quick(sync=True):
         shim.syscalls_arm(str(folder).encode(), failing.call, failing.error, failing.log)
         shim.allocations_arm(failing.least, failing.allocation, failing.since)
@@ -185,7 +167,7 @@ def _child(words: Sequence[str], folder: Path, failing: Failing, said: Path, tel
 
 @contextmanager
 def prepared() -> Iterator[Path]:
-    """A folder with what the commands read, and an older result; all of mpucal is loaded, for the children."""
+    """Yield a folder with what the commands read, and an older result; all of mpucal is loaded, for the children."""
     ready()
     with TemporaryDirectory() as temporary:
         place = Path(temporary).resolve()
@@ -194,10 +176,10 @@ def prepared() -> Iterator[Path]:
         warm = [word.replace(f"{SIM}20", f"{SIM}45,hand=placing") for word in SESSION]
         for name, words in (("a", SESSION), ("b", warm), ("v", FLIGHT)):
             folder = place / name
-            made = ended([*words, str(folder)], start)
+            made = run_failing([*words, str(folder)], start)
             assert made.code == 0, made.said
             shutil.copy(folder / "calibration.json", start / f"{name}.json")
-        written = ended([*WORDS["write"][:-3], "-o", str(place / "a"), "--yes"], start)
+        written = run_failing([*WORDS["write"][:-3], "-o", str(place / "a"), "--yes"], start)
         assert written.code == 0, written.said
         shutil.copy(place / "a" / "chip-offsets.json", start)
         shutil.copy(place / "a" / "capture.mcap", start / "in.mcap")
