@@ -1,3 +1,5 @@
+"""A vehicle's clock: wraps, reboots, time that is set, and packets that come late."""
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -8,7 +10,7 @@ WRAP = 1 << 32
 
 
 def run(unit_us, pairs):
-    """pairs of (raw, received [s])."""
+    """Return time and jump of each (raw, received [s])."""
     clock = VehicleClock(unit_us)
     return [clock.unwrap(raw, round(received * 1e9)) for raw, received in pairs]
 
@@ -41,14 +43,11 @@ def test_jumps_are_told_apart(before_s, after_s, jump):
     assert second is jump
 
 
-def test_time_goes_on_over_a_reset():
-    found = run(1, [(10_000_000, 50.0), (2_000_000, 53.0), (2_010_000, 53.01)])
-    assert [t_us for t_us, _ in found] == [10_000_000, 13_000_000, 13_010_000]
-
-
-def test_a_late_packet_keeps_its_time():
-    found = run(1000, [(1000, 1.0), (1030, 1.03), (1010, 1.031), (1040, 1.04)])
-    assert [t_us for t_us, _ in found] == [1_000_000, 1_030_000, 1_010_000, 1_040_000]
+def test_time_goes_on_over_a_reset_and_a_late_packet_keeps_its_time():
+    reset = run(1, [(10_000_000, 50.0), (2_000_000, 53.0), (2_010_000, 53.01)])
+    assert [t_us for t_us, _ in reset] == [10_000_000, 13_000_000, 13_010_000]
+    late = run(1000, [(1000, 1.0), (1030, 1.03), (1010, 1.031), (1040, 1.04)])
+    assert [t_us for t_us, _ in late] == [1_000_000, 1_030_000, 1_010_000, 1_040_000]
 
 
 def test_what_was_read_late_in_a_burst_is_no_clock_that_was_set():

@@ -1,3 +1,5 @@
+"""The parser: streams that are cut anywhere, junk, damage and signatures."""
+
 from itertools import pairwise
 
 import pytest

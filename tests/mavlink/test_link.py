@@ -1,3 +1,5 @@
+"""The link: which vehicle it hears and speaks to, signatures, losses, and requests."""
+
 import pytest
 
 from mpucal.errors import BusError, LinkError, NoAnswer, UsageError
@@ -17,8 +19,12 @@ def in_order(*arriving):
     return sorted([packet for packets in arriving for packet in packets], key=lambda packet: packet[0])
 
 
+def unlocked(transport, key=None):
+    return Link(transport, lambda t_ns, data: None, key)
+
+
 def locked(transport, key=None):
-    """A link locked to the only vehicle, and what it records."""
+    """Return a link locked to the only vehicle, and the packets that it records."""
     record = []
     link = Link(transport, lambda t_ns, data: record.append((t_ns, data)), key)
     link.lock(choose_vehicle(link.listen(), None))
@@ -27,7 +33,7 @@ def locked(transport, key=None):
 
 def test_it_only_reads_until_it_is_locked_and_then_beats_once_a_second(script, station, decoded):
     transport = script(heartbeats(station(), HOME))
-    link = Link(transport, lambda t_ns, data: None)
+    link = unlocked(transport)
     (vehicle,) = link.listen()
     assert (vehicle.address, vehicle.system, link.now_ns()) == (HOME, 1, 2 * S)
     assert transport.sent == []
@@ -40,13 +46,13 @@ def test_it_only_reads_until_it_is_locked_and_then_beats_once_a_second(script, s
 
 def test_a_partner_that_was_named_is_spoken_to_at_once(script, station):
     transport = script(heartbeats(station(), HOME), outward=True)
-    Link(transport, lambda t_ns, data: None).listen()
+    unlocked(transport).listen()
     assert [(t, address) for t, address, _ in transport.sent] == [(0.0, None), (1.0, None)]
 
 
 def test_a_flood_of_strangers_is_named_and_ends_no_later(script, station):
     junk = [(k / 1000, f"10.0.{k % 200}.1:{k}", b"no packet") for k in range(60_000)]
-    link = Link(script(junk), lambda t_ns, data: None)
+    link = unlocked(script(junk))
     with pytest.raises(LinkError, match=r"a script is flooded: \d+ pieces came within 6 s that are no vehicle's"):
         link.listen()
     assert link.now_ns() == 6 * S
@@ -58,31 +64,29 @@ def test_a_flood_of_strangers_is_named_and_ends_no_later(script, station):
 @pytest.mark.parametrize(("kB", "words"), [(60, "no autopilot's heartbeat came"), (600, "is flooded")])
 def test_noise_on_a_serial_line_is_a_flood_where_it_is_more_than_a_line_carries(script, kB, words):
     noise = [(5 * k / kB, HOME, bytes([k % 256]) * 1000) for k in range(kB)]
-    link = Link(script(noise, outward=True, datagrams=False), lambda t_ns, data: None)
+    link = unlocked(script(noise, outward=True, datagrams=False))
     with pytest.raises(BusError, match=f"{words}.*within 6 s"):
         link.listen()
 
 
 def test_several_vehicles_end_with_their_list(script, station):
-    transport = script(in_order(heartbeats(station(1), HOME), heartbeats(station(7, autopilot=12), STRANGER)))
-    vehicles = Link(transport, lambda t_ns, data: None).listen()
-    with pytest.raises(UsageError) as raised:
-        choose_vehicle(vehicles, None)
-    assert str(raised.value) == (
-        f"there are several vehicles: system 1 (ArduPilot) at {HOME}, system 7 (PX4) at {STRANGER}: "
-        "choose one with --system N."
-    )
+    both = in_order(heartbeats(station(1), HOME), heartbeats(station(7, autopilot=12), STRANGER))
+    vehicles = unlocked(script(both)).listen()
+    listed = rf"several vehicles: system 1 \(ArduPilot\) at {HOME}, system 7 \(PX4\) at {STRANGER}: choose one with"
+    for given, system, words in (
+        (vehicles, None, listed),
+        (vehicles, 9, "no vehicle is system 9"),
+        (vehicles[:1] * 100, None, f"at {HOME} and 92 more: choose one"),
+    ):
+        with pytest.raises(UsageError, match=words):
+            choose_vehicle(given, system)
     assert choose_vehicle(vehicles, 7).address == STRANGER
-    with pytest.raises(UsageError, match="no vehicle is system 9"):
-        choose_vehicle(vehicles, 9)
-    with pytest.raises(UsageError, match=f"at {HOME} and 92 more: choose one"):
-        choose_vehicle(vehicles[:1] * 100, None)
 
 
 def test_a_second_vehicle_is_heard_where_the_first_comes_late(script, station):
     late = [(t_s + 3, *rest) for t_s, *rest in heartbeats(station(), HOME)]
     later = [(t_s + 3.7, *rest) for t_s, *rest in heartbeats(station(7), STRANGER)]
-    link = Link(script(in_order(late, later)), lambda t_ns, data: None)
+    link = unlocked(script(in_order(late, later)))
     assert [vehicle.system for vehicle in link.listen()] == [1, 7]
     assert link.now_ns() == 5.5 * S
 
@@ -105,7 +109,7 @@ def test_a_vehicle_that_comes_back_at_another_port_is_found_there_once_it_is_sou
 def test_one_system_at_two_addresses_is_not_guessed_at(script, station):
     transport = script(in_order(heartbeats(station(), HOME), heartbeats(station(), STRANGER)))
     with pytest.raises(UsageError, match="stop the other"):
-        choose_vehicle(Link(transport, lambda t_ns, data: None).listen(), 1)
+        choose_vehicle(unlocked(transport).listen(), 1)
 
 
 @pytest.mark.parametrize("key", [None, KEY], ids=["unsigned", "signed"])
@@ -143,34 +147,20 @@ def test_others_at_the_vehicles_address_are_kept_but_not_heard(script, station):
     assert [t_ns for t_ns, _ in record] == sorted(t_ns for t_ns, _ in record)
 
 
-def test_nobody_there_is_one_sentence(script):
+@pytest.mark.parametrize("stations", [False, True], ids=["nobody", "ground stations"])
+def test_no_vehicle_there_is_one_sentence(script, station, stations):
+    beat = station(255, 190).message("heartbeat", 6, 8, 0, 0, 4)
     with pytest.raises(NoAnswer, match="no autopilot's heartbeat came over a script within 6 s: power the vehicle"):
-        Link(script([]), lambda t_ns, data: None).listen()
-
-
-def test_ground_stations_are_no_vehicles(script, station):
-    station_ = station(255, 190)
-    beats = [(0.5 + k, HOME, station_.message("heartbeat", 6, 8, 0, 0, 4)) for k in range(9)]
-    with pytest.raises(NoAnswer):
-        Link(script(beats), lambda t_ns, data: None).listen()
+        unlocked(script([(0.5 + k, HOME, beat) for k in range(9)] if stations else [])).listen()
 
 
 def test_a_first_heartbeat_may_take_six_seconds(script, station):
-    transport = script([(5.5, HOME, station().heartbeat())])
-    assert len(Link(transport, lambda t_ns, data: None).listen()) == 1
+    assert len(unlocked(script([(5.5, HOME, station().heartbeat())])).listen()) == 1
 
 
 def test_a_wrong_signing_key_is_named(script, station):
-    transport = script(heartbeats(station(key=KEY), HOME))
     with pytest.raises(LinkError, match="none is signed with the key of --signing-key"):
-        Link(transport, lambda t_ns, data: None, b"x" * 32).listen()
-
-
-def test_with_the_key_both_sides_sign(script, station, decoded):
-    transport = script(heartbeats(station(key=KEY), HOME))
-    link, _ = locked(transport, KEY)
-    list(link.messages(5 * S))
-    assert all(decoded(data).get_header().incompat_flags & 1 for _, _, data in transport.sent)
+        unlocked(script(heartbeats(station(key=KEY), HOME)), b"x" * 32).listen()
 
 
 def test_a_vehicle_whose_clock_stood_still_is_believed(script, station):
@@ -178,16 +168,17 @@ def test_a_vehicle_whose_clock_stood_still_is_believed(script, station):
     vehicle.mav.signing.timestamp = 7
     transport = script([(now_s + 0.5, HOME, vehicle.heartbeat())])
     transport._now_ns = now_s * S
-    assert len(Link(transport, lambda t_ns, data: None, KEY).listen()) == 1
+    assert len(unlocked(transport, KEY).listen()) == 1
 
 
-def test_our_signatures_are_not_older_than_the_vehicles(script, station):
+def test_we_sign_no_earlier_than_the_vehicle(script, station, decoded):
     vehicle = station(key=KEY)
     vehicle.mav.signing.timestamp = ahead = 1 << 44
     transport = script(heartbeats(vehicle, HOME))
     link, _ = locked(transport, KEY)
     list(link.messages(5 * S))
     assert transport.sent
+    assert all(decoded(data).get_header().incompat_flags & 1 for _, _, data in transport.sent)
     # MAVLink 2 signing: link id, 6 bytes of time, 6 of signature at the packet's end
     assert all(int.from_bytes(data[-12:-6], "little") >= ahead for _, _, data in transport.sent)
 
@@ -195,9 +186,8 @@ def test_our_signatures_are_not_older_than_the_vehicles(script, station):
 def test_who_forges_signatures_meanwhile_does_not_silence_the_vehicle(script, station):
     vehicle, forger = station(key=KEY), station(key=b"x" * 32)
     forger.mav.signing.timestamp = 1 << 47
-    transport = script(in_order(heartbeats(vehicle, HOME), heartbeats(forger, STRANGER, 4)))
-    found = Link(transport, lambda t_ns, data: None, KEY).listen()
-    assert [each.address for each in found] == [HOME]
+    both = in_order(heartbeats(vehicle, HOME), heartbeats(forger, STRANGER, 4))
+    assert [each.address for each in unlocked(script(both), KEY).listen()] == [HOME]
 
 
 def test_a_vehicle_that_signs_is_noticed_where_we_do_not(script, station):

@@ -1,4 +1,4 @@
-"""New parameters of a calibration, against the stream that they then make, computed the long way."""
+"""New parameters of a calibration, judged by the stream that they then make, computed the long way."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpucal.data import STANDARD_GRAVITY_MPS2
+from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.parameters.compose import Correction, compose
 from mpucal.mavlink.parameters.mounting import orientation_matrix
 from mpucal.mavlink.parameters.slots import px4_slot
@@ -15,21 +16,29 @@ ORIENTATIONS = [number for number in range(41) if orientation_matrix(number) is 
 
 
 def sensor(rng, cross):
-    """raw = C f_sensor + bias, in the sensor's axes."""
+    """Return C and bias of raw = C f_sensor + bias, in the sensor's axes."""
     C = np.diag(rng.uniform(0.9, 1.1, 3)) + cross * rng.uniform(-1, 1, (3, 3)) * (1 - np.eye(3))
     return C, rng.uniform(-1, 1, 3)
 
 
 def stream(C, bias, correction, R, f):
-    """What an autopilot delivers of the specific force f (n, 3) in its own axes."""
+    """Return an autopilot's output for the specific force f (n, 3) in its own axes."""
     raw = f @ R @ C.T + bias
     return ((raw - correction.offset) * correction.scale) @ R.T
 
 
 def calibrated(C, bias, correction, R):
-    """D and b_a of that stream."""
+    """Return D and b_a of that stream."""
     b = stream(C, bias, correction, R, np.zeros((1, 3)))[0]
     return (stream(C, bias, correction, R, np.eye(3)) - b).T, b
+
+
+def composed_at_random(seed, number, cross):
+    rng = np.random.default_rng(seed)
+    R = orientation_matrix(number)
+    C, bias = sensor(rng, cross)
+    old = Correction(rng.uniform(-0.5, 0.5, 3), rng.uniform(0.9, 1.1, 3))
+    return C, bias, R, compose(*calibrated(C, bias, old, R), old, R, STANDARD_GRAVITY_MPS2)
 
 
 def sphere(n, radius):
@@ -40,11 +49,7 @@ def sphere(n, radius):
 @settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(ORIENTATIONS))
 def test_a_sensor_without_cross_axis_terms_is_made_perfect(seed, number):
-    rng = np.random.default_rng(seed)
-    R = orientation_matrix(number)
-    C, bias = sensor(rng, cross=0.0)
-    old = Correction(rng.uniform(-0.5, 0.5, 3), rng.uniform(0.9, 1.1, 3))
-    composed = compose(*calibrated(C, bias, old, R), old, R, STANDARD_GRAVITY_MPS2)
+    C, bias, R, composed = composed_at_random(seed, number, cross=0.0)
     f = sphere(20, STANDARD_GRAVITY_MPS2)
     np.testing.assert_allclose(stream(C, bias, composed.correction, R, f), f, atol=1e-9)
     assert composed.residual_of(composed.correction) < 1e-9
@@ -53,11 +58,7 @@ def test_a_sensor_without_cross_axis_terms_is_made_perfect(seed, number):
 @settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(ORIENTATIONS))
 def test_the_offset_is_exact_and_the_residual_what_the_worst_attitude_shows(seed, number):
-    rng = np.random.default_rng(seed)
-    R = orientation_matrix(number)
-    C, bias = sensor(rng, cross=0.02)
-    old = Correction(rng.uniform(-0.5, 0.5, 3), rng.uniform(0.9, 1.1, 3))
-    composed = compose(*calibrated(C, bias, old, R), old, R, STANDARD_GRAVITY_MPS2)
+    C, bias, R, composed = composed_at_random(seed, number, cross=0.02)
     new = composed.correction
     np.testing.assert_allclose(new.offset, bias, atol=1e-12)
     f = sphere(4000, STANDARD_GRAVITY_MPS2)
@@ -82,21 +83,19 @@ def test_what_is_only_turned_is_said_and_not_written():
     assert composed.residual_of(composed.correction) < 0.01
 
 
-def test_the_stream_after_a_change_is_foretold():
+def test_the_stream_after_a_change_is_predicted():
     rng = np.random.default_rng(5)
     C, bias = sensor(rng, cross=0.02)
     R = orientation_matrix(14)
     old, new = (Correction(rng.uniform(-0.5, 0.5, 3), rng.uniform(0.9, 1.1, 3)) for _ in range(2))
     f = sphere(10, STANDARD_GRAVITY_MPS2)
-    foretold = old.recorrect(new, R, stream(C, bias, old, R, f))
-    np.testing.assert_allclose(foretold, stream(C, bias, new, R, f), atol=1e-12)
+    predicted = old.recorrect(new, R, stream(C, bias, old, R, f))
+    np.testing.assert_allclose(predicted, stream(C, bias, new, R, f), atol=1e-12)
 
 
 @pytest.mark.parametrize("number", ORIENTATIONS)
 def test_orientations_are_pymavlinks_euler_angles(number):
     rotmat = pytest.importorskip("pymavlink.rotmat")
-    from mpucal.mavlink.dialect import dialect
-
     words = dialect().enums["MAV_SENSOR_ORIENTATION"][number].name.removeprefix("MAV_SENSOR_ROTATION_").split("_")
     angles = dict(zip(words[::2], map(float, words[1::2]), strict=False)) if len(words) > 1 else {}
     expected = rotmat.Matrix3()

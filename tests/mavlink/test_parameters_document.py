@@ -1,4 +1,4 @@
-"""What a calibration of a vehicle says of its parameters: the new ones, or why there are none."""
+"""An autopilot's entry in a calibration: its new parameters, or the reason why there are none."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Values on the wire, through pymavlink's own packing and back."""
+"""Parameters on the wire, through pymavlink's own packing and back; their files; their slots and mounting."""
 
 import math
 
@@ -37,18 +37,13 @@ def test_integers_travel_by_their_bytes_to_px4(kind, data):
     assert (parameter.value, parameter.index, parameter.count) == (value, 7, 100)
 
 
-@given(st.integers(-(1 << 24), 1 << 24))
-def test_integers_travel_by_their_value_to_ardupilot(value):
-    assert sent("INS_ACC_ID", value, INT32, False).value == value
-
-
-@given(st.floats(width=32, allow_nan=False, allow_infinity=False), st.booleans())
-def test_floats_travel_as_they_are(value, bytewise):
+@given(st.integers(-(1 << 24), 1 << 24), st.floats(width=32, allow_nan=False, allow_infinity=False), st.booleans())
+def test_other_values_travel_as_they_are(whole, value, bytewise):
+    assert sent("INS_ACC_ID", whole, INT32, False).value == whole
     assert sent("X", value, REAL32, bytewise).value == value
 
 
 def test_a_name_of_sixteen_letters_has_no_end_mark():
-    assert name_bytes("CAL_ACC0_XSCALE_") == b"CAL_ACC0_XSCALE_"
     assert sent("ABCDEFGHIJKLMNOP", 1.0, REAL32, False).name == "ABCDEFGHIJKLMNOP"
 
 
@@ -91,37 +86,29 @@ def test_another_file_is_refused(tmp_path, text):
         read_parameters_file(tmp_path / "x.param")
 
 
-def test_px4_keeps_a_sensor_in_the_slot_that_names_it():
+def test_slots_are_named_by_px4s_ids_and_ardupilots_numbers():
     ids = {"CAL_ACC0_ID": 0.0, "CAL_ACC1_ID": 1310988.0, "CAL_ACC2_ID": 1310996.0}
     assert find_slot("PX4", 1, ids).offset[0] == "CAL_ACC1_XOFF"
     assert find_slot("PX4", 2, ids).scale[2] == "CAL_ACC2_ZSCALE"
     assert find_slot("PX4", 3, ids) is None
-
-
-@pytest.mark.parametrize(
-    ("firmware", "imu", "name"),
-    [("ArduPilot", 1, "INS_ACCOFFS_X"), ("ArduPilot", 2, "INS_ACC2OFFS_X"), ("ArduPilot", 3, "INS_ACC3OFFS_X")],
-    ids=["first", "second", "third"],
-)
-def test_ardupilots_names_count_from_the_second(firmware, imu, name):
-    assert find_slot(firmware, imu, {}).offset[0] == name
-    assert name in [where.offset[0] for where in all_slots(firmware)]
+    names = [find_slot("ArduPilot", imu, {}).offset[0] for imu in (1, 2, 3)]
+    assert names == ["INS_ACCOFFS_X", "INS_ACC2OFFS_X", "INS_ACC3OFFS_X"]
+    assert names == [slot.offset[0] for slot in all_slots("ArduPilot")]
 
 
 def test_the_mounting_is_that_of_the_board_unless_the_sensor_is_outside():
-    where = find_slot("PX4", 1, {"CAL_ACC0_ID": 5.0})
+    slot = find_slot("PX4", 1, {"CAL_ACC0_ID": 5.0})
     board = {"SENS_BOARD_ROT": 2.0, "CAL_ACC0_ROT": -1.0}
-    np.testing.assert_allclose(mounting("PX4", where, board) @ [1, 0, 0], [0, 1, 0], atol=1e-12)
     outside = board | {"CAL_ACC0_ROT": 4.0}
-    np.testing.assert_allclose(mounting("PX4", where, outside) @ [1, 0, 0], [-1, 0, 0], atol=1e-12)
     level = board | {"SENS_BOARD_ROT": 0.0, "SENS_BOARD_Z_OFF": 90.0}
-    np.testing.assert_allclose(mounting("PX4", where, level) @ [1, 0, 0], [0, 1, 0], atol=1e-12)
+    for values, x in ((board, [0, 1, 0]), (outside, [-1, 0, 0]), (level, [0, 1, 0])):
+        np.testing.assert_allclose(mounting("PX4", slot, values) @ [1, 0, 0], x, atol=1e-12)
 
 
 def test_a_custom_orientation_needs_its_angles():
-    where = find_slot("ArduPilot", 1, {})
-    assert mounting("ArduPilot", where, {"AHRS_ORIENTATION": 101.0}) is None
-    assert mounting("ArduPilot", where, {}) is None
+    slot = find_slot("ArduPilot", 1, {})
+    assert mounting("ArduPilot", slot, {"AHRS_ORIENTATION": 101.0}) is None
+    assert mounting("ArduPilot", slot, {}) is None
     angles = {"CUST_ROT1_ROLL": 0.0, "CUST_ROT1_PITCH": 0.0, "CUST_ROT1_YAW": 90.0}
-    turned = mounting("ArduPilot", where, {"AHRS_ORIENTATION": 101.0, **angles})
+    turned = mounting("ArduPilot", slot, {"AHRS_ORIENTATION": 101.0, **angles})
     np.testing.assert_allclose(turned @ [1, 0, 0], [0, 1, 0], atol=1e-12)

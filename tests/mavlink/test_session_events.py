@@ -1,3 +1,5 @@
+"""Notes of a session as STATUSTEXT chunks."""
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,7 +13,7 @@ DATA = st.dictionaries(st.text(max_size=9), LEAVES | st.lists(LEAVES, max_size=4
 
 
 def travel(messages, system=OWN_SYSTEM):
-    """The messages packed and decoded."""
+    """Return the messages packed and decoded."""
     sender, receiver = dialect().MAVLink(None, system, OWN_COMPONENT), dialect().MAVLink(None)
     return [receiver.decode(bytearray(message.pack(sender))) for message in messages]
 
@@ -31,12 +33,8 @@ def test_a_note_that_misses_a_chunk_is_none():
     assert [notes.add(message) for message in (first, *rest)] == [None] * (1 + len(rest))
 
 
-def test_the_notes_of_others_are_none():
-    notes = NoteReader()
-    assert [notes.add(message) for message in travel(encode_note(Note("key", {}), 5), system=1)] == [None]
-
-
-def test_text_of_ours_that_is_no_note():
+def test_others_notes_and_other_text_of_ours_are_none():
+    assert NoteReader().add(*travel(encode_note(Note("key", {}), 5), system=1)) is None
     text = dialect().MAVLink_statustext_message(6, b"mpucal: rotate", 0, 0)
     assert NoteReader().add(*travel([text])) is None
 

@@ -1,4 +1,4 @@
-"""The forms in which a key for signed packets is given."""
+"""Forms of the key for signed packets."""
 
 import hashlib
 import os
@@ -14,24 +14,14 @@ KEY = bytes(range(32))
 @pytest.mark.parametrize(
     ("content", "key"),
     [
-        (KEY, KEY),
-        (KEY.hex().encode() + b"\n", KEY),
-        (b"correct horse\n", hashlib.sha256(b"correct horse").digest()),
-        (b"p" * 31 + b"\n", hashlib.sha256(b"p" * 31).digest()),
-        (b"p" * 30 + b"\r\n", hashlib.sha256(b"p" * 30).digest()),
-        (b"p" * 32, b"p" * 32),
-        (bytes(range(31)) + b"\n", bytes(range(31)) + b"\n"),
-        (b"\xff" * 31 + b"\n", b"\xff" * 31 + b"\n"),
-    ],
-    ids=[
-        "bytes",
-        "hexadecimal",
-        "passphrase",
-        "31 and newline",
-        "30 and CRLF",
-        "32 letters",
-        "bytes, 10",
-        "no text, 10",
+        pytest.param(KEY, KEY, id="bytes"),
+        pytest.param(KEY.hex().encode() + b"\n", KEY, id="hexadecimal"),
+        pytest.param(b"correct horse\n", hashlib.sha256(b"correct horse").digest(), id="passphrase"),
+        pytest.param(b"p" * 31 + b"\n", hashlib.sha256(b"p" * 31).digest(), id="31 and newline"),
+        pytest.param(b"p" * 30 + b"\r\n", hashlib.sha256(b"p" * 30).digest(), id="30 and CRLF"),
+        pytest.param(b"p" * 32, b"p" * 32, id="32 letters"),
+        pytest.param(bytes(range(31)) + b"\n", bytes(range(31)) + b"\n", id="bytes, 10"),
+        pytest.param(b"\xff" * 31 + b"\n", b"\xff" * 31 + b"\n", id="no text, 10"),
     ],
 )
 def test_the_forms_of_a_key(content, key, tmp_path):

@@ -1,9 +1,11 @@
+"""Requests of IMU streams, and rates that another station or a slow link lowers."""
+
 import pytest
 
 from mpucal.errors import LinkError
 from mpucal.mavlink.dialect import dialect
 from mpucal.mavlink.firmwares import ARDUPILOT, PX4
-from mpucal.mavlink.imu import Stream
+from mpucal.mavlink.imu import MESSAGE_ID, Stream
 from mpucal.mavlink.link import Link, S
 from mpucal.mavlink.stream import Streams
 
@@ -13,7 +15,7 @@ RAW, HIGHRES, SCALED, SCALED2 = 27, 105, 26, 116
 
 @pytest.fixture
 def vehicle(script, station, decoded):
-    """vehicle(...): a transport to one that streams what it is asked for, as ArduPilot does."""
+    """vehicle(...) returns a transport to one that streams the requested messages, as ArduPilot does."""
 
     class Streaming(script):
         outward = False
@@ -65,6 +67,13 @@ def vehicle(script, station, decoded):
     return Streaming
 
 
+def polling(link, asked, seconds):
+    """Watch the streams for that long, as a session's source does."""
+    for _ in range(20 * seconds):
+        list(link.messages(link.now_ns() + S // 20))
+        asked.watch()
+
+
 def streams(transport, said=None, rate_hz=200.0, firmware=ARDUPILOT):
     link = Link(transport, lambda t_ns, data: None)
     link.lock(link.listen()[0])
@@ -97,44 +106,38 @@ def test_the_person_is_told_once_which_rate_comes_instead(vehicle):
     said = []
     link, asked = streams(vehicle(fastest_hz=120), said, rate_hz=400.0)
     asked.start()
-    for _ in range(200):
-        list(link.messages(link.now_ns() + S // 20))
-        asked.watch()
+    polling(link, asked, 10)
     assert said == ["400 Hz were asked for; the vehicle sends RAW_IMU at 100 Hz."]
 
 
 def watched(transport, lowered_hz, said, firmware=ARDUPILOT):
-    """How many of IMU 1's messages come in the 20 s after another station set its rate."""
+    """Return the rate of IMU 1's messages in the 20 s after another station set it."""
     message_id, name = (SCALED, "SCALED_IMU") if firmware == PX4 else (RAW, "RAW_IMU")
     link, asked = streams(transport, said, firmware=firmware)
     asked.start()
     counted = []
     link.subscribe(lambda message: counted.append(message) if message.get_type() == name else None)
-    for second in range(30):
-        if second == 10:
-            counted.clear()
-            transport.set(message_id, lowered_hz)
-        for _ in range(20):
-            list(link.messages(link.now_ns() + S // 20))
-            asked.watch()
+    polling(link, asked, 10)
+    counted.clear()
+    transport.set(message_id, lowered_hz)
+    polling(link, asked, 20)
     return len(counted) / 20.0
 
 
-@pytest.mark.parametrize("lowered_hz", [4, 60])
-def test_a_lowered_rate_is_asked_for_again_and_told(vehicle, lowered_hz):
+@pytest.mark.parametrize(
+    ("firmware", "lowered_hz", "name", "remedy"),
+    [
+        (ARDUPILOT, 4, "RAW_IMU", "--streamrate=-1"),
+        (ARDUPILOT, 60, "RAW_IMU", "--streamrate=-1"),
+        (PX4, 60, "SCALED_IMU", "MAV_0_RATE"),
+    ],
+)
+def test_a_lowered_rate_is_asked_for_again_and_told(vehicle, firmware, lowered_hz, name, remedy):
     said = []
-    assert watched(vehicle(), lowered_hz, said) > 140
-    assert len(said) == 1
-    assert "RAW_IMU was slowed down from 200 Hz" in said[0]
-    assert "--streamrate=-1" in said[0]
-
-
-def test_px4_may_be_slowed_by_its_own_link(vehicle):
-    said = []
-    assert watched(vehicle(streams=(SCALED,)), 60, said, PX4) > 140
-    assert len(said) == 1
-    assert "MAV_0_RATE" in said[0]
-    assert "--streamrate" not in said[0]
+    assert watched(vehicle(streams=(SCALED if firmware == PX4 else RAW,)), lowered_hz, said, firmware) > 140
+    (told,) = said
+    assert f"{name} was slowed down from 200 Hz" in told
+    assert [word for word in ("--streamrate=-1", "MAV_0_RATE") if word in told] == [remedy]
 
 
 def test_a_slightly_lower_rate_is_let_be(vehicle):
@@ -152,12 +155,10 @@ def test_a_vehicle_whose_time_goes_slowly_was_slowed_by_nobody(vehicle):
 
 
 def test_a_vehicle_that_streams_nothing_is_one_sentence(vehicle):
-    _, asked = streams(vehicle(streams=()))
-    with pytest.raises(LinkError, match="sends no IMU messages, though HIGHRES_IMU and RAW_IMU were asked for: check"):
-        asked.start()
-    _, asked = streams(vehicle(streams=()), firmware=PX4)
-    with pytest.raises(LinkError, match="sends no IMU messages, though SCALED_IMU was asked for: check"):
-        asked.start()
+    for firmware, names in ((ARDUPILOT, "HIGHRES_IMU and RAW_IMU were"), (PX4, "SCALED_IMU was")):
+        _, asked = streams(vehicle(streams=()), firmware=firmware)
+        with pytest.raises(LinkError, match=f"sends no IMU messages, though {names} asked for: check"):
+            asked.start()
 
 
 def test_a_slow_link_brings_the_first_ones_late(vehicle):
@@ -166,7 +167,5 @@ def test_a_slow_link_brings_the_first_ones_late(vehicle):
 
 
 def test_the_messages_asked_for_are_those_of_the_dialect():
-    from mpucal.mavlink.imu import MESSAGE_ID
-
     ids = {name: getattr(dialect(), f"MAVLINK_MSG_ID_{name}") for name in MESSAGE_ID}
     assert ids == MESSAGE_ID

@@ -1,3 +1,5 @@
+"""The .tlog format: written, read, damaged, read by others, and made into recordings."""
+
 import struct
 import subprocess
 import sys
@@ -16,16 +18,31 @@ START_NS = 1_700_000_000_000_000_000
 
 
 @pytest.fixture
-def written(station, tmp_path):
+def made(tmp_path):
+    """made(packets) writes a .tlog of (time [s], packet)."""
+
+    def make(packets):
+        path = tmp_path / "made.tlog"
+        path.unlink(missing_ok=True)
+        with TlogWriter(path) as writer:
+            for t_s, data in packets:
+                writer.packet(START_NS + round(t_s * 1e9), data)
+        return path
+
+    return make
+
+
+def turned(vehicle, begin=0, end=200, at_us=0):
+    """Packets of RAW_IMU at 100 Hz, numbered from `begin`, whose clock is ahead by `at_us`."""
+    return [(0.01 * k, vehicle.raw(at_us + 10_000 * k)) for k in range(begin, end)]
+
+
+@pytest.fixture
+def written(station, made):
     """A .tlog of two seconds, and its records."""
     vehicle = station()
-    records = [Record(START_NS, vehicle.heartbeat())]
-    records += [Record(START_NS + 10_000_000 * k, vehicle.raw(10_000 * k)) for k in range(1, 200)]
-    path = tmp_path / "capture.tlog"
-    with TlogWriter(path) as writer:
-        for record in records:
-            writer.packet(*record)
-    return path, records
+    packets = [(0.0, vehicle.heartbeat()), *turned(vehicle, 1)]
+    return made(packets), [Record(START_NS + round(t_s * 1e9), data) for t_s, data in packets]
 
 
 def test_what_is_written_is_read(written):
@@ -85,34 +102,23 @@ def test_a_place_that_cannot_be_written_to(tmp_path):
         TlogWriter(tmp_path / "missing" / "capture.tlog")
 
 
-def log_of(tmp_path, records):
-    path = tmp_path / "made.tlog"
-    path.unlink(missing_ok=True)
-    with TlogWriter(path) as writer:
-        for t_s, data in records:
-            writer.packet(START_NS + round(t_s * 1e9), data)
-    return path
-
-
-def test_a_reboot_splits_a_log_and_the_longest_part_is_taken(station, tmp_path):
+def test_a_reboot_splits_a_log_and_the_longest_part_is_taken(station, made):
     vehicle = station()
-    before = [(0.01 * k, vehicle.raw(50_000_000 + 10_000 * k)) for k in range(100)]
-    after = [(1.0 + 0.01 * k, vehicle.raw(2_000_000 + 10_000 * k)) for k in range(300)]
-    recording = mpucal.load(log_of(tmp_path, [(0.0, vehicle.heartbeat()), *before, *after]))
+    before, after = turned(vehicle, 0, 100, 50_000_000), turned(vehicle, 100, 400, 1_000_000)
+    recording = mpucal.load(made([(0.0, vehicle.heartbeat()), *before, *after]))
     assert len(recording) == 300
     assert recording.t[0] == pytest.approx(2.0)
 
 
-def test_a_parameter_that_changes_splits_a_log(station, tmp_path):
+def test_a_parameter_that_changes_splits_a_log(station, made):
     vehicle = station()
 
     def offset(value):
         return vehicle.message("param_value", b"INS_ACCOFFS_X", value, 9, 1, 0)
 
-    turned = [(0.01 * k, vehicle.raw(1_000_000 + 10_000 * k)) for k in range(300)]
-    checked = [(3.0 + 0.01 * k, vehicle.raw(4_000_000 + 10_000 * k)) for k in range(100)]
-    packets = [(0.0, vehicle.heartbeat()), (0.0, offset(0.25)), *turned, (3.0, offset(0.5)), *checked]
-    recording = mpucal.load(log_of(tmp_path, packets))
+    head = [(0.0, vehicle.heartbeat()), (0.0, offset(0.25))]
+    packets = [*head, *turned(vehicle, 0, 300), (3.0, offset(0.5)), *turned(vehicle, 300, 400)]
+    recording = mpucal.load(made(packets))
     assert len(recording) == 300
     assert recording.autopilot.parameters["INS_ACCOFFS_X"] == 0.25
 
@@ -133,18 +139,18 @@ def test_more_parameters_than_any_firmware_has_are_not_kept():
     assert log.segments[-1].parameters["P1"] == 2.0
 
 
-def test_several_vehicles_are_listed_and_one_can_be_chosen(station, tmp_path):
+def test_several_vehicles_are_listed_and_one_can_be_chosen(station, made):
     packets = []
     for system in (1, 7):
         vehicle = station(system)
-        packets += [(0.0, vehicle.heartbeat()), *((0.01 * k, vehicle.raw(10_000 * k)) for k in range(1, 50))]
-    path = log_of(tmp_path, sorted(packets, key=lambda packet: packet[0]))
+        packets += [(0.0, vehicle.heartbeat()), *turned(vehicle, 1, 50)]
+    path = made(sorted(packets, key=lambda packet: packet[0]))
     with pytest.raises(RecordingError, match=r"several vehicles: system 1 \(ArduPilot\), system 7"):
         mpucal.load(path)
     assert len(read_log(read_tlog(path).records, path.name, system=7)) == 49
 
 
-def test_px4_highres_is_believed_only_without_the_estimators_biases(station, tmp_path):
+def test_px4_highres_is_believed_only_without_the_estimators_biases(station, made):
     px4 = station(autopilot=12)
 
     def highres(k):
@@ -157,31 +163,23 @@ def test_px4_highres_is_believed_only_without_the_estimators_biases(station, tmp
     stream = [(0.01 * k, highres(k)) for k in range(1, 50)]
     # bit 0: the gyroscope's, bit 1: the accelerometer's
     for bits in (7, 6, 5):
-        biased = [(0.0, px4.heartbeat()), (0.0, control(bits)), *stream]
         with pytest.raises(RecordingError, match="estimator's bias is subtracted"):
-            mpucal.load(log_of(tmp_path, biased))
-    unbiased = [(0.0, px4.heartbeat()), (0.0, control(4)), *stream]
-    assert mpucal.load(log_of(tmp_path, unbiased)).sensor.message == "HIGHRES_IMU"
+            mpucal.load(made([(0.0, px4.heartbeat()), (0.0, control(bits)), *stream]))
+    unbiased = made([(0.0, px4.heartbeat()), (0.0, control(4)), *stream])
+    assert mpucal.load(unbiased).sensor.message == "HIGHRES_IMU"
 
 
-def test_a_log_without_imu_messages(station, tmp_path):
-    with pytest.raises(RecordingError, match="holds no accelerations"):
-        mpucal.load(log_of(tmp_path, [(0.0, station().heartbeat())]))
+@pytest.mark.parametrize(("kind", "words"), [("heartbeat", "no accelerations"), ("raw", "no autopilot's heartbeat")])
+def test_a_log_that_lacks_messages_is_refused(station, made, kind, words):
+    packet = station().heartbeat() if kind == "heartbeat" else station().raw(1000)
+    with pytest.raises(RecordingError, match=f"holds {words}"):
+        mpucal.load(made([(0.0, packet)]))
 
 
-def test_a_log_without_a_vehicle(station, tmp_path):
-    with pytest.raises(RecordingError, match="no autopilot's heartbeat"):
-        mpucal.load(log_of(tmp_path, [(0.0, station().raw(1000))]))
-
-
-def test_a_log_is_not_held_as_messages(station, tmp_path):
-    """A message takes two thousand bytes, what is read of it two hundred at most."""
+def test_a_log_is_not_held_as_messages(station, made):
+    """A message takes two thousand bytes, a reading two hundred at most."""
     vehicle = station()
-    path = tmp_path / "long.tlog"
-    with TlogWriter(path) as writer:
-        writer.packet(START_NS, vehicle.heartbeat())
-        for k in range(1, 3000):
-            writer.packet(START_NS + 10_000_000 * k, vehicle.raw(10_000 * k))
+    path = made([(0.0, vehicle.heartbeat()), *turned(vehicle, 1, 3000)])
     mpucal.load(path)
     tracemalloc.start()
     try:

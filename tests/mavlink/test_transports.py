@@ -16,7 +16,7 @@ from mpucal.mavlink.url import Kind, Url
 
 SOON_NS = 60_000_000_000
 AWAY_NS = 200_000_000
-# an address of this process alone: who runs beside it takes no port from it
+# An address of this process alone, so that tests beside it take none of its ports.
 HOST = f"127.{os.getpid() >> 16 & 63 | 64}.{os.getpid() >> 8 & 255}.{os.getpid() & 255}"
 
 
@@ -35,7 +35,7 @@ def free_udp():
 
 
 class Line:
-    """A serial line, and its other end."""
+    """A pseudo terminal: a serial line, and its other end."""
 
     def __init__(self):
         self.ours, self._theirs = pty.openpty()
@@ -48,7 +48,7 @@ class Line:
 
 
 def heard(line, transport):
-    """What arrives of who writes until somebody listens."""
+    """Write to the line until something is received; return it."""
     for _ in range(SOON_NS // AWAY_NS):
         os.write(line.ours, b"hello")
         received = transport.receive(transport.now_ns() + AWAY_NS)
@@ -57,8 +57,8 @@ def heard(line, transport):
     raise AssertionError("nothing was heard")
 
 
-def nothing(transport):
-    """Whether nothing comes of who is away, for as long as it is looked for anew."""
+def hears_nothing(transport):
+    """Return True if nothing comes during four attempts to open it again."""
     return not any(transport.receive(transport.now_ns() + AWAY_NS) for _ in range(4))
 
 
@@ -109,11 +109,6 @@ def test_a_partner_that_is_not_there_yet_is_waited_for():
         assert transport.receive(transport.now_ns() + 20_000_000) is None
 
 
-def test_a_taken_port_is_one_sentence(other):
-    with pytest.raises(LinkError, match=r"Address already in use.*: check host and port"):
-        open_transport(Url(Kind.UDP, HOST, other.getsockname()[1]))
-
-
 def test_tcp_moves_bytes_and_is_connected_again():
     server = socket.create_server((HOST, 0))
     where = server.getsockname()
@@ -126,21 +121,25 @@ def test_tcp_moves_bytes_and_is_connected_again():
         assert line.recv(99) == b"answer"
         line.close()
         server.close()
-        assert nothing(transport)
+        assert hears_nothing(transport)
         transport.send(b"lost", None)
         with socket.create_server(where) as server:
-            assert nothing(transport)
+            assert hears_nothing(transport)
             line, _ = server.accept()
             line.sendall(b"again")
             assert soon(transport).data == b"again"
             line.close()
 
 
-def test_nobody_at_a_tcp_port():
-    with socket.create_server((HOST, 0)) as server:
-        port = server.getsockname()[1]
-    with pytest.raises(NoAnswer, match=f"nothing answers at tcp:{HOST}:{port}: start the vehicle"):
-        open_transport(Url(Kind.TCP, HOST, port))
+def test_an_end_that_cannot_be_opened_is_one_sentence(other):
+    port = other.getsockname()[1]
+    for url, error, words in (
+        (Url(Kind.UDP, HOST, port), LinkError, "Address already in use.*: check host and port"),
+        (Url(Kind.TCP, HOST, port), NoAnswer, f"nothing answers at tcp:{HOST}:{port}: start the vehicle"),
+        (Url(Kind.SERIAL, "/dev/none", 57600), LinkError, r"/dev/none:57600 cannot be opened \(No such file"),
+    ):
+        with pytest.raises(error, match=words):
+            open_transport(url)
 
 
 def test_a_serial_line_moves_bytes():
@@ -159,7 +158,7 @@ def test_a_device_that_comes_back_under_its_name_is_opened_again(tmp_path):
         address = heard(first, transport).address
         first.close()
         name.unlink()
-        assert nothing(transport)
+        assert hears_nothing(transport)
         transport.send(b"lost", None)
         name.symlink_to(second.url.host)
         # the vehicle of before is heard: a link is locked to its address
@@ -178,11 +177,6 @@ def test_a_board_that_comes_back_as_another_port_is_known_by_its_serial_number(m
         address = heard(first, transport).address
         first.close()
         del ports[first.url.host]
-        assert nothing(transport)
+        assert hears_nothing(transport)
         ports[second.url.host] = "1A2B"
         assert heard(second, transport).address == address
-
-
-def test_no_such_device():
-    with pytest.raises(LinkError, match=r"/dev/none:57600 cannot be opened \(No such file"):
-        open_transport(Url(Kind.SERIAL, "/dev/none", 57600))

@@ -1,3 +1,5 @@
+"""URLs of --mavlink."""
+
 import pytest
 
 from mpucal.errors import UsageError
