@@ -27,8 +27,8 @@ from ..result.clock import now
 from ..result.session_files import BLOB, DOCUMENT
 from ..session.folder import SessionFolder
 from ..session.results import check_owner, save
-from ..sinks.choose import chosen
-from ..sinks.record import in_file
+from ..sinks.choose import choose_sinks
+from ..sinks.record import file_recorder
 from ..sinks.table import SINKS
 from ..sinks.write_back import write_to_all
 from ..sources.opened_source import OpenedSource
@@ -158,8 +158,8 @@ def _left(folder: Path, of: Calibration, result: CheckResult, recording: Recordi
 def _write_back(sinks: tuple[str, ...], folder: Path, options: dict[str, Any], yes: bool, as_json: bool) -> None:
     """Write the updated calibration to the source's own sinks."""
     path = folder / DOCUMENT.name
-    kinds = chosen(sinks, False, matching_kinds(options)[0])
+    kinds = choose_sinks(sinks, False, matching_kinds(options)[0])
     confirm, in_doubt = partial(ask, yes=yes), partial(ask_in_doubt, yes=yes)
-    sensor, record = device(options), in_file(path)
+    sensor, record = device(options), file_recorder(path)
     for applied in write_to_all(kinds, Calibration.load(path), sensor, folder, record, confirm, sinks, in_doubt):
         click.echo(f"Done: {applied.what}.", err=as_json)

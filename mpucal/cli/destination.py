@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import click
 
 from ..errors import UsageError
-from ..sinks.choose import FILE, check_behind, defaults
+from ..sinks.choose import FILE, check_behind, default_sinks
 from ..sinks.kind import Device, SinkKind
 from ..sinks.table import SINKS
 from ..sources.kind import SourceKind
@@ -29,7 +29,7 @@ def session_sink_options(command: F) -> F:
             "sinks",
             type=click.Choice([FILE, *SINKS]),
             multiple=True,
-            help=f"Where to write the result, may be repeated; {defaults()}.",
+            help=f"Where to write the result, may be repeated; {default_sinks()}.",
         ),
     ):
         command = option(command)

@@ -18,9 +18,9 @@ from ..page.address import Address
 from ..result.calibration import REFUSED, Calibration
 from ..result.session_files import CAPTURE_OF_VEHICLE, DOCUMENT, LOG
 from ..session.folder import SessionFolder, check_unfinished
-from ..sinks.choose import announced, chosen
+from ..sinks.choose import announce_sinks, choose_sinks
 from ..sinks.kind import SinkKind
-from ..sinks.record import in_session
+from ..sinks.record import session_recorder
 from ..sinks.sink import Applied
 from ..sinks.write_back import write_to_all
 from ..sources.kind import NAME
@@ -99,7 +99,7 @@ def command(
         beside(terminal, page, source, options, title, board, page_keys, json_events, seen) as (person, tell),
     ):
         # a program that reads the events finds it in calibration.json
-        announcement = "" if json_events else announced(kinds, no_write)
+        announcement = "" if json_events else announce_sinks(kinds, no_write)
         recording, calibration, paths = _run(source, into, person, announcement, name)
         files = [into.capture, *paths]
         tell(on_a_page(calibration), files)
@@ -107,7 +107,7 @@ def command(
             if not json_events:
                 click.echo(err=True)
             click.echo(f"{summary(calibration)}\n\n{written(files)}")
-        record = in_session(into.path, calibration, recording, source.truth)
+        record = session_recorder(into.path, calibration, recording, source.truth)
         sensor = device({**options, "gravity": source.plan.gravity, "model": source.plan.model})
         confirm, in_doubt = partial(ask, yes=yes), partial(ask_in_doubt, yes=yes)
         writing = write_to_all(kinds, calibration, sensor, into.path, record, confirm, sinks, in_doubt)
@@ -122,14 +122,14 @@ def _opened(
     if resume is None:
         # the write-back opens a simulated vehicle again, which then holds what it was given meanwhile
         options = {**options, "kept": {}}
-        kinds = chosen(sinks, no_write, check_source(click.get_current_context()))
+        kinds = choose_sinks(sinks, no_write, check_source(click.get_current_context()))
         opening = {**options, "attended": attended, "writes": bool(kinds)}
         return open_source(opening, given()), kinds, options
     check_resume_options(given())
     check_unfinished(resume)
     source = open_resumed(resume)
     options = {**options, **source.live.words}
-    return source, chosen(sinks, no_write, matching_kinds(options)[0]), options
+    return source, choose_sinks(sinks, no_write, matching_kinds(options)[0]), options
 
 
 def _run(

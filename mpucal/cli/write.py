@@ -9,10 +9,9 @@ import click
 
 from ..data import STANDARD_GRAVITY_MPS2
 from ..disk.folder import Folder
-from ..sinks.doubt import doubt
-from ..sinks.record import in_file, is_calibration
+from ..sinks.record import file_recorder, is_calibration
 from ..sinks.table import SINKS
-from ..sinks.write_back import put_back, write_to
+from ..sinks.write_back import put_back, write_objection, write_to
 from .destination import check_sink, device, sink_flags
 from .loading import force_option, trusted
 from .options import check_source, source_options
@@ -49,7 +48,7 @@ def command(
         Folder(folder or calibration.parent) as into,
         kind.open(device({**options, "gravity": gravity})) as sink,
     ):
-        against = doubt(written, sink) if written is not None and written.quality else None
+        against = write_objection(written, sink) if written is not None and written.quality else None
         if against is not None:
             say(f"{against}.")
         ask(f"Write {calibration} to {sink.where}?", yes)
@@ -57,7 +56,7 @@ def command(
             click.echo(f"Done: {put_back(kind, sink, calibration, into.path, say)}.")
             return
         path = into.path / kind.after_write(calibration.stem)
-        applied = write_to(kind, sink, written, into.path, in_file(path), say)
+        applied = write_to(kind, sink, written, into.path, file_recorder(path), say)
     if as_json:
         click.echo(applied.calibration.json(), nl=False)
         return

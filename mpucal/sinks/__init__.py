@@ -1,1 +1,1 @@
-"""Where a calibration is written to besides files: a chip's registers, a bridge's memory, an autopilot."""
+"""Sinks of a calibration besides files: a chip's registers, a kernel driver, a bridge's memory, an autopilot."""

@@ -1,4 +1,4 @@
-"""An autopilot's accelerometer parameters as a sink: set, read back, and seen in its streams, or put back."""
+"""An autopilot's accelerometer parameters as a sink: set, read back, and verified in its streams, or restored."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ from ..result.journal import AT, Journal
 from ..session.lay_flat import put_down
 from ..sources.vehicle import OpenedVehicle
 from .kind import Device
+from .old_state import nothing_written
 from .signals import interrupting
 from .sink import Applied
 from .table import AUTOPILOT, OLD_PARAM, OLD_PARAMS
@@ -36,37 +37,37 @@ from .table import AUTOPILOT, OLD_PARAM, OLD_PARAMS
 FILE, FOLDERS = "{}mpucal-imu{}.bin", {ARDUPILOT: "/APM/", PX4: "/fs/microsd/"}
 CORRECTION = re.compile(r"ACC\d?(OFFS|SCAL)_[XYZ]$|ACC\d_[XYZ](OFF|SCALE)$")
 SAVE_IDS = 76
-# what ArduPilot says of sensors whose ids are not those of their calibration
+# ArduPilot's complaint about sensors with other ids than their calibration's
 UNCALIBRATED = re.compile(r"accel\w*.* cal", re.IGNORECASE)
 INCONSISTENT, AGREE_NS = re.compile(r"accel\w* inconsistent", re.IGNORECASE), 13 * S
 
 
 @contextmanager
 def open_autopilot(device: Device) -> Iterator[AutopilotSink]:
-    """The parameters of the vehicle on a link, once its person was asked to put it down.
+    """Open the parameters of the vehicle on a link, after asking the user to put it down.
 
     Raises
     ------
-    LinkError : it cannot be opened, or there is no vehicle.
+    LinkError : the link cannot be opened, or there is no vehicle.
     """
     source: OpenedVehicle = device.open()
     with source.connected(device.say) as link:
         put_down(source.listeners, device.say)
         sink = AutopilotSink(link, "store" in device.flags, Journal.of(AUTOPILOT, device.name))
-        said = sink.recover()
-        if said is not None:
-            device.say(said)
+        recovered = sink.recover()
+        if recovered is not None:
+            device.say(recovered)
         yield sink
 
 
 class AutopilotSink:
-    """The vehicle at the end of a locked link.
+    """Accelerometer parameters of the vehicle on a locked link.
 
     Parameters
     ----------
     link : locked to the vehicle; the sink leaves it open.
-    store : keep D and b_a, which parameters do not hold in full, as files in the vehicle's storage too.
-    journal : where a write is noted while it lasts.
+    store : also save D and b_a, which parameters do not hold in full, as files in the vehicle's storage.
+    journal : notes a write.
     """
 
     def __init__(self, link: Link, store: bool = False, journal: Journal | None = None) -> None:
@@ -78,36 +79,36 @@ class AutopilotSink:
 
     @property
     def where(self) -> str:
-        """The vehicle, in words."""
+        """Return the name of the vehicle, for messages."""
         return str(self._link.vehicle)
 
     def recover(self) -> str | None:
-        """Put back what an earlier write that was cut off noted, and say so; None where there was none.
+        """Restore the parameters of an interrupted write; return a clause for the user, or None if there was none.
 
         Raises
         ------
-        LinkError : the vehicle does not say what it holds. WriteBackError : see Sink.
+        LinkError : the parameters cannot be read. WriteBackError : see Sink.
         """
-        left = self._journal.interrupted()
-        if left is None:
+        note = self._journal.interrupted()
+        if note is None:
             return None
-        old, new = left[OLD], left[NEW]
-        writer = Writer(self._link, self._watch, [w for w in all_slots(self._firmware) if set(w.names) <= set(old)])
+        old, new = note[OLD], note[NEW]
+        writer = Writer(self._link, self._watch, [s for s in all_slots(self._firmware) if set(s.names) <= set(old)])
         held = writer.read()
-        cut_off = f"a write to this vehicle was cut off at {left[AT]}"
+        interrupted = f"a write to this vehicle was interrupted at {note[AT]}"
         if held == old:
             self._journal.end()
             return None
         if set(held) != set(old) or not is_partial_write(held, old, new):
             self._journal.end()
-            return f"{cut_off}, and {self.where} holds neither the parameters of before nor those: they are left alone"
+            return f"{interrupted}; {self.where} has neither the old nor the new parameters, and they are not changed"
         with interrupting():
             writer.write(held, old, lambda: None)
         self._journal.end()
-        return f"{cut_off}: the parameters of before are back, read back as they were"
+        return f"{interrupted}; the old parameters are restored and read back"
 
     def keep(self, folder: Path) -> tuple[Path, ...]:
-        """Save all accelerometer parameters of the vehicle to a file that its ground stations load.
+        """Save all accelerometer parameters of the vehicle to a file that ground stations can load.
 
         Raises
         ------
@@ -119,63 +120,52 @@ class AutopilotSink:
         file, text = OLD_PARAM, param_text(values, remarks)
         if self._firmware == PX4:
             file, text = OLD_PARAMS, params_text(values, remarks, self._link.vehicle.system)
-        # an earlier file holds an earlier state: it stays
         path = file.free_in(folder)
         write_atomically(path, text.encode())
         return (path,)
 
     def put_back(self, kept: Path) -> str:
-        """Write what an earlier `keep` saved, and say so in a sentence.
-
-        Raises
-        ------
-        RecordingError : `kept` is no such file. WriteBackError : see Sink.
-        """
+        """Restore the parameters from the file of an earlier `keep`; see Restorable."""
         wanted = read_parameters_file(kept)
-        slots = [where for where in all_slots(self._firmware) if set(where.names) <= set(wanted)]
+        slots = [slot for slot in all_slots(self._firmware) if set(slot.names) <= set(wanted)]
         if not slots:
             raise RecordingError(
-                f"{kept} holds no accelerometer parameters of {self._firmware}", "give a file that a write kept"
+                f"{kept} holds no accelerometer parameters of {self._firmware}", "give a file that a write saved"
             )
         writer = Writer(self._link, self._watch, slots, self._journal)
-        with _nothing_written():
+        with nothing_written():
             old = writer.read()
-        writer.write(old, {name: wanted[name] for where in slots for name in where.names}, lambda: None)
-        return f"{self.where} holds again what {kept.name} says, read back"
+        writer.write(old, {name: wanted[name] for slot in slots for name in slot.names}, lambda: None)
+        return f"{self.where} has the parameters of {kept.name} again, read back"
 
-    def as_good(self, calibration: Calibration) -> str | None:
-        """See Comparing; cross-axis residue included. One IMU whose new parameters are better is enough."""
+    def reason_to_keep(self, calibration: Calibration) -> str | None:
+        """See ComparableSink; residual cross-axis errors count, and one IMU with better parameters is enough."""
         planned = plan_changes(calibration, self._firmware)
         if any(change.improves for change in planned):
             return None
         old, new = (max(getattr(c, key) or 0.0 for c in planned) for key in ("residual_old_mps2", "residual_mps2"))
         return (
-            f"the parameters that {self.where} has are predicted to be as good as the new ones (|a| wrong by up to"
+            f"the parameters of {self.where} are predicted to be as good as the new ones (error of |a| up to"
             f" {old:.3f} m/s^2 with the old ones, {new:.3f} with the new ones)"
         )
 
     def write(self, calibration: Calibration) -> Applied:
-        """Set each parameter, read all back, and see their effect in the streams; or put the old ones back.
-
-        Raises
-        ------
-        WriteBackError : refused (nothing was written), or failed (the old parameters are back).
-        """
+        """Set each parameter, read all back, and verify their effect in the streams; see Sink."""
         try:
-            return self._written(calibration)
+            return self._write(calibration)
         except WriteBackError as error:
             other = error.__cause__
             if not isinstance(other, SwappedSlotsError) or not self._writer.restored:
                 raise
-        return self._written(swap_slots(calibration, other.order, self._firmware))
+        return self._write(swap_slots(calibration, other.order, self._firmware))
 
-    def _written(self, calibration: Calibration) -> Applied:
+    def _write(self, calibration: Calibration) -> Applied:
         possible = plan_changes(calibration, self._firmware)
         planned = select_improving(possible)
         slots = [change.slot for change in planned]
         writer = self._writer = Writer(self._link, self._watch, slots, self._journal)
         monitor = RestMonitor(self._link, [change.stream for change in planned])
-        with _nothing_written():
+        with nothing_written():
             self._check(planned)
             before = check_prearm(self._link)
             old = writer.read()
@@ -184,25 +174,28 @@ class AutopilotSink:
             raise WriteBackError(f"{NOTHING}: the vehicle did not lie still", "set it down, then write again")
         new = {name: value for change in planned for name, value in change.slot.values(change.new).items()}
         now = adapt_to_write(calibration, [change.imu for change in planned])
-        with self._stored(now, planned) as paths:
+        with self._storing(now, planned) as paths:
             writer.write(old, new, lambda: verify(planned, old, rest, monitor.wait()))
-        after = self._settled()
-        said = [
-            *self._said(planned, before, after),
-            *_kept(possible, planned, refused_imus(calibration)),
-            *self._saves(),
+        imus = " and ".join(str(change.imu) for change in planned)
+        residuals = ", ".join(f"{change.residual_mps2:.3f}" for change in planned)
+        clauses = [
+            f"{self.where} has the new parameters of IMU {imus}, read back and verified in its streams; they have no"
+            f" cross-axis terms, which leaves an error of |a| of up to {residuals} m/s^2",
+            f"before, it {before}; now it {self._settled()}",
+            *_unchanged(possible, planned, refused_imus(calibration)),
+            *(["leave it powered for three more seconds, as PX4 saves late"] if self._firmware == PX4 else []),
         ]
-        return Applied(now, "; ".join([*said, *paths]))
+        return Applied(now, "; ".join([*clauses, *paths]))
 
     @contextmanager
-    def _stored(self, now: Calibration, planned: Sequence[Change]) -> Iterator[list[str]]:
-        """The files in its storage while the parameters are written: where that fails, they are removed again."""
+    def _storing(self, now: Calibration, planned: Sequence[Change]) -> Iterator[list[str]]:
+        """Store D and b_a as files in the vehicle, and remove them if the block fails; yield clauses for the user."""
         if not self._store:
             yield []
             return
         storage = Storage(self._link)
         files = {FILE.format(FOLDERS[self._firmware], change.imu): select_imu(now, change.imu) for change in planned}
-        with _nothing_written():
+        with nothing_written():
             for path, calibration in files.items():
                 storage.put(path, calibration.blob().encode())
         try:
@@ -214,23 +207,23 @@ class AutopilotSink:
             raise
 
     def _check(self, planned: Sequence[Change]) -> None:
-        """Disarmed, and with the sensors that were calibrated."""
+        """Check that the vehicle is disarmed and has the sensors that were calibrated."""
         if self._watch.armed:
             raise WriteBackError(f"{NOTHING}: {self.where} is armed", "disarm it, then write again")
         known = {c.slot.sensor_id: c.sensor_id for c in planned if c.sensor_id}
         for name, held in ParameterClient(self._link).read(tuple(known)).items():
-            # 0: the vehicle's parameters were wiped since
+            # 0: the vehicle's parameters were reset
             if held not in (0, known[name]):
                 raise WriteBackError(
-                    f"{NOTHING}: {name} is {held:.0f}, and the calibration is of sensor {known[name]:.0f}",
+                    f"{NOTHING}: {name} is {held:.0f}, but the calibration is of sensor {known[name]:.0f}",
                     "connect the vehicle that was calibrated, or calibrate this one",
                 )
 
     def _settled(self) -> PrearmState:
-        """How it would arm now; an ArduPilot whose saved ids are none or others' saves those of its sensors.
+        """Return the pre-arm state once it has settled; an ArduPilot with wrong saved ids saves those of its sensors.
 
-        It calls IMUs inconsistent until they have agreed for ten seconds (AP_Arming::ins_accels_consistent).
-        It shows its sensors' ids all the same: AP_InertialSensor::register_accel sets them, and does not save them.
+        ArduPilot calls IMUs inconsistent until they have agreed for ten seconds (AP_Arming::ins_accels_consistent).
+        Its id parameters show the sensors' ids without being saved (AP_InertialSensor::register_accel).
         """
         now = check_prearm(self._link)
         if self._firmware != ARDUPILOT:
@@ -243,36 +236,15 @@ class AutopilotSink:
             now = check_prearm(self._link)
         return now
 
-    def _said(self, planned: Sequence[Change], before: PrearmState, after: PrearmState) -> list[str]:
-        imus = " and ".join(str(change.imu) for change in planned)
-        residuals = ", ".join(f"{change.residual_mps2:.3f}" for change in planned)
-        return [
-            f"{self.where} has the new parameters of IMU {imus}, read back and seen in its streams; they hold no"
-            f" cross-axis terms, without which |a| stays wrong by up to {residuals} m/s^2",
-            f"before, it {before}; now it {after}",
-        ]
 
-    def _saves(self) -> list[str]:
-        return ["leave it powered for three seconds more, as PX4 saves late"] if self._firmware == PX4 else []
-
-
-def _kept(possible: Sequence[Change], planned: Sequence[Change], refused: Sequence[int]) -> list[str]:
-    """Which IMUs keep their old parameters, and why."""
-    said = [
-        f"IMU {change.imu} keeps its old ones, which are predicted to be as good (|a| wrong by up to"
+def _unchanged(possible: Sequence[Change], planned: Sequence[Change], refused: Sequence[int]) -> list[str]:
+    """Return clauses on the IMUs that keep their old parameters, with the reason."""
+    clauses = [
+        f"IMU {change.imu} keeps its old ones, which are predicted to be as good (error of |a| up to"
         f" {change.residual_old_mps2 or 0.0:.3f} m/s^2)"
         for change in possible
         if change not in planned
     ]
     if refused:
-        said.append(f"IMU {', '.join(map(str, refused))} keeps its old ones, as its calibration was refused")
-    return said
-
-
-@contextmanager
-def _nothing_written() -> Iterator[None]:
-    """What fails on the link before anything is written."""
-    try:
-        yield
-    except LinkError as error:
-        raise WriteBackError(f"{NOTHING}: {error.what}", error.remedy) from error
+        clauses.append(f"IMU {', '.join(map(str, refused))} keeps its old ones, as its calibration was refused")
+    return clauses

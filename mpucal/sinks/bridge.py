@@ -1,4 +1,4 @@
-"""The memory of a serial bridge as a sink: the config blob stored, read back, and found valid by its firmware."""
+"""The memory of a serial bridge as a sink: the config blob is stored, read back, and validated by the firmware."""
 
 from __future__ import annotations
 
@@ -10,42 +10,41 @@ from pkgutil import resolve_name
 from ..disk.whole import write_atomically
 from ..errors import BusError, WriteBackError
 from ..result.blob import Blob, BlobError
-from ..result.calibration import REFUSED, Calibration
+from ..result.calibration import Calibration
 from ..result.comparison import is_better, worst_magnitude_error
 from ..sources.bridge.store import BlobStore, StoredBlob
 from .kind import Device
+from .old_state import check_accepted, nothing_written
 from .sink import Applied
 from .table import BRIDGE_BLOB
-
-UNTOUCHED = "nothing was written"
 
 
 @contextmanager
 def open_bridge(device: Device) -> Iterator[BridgeSink]:
-    """The memory of the bridge on a port.
+    """Open the memory of the bridge on a port.
 
     Raises
     ------
-    BusError : no such port, no bridge on it, or one that keeps nothing.
+    BusError : there is no such port, no bridge on it, or the bridge has no memory.
     """
     with resolve_name(device.kind.store)(device.values) as store:
         if store.occupied:
             device.say(
-                f"the memory of the bridge on {store.name} holds what is no calibration, perhaps another sketch's;"
-                " storing one overwrites it (MPUCAL_EEPROM_AT in the sketch chooses another place)"
+                f"the memory of the bridge on {store.name} holds something else, perhaps data of another sketch;"
+                " a write overwrites it (MPUCAL_EEPROM_AT in the sketch chooses another address)"
             )
         yield BridgeSink(store)
 
 
 class BridgeSink:
-    """The config blob that the bridge behind `store` keeps for the firmware that uses it."""
+    """Config blob in the memory of the bridge behind `store`."""
 
     def __init__(self, store: BlobStore) -> None:
         self._store = store
         self.where = f"the bridge on {store.name}"
 
     def keep(self, folder: Path) -> tuple[Path, ...]:
-        """Save the old blob to bridge-blob-N.bin, N its number; `mpucal write` takes it like any other. See Sink."""
+        """Save the old blob to bridge-blob-N.bin, N being its number; `mpucal write` restores it. See Sink."""
         held, old = self._store.state(), self._store.read()
         if held is None or old is None:
             return ()
@@ -53,8 +52,8 @@ class BridgeSink:
         write_atomically(path, old)
         return (path,)
 
-    def as_good(self, calibration: Calibration) -> str | None:
-        """See Comparing; a memory that holds no calibration, or a damaged one, is never as good."""
+    def reason_to_keep(self, calibration: Calibration) -> str | None:
+        """See ComparableSink; an empty or damaged memory is never as good."""
         held = self._store.read()
         try:
             old = None if held is None else Calibration.from_blob(Blob.decode(held))
@@ -62,83 +61,79 @@ class BridgeSink:
             return None
         if old is None or is_better(0.0, worst_magnitude_error(calibration, old.D, old.b_a), calibration.magnitude_std):
             return None
-        return f"the calibration that {self.where} keeps is predicted to be as good"
+        return f"the calibration in {self.where} is predicted to be as good"
 
     def write(self, calibration: Calibration) -> Applied:
-        """Store the blob, read it back, compare, and ask the firmware whether it is valid; see Sink."""
-        new = self._blob(calibration)
-        try:
+        """Store the blob, read it back, compare, and have the firmware validate it; see Sink."""
+        new = _encode(calibration)
+        with nothing_written():
             self._check_chip(calibration)
             old = self._store.read()
-        except BusError as error:
-            raise WriteBackError(f"{error.what}; {UNTOUCHED}", error.remedy) from error
         try:
             self._store.write(new)
             read_back, held = self._store.read(), self._store.state()
         except (BusError, KeyboardInterrupt) as error:
             failure = error if isinstance(error, BusError) else BusError("the write was interrupted", "start again")
-            read_back, held = self._after(failure, old, new)
+            read_back, held = self._read_after(failure, old, new)
         if read_back != new or held is None:
-            raise self._restored(old)
+            raise self._restore(old)
         return Applied(
             calibration,
             f"{self.where} keeps it as its blob number {held.generation} ({len(new)} bytes, CRC-32 {held.crc:08x}),"
-            " read back the same, and found valid by its firmware",
+            " read back and validated by its firmware",
         )
-
-    def _blob(self, calibration: Calibration) -> bytes:
-        # a blob says nothing of its quality: what was refused has none
-        if calibration.quality.get("verdict") == REFUSED:
-            raise WriteBackError(f"the calibration was refused; {UNTOUCHED}", "measure again, as its reasons say")
-        try:
-            return calibration.blob().encode()
-        except BlobError as error:
-            raise WriteBackError(
-                f"the calibration does not fit a blob ({error}); {UNTOUCHED}", "measure again"
-            ) from error
 
     def _check_chip(self, calibration: Calibration) -> None:
         answer, calibrated = self._store.who_am_i(), calibration.sensor.who_am_i
         if None not in (answer, calibrated) and answer != calibrated:
             raise WriteBackError(
-                f"the chip of {self.where} answers 0x{answer:02x} to WHO_AM_I, and the calibrated one"
-                f" 0x{calibrated:02x}; {UNTOUCHED}",
+                f"nothing was written: WHO_AM_I of the chip of {self.where} is 0x{answer:02x}, but that of the"
+                f" calibrated one is 0x{calibrated:02x}",
                 "give the calibration of this chip",
             )
 
-    def _after(self, error: BusError, old: bytes | None, new: bytes) -> tuple[bytes, StoredBlob | None]:
-        """What the bridge holds after `error`, where that is the new blob.
+    def _read_after(self, error: BusError, old: bytes | None, new: bytes) -> tuple[bytes, StoredBlob | None]:
+        """Return the content of the memory after `error` if it is the new blob.
 
         Raises
         ------
-        WriteBackError : it holds the old one, or does not tell.
+        WriteBackError : it is the old one, or cannot be read.
         """
         try:
             self._store.greet()
             blob, held = self._store.read(), self._store.state()
         except BusError as gone:
             raise WriteBackError(
-                f"{error.what}; it keeps the old calibration or the new one, never a part",
-                f"plug it in again, then see which: mpucal show --serial {self._store.name}",
+                f"{error.what}; it has either the old calibration or the new one, whole",
+                f"connect it again, and check which with mpucal show --serial {self._store.name}",
             ) from gone
         if blob != new:
-            holds = "it keeps the old calibration" if old else "it keeps none, as before"
+            holds = "it still has the old calibration" if old else "it still has none"
             raise WriteBackError(f"{error.what}; {holds}", error.remedy) from error
         return blob, held
 
-    def _restored(self, old: bytes | None) -> WriteBackError:
-        """What to say of a memory that gives back something else."""
+    def _restore(self, old: bytes | None) -> WriteBackError:
+        """Restore the old blob after a wrong read-back; return the error to raise."""
         with suppress(BusError):
             if old is None:
                 self._store.erase()
             else:
                 self._store.write(old)
             if self._store.read() == old:
-                holds = "the old calibration is there again" if old else "it keeps none, as before"
-                return WriteBackError(
-                    f"{self.where} gives back another calibration than was stored; {holds}", "try again"
-                )
+                holds = "the old calibration is restored" if old else "it has none, as before"
+                return WriteBackError(f"{self.where} does not read back what was stored; {holds}", "try again")
         return WriteBackError(
-            f"{self.where} gives back another calibration than was stored, and does not take the old one",
+            f"{self.where} does not read back what was stored, and does not accept the old calibration",
             "use another board: its memory is worn out",
         )
+
+
+def _encode(calibration: Calibration) -> bytes:
+    # a blob has no verdict, so a refused calibration must not become one
+    check_accepted(calibration)
+    try:
+        return calibration.blob().encode()
+    except BlobError as error:
+        raise WriteBackError(
+            f"nothing was written: the calibration does not fit into a blob ({error})", "calibrate again"
+        ) from error

@@ -1,13 +1,13 @@
-"""A chip's accelerometer offset registers as a sink of b_a: written, read back, and seen in the samples.
+"""A chip's accelerometer offset registers as a sink of b_a: written, read back, and verified in the samples.
 
-Only b_a fits there, in steps of 1 mg; D has no register. They are volatile: what is written is gone with the supply,
-and with the reset that a session begins with.
+They hold only b_a, in steps of 1 mg. They are volatile: a power cycle, and the reset at the beginning of a session,
+restore the factory trim.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,113 +23,112 @@ from ..chip.probe import read_identity
 from ..chip.quick_measure import TemporaryMeasurement
 from ..chip.setup import reset
 from ..data import STANDARD_GRAVITY_MPS2, Vector
-from ..errors import ChipError, SourceError, WriteBackError
-from ..result.calibration import REFUSED, Calibration
+from ..errors import ChipError
+from ..result.calibration import Calibration
 from ..result.comparison import is_better
 from ..result.journal import AT, Journal
 from ..session.lay_flat import put_down
 from ..sources.chip import OpenedChip
-from .kept import keep, kept, not_kept
 from .kind import Device
+from .old_state import check_accepted, load_state, not_a_state, nothing_written, restore_on_failure, save_state
 from .sink import Applied
 from .table import CHIP, CHIP_OFFSETS
 
 FORMAT, REGISTERS = "mpucal.chip_offsets", "registers"
 
-# a calibration that fits the chip brings gravity out within 20 mg, wherever the board lies
+# m/s^2: error of gravity with the calibration of this chip, in any orientation
 GRAVITY_MPS2 = 0.2
-# the registers count mg: what half a step is, rms over three axes
+# half a step of 1 mg, rms over three axes
 STEP_MPS2 = 0.001 * STANDARD_GRAVITY_MPS2 * 0.5
-# a measured step: the board lay still, and the accelerometer's own scale is within 3 %
+# tolerances of a measured step, absolute and relative: the accelerometer's scale is known to 3 %
 SHIFT_G, SHIFT_SHARE = 0.006, 0.1
 
 VOLATILE = (
-    "the registers are volatile: without supply, or after a reset, the factory's trim is back,"
-    " and the calibration holds as it was before"
+    "these registers are volatile: after a power cycle or reset the factory trim returns,"
+    " and the calibration from before the write applies"
 )
 
 
 @contextmanager
 def open_chip(device: Device) -> Iterator[ChipSink]:
-    """The offset registers of the chip on a bus, once its person was asked to put it down.
+    """Open the offset registers of the chip on a bus, after asking the user to put it down.
 
     Raises
     ------
-    BusError : no such bus or port, or no chip on it.
+    BusError : there is no such bus or port, or no chip on it.
     """
     source: OpenedChip = device.open()
     with closing(source.bus):
         put_down(source.listeners, device.say)
         sink = ChipSink(source.bus, f"the chip on {device.name}", Journal.of(CHIP, device.name))
-        said = sink.cut_off()
-        if said is not None:
-            device.say(said)
+        warning = sink.interruption_warning()
+        if warning is not None:
+            device.say(warning)
         yield sink
 
 
 class ChipSink:
-    """The offset registers of the chip on `bus`; `where` says which one, in words, `journal` notes a write."""
+    """Offset registers of the chip on `bus`, which messages call `where`; `journal` notes a write."""
 
     def __init__(self, bus: Bus, where: str, journal: Journal | None = None) -> None:
         self._journal = journal or Journal()
         self._port = Port(bus, Decoder(where))
         self.where = where
 
-    def cut_off(self) -> str | None:
-        """What an earlier write that was cut off may have left, in a sentence; None where there was none.
+    def interruption_warning(self) -> str | None:
+        """Return a warning if an earlier write was interrupted and the registers changed; None if not.
 
         Raises
         ------
         SourceError : the chip cannot be read.
         """
-        left = self._journal.interrupted()
-        if left is None:
+        note = self._journal.interrupted()
+        if note is None:
             return None
-        if left[REGISTERS] == _hex(self._blocks()):
+        if note[REGISTERS] == _hex(self._blocks()):
             self._journal.end()
             return None
         return (
-            f"a write to the offset registers of {self.where} was cut off at {left[AT]}, and they hold something else"
-            " than before it: a reset, as with the supply off, brings the factory's trim back"
+            f"a write to the offset registers of {self.where} was interrupted at {note[AT]}, and their content has"
+            " changed: a reset or power cycle restores the factory trim"
         )
 
     def keep(self, folder: Path) -> tuple[Path, ...]:
-        """Save what the registers hold to chip-offsets.json; see Sink."""
-        return keep(CHIP_OFFSETS, folder, FORMAT, self.where, {REGISTERS: _hex(self._blocks())})
+        """Save the content of the registers to chip-offsets.json; see Sink."""
+        return save_state(CHIP_OFFSETS, folder, FORMAT, self.where, {REGISTERS: _hex(self._blocks())})
 
     def put_back(self, path: Path) -> str:
-        """Write what an earlier `keep` saved, and say so in a sentence.
-
-        Raises
-        ------
-        RecordingError : `path` is no such file. WriteBackError : see Sink.
-        """
-        wanted = kept_blocks(path)
-        with _refusing():
+        """Restore the registers from the file of an earlier `keep`; see Restorable."""
+        wanted = saved_blocks(path)
+        with nothing_written():
             read_identity(self._port)
             olds = self._blocks()
-        with self._old_or_new(olds):
+        with self._restoring(olds):
             for block in wanted:
                 if OffsetRegisters.read(self._port, block.place) != block and not block.write(self._port):
-                    raise ChipError(f"the chip does not take {block.data.hex(' ')}", "check that it is the same chip")
-        return f"the offset registers of {self.where} hold again what {path.name} says; {VOLATILE}"
+                    raise ChipError(f"the chip does not accept {block.data.hex(' ')}", "check that it is the same chip")
+        return f"the offset registers of {self.where} have the content of {path.name} again; {VOLATILE}"
 
-    def as_good(self, calibration: Calibration) -> str | None:
-        """See Comparing: a bias that is less than a step and its uncertainty is as well left where it is."""
+    def reason_to_keep(self, calibration: Calibration) -> str | None:
+        """See ComparableSink; a bias below a step and its uncertainty cannot be improved."""
         bias, std = (
             float(np.linalg.norm(np.nan_to_num(b))) for b in (calibration.b_a_to_subtract, calibration.b_a_std)
         )
         if is_better(STEP_MPS2, bias, std):
             return None
-        return f"b_a is {bias:.3f} m/s^2, which the offset registers of {self.where} cannot make less"
+        return f"b_a is only {bias:.3f} m/s^2, which the offset registers of {self.where} cannot reduce"
 
     def write(self, calibration: Calibration) -> Applied:
-        """Write b_a into the registers, and measure that it is gone from the samples; see Sink."""
-        with _refusing():
-            _check(calibration)
+        """Write b_a to the registers, and verify in the samples that it is removed; see Sink."""
+        check_accepted(calibration)
+        with nothing_written():
+            if "autopilot" in calibration.extra:
+                raise ChipError(
+                    "the calibration is of an autopilot's stream, not of a chip", "write it to the autopilot"
+                )
             likely = self._identified(calibration)
             olds = self._blocks()
-        with self._old_or_new(olds):
+        with self._restoring(olds):
             with TemporaryMeasurement(self._port) as measurement:
                 response = measure_offset_response(self._port, measurement, likely)
             reference = self._reference(calibration, response)
@@ -139,37 +138,31 @@ class ChipSink:
         return Applied(
             replace(calibration, applied_in_hardware=applied),
             f"the offset registers at 0x{response.place[0]:02x} of {self.where} now subtract ({bias}) mg,"
-            f" read back and seen in the samples; {VOLATILE}",
+            f" read back and verified in the samples; {VOLATILE}",
         )
 
     def _blocks(self) -> tuple[OffsetRegisters, ...]:
         return tuple(OffsetRegisters.read(self._port, place) for place in PLACES)
 
-    @contextmanager
-    def _old_or_new(self, olds: Sequence[OffsetRegisters]) -> Iterator[None]:
-        """What fails within leaves the registers as they were."""
-        self._journal.begin({REGISTERS: _hex(olds)})
-        try:
-            yield
-        except BaseException as error:
-            try:
-                for old in olds:
-                    restore(self._port, old)
-            except SourceError as worse:
-                raise WriteBackError(f"{_what(error)}, and then {worse.what}", worse.remedy) from error
-            self._journal.end()
-            if isinstance(error, SourceError):
-                raise WriteBackError(f"{error.what}; the offset registers are as before", error.remedy) from error
-            raise
-        self._journal.end()
+    def _restoring(self, olds: Sequence[OffsetRegisters]) -> AbstractContextManager[None]:
+        def undo() -> None:
+            for old in olds:
+                restore(self._port, old)
+
+        return restore_on_failure(self._journal, {REGISTERS: _hex(olds)}, undo, "the offset registers")
 
     def _identified(self, calibration: Calibration) -> Place:
-        """Where the offset registers are by the chip's name; ChipError where it is another chip than was calibrated."""
+        """Return the place of the offset registers by the chip's name.
+
+        Raises
+        ------
+        ChipError : it is not the chip that was calibrated.
+        """
         who_am_i = read_identity(self._port)
         calibrated = calibration.sensor
         if calibrated.who_am_i not in (None, who_am_i):
             raise ChipError(
-                f"the chip answers 0x{who_am_i:02x} to WHO_AM_I, and the calibrated one 0x{calibrated.who_am_i:02x}",
+                f"WHO_AM_I of this chip is 0x{who_am_i:02x}, but 0x{calibrated.who_am_i:02x} of the calibrated one",
                 "give the calibration of this chip",
             )
         named = {part.chip: part.family.accel_offset_h for part in PARTS.values()}
@@ -177,11 +170,11 @@ class ChipSink:
         return by_name or (PARTS[who_am_i].family.accel_offset_h if who_am_i in PARTS else PLACES[0])
 
     def _reference(self, calibration: Calibration, response: OffsetResponse) -> Words:
-        """What the registers held while b_a was measured: what they hold now, or will after a reset.
+        """Return the content of the registers during the calibration, which they have now or after a reset.
 
         Raises
         ------
-        ChipError : they hold something else even then: it is another chip.
+        ChipError : they have another content after a reset, so it is another chip.
         """
         known = calibration.sensor.accel_offsets
         held = OffsetRegisters.read(self._port, response.place).words
@@ -191,7 +184,7 @@ class ChipSink:
         held = OffsetRegisters.read(self._port, response.place).words
         if known is not None and known != held:
             raise ChipError(
-                f"the factory's trim of this chip is {held}, and {known} in the one that was calibrated",
+                f"the factory trim of this chip is {held}, but {known} in the one that was calibrated",
                 "give the calibration of this chip",
             )
         return held
@@ -199,19 +192,19 @@ class ChipSink:
     def _apply(
         self, calibration: Calibration, response: OffsetResponse, reference: Words, measurement: TemporaryMeasurement
     ) -> Vector:
-        """Write, read back, measure; (3,) m/s^2 that the registers then subtract."""
+        """Write, read back and measure; return (3,) m/s^2 that the registers then subtract."""
         old = OffsetRegisters.read(self._port, response.place)
         counts = calibration.b_a / STANDARD_GRAVITY_MPS2 * response.lsb_per_g
         new = old.with_words(shift_words(reference, -counts))
         before = measurement.rest()
         _check_gravity(calibration, before, _subtracted(old.words, reference, response))
         if not new.write(self._port):
-            raise ChipError("the offset registers read back other than written", "check the wires, and try again")
+            raise ChipError("the offset registers do not read back as written", "check the wires, and try again")
         after = measurement.rest()
         expected = np.array(word_difference(new.words, old.words)) / response.lsb_per_g
         if (np.abs(after - before - expected) > SHIFT_G + SHIFT_SHARE * np.abs(expected)).any():
             raise ChipError(
-                f"the samples moved by ({_mg(after - before)}) mg where ({_mg(expected)}) were written",
+                f"the samples changed by ({_mg(after - before)}) mg, but ({_mg(expected)}) was written",
                 "put the board on a firm surface, and try again",
             )
         applied = _subtracted(new.words, reference, response)
@@ -219,57 +212,43 @@ class ChipSink:
         return applied
 
 
-def _check(calibration: Calibration) -> None:
-    if calibration.quality.get("verdict") == REFUSED or not np.isfinite(calibration.b_a).all():
-        raise ChipError("the calibration was refused", "repeat the session as its reasons say")
-    if "autopilot" in calibration.extra:
-        raise ChipError("the calibration is of an autopilot's stream, not of a chip", "write it to the autopilot")
-
-
 def _check_gravity(calibration: Calibration, mean_g: Vector, applied_mps2: Vector) -> None:
-    """The calibration, with what the registers subtract, makes gravity of what the chip shows at rest."""
+    """Check that the calibration gives gravity for the mean (3,) at rest, with what the registers subtract (3,)."""
     gravity = float(calibration.fit.get("gravity") or STANDARD_GRAVITY_MPS2)
     a = replace(calibration, applied_in_hardware=applied_mps2).apply(mean_g * STANDARD_GRAVITY_MPS2)
     if not abs(np.linalg.norm(a) - gravity) < GRAVITY_MPS2:
         raise ChipError(
-            f"with this calibration the chip at rest shows {np.linalg.norm(a):.2f} m/s², not {gravity:.2f}",
+            f"with this calibration |a| of the chip at rest is {np.linalg.norm(a):.2f} m/s², not {gravity:.2f}",
             "lay the board still, and give the calibration of this very chip",
         )
 
 
 def _subtracted(words: Words, reference: Words, response: OffsetResponse) -> Vector:
-    """(3,) m/s^2 that `words` take from the samples, other than `reference`; more counts add."""
+    """Return (3,) m/s^2 that `words` subtract from the samples more than `reference`; larger words add."""
     return -np.array(word_difference(words, reference)) / response.lsb_per_g * STANDARD_GRAVITY_MPS2
 
 
 def _hex(blocks: Sequence[OffsetRegisters]) -> dict[str, str]:
-    """Registers by their first address, in hexadecimal digits."""
+    """Return the content of the registers by their first address, in hexadecimal digits."""
     return {f"0x{block.place[0]:02x}": block.data.hex() for block in blocks}
 
 
-def kept_blocks(path: Path) -> list[OffsetRegisters]:
-    """What `keep` saved."""
-    held = kept(CHIP_OFFSETS, path, FORMAT, REGISTERS)[REGISTERS]
+def saved_blocks(path: Path) -> list[OffsetRegisters]:
+    """Return the registers in a file of ChipSink.keep.
+
+    Raises
+    ------
+    RecordingError : it is not such a file.
+    """
+    held = load_state(CHIP_OFFSETS, path, FORMAT, REGISTERS)[REGISTERS]
     try:
         registers = {int(first, 0): bytes.fromhex(data) for first, data in held.items()}
     except (ValueError, TypeError, AttributeError) as error:
-        raise not_kept(CHIP_OFFSETS, path, str(error)) from error
+        raise not_a_state(CHIP_OFFSETS, path, str(error)) from error
     blocks = [OffsetRegisters(place, registers[place[0]]) for place in PLACES if place[0] in registers]
     if not blocks or any(len(block.data) != block.place[2] + 2 - block.place[0] for block in blocks):
-        raise not_kept(CHIP_OFFSETS, path, "some are missing, or too long")
+        raise not_a_state(CHIP_OFFSETS, path, "some are missing, or too long")
     return blocks
-
-
-@contextmanager
-def _refusing() -> Iterator[None]:
-    try:
-        yield
-    except SourceError as error:
-        raise WriteBackError(f"nothing was written: {error.what}", error.remedy) from error
-
-
-def _what(error: BaseException) -> str:
-    return error.what if isinstance(error, SourceError) else "the write was interrupted"
 
 
 def _mg(values_g: Vector) -> str:

@@ -1,4 +1,4 @@
-"""Which sinks a session writes to: what --to named, or what belongs to the source."""
+"""Choice of the sinks that a session writes to: those of --to, or the defaults of the source."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from ..sources.table import SOURCES, unique
 from .kind import SinkKind
 from .table import SINKS
 
-# of --to: the files of a session, which are written in any case
+# value of --to for the session's files, which are always written
 FILE = "file"
 
 
-def chosen(asked: Sequence[str], no_write: bool, source: SourceKind) -> tuple[SinkKind, ...]:
-    """The sinks to write to besides the files, in the table's order.
+def choose_sinks(asked: Sequence[str], no_write: bool, source: SourceKind) -> tuple[SinkKind, ...]:
+    """Return the sinks to write to besides files, in the table's order.
 
     Parameters
     ----------
-    asked : what --to named; none: what is written to by default. source : of the session.
+    asked : names given with --to; empty: the defaults. source : of the session.
 
     Raises
     ------
-    UsageError : a sink that is not behind the source, or sinks beside --no-write.
+    UsageError : the source does not have such a sink, or --to is given with --no-write.
     """
     if no_write and asked:
-        raise UsageError("--to and --no-write were given together", "leave one of them out")
+        raise UsageError("--to and --no-write exclude each other", "leave one of them out")
     for name in asked:
         if name != FILE:
             check_behind(SINKS[name], source, f"--to {name} was given", ", or leave it out")
@@ -39,31 +39,35 @@ def chosen(asked: Sequence[str], no_write: bool, source: SourceKind) -> tuple[Si
 
 
 def check_behind(kind: SinkKind, source: SourceKind, given: str, otherwise: str = "") -> None:
-    """Refuse a sink that is not behind the source.
+    """Check that the source has such a sink.
+
+    Parameters
+    ----------
+    given, otherwise : the beginning of the message and the end of its remedy.
 
     Raises
     ------
-    UsageError : `given`, and the source has none; give another one, `otherwise` do what that says.
+    UsageError : it does not.
     """
     if not kind.behind(source):
         has = "has no sensor to write to" if source.delivers is Delivery.CAPTURE else f"has no {kind.name}"
-        raise UsageError(f"{given}, and {source.flag} {has}", f"{one_of(filter(kind.behind, SOURCES))}{otherwise}")
+        raise UsageError(f"{given}, but {source.flag} {has}", f"{one_of(filter(kind.behind, SOURCES))}{otherwise}")
 
 
-def announced(kinds: Sequence[SinkKind], no_write: bool) -> str:
-    """Where the result will go, in a sentence for the person."""
+def announce_sinks(kinds: Sequence[SinkKind], no_write: bool) -> str:
+    """Return a sentence for the user on where the result will be written."""
     if no_write:
         return "Results are written to files only."
     listed = " and ".join(["files", *(kind.where for kind in kinds)])
     return f"Results are written to {listed} (change with --to or --no-write)."
 
 
-def defaults() -> str:
-    """Where a session writes by default, for the help."""
-    listed = [f"{kind.where} of {' or '.join(behind(kind))}" for kind in SINKS.values() if kind.default]
+def default_sinks() -> str:
+    """Return the default sinks as text for the help."""
+    listed = [f"{kind.where} of {' or '.join(source_flags(kind))}" for kind in SINKS.values() if kind.default]
     return f"by default {', '.join(listed)}, else files only"
 
 
-def behind(kind: SinkKind) -> list[str]:
-    """The options of the sources that have the sink, as a person writes them."""
+def source_flags(kind: SinkKind) -> list[str]:
+    """Return the command-line options of the sources that have the sink."""
     return [option.flag for option in unique(source.option for source in SOURCES if kind.behind(source))]

@@ -1,4 +1,4 @@
-"""What the program asks of a kind of sink: its name, the sources it is behind, what opens it, what a write changes."""
+"""Kinds of sinks: the name, the sources that have one, the function that opens it, and the effect of a write."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ Say = Callable[[str], None]
 
 
 class Effect(Enum):
-    """What a write does to the samples that the sensor delivers from then on, and so what a session records of it."""
+    """Effect of a write on later samples of the sensor, which decides how a session records the write."""
 
-    NONE = "they stay as they were: calibration.json says that it was written"
-    LESS_BIAS = "a part of b_a is gone from them: all result files are made again, and say how much"
-    OTHER_STREAM = "they need another calibration, which has a file of its own; calibration.json stays as measured"
+    NONE = "they stay the same: calibration.json lists the write"
+    LESS_BIAS = "a part of b_a is removed from them: all result files are made again with that part"
+    OTHER_STREAM = "they need another calibration, in a file of its own; calibration.json stays as measured"
 
 
 @dataclass(frozen=True)
 class Flag:
-    """An option of `mpucal write` for one kind of sink: its name, and what the help says."""
+    """Option of `mpucal write` for one kind of sink: its name and help text."""
 
     name: str
     help: str
@@ -37,12 +37,12 @@ class Flag:
 
 @dataclass(frozen=True)
 class Device:
-    """What a sink is opened on.
+    """Device of a sink.
 
     Attributes
     ----------
-    kind : of the source. name : as the source's option says it, such as /dev/i2c-1. open : opens the source.
-    say : tells the person a sentence. flags : the names of those that were given. values : of the source's options.
+    kind : of the source. name : value of the source's option, such as /dev/i2c-1. open : opens the source.
+    say : shows the user a sentence. flags : names of the given flags. values : of the source's options.
     """
 
     kind: SourceKind
@@ -55,15 +55,15 @@ class Device:
 
 @dataclass(frozen=True)
 class SinkKind:
-    """A kind of sink: one row of the table.
+    """Kind of sink: one row of the table.
 
     Attributes
     ----------
-    name : as `--to` and `mpucal write` spell it. behind : whether the devices of a kind of source have one.
-    where : it, in a sentence for a person. holds : what of a calibration it holds, for the documentation.
-    opener : "module:attribute" of a context manager from a Device to a Sink; imported when it is opened.
-    default : whether a session on such a device writes to it where --to does not choose.
-    effect : see Effect. kept : the files in which the old state may be kept. flags : see Flag.
+    name : for `--to` and `mpucal write`. behind : returns True if devices of a kind of source have such a sink.
+    where : its name in messages. holds : the part of a calibration that it holds, for the documentation.
+    opener : "module:function" of a context manager from a Device to a Sink; imported when it is opened.
+    default : a session on such a device writes to it without --to.
+    effect : see Effect. kept : files in which the old state may be saved. flags : see Flag.
     """
 
     name: str
@@ -77,23 +77,23 @@ class SinkKind:
     flags: tuple[Flag, ...] = ()
 
     def open(self, device: Device) -> AbstractContextManager[Sink]:
-        """The sink on `device`; closed when the context ends.
+        """Open the sink on `device`; it is closed when the context ends.
 
         Raises
         ------
-        SourceError : the device cannot be opened; KeepsNothing, where it holds no calibration at all.
+        SourceError : the device cannot be opened; KeepsNothing if it has no memory for a calibration.
         """
         opener: Callable[[Device], AbstractContextManager[Sink]] = resolve_name(self.opener)
         return opener(device)
 
     def after_write(self, stem: str) -> str:
-        """Name of the file with the calibration `stem` of the sensor as it is after a write."""
+        """Return the name of the file with the calibration `stem` as it applies after a write."""
         return f"{stem}-on-{self.name}.json"
 
     @property
     def session_files(self) -> tuple[SessionFile, ...]:
-        """What a write leaves in a session's folder besides what is there without one."""
+        """Return the extra files that a write adds to a session's folder."""
         if self.effect is not Effect.OTHER_STREAM:
             return self.kept
         name = self.after_write(Path(DOCUMENT.name).stem)
-        return (*self.kept, SessionFile(name, f"the calibration of the sensor as it is after a write to {self.where}"))
+        return (*self.kept, SessionFile(name, f"the calibration that applies after a write to {self.where}"))

@@ -1,4 +1,4 @@
-"""What the files say after a write to a sink: what is applied where, so that nothing is removed from a sample twice."""
+"""Records of a write to a sink in the result files, so that a bias is not removed from a sample twice."""
 
 from __future__ import annotations
 
@@ -17,15 +17,17 @@ from ..session.results import result_files, save
 from ..strict_json import MOST_BYTES, parsed
 from .kind import Effect, SinkKind
 
-# of calibration.json: the writes, one entry each
+# key in calibration.json: the writes, one entry each
 WRITTEN = "written"
 
-# saves the calibration of the sensor as it is after a write to a sink; gives what calibration.json then holds
-Record = Callable[[SinkKind, Calibration], Calibration]
+# saves the calibration that applies after a write to a sink; returns the content of calibration.json
+Recorder = Callable[[SinkKind, Calibration], Calibration]
 
 
-def in_session(folder: Path, measured: Calibration, recording: Recording, truth: Mapping[str, Any] | None) -> Record:
-    """Records in a session's folder, as the sink's effect demands; `measured` is what the session found."""
+def session_recorder(
+    folder: Path, measured: Calibration, recording: Recording, truth: Mapping[str, Any] | None
+) -> Recorder:
+    """Return the recorder for a session's folder, by the sink's effect; `measured` is the session's result."""
 
     def record(kind: SinkKind, now: Calibration) -> Calibration:
         if kind.effect is Effect.LESS_BIAS:
@@ -42,8 +44,8 @@ def in_session(folder: Path, measured: Calibration, recording: Recording, truth:
     return record
 
 
-def in_file(path: Path) -> Record:
-    """Records in a file of its own, `path` (.json), and the same as a config blob (.bin)."""
+def file_recorder(path: Path) -> Recorder:
+    """Return the recorder for the file `path` (.json) and a config blob (.bin) beside it."""
 
     def record(_kind: SinkKind, now: Calibration) -> Calibration:
         save(path.parent, {path.with_suffix(".bin").name: now.blob().encode(), path.name: now.json().encode()})
@@ -53,7 +55,7 @@ def in_file(path: Path) -> Record:
 
 
 def is_calibration(path: Path) -> bool:
-    """Whether it is one (or damaged, or not there), and not a file of another kind in which a sink keeps its state."""
+    """Return False if the file is a saved state of a sink; True for a calibration, even if damaged or missing."""
     if path.suffix != ".json":
         return path.suffix == ".bin" or not path.exists()
     try:

@@ -1,4 +1,4 @@
-"""SIGTERM and SIGHUP while a sink is written: as Ctrl-C, so that the old state is put back before the program ends."""
+"""SIGTERM and SIGHUP during a write to a sink, handled as Ctrl-C, so that the old state is restored first."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NAMES = ("SIGTERM", "SIGHUP")
 
 @contextmanager
 def interrupting() -> Iterator[None]:
-    """The first of them raises KeyboardInterrupt within; what follows it does not disturb the putting back."""
+    """Raise KeyboardInterrupt in the block at the first of these signals; later ones do not disturb the restoring."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -25,16 +25,15 @@ def interrupting() -> Iterator[None]:
             ended = True
             raise KeyboardInterrupt
 
-    # Windows has no SIGHUP; and what somebody sees to already is left to them
-    numbers = [number for name in NAMES if (number := getattr(signal, name, None)) and _ends(number)]
+    # Windows has no SIGHUP; a signal that has a handler keeps it
+    numbers = [
+        number
+        for name in NAMES
+        if (number := getattr(signal, name, None)) and signal.getsignal(number) is signal.SIG_DFL
+    ]
     before = {number: signal.signal(number, interrupt) for number in numbers}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def _ends(number: int) -> bool:
-    """Whether the signal would end the program now."""
-    return signal.getsignal(number) is signal.SIG_DFL

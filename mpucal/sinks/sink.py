@@ -1,4 +1,4 @@
-"""What every sink does: keep what it holds, write a calibration, and perhaps put back what it kept."""
+"""Interfaces of a sink: save its state, write a calibration, and perhaps restore the state."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ..result.calibration import Calibration
 
 @dataclass(frozen=True)
 class Applied:
-    """What a write left behind.
+    """Result of a write.
 
     Attributes
     ----------
-    calibration : the written one, which now says what is applied where.
-    what : one sentence for the person: what was written where, and how it was checked.
+    calibration : the written one, with the parts that the device applies from now on.
+    what : a clause for the user: what was written where, and how it was checked.
     """
 
     calibration: Calibration
@@ -28,14 +28,14 @@ class Sink(Protocol):
 
     Attributes
     ----------
-    where : the very device, in words.
+    where : the device, for messages.
     """
 
     @property
     def where(self) -> str: ...  # noqa: D102 - see above
 
     def keep(self, folder: Path) -> tuple[Path, ...]:
-        """Save what the place holds now to files in `folder`, before anything is changed; none where it is empty.
+        """Save the state of the device to files in `folder` before anything is changed; no file if it is empty.
 
         Raises
         ------
@@ -44,7 +44,7 @@ class Sink(Protocol):
         ...
 
     def write(self, calibration: Calibration) -> Applied:
-        """Write, read back, compare, and verify by effect where the place can show one.
+        """Write, read back, compare, and verify the effect if the device can show it.
 
         Raises
         ------
@@ -55,13 +55,27 @@ class Sink(Protocol):
 
 @runtime_checkable
 class Restorable(Sink, Protocol):
-    """A sink that takes back what it kept."""
+    """Sink that can restore a saved state."""
 
     def put_back(self, kept: Path) -> str:
-        """Write back what `keep` saved to `kept`, and say in one sentence what holds now.
+        """Restore the state that `keep` saved to `kept`; return a clause on it for the user.
 
         Raises
         ------
-        RecordingError : `kept` is not what this sink keeps. WriteBackError : see Sink.
+        RecordingError : `kept` is not a state of this sink. WriteBackError : see Sink.
+        """
+        ...
+
+
+@runtime_checkable
+class ComparableSink(Sink, Protocol):
+    """Sink that can predict whether a calibration is better than the one that it holds."""
+
+    def reason_to_keep(self, calibration: Calibration) -> str | None:
+        """Return why the held calibration is predicted to be as good, as a clause; None if the new one is better.
+
+        Raises
+        ------
+        SourceError : it cannot be read.
         """
         ...

@@ -1,7 +1,7 @@
 """The table of sinks: one row for each kind, from which options, help, error messages and documentation are made.
 
-A new sink is a module that opens it and a row here. The module, and the library behind it, are imported when a sink of
-that kind is opened.
+A new sink is a module that opens it and a row here. The module and its libraries are imported when such a sink is
+opened.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ from ..sources.kind import Delivery
 from ..sources.table import IIO, MAVLINK
 from .kind import Effect, Flag, SinkKind
 
-CHIP_OFFSETS = SessionFile("chip-offsets.json", "what a chip's offset registers held before a write")
-# N is the number that the bridge gave it
-BRIDGE_BLOB = SessionFile("bridge-blob-N.bin", "the calibration that a bridge's memory held before a write")
-OLD_PARAM = SessionFile("autopilot_old.param", "what an ArduPilot's parameters were before a write")
-OLD_PARAMS = SessionFile("autopilot_old.params", "what a PX4's parameters were before a write")
-IIO_STATE = SessionFile("iio-state.json", "what calibbias and the rule of udev were before a write")
+CHIP_OFFSETS = SessionFile("chip-offsets.json", "the content of a chip's offset registers before a write")
+# N is the bridge's number of the blob
+BRIDGE_BLOB = SessionFile("bridge-blob-N.bin", "the calibration in a bridge's memory before a write")
+OLD_PARAM = SessionFile("autopilot_old.param", "an ArduPilot's parameters before a write")
+OLD_PARAMS = SessionFile("autopilot_old.params", "a PX4's parameters before a write")
+IIO_STATE = SessionFile("iio-state.json", "calibbias and the rule of udev before a write")
 
 CHIP, KERNEL, BRIDGE, AUTOPILOT = "chip", "kernel", "bridge", "autopilot"
 
-# by name; a session writes to them in this order, so that what is written later says what an earlier one applies
+# a session writes in this order, so that later sinks get the calibration that earlier ones leave
 SINKS = {
     kind.name: kind
     for kind in (
@@ -28,7 +28,7 @@ SINKS = {
             CHIP,
             behind=lambda source: source.delivers is Delivery.REGISTERS,
             where="the chip's offset registers",
-            holds="b_a alone, in steps of 1 mg, until the chip's supply goes",
+            holds="only b_a, in steps of 1 mg, until the next power cycle or reset",
             opener="mpucal.sinks.chip:open_chip",
             effect=Effect.LESS_BIAS,
             kept=(CHIP_OFFSETS,),
@@ -37,7 +37,7 @@ SINKS = {
             KERNEL,
             behind=lambda source: source.option is IIO,
             where="the kernel's driver",
-            holds="D as ACCEL_MOUNT_MATRIX of udev; b_a in calibbias of an MPU-6050, until its supply goes",
+            holds="D as ACCEL_MOUNT_MATRIX of udev; b_a in calibbias of an MPU-6050, until its next power cycle",
             opener="mpucal.sinks.iio:open_kernel",
             effect=Effect.LESS_BIAS,
             kept=(IIO_STATE,),
@@ -47,7 +47,7 @@ SINKS = {
             behind=lambda source: bool(source.store),
             default=True,
             where="the bridge's memory",
-            holds="the config blob: D, b_a, K, b_omega, and b_a(T) where it is known",
+            holds="the config blob: D, b_a, K, b_omega, and b_a(T) if known",
             opener="mpucal.sinks.bridge:open_bridge",
             kept=(BRIDGE_BLOB,),
         ),
@@ -56,11 +56,11 @@ SINKS = {
             behind=lambda source: source.option is MAVLINK,
             default=True,
             where="the autopilot",
-            holds="offsets and scales; cross-axis terms stay, and it says what error that leaves",
+            holds="offsets and scales; without cross-axis terms, and mpucal prints the error that remains",
             opener="mpucal.sinks.autopilot:open_autopilot",
             effect=Effect.OTHER_STREAM,
             kept=(OLD_PARAM, OLD_PARAMS),
-            flags=(Flag("store", "keep D in the vehicle's storage too."),),
+            flags=(Flag("store", "also store D in the vehicle's storage."),),
         ),
     )
 }

@@ -1,4 +1,4 @@
-"""One write of a calibration to a sink: what was there kept, what is there now recorded, or undone; and put back."""
+"""Write of a calibration to a sink: save the old state, write, record or undo the write; and restore a saved state."""
 
 from __future__ import annotations
 
@@ -10,33 +10,32 @@ from pathlib import Path
 from ..errors import KeepsNothing, OutputError, SourceError, WriteBackError
 from ..result.calibration import REFUSED, Calibration
 from ..result.clock import now
-from .doubt import doubt
 from .kind import Device, Say, SinkKind
-from .record import WRITTEN, Record
+from .record import WRITTEN, Recorder
 from .signals import interrupting
-from .sink import Applied, Restorable, Sink
+from .sink import Applied, ComparableSink, Restorable, Sink
 
-# asks whether to go on; WriteBackError where the person says no, or where there is a doubt and no person
+# asks the user whether to go on; raises WriteBackError if not
 Ask = Callable[[str], None]
 
 NO_MEMORY = "there was not enough memory"
 
 
 def keep(kind: SinkKind, sink: Sink, folder: Path, say: Say) -> tuple[Path, ...]:
-    """Save what the sink holds, and tell how to bring it back; see Sink.keep."""
+    """Save the state of the sink, and tell the user how to restore it; see Sink.keep."""
     kept = sink.keep(folder)
     for path in kept:
         say(f"the previous state is saved in {path}; `mpucal write {path} {kind.name} ...` restores it.")
     return kept
 
 
-def write_to(kind: SinkKind, sink: Sink, calibration: Calibration, folder: Path, record: Record, say: Say) -> Applied:
-    """Keep what the sink holds, write, and have `record` save what is applied now, and give what the files then hold.
+def write_to(kind: SinkKind, sink: Sink, calibration: Calibration, folder: Path, record: Recorder, say: Say) -> Applied:
+    """Save the state of the sink, write, and have `record` save the result; return it as the files hold it.
 
     Raises
     ------
-    WriteBackError : see Sink.write; or the record could not be saved, and nothing was changed.
-    OutputError : the record could not be saved, and the sink keeps what was written.
+    WriteBackError : see Sink.write; or the record could not be saved, and the old state is restored.
+    OutputError : the record could not be saved, and the sink keeps the new state.
     """
     kept = keep(kind, sink, folder, say)
     with _interrupted_as_refused(sink):
@@ -51,11 +50,11 @@ def write_to(kind: SinkKind, sink: Sink, calibration: Calibration, folder: Path,
         )
         if not isinstance(sink, Restorable) or not kept:
             raise OutputError(f"{applied.what}, but {error.what}", error.remedy) from cause
-        # a bias that is gone from the samples, with no file that says so, would be removed twice
+        # without a record, a bias that the device removes would be removed from its samples again
         try:
             back = sink.put_back(kept[0])
         except MemoryError:
-            do = f"put back what was there with `mpucal write {kept[0]} {kind.name} ...`"
+            do = f"restore the old state with `mpucal write {kept[0]} {kind.name} ...`"
             raise OutputError(f"{applied.what}, but {error.what}", do) from cause
         raise WriteBackError(f"{error.what}; {back}", error.remedy) from cause
 
@@ -65,50 +64,62 @@ def write_to_all(
     calibration: Calibration,
     device: Device,
     folder: Path,
-    record: Record,
+    record: Recorder,
     ask: Ask,
     asked: Sequence[str] = (),
     in_doubt: Ask | None = None,
 ) -> Iterator[Applied]:
-    """Write to each sink in turn, and save what is applied then; nothing of a calibration that was refused.
+    """Write to each sink in turn, and record each write; a refused calibration is not written.
 
     Parameters
     ----------
-    asked : the sinks that --to named: a device that keeps nothing is no failure unless its sink was.
-    in_doubt : asks in place of `ask` where the calibration was not verified, or what the sink holds is predicted to be
-        as good.
+    asked : sinks named with --to: only for these is a device without memory an error.
+    in_doubt : replaces `ask` if there is an objection; see write_objection.
 
     Raises
     ------
-    WriteBackError : refused or failed; what was written to the sinks before it stays. OutputError : see write_to.
+    WriteBackError : refused or failed; earlier sinks keep what was written. OutputError : see write_to.
     """
     for kind in kinds if calibration.verdict != REFUSED else ():
         try:
             with kind.open(device) as sink:
-                against = doubt(calibration, sink)
-                if against is None:
+                objection = write_objection(calibration, sink)
+                if objection is None:
                     ask(f"Write the calibration to {sink.where}?")
                 else:
-                    (in_doubt or ask)(f"{against}. Write it to {sink.where} all the same?")
+                    (in_doubt or ask)(f"{objection}. Write it to {sink.where} anyway?")
                 applied = write_to(kind, sink, calibration, folder, record, device.say)
         except SourceError as error:
             if isinstance(error, KeepsNothing) and kind.name not in asked:
-                device.say(f"{error.what}: the result is in files only.")
+                device.say(f"{error.what}: the result is only in files.")
                 continue
             raise WriteBackError(f"nothing was written to {kind.where}: {error.what}", error.remedy) from error
         calibration = applied.calibration
         yield applied
 
 
-def put_back(kind: SinkKind, sink: Sink, kept: Path, folder: Path, say: Say) -> str:
-    """Write back what an earlier write kept in the file `kept`, after what is there now is kept too; say it.
+def write_objection(calibration: Calibration, sink: Sink) -> str | None:
+    """Return the reason why only the user may decide on a write, as a clause; None if there is none.
 
     Raises
     ------
-    WriteBackError : the sink takes nothing but a calibration, or see Restorable.put_back.
+    SourceError : the sink cannot be read.
+    """
+    verification = calibration.quality.get("verification")
+    if not verification or verification.get("agrees") is not True:
+        return "the calibration was not verified in new orientations"
+    return sink.reason_to_keep(calibration) if isinstance(sink, ComparableSink) else None
+
+
+def put_back(kind: SinkKind, sink: Sink, kept: Path, folder: Path, say: Say) -> str:
+    """Restore the state saved in the file `kept`, after saving the present one; return a clause for the user.
+
+    Raises
+    ------
+    WriteBackError : the sink accepts only a calibration, or see Restorable.put_back.
     """
     if not isinstance(sink, Restorable):
-        raise WriteBackError(f"nothing was written: {kept} is no calibration", "give a calibration.json")
+        raise WriteBackError(f"nothing was written: {kept} is not a calibration", "give a calibration.json")
     keep(kind, sink, folder, say)
     with _interrupted_as_refused(sink):
         return sink.put_back(kept)
@@ -116,10 +127,10 @@ def put_back(kind: SinkKind, sink: Sink, kept: Path, folder: Path, say: Say) -> 
 
 @contextmanager
 def _interrupted_as_refused(sink: Sink) -> Iterator[None]:
-    """By Ctrl-C, SIGTERM, SIGHUP or lack of memory a sink puts back what was there: a write-back that failed."""
+    """Report a write that Ctrl-C, SIGTERM, SIGHUP or lack of memory ended, and that the sink has undone, as failed."""
     with interrupting():
         try:
             yield
         except (KeyboardInterrupt, MemoryError) as error:
             why = NO_MEMORY if isinstance(error, MemoryError) else "the write was interrupted"
-            raise WriteBackError(f"{why}, and {sink.where} is as before", "start again") from error
+            raise WriteBackError(f"{why}; the old state of {sink.where} is restored", "start again") from error

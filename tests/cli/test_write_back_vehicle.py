@@ -12,7 +12,7 @@ from mpucal.__main__ import run
 from mpucal.cli.destination import device
 from mpucal.errors import WriteBackError
 from mpucal.result.calibration import Calibration
-from mpucal.sinks.record import in_session
+from mpucal.sinks.record import session_recorder
 from mpucal.sinks.table import SINKS
 from mpucal.sinks.write_back import write_to_all
 
@@ -56,7 +56,7 @@ def test_the_new_parameters_are_there_and_the_files_say_so(flown):
     assert document == json.loads((flown.folder / "calibration.json").read_text())
     (entry,) = document["written"]
     assert entry["to"] == "autopilot"
-    assert "read back and seen in its streams" in entry["what"]
+    assert "read back and verified in its streams" in entry["what"]
     assert "Results are written to files and the autopilot" in flown.err
     # of what was measured, as truth.json is; of the streams that come now, the other file
     truth = json.loads((flown.folder / "truth.json").read_text())
@@ -76,7 +76,7 @@ def test_its_own_recording_takes_the_calibration_of_what_was_measured(flown, mpu
 
 def test_a_vehicle_that_refuses_keeps_what_it_held(flown, tmp_path):
     measured = Calibration.load(flown.folder / "calibration.json")
-    record = in_session(tmp_path, measured, None, None)
+    record = session_recorder(tmp_path, measured, None, None)
     vehicle = device({**WORDS, "mavlink": "sim:imus=1,refuse=INS_ACCSCAL_Y"})
     with pytest.raises(WriteBackError) as raised:
         list(write_to_all((SINKS["autopilot"],), measured, vehicle, tmp_path, record, lambda question: None))

@@ -42,7 +42,7 @@ def test_it_is_said_that_it_does_not_last(mpucal, calibrated, tmp_path):
 @pytest.mark.parametrize(
     ("bus", "words"),
     [
-        ("sim:seed=4", "the offset registers are as before"),
+        ("sim:seed=4", "the old state of the offset registers is restored"),
         ("sim:seed=3,offsets=readonly", "does not respond to its offset registers"),
         ("sim:seed=3,chip=mpu6500", "nothing was written"),
     ],

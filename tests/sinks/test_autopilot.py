@@ -87,7 +87,7 @@ def brief(monkeypatch):
 
 
 def calibration_of(vehicle):
-    """What a perfect fit says of its streams."""
+    """Return the calibration of a perfect fit of its streams."""
     firmware = vehicle.firmware
     name = "PX4" if firmware.bytewise else "ArduPilot"
     parameters = {key: float(firmware.store[key]) for key in firmware.store}
@@ -109,13 +109,13 @@ def calibration_of(vehicle):
 
 
 def stored(vehicle):
-    """Its accelerometers' corrections."""
+    """Return the parameters that correct its accelerometers."""
     pattern = re.compile(r"(OFFS|SCAL)_[XYZ]$|[XYZ](OFF|SCALE)$")
     return {name: vehicle.firmware.store[name] for name in vehicle.firmware.store if pattern.search(name)}
 
 
 def error_mps2(vehicle, imu=0):
-    """By how much |a| of its stream is wrong at worst, over attitudes."""
+    """Return the largest error of |a| of its stream over all attitudes."""
     truth = vehicle.imus.truth(imu, *vehicle.firmware.correction(imu))
     points = np.random.default_rng(1).normal(size=(500, 3))
     f = 9.80665 * points / np.linalg.norm(points, axis=1, keepdims=True)
@@ -296,7 +296,7 @@ def lose(transport, number):
 
 
 def arm(transport, number):
-    """It is armed at the nth PARAM_SET."""
+    """Arm the vehicle at the nth PARAM_SET."""
 
     def befall(count, message):
         transport.vehicle.firmware.armed |= count >= number
@@ -306,7 +306,7 @@ def arm(transport, number):
 
 
 def refuse(transport, number):
-    """From the nth PARAM_SET on it takes no value for the next parameter that was not set before."""
+    """Refuse the next new parameter from the nth PARAM_SET on."""
     seen, names = set(), []
 
     def befall(count, message):
@@ -332,7 +332,7 @@ def spoil(transport, number):
 
 
 def reboot(transport, number):
-    """It starts anew at the nth PARAM_SET."""
+    """Reboot the vehicle at the nth PARAM_SET."""
 
     def befall(count, message):
         if count == number:
@@ -438,7 +438,7 @@ def test_an_imu_that_would_not_become_better_keeps_its_parameters(firmware):
     if firmware == "px4":
         vehicle.firmware.start()
     again = calibration_of(vehicle)
-    assert sink.as_good(again) is None
+    assert sink.reason_to_keep(again) is None
     old = stored(vehicle)
     applied = sink.write(again)
     second = "ACC2" if firmware == "ardupilot" else "ACC1"
@@ -447,7 +447,7 @@ def test_an_imu_that_would_not_become_better_keeps_its_parameters(firmware):
     assert not any(second in name for name in changed)
     assert "IMU 2 keeps its old ones, which are predicted to be as good" in applied.what
     # and a whole vehicle that is calibrated already is left to a person
-    assert "as good as the new ones" in sink.as_good(once)
+    assert "as good as the new ones" in sink.reason_to_keep(once)
 
 
 def test_px4_is_not_said_to_hold_what_lies_in_its_dead_band():
@@ -460,7 +460,7 @@ def test_px4_is_not_said_to_hold_what_lies_in_its_dead_band():
 
 
 class Killed(BaseException):
-    """As kill -9: nothing of the program runs any more."""
+    """End of the program as by kill -9."""
 
 
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGINT"])
@@ -512,7 +512,7 @@ def test_after_a_kill_the_next_write_finds_what_was_there(firmware, number, tmp_
     said = AutopilotSink(link, journal=journal).recover()
     assert stored(vehicle) == old
     assert journal.interrupted() is None
-    assert said is None if number == 1 else "the parameters of before are back" in said
+    assert said is None if number == 1 else "the old parameters are restored" in said
     assert AutopilotSink(link, journal=journal).recover() is None
 
 
@@ -530,7 +530,7 @@ def test_another_vehicle_is_not_given_the_parameters_of_one_whose_write_was_cut_
     with pytest.raises(Killed):
         AutopilotSink(link, journal=journal).write(calibration_of(vehicle))
     other, sets, link = vehicle_of("ardupilot", ",imus=1,seed=9,INS_ACCOFFS_X=0.7")
-    assert "left alone" in AutopilotSink(link, journal=journal).recover()
+    assert "not changed" in AutopilotSink(link, journal=journal).recover()
     assert sets.sets == 0
     assert other.firmware.store["INS_ACCOFFS_X"] == pytest.approx(0.7)
 

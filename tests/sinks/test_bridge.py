@@ -66,7 +66,7 @@ def test_it_is_stored_read_back_and_found_valid(calibration):
     applied = BridgeSink(store).write(calibration)
     assert store.blob == calibration.blob().encode()
     assert applied.calibration is calibration
-    assert "blob number 8 (212 bytes, CRC-32 1234abcd), read back the same, and found valid" in applied.what
+    assert "blob number 8 (212 bytes, CRC-32 1234abcd), read back and validated" in applied.what
 
 
 def test_the_old_one_is_kept_in_a_file_of_its_number(tmp_path):
@@ -78,10 +78,10 @@ def test_the_old_one_is_kept_in_a_file_of_its_number(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "store", "words"),
     [
-        ({"quality": {"verdict": "refused"}}, {}, "was refused; nothing was written: measure again"),
-        ({"D": np.full((3, 3), np.nan)}, {}, "does not fit a blob .*; nothing was written"),
-        ({}, {"chip": 0x70}, "answers 0x70 to WHO_AM_I, and the calibrated one 0x68; nothing was written"),
-        ({}, {"fails": ["who_am_i"]}, "the bridge was reset; nothing was written: check its cable"),
+        ({"quality": {"verdict": "refused"}}, {}, "nothing was written: the calibration was refused"),
+        ({"D": np.full((3, 3), np.nan)}, {}, "nothing was written: the calibration lacks D or b_a"),
+        ({}, {"chip": 0x70}, "nothing was written: WHO_AM_I of .* is 0x70, but that of the calibrated one is 0x68"),
+        ({}, {"fails": ["who_am_i"]}, "nothing was written: the bridge was reset: check its cable"),
     ],
     ids=["refused", "not finite", "another chip", "lost"],
 )
@@ -95,16 +95,16 @@ def test_what_is_refused_touches_nothing(calibration, changes, store, words):
 @pytest.mark.parametrize(
     ("store", "words", "left"),
     [
-        ({"fails": ["write"]}, "the bridge was reset; it keeps the old calibration: check", OLD),
-        ({"fails": ["write"], "blob": None}, "the bridge was reset; it keeps none, as before", None),
+        ({"fails": ["write"]}, "the bridge was reset; it still has the old calibration: check", OLD),
+        ({"fails": ["write"], "blob": None}, "the bridge was reset; it still has none", None),
         (
             {"fails": ["write", "greet"]},
-            "the old calibration or the new one, never a part: plug it in again.*show",
+            "either the old calibration or the new one, whole: connect it again.*show",
             OLD,
         ),
-        ({"spoils": [b"x"]}, "gives back another calibration than was stored; the old calibration is there again", OLD),
-        ({"spoils": [b"x"], "blob": None}, "than was stored; it keeps none, as before", None),
-        ({"spoils": [b"x", b"y"]}, "does not take the old one: use another board", b"y"),
+        ({"spoils": [b"x"]}, "does not read back what was stored; the old calibration is restored", OLD),
+        ({"spoils": [b"x"], "blob": None}, "what was stored; it has none, as before", None),
+        ({"spoils": [b"x", b"y"]}, "does not accept the old calibration: use another board", b"y"),
     ],
     ids=["reset", "reset, empty", "gone", "spoiled", "spoiled, empty", "worn out"],
 )
@@ -117,5 +117,5 @@ def test_what_fails_leaves_the_old_one_and_says_so(calibration, store, words, le
 
 def test_a_reply_that_was_lost_behind_the_commit_is_no_failure(calibration):
     held = FakeStore(fails=["write"], stores_first=True)
-    assert "read back the same" in BridgeSink(held).write(calibration).what
+    assert "read back and validated" in BridgeSink(held).write(calibration).what
     assert held.blob == calibration.blob().encode()

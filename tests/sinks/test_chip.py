@@ -94,7 +94,7 @@ class Board:
 
 @pytest.fixture(scope="module")
 def calibration():
-    """Of that board, made before anything was written."""
+    """Return a calibration of that board from before any write."""
 
     def make(**changes):
         sensor = Sensor(chip="MPU-6050", who_am_i=None, accel_offsets=changes.pop("accel_offsets", TRIM))
@@ -124,7 +124,7 @@ def test_the_bias_lands_where_it_belongs(calibration, model, scale, who_am_i):
 
 
 def test_the_bias_is_removed_once(calibration):
-    """What the chip shows then, through the calibration that the write left, is gravity and nothing else."""
+    """Correct samples after the write by the calibration that it returns: only gravity is left."""
     board = Board()
     applied = board.sink().write(calibration()).calibration
     board.inner.write(reg.PWR_MGMT_1, b"\x01")
@@ -184,7 +184,7 @@ def test_another_file_is_not_put_back(tmp_path, text):
     ("board", "changes", "words"),
     [
         (Board(offsets="readonly"), {}, "does not respond to its offset registers"),
-        (Board(), {"accel_offsets": (1, 2, 3)}, "factory's trim of this chip is .* and .1, 2, 3. in the one"),
+        (Board(), {"accel_offsets": (1, 2, 3)}, "factory trim of this chip is .* but .1, 2, 3. in the one"),
         (Board(), {"quality": {"verdict": REFUSED}}, "nothing was written: the calibration was refused"),
         (Board(), {"extra": {"autopilot": {}}}, "nothing was written: .*autopilot"),
         (Board(feed=AtRest(shakes_g=0.3)), {}, "the board moves"),
@@ -200,7 +200,7 @@ def test_a_refusal_leaves_all_as_it_was(calibration, board, changes, words):
 @pytest.mark.parametrize(
     ("sensor", "words"),
     [
-        (Sensor(who_am_i=0x70), "answers 0x68 to WHO_AM_I, and the calibrated one 0x70"),
+        (Sensor(who_am_i=0x70), "WHO_AM_I of this chip is 0x68, but 0x70 of the calibrated one"),
         (Sensor(), "not 9.81"),
     ],
     ids=["who_am_i", "gravity"],

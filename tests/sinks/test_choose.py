@@ -1,11 +1,11 @@
-"""Which sinks a session writes to."""
+"""Choice of the sinks of a session."""
 
 import re
 
 import pytest
 
 from mpucal.errors import UsageError
-from mpucal.sinks.choose import announced, chosen
+from mpucal.sinks.choose import announce_sinks, choose_sinks
 from mpucal.sources.table import matching_kinds
 
 
@@ -27,9 +27,9 @@ def source(name):
     ],
 )
 def test_a_session_chooses_the_sink_that_fits_its_source(asked, no_write, name, names):
-    kinds = chosen(asked, no_write, source(name))
+    kinds = choose_sinks(asked, no_write, source(name))
     assert [kind.name for kind in kinds] == names
-    said = announced(kinds, no_write)
+    said = announce_sinks(kinds, no_write)
     assert said.startswith("Results are written to files")
     assert all(kind.where in said for kind in kinds)
 
@@ -46,4 +46,4 @@ def test_a_session_chooses_the_sink_that_fits_its_source(asked, no_write, name, 
 )
 def test_a_sink_that_is_not_there_is_wrong_usage_before_anything_begins(asked, no_write, name, says):
     with pytest.raises(UsageError, match=re.escape(says)):
-        chosen(asked, no_write, source(name))
+        choose_sinks(asked, no_write, source(name))

@@ -1,4 +1,4 @@
-"""What a session writes by itself: what was verified, and is predicted to be better than what is there."""
+"""Objections to a write without a person: not verified, or predicted to be no better than the old state."""
 
 import sys
 from contextlib import contextmanager
@@ -14,10 +14,9 @@ from mpucal.cli.person import ask_in_doubt
 from mpucal.errors import WriteBackError
 from mpucal.result.calibration import Calibration
 from mpucal.result.comparison import is_better, worst_magnitude_error
-from mpucal.sinks.doubt import doubt
 from mpucal.sinks.kind import Device, SinkKind
 from mpucal.sinks.sink import Applied
-from mpucal.sinks.write_back import write_to_all
+from mpucal.sinks.write_back import write_objection, write_to_all
 
 VERIFIED = {"verification": {"agrees": True, "orientations": []}}
 KIND = SinkKind("made", behind=lambda source: True, where="the made-up sink", holds="all", opener="made_up_sink:opened")
@@ -34,7 +33,7 @@ class Place:
     def keep(self, folder):
         return ()
 
-    def as_good(self, calibration):
+    def reason_to_keep(self, calibration):
         return self.against
 
     def write(self, calibration):
@@ -86,7 +85,7 @@ def test_without_a_person_only_what_is_verified_and_better_is_written(
     if why is None:
         write()
     else:
-        assert why in doubt(made, place)
+        assert why in write_objection(made, place)
         with pytest.raises(WriteBackError, match=f"nothing was changed: .*{why}") as raised:
             write()
         assert raised.value.exit_code == 6

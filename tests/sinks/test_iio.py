@@ -69,7 +69,7 @@ def test_b_a_is_gone_from_the_samples_and_udev_has_the_rest(made, tmp_path):
     assert 'KERNEL=="iio:device0", ATTR{name}=="mpu6050"' in rule
     rows = matrix_in(tmp_path / "61-mpucal-iio-device0.rules")
     np.testing.assert_allclose(rows @ found.D, np.eye(3), atol=1e-8)
-    assert "read back and seen in the samples" in applied.what
+    assert "read back and verified in the samples" in applied.what
     sink.put_back(kept)
     assert files._words() == before
     assert not list(tmp_path.glob("*.rules"))
@@ -102,7 +102,7 @@ def test_what_is_not_seen_in_the_samples_is_put_back(made, tmp_path, monkeypatch
 
     monkeypatch.setattr(files, "_write_words", other_axes)
     monkeypatch.setattr(files, "_words", lambda: files._written or before)
-    with pytest.raises(WriteBackError, match=r"the samples moved by .*iio:device0 \(mpu6050\) is as before"):
+    with pytest.raises(WriteBackError, match=r"the samples changed by .*iio:device0 \(mpu6050\) is restored"):
         sink.write(found)
     assert files._written == before
     assert not list(tmp_path.glob("*.rules"))
@@ -115,5 +115,5 @@ def test_what_is_refused_or_no_state_is_not_written(made, tmp_path):
     state = {"format": "mpucal.iio_state", "calibbias": [1, 2, 3], "rule": None}
     for document in ({}, 5, {**state, "calibbias": ["1", 2, 3]}, {**state, "rule": 5}):
         (tmp_path / "x.json").write_text(json.dumps(document))
-        with pytest.raises(RecordingError, match="does not hold what calibbias"):
+        with pytest.raises(RecordingError, match="does not hold calibbias"):
             sink.put_back(tmp_path / "x.json")

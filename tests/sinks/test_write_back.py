@@ -126,7 +126,7 @@ def test_a_place_that_cannot_be_restored_says_what_it_keeps(tmp_path):
 def test_a_place_that_takes_calibrations_alone_is_given_nothing_else(tmp_path):
     sink = Registers(set())
     sink.put_back = None
-    with pytest.raises(WriteBackError, match="old is no calibration"):
+    with pytest.raises(WriteBackError, match="old is not a calibration"):
         put_back(KIND, sink, tmp_path / "old", tmp_path, print)
     assert sink.steps == 0
 
@@ -155,4 +155,4 @@ def test_a_device_that_keeps_nothing_is_a_failure_where_it_was_asked_for(tmp_pat
             write_all(monkeypatch, keeps_nothing, calibration, tmp_path, as_it_is, asked)
     else:
         assert write_all(monkeypatch, keeps_nothing, calibration, tmp_path, as_it_is, said=said.append) == []
-        assert "in files only" in said[0]
+        assert "only in files" in said[0]

@@ -39,7 +39,7 @@ from mpucal.session.plan import Plan
 from mpucal.simulated.chip.options import ChipOptions
 from mpucal.simulated.vehicle.options import VehicleOptions
 from mpucal.sinks.chip import FORMAT as KEPT
-from mpucal.sinks.chip import REGISTERS, kept_blocks
+from mpucal.sinks.chip import REGISTERS, saved_blocks
 from mpucal.sinks.record import is_calibration
 from mpucal.sources.bridge import messages as wire
 from mpucal.sources.bridge.frame import Frame
@@ -173,7 +173,7 @@ def texts(data: bytes) -> None:
 def notes(path: Path) -> None:
     """What is kept of a write, and of a session."""
     with suppress(MpucalError):
-        kept_blocks(path)
+        saved_blocks(path)
     is_calibration(path)
     Journal(path).interrupted()
 
