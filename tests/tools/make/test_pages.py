@@ -1,9 +1,48 @@
-"""The pages and drawings of docs/ are those of the tables and imports that they are made from."""
+"""The pages and drawings of docs/ are those of the tables and imports, and what they name is there."""
+
+import ast
+import re
+from graphlib import CycleError
+from pathlib import Path
 
 import pytest
 
 from mpucal.sources.table import SOURCES
-from tools.make import pages, sources
+from tools.make import pages
+
+ROOT = Path(__file__).parents[3]
+DOCUMENT = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+REFERENCES = {(path, name) for path, name in re.findall(r"`([\w/]+\.(?:py|[ch]pp|md))(?::\s+([\w.]+))?`", DOCUMENT)}
+
+
+def test_an_arrow_that_a_longer_way_implies_is_left_out():
+    imports = {"top": {"middle", "bottom"}, "middle": {"bottom"}, "bottom": set()}
+    assert pages.floors(imports) == ["bottom", "middle", "top"]
+    assert pages.reduced(imports) == {"top": {"middle"}, "middle": {"bottom"}, "bottom": set()}
+
+
+def test_a_circle_cannot_be_drawn():
+    with pytest.raises(CycleError):
+        pages.floors({"one": {"other"}, "other": {"one"}})
+
+
+def defined(tree, name):
+    """Whether a module defines, or imports, a name such as Class.method."""
+    first, *rest = name.split(".")
+    for node in tree.body:
+        names = {getattr(node, "name", None)}
+        if isinstance(node, ast.Assign | ast.AnnAssign):
+            names = {ast.unparse(target) for target in getattr(node, "targets", None) or [node.target]}
+        if first in names:
+            return not rest or defined(node, ".".join(rest))
+    return False
+
+
+@pytest.mark.parametrize(("path", "name"), sorted(REFERENCES), ids=lambda word: word or "file")
+def test_what_it_points_at_is_there(path, name):
+    found = next((folder / path for folder in (ROOT / "mpucal", ROOT) if (folder / path).exists()), None)
+    assert found is not None
+    assert not name or defined(ast.parse(found.read_text(encoding="utf-8")), name)
 
 
 def test_what_is_made_is_made_anew():
@@ -12,6 +51,6 @@ def test_what_is_made_is_made_anew():
 
 @pytest.mark.parametrize("kind", SOURCES, ids=lambda kind: kind.flag)
 def test_a_row_says_what_the_table_says(kind):
-    (row,) = (line for line in sources.page("").splitlines() if line.startswith(f"| `{kind.flag}` |"))
+    (row,) = (line for line in pages.sources().splitlines() if line.startswith(f"| `{kind.flag}` |"))
     assert all(f"`{option.flag}`" in row for option in (*kind.options, *kind.settings))
     assert ("`doctor`" in row) == bool(kind.doctor)
