@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..sources.bridge.conformance import Talk, converse, talks
+from ..sources.bridge.conformance import Talk, run_talk, talks
 from ..sources.bridge.link import REPLY_NS, STORE_NS, Link
 from ..sources.bridge.messages import BlobErase, BlobState, Feature, Status
 from .finding import Finding, Mark
@@ -38,7 +38,7 @@ def _run_talk(link: Link, name: str, talk: Talk) -> Finding:
     stores = "blob" in talk["needs"]
     # A talk before may have left another address.
     link.greet()
-    differs = converse(link.port, talk, (STORE_NS if stores else REPLY_NS) + link.latency.most_ns)
+    differs = run_talk(link.port, talk, (STORE_NS if stores else REPLY_NS) + link.latency.most_ns)
     link.greet()
     if stores:
         link.ask(BlobErase())

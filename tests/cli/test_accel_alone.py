@@ -72,7 +72,7 @@ def test_what_needs_the_gyroscope_says_so(mpucal, command):
     assert result.code == 2
     assert result.err == (
         "mpucal: at 4000 Hz a chip measures with its accelerometer alone, and this needs the gyroscope:"
-        " take --rate 1000 or less; `mpucal record` and `mpucal stream` do with --rate 4000.\n"
+        " take --rate 1000 or less; `mpucal record` and `mpucal stream` accept --rate 4000.\n"
     )
 
 
@@ -85,7 +85,7 @@ def test_a_session_does_not_replay_it(mpucal, capture):
 def test_a_bridge_is_too_slow_for_it(mpucal):
     result = mpucal("record", "--serial", "socket://localhost:1", "--rate", "4000")
     assert result.code == 2
-    assert "a bridge does not move 4000 samples a second" in result.err
+    assert "a bridge cannot carry 4000 samples a second" in result.err
 
 
 def test_the_filter_is_chosen(mpucal, tmp_path):

@@ -15,7 +15,7 @@ from mpucal.doctor.finding import Mark
 from mpucal.simulated.bridge import EmulatedBridge
 from mpucal.sources.bridge import board
 from mpucal.sources.bridge import messages as wire
-from mpucal.sources.bridge.conformance import difference, talks
+from mpucal.sources.bridge.conformance import find_difference, talks
 from mpucal.sources.bridge.frame import Deframer, Frame
 from mpucal.sources.bridge.link import Link
 from mpucal.sources.bridge.messages import Status
@@ -75,7 +75,7 @@ def test_answers_as_the_golden_talks_say(path, made, request, tmp_path):
     said = made(request, tmp_path)
     said(Frame(wire.Hello.TYPE, 0, wire.Hello().payload()).encode())
     for each in json.loads(path.read_text())["talk"]:
-        assert difference(each, Deframer().feed(said(bytes.fromhex(each["host"])))) == ""
+        assert find_difference(each, Deframer().feed(said(bytes.fromhex(each["host"])))) == ""
 
 
 def test_the_package_holds_the_golden_talks():
@@ -96,7 +96,7 @@ EXCHANGE = json.loads((VECTORS / "talk_fifo_count.json").read_text())["talk"][0]
     ],
 )
 def test_another_answer_is_told(said, words):
-    assert re.search(words, difference(EXCHANGE, said))
+    assert re.search(words, find_difference(EXCHANGE, said))
 
 
 def test_the_build_for_an_uno_has_all_talks(switch_on):

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from ...sources.bridge.port import BAUDS, Chunk
-from ...sources.bridge.port_errors import gone
+from ...sources.bridge.port_errors import port_gone
 
 STEP_NS = 500_000
 BITS_A_BYTE = 10
@@ -122,7 +122,7 @@ class EmulatedLine:
     def _check(self) -> None:
         if self.unplugged:
             self._coming.clear()
-            raise gone(self.name)
+            raise port_gone(self.name)
 
 
 def _unchanged(data: bytes) -> bytes:

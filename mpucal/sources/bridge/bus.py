@@ -1,8 +1,8 @@
-"""A chip behind a serial bridge, as a bus.
+"""Bus to a chip behind a serial bridge.
 
-What the bridge pushes is read-ahead below the bus: FIFO_COUNT and FIFO_R_W are answered from it, each count with
-the time at which the bridge read it, and what was lost on the way shows as an overflow in INT_STATUS. Nothing is
-read ahead of a FIFO that was started without a reset: whoever lets it fill sees it fill.
+The bridge pushes the FIFO's content ahead of the driver: FIFO_COUNT and FIFO_R_W are answered from a buffer, each count
+with the time at which the bridge read it, and losses on the way show as an overflow in INT_STATUS. A FIFO that was
+started without a reset is not read ahead, so that the driver can see it fill.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ...chip.clock import poll_phase
 from ...errors import BusError, NoAnswer
 from .fifo_tracker import CONTROLS, FifoTracker
 from .link import MS, Link, LinkLost
-from .link_errors import no_chip, no_reply, refused
+from .link_errors import no_chip, no_reply, request_failed
 from .messages import (
     MAX_BURST,
     MAX_READ,
@@ -39,55 +39,50 @@ from .reset_monitor import ResetMonitor
 
 # Four frames of 14 bytes fill one message.
 BATCH = 4
-# without a message, and with the line's latency on top: a bridge that was reset says so before
+# Time without a message, besides the line's latency, after which the bridge is lost; one that was reset says so sooner.
 GONE_NS = 1000 * MS
-REMIND_NS = 100 * MS
-# A cable is plugged in again, and a boot loader waits for two seconds.
+REPEAT_NS = 100 * MS
+# Time for plugging a cable in again, and for a boot loader's two seconds.
 RECOVER_NS = 10_000 * MS
-# An FTDI adapter hands over what came every 16 ms. What is asked in step with that is answered as late each time, or
-# later and later, as if the bridge's clock were off by 100 ppm.
-HELD_NS = 16 * MS
+# An FTDI adapter delivers its bytes every 16 ms. Requests in step with that would get equally late replies, or later
+# and later ones, as if the bridge's clock were off by 100 ppm.
+ADAPTER_NS = 16 * MS
 
 
 class BridgeBus:
-    """The chip behind the bridge on `port`; its clock is the bridge's.
+    """Chip behind the bridge on `port`; the bus has the bridge's clock.
 
     Parameters
     ----------
-    port : open; the bus closes it. address : where the chip is; None lets the bridge try 0x68, then 0x69.
+    port : open; the bus closes it. address : of the chip; None lets the bridge try 0x68, then 0x69.
 
     Raises
     ------
-    BusError : no bridge answers. NoAnswer : it finds no chip.
+    BusError : no bridge answers. NoAnswer : the bridge finds no chip.
     """
 
     def __init__(self, port: Port, address: int | None = None) -> None:
-        self.link = Link(port, self._pushed)
+        self.link = Link(port, self._on_frames)
         self._port = port
-        self._watch = FifoTracker()
+        self._tracker = FifoTracker()
         self._ahead: ReadAhead | None = None
         self._lost = False
-        self._asked = 0
-        self._beside = ResetMonitor(self.link)
+        self._requests = 0
+        self._monitor = ResetMonitor(self.link)
         self._dead: BusError | None = None
         try:
-            self._address = self.link.greet(address or 0).address
-            if not self._address:
+            self.address = self.link.greet(address or 0).address
+            if not self.address:
                 raise NoAnswer(*no_chip(port.name, address))
         except BaseException:
             port.close()
             raise
 
-    @property
-    def address(self) -> int:
-        """Where the chip answers."""
-        return self._address
-
     def read(self, register: int, count: int) -> Reply:
-        """`count` bytes from `register` on; where that is more than MAX_READ, in several transfers."""
+        """Read `count` bytes from `register` on; more than MAX_READ take several transfers."""
         ahead = self._ahead
         if ahead is not None and (register, count) == (reg.FIFO_COUNT_H, 2):
-            held, t_ns, host_ns = self._count(ahead)
+            held, t_ns, host_ns = self._wait_for_count(ahead)
             return Reply(held.to_bytes(2, "big"), t_ns, host_ns)
         if ahead is not None and register == reg.FIFO_R_W:
             return Reply(*ahead.pop(count))
@@ -95,16 +90,16 @@ class BridgeBus:
             try:
                 return self._read_now(register, count)
             except NoAnswer as error:
-                # a bridge makes several transfers of it, and the first may have taken bytes
+                # A bridge makes several transfers of it, and the first may have taken bytes.
                 raise BusError(error.what, error.remedy) from error
         at = reg.INT_STATUS - register
         if ahead is not None and register == reg.INT_ENABLE and at == count - 1:
-            return self._status(ahead)
+            return self._read_status(ahead)
         if not 0 <= at < count:
             return self._read_now(register, count)
         if at == count - 1:
-            self._step_out_of_line()
-        return self._judged(self._read_now(register, count), at)
+            self._wait_out_of_step()
+        return self._add_overflow(self._read_now(register, count), at)
 
     def write(self, register: int, data: bytes) -> int:
         """Write `data` from `register` on, and return the time."""
@@ -116,36 +111,36 @@ class BridgeBus:
             self._ahead = None
             requests.append(Stream(0, 0))
         requests.append(Write(register, data))
-        self._watch.on_write(register, data)
-        self._beside.on_write(register, data)
-        if controls and self._can_read_ahead:
-            return self._start(*requests)
-        return self._seen_from(self._ask(*requests)[-1][-1].t_ns)
+        self._tracker.on_write(register, data)
+        self._monitor.on_write(register, data)
+        has_stream = bool(self.link.bridge.features & Feature.STREAM)
+        if controls and has_stream and self._ahead is None and self._tracker.frame_bytes:
+            return self._start_stream(*requests)
+        return self._not_after_looks(self._ask(*requests)[-1][-1].t_ns)
 
     def sleep_until(self, t_ns: int) -> None:
-        """Wait until the bridge's clock shows `t_ns`, as far as is known, and take what it pushes."""
+        """Wait until the bridge's clock shows `t_ns`, as far as it is known, and take what it pushes."""
         self._wait(lambda host_ns: t_ns - self.link.clock.now(host_ns))
 
     def close(self) -> None:
-        """Stop what the bridge pushes, if it still listens, and let go of the port."""
+        """Stop the stream if the bridge still listens, and close the port."""
         if self._ahead is not None and self._dead is None:
-            with suppress(BusError):
-                self.link.ask(Stream(0, 0))
+            self._stop_stream()
         self.link.close()
 
     def _wait(self, left_ns: Callable[[int], int]) -> None:
-        """Take what is pushed until nothing is left of the time that `left_ns` gives for the host's."""
+        """Take what is pushed until `left_ns` of the host's time is 0."""
         while (left := left_ns(host_ns := self._port.now_ns())) > 0:
             try:
                 self.link.wait(host_ns + left)
             except BusError:
-                # the next access says so
+                # The next access raises it.
                 return
 
-    def _step_out_of_line(self) -> None:
-        """Wait for another part of HELD_NS each time, so that some reply is hardly held back."""
-        self._asked += 1
-        until_ns = self._port.now_ns() + round((poll_phase(self._asked) + 0.5) * HELD_NS)
+    def _wait_out_of_step(self) -> None:
+        """Wait a varying part of ADAPTER_NS, so that some replies are hardly delayed."""
+        self._requests += 1
+        until_ns = self._port.now_ns() + round((poll_phase(self._requests) + 0.5) * ADAPTER_NS)
         self._wait(lambda host_ns: until_ns - host_ns)
 
     def _read_now(self, register: int, count: int) -> Reply:
@@ -153,28 +148,28 @@ class BridgeBus:
             raise BusError(f"a bridge reads at most {MAX_BURST} bytes at once, not {count}", "read less at once")
         answers = [answer for several in self._ask(*_reads(register, count)) for answer in several]
         begun_ns, host_ns = answers[0].t_ns, answers[0].host_ns
-        seen_ns = self._seen_from(begun_ns)
-        return Reply(b"".join(_data(answers)), seen_ns, host_ns - (begun_ns - seen_ns))
+        shown_ns = self._not_after_looks(begun_ns)
+        return Reply(b"".join(_data(answers)), shown_ns, host_ns - (begun_ns - shown_ns))
 
-    def _status(self, ahead: ReadAhead) -> Reply:
-        """INT_ENABLE to INT_STATUS while the bridge pushes.
+    def _read_status(self, ahead: ReadAhead) -> Reply:
+        """Return INT_ENABLE to INT_STATUS during a stream.
 
-        INT_STATUS is what FRAMES say, whose bridge reads it. INT_ENABLE, 0 in a chip that was reset, was asked for a
-        poll ago: nobody waits for a reply, which may be late. Its times tell how fast the bridge's clock runs.
+        INT_STATUS comes from FRAMES, for which the bridge reads it. INT_ENABLE, 0 after a reset of the chip, was
+        requested one poll earlier, since its reply may be late. The reply's times give the rate of the bridge's clock.
         """
-        t_ns = ahead.shown_ns
-        ahead_ns = self._beside.take()
-        if not self._beside.is_asked:
-            self._step_out_of_line()
-            self._beside.ask()
+        t_ns = ahead.counted_ns
+        ahead_ns = self._monitor.take_answer()
+        if not self._monitor.is_waiting:
+            self._wait_out_of_step()
+            self._monitor.request()
         overflow = reg.INT_FIFO_OFLOW * ahead.take_overflow()
-        return Reply(bytes([self._beside.held, 0, overflow]), t_ns, None if ahead_ns is None else t_ns + ahead_ns)
+        return Reply(bytes([self._monitor.held, 0, overflow]), t_ns, None if ahead_ns is None else t_ns + ahead_ns)
 
-    def _judged(self, reply: Reply, at: int) -> Reply:
-        """What was read, with INT_STATUS at `at`: it tells what was lost on the way to the host, too."""
+    def _add_overflow(self, reply: Reply, at: int) -> Reply:
+        """Return a read with INT_STATUS at `at`, in which losses on the way to the host are added as an overflow."""
         if self._ahead is not None:
             if reply.data[at] & reg.INT_FIFO_OFLOW:
-                # the reading cleared it, and the bridge does not see it any more
+                # The read cleared the flag, so that the bridge does not see it.
                 self._ahead.lose(reply.t_ns, reply.host_ns or 0)
             lost = self._ahead.take_overflow()
         else:
@@ -183,57 +178,55 @@ class BridgeBus:
         data[at] |= reg.INT_FIFO_OFLOW * lost
         return reply._replace(data=bytes(data))
 
-    def _seen_from(self, t_ns: int) -> int:
-        return t_ns if self._ahead is None else self._ahead.seen_from(t_ns)
+    def _not_after_looks(self, t_ns: int) -> int:
+        return t_ns if self._ahead is None else self._ahead.not_after_looks(t_ns)
 
-    @property
-    def _can_read_ahead(self) -> bool:
-        has_stream = bool(self.link.bridge.features & Feature.STREAM)
-        return has_stream and self._ahead is None and bool(self._watch.frame_bytes)
+    def _start_stream(self, *before: Message) -> int:
+        """Send the requests `before` and start the stream; return the time of the last of `before`.
 
-    def _start(self, *before: Message) -> int:
-        """Let the bridge push, right behind the requests `before`; returns the time of the last of those.
-
-        The FIFO must not fill while the host waits for a reply, so all of them are sent at once.
+        All are sent at once, since the FIFO must not fill while the host waits for a reply.
         """
         self._lost = False
-        self._beside.forget()
-        frame_bytes = self._watch.frame_bytes
-        # before it is asked for: what it pushes may come together with its reply
+        self._monitor.cancel()
+        frame_bytes = self._tracker.frame_bytes
+        # Prepared before the request: the first frames may come together with its reply.
         self._ahead = ReadAhead(self.link.seq_of(len(before)), frame_bytes)
         try:
             answers = self._ask(*before, Stream(frame_bytes, BATCH))
         except BusError:
             if self._ahead is not None:
                 self._ahead = None
-                with suppress(BusError):
-                    self.link.ask(Stream(0, 0))
+                self._stop_stream()
             raise
         return answers[-2][-1].t_ns
 
-    def _count(self, ahead: ReadAhead) -> tuple[int, int, int]:
+    def _stop_stream(self) -> None:
+        with suppress(BusError):
+            self.link.ask(Stream(0, 0))
+
+    def _wait_for_count(self, ahead: ReadAhead) -> tuple[int, int, int]:
         give_up_ns = self._port.now_ns() + GONE_NS + self.link.latency.most_ns
         while not ahead.can_count:
             try:
                 if self._port.now_ns() >= give_up_ns:
                     raise LinkLost(*no_reply(self._port.name))
-                self._beside.remind()
-                self.link.wait(min(give_up_ns, self._port.now_ns() + REMIND_NS))
+                self._monitor.repeat_if_overdue()
+                self.link.wait(min(give_up_ns, self._port.now_ns() + REPEAT_NS))
             except BusError as error:
                 self._recover(error)
                 raise
         return ahead.count()
 
-    def _pushed(self, seq: int, frames: Frames, t_ns: int, host_ns: int) -> None:
+    def _on_frames(self, seq: int, frames: Frames, t_ns: int, host_ns: int) -> None:
         if self._ahead is not None and seq == self._ahead.seq:
             self._ahead.push(frames, t_ns, host_ns)
 
     def _ask(self, *requests: Message) -> list[list[Answer]]:
-        """The answers, none of them a failure.
+        """Send the requests and return their answers, none of which is a failure.
 
         Raises
         ------
-        BusError : the bridge could not do it; or it was lost, and is greeted again: then asking again may help.
+        BusError : the bridge could not do it; or it was lost and is greeted again, after which a retry may succeed.
         """
         if self._dead is not None:
             raise self._dead
@@ -246,15 +239,15 @@ class BridgeBus:
             status = several[-1].reply.status
             if status != Status.OK:
                 kind = NoAnswer if status == Status.NO_ANSWER else BusError
-                raise kind(*refused(self._port.name, status))
+                raise kind(*request_failed(self._port.name, status))
         return answers
 
     def _recover(self, error: BusError) -> None:
-        """Greet the bridge again, on its port opened anew where that was gone; what it pushed is lost.
+        """Greet the bridge again, and reopen its port if that was gone; the buffer is lost.
 
         Raises
         ------
-        BusError : it does not come back.
+        BusError : the bridge does not come back.
         """
         self._ahead, self._lost = None, True
         until_ns = self._port.now_ns() + RECOVER_NS
@@ -263,14 +256,14 @@ class BridgeBus:
                 self._port.revive(until_ns)
             else:
                 self._port.reopen(until_ns)
-            self.link.greet(self._address, until_ns - self._port.now_ns())
+            self.link.greet(self.address, until_ns - self._port.now_ns())
         except BusError as still:
             self._dead = error
             raise error from still
 
 
 def _reads(register: int, count: int) -> Iterator[Message]:
-    """The requests for `count` bytes from `register` on."""
+    """Yield the requests for `count` bytes from `register` on."""
     if register == reg.FIFO_R_W:
         yield Burst(register, count) if count > MAX_READ else Read(register, count)
         return

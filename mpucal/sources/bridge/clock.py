@@ -1,23 +1,23 @@
-"""The bridge's microsecond clock, unwrapped and seen from the host."""
+"""Microsecond clock of the bridge, unwrapped and seen from the host."""
 
 from __future__ import annotations
 
 WRAP_US = 2**32
 US = 1000
 
-# A ceramic resonator is within 0.5 %; twice that, so that an estimate can fall behind and come back.
+# A ceramic resonator is within 0.5 %; twice that lets an estimate that fell behind come back.
 DRIFT = 0.01
-# No message is under way for longer: it is the bridge that lags, as one that is emulated on a busy machine does.
+# No message is delayed for longer: the bridge itself lags, as an emulated one does on a busy machine.
 LATE_NS = 250_000_000
-# A clock that is this far from what was expected of it is taken to have been reset; nothing is lost where it was not.
+# A clock that is off by more was reset; taking it for reset by mistake does no harm.
 LEAP_NS = 50_000_000
 
 
 class BridgeClock:
-    """Bus time: what the bridge's clock shows, in ns without wraps; goes on where the bridge was reset.
+    """Bus time: the bridge's clock in ns without wraps, which continues after a reset of the bridge.
 
-    What the clock shows now is known from the message that took the shortest way to the host: `host - bus` is
-    least for that one. Between two messages the clocks may drift apart by DRIFT; one that lags by LATE_NS is followed.
+    The present time is known from the message with the shortest way to the host, which has the least `host - bus`.
+    Between two messages the clocks may drift apart by DRIFT; a bridge that lags by LATE_NS is followed.
     """
 
     def __init__(self) -> None:
@@ -26,8 +26,8 @@ class BridgeClock:
         self._seen_at_ns = 0
         self._latest_ns = 0
 
-    def seen(self, t_us: int, host_ns: int) -> int:
-        """The bus time of `t_us`, which came in at `host_ns` of the host's clock."""
+    def bus_time(self, t_us: int, host_ns: int) -> int:
+        """Convert `t_us` of a message, which arrived at `host_ns` of the host's clock, to bus time."""
         if self._ahead_ns is None:
             t_ns = t_us * US
         else:
@@ -37,16 +37,16 @@ class BridgeClock:
         return t_ns
 
     def now(self, host_ns: int) -> int:
-        """What it shows when the host's shows `host_ns`, as far as is known."""
+        """Return the bus time, as far as it is known, at `host_ns` of the host's clock."""
         return host_ns - (self._ahead_ns or 0) if self._ahead_ns is not None else 0
 
-    def greeted(self, t_us: int, host_ns: int) -> None:
-        """The bridge was greeted again: where its clock leapt, it was reset, and bus time goes on from now."""
+    def on_greeting(self, t_us: int, host_ns: int) -> None:
+        """Take the time of a reply to HELLO: if the clock leapt, the bridge was reset, and bus time continues."""
         if self._ahead_ns is not None:
             now_ns = max(self.now(host_ns), self._latest_ns)
             if abs(_nearest(t_us - (now_ns - self._base_ns) // US)) * US > LEAP_NS:
                 self._base_ns = now_ns - t_us * US
-        self.seen(t_us, host_ns)
+        self.bus_time(t_us, host_ns)
 
     def _follow(self, t_ns: int, host_ns: int) -> None:
         ahead_ns = host_ns - t_ns
@@ -58,5 +58,5 @@ class BridgeClock:
 
 
 def _nearest(difference_us: int) -> int:
-    """The same modulo WRAP_US, -WRAP_US / 2 .. WRAP_US / 2."""
+    """Reduce modulo WRAP_US to -WRAP_US / 2 .. WRAP_US / 2."""
     return (difference_us + WRAP_US // 2) % WRAP_US - WRAP_US // 2

@@ -1,4 +1,4 @@
-"""Whether a bridge answers as firmware_protocol.md settles it: golden talks, exchange by exchange."""
+"""Conformance test of a bridge: golden talks of firmware_protocol.md, exchange by exchange."""
 
 from __future__ import annotations
 
@@ -13,38 +13,38 @@ from .port import Port
 
 MS = 1_000_000
 TALKS = Path(__file__).with_name("talks.json")
-# of a reply's payload: status, t_us; then of HELLO_REPLY magic, major, minor and address
+# A reply's payload begins with status and t_us; HELLO_REPLY continues with magic, major, minor and address.
 BODY_AT, MAJOR_AT, ADDRESS_AT = 5, 9, 11
-# after which nothing comes any more that was on its way
+# Silence after which nothing more is on its way.
 QUIET_NS = 100 * MS
 
 Talk = Mapping[str, Any]
 
 
 def talks() -> dict[str, Talk]:
-    """The golden talks by name, as `python -m tools.make vectors` writes them.
+    """Read the golden talks by name, as `python -m tools.make vectors` writes them.
 
-    Each says what is `settled`, what it `needs` of a bridge ("chip", "stream"; "blob": to store, where none is stored),
-    and has its exchanges in `talk`: bytes of the `host`, and the reply or replies of the `bridge`.
+    Each names the rule that is `settled` and what it `needs` of a bridge ("chip", "stream"; "blob": an empty store).
+    Its exchanges are in `talk`: bytes of the `host`, and the reply or replies of the `bridge`.
     """
-    held: dict[str, Talk] = json.loads(TALKS.read_text(encoding="utf-8"))
-    return held
+    golden: dict[str, Talk] = json.loads(TALKS.read_text(encoding="utf-8"))
+    return golden
 
 
-def due(exchange: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The replies to an exchange's requests, in order."""
+def expected_replies(exchange: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the replies to an exchange's requests, in order."""
     bridge = exchange["bridge"]
     return bridge if isinstance(bridge, list) else [bridge] * (bridge is not None)
 
 
-def difference(exchange: Mapping[str, Any], said: Sequence[Frame], exact: bool = True) -> str:
-    """What is not as it was settled, in words; empty: nothing.
+def find_difference(exchange: Mapping[str, Any], received: Sequence[Frame], exact: bool = True) -> str:
+    """Describe the first difference from the golden replies; empty: none.
 
     Parameters
     ----------
-    said : the frames that came. exact : whether the chip is the one of the talks, or any.
+    received : frames from the bridge. exact : True if the chip is the one of the talks, False for any chip.
     """
-    wanted, got = due(exchange), [frame for frame in said if frame.type != Frames.TYPE]
+    wanted, got = expected_replies(exchange), [frame for frame in received if frame.type != Frames.TYPE]
     if len(got) != len(wanted):
         return f"{len(got)} replies to {exchange['host']}, not {len(wanted)}"
     for frame, reply in zip(got, wanted, strict=True):
@@ -52,43 +52,44 @@ def difference(exchange: Mapping[str, Any], said: Sequence[Frame], exact: bool =
         if (frame.type, frame.seq) != (reply["type"], reply["seq"]):
             return f"a reply of type 0x{frame.type:02x} and seq {frame.seq} to {exchange['host']}"
         if frame.payload[:1] != payload[:1]:
-            of = f"status {int.from_bytes(frame.payload[:1], 'big')} ({_name(frame.payload)})"
-            return f"{of} in the reply to {exchange['host']}, not {payload[0]} ({_name(payload)})"
-        if payload[0] == Status.OK and not _same(frame, payload, exact):
+            status = f"status {int.from_bytes(frame.payload[:1], 'big')} ({_status_name(frame.payload)})"
+            return f"{status} in the reply to {exchange['host']}, not {payload[0]} ({_status_name(payload)})"
+        if payload[0] == Status.OK and not _matches(frame, payload, exact):
             return f"{frame.payload.hex()} in the reply to {exchange['host']}, not {payload.hex()}"
     return ""
 
 
-def converse(port: Port, talk: Talk, patience_ns: int) -> str:
-    """What the bridge on `port`, which was greeted, answers otherwise than was settled; empty: nothing.
+def run_talk(port: Port, talk: Talk, patience_ns: int) -> str:
+    """Run a talk with the greeted bridge on `port`, and describe the first difference; empty: none.
 
     Parameters
     ----------
-    patience_ns : how long a reply may take.
+    patience_ns : time allowed for a reply.
     """
-    _heard(port, Deframer(), [], None, port.now_ns() + QUIET_NS)
+    _receive(port, 0, QUIET_NS)
     for exchange in talk["talk"]:
-        deframer, said = Deframer(), list[Frame]()
         port.write(b"\0" + bytes.fromhex(exchange["host"]))
-        wanted = len(due(exchange))
-        _heard(port, deframer, said, wanted or None, port.now_ns() + (patience_ns if wanted else QUIET_NS))
-        differs = difference(exchange, said, exact=False)
-        if differs:
-            return differs
+        wanted = len(expected_replies(exchange))
+        received = _receive(port, wanted, patience_ns if wanted else QUIET_NS)
+        difference = find_difference(exchange, received, exact=False)
+        if difference:
+            return difference
     return ""
 
 
-def _heard(port: Port, deframer: Deframer, said: list[Frame], count: int | None, until_ns: int) -> None:
-    """Take what comes until there are so many replies, or until the host's clock shows `until_ns`."""
-    while count is None or sum(frame.type != Frames.TYPE for frame in said) < count:
+def _receive(port: Port, count: int, within_ns: int) -> list[Frame]:
+    """Receive frames until there are `count` replies, or until the time is over; 0: for all of it."""
+    deframer, received, until_ns = Deframer(), list[Frame](), port.now_ns() + within_ns
+    while not count or sum(frame.type != Frames.TYPE for frame in received) < count:
         chunk = port.read(until_ns)
         if chunk is None or chunk.t_ns > until_ns:
-            return
-        said += deframer.feed(chunk.data)
+            break
+        received += deframer.feed(chunk.data)
+    return received
 
 
-def _same(frame: Frame, payload: bytes, exact: bool) -> bool:
-    """Whether the fields of a reply are as they are to be; fields may be appended."""
+def _matches(frame: Frame, payload: bytes, exact: bool) -> bool:
+    """Return True if a reply has the golden fields; more may be appended."""
     got = frame.payload
     if frame.type == Hello.TYPE | REPLY_BIT:
         named = got[BODY_AT:].startswith(MAGIC) and got[MAJOR_AT : MAJOR_AT + 1] == payload[MAJOR_AT : MAJOR_AT + 1]
@@ -98,7 +99,7 @@ def _same(frame: Frame, payload: bytes, exact: bool) -> bool:
     return got[BODY_AT:].startswith(payload[BODY_AT:])
 
 
-def _name(payload: bytes) -> str:
+def _status_name(payload: bytes) -> str:
     try:
         return Status(payload[0]).name
     except (ValueError, IndexError):

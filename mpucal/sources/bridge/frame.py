@@ -1,4 +1,4 @@
-"""Frames of the serial bridge: COBS, CRC-16 and a zero between them.
+"""Frames of the serial bridge: COBS, CRC-16 and a zero as delimiter.
 
 See firmware_protocol.md, "Framing".
 """
@@ -23,19 +23,19 @@ CRC_INITIAL = 0xFFFF
 
 
 class FrameError(ValueError):
-    """Bytes that are no frame, or a payload that fits none."""
+    """Bytes that are not a frame, or a payload that does not fit into one."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame: message type and sequence number, 0..255, and at most MAX_PAYLOAD bytes of payload."""
+    """Frame: message type and sequence number, 0..255, and at most MAX_PAYLOAD bytes of payload."""
 
     type: int
     seq: int
     payload: bytes = b""
 
     def encode(self) -> bytes:
-        """The bytes on the line, with the delimiter.
+        """Encode the frame to the bytes on the line, with the delimiter.
 
         Raises
         ------
@@ -48,11 +48,11 @@ class Frame:
 
     @classmethod
     def decode(cls, encoded: bytes) -> Frame:
-        """The frame of the bytes between two delimiters.
+        """Decode the bytes between two delimiters.
 
         Raises
         ------
-        FrameError : too short or too long, no COBS, or damaged.
+        FrameError : too short, too long, not COBS, or damaged.
         """
         if len(encoded) > MAX_ENCODED:
             raise FrameError(f"{len(encoded)} bytes without a zero are longer than a frame")
@@ -67,11 +67,11 @@ class Frame:
 
 
 class Deframer:
-    """Takes bytes as they come, and gives the frames among them; what is none is counted and left out.
+    """Splitter of a stream of bytes into frames; other bytes are counted and skipped.
 
     Attributes
     ----------
-    rejected : how many pieces between two delimiters were no frame.
+    rejected : number of pieces between two delimiters that were not a frame.
     """
 
     def __init__(self) -> None:
@@ -79,7 +79,7 @@ class Deframer:
         self.rejected = 0
 
     def feed(self, data: bytes) -> Iterator[Frame]:
-        """The frames that end within `data`; to be used up before the next call."""
+        """Yield the frames that end within `data`; use them up before the next call."""
         *ends, rest = DELIMITERS.split(data)
         for end in ends:
             self._take(end)
@@ -94,22 +94,22 @@ class Deframer:
         self._take(rest)
 
     def _take(self, data: bytes) -> None:
-        # one byte too many is enough to know that it is no frame
+        # One byte too many is kept, which shows that the piece is not a frame.
         self._piece += data[: MAX_ENCODED + 1 - len(self._piece)]
 
 
 def crc16(data: bytes) -> int:
-    """CRC-16/CCITT-FALSE."""
+    """Return the CRC-16/CCITT-FALSE."""
     return binascii.crc_hqx(data, CRC_INITIAL)
 
 
 def stuff(content: bytes) -> bytes:
-    """COBS of at most 253 bytes: no zero in it, and one byte longer."""
+    """Encode at most 253 bytes by COBS: the result is one byte longer and has no zero."""
     return b"".join(bytes([len(piece) + 1]) + piece for piece in content.split(DELIMITER))
 
 
 def unstuff(encoded: bytes) -> bytes:
-    """The inverse of `stuff`, of bytes without a zero.
+    """Decode COBS bytes, which have no zero: the inverse of `stuff`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Messages of the serial bridge: payloads to values and back.
+"""Messages of the serial bridge: payloads converted to values and back.
 
 See firmware_protocol.md, "Messages"; each class is the table of its name there.
 """
@@ -24,11 +24,11 @@ MIN_WINDOW = 2
 
 
 class MessageError(ValueError):
-    """A payload that is not of its message's form, or values that do not fit it."""
+    """Payload that does not have its message's form, or value that does not fit its field."""
 
 
 class Status(IntEnum):
-    """Whether a request was done; see "Status codes"."""
+    """Result of a request; see "Status codes"."""
 
     OK = 0
     NO_HELLO = 1
@@ -47,7 +47,7 @@ class Status(IntEnum):
 
 
 class Feature(IntFlag):
-    """What a bridge has besides register access; OCCUPIED: storing overwrites what is not a blob."""
+    """Features of a bridge besides register access; OCCUPIED: storing overwrites other data than a blob."""
 
     STREAM = 1
     BLOB = 2
@@ -55,21 +55,36 @@ class Feature(IntFlag):
     OCCUPIED = 8
 
 
+_KINDS: dict[int, type[Message]] = {}
+
+
+@dataclass(frozen=True)
 class Message:
-    """What all messages have: the fixed fields in FORMAT's order, then the bytes of TAIL, if it has some."""
+    """Base of the messages: the fixed fields in FORMAT's order, then the bytes of TAIL, if it has one.
+
+    A subclass with a `code` is a message of that type: requests are below 0x80, and what a bridge sends is above.
+    """
 
     TYPE: ClassVar[int]
-    FORMAT: ClassVar[struct.Struct]
+    FORMAT: ClassVar[struct.Struct] = struct.Struct("<")
     TAIL: ClassVar[bool] = False
 
+    def __init_subclass__(cls, code: int | None = None, form: str | None = None, tail: bool = False) -> None:
+        if code is not None:
+            cls.TYPE = code
+            _KINDS[code] = cls
+        if form is not None:
+            cls.FORMAT = struct.Struct(form)
+        cls.TAIL = tail
+
     def payload(self) -> bytes:
-        """The payload's bytes.
+        """Encode the payload.
 
         Raises
         ------
         MessageError : a value does not fit its field.
         """
-        values = list(astuple(self))  # type: ignore[call-overload]
+        values = list(astuple(self))
         tail = values.pop() if self.TAIL else b""
         try:
             return self.FORMAT.pack(*values) + bytes(tail)
@@ -78,11 +93,11 @@ class Message:
 
     @classmethod
     def decode(cls, payload: bytes) -> Self:
-        """The values of a payload; fields that a newer minor version appended are skipped.
+        """Decode a payload; fields that a newer minor version appended are skipped.
 
         Raises
         ------
-        MessageError : it is too short.
+        MessageError : the payload is too short.
         """
         size = cls.FORMAT.size
         if len(payload) < size:
@@ -92,11 +107,9 @@ class Message:
 
 
 @dataclass(frozen=True)
-class Hello(Message):
-    """Who is there; `address` 0 lets the bridge try both."""
+class Hello(Message, code=0x01, form="<4s B B B"):
+    """Greeting; with `address` 0 the bridge tries both."""
 
-    TYPE: ClassVar[int] = 0x01
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<4s B B B")
     magic: bytes = MAGIC
     major: int = MAJOR
     minor: int = MINOR
@@ -104,128 +117,95 @@ class Hello(Message):
 
 
 @dataclass(frozen=True)
-class Read(Message):
-    """Read `count` registers from `register` on."""
+class Read(Message, code=0x02, form="<B B"):
+    """Request to read `count` registers from `register` on."""
 
-    TYPE: ClassVar[int] = 0x02
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<B B")
     register: int
     count: int
 
 
 @dataclass(frozen=True)
-class Burst(Message):
-    """Read `count` bytes from a register that does not auto-increment."""
+class Burst(Message, code=0x03, form="<B H"):
+    """Request to read `count` bytes from a register that does not auto-increment."""
 
-    TYPE: ClassVar[int] = 0x03
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<B H")
     register: int
     count: int
 
 
 @dataclass(frozen=True)
-class Write(Message):
-    """Write `data` from `register` on."""
+class Write(Message, code=0x04, form="<B", tail=True):
+    """Request to write `data` from `register` on."""
 
-    TYPE: ClassVar[int] = 0x04
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<B")
-    TAIL: ClassVar[bool] = True
     register: int
     data: bytes
 
 
 @dataclass(frozen=True)
-class Stream(Message):
-    """Push frames of `frame_bytes` from the FIFO, `batch` or more at a time; 0 stops it."""
+class Stream(Message, code=0x05, form="<B B"):
+    """Request to push frames of `frame_bytes` from the FIFO, `batch` or more at a time; 0 stops it."""
 
-    TYPE: ClassVar[int] = 0x05
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<B B")
     frame_bytes: int
     batch: int
 
 
-@dataclass(frozen=True)
-class Leave(Message):
-    """End the program, which somebody started from a REPL."""
-
-    TYPE: ClassVar[int] = 0x06
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<")
+class Leave(Message, code=0x06):
+    """Request to end a program that was started from a REPL."""
 
 
-@dataclass(frozen=True)
-class BlobState(Message):
-    """Which blob is stored, and is it valid."""
-
-    TYPE: ClassVar[int] = 0x10
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<")
+class BlobState(Message, code=0x10):
+    """Request for the state of the stored blob."""
 
 
 @dataclass(frozen=True)
-class BlobRead(Message):
-    """Read `count` bytes of the stored blob."""
+class BlobRead(Message, code=0x11, form="<H B"):
+    """Request for `count` bytes of the stored blob."""
 
-    TYPE: ClassVar[int] = 0x11
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<H B")
     offset: int
     count: int
 
 
 @dataclass(frozen=True)
-class BlobBegin(Message):
-    """A blob of `length` bytes comes."""
+class BlobBegin(Message, code=0x12, form="<H"):
+    """Announcement of a blob of `length` bytes."""
 
-    TYPE: ClassVar[int] = 0x12
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<H")
     length: int
 
 
 @dataclass(frozen=True)
-class BlobData(Message):
-    """Some of its bytes."""
+class BlobData(Message, code=0x13, form="<H", tail=True):
+    """Part of the announced blob."""
 
-    TYPE: ClassVar[int] = 0x13
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<H")
-    TAIL: ClassVar[bool] = True
     offset: int
     data: bytes
 
 
 @dataclass(frozen=True)
-class BlobCommit(Message):
-    """That was all; `crc` is its CRC-32."""
+class BlobCommit(Message, code=0x14, form="<H I"):
+    """End of the announced blob; `crc` is its CRC-32."""
 
-    TYPE: ClassVar[int] = 0x14
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<H I")
     length: int
     crc: int
 
 
-@dataclass(frozen=True)
-class BlobErase(Message):
-    """Store none."""
-
-    TYPE: ClassVar[int] = 0x15
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<")
+class BlobErase(Message, code=0x15):
+    """Request to erase the stored blob."""
 
 
 @dataclass(frozen=True)
-class Reply(Message):
-    """What every message of a bridge begins with, and where it failed may end with.
+class Reply(Message, form="<B I"):
+    """Beginning of every message of a bridge; a failed request may have no more.
 
     `t_us`: the bridge's clock, modulo 2**32, when the transfer began or the request was handled.
     """
 
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<B I")
     status: int
     t_us: int
 
 
 @dataclass(frozen=True)
-class HelloReply(Reply):
-    """The bridge: its version, the chip's address (0: none answers), what it has and can hold."""
+class HelloReply(Reply, code=Hello.TYPE | REPLY_BIT, form="<B I 4s B B B B B H 16s"):
+    """Description of the bridge: version, the chip's address (0: none answers), features and limits."""
 
-    TYPE: ClassVar[int] = Hello.TYPE | REPLY_BIT
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<B I 4s B B B B B H 16s")
     magic: bytes
     major: int
     minor: int
@@ -237,157 +217,91 @@ class HelloReply(Reply):
 
 
 @dataclass(frozen=True)
-class ReadReply(Reply):
-    """The bytes read."""
+class ReadReply(Reply, code=Read.TYPE | REPLY_BIT, tail=True):
+    """Bytes that were read."""
 
-    TYPE: ClassVar[int] = Read.TYPE | REPLY_BIT
-    TAIL: ClassVar[bool] = True
     data: bytes
 
 
 @dataclass(frozen=True)
-class BurstReply(Reply):
-    """Bytes from `offset` on of those asked for."""
+class BurstReply(Reply, code=Burst.TYPE | REPLY_BIT, form="<B I H", tail=True):
+    """Part of a burst, from `offset` on."""
 
-    TYPE: ClassVar[int] = Burst.TYPE | REPLY_BIT
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<B I H")
-    TAIL: ClassVar[bool] = True
     offset: int
     data: bytes
 
 
-@dataclass(frozen=True)
-class WriteReply(Reply):
-    """Written."""
-
-    TYPE: ClassVar[int] = Write.TYPE | REPLY_BIT
+class WriteReply(Reply, code=Write.TYPE | REPLY_BIT):
+    """Confirmation of a write."""
 
 
-@dataclass(frozen=True)
-class StreamReply(Reply):
-    """The stream began or stopped."""
+class StreamReply(Reply, code=Stream.TYPE | REPLY_BIT):
+    """Confirmation that the stream began or stopped."""
 
-    TYPE: ClassVar[int] = Stream.TYPE | REPLY_BIT
+
+class LeaveReply(Reply, code=Leave.TYPE | REPLY_BIT):
+    """Confirmation that the program ends."""
 
 
 @dataclass(frozen=True)
-class LeaveReply(Reply):
-    """The program ends."""
+class BlobStateReply(Reply, code=BlobState.TYPE | REPLY_BIT, form="<B I I H I"):
+    """State of the stored blob, which the bridge has just checked."""
 
-    TYPE: ClassVar[int] = Leave.TYPE | REPLY_BIT
-
-
-@dataclass(frozen=True)
-class BlobStateReply(Reply):
-    """The stored blob, which the bridge has just checked."""
-
-    TYPE: ClassVar[int] = BlobState.TYPE | REPLY_BIT
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<B I I H I")
     generation: int
     length: int
     crc: int
 
 
 @dataclass(frozen=True)
-class BlobReadReply(Reply):
+class BlobReadReply(Reply, code=BlobRead.TYPE | REPLY_BIT, tail=True):
     """Bytes of the stored blob."""
 
-    TYPE: ClassVar[int] = BlobRead.TYPE | REPLY_BIT
-    TAIL: ClassVar[bool] = True
     data: bytes
 
 
-@dataclass(frozen=True)
-class BlobBeginReply(Reply):
-    """Begun."""
-
-    TYPE: ClassVar[int] = BlobBegin.TYPE | REPLY_BIT
+class BlobBeginReply(Reply, code=BlobBegin.TYPE | REPLY_BIT):
+    """Confirmation of an announcement."""
 
 
-@dataclass(frozen=True)
-class BlobDataReply(Reply):
-    """Written to the slot that is not in use."""
-
-    TYPE: ClassVar[int] = BlobData.TYPE | REPLY_BIT
+class BlobDataReply(Reply, code=BlobData.TYPE | REPLY_BIT):
+    """Confirmation of a part, which is in the slot that is not in use."""
 
 
 @dataclass(frozen=True)
-class BlobCommitReply(Reply):
-    """The new blob is the valid one."""
+class BlobCommitReply(Reply, code=BlobCommit.TYPE | REPLY_BIT, form="<B I I"):
+    """Confirmation that the new blob is valid and in use."""
 
-    TYPE: ClassVar[int] = BlobCommit.TYPE | REPLY_BIT
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<B I I")
     generation: int
 
 
-@dataclass(frozen=True)
-class BlobEraseReply(Reply):
-    """None is stored."""
-
-    TYPE: ClassVar[int] = BlobErase.TYPE | REPLY_BIT
+class BlobEraseReply(Reply, code=BlobErase.TYPE | REPLY_BIT):
+    """Confirmation that no blob is stored."""
 
 
 @dataclass(frozen=True)
-class Frames(Reply):
-    """What was in the FIFO: `left` frames that were counted at `t_us` follow, or status says why it stands."""
+class Frames(Reply, code=0xC0, form="<B I H H B", tail=True):
+    """Content of the FIFO; `left` more frames that were counted at `t_us` follow. `status`: why the stream stands."""
 
-    TYPE: ClassVar[int] = 0xC0
-    FORMAT: ClassVar[struct.Struct] = struct.Struct("<B I H H B")
-    TAIL: ClassVar[bool] = True
     index: int
     drops: int
     left: int
     frames: bytes
 
 
-REQUESTS: dict[int, type[Message]] = {
-    kind.TYPE: kind
-    for kind in (
-        Hello,
-        Read,
-        Burst,
-        Write,
-        Stream,
-        Leave,
-        BlobState,
-        BlobRead,
-        BlobBegin,
-        BlobData,
-        BlobCommit,
-        BlobErase,
-    )
-}
-ANSWERS: dict[int, type[Reply]] = {
-    kind.TYPE: kind
-    for kind in (
-        HelloReply,
-        ReadReply,
-        BurstReply,
-        WriteReply,
-        StreamReply,
-        LeaveReply,
-        BlobStateReply,
-        BlobReadReply,
-        BlobBeginReply,
-        BlobDataReply,
-        BlobCommitReply,
-        BlobEraseReply,
-        Frames,
-    )
-}
+REQUESTS = {code: kind for code, kind in _KINDS.items() if not issubclass(kind, Reply)}
+ANSWERS = {code: kind for code, kind in _KINDS.items() if issubclass(kind, Reply)}
 
 
-def answer_of(kind: int, payload: bytes) -> Reply:
-    """What a bridge says in a message of type `kind`; a bare Reply where a failed one ends early.
+def answer_of(code: int, payload: bytes) -> Reply:
+    """Decode a message of a bridge; a failed reply that ends early becomes a bare Reply.
 
     Raises
     ------
-    MessageError : no such message, or a payload that is too short.
+    MessageError : an unknown message, or a payload that is too short.
     """
-    try:
-        known = ANSWERS[kind]
-    except KeyError:
-        raise MessageError(f"a bridge sends no message of type 0x{kind:02x}") from None
+    known = ANSWERS.get(code)
+    if known is None:
+        raise MessageError(f"a bridge sends no message of type 0x{code:02x}")
     start = Reply.decode(payload)
     if start.status != Status.OK and len(payload) < known.FORMAT.size:
         return start

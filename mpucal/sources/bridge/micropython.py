@@ -1,4 +1,4 @@
-"""A board that runs MicroPython, as a port: the bridge is pasted into its REPL, and runs until the port is closed."""
+"""Port to a board with MicroPython: the bridge is pasted into its REPL, and runs until the port is closed."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from .port import Chunk, Port, SerialPort
 from .repl import RawRepl
 
 PROGRAM = Path(__file__).with_name("board.py")
-# what a REPL on a UART runs at; on USB any rate will do
+# Rate of a REPL on a UART; on USB it has no effect.
 BAUDS = (115_200,)
 ENTER_NS = 10_000_000_000
 
 
 class MicroPythonPort:
-    """The bridge that runs on the board behind `port`; see Port.
+    """Port to a bridge that runs on MicroPython; see Port.
 
     Parameters
     ----------
-    text : PORT[:BAUD], or a URL; or a port that is open. pins : SDA and SCL, numbers or names; empty: the board's own.
+    text : PORT[:BAUD], or a URL; or an open port. pins : SDA and SCL, numbers or names; empty: the board's own.
 
     Raises
     ------
@@ -57,26 +57,26 @@ class MicroPythonPort:
         self._port.set_baud(baud)
 
     def reopen(self, until_ns: int) -> None:
-        """See Port; a board that was off has forgotten the bridge."""
+        """Open the port again and restart the bridge, which a board that was off has lost."""
         self._port.reopen(until_ns)
         self.revive(until_ns)
 
     def revive(self, until_ns: int) -> None:
-        """Paste the bridge again: a board that was reset shows its REPL."""
-        repl = RawRepl(self._port, _farewell())
+        """Paste the bridge again, since a board that was reset shows its REPL."""
+        repl = RawRepl(self._port, _leave_bytes())
         repl.enter(until_ns)
-        repl.run(f"{reduced(PROGRAM.read_text(encoding='utf-8'))}\nmain({self._pins!r})\n")
+        repl.run(f"{minify(PROGRAM.read_text(encoding='utf-8'))}\nmain({self._pins!r})\n")
 
     def close(self) -> None:
-        """End the bridge, and leave the board as it was before: its own programs start anew."""
+        """End the bridge, and restart the board's own programs."""
         with suppress(BusError):
-            self.write(_farewell())
+            self.write(_leave_bytes())
             RawRepl(self._port, b"").leave()
         self._port.close()
 
 
-def reduced(text: str) -> str:
-    """A program without its comments and docstrings, which take a board's memory."""
+def minify(text: str) -> str:
+    """Remove a program's comments and docstrings, which take a board's memory."""
     tree = ast.parse(text)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
@@ -84,6 +84,6 @@ def reduced(text: str) -> str:
     return ast.unparse(tree)
 
 
-def _farewell() -> bytes:
-    """What ends a bridge that runs, greeted or not."""
+def _leave_bytes() -> bytes:
+    """Return the bytes that end a running bridge, greeted or not."""
     return DELIMITER + b"".join(Frame(each.TYPE, 0, each.payload()).encode() for each in (Hello(), Leave()))

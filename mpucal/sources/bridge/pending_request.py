@@ -1,4 +1,4 @@
-"""A request on its way to a bridge, and what has come for it."""
+"""Request that was sent to a bridge, and the answers that came for it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .messages import REPLY_BIT, BlobRead, BlobReadReply, Burst, BurstReply, Mes
 
 
 class Answer(NamedTuple):
-    """A reply, its bus time, and the host's time when it came."""
+    """Reply with its bus time and the host's time of its arrival."""
 
     reply: Reply
     t_ns: int
@@ -20,7 +20,12 @@ class Answer(NamedTuple):
 
 @dataclass
 class PendingRequest:
-    """A request on its way, and what came for it; when it was sent last, and how often."""
+    """Request on its way.
+
+    Attributes
+    ----------
+    answers : replies so far. sent_ns : host's time when it was sent last. sent : number of times it was sent.
+    """
 
     seq: int
     request: Message
@@ -30,7 +35,7 @@ class PendingRequest:
 
     @property
     def done(self) -> bool:
-        """Whether all of its answer has come."""
+        """True if the whole answer has come."""
         if not self.answers:
             return False
         last = self.answers[-1].reply
@@ -40,7 +45,7 @@ class PendingRequest:
 
     @property
     def repeatable(self) -> bool:
-        """Whether it does no harm when carried out twice: reading these two takes something away."""
+        """True if it may be carried out twice; a read of the FIFO or of INT_STATUS may not, since it changes them."""
         if isinstance(self.request, Burst):
             return False
         if not isinstance(self.request, Read):
@@ -49,7 +54,7 @@ class PendingRequest:
         return not first <= INT_STATUS < first + self.request.count and first != FIFO_R_W
 
     def is_answered_by(self, frame: Frame, reply: Reply) -> bool:
-        """Whether `reply` is what it waits for, with as many bytes as were asked for; of a BURST, the next piece."""
+        """Return True if `reply` answers it with the right number of bytes; to a BURST, with the next part."""
         if self.done or (frame.seq, frame.type) != (self.seq, self.request.TYPE | REPLY_BIT):
             return False
         if isinstance(reply, ReadReply | BlobReadReply) and isinstance(self.request, Read | BlobRead):
@@ -60,5 +65,5 @@ class PendingRequest:
         return reply.offset == held and held + len(reply.data) <= self.request.count
 
     def encoded(self) -> bytes:
-        """Its bytes on the line."""
+        """Return its bytes on the line."""
         return Frame(self.request.TYPE, self.seq, self.request.payload()).encode()

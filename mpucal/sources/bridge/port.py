@@ -1,7 +1,4 @@
-"""A serial port on pyserial, read by a thread of its own.
-
-The thread takes bytes as they come, so that a host that computes for a while loses none.
-"""
+"""Serial port of pyserial, read by its own thread, so that no bytes are lost while the host computes."""
 
 from __future__ import annotations
 
@@ -13,90 +10,90 @@ from threading import Event, Thread
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from ...errors import BusError, UsageError
-from .port_errors import another, gone, opening_error
+from .port_errors import opening_error, other_ports, port_gone
 
 if TYPE_CHECKING:
     from serial import Serial
 
-# What a bridge runs at, and what it runs at where that is too fast for it
+# Rate of a bridge, and of one for which that is too fast.
 BAUDS = (500_000, 115_200)
 WAKE_S = 0.05
 CHUNK_BYTES = 4096
-# minutes of a bridge's: who leaves more than that unread is flooded
+# Several minutes of a bridge's bytes: a port with more unread ones is flooded.
 UNREAD_CHUNKS = 1 << 14
 REOPEN_S = 0.25
 
 
 class Chunk(NamedTuple):
-    """Bytes that came, and when by the host's clock."""
+    """Received bytes, with the host's time of their arrival."""
 
     data: bytes
     t_ns: int
 
 
 class Port(Protocol):
-    """Bytes to a bridge and back, and the host's time; every method raises BusError where the port is gone.
+    """Transport of bytes to and from a bridge, with the host's time; methods raise BusError if the port is gone.
 
     Attributes
     ----------
-    name : what a person calls it. bauds : the rates at which to look for a bridge, in order.
+    name : for messages. bauds : rates at which to try to reach a bridge, in order.
     """
 
     name: str
     bauds: tuple[int, ...]
 
     def now_ns(self) -> int:
-        """The host's clock."""
+        """Return the host's time."""
         ...
 
     def read(self, until_ns: int) -> Chunk | None:
-        """What has come; waits for it until the host's clock shows `until_ns`, then None."""
+        """Return received bytes; wait for them until the host's clock shows `until_ns`, then return None."""
         ...
 
     def write(self, data: bytes) -> None:
-        """Send `data`."""
+        """Write `data`."""
         ...
 
     def set_baud(self, baud: int) -> None:
-        """Go on at another rate."""
+        """Change the rate."""
         ...
 
     def reopen(self, until_ns: int) -> None:
-        """Open it anew, after it was gone; tries until the host's clock shows `until_ns`."""
+        """Open a port that was gone again, with retries until the host's clock shows `until_ns`."""
         ...
 
     def revive(self, until_ns: int) -> None:
-        """Start again what answers there no longer, where that is the port's to start."""
+        """Restart the program behind the port if the port itself started it."""
         ...
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the port."""
         ...
 
 
 class SerialPort:
-    """A port that pyserial opens: a device's name, or a URL such as socket://host:port.
+    """Port that pyserial opens by a device's name, or a URL such as socket://host:port.
 
     Parameters
     ----------
-    text : PORT[:BAUD], or a URL. bauds : the rates to try where it names none.
+    text : PORT[:BAUD], or a URL. bauds : rates to try if it names none.
 
     Raises
     ------
-    UsageError : no port is named. BusError : no such port, no permission, or taken.
+    UsageError : no port is named. BusError : no such port, no permission, or in use.
     """
 
     def __init__(self, text: str, bauds: tuple[int, ...] = BAUDS) -> None:
         if not text:
-            raise UsageError("no serial port was named", another())
-        self.name, self.bauds = split(text, bauds)
+            raise UsageError("no serial port was named", other_ports())
+        self.name, self.bauds = split_port(text, bauds)
         self._chunks: queue.SimpleQueue[Chunk | BusError] = queue.SimpleQueue()
         self._closing = Event()
         self._thread: Thread | None = None
         self._open()
 
     def now_ns(self) -> int:
-        """The monotonic clock."""
+        """Return the time of the monotonic clock."""
         return time.monotonic_ns()
 
     def read(self, until_ns: int) -> Chunk | None:
@@ -106,7 +103,7 @@ class SerialPort:
         except queue.Empty:
             return None
         if isinstance(got, BusError):
-            # whoever asks again hears it again
+            # The next read raises it again.
             self._chunks.put(got)
             raise got
         return got
@@ -116,7 +113,7 @@ class SerialPort:
         try:
             self._serial.write(data)
         except OSError as error:
-            raise gone(self.name) from error
+            raise port_gone(self.name) from error
 
     def set_baud(self, baud: int) -> None:
         """See Port."""
@@ -137,7 +134,7 @@ class SerialPort:
                 time.sleep(REOPEN_S)
 
     def revive(self, until_ns: int) -> None:
-        """See Port; what is there starts by itself."""
+        """Do nothing: firmware starts by itself."""
 
     def close(self) -> None:
         """See Port."""
@@ -154,48 +151,48 @@ class SerialPort:
             self._serial = serial.serial_for_url(self.name, self.bauds[0], timeout=0, write_timeout=2, exclusive=True)
         except (OSError, ValueError) as error:
             raise opening_error(error, self.name) from error
-        # an FTDI adapter holds bytes back for 16 ms unless it is told not to
+        # By default an FTDI adapter holds bytes back for 16 ms.
         with suppress(AttributeError, NotImplementedError, OSError, ValueError):
             self._serial.set_low_latency_mode(True)
         self._chunks = queue.SimpleQueue()
         self._closing = Event()
         self._thread = Thread(
-            target=_take, args=(self._serial, self._chunks, self._closing, self.name), name=self.name, daemon=True
+            target=_read_loop, args=(self._serial, self._chunks, self._closing, self.name), name=self.name, daemon=True
         )
         self._thread.start()
 
 
-def split(text: str, bauds: tuple[int, ...] = BAUDS) -> tuple[str, tuple[int, ...]]:
-    """PORT[:BAUD] as the port's name and the rates to try; a URL has no rate."""
+def split_port(text: str, bauds: tuple[int, ...] = BAUDS) -> tuple[str, tuple[int, ...]]:
+    """Split PORT[:BAUD] into the port's name and the rates to try; a URL has no rate."""
     name, colon, baud = text.rpartition(":")
     if colon and "://" not in text and baud.isdecimal() and int(baud) > 0:
         return name, (int(baud),)
     return text, bauds[:1] if "://" in text else bauds
 
 
-def _take(serial: Serial, chunks: queue.SimpleQueue[Chunk | BusError], closing: Event, name: str) -> None:
+def _read_loop(serial: Serial, chunks: queue.SimpleQueue[Chunk | BusError], closing: Event, name: str) -> None:
     """Read until the port is closed or gone."""
     try:
         while not closing.is_set():
             if chunks.qsize() >= UNREAD_CHUNKS:
                 closing.wait(WAKE_S)
                 continue
-            data = _wait(serial)
+            data = _read_available(serial)
             if data:
                 chunks.put(Chunk(data, time.monotonic_ns()))
     except (OSError, ValueError, TypeError) as error:
-        # pyserial's own names for a port that was unplugged or closed meanwhile
-        failure = gone(name)
+        # These are pyserial's errors for a port that was unplugged or closed.
+        failure = port_gone(name)
         failure.__cause__ = error
         chunks.put(failure)
 
 
-def _wait(serial: Serial) -> bytes:
-    """What has come, or nothing after WAKE_S."""
+def _read_available(serial: Serial) -> bytes:
+    """Read the received bytes; return none after WAKE_S."""
     try:
         handle = serial.fileno()
     except (AttributeError, OSError):
-        # no file to wait for: Windows, rfc2217://
+        # There is no file descriptor on Windows and for rfc2217://.
         serial.timeout = WAKE_S
         return bytes(serial.read(max(1, serial.in_waiting)))
     ready, _, _ = select.select([handle], [], [], WAKE_S)

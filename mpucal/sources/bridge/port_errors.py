@@ -1,4 +1,4 @@
-"""What can go wrong with a serial port, as sentences."""
+"""Errors of a serial port as sentences."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from ...errors import BusError, LinkError
 
 
 def opening_error(error: Exception, port: str) -> BusError:
-    """The sentence of an error with which a port did not open."""
+    """Convert the error of a port that did not open."""
     number, words = getattr(error, "errno", None), str(error)
     if number == errno.ENOENT or (number is None and "No such file" in words):
-        return BusError(f"there is no serial port {port}", another())
+        return BusError(f"there is no serial port {port}", other_ports())
     if number == errno.EACCES or "Permission denied" in words:
         return BusError(
             f"no permission to use {port}",
@@ -22,29 +22,29 @@ def opening_error(error: Exception, port: str) -> BusError:
         return BusError(f"another program uses {port}", "close it (a serial monitor, perhaps), then try again")
     if number in (errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ETIMEDOUT) or "://" in port:
         return BusError(
-            f"cannot connect to {port} ({_reason(error)})", "check the address, and that it is served there"
+            f"cannot connect to {port} ({_reason(error)})", "check the address, and that a server runs there"
         )
     if isinstance(error, ValueError) or number in (errno.ENOTTY, errno.EINVAL, errno.EISDIR, None):
-        return BusError(f"{port} is no serial port ({_reason(error)})", another())
-    return BusError(f"cannot open {port} ({_reason(error)})", another())
+        return BusError(f"{port} is not a serial port ({_reason(error)})", other_ports())
+    return BusError(f"cannot open {port} ({_reason(error)})", other_ports())
 
 
-def gone(port: str) -> LinkError:
-    """The sentence of a port that was there."""
+def port_gone(port: str) -> LinkError:
+    """Return the error of a port that was there and is not any more."""
     return LinkError(f"{port} is gone", "check its cable, plug it in again, then start again")
 
 
-def another() -> str:
-    """What to do where no port was given, or a wrong one: the ports there are."""
-    from serial.tools.list_ports import comports  # noqa: PLC0415 - only where something is wrong
+def other_ports() -> str:
+    """Return the remedy for a missing or wrong port: the ports that there are."""
+    from serial.tools.list_ports import comports  # noqa: PLC0415 - only needed for an error
 
     ports = [f"{port.device} ({port.description})" for port in sorted(comports()) if port.hwid != "n/a"]
     if not ports:
-        return "plug the bridge in (this machine shows no serial port)"
-    return f"take one of {', '.join(ports)}"
+        return "connect the bridge (no serial ports found)"
+    return f"use one of {', '.join(ports)}"
 
 
 def _reason(error: Exception) -> str:
-    """The system's own words, which pyserial wraps in its own."""
+    """Return the system's message, which pyserial wraps in its own."""
     found = re.findall(r"\[Errno \d+\] ([^:']+)|\(\d+, '([^']+)'\)", str(error))
     return "".join(found[-1]) if found else str(error)

@@ -1,4 +1,4 @@
-"""What a bridge has pushed, as the FIFO that the driver reads.
+"""Buffer of what a bridge has pushed, presented as the FIFO that the driver reads.
 
 See firmware_protocol.md, "FRAMES": a look is one reading of FIFO_COUNT and all frames counted then.
 """
@@ -14,8 +14,8 @@ INDEX_WRAP = 2**16
 
 
 @dataclass(frozen=True)
-class FifoReading:
-    """What was found in the FIFO at `t_ns`, and heard at `host_ns`; where `lost`, nothing that can be believed."""
+class Look:
+    """Content of the FIFO at `t_ns`, which arrived at `host_ns`; `lost`: it is not valid."""
 
     t_ns: int
     host_ns: int
@@ -24,29 +24,34 @@ class FifoReading:
 
 
 class ReadAhead:
-    """The frames of one stream, whole looks only, in order; what was lost shows as an overflow in its place.
+    """Frames of one stream, in order and by whole looks; a loss shows as an overflow in its place.
 
     Parameters
     ----------
     seq : of the STREAM that started it. frame_bytes : of one frame.
+
+    Attributes
+    ----------
+    counted_ns : time of the last `count`.
     """
 
     def __init__(self, seq: int, frame_bytes: int) -> None:
         self.seq = seq
+        self.counted_ns = 0
+        self._counted_host_ns = 0
+        self._counted = bytearray()
         self._frame_bytes = frame_bytes
-        self._looks: deque[FifoReading] = deque()
+        self._looks: deque[Look] = deque()
         self._begun: list[Frames] = []
         self._begun_t_ns = 0
         self._next_index = 0
         self._drops: int | None = None
-        self._shown = bytearray()
-        self._shown_t_ns = self._shown_host_ns = 0
         self._last_byte = 0
         self._overflow = False
 
     def push(self, frames: Frames, t_ns: int, host_ns: int) -> None:
-        """`frames` came at `host_ns`; `t_ns` is the bus time of its look."""
-        if self._is_lost(frames):
+        """Add `frames` that arrived at `host_ns`; `t_ns` is the bus time of their look."""
+        if not self._continues(frames):
             self.lose(t_ns, host_ns)
             return
         self._drops = frames.drops
@@ -55,71 +60,65 @@ class ReadAhead:
         self._begun_t_ns = t_ns
         if frames.left == 0:
             data = b"".join(part.frames for part in self._begun)
-            self._looks.append(FifoReading(t_ns, host_ns, data, lost=False))
+            self._looks.append(Look(t_ns, host_ns, data, lost=False))
             self._begun.clear()
 
     def lose(self, t_ns: int, host_ns: int) -> None:
-        """Frames were lost about `t_ns`."""
+        """Note that frames were lost at about `t_ns`."""
         self._begun.clear()
         if not (self._looks and self._looks[-1].lost):
-            self._looks.append(FifoReading(t_ns, host_ns, b"", lost=True))
+            self._looks.append(Look(t_ns, host_ns, b"", lost=True))
 
     @property
     def can_count(self) -> bool:
-        """Whether FIFO_COUNT has something to say without waiting."""
-        return bool(self._shown or self._looks)
+        """True if `count` has a value without waiting."""
+        return bool(self._counted or self._looks)
 
     def count(self) -> tuple[int, int, int]:
-        """FIFO_COUNT, its time and when the host heard of it [ns]: of whole looks, as the count was at that time.
+        """Return FIFO_COUNT, its time and its arrival at the host [ns], as the count was then.
 
-        Of several looks never more than chips hold soundly, however long nobody asked; the rest is for the next time.
+        Several looks are joined only up to what chips hold without corruption, however long the driver was away; the
+        next call has the rest.
         """
-        while self._looks and not (self._shown and self._looks[0].lost):
+        while self._looks and not (self._counted and self._looks[0].lost):
             look = self._looks[0]
-            if self._shown and len(self._shown) + len(look.data) > MAX_BATCH * self._frame_bytes:
+            if self._counted and len(self._counted) + len(look.data) > MAX_BATCH * self._frame_bytes:
                 break
             self._looks.popleft()
-            self._shown += look.data
-            self._shown_t_ns, self._shown_host_ns = look.t_ns, look.host_ns
+            self._counted += look.data
+            self.counted_ns, self._counted_host_ns = look.t_ns, look.host_ns
             if look.lost:
                 self._overflow = True
                 break
-        return len(self._shown), self._shown_t_ns, self._shown_host_ns
-
-    @property
-    def shown_ns(self) -> int:
-        """The time of what was counted last."""
-        return self._shown_t_ns
+        return len(self._counted), self.counted_ns, self._counted_host_ns
 
     def pop(self, count: int) -> tuple[bytes, int]:
-        """FIFO_R_W: the oldest `count` bytes of what was counted; where it is empty, the last again."""
-        data = bytes(self._shown[:count])
-        del self._shown[:count]
+        """Read FIFO_R_W: the oldest `count` bytes of the counted ones; an empty FIFO repeats the last byte."""
+        data = bytes(self._counted[:count])
+        del self._counted[:count]
         if data:
             self._last_byte = data[-1]
-        return data + bytes([self._last_byte]) * (count - len(data)), self._shown_t_ns
+        return data + bytes([self._last_byte]) * (count - len(data)), self.counted_ns
 
     def take_overflow(self) -> bool:
-        """INT_STATUS: whether something was lost before what was counted last; told once."""
+        """Return True once if something was lost before the last `count`: the overflow flag of INT_STATUS."""
         overflow, self._overflow = self._overflow, False
         return overflow
 
-    def seen_from(self, t_ns: int) -> int:
-        """When something that was done at `t_ns` was done for who still has looks of before to count.
-
-        Time would go back for him otherwise, and he would take himself to be up to date.
-        """
+    def not_after_looks(self, t_ns: int) -> int:
+        """Return `t_ns`, but no later than the oldest look that was not counted yet: time must not go back."""
         if self._looks:
             return min(t_ns, self._looks[0].t_ns)
         return min(t_ns, self._begun_t_ns) if self._begun else t_ns
 
-    def _is_lost(self, frames: Frames) -> bool:
+    def _continues(self, frames: Frames) -> bool:
+        """Return True if no frames were lost before these."""
         if frames.status != Status.OK or len(frames.frames) % self._frame_bytes:
-            return True
-        if frames.index != self._next_index or frames.drops != (frames.drops if self._drops is None else self._drops):
-            return True
-        # the same look goes on, and counts down
-        return bool(self._begun) and (
-            frames.t_us != self._begun[-1].t_us
-            or frames.left + len(frames.frames) // self._frame_bytes != self._begun[-1].left
+            return False
+        if frames.index != self._next_index or self._drops not in (None, frames.drops):
+            return False
+        # Messages of one look have the same time, and count down.
+        return not self._begun or (
+            frames.t_us == self._begun[-1].t_us
+            and frames.left + len(frames.frames) // self._frame_bytes == self._begun[-1].left
         )

@@ -1,4 +1,4 @@
-"""A chip behind a serial bridge as a source: what `--serial` opens."""
+"""Source that `--serial` opens: a chip behind a serial bridge."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from . import open_bridge
 
 
 def open_source(request: Request) -> OpenedChip:
-    """The chip behind the bridge on a port; see open_bridge.
+    """Open the chip behind the bridge on a port; see open_bridge.
 
     Raises
     ------
-    UsageError : more samples a second are asked for than a serial line moves.
+    UsageError : the requested rate is more than a serial line can carry.
     """
     config = request.plan.config
     if config.accel_only:
         raise UsageError(
-            f"a bridge does not move {config.rate_hz:g} samples a second",
-            "take --rate 1000 or less, or connect the chip to an I2C bus of this computer",
+            f"a bridge cannot carry {config.rate_hz:g} samples a second",
+            "use --rate 1000 or less, or connect the chip to an I2C bus of this computer",
         )
     bridge = open_bridge(request.value, request.values.get("address"), request.values.get("micropython"))
     return OpenedChip(bridge, request.plan, words=request.words)

@@ -141,7 +141,7 @@ def test_no_chip_on_the_bridge(rig):
     made = rig()
     made.chip = None
     made.line.device = made.new_bridge()
-    with pytest.raises(NoAnswer, match="answers, but nothing answers it at 0x68 or 0x69 on its I2C bus: check"):
+    with pytest.raises(NoAnswer, match="answers, but no chip answers it at 0x68 or 0x69 on its I2C bus: check"):
         made.bus()
     with pytest.raises(NoAnswer, match="at 0x69 on its"):
         rig().bus(address=0x69)

@@ -23,7 +23,7 @@ def test_it_unwraps_whatever_the_pauses(start_us, pauses_s, fast_ppm, latency_ms
     for pause_s, late_ms in zip(pauses_s, latency_ms, strict=False):
         true_ns += round(pause_s * S)
         bridge_ns = round(true_ns * (1 + fast_ppm * 1e-6))
-        t_ns = clock.seen(shown(bridge_ns, start_us), true_ns + round(late_ms * MS) + 5 * S)
+        t_ns = clock.bus_time(shown(bridge_ns, start_us), true_ns + round(late_ms * MS) + 5 * S)
         first = t_ns - bridge_ns if first is None else first
         assert abs(t_ns - bridge_ns - first) <= US
 
@@ -35,7 +35,7 @@ def test_it_knows_what_the_bridge_shows_now(fast_ppm):
         host_ns = i * 20 * MS
         bridge_ns = round(host_ns * (1 + fast_ppm * 1e-6))
         late_ns = (1 + 15 * (i % 7 > 0)) * MS
-        clock.seen(shown(bridge_ns), host_ns + late_ns)
+        clock.bus_time(shown(bridge_ns), host_ns + late_ns)
         if i > 10:
             assert clock.now(host_ns + late_ns) == pytest.approx(bridge_ns + late_ns, abs=4 * MS)
 
@@ -45,17 +45,17 @@ def test_it_knows_what_the_bridge_shows_now(fast_ppm):
 def test_a_reset_takes_no_time_away(shows_s, away_s):
     clock = BridgeClock()
     for i in range(100):
-        clock.seen(shown(i * 20 * MS), i * 20 * MS + MS)
+        clock.bus_time(shown(i * 20 * MS), i * 20 * MS + MS)
     host_ns = 2 * S + round(away_s * S)
-    clock.greeted(shown(round(shows_s * S)), host_ns)
-    assert clock.seen(shown(round(shows_s * S) + S), host_ns + S) == pytest.approx(host_ns + S, abs=60 * MS)
+    clock.on_greeting(shown(round(shows_s * S)), host_ns)
+    assert clock.bus_time(shown(round(shows_s * S) + S), host_ns + S) == pytest.approx(host_ns + S, abs=60 * MS)
 
 
 def test_a_clock_that_went_on_is_followed():
     clock = BridgeClock()
-    clock.seen(shown(10 * S), S)
-    clock.greeted(shown(13 * S), 4 * S + 16 * MS)
-    assert clock.seen(shown(14 * S), 5 * S) == 14 * S
+    clock.bus_time(shown(10 * S), S)
+    clock.on_greeting(shown(13 * S), 4 * S + 16 * MS)
+    assert clock.bus_time(shown(14 * S), 5 * S) == 14 * S
 
 
 def test_it_shows_nothing_before_it_was_seen():
@@ -65,7 +65,7 @@ def test_it_shows_nothing_before_it_was_seen():
 def test_a_bridge_that_runs_at_half_speed_is_followed():
     clock = BridgeClock()
     for i in range(1000):
-        clock.seen(shown(i * 10 * MS), i * 20 * MS)
+        clock.bus_time(shown(i * 10 * MS), i * 20 * MS)
         assert 0 <= clock.now(i * 20 * MS) - i * 10 * MS <= 250 * MS
 
 
@@ -73,5 +73,5 @@ def test_a_clock_that_is_far_too_slow_is_followed_nevertheless():
     """As an emulated board's is on a busy machine: whoever waits for its time would wait for ever otherwise."""
     clock = BridgeClock()
     for i in range(2000):
-        clock.seen(shown(i * 10 * MS), i * 20 * MS)
+        clock.bus_time(shown(i * 10 * MS), i * 20 * MS)
     assert clock.now(2000 * 20 * MS) - 2000 * 10 * MS < 300 * MS

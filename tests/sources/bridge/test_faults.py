@@ -177,13 +177,13 @@ class Chatty:
     ("text", "sentence"),
     [
         (b"", "nothing answers on the emulated line: check that the board there runs the bridge's firmware"),
-        (b"$GPGGA,123519,4807.038,N\r\n", "is no bridge: it says '.GPGGA,123519,4807.038,N': put the bridge's"),
-        (b"ypr\t0.1\t2.0\r\n", r"is no bridge: it says 'ypr\\t0.1\\t2.0'"),
+        (b"$GPGGA,123519,4807.038,N\r\n", "is not a bridge: it sends '.GPGGA,123519,4807.038,N': put the bridge's"),
+        (b"ypr\t0.1\t2.0\r\n", r"is not a bridge: it sends 'ypr\\t0.1\\t2.0'"),
         (
             bytes(range(0x80, 0xF0)),
-            "bytes come from the emulated line, but none that a bridge sends at 500000 baud: give",
+            "the emulated line sends bytes, but not those of a bridge at 500000 baud: give",
         ),
-        (b"\0\0\0\0", "bytes come from"),
+        (b"\0\0\0\0", "sends bytes, but"),
     ],
     ids=["silent", "GPS", "sketch", "wrong baud", "break"],
 )

@@ -16,7 +16,7 @@ from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, UsageError
 from mpucal.sources.bridge import open_bridge
 from mpucal.sources.bridge.link import Link
-from mpucal.sources.bridge.port import BAUDS, SerialPort, split
+from mpucal.sources.bridge.port import BAUDS, SerialPort, split_port
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ from mpucal.sources.bridge.port import BAUDS, SerialPort, split
     ids=["both rates", "a rate", "Windows", "a colon in the name", "URL", "no rate"],
 )
 def test_a_port_and_its_rate(text, name, bauds):
-    assert split(text) == (name, bauds)
+    assert split_port(text) == (name, bauds)
 
 
 @pytest.mark.parametrize("kind", ["pty", "socket"])
@@ -90,14 +90,14 @@ class Listed:
 @pytest.mark.parametrize(
     ("ports", "remedy"),
     [
-        ([], r"plug the bridge in \(this machine shows no serial port\)"),
+        ([], r"connect the bridge \(no serial ports found\)"),
         (
             [
                 Listed("/dev/ttyUSB0", "CP2102", "USB"),
                 Listed("/dev/ttyACM0", "Uno", "USB"),
                 Listed("/dev/ttyS0", "n/a", "n/a"),
             ],
-            r"take one of /dev/ttyACM0 \(Uno\), /dev/ttyUSB0 \(CP2102\)\.$",
+            r"use one of /dev/ttyACM0 \(Uno\), /dev/ttyUSB0 \(CP2102\)\.$",
         ),
     ],
     ids=["none", "two"],
@@ -107,8 +107,8 @@ class Listed:
     [
         ("", "no serial port was named", UsageError),
         ("/dev/there-is-none", "there is no serial port /dev/there-is-none", BusError),
-        ("/dev/null", r"/dev/null is no serial port \(Inappropriate ioctl for device\)", BusError),
-        ("/", r"/ is no serial port \(Is a directory\)", BusError),
+        ("/dev/null", r"/dev/null is not a serial port \(Inappropriate ioctl for device\)", BusError),
+        ("/", r"/ is not a serial port \(Is a directory\)", BusError),
     ],
     ids=["no name", "missing", "no terminal", "a folder"],
 )
@@ -130,7 +130,7 @@ def test_the_ports_are_listed_where_the_name_is_wrong(monkeypatch, ports, remedy
             serial.SerialException(errno.EIO, "could not open port: [Errno 5] Input/output error"),
             r"cannot open .*\(Input/output",
         ),
-        (ValueError("Invalid baud rate: 123"), r"is no serial port \(Invalid baud rate: 123\)"),
+        (ValueError("Invalid baud rate: 123"), r"is not a serial port \(Invalid baud rate: 123\)"),
     ],
     ids=["EACCES", "EBUSY", "EIO", "baud"],
 )

