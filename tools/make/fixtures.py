@@ -1,8 +1,9 @@
 """Make every fixture anew, all from seeds: python -m tools.make fixtures [FOLDER].
 
 sessions/NAME.mcap is the capture of a whole session on the simulated chip, and NAME.json beside it is what that session
-said and found: what a replay must say and find too. faults/ are those of faults.py, vectors/ those of
-vectors.py.
+said and found: what a replay must say and find too. faults/NAME.mcap is what crossed the bus while the driver measured
+a simulated chip, ten seconds at 50 Hz, that suffered the fault NAME at the fifth; NAME.json is what the driver made of
+it. vectors/ are those of vectors.py.
 """
 
 from __future__ import annotations
@@ -18,21 +19,30 @@ from pathlib import Path
 from typing import Any
 
 from mpucal.calibration import calibrate
+from mpucal.chip.access import Bus
 from mpucal.chip.config import Config
+from mpucal.chip.driver import Driver
 from mpucal.chip.records import SessionEvent
-from mpucal.cli.running import running
+from mpucal.cli.running import open_runner
+from mpucal.data import Recording
+from mpucal.errors import EndOfCapture, SourceError
 from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.session.events import Key, Output, Progress
 from mpucal.session.plan import Plan
+from mpucal.simulated.chip import open_simulated
+from mpucal.simulated.faults import OF_CHIP, kinds
 from mpucal.sources.opening import reopen_source
+from mpucal.sources.tap import Tap
 from mpucal.terminal.keys import Keys
 from mpucal.terminal.lines import JsonLines
 
-from . import faults, vectors
+from . import vectors
 
 FOLDER = Path(__file__).parents[2] / "fixtures"
 # named, so that what `auto` chooses is free to change without them
 MODEL = "hand"
+FAULTY = Plan(Config(rate_hz=50))
+FAULT_S, END_S = 5.0, 10.0
 # what a person is asked and told, without the dials between
 SAID = ("prompt", "decision")
 
@@ -75,7 +85,7 @@ class Typist(JsonLines):
             self._pressed.append(Key.ENOUGH)
 
     def pressed(self) -> Sequence[Key]:
-        """What was pressed since the last call."""
+        """Return what was pressed since the last call."""
         pressed, self._pressed = self._pressed, []
         return pressed
 
@@ -86,7 +96,7 @@ def make_session(script: Script, capture: Path) -> dict[str, Any]:
     person = Typist(script.enter)
     with tempfile.TemporaryDirectory() as folder:
         dated = Path(folder) / capture.name
-        with running(source, dated, person) as runner:
+        with open_runner(source, dated, person) as runner:
             recording = runner.measure()
             calibration = runner.calibrate(recording, partial(calibrate, model=MODEL))
         without_date(dated, capture)
@@ -113,15 +123,50 @@ def without_date(dated: Path, capture: Path) -> None:
                 writer.transaction(record)
 
 
+def measured(bus: Bus) -> tuple[Recording, str | None]:
+    """Return what the driver measures on `bus` until ten seconds are over or it gives up, and why it gave up."""
+    driver = Driver(bus, FAULTY.config)
+    try:
+        driver.start()
+        while driver.now_ns() < END_S * 1e9:
+            driver.poll()
+    except EndOfCapture:
+        return driver.recording(), None
+    except SourceError as error:
+        return driver.recording(), str(error)
+    driver.stop()
+    return driver.recording(), None
+
+
+def made_of_it(recording: Recording, why: str | None) -> dict[str, Any]:
+    """Return that as JSON."""
+    return {
+        "samples": len(recording),
+        "gaps": int(recording.gap.sum()),
+        "rate_hz": recording.sensor.rate_hz,
+        "gave_up": why,
+    }
+
+
+def make_faults(folder: Path) -> None:
+    """Make the captures of faulty runs."""
+    for name in kinds(*OF_CHIP):
+        simulated = open_simulated(f"sim:seed=8,chip=mpu6500,fault={name}@{FAULT_S:g}")
+        with CaptureWriter(folder / f"{name}.mcap") as writer:
+            writer.start(FAULTY.meta())
+            found = made_of_it(*measured(Tap(simulated, writer)))
+        (folder / f"{name}.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+
+
 def main() -> None:
     """Make them all."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
-    sessions = folder / "sessions"
-    sessions.mkdir(parents=True, exist_ok=True)
+    for name in ("sessions", "faults"):
+        (folder / name).mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*/*.mcap"):  # a capture replaces no file
         old.unlink()
     for name, script in SESSIONS.items():
-        found = make_session(script, sessions / f"{name}.mcap")
-        (sessions / f"{name}.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
-    faults.write(folder / "faults")
+        found = make_session(script, folder / "sessions" / f"{name}.mcap")
+        (folder / "sessions" / f"{name}.json").write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    make_faults(folder / "faults")
     vectors.write(folder / "vectors")

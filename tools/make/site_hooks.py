@@ -1,0 +1,104 @@
+"""Hooks of the documentation site: pages that lie beside docs/, links to files that are no pages, and the notebook."""
+
+from __future__ import annotations
+
+import base64
+import re
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import nbformat
+from mkdocs.structure.files import File, Files
+from nbclient import NotebookClient
+
+ROOT = Path(__file__).parents[2]
+# read by people who never see the site, and so at the top of the source tree
+OUTSIDE = ("firmware_protocol.md", "CONTRIBUTING.md")
+SCHEMA = "calibration.schema.json"
+# what the theme would fetch so that the search works in pages that are read from a folder, and what does that here
+SHIM, WORKER = "https://unpkg.com/iframe-worker/shim", "javascripts/worker.js"
+LINK = re.compile(r"\[([^\]]+)\]\(([^)#:]+)(#[^)]*)?\)")
+NOTEBOOK = "notebook"
+TIMEOUT_S = 300
+# of a line that was written over, what stayed
+WRITTEN_OVER = re.compile(r"^.*\r(?!\n)", re.MULTILINE)
+# the theme lets a table without a class scroll on a narrow screen
+TABLE = re.compile(r"<table[^>]*>")
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the pages that lie outside docs/, the schema, and the notebook with its pictures."""
+    for name in OUTSIDE:
+        files.append(File.generated(config, name, content=(ROOT / name).read_text(encoding="utf-8")))
+    schema = (ROOT / "mpucal" / "result" / SCHEMA).read_text(encoding="utf-8")
+    files.append(File.generated(config, f"reference/{SCHEMA}", content=schema))
+    files.append(File.generated(config, f"{NOTEBOOK}.md", content="\n\n".join(_notebook(files, config))))
+    return files
+
+
+def _notebook(files: Files, config: Any) -> Iterator[str]:
+    """Run docs/notebook.ipynb, and yield its parts with what its cells gave; a cell that raises ends the build."""
+    notebook = nbformat.read(f"{config.docs_dir}/{NOTEBOOK}.ipynb", as_version=4)
+    with tempfile.TemporaryDirectory() as folder:
+        client = NotebookClient(
+            notebook, timeout=TIMEOUT_S, coalesce_streams=True, resources={"metadata": {"path": folder}}
+        )
+        client.execute(stderr=subprocess.DEVNULL)  # the kernel says there that it uses TCP
+    for cell in notebook.cells:
+        yield cell.source if cell.cell_type == "markdown" else _fenced(cell.source, "python")
+        for output in cell.get("outputs", ()):
+            yield _shown(output, f"{NOTEBOOK}-{cell.id}.png", files, config)
+
+
+def _shown(output: Any, picture: str, files: Files, config: Any) -> str:
+    """Return an output of a cell in Markdown: a picture, a table, or text."""
+    data = output.get("data", {})
+    if "image/png" in data:
+        files.append(File.generated(config, picture, content=base64.b64decode(data["image/png"])))
+        return f"![{data['text/plain']}]({picture})"
+    if "text/html" in data:
+        return TABLE.sub("<table>", data["text/html"])
+    return _fenced(WRITTEN_OVER.sub("", output.get("text", data.get("text/plain", ""))).strip("\n"), "text")
+
+
+def _fenced(text: str, language: str) -> str:
+    return f"```{language}\n{text}\n```"
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
+    """Return a page with links as the site has them: a page's path from docs/, or the bare name of a file."""
+    # links of a page in docs/ and of one beside docs/ start from different folders of the source tree
+    name = page.file.src_uri
+    folder = ROOT if name in OUTSIDE else (ROOT / "docs" / name).parent
+
+    def replaced(link: re.Match[str]) -> str:
+        text, target, anchor = link[1], link[2], link[3] or ""
+        path = (folder / target).resolve()
+        for base in (ROOT / "docs", ROOT):
+            if not path.is_relative_to(base):
+                continue
+            uri = path.relative_to(base).as_posix()
+            if files.get_file_from_path(uri) is not None:
+                return f"[{text}]({'../' * name.count('/')}{uri}{anchor})"
+        # a wrong link is left to the check of links
+        return text if path.exists() else link[0]
+
+    return LINK.sub(replaced, markdown)
+
+
+def on_page_content(html: str, page: Any, config: Any, files: Files) -> str:
+    """Show no default where click has none, which mkdocs-click shows by its name."""
+    return html.replace("<code>Sentinel.UNSET</code>", "")
+
+
+def on_post_page(output: str, page: Any, config: Any) -> str:
+    """Have a page fetch nothing from elsewhere."""
+    return output.replace(SHIM, "../" * page.url.count("/") + WORKER)
+
+
+def on_post_template(output_content: str, template_name: str, config: Any) -> str:
+    """Have the page of what is not found do so, too."""
+    return output_content.replace(SHIM, WORKER)
