@@ -124,7 +124,7 @@ _ROWS = (
         "clock",
         Where.CHIP,
         "the sample clock runs 1 % faster from then on",
-        strike=lambda chip, t_ns, _: chip.hurry(1.01, t_ns),
+        strike=lambda chip, t_ns, _: chip.change_speed(1.01, t_ns),
     ),
     FaultKind(
         "frozen",
@@ -133,18 +133,18 @@ _ROWS = (
         seconds=1.0,
         strike=lambda chip, _, end_ns: chip.freeze(end_ns),
     ),
-    FaultKind("slip", Where.CHIP, "the FIFO loses a byte", strike=lambda chip, t_ns, _: chip.slip(t_ns)),
+    FaultKind("slip", Where.CHIP, "the FIFO loses a byte", strike=lambda chip, t_ns, _: chip.lose_fifo_byte(t_ns)),
     FaultKind(
         "low_byte",
         Where.CHIP,
         "the low byte of the accelerometer's x stays 0 from then on",
-        strike=lambda chip, *_: chip.stick(0, 0xFF),
+        strike=lambda chip, *_: chip.clear_bits(0, 0xFF),
     ),
     FaultKind(
         "high_bit",
         Where.CHIP,
         "bit 12 of the accelerometer's y stays 0 from then on",
-        strike=lambda chip, *_: chip.stick(1, 1 << 12),
+        strike=lambda chip, *_: chip.clear_bits(1, 1 << 12),
     ),
     FaultKind(
         "bit_errors",
@@ -228,17 +228,17 @@ _ROWS = (
     FaultKind("noise", Where.SERIAL, "up to 89 bytes of noise", spoils=lambda byte, v: bytes([byte]) + bytes(v % 90)),
     FaultKind("late", Where.SERIAL, "what follows comes with what is sent next"),
 )
-KINDS = {kind.name: kind for kind in _ROWS}
+FAULTS = {kind.name: kind for kind in _ROWS}
 
 
-def kinds(*where: Where) -> dict[str, FaultKind]:
+def fault_kinds(*where: Where) -> dict[str, FaultKind]:
     """The rows of faults that befall any of these, by name."""
-    return {name: kind for name, kind in KINDS.items() if kind.where in where}
+    return {name: kind for name, kind in FAULTS.items() if kind.where in where}
 
 
 @dataclass(frozen=True)
 class Fault:
-    """A kind of fault, by its name in KINDS, at `at_s` of its world's clock; 0 for one that is not timed."""
+    """A kind of fault, by its name in FAULTS, at `at_s` of its world's clock; 0 for one that is not timed."""
 
     name: str
     at_s: float = 0.0
@@ -250,7 +250,7 @@ class Fault:
     def parse(cls, text: str, *where: Where) -> Self:
         """Of NAME@SECONDS, or NAME of one that is not timed; KeyError or ValueError of anything else."""
         name, at, seconds = text.partition("@")
-        if kinds(*where)[name].timed != bool(at):
+        if fault_kinds(*where)[name].timed != bool(at):
             raise ValueError(text)
         at_s = float(seconds) if at else 0.0
         if not 0 <= at_s < math.inf:
@@ -260,7 +260,7 @@ class Fault:
     @property
     def kind(self) -> FaultKind:
         """Its row."""
-        return KINDS[self.name]
+        return FAULTS[self.name]
 
     @property
     def begin_ns(self) -> int:
@@ -296,7 +296,7 @@ class Schedule:
         return [fault for _, fault in due]
 
 
-def mishaps(faults: Iterable[Fault]) -> list[Mishap]:
+def begin_mishaps(faults: Iterable[Fault]) -> list[Mishap]:
     """What befalls the sensor in the hand, each begun at its time."""
     begun = []
     for fault in faults:

@@ -170,7 +170,7 @@ class Restless(Guided):
         return Move(now.step, now.step + steps(self._rng.uniform(0.3, 0.7)), turn, (now.held, IN_THE_HAND))
 
 
-KINDS: dict[str, type[Hand]] = {
+HANDS: dict[str, type[Hand]] = {
     "guided": Guided,
     "placing": Placing,
     "random": Random,

@@ -31,7 +31,7 @@ class Mishap:
         """It happens at `t_s`, once."""
         self._begun_s = min(self._begun_s, t_s)
 
-    def felt(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
+    def apply(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
         """What the sensor feels of specific force (n, 3) [m/s^2] and rate (n, 3) [rad/s] at times (n,)."""
         return force, rate
 
@@ -47,7 +47,7 @@ class Mishap:
 class Slip(Mishap):
     """The accelerometer's mount gives way, and the gyroscope's does not."""
 
-    def felt(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
+    def apply(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
         """Turned by some degrees, slowly enough for nobody to notice."""
         turn = self._share(t_s, SLIP_S)[:, None] * SLIP_RAD
         # small enough for one step of a turn
@@ -57,7 +57,7 @@ class Slip(Mishap):
 class Knock(Mishap):
     """A blow, after which the accelerometer's zero is elsewhere."""
 
-    def felt(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
+    def apply(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
         """The blow and what it left."""
         share = self._share(t_s, KNOCK_S)[:, None]
         return force + share * ZERO_SHIFT_MPS2 + 4.0 * share * (1.0 - share) * KNOCK_MPS2, rate
@@ -75,7 +75,7 @@ class ZeroStep(Mishap):
         super().__init__()
         self._step = step
 
-    def felt(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
+    def apply(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
         """From one sample to the next."""
         return force + (t_s >= self._begun_s)[:, None] * self._step, rate
 
@@ -83,7 +83,7 @@ class ZeroStep(Mishap):
 class Warmth(Mishap):
     """The sun comes out: the chip warms, and its biases follow."""
 
-    def felt(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
+    def apply(self, force: Vector, rate: Vector, t_s: Vector) -> tuple[Vector, Vector]:
         """As by the data sheet."""
         warmer = self.warmer_c(t_s)[:, None]
         return force + ACC_MPS2_A_C * warmer, rate + GYRO_RAD_S_A_C * warmer

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Vector
 from . import rotation
-from .habits import JERK_MPS2, JERK_S, SWAY_HZ, TREMBLING, TREMOR_HZ, Habits, swing
+from .disturbance import JERK_MPS2, JERK_S, SWAY_HZ, TREMOR_HZ, TYPICAL_TREMOR, HandDisturbance, point_acceleration
 from .hand import REACTION_S, Hand, HandPrompt, Stance
 from .legs import STEP_HZ, STEP_S, Leg, steps
 from .mishaps import Mishap
@@ -23,7 +23,7 @@ SINES = 12
 FEW = 4
 
 
-class Wobble:
+class BandNoise:
     """Band-limited noise as a sum of sines, three axes.
 
     Parameters
@@ -54,7 +54,7 @@ class Wobble:
 
 
 @dataclass(frozen=True)
-class Pulse:
+class Jerk:
     """A jerk: half a sine of `peak_mps2` (3,) that starts at `start_s`."""
 
     start_s: float
@@ -102,20 +102,20 @@ class Motion:
         rng: np.random.Generator,
         gravity: float,
         mishaps: Iterable[Mishap] = (),
-        habits: Habits = TREMBLING,
+        habits: HandDisturbance = TYPICAL_TREMOR,
     ) -> None:
         self._hand = hand
         self.mishaps = tuple(mishap for mishap in (hand.mishap, *mishaps) if type(mishap) is not Mishap)
         self._gravity, self._habits = gravity, habits
         lever = rng.normal(size=3)
         self._lever_m = lever / np.linalg.norm(lever) * rng.uniform(*habits.lever_m)
-        self._tremble = Wobble(rng, TREMOR_HZ, habits.tremor_mps2 * rng.uniform(0.5, 1.0))
-        self._quiver = Wobble(rng, TREMOR_HZ, habits.tremor_rad_s)
-        self._push = Wobble(rng, SWAY_HZ, habits.sway_mps2)
+        self._tremble = BandNoise(rng, TREMOR_HZ, habits.tremor_mps2 * rng.uniform(0.5, 1.0))
+        self._quiver = BandNoise(rng, TREMOR_HZ, habits.tremor_rad_s)
+        self._push = BandNoise(rng, SWAY_HZ, habits.sway_mps2)
         self._fate = rng.spawn(1)[0]
         self._stance = hand.first_stance()
         self._rate = np.zeros(3)
-        self._pulses: list[Pulse] = []
+        self._pulses: list[Jerk] = []
         self._first = 0
         self._sums = np.zeros((1, 6))
         self._attitudes = self._shaken(self._stance.attitude[None], 0, np.ones(1))
@@ -145,7 +145,7 @@ class Motion:
             rate = means[n:, 3:]
         self._forget(node)
         for mishap in self.mishaps:
-            force, rate = mishap.felt(force, rate, edges_s[1:])
+            force, rate = mishap.apply(force, rate, edges_s[1:])
         return force, rate
 
     def _sums_at(self, t_s: Vector) -> tuple[Vector, int]:
@@ -219,7 +219,7 @@ class Motion:
             return np.zeros_like(rates)
         alpha = np.diff(rates, axis=0, prepend=self._rate[None]) / STEP_S
         self._rate = rates[-1]
-        return swing(alpha, rates, self._lever_m)
+        return point_acceleration(alpha, rates, self._lever_m)
 
     def _clumsiness(self, leg: Leg, nodes: Vector, grip: Vector) -> Vector:
         """The hand's own acceleration (n, 3) in each step: tremor, wandering, jerks."""
@@ -231,7 +231,7 @@ class Motion:
         if effort.any():
             push += self._push.at(first, len(t_s)) * effort
             for _ in range(self._fate.poisson(self._habits.jerks_per_s * len(t_s) * STEP_S)):
-                self._pulses.append(Pulse.draw(self._fate, float(self._fate.uniform(t_s[0], t_s[-1]))))
+                self._pulses.append(Jerk.draw(self._fate, float(self._fate.uniform(t_s[0], t_s[-1]))))
         for pulse in self._pulses:
             push += pulse.at(t_s)
         self._pulses = [pulse for pulse in self._pulses if pulse.end_s > t_s[-1]]

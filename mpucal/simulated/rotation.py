@@ -39,7 +39,7 @@ def log(q: Vector) -> Vector:
     return np.asarray(2.0 * np.arctan2(sine, np.abs(q[..., :1])) / sine * v)
 
 
-def across(a: Vector, b: Vector) -> Vector:
+def cross_rows(a: Vector, b: Vector) -> Vector:
     """a x b of (n, 3) and (n, 3) or (3,); np.cross takes three times as long."""
     (a_x, a_y, a_z), (b_x, b_y, b_z) = a.T, b.T
     axes = (a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x)

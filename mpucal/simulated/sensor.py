@@ -51,7 +51,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class InSi:
+class SiSetting:
     """A setting whose counts are m/s^2, rad/s and degrees Celsius, of no limit; `rate_hz` as in Setting."""
 
     rate_hz: float
@@ -127,10 +127,10 @@ class SensorTruth:
         rng = np.random.default_rng([seed, 1])
         skew = non_orthogonality(*rng.uniform(-0.02, 0.02, 3))
         gains = np.diag(rng.uniform(0.97, 1.03, 3))
-        D = gains @ skew @ turned(np.radians(rng.uniform(-2, 2, 3)))
+        D = gains @ skew @ euler_rotation(np.radians(rng.uniform(-2, 2, 3)))
         gyro = rng.uniform(-0.02, 0.02, (3, 3))
         np.fill_diagonal(gyro, rng.uniform(0.97, 1.03, 3))
-        D, K, _ = in_symmetric_frame(D, np.linalg.inv(gyro))
+        D, K, _ = to_symmetric_frame(D, np.linalg.inv(gyro))
         family = MPU6050 if chip.startswith("mpu6050") else MPU6500
         return cls(
             D=D,
@@ -146,7 +146,7 @@ class SensorTruth:
             seed=seed,
         )
 
-    def response(self, setting: Setting | InSi) -> SensorResponse:
+    def response(self, setting: Setting | SiSetting) -> SensorResponse:
         """What the sensor makes of a motion, so set.
 
         A mean over one sample passes white noise up to half the sample rate.
@@ -170,11 +170,11 @@ class SensorTruth:
 
     def symmetric(self) -> tuple[Self, Vector]:
         """The same sensor in the body frame in which K is symmetric, and Q, which turns the body to that frame."""
-        D, K, Q = in_symmetric_frame(self.D, self.K)
+        D, K, Q = to_symmetric_frame(self.D, self.K)
         return replace(self, D=D, K=K), Q
 
 
-def in_symmetric_frame(D: Vector, K: NDArray[np.floating[Any]]) -> tuple[Vector, Vector, Vector]:
+def to_symmetric_frame(D: Vector, K: NDArray[np.floating[Any]]) -> tuple[Vector, Vector, Vector]:
     """D Q^T, the symmetric Q K, and Q: K = U S V^T, Q = V U^T."""
     U, S, Vt = np.linalg.svd(K)
     Q, symmetric = Vt.T @ U.T, Vt.T @ np.diag(S) @ Vt
@@ -192,7 +192,7 @@ def non_orthogonality(zeta: float, eta: float, rho: float) -> Vector:
     )
 
 
-def turned(angles_rad: Vector) -> Vector:
+def euler_rotation(angles_rad: Vector) -> Vector:
     """Rx Ry Rz of three angles [rad]."""
     x, y, z = rotation(np.diag(angles_rad))
     return np.asarray(x @ y @ z)
@@ -203,7 +203,7 @@ def density(std: Vector, rate_hz: float) -> Vector:
     return np.asarray(std / np.sqrt(rate_hz / 2.0))
 
 
-def quantised(y: Vector, step: float) -> tuple[Vector, Mask]:
+def quantise(y: Vector, step: float) -> tuple[Vector, Mask]:
     """y (n, 3) as 16-bit counts of size step, and the samples (n,) with an axis at the end of its range."""
     if step == 0.0:
         return y, np.zeros(len(y), bool)

@@ -14,7 +14,7 @@ from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.bus import SimulatedBus
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS
 from mpucal.sources.tap import Tap
 
@@ -43,7 +43,7 @@ class Rig:
 
     def __init__(self, model="mpu6050", rate_error_ppm=3000.0):
         self.clock, self.transactions = FastClock(), []
-        self.chip = Chip(MODELS[model], NumberedFeed(), rate_error_ppm, Factory((-1500, 2001, 700)))
+        self.chip = Chip(MODELS[model], NumberedFeed(), rate_error_ppm, FactoryTrim((-1500, 2001, 700)))
         self.inner = SimulatedBus(self.chip, self.clock)
         self.before: dict[tuple[str, int], Callable] = {}
         self.bus = Tap(self, self)

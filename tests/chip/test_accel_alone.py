@@ -9,7 +9,7 @@ from mpucal.chip.decode import decode
 from mpucal.chip.driver import Driver
 from mpucal.errors import BusError, ChipError
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.faults import OF_CHIP, kinds
+from mpucal.simulated.faults import OF_CHIP, fault_kinds
 
 ALONE = Config(rate_hz=4000)
 
@@ -73,7 +73,7 @@ def test_a_late_host_does_not_count_as_a_slow_bus(started):
     assert driver.recording().gap.sum() == 10
 
 
-@pytest.mark.parametrize("fault", sorted(set(kinds(*OF_CHIP)) - {"stuck", "unplugged", "bitflips", "high_bit"}))
+@pytest.mark.parametrize("fault", sorted(set(fault_kinds(*OF_CHIP)) - {"stuck", "unplugged", "bitflips", "high_bit"}))
 def test_a_passing_fault_leaves_valid_samples(fault, tapped):
     bus, transactions = tapped(f"sim:chip=mpu6500,hand=still,rate_error_ppm=0,fault={fault}@1.7")
     driver = Driver(bus, ALONE)

@@ -19,7 +19,7 @@ from mpucal.errors import BusError
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
 from mpucal.simulated.chip import Chip, SimulatedBus
-from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS
 from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.bridge.link import Link
@@ -49,7 +49,7 @@ class Numbers:
 
 
 def _numbering(clock):
-    return SimulatedBus(Chip(MODELS["mpu6050"], Numbers(), 0.0, Factory()), clock)
+    return SimulatedBus(Chip(MODELS["mpu6050"], Numbers(), 0.0, FactoryTrim()), clock)
 
 
 def open_store(port):
@@ -121,7 +121,7 @@ class Still:
 
 
 def _still(clock):
-    return SimulatedBus(Chip(MODELS["mpu6050"], Still(), 0.0, Factory()), clock)
+    return SimulatedBus(Chip(MODELS["mpu6050"], Still(), 0.0, FactoryTrim()), clock)
 
 
 def test_the_corrected_sketch_prints_what_is_stored(switch_on, sketches):

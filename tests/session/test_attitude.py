@@ -11,9 +11,9 @@ from mpucal.session.attitude import quaternion, straight
 from mpucal.session.events import Connected, FitKind, Knowledge, Learnt, Measured, Meter, Prompt, RequestFit, Target
 from mpucal.session.machine import Machine
 from mpucal.session.meter import MotionWatch
-from mpucal.simulated.hands import KINDS
+from mpucal.simulated.hands import HANDS
 from mpucal.simulated.motion import Motion
-from mpucal.simulated.sensor import InSi, SensorTruth
+from mpucal.simulated.sensor import SensorTruth, SiSetting
 
 STILL = np.zeros(3)
 # of the simulated hands, whose mishaps come within; a poll is 50 ms long
@@ -62,7 +62,7 @@ def learnt(down):
 
 def polls(motion, rng):
     """The samples of a sensor that is moved so, a poll after the other."""
-    response = SensorTruth.draw(1).response(InSi(RATE_HZ))
+    response = SensorTruth.draw(1).response(SiSetting(RATE_HZ))
     for first in range(0, round(SECONDS * RATE_HZ), POLL):
         edges_s = np.arange(first, first + POLL + 1) / RATE_HZ
         values = response.values(*motion.means(edges_s), rng.standard_normal((POLL, 7)))
@@ -74,7 +74,7 @@ def polls(motion, rng):
 def meters(hand):
     """Return all meters of a simulated hand that is asked for one direction after the other."""
     of_hand, of_motion, of_noise, of_advice = np.random.default_rng(1).spawn(4)
-    motion = Motion(KINDS[hand](of_hand), of_motion, STANDARD_GRAVITY_MPS2)
+    motion = Motion(HANDS[hand](of_hand), of_motion, STANDARD_GRAVITY_MPS2)
     asked = iter(of_advice.permutation(ALL_AROUND).tolist())
     machine, found, t_s = Machine(), [], 0.0
 
@@ -101,7 +101,7 @@ def meters(hand):
 MEASURING = ("lay flat", "rotate", "verify")
 
 
-@pytest.mark.parametrize("hand", KINDS)
+@pytest.mark.parametrize("hand", HANDS)
 def test_the_picture_does_not_jump(hand):
     """The picture turns from one meter to the next by no more than gravity did, or the gyroscope says."""
     found = meters(hand)

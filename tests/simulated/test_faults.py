@@ -10,7 +10,7 @@ from mpucal.chip.driver import Driver
 from mpucal.errors import UsageError
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.options import ChipOptions
-from mpucal.simulated.faults import KINDS, OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, kinds
+from mpucal.simulated.faults import FAULTS, OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, fault_kinds
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -22,16 +22,18 @@ def table(page, number=1):
 
 
 def test_the_pages_hold_the_table():
-    assert table("chips.md") == [f"| {kind.name} | {kind.what} |" for kind in kinds(*OF_CHIP, Where.HAND).values()]
-    assert table("chips.md", 2) == [f"| {kind.name} | {kind.what} |" for kind in kinds(Where.DEFECT).values()]
-    vehicles = kinds(*OF_VEHICLE).values()
+    assert table("chips.md") == [
+        f"| {kind.name} | {kind.what} |" for kind in fault_kinds(*OF_CHIP, Where.HAND).values()
+    ]
+    assert table("chips.md", 2) == [f"| {kind.name} | {kind.what} |" for kind in fault_kinds(Where.DEFECT).values()]
+    vehicles = fault_kinds(*OF_VEHICLE).values()
     assert table("mavlink.md") == [f"| {kind.name}{'@' * kind.timed} | {kind.what} |" for kind in vehicles]
 
 
 @pytest.mark.parametrize("options", WORLDS)
 def test_each_world_takes_its_own_faults_and_names_them(options):
-    own = kinds(*WORLDS[options])
-    for name, kind in KINDS.items():
+    own = fault_kinds(*WORLDS[options])
+    for name, kind in FAULTS.items():
         word = f"{name}@3" if kind.timed else name
         if name in own:
             assert [str(fault) for fault in options.parse(f"sim:fault={word}").fault] == [word]
@@ -74,5 +76,5 @@ def test_what_befalls_the_hand_moves_the_sensor_of_chip_and_vehicle(name, least)
         SimulatedVehicle(VehicleOptions.parse("sim:imus=1,hand=still" + word)) for word in ("", f",fault={name}@0")
     )
     for vehicle in (plain, struck):
-        vehicle.go_on(13_000_000)
+        vehicle.run_until(13_000_000)
     assert np.linalg.norm(struck.firmware.corrected[0, 0] - plain.firmware.corrected[0, 0]) > least / 2

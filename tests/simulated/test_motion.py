@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mpucal.simulated.hands import KINDS
-from mpucal.simulated.motion import AHEAD_S, Motion, Wobble
+from mpucal.simulated.hands import HANDS
+from mpucal.simulated.motion import AHEAD_S, BandNoise, Motion
 
 GRAVITY = 9.81
 PERIOD_S = 1 / (200 * 1.00371)
@@ -22,7 +22,7 @@ class Run:
 
     def __init__(self, kind, prompts, seconds, seed=3, poll=50):
         hand, motion = np.random.default_rng(seed).spawn(2)
-        self.motion = Motion(KINDS[kind](hand), motion, GRAVITY)
+        self.motion = Motion(HANDS[kind](hand), motion, GRAVITY)
         self.first_attitude = self.motion.attitude(0.0)
         forces, rates, waiting = [], [], list(prompts)
         for i in range(0, int(seconds / PERIOD_S), poll):
@@ -215,7 +215,7 @@ def test_the_restless_hand_never_lies_still():
 
 
 def test_a_wobble_has_its_strength_and_its_integral():
-    wobble = Wobble(np.random.default_rng(5), (2.0, 10.0), 0.3)
+    wobble = BandNoise(np.random.default_rng(5), (2.0, 10.0), 0.3)
     n, step = 400, 1 / 2000
     blocks = [(wobble.at(first, n), wobble.integral(first, n)) for first in range(0, 40000, n)]
     values, integral = (np.concatenate(part) for part in zip(*blocks, strict=True))
@@ -234,7 +234,7 @@ def test_one_of_the_two_may_be_that_of_earlier(late_s):
 
     def means(at, *late):
         hand, motion = np.random.default_rng(3).spawn(2)
-        moved = Motion(KINDS["random"](hand), motion, GRAVITY)
+        moved = Motion(HANDS["random"](hand), motion, GRAVITY)
         moved.hear(said[0], 0.0)
         return moved.means(at, *late)
 

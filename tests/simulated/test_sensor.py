@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from mpucal.simulated.sensor import SensorTruth, Setting, in_symmetric_frame
+from mpucal.simulated.sensor import SensorTruth, Setting, to_symmetric_frame
 
 G0 = 9.80665
 STILL = np.tile([0.0, 0.0, 9.81], (4000, 1))
@@ -52,7 +52,7 @@ def test_the_document_is_plain_json():
 def test_the_symmetric_frame_is_another_view_of_the_same_sensor():
     rng = np.random.default_rng(2)
     D, K = np.eye(3) + rng.normal(size=(3, 3)) * 0.1, np.eye(3) + rng.normal(size=(3, 3)) * 0.1
-    D2, K2, Q = in_symmetric_frame(D, K)
+    D2, K2, Q = to_symmetric_frame(D, K)
     np.testing.assert_allclose(K2, K2.T, atol=1e-12)
     assert np.all(np.linalg.eigvalsh(K2) > 0)
     # what is seen by both of one turn and one force: K and D differ by one rotation

@@ -15,7 +15,7 @@ from mpucal.errors import BusError, NoAnswer, RecordingError, WriteBackError
 from mpucal.result.calibration import REFUSED, Calibration
 from mpucal.simulated.chip import Chip, SimulatedBus
 from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS, OFFSETS
 from mpucal.sinks.chip import ChipSink
 from mpucal.sinks.table import CHIP_OFFSETS
@@ -56,7 +56,7 @@ class Board:
         self.model = replace(MODELS[model], **OFFSETS[offsets])
         if who_am_i is not None:
             self.model = replace(self.model, who_am_i=who_am_i)
-        self.chip = Chip(self.model, feed or AtRest(), 0.0, Factory(TRIM))
+        self.chip = Chip(self.model, feed or AtRest(), 0.0, FactoryTrim(TRIM))
         self.inner = SimulatedBus(self.chip, FastClock())
         self.accesses, self.fails = 0, {}
 
@@ -215,7 +215,7 @@ def test_the_calibration_of_another_chip_is_refused(calibration, sensor, words):
 
 def test_a_bias_that_does_not_fit_is_refused(calibration):
     board = Board()
-    board.chip = Chip(board.model, AtRest(), 0.0, Factory((32000, 0, 0)))
+    board.chip = Chip(board.model, AtRest(), 0.0, FactoryTrim((32000, 0, 0)))
     board.inner = SimulatedBus(board.chip, FastClock())
     far = replace(calibration(accel_offsets=None), b_a=np.array([-9.0, 0.0, 0.0]))
     with pytest.raises(WriteBackError, match="cannot hold"):

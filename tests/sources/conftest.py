@@ -13,7 +13,7 @@ import mpucal.sources.i2c
 from mpucal.simulated.chip import SimulatedBus
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS
 
 I2C_M_RD = 0x0001
@@ -130,7 +130,7 @@ def still_chip():
 
     def make(model="mpu6050", rate_error_ppm=2500.0):
         clock = FastClock()
-        return SimulatedBus(Chip(MODELS[model], StillFeed(), rate_error_ppm, Factory()), clock), clock
+        return SimulatedBus(Chip(MODELS[model], StillFeed(), rate_error_ppm, FactoryTrim()), clock), clock
 
     return make
 

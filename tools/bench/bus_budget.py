@@ -28,7 +28,7 @@ from mpucal.files.mcap import read_capture
 from mpucal.simulated.chip.bus import SimulatedBus
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.clock import FastClock, RealClock
-from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS
 from mpucal.simulated.sensor import Counts, Setting
 from mpucal.sources.spi import DATA, REGISTER_HZ, SpiBus
@@ -105,7 +105,7 @@ def run(
 ) -> tuple[Recording, float, float]:
     """What was recorded on a host that is late, the share of the bus, and processor seconds a second."""
     kept = Kept()
-    bus = SimulatedBus(Chip(MODELS[model], NumberedFeed(), ppm, Factory()), JitterClock(late_s, seed))
+    bus = SimulatedBus(Chip(MODELS[model], NumberedFeed(), ppm, FactoryTrim()), JitterClock(late_s, seed))
     driver = Driver(Tap(bus, kept), Config(rate_hz=rate_hz))
     driver.start()
     kept.clear()
@@ -119,7 +119,7 @@ class Wired:
     """As much of spidev.SpiDev as SpiBus uses, with an MPU-6500 behind it that lives in real time."""
 
     def __init__(self) -> None:
-        self._chip = SimulatedBus(Chip(MODELS["mpu6500"], NumberedFeed(), 0.0, Factory()), RealClock())
+        self._chip = SimulatedBus(Chip(MODELS["mpu6500"], NumberedFeed(), 0.0, FactoryTrim()), RealClock())
 
     def open_path(self, path: str) -> None:
         """Any."""

@@ -23,17 +23,17 @@ import numpy as np
 
 from mpucal.result.error_model import MG_PER_MPS2
 from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine, Memory
-from mpucal.simulated.bridge.spoilt import SpoiltBytes
+from mpucal.simulated.bridge.line_faults import LineFaults
 from mpucal.simulated.chip import SimulatedBus, open_simulated
-from mpucal.simulated.chip.faults import Faults
-from mpucal.simulated.faults import OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, kinds, mishaps
+from mpucal.simulated.chip.fault_injector import FaultInjector
+from mpucal.simulated.faults import OF_CHIP, OF_VEHICLE, Fault, Schedule, Where, begin_mishaps, fault_kinds
 from mpucal.simulated.mishaps import Mishap, ZeroStep
 from mpucal.simulated.vehicle.line import PacketLine
 from mpucal.simulated.vehicle.transport import SimulatedTransport
 from mpucal.sources.bridge.bus import BridgeBus
 
 CHIP, BRIDGE, VEHICLE = "chip", "bridge", "vehicle"
-SERIAL = tuple(kinds(Where.SERIAL))
+SERIAL = tuple(fault_kinds(Where.SERIAL))
 # of the process and its clock, in any world
 STEP = "step"
 PROCESS = ("killed", "terminated", "interrupted", "disk_full", "deaf")
@@ -41,9 +41,9 @@ CLOCK = ("stopped_5s", "suspended_2min")
 PAUSES_S = {"stopped_5s": 5.0, "suspended_2min": 120.0}
 SIGNALS = {"killed": signal.SIGKILL, "terminated": signal.SIGTERM, "interrupted": signal.SIGINT}
 KINDS: dict[str, tuple[str, ...]] = {
-    CHIP: (*kinds(*OF_CHIP, Where.HAND, Where.DEFECT), STEP, *CLOCK, *PROCESS),
-    BRIDGE: (*kinds(*OF_CHIP, Where.HAND), STEP, *SERIAL, *CLOCK, *PROCESS),
-    VEHICLE: (*kinds(*OF_VEHICLE), *PROCESS),
+    CHIP: (*fault_kinds(*OF_CHIP, Where.HAND, Where.DEFECT), STEP, *CLOCK, *PROCESS),
+    BRIDGE: (*fault_kinds(*OF_CHIP, Where.HAND), STEP, *SERIAL, *CLOCK, *PROCESS),
+    VEHICLE: (*fault_kinds(*OF_VEHICLE), *PROCESS),
 }
 SPOILT_BYTES, WITHIN_BYTES = 40, 4000
 STEP_MG = 3.0, 300.0
@@ -63,7 +63,7 @@ class Blow:
 
     def fault(self) -> Fault | None:
         """As the simulation's own table has it."""
-        table = kinds(*OF_CHIP, *OF_VEHICLE, Where.HAND, Where.DEFECT)
+        table = fault_kinds(*OF_CHIP, *OF_VEHICLE, Where.HAND, Where.DEFECT)
         return Fault(self.name, self.at_s if table[self.name].timed else 0.0) if self.name in table else None
 
 
@@ -157,9 +157,9 @@ class World:
                 (int(at), blow.name, int(rng.integers(1, 256))) for at in rng.integers(0, WITHIN_BYTES, SPOILT_BYTES)
             ]
             if rng.random() < 0.5:
-                self.line.to_host = SpoiltBytes(spoilt)
+                self.line.to_host = LineFaults(spoilt)
             else:
-                self.line.to_device = SpoiltBytes([(at // 16, *rest) for at, *rest in spoilt])
+                self.line.to_device = LineFaults([(at // 16, *rest) for at, *rest in spoilt])
 
 
 class HookedBus(SimulatedBus):
@@ -176,7 +176,7 @@ class HookedBus(SimulatedBus):
 
     def suffer(self, faults: Sequence[Fault], seed: int) -> None:
         """They happen from now on."""
-        self._faults = Faults(faults, self._chip, self._clock, np.random.default_rng(seed)) if faults else None
+        self._faults = FaultInjector(faults, self._chip, self._clock, np.random.default_rng(seed)) if faults else None
 
 
 class Bridged(BridgeBus):
@@ -237,7 +237,7 @@ def _faults(blows: Sequence[Blow]) -> list[Fault]:
 
 def _befallen(blows: Sequence[Blow]) -> list[Mishap]:
     """What befalls the sensor; none of a vehicle's."""
-    return [*mishaps(_faults(blows)), *(_step(blow) for blow in blows if blow.name == STEP)]
+    return [*begin_mishaps(_faults(blows)), *(_step(blow) for blow in blows if blow.name == STEP)]
 
 
 def _step(blow: Blow) -> ZeroStep:
@@ -252,5 +252,5 @@ def _step(blow: Blow) -> ZeroStep:
 def _affine(mishap: Mishap, t_s: float) -> tuple[np.ndarray, np.ndarray]:
     """(A, c) by which specific force s is felt as A s + c then."""
     at = np.full(4, t_s)
-    felt, _ = mishap.felt(np.vstack((np.zeros(3), np.eye(3))), np.zeros((4, 3)), at)
+    felt, _ = mishap.apply(np.vstack((np.zeros(3), np.eye(3))), np.zeros((4, 3)), at)
     return (felt[1:] - felt[0]).T, felt[0]

@@ -22,7 +22,7 @@ from mpucal.data import Recording, Vector
 from mpucal.errors import RecordingError
 from mpucal.rests.flat import find_flat, flat_statistics
 from mpucal.rests.intervals import RestFinder
-from mpucal.simulated.sensor import SensorTruth, non_orthogonality, turned
+from mpucal.simulated.sensor import SensorTruth, euler_rotation, non_orthogonality
 
 from .judge import followed, sph_rms, tilts_deg
 from .runner import Asked, Program, option
@@ -94,7 +94,7 @@ def distortion(seed: int) -> tuple[Vector, Vector]:
     gain = 1.0 + rng.uniform(-GAIN, GAIN, 3)
     skew = rng.uniform(-SKEW_RAD, SKEW_RAD, 3)
     turn = rng.uniform(-MISALIGNMENT_RAD, MISALIGNMENT_RAD, 3)
-    return np.diag(gain) @ non_orthogonality(*skew) @ turned(-turn), rng.uniform(-BIAS_MPS2, BIAS_MPS2, 3)
+    return np.diag(gain) @ non_orthogonality(*skew) @ euler_rotation(-turn), rng.uniform(-BIAS_MPS2, BIAS_MPS2, 3)
 
 
 def of_seed(item: tuple[Path, int], model: str, gravity: float) -> list[Errors]:

@@ -32,7 +32,7 @@ from mpucal.session.plan import Plan
 from mpucal.session.turn_guide import TURN_WORDS
 from mpucal.simulated import rotation as quaternions
 from mpucal.simulated.hand import MISS_RAD, ON_THE_TABLE, REACTION_S, Stance
-from mpucal.simulated.hands import KINDS, Guided
+from mpucal.simulated.hands import HANDS, Guided
 from mpucal.simulated.legs import STEP_S, Leg
 from mpucal.terminal.view import NEAR_DEG, Moment, View
 
@@ -79,7 +79,7 @@ class ByWords(Guided):
         return self.move(now, math.radians(self.DEGREES) * axis[1:] + miss, self.HELD)
 
 
-KINDS[BY_WORDS] = ByWords
+HANDS[BY_WORDS] = ByWords
 
 
 @dataclass
@@ -205,5 +205,5 @@ main = Program(
     of_hand,
     items=lambda asked: product(asked.hand, asked.seeds),
     report=report,
-    options=(option("--hand", nargs="*", default=list(KINDS), choices=list(KINDS)),),
+    options=(option("--hand", nargs="*", default=list(HANDS), choices=list(HANDS)),),
 )

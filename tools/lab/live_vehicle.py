@@ -40,9 +40,9 @@ from mpucal.mavlink.stream_parameters import read_parameters, read_stream_parame
 from mpucal.mavlink.transport import Transport
 from mpucal.mavlink.transports import open_transport
 from mpucal.mavlink.url import parse_url
-from mpucal.simulated.hands import KINDS
+from mpucal.simulated.hands import HANDS
 from mpucal.simulated.motion import Motion
-from mpucal.simulated.vehicle.imus import FROM_HAND, turned_over
+from mpucal.simulated.vehicle.imus import FROM_HAND, to_hand_axes
 
 from .judge import off, rms, z_of
 
@@ -67,7 +67,7 @@ class Body:
 
     def __init__(self, port: int, hand: str, seed: int) -> None:
         of_hand, of_motion = np.random.default_rng(seed).spawn(2)
-        self._motion = Motion(KINDS[hand](of_hand), of_motion, STANDARD_GRAVITY_MPS2)
+        self._motion = Motion(HANDS[hand](of_hand), of_motion, STANDARD_GRAVITY_MPS2)
         self._lock = threading.Lock()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
@@ -80,7 +80,7 @@ class Body:
     def hear(self, kind: str, down: tuple[float, float, float] | None) -> None:
         """A prompt, whose `down` is in the vehicle's axes."""
         with self._lock:
-            self._motion.hear(ReceivedPrompt(kind, None if down is None else turned_over(down)), self._t_s)
+            self._motion.hear(ReceivedPrompt(kind, None if down is None else to_hand_axes(down)), self._t_s)
 
     def _serve(self) -> None:
         answer, last = b"", -1
@@ -179,7 +179,7 @@ def main() -> int:
     parser.add_argument("--mavlink", required=True, metavar="URL", help="of the session")
     parser.add_argument("--parameters", required=True, metavar="URL", help="another one of the same SITL")
     parser.add_argument("--port", type=int, default=9002, help="where the SITL looks for its JSON model")
-    parser.add_argument("--hand", choices=KINDS, default="guided")
+    parser.add_argument("--hand", choices=HANDS, default="guided")
     parser.add_argument("--seed", type=int, default=0, help="of the hand")
     parser.add_argument("-o", "--folder", type=Path, help="of the session's files")
     parser.add_argument("words", nargs="*", help="for mpucal session")

@@ -32,8 +32,8 @@ from mpucal.result.error_model import MG_PER_MPS2
 from mpucal.session.events import Decision, Prompt, PromptKind, Verification
 from mpucal.session.plan import Plan
 from mpucal.simulated.chip.models import MODELS
-from mpucal.simulated.faults import OF_CHIP, Fault, kinds
-from mpucal.simulated.hands import KINDS as HANDS
+from mpucal.simulated.faults import OF_CHIP, Fault, fault_kinds
+from mpucal.simulated.hands import HANDS
 from mpucal.simulated.mishaps import ZeroStep
 
 from .judge import rms
@@ -61,7 +61,7 @@ SABOTAGE = {
 TEMPERATURE_C, NEAR_C, NEAR = 27.0, 0.3, 2e-3
 DAMAGES = {"zero": None, "byte": "low_byte", "bits": "bit_errors", "none": None}
 DAMAGED_S, STEP_MG = (12.0, 75.0), (3.0, 30.0)
-FAULTS = tuple(kinds(*OF_CHIP))
+FAULTS = tuple(fault_kinds(*OF_CHIP))
 PAIR = "a pair"
 COMBINATIONS = [*FAULTS, *map("/".join, combinations_with_replacement(FAULTS, 2))]
 CHIPS = ("mpu6050", "mpu6500", "clone98")

@@ -33,7 +33,7 @@ from typing import NoReturn
 
 from mpucal.errors import LinkError, MpucalError, UsageError
 from mpucal.mavlink.signing import read_key
-from mpucal.simulated.faults import OF_VEHICLE, Where, kinds
+from mpucal.simulated.faults import OF_VEHICLE, Where, fault_kinds
 from mpucal.simulated.vehicle import SimulatedVehicle, VehicleOptions
 from mpucal.simulated.vehicle.line import PacketLine
 
@@ -181,8 +181,8 @@ class Ride:
     def go_on(self, until_us: int) -> None:
         """Hear what came, and live until `until_us`."""
         for data in self._port.receive():
-            self._vehicle.hear(data, self._port.datagrams)
-        for data in self._line.carry([packet.data for packet in self._vehicle.go_on(until_us)]):
+            self._vehicle.receive(data, self._port.datagrams)
+        for data in self._line.carry([packet.data for packet in self._vehicle.run_until(until_us)]):
             self._port.send(data)
 
 
@@ -201,7 +201,7 @@ def run(rides: Sequence[Ride], speed: float) -> NoReturn:
 
 def main() -> int:
     """Run it; the exit code."""
-    faults = "\n".join(f"  {name:<16}{kind.what}" for name, kind in kinds(*OF_VEHICLE, Where.HAND).items())
+    faults = "\n".join(f"  {name:<16}{kind.what}" for name, kind in fault_kinds(*OF_VEHICLE, Where.HAND).items())
     parser = argparse.ArgumentParser(
         description=__doc__, epilog=f"faults:\n{faults}", formatter_class=argparse.RawDescriptionHelpFormatter
     )

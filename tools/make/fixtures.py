@@ -30,7 +30,7 @@ from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.session.events import Key, Output, Progress
 from mpucal.session.plan import Plan
 from mpucal.simulated.chip import open_simulated
-from mpucal.simulated.faults import OF_CHIP, kinds
+from mpucal.simulated.faults import OF_CHIP, fault_kinds
 from mpucal.sources.opening import reopen_source
 from mpucal.sources.tap import Tap
 from mpucal.terminal.keys import Keys
@@ -150,7 +150,7 @@ def made_of_it(recording: Recording, why: str | None) -> dict[str, Any]:
 
 def make_faults(folder: Path) -> None:
     """Make the captures of faulty runs."""
-    for name in kinds(*OF_CHIP):
+    for name in fault_kinds(*OF_CHIP):
         simulated = open_simulated(f"sim:seed=8,chip=mpu6500,fault={name}@{FAULT_S:g}")
         with CaptureWriter(folder / f"{name}.mcap") as writer:
             writer.start(FAULTY.meta())

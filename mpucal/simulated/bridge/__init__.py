@@ -14,9 +14,9 @@ from ...sources.bridge import messages as wire
 from ...sources.bridge.clock import US, WRAP_US
 from ...sources.bridge.frame import Deframer, Frame
 from ...sources.bridge.messages import Frames, Message, Reply, Status
-from .keeper import Keeper
+from .blob_handler import BlobHandler
+from .frame_streamer import FrameStreamer
 from .line import EmulatedLine
-from .pusher import Pusher
 from .storage import Memory
 
 __all__ = ["EmulatedBridge", "EmulatedLine", "Memory"]
@@ -48,14 +48,14 @@ class EmulatedBridge:
         window: int = 4,
     ) -> None:
         self._chip, self._now_ns, self._address = chip, now_ns, address
-        self._keeper = Keeper(memory or Memory())
+        self._blobs = BlobHandler(memory or Memory())
         self._features, self._window = features, window
         self._deframer = Deframer()
         self._inbox: list[Frame] = []
         self._greeted = False
         self._chosen = 0
         self._drops = 0
-        self._pusher: Pusher | None = None
+        self._streamer: FrameStreamer | None = None
 
     def receive(self, data: bytes) -> None:
         """Bytes came in."""
@@ -65,9 +65,9 @@ class EmulatedBridge:
         """Do what there is to do, and return what goes out; to be called once a millisecond."""
         out = [self._handle(frame) for frame in self._inbox]
         self._inbox.clear()
-        pusher = self._pusher
-        if pusher is not None:
-            out += [_encoded(Frames.TYPE, pusher.seq, frames) for frames in pusher.look()]
+        streamer = self._streamer
+        if streamer is not None:
+            out += [_encoded(Frames.TYPE, streamer.seq, frames) for frames in streamer.look()]
         return b"".join(out)
 
     def _handle(self, frame: Frame) -> bytes:
@@ -105,7 +105,7 @@ class EmulatedBridge:
             case wire.Stream() if wire.Feature.STREAM in self._features:
                 return [self._stream(request, seq)]
             case wire.Message() if wire.Feature.BLOB in self._features:
-                reply = self._keeper.answer(request, self._time())
+                reply = self._blobs.answer(request, self._time())
                 if isinstance(request, wire.BlobBegin) and reply.status == Status.OK:
                     self._stop()
                 return [reply]
@@ -124,11 +124,11 @@ class EmulatedBridge:
         if status == Status.OK:
             asked = (request.address,) if request.address else ADDRESSES
             self._chosen = self._address if self._chip is not None and self._address in asked else 0
-            self._greeted, self._pusher, self._drops = True, None, 0
-            self._keeper.give_up()
+            self._greeted, self._streamer, self._drops = True, None, 0
+            self._blobs.give_up()
         room = MAX_LENGTH if wire.Feature.BLOB in self._features else 0
         identity = (wire.MAGIC, wire.MAJOR, wire.MINOR, self._chosen)
-        occupied = wire.Feature.OCCUPIED if room and self._keeper.occupied else 0
+        occupied = wire.Feature.OCCUPIED if room and self._blobs.occupied else 0
         return wire.HelloReply(
             status, self._time(), *identity, self._features | occupied, self._window, room, NAME.ljust(16, b"\0")
         )
@@ -165,12 +165,12 @@ class EmulatedBridge:
             return self._said(Status.BAD_PAYLOAD)
         self._stop()
         if request.frame_bytes:
-            self._pusher = Pusher(self._bus, seq, request, self._drops, self._now_ns)
+            self._streamer = FrameStreamer(self._bus, seq, request, self._drops, self._now_ns)
         return wire.StreamReply(Status.OK, self._time())
 
     def _stop(self) -> None:
-        if self._pusher is not None:
-            self._drops, self._pusher = self._pusher.drops, None
+        if self._streamer is not None:
+            self._drops, self._streamer = self._streamer.drops, None
 
 
 def _encoded(kind: int, seq: int, reply: Reply) -> bytes:

@@ -94,12 +94,12 @@ class SlotStorage:
         generation, check = HEADER.unpack_from(data)
         body = data[HEADER.size :]
         blob = body[: int.from_bytes(body[LENGTH_AT : LENGTH_AT + 2], "little")]
-        if generation ^ check != WRAP - 1 or not acceptable(blob):
+        if generation ^ check != WRAP - 1 or not is_valid_blob(blob):
             return None
         return Stored(slot, generation, blob)
 
 
-def acceptable(blob: bytes) -> bool:
+def is_valid_blob(blob: bytes) -> bool:
     """Whether a reader may accept it."""
     try:
         Blob.decode(blob)

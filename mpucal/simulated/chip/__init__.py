@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...data import STANDARD_GRAVITY_MPS2
-from ..faults import mishaps as begun
-from ..hands import KINDS
+from ..faults import begin_mishaps
+from ..hands import HANDS
 from ..mishaps import Mishap
 from ..motion import Motion
 from ..sensor import SensorTruth
 from .bus import SimulatedBus
 from .chip import Chip
 from .clock import CLOCKS, FastClock, SimulatedClock
-from .factory import Factory
-from .faults import Faults
+from .factory import FactoryTrim
+from .fault_injector import FaultInjector
 from .feed import Feed, RecordedFeed, SensorFeed
 from .models import MODELS, OFFSETS
 from .options import ChipOptions
@@ -50,14 +50,14 @@ def open_simulated(
     options = ChipOptions.parse(text, seed)
     truth = _truth(options, gravity)
     of_hand, of_motion, of_noise, of_trim, of_faults = np.random.default_rng([options.seed, 2]).spawn(5)
-    motion = Motion(KINDS[options.hand](of_hand), of_motion, gravity, (*begun(options.fault), *mishaps))
+    motion = Motion(HANDS[options.hand](of_hand), of_motion, gravity, (*begin_mishaps(options.fault), *mishaps))
     model = replace(MODELS[options.chip], **OFFSETS[options.offsets])
     if options.who_am_i is not None:
         model = replace(model, who_am_i=options.who_am_i)
-    factory = Factory.draw(of_trim, model.family)
+    factory = FactoryTrim.draw(of_trim, model.family)
     chip = Chip(model, SensorFeed(truth, motion, of_noise), truth.rate_error_ppm, factory)
     clock = clock or CLOCKS[options.pace]()
-    faults = Faults(options.fault, chip, clock, of_faults) if options.fault else None
+    faults = FaultInjector(options.fault, chip, clock, of_faults) if options.fault else None
     return SimulatedBus(chip, clock, motion, truth, faults, options.khz)
 
 
@@ -80,7 +80,7 @@ def open_recorded(
     RecordingError : counts that are no int16, or not as many of both.
     """
     feed = RecordedFeed(acc_counts, gyr_counts, rate_hz, accel_range_g, gyro_range_dps)
-    return SimulatedBus(Chip(MODELS[chip], feed, rate_error_ppm, Factory()), FastClock())
+    return SimulatedBus(Chip(MODELS[chip], feed, rate_error_ppm, FactoryTrim()), FastClock())
 
 
 def _truth(options: ChipOptions, gravity: float) -> SensorTruth:

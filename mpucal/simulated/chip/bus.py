@@ -11,7 +11,7 @@ from ..motion import Motion
 from ..sensor import SensorTruth
 from .chip import Chip
 from .clock import RealClock, SimulatedClock
-from .faults import Faults
+from .fault_injector import FaultInjector
 
 KHZ = 400
 NAME, ADDRESS = "the simulated bus", 0x68
@@ -33,7 +33,7 @@ class SimulatedBus:
         clock: SimulatedClock,
         motion: Motion | None = None,
         truth: SensorTruth | None = None,
-        faults: Faults | None = None,
+        faults: FaultInjector | None = None,
         khz: float = KHZ,
     ) -> None:
         self._chip, self._clock, self._motion, self._truth, self._faults = chip, clock, motion, truth, faults

@@ -12,7 +12,7 @@ from ...chip.families import Family, WordGroup
 from ...data import Vector
 from ...errors import EndOfCapture
 from ..sensor import Counts, Setting
-from .factory import Factory, Three
+from .factory import FactoryTrim, Three
 from .feed import Feed
 from .fifo import Fifo
 from .models import Model
@@ -34,7 +34,7 @@ class Chip:
     factory : what this piece brings along.
     """
 
-    def __init__(self, model: Model, feed: Feed, rate_error_ppm: float, factory: Factory) -> None:
+    def __init__(self, model: Model, feed: Feed, rate_error_ppm: float, factory: FactoryTrim) -> None:
         self._model, self._feed, self._factory = model, feed, factory
         self._speed = 1 + rate_error_ppm * 1e-6
         self._writable = model.writable()
@@ -138,7 +138,7 @@ class Chip:
 
     # What goes wrong with it.
 
-    def hurry(self, factor: float, t_ns: int) -> None:
+    def change_speed(self, factor: float, t_ns: int) -> None:
         """Its sample clock runs `factor` times as fast from now on."""
         self._advance(t_ns)
         self._collect()
@@ -150,16 +150,16 @@ class Chip:
         self._collect()
         self._frozen_until_ns, self._frozen = until_ns, None
 
-    def stick(self, word: int, bits: int) -> None:
+    def clear_bits(self, word: int, bits: int) -> None:
         """These bits of a sample's word number `word` are 0 from now on."""
         self._collect()
         self._stuck.append((word, bits))
 
-    def pin(self, words: tuple[int, ...], count: int) -> None:
+    def hold_words(self, words: tuple[int, ...], count: int) -> None:
         """These words of a sample stay at `count`, whatever it measures."""
         self._pinned.append((words, count))
 
-    def slip(self, t_ns: int) -> None:
+    def lose_fifo_byte(self, t_ns: int) -> None:
         """Its FIFO loses a byte."""
         self._advance(t_ns)
         self._collect()
@@ -272,7 +272,7 @@ def _columns(sources: int, family: Family) -> list[int]:
     return [word for group in family.frame for word, bit in WORD_BITS[group] if sources & bit]
 
 
-def _setting(registers: bytearray, rate_hz: float, model: Model, factory: Factory) -> Setting:
+def _setting(registers: bytearray, rate_hz: float, model: Model, factory: FactoryTrim) -> Setting:
     """What the registers say about how to measure."""
     accel, gyro = registers[reg.ACCEL_CONFIG], registers[reg.GYRO_CONFIG]
     ax, ay, az = (

@@ -25,7 +25,7 @@ SELF_TEST_SPREAD = 0.05
 
 
 @dataclass(frozen=True)
-class Factory:
+class FactoryTrim:
     """One piece.
 
     Attributes

@@ -7,7 +7,7 @@ from typing import Any
 
 from ...chip import registers as reg
 from ...chip.families import ICM20602, ICM20689, ICM20690, MPU6050, MPU6500, MPU6880, MPU6886, Family
-from .factory import Factory
+from .factory import FactoryTrim
 
 AWAKE = 0x01
 
@@ -60,7 +60,7 @@ class Model:
         """The bits of FIFO_EN that it keeps."""
         return self.family.fifo_en_frame
 
-    def reset_values(self, factory: Factory) -> bytearray:
+    def reset_values(self, factory: FactoryTrim) -> bytearray:
         """All 128 registers after a reset, with what the factory left in this piece."""
         values = bytearray(128)
         values[reg.PWR_MGMT_1] = reg.PWR_MGMT_1_SLEEP if self.family.asleep else AWAKE

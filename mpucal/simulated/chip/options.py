@@ -9,8 +9,8 @@ import numpy as np
 
 from ...data import Vector
 from ..faults import OF_CHIP, Fault, Where
-from ..hands import KINDS
-from ..words import FAULT, Parser, at_least, faults, number, one_of, parsed, whole
+from ..hands import HANDS
+from ..option_text import FAULT, Parser, at_least, faults, number, one_of, parse_options, whole
 from .bus import KHZ
 from .clock import CLOCKS
 from .models import MODELS, OFFSETS
@@ -58,7 +58,7 @@ class ChipOptions:
         ------
         UsageError : an unknown key or value, a key given twice, or two seeds.
         """
-        return cls(**parsed(text, PARSERS, seed))
+        return cls(**parse_options(text, PARSERS, seed))
 
 
 def _positive(text: str) -> float:
@@ -89,7 +89,7 @@ PARSERS: dict[str, Parser] = {
     "who_am_i": (_identity, "a byte such as 0x68"),
     "offsets": one_of(OFFSETS),
     "seed": whole(0),
-    "hand": one_of(KINDS),
+    "hand": one_of(HANDS),
     "pace": one_of(CLOCKS),
     FAULT: faults(*OF_CHIP, Where.DEFECT, Where.HAND),
     "rate_error_ppm": (number, "a number"),

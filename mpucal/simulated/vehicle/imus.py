@@ -9,9 +9,9 @@ import numpy as np
 
 from ...data import Vector
 from ...mavlink.prompts import Direction, ReceivedPrompt
-from ..faults import mishaps
+from ..faults import begin_mishaps
 from ..hand import HandPrompt
-from ..hands import KINDS
+from ..hands import HANDS
 from ..motion import Motion
 from ..sensor import SensorResponse, SensorTruth, Setting
 from .options import VehicleOptions
@@ -36,7 +36,7 @@ class Imus:
 
     def __init__(self, options: VehicleOptions, rotation: Vector, rate_hz: float, gravity: float) -> None:
         of_hand, of_motion, self._rng = np.random.default_rng([options.seed, 3]).spawn(3)
-        self._motion = Motion(KINDS[options.hand](of_hand), of_motion, gravity, mishaps(options.fault))
+        self._motion = Motion(HANDS[options.hand](of_hand), of_motion, gravity, begin_mishaps(options.fault))
         self._rotation, self._rate_hz = rotation, rate_hz
         self.truths = tuple(_truth(options.seed, number, gravity) for number in range(options.imus))
         self._setting = Setting(rate_hz, ACCEL_RANGE_G, GYRO_RANGE_DPS, lsb_per_c=333.87, zero_c=21.0)
@@ -51,7 +51,7 @@ class Imus:
     def hear(self, prompt: HandPrompt, t_s: float) -> None:
         """The hand hears `prompt`, whose `down` is in the vehicle's axes."""
         down = prompt.down
-        self._motion.hear(ReceivedPrompt(str(prompt.kind), None if down is None else turned_over(down)), t_s)
+        self._motion.hear(ReceivedPrompt(str(prompt.kind), None if down is None else to_hand_axes(down)), t_s)
 
     def restart(self) -> None:
         """The autopilot takes the gyroscopes' biases anew, and leaves a little of each."""
@@ -88,7 +88,7 @@ class Imus:
         return np.stack((acc, gyr), axis=1)
 
 
-def turned_over(down: Direction) -> Direction:
+def to_hand_axes(down: Direction) -> Direction:
     """The same direction in the hand's axes."""
     x, y, z = down
     return x, -y, -z

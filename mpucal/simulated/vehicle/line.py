@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from random import Random
 
-from ..faults import KINDS, Fault, Where
+from ..faults import FAULTS, Fault, Where
 
 LATE_BY = 3
 
@@ -40,4 +40,4 @@ class PacketLine:
         return out
 
     def _befalls(self, name: str) -> bool:
-        return name in self._suffered and self._random.random() < KINDS[name].share
+        return name in self._suffered and self._random.random() < FAULTS[name].share

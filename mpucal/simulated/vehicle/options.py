@@ -8,8 +8,8 @@ from typing import Self
 
 from ...mavlink.parameters.mounting import CUSTOM_ANGLES
 from ..faults import OF_VEHICLE, Fault, Where
-from ..hands import KINDS
-from ..words import FAULT, Parser, at_least, faults, one_of, parsed, whole
+from ..hands import HANDS
+from ..option_text import FAULT, Parser, at_least, faults, one_of, parse_options, whole
 
 FIRMWARES = ("ardupilot", "px4")
 TYPES = ("copter", "plane", "rover")
@@ -58,7 +58,7 @@ class VehicleOptions:
         ------
         UsageError : an unknown key or value, a key given twice, or two seeds.
         """
-        return cls(**parsed(text, PARSERS, seed, "parameters"))
+        return cls(**parse_options(text, PARSERS, seed, "parameters"))
 
     def suffers(self, name: str) -> bool:
         """Whether this fault is among those asked for."""
@@ -80,7 +80,7 @@ PARSERS: dict[str, Parser] = {
     "rotation": (_orientation, "a MAV_SENSOR_ORIENTATION: 0 to 40, 100 to 102"),
     "highres": (lambda text: {"yes": True, "no": False}[text], "yes or no"),
     "seed": whole(0),
-    "hand": one_of(KINDS),
+    "hand": one_of(HANDS),
     "pace": one_of(PACES),
     "rotate_at": at_least(0),
     FAULT: faults(*OF_VEHICLE, Where.HAND),

@@ -38,7 +38,7 @@ class SimulatedTransport:
     def receive(self, until_ns: int) -> ReceivedBytes | None:
         """See Transport."""
         while not self._queue and self.now_ns() < until_ns:
-            sent = self._vehicle.go_on_to_next(-(-(until_ns - self._begun_ns) // US))
+            sent = self._vehicle.run_to_next(-(-(until_ns - self._begun_ns) // US))
             self._keep_pace()
             self._queue.extend(
                 ReceivedBytes(data, ADDRESS, self.now_ns()) for data in self._line.carry([s.data for s in sent])
@@ -47,7 +47,7 @@ class SimulatedTransport:
 
     def send(self, data: bytes, address: str | None) -> None:
         """See Transport."""
-        self._vehicle.hear(data)
+        self._vehicle.receive(data)
 
     def restrict(self, address: str | None) -> None:
         """See Transport: it is the only one."""

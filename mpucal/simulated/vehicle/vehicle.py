@@ -87,7 +87,7 @@ class SimulatedVehicle:
         """Whether it sends and hears nothing now, as while it boots."""
         return self._now_us < self._silent_until_us
 
-    def hear(self, data: bytes, datagram: bool = True) -> None:
+    def receive(self, data: bytes, datagram: bool = True) -> None:
         """Bytes arrive now: a datagram of whole packets, or a piece of a stream."""
         if self.silent:
             return
@@ -99,14 +99,14 @@ class SimulatedVehicle:
             if answer is not None and getattr(packet.message, "target_system", 0) in (0, self.options.system):
                 answer(self, packet.message)
 
-    def go_on(self, until_us: int) -> list[Sent]:
+    def run_until(self, until_us: int) -> list[Sent]:
         """Live until `until_us`; the packets that went out since the last call."""
         while self._now_us + self.firmware.tick_us <= until_us:
             self._live(until_us)
         return self._taken()
 
-    def go_on_to_next(self, until_us: int) -> list[Sent]:
-        """Live until it may have sent something, and no longer than the first tick from `until_us` on; see `go_on`."""
+    def run_to_next(self, until_us: int) -> list[Sent]:
+        """Live until it may have sent something, and no longer than the first tick from `until_us` on; see `run_until`."""
         tick_us = self.firmware.tick_us
         self._live(max(-(-until_us // tick_us), self._now_us // tick_us + 1) * tick_us)
         return self._taken()

@@ -24,7 +24,7 @@ from umockdev import Testbed
 from mpucal.chip.access import Reply
 from mpucal.simulated.chip import Chip, RecordedFeed, SimulatedBus, open_simulated
 from mpucal.simulated.chip.clock import CLOCKS, SimulatedClock
-from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS
 
 NODE, SPI_NODE, STILL, CLOCK_CHIP = "/dev/i2c-1", "/dev/spidev0.0", "still", "DS3231"
@@ -94,7 +94,7 @@ def open_bus(text: str, clock: Path) -> SimulatedBus | ClockChip:
     if text == STILL:
         counts = [(12, -34, 4096)] * 10_000, [(56, -78, 90)] * 10_000
         feed = RecordedFeed(*counts, rate_hz=200.0, accel_range_g=8.0, gyro_range_dps=500.0)
-        return SimulatedBus(Chip(MODELS["mpu6050"], feed, 2500.0, Factory()), SharedClock(clock))
+        return SimulatedBus(Chip(MODELS["mpu6050"], feed, 2500.0, FactoryTrim()), SharedClock(clock))
 
     def shared() -> SimulatedClock:
         return SharedClock(clock)

@@ -8,12 +8,12 @@ import pytest
 from mpucal.chip import registers as reg
 from mpucal.errors import EndOfCapture
 from mpucal.simulated.chip.chip import Chip
-from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS, OFFSETS
 
 MS = 1_000_000
 TRIM = (-1500, 2001, 700)
-PIECE = Factory(TRIM, (13, 22, 31), (9, 1, 30), (0.4, 0.5, 0.6), (30.0, -40.0, 50.0))
+PIECE = FactoryTrim(TRIM, (13, 22, 31), (9, 1, 30), (0.4, 0.5, 0.6), (30.0, -40.0, 50.0))
 
 
 class Counter:
@@ -340,7 +340,7 @@ def test_self_test_adds_what_the_piece_answers_on_the_axes_asked_for(model):
 def test_a_drawn_piece_answers_its_self_test_as_its_codes_say(model):
     family = MODELS[model].family
     for seed in range(20):
-        piece = Factory.draw(np.random.default_rng(seed), family)
+        piece = FactoryTrim.draw(np.random.default_rng(seed), family)
         for axis in range(3):
             accel, gyro = piece.accel_codes[axis], piece.gyro_codes[axis]
             if family.packed_self_test:

@@ -19,10 +19,10 @@ from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.bus import SimulatedBus
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.chip.factory import Factory
-from mpucal.simulated.chip.faults import Faults
+from mpucal.simulated.chip.factory import FactoryTrim
+from mpucal.simulated.chip.fault_injector import FaultInjector
 from mpucal.simulated.chip.models import MODELS
-from mpucal.simulated.faults import OF_CHIP, Fault, kinds
+from mpucal.simulated.faults import OF_CHIP, Fault, fault_kinds
 from mpucal.sources.replay import ReplayBus
 
 CAPTURES = Path(__file__).parents[3] / "fixtures" / "faults"
@@ -46,8 +46,8 @@ class NumberedFeed:
 
 def suffering(*faults, model="mpu6050", seed=0):
     clock = FastClock()
-    chip = Chip(MODELS[model], NumberedFeed(), 3000.0, Factory())
-    return SimulatedBus(chip, clock, faults=Faults(faults, chip, clock, np.random.default_rng(seed)))
+    chip = Chip(MODELS[model], NumberedFeed(), 3000.0, FactoryTrim())
+    return SimulatedBus(chip, clock, faults=FaultInjector(faults, chip, clock, np.random.default_rng(seed)))
 
 
 @pytest.mark.parametrize("text", ["melt@3", "nack", "nack@", "nack@-1", "nack@inf", "nack@1/", "@3"])
@@ -145,7 +145,7 @@ def test_what_lasts_is_given_up_with_its_cause(name, says):
 # of which no driver can know that they are not what was measured
 UNSEEN = {"low_byte", "high_bit"}
 places = st.builds(
-    Fault, st.sampled_from(sorted({*kinds(*OF_CHIP)} - UNSEEN)), st.floats(0, 4).map(lambda t: round(t, 3))
+    Fault, st.sampled_from(sorted({*fault_kinds(*OF_CHIP)} - UNSEEN)), st.floats(0, 4).map(lambda t: round(t, 3))
 )
 
 
@@ -176,7 +176,7 @@ def test_whatever_happens_what_is_delivered_is_true(faults, model, rate_hz, seed
         assert not ((steps != 1) & ~recording.gap[1:]).any()
 
 
-@pytest.mark.parametrize("name", kinds(*OF_CHIP))
+@pytest.mark.parametrize("name", fault_kinds(*OF_CHIP))
 def test_the_capture_of_a_fault_replays(name):
     capture = read_capture(CAPTURES / f"{name}.mcap")
     found = json.loads((CAPTURES / f"{name}.json").read_text())

@@ -33,7 +33,7 @@ class Station:
         self._parser = Parser(dialect().MAVLink(None))
 
     def say(self, kind, *fields):
-        self.vehicle.hear(bytes(getattr(self.mav, f"{kind}_encode")(*fields).pack(self.mav)))
+        self.vehicle.receive(bytes(getattr(self.mav, f"{kind}_encode")(*fields).pack(self.mav)))
 
     def command(self, number, *params):
         self.say("command_long", 1, 1, number, 0, *params, *[0] * (7 - len(params)))
@@ -47,7 +47,7 @@ class Station:
         return self.hear(0.01)
 
     def hear(self, seconds):
-        sent = self.vehicle.go_on(self.vehicle.now_us + round(seconds * S_US))
+        sent = self.vehicle.run_until(self.vehicle.now_us + round(seconds * S_US))
         return [packet.message for one in sent for packet in self._parser.datagram(one.data)]
 
     def rates(self, seconds=2.0):
@@ -56,7 +56,7 @@ class Station:
 
     def rest(self):
         """Set it down."""
-        self.vehicle.hear(bytes(encode_prompt(ReceivedPrompt("lay_flat", None)).pack(self.mav)))
+        self.vehicle.receive(bytes(encode_prompt(ReceivedPrompt("lay_flat", None)).pack(self.mav)))
         self.hear(5.0)
 
 
@@ -135,7 +135,7 @@ def test_how_its_time_is_moved_on_changes_nothing(words):
         for message_id in (HIGHRES, RAW, SCALED, SCALED2):
             station.interval(message_id, 100)
         station.set("CAL_ACC0_XOFF" if "px4" in words else "INS_ACCOFFS_X", 0.25)
-        sent.append([packet for stop_us in stops_us for packet in station.vehicle.go_on(stop_us)])
+        sent.append([packet for stop_us in stops_us for packet in station.vehicle.run_until(stop_us)])
     assert sent[0] == sent[1] == sent[2]
     assert len(sent[0]) > 300
 
@@ -239,7 +239,7 @@ def test_the_hand_obeys_prompts():
         return -f / np.linalg.norm(f)
 
     assert down() @ [0, 0, 1] > 0.98
-    station.vehicle.hear(bytes(encode_prompt(ReceivedPrompt("rotate", (1.0, 0.0, 0.0))).pack(station.mav)))
+    station.vehicle.receive(bytes(encode_prompt(ReceivedPrompt("rotate", (1.0, 0.0, 0.0))).pack(station.mav)))
     assert down() @ [1, 0, 0] > 0.9
 
 

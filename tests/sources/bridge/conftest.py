@@ -15,7 +15,7 @@ from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
 from mpucal.simulated.chip import SimulatedBus
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS
 from mpucal.sources.bridge import bus, link
 from mpucal.sources.bridge.bus import BridgeBus
@@ -42,7 +42,7 @@ class Rig(SimpleNamespace):
 
     def new_chip(self):
         """One that has just got its supply."""
-        self.chip = SimulatedBus(Chip(MODELS[self.model], NumberedFeed(), 2500.0, Factory()), self.clock)
+        self.chip = SimulatedBus(Chip(MODELS[self.model], NumberedFeed(), 2500.0, FactoryTrim()), self.clock)
 
     def new_bridge(self, boot_ns=0, **how):
         """One that has just got its supply, with the chip there is."""

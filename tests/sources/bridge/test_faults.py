@@ -13,9 +13,9 @@ from mpucal.errors import BusError, MpucalError, NoAnswer, WriteBackError
 from mpucal.result.blob import Blob
 from mpucal.result.calibration import Calibration
 from mpucal.simulated.bridge import EmulatedLine, Memory
-from mpucal.simulated.bridge.spoilt import SpoiltBytes
+from mpucal.simulated.bridge.line_faults import LineFaults
 from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.faults import Where, kinds
+from mpucal.simulated.faults import Where, fault_kinds
 from mpucal.sinks.bridge import BridgeSink
 from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.bridge.link import Link
@@ -25,7 +25,7 @@ from mpucal.sources.bridge.store import BlobStore
 MS = 1_000_000
 
 faults = st.lists(
-    st.tuples(st.integers(0, 4000), st.sampled_from(list(kinds(Where.SERIAL))), st.integers(1, 255)),
+    st.tuples(st.integers(0, 4000), st.sampled_from(list(fault_kinds(Where.SERIAL))), st.integers(1, 255)),
     max_size=8,
 )
 
@@ -42,8 +42,8 @@ def test_spoiled_bytes(rig, numbers, stream, to_host, to_device, rate_hz):
     made = rig()
     driver = Driver(made.bus(), Config(rate_hz=rate_hz))
     made.line.to_host, made.line.to_device = (
-        SpoiltBytes(to_host),
-        SpoiltBytes([(n // 16, *rest) for n, *rest in to_device]),
+        LineFaults(to_host),
+        LineFaults([(n // 16, *rest) for n, *rest in to_device]),
     )
     driver.start()
     while made.line.to_host.number < 4000:
@@ -311,8 +311,8 @@ def test_spoiled_bytes_never_leave_a_part_of_a_blob(rig, to_host, to_device):
     store = store_on(made.line)
     store.write(old)
     made.line.to_host, made.line.to_device = (
-        SpoiltBytes([(n // 16, *rest) for n, *rest in to_host]),
-        SpoiltBytes([(n // 10, *rest) for n, *rest in to_device]),
+        LineFaults([(n // 16, *rest) for n, *rest in to_host]),
+        LineFaults([(n // 10, *rest) for n, *rest in to_device]),
     )
     try:
         store.write(new)
@@ -351,8 +351,8 @@ def test_the_sink_says_truly_which_calibration_is_there(rig, held_before, bytes_
     made.line.device = Reset(shaky, lambda: made.new_bridge(memory=memory))
     sink = BridgeSink(store_on(made.line))
     made.line.to_host, made.line.to_device = (
-        SpoiltBytes([(n // 16, *rest) for n, *rest in to_host]),
-        SpoiltBytes([(n // 10, *rest) for n, *rest in to_device]),
+        LineFaults([(n // 16, *rest) for n, *rest in to_host]),
+        LineFaults([(n // 10, *rest) for n, *rest in to_device]),
     )
     try:
         sink.write(calibration)

@@ -13,7 +13,7 @@ from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.simulated.bridge import EmulatedBridge, EmulatedLine
 from mpucal.simulated.chip import Chip, SimulatedBus
 from mpucal.simulated.chip.clock import FastClock
-from mpucal.simulated.chip.factory import Factory
+from mpucal.simulated.chip.factory import FactoryTrim
 from mpucal.simulated.chip.models import MODELS
 from mpucal.sources.bridge.bus import BridgeBus
 from mpucal.sources.replay import ReplayBus
@@ -43,7 +43,7 @@ def recorded(tmp_path):
 
     def run(seconds, ppm, drift_ppm_a_minute=0.0, burst_ms=1, rate_error_ppm=2500.0, reset_s=None):
         clock = FastClock()
-        chip = SimulatedBus(Chip(MODELS["mpu6050"], Counting(), rate_error_ppm, Factory()), clock)
+        chip = SimulatedBus(Chip(MODELS["mpu6050"], Counting(), rate_error_ppm, FactoryTrim()), clock)
         drift = 0.5 * drift_ppm_a_minute * 1e-6 / 60 * 1e-9
 
         def shown():

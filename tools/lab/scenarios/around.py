@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpucal.data import STANDARD_GRAVITY_MPS2, Vector
-from mpucal.simulated.habits import JERK_MPS2, SWAY_HZ, TREMOR_HZ, Habits
+from mpucal.simulated.disturbance import JERK_MPS2, SWAY_HZ, TREMOR_HZ, HandDisturbance
 
 from .course import FLAT_S, Course, Rng, Span, direction, within
 from .shaking import PIVOT_HZ
@@ -22,7 +22,7 @@ Around = Callable[[Course, Rng], Push]
 
 
 @dataclass(frozen=True)
-class Hand(Habits):
+class Hand(HandDisturbance):
     """A hand with the sensor on a lever; `passes`: how often the pivot changes place, as from one hand to the other."""
 
     lever_m: Span = (0.1, 0.3)

@@ -10,8 +10,8 @@ import numpy as np
 
 from mpucal.data import STANDARD_GRAVITY_MPS2, Recording, Sensor, Vector
 from mpucal.errors import UsageError
-from mpucal.simulated.habits import Habits
-from mpucal.simulated.sensor import InSi, SensorTruth, quantised
+from mpucal.simulated.disturbance import HandDisturbance
+from mpucal.simulated.sensor import SensorTruth, SiSetting, quantise
 
 from .motions import (
     CHECK_S,
@@ -50,14 +50,14 @@ class Simulated:
     attitude: Vector
 
 
-_USUAL = Habits()
-_CALM = Habits(lever_m=(0.0, 0.0), sway_mps2=0.0, jerks_per_s=3.0)
+_USUAL = HandDisturbance()
+_CALM = HandDisturbance(lever_m=(0.0, 0.0), sway_mps2=0.0, jerks_per_s=3.0)
 
 
 @dataclass(frozen=True)
 class _Scene:
     motion: Callable[[Vector, np.random.Generator], tuple[Vector, Vector]]
-    habits: Habits = _USUAL
+    habits: HandDisturbance = _USUAL
     perfect_gyro: bool = False
     moving_s: float = MOVING_S
 
@@ -70,8 +70,8 @@ _SCENES = {
     "check": _Scene(three_orientations, moving_s=CHECK_S),
     "check as asked": _Scene(as_asked, moving_s=CHECK_S),
     "continuous": _Scene(continuous),
-    "wobble30": _Scene(continuous, Habits(wobble=0.3)),
-    "wobble100": _Scene(continuous, Habits(wobble=1.0)),
+    "wobble30": _Scene(continuous, HandDisturbance(wobble=0.3)),
+    "wobble100": _Scene(continuous, HandDisturbance(wobble=1.0)),
     "turns": _Scene(three_turns),
     "calm jerks": _Scene(continuous, _CALM, perfect_gyro=True),
 }
@@ -155,8 +155,8 @@ def _measured(
 ) -> Simulated:
     """What the sensor reads, in steps [m/s^2, rad/s], of the rates omega and the specific force s + a, all (n, 3)."""
     normal = np.hstack((rng.standard_normal(s.shape), np.zeros((len(s), 1)), rng.standard_normal(s.shape)))
-    y = sensor.response(InSi(rate_hz)).values(s + a, omega, normal)
-    (acc, acc_clipped), (gyr, gyr_clipped) = quantised(y[:, :3], steps[0]), quantised(y[:, 4:], steps[1])
+    y = sensor.response(SiSetting(rate_hz)).values(s + a, omega, normal)
+    (acc, acc_clipped), (gyr, gyr_clipped) = quantise(y[:, :3], steps[0]), quantise(y[:, 4:], steps[1])
     truth, Q = sensor.symmetric()
     recording = Recording.from_arrays(
         np.arange(len(s)) / rate_hz,

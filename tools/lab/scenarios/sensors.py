@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mpucal.chip.families import MPU6050
 from mpucal.data import STANDARD_GRAVITY_MPS2, Mask, Vector
-from mpucal.simulated.sensor import SensorTruth, density, non_orthogonality, turned
+from mpucal.simulated.sensor import SensorTruth, density, euler_rotation, non_orthogonality
 
 Counts = NDArray[np.int32]
 
@@ -24,7 +24,7 @@ def paper_sensor(rng: np.random.Generator, rate_hz: float = 100.0) -> SensorTrut
     gain = rng.uniform(0.5, 1.5, 3)
     skew, misalignment = np.radians(rng.uniform(-30, 30, 3)), np.radians(rng.uniform(-10, 10, 3))
     return SensorTruth(
-        D=np.diag(gain) @ non_orthogonality(*skew) @ turned(-misalignment),
+        D=np.diag(gain) @ non_orthogonality(*skew) @ euler_rotation(-misalignment),
         b_a=rng.uniform(-1, 1, 3),
         K=np.eye(3),
         b_omega=rng.uniform(-1, 1, 3),
@@ -41,7 +41,7 @@ def hand_sensor(rng: np.random.Generator, perfect_gyro: bool = False) -> SensorT
     b_a, b_omega = rng.uniform(-0.08, 0.08, 3) * STANDARD_GRAVITY_MPS2, np.radians(rng.uniform(-20, 20, 3))
     error = np.where(np.eye(3, dtype=bool), rng.uniform(-0.03, 0.03, (3, 3)), rng.uniform(-0.02, 0.02, (3, 3)))
     return SensorTruth(
-        D=np.diag(gain) @ non_orthogonality(*skew) @ turned(-misalignment),
+        D=np.diag(gain) @ non_orthogonality(*skew) @ euler_rotation(-misalignment),
         b_a=b_a,
         K=np.eye(3) if perfect_gyro else np.asarray(np.linalg.inv(np.eye(3) + error)),
         b_omega=b_omega,
@@ -85,7 +85,7 @@ class Chip:
         """One sensor, in the gyroscope's own frame."""
         gains = np.diag(1.0 + rng.uniform(-self.gain, self.gain, 3))
         skew = non_orthogonality(*rng.uniform(-self.cross, self.cross, 3))
-        turn = turned(np.radians(rng.uniform(-self.misaligned_deg, self.misaligned_deg, 3)))
+        turn = euler_rotation(np.radians(rng.uniform(-self.misaligned_deg, self.misaligned_deg, 3)))
         error = rng.uniform(-self.gyro_cross, self.gyro_cross, (3, 3))
         np.fill_diagonal(error, rng.uniform(-self.gyro_gain, self.gyro_gain, 3))
         noisy = rng.uniform(0.7, 1.4, 2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mpucal.data import Vector
-from mpucal.simulated.habits import JERK_MPS2, JERK_S, SWAY_HZ, TREMOR_HZ, Habits, swing
+from mpucal.simulated.disturbance import JERK_MPS2, JERK_S, SWAY_HZ, TREMOR_HZ, HandDisturbance, point_acceleration
 
 from .course import direction
 
@@ -13,7 +13,7 @@ PIVOT_HZ = (0.05, 0.4)
 
 
 def acceleration(
-    habits: Habits, omega: Vector, moving: Vector, holding: Vector, step_s: float, rng: np.random.Generator
+    habits: HandDisturbance, omega: Vector, moving: Vector, holding: Vector, step_s: float, rng: np.random.Generator
 ) -> Vector:
     """The board's acceleration (n, 3) [m/s^2] in the body, turned by omega (n, 3) [rad/s] at steps of step_s.
 
@@ -27,12 +27,12 @@ def acceleration(
     return a
 
 
-def tremor(habits: Habits, holding: Vector, step_s: float, rng: np.random.Generator) -> Vector:
+def tremor(habits: HandDisturbance, holding: Vector, step_s: float, rng: np.random.Generator) -> Vector:
     """The rates (n, 3) [rad/s] of the tremor."""
     return habits.tremor_rad_s * holding[:, None] * band_noise(len(holding), step_s, TREMOR_HZ, rng)
 
 
-def _lever(habits: Habits, moving: Vector, step_s: float, rng: np.random.Generator) -> Vector:
+def _lever(habits: HandDisturbance, moving: Vector, step_s: float, rng: np.random.Generator) -> Vector:
     """Where the sensor is from the pivot (n, 3) [m], in the body."""
     along, length = direction(rng), rng.uniform(*habits.lever_m)
     # an rms of wobble * length over three axes
@@ -41,7 +41,7 @@ def _lever(habits: Habits, moving: Vector, step_s: float, rng: np.random.Generat
     return np.asarray(length * along + travel)
 
 
-def _jerks(habits: Habits, moving: Vector, step_s: float, rng: np.random.Generator) -> Vector:
+def _jerks(habits: HandDisturbance, moving: Vector, step_s: float, rng: np.random.Generator) -> Vector:
     """Half sines that begin while the hand moves."""
     n = len(moving)
     a = np.zeros((n, 3))
@@ -55,7 +55,7 @@ def _jerks(habits: Habits, moving: Vector, step_s: float, rng: np.random.Generat
 def lever_acceleration(omega: Vector, r: Vector, step_s: float) -> Vector:
     """The acceleration (n, 3) [m/s^2] in the body of a point r (n, 3) [m] of it, itself moving or not."""
     alpha, v = np.gradient(omega, step_s, axis=0), np.gradient(r, step_s, axis=0)
-    return np.asarray(swing(alpha, omega, r, v) + np.gradient(v, step_s, axis=0))
+    return np.asarray(point_acceleration(alpha, omega, r, v) + np.gradient(v, step_s, axis=0))
 
 
 def band_noise(n: int, step_s: float, band_hz: tuple[float, float], rng: np.random.Generator) -> Vector:

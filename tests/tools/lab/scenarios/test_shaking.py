@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mpucal.simulated.habits import Habits
+from mpucal.simulated.disturbance import HandDisturbance
 from tools.lab.scenarios import shaking
 from tools.lab.scenarios.motions import attitude
 from tools.lab.scenarios.shaking import band_noise, lever_acceleration
@@ -24,7 +24,7 @@ def test_band_noise_has_unit_rms_and_nothing_outside_its_band():
 
 
 def test_a_lever_at_constant_rate_is_centripetal():
-    a = acceleration(Habits(lever_m=(0.2, 0.2), sway_mps2=0.0, jerks_per_s=0.0))
+    a = acceleration(HandDisturbance(lever_m=(0.2, 0.2), sway_mps2=0.0, jerks_per_s=0.0))
     assert np.ptp(a, axis=0).max() < 1e-12
     assert a[0, 2] == 0
     assert 0 < np.linalg.norm(a[0]) <= 4 * 0.2
@@ -43,7 +43,9 @@ def test_a_levers_acceleration_is_the_second_derivative_of_its_path():
 
 
 def test_a_pivot_that_wobbles_shakes_a_board_that_does_not_turn():
-    rigid, wobbling = (Habits(lever_m=(0.2, 0.2), wobble=w, sway_mps2=0.0, jerks_per_s=0.0) for w in (0.0, 1.0))
+    rigid, wobbling = (
+        HandDisturbance(lever_m=(0.2, 0.2), wobble=w, sway_mps2=0.0, jerks_per_s=0.0) for w in (0.0, 1.0)
+    )
     assert (acceleration(rigid, 0 * OMEGA) == 0).all()
     # 0.2 m rms at 0.05 to 0.4 Hz: between 0.2 (2 pi 0.05)^2 and 0.2 (2 pi 0.4)^2
     rms = np.sqrt((acceleration(wobbling, 0 * OMEGA) ** 2).sum(1).mean())
@@ -52,7 +54,7 @@ def test_a_pivot_that_wobbles_shakes_a_board_that_does_not_turn():
 
 def test_jerks_come_while_the_hand_moves_and_are_as_large_as_said():
     moving = np.where(np.arange(N) < N // 2, 1.0, 0.0)
-    a = acceleration(Habits(lever_m=(0, 0), sway_mps2=0.0, jerks_per_s=1.0), 0 * OMEGA, moving)
+    a = acceleration(HandDisturbance(lever_m=(0, 0), sway_mps2=0.0, jerks_per_s=1.0), 0 * OMEGA, moving)
     size = np.linalg.norm(a, axis=1)
     assert (size[N // 2 + 120 :] == 0).all()
     assert 2 < size.max() < 12
@@ -63,7 +65,7 @@ def test_jerks_come_while_the_hand_moves_and_are_as_large_as_said():
     ("moving", "holding", "rms"), [(1, 0, 0.3), (0, 1, 0.1), (0, 0, 0.0)], ids=["sway", "tremor", "flat"]
 )
 def test_sway_while_moving_tremor_while_holding(moving, holding, rms):
-    hand = Habits(lever_m=(0, 0), jerks_per_s=0.0, tremor_mps2=0.1, tremor_rad_s=0.02)
+    hand = HandDisturbance(lever_m=(0, 0), jerks_per_s=0.0, tremor_mps2=0.1, tremor_rad_s=0.02)
     a = acceleration(hand, 0 * OMEGA, moving * ALWAYS, holding * ALWAYS)
     np.testing.assert_allclose(np.sqrt((a**2).mean(0)), rms, rtol=1e-9)
     tremor = shaking.tremor(hand, holding * ALWAYS, STEP_S, np.random.default_rng(0))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..faults import KINDS
+from ..faults import FAULTS
 
 LATE = "late"
 
 
-class SpoiltBytes:
+class LineFaults:
     """What arrives of what is sent; to be given to EmulatedLine.
 
     Parameters
@@ -34,7 +34,7 @@ class SpoiltBytes:
             name, value = self._at.get(self.number, ("", 0))
             self.number += 1
             late = late or name == LATE
-            spoils = KINDS[name].spoils if name else None
+            spoils = FAULTS[name].spoils if name else None
             made = bytes([byte]) if spoils is None else spoils(byte, value)
             if late:
                 self._held += made

@@ -5,10 +5,10 @@ from __future__ import annotations
 from ...result.blob import MAX_LENGTH
 from ...sources.bridge import messages as wire
 from ...sources.bridge.messages import Message, Reply, Status
-from .storage import Memory, SlotStorage, acceptable, crc_of
+from .storage import Memory, SlotStorage, crc_of, is_valid_blob
 
 
-class Keeper:
+class BlobHandler:
     """The blob messages of firmware_protocol.md, on a memory."""
 
     def __init__(self, memory: Memory) -> None:
@@ -85,7 +85,7 @@ class Keeper:
         if self._arrived != self._length or request.length != self._length:
             return Reply(Status.BAD_OFFSET, t_us)
         blob = self._storage.written(self._length)
-        if not acceptable(blob) or crc_of(blob) != request.crc:
+        if not is_valid_blob(blob) or crc_of(blob) != request.crc:
             return Reply(Status.BAD_BLOB, t_us)
         self._length = None
         return wire.BlobCommitReply(Status.OK, t_us, self._storage.commit())

@@ -13,7 +13,7 @@ from .chip import Chip
 from .clock import SimulatedClock
 
 
-class Faults:
+class FaultInjector:
     """What goes wrong with one bus.
 
     Parameters
@@ -29,7 +29,7 @@ class Faults:
         self._altering = [fault.kind.alters for fault in faults if fault.kind.alters is not None]
         for fault in faults:
             if fault.kind.pins is not None:
-                chip.pin(*fault.kind.pins)
+                chip.hold_words(*fault.kind.pins)
 
     def before_transfer(self) -> None:
         """What happens now, before a transfer.

@@ -14,7 +14,7 @@ BEAT_NS = 100_000_000
 INDEX_WRAP = 2**16
 
 
-class Pusher:
+class FrameStreamer:
     """One stream.
 
     Parameters

@@ -8,14 +8,16 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from ..errors import UsageError, meant
-from .faults import Fault, Where, kinds
+from .faults import Fault, Where, fault_kinds
 
 FAULT = "fault"
 # how a value is read, and what it is to be
 Parser = tuple[Callable[[str], Any], str]
 
 
-def parsed(text: str, parsers: Mapping[str, Parser], seed: int | None, others: str | None = None) -> dict[str, Any]:
+def parse_options(
+    text: str, parsers: Mapping[str, Parser], seed: int | None, others: str | None = None
+) -> dict[str, Any]:
     """The values by key of `sim` or `sim:key=value,...`; those of faults given more than once add up.
 
     Parameters
@@ -98,8 +100,8 @@ def one_of(names: Collection[str]) -> Parser:
 
 def faults(*where: Where) -> Parser:
     """One or several faults that befall any of these."""
-    timed = ", ".join(name for name, kind in kinds(*where).items() if kind.timed)
-    others = ", ".join(name for name, kind in kinds(*where).items() if not kind.timed)
+    timed = ", ".join(name for name, kind in fault_kinds(*where).items() if kind.timed)
+    others = ", ".join(name for name, kind in fault_kinds(*where).items() if not kind.timed)
     expected = f"NAME@SECONDS, or several with / between them, of {timed}"
 
     def parse(text: str) -> tuple[Fault, ...]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import Vector
-from .rotation import across
+from .rotation import cross_rows
 
 SWAY_HZ, TREMOR_HZ = (0.5, 4.0), (2.0, 10.0)
 # peak and duration of a jerk, half a sine
@@ -15,7 +15,7 @@ JERK_MPS2, JERK_S = (2.0, 6.0), (0.06, 0.12)
 
 
 @dataclass(frozen=True)
-class Habits:
+class HandDisturbance:
     """A hand's habits.
 
     Attributes
@@ -36,12 +36,12 @@ class Habits:
 
 
 # 1 deg/s over all axes
-TREMBLING = Habits(tremor_mps2=0.1, tremor_rad_s=float(np.radians(1.0) / np.sqrt(3)))
+TYPICAL_TREMOR = HandDisturbance(tremor_mps2=0.1, tremor_rad_s=float(np.radians(1.0) / np.sqrt(3)))
 
 
-def swing(alpha: Vector, omega: Vector, r: Vector, v: Vector | float = 0.0) -> Vector:
+def point_acceleration(alpha: Vector, omega: Vector, r: Vector, v: Vector | float = 0.0) -> Vector:
     """What a board that turns by omega, alpha (n, 3) [rad/s, rad/s^2] does to a point r [m] that moves by v [m/s]:
 
     alpha x r + omega x (omega x r + 2 v), (n, 3) m/s^2 in the body.
     """
-    return np.asarray(across(alpha, r) + across(omega, across(omega, r) + 2.0 * v))
+    return np.asarray(cross_rows(alpha, r) + cross_rows(omega, cross_rows(omega, r) + 2.0 * v))
