@@ -83,16 +83,16 @@ def test_a_bus_that_fails_says_why_and_leaves_nothing(mpucal, tmp_path, monkeypa
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["session", "--bus", "sim", "--gravity", "-9.81"], "'-9.81' is no local gravity"),
-        (["session", "--bus", "sim", "--gravity", "nan"], "'nan' is no local gravity"),
+        (["session", "--bus", "sim", "--gravity", "-9.81"], "'-9.81' is not a local gravity"),
+        (["session", "--bus", "sim", "--gravity", "nan"], "'nan' is not a local gravity"),
         (["session", "--bus", "sim", "--gravity", "981"], "981 m/s² (9.76 to 9.84). In cm/s² it is --gravity 9.81."),
-        (["session", "--bus", "sim", "--gravity", "1"], "In g it is --gravity 9.8066. Where"),
-        (["calibrate", "walk.npz", "--gravity", "much"], "'much' is no local gravity"),
+        (["session", "--bus", "sim", "--gravity", "1"], "In g it is --gravity 9.8066. To use"),
+        (["calibrate", "walk.npz", "--gravity", "much"], "'much' is not a local gravity"),
         (["session", "--bus", "sim", "--address", "0x68"], "--address was given beside --bus sim, which has none"),
-        (["session", "--bus", "sim", "--rate", "3"], "take 3.90625 Hz"),
+        (["session", "--bus", "sim", "--rate", "3"], "use 3.90625 Hz"),
         (["record", "--bus", "sim", "--seconds", "0"], "--seconds"),
-        (["stream", "--bus", "sim", "--seconds", "nan"], "'nan' is no finite number"),
-        (["doctor", "--bus", "sim", "--seconds", "inf"], "'inf' is no finite number"),
+        (["stream", "--bus", "sim", "--seconds", "nan"], "'nan' is not a finite number"),
+        (["doctor", "--bus", "sim", "--seconds", "inf"], "'inf' is not a finite number"),
         (["record"], "no source was given"),
         (["doctor", "--bus", ""], "no bus is named"),
         (["sesion", "--bus", "sim"], "did you mean session?"),
@@ -156,7 +156,7 @@ def test_a_full_disk_is_3_and_keeps_what_was_recorded(mpucal, walk, tmp_path, mo
     monkeypatch.setattr(sink, "write_together", full)
     code, said = mpucal("session", "--replay", walk, "-o", "board")
     assert code == 3
-    assert "What was recorded is kept in board/capture.mcap.\n" in said
+    assert "The capture is kept in board/capture.mcap.\n" in said
     assert "No space left on device" in said.splitlines()[-1]
     assert read_capture(tmp_path / "board" / "capture.mcap").recovered is None
 

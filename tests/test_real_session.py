@@ -14,7 +14,7 @@ import pytest
 from mpucal.__main__ import run
 from mpucal.chip import registers as reg
 from mpucal.chip.config import Config
-from mpucal.cli.running import running
+from mpucal.cli.running import open_runner
 from mpucal.files import load
 from mpucal.session.plan import Plan
 from mpucal.simulated.chip import open_recorded
@@ -77,7 +77,7 @@ def make_capture(file, capture, gravity, poll_s):
     config = Config(reg.ACCEL_RANGES_G[accel], reg.GYRO_RANGES_DPS[gyro], rate_hz, poll_s=poll_s)
     error_ppm = 1e6 * (recorded_hz / rate_hz - 1)
     bus = open_recorded(acc, gyr, rate_hz, config.accel_range_g, config.gyro_range_dps, rate_error_ppm=error_ppm)
-    with running(OpenedChip(bus, Plan(config, gravity, until_end=True)), capture, console(quiet=True)) as runner:
+    with open_runner(OpenedChip(bus, Plan(config, gravity, until_end=True)), capture, console(quiet=True)) as runner:
         runner.measure()
     return config
 

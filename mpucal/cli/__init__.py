@@ -1,4 +1,4 @@
-"""The commands by name; each one's file loads when it is called, so that help needs nothing heavy."""
+"""Commands by name; each one's module is imported when it is called, so that --help loads nothing heavy."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import click
 from .. import __version__
 from ..errors import meant
 
-# name: what --help says of it; the command stands in the module of that name
+# Name: help text; the command is in the module of that name.
 COMMANDS = {
     "session": "Guide a person through a calibration, and write the result.",
     "record": "Record a sensor to a capture file, without calibrating.",
@@ -30,14 +30,14 @@ COMMANDS = {
 
 
 class Commands(click.Group):
-    """A group that imports a command when it is called."""
+    """Command group that imports a command when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """All names."""
+        """Return all names."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command of that name."""
+        """Return the command of that name; None if there is none."""
         if cmd_name not in COMMANDS:
             return None
         command: click.Command = import_module(f".{cmd_name}", __name__).command
@@ -46,13 +46,13 @@ class Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command that is called; one that is nearly called is named."""
+        """Return the command that is called; fail with a suggestion if its name is misspelt."""
         if nearly := meant(args[0], COMMANDS):
             ctx.fail(f"there is no command {args[0]}{nearly}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The names with what they do."""
+        """Write the names with their help texts."""
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
 

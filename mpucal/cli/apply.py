@@ -21,8 +21,9 @@ from ..files.folder import captures_in
 from ..files.formats import formats_in_memory, writable_formats
 from ..files.rows import Rows
 from ..result.correction import make_correction
-from .loading import loaded
-from .recording_options import hint_options, hints_of, say_taken
+from .arguments import PATH, calibration_argument, json_option, output_option
+from .loading import load_calibration
+from .recording_options import hint_options, make_hints, say_interpretation
 
 EXAMPLE = "Example: `mpucal apply board7/calibration.json walk.npz -o walk-calibrated.mcap`"
 
@@ -34,33 +35,27 @@ The result is in m/s² and rad/s, in the calibration's body frame. Only {formats
 
 
 @click.command("apply", help=HELP, epilog=EXAMPLE)
-@click.argument("calibration", metavar="CALIBRATION", type=click.Path(path_type=Path))
-@click.argument("file", metavar="FILE|DIR", type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "target",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help=f"Output file: {writable_formats()}, by its suffix; default: a table on stdout.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON; needs -o.")
+@calibration_argument
+@click.argument("file", metavar="FILE|DIR", type=PATH)
+@output_option("target", "FILE", f"Output file: {writable_formats()}, by its suffix; default: a table on stdout.")
+@json_option("Print a summary as JSON; needs -o.")
 @hint_options()
 def command(calibration: Path, file: Path, target: Path | None, as_json: bool, **hints: Any) -> None:
-    """Pass the samples through, a run at a time."""
+    """Apply the calibration to a run of samples at a time; constant memory."""
     if as_json and target is None:
         raise UsageError("--json was given without -o, and the samples go to stdout", "name a file with -o")
     if target is not None:
         check_not_among(target, (calibration, file, *captures_in(file)))
-    rows = open_rows(file, hints_of(hints))
-    say_taken(rows.taken)
+    rows = open_rows(file, make_hints(hints))
+    say_interpretation(rows.taken)
     if rows.done:
         raise UsageError(f"{file} is calibrated already ({rows.done})", "give the uncalibrated recording")
-    ready = make_correction(loaded(calibration), rows.sensor, rows.autopilot)
+    ready = make_correction(load_calibration(calibration), rows.sensor, rows.autopilot)
     for remark in (*ready.remarks, *_remarks(rows)):
         click.echo(f"mpucal: {remark}", err=True)
     noise = np.array([ready.calibration.noise_std, ready.calibration.gyro_noise_std])
     done = f"calibrated with {calibration.name} of {ready.calibration.created or 'an unknown time'}"
-    seen = _Seen()
+    totals = _Totals()
     with (
         nullcontext(CsvText(lambda text: sys.stdout.write(text.decode()), rows.utc_ns).write)
         if target is None
@@ -68,38 +63,35 @@ def command(calibration: Path, file: Path, target: Path | None, as_json: bool, *
     ):
         for samples in rows.runs:
             after = ready.apply(samples)
-            seen.add(samples, after, magnitudes=as_json)
+            totals.add(samples, after, magnitudes=as_json)
             write(after)
     if as_json:
-        click.echo(json.dumps({"file": str(target), "done": done, "utc_ns": rows.utc_ns, **seen.facts()}, indent=2))
+        click.echo(json.dumps({"file": str(target), "done": done, "utc_ns": rows.utc_ns, **totals.facts()}, indent=2))
     elif target is not None:
-        lack = f", {seen.lack} of which lack a number" if seen.lack else ""
-        click.echo(f"{target}: {seen.samples} samples{lack}, {done}.")
+        lack = f", {totals.lack} of which lack a number" if totals.lack else ""
+        click.echo(f"{target}: {totals.samples} samples{lack}, {done}.")
 
 
 def _remarks(rows: Rows) -> tuple[str, ...]:
-    others = f"Of {rows.name} this is the first IMU; {rows.others} more are in it." if rows.others else None
-    undated = (
-        None if rows.utc_ns is not None else f"{rows.name} does not say the time of day: its times stay as they are."
-    )
+    others = f"{rows.name} holds {rows.others} more IMUs; only the first one is converted." if rows.others else None
+    undated = f"{rows.name} holds no time of day; its times are kept." if rows.utc_ns is None else None
     return tuple(filter(None, (rows.recovered, others, undated)))
 
 
-class _Seen:
-    """How many samples there were, how many lack a number, and the others' mean |a|."""
+class _Totals:
+    """Number of samples, number of those that lack a value, and mean |a| of the others before and after."""
 
     def __init__(self) -> None:
         self.samples, self.lack, self._before, self._after = 0, 0, 0.0, 0.0
 
     def add(self, before: Samples, after: Samples, magnitudes: bool) -> None:
         self.samples += len(before)
-        self.lack += int(np.isnan(after.acc[:, 0]).sum())
-        # they take as long as all the rest
-        if not magnitudes:
-            return
-        there = ~np.isnan(after.acc[:, 0])
-        self._before += float(np.linalg.norm(before.acc[there], axis=1).sum())
-        self._after += float(np.linalg.norm(after.acc[there], axis=1).sum())
+        complete = ~np.isnan(after.acc[:, 0])
+        self.lack += len(before) - int(complete.sum())
+        # The magnitudes take as long as all the rest.
+        if magnitudes:
+            self._before += float(np.linalg.norm(before.acc[complete], axis=1).sum())
+            self._after += float(np.linalg.norm(after.acc[complete], axis=1).sum())
 
     def facts(self) -> dict[str, Any]:
         n = max(self.samples - self.lack, 1)

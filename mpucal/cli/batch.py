@@ -17,9 +17,10 @@ from ..batch.row import Settings
 from ..disk.folder import Folder
 from ..disk.whole import write_atomically
 from ..errors import UsageError
+from .arguments import PATH, output_option
 from .options import fit_options
 from .person import say
-from .recording_options import hint_options, hints_by_pattern, hints_of
+from .recording_options import hint_options, make_hints, read_hints_file
 
 EXAMPLE = "Example: `mpucal batch 'line3/*.mcap' -o fleet --workers 1`"
 EVERY_S = 2.0
@@ -28,17 +29,17 @@ REPORTS = "reports"
 
 @click.command("batch", epilog=EXAMPLE)
 @click.argument("files", metavar="FILE|GLOB|URL...", nargs=-1, required=True)
-@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), required=True, help="For the results.")
-@click.option("--workers", metavar="N", type=click.IntRange(1), help="Processes on this machine; one a processor.")
-@click.option("--scheduler", metavar="ADDRESS", help="A dask scheduler that runs already, tcp://HOST:PORT.")
-@click.option("--dashboard", is_flag=True, help="Say where dask's dashboard is.")
-@click.option("--reports", is_flag=True, help="Write a report of each, which the page links to.")
+@output_option("folder", "DIR", "Folder for the results.", required=True)
+@click.option("--workers", metavar="N", type=click.IntRange(1), help="Processes on this machine; default: one a core.")
+@click.option("--scheduler", metavar="ADDRESS", help="Use a running dask scheduler, tcp://HOST:PORT.")
+@click.option("--dashboard", is_flag=True, help="Print the address of dask's dashboard.")
+@click.option("--reports", is_flag=True, help="Write a report of each recording, linked from the page.")
 @click.option(
     "--hints",
     "by_pattern",
     metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="Lines of a pattern of files and options of those: `walk*.csv --units acc=g`.",
+    type=PATH,
+    help="File with a pattern of file names and their options on each line: `walk*.csv --units acc=g`.",
 )
 @fit_options
 @hint_options()
@@ -57,18 +58,18 @@ def command(
 ) -> int:
     """Calibrate many recordings: a table with a row for each, and a page about all of them.
 
-    The same command again goes on where it was stopped; what is done is not done again.
+    A command that was stopped continues when it is given again: finished recordings are not calibrated twice.
     """
     if scheduler and workers:
-        raise UsageError("--workers is for this machine, and --scheduler names another's", "give one of them")
+        raise UsageError("--workers and --scheduler were given together", "give one of them")
     paths = found(files)
     settings = Settings(
         model,
         gravity,
         gravity_anyway,
         str((folder / REPORTS).resolve()) if reports else "",
-        hints_of(hints),
-        () if by_pattern is None else hints_by_pattern(by_pattern),
+        make_hints(hints),
+        () if by_pattern is None else read_hints_file(by_pattern),
     )
     with (
         Folder(folder),
@@ -79,28 +80,28 @@ def command(
             if dashboard:
                 say(f"the dashboard is at {client.dashboard_link}")
             _follow(run(paths, client, journal, settings))
-        _tell(folder, paths, journal)
+        _write_results(folder, paths, journal)
     return 0
 
 
 def _follow(progress: Iterator[Progress]) -> None:
-    """Say how far it is, every two seconds and at the end."""
-    said = time.monotonic()
+    """Print the progress every two seconds and at the end."""
+    said_s = time.monotonic()
     for each in progress:
-        if time.monotonic() - said > EVERY_S or each.done == each.of:
-            said = time.monotonic()
-            say(_words(each))
+        if time.monotonic() - said_s > EVERY_S or each.done == each.of:
+            said_s = time.monotonic()
+            say(_progress_text(each))
 
 
-def _words(progress: Progress) -> str:
-    words = f"{progress.done} of {progress.of}"
+def _progress_text(progress: Progress) -> str:
+    text = f"{progress.done} of {progress.of}"
     if made := progress.done - progress.kept:
-        words += f", {made / progress.seconds:.3g} a second"
+        text += f", {made / progress.seconds:.3g} a second"
     if progress.left_s:
-        words += f", {_duration(progress.left_s)} left"
+        text += f", {_duration(progress.left_s)} left"
     if progress.kept:
-        words += f", {progress.kept} were there already"
-    return words + (f", {progress.failed} unreadable" if progress.failed else "")
+        text += f", {progress.kept} done before"
+    return text + (f", {progress.failed} unreadable" if progress.failed else "")
 
 
 def _duration(seconds: float) -> str:
@@ -109,8 +110,8 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
-def _tell(folder: Path, paths: list[str], journal: Journal) -> None:
-    # pyarrow is slow to load
+def _write_results(folder: Path, paths: list[str], journal: Journal) -> None:
+    # PyArrow is slow to load.
     from ..batch.page import PAGE, page  # noqa: PLC0415
     from ..batch.table import write  # noqa: PLC0415
 

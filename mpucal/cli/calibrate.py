@@ -17,9 +17,10 @@ from ..result.calibration import REFUSED
 from ..result.noise import Noise, with_noise
 from ..result.session_files import BLOB
 from ..session.results import check_owner, result_files, save
+from .arguments import PATH, json_option, noise_option, output_option
 from .options import fit_options
-from .recording_options import hint_options, hints_of, say_taken
-from .summary import summary, written
+from .recording_options import hint_options, make_hints, say_interpretation
+from .summary import files_written, summary
 
 EXAMPLE = "Example: `mpucal calibrate capture.mcap -o results` or `mpucal calibrate walk.npz --json`"
 
@@ -31,10 +32,10 @@ Exit code 5: the calibration was refused, with reasons.
 
 
 @click.command("calibrate", help=HELP, epilog=EXAMPLE)
-@click.argument("recording", metavar="FILE|DIR", type=click.Path(path_type=Path))
-@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for the results.")
-@click.option("--json", "as_json", is_flag=True, help="Print only calibration.json.")
-@click.option("--noise", metavar="FILE", type=click.Path(path_type=Path), help="noise.json of `mpucal noise`.")
+@click.argument("recording", metavar="FILE|DIR", type=PATH)
+@output_option("folder", "DIR", "Folder for the results.")
+@json_option("Print only calibration.json.")
+@noise_option
 @fit_options
 @hint_options()
 def command(
@@ -47,9 +48,9 @@ def command(
     model: str,
     **hints: Any,
 ) -> int:
-    """Fit a recording, and print or write what comes of it."""
-    samples = load(recording, hints_of(hints))
-    say_taken(samples.taken)
+    """Calibrate from a recording, and print or write the result."""
+    samples = load(recording, make_hints(hints))
+    say_interpretation(samples.taken)
     if samples.recovered is not None:
         click.echo(f"mpucal: {samples.recovered}", err=True)
     known = None if noise is None else Noise.load(noise)
@@ -67,9 +68,9 @@ def command(
     else:
         click.echo(summary(calibration))
         if paths:
-            click.echo("\n" + written(paths))
+            click.echo("\n" + files_written(paths))
     if calibration.verdict != REFUSED:
         return 0
     if folder is not None and (folder / BLOB.name).exists():
-        click.echo(f"mpucal: {folder / BLOB.name} is of an earlier calibration, and was left as it is.", err=True)
+        click.echo(f"mpucal: {folder / BLOB.name} is that of an earlier calibration; it was not changed.", err=True)
     return RefusedError.exit_code

@@ -1,51 +1,50 @@
-"""The options of the commands that write to a sink, made from the table of sinks."""
+"""Options of the commands that write to a sink, made from the table of sinks, and the writing."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
 from ..errors import UsageError
+from ..result.calibration import Calibration
 from ..sinks.choose import FILE, check_behind, default_sinks
 from ..sinks.kind import Device, SinkKind
+from ..sinks.record import Recorder
+from ..sinks.sink import Applied
 from ..sinks.table import SINKS
+from ..sinks.write_back import write_to_all
 from ..sources.kind import SourceKind
 from ..sources.opening import open_source
 from ..sources.table import matching_kinds
-from .person import say
+from .options import decorated
+from .person import ask, ask_in_doubt, say
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def session_sink_options(command: F) -> F:
-    """--to and --no-write."""
-    for option in (
+    """Add --to and --no-write."""
+    to_help = f"Where to write the result, may be repeated; {default_sinks()}."
+    return decorated(
+        command,
+        click.option("--to", "sinks", type=click.Choice([FILE, *SINKS]), multiple=True, help=to_help),
         click.option("--no-write", is_flag=True, help="Write only files."),
-        click.option(
-            "--to",
-            "sinks",
-            type=click.Choice([FILE, *SINKS]),
-            multiple=True,
-            help=f"Where to write the result, may be repeated; {default_sinks()}.",
-        ),
-    ):
-        command = option(command)
-    return command
+    )
 
 
 def sink_flags(command: F) -> F:
-    """The options that belong to one kind of sink, such as --store."""
-    for kind in SINKS.values():
-        for flag in kind.flags:
-            command = click.option(f"--{flag.name}", is_flag=True, help=f"{kind.name}: {flag.help}")(command)
-    return command
+    """Add the options that belong to one kind of sink, such as --store."""
+    flags = [(kind.name, flag) for kind in SINKS.values() for flag in kind.flags]
+    options = (click.option(f"--{flag.name}", is_flag=True, help=f"{name}: {flag.help}") for name, flag in flags)
+    return decorated(command, *options)
 
 
-def device(options: Mapping[str, Any]) -> Device:
-    """The device that a command's source options name; its sinks' flags are among the options."""
+def make_device(options: Mapping[str, Any]) -> Device:
+    """Return the device that a command's source options name, with the flags of sinks that are given."""
     kind = matching_kinds(options)[0]
     flags = {flag.name for kind in SINKS.values() for flag in kind.flags}
     given = frozenset(name for name in flags if options.get(name))
@@ -53,14 +52,32 @@ def device(options: Mapping[str, Any]) -> Device:
 
 
 def check_sink(kind: SinkKind, source: SourceKind, options: Mapping[str, Any]) -> None:
-    """Refuse a sink that is not behind the source, and flags of another one.
-
-    Raises
-    ------
-    UsageError : the options do not fit the sink.
-    """
+    """Raise UsageError if the sink is not behind the source, or a flag belongs to another sink."""
     check_behind(kind, source, f"{kind.name} was named")
     for other in SINKS.values():
         for flag in other.flags:
             if options.get(flag.name) and flag not in kind.flags:
-                raise UsageError(f"--{flag.name} was given, and {kind.where} has no use for it", "leave it out")
+                raise UsageError(f"--{flag.name} was given, and {kind.where} does not take it", "leave it out")
+
+
+def write_back(
+    kinds: Sequence[SinkKind],
+    calibration: Calibration,
+    options: Mapping[str, Any],
+    folder: Path,
+    record: Recorder,
+    sinks: tuple[str, ...],
+    yes: bool,
+    as_json: bool,
+) -> Iterator[Applied]:
+    """Write a calibration to each of `kinds`, and print what was done; see write_to_all.
+
+    Parameters
+    ----------
+    sinks : those that the person named with --to. yes : ask no questions.
+    """
+    confirm, in_doubt = partial(ask, yes=yes), partial(ask_in_doubt, yes=yes)
+    device = make_device(options)
+    for applied in write_to_all(kinds, calibration, device, folder, record, confirm, sinks, in_doubt):
+        click.echo(f"Done: {applied.what}.", err=as_json)
+        yield applied

@@ -10,12 +10,13 @@ import click
 from ..disk.whole import check_not_among, write_atomically
 from ..export.forms import FORMS, form
 from ..result.noise import Noise, with_noise
-from .loading import loaded
+from .arguments import calibration_argument, json_option, noise_option, output_option
+from .loading import load_calibration
 
 EXAMPLE = "Example: `mpucal export board7/calibration.json --to c-header -o calibration.h`"
 
 
-# the marks of Markdown are for docs/use.md; \b keeps click from filling the lines
+# Backticks are Markdown's, for docs/use.md; \b keeps click from joining the lines.
 _ROWS = "\n".join(f"{row.name:<12}{row.read_by.replace('`', '')}" for row in FORMS)
 HELP = f"""Convert a calibration (.json or .bin) to the format of another program, and say what is lost.
 
@@ -27,17 +28,17 @@ Exit code 5: the calibration was refused; 6: the format cannot represent it.
 
 
 @click.command("export", help=HELP, epilog=EXAMPLE)
-@click.argument("calibration", metavar="CALIBRATION", type=click.Path(path_type=Path))
+@calibration_argument
 @click.option("--to", "name", type=click.Choice([row.name for row in FORMS]), required=True, help="Output format.")
-@click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="Output file; default: stdout.")
-@click.option("--noise", metavar="FILE", type=click.Path(path_type=Path), help="noise.json of `mpucal noise`.")
-@click.option("--json", "as_json", is_flag=True, help="Print format, text and what is lost as JSON.")
+@output_option("file", "FILE", "Output file; default: stdout.")
+@noise_option
+@json_option("Print format, text and what is lost as JSON.")
 def command(calibration: Path, name: str, file: Path | None, noise: Path | None, as_json: bool) -> None:
-    """Make the file's text, and put it where it is asked to go."""
+    """Convert the calibration, and print or write the text."""
     if file is not None:
         check_not_among(file, [calibration])
     chosen = form(name)
-    read = loaded(calibration)
+    read = load_calibration(calibration)
     text, notes = chosen.export(read if noise is None else with_noise(read, Noise.load(noise)))
     if file is not None:
         write_atomically(file, text.encode())

@@ -1,4 +1,4 @@
-"""`mpucal firmware`: the bridge as an Arduino library, or onto a board."""
+"""`mpucal firmware`: write the serial bridge's firmware, as an Arduino library or onto a board."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from ..errors import OutputError, SourceError, UsageError, WriteBackError
+from .arguments import output_option
 
 EXAMPLE = "Example: `mpucal firmware -o libraries/mpucal` writes the library into a sketchbook."
 PACKAGE = Path(__file__).parents[1]
@@ -17,9 +18,9 @@ FOLDER = PACKAGE / "firmware"
 LIBRARY = ("src", "examples", "library.properties", "library.json", "keywords.txt", "README.md")
 HEX = "mpucal_bridge.hex"
 LICENCE = "LICENSE"
-# boards with an ATmega328P at 16 MHz, which take the image, and the rate of their boot loader
+# Boards with an ATmega328P at 16 MHz, for which there is an image, and the baud rate of their boot loader.
 BAUDS = {"uno": 115_200, "nano": 115_200, "nano-old": 57_600}
-# what arduino-cli calls others, for which it builds the sketch and finds their own tool
+# Other boards, for which arduino-cli builds the sketch and finds the tool, by its name for them (FQBN).
 NAMES = {
     "mega": "arduino:avr:mega",
     "leonardo": "arduino:avr:leonardo",
@@ -27,20 +28,20 @@ NAMES = {
     "uno-wifi": "arduino:megaavr:uno2018",
     "esp32": "esp32:esp32:esp32",
     "esp8266": "esp8266:esp8266:nodemcuv2",
-    # its first option has no file system, where the calibration is to lie
+    # The default layout has no file system, which stores the calibration.
     "pico": "rp2040:rp2040:rpipico:flash=2097152_65536",
 }
 
 
 @click.command("firmware", epilog=EXAMPLE)
-@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Write the Arduino library here.")
+@output_option("folder", "DIR", "Write the Arduino library to this folder.")
 @click.option("--flash", "port", metavar="PORT", help="Write the bridge onto the board on this serial port.")
-@click.option("--board", type=click.Choice([*BAUDS, *NAMES]), default="uno", show_default=True, help="What is on PORT.")
+@click.option("--board", type=click.Choice([*BAUDS, *NAMES]), default="uno", show_default=True, help="Board on PORT.")
 def command(folder: Path | None, port: str | None, board: str) -> None:
     """Write the serial bridge's firmware: as a library for the Arduino IDE, or onto a board.
 
-    An Uno or Nano is written by avrdude, from an image that mpucal holds; for other boards arduino-cli builds the
-    sketch, and writes it with the tool of their core.
+    An Uno or Nano is flashed by avrdude with an image that comes with mpucal; for other boards arduino-cli builds the
+    sketch, and flashes it with the tool of their core.
     """
     if (folder is None) == (port is None):
         raise UsageError("`mpucal firmware` takes one of -o DIR and --flash PORT", "give one of them")
@@ -52,20 +53,20 @@ def command(folder: Path | None, port: str | None, board: str) -> None:
         click.echo(f"The bridge is on the board; try `mpucal doctor --serial {port}`.")
 
 
-def _source() -> Path:
+def _library() -> Path:
     if not (FOLDER / "library.properties").is_file():
-        raise SourceError("this installation of mpucal holds no firmware", "install it again")
+        raise SourceError("this installation of mpucal has no firmware", "install it again")
     return FOLDER
 
 
 def _write(folder: Path) -> None:
-    source = _source()
+    source = _library()
     try:
         folder.mkdir(parents=True)
         for name in LIBRARY:
             copy = shutil.copytree if (source / name).is_dir() else shutil.copyfile
             copy(source / name, folder / name)
-        # in a checkout it is that of all
+        # A checkout has one licence for all, at its top.
         licences = (source / LICENCE, source.parents[1] / LICENCE)
         shutil.copyfile(next(filter(Path.is_file, licences), licences[0]), folder / LICENCE)
     except FileExistsError as error:
@@ -78,7 +79,7 @@ def _flash(port: str, board: str) -> None:
     words = _by_avrdude(port, BAUDS[board]) if board in BAUDS else _by_arduino(port, NAMES[board])
     if shutil.which(words[0]) is None:
         core = "" if board in BAUDS else f" and the core {':'.join(NAMES[board].split(':')[:2])}"
-        raise SourceError(f"there is no {words[0]} to write it with", f"install it{core}, then: {shlex.join(words)}")
+        raise SourceError(f"{words[0]} is not installed", f"install it{core}, then: {shlex.join(words)}")
     if subprocess.run(words, check=False).returncode:
         raise WriteBackError(
             f"{words[0]} could not write to the board on {port}",
@@ -87,15 +88,15 @@ def _flash(port: str, board: str) -> None:
 
 
 def _by_avrdude(port: str, baud: int) -> list[str]:
-    source = _source()
+    source = _library()
     image = next((path for path in (source / HEX, source / "build" / HEX) if path.is_file()), None)
     if image is None:
-        raise SourceError("this installation of mpucal holds no image of the bridge", "make it: `make firmware`")
+        raise SourceError("this installation of mpucal has no image of the bridge", "build it: `make firmware`")
     upload = f"flash:w:{image}:i"
     return ["avrdude", "-p", "atmega328p", "-c", "arduino", "-b", str(baud), "-P", port, "-D", "-U", upload]
 
 
 def _by_arduino(port: str, name: str) -> list[str]:
-    source = _source()
+    source = _library()
     sketch = str(source / "examples" / "mpucal_bridge")
     return ["arduino-cli", "compile", "--upload", "-b", name, "-p", port, "--library", str(source), sketch]

@@ -11,17 +11,18 @@ from ..disk.whole import check_not_among
 from ..result.merge import merge
 from ..result.session_files import BLOB, DOCUMENT
 from ..session.results import check_owner, save
-from .loading import force_option, trusted
+from .arguments import PATH, json_option, output_option
+from .loading import force_option, load_trusted
 from .summary import slope, summary
 
 EXAMPLE = "Example: `mpucal merge cold/calibration.json warm/calibration.json hot/calibration.json -o merged`"
 
 
 @click.command("merge", epilog=EXAMPLE)
-@click.argument("calibrations", metavar="A B ...", nargs=-1, type=click.Path(path_type=Path))
-@click.option("-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for the result.")
+@click.argument("calibrations", metavar="A B ...", nargs=-1, type=PATH)
+@output_option("folder", "DIR", "Folder for the result.")
 @force_option
-@click.option("--json", "as_json", is_flag=True, help="Print only calibration.json.")
+@json_option("Print only calibration.json.")
 def command(calibrations: tuple[Path, ...], folder: Path | None, force: bool, as_json: bool) -> None:
     """Combine calibrations of one chip at different temperatures into one with b_a(T).
 
@@ -31,7 +32,7 @@ def command(calibrations: tuple[Path, ...], folder: Path | None, force: bool, as
     if folder is not None:
         for file in (BLOB, DOCUMENT):
             check_not_among(folder / file.name, calibrations)
-    made = merge([trusted(path, force) for path in calibrations])
+    made = merge([load_trusted(path, force) for path in calibrations])
     if folder is not None:
         check_owner(folder, made.calibration, None, "merge", *map(str, calibrations))
         with Folder(folder) as into:

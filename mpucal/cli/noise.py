@@ -1,4 +1,4 @@
-"""`mpucal noise`: the noise of a sensor that lies still, from a long rest."""
+"""`mpucal noise`: measure the noise of a sensor that lies still."""
 
 from __future__ import annotations
 
@@ -27,43 +27,44 @@ from ..session.ports import Source
 from ..session.results import save
 from ..sources.opening import one_of, open_source
 from ..sources.table import kinds_for, matching_kinds
-from .options import ABOVE_ZERO, check_gyroscope, check_source, given, source_options
-from .recording_options import given_hints, hint_options, say_taken
+from .arguments import PATH, json_option, output_option
+from .options import ABOVE_ZERO, check_gyroscope, check_source, given_options, source_options
+from .person import say
+from .recording_options import given_hints, hint_options, say_interpretation
 
 EXAMPLE = "Example: `mpucal noise walk.npz -o noise`, or `mpucal noise --bus sim --hours 0.02`"
 DOCUMENT, PAGE = "noise.json", "noise.html"
-# bias instability is wanted to this share of itself (1 sigma)
+# Wanted relative standard uncertainty of the bias instability.
 WANTED = 0.1
-TELL_S = {True: 2.0, False: 60.0}
-# the time in which a person puts the board down, in runs of a second
+# Interval of the progress [s], on a terminal or not.
+PROGRESS_S = {True: 2.0, False: 60.0}
+# Runs of a second in which a person puts the board down.
 PUT_DOWN_RUNS = 5
 
 
 @click.command("noise", epilog=EXAMPLE)
-@click.argument("file", metavar="[FILE|DIR]", type=click.Path(path_type=Path), required=False)
+@click.argument("file", metavar="[FILE|DIR]", type=PATH, required=False)
 @source_options("noise")
 @hint_options("accel_range", "gyro_range", "rate")
 @click.option("--hours", type=ABOVE_ZERO, help="Measure for this long; else until Ctrl-C.")
-@click.option(
-    "-o", "folder", metavar="DIR", type=click.Path(path_type=Path), help="Folder for noise.json and noise.html."
-)
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@output_option("folder", "DIR", "Folder for noise.json and noise.html.")
+@json_option("Print JSON.")
 def command(file: Path | None, hours: float | None, folder: Path | None, as_json: bool, **options: Any) -> None:
     """Measure the noise of a sensor that lies still: white noise, bias instability, random walk, quantisation.
 
-    By the overlapping Allan deviation of all six axes, with 95 % intervals, beside the data sheet's values, in constant
-    memory. Ctrl-C ends a measurement and keeps what there is. `mpucal export --noise` and `mpucal calibrate --noise`
-    take noise.json.
+    The overlapping Allan deviation of all six axes is computed in constant memory, with 95 % intervals, and compared
+    with the data sheet. Ctrl-C ends a measurement and keeps its result. `mpucal export --noise` and `mpucal calibrate
+    --noise` take noise.json.
     """
     kinds = matching_kinds(options)
     if (file is None) == (not kinds):
-        what = "a file and a source were given together" if kinds else "nothing to measure was given"
+        what = "a file and a source were given together" if kinds else "neither a recording nor a source was given"
         raise UsageError(what, f"give a recording, or {one_of(kinds_for('noise'))}")
     if file is not None:
-        noise = _of_file(file, options)
+        noise = _measure_file(file, options)
     else:
         check_source(click.get_current_context())
-        noise = _of_source(options, None if hours is None else 3600.0 * hours)
+        noise = _measure_source(options, None if hours is None else 3600.0 * hours)
     click.echo(noise.json() if as_json else summary(noise), nl=not as_json)
     if folder is not None:
         with Folder(folder) as into:
@@ -71,32 +72,32 @@ def command(file: Path | None, hours: float | None, folder: Path | None, as_json
         click.echo(f"\nWritten to {folder}:\n  {DOCUMENT}, {PAGE}", err=as_json)
 
 
-def _of_file(file: Path, options: dict[str, Any]) -> Noise:
+def _measure_file(file: Path, options: dict[str, Any]) -> Noise:
     rows = open_rows(file, given_hints(options))
-    say_taken(rows.taken)
+    say_interpretation(rows.taken)
     meter = NoiseMeter(rows.sensor)
     for samples in rows.runs:
         meter.add(drop_incomplete(samples))
     return meter.result(now().isoformat())
 
 
-def _of_source(options: dict[str, Any], seconds: float | None) -> Noise:
-    """Until the time is over, the source ends, or a person ends it."""
-    source = open_source(options, given(), until_end=True)
+def _measure_source(options: dict[str, Any], seconds: float | None) -> Noise:
+    """Measure until the time is over, the source ends, or Ctrl-C is pressed."""
+    source = open_source(options, given_options(), until_end=True)
     check_gyroscope(source.plan.config)
     meter: NoiseMeter | None = None
-    with source.measuring(Path(os.devnull), _say, now().isoformat()) as measuring, _progress() as tell:
-        # what has been measured outlives who ends it, and a source that fails
+    with source.measuring(Path(os.devnull), say, now().isoformat()) as measuring, _progress() as show_progress:
+        # The result so far is kept, whatever ends the measurement.
         with suppress(KeyboardInterrupt, EndOfCapture):
             sensor = measuring.source.start()
-            left_out = 0 if options["replay"] else PUT_DOWN_RUNS
-            if left_out:
-                put_down(source.listeners, _say)
-            for samples in islice(_polled(measuring.source), left_out, None):
+            skipped = 0 if options["replay"] else PUT_DOWN_RUNS
+            if skipped:
+                put_down(source.listeners, say)
+            for samples in islice(_runs(measuring.source), skipped, None):
                 meter = meter or NoiseMeter(sensor)
                 meter.add(samples)
                 measuring.source.forget()
-                tell(meter, seconds)
+                show_progress(meter, seconds)
                 if seconds is not None and meter.seconds >= seconds:
                     break
         with suppress(EndOfCapture):
@@ -104,8 +105,8 @@ def _of_source(options: dict[str, Any], seconds: float | None) -> Noise:
     return (meter or NoiseMeter(Sensor())).result(now().isoformat())
 
 
-def _polled(source: Source) -> Iterator[Samples]:
-    """Samples as they come, in runs of a second: many small ones would take longer than they last."""
+def _runs(source: Source) -> Iterator[Samples]:
+    """Yield samples in runs of a second: the meter could not keep up with many small ones."""
     held: list[Samples] = []
     while True:
         held.append(source.poll())
@@ -118,32 +119,28 @@ def _polled(source: Source) -> Iterator[Samples]:
 
 @contextmanager
 def _progress() -> Iterator[Any]:
-    """Tells how far it is: on one line of a terminal, elsewhere a line a minute."""
+    """Yield a function that shows the progress: on one line of a terminal, elsewhere a line a minute."""
     on_a_terminal = sys.stderr.isatty()
-    told_s = monotonic()
+    shown_s = monotonic()
 
-    def tell(meter: NoiseMeter, seconds: float | None) -> None:
-        nonlocal told_s
-        if monotonic() - told_s < TELL_S[on_a_terminal]:
+    def show(meter: NoiseMeter, seconds: float | None) -> None:
+        nonlocal shown_s
+        if monotonic() - shown_s < PROGRESS_S[on_a_terminal]:
             return
-        told_s = monotonic()
-        of = "" if seconds is None else f" of {_long(seconds)}"
+        shown_s = monotonic()
+        of = "" if seconds is None else f" of {_duration(seconds)}"
         needed_s = meter.needed_s(WANTED)
-        more = "" if needed_s is None else f"; bias instability to {100 * WANTED:.0f} %: {_long(needed_s)} more"
-        said = f"{_long(meter.seconds)}{of}{more}"
-        click.echo(f"\r{said}   " if on_a_terminal else said, err=True, nl=not on_a_terminal)
+        more = "" if needed_s is None else f"; bias instability to {100 * WANTED:.0f} %: {_duration(needed_s)} more"
+        text = f"{_duration(meter.seconds)}{of}{more}"
+        click.echo(f"\r{text}   " if on_a_terminal else text, err=True, nl=not on_a_terminal)
 
     try:
-        yield tell
+        yield show
     finally:
         if on_a_terminal:
             click.echo(err=True)
 
 
-def _long(seconds: float) -> str:
+def _duration(seconds: float) -> str:
     minutes, hours = seconds / 60.0, seconds / 3600.0
     return f"{hours:.1f} h" if hours >= 1.0 else f"{minutes:.1f} min" if minutes >= 1.0 else f"{seconds:.0f} s"
-
-
-def _say(text: str) -> None:
-    click.echo(f"mpucal: {text.strip()}", err=True)

@@ -1,4 +1,4 @@
-"""Options that several commands share, and where their values fit together."""
+"""Options that several commands share, and checks of their values together."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 class Parsed(click.ParamType[Any]):
-    """A value of the text that a person gives, by the parser of its option."""
+    """Parameter type whose values are parsed by a function that raises ValueError."""
 
     name = "text"
 
@@ -31,7 +31,7 @@ class Parsed(click.ParamType[Any]):
         self._parse = parse
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The value; a default is one already."""
+        """Return the parsed text; a default value is parsed already."""
         if not isinstance(value, str):
             return value
         try:
@@ -41,70 +41,75 @@ class Parsed(click.ParamType[Any]):
 
 
 class Finite(click.FloatRange):
-    """A number within a range, and no nan, which every range admits."""
+    """Finite number within a range; click's FloatRange accepts nan."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """The number."""
+        """Return the number."""
         number = super().convert(value, param, ctx)
         if not math.isfinite(number):
-            self.fail(f"{value!r} is no finite number.", param, ctx)
+            self.fail(f"{value!r} is not a finite number.", param, ctx)
         return float(number)
 
 
 ABOVE_ZERO = Finite(min=0.0, min_open=True)
 
 
-def local_gravity(text: str) -> float:
-    """A local gravity in m/s² as text."""
+def decorated(command: F, *options: Callable[[F], F]) -> F:
+    """Return the command with options, which its help lists in this order."""
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def parse_gravity(text: str) -> float:
+    """Parse a local gravity in m/s²."""
     try:
         gravity = float(text)
     except ValueError:
         gravity = math.nan
     if not LEAST_GRAVITY_MPS2 <= gravity <= MOST_GRAVITY_MPS2:
-        raise ValueError(f"{text!r} is no local gravity: give it in m/s², about 9.81.")
+        raise ValueError(f"{text!r} is not a local gravity: give it in m/s², about 9.81.")
     return gravity
 
 
 def check_gravity(gravity: float, anyway: bool) -> None:
-    """Refuse, before a person turns a board, a gravity that no place on Earth has."""
+    """Raise UsageError for a gravity outside the range found on Earth, before a person turns a board."""
     if anyway or LEAST_ON_EARTH_MPS2 <= gravity <= MOST_ON_EARTH_MPS2:
         return
     units = {"cm/s²": 0.01, "g": STANDARD_GRAVITY_MPS2, "mg": STANDARD_GRAVITY_MPS2 / 1e3, "ft/s²": 0.3048}
-    meant = [
+    suggestions = [
         f" In {unit} it is --gravity {gravity * factor:.5g}."
         for unit, factor in units.items()
         if LEAST_ON_EARTH_MPS2 <= gravity * factor <= MOST_ON_EARTH_MPS2
     ]
     raise click.UsageError(
         f"no place on Earth has a gravity of {gravity:g} m/s² ({LEAST_ON_EARTH_MPS2:g} to {MOST_ON_EARTH_MPS2:g})."
-        f"{''.join(meant)} Where it is meant, add --gravity-anyway."
+        f"{''.join(suggestions)} To use it all the same, add --gravity-anyway."
     )
 
 
 def source_options(name: str, settings: bool = True) -> Callable[[F], F]:
-    """The sources that the command `name` takes, and what belongs to them; the others are there to be refused.
+    """Return the options of the sources that the command `name` takes; those of other sources are hidden.
+
+    Hidden options are parsed, so that they are refused with a reason.
 
     Parameters
     ----------
-    settings : how the sensor is set, too.
+    settings : add the settings of the sensor, too.
     """
     taken = kinds_for(name)
     belonging = [option for kind in taken for option in kind.options]
     if settings:
         belonging += [option for kind in taken for option in kind.settings]
-
-    def decorate(command: F) -> F:
-        for option in reversed(unique(belonging)):
-            command = _declared(option, option.help)(command)
-        for option in reversed(unique(kind.option for kind in SOURCES)):
-            forms = [kind.forms for kind in taken if kind.option is option]
-            command = _declared(option, _sentence(", or ".join(forms)), hidden=not forms)(command)
-        return command
-
-    return decorate
+    declared = []
+    for option in unique(kind.option for kind in SOURCES):
+        forms = [kind.forms for kind in taken if kind.option is option]
+        declared.append(_click_option(option, _sentence(", or ".join(forms)), hidden=not forms))
+    declared += [_click_option(option, option.help) for option in unique(belonging)]
+    return lambda command: decorated(command, *declared)
 
 
-def _declared(option: Option, text: str, hidden: bool = False) -> Callable[[F], F]:
+def _click_option(option: Option, text: str, hidden: bool = False) -> Callable[[F], F]:
     bare: dict[str, Any] = {} if option.bare is None else {"is_flag": False, "flag_value": option.bare}
     return click.option(
         option.flag,
@@ -120,38 +125,34 @@ def _declared(option: Option, text: str, hidden: bool = False) -> Callable[[F], 
 
 
 def _sentence(words: str) -> str:
-    """A form such as udp:PORT keeps its small letter, as it is typed."""
+    """Return a sentence; a form such as udp:PORT keeps its small letter, as it is typed."""
     first, _, _ = words.partition(" ")
     return f"{words if ':' in first else words[:1].upper() + words[1:]}."
 
 
 def fit_options(command: F) -> F:
-    """--gravity, --gravity-anyway and --model."""
-    for option in (
-        click.option("--model", type=click.Choice(MODELS), default="auto", show_default=True, help="What to estimate."),
+    """Add --gravity-anyway, --gravity and --model."""
+    return decorated(
+        command,
+        click.option("--gravity-anyway", is_flag=True, help="Allow a gravity outside the range found on Earth."),
         click.option(
             "--gravity",
             metavar="MPS2",
-            type=Parsed(local_gravity),
+            type=Parsed(parse_gravity),
             default=STANDARD_GRAVITY_MPS2,
             show_default=True,
             help="Local gravity [m/s²].",
         ),
-        click.option("--gravity-anyway", is_flag=True, help="Accept a gravity that no place on Earth has."),
-    ):
-        command = option(command)
-    return command
+        click.option(
+            "--model", type=click.Choice(MODELS), default="auto", show_default=True, help="Parameters to estimate."
+        ),
+    )
 
 
 def aim_options(command: F) -> F:
-    """--target and --tilt-only."""
-    for option in (
-        click.option(
-            "--tilt-only",
-            is_flag=True,
-            help="For boards that cannot be turned upside down: use tilts only; parameters that tilts do not show keep "
-            "their defaults.",
-        ),
+    """Add --target and --tilt-only."""
+    return decorated(
+        command,
         click.option(
             "--target",
             type=click.Choice(tuple(AIMS)),
@@ -160,27 +161,26 @@ def aim_options(command: F) -> F:
             help="Required accuracy (1 sigma): normal is 1 mg of bias, 0.1 % of scale factor error, 0.05 deg of "
             "misalignment.",
         ),
-    ):
-        command = option(command)
-    return command
+        click.option(
+            "--tilt-only",
+            is_flag=True,
+            help="For boards that cannot be turned upside down: use tilts only; parameters that tilts do not show keep "
+            "their defaults.",
+        ),
+    )
 
 
 def check_gyroscope(config: Config) -> None:
-    """What is to be calibrated or examined is measured with the gyroscope, too.
-
-    Raises
-    ------
-    UsageError : it is left out.
-    """
+    """Raise UsageError if the settings leave the gyroscope out."""
     if config.accel_only:
         raise UsageError(
             f"at {config.rate_hz:g} Hz a chip measures with its accelerometer alone, and this needs the gyroscope",
-            f"take --rate 1000 or less; `mpucal record` and `mpucal stream` do with --rate {config.rate_hz:g}",
+            f"take --rate 1000 or less; `mpucal record` and `mpucal stream` accept --rate {config.rate_hz:g}",
         )
 
 
-def given() -> dict[str, str]:
-    """The options of the present command that a person wrote: name to spelling."""
+def given_options() -> dict[str, str]:
+    """Return the options that the command line holds: name to spelling."""
     context = click.get_current_context()
     return {
         str(option.name): option.opts[0]
@@ -191,10 +191,10 @@ def given() -> dict[str, str]:
 
 
 def check_source(context: click.Context) -> SourceKind:
-    """One source that the command takes, and nothing beside it that belongs to another; see sources.opening.
+    """Return the kind of the source that is given; see sources.opening.
 
     Raises
     ------
-    UsageError : none, several, or options that do not fit the source.
+    UsageError : no source or several were given, or an option does not belong to it.
     """
-    return opening.check_source(context.params, given(), str(context.command.name))
+    return opening.check_source(context.params, given_options(), str(context.command.name))

@@ -1,4 +1,4 @@
-"""The page beside a session, a check or a stream: its options, and where it is served."""
+"""Page in a browser beside a session, a check or a stream: its options, and its start."""
 
 from __future__ import annotations
 
@@ -12,33 +12,32 @@ from ..page.address import HERE, Address, address
 from ..sources.opened_source import OpenedSource
 from ..terminal.console import Console
 from ..terminal.flat import BOARD, BOARDS
-from .options import Parsed
+from .options import Parsed, decorated
 
 if TYPE_CHECKING:
-    from ..page.console import Tells
+    from ..page.console import ResultCallback
 
 F = TypeVar("F", bound=Callable[..., Any])
 UNPACED = "pace=fast"
 
 
 def page_options(command: F) -> F:
-    """--page and --board."""
-    for option in (
-        click.option("--board", type=click.Choice(BOARDS), help=f"The board that is drawn; default: {BOARD}."),
+    """Add --page and --board."""
+    return decorated(
+        command,
         click.option(
             "--page",
             metavar="lan|HOST:PORT",
             type=Parsed(address),
             is_flag=False,
             flag_value=HERE,
-            help="Show it on a page in a browser, of this computer or (lan, HOST:PORT) of its network.",
+            help="Show it on a page in a browser, on this computer or (lan, HOST:PORT) in its network.",
         ),
-    ):
-        command = option(command)
-    return command
+        click.option("--board", type=click.Choice(BOARDS), help=f"Board to draw; default: {BOARD}."),
+    )
 
 
-def beside(
+def with_page(
     terminal: Console,
     page: Address | None,
     source: OpenedSource,
@@ -48,14 +47,14 @@ def beside(
     keys: bool = False,
     as_json: bool = False,
     attended: bool = False,
-) -> AbstractContextManager[tuple[Console, Tells]]:
-    """The terminal, with a page beside it where one is asked for, see `on_page`.
+) -> AbstractContextManager[tuple[Console, ResultCallback]]:
+    """Return the terminal, with a page beside it if one is asked for; see `on_page`.
 
-    A source whose time runs ahead is shown at its own pace.
+    A simulation that runs faster than time is shown at the pace of its samples, unless `pace=fast` is given.
     """
     if page is None:
         return nullcontext((terminal, lambda result, paths: None))
-    # slow to load, and most sessions are shown on none
+    # The page is slow to load, and most sessions have none.
     from ..page.console import on_page  # noqa: PLC0415
 
     paced = not source.real_time and UNPACED not in str(options.get("bus"))

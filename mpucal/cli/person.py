@@ -1,4 +1,4 @@
-"""The person at the terminal, beside the results on stdout: what is said to them, and a question that they confirm."""
+"""Messages and questions to the person at the terminal; results go to stdout."""
 
 from __future__ import annotations
 
@@ -10,30 +10,20 @@ from ..errors import WriteBackError
 
 
 def say(text: str) -> None:
-    """A sentence, on stderr."""
-    click.echo(f"mpucal: {text}", err=True)
+    """Print a sentence on stderr."""
+    click.echo(f"mpucal: {text.strip()}", err=True)
 
 
 def ask_in_doubt(question: str, yes: bool) -> None:
-    """Go on only where a person agrees to what speaks against it; without one, keep what is there.
-
-    Raises
-    ------
-    WriteBackError : nobody agreed.
-    """
-    against = question.partition(". ")[0]
+    """Ask about an objection; raise WriteBackError unless a person agrees, also with `yes` or without a person."""
+    objection = question.partition(". ")[0]
     if yes or not sys.stdin.isatty():
-        raise WriteBackError(f"nothing was changed: {against}", "repeat the session, or `mpucal write` it as it is")
+        raise WriteBackError(f"nothing was changed: {objection}", "repeat the session, or `mpucal write` it as it is")
     if not click.confirm(question[:1].upper() + question[1:], err=True):
-        raise WriteBackError(f"nothing was changed: {against}, and you declined", "repeat the session")
+        raise WriteBackError(f"nothing was changed: {objection}, and you declined", "repeat the session")
 
 
 def ask(question: str, yes: bool) -> None:
-    """Go on where the person agrees, or cannot be asked.
-
-    Raises
-    ------
-    WriteBackError : the person said no.
-    """
+    """Ask for confirmation; raise WriteBackError if a person declines."""
     if not yes and sys.stdin.isatty() and not click.confirm(question, err=True):
-        raise WriteBackError("nothing was written: you declined", "repeat it when you want it written")
+        raise WriteBackError("nothing was written: you declined", "give the command again to write it")

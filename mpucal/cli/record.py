@@ -14,8 +14,9 @@ from ..result.clock import stamp
 from ..sources.opening import open_source
 from ..terminal.console import console
 from ..terminal.hangup import outliving
-from .options import ABOVE_ZERO, check_source, fit_options, given, source_options
-from .running import running
+from .arguments import output_option
+from .options import ABOVE_ZERO, check_source, fit_options, given_options, source_options
+from .running import open_runner
 
 EXAMPLE = "Example: `mpucal record --bus /dev/i2c-1 -o capture.mcap --seconds 60`"
 
@@ -23,7 +24,7 @@ EXAMPLE = "Example: `mpucal record --bus /dev/i2c-1 -o capture.mcap --seconds 60
 @click.command("record", epilog=EXAMPLE)
 @source_options("record")
 @fit_options
-@click.option("-o", "file", metavar="FILE", type=click.Path(path_type=Path), help="The capture file.")
+@output_option("file", "FILE", "Capture file.")
 @click.option("--seconds", type=ABOVE_ZERO, help="Stop after this time [s].")
 def command(file: Path | None, seconds: float | None, **options: Any) -> None:
     """Record to a capture file until Enter, Ctrl-C or --seconds; `mpucal calibrate` reads it.
@@ -31,18 +32,19 @@ def command(file: Path | None, seconds: float | None, **options: Any) -> None:
     The prompts are those of a session. --gravity and --model are stored for its replay.
     """
     check_source(click.get_current_context())
-    source = open_source(options, given(), until_end=True)
-    file = file or Path(f"record-{stamp()}").with_suffix(Path(source.capture_name).suffix)
+    source = open_source(options, given_options(), until_end=True)
     suffix = Path(source.capture_name).suffix
+    file = file or Path(f"record-{stamp()}{suffix}")
     if file.suffix.lower() != suffix:
         raise OutputError(f"{file} does not end with {suffix}, by which other commands know a capture", f"add {suffix}")
     check_free(file)
     person = console(quiet=False)
     with outliving(lambda: file.with_suffix(".log"), partial(person.hung_up, stop=True)):
-        with running(source, file, person) as runner:
+        with open_runner(source, file, person) as runner:
             try:
                 samples = runner.record(seconds)
             finally:
-                if runner.sensor is None:  # it never answered: nothing may stand in the way of the next try
+                # A sensor that never answered leaves no file, so that the next attempt can use its name.
+                if runner.sensor is None:
                     file.unlink(missing_ok=True)
         click.echo(f"{file}: {samples} samples.")

@@ -1,4 +1,4 @@
-"""Options that say of a recording what it does not say itself, and the sentence of what was taken."""
+"""Options for properties that a recording does not state itself, and the message about how it was interpreted."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from ..arguments import content
 from ..errors import UsageError
 from ..files.budget import MOST_MB, VARIABLE
 from ..files.hints import Hints, parse_columns, parse_span, parse_units
-from .options import ABOVE_ZERO, Parsed, given
+from .options import ABOVE_ZERO, Parsed, decorated, given_options
+from .person import say
 
 F = TypeVar("F", bound=Callable[..., Any])
 MOST_BYTES = 1 << 20
@@ -40,12 +41,12 @@ _MOST = click.option(
     type=click.IntRange(1),
     expose_value=False,
     callback=_allow,
-    help=f"Memory that reading may take; default: ${VARIABLE}, or {MOST_MB}.",
+    help=f"Limit of the memory for reading; default: ${VARIABLE}, or {MOST_MB}.",
 )
 
 
 def hint_options(*left_out: str) -> Callable[[F], F]:
-    """Options for all of NAMES, but for those that a command has already, and --most-mb."""
+    """Return the options for all of NAMES but those `left_out`, which the command has already, and --most-mb."""
     options = {
         "topic": click.option(
             "--topic", metavar="NAME", help="Topic of a bag; two, the accelerometer's first: ONE,OTHER."
@@ -75,62 +76,60 @@ def hint_options(*left_out: str) -> Callable[[F], F]:
         ),
     }
 
-    def decorate(command: F) -> F:
-        for name, option in reversed(options.items()):
-            command = command if name in left_out else option(command)
-        return _MOST(command)
-
-    return decorate
+    return lambda command: decorated(
+        command, _MOST, *(option for name, option in options.items() if name not in left_out)
+    )
 
 
-def hints_of(options: Mapping[str, Any]) -> Hints:
-    """What was said, of a command's options."""
-    said = {attribute: options[name] for name, attribute in NAMES.items() if options.get(name) is not None}
-    return Hints(**said)
+def make_hints(options: Mapping[str, Any]) -> Hints:
+    """Return the hints among a command's options."""
+    return Hints(**{hint: options[name] for name, hint in NAMES.items() if options.get(name) is not None})
 
 
 def given_hints(options: Mapping[str, Any]) -> Hints:
-    """The same of a command that also takes sources: how their sensor is set says of a file how counts were made."""
-    said = given()
-    values = {name: options[name] for name in NAMES if name in said}
-    # a range is a number, which a source's option has as text
+    """Return the hints on the command line of a command that also takes sources.
+
+    The settings of a source's sensor, such as its ranges, then describe the recording.
+    """
+    given = given_options()
+    values = {name: options[name] for name in NAMES if name in given}
+    # The options of a source have ranges as text.
     ranges = {name: float(value) for name, value in values.items() if name in ("accel_range", "gyro_range")}
-    return hints_of({**values, **ranges})
+    return make_hints({**values, **ranges})
 
 
-def hints_by_pattern(path: Path) -> tuple[tuple[str, Hints], ...]:
-    """The hints of a file that has on each line a pattern of files' names and what is said of those; `#` begins a note.
+def read_hints_file(path: Path) -> tuple[tuple[str, Hints], ...]:
+    """Read pairs of a pattern of file names and its hints, one on each line; `#` begins a comment.
 
     Raises
     ------
-    UsageError : it cannot be read, or a line is none; it is named by its number.
+    UsageError : the file cannot be read, or a line cannot be parsed; the message has its number.
     """
     try:
         lines = content(path, MOST_BYTES).decode().splitlines()
     except UnicodeDecodeError as error:
-        raise UsageError(f"{path} is no text", "give a pattern and options on each line") from error
+        raise UsageError(f"{path} is not a text file", "give a pattern and options on each line") from error
     found = []
     for number, line in enumerate(lines, 1):
         try:
             words = shlex.split(line, comments=True)
             if words:
                 context = _HINTS.make_context("hints", words[1:])
-                found.append((words[0], hints_of(context.params)))
+                found.append((words[0], make_hints(context.params)))
         except (ValueError, click.ClickException) as error:
-            said = error.format_message() if isinstance(error, click.ClickException) else str(error)
-            raise UsageError(
-                f"{path}: line {number} is no pattern with options ({said})", "write it as `walk*.csv --units acc=g`"
-            ) from error
+            why = error.format_message() if isinstance(error, click.ClickException) else str(error)
+            what = f"{path}: line {number} is not a pattern with options ({why})"
+            raise UsageError(what, "write it as `walk*.csv --units acc=g`") from error
     return tuple(found)
 
 
 @click.command(add_help_option=False)
 @hint_options()
-def _HINTS(**_hints: Any) -> None:  # noqa: N802 - a command, of which the options are read
-    """Options that may follow a pattern on a line of hints."""
+def _HINTS(**_hints: Any) -> None:  # noqa: N802 - a command that only parses options
+    """Parse the options after a pattern on a line of a hints file."""
 
 
-def say_taken(taken: str | None) -> None:
-    """What a file's columns and units were taken for, where they had to be recognised."""
-    if taken is not None:
-        click.echo(f"mpucal: {taken}", err=True)
+def say_interpretation(remark: str | None) -> None:
+    """Print how a file's columns and units were interpreted, if that had to be guessed."""
+    if remark is not None:
+        say(remark)

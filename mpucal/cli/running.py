@@ -1,4 +1,4 @@
-"""A session's runner on an open source, recording into a capture, from opening to closing both."""
+"""A session's runner on an open source that is recorded into a capture."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from ..terminal.console import Console
 
 
 @contextmanager
-def running(source: OpenedSource, capture: Path, person: Console, checking: bool = False) -> Iterator[Runner]:
-    """A runner on `source` that records into `capture`; whatever happens, both are closed; checking : see Runner.
+def open_runner(source: OpenedSource, capture: Path, person: Console, checking: bool = False) -> Iterator[Runner]:
+    """Yield a runner on `source` that records into `capture`, and close both; checking : see Runner.
 
     Raises
     ------
-    CaptureError : a replay came to its end before its capture did.
+    CaptureError : a replay ended before its capture did.
     """
     with source.measuring(capture, person.say, now().isoformat()) as measuring, person.listening():
         if source.recovered is not None:

@@ -24,10 +24,11 @@ from ..sinks.table import SINKS
 from ..sources.kind import SourceKind
 from ..sources.opening import contents, one_of
 from ..sources.table import kinds_for, matching_kinds
-from .loading import loaded
-from .options import check_source, given, source_options
+from .arguments import PATH, json_option
+from .loading import load_calibration
+from .options import check_source, given_options, source_options
 from .person import say
-from .recording_options import NAMES, hint_options, hints_of, say_taken
+from .recording_options import NAMES, hint_options, make_hints, say_interpretation
 from .summary import formula, slope, summary
 
 EXAMPLE = "Example: `mpucal show calibration.json`, `mpucal show capture.mcap --json`, or `mpucal show --serial PORT`"
@@ -42,12 +43,12 @@ parameters are read; nothing is written.
 
 
 @click.command("show", help=HELP, epilog=EXAMPLE)
-@click.argument("file", metavar="FILE|DIR", type=click.Path(path_type=Path), required=False)
+@click.argument("file", metavar="FILE|DIR", type=PATH, required=False)
 @source_options("show", settings=False)
 @hint_options()
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@json_option("Print JSON.")
 def command(file: Path | None, as_json: bool, **options: Any) -> None:
-    """Show the one place that is given."""
+    """Show the file or the device that is given."""
     sources = matching_kinds(options)
     places = [*(["a file"] if file is not None else []), *(kind.option.flag for kind in sources)]
     if len(places) != 1:
@@ -56,14 +57,14 @@ def command(file: Path | None, as_json: bool, **options: Any) -> None:
             f"give a file, or {one_of(kinds_for('show'))}",
         )
     if file is None:
-        if said := [spelled for name, spelled in given().items() if name in NAMES]:
-            raise UsageError(f"{' and '.join(said)} say how a file is read, and a device was given", "leave them out")
+        if hints := [spelling for name, spelling in given_options().items() if name in NAMES]:
+            raise UsageError(f"{' and '.join(hints)} say how a file is read, and a device was given", "leave them out")
         kept = {name: value for name, value in options.items() if name not in NAMES}
         _show_device(check_source(click.get_current_context()), kept, as_json)
     elif file.suffix in CALIBRATIONS and recognise(file) is None:
-        _show_calibration(str(file), loaded(file), as_json)
+        _show_calibration(str(file), load_calibration(file), as_json)
     else:
-        _show_recording(file, hints_of(options), as_json)
+        _show_recording(file, make_hints(options), as_json)
 
 
 def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) -> None:
@@ -81,57 +82,54 @@ def _show_device(kind: SourceKind, options: Mapping[str, Any], as_json: bool) ->
             held = Blob.decode(blob)
             if held.gyro_counts is None:
                 say(
-                    f"{where} is of a version that does not say the unit of K: it is that of 131 counts to 1 deg/s at"
-                    " ±250 deg/s, and rates from firmware of its time are 0.055 % too small; a newer one's are not"
+                    f"{where} has an old format that does not state the unit of K: 131 counts to 1 deg/s at ±250 deg/s"
+                    " are assumed; rates from firmware of that time are 0.055 % too small"
                 )
             _show_calibration(where, Calibration.from_blob(held), as_json)
         return
-    from .show_device import page  # noqa: PLC0415 - a file needs no driver
-
     facts = contents(options)
-    click.echo(json.dumps(facts, indent=2) if as_json else page(facts))
+    click.echo(json.dumps(facts, indent=2) if as_json else _device_page(facts))
 
 
 def _show_calibration(where: str, calibration: Calibration, as_json: bool) -> None:
-    click.echo(calibration.json() if as_json else _calibration(where, calibration), nl=not as_json)
+    click.echo(calibration.json() if as_json else _calibration_page(where, calibration), nl=not as_json)
 
 
 def _show_recording(file: Path, hints: Hints, as_json: bool) -> None:
     recording = load(file, hints)
-    say_taken(recording.taken)
-    if recording.recovered is not None:
-        click.echo(f"mpucal: {recording.recovered}", err=True)
+    for remark in (recording.taken, recording.recovered):
+        say_interpretation(remark)
     facts = _facts(recording)
-    click.echo(json.dumps(facts, indent=2) if as_json else _recording(file, facts))
+    click.echo(json.dumps(facts, indent=2) if as_json else _recording_page(file, facts))
 
 
-def _calibration(where: str, calibration: Calibration) -> str:
+def _calibration_page(where: str, calibration: Calibration) -> str:
     made = f", made {calibration.created}" if calibration.created else ""
-    head = f"{where}: a calibration of {_chip(calibration.sensor)}{made}."
-    return "\n".join([head, "", summary(calibration), "", formula(calibration), *_applied(calibration)])
+    head = f"{where}: a calibration of {_sensor_name(calibration.sensor)}{made}."
+    return "\n".join([head, "", summary(calibration), "", formula(calibration), *_where_applied(calibration)])
 
 
-def _applied(calibration: Calibration) -> list[str]:
-    """Where it is applied already, and how it goes with the temperature; nothing of what nobody said."""
-    said = []
+def _where_applied(calibration: Calibration) -> list[str]:
+    """Return lines about hardware offsets, write-backs and the temperature model, if present."""
+    lines = []
     if np.any(calibration.applied_in_hardware):
         mg = ", ".join(f"{1000 * value / STANDARD_GRAVITY_MPS2:+.1f}" for value in calibration.applied_in_hardware)
-        said.append(f"The chip's offset registers subtract ({mg}) mg of b_a, until its supply goes or it is reset.")
-    said += [f"Written at {entry.get('at')}: {entry.get('what')}." for entry in calibration.extra.get("written", ())]
+        lines.append(f"The chip's offset registers subtract ({mg}) mg of b_a, until a power cycle or reset.")
+    lines += [f"Written at {entry.get('at')}: {entry.get('what')}." for entry in calibration.extra.get("written", ())]
     if calibration.follows_temperature:
-        said.append(slope(calibration))
-    return ["", *said] if said else []
+        lines.append(slope(calibration))
+    return ["", *lines] if lines else []
 
 
 def _facts(recording: Recording) -> dict[str, Any]:
-    """What a recording holds, in JSON's own types."""
+    """Return the properties of a recording, in JSON's own types."""
     flat = recording.flat or find_flat(recording)
     temperature = recording.temperature_c[np.isfinite(recording.temperature_c)]
     if not len(temperature) and recording.sensor.temperature_c is not None:
-        # of the accelerometer alone it is that of the start
+        # Recordings of the accelerometer alone have the temperature of their start only.
         temperature = np.array([recording.sensor.temperature_c])
     return {
-        "chip": _chip(recording.sensor),
+        "chip": _sensor_name(recording.sensor),
         "accel_range_g": recording.sensor.accel_range_g,
         "gyro_range_dps": recording.sensor.gyro_range_dps,
         "imus": 1 + len(recording.others),
@@ -148,29 +146,56 @@ def _facts(recording: Recording) -> dict[str, Any]:
     }
 
 
-def _recording(file: Path, facts: dict[str, Any]) -> str:
-    flat, warm = facts["flat_s"], facts["temperature_c"]
-    ranges = [
-        f"±{facts[key]:g} {unit}"
-        for key, unit in (("accel_range_g", "g"), ("gyro_range_dps", "deg/s"))
-        if facts[key] is not None
-    ]
+def _recording_page(file: Path, facts: dict[str, Any]) -> str:
+    flat, celsius = facts["flat_s"], facts["temperature_c"]
+    ranges = (("accel_range_g", "g"), ("gyro_range_dps", "deg/s"))
+    sensor = [facts["chip"], *(f"±{facts[key]:g} {unit}" for key, unit in ranges if facts[key] is not None)]
+    if facts["imus"] > 1:
+        sensor.append(f"the first of {facts['imus']} IMUs")
     rows = {
-        "sensor": ", ".join(
-            [facts["chip"], *ranges, *([f"the first of {n} IMUs"] if (n := facts["imus"]) > 1 else [])]
-        ),
+        "sensor": ", ".join(sensor),
         "samples": f"{facts['samples']} in {facts['seconds']:.1f} s, at {facts['rate_hz']:.2f} Hz",
         "lost": f"{facts['gaps']} gaps" if facts["gaps"] else "none",
         "clipped": f"{facts['acc_clipped']} accelerometer, {facts['gyr_clipped']} gyroscope samples",
         "lies flat": "never" if flat is None else f"from {flat[0]:.1f} to {flat[1]:.1f} s",
         "median |a|": f"{facts['magnitude_mps2']:.3f} m/s²",
         "fastest turn": "not measured" if facts["fastest_dps"] is None else f"{facts['fastest_dps']:.0f} deg/s",
-        "temperature": "unknown" if warm is None else f"{warm[0]:.1f} to {warm[1]:.1f} °C",
+        "temperature": "unknown" if celsius is None else f"{celsius[0]:.1f} to {celsius[1]:.1f} °C",
     }
     return "\n".join([f"{file}: a recording.", "", *(f"  {key:<14}{value}" for key, value in rows.items())])
 
 
-def _chip(sensor: Sensor) -> str:
+def _sensor_name(sensor: Sensor) -> str:
     if sensor.chip:
         return sensor.chip
-    return "an unnamed sensor" if sensor.who_am_i is None else f"a sensor of WHO_AM_I 0x{sensor.who_am_i:02x}"
+    return "an unnamed sensor" if sensor.who_am_i is None else f"a sensor with WHO_AM_I 0x{sensor.who_am_i:02x}"
+
+
+def _device_page(facts: Mapping[str, Any]) -> str:
+    """Return the page of a device's registers or parameters; see OpenedSource.contents."""
+    rows = _vehicle_rows(facts) if "parameters" in facts else _chip_rows(facts) if "who_am_i" in facts else dict(facts)
+    rows.pop("where", None)
+    width = max(18, *(len(key) + 2 for key in rows))
+    return "\n".join([f"{facts['where']}, as it is now.", "", *(f"  {key:<{width}}{rows[key]}" for key in rows)])
+
+
+def _vehicle_rows(facts: Mapping[str, Any]) -> dict[str, str]:
+    values = {name: value for name, value in facts["parameters"].items() if "OFF" in name or "SCAL" in name}
+    corrected = [name for name, value in values.items() if value != ("SCAL" in name) and not name.startswith("SENS")]
+    holds = f"a correction in {len(corrected)} parameters" if corrected else "no correction of its accelerometers"
+    return {"holds": holds, **{name: f"{value:g}" for name, value in facts["parameters"].items()}}
+
+
+def _chip_rows(facts: Mapping[str, Any]) -> dict[str, str]:
+    name = facts["chip"] or "unknown chip"
+    rows = {
+        "chip": f"{name}, WHO_AM_I 0x{facts['who_am_i']:02x}{', asleep' if facts['asleep'] else ''}",
+        "ranges": f"±{facts['accel_range_g']} g, ±{facts['gyro_range_dps']} deg/s",
+    }
+    for address, words in facts["accel_offsets"].items():
+        rows[f"offsets at {address}"] = ", ".join(map(str, words))
+    if "acc_mps2" in facts:
+        acc = facts["acc_mps2"]
+        rows["measures"] = f"({', '.join(f'{a:+.3f}' for a in acc)}) m/s², |a| {np.linalg.norm(acc):.3f}"
+        rows["temperature"] = f"{facts['temperature_c']:.1f} °C"
+    return rows

@@ -1,4 +1,4 @@
-"""The summary of a calibration on the terminal: verdict, parameters in %, mg and deg, estimated error, files."""
+"""Summary of a calibration on the terminal: verdict, parameters in %, mg and deg, estimated error, files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.document import ACCELEROMETER_FORMULA
 from ..result.session_files import BLOB, DOCUMENT, REPORT
 
-# what fits a terminal of 80 columns
+# For a terminal of 80 columns.
 WIDTH, LABEL, COLUMN = 79, 23, 18
 SENTENCES = {
     GOOD: "The calibration is good.",
@@ -24,16 +24,21 @@ SENTENCES = {
 
 
 def summary(calibration: Calibration) -> str:
-    """The verdict with its reasons, the parameters with their standard uncertainties, and the estimated error."""
+    """Return the verdict with its reasons, the parameters with standard uncertainties, and the estimated error."""
     lines = []
     if "verdict" in calibration.quality:
         reasons = calibration.quality.get("reasons", [])
         lines = [SENTENCES[calibration.verdict], *(_reason(reason["message"]) for reason in reasons), ""]
-    return "\n".join([*lines, *_parameters(calibration), *_accuracy(calibration), *_fit(calibration)])
+    # Scale factor error, bias and misalignment, one column an axis.
+    rows = [("value ± 1 sigma", AXES), *((f"{row.name}, {row.unit}", row.cells) for row in accelerometer(calibration))]
+    lines += [(f"{name:<{LABEL}}" + "".join(f"{cell:>{COLUMN}}" for cell in cells)).rstrip() for name, cells in rows]
+    if error := estimated_error(calibration):
+        lines += ["", textwrap.fill(error, WIDTH)]
+    return "\n".join([*lines, *_fit(calibration)])
 
 
-def on_a_page(calibration: Calibration) -> Result:
-    """The same for a page, which has columns and lines of its own."""
+def page_result(calibration: Calibration) -> Result:
+    """Return the summary for the page, which lays it out itself."""
     return Result(
         calibration.verdict,
         estimated_error(calibration),
@@ -43,8 +48,8 @@ def on_a_page(calibration: Calibration) -> Result:
     )
 
 
-def written(paths: Sequence[Path]) -> str:
-    """The files, and what to do with them."""
+def files_written(paths: Sequence[Path]) -> str:
+    """Return the list of files, and the next steps."""
     folder = paths[0].parent
     lines = [f"Written to {folder}:", "  " + ", ".join(path.name for path in paths)]
     if any(path.name == BLOB.name for path in paths):
@@ -52,15 +57,15 @@ def written(paths: Sequence[Path]) -> str:
             "Next:",
             f"  look at      {folder / REPORT.name}",
             f'  in Python    a = mpucal.Calibration.load("{folder / DOCUMENT.name}").apply(acc)',
-            f"  in firmware  {folder / BLOB.name}, as firmware_protocol.md describes it",
+            f"  in firmware  {folder / BLOB.name} (format: firmware_protocol.md)",
         ]
     else:
-        lines += [f"Next: look at {folder / REPORT.name}, fix what is named above, and run the session again."]
+        lines += [f"Next: look at {folder / REPORT.name}, fix the problem above, and calibrate again."]
     return "\n".join(lines)
 
 
 def formula(calibration: Calibration) -> str:
-    """The calibrated acceleration, with its numbers."""
+    """Return the formula of the calibrated acceleration with its numbers."""
     rows = [
         f"  [{' '.join(f'{value:+.6f}' for value in row)}]   y_{axis} {-bias:+.5f}"
         for axis, row, bias in zip(AXES, calibration.inverse, calibration.b_a_to_subtract, strict=True)
@@ -69,7 +74,7 @@ def formula(calibration: Calibration) -> str:
 
 
 def slope(calibration: Calibration) -> str:
-    """b_a(T) in a sentence."""
+    """Return b_a(T) as a sentence."""
     if not calibration.follows_temperature:
         return "b_a is assumed to be the same at every temperature."
     steps = ", ".join(f"{1000 * value / STANDARD_GRAVITY_MPS2:+.3f}" for value in calibration.b_a_slope)
@@ -82,18 +87,6 @@ def slope(calibration: Calibration) -> str:
 
 def _reason(message: str) -> str:
     return textwrap.fill(f"  - {message}.", WIDTH, subsequent_indent="    ")
-
-
-def _parameters(c: Calibration) -> list[str]:
-    """Scale factor error, bias and misalignment, one column an axis."""
-    rows = [("value ± 1 sigma", list(AXES)), *((f"{row.name}, {row.unit}", row.cells) for row in accelerometer(c))]
-    return [(f"{name:<{LABEL}}" + "".join(f"{cell:>{COLUMN}}" for cell in cells)).rstrip() for name, cells in rows]
-
-
-def _accuracy(calibration: Calibration) -> list[str]:
-    """The estimated error."""
-    said = estimated_error(calibration)
-    return ["", textwrap.fill(said, WIDTH)] if said else []
 
 
 def _fit(calibration: Calibration) -> list[str]:

@@ -22,13 +22,13 @@ from .result import Result
 ASK_EVERY_S = 0.1
 
 
-class Tells(Protocol):
-    """Tells the page the result, and which files hold it."""
+class ResultCallback(Protocol):
+    """ResultCallback the page the result, and which files hold it."""
 
     def __call__(self, result: Result, paths: Sequence[Path]) -> None: ...  # noqa: D102
 
 
-class Beside:
+class TeeConsole:
     """A console, and a page beside it.
 
     Parameters
@@ -81,12 +81,12 @@ def on_page(
     paced: bool = False,
     as_json: bool = False,
     attended: bool = False,
-) -> Iterator[tuple[Console, Tells]]:
+) -> Iterator[tuple[Console, ResultCallback]]:
     """The console with a page beside it, and what tells the page the result.
 
     Parameters
     ----------
-    where : the page's address. about, keys : see Feed. paced : see Beside.
+    where : the page's address. about, keys : see Feed. paced : see TeeConsole.
     as_json : the address is told as an event. attended : somebody at the terminal opens the page and ends it.
 
     Raises
@@ -101,7 +101,7 @@ def on_page(
 
     try:
         _invite(feed, as_json, attended)
-        yield Beside(console, feed, paced), tell
+        yield TeeConsole(console, feed, paced), tell
         if attended and feed.visited:
             _wait("The page stays open; press Enter to end it.", lambda: False)
     except MpucalError as error:

@@ -81,7 +81,7 @@ def test_a_session_ends_in_order_and_says_in_its_log_how_to_go_on(on_a_terminal,
     assert session.exit_code() == 4
     log = (tmp_path / "board" / "session.log").read_text()
     assert "the terminal went away" in log
-    assert log.endswith("go on with `mpucal session --resume board` when you are ready.\n")
+    assert log.endswith("continue with `mpucal session --resume board` when you are ready.\n")
     capture = read_capture(tmp_path / "board" / "capture.mcap")
     assert capture.recovered is None
     assert capture.records[-1].t_ns > 5e8

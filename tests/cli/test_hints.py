@@ -11,7 +11,7 @@ import pytest
 
 import mpucal as package
 from mpucal.batch.row import Settings, row_of
-from mpucal.cli.recording_options import hints_by_pattern
+from mpucal.cli.recording_options import read_hints_file
 from mpucal.errors import UsageError
 from mpucal.files.hints import Hints, parse_span
 from mpucal.result.calibration import Calibration
@@ -57,7 +57,7 @@ def test_a_device_needs_no_columns(mpucal):
 
 def test_a_batch_is_told_by_patterns(table, recording, tmp_path):
     (tmp_path / "hints").write_text(f"# those of the old logger\n\nodd*.csv {shlex.join(SAID)}\n*.txt --rate 100\n")
-    by_pattern = hints_by_pattern(tmp_path / "hints")
+    by_pattern = read_hints_file(tmp_path / "hints")
     settings = Settings("accel", 9.80665, by_pattern=by_pattern)
     assert [pattern for pattern, _ in by_pattern] == ["odd*.csv", "*.txt"]
     assert settings.hints_of("line3/b.txt").rate_hz == 100
@@ -72,8 +72,8 @@ def test_a_batch_is_told_by_patterns(table, recording, tmp_path):
 @pytest.mark.parametrize("line", ["*.csv --units acc=feet", "*.csv --rate", "*.csv 'open", "*.csv more"])
 def test_a_line_that_is_no_hint_is_named(line, tmp_path):
     (tmp_path / "hints").write_text(f"*.txt --rate 100\n{line}\n")
-    with pytest.raises(UsageError, match="line 2 is no pattern with options"):
-        hints_by_pattern(tmp_path / "hints")
+    with pytest.raises(UsageError, match="line 2 is not a pattern with options"):
+        read_hints_file(tmp_path / "hints")
 
 
 def test_a_refusal_ends_with_the_whole_command_that_works(mpucal, recording, save):

@@ -102,7 +102,7 @@ def test_the_help_names_it(call, tmp_path, command):
             ("session", "--mavlink", "sim", "--to", "logbook"),
             "has no logbook: give --bus BUS, or leave it out.",
         ),
-        (("session", *SIM, "--to", "logbook", "--no-write"), "--to and --no-write were given together"),
+        (("session", *SIM, "--to", "logbook", "--no-write"), "--to and --no-write exclude each other"),
         (("session", *SIM, "--to", "diary"), "'logbook'"),
         (("write", "c.json", "logbook", "--mavlink", "sim"), "--mavlink sim has no logbook: give --bus BUS."),
         (

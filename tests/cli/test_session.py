@@ -117,7 +117,7 @@ def test_a_head_without_a_plan_stops(mpucal, session, tmp_path):
     capture = read_capture(session.folder / "capture.mcap")
     result = mpucal("session", "--replay", rewritten(capture, tmp_path / "odd.mcap", plan={"config": 3}))
     assert result.code == 3
-    assert "does not say how it was made" in result.err
+    assert "does not hold the session's settings" in result.err
 
 
 def test_a_changed_access_stops(mpucal, session, tmp_path):

@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 
-from mpucal.cli.summary import formula, summary, written
+from mpucal.cli.summary import files_written, formula, summary
 from mpucal.result.calibration import Calibration
 
 
@@ -70,11 +70,11 @@ def test_the_formula_calibrates():
 
 
 def test_what_is_next_depends_on_what_was_written(tmp_path):
-    good = written([tmp_path / "calibration.json", tmp_path / "calibration.bin", tmp_path / "report.html"])
+    good = files_written([tmp_path / "calibration.json", tmp_path / "calibration.bin", tmp_path / "report.html"])
     assert "firmware" in good
-    refused = written([tmp_path / "calibration.json", tmp_path / "report.html"])
+    refused = files_written([tmp_path / "calibration.json", tmp_path / "report.html"])
     assert "firmware" not in refused
-    assert "run the session again" in refused
+    assert "calibrate again" in refused
 
 
 @pytest.mark.parametrize("name", ["calibration.json", "calibration.bin"])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mpucal.__main__ import run
-from mpucal.cli.destination import device
+from mpucal.cli.destination import make_device
 from mpucal.errors import WriteBackError
 from mpucal.result.calibration import Calibration
 from mpucal.sinks.record import session_recorder
@@ -77,7 +77,7 @@ def test_its_own_recording_takes_the_calibration_of_what_was_measured(flown, mpu
 def test_a_vehicle_that_refuses_keeps_what_it_held(flown, tmp_path):
     measured = Calibration.load(flown.folder / "calibration.json")
     record = session_recorder(tmp_path, measured, None, None)
-    vehicle = device({**WORDS, "mavlink": "sim:imus=1,refuse=INS_ACCSCAL_Y"})
+    vehicle = make_device({**WORDS, "mavlink": "sim:imus=1,refuse=INS_ACCSCAL_Y"})
     with pytest.raises(WriteBackError) as raised:
         list(write_to_all((SINKS["autopilot"],), measured, vehicle, tmp_path, record, lambda question: None))
     assert raised.value.exit_code == 6

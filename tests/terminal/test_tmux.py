@@ -92,8 +92,8 @@ def test_a_session_is_shown_and_ctrl_c_leaves_the_terminal_as_it_was(terminal):
     after = tmux.wait_for("left with 4", "that was all")
     assert not tmux.is_on_the_second_screen()
     assert "the session was interrupted" in after
-    assert "What was recorded is kept in board/capture.mcap." in after
-    assert "go on with `mpucal session --resume board`" in after.replace("\n", "")
+    assert "The capture is kept in board/capture.mcap." in after
+    assert "continue with `mpucal session --resume board`" in after.replace("\n", "")
     assert "Traceback" not in after
     assert after.split("left with 4")[1].split()[:2] == ["icanon", "echo"]
 

@@ -21,7 +21,7 @@ from mcap.writer import CompressionType, Writer
 
 from mpucal import Calibration
 from mpucal.__main__ import run
-from mpucal.cli.options import local_gravity
+from mpucal.cli.options import parse_gravity
 from mpucal.errors import MpucalError, UsageError
 from mpucal.export.forms import FORMS
 from mpucal.files import load
@@ -76,7 +76,7 @@ TEXTS = (
     address,
     parse_columns,
     parse_units,
-    local_gravity,
+    parse_gravity,
     *(option.parse for kind in SOURCES for option in (kind.option, *kind.options, *kind.settings)),
 )
 WORDS = (
