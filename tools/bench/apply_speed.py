@@ -1,4 +1,4 @@
-"""How fast `mpucal apply` goes, and in how much memory, beside NumPy's own formula on an array in memory.
+"""The speed of `mpucal apply`, and its memory, beside NumPy's own formula on an array in memory.
 
 python -m tools.bench apply_speed                                             1 GB of samples, archive to archive
 python -m tools.bench apply_speed --gigabytes 0.1 --of .csv .npz --to .csv .mcap
@@ -8,11 +8,8 @@ python -m tools.bench apply_speed --gigabytes 0.1 --of .mcap          a capture:
 from __future__ import annotations
 
 import argparse
-import json
 import subprocess
-import sys
 import tempfile
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,6 +23,8 @@ from mpucal.files.mcap import CaptureWriter, read_capture
 from mpucal.files.rows import ROWS, Rows
 from mpucal.result.calibration import Calibration
 
+from .timing import command, used
+
 # t, acc, gyr and temperature as float64, and three masks
 BYTES = 8 * 8 + 3
 SESSION = Path(__file__).parents[2] / "fixtures" / "sessions" / "mpu6050.mcap"
@@ -34,7 +33,7 @@ B_A = np.array([0.31, -0.22, 1.08])
 
 
 def write_samples(path: Path, count: int) -> None:
-    """A recording of that many samples, made a run at a time."""
+    """Write a recording of that many samples, a run at a time."""
     rng = np.random.default_rng(1)
     acc, gyr, no = rng.normal(0.0, 5.0, (ROWS, 3)), rng.normal(0.0, 1.0, (ROWS, 3)), np.zeros(ROWS, bool)
     with open_writer(path, Rows(iter(())), "") as write:
@@ -46,7 +45,7 @@ def write_samples(path: Path, count: int) -> None:
 
 
 def write_capture(path: Path, count: int) -> None:
-    """A capture of at least that many samples: those of a stored session, again and again."""
+    """Write a capture of at least that many samples: those of a stored session, again and again."""
     capture = read_capture(SESSION)
     accesses = [record for record in capture.records if isinstance(record, Transaction)]
     begin = next(i for i, access in enumerate(accesses) if access.register == reg.FIFO_R_W) - 1
@@ -62,38 +61,22 @@ def write_capture(path: Path, count: int) -> None:
                 writer.transaction(replace(access, t_ns=access.t_ns + again * length_ns))
 
 
-def applied(folder: Path, source: Path, target: Path) -> tuple[float, float, float]:
-    """Seconds, the processor's seconds and peak megabytes of `mpucal apply`, a process of its own."""
-    words = [sys.executable, "-m", "mpucal", "apply", "c.json", source.name, "-o", target.name]
-    code = (
-        "import json, resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL);"
-        "used = resource.getrusage(resource.RUSAGE_CHILDREN);"
-        "print(json.dumps([used.ru_utime + used.ru_stime, used.ru_maxrss / 1024]))"
-    )
-    begun = time.perf_counter()
-    done = subprocess.run([sys.executable, "-c", code, *words], cwd=folder, capture_output=True, text=True, check=True)
-    processor_s, peak = json.loads(done.stdout)
-    return time.perf_counter() - begun, processor_s, peak
-
-
 def in_memory(count: int) -> float:
-    """Samples the processor's second of the formula alone, on arrays that are there."""
+    """Return the samples the processor's second of the formula alone, on arrays that are there."""
     rng = np.random.default_rng(1)
     acc, gyr = rng.normal(size=(count, 3)), rng.normal(size=(count, 3))
     gain, K, b_omega = np.linalg.inv(D), np.eye(3), np.zeros(3)
-    begun = time.process_time()
-    a, w = (acc - B_A) @ gain.T, (gyr - b_omega) @ K.T
-    seconds = time.process_time() - begun
-    return len(a) / seconds if len(w) else 0.0
+    with used() as time:
+        a, w = (acc - B_A) @ gain.T, (gyr - b_omega) @ K.T
+    return len(a) / time.cpu_s if len(w) else 0.0
 
 
 def copied(source: Path) -> float:
-    """Megabytes a second of a plain copy on the same disk, flushed."""
-    begun = time.perf_counter()
-    subprocess.run(["dd", f"if={source}", f"of={source}.copy", "bs=4M", "conv=fsync", "status=none"], check=True)
-    seconds = time.perf_counter() - begun
+    """Return the megabytes a second of a plain copy on the same disk, flushed."""
+    with used() as time:
+        subprocess.run(["dd", f"if={source}", f"of={source}.copy", "bs=4M", "conv=fsync", "status=none"], check=True)
     Path(f"{source}.copy").unlink()
-    return source.stat().st_size / 1e6 / seconds
+    return source.stat().st_size / 1e6 / time.wall_s
 
 
 def main() -> None:
@@ -121,17 +104,16 @@ def measure(folder: Path, kind: str, endings: list[str], count: int) -> None:
     source, small = folder / f"in{kind}", folder / f"small{kind}"
     write(source, count)
     write(small, 2 * ROWS)
-    *_, least = applied(folder, small, folder / "out.npz")
+    _, least = command(["apply", "c.json", small.name, "-o", "out.npz"], folder)
     size = source.stat().st_size
     print(f"{kind} of {count} samples, {size / 1e9:.2f} GB; a plain copy: {copied(source):.0f} MB/s")
     for ending in endings:
-        target = folder / f"out{ending}"
-        seconds, processor_s, peak = applied(folder, source, target)
+        seconds, done = command(["apply", "c.json", source.name, "-o", f"out{ending}"], folder)
         print(
             f"mpucal apply, {kind} to {ending}: {count / seconds / 1e6:.2f} million samples/s,"
-            f" {count / processor_s / 1e6:.2f} a second of the processor's,"
-            f" {size / 1e6 / processor_s:.0f} MB read in it, {peak:.0f} MB of memory at most"
-            f" ({least:.0f} MB with {2 * ROWS} samples)"
+            f" {count / done.cpu_s / 1e6:.2f} a second of the processor's,"
+            f" {size / 1e6 / done.cpu_s:.0f} MB read in it, {done.peak_mb} MB of memory at most"
+            f" ({least.peak_mb} MB with {2 * ROWS} samples)"
         )
-        target.unlink()
+        (folder / f"out{ending}").unlink()
     source.unlink()

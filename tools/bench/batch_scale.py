@@ -1,4 +1,4 @@
-"""How `mpucal batch` scales: rows a second by workers, what the engine costs a row, and what kills do to it.
+"""The scaling of `mpucal batch`: rows a second by workers, the engine's cost of a row, and the effect of kills.
 
 python -m tools.bench batch_scale --captures 200 --workers 1 2
 python -m tools.bench batch_scale --captures 10000 --workers 2 --kill --of sessions/*/capture.mcap
@@ -16,11 +16,9 @@ import csv
 import io
 import resource
 import tempfile
-import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -35,11 +33,13 @@ from mpucal.chip import registers as reg
 from mpucal.chip.access import Transaction
 from mpucal.files.mcap import CaptureWriter, read_capture
 
+from .timing import Used, used
+
 SESSIONS = Path(__file__).parents[2] / "fixtures" / "sessions"
 
 
 def write_captures(folder: Path, count: int, stored: Sequence[Path]) -> list[str]:
-    """That many captures, of which each hundred has one that is cut and one that is junk."""
+    """Write that many captures, of which each hundred has one that is cut and one that is junk."""
     captures, rng = [read_capture(path) for path in stored], np.random.default_rng(1)
     paths = []
     for i in range(count):
@@ -63,51 +63,26 @@ def write_captures(folder: Path, count: int, stored: Sequence[Path]) -> list[str
     return paths
 
 
-@dataclass
-class Cost:
-    """Of a batch: s by the clock, s of processors in this program and in the workers that lived on."""
-
-    seconds: float = 0.0
-    program_s: float = 0.0
-    workers_s: float = 0.0
-
-    @contextmanager
-    def counted(self) -> Iterator[None]:
-        """What happens meanwhile."""
-        children = psutil.Process().children(recursive=True)
-        begun, program_s, workers_s = time.perf_counter(), time.process_time(), _processor_s(children)
-        try:
-            yield
-        finally:
-            self.seconds += time.perf_counter() - begun
-            self.program_s += time.process_time() - program_s
-            self.workers_s += _processor_s(children) - workers_s
-
-    def said(self, rows: int) -> str:
-        """A row."""
-        each = (1e3 * x / rows for x in (self.program_s, self.workers_s))
-        return "{:.2f} rows/s; of a processor a row: program and scheduler {:.2f} ms, workers {:.2f} ms".format(
-            rows / self.seconds, *each
-        )
+def cost(time: Used, rows: int) -> str:
+    """Return the cost of so many rows in words."""
+    program_ms, workers_ms = (1e3 * x / rows for x in (time.cpu_s, time.children_s))
+    of = f"of a processor a row: program and scheduler {program_ms:.2f} ms, workers {workers_ms:.2f} ms"
+    return f"{rows / time.wall_s:.2f} rows/s; {of}"
 
 
-def _processor_s(children: list[psutil.Process]) -> float:
-    return float(sum(sum(child.cpu_times()[:2]) for child in children if child.is_running()))
-
-
-def timed(paths: list[str], workers: int, journal: Journal, settings: Settings, until: int | None = None) -> Cost:
-    """A batch on workers of its own; `until` : a worker is killed after half of so many rows, and all after them."""
-    cost = Cost()
+def timed(paths: list[str], workers: int, journal: Journal, settings: Settings, until: int | None = None) -> Used:
+    """Run a batch on workers of its own; `until` : one is killed after half of so many rows, and all after them."""
     with local_client(workers) as client:
         client.wait_for_workers(workers)
         # what a worker imports with its first row
         client.run(row_of, str(SESSIONS / "mpu6050.mcap"), settings)
         processes = list(client.run(_process).values())
-        with cost.counted():
+        children = psutil.Process().children(recursive=True)
+        with used(lambda: sum(sum(one.cpu_times()[:2]) for one in children if one.is_running())) as time:
             for progress in islice(run(paths, client, journal, settings), until):
                 if until is not None and progress.done == until // 2:
                     psutil.Process(processes[0]).kill()
-    return cost
+    return time
 
 
 def _process() -> int:
@@ -115,7 +90,7 @@ def _process() -> int:
 
 
 def measured(folder: Path, paths: list[str], workers: int, settings: Settings, kill: bool) -> bytes:
-    """What a batch costs; its results.csv."""
+    """Print the cost of a batch, and return its results.csv."""
     folder.mkdir()
     journal = Journal(folder / JOURNAL, settings.key)
     try:
@@ -123,10 +98,9 @@ def measured(folder: Path, paths: list[str], workers: int, settings: Settings, k
             timed(paths, workers, journal, settings, until=2 * len(paths) // 3)
             print(f"{workers} workers, one killed, and then all: {len(journal)} rows are there", flush=True)
         kept = len(journal)
-        cost = timed(paths, workers, journal, settings)
-        print(f"{workers} workers: {cost.said(len(paths) - kept)}", flush=True)
-        cost = timed(paths, workers, journal, settings)
-        print(f"  again, all there already: {cost.said(len(paths))}", flush=True)
+        print(f"{workers} workers: {cost(timed(paths, workers, journal, settings), len(paths) - kept)}", flush=True)
+        again = timed(paths, workers, journal, settings)
+        print(f"  again, all there already: {cost(again, len(paths))}", flush=True)
         return write(folder, journal.rows(paths))[1].read_bytes()
     finally:
         journal.close()
@@ -147,10 +121,9 @@ def main() -> None:
         if options.engine_only:
             paths = [f"{name}/none/{i}.mcap" for i in range(options.captures)]
         else:
-            begun = time.perf_counter()
             paths = write_captures(Path(name), options.captures, options.of)
             size = sum(Path(path).stat().st_size for path in paths) / 1e6
-            print(f"{len(paths)} captures, {size:.1f} MB, written in {time.perf_counter() - begun:.0f} s", flush=True)
+            print(f"{len(paths)} captures, {size:.1f} MB", flush=True)
         for workers in options.workers:
             kill = options.kill and workers == options.workers[-1]
             tables.append(measured(Path(name) / f"out-{workers}", paths, workers, settings, kill))

@@ -1,4 +1,4 @@
-"""How much of a bus the driver takes, 400 kHz I2C or SPI, whether it keeps up, and how well it knows the sample rate.
+"""The share of a bus that the driver takes, 400 kHz I2C or SPI, the samples it loses, and the sample rate it measures.
 
     python -m tools.bench bus_budget [CAPTURE.mcap] [--seconds 3600] [--seeds 100]
 
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
@@ -34,6 +33,8 @@ from mpucal.simulated.sensor import Counts, Setting
 from mpucal.sources.spi import DATA, REGISTER_HZ, SpiBus
 from mpucal.sources.tap import Tap
 
+from .timing import used
+
 BUS_HZ = 400_000
 READ_BITS, WRITE_BITS, BYTE_BITS = 30, 20, 9
 FASTEST_PPM = 10_000.0
@@ -54,7 +55,7 @@ class NumberedFeed:
         self.next = 0
 
     def samples(self, edges_s: Vector, setting: Setting) -> Counts:
-        """The next samples of a board at rest."""
+        """Return the next samples of a board at rest."""
         n = len(edges_s) - 1
         rows = np.tile(np.array([0, 0, round(32768 / setting.accel_range_g), -2000, 0, 0, 0], np.int16), (n, 1))
         rows[:, 0] = np.arange(self.next, self.next + n) % 30000
@@ -83,13 +84,13 @@ class Kept(list[Transaction]):
 
 
 def share(transactions: Sequence[Transaction]) -> float:
-    """Of the bus, from the first of them to the last."""
+    """Return the share of an I2C bus, from the first of them to the last."""
     bits = sum((READ_BITS if t.op == "read" else WRITE_BITS) + BYTE_BITS * t.count for t in transactions)
     return bits / BUS_HZ / ((transactions[-1].t_ns - transactions[0].t_ns) * 1e-9)
 
 
 def spi_share(transactions: Sequence[Transaction]) -> float:
-    """The same of an SPI bus, as mpucal/sources/spi.py moves them."""
+    """Return the share of an SPI bus, as mpucal/sources/spi.py moves them."""
     busy_s = sum(8 * (t.count + 1) / (MPU6500.spi_data_hz if t.register in DATA else REGISTER_HZ) for t in transactions)
     return busy_s / ((transactions[-1].t_ns - transactions[0].t_ns) * 1e-9)
 
@@ -103,16 +104,23 @@ def run(
     seed: int = 0,
     share: Callable[[Sequence[Transaction]], float] = share,
 ) -> tuple[Recording, float, float]:
-    """What was recorded on a host that is late, the share of the bus, and processor seconds a second."""
+    """Return what was recorded on a host that is late, the share of the bus, and processor seconds a second."""
     kept = Kept()
     bus = SimulatedBus(Chip(MODELS[model], NumberedFeed(), ppm, FactoryTrim()), JitterClock(late_s, seed))
     driver = Driver(Tap(bus, kept), Config(rate_hz=rate_hz))
+    processor = polled(driver, seconds, kept)
+    return driver.recording(), share(kept), processor
+
+
+def polled(driver: Driver, seconds: float, kept: Kept) -> float:
+    """Poll for so long from the start on, and return processor seconds a second."""
     driver.start()
     kept.clear()
-    begun_ns, begun = driver.now_ns(), time.process_time()
-    while driver.now_ns() < begun_ns + seconds * 1e9:
-        driver.poll()
-    return driver.recording(), share(kept), (time.process_time() - begun) / seconds
+    until_ns = driver.now_ns() + seconds * 1e9
+    with used() as found:
+        while driver.now_ns() < until_ns:
+            driver.poll()
+    return found.cpu_s / seconds
 
 
 class Wired:
@@ -133,25 +141,21 @@ class Wired:
 
 
 def spi_processor(rate_hz: float, seconds: float) -> float:
-    """Processor seconds a second of reading over SPI in real time; the simulated chip is in it, the wires are not."""
+    """Return processor seconds a second of reading over SPI in real time; the simulated chip is in it, no wires are."""
     sys.modules["spidev"] = library = ModuleType("spidev")
     library.SpiDev = Wired  # type: ignore[attr-defined]
-    driver = Driver(Tap(SpiBus("simulated"), Kept()), Config(rate_hz=rate_hz))
-    driver.start()
-    begun_ns, begun = driver.now_ns(), time.process_time()
-    while driver.now_ns() < begun_ns + seconds * 1e9:
-        driver.poll()
-    return (time.process_time() - begun) / seconds
+    kept = Kept()
+    return polled(Driver(Tap(SpiBus("simulated"), kept), Config(rate_hz=rate_hz)), seconds, kept)
 
 
 def lost(recording: Recording) -> int:
-    """How many samples are missing between the first and the last."""
+    """Return how many samples are missing between the first and the last."""
     number = np.rint(recording.acc[:, 0] / 9.80665 * 8192).astype(int)
     return int(((np.diff(number) % 30000) - 1).sum())
 
 
 def rate_error_ppm(rate_hz: float, seconds: float, seeds: int) -> float:
-    """The root mean square of the measured rate's error, on a host 1 ms late."""
+    """Return the root mean square of the measured rate's error, on a host 1 ms late."""
     errors = []
     for seed in range(seeds):
         ppm = float(np.random.default_rng(seed).uniform(-8000, 8000))

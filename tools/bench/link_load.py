@@ -23,6 +23,8 @@ from mpucal.mavlink.transports import Udp
 from mpucal.mavlink.url import Kind, Url
 from mpucal.mavlink.vehicle_source import VehicleSource
 
+from .timing import used
+
 
 def vehicle(port: int, rate_hz: float) -> None:
     """Send HIGHRES_IMU, SCALED_IMU2 and SCALED_IMU3 at `rate_hz`, and HEARTBEAT; acknowledge everything."""
@@ -50,7 +52,7 @@ def vehicle(port: int, rate_hz: float) -> None:
 
 
 def asked(line: socket.socket, mav: object) -> int:
-    """How many commands arrived."""
+    """Return how many commands arrived."""
     count = 0
     while True:
         try:
@@ -59,8 +61,8 @@ def asked(line: socket.socket, mav: object) -> int:
             return count
 
 
-def main() -> int:
-    """Measure and print; the exit code."""
+def main() -> None:
+    """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rate", type=float, default=333.0, metavar="HZ")
     parser.add_argument("--seconds", type=float, default=20.0)
@@ -75,14 +77,12 @@ def main() -> int:
         sender.start()
         try:
             source.start()
-            samples, wall_s, cpu_s = 0, time.monotonic(), time.process_time()
-            while time.monotonic() - wall_s < arguments.seconds:
-                samples += len(source.poll())
-            wall_s, cpu_s = time.monotonic() - wall_s, time.process_time() - cpu_s
+            samples, until_s = 0, time.monotonic() + arguments.seconds
+            with used() as found:
+                while time.monotonic() < until_s:
+                    samples += len(source.poll())
         finally:
             sender.kill()
             link.close()
-    print(
-        f"3 IMUs at {samples / wall_s:.0f} Hz: {100 * cpu_s / wall_s:.1f} % of one processor, {link.lost} packets lost"
-    )
-    return 0
+    share = 100 * found.cpu_s / found.wall_s
+    print(f"3 IMUs at {samples / found.wall_s:.0f} Hz: {share:.1f} % of one processor, {link.lost} packets lost")

@@ -12,7 +12,6 @@ another one has stopped reading. The simulation itself takes a part of the time.
 from __future__ import annotations
 
 import argparse
-import os
 import socket
 import subprocess
 import sys
@@ -21,7 +20,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -31,7 +29,7 @@ from mpucal.chip import registers as reg
 from mpucal.chip.access import Bus, Reply
 from mpucal.chip.config import Config
 from mpucal.chip.driver import Driver
-from mpucal.data import Sensor
+from mpucal.data import Sensor, Vector
 from mpucal.errors import EndOfCapture
 from mpucal.files.mcap import CaptureWriter
 from mpucal.page.address import Address
@@ -44,6 +42,8 @@ from mpucal.session.plan import Plan
 from mpucal.session.runner import Runner
 from mpucal.simulated.chip import open_simulated
 from mpucal.sources.tap import Tap
+
+from .timing import ended_children_s, used
 
 FIFO_FRAMES = 512 // reg.FRAME_BYTES
 
@@ -80,6 +80,7 @@ class Timed:
 
     def __init__(self, bus: Bus, seconds: float) -> None:
         self._bus, self._end_ns = bus, time.monotonic_ns() + round(seconds * 1e9)
+        self.write, self.sleep_until, self.close = bus.write, bus.sleep_until, bus.close
         self.looks_ns: list[int] = []
 
     def read(self, register: int, count: int) -> Reply:
@@ -90,28 +91,16 @@ class Timed:
             raise EndOfCapture
         return self._bus.read(register, count)
 
-    def write(self, register: int, data: bytes) -> int:
-        """See Bus."""
-        return self._bus.write(register, data)
-
-    def sleep_until(self, t_ns: int) -> None:
-        """See Bus."""
-        self._bus.sleep_until(t_ns)
-
-    def close(self) -> None:
-        """See Bus."""
-        self._bus.close()
-
 
 class Nobody:
-    """Says nothing; at the first prompt, when the chip is set up, the count of looks begins. A page may be told."""
+    """A person who presses nothing; at the first prompt, when the chip is set up, the looks begin to be counted."""
 
     def __init__(self, bus: Timed, feed: Feed | None) -> None:
         self._bus: Timed | None = bus
         self._feed = feed
 
     def hear(self, output: Output) -> None:
-        """Begin to count."""
+        """Begin to count; a page is told everything."""
         if self._feed is not None:
             self._feed.hear(output)
         if self._bus is not None:
@@ -119,21 +108,13 @@ class Nobody:
         self._bus = None
 
     def pressed(self) -> Sequence[Key]:
-        """Nothing."""
+        """Press nothing."""
         return ()
-
-
-@dataclass(frozen=True)
-class Measured:
-    """Gaps (n,) between looks [ms], and what of a core was used."""
-
-    gaps_ms: np.ndarray
-    share: float
 
 
 @contextmanager
 def followed(page: bool) -> Iterator[Feed | None]:
-    """A page with its two clients, if there is to be one."""
+    """Yield a page with its two clients, if there is to be one."""
     if not page:
         yield None
         return
@@ -150,8 +131,8 @@ def followed(page: bool) -> Iterator[Feed | None]:
         feed.close()
 
 
-def measure(rate_hz: float, seconds: float, start_worker: Hire, page: bool) -> Measured:
-    """One session of so long."""
+def measure(rate_hz: float, seconds: float, start_worker: Hire, page: bool) -> tuple[Vector, float]:
+    """Run a session for so long; return the gaps (n,) between looks [ms], and the share of a core that was used."""
     chip = open_simulated("sim:pace=real", seed=1)
     bus = Timed(chip, seconds)
     plan = Plan(Config(rate_hz=rate_hz), target="best")
@@ -163,19 +144,12 @@ def measure(rate_hz: float, seconds: float, start_worker: Hire, page: bool) -> M
         writer.start({})
         driver = Driver(Tap(bus, writer), plan.config)
         runner = Runner(driver, Nobody(bus, feed), writer.event, plan, (chip.hear,), start_worker=start_worker)
-        begun, used_s = time.monotonic(), _used_s()
-        runner.measure()
-        share = (_used_s() - used_s) / (time.monotonic() - begun)
-    return Measured(np.diff(bus.looks_ns) * 1e-6, share)
+        with used(ended_children_s) as found:
+            runner.measure()
+    return np.diff(bus.looks_ns) * 1e-6, (found.cpu_s + found.children_s) / found.wall_s
 
 
-def _used_s() -> float:
-    """CPU time of this process and of those that have ended."""
-    used = os.times()
-    return used.user + used.system + used.children_user + used.children_system
-
-
-def main() -> int:
+def main() -> None:
     """Measure all of them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--rate", type=float, default=1000.0)
@@ -184,11 +158,9 @@ def main() -> int:
     print(f"{arguments.rate:g} Hz, {arguments.seconds:g} s; a 512-byte FIFO holds", end=" ")
     print(f"{1000.0 * FIFO_FRAMES / arguments.rate:.0f} ms")
     for name, (start_worker, page) in HIRED.items():
-        found = measure(arguments.rate, arguments.seconds, start_worker, page)
-        gaps = found.gaps_ms
+        gaps, share = measure(arguments.rate, arguments.seconds, start_worker, page)
         print(
             f"{name}: gaps {np.median(gaps):.1f} ms in the median, "
-            f"{np.quantile(gaps, 0.99):.1f} at 99 %, {gaps.max():.1f} at worst; {found.share:.0%} of a core",
+            f"{np.quantile(gaps, 0.99):.1f} at 99 %, {gaps.max():.1f} at worst; {share:.0%} of a core",
             flush=True,
         )
-    return 0

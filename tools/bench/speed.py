@@ -1,4 +1,4 @@
-"""How long things take and how much memory they need: python -m tools.bench speed [--json FILE].
+"""Times and memory of what mpucal does: python -m tools.bench speed [--json FILE].
 
 The kernel is compared with its NumPy twins on the same data in the same run, so that their ratio means the same on
 every machine. Times are the processor's, so that what else runs counts little. Nothing here passes or fails.
@@ -8,13 +8,8 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import statistics
 import subprocess
 import sys
-import time
-import tracemalloc
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,6 +31,8 @@ from tools.lab.reference import evaluate_reference
 from tools.lab.scenarios.recordings import GRAVITY_MPS2, hand_scenario, paper_scenario
 from tools.lab.table import plain_table, show
 
+from .timing import ended_children_s, median_s, peak_bytes
+
 FLAT_S, TURNS = 10.0, 3
 # long enough for a loop's start not to count, and what the twins do in a second
 KERNEL_STEPS, TWIN_STEPS = 10_000, 300
@@ -46,23 +43,12 @@ HELP = "from mpucal.__main__ import run; run(['--help']); import sys; sys.stderr
 
 
 def turned(seconds: float, rate_hz: float) -> Recording:
-    """Ten seconds flat, then one turn about each axis, by a sensor of the paper's simulation."""
+    """Simulate ten seconds flat, then one turn about each axis, with a sensor of the paper's simulation."""
     return paper_scenario(0, rate_hz=rate_hz, turn_s=(seconds - FLAT_S) / TURNS).recording
 
 
-def median_s(call: Callable[[], Any], runs: int, clock: Callable[[], float] = time.process_time) -> float:
-    """The median time of `runs` calls [s], after one that warms up."""
-    call()
-    times = []
-    for _ in range(runs):
-        began = clock()
-        call()
-        times.append(clock() - began)
-    return statistics.median(times)
-
-
 def calibrations(runs: int) -> list[dict[str, Any]]:
-    """Of whole calibrations with their verdicts, and of the estimation alone."""
+    """Time whole calibrations with their verdicts, and the estimation alone."""
     by_hand = hand_scenario(0, "pose12").recording
     rows = []
     for motion, recording, model in (
@@ -91,14 +77,14 @@ def calibrations(runs: int) -> list[dict[str, Any]]:
 
 
 def problem_of(recording: Recording) -> tuple[Problem, Theta]:
-    """What the filters run over, and where an estimate begins."""
+    """Return what the filters run over, and where an estimate begins."""
     flat = flat_statistics(recording, recording.flat)
     problem = Problem(Series.after(recording, flat), flat, GRAVITY_MPS2)
     return problem, initialise(problem, flat.b_omega)
 
 
 def as_hand(problem: Problem) -> Problem:
-    """The same for the hand's filter, with everything that it may be given."""
+    """Return the problem for the hand's filter, with everything that it may be given."""
     series = problem.series
     n = len(series)
     alpha = np.gradient(series.omega, axis=0) / series.dt[:, None]
@@ -107,13 +93,13 @@ def as_hand(problem: Problem) -> Problem:
 
 
 def cut(problem: Problem, steps: int) -> Problem:
-    """Its first steps."""
+    """Return the problem of the first steps."""
     arrays = {name: None if x is None else x[:steps] for name, x in vars(problem.series).items()}
     return replace(problem, series=replace(problem.series, **arrays))
 
 
 def kernel(runs: int) -> list[dict[str, Any]]:
-    """Of one step of V, and of V with gradient and Fisher matrix, beside the NumPy twin."""
+    """Time one step of V, and of V with gradient and Fisher matrix, beside the NumPy twin."""
     problem, theta = problem_of(turned(60.0, 200.0))
     runs *= MORE_OF_A_KERNEL
     rows = []
@@ -139,7 +125,7 @@ def kernel(runs: int) -> list[dict[str, Any]]:
 
 
 def growth(runs: int) -> list[dict[str, Any]]:
-    """Of the fit by `accel` of a minute at one rate after the other: time, and the most memory it needed."""
+    """Time the fit by `accel` of a minute at one rate after the other, and find the most memory it needed."""
     rows = []
     for n in GROWTH:
         recording = turned(60.0, n / 60.0)
@@ -157,35 +143,20 @@ def growth(runs: int) -> list[dict[str, Any]]:
     return rows
 
 
-def peak_bytes(call: Callable[[], Any]) -> int:
-    """The most memory that the call's arrays took beyond what was there; the kernel itself keeps none a sample."""
-    tracemalloc.start()
-    call()
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    return peak
-
-
 def start(runs: int) -> dict[str, Any]:
-    """Of `mpucal --help` as a process, beside an interpreter that does nothing."""
+    """Time `mpucal --help` as a process, beside an interpreter that does nothing."""
 
     def process(program: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
 
     def ms(program: str) -> float:
-        return 1e3 * median_s(lambda: process(program), runs, children_s)
+        return 1e3 * median_s(lambda: process(program), runs, ended_children_s)
 
     return {
         "mpucal --help ms": ms(HELP),
         "of which the interpreter": ms("pass"),
         "NumPy loaded": process(HELP).stderr,
     }
-
-
-def children_s() -> float:
-    """The processor's time that the processes started from here have taken."""
-    spent = os.times()
-    return spent.children_user + spent.children_system
 
 
 def main() -> None:
