@@ -1,1 +1,1 @@
-"""A calibration in the forms that other programs read; `forms` has a row for each."""
+"""Export of a calibration to other programs; `forms` has a row for each form."""

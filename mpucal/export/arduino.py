@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from ..chip.families import MPU6050, family_of
 from ..data import ACCEL_COUNTS, GYRO_COUNTS
 from ..result.calibration import Calibration
-from .c_code import INCLUDES, at_temperature
-from .code import in_c
-from .losses import head
+from .c_code import INCLUDES, c_functions, c_temperature_function
+from .losses import heading
 
 ACCEL_CONFIG = {2.0: 0x00, 4.0: 0x08, 8.0: 0x10, 16.0: 0x18}
 GYRO_CONFIG = {250.0: 0x00, 500.0: 0x08, 1000.0: 0x10, 2000.0: 0x18}
@@ -17,24 +16,22 @@ DEFAULT_RANGE_G, DEFAULT_RANGE_DPS = 4.0, 500.0
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
-    """The sketch's text, with `notes` in its head."""
-    remarks = "\n".join(f"// {line}" for line in (f"{head(calibration)}, rad/s.", *notes))
-    functions = f"{in_c(calibration)}{at_temperature(calibration)}"
+    """Return the sketch's text, with `notes` in its heading."""
+    remarks = "\n".join(heading(calibration, notes, "// ", "m/s^2, rad/s"))
+    functions = f"{c_functions(calibration)}{c_temperature_function(calibration)}"
     return f"{remarks}\n#include <Wire.h>\n{INCLUDES}\n{functions}{_constants(calibration)}{_BODY}"
 
 
-def left(calibration: Calibration) -> tuple[str, ...]:
-    """Assumptions of the sketch that the calibration leaves open."""
-    sensor, said = calibration.sensor, ["It reads the chip at address 0x68: where AD0 is high, change CHIP to 0x69."]
+def losses(calibration: Calibration) -> tuple[str, ...]:
+    """Return notes on assumptions of the sketch."""
+    sensor, notes = calibration.sensor, ["It reads the chip at address 0x68: if AD0 is high, change CHIP to 0x69."]
     if sensor.accel_range_g not in ACCEL_CONFIG:
-        said.append(
-            f"It sets +-{DEFAULT_RANGE_G:g} g, as the calibration names no such range: b_a and D hold for their own."
-        )
+        notes.append(f"It sets +-{DEFAULT_RANGE_G:g} g, but the calibration is of another or unknown range.")
     if sensor.gyro_range_dps not in GYRO_CONFIG:
-        said.append(f"It sets +-{DEFAULT_RANGE_DPS:g} deg/s, as the calibration names no such range.")
+        notes.append(f"It sets +-{DEFAULT_RANGE_DPS:g} deg/s, but the calibration is of another or unknown range.")
     if family_of(sensor.chip) is None and calibration.follows_temperature:
-        said.append("It takes the chip's temperature for an MPU-6050's: mpucal doctor says which chip it is.")
-    return tuple(said)
+        notes.append("It assumes the thermometer of an MPU-6050; `mpucal doctor` shows which chip it is.")
+    return tuple(notes)
 
 
 def _constants(calibration: Calibration) -> str:
@@ -59,7 +56,7 @@ static void set(uint8_t reg, uint8_t value) {
     Wire.endTransmission();
 }
 
-// One sample's counts: accelerometer x, y, z, temperature, gyroscope x, y, z; false where the chip does not answer.
+// Read one sample: accelerometer x, y, z, temperature, gyroscope x, y, z; false if the chip does not answer.
 static bool measure(int16_t counts[7]) {
     Wire.beginTransmission(CHIP);
     Wire.write((uint8_t)0x3B);

@@ -1,22 +1,66 @@
-"""What C code does with a calibration besides in_c: b_a(T), and the chip's counts at the range that it is set to."""
+"""C functions that apply a calibration: to m/s^2 and rad/s, with b_a(T), and to the chip's counts."""
 
 from __future__ import annotations
 
-from ..data import ACCEL_COUNTS, GYRO_COUNTS
+import numpy as np
+
+from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
 from ..result.calibration import Calibration
-from .code import temperatures
+from .losses import temperature_range
 
 INCLUDES = "#include <stdint.h>\n#include <string.h>\n"
 
 
-def at_temperature(c: Calibration) -> str:
-    """`mpucal_correct_at(y, temperature_c, a)`: NaN is told by its bits, since -ffast-math has no NaN."""
-    at, start, end = temperatures(c)
-    slope = ", ".join(f"{v:.8e}f" for v in c.b_a_slope)
-    return f"""static const float MPUCAL_SLOPE[3] = {{{slope}}}; /* of b_a, m/s^2 per deg C; zeros: not known */
+def c_functions(c: Calibration) -> str:
+    """Return constants of inv(D), b_a, K and b_omega, and functions for firmware that apply them.
+
+    Their names differ from those of mpucal_apply.h, so that a file can include both.
+    """
+    bias = _row(c.b_a_to_subtract)
+    rate_bias = _row(np.nan_to_num(c.b_omega))
+    return f"""static const float MPUCAL_INV_D[3][3] = {{
+{c_matrix(c.inverse)}
+}};
+static const float MPUCAL_B_A[3] = {{{bias}}}; /* m/s^2 */
+static const float MPUCAL_K[3][3] = {{
+{c_matrix(c.K)}
+}};
+static const float MPUCAL_B_OMEGA[3] = {{{rate_bias}}}; /* rad/s */
+
+{_about_counts(c)}
+static inline void mpucal_correct(const float y[3], float a[3])
+{{
+    for (int i = 0; i < 3; i++) {{
+        a[i] = 0.0f;
+        for (int j = 0; j < 3; j++)
+            a[i] += MPUCAL_INV_D[i][j] * (y[j] - MPUCAL_B_A[j]);
+    }}
+}}
+
+{_about_rates(c)}
+static inline void mpucal_correct_gyro(const float y[3], float w[3])
+{{
+    for (int i = 0; i < 3; i++) {{
+        w[i] = 0.0f;
+        for (int j = 0; j < 3; j++)
+            w[i] += MPUCAL_K[i][j] * (y[j] - MPUCAL_B_OMEGA[j]);
+    }}
+}}
+"""
+
+
+def c_matrix(matrix: Vector) -> str:
+    """Return the rows of a C initialiser, in float."""
+    return ",\n".join(f"    {{{_row(row)}}}" for row in matrix)
+
+
+def c_temperature_function(c: Calibration) -> str:
+    """Return `mpucal_correct_at(y, temperature_c, a)`; it tests for NaN by its bits, since -ffast-math has no NaN."""
+    at, start, end = temperature_range(c)
+    return f"""static const float MPUCAL_SLOPE[3] = {{{_row(c.b_a_slope)}}}; /* m/s^2 per deg C; zeros: not known */
 static const float MPUCAL_AT_C = {at:.8e}f, MPUCAL_FROM_C = {start:.8e}f, MPUCAL_TO_C = {end:.8e}f;
 
-/* The same with b_a(T) at the chip's temperature [deg C]; one that is not known, NaN, is that of b_a. */
+/* As mpucal_correct, with b_a(T) at the chip's temperature [deg C]; NaN if that is not known. */
 static inline void mpucal_correct_at(const float y[3], float temperature_c, float a[3])
 {{
     uint32_t bits;
@@ -31,14 +75,14 @@ static inline void mpucal_correct_at(const float y[3], float temperature_c, floa
 """
 
 
-def of_counts(c: Calibration) -> str:
-    """Functions of counts: each refuses another range than the calibration's, or does not compile."""
+def c_count_functions(c: Calibration) -> str:
+    """Return functions of counts, which refuse another range than the calibration's at run time or compile time."""
     accel_g, gyro_dps = c.sensor.accel_range_g or 0.0, c.sensor.gyro_range_dps or 0.0
     checks = _check("MPUCAL_USED_RANGE_G", accel_g, "g") + _check("MPUCAL_USED_RANGE_DPS", gyro_dps, "deg/s")
     return f"""{checks}/* 0: not known */
 static const float MPUCAL_RANGE_G = {accel_g:.8e}f, MPUCAL_RANGE_DPS = {gyro_dps:.8e}f;
 
-/* a of the chip's counts at +-range_g, to which it is set; 0, and no a, where that is not the calibration's range. */
+/* Correct the chip's counts at +-range_g, its setting; return 0 and no a if this is not the calibration's range. */
 static inline int mpucal_correct_counts(const int16_t counts[3], float range_g, float a[3])
 {{
     float y[3];
@@ -50,7 +94,7 @@ static inline int mpucal_correct_counts(const int16_t counts[3], float range_g, 
     return 1;
 }}
 
-/* The same of the gyroscope's counts at +-range_dps: 131 of them are 1 deg/s at +-250 deg/s. */
+/* As above for the gyroscope's counts at +-range_dps: 131 of them are 1 deg/s at +-250 deg/s. */
 static inline int mpucal_correct_gyro_counts(const int16_t counts[3], float range_dps, float w[3])
 {{
     float y[3];
@@ -65,10 +109,33 @@ static inline int mpucal_correct_gyro_counts(const int16_t counts[3], float rang
 
 
 def _check(used: str, measured: float, unit: str) -> str:
+    """Return a compile-time check of the range that the user's code sets."""
     if not measured or measured % 1:
         return ""
-    return f"""/* Define {used} as the range that your code sets, an integer: another one than this does not compile. */
+    return f"""/* Define {used} as the range that your code sets, an integer: any other than this does not compile. */
 #if defined({used}) && {used} != {measured:g}
-#error "mpucal: this calibration is of +-{measured:g} {unit}, and {used} is another range"
+#error "mpucal: this calibration is of +-{measured:g} {unit}, but {used} is another range"
 #endif
 """
+
+
+def _about_counts(c: Calibration) -> str:
+    line = "/* y: as measured, a: calibrated, both in m/s^2. */"
+    if c.sensor.accel_range_g is None:
+        return line
+    scale = c.sensor.accel_range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
+    return f"{line}\n/* At +-{c.sensor.accel_range_g:g} g one count of the chip is {scale:.9g} m/s^2. */"
+
+
+def _about_rates(c: Calibration) -> str:
+    line = "/* y: as measured, w: calibrated, both in rad/s. */"
+    range_dps = c.sensor.gyro_range_dps
+    if range_dps is None:
+        return line
+    lsb, scale = GYRO_COUNTS / range_dps, np.radians(range_dps / GYRO_COUNTS)
+    of = f"{range_dps:g} deg/s one count of the chip is {scale:.9g} rad/s, {lsb:g} LSB/(deg/s)"
+    return f"{line}\n/* At +-{of}; another scale of y changes w by as much. */"
+
+
+def _row(values: Vector) -> str:
+    return ", ".join(f"{value:.8e}f" for value in values)

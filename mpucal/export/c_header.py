@@ -1,18 +1,17 @@
-"""A calibration as a C header: its numbers as constants, and the functions that apply them."""
+"""A calibration as a C header: its numbers as constants, and functions that apply them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from ..result.calibration import Calibration
-from .c_code import INCLUDES, at_temperature, of_counts
-from .code import c_matrix, in_c
-from .losses import head
+from .c_code import INCLUDES, c_count_functions, c_functions, c_matrix, c_temperature_function
+from .losses import heading
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
-    """The header's text (C99 or C++11), with `notes` in its head."""
-    remarks = "\n".join(f" * {line}" for line in (f"{head(calibration)}.", *notes))
+    """Return the header's text (C99 or C++11), with `notes` in its heading."""
+    remarks = "\n".join(heading(calibration, notes, " * "))
     return f"""/*
 {remarks}
  */
@@ -20,13 +19,13 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
 #define MPUCAL_CALIBRATION_H
 
 {INCLUDES}
-/* y = D s + b_a, of the specific force s; for whoever wants to know: what is applied is its inverse. */
+/* y = D s + b_a, with the specific force s; for information: the functions use its inverse. */
 static const float MPUCAL_D[3][3] = {{
 {c_matrix(calibration.D)}
 }};
 
-{in_c(calibration)}
-{at_temperature(calibration)}
-{of_counts(calibration)}
+{c_functions(calibration)}
+{c_temperature_function(calibration)}
+{c_count_functions(calibration)}
 #endif
 """

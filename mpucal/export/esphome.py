@@ -1,7 +1,7 @@
-"""A calibration as YAML for ESPHome: its mpu6050 sensor, and a template sensor of each calibrated axis.
+"""A calibration as YAML for ESPHome: its mpu6050 sensor, and a template sensor for each calibrated axis.
 
 ESPHome sets +-2 g and +-2000 deg/s, and publishes counts * 0.000061 * 9.80665 m/s^2 and counts * 0.060975 deg/s
-(mpu6050.cpp), where one count is 1/16384 g and 2000/32750 deg/s: its numbers are made the nominal ones first.
+(mpu6050.cpp), but one count is 1/16384 g and 2000/32750 deg/s: its numbers are scaled to nominal ones first.
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ import numpy as np
 
 from ..data import ACCEL_COUNTS, GYRO_COUNTS, Vector
 from ..result.calibration import Calibration
-from .code import temperatures
-from .losses import head
+from .losses import heading, temperature_range
 
 RANGE_G, RANGE_DPS = 2.0, 2000.0
 G_PER_COUNT, NOMINAL_G = 0.000061, RANGE_G / ACCEL_COUNTS
@@ -21,9 +20,8 @@ DPS_PER_COUNT, NOMINAL_DPS = 0.060975, RANGE_DPS / GYRO_COUNTS
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
-    """The `sensor:` part of a configuration, with `notes` in its head."""
-    lines = [f"# {line}" for line in (f"{head(calibration)}.", *notes)]
-    lines += ["sensor:", "  - platform: mpu6050", "    update_interval: 1s"]
+    """Return the `sensor:` part of a configuration, with `notes` in its heading."""
+    lines = [*heading(calibration, notes, "# "), "sensor:", "  - platform: mpu6050", "    update_interval: 1s"]
     for name in (*(f"{kind}_{axis}" for kind in ("accel", "gyro") for axis in "xyz"), "temperature"):
         lines += [f"    {name}:", f"      id: measured_{name}", "      internal: true"]
     g, dps = NOMINAL_G / G_PER_COUNT, NOMINAL_DPS / DPS_PER_COUNT
@@ -34,24 +32,24 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def left(calibration: Calibration) -> tuple[str, ...]:
-    """What it is for other ranges."""
-    said = [
-        f"ESPHome sets +-{set_to:g} {unit}, and the calibration is of +-{of:g} {unit}: what its scale differs between"
-        f" both is left; calibrate with {option} {set_to:g}."
+def losses(calibration: Calibration) -> tuple[str, ...]:
+    """Return notes on a calibration of other ranges than ESPHome's."""
+    notes = [
+        f"ESPHome sets +-{set_to:g} {unit}, but the calibration is of +-{of:g} {unit}: the difference of scale between"
+        f" the two remains; calibrate with {option} {set_to:g}."
         for of, set_to, unit, option in (
             (calibration.sensor.accel_range_g, RANGE_G, "g", "--accel-range"),
             (calibration.sensor.gyro_range_dps, RANGE_DPS, "deg/s", "--gyro-range"),
         )
         if of not in (None, set_to)
     ]
-    return tuple(said)
+    return tuple(notes)
 
 
 def _axes(
     name: str, unit: str, kind: str, gain: Vector, bias: Vector, away: str = "", slope: Vector | None = None
 ) -> list[str]:
-    """A template sensor of each axis: gain (state - bias - slope away)."""
+    """Return a template sensor for each axis: gain (state - bias - slope away)."""
     lines: list[str] = []
     for i, axis in enumerate("xyz"):
         terms = [f"{gain[i, j]:.9e}f * (id(measured_{kind}_{of}).state - {bias[j]:.9e}f)" for j, of in enumerate("xyz")]
@@ -69,9 +67,9 @@ def _axes(
 
 
 def _away(calibration: Calibration) -> str:
-    """How far the temperature is from that of b_a, as C++; 0 where it is not known. Empty without b_a(T)."""
+    """Return the temperature minus that of b_a as C++, 0 if it is not known; empty without b_a(T)."""
     if not calibration.follows_temperature:
         return ""
-    at, start, end = temperatures(calibration)
+    at, start, end = temperature_range(calibration)
     T = "id(measured_temperature).state"
     return f"(std::isnan({T}) ? 0.0f : std::min(std::max({T}, {start:.6e}f), {end:.6e}f) - {at:.6e}f)"

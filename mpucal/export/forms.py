@@ -1,4 +1,4 @@
-"""The forms in which other programs read a calibration, a row each."""
+"""The export forms of a calibration for other programs, a row each."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from . import arduino, c_header, esphome, i2cdevlib, linux_iio, micropython, pyt
 from .losses import (
     Loss,
     check_usable,
-    in_float,
-    where_temperature_is_not_given,
-    with_hardware,
+    float_rounding,
+    hardware_offsets,
+    optional_temperature,
     without_gyroscope,
     without_temperature,
 )
@@ -20,15 +20,15 @@ from .losses import (
 
 @dataclass(frozen=True)
 class Form:
-    """A form in which another program reads a calibration.
+    """Export form of a calibration.
 
     Attributes
     ----------
-    name : as `--to` spells it. suffix : of the file's name.
-    read_by : who reads it, and applied : how that applies it; in Markdown, as docs/use.md has them.
-    text : (calibration, notes) -> the file's text, which states the notes where it can.
-    losses : what the form cannot carry; each gives its sentences for a calibration.
-    only_usable : whether a calibration that must not be used is refused before `text` is asked for.
+    name : for `--to`. suffix : of the file's name.
+    read_by : the program that reads it. applied : how that program applies it. Both are Markdown for docs/use.md.
+    text : (calibration, notes) -> the file's text, with the notes if the format has comments.
+    losses : functions that return notes on the parts of a calibration that the form cannot hold.
+    only_usable : refuse an unusable calibration before `text` is called.
     """
 
     name: str
@@ -40,17 +40,17 @@ class Form:
     only_usable: bool = True
 
     def export(self, calibration: Calibration) -> tuple[str, tuple[str, ...]]:
-        """The file's text, and what it cannot carry and what error that leaves, a sentence each.
+        """Return the file's text, and sentences on the parts that it cannot hold and the remaining error.
 
         Raises
         ------
-        RefusedError : a calibration that must not be used. WriteBackError : one that this form cannot hold.
+        RefusedError : the calibration must not be used. WriteBackError : this form cannot hold it.
         """
         if self.only_usable:
             check_usable(calibration)
         notes = tuple(sentence for loss in self.losses for sentence in loss(calibration))
         if calibration.doubt:
-            notes += (f"Of the calibration, {calibration.doubt}.",)
+            notes += (f"About the calibration: {calibration.doubt}.",)
         return self.text(calibration, notes), notes
 
 
@@ -59,17 +59,17 @@ FORMS = (
         "c-header",
         ".h",
         "C99, C++11",
-        "`mpucal_correct_at(y, temperature_c, a)`, `mpucal_correct_gyro(y, w)`, and of counts, which check the range",
+        "`mpucal_correct_at(y, temperature_c, a)`, `mpucal_correct_gyro(y, w)`; of counts, with a check of the range",
         c_header.text,
-        (in_float, where_temperature_is_not_given, with_hardware),
+        (float_rounding, optional_temperature, hardware_offsets),
     ),
     Form(
         "arduino",
         ".ino",
         "the Arduino IDE",
-        "a sketch that reads the chip over Wire, and prints accelerations and rates",
+        "a sketch that reads the chip over Wire and prints accelerations and rates",
         arduino.text,
-        (in_float, arduino.left, with_hardware),
+        (float_rounding, arduino.losses, hardware_offsets),
     ),
     Form(
         "python",
@@ -77,24 +77,24 @@ FORMS = (
         "NumPy",
         "`apply(y, temperature_c)`, `apply_gyro(y)`",
         python.text,
-        (where_temperature_is_not_given, with_hardware),
+        (optional_temperature, hardware_offsets),
     ),
     Form(
         "ros",
         ".yaml",
         "imu_calib's apply node",
-        "`SM raw - bias`: its bias is inv(D) b_a; covariances for filters besides",
+        "`SM raw - bias`: its bias is inv(D) b_a; with covariances for filters",
         ros.text,
-        (ros.left, without_temperature, with_hardware),
+        (ros.losses, without_temperature, hardware_offsets),
     ),
     Form(
         "linux-iio",
         ".sh",
         "`sh FILE /sys/bus/iio/devices/iio:deviceN`",
-        "calibbias (of an MPU-6050 alone: of an MPU-6500 the kernel's driver takes the offset registers to lie two "
-        "addresses apart, and they lie three apart), calibscale; the line for udev's ACCEL_MOUNT_MATRIX is printed",
+        "calibbias (only of an MPU-6050: the kernel's driver uses wrong addresses of an MPU-6500's offset registers), "
+        "calibscale; it prints the line for udev's ACCEL_MOUNT_MATRIX",
         linux_iio.text,
-        (linux_iio.left, without_gyroscope, without_temperature),
+        (linux_iio.losses, without_gyroscope, without_temperature),
     ),
     Form(
         "ardupilot",
@@ -102,7 +102,7 @@ FORMS = (
         "Mission Planner, MAVProxy",
         "ArduPilot's offsets and scales",
         vehicles.ardupilot,
-        (vehicles.left_by_ardupilot,),
+        (vehicles.ardupilot_losses,),
         only_usable=False,
     ),
     Form(
@@ -111,16 +111,16 @@ FORMS = (
         "QGroundControl",
         "PX4's offsets and scales",
         vehicles.px4,
-        (vehicles.left_by_px4,),
+        (vehicles.px4_losses,),
         only_usable=False,
     ),
     Form(
         "kalibr",
         ".yaml",
         "Kalibr",
-        "imu.yaml: noise densities; the samples are corrected before",
+        "imu.yaml: noise densities; correct the samples before",
         vio.kalibr,
-        (vio.left_by_kalibr,),
+        (vio.kalibr_losses,),
         only_usable=False,
     ),
     Form(
@@ -129,38 +129,38 @@ FORMS = (
         "OpenVINS",
         "kalibr_imu_chain.yaml: `Ta`, `R_IMUtoACC` of inv(D), `Tw`, `R_IMUtoGYRO` of K; it estimates the biases",
         vio.openvins,
-        (vio.left_by_openvins,),
+        (vio.openvins_losses,),
         only_usable=False,
     ),
     Form(
         "i2cdevlib",
         ".h",
         "sketches with i2cdevlib's MPU6050",
-        "`setOffsets(mpu)`: setXAccelOffset and the like, biases alone",
+        "`setOffsets(mpu)`: setXAccelOffset and the like, only biases",
         i2cdevlib.text,
-        (i2cdevlib.left, without_temperature),
+        (i2cdevlib.losses, without_temperature),
     ),
     Form(
         "micropython",
         ".py",
         "MicroPython, CircuitPython",
-        "`apply(y, temperature_c)`, `apply_gyro(y)` of one sample, without NumPy, and of counts, which check the range",
+        "`apply(y, temperature_c)`, `apply_gyro(y)` of one sample, without NumPy; of counts, with a check of the range",
         micropython.text,
-        (in_float, where_temperature_is_not_given, with_hardware),
+        (float_rounding, optional_temperature, hardware_offsets),
     ),
     Form(
         "esphome",
         ".yaml",
         "ESPHome",
-        "template sensors of the calibrated axes, beside its mpu6050 sensor",
+        "template sensors of the calibrated axes and its mpu6050 sensor",
         esphome.text,
-        (in_float, esphome.left, with_hardware),
+        (float_rounding, esphome.losses, hardware_offsets),
     ),
     Form(
         "json",
         ".json",
         "anything",
-        "calibration.json; of a blob, what the blob holds, with no digit lost",
+        "calibration.json; a blob's content is kept to the last digit",
         lambda calibration, _notes: calibration.json(),
         only_usable=False,
     ),
@@ -168,5 +168,5 @@ FORMS = (
 
 
 def form(name: str) -> Form:
-    """The form of that name in FORMS."""
+    """Return the form of that name in FORMS."""
     return next(row for row in FORMS if row.name == name)

@@ -1,7 +1,7 @@
 """A calibration as the six offset words of i2cdevlib's MPU6050: setXAccelOffset and the like.
 
-The accelerometer's registers add 1/2048 g a count to what the factory trimmed, with bit 0 reserved; the gyroscope's add
-4/131 deg/s a count, whatever the range (register map of the MPU-6500, revision 2.1, XG_OFFS_USR; MPU-6050: the same).
+The accelerometer's registers add 1/2048 g per count to the factory trim, with bit 0 reserved; the gyroscope's add
+4/131 deg/s per count at any range (register map of the MPU-6500, revision 2.1, XG_OFFS_USR; MPU-6050: the same).
 """
 
 from __future__ import annotations
@@ -15,41 +15,51 @@ from ..chip.registers import GYRO_OFFSET_LSB_PER_DPS
 from ..data import STANDARD_GRAVITY_MPS2
 from ..errors import ChipError, WriteBackError
 from ..result.calibration import Calibration
-from .losses import head, mps2
+from .losses import format_xyz, heading
 
 LSB_PER_G = 2048.0
 WORD = 1 << 15
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
-    """A function for a sketch, with `notes` in its head.
+    """Return a function for a sketch, with `notes` in its heading.
 
     Raises
     ------
-    WriteBackError : nothing says what the factory's trim was, or a word does not hold an offset.
+    WriteBackError : the factory trim is not known, or an offset does not fit into a word.
     """
     a, w = _words(calibration)
-    remarks = "\n".join(f"// {line}" for line in (f"{head(calibration)}.", *notes))
     calls = [
         f"    mpu.set{axis}{kind}Offset({word});"
-        for kind, of in (("Accel", a), ("Gyro", w))
-        for axis, word in _axes(of)
+        for kind, words in (("Accel", a), ("Gyro", w))
+        for axis, word in zip("XYZ", words, strict=True)
     ]
-    return "\n".join([remarks, '#include "MPU6050.h"', "", "void setOffsets(MPU6050 &mpu)", "{", *calls, "}", ""])
+    return "\n".join(
+        [
+            *heading(calibration, notes, "// "),
+            '#include "MPU6050.h"',
+            "",
+            "void setOffsets(MPU6050 &mpu)",
+            "{",
+            *calls,
+            "}",
+            "",
+        ]
+    )
 
 
-def left(calibration: Calibration) -> tuple[str, ...]:
-    """What offsets leave."""
+def losses(calibration: Calibration) -> tuple[str, ...]:
+    """Return notes on the errors that remain with offsets only."""
     scale = 100.0 * float(np.abs(calibration.D - np.eye(3)).max())
     return (
-        f"It holds offsets alone: scale factor errors and misalignments, up to {scale:.2f} % of an acceleration, stay.",
+        f"It holds only offsets: scale factor errors and misalignments of up to {scale:.2f} % of |a| remain.",
         "Call setOffsets(mpu) after each mpu.initialize() and after a reset of the chip, as its registers are volatile;"
-        " their steps of 1 mg and 0.03 deg/s leave half of that.",
-        "It assumes that the accelerometer's offset registers count 2048 to 1 g: where they count 4096, as in some"
-        " MPU-6050, half of b_a stays. `mpucal doctor` measures which it is, and `mpucal write CALIBRATION chip` writes"
-        " by that.",
-        f"The accelerometer's registers held {calibration.sensor.accel_offsets}, and the gyroscope's are taken to have"
-        f" held 0; all of b_a, ({mps2(calibration.b_a)}) m/s^2, is in the words.",
+        " the rounding to steps of 1 mg and 0.03 deg/s leaves half a step.",
+        "It assumes that 2048 counts of the accelerometer's offset registers are 1 g: where it is 4096, as in some"
+        " MPU-6050, half of b_a remains. `mpucal doctor` measures this, and `mpucal write CALIBRATION chip` takes it"
+        " into account.",
+        f"The words contain all of b_a, ({format_xyz(calibration.b_a)}) m/s^2: the accelerometer's registers held"
+        f" {calibration.sensor.accel_offsets}, and the gyroscope's are assumed to have held 0.",
     )
 
 
@@ -57,7 +67,7 @@ def _words(calibration: Calibration) -> tuple[tuple[int, int, int], tuple[int, .
     trim = calibration.sensor.accel_offsets
     if trim is None:
         raise WriteBackError(
-            "nothing was exported: the calibration does not say what the accelerometer's offset registers held",
+            "nothing was exported: the calibration lacks the content of the accelerometer's offset registers",
             "calibrate from a capture of the chip",
         )
     try:
@@ -66,9 +76,7 @@ def _words(calibration: Calibration) -> tuple[tuple[int, int, int], tuple[int, .
         raise WriteBackError(f"nothing was exported: {error.what}", error.remedy) from error
     w = np.rint(-np.degrees(np.nan_to_num(calibration.b_omega)) * GYRO_OFFSET_LSB_PER_DPS)
     if np.abs(w).max() >= WORD:
-        raise WriteBackError("nothing was exported: no word holds the gyroscope's bias", "check the gyroscope")
+        raise WriteBackError(
+            "nothing was exported: the gyroscope's bias does not fit into a word", "check the gyroscope"
+        )
     return a, tuple(w.astype(int).tolist())
-
-
-def _axes(words: Sequence[int]) -> list[tuple[str, int]]:
-    return list(zip("XYZ", words, strict=True))

@@ -8,14 +8,13 @@ import numpy as np
 
 from ..data import ACCEL_COUNTS, GYRO_COUNTS, STANDARD_GRAVITY_MPS2, Vector
 from ..result.calibration import Calibration
-from .code import temperatures
-from .losses import head
+from .losses import heading, temperature_range
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
-    """The module's text, with `notes` in its head."""
-    remarks = "\n".join(f"# {line}" for line in (f"{head(calibration)}, rad/s.", *notes))
-    at, start, end = temperatures(calibration)
+    """Return the module's text, with `notes` in its heading."""
+    remarks = "\n".join(heading(calibration, notes, "# ", "m/s^2, rad/s"))
+    at, start, end = temperature_range(calibration)
     range_g, range_dps = calibration.sensor.accel_range_g, calibration.sensor.gyro_range_dps
     return f"""{remarks}
 
@@ -34,7 +33,7 @@ def _corrected(M, y, b):
 
 
 def apply(y, temperature_c=None):
-    # calibrated acceleration (x, y, z) [m/s^2] of a measured one, at the chip's deg C where that is known
+    # return the calibrated acceleration (x, y, z) [m/s^2], at the chip's deg C if known
     if temperature_c is None or temperature_c != temperature_c:
         temperature_c = AT_C
     away = min(max(temperature_c, FROM_C), TO_C) - AT_C
@@ -42,7 +41,7 @@ def apply(y, temperature_c=None):
 
 
 def apply_gyro(y):
-    # calibrated rate (x, y, z) [rad/s] of a measured one
+    # return the calibrated rate (x, y, z) [rad/s]
     return _corrected(K, y, B_OMEGA)
 
 
@@ -53,7 +52,7 @@ def _measured(counts, used, calibrated, unit):
 
 
 def apply_counts(counts, range_g, temperature_c=None):
-    # the same of the chip's counts at +-range_g, to which it is set
+    # return the calibrated acceleration of the chip's counts at +-range_g, its setting
     return apply(_measured(counts, range_g, RANGE_G, {STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS:.9g}), temperature_c)
 
 

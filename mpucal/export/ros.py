@@ -1,8 +1,8 @@
-"""A calibration as YAML for ROS: what imu_calib's apply node reads, with the noise that filters ask for.
+"""A calibration for ROS: YAML for imu_calib's apply node, with noise covariances, and a node for ROS 2.
 
-imu_calib (dpkoch/imu_calib, AccelCalib::applyCalib) publishes SM raw - bias: its bias is taken away after the matrix,
-so that SM = inv(D) and bias = inv(D) b_a. Its node subtracts the mean of the gyroscope's first samples itself
-(calibrate_gyros, which is its default). It ignores keys that it does not know.
+imu_calib (dpkoch/imu_calib, AccelCalib::applyCalib) publishes SM raw - bias: the bias is subtracted after the matrix,
+so SM = inv(D) and bias = inv(D) b_a. Its node subtracts the mean of the gyroscope's first samples itself
+(calibrate_gyros, the default). It ignores unknown keys.
 """
 
 from __future__ import annotations
@@ -14,15 +14,16 @@ import numpy as np
 from ..data import Vector
 from ..result.calibration import Calibration
 from ..result.noise import ACCELEROMETER, GYROSCOPE, KEY, WHITE
-from .losses import head
+from .losses import heading
+from .python import python_constants
 
 
 def text(calibration: Calibration, notes: Sequence[str]) -> str:
-    """The file's text, with `notes` in its head."""
+    """Return the file's text, with `notes` in its heading."""
     SM = calibration.inverse
     lines = [
-        *(f"# {line}" for line in (f"{head(calibration)}.", *notes)),
-        "# corrected = SM * raw - bias, as imu_calib's apply_calib does: bias is inv(D) b_a",
+        *heading(calibration, notes, "# "),
+        "# corrected = SM * raw - bias, as in imu_calib's apply_calib: bias is inv(D) b_a",
         f"SM: {_row(SM.ravel())}",
         f"bias: {_row(SM @ calibration.b_a_to_subtract)}",
     ]
@@ -32,23 +33,53 @@ def text(calibration: Calibration, notes: Sequence[str]) -> str:
         ("angular_velocity_covariance", GYROSCOPE, calibration.gyro_noise_std),
     ):
         if known is not None:
-            # of one sample
+            # from a density to one sample
             noise = np.full(3, known[sensor][WHITE] * np.sqrt(rate_hz or known["rate_hz"]))  # noqa: PLW2901
         if np.isfinite(noise).all():
             lines.append(f"{key}: {_row(np.diag(noise**2).ravel())}")
     return "\n".join(lines) + "\n"
 
 
-def left(calibration: Calibration) -> tuple[str, ...]:
-    """What imu_calib does with the gyroscope."""
+def ros_node(c: Calibration) -> str:
+    """Return a node for ROS 2 that subscribes to imu/data_raw and publishes imu/data."""
+    noise = np.diag(c.noise_std**2)
+    known = f"COVARIANCE = {noise.ravel().tolist()}\n" if np.isfinite(noise).all() else ""
+    covariance = "        imu.linear_acceleration_covariance = COVARIANCE\n" if known else ""
+    return f"""import numpy as np
+import rclpy
+from rclpy.node import Node
+from sensor_msgs.msg import Imu
+
+{python_constants(c)}{known}
+
+class Calibrated(Node):
+    def __init__(self):
+        super().__init__("calibrated_imu")
+        self.out = self.create_publisher(Imu, "imu/data", 10)
+        self.create_subscription(Imu, "imu/data_raw", self.correct, 10)
+
+    def correct(self, imu):
+        y = imu.linear_acceleration
+        y.x, y.y, y.z = (INV_D @ (np.array([y.x, y.y, y.z]) - B_A)).tolist()
+{covariance}        self.out.publish(imu)
+
+
+if __name__ == "__main__":
+    rclpy.init()
+    rclpy.spin(Calibrated())
+"""
+
+
+def losses(calibration: Calibration) -> tuple[str, ...]:
+    """Return notes on imu_calib's handling of the gyroscope."""
     scale = 100.0 * float(np.abs(calibration.K - np.eye(3)).max())
-    stays = f": up to {scale:.2f} % of a rate stay" if scale else ""
+    remaining = f": up to {scale:.2f} % of a rate remain" if scale else ""
     return (
-        "imu_calib subtracts the gyroscope's bias as it is when its node starts, which takes a sensor that is still;"
-        f" it does not correct scale factor errors and misalignments of the gyroscope{stays}.",
+        "imu_calib subtracts the gyroscope's bias at the start of its node, when the sensor must be still; it does not"
+        f" correct scale factor errors and misalignments of the gyroscope{remaining}.",
     )
 
 
 def _row(values: Vector) -> str:
-    # YAML takes 1e-05 for a word: a number needs its point
+    # YAML reads 1e-05 as a word: a number needs its point
     return "[" + ", ".join(np.format_float_positional(v, trim="0") for v in values) + "]"

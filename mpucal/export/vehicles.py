@@ -12,41 +12,41 @@ from ..mavlink.parameters.encoding import INT32, as_float32
 from ..mavlink.parameters.plan import plan_changes, refused_imus
 from ..mavlink.parameters.text import param_text, params_text
 from ..result.calibration import Calibration
-from .losses import dated
+from .losses import date_text
 
-UNNOTICED = "PX4 takes a vector over at once only where it differs by more than 0.01 from the one in use; restart it."
+UNNOTICED = "PX4 uses a new vector at once only if it differs by more than 0.01 from the old one; restart the vehicle."
 
 
 def ardupilot(calibration: Calibration, notes: Sequence[str]) -> str:
-    """A .param file's text, with `notes` in its head.
+    """Return a .param file's text, with `notes` in its heading.
 
     Raises
     ------
-    WriteBackError : a calibration that is refused, of no vehicle or of another firmware, or beyond ArduPilot's limits.
+    WriteBackError : the calibration is refused, not of a vehicle with this firmware, or beyond ArduPilot's limits.
     """
     values = _values(calibration, ARDUPILOT) | _ids(calibration, ARDUPILOT)
     return param_text(values, (_head(calibration, ARDUPILOT), *notes))
 
 
 def px4(calibration: Calibration, notes: Sequence[str]) -> str:
-    """A .params file's text; see ardupilot."""
+    """Return a .params file's text; see ardupilot."""
     ids = _ids(calibration, PX4)
     values = _values(calibration, PX4) | ids
     return params_text(values, (_head(calibration, PX4), *notes), types=dict.fromkeys(ids, INT32))
 
 
-def left_by_ardupilot(calibration: Calibration) -> tuple[str, ...]:
-    """What ArduPilot's parameters do not hold; see ardupilot for what it raises."""
-    return _left_by(calibration, ARDUPILOT)
+def ardupilot_losses(calibration: Calibration) -> tuple[str, ...]:
+    """Return notes on errors that remain with ArduPilot's parameters; for errors raised see ardupilot."""
+    return _losses(calibration, ARDUPILOT)
 
 
-def left_by_px4(calibration: Calibration) -> tuple[str, ...]:
-    """What PX4's parameters do not hold."""
-    return (*_left_by(calibration, PX4), UNNOTICED)
+def px4_losses(calibration: Calibration) -> tuple[str, ...]:
+    """Return notes on errors that remain with PX4's parameters; for errors raised see ardupilot."""
+    return (*_losses(calibration, PX4), UNNOTICED)
 
 
 def _values(calibration: Calibration, firmware: str) -> dict[str, float]:
-    """The new parameters of every IMU by name, as a float32 holds them."""
+    """Return the new parameters of every IMU by name, rounded to float32."""
     held: dict[str, float] = {}
     for change in plan_changes(calibration, firmware):
         held |= {name: as_float32(value) for name, value in change.slot.values(change.new).items()}
@@ -54,30 +54,29 @@ def _values(calibration: Calibration, firmware: str) -> dict[str, float]:
 
 
 def _ids(calibration: Calibration, firmware: str) -> dict[str, float]:
-    """The IDs of the sensors that were calibrated, by name; a firmware takes one without its ID for uncalibrated."""
+    """Return the IDs of the calibrated sensors by name; a firmware treats a sensor without its ID as uncalibrated."""
     of = {change.slot.sensor_id: change.sensor_id for change in plan_changes(calibration, firmware)}
     return {name: as_float32(value) for name, value in of.items() if value}
 
 
 def _head(calibration: Calibration, firmware: str) -> str:
     imus = ", ".join(str(change.imu) for change in plan_changes(calibration, firmware))
-    return f"Accelerometer calibration of a {firmware} vehicle by mpucal, {dated(calibration)}: IMU {imus}"
+    return f"Accelerometer calibration of a {firmware} vehicle by mpucal, {date_text(calibration)}: IMU {imus}"
 
 
-def _left_by(calibration: Calibration, firmware: str) -> tuple[str, ...]:
-    said = [
-        f"IMU {change.imu}: parameters hold no cross-axis terms; |a| stays wrong by up to"
+def _losses(calibration: Calibration, firmware: str) -> tuple[str, ...]:
+    notes = [
+        f"IMU {change.imu}: parameters have no cross-axis terms, which leaves an error of |a| of up to"
         f" {change.residual_mps2:.3f} m/s^2."
         for change in plan_changes(calibration, firmware)
     ]
     named = _ids(calibration, firmware)
-    said += [
-        f"The vehicle did not say what {change.slot.sensor_id} is, and {firmware} takes an accelerometer without it"
-        " for uncalibrated: where it is 0, calibrate with the ground station once, and load the file then."
+    notes += [
+        f"The vehicle did not report {change.slot.sensor_id}, without which {firmware} treats an accelerometer as"
+        " uncalibrated: if it is 0, calibrate with the ground station once, and load the file after that."
         for change in plan_changes(calibration, firmware)
         if change.slot.sensor_id not in named
     ]
-    out = refused_imus(calibration)
-    if out:
-        said.append(f"IMU {', '.join(map(str, out))} is not in the file: its calibration was refused.")
-    return tuple(said)
+    if refused := refused_imus(calibration):
+        notes.append(f"IMU {', '.join(map(str, refused))} is not in the file: its calibration was refused.")
+    return tuple(notes)

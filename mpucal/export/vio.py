@@ -1,12 +1,12 @@
 """A calibration for visual-inertial estimators: Kalibr's imu.yaml and OpenVINS's kalibr_imu_chain.yaml.
 
-Kalibr reads noise alone: densities [m/s^2/sqrt(Hz), rad/s/sqrt(Hz)], which it multiplies by the root of the rate
+Kalibr reads only noise: densities [m/s^2/sqrt(Hz), rad/s/sqrt(Hz)], which it multiplies by the root of the rate
 (ethz-asl/kalibr, wiki "IMU Noise Model"). OpenVINS (rpng/open_vins, VioManagerOptions.h and Propagator) computes
 
     a = R_IMUtoACC^T inv(Ta) (a_m - b_a),  w = R_IMUtoGYRO^T inv(Tw) (w_m - b_g - Tg a)
 
-with its model "kalibr", of which inv(Ta) and inv(Tw) are lower triangular, and estimates both biases itself:
-inv(D) = Q L with Q a rotation gives R_IMUtoACC = Q^T and Ta = inv(L), and so does K.
+with its model "kalibr", where inv(Ta) and inv(Tw) are lower triangular, and estimates both biases itself:
+inv(D) = Q L, with a rotation Q, gives R_IMUtoACC = Q^T and Ta = inv(L); K in the same way.
 """
 
 from __future__ import annotations
@@ -20,33 +20,32 @@ from ..errors import WriteBackError
 from ..result.calibration import Calibration
 from ..result.noise import ACCELEROMETER, GYROSCOPE, KEY, WHITE
 from ..result.noise import WALK as RANDOM_WALK
-from .losses import check_usable, head
+from .losses import check_usable, heading
 
-# of the densities, for the random walks that a calibration does not measure
+# random walks over densities, as a calibration does not measure random walks
 WALK = 0.1
 UNMEASURED = (
-    "A calibration measures no random walks: a tenth of the noise densities stands for them. `mpucal noise` measures"
-    " them in a rest of hours; give its noise.json with --noise."
+    "A calibration does not measure random walks: a tenth of the noise densities is used. `mpucal noise` measures them"
+    " in a rest of hours; pass its noise.json with --noise."
 )
 
 
 def kalibr(calibration: Calibration, notes: Sequence[str]) -> str:
-    """imu.yaml.
+    """Return imu.yaml.
 
     Raises
     ------
-    RefusedError : the calibration must not be used. WriteBackError : it does not say the noise or the rate.
+    RefusedError : the calibration must not be used. WriteBackError : its noise or rate is not known.
     """
-    lines = [f"# {line}" for line in (f"{head(calibration)}.", *notes)]
-    return "\n".join([*lines, "#", *_noise(calibration)]) + "\n"
+    return "\n".join([*heading(calibration, notes, "# "), "#", *_noise(calibration)]) + "\n"
 
 
 def openvins(calibration: Calibration, notes: Sequence[str]) -> str:
-    """kalibr_imu_chain.yaml, as OpenCV's FileStorage reads it; see kalibr."""
+    """Return kalibr_imu_chain.yaml for OpenCV's FileStorage; see kalibr."""
     check_usable(calibration)
     Q_a, L_a = rotation_and_lower(calibration.inverse)
     Q_w, L_w = rotation_and_lower(calibration.K)
-    lines = ["%YAML:1.0", *(f"# {line}" for line in (f"{head(calibration)}.", *notes)), "", "imu0:"]
+    lines = ["%YAML:1.0", *heading(calibration, notes, "# "), "", "imu0:"]
     lines += _block("T_i_b", np.eye(4))
     lines += [f"  {line}" for line in (*_noise(calibration), "time_offset: 0.0", 'model: "kalibr"')]
     for key, matrix in (
@@ -60,34 +59,34 @@ def openvins(calibration: Calibration, notes: Sequence[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def left_by_kalibr(calibration: Calibration) -> tuple[str, ...]:
-    """Kalibr takes corrected samples."""
-    said = "It holds the noise alone: give Kalibr the samples that `mpucal apply` has corrected."
-    return (said, *_of_noise(calibration))
+def kalibr_losses(calibration: Calibration) -> tuple[str, ...]:
+    """Return notes on Kalibr, which needs corrected samples."""
+    note = "It holds only the noise: give Kalibr the samples that `mpucal apply` has corrected."
+    return (note, *_noise_notes(calibration))
 
 
-def left_by_openvins(calibration: Calibration) -> tuple[str, ...]:
-    """OpenVINS estimates biases."""
+def openvins_losses(calibration: Calibration) -> tuple[str, ...]:
+    """Return notes on OpenVINS, which estimates biases."""
     return (
         "It holds no biases: OpenVINS estimates b_a and b_omega itself. Give it the samples as measured.",
-        *_of_noise(calibration),
+        *_noise_notes(calibration),
     )
 
 
-def _of_noise(calibration: Calibration) -> tuple[str, ...]:
+def _noise_notes(calibration: Calibration) -> tuple[str, ...]:
     known = calibration.extra.get(KEY)
     if known is None:
         return (UNMEASURED,)
     unsure = [
         f"{sensor}_random_walk" for sensor in (ACCELEROMETER, GYROSCOPE) if RANDOM_WALK in known[sensor]["at_most"]
     ]
-    said = f"Its noise is that of a rest of {known['seconds'] / 3600.0:.2f} h."
-    return (f"{said} Not told from zero, and given as at most: {', '.join(unsure)}." if unsure else said,)
+    note = f"Its noise is from a rest of {known['seconds'] / 3600.0:.2f} h."
+    return (f"{note} Not significant, and given as upper limits: {', '.join(unsure)}." if unsure else note,)
 
 
 def rotation_and_lower(M: Vector) -> tuple[Vector, Vector]:
-    """M = Q L, (3, 3) each: Q a rotation, L lower triangular with a positive diagonal."""
-    # the QR decomposition of the matrix turned by half a turn
+    """Factor M = Q L, (3, 3) each: Q a rotation, L lower triangular with a positive diagonal."""
+    # reversing rows and columns turns QR into QL
     Q, R = np.linalg.qr(M[::-1, ::-1])
     sign = np.sign(np.diag(R))
     return (Q * sign)[::-1, ::-1], (R * sign[:, None])[::-1, ::-1]
@@ -103,7 +102,7 @@ def _noise(calibration: Calibration) -> list[str]:
         densities = [(known[sensor][WHITE], known[sensor][RANDOM_WALK]) for sensor in (ACCELEROMETER, GYROSCOPE)]
     elif not rate_hz or not all(np.isfinite(std).all() and std.any() for std in stds):
         raise WriteBackError(
-            "nothing was exported: the calibration does not say the noise of a sample and its rate",
+            "nothing was exported: the calibration lacks the noise of a sample or the sample rate",
             "calibrate with mpucal from a recording in which the board lies still",
         )
     else:
@@ -125,5 +124,5 @@ def _block(key: str, matrix: Vector) -> list[str]:
 
 
 def _number(value: float) -> str:
-    # YAML takes 1e-05 for a word: a number needs its point
+    # YAML reads 1e-05 as a word: a number needs its point
     return np.format_float_positional(value + 0.0, trim="0")

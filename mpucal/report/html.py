@@ -11,7 +11,9 @@ import numpy as np
 
 from .. import __version__
 from ..data import Recording
-from ..export.code import in_c, in_python, in_ros
+from ..export.c_code import c_functions
+from ..export.python import python_functions
+from ..export.ros import ros_node
 from ..files.formats import is_of_session
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.session_files import CAPTURE
@@ -126,13 +128,13 @@ def _application(calibration: Calibration) -> str:
     return "".join(
         (
             heading("C"),
-            code(in_c(calibration), "c"),
+            code(c_functions(calibration), "c"),
             paragraph("Or read calibration.bin, whose layout firmware_protocol.md describes.", note=True),
             heading("Python"),
-            code(in_python(calibration), "python"),
+            code(python_functions(calibration), "python"),
             paragraph('Or, with mpucal: a = mpucal.Calibration.load("calibration.json").apply(y).', note=True),
             heading("ROS 2"),
-            code(in_ros(calibration), "ros"),
+            code(ros_node(calibration), "ros"),
         )
     )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from mpucal.data import Sensor
 from mpucal.result.calibration import Calibration
 
 D = np.array([[1.021, 0.013, -0.007], [-0.009, 0.987, 0.021], [0.004, -0.016, 1.034]])
+APPLIED = np.array([0.25, -0.2, 1.0])
 
 
 @pytest.fixture
@@ -27,6 +30,11 @@ def calibration():
         sensor=Sensor("MPU-6050", 0x68, 4.0, 500.0, 200.0, 27.5, (-1501, 2000, 701)),
         created="2024-05-17T09:30:00+00:00",
     )
+
+
+@pytest.fixture(params=[np.zeros(3), APPLIED], ids=["nothing applied", "applied in hardware"])
+def calibrated(request, calibration):
+    return replace(calibration, applied_in_hardware=request.param)
 
 
 @pytest.fixture

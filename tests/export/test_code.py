@@ -4,14 +4,15 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
 
-from mpucal.export.code import in_c, in_python, in_ros
+from mpucal.export.c_code import c_functions
+from mpucal.export.python import python_functions
+from mpucal.export.ros import ros_node
 
 Y = np.array([[0.5, -3.0, 9.0], [-9.7, 0.1, 0.4], [4.0, 6.0, -6.5]])
 LIBRARY = Path(__file__).parents[2] / "mpucal" / "firmware" / "src"
@@ -30,16 +31,11 @@ int main(void) {{
 """
 
 
-@pytest.fixture(params=[[0.0, 0.0, 0.0], [0.25, -0.1, 1.0]], ids=["nothing applied", "applied in hardware"])
-def calibrated(request, calibration):
-    return replace(calibration, applied_in_hardware=np.array(request.param))
-
-
 def test_c_computes_what_the_calibration_does(calibrated, tmp_path):
     if shutil.which("cc") is None:
         pytest.skip("there is no C compiler here")
     rows = ", ".join("{" + ", ".join(map(str, row)) + "}" for row in Y)
-    (tmp_path / "apply.c").write_text(f'#include "mpucal_apply.h"\n{in_c(calibrated)}{MAIN.format(rows=rows)}')
+    (tmp_path / "apply.c").write_text(f'#include "mpucal_apply.h"\n{c_functions(calibrated)}{MAIN.format(rows=rows)}')
     words = ["cc", "-std=c99", "-Wall", "-Wextra", "-Werror", f"-I{LIBRARY}", "-o", "apply", "apply.c"]
     subprocess.run(words, cwd=tmp_path, check=True)
     printed = subprocess.run([tmp_path / "apply"], capture_output=True, text=True, check=True).stdout
@@ -49,13 +45,13 @@ def test_c_computes_what_the_calibration_does(calibrated, tmp_path):
 
 
 def test_c_says_what_a_count_is(calibration):
-    scale = float(re.search(r"one count of the chip is (\S+) m/s\^2", in_c(calibration))[1])
+    scale = float(re.search(r"one count of the chip is (\S+) m/s\^2", c_functions(calibration))[1])
     np.testing.assert_allclose(scale * 32768, calibration.sensor.accel_range_g * 9.80665)
 
 
 def test_python_computes_what_the_calibration_does(calibrated):
     names = {}
-    exec(in_python(calibrated), names)
+    exec(python_functions(calibrated), names)
     np.testing.assert_allclose(names["apply"](Y), calibrated.apply(Y), atol=1e-6)
 
 
@@ -83,11 +79,11 @@ def test_the_node_publishes_what_it_hears_calibrated(calibrated, monkeypatch):
         vars(module).update(contents)
         monkeypatch.setitem(sys.modules, name, module)
     names = {"__name__": "node"}
-    exec(in_ros(calibrated), names)
+    exec(ros_node(calibrated), names)
     node = names["Calibrated"]()
     for y in Y:
         x, y_, z = y.tolist()
-        node.hear(SimpleNamespace(linear_acceleration=SimpleNamespace(x=x, y=y_, z=z)))
+        node.correct(SimpleNamespace(linear_acceleration=SimpleNamespace(x=x, y=y_, z=z)))
     heard = [(m.linear_acceleration.x, m.linear_acceleration.y, m.linear_acceleration.z) for m in published]
     np.testing.assert_allclose(heard, calibrated.apply(Y), atol=1e-6)
     np.testing.assert_allclose(

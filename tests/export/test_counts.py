@@ -143,7 +143,7 @@ def test_micropythons_module(ranged, words):
 
 
 def test_a_blob_and_the_document_of_one_calibration_agree(ranged, words):
-    """Of any version: one before 2 does not say its counts, and was written of the same."""
+    """Include a blob before version 2, which lacks its counts and refers to the same ones."""
     code, calibration, a, w = ranged
     for gyro_counts in (None, 32750.0):
         blob = replace(calibration.blob(), gyro_counts=gyro_counts)

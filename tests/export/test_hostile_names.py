@@ -106,7 +106,7 @@ CONSUMERS = {
 
 
 def of_vehicle(calibration, name):
-    """The same calibration, of a vehicle where the form is one's."""
+    """Return the calibration, as one of a vehicle for a vehicle's form."""
     stem, slots = ("INS_ACC", "{stem}{kind}_{axis}") if name == "ardupilot" else ("CAL_ACC0_", "{stem}{axis}{kind}")
     kinds = ("OFFS", "SCAL") if name == "ardupilot" else ("OFF", "SCALE")
     values = {

@@ -68,7 +68,7 @@ def test_what_must_not_be_used_is_not_exported(calibration, name, changes):
 
 @pytest.mark.parametrize("name", ["kalibr", "openvins"])
 def test_noise_that_nobody_knows_is_not_made_up(calibration, name):
-    with pytest.raises(WriteBackError, match="does not say the noise"):
+    with pytest.raises(WriteBackError, match="lacks the noise"):
         form(name).export(replace(calibration, gyro_noise_std=np.full(3, np.nan)))
 
 
@@ -101,7 +101,7 @@ def test_the_registers_that_i2cdevlib_sets_take_the_biases_away(calibration, sam
 
 
 def test_offsets_without_the_factorys_trim_are_not_made_up(calibration):
-    with pytest.raises(WriteBackError, match="does not say what the accelerometer's offset registers held"):
+    with pytest.raises(WriteBackError, match="lacks the content of the accelerometer's offset registers"):
         form("i2cdevlib").export(replace(calibration, sensor=replace(calibration.sensor, accel_offsets=None)))
 
 
@@ -175,15 +175,15 @@ def test_esphomes_lambdas_compiled_and_fed_with_counts(calibration, tmp_path):
 @pytest.mark.parametrize(
     ("name", "changes", "words"),
     [
-        ("i2cdevlib", {}, "count 2048 to 1 g: where they count 4096, as in some MPU-6050, half of b_a stays"),
+        ("i2cdevlib", {}, "where it is 4096, as in some MPU-6050, half of b_a remains"),
         (
             "esphome",
             {},
-            r"sets \+-2000 deg/s, and the calibration is of \+-500 deg/s.*with --gyro-range 2000",
+            r"sets \+-2000 deg/s, but the calibration is of \+-500 deg/s.*with --gyro-range 2000",
         ),
-        ("arduino", {}, "at address 0x68: where AD0 is high, change CHIP"),
-        ("arduino", {"accel_range_g": None}, r"sets \+-4 g, as the calibration names no such range"),
-        ("arduino", {"gyro_range_dps": None}, r"sets \+-500 deg/s, as the calibration names no such range"),
+        ("arduino", {}, "at address 0x68: if AD0 is high, change CHIP"),
+        ("arduino", {"accel_range_g": None}, r"sets \+-4 g, but the calibration is of another"),
+        ("arduino", {"gyro_range_dps": None}, r"sets \+-500 deg/s, but the calibration is of another"),
     ],
 )
 def test_an_export_says_what_it_assumes(calibration, name, changes, words):

@@ -39,7 +39,7 @@ IDS = {
 
 
 def delivered(s, offset, scale, R_b):
-    """What a firmware makes of its sensor's (n, 3) m/s^2: AP_InertialSensor's and PX4's order."""
+    """Return the stream (n, 3) of a firmware from its sensor's output, in the order of AP_InertialSensor and PX4."""
     return ((s - offset) * scale) @ R_b.T
 
 
@@ -50,7 +50,7 @@ def parsed(text):
 
 
 def of_vehicle(name, rotation, A):
-    """What a perfect fit says of the stream while OLD is in place."""
+    """Return the calibration of a perfect fit of the stream under OLD."""
     R_b, (offsets, scales, orientation) = MOUNTINGS[rotation], NAMES[name]
     parameters = {
         **IDS[name],
@@ -103,7 +103,7 @@ def test_what_is_left_is_what_it_says(name, rotation):
 
 
 def test_mavproxy_loads_it_with_the_sensors_id(tmp_path):
-    """Its reader is pymavlink's; without its id an accelerometer counts as uncalibrated."""
+    """Load the file by MAVProxy's reader, pymavlink; without its id an accelerometer is uncalibrated."""
     calibration = of_vehicle("ardupilot", 0, np.diag(GAIN))
     (tmp_path / "new.param").write_text(form("ardupilot").export(calibration)[0])
     loaded = MAVParmDict()
@@ -113,7 +113,7 @@ def test_mavproxy_loads_it_with_the_sensors_id(tmp_path):
 
 
 def test_qgroundcontrol_loads_it_with_the_sensors_id():
-    """It takes lines of five columns, and sets a parameter only with its own type: MAV_PARAM_TYPE_INT32 is 6."""
+    """Expect five columns, and the type of each parameter, without which QGroundControl ignores it (INT32 is 6)."""
     lines = form("px4").export(of_vehicle("px4", 0, np.diag(GAIN)))[0].splitlines()
     rows = [line.split("\t") for line in lines if not line.startswith("#")]
     assert all(len(row) == 5 for row in rows)
@@ -131,7 +131,7 @@ def test_an_id_that_the_vehicle_did_not_say_is_missed(name):
     calibration = replace(calibration, extra={"autopilot": document | {"params_old": old}})
     text, notes = form(name).export(calibration)
     assert of not in parsed(text)
-    assert f"did not say what {of} is" in " ".join(notes)
+    assert f"did not report {of}" in " ".join(notes)
 
 
 @pytest.mark.parametrize("key", ["mounting", "params_old", "imu", "firmware", "message", "residual_mps2"])
@@ -140,3 +140,13 @@ def test_a_document_that_no_session_wrote_is_refused(key):
     lacking = {name: value for name, value in made.extra["autopilot"].items() if name != key}
     with pytest.raises(WriteBackError, match=f"has no {key} of the vehicle"):
         form("ardupilot").export(replace(made, extra=MappingProxyType({"autopilot": lacking})))
+
+
+@pytest.mark.parametrize(
+    ("name", "gain", "says"),
+    [("px4", GAIN, "PX4"), ("ardupilot", [0.5, 1.0, 1.0], "beyond")],
+    ids=["another firmware", "beyond ArduPilot's own limits"],
+)
+def test_what_ardupilot_does_not_take_is_refused(name, gain, says):
+    with pytest.raises(WriteBackError, match=says):
+        form("ardupilot").export(of_vehicle(name, 0, np.diag(gain)))

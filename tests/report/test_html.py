@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from mpucal.data import Recording, Sensor
-from mpucal.export.code import in_c, in_python, in_ros
+from mpucal.export.c_code import c_functions
+from mpucal.export.python import python_functions
+from mpucal.export.ros import ros_node
 from mpucal.report import render
 from mpucal.result.calibration import Calibration
 
@@ -218,6 +220,6 @@ def test_says_what_to_do_now(calibration, verdict):
 
 
 def test_the_page_shows_them(result):
-    for name, text in (("c", in_c), ("python", in_python), ("ros", in_ros)):
+    for name, text in (("c", c_functions), ("python", python_functions), ("ros", ros_node)):
         shown = re.search(rf'<pre id="{name}"[^>]*>(.*?)</pre>', result.html, re.DOTALL)[1]
         assert unescape(shown) == text(result.calibration)

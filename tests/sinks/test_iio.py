@@ -90,7 +90,7 @@ def test_of_an_mpu_6500_calibbias_is_left_alone(made):
     applied = sink.write(found)
     assert files._words() == before
     assert not applied.calibration.applied_in_hardware.any()
-    assert "calibbias is left alone, as the driver writes to wrong registers" in applied.what
+    assert "calibbias is not used, as the driver writes to wrong registers" in applied.what
 
 
 def test_what_is_not_seen_in_the_samples_is_put_back(made, tmp_path, monkeypatch):
