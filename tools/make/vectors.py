@@ -248,148 +248,132 @@ def lines() -> dict[str, tuple[bytes, dict[str, Any]]]:
     }
 
 
-# What a host asks of a bridge that was greeted, that stores nothing, and whose chip has 504 bytes in its FIFO: what is
-# settled, what that needs, and requests with their replies' bytes behind t_us; of one that failed the status alone.
+# Requests of a host to a bridge that was greeted, that stores nothing, and whose chip has 504 bytes in its FIFO: the
+# request's type, its seq, its payload (in hexadecimal), and the reply's status and bytes behind t_us, if there is one.
+# Several that are sent at once stand in one line, with & between them.
 
-Reply = tuple[wire.Status, bytes]
-Exchange = tuple[Frame, Reply | None]
-# several are sent at once
-Talk = list[Exchange | list[Exchange]]
-OK, BAD_PAYLOAD, CRC = (wire.Status.OK, b""), (wire.Status.BAD_PAYLOAD, b""), 0x5D9B9255
-COMMIT, FIRST = Frame(0x14, 9, wire.BlobCommit(188, CRC).payload()), (wire.Status.OK, struct.pack("<I", 1))
-BEGIN = Frame(0x12, 8, wire.BlobBegin(188).payload())
-READ: Exchange = (Frame(0x02, 2, bytes([0x72, 2])), (wire.Status.OK, b"\x01\xf8"))
-DATA: list[Exchange] = [
-    (Frame(0x13, at // 32, wire.BlobData(at, MEASURED.encode()[at : at + 32]).payload()), OK)
+READ = "02 2 7202 > OK 01f8"
+BEGIN = f"12 8 {wire.BlobBegin(188).payload().hex()} > OK"
+DATA = [
+    f"13 {at // 32} {wire.BlobData(at, MEASURED.encode()[at : at + 32]).payload().hex()} > OK"
     for at in range(0, 188, 32)
 ]
-NO_ANSWER, NO_BLOB = (wire.Status.NO_ANSWER, b""), (wire.Status.NO_BLOB, b"")
-BAD_OFFSET, NOT_BEGUN = (wire.Status.BAD_OFFSET, b""), (wire.Status.NOT_BEGUN, b"")
+COMMIT = f"14 9 {wire.BlobCommit(188, 0x5D9B9255).payload().hex()}"
+COMMITTED = f"{COMMIT} > OK {struct.pack('<I', 1).hex()}"
 
 
-def greeting(seq: int, asked: int, found: int) -> Exchange:
-    """HELLO and its reply, in which version and address are of meaning."""
-    return Frame(0x01, seq, wire.Hello(address=asked).payload()), (wire.Status.OK, wire.MAGIC + bytes([1, 0, found]))
+def commit(seq: int, length: int, crc: int = 0x5D9B9255) -> str:
+    """Return a BLOB_COMMIT of another length."""
+    return f"14 {seq} {wire.BlobCommit(length, crc).payload().hex()}"
 
 
-TALKS: dict[str, tuple[str, tuple[str, ...], Talk]] = {
+def greeting(seq: int, asked: int, found: int) -> str:
+    """Return HELLO and its reply, in which version and address are of meaning."""
+    return f"01 {seq} {wire.Hello(address=asked).payload().hex()} > OK {(wire.MAGIC + bytes([1, 0, found])).hex()}"
+
+
+# of each talk what is settled by it, and what it needs
+TALKS: dict[str, tuple[str, tuple[str, ...], list[str]]] = {
     "fifo_count": ("FIFO_COUNT passes through as it is in the chip, big-endian", ("chip",), [READ]),
     "types_from_0x80": (
         "types from 0x80 on are ignored",
         ("chip",),
-        [(Frame(0x80, 1), None), (Frame(0x81, 1, wire.Hello().payload()), None), (Frame(0xFF, 1), None), READ],
+        ["80 1", f"81 1 {wire.Hello().payload().hex()}", "ff 1", READ],
     ),
     "other_magic": (
         "a HELLO with another magic is answered with BAD_PAYLOAD, and nothing is done",
         ("chip",),
-        [(Frame(0x01, 3, b"MPUX\1\0\0"), BAD_PAYLOAD), READ],
+        [f"01 3 {b'MPUX'.hex()}010000 > BAD_PAYLOAD", READ],
     ),
     "stream_stop_of_one_byte": (
         "STREAM needs both bytes to stop, too",
         ("stream",),
-        [(Frame(0x05, 4, b"\0"), BAD_PAYLOAD), (Frame(0x05, 5, b"\0\0"), OK)],
+        ["05 4 00 > BAD_PAYLOAD", "05 5 0000 > OK"],
     ),
     "window": (
         "a host may send MIN_WINDOW requests at once; each is answered, in their order",
         ("chip", "stream"),
-        [[READ, (Frame(0x02, 3, bytes([0x72, 2])), READ[1])], [(Frame(0x05, 4, b"\0"), BAD_PAYLOAD), READ]],
+        [f"{READ} & 02 3 7202 > OK 01f8", f"05 4 00 > BAD_PAYLOAD & {READ}"],
     ),
     "commit_too_early": (
         "a commit that fails leaves what was begun as it was; one that is repeated succeeds, and changes nothing",
         ("blob",),
-        [(BEGIN, OK), DATA[0], (COMMIT, (wire.Status.BAD_OFFSET, b"")), *DATA[1:], (COMMIT, FIRST), (COMMIT, FIRST)],
+        [BEGIN, DATA[0], f"{COMMIT} > BAD_OFFSET", *DATA[1:], COMMITTED, COMMITTED],
     ),
     "begin_of_0": (
         "a BLOB_BEGIN of 0 is taken, and its commit fails",
         ("blob",),
-        [
-            (Frame(0x12, 6, b"\0\0"), OK),
-            (Frame(0x14, 7, wire.BlobCommit(0, 0).payload()), (wire.Status.BAD_BLOB, b"")),
-            (Frame(0x10, 8), (wire.Status.NO_BLOB, b"")),
-        ],
+        ["12 6 0000 > OK", f"{commit(7, 0, 0)} > BAD_BLOB", "10 8 > NO_BLOB"],
     ),
     "generation_after_erase": (
         "the generation begins at 1 again",
         ("blob",),
-        [
-            *((BEGIN, OK), *DATA, (COMMIT, FIRST), (Frame(0x15, 10), OK)),
-            (Frame(0x10, 11), (wire.Status.NO_BLOB, b"")),
-            *((BEGIN, OK), *DATA, (COMMIT, FIRST)),
-        ],
+        [BEGIN, *DATA, COMMITTED, "15 10 > OK", "10 11 > NO_BLOB", BEGIN, *DATA, COMMITTED],
     ),
     "begin_refused": (
         "a BLOB_BEGIN that is refused does nothing: what was begun before goes on",
         ("blob",),
-        [
-            *((BEGIN, OK), DATA[0], (Frame(0x12, 1, b"\xff\xff"), (wire.Status.NO_ROOM, b""))),
-            *((Frame(0x12, 2, b"\1"), BAD_PAYLOAD), *DATA[1:], (COMMIT, FIRST)),
-        ],
+        [BEGIN, DATA[0], "12 1 ffff > NO_ROOM", "12 2 01 > BAD_PAYLOAD", *DATA[1:], COMMITTED],
     ),
     "payload_before_state": (
         "a payload is looked at before what is stored or begun: BAD_PAYLOAD where NO_BLOB or NOT_BEGUN applies too",
         ("blob",),
         [
-            (Frame(0x11, 1, b"\0\0\0"), BAD_PAYLOAD),
-            (Frame(0x11, 2, b"\0\0\1"), NO_BLOB),
-            (Frame(0x13, 3, b"\0\0"), BAD_PAYLOAD),
-            (Frame(0x13, 4, b"\0\0\1"), NOT_BEGUN),
-            (Frame(0x14, 5, bytes(5)), BAD_PAYLOAD),
-            (Frame(0x14, 6, bytes(6)), NOT_BEGUN),
+            *("11 1 000000 > BAD_PAYLOAD", "11 2 000001 > NO_BLOB", "13 3 0000 > BAD_PAYLOAD"),
+            *("13 4 000001 > NOT_BEGUN", "14 5 0000000000 > BAD_PAYLOAD", "14 6 000000000000 > NOT_BEGUN"),
         ],
     ),
     "commit_of_another_length": (
         "a commit of another length than was begun is answered with BAD_OFFSET",
         ("blob",),
-        [
-            *((BEGIN, OK), *DATA, (Frame(0x14, 1, wire.BlobCommit(187, CRC).payload()), BAD_OFFSET)),
-            *((Frame(0x14, 2, wire.BlobCommit(189, CRC).payload()), BAD_OFFSET), (COMMIT, FIRST)),
-        ],
+        [BEGIN, *DATA, f"{commit(1, 187)} > BAD_OFFSET", f"{commit(2, 189)} > BAD_OFFSET", COMMITTED],
     ),
     "erase_ends_what_was_begun": (
         "BLOB_ERASE gives up what was begun",
         ("blob",),
-        [(BEGIN, OK), DATA[0], (Frame(0x15, 1), OK), (DATA[1][0], NOT_BEGUN), (COMMIT, NOT_BEGUN)],
+        [BEGIN, DATA[0], "15 1 > OK", DATA[1].replace("> OK", "> NOT_BEGUN"), f"{COMMIT} > NOT_BEGUN"],
     ),
     "address_without_a_chip": (
         "a HELLO whose address does not answer succeeds with address 0; transfers then fail, at no address at all",
         ("chip", "stream"),
         [
-            greeting(1, 0x23, 0),
-            (Frame(0x02, 2, bytes([0x75, 1])), NO_ANSWER),
-            (Frame(0x03, 3, b"\x74\x46\0"), NO_ANSWER),
-            (Frame(0x04, 4, b"\x23\0"), NO_ANSWER),
-            (Frame(0x05, 5, bytes([14, 4])), OK),
-            (Frame(0x05, 6, b"\0\0"), OK),
-            greeting(7, 0, 0x68),
-            READ,
+            *(greeting(1, 0x23, 0), "02 2 7501 > NO_ANSWER", "03 3 744600 > NO_ANSWER", "04 4 2300 > NO_ANSWER"),
+            *("05 5 0e04 > OK", "05 6 0000 > OK", greeting(7, 0, 0x68), READ),
         ],
     ),
     "address_beyond_7_bits": (
         "a HELLO whose address has more than 7 bits is answered with BAD_PAYLOAD, and nothing is done",
         ("chip",),
-        [(Frame(0x01, 1, b"MPUB\1\0\x80"), BAD_PAYLOAD), (Frame(0x01, 2, b"MPUB\1\0"), BAD_PAYLOAD), READ],
+        [f"01 1 {b'MPUB'.hex()}010080 > BAD_PAYLOAD", f"01 2 {b'MPUB'.hex()}0100 > BAD_PAYLOAD", READ],
     ),
     "another_major": (
         "a HELLO of another major version needs its first six bytes; the bridge stays as it was",
         ("chip",),
-        [(Frame(0x01, 1, b"MPUB\x63\0"), (wire.Status.BAD_VERSION, b"")), READ],
+        [f"01 1 {b'MPUB'.hex()}6300 > BAD_VERSION", READ],
     ),
 }
 
 
-def talk(settled: str, needs: tuple[str, ...], exchanges: Talk) -> dict[str, Any]:
-    """A talk's JSON: requests as bytes on the line, replies as frames whose t_us is 0; a list where several are due."""
+def exchanged(text: str) -> tuple[Frame, Frame | None]:
+    """Return the request and the reply of a line of a talk; the reply's t_us is 0."""
+    asked, _, answered = text.partition(" > ")
+    kind, seq, *payload = asked.split()
+    request = Frame(int(kind, 16), int(seq), bytes.fromhex("".join(payload)))
+    if not answered:
+        return request, None
+    status, *content = answered.split()
+    reply = bytes([wire.Status[status]]) + bytes(4) + bytes.fromhex("".join(content))
+    return request, Frame(request.type | wire.REPLY_BIT, request.seq, reply)
+
+
+def talk(settled: str, needs: tuple[str, ...], lines: list[str]) -> dict[str, Any]:
+    """Return a talk's JSON: requests as bytes on the line, and replies as frames; a list where several are due."""
     said: list[dict[str, Any]] = []
-    for exchange in exchanges:
-        asked = exchange if isinstance(exchange, list) else [exchange]
-        answers = [
-            plain_frame(Frame(request.type | wire.REPLY_BIT, request.seq, bytes([reply[0]]) + bytes(4) + reply[1]))
-            for request, reply in asked
-            if reply is not None
-        ]
-        one = answers[0] if answers else None
-        host = b"".join(request.encode() for request, _ in asked)
-        said.append({"host": host.hex(), "bridge": answers if isinstance(exchange, list) else one})
+    for line in lines:
+        pairs = [exchanged(text) for text in line.split(" & ")]
+        answers = [plain_frame(reply) for _, reply in pairs if reply is not None]
+        host = b"".join(request.encode() for request, _ in pairs)
+        said.append({"host": host.hex(), "bridge": answers if len(pairs) > 1 else next(iter(answers), None)})
     return {"settled": settled, "needs": list(needs), "talk": said}
 
 
