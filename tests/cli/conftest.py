@@ -1,4 +1,4 @@
-"""The command line, called as a person calls it."""
+"""Fixtures that call the command line as a person does."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 
 from mpucal.__main__ import run
+from mpucal.chip.records import SessionEvent
+from mpucal.files.mcap import CaptureWriter
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,7 @@ class Result:
 
 @pytest.fixture
 def mpucal(capsys, tmp_path, monkeypatch):
-    """Call it in this process, in an empty folder."""
+    """Return a function that calls mpucal in this process, in an empty folder."""
     monkeypatch.chdir(tmp_path)
 
     def call(*words):
@@ -37,13 +39,30 @@ def mpucal(capsys, tmp_path, monkeypatch):
 
 @pytest.fixture(scope="session")
 def process():
-    """Call it, or another program, as a process of its own in a folder."""
+    """Return a function that calls mpucal, or another program, in a process of its own."""
 
     def call(folder: Path, *words, program=("-m", "mpucal")):
         done = subprocess.run(
             [sys.executable, *program, *map(str, words)], cwd=folder, capture_output=True, text=True, check=False
         )
         return Result(done.returncode, done.stdout, done.stderr)
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def write_capture():
+    """Return a function that writes a capture of these records, and returns its path."""
+
+    def call(path, meta, records):
+        with CaptureWriter(path) as writer:
+            writer.start(meta)
+            for record in records:
+                if isinstance(record, SessionEvent):
+                    writer.event(record.name, record.t_ns, record.data)
+                else:
+                    writer.transaction(record)
+        return path
 
     return call
 
@@ -56,7 +75,7 @@ class Session:
 
 @pytest.fixture(scope="session")
 def session(once, process):
-    """One whole session on the simulated chip; nothing is to be changed in its folder."""
+    """Return a whole session on the simulated chip; tests must not change its folder."""
 
     def make(folder):
         words = ("session", "--bus", "sim", "--seed", "3", "--rate", "100", "-o", "board")
@@ -67,7 +86,7 @@ def session(once, process):
 
 
 class Served:
-    """A program of this folder that adds to mpucal's tables: a process that runs one command line after the other."""
+    """Process of a program of this folder that adds to mpucal's tables; it runs one command line after another."""
 
     def __init__(self, program: str) -> None:
         words = [sys.executable, Path(__file__).with_name("served.py"), program]
@@ -84,7 +103,7 @@ class Served:
 
 @pytest.fixture(scope="module")
 def served():
-    """served(program): see Served."""
+    """Return a function that starts a Served."""
     begun = []
 
     def call(program):
@@ -96,13 +115,13 @@ def served():
         each.end()
 
 
-# how long a busy machine may take, for what takes it a second or two
+# Time that a busy machine may need for a step of a second or two.
 PATIENCE_S = 300.0
 
 
 @pytest.fixture(scope="session")
 def stopped_at():
-    """Run held.py in a folder, send its session a signal while it is held, and wait until it ended."""
+    """Return a function that runs held.py, sends its session a signal while it is held, and waits for its end."""
 
     def call(folder: Path, held, sign, *words):
         said, began_s = folder / "said.txt", time.monotonic()

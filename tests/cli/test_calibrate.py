@@ -54,6 +54,11 @@ UNREADABLE = {
 }
 
 
+def contents(folder):
+    """Return the bytes of each file, to compare them after a command."""
+    return {path: path.read_bytes() for path in folder.iterdir()}
+
+
 @pytest.mark.parametrize(("change", "sentence"), UNREADABLE.values(), ids=UNREADABLE.keys())
 def test_what_is_no_recording_is_3(mpucal, tmp_path, change, sentence):
     np.savez(tmp_path / "walk.npz", **change(turning()))
@@ -168,41 +173,41 @@ def test_a_refusal_leaves_an_earlier_blob_and_says_so(mpucal, tmp_path):
 
 
 def test_a_folder_is_one_recording_s(mpucal, session, tmp_path):
-    """Another recording goes neither beside a session's capture nor in the place of another one's results."""
+    """Results are not written beside the capture of another recording, nor over the results of another one."""
     np.savez(tmp_path / "walk.npz", **turning())
     np.savez(tmp_path / "other.npz", **turning(noise=0.04))
     assert mpucal("calibrate", "walk.npz", "-o", "out").code == 0
     assert mpucal("calibrate", "walk.npz", "-o", "out", "--model", "accel").code == 0
     for folder in (session.folder, tmp_path / "out"):
-        before = {path: path.read_bytes() for path in folder.iterdir()}
+        before = contents(folder)
         result = mpucal("calibrate", "other.npz", "-o", folder)
         assert result.code == 3
         assert f"`mpucal calibrate other.npz -o {folder}-2` puts these elsewhere" in result.err
-        assert {path: path.read_bytes() for path in folder.iterdir()} == before
+        assert contents(folder) == before
 
 
 def test_what_a_check_updates_goes_beside_no_capture(mpucal, session):
-    """Also where that is of the very recording that the calibration was made of."""
+    """This holds even for the capture that the calibration was made from."""
     calibration = session.folder / "calibration.json"
     copy, words = Path("copy.json"), ("check", "copy.json", session.folder / "capture.mcap")
     copy.write_bytes(calibration.read_bytes())
-    before = {path: path.read_bytes() for path in session.folder.iterdir()}
+    before = contents(session.folder)
     result = mpucal(*words, "-o", session.folder)
     assert result.code == 3
     assert f"`mpucal {' '.join(map(str, words))} -o {session.folder}-2` puts" in result.err
     for name in ("calibration.json", "calibration.bin"):
         result = mpucal("check", session.folder / name, session.folder, "-o", session.folder)
         assert (result.code, "was given to be read" in result.err) == (2, True)
-    assert {path: path.read_bytes() for path in session.folder.iterdir()} == before
+    assert contents(session.folder) == before
 
 
 def test_a_finished_session_is_not_gone_on_with(mpucal, session):
-    before = {path: path.read_bytes() for path in session.folder.iterdir()}
+    before = contents(session.folder)
     result = mpucal("session", "--resume", session.folder)
     assert result.code == 2
     assert "is finished" in result.err
     assert f"-o {session.folder}-2" in result.err
-    assert {path: path.read_bytes() for path in session.folder.iterdir()} == before
+    assert contents(session.folder) == before
 
 
 def test_more_memory_is_allowed_by_an_option(mpucal, tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""The examples in each command's help, run as they stand there; only the devices are simulated ones."""
+"""Examples in each command's help, run with simulated devices."""
 
 import re
 import shlex
@@ -12,9 +12,9 @@ from mpucal.cli import COMMANDS, commands
 from mpucal.files import load
 from mpucal.result.calibration import Calibration
 
-# what stands there for what a person has; a bridge's own tests show what it keeps
+# Devices of the examples, and those of the tests. Examples with a serial bridge are tested with the bridges.
 DEVICES = {"/dev/i2c-1": "sim:seed=3", "sim": "sim:seed=3"}
-# what tests/test_readme.py runs as it stands
+# This example is run by tests/test_readme.py.
 ELSEWHERE = "session --bus sim"
 SHORTER = {"session": ("--rate", "50", "--target", "quick"), "record": ("--rate", "25")}
 NEEDS_A_PORT = "--serial PORT"
@@ -31,7 +31,7 @@ def examples():
 
 @pytest.fixture(scope="module")
 def made(session, save, tmp_path_factory):
-    """What the examples name: results of sessions, recordings."""
+    """Return a folder with the results and recordings that the examples name."""
     into = tmp_path_factory.mktemp("made")
     made = Calibration.load(session.folder / "calibration.json")
     for number, name in enumerate(("board7", "board7-today", "cold", "warm", "hot")):
@@ -50,7 +50,7 @@ def made(session, save, tmp_path_factory):
 
 @pytest.fixture
 def belongings(made, tmp_path):
-    """A copy of it, to be changed."""
+    """Copy these files, so that an example may change them."""
     shutil.copytree(made, tmp_path, dirs_exist_ok=True)
 
 

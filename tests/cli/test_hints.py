@@ -1,4 +1,4 @@
-"""What is said of a recording is said alike to every command that reads one, and a refusal ends with what works."""
+"""Hints about a recording: every command takes the same ones, and a refusal names those that are missing."""
 
 import json
 import pickle
@@ -27,7 +27,7 @@ def recording():
 
 @pytest.fixture
 def table(recording, tmp_path):
-    """Its columns have other names, and stand in an order that tells nothing."""
+    """Write a table whose columns have unknown names, in an unusual order; return its path."""
     r = recording
     columns = [r.t, *r.acc[:, [0, 2]].T, r.gyr[:, 1], r.acc[:, 1], *r.gyr[:, [0, 2]].T]
     np.savetxt(tmp_path / "odd.csv", np.column_stack(columns), delimiter=",", header="a,b,c,d,e,f,g", comments="")

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpucal.chip.records import SessionEvent
-from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.files.mcap import read_capture
 from mpucal.result.calibration import Calibration
 
 PROGRAM = Path(__file__).with_name("turntable.py")
@@ -45,16 +44,10 @@ def test_the_session_is_replayed(call, measured, tmp_path):
     assert np.array_equal(*found)
 
 
-def test_a_session_that_broke_off_goes_on_with_it(call, measured, tmp_path):
+def test_a_session_that_broke_off_goes_on_with_it(call, measured, write_capture, tmp_path):
     whole = read_capture(measured / "board" / "capture.mcap")
     (tmp_path / "board").mkdir()
-    with CaptureWriter(tmp_path / "board" / "capture.mcap") as writer:
-        writer.start(whole.meta)
-        for record in whole.records[: len(whole.records) // 4]:
-            if isinstance(record, SessionEvent):
-                writer.event(record.name, record.t_ns, record.data)
-            else:
-                writer.transaction(record)
+    write_capture(tmp_path / "board" / "capture.mcap", whole.meta, whole.records[: len(whole.records) // 4])
     done = call(tmp_path, "session", "--resume", "board", "--yes")
     assert done.code == 0, done.err
     assert read_capture(tmp_path / "board" / "capture-2.mcap").meta["source"] == whole.meta["source"]

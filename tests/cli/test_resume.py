@@ -1,4 +1,4 @@
-"""A session that is interrupted and resumed: nothing lost, and the same bits as if it had never stopped."""
+"""Sessions that are interrupted and resumed: nothing is lost, and the bits are those of an unbroken session."""
 
 import json
 import signal
@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from mpucal.calibration import calibrate
-from mpucal.chip.records import SessionEvent
 from mpucal.data import Samples
 from mpucal.files import load
-from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.files.mcap import read_capture
 from mpucal.result.calibration import Calibration
 
 STORED = Path(__file__).parents[2] / "fixtures" / "sessions" / "enter.mcap"
@@ -30,22 +29,15 @@ def last_s(capture):
     return read_capture(capture).records[-1].t_ns * 1e-9
 
 
-def joined(folder, names):
-    """One capture with the records of all."""
+def joined(write_capture, folder, names):
+    """Write one capture with the records of all; return its path."""
     captures = [read_capture(folder / name) for name in names]
-    path = folder.parent / "joined.mcap"
-    with CaptureWriter(path) as writer:
-        writer.start(captures[0].meta)
-        for record in (record for capture in captures for record in capture.records):
-            if isinstance(record, SessionEvent):
-                writer.event(record.name, record.t_ns, record.data)
-            else:
-                writer.transaction(record)
-    return path
+    records = [record for capture in captures for record in capture.records]
+    return write_capture(folder.parent / "joined.mcap", captures[0].meta, records)
 
 
-def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, stopped_at, tmp_path):
-    """Killed while flat, and stopped with Ctrl-C while rotating."""
+def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, stopped_at, write_capture, tmp_path):
+    """The session is killed while flat, and stopped with Ctrl-C while rotating."""
     folder = tmp_path / "board"
     words = ("--bus", "sim", "--rate", "25", "--target", "quick", "-o", "board", "--name", "Bench 7")
     killed_s = came_to_s(stopped_at(tmp_path, ("flat", 50), signal.SIGKILL, *WORDS, *words).err)
@@ -69,7 +61,10 @@ def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, stopped_at,
 
     found = Calibration.load(folder / "calibration.json")
     assert found.extra["name"] == "Bench 7"
-    parts, unbroken = load(folder), load(joined(folder, ("capture.mcap", "capture-2.mcap", "capture-3.mcap")))
+    parts, unbroken = (
+        load(folder),
+        load(joined(write_capture, folder, ("capture.mcap", "capture-2.mcap", "capture-3.mcap"))),
+    )
     for name in Samples.__dataclass_fields__:
         assert np.array_equal(getattr(parts, name), getattr(unbroken, name), equal_nan=name == "temperature_c")
     other = calibrate(unbroken)
@@ -105,37 +100,28 @@ def test_a_vehicle_cannot_be_resumed(mpucal, tmp_path):
     assert "is a vehicle's, which cannot be resumed" in result.err
 
 
-def test_a_capture_without_a_source_cannot_be_resumed(mpucal, tmp_path):
+def test_a_capture_without_a_source_cannot_be_resumed(mpucal, write_capture, tmp_path):
     capture = read_capture(STORED)
     (tmp_path / "old").mkdir()
-    with CaptureWriter(tmp_path / "old" / "capture.mcap") as writer:
-        writer.start({key: value for key, value in capture.meta.items() if key != "source"})
+    meta = {key: value for key, value in capture.meta.items() if key != "source"}
+    write_capture(tmp_path / "old" / "capture.mcap", meta, [])
     result = mpucal("session", "--resume", "old")
     assert result.code == 2
     assert "does not name a source to go on with" in result.err
 
 
-def of_another_hand(capture, hand, folder):
-    """The capture of a simulated session, as if a board in another hand were to go on with it."""
-    recorded = read_capture(capture)
-    folder.mkdir()
-    with CaptureWriter(folder / "capture.mcap") as writer:
-        writer.start({**recorded.meta, "source": {**recorded.meta["source"], "bus": f"sim:hand={hand}"}})
-        for record in recorded.records:
-            if isinstance(record, SessionEvent):
-                writer.event(record.name, record.t_ns, record.data)
-            else:
-                writer.transaction(record)
-
-
 @pytest.mark.slow
-def test_a_board_that_was_never_still_is_laid_flat_again(mpucal, tmp_path):
+def test_a_board_that_was_never_still_is_laid_flat_again(mpucal, write_capture, tmp_path):
     first = mpucal("session", "--bus", "sim:hand=restless", "--rate", "50", "-o", "restless")
     assert first.code == 4
     assert "start again" not in first.err
     assert first.err.count("--resume restless") == 1
 
-    of_another_hand(tmp_path / "restless" / "capture.mcap", "guided", tmp_path / "calm")
+    # The session is resumed with the board in another, calm hand.
+    recorded = read_capture(tmp_path / "restless" / "capture.mcap")
+    (tmp_path / "calm").mkdir()
+    meta = {**recorded.meta, "source": {**recorded.meta["source"], "bus": "sim:hand=guided"}}
+    write_capture(tmp_path / "calm" / "capture.mcap", meta, recorded.records)
     resumed = mpucal("session", "--resume", "calm")
     assert resumed.code == 0, resumed.err
     assert resumed.err.count("LAY FLAT") == 1

@@ -10,24 +10,21 @@ import numpy as np
 import pytest
 
 from mpucal.chip.access import Transaction
-from mpucal.chip.records import SessionEvent
-from mpucal.files.mcap import CaptureWriter, read_capture
+from mpucal.files.mcap import read_capture
 from mpucal.result.calibration import Calibration
 from mpucal.session.runner import Runner
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 
 
-def rewritten(capture, path, records=None, **meta):
-    """The same capture with another head or other records."""
-    with CaptureWriter(path) as writer:
-        writer.start({**capture.meta, **meta})
-        for record in capture.records if records is None else records:
-            if isinstance(record, SessionEvent):
-                writer.event(record.name, record.t_ns, record.data)
-            else:
-                writer.transaction(record)
-    return path
+@pytest.fixture(scope="session")
+def rewritten(write_capture):
+    """Return a function that writes a capture with another head or other records, and returns its path."""
+
+    def call(capture, path, records=None, **meta):
+        return write_capture(path, {**capture.meta, **meta}, capture.records if records is None else records)
+
+    return call
 
 
 def test_a_session_leaves_its_files_and_says_what_it_found(session):
@@ -105,7 +102,7 @@ def test_no_capture_is_written_over(mpucal, session):
     assert (session.folder / "capture.mcap").read_bytes() == before
 
 
-def test_a_capture_of_another_driver_stops(mpucal, session, tmp_path):
+def test_a_capture_of_another_driver_stops(mpucal, session, tmp_path, rewritten):
     capture = read_capture(session.folder / "capture.mcap")
     result = mpucal("session", "--replay", rewritten(capture, tmp_path / "old.mcap", driver=0))
     assert result.code == 3
@@ -113,14 +110,14 @@ def test_a_capture_of_another_driver_stops(mpucal, session, tmp_path):
     assert "mpucal calibrate" in result.err
 
 
-def test_a_head_without_a_plan_stops(mpucal, session, tmp_path):
+def test_a_head_without_a_plan_stops(mpucal, session, tmp_path, rewritten):
     capture = read_capture(session.folder / "capture.mcap")
     result = mpucal("session", "--replay", rewritten(capture, tmp_path / "odd.mcap", plan={"config": 3}))
     assert result.code == 3
     assert "does not hold the session's settings" in result.err
 
 
-def test_a_changed_access_stops(mpucal, session, tmp_path):
+def test_a_changed_access_stops(mpucal, session, tmp_path, rewritten):
     capture = read_capture(session.folder / "capture.mcap")
     records = list(capture.records)
     k = len(records) // 10
@@ -163,7 +160,7 @@ def test_ctrl_c_leaves_a_whole_capture_that_replays(mpucal, stopped_at, tmp_path
     assert "the session was interrupted" in again.err
 
 
-def test_a_recording_is_calibrated_and_replayed_later_unless_accesses_are_left_unread(mpucal, tmp_path):
+def test_a_recording_is_calibrated_and_replayed_later_unless_accesses_are_left_unread(mpucal, tmp_path, rewritten):
     recorded = mpucal("record", "--bus", "sim", "--rate", "50", "--seconds", "20", "-o", "walk.mcap")
     assert recorded.code == 0, recorded.err
     assert re.fullmatch(r"walk.mcap: 9\d{2} samples.\n", recorded.out)
@@ -180,7 +177,7 @@ def test_a_recording_is_calibrated_and_replayed_later_unless_accesses_are_left_u
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others do not tell where a folder went")
 def test_a_folder_that_is_renamed_and_a_capture_that_is_cut_meanwhile(mpucal, tmp_path, monkeypatch):
-    """The results go where the capture is, and who spoils that is told of."""
+    """The results follow the capture, and a capture that another program shortens is reported."""
     calibrate = Runner.calibrate
 
     def meddled(runner, *words):

@@ -86,7 +86,7 @@ def test_memory_does_not_grow(made, monkeypatch, source, seconds, kept):
 
 
 def test_a_line_comes_at_once_and_a_closed_pipe_is_no_error(made):
-    """At 4 samples a second a buffer of 8 KiB would fill in a quarter of a minute, and be written as a whole."""
+    """A buffer of 8 KiB would take a quarter of a minute to fill at 4 samples a second."""
     words = ["stream", "--bus", "sim:seed=3,pace=real", "--rate", "4"]
     with subprocess.Popen(
         [sys.executable, "-m", "mpucal", *words, "--apply", made],

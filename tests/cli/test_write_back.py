@@ -26,24 +26,8 @@ def test_a_person_is_asked_and_nobody_else(monkeypatch, answer):
 
 
 def test_a_session_writes_to_the_chip_and_says_so(mpucal):
-    words = (
-        "session",
-        "--bus",
-        "sim",
-        "--seed",
-        "3",
-        "--rate",
-        "50",
-        "--target",
-        "quick",
-        "--to",
-        "chip",
-        "-o",
-        "board",
-        "--json",
-        "--yes",
-    )
-    result = mpucal(*words)
+    source = ("--bus", "sim", "--seed", "3", "--rate", "50", "--target", "quick")
+    result = mpucal("session", *source, "--to", "chip", "-o", "board", "--json", "--yes")
     assert result.code == 0, result.err
     made = Calibration.load("board/calibration.json")
     assert result.out == made.json()

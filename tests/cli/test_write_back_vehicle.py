@@ -38,7 +38,7 @@ WORDS = {
 
 @pytest.fixture(scope="session")
 def flown(once):
-    """One session on the simulated vehicle, which writes to it."""
+    """Return a session on the simulated vehicle, which writes to it."""
 
     def make(folder):
         words = ["--mavlink", "sim:imus=1", "--rate", "50", "--target", "quick", "-o", str(folder / "flown"), "--json"]
