@@ -1,4 +1,4 @@
-"""The HTML elements that the report is made of; text from outside is escaped here."""
+"""The HTML elements of the report; they escape all text from outside."""
 
 from __future__ import annotations
 
@@ -8,54 +8,65 @@ from html import escape as without_marks
 from typing import Any
 
 from ..errors import plain
+from .style import CSS
 
 
 def escape(text: str) -> str:
-    """Text from anywhere as a page only shows it."""
+    """Return text as HTML that only shows it."""
     return without_marks(plain(text))
 
 
+def document(title: str, heading: str, *content: str) -> str:
+    """Return a whole page, which needs no network and no script."""
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n<main>\n"
+        f"<h1>{escape(heading)}</h1>\n{''.join(content)}</main>\n</body>\n</html>\n"
+    )
+
+
 def section(title: str, *content: str) -> str:
-    """A part of the page under its heading; empty without content."""
+    """Return a part of the page under its heading; empty without content."""
     text = "".join(content)
     return f"<section>\n<h2>{escape(title)}</h2>\n{text}</section>\n" if text else ""
 
 
 def details(title: str, *content: str) -> str:
-    """A part of the page that is folded away, and not printed while it is; empty without content."""
+    """Return a collapsed part of the page, which is not printed while it is; empty without content."""
     text = "".join(content)
     return f"<details>\n<summary>{escape(title)}</summary>\n{text}</details>\n" if text else ""
 
 
 def heading(text: str) -> str:
-    """A heading within a section."""
+    """Return a heading within a section."""
     return f"<h3>{escape(text)}</h3>\n"
 
 
 def paragraph(text: str, id_: str = "", note: bool = False) -> str:
-    """A paragraph; a note is printed fainter."""
+    """Return a paragraph; a note is fainter."""
     attributes = (f' id="{id_}"' if id_ else "") + (' class="note"' if note else "")
     return f"<p{attributes}>{escape(text)}</p>\n"
 
 
 def code(text: str, id_: str) -> str:
-    """Text for a machine; where it is wider than the page, keys scroll it."""
+    """Return preformatted text, which the keyboard can scroll."""
     return f'<pre id="{id_}" tabindex="0">{escape(text)}</pre>\n'
 
 
 def figure(svg: str, caption: str) -> str:
-    """A picture (markup of our own) and what to see in it; empty without picture."""
+    """Return a picture (our own markup) with a caption; empty without picture."""
     return f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>\n" if svg else ""
 
 
 def pair(*figures: str) -> str:
-    """Figures or sections beside each other where there is room; empty without any."""
+    """Return figures or sections side by side if there is room; empty without any."""
     text = "".join(figures)
     return f'<div class="pair">\n{text}</div>\n' if text else ""
 
 
 def first(decision: str, values: str) -> str:
-    """What is seen first: where there is room, what to do stands to the right of the values."""
+    """Return the top of the page: the decision, to the right of the values if there is room."""
     return f'<div class="first">\n{decision}{values}</div>\n'
 
 
@@ -67,9 +78,11 @@ def table(
     words: int = 99,
     links: Mapping[str, str] | None = None,
 ) -> str:
-    """A table whose rows begin with their names; from cell number `words` on they are text rather than numbers.
+    """Return a table whose rows begin with their names.
 
-    `links` : by name, where it leads.
+    Parameters
+    ----------
+    words : the cells from this number on are text instead of numbers. links : row name -> URL.
     """
     lines = [f'<div class="wide"><table id="{id_}">']
     if caption:
@@ -87,17 +100,17 @@ def table(
 
 
 def number(value: Any, decimals: int = 6) -> str:
-    """A number, or that it is not known."""
+    """Return a number as text, or "unknown"."""
     known = as_float(value)
     return f"{known:.{decimals}f}" if math.isfinite(known) else "unknown"
 
 
 def quantity(value: Any, unit: str, sign: str = "", digits: int = 6) -> str | None:
-    """A number with its unit; None where it is not known."""
+    """Return a number with its unit; None if it is not known."""
     known = as_float(value)
     return f"{sign}{known:.{digits}g} {unit}".rstrip() if math.isfinite(known) else None
 
 
 def as_float(value: Any) -> float:
-    """NaN for None."""
+    """Return a float; NaN for None."""
     return math.nan if value is None else float(value)

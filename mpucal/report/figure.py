@@ -1,4 +1,4 @@
-"""Pictures as SVG elements that take their colours from the page: marks, and axes for values over time."""
+"""Pictures as SVG in the page's colours: marks, and axes for values over time."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ import numpy as np
 from ..data import Vector
 from .elements import escape
 
-# in px; the page scales a picture to its column
+# px; the page scales a picture to its column
 WIDTH = 420.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 48.0, 6.0, 24.0, 32.0
-# what may stand at an axis, times a power of ten
+# steps between ticks, times a power of ten
 _STEPS, _FEWEST_TICKS = (10.0, 5.0, 2.0, 1.0), 4
-# the page's own colours, which change with the reader's light
+# the page's colours, which differ in light and dark mode
 INK, BEFORE, AFTER, FAINT, LINE, X, Y, Z = (
     f"var(--{name})" for name in ("ink", "before", "after", "faint", "line", "x", "y", "z")
 )
 
 
 def svg(name: str, label: str, height: float, *marks: str) -> str:
-    """An `svg` element; `name` is unlike any other on the page, `label` for who cannot see it."""
+    """Return an `svg` element; `name` is its id, `label` its text for screen readers."""
     head = f'<svg id="{name}" role="img" aria-label="{escape(label)}" viewBox="0 0 {WIDTH:g} {height:g}"'
     return f'{head} font-size="11" fill="{INK}">{"".join(marks)}</svg>'
 
 
 def line(x: Vector, y: Vector, colour: str, width: float = 1.0, dashed: bool = False) -> str:
-    """A line through the points [px]; it is broken where they are NaN."""
+    """Return a line through the points [px], interrupted at NaN."""
     pen, steps = "M", []
     for at_x, at_y in zip(x.tolist(), y.tolist(), strict=True):
         if math.isnan(at_x) or math.isnan(at_y):
@@ -40,19 +40,19 @@ def line(x: Vector, y: Vector, colour: str, width: float = 1.0, dashed: bool = F
 
 
 def dots(x: Vector, y: Vector, radius: float, colour: str, hollow: bool = False) -> str:
-    """A dot at each of the points [px]."""
+    """Return a dot at each of the points [px]."""
     style = f"fill: none; stroke: {colour}" if hollow else f"fill: {colour}"
     circles = "".join(f'<circle cx="{i:.1f}" cy="{j:.1f}" r="{radius:g}"/>' for i, j in zip(x, y, strict=True))
     return f'<g style="{style}">{circles}</g>'
 
 
 def text(x: float, y: float, words: str, anchor: str = "middle", colour: str = INK) -> str:
-    """Words at a point [px]; `anchor`: start, middle or end."""
+    """Return text at a point [px]; `anchor` is start, middle or end."""
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" style="fill: {colour}">{escape(words)}</text>'
 
 
 def legend(*entries: tuple[str, str]) -> str:
-    """What the marks are: words and colours, from the right."""
+    """Return a legend of (words, colour) entries, aligned to the right."""
     marks, right = [], WIDTH - _RIGHT
     for words, colour in reversed(entries):
         marks.append(text(right, 12.0, words, "end"))
@@ -63,11 +63,11 @@ def legend(*entries: tuple[str, str]) -> str:
 
 
 class Axes:
-    """Axes for what lies in `x` and `y` (least, greatest); what is beyond `y` is drawn at its edge.
+    """Axes over the ranges `x` and `y` (least, greatest); values beyond `y` are drawn at its edge.
 
     Parameters
     ----------
-    height : of the picture [px]. whole : of x only whole numbers are written.
+    height : of the picture [px].
     """
 
     def __init__(
@@ -77,27 +77,27 @@ class Axes:
         self._labels = x_label, y_label
 
     def place(self, x: Vector, y: Vector) -> tuple[Vector, Vector]:
-        """Where on the picture [px]."""
+        """Return the positions of values in the picture [px]."""
         (left, right), (low, high) = self._x, self._y
         across, up = (x - left) / (right - left), (np.clip(y, low, high) - low) / (high - low)
         return _LEFT + across * (WIDTH - _LEFT - _RIGHT), self._bottom - up * (self._bottom - _TOP)
 
     def line(self, x: Vector, y: Vector, colour: str, width: float = 1.0) -> str:
-        """A line through values."""
+        """Return a line through values."""
         return line(*self.place(x, y), colour, width)
 
     def level(self, y: float, colour: str = INK) -> str:
-        """A dashed line at a value, all the way across."""
+        """Return a dashed horizontal line at a value."""
         return line(*self.place(np.array(self._x), np.array([y, y])), colour, dashed=True)
 
     def band(self, first: float, last: float) -> str:
-        """A stretch of x, shaded."""
+        """Return a shaded range of x."""
         (left, right), _ = self.place(np.array([first, last]), np.array(self._y))
         size = f'width="{right - left:.1f}" height="{self._bottom - _TOP:g}"'
         return f'<rect x="{left:.1f}" y="{_TOP:g}" {size} style="fill: {LINE}"/>'
 
     def frame(self) -> str:
-        """The axes themselves, with their numbers and names."""
+        """Return the axes with their numbers and labels."""
         (left, right), (bottom, top) = self.place(np.array(self._x), np.array(self._y))
         marks = [line(np.array([left, left, right]), np.array([top, bottom, bottom]), INK)]
         for value, said in ticks(*self._x):
@@ -116,7 +116,7 @@ class Axes:
 
 
 def ticks(low: float, high: float) -> list[tuple[float, str]]:
-    """Round numbers within (low, high), with their words."""
+    """Return round numbers within (low, high) with their text."""
     power = math.floor(math.log10(high - low))
     step = next(
         step

@@ -1,4 +1,4 @@
-"""The report as one HTML file that needs no network and no script."""
+"""The report as one HTML file."""
 
 from __future__ import annotations
 
@@ -17,14 +17,34 @@ from ..export.ros import ros_node
 from ..files.formats import is_of_session
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.session_files import CAPTURE
-from .decision import what_now
-from .elements import as_float, code, details, escape, first, heading, number, pair, paragraph, quantity, section, table
-from .found import accelerometer_section, formula, gyroscope_table, is_regular, matrices, verification_section
-from .gallery import gallery
-from .style import CSS
+from .elements import (
+    as_float,
+    code,
+    details,
+    document,
+    escape,
+    first,
+    heading,
+    number,
+    pair,
+    paragraph,
+    quantity,
+    section,
+    table,
+)
+from .pictures import gallery
+from .sections import (
+    accelerometer_section,
+    formula,
+    gyroscope_table,
+    is_regular,
+    matrices,
+    vehicle_section,
+    verification_section,
+    what_now,
+)
 from .track import Track
 from .units import estimated_error
-from .vehicle import vehicle_section
 
 VERDICTS = {
     GOOD: "Good: the model explains the measurements, and every parameter is well determined.",
@@ -35,7 +55,7 @@ _NOTHING: Mapping[str, str] = MappingProxyType({})
 
 
 def render(calibration: Calibration, recording: Recording | None = None) -> str:
-    """The page of a calibration; with its recording, also the pictures of that. What is folded away is not printed."""
+    """Return the report of a calibration; with its recording, it includes pictures. Collapsed parts are not printed."""
     track = _track(calibration, recording)
     drawn = _NOTHING if track is None else gallery(track)
     no_pictures = recording is not None and track is None
@@ -47,13 +67,13 @@ def render(calibration: Calibration, recording: Recording | None = None) -> str:
             "At rest, before and after",
             _magnitudes(track),
             paragraph("D cannot be inverted, so there are no pictures.", note=True) if no_pictures else "",
-            pair(*_those(drawn, "sphere", "residuals")),
+            pair(*_select(drawn, "sphere", "residuals")),
         ),
-        section("Turned and held", pair(*_those(drawn, "coverage", "innovations"))),
+        section("Orientations and motion", pair(*_select(drawn, "coverage", "innovations"))),
         vehicle_section(calibration),
         details("The formula", formula(calibration)),
-        details("The gyroscope", gyroscope_table(calibration), *_those(drawn, "rates")),
-        details("Over time", *_those(drawn, "magnitude", "temperature")),
+        details("The gyroscope", gyroscope_table(calibration), *_select(drawn, "rates")),
+        details("Over time", *_select(drawn, "magnitude", "temperature")),
         details("How to apply it", _application(calibration)),
         details("Sensor and settings", _settings(calibration, recording)),
         details("Parameters in calibration.json", matrices(calibration)),
@@ -62,27 +82,18 @@ def render(calibration: Calibration, recording: Recording | None = None) -> str:
     )
     chip, name = calibration.sensor.chip, calibration.extra.get("name")
     title = f"Calibration of {name or _article(chip)}"
-    facts = filter(None, [chip if name else "", _date(calibration.created), _warmth(calibration)])
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n<main>\n"
-        f"<h1>{escape(title)}</h1>\n{paragraph(', '.join(facts), 'facts', note=True)}{''.join(body)}"
-        "</main>\n</body>\n</html>\n"
-    )
+    temperature = quantity(calibration.sensor.temperature_c, "°C", digits=3)
+    facts = filter(None, [chip if name else "", _date(calibration.created), temperature])
+    return document(title, title, paragraph(", ".join(facts), "facts", note=True), *body)
 
 
 def _date(created: str) -> str:
-    """22 November 2026, 03:23 UTC; as it is where it is no date."""
+    """Return a date such as 22 November 2026, 03:23 UTC; other text is returned unchanged."""
     try:
         date = datetime.fromisoformat(created)
     except ValueError:
         return created
     return f"{date.day} {date:%B %Y, %H:%M} {date.tzname() or ''}".strip()
-
-
-def _warmth(calibration: Calibration) -> str:
-    return f"{quantity(calibration.sensor.temperature_c, '°C', digits=3) or ''}"
 
 
 def _article(chip: str | None) -> str:
@@ -102,12 +113,12 @@ def _verdict(calibration: Calibration, recording: Recording | None) -> str:
 
 
 def _track(calibration: Calibration, recording: Recording | None) -> Track | None:
-    """The recording as the calibration sees it; None without one, or where D cannot be inverted."""
+    """Return the recording with its calibration; None without a recording, or if D cannot be inverted."""
     return None if recording is None or not is_regular(calibration) else Track(recording, calibration)
 
 
 def _magnitudes(track: Track | None) -> str:
-    """|a| before and after of the rests' means; empty where there are no rests."""
+    """Return a table of |a| of the rests before and after; empty if there are no rests."""
     if track is None or not len(track.runs):
         return ""
     rows = []
@@ -118,7 +129,7 @@ def _magnitudes(track: Track | None) -> str:
     return table("magnitudes", caption, ["", "median", "mean", "standard deviation"], rows)
 
 
-def _those(drawn: Mapping[str, str], *names: str) -> list[str]:
+def _select(drawn: Mapping[str, str], *names: str) -> list[str]:
     return [drawn[name] for name in names if name in drawn]
 
 
@@ -129,7 +140,7 @@ def _application(calibration: Calibration) -> str:
         (
             heading("C"),
             code(c_functions(calibration), "c"),
-            paragraph("Or read calibration.bin, whose layout firmware_protocol.md describes.", note=True),
+            paragraph("Or read calibration.bin (format: firmware_protocol.md).", note=True),
             heading("Python"),
             code(python_functions(calibration), "python"),
             paragraph('Or, with mpucal: a = mpucal.Calibration.load("calibration.json").apply(y).', note=True),
@@ -163,20 +174,20 @@ def _settings(calibration: Calibration, recording: Recording | None) -> str:
 
 
 def _reproduction(calibration: Calibration, recording: Recording | None) -> str:
-    """The commands that reproduce these numbers; none where the recording is not known."""
+    """Return the commands that reproduce the numbers; empty if the recording is not known."""
     gravity, model = as_float(calibration.fit.get("gravity")), calibration.fit.get("model")
     if recording is None or model is None or not math.isfinite(gravity):
         return ""
-    # one file of a session that was resumed is not all that was recorded: its folder is
+    # a resumed session has several captures, so its folder is given
     source = "." if CAPTURE.matches(recording.name) else recording.name
     anyway = " --gravity-anyway" if calibration.fit.get("gravity_anyway") else ""
     lines = [f"mpucal calibrate {source} --model {model} --gravity {gravity:.9g}{anyway} -o again"]
     if is_of_session(recording.name):
         lines.append(f"mpucal session --replay {source} -o replayed")
-    said = paragraph(
-        "In the folder of this page. The first fits the recording again; the second replays the whole session, "
-        "prompt by prompt, where a session made it."
+    intro = paragraph(
+        "Run them in the folder of this page. The first calibrates the recording again; the second replays the whole "
+        "session, prompt by prompt, if a session made the recording."
         if len(lines) > 1
-        else "In the folder of the recording:"
+        else "Run it in the folder of the recording:"
     )
-    return said + code("\n".join(lines), "reproduce")
+    return intro + code("\n".join(lines), "reproduce")

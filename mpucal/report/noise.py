@@ -1,4 +1,4 @@
-"""The noise of a sensor as text and as one HTML page: its coefficients, the Allan deviation, the slow course."""
+"""The noise of a sensor as text and as an HTML page: coefficients, Allan deviation, slow course."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ import numpy as np
 from .. import __version__
 from ..data import STANDARD_GRAVITY_MPS2
 from ..result.noise import ACCELEROMETER, GYROSCOPE, INSTABILITY, QUANTISATION, WALK, WHITE, Noise
-from .elements import escape, figure, paragraph, section, table
+from .elements import document, figure, paragraph, section, table
 from .figure import INK, Axes, X, Y, Z, legend, svg
-from .style import CSS
 
 HEIGHT = 240.0
 SENSORS = (ACCELEROMETER, GYROSCOPE)
 _UG, _DPS = 1e6 / STANDARD_GRAVITY_MPS2, math.degrees(1.0)
-# of each sensor: (factor, unit) in which a coefficient is said
+# sensor -> coefficient -> (factor, unit) of the text
 UNITS = {
     ACCELEROMETER: {
         WHITE: (_UG, "ug/√Hz"),
@@ -35,7 +34,7 @@ UNITS = {
 
 
 def rows(noise: Noise, sensor: str) -> Iterator[tuple[str, list[str]]]:
-    """Name with unit, and the values of x, y, z with their 95 % intervals, of each coefficient of a sensor."""
+    """Yield name with unit, and the values of x, y, z with 95 % intervals, of each coefficient of a sensor."""
     part = slice(0, 3) if sensor == ACCELEROMETER else slice(3, 6)
     for name, (factor, unit) in UNITS[sensor].items():
         cells = [
@@ -46,32 +45,32 @@ def rows(noise: Noise, sensor: str) -> Iterator[tuple[str, list[str]]]:
 
 
 def summary(noise: Noise) -> str:
-    """What `mpucal noise` prints."""
+    """Return the text that `mpucal noise` prints."""
     lines = [f"! {row['message']}." for row in noise.suspicious]
     lines += [""] if lines else []
     for sensor in SENSORS:
         lines += [f"{sensor:<32}" + "".join(f"{axis:>31}" for axis in "xyz")]
         lines += [f"  {name:<30}" + "".join(f"{cell:>31}" for cell in cells) for name, cells in rows(noise, sensor)]
-        said = _data_sheet(noise, sensor)
-        lines += [f"  {said}", ""] if said else [""]
+        comparison = _data_sheet(noise, sensor)
+        lines += [f"  {comparison}", ""] if comparison else [""]
     lines.append(
-        f"{noise.samples} samples at {noise.rate_hz:.1f} Hz in {noise.seconds / 60.0:.1f} min. In brackets 95 %."
+        f"{noise.samples} samples at {noise.rate_hz:.1f} Hz in {noise.seconds / 60.0:.1f} min. In brackets: 95 %."
     )
     return "\n".join(lines)
 
 
 def render(noise: Noise) -> str:
-    """The page."""
+    """Return the page."""
     head = ("", *"xyz")
     tables = [
         table(sensor, sensor, head, [(name, *cells) for name, cells in rows(noise, sensor)])
-        + (paragraph(said, note=True) if (said := _data_sheet(noise, sensor)) else "")
+        + (paragraph(sheet, note=True) if (sheet := _data_sheet(noise, sensor)) else "")
         for sensor in SENSORS
     ]
     pictures = [_allan(noise, sensor) for sensor in SENSORS]
     course = _course(noise) if len(noise.course) > 1 else ""
     beside = ", and the data sheet's white noise" if noise.data_sheet else ""
-    caption = f"Overlapping Allan deviation, thin lines its 95 % interval{beside}."
+    caption = f"Overlapping Allan deviation; thin lines: 95 % interval{beside}."
     suspicious = "".join(paragraph(f"{row['message']}.") for row in noise.suspicious)
     about = f"{noise.samples} samples at {noise.rate_hz:.1f} Hz in {noise.seconds / 3600.0:.2f} h."
     name = noise.sensor.chip or "a sensor"
@@ -79,15 +78,10 @@ def render(noise: Noise) -> str:
         section("Suspicious", suspicious),
         section("Coefficients", *tables, paragraph("In brackets: 95 % intervals.", note=True)),
         section("Allan deviation", *(figure(picture, caption) for picture in pictures)),
-        section("Over time", figure(course, "Means over blocks, each axis less its own mean, in its deviations.")),
+        section("Over time", figure(course, "Means over blocks, each axis minus its mean, in standard deviations.")),
     )
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>Noise of {escape(name)}</title><style>{CSS}</style></head><body>\n"
-        f"<h1>Noise of {escape(name)}</h1>\n{paragraph(about)}{''.join(body)}"
-        f"{paragraph(f'mpucal {__version__}, {noise.created}', note=True)}</body></html>\n"
-    )
+    made = paragraph(f"mpucal {__version__}, {noise.created}", note=True)
+    return document(f"Noise of {name}", f"Noise of {name}", paragraph(about), *body, made)
 
 
 def _allan(noise: Noise, sensor: str) -> str:
@@ -129,5 +123,5 @@ def _data_sheet(noise: Noise, sensor: str) -> str:
         return ""
     factor, unit = UNITS[sensor][WHITE]
     typical, found = noise.data_sheet[sensor], noise.of(sensor, WHITE)
-    said = f"data sheet: {factor * typical:.3g} {unit} ({factor * typical * math.sqrt(2.0):.3g} one-sided, as printed)"
-    return f"{said}; {found / typical:.2f} times that" if noise.is_significant(sensor, WHITE) else said
+    sheet = f"data sheet: {factor * typical:.3g} {unit} ({factor * typical * math.sqrt(2.0):.3g} one-sided, as printed)"
+    return f"{sheet}; {found / typical:.2f} times that" if noise.is_significant(sensor, WHITE) else sheet

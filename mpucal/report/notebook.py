@@ -1,4 +1,4 @@
-"""A calibration and a recording in a notebook: a table, and figures of matplotlib in its own colours."""
+"""A calibration and a recording in a notebook: a table, and figures of matplotlib."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ..chip.families import Family, family_of
 from ..data import Recording, Vector
 from ..result.calibration import Calibration
 from ..result.error_model import MG_PER_MPS2
+from .data_sheet import tolerance
 from .elements import paragraph, table
 from .pictures import envelope
 from .track import Track
 from .units import AXES, ParameterRow, accelerometer, estimated_error
-from .usual import tolerance
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,18 +27,18 @@ WIDTH_IN, HEIGHT_IN = 8.0, 4.5
 
 
 def html(calibration: Calibration) -> str:
-    """The verdict with its reasons, and the accelerometer's parameters with their standard uncertainties."""
+    """Return the verdict with its reasons, and a table of the accelerometer's parameters."""
     reasons = [str(reason["message"]) for reason in calibration.quality.get("reasons", ())]
-    said = " ".join(
+    sentences = " ".join(
         filter(None, [f"{calibration.verdict}.", *(f"{r}." for r in reasons), estimated_error(calibration)])
     )
     rows = [[f"{row.name}, {row.unit}", *row.cells] for row in accelerometer(calibration)]
     caption = f"{calibration.sensor.chip or 'accelerometer'}: value ± 1 sigma"
-    return paragraph(said) + table("mpucal", caption, ["", *AXES], rows)
+    return paragraph(sentences) + table("mpucal", caption, ["", *AXES], rows)
 
 
 def plot_calibration(calibration: Calibration, recording: Recording | None) -> Figure:
-    """The parameters beside the data sheet; of a recording |a| before and after, of each rest too, and innovations.
+    """Plot the parameters and the data sheet; with a recording, |a| before and after and the innovations instead.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def plot_calibration(calibration: Calibration, recording: Recording | None) -> F
 
 
 def plot_recording(recording: Recording) -> Figure:
-    """Accelerations and rates over time, and the flat part, where it is known.
+    """Plot accelerations and rates over time, and the flat part if known.
 
     Raises
     ------
@@ -68,11 +68,11 @@ def plot_recording(recording: Recording) -> Figure:
 
 
 def _figure(height_in: float) -> Figure:
-    """An empty figure, which a notebook shows as a picture."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - only where something is drawn
+    """Return an empty figure, which a notebook shows as a picture."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - only for a plot
 
     figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
-    # IPython knows figures only where pyplot was imported
+    # IPython knows figures only if pyplot is imported
     vars(figure)["_repr_png_"] = partial(_png, figure)
     return figure
 
@@ -84,7 +84,7 @@ def _png(figure: Figure) -> bytes:
 
 
 def _parameters(calibration: Calibration) -> Figure:
-    """Scale factor errors, biases and misalignments with their standard uncertainties."""
+    """Plot scale factor errors, biases and misalignments with their standard uncertainties."""
     figure = _figure(HEIGHT_IN)
     sheet = family_of(calibration.sensor.chip)
     gain, bias, *angles = accelerometer(calibration)
@@ -95,7 +95,7 @@ def _parameters(calibration: Calibration) -> Figure:
 
 
 def _values(axes: Axes, rows: Sequence[ParameterRow], sheet: Family | None) -> None:
-    """Rows of one unit, and what the data sheet allows behind them."""
+    """Plot rows of one unit over the tolerance of the data sheet."""
     name, *_ = rows[0].name.split(" x->")
     which = [(row, i) for row in rows for i in range(3) if AXES[i] in row.axes]
     x = [row.name.split()[-1] if len(row.axes) == 1 else AXES[i] for row, i in which]

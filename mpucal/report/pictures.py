@@ -1,25 +1,74 @@
-"""The pictures over time: the rests before and after, magnitudes, innovations, rates, temperature."""
+"""The pictures of a recording with their captions: rests, magnitudes, innovations, rates and temperature over time."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 
 from ..data import Vector
 from ..result.error_model import MG_PER_MPS2
+from .elements import figure
 from .figure import AFTER, BEFORE, INK, LINE, Axes, X, Y, Z, dots, legend, svg
+from .spheres import coverage, sphere
 from .track import Track
 
 BINS = 500
 HEIGHT = 210.0
-# innovations beyond this share of them are jerks, which may lie outside the picture
+# share of the innovations that fit into the picture; larger ones are jerks
 _MOST = 0.995
 _LEAST_SPAN_C = 1.0
 _TIME = "time [s]"
 _XYZ = (("x", X), ("y", Y), ("z", Z))
+RESIDUALS = "|a| of each rest minus gravity. After calibration all should lie at zero, apart from hand tremor."
+MAGNITUDE = "|a| over time. At rest it should equal gravity in every orientation; while the board moves it does not."
+SPHERE = (
+    "Each dot is the mean of a rest. After calibration they lie on the sphere of gravity, before on an ellipsoid beside"
+    " it. Hollow dots are on the far side."
+)
+COVERAGE = (
+    "The upward direction in the board's axes: the upper and the lower half of a sphere, seen from above. Large dots: "
+    "held still. Small dots: moving. Empty areas were not visited."
+)
+
+
+def gallery(track: Track) -> Mapping[str, str]:
+    """Return the figures by name; empty if the recording lacks the data."""
+    return {
+        "residuals": figure(residuals(track), RESIDUALS),
+        "magnitude": figure(magnitude(track), MAGNITUDE),
+        "sphere": figure(sphere(track), SPHERE),
+        "innovations": figure(innovations(track), _about_innovations(track)),
+        "coverage": figure(coverage(track), COVERAGE),
+        "rates": figure(rates(track), _about_rates(track)),
+        "temperature": figure(temperature(track), ""),
+    }
+
+
+def _about_innovations(track: Track) -> str:
+    e = track.innovations
+    if e is None:
+        return ""
+    resting = track.resting[-len(e) :]
+    rms = [
+        f"{float(np.sqrt(np.mean(e[part] ** 2))):.2g} m/s² rms {where}"
+        for part, where in ((resting, "at rest"), (~resting, "while it moves"))
+        if part.any()
+    ]
+    return (
+        "Innovation: the calibrated acceleration minus gravity as predicted by the gyroscope, "
+        f"{' and '.join(rms)} for each axis. At rest it should be noise around zero; while the board moves it is "
+        "mostly the acceleration of the hand."
+    )
+
+
+def _about_rates(track: Track) -> str:
+    fastest = float(np.degrees(np.abs(track.recording.gyr).max()))
+    return f"Fastest: {fastest:.0f} deg/s. Rates beyond the range are clipped."
 
 
 def residuals(track: Track) -> str:
-    """|a| - g of each rest before and after; empty where there are none."""
+    """Draw |a| - g of each rest before and after; empty if there are no rests."""
     if not len(track.runs):
         return ""
     both = [
@@ -35,7 +84,7 @@ def residuals(track: Track) -> str:
 
 
 def magnitude(track: Track) -> str:
-    """|a| over time before and after: the paper's Fig. 2."""
+    """Draw |a| over time before and after, as the paper's Fig. 2."""
     both = [np.linalg.norm(acc, axis=1) for acc in (track.recording.acc, track.calibrated)]
     axes = _over_time(track, _span(np.concatenate(both)), "|a| [m/s²]")
     lines = [
@@ -47,7 +96,7 @@ def magnitude(track: Track) -> str:
 
 
 def innovations(track: Track) -> str:
-    """The innovations: measured minus predicted acceleration; empty where the filter cannot run."""
+    """Draw the innovations, measured minus predicted acceleration; empty if the filter cannot run."""
     e = track.innovations
     if e is None:
         return ""
@@ -60,7 +109,7 @@ def innovations(track: Track) -> str:
 
 
 def rates(track: Track) -> str:
-    """How fast the board was turned, and how fast the gyroscope can follow."""
+    """Draw the rates of turn and the gyroscope's range."""
     gyr, limit = np.degrees(track.recording.gyr), track.calibration.sensor.gyro_range_dps
     most = 1.1 * max(float(np.abs(gyr).max()), limit or 0.0) + 1e-6
     axes = _over_time(track, (-most, most), "rate [deg/s]")
@@ -70,19 +119,19 @@ def rates(track: Track) -> str:
 
 
 def temperature(track: Track) -> str:
-    """The sensor's temperature over time; empty where it is not known."""
+    """Draw the sensor's temperature over time; empty if it is not known."""
     known = np.isfinite(track.recording.temperature_c)
     if known.sum() < 2:
         return ""
     t, values = envelope(track.t[known], track.recording.temperature_c[known])
-    # a tenth of a degree shall not look like a change
+    # a least span, so that a tenth of a degree does not look like a change
     middle, half = 0.5 * (values.min() + values.max()), max(0.55 * float(np.ptp(values)), _LEAST_SPAN_C)
     axes = _over_time(track, (middle - half, middle + half), "temperature [°C]")
     return svg("temperature", "Temperature over time", HEIGHT, axes.line(t, values, AFTER), axes.frame())
 
 
 def envelope(t: Vector, values: Vector) -> tuple[Vector, Vector]:
-    """The least and the greatest value of each of BINS stretches: few points, and no spike lost."""
+    """Return the least and greatest values of BINS stretches: few points that keep every spike."""
     if len(t) <= 2 * BINS:
         return t, values
     edges = np.linspace(0, len(t), BINS + 1).astype(int)[:-1]
@@ -95,7 +144,7 @@ def _over_time(track: Track, y: tuple[float, float], y_label: str) -> Axes:
 
 
 def _span(values: Vector) -> tuple[float, float]:
-    """A little more than from the least to the greatest."""
+    """Return the range of the values with a margin."""
     low, high = float(values.min()), float(values.max())
     margin = 0.04 * (high - low) + 1e-6
     return low - margin, high + margin

@@ -1,4 +1,4 @@
-"""The pictures of directions: measurements beside the sphere of gravity, and the coverage of orientations."""
+"""The pictures of directions: measurements and the sphere of gravity, and the coverage of orientations."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..data import Vector
 from .figure import AFTER, BEFORE, FAINT, INK, LINE, WIDTH, dots, legend, line, svg, text
 from .track import Track
 
-# where the sphere is looked at from; deviations are enlarged as long as they stay below this share of it
+# viewpoint of the sphere; enlargements of deviations, and their largest share of the radius
 _FROM = (0.76, -0.54, 0.36)
 _TIMES, _SHOWN = (20, 10, 5, 2, 1), 0.5
 _FEWEST_RESTS, _MOST_LINES = 3, 60
@@ -19,19 +19,19 @@ _HEIGHT, _LOW = 340.0, 230.0
 
 
 class _Disc:
-    """A part of the picture about a centre [px], in which 1 is `unit` px long, and y goes up."""
+    """Part of the picture about a centre [px], where 1 is `unit` px and y points up."""
 
     def __init__(self, x: float, y: float, unit: float) -> None:
         self._centre, self._unit = np.array([x, y]), unit
 
     def place(self, points: Vector) -> tuple[Vector, Vector]:
-        """Where on the picture [px], of (n, 2) or more columns."""
+        """Return the positions in the picture [px] of points (n, 2) or more columns."""
         x, y = (self._centre + self._unit * points[:, :2] * (1.0, -1.0)).T
         return x, y
 
 
 def sphere(track: Track) -> str:
-    """The measurements before and after, beside the sphere of gravity: the paper's Fig. 1."""
+    """Draw the measurements before and after with the sphere of gravity, as the paper's Fig. 1."""
     both = [_points(track, acc) / track.gravity for acc in (track.recording.acc, track.calibrated)]
     farthest = max(float(np.abs(np.linalg.norm(points, axis=1) - 1.0).max()) for points in both)
     times = next((k for k in _TIMES if k * farthest <= _SHOWN), 1)
@@ -54,13 +54,13 @@ def sphere(track: Track) -> str:
         marks.append(dots(*disc.place(seen[~front]), 2.6, colour, hollow=True))
     marks.append(legend(("before", BEFORE), ("after", AFTER), ("gravity", INK)))
     if times > 1:
-        said = f"distances from the sphere are drawn {times} times as large"
-        marks.append(text(WIDTH / 2.0, _HEIGHT - 4.0, said, colour=FAINT))
+        note = f"distances from the sphere are enlarged {times} times"
+        marks.append(text(WIDTH / 2.0, _HEIGHT - 4.0, note, colour=FAINT))
     return svg("sphere", f"Measurements before and after beside the sphere, deviations times {times}", _HEIGHT, *marks)
 
 
 def coverage(track: Track) -> str:
-    """Which way was up in the board's axes: both halves of the sphere, in equal areas."""
+    """Draw the upward directions in the board's axes, on both halves of the sphere, in equal areas."""
     moving = _units(track.calibrated[:: max(len(track.calibrated) // _SPECKS, 1)])
     rests = _units(track.at_rest(track.calibrated))
     marks = []
@@ -73,18 +73,18 @@ def coverage(track: Track) -> str:
             marks.append(text(float(x), float(y), letter, colour=FAINT))
         for units, colour, radius in ((moving, FAINT, 0.8), (rests, AFTER, 3.2)):
             marks.append(dots(*disc.place(_flattened(units[sign * units[:, 2] >= 0.0])), radius, colour))
-    label = "Which way was up in the board's axes: dots are rests, specks are turns"
+    label = "Upward direction in the board's axes: large dots held still, small dots moving"
     return svg("coverage", label, _LOW, *marks)
 
 
 def _points(track: Track, acc: Vector) -> Vector:
-    """(k, 3) m/s^2: the rests' means, or single samples where there are hardly any rests."""
+    """Return (k, 3) m/s^2: the means of rests, or single samples if there are hardly any rests."""
     rests = track.at_rest(acc)
     return rests if len(rests) >= _FEWEST_RESTS else acc[:: max(len(acc) // _POINTS, 1)]
 
 
 def _view() -> Vector:
-    """(3, 3) right, up and towards the eye, as rows."""
+    """Return (3, 3): the directions right, up and towards the viewer, as rows."""
     eye = np.array(_FROM) / np.linalg.norm(_FROM)
     right = np.cross((0.0, 0.0, 1.0), eye)
     right /= np.linalg.norm(right)
@@ -92,7 +92,7 @@ def _view() -> Vector:
 
 
 def _flattened(units: Vector) -> Vector:
-    """(k, 2) of unit vectors (k, 3) of one half of the sphere: Lambert's azimuthal projection, rim at 1."""
+    """Project unit vectors (k, 3) of a hemisphere to (k, 2) by Lambert's azimuthal projection, rim at 1."""
     return np.asarray(units[:, :2] / np.sqrt(1.0 + np.abs(units[:, 2:])))
 
 

@@ -39,7 +39,7 @@ svg { display: block; width: 100%; height: auto; }
     border-bottom: 1px solid var(--line); }
   #accelerometer th, #accelerometer td { border: 0; }
   #accelerometer td.words { grid-column: 1 / -1; padding-top: 0; }
-  #accelerometer td.words:not(:empty)::before { content: "by its sheet: "; color: var(--faint); } }
+  #accelerometer td.words:not(:empty)::before { content: "data sheet: "; color: var(--faint); } }
 @media screen and (min-width: 72rem) { body { max-width: 80rem; } p:not(.verdict) { max-width: 58rem; }
   .first { display: grid; grid-template-columns: minmax(0, 2.2fr) minmax(0, 1fr); gap: 0 2rem; font-size: .93rem; }
   .first > :last-child { order: -1; } .first .pair { display: block; } .first h2 { margin-top: 1.2rem; }

@@ -1,4 +1,4 @@
-"""A recording seen through its calibration: rests, calibrated samples, innovations."""
+"""A recording with its calibration: rests, calibrated samples, innovations."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ from ..rests.flat import find_flat, flat_statistics
 from ..rests.intervals import Intervals, RestFinder
 from ..result.calibration import Calibration
 
-# The hand's acceleration while it moves, as the filter that makes the innovations is told: what hands do.
+# typical acceleration of a moving hand, for the filter behind the innovations
 HAND_MPS2 = 0.5
 
 
 @dataclass(frozen=True)
 class Track:
-    """Both together, and what follows from both; D must be regular."""
+    """Recording with its calibration, and quantities derived from both; D must be regular."""
 
     recording: Recording
     calibration: Calibration
 
     @cached_property
     def t(self) -> Vector:
-        """(n,) s since the first sample."""
+        """Return (n,) s since the first sample."""
         return np.asarray(self.recording.t - self.recording.t[0])
 
     @cached_property
     def gravity(self) -> float:
-        """m/s^2, as the calibration assumed it."""
+        """Return gravity as the calibration assumed it [m/s^2]."""
         gravity = self.calibration.fit.get("gravity")
         return STANDARD_GRAVITY_MPS2 if gravity is None or not math.isfinite(gravity) else float(gravity)
 
     @cached_property
     def calibrated(self) -> Vector:
-        """(n, 3) m/s^2, equation (4)."""
+        """Return (n, 3) m/s^2 by equation (4)."""
         return np.asarray(self.calibration.apply(self.recording.acc))
 
     @cached_property
     def flat(self) -> tuple[int, int] | None:
-        """(first, last + 1) of the segment that lies flat; None: it lies nowhere, or there is nothing after it."""
+        """Return (first, last + 1) of the flat segment; None if there is none, or nothing after it."""
         flat = self.recording.flat or find_flat(self.recording)
         if flat is None or flat[1] - flat[0] < 2 or flat[1] >= len(self.recording) - 1:
             return None
@@ -53,28 +53,28 @@ class Track:
 
     @cached_property
     def runs(self) -> Intervals:
-        """(k, 2) first and last + 1 of the samples of each rest."""
+        """Return (k, 2): first and last + 1 of the samples of each rest."""
         if self.flat is None:
             return np.zeros((0, 2), np.intp)
         return RestFinder(self.recording, flat_statistics(self.recording, self.flat)).alike()
 
     @cached_property
     def resting(self) -> Mask:
-        """(n,) whether the board rests."""
+        """Return (n,) True where the board rests."""
         mask = np.zeros(len(self.recording), bool)
         for first, last in self.runs:
             mask[first:last] = True
         return mask
 
     def at_rest(self, acc: Vector) -> Vector:
-        """(k, 3) means of `acc` (n, 3) over each rest."""
+        """Return (k, 3) means of `acc` (n, 3) over each rest."""
         return np.array([acc[first:last].mean(0) for first, last in self.runs]).reshape(-1, 3)
 
     @cached_property
     def innovations(self) -> Vector | None:
-        """(m, 3) m/s^2, the last m samples' calibrated measurement minus gravity as the gyroscope predicts it.
+        """Return (m, 3) m/s^2: the last m calibrated measurements minus gravity as predicted by the gyroscope.
 
-        It is inv(D) e of equation (8), by the hand's filter. None where the filter cannot run.
+        This is inv(D) e of equation (8), by the hand's filter. None if the filter cannot run.
         """
         c = self.calibration
         known = (c.D, c.b_a, c.K, c.b_omega)

@@ -1,4 +1,4 @@
-"""The parameters as report and terminal show them: %, mg and deg, with standard uncertainties (1 sigma)."""
+"""The parameters in the units of report and terminal: %, mg and deg, with standard uncertainties (1 sigma)."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from ..result import error_model
 from ..result.calibration import REFUSED, Calibration, unknown
 
 AXES = error_model.AXES
-# standard uncertainties from here on, in the unit that is shown, are said to be not observable
+# a standard uncertainty from here on, in the unit that is shown, means not observable
 UNKNOWN = 100.0
 
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """Numbers of one kind for the axes x, y and z, NaN where unknown.
+    """Row of numbers of one kind for the axes x, y and z, NaN if unknown.
 
     Attributes
     ----------
-    name, unit : of the row. value, std : (3,) of x, y and z. axes : those that the row has a number for.
+    name, unit : of the row. value, std : (3,) of x, y and z. axes : those that the row has numbers for.
     """
 
     name: str
@@ -33,7 +33,7 @@ class ParameterRow:
 
     @property
     def cells(self) -> list[str]:
-        """value ± standard uncertainty, one text an axis; empty where the row has none."""
+        """Return "value ± standard uncertainty" for each axis; empty if the row has no number for it."""
         return [self._cell(i) if axis in self.axes else "" for i, axis in enumerate(AXES)]
 
     def _cell(self, axis: int) -> str:
@@ -42,16 +42,16 @@ class ParameterRow:
 
 
 def accelerometer(c: Calibration) -> list[ParameterRow]:
-    """Scale factor error, bias and misalignment of each axis."""
+    """Return scale factor error, bias and misalignments of the accelerometer."""
     bias = ParameterRow("bias", "mg", error_model.bias_mg(c.b_a), error_model.bias_mg(c.b_a_std))
     return [_scale_factor_error(c.D, c.D_std), bias, *_misalignments(c.D, c.D_std)]
 
 
 def gyroscope(c: Calibration) -> list[ParameterRow]:
-    """The same of the gyroscope, y = inv(K) w + b_omega."""
+    """Return scale factor error, bias and misalignments of the gyroscope, y = inv(K) w + b_omega."""
     known = np.isfinite(c.K).all() and np.linalg.matrix_rank(c.K) == 3
     matrix = np.asarray(np.linalg.inv(c.K)) if known else unknown(3, 3)
-    # the deviations of inv(K) are those of K to first order, which is what a K near the identity is good for
+    # for K near the identity, the standard deviations of inv(K) are those of K to first order
     bias = ParameterRow("bias", "deg/s", np.degrees(c.b_omega), np.degrees(c.b_omega_std))
     return [_scale_factor_error(matrix, c.K_std), bias, *_misalignments(matrix, c.K_std)]
 
@@ -62,7 +62,7 @@ def _scale_factor_error(matrix: Vector, std: Vector) -> ParameterRow:
 
 
 def _misalignments(matrix: Vector, std: Vector) -> list[ParameterRow]:
-    """Six rows, each with one number in the column of the axis that is misaligned."""
+    """Return six rows, each with one number in the column of the misaligned axis."""
     angle, angle_std = error_model.misalignment(matrix), error_model.misalignment_std(matrix, std)
     return [
         ParameterRow(f"misalignment {axis}->{other}", "deg", angle[:, j], angle_std[:, j], axis)
@@ -73,7 +73,7 @@ def _misalignments(matrix: Vector, std: Vector) -> list[ParameterRow]:
 
 
 def with_std(value: float, std: float, most_digits: int = 5) -> str:
-    """A value ± its standard uncertainty, to the second digit of that."""
+    """Return "value ± standard uncertainty", to the second digit of the latter."""
     if not math.isfinite(value):
         return "unknown"
     if not math.isfinite(std) or std <= 0.0:
@@ -83,13 +83,13 @@ def with_std(value: float, std: float, most_digits: int = 5) -> str:
 
 
 def estimated_error(c: Calibration) -> str:
-    """The estimated error of a calibrated acceleration in a sentence; empty where unknown or refused."""
+    """Return a sentence on the estimated error of a calibrated acceleration; empty if unknown or refused."""
     error = c.quality.get("error_std") or {}
     known = (error.get("rms"), error.get("direction_deg"))
     rms, direction = (math.nan if value is None else float(value) for value in known)
     if c.verdict == REFUSED or not (math.isfinite(rms) and math.isfinite(direction)):
         return ""
-    where = "the tilts that it holds for" if c.fit.get("model") == "tilt" else "all orientations"
+    where = "the tilts that it is valid for" if c.fit.get("model") == "tilt" else "all orientations"
     return (
         f"Estimated error at rest: {_before(c)}{error_model.MG_PER_MPS2 * rms:.2g} mg rms (1 sigma) over {where} after"
         f" calibration, {direction:.2g} deg in direction."
@@ -97,7 +97,7 @@ def estimated_error(c: Calibration) -> str:
 
 
 def _before(c: Calibration) -> str:
-    """What the error was, where all orientations are known."""
+    """Return the error before calibration as text; empty if not all orientations are known."""
     gravity = c.fit.get("gravity")
     if c.fit.get("model") == "tilt" or gravity is None:
         return ""

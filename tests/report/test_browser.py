@@ -36,7 +36,7 @@ def page(chromium, result, tmp_path_factory):
 
 @pytest.fixture
 def look(page):
-    """What the browser makes of it at a width."""
+    """Return the layout of the page in a browser of a width."""
 
     def at(width):
         page.set_viewport_size({"width": width, "height": 800})

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from mpucal.report import render
+from mpucal.report.units import ParameterRow
 from mpucal.result.calibration import Calibration
 
 CELL = re.compile(r"([-+]?[\d.]+) ±\u00a0([\d.]+)")
@@ -99,7 +100,7 @@ def test_a_bias_beside_the_data_sheet(result, bias_mg, said):
 def test_a_chip_whose_data_sheet_is_not_at_hand_is_compared_with_none(result):
     page = render(replace(result.calibration, sensor=replace(result.calibration.sensor, chip="ICM-20602")))
     assert len(table(page, "accelerometer")["bias, mg"]) == 3
-    assert "data sheet" not in page
+    assert "data sheet" not in page.partition("</style>")[2]
 
 
 def test_the_sentence_says_how_sure(result):
@@ -133,7 +134,7 @@ def test_a_session_is_fitted_again_from_all_its_captures(result, name):
 def test_what_was_only_tilted_claims_its_tilts_alone(result):
     document = {**result.document, "fit": {**result.document["fit"], "model": "tilt"}}
     sentence = re.search(r'id="verdict">(.*?)</p>', render(Calibration.from_document(document)))[1]
-    assert "rms (1 sigma) over the tilts that it holds for" in sentence
+    assert "rms (1 sigma) over the tilts that it is valid for" in sentence
 
 
 def test_the_verification(result):
@@ -159,3 +160,8 @@ def test_the_verification(result):
     page = render(Calibration.from_document(document))
     assert table(page, "verification")["corner +X +Y −Z down"] == ["-0.0010 (±\u00a00.0087)", "0.064 (±\u00a00.131)"]
     assert 'id="verification"' not in result.html
+
+
+def test_a_number_of_which_nothing_is_known_is_not_shown():
+    row = ParameterRow("scale factor error", "%", np.array([6058.0, 2.1, 0.3]), np.array([812.0, 19.0, 0.02]))
+    assert row.cells == ["not observable", "+2 ± 19", "+0.300 ± 0.020"]

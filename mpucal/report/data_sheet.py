@@ -1,4 +1,4 @@
-"""The accelerometer's parameters beside the chip's data sheet: usual, unusual, or outside of it."""
+"""The accelerometer's parameters compared with the chip's data sheet: usual, unusual, or outside."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .elements import paragraph, table
 from .units import AXES, ParameterRow, accelerometer
 
 USUAL, UNUSUAL, OUTSIDE = "usual", "unusual", "outside the data sheet"
-# of a tolerance that is three standard deviations of what leaves the factory, two
+# share of the tolerance: two of the three standard deviations that it covers
 UNUSUAL_FROM = 2.0 / 3.0
 CAPTION = "value ± standard uncertainty (1 sigma)"
 NOTE = (
@@ -23,25 +23,25 @@ NOTE = (
 
 
 def accelerometer_table(c: Calibration, id_: str) -> str:
-    """Scale factor errors, biases and misalignments, beside the data sheet where that is at hand."""
+    """Return the table of scale factor errors, biases and misalignments, with the data sheet if it is known."""
     sheet = family_of(c.sensor.chip)
     rows = []
     for row in accelerometer(c):
-        # where a column is narrow, the deviation goes below its value as a whole
+        # a narrow column breaks before ±, not after it
         cells = [f"{row.name}, {row.unit}", *(cell.replace("± ", "±\u00a0") for cell in row.cells)]
         if sheet is not None:
-            cells.append(f"{_said(tolerance(row, sheet))}: {comparison(row, sheet)}")
+            cells.append(f"{_format_tolerance(tolerance(row, sheet))}: {comparison(row, sheet)}")
         rows.append(cells)
     return table(id_, CAPTION, ["", *AXES, *(() if sheet is None else ("data sheet",))], rows, words=len(AXES))
 
 
 def about(c: Calibration) -> str:
-    """What the table shows, and what stands in no table."""
+    """Return the notes on the table."""
     sheet = family_of(c.sensor.chip)
     if sheet is None:
         return paragraph(NOTE, note=True)
     return paragraph(
-        f"{NOTE} The data sheet is {sheet.data_sheet}: unusual is beyond two thirds of its tolerance."
+        f"{NOTE} The data sheet is {sheet.data_sheet}; unusual means beyond two thirds of its tolerance."
         f" Its cross-axis sensitivity is ±{sheet.cross_axis_percent:g} %; its nonlinearity,"
         f" {sheet.nonlinearity_percent:g} % of the range, is not estimated.",
         note=True,
@@ -49,7 +49,7 @@ def about(c: Calibration) -> str:
 
 
 def tolerance(row: ParameterRow, sheet: Family) -> Vector:
-    """(3,) what the data sheet allows, in the row's unit."""
+    """Return the tolerance (3,) of the data sheet in the row's unit."""
     if row.unit == "mg":
         return np.array(sheet.zero_g_mg)
     if row.unit == "%":
@@ -58,7 +58,7 @@ def tolerance(row: ParameterRow, sheet: Family) -> Vector:
 
 
 def comparison(row: ParameterRow, sheet: Family) -> str:
-    """In words, for each axis where they differ; empty where a value is not known."""
+    """Return the comparison in words, for each axis if they differ; empty if a value is not known."""
     judged = _by_axis(row, sheet)
     if len(set(judged.values())) == 1:
         return next(iter(judged.values()))
@@ -66,7 +66,7 @@ def comparison(row: ParameterRow, sheet: Family) -> str:
 
 
 def compared(c: Calibration) -> str:
-    """What is not usual, in a sentence; empty without a data sheet."""
+    """Return a sentence on the unusual parameters; empty without a data sheet."""
     sheet = family_of(c.sensor.chip)
     if sheet is None:
         return ""
@@ -74,8 +74,8 @@ def compared(c: Calibration) -> str:
     for row in accelerometer(c):
         for axis, words in _by_axis(row, sheet).items():
             named.get(words, []).append(row.name if len(row.axes) == 1 else f"{row.name} {axis}")
-    said = [f"{words[:1].upper()}{words[1:]}: {', '.join(names)}." for words, names in named.items() if names]
-    return paragraph(" ".join(said) or "All of it is usual by the data sheet.", "compared")
+    lists = [f"{words[:1].upper()}{words[1:]}: {', '.join(names)}." for words, names in named.items() if names]
+    return paragraph(" ".join(lists) or "All parameters are usual by the data sheet.", "compared")
 
 
 def _by_axis(row: ParameterRow, sheet: Family) -> dict[str, str]:
@@ -87,14 +87,14 @@ def _by_axis(row: ParameterRow, sheet: Family) -> dict[str, str]:
 
 
 def _judged(value: float, std: float, allowed: float) -> str:
-    # what two standard deviations may explain is not held against the chip
+    # two standard deviations are allowed for the uncertainty
     size = abs(value) - (2.0 * std if math.isfinite(std) else 0.0)
     if not math.isfinite(size):
         return ""
     return OUTSIDE if size > allowed else UNUSUAL if size > UNUSUAL_FROM * allowed else USUAL
 
 
-def _said(allowed: Vector) -> str:
-    """ "±3", or "±50, ±50, ±80" where the axes differ."""
+def _format_tolerance(allowed: Vector) -> str:
+    """Return "±3", or "±50, ±50, ±80" if the axes differ."""
     texts = [f"±{value:.2g}" for value in allowed.tolist()]
     return texts[0] if len(set(texts)) == 1 else ", ".join(texts)
