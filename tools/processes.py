@@ -98,7 +98,7 @@ class Child:
         os.close(hold)
 
     def go(self) -> Child:
-        """Let it begin; another process forked since holds the pipe open, too."""
+        """Begin; another process forked since holds the pipe open, too."""
         os.write(self._go, b"!")
         os.close(self._go)
         return self

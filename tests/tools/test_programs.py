@@ -34,7 +34,7 @@ def test_a_folder_lists_its_programs(folder, monkeypatch, capsys):
 
 
 def _has_main(path):
-    """Both forms of `main`: a function, and what makes one of its options."""
+    """Return True if there is a `main`: a function, or what makes one of its options."""
     names = [
         (getattr(node, "name", None), *map(ast.unparse, getattr(node, "targets", ())))
         for node in ast.parse(path.read_text()).body

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 
 class Call(NamedTuple):
-    """One that was logged.
+    """A call that was logged.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Inode:
     folder: bool = False
 
     def after(self, writes: Sequence[tuple[int, bytes]]) -> bytes:
-        """Its content with these writes alone."""
+        """Return its content with these writes alone."""
         data = bytearray(self.kept)
         for at, part in writes:
             data.extend(bytes(max(0, at + len(part) - len(data))))
@@ -75,7 +75,7 @@ class Disk:
         self.placed: dict[str, list[bytes]] = {}
 
     def call(self, call: Call) -> None:
-        """One that happened."""
+        """Take in a call that happened."""
         op, path = call.op, call.path
         inode = self._now.get(path)
         if not call.done:
@@ -101,7 +101,7 @@ class Disk:
             self._set(path, None)
 
     def cut(self, rng: random.Random, share: float) -> dict[str, bytes]:
-        """What is there after a cut that lets `share` of what was not synced reach the disk, in any order."""
+        """Return what is there after a cut that lets `share` of what was not synced reach the disk, in any order."""
         names = dict(self._names)
         for name, inode in rng.sample(self._since, len(self._since)):
             if rng.random() < share:

@@ -42,11 +42,11 @@ Check = Callable[[bytes], str | None]
 
 
 class TooLongError(BaseException):
-    """It takes longer than any reader may; no reader takes it for an error of a library's."""
+    """A reader takes longer than any may; no reader takes it for an error of a library's."""
 
 
 def mutated(corpus: Sequence[bytes], seed: int) -> bytes:
-    """Damaged by its seed."""
+    """Damage one of the corpus by a seed."""
     from ..lab.campaign_recordings import OF_BYTES  # noqa: PLC0415 - not before the package is instrumented
 
     rng = np.random.default_rng(seed)
@@ -60,7 +60,7 @@ def mutated(corpus: Sequence[bytes], seed: int) -> bytes:
 
 
 def checked(run: Run) -> Check:
-    """What of its exceptions should not be, as a trace; None where all is well."""
+    """Return a check: the trace of an exception that should not be; None where all is well."""
     from mpucal.errors import MpucalError  # noqa: PLC0415 - as above
     from mpucal.result.blob import BlobError  # noqa: PLC0415
     from mpucal.sources.bridge.messages import MessageError  # noqa: PLC0415
@@ -79,7 +79,7 @@ def checked(run: Run) -> Check:
 
 
 def blind(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds: float) -> tuple[str, int]:
-    """What was done, and how many raised what they should not."""
+    """Run seed after seed; return what was done, and how many raised what they should not."""
     until, seed, wrong = time.monotonic() + seconds, first, 0
     while True:
         if (trace := check(mutated(corpus, seed))) is not None:
@@ -91,7 +91,7 @@ def blind(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds:
 
 
 def guided(name: str, check: Check, corpus: Sequence[bytes], first: int, seconds: float) -> tuple[str, int]:
-    """The same; libFuzzer ends its process, which therefore is another one."""
+    """Run libFuzzer in a process of its own, which it ends; return as `blind`."""
     folder = KEPT / re.sub(r"\W+", "_", name)
     wrong, log = folder.with_suffix(".wrong"), folder.with_suffix(".log")
     folder.mkdir(parents=True, exist_ok=True)
@@ -143,7 +143,7 @@ def _fuzz(name: str, check: Check, folder: Path, wrong: Path, log: Path, first: 
 
 
 def again(name: str, check: Check, path: Path) -> int:
-    """How many of these files are wrong."""
+    """Run the files again, and return how many of them are wrong."""
     paths = sorted(path.iterdir()) if path.is_dir() else [path]
     traces = [trace for each in paths if (trace := check(each.read_bytes())) is not None]
     print(*traces, f"{name:<44}{len(paths):>9} files: {len(traces)} wrong", sep="\n", flush=True)
@@ -151,7 +151,7 @@ def again(name: str, check: Check, path: Path) -> int:
 
 
 def too_long(_signal: int, _frame: FrameType | None) -> None:
-    """It takes longer than any reader may."""
+    """Raise, as a reader takes longer than any may."""
     raise TooLongError(f"longer than {LONGEST_S} s of processor time")
 
 

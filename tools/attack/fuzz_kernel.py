@@ -23,7 +23,13 @@ import numpy as np
 
 from . import sanitized
 
-TESTS = ("kernel", "files/test_csv.py", "files/test_protobuf.py", "chip/test_bit_flips.py", "chip/test_piecewise_rate.py")
+TESTS = (
+    "kernel",
+    "files/test_csv.py",
+    "files/test_protobuf.py",
+    "chip/test_bit_flips.py",
+    "chip/test_piecewise_rate.py",
+)
 REFUSED = (TypeError, ValueError, OverflowError, MemoryError)
 ODD = (np.nan, np.inf, -np.inf, 5e-324, -0.0, 0.0, 1e308, -1e308, 1e-300, -1.0)
 ODD_NUMBERS = (0, 1, -1, 2, 3, 7, 63, 1 << 31, 1 << 62, (1 << 63) - 1, 1 << 63, (1 << 64) - 1, 6148914691236517206, 0.5)
@@ -32,23 +38,23 @@ Rng = np.random.Generator
 
 
 def longer(array: Any, rng: Rng) -> Any:
-    """Of another length."""
+    """Return the array in another length."""
     return np.resize(array, max(0, array.size + int(rng.integers(-4, 5))))
 
 
 def shaped(array: Any, rng: Rng) -> Any:
-    """In another shape."""
+    """Return the array in another shape."""
     return [array.ravel(), array.T, array[None], array[..., None], array[:0], np.zeros((0, 1 << 40))][rng.integers(6)]
 
 
 def typed(array: Any, rng: Rng) -> Any:
-    """Of another type."""
+    """Return the array as another type."""
     with np.errstate(all="ignore"):
         return array.astype(ODD_TYPES[rng.integers(len(ODD_TYPES))])
 
 
 def strided(array: Any, rng: Rng) -> Any:
-    """The same numbers, elsewhere in memory: backwards, with gaps, by columns, not aligned, not to be written."""
+    """Return the same numbers elsewhere in memory: backwards, with gaps, by columns, not aligned, or read-only."""
     way = rng.integers(5)
     if way == 0:
         return array[::-1].copy()[::-1] if array.ndim else array
@@ -64,7 +70,7 @@ def strided(array: Any, rng: Rng) -> Any:
 
 
 def valued(array: Any, rng: Rng) -> Any:
-    """With values that no sensor gives."""
+    """Return the array with values that no sensor gives."""
     if array.dtype.kind != "f" or not array.size:
         return rng.integers(-3, 80, array.shape) if rng.random() < 0.7 else array.astype(int) + ((1 << 62) - 7)
     array = array.copy()
@@ -76,7 +82,7 @@ ODDITIES = (longer, shaped, typed, strided, valued)
 
 
 def odd(value: Any, rng: Rng) -> Any:
-    """One in three is odd."""
+    """Return an odd value in one of three cases."""
     if rng.random() > 1 / 3:
         return value
     if isinstance(value, np.ndarray):
@@ -89,7 +95,7 @@ def odd(value: Any, rng: Rng) -> Any:
 
 
 def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]]]:
-    """Each, and what makes arguments of n samples that it takes."""
+    """Return each function, and what makes arguments of n samples that it takes."""
     from mpucal.calibration.likelihood import EXACT, USED  # noqa: PLC0415 - not before the modules are those of build/asan
     from mpucal.calibration.parameters import TABLE  # noqa: PLC0415
     from mpucal.calibration.theta import Theta  # noqa: PLC0415
@@ -151,7 +157,7 @@ def functions() -> dict[Callable[..., Any], Callable[[int, Rng], tuple[Any, ...]
 
 
 def fuzz(first: int, seconds: float, last: int) -> int:
-    """One seed after the other; each is written to the file `last` before it is run."""
+    """Run one seed after the other; each is written to the file `last` before it is run."""
     from mpucal.kernel import _kernel  # noqa: PLC0415 - as above
 
     table, until, seed, counts = functions(), time.monotonic() + seconds, first, Counter[str]()

@@ -34,7 +34,7 @@ MOST_HEARD = 3000
 
 @dataclass
 class Attack:
-    """What one process suffers; `heard` is what the vehicle sent in an earlier session.
+    """An attack that one process suffers; `heard` is what the vehicle sent in an earlier session.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Attack:
     hz: float = 0.0
 
     def draw(self, command: str) -> None:
-        """When and how fast it happens during the next command."""
+        """Draw when and how fast it happens during the next command."""
         self.sets, self.hz = [], self.rate
         if self.seed and self.rate:
             rng = random.Random(f"{self.seed} {command}")
@@ -65,7 +65,7 @@ class Attack:
             self.hz = math.exp(rng.uniform(math.log(LEAST_HZ), math.log(2 * self.rate)))
 
     def due(self, passed_s: float) -> int:
-        """How many packets come within so long."""
+        """Return how many packets come within so long."""
         return int(min(max(passed_s - self.begin_s, 0.0), self.lasts_s) * self.hz)
 
 

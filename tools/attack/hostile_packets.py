@@ -33,7 +33,7 @@ class Attacker:
         self.now_us = 0
 
     def packet(self, kind: str) -> bytes:
-        """One of `kind`: a new one, or one that was made before, as making them takes longest."""
+        """Return a packet of `kind`: a new one, or one that was made before, as making them takes longest."""
         made, rng = self._made.setdefault(kind, []), self._rng
         if len(made) < KEPT:
             made.append(KINDS[kind](self))
@@ -63,7 +63,7 @@ class Attacker:
         return getattr(m, f"MAVLink_{name}_message")(time_us // 1000 % (1 << 32), *counts)
 
     def ids(self) -> bytes:
-        """What a vehicle sends, from other systems and components."""
+        """Return what a vehicle sends, from other systems and components."""
         rng, m = self._rng, dialect()
         message = rng.choice(
             (
@@ -76,19 +76,19 @@ class Attacker:
         return self._packed(message, rng.choice((2, 255, 0, rng.randrange(2, 256))), rng.randrange(256))
 
     def values(self) -> bytes:
-        """The vehicle's IMU messages with NaN, infinite, huge and subnormal values, at its times and others."""
+        """Return the vehicle's IMU messages with NaN, infinite, huge and subnormal values, at its times and others."""
         t = self._rng.choice((self.now_us + self._rng.randrange(20_000), self._rng.randrange(1 << 28)))
         return self._packed(self._imu(t, self._rng.choices(ODD, k=6)))
 
     def time(self) -> bytes:
-        """The vehicle's IMU messages at times of anywhere: 0, 2^64 - 1, and its own, running backwards."""
+        """Return the vehicle's IMU messages at times of anywhere: 0, 2^64 - 1, and its own, running backwards."""
         rng = self._rng
         back = max(self.now_us - rng.randrange(1 << rng.randrange(1, 28)), 0)
         t = rng.choice((0, 1, (1 << 64) - 1, (1 << 63) + 5, rng.randrange(1 << rng.randrange(1, 64)), back, back))
         return self._packed(self._imu(t, [0.1, 0.2, -9.8, 0.01, 0.02, 0.03]))
 
     def parameters(self) -> bytes:
-        """PARAM_VALUE and PARAM_ERROR of the names that mpucal reads, of any type and value."""
+        """Return PARAM_VALUE and PARAM_ERROR of the names that mpucal reads, of any type and value."""
         rng, m = self._rng, dialect()
         name = rng.choice((rng.choice(self._names), rng.choice(self._names), rng.randbytes(rng.randrange(17))))
         if rng.random() < 0.1:
@@ -97,7 +97,7 @@ class Attacker:
         return self._packed(m.MAVLink_param_value_message(name, value, rng.randrange(256), 100, rng.randrange(65536)))
 
     def ftp(self) -> bytes:
-        """FILE_TRANSFER_PROTOCOL: payloads of noise, and answers that might be meant."""
+        """Return FILE_TRANSFER_PROTOCOL: payloads of noise, and answers that might be meant."""
         rng = self._rng
         payload = bytearray(rng.randbytes(PAYLOAD))
         if rng.random() < 0.8:
@@ -112,14 +112,14 @@ class Attacker:
         return self._packed(dialect().MAVLink_file_transfer_protocol_message(0, 254, 190, payload))
 
     def replayed(self) -> bytes:
-        """Packets of the vehicle again, with the signatures that they had, if any; some with bits flipped."""
+        """Return packets of the vehicle again, with the signatures that they had, if any; some with bits flipped."""
         data = bytearray(self._rng.choice(self.heard))
         if self._rng.random() < 0.3:
             data[self._rng.randrange(len(data))] ^= 1 << self._rng.randrange(8)
         return bytes(data)
 
     def states(self) -> bytes:
-        """HEARTBEAT (armed, of another autopilot), COMMAND_ACK and STATUSTEXT of the vehicle."""
+        """Return HEARTBEAT (armed, of another autopilot), COMMAND_ACK and STATUSTEXT of the vehicle."""
         rng, m = self._rng, dialect()
         text = rng.choice((b"PreArm: \xff\x00\x1b[2J", rng.randbytes(50), b"mpucal: rotate"))
         message = rng.choice(
@@ -132,12 +132,12 @@ class Attacker:
         return self._packed(message)
 
     def junk(self) -> bytes:
-        """Noise, and packets cut short."""
+        """Return noise, and packets cut short."""
         whole = self.values() if self._rng.random() < 0.5 else b"\xfd" + self._rng.randbytes(self._rng.randrange(300))
         return whole[: self._rng.randrange(1, len(whole) + 1)]
 
     def mixed(self) -> bytes:
-        """One of any other kind."""
+        """Return a packet of any other kind."""
         return self.packet(self._rng.choice([kind for kind in KINDS if kind != "mixed"]))
 
 

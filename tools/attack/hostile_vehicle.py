@@ -59,7 +59,7 @@ NUMBER = re.compile(r"-?\d[\d.e+-]*|nan|inf")
 
 
 def commands(attack: Attack, clean: Path | None) -> Iterator[tuple[str, list[str]]]:
-    """Each command, and the file whose parameters it may set."""
+    """Yield each command, and the file whose parameters it may set."""
     vehicle = [f"sim:firmware={attack.firmware}"]
     signing = ["--signing-key", "key"] if attack.attacker == SIGNED else []
     yield "out/calibration.json", ["session", "--mavlink", *vehicle, *signing, *QUICK, "-o", "out", "--yes"]
@@ -96,7 +96,7 @@ def suffer(attack: Attack, clean: Path | None, place: Path) -> dict[str, Any]:
 
 
 def judge_samples(attack: Attack) -> tuple[int, list[str]]:
-    """1 where a calibration is farther from the truth than it says; that is wrong where no samples were forged."""
+    """Return 1 where a calibration is farther from the truth than it says: wrong where no samples were forged."""
     try:
         calibration = Calibration.load(Path("out/calibration.json"))
     except MpucalError:
@@ -109,7 +109,7 @@ def judge_samples(attack: Attack) -> tuple[int, list[str]]:
 
 
 def not_asked(sets: list[tuple[str, float, float]], file: Path) -> list[tuple[str, float]]:
-    """What was set that is neither of the calibration in `file` nor the vehicle's own."""
+    """Return what was set that is neither of the calibration in `file` nor the vehicle's own."""
     new: dict[str, float] = {}
     if file.is_file():
         document = json.loads(file.read_text())
@@ -123,7 +123,7 @@ def not_asked(sets: list[tuple[str, float, float]], file: Path) -> list[tuple[st
 
 
 def same(file: Path, clean: Path) -> bool:
-    """Whether both hold the same D and b_a."""
+    """Return True if both hold the same D and b_a."""
     if not file.is_file():
         return False
     one, other = map(Calibration.load, (file, clean))
@@ -131,7 +131,7 @@ def same(file: Path, clean: Path) -> bool:
 
 
 def outcomes(attacks: Sequence[tuple[Attack, Path | None, Path]], jobs: int) -> Iterator[dict[str, Any]]:
-    """Of each attack, run in a process of its own, as they end."""
+    """Run each attack in a process of its own, and yield the outcomes, as they end."""
     for _, told in forked([partial(alone, *each) for each in attacks], jobs):
         died = {"sent": 0, "codes": ["?"], "unasked": 0, "fooled": 0, "ends": [], "mb": 0}
         yield {**died, "wrong": [f"it hung, or was ended ({told.code})"]} if isinstance(told, Died) else told
@@ -169,7 +169,7 @@ def main() -> int:
 
 
 def undisturbed(place: Path, attacker: str, firmware: str) -> Path:
-    """What a session without an attack leaves, as often as it is needed."""
+    """Return what a session without an attack leaves."""
     signed = SIGNED if attacker == SIGNED else STRANGER
     folder = place / f"{firmware} {signed}"
     if not folder.exists():
@@ -180,7 +180,7 @@ def undisturbed(place: Path, attacker: str, firmware: str) -> Path:
 
 
 def campaign(asked: argparse.Namespace, place: Path, kind: str, attacker: str) -> int:
-    """Runs until enough packets of one kind were heard; how many were wrong."""
+    """Run attacks until enough packets of a kind were heard; return how many were wrong."""
     firmwares = asked.firmware or FIRMWARES
     clean = {firmware: undisturbed(place, attacker, firmware) for firmware in firmwares}
     heard = {f: tuple(r.data for r in read_tlog(clean[f] / "capture.tlog").records[-MOST_HEARD // 2 :]) for f in clean}
@@ -206,7 +206,7 @@ def campaign(asked: argparse.Namespace, place: Path, kind: str, attacker: str) -
 
 
 def row(kind: str, attacker: str, done: Sequence[dict[str, Any]]) -> str:
-    """Of the table."""
+    """Return a row of the table."""
     sent, unasked, fooled = (sum(outcome[key] for outcome in done) for key in ("sent", "unasked", "fooled"))
     wrong = sum(bool(outcome["wrong"]) for outcome in done)
     codes = Counter(",".join(map(str, outcome["codes"])) for outcome in done)

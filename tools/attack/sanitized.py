@@ -25,7 +25,7 @@ def build() -> None:
 
 
 def environment() -> dict[str, str]:
-    """In which a Python loads them; its own blocks of memory are each by themselves, and many are kept to its end."""
+    """Return an environment in which a Python loads them, and each of its blocks of memory is by itself."""
     # C++'s, too: else the exceptions that Python does not know are not intercepted
     libraries = [
         subprocess.run(["gcc", f"-print-file-name={name}"], capture_output=True, text=True, check=True).stdout.strip()

@@ -124,16 +124,16 @@ def polled(driver: Driver, seconds: float, kept: Kept) -> float:
 
 
 class Wired:
-    """As much of spidev.SpiDev as SpiBus uses, with an MPU-6500 behind it that lives in real time."""
+    """A part of spidev.SpiDev, as much as SpiBus uses, with an MPU-6500 behind it that lives in real time."""
 
     def __init__(self) -> None:
         self._chip = SimulatedBus(Chip(MODELS["mpu6500"], NumberedFeed(), 0.0, FactoryTrim()), RealClock())
 
     def open_path(self, path: str) -> None:
-        """Any."""
+        """Open any path."""
 
     def xfer2(self, values: list[int], _hz: int) -> list[int]:
-        """One message: the address, with bit 7 to read, and the data."""
+        """Transfer a message: the address, with bit 7 to read, and the data."""
         if values[0] & 0x80:
             return [0, *self._chip.read(values[0] & 0x7F, len(values) - 1).data]
         self._chip.write(values[0], bytes(values[1:]))

@@ -53,7 +53,7 @@ WORLDS = (*(CHIP,) * 15, BRIDGE, VEHICLE)
 
 @dataclass(frozen=True)
 class Case:
-    """One struck session: `number` of its prefix, `k` of the case, and its faults, the earliest first."""
+    """A struck session: `number` of its prefix, `k` of the case, and its faults, the earliest first."""
 
     number: int
     k: int
@@ -97,7 +97,7 @@ def words(number: int) -> list[str]:
 
 
 class Prefix:
-    """One session without faults, and the struck ones that leave it."""
+    """A session without faults, and the struck ones that leave it."""
 
     def __init__(self, number: int, cases: Sequence[Case], place: Path, keep: bool) -> None:
         self._number, self._place, self._keep = number, place, keep

@@ -62,7 +62,7 @@ class Blow:
         return f"{self.name}@{self.at_s:g}"
 
     def fault(self) -> Fault | None:
-        """As the simulation's own table has it."""
+        """Return the fault of the simulation's own table."""
         table = fault_kinds(*OF_CHIP, *OF_VEHICLE, Where.HAND, Where.DEFECT)
         return Fault(self.name, self.at_s if table[self.name].timed else 0.0) if self.name in table else None
 
@@ -74,17 +74,17 @@ class Moments:
         self.due: list[tuple[float, Callable[[], None]]] = []
 
     def reach(self, now_s: float) -> None:
-        """It is `now_s`."""
+        """Call what is due at `now_s`."""
         while self.due and self.due[0][0] <= now_s:
             self.due.pop(0)[1]()
 
     def add(self, at_s: float, call: Callable[[], None]) -> None:
-        """Call it then."""
+        """Call that at a time [s]."""
         self.due = sorted([*self.due, (at_s, call)], key=lambda item: item[0])
 
 
 class World:
-    """What the hooks below have opened; one a process."""
+    """A simulated world, with what the hooks below have opened; one a process."""
 
     def __init__(self, kind: str) -> None:
         self.kind, self.moments = kind, Moments()
@@ -94,7 +94,7 @@ class World:
 
     @contextmanager
     def opened(self) -> Iterator[None]:
-        """Meanwhile `--bus sim` and `--mavlink sim` open this world."""
+        """Have `--bus sim` and `--mavlink sim` open this world meanwhile."""
 
         def bridged(*arguments: Any) -> Bridged:
             return Bridged(open_simulated(*arguments), self)
@@ -107,7 +107,7 @@ class World:
             yield
 
     def suffer(self, blows: Sequence[Blow]) -> None:
-        """From now on these happen, each at its time."""
+        """Begin these, each at its time."""
         faults = _faults(blows)
         if self.bus is not None:
             self.bus.suffer(faults, blows[0].number)
@@ -119,7 +119,7 @@ class World:
                 self.moments.add(blow.at_s, lambda blow=blow: self._strike(blow))
 
     def truths(self, blows: Sequence[Blow], folder: Path) -> list[tuple[np.ndarray, np.ndarray]]:
-        """(D, b_a) of the sensor as it may be called: before and after what befell it, and amid what is slow."""
+        """Return (D, b_a) of the sensor as it may be called: before and after what befell it, and amid what is slow."""
         document = self.truth(folder)
         D, b_a = np.array(document["D"], float), np.array(document["b_a"], float)
         maps = []
@@ -135,7 +135,7 @@ class World:
         return found
 
     def truth(self, folder: Path) -> dict[str, Any]:
-        """What a session without faults writes to truth.json."""
+        """Return what a session without faults writes to truth.json."""
         if self.bus is not None:
             return self.bus.truth_document() or {}
         # a vehicle may have changed its own offsets meanwhile, and is written to afterwards
@@ -175,7 +175,7 @@ class HookedBus(SimulatedBus):
         return super()._begun()
 
     def suffer(self, faults: Sequence[Fault], seed: int) -> None:
-        """They happen from now on."""
+        """Begin these now."""
         self._faults = FaultInjector(faults, self._chip, self._clock, np.random.default_rng(seed)) if faults else None
 
 
@@ -214,7 +214,7 @@ class HookedTransport(SimulatedTransport):
         return super().receive(until_ns)
 
     def suffer(self, faults: Sequence[Fault]) -> None:
-        """They happen from now on."""
+        """Begin these now."""
         vehicle = self._vehicle
         vehicle.options = replace(vehicle.options, fault=tuple(faults))
         vehicle._schedule = Schedule(faults)
@@ -222,7 +222,7 @@ class HookedTransport(SimulatedTransport):
 
 
 def fill_disk(room: int) -> None:
-    """No file of this process can be longer than `room` bytes: its writes fail as on a full disk.
+    """Have no file of this process be longer than `room` bytes: its writes fail as on a full disk.
 
     But what is said goes to a file here, and has room.
     """
@@ -236,7 +236,7 @@ def _faults(blows: Sequence[Blow]) -> list[Fault]:
 
 
 def _befallen(blows: Sequence[Blow]) -> list[Mishap]:
-    """What befalls the sensor; none of a vehicle's."""
+    """Return what befalls the sensor; none of a vehicle's."""
     return [*begin_mishaps(_faults(blows)), *(_step(blow) for blow in blows if blow.name == STEP)]
 
 
@@ -250,7 +250,7 @@ def _step(blow: Blow) -> ZeroStep:
 
 
 def _affine(mishap: Mishap, t_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """(A, c) by which specific force s is felt as A s + c then."""
+    """Return (A, c) by which specific force s is felt as A s + c then."""
     at = np.full(4, t_s)
     felt, _ = mishap.apply(np.vstack((np.zeros(3), np.eye(3))), np.zeros((4, 3)), at)
     return (felt[1:] - felt[0]).T, felt[0]

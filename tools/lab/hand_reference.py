@@ -24,7 +24,7 @@ LONGEST_STEP_S, SPEED_OF_RESET_S = 0.2, 0.04
 
 
 class Gain(NamedTuple):
-    """What one measurement decides by P and e: the gain K (12, 3), S^-1 (3, 3) and the weight w."""
+    """The decisions of a measurement by P and e: the gain K (12, 3), S^-1 (3, 3) and the weight w."""
 
     K: Vector
     Si: Vector
@@ -62,7 +62,7 @@ class Pass:
             self._measure(series.y[i], scale * flat.Sigma_a + extra, rate, alpha, self.theta.tau, self.problem.huber)
 
     def _turn(self, i: int) -> None:
-        """All four vectors by F, and the gyroscope's noise on s."""
+        """Turn all four vectors by F, and add the gyroscope's noise to s."""
         series, theta = self.problem.series, self.theta
         dt, rate = series.dt[i], series.omega[i] - theta.b_omega
         phi = -dt * theta.K @ rate
@@ -77,7 +77,7 @@ class Pass:
         self.P[:3, :3] += s @ np.diag(c) @ s.T
 
     def _travel(self, i: int) -> None:
-        """(p, v, a) along the chain; Phi and Q from one matrix exponential (Van Loan 1978)."""
+        """Move (p, v, a) along the chain; Phi and Q from one matrix exponential (Van Loan 1978)."""
         lam, h = self.problem.lam, min(self.problem.series.dt[i], LONGEST_STEP_S)
         A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-(lam**3), -3.0 * lam**2, -3.0 * lam]])
         both = expm(h * np.block([[-A, np.diag([0.0, 0.0, 1.0])], [np.zeros((3, 3)), A.T]]))
@@ -94,7 +94,7 @@ class Pass:
         self.P[9:, 9:] = sigma**2 * np.eye(3)
 
     def _measure(self, y: Vector, R: Vector, rate: Vector, alpha: Vector, tau: float, huber: float) -> None:
-        """Innovation, cost, derivatives and update; R (3,) is the diagonal of the noise."""
+        """Compute innovation, cost, derivatives and update; R (3,) is the diagonal of the noise."""
         theta, g, x = self.theta, self.problem.gravity, self.x
         E = np.eye(3) + tau * cross(rate)
         L = cross(alpha) + cross(rate) @ cross(rate)
@@ -133,18 +133,18 @@ class Pass:
 
 
 def evaluate_hand_reference(problem: Problem, theta: Theta) -> Evaluation:
-    """The same as likelihood.evaluate of all parameters, with twelve-state matrices and no structure used."""
+    """Evaluate all parameters as likelihood.evaluate, with twelve-state matrices and no structure used."""
     done = Pass(problem, theta)
     return Evaluation(done.V, done.squares, done.gradient, done.fisher)
 
 
 def gains(problem: Problem, theta: Theta) -> list[Gain]:
-    """What the filter decides at each measurement, the flat mean's first."""
+    """Return what the filter decides at each measurement, the flat mean's first."""
     return Pass(problem, theta).gains
 
 
 def innovations(problem: Problem, theta: Theta, held: list[Gain]) -> Vector:
-    """(n + 1, 3) m/s^2, with the gains held: the function whose derivatives the gradient is made of."""
+    """Return innovations (n + 1, 3) [m/s^2], with the gains held: the gradient is made of their derivatives."""
     return np.array(Pass(problem, theta, held).innovations)
 
 

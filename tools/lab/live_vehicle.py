@@ -34,7 +34,8 @@ from mpucal.errors import NoAnswer
 from mpucal.mavlink.firmwares import ARDUPILOT
 from mpucal.mavlink.link import Link
 from mpucal.mavlink.parameters.compose import Correction
-from mpucal.mavlink.parameters.slots import AXES, ardupilot_slot, mounting
+from mpucal.mavlink.parameters.mounting import mounting
+from mpucal.mavlink.parameters.slots import AXES, ardupilot_slot
 from mpucal.mavlink.prompts import ReceivedPrompt
 from mpucal.mavlink.stream_parameters import read_parameters, read_stream_parameters
 from mpucal.mavlink.transport import Transport
@@ -78,7 +79,7 @@ class Body:
         threading.Thread(target=self._serve, daemon=True).start()
 
     def hear(self, kind: str, down: tuple[float, float, float] | None) -> None:
-        """A prompt, whose `down` is in the vehicle's axes."""
+        """Hear a prompt, whose `down` is in the vehicle's axes."""
         with self._lock:
             self._motion.hear(ReceivedPrompt(kind, None if down is None else to_hand_axes(down)), self._t_s)
 
@@ -116,7 +117,7 @@ class Body:
 
 
 class Held:
-    """What the vehicle holds of its IMUs, and what it should.
+    """Parameters that a vehicle holds of its IMUs, and those that it should.
 
     Parameters
     ----------
@@ -127,19 +128,19 @@ class Held:
         self.parameters = parameters
 
     def true(self, imu: int) -> Correction:
-        """The parameters that IMU `imu`, counted from 1, needs."""
+        """Return the parameters that IMU `imu`, counted from 1, needs."""
         bias, scale = (np.array([self.parameters[f"SIM_ACC{imu}_{kind}_{a}"] for a in AXES]) for kind in KINDS_OF_ERROR)
         # a scale of 0 is 1 to it
         return Correction(bias, np.where(scale == 0, 1.0, scale))
 
     def off(self) -> str:
-        """How far its parameters are from the truth at worst: offset [m/s^2] and scale."""
+        """Return how far its parameters are from the truth at worst: offset [m/s^2] and scale."""
         imus = range(1, round(self.parameters["SIM_IMU_COUNT"]) + 1)
         far = [off(ardupilot_slot(imu), self.parameters, self.true(imu)) for imu in imus]
         return "{:.5f} {:.6f}".format(*map(max, zip(*far, strict=True)))
 
     def z(self, document: Mapping[str, Any]) -> tuple[float, ...]:
-        """(12,) of D and b_a of one IMU's document, where this is what was held while it was measured."""
+        """Return (12,) of D and b_a of one IMU's document, where this is what was held while it was measured."""
         imu = int(document["autopilot"]["imu"])
         where = ardupilot_slot(imu)
         R, held, true = mounting(ARDUPILOT, where, self.parameters), where.correction(self.parameters), self.true(imu)
@@ -150,7 +151,7 @@ class Held:
 
 
 def held(url: str) -> Held:
-    """What it holds now, asked at another of its ports."""
+    """Ask the vehicle at another of its ports for what it holds now."""
     names = [f"SIM_ACC{imu}_{kind}_{a}" for imu in range(1, IMUS + 1) for kind in KINDS_OF_ERROR for a in AXES]
     with closing(_opened(url)) as transport:
         link = Link(transport, lambda _t_ns, _packet: None, own_system=OWN_SYSTEM)
@@ -160,7 +161,7 @@ def held(url: str) -> Held:
 
 
 def _opened(url: str) -> Transport:
-    """A transport; a SITL opens its ports some seconds after it began to step.
+    """Open a transport; a SITL opens its ports some seconds after it began to step.
 
     Raises
     ------
@@ -213,7 +214,7 @@ def session(body: Body, words: list[str]) -> int:
 
 
 def line(code: int, before: Held, after: Held, document: Mapping[str, Any] | None) -> str:
-    """What came of it."""
+    """Return the result in a line."""
     imus = [document, *document.get("others", [])] if document else []
     z = rms([each for one in imus if "accelerometer" in one for each in before.z(one)])
     verdict = document["quality"]["verdict"] if document else "none"

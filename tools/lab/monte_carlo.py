@@ -72,7 +72,7 @@ SCENES = {
 
 @dataclass(frozen=True)
 class Run(Judgement):
-    """One simulated calibration.
+    """A simulated calibration.
 
     Attributes
     ----------

@@ -29,7 +29,7 @@ class _State(NamedTuple):
 
 
 class _Sums:
-    """What a pass adds up."""
+    """Sums of a pass."""
 
     def __init__(self, p: int) -> None:
         self.V, self.squares, self.measurements = 0.0, 0.0, 0
@@ -37,7 +37,7 @@ class _Sums:
 
 
 def evaluate_reference(problem: Problem, theta: Theta, parameters: int) -> Evaluation:
-    """The same as likelihood.evaluate, derived term by term (matrix calculus, no structure used)."""
+    """Evaluate as likelihood.evaluate does, derived term by term (matrix calculus, no structure used)."""
     p, series, flat, g = parameters, problem.series, problem.flat, problem.gravity
     sums = _Sums(p)
     ds = np.zeros((p, 3))
@@ -54,7 +54,7 @@ def evaluate_reference(problem: Problem, theta: Theta, parameters: int) -> Evalu
 
 
 def _directions(p: int) -> tuple[Vector, Vector]:
-    """Derivatives of D (p, 3, 3) and b_a (p, 3) by the parameters."""
+    """Return derivatives of D (p, 3, 3) and b_a (p, 3) by the parameters."""
     dD, db = np.zeros((p, 3, 3)), np.zeros((p, 3))
     if p:
         dD[PLACES["D"]] = np.eye(9).reshape(9, 3, 3)
@@ -63,7 +63,7 @@ def _directions(p: int) -> tuple[Vector, Vector]:
 
 
 def _measure(state: _State, y: Vector, R: Vector, theta: Theta, g: float, sums: _Sums) -> _State:
-    """Innovation, cost and update; R (3,) is Sigma_a of this sample."""
+    """Compute innovation, cost and update; R (3,) is Sigma_a of this sample."""
     s, P, ds, dP = state
     D, p = theta.D, len(ds)
     dD, db = _directions(p)
@@ -93,7 +93,7 @@ def _measure(state: _State, y: Vector, R: Vector, theta: Theta, g: float, sums: 
 
 
 def _propagate(state: _State, problem: Problem, theta: Theta, i: int) -> _State:
-    """s and P through the turn of step i."""
+    """Carry s and P through the turn of step i."""
     s, P, ds, dP = state
     series, p = problem.series, len(ds)
     dt, rate = series.dt[i], series.omega[i] - theta.b_omega

@@ -1,4 +1,4 @@
-"""Other ways to calibrate the same recording: six positions, an ellipsoid, imucal.
+"""Rival calibrations of the same recording: six positions, an ellipsoid, imucal.
 
 All work on the rests of a recording. Each returns an Estimate, or raises Unfit with the sentence that says why the
 data do not suit it.
@@ -51,7 +51,7 @@ class Rests:
 
     @classmethod
     def of(cls, recording: Recording) -> Rests:
-        """The rests of a recording.
+        """Find the rests of a recording.
 
         Raises
         ------
@@ -67,22 +67,22 @@ class Rests:
 
     @cached_property
     def y(self) -> Vector:
-        """(k, 3) m/s^2, the accelerometer's means."""
+        """Return the accelerometer's means (k, 3) [m/s^2]."""
         return np.array([self.recording.acc[a:b].mean(0) for a, b in self.runs]).reshape(-1, 3)
 
     @cached_property
     def b_omega(self) -> Vector:
-        """(k, 3) rad/s, the gyroscope's means."""
+        """Return the gyroscope's means (k, 3) [rad/s]."""
         return np.array([self.recording.gyr[a:b].mean(0) for a, b in self.runs]).reshape(-1, 3)
 
     def trimmed(self) -> Rests:
-        """The rests without half a second at each end, or a quarter of a short one: a board settles as hands let go."""
+        """Return the rests without half a second at each end, or a quarter of a short one, while a board settles."""
         a, b = self.runs.T
         cut = np.minimum(round(TRIM_S * self.recording.rate_hz), (MOST_TRIMMED * (b - a)).astype(np.intp))
         return replace(self, runs=np.stack([a + cut, b - cut], axis=1))
 
     def moves(self, K: Vector) -> list[tuple[int, Vector]]:
-        """(k, F) of each short move: F (3, 3) carries a vector of the body at rest k to the body at rest k + 1."""
+        """Return (k, F) of each short move: F (3, 3) carries a vector of the body at rest k to that at k + 1."""
         r = self.recording
         moves = []
         for k, ((_, a), (b, _)) in enumerate(pairwise(self.runs.tolist())):
@@ -92,20 +92,20 @@ class Rests:
         return moves
 
     def misses_rad(self, D: Vector, b_a: Vector, K: Vector) -> Vector:
-        """Angles between calibrated gravity at each rest and what the gyroscope carried there from the one before."""
+        """Return angles between calibrated gravity at each rest and what the gyroscope carried there."""
         s = (self.y - b_a) @ np.linalg.inv(D).T
         u = s / np.linalg.norm(s, axis=1, keepdims=True)
         return np.arccos([np.clip(F @ u[k] @ u[k + 1], -1.0, 1.0) for k, F in self.moves(K)])
 
 
 def six_positions(rests: Rests, gravity: float) -> Estimate:
-    """Gains and biases, each axis by itself, from six faces: what most instructions for hobbyists do."""
+    """Find gains and biases, each axis by itself, from six faces: what most instructions for hobbyists do."""
     up, down = (np.diag([rests.y[k] for k in faces(rests)[i::2]]) for i in (0, 1))
     return Estimate(np.diag((up - down) / (2.0 * gravity)), (up + down) / 2.0, np.eye(3), rests.flat.b_omega)
 
 
 def ellipsoid(rests: Rests, gravity: float) -> Estimate:
-    """Nine parameters from magnitudes alone: the sensor's frame against the gyroscope's stays unknown.
+    """Find nine parameters from magnitudes alone: the sensor's frame against the gyroscope's stays unknown.
 
     T, upper triangular, and b_a minimise the sum of (|T (y - b_a)| - g)^2 over the rests.
     """
@@ -132,7 +132,7 @@ def ellipsoid(rests: Rests, gravity: float) -> Estimate:
 
 
 def aligned_ellipsoid(rests: Rests, gravity: float) -> Estimate:
-    """The ellipsoid, turned by the Q that makes the gyroscope carry gravity best from rest to rest."""
+    """Find the ellipsoid, turned by the Q that makes the gyroscope carry gravity best from rest to rest."""
     free = ellipsoid(rests, gravity)
     moves = rests.moves(np.eye(3))
     if len(moves) < 2:
@@ -149,7 +149,7 @@ def aligned_ellipsoid(rests: Rests, gravity: float) -> Estimate:
 
 
 def imucal(rests: Rests, gravity: float) -> Estimate:
-    """Ferraris et al. (1995) as mad-lab-fau/imucal does it: six faces, and a complete turn about each axis."""
+    """Calibrate by Ferraris et al. (1995) as mad-lab-fau/imucal does: six faces, and a turn about each axis."""
     try:
         from imucal import FerrarisCalibration, FerrarisSignalRegions  # noqa: PLC0415 - optional
     except ImportError as error:
@@ -168,7 +168,7 @@ def imucal(rests: Rests, gravity: float) -> Estimate:
 
 
 def faces(rests: Rests) -> list[int]:
-    """The rests nearest to +x, -x, +y, -y, +z, -z up."""
+    """Return the rests nearest to +x, -x, +y, -y, +z, -z up."""
     u = rests.y / np.linalg.norm(rests.y, axis=1, keepdims=True)
     found, missing = [], []
     for axis in range(3):
@@ -183,7 +183,7 @@ def faces(rests: Rests) -> list[int]:
 
 
 def complete_turns(rests: Rests) -> tuple[list[tuple[int, int]], float]:
-    """(first, last + 1) of a complete turn about x, y and z between two rests, and their common angle, ±360 deg."""
+    """Return (first, last + 1) of a complete turn about x, y and z each, and their common angle, ±360 deg."""
     r = rests.recording
     spans: dict[int, tuple[int, int]] = {}
     angles = np.zeros(3)

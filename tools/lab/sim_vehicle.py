@@ -187,7 +187,7 @@ class Ride:
 
 
 def run(rides: Sequence[Ride], speed: float) -> NoReturn:
-    """Let them live as time goes on, until Ctrl-C."""
+    """Run the vehicles as time goes on, until Ctrl-C."""
     passed_s, last = 0.0, time.monotonic()
     while True:
         time.sleep(STEP_S)

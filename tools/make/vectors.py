@@ -64,28 +64,28 @@ COUNTS = (3000, -20000, 32767)
 
 
 def sealed(body: bytes, length: int | None = None) -> bytes:
-    """`body` with its length and CRC-32 made right; `length` writes another one."""
+    """Return `body` with its length and CRC-32 made right; `length` writes another one."""
     body = bytearray(body)
     struct.pack_into("<H", body, 6, len(body) + 4 if length is None else length)
     return bytes(body) + struct.pack("<I", zlib.crc32(body))
 
 
 def accepted(blob: Blob, data: bytes | None = None) -> tuple[bytes, dict[str, Any]]:
-    """A blob and what a reader finds in it; `data` are other bytes that mean the same."""
+    """Return a blob and what a reader finds in it; `data` are other bytes that mean the same."""
     values = {key: plain(value) for key, value in asdict(blob).items() if value is not None}
     content = {"blob": values, "y": list(Y), "a": applied(blob, 0.0), "counts": list(COUNTS), "w": rates(blob)}
     return data or blob.encode(), content | (at_temperatures(blob) if any(blob.b_a_slope) else {})
 
 
 def at_temperatures(blob: Blob) -> dict[str, Any]:
-    """What b_a(T) makes of Y."""
+    """Return what b_a(T) makes of Y."""
     low, high = blob.temperature_range_c
     away = [min(max(T, low), high) - blob.temperature_c for T in TEMPERATURES_C]
     return {"at_c": TEMPERATURES_C, "a_at": [applied(blob, each) for each in away]}
 
 
 def applied(blob: Blob, away_c: float) -> list[float]:
-    """inv(D) (Y - b_a(T) + applied_b_a) by Cramer's rule in fractions: rounded once, the same on every machine."""
+    """Return inv(D) (Y - b_a(T) + applied_b_a) by Cramer's rule in fractions: the same on every machine."""
     D = [[Fraction(value) for value in blob.D[at : at + 3]] for at in (0, 3, 6)]
     terms = zip(Y, blob.b_a, blob.b_a_slope, blob.applied_b_a, strict=True)
     y = [Fraction(y) - Fraction(b) - Fraction(s) * Fraction(away_c) + Fraction(h) for y, b, s, h in terms]
@@ -94,7 +94,7 @@ def applied(blob: Blob, away_c: float) -> list[float]:
 
 
 def rates(blob: Blob) -> list[float]:
-    """K (y_omega - b_omega) of COUNTS at the blob's range, 500 deg/s where it says none; rounded once, too."""
+    """Return K (y_omega - b_omega) of COUNTS at the blob's range, 500 deg/s where it says none; rounded once, too."""
     unit = Fraction(math.pi) / 180 * Fraction(blob.gyro_range_dps or 500.0) / Fraction(blob.gyro_counts or GYRO_COUNTS)
     bias = [0.0 if math.isnan(value) else value for value in blob.b_omega]
     y = [count * unit - Fraction(value) for count, value in zip(COUNTS, bias, strict=True)]
@@ -102,25 +102,25 @@ def rates(blob: Blob) -> list[float]:
 
 
 def determinant(M: list[list[Fraction]]) -> Fraction:
-    """Of 3 by 3."""
+    """Return the determinant of a matrix of 3 by 3."""
     (a, b, c), (d, e, f), (g, h, i) = M
     return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
 
 def plain(value: Any) -> Any:
-    """JSON's own types; NaN becomes null."""
+    """Return a value in JSON's own types; NaN becomes null."""
     if isinstance(value, tuple):
         return [plain(item) for item in value]
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
 def with_byte(data: bytes, at: int, value: int) -> bytes:
-    """`data` with one byte changed."""
+    """Return `data` with one byte changed."""
     return data[:at] + bytes([value]) + data[at + 1 :]
 
 
 def vectors() -> dict[str, tuple[bytes, dict[str, Any]]]:
-    """Name -> (bytes, content of the .json)."""
+    """Return by name the bytes and the content of the .json."""
     good = MEASURED.encode()
     body = good[:-4]
     nan, minus = struct.pack("<f", math.nan), struct.pack("<f", -4.0)
@@ -199,7 +199,7 @@ BYTES = ("data", "frames")
 
 
 def one_message(seq: int, message: wire.Message, kind: int | None = None) -> tuple[bytes, dict[str, Any]]:
-    """The line's bytes of one message, and its content."""
+    """Return the line's bytes of a message, and its content."""
     frame = Frame(message.TYPE if kind is None else kind, seq, message.payload())
     values = {
         key: value.rstrip(b"\0").decode() if key in ("magic", "name") else value.hex() if key in BYTES else value
@@ -209,18 +209,18 @@ def one_message(seq: int, message: wire.Message, kind: int | None = None) -> tup
 
 
 def plain_frame(frame: Frame) -> dict[str, Any]:
-    """A frame in JSON's own types."""
+    """Return a frame in JSON's own types."""
     return {"type": frame.type, "seq": frame.seq, "payload": frame.payload.hex()}
 
 
 def several(data: bytes, *frames: Frame, rejected: str = "") -> tuple[bytes, dict[str, Any]]:
-    """Bytes in which a receiver must find `frames` and nothing else."""
+    """Return bytes in which a receiver must find `frames` and nothing else."""
     why = {"rejected": rejected} if rejected else {}
     return data, {"frames": [plain_frame(frame) for frame in frames], **why}
 
 
 def lines() -> dict[str, tuple[bytes, dict[str, Any]]]:
-    """Name -> (bytes on the line, content of the .json)."""
+    """Return by name the bytes on the line and the content of the .json."""
     kinds = {"failed_early": wire.BlobStateReply.TYPE}
     made = {name: one_message(seq, message, kinds.get(name)) for name, (seq, message) in {**EXAMPLE, **OTHERS}.items()}
     read = Frame(2, 1, bytes([0x75, 1]))
@@ -378,12 +378,12 @@ def talk(settled: str, needs: tuple[str, ...], lines: list[str]) -> dict[str, An
 
 
 def talks() -> dict[str, dict[str, Any]]:
-    """Name -> JSON."""
+    """Return the talks' JSON by name."""
     return {name: talk(*row) for name, row in TALKS.items()}
 
 
 def clock(bits: int) -> dict[str, Any]:
-    """A clock's JSON: what one of so many bits shows when it is asked, and `t_us`, which wraps meanwhile."""
+    """Return a clock's JSON: what one of so many bits shows when it is asked, and `t_us`, which wraps meanwhile."""
     # hardly less than it counts to
     passed_us = [i * (2**bits - 3) for i in range(6)]
     return {
@@ -395,7 +395,7 @@ def clock(bits: int) -> dict[str, Any]:
 
 
 def slots(*generations: int) -> bytes:
-    """Both slots of the storage, each with MEASURED."""
+    """Return both slots of the storage, each with MEASURED."""
     seals = [struct.pack("<II", generation, generation ^ 0xFFFFFFFF) for generation in generations]
     return b"".join(seal + MEASURED.encode().ljust(256, b"\0") for seal in seals)
 

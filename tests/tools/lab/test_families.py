@@ -154,7 +154,7 @@ def test_times_increase_and_stay_beside_their_samples(name):
 
 
 def test_every_family_gives_a_recording():
-    """Of the table, but for those that take long."""
+    """Simulates every twelfth of the table, but for those that take long."""
     families = [f for f in table.FAMILIES.values() if "20 minutes" not in f.name and "2 kHz" not in f.name]
     assert len({f.name for f in families}) > 70
     for one in families[::12]:

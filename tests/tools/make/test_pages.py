@@ -27,7 +27,7 @@ def test_a_circle_cannot_be_drawn():
 
 
 def defined(tree, name):
-    """Whether a module defines, or imports, a name such as Class.method."""
+    """Return True if a module defines, or imports, a name such as Class.method."""
     first, *rest = name.split(".")
     for node in tree.body:
         names = {getattr(node, "name", None)}

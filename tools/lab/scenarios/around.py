@@ -1,4 +1,4 @@
-"""What moves a board besides being turned: the hand that holds it, and what that hand stands in.
+"""Motions of a board besides its turns: the hand that holds it, and what that hand stands in.
 
 Each is a function of the course and a generator: (n, 3) m/s^2 of the pivot in the world, z up, and (n, 3) rad/s in the
 body; 0.0 for none.
@@ -29,7 +29,7 @@ class Hand(HandDisturbance):
     passes: int = 0
 
     def push(self, course: Course, rng: Rng) -> Push:
-        """Sway and jerks while it moves, tremor while it holds."""
+        """Return sway and jerks while it moves, and tremor while it holds."""
         n, step_s, moving = len(course.omega), course.step_s, course.moving[:, None]
         world = self.sway_mps2 * moving * within(n, step_s, SWAY_HZ, rng) if self.sway_mps2 else np.zeros((n, 3))
         for start in np.flatnonzero(rng.random(n) < self.jerks_per_s * step_s * course.moving).tolist():
@@ -44,7 +44,7 @@ class Hand(HandDisturbance):
         return world, omega
 
     def lever(self, course: Course, rng: Rng) -> Vector:
-        """Where the sensor is from the pivot (n, 3) [m], in the body."""
+        """Return the sensor's place from the pivot (n, 3) [m], in the body."""
         n = len(course.omega)
         r = np.tile(rng.uniform(*self.lever_m) * direction(rng), (n, 1))
         if self.wobble:
@@ -57,9 +57,9 @@ class Hand(HandDisturbance):
 
 
 def walking(course: Course, rng: Rng, bounce_mps2: float = 1.0) -> Push:
-    """Steps at about 2 Hz after the flat segment: bounce_mps2 up and down, half of it sideways at half the rate.
+    """Walk after the flat segment, in steps at about 2 Hz, with a second harmonic and a cadence that wanders.
 
-    With a second harmonic, and a cadence that wanders by some per cent.
+    bounce_mps2 : up and down; half of it goes sideways at half the rate.
     """
     cadence = 2.0 * (1.0 + 0.05 * within(len(course.omega), course.step_s, (0.05, 0.3), rng)[:, 0])
     phase = 2 * np.pi * np.cumsum(cadence) * course.step_s
@@ -78,14 +78,14 @@ def vibration(
     dps: float = 0.5,
     flat_too: bool = False,
 ) -> Push:
-    """A motor: rms_mps2 an axis within band_hz, and `dps` of rates; `flat_too`: it runs from the start."""
+    """Run a motor: rms_mps2 an axis within band_hz, and `dps` of rates; `flat_too`: it runs from the start."""
     n, runs = len(course.omega), 1.0 if flat_too else course.after_flat[:, None]
     a, w = within(n, course.step_s, band_hz, rng), within(n, course.step_s, band_hz, rng)
     return rms_mps2 * runs * a, np.radians(dps) * runs * w
 
 
 def coning(course: Course, rng: Rng, hz: float = 5.0, dps: float = 30.0) -> Push:
-    """After the flat segment, the board's axis goes round a cone: rates of `dps` about an axis that turns at hz."""
+    """Turn the board's axis round a cone after the flat segment: rates of `dps` about an axis that turns at hz."""
     axis = direction(rng)
     e = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     e /= np.linalg.norm(e)
@@ -95,7 +95,7 @@ def coning(course: Course, rng: Rng, hz: float = 5.0, dps: float = 30.0) -> Push
 
 
 def elevator(course: Course, rng: Rng, a_mps2: float = 1.0) -> Push:
-    """Rides up and down, a_mps2 for two seconds at either end of each; the first begins after the flat segment."""
+    """Ride up and down, a_mps2 for two seconds at either end of each; the first begins after the flat segment."""
     a, t, up = np.zeros((len(course.omega), 3)), course.t, rng.choice([-1.0, 1.0])
     start = FLAT_S + rng.uniform(1.0, 5.0)
     while start < t[-1]:
@@ -108,7 +108,7 @@ def elevator(course: Course, rng: Rng, a_mps2: float = 1.0) -> Push:
 
 
 def swing(course: Course, rng: Rng, length_m: float = 2.2, deg: float = 10.0) -> Push:
-    """Who turns the board sits in a swing: a pendulum of length_m and amplitude deg, from the flat segment's end.
+    """Sit in a swing while the board is turned: a pendulum of length_m and amplitude deg, from the flat segment's end.
 
     Small angles: the pendulum is harmonic; the acceleration of its end is exact for that angle.
     """
@@ -126,12 +126,12 @@ def swing(course: Course, rng: Rng, length_m: float = 2.2, deg: float = 10.0) ->
 
 
 def carried(course: Course, rng: Rng, rms_mps2: float = 0.2, band_hz: Span = (0.1, 0.5)) -> Push:
-    """A boat, a train: slow accelerations of rms_mps2 an axis within band_hz, the flat segment included."""
+    """Ride in a boat or train: slow accelerations of rms_mps2 an axis within band_hz, the flat segment included."""
     return rms_mps2 * within(len(course.omega), course.step_s, band_hz, rng), 0.0
 
 
 def thumps(course: Course, rng: Rng, peak_mps2: float = 30.0) -> Push:
-    """The board is set down with a knock of about peak_mps2, a ring at 60 Hz, at the end of each move."""
+    """Set the board down with a knock of about peak_mps2, a ring at 60 Hz, at the end of each move."""
     ends = np.flatnonzero((course.moving[:-1] > 0.0) & (course.moving[1:] == 0.0)) + 1
     ring = np.arange(0.0, 0.1, course.step_s)
     shape = np.exp(-ring / 0.015) * np.sin(2 * np.pi * 60.0 * ring)
@@ -143,7 +143,7 @@ def thumps(course: Course, rng: Rng, peak_mps2: float = 30.0) -> Push:
 
 
 def sinking(course: Course, rng: Rng, dps: float = 0.3) -> Push:
-    """It lies on something soft: what is flat or held still leans over for some more seconds, by `dps` at first."""
+    """Lay the board on something soft: what is flat or held still leans over for some seconds, by `dps` at first."""
     begins = np.r_[0, np.flatnonzero((course.moving[:-1] > 0.0) & (course.moving[1:] == 0.0)) + 1]
     omega = np.zeros((len(course.omega), 3))
     for first, last in zip(begins.tolist(), [*begins[1:].tolist(), len(omega)], strict=True):

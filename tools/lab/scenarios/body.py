@@ -13,7 +13,7 @@ BLOCK = 256
 
 
 def attitudes(omega: Vector, step_s: float, start: Vector) -> Vector:
-    """Quaternions (n + 1, 4) from `start` (4,) on, turned by omega (n, 3) [rad/s] in the body for step_s each."""
+    """Return quaternions (n + 1, 4) from `start` (4,) on, turned by omega (n, 3) [rad/s] for step_s each."""
     n = len(omega)
     blocks = -(-n // BLOCK)
     turns = np.zeros((blocks * BLOCK, 3))
@@ -26,14 +26,14 @@ def attitudes(omega: Vector, step_s: float, start: Vector) -> Vector:
 
 
 def in_board(q: Vector, world: Vector) -> Vector:
-    """Vectors (n, 3) of the world in the axes of boards of attitude q (n, 4): v - 2 w (u x v) + 2 u x (u x v)."""
+    """Return vectors (n, 3) of the world in axes of boards of attitude q (n, 4): v - 2 w (u x v) + 2 u x (u x v)."""
     w, u = q[:, :1], q[:, 1:]
     across = np.cross(u, world)
     return np.asarray(world - 2.0 * w * across + 2.0 * np.cross(u, across))
 
 
 def specific_force(q: Vector, omega: Vector, step_s: float, gravity: float, lever_m: Vector, world: Vector) -> Vector:
-    """What a sensor feels (n, 3) [m/s^2] in each step, in the axes of the board.
+    """Return what a sensor feels (n, 3) [m/s^2] in each step, in the axes of the board.
 
     Parameters
     ----------

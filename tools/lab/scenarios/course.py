@@ -1,4 +1,4 @@
-"""How a board of the families is turned after it has lain flat: angular rates on a fine clock.
+"""Turns of a board of the families after it has lain flat: angular rates on a fine clock.
 
 Each motion is a function of the clock's step and a generator, and draws a course; a span is the least and the most.
 """
@@ -34,12 +34,12 @@ class Course:
 
     @property
     def t(self) -> Vector:
-        """(n,) s, the middle of each step."""
+        """Return the middle of each step (n,) [s]."""
         return self.step_s * np.arange(0.5, len(self.omega))
 
     @property
     def after_flat(self) -> Vector:
-        """(n,) 0 while the board lies flat at first, 1 after."""
+        """Return (n,) 0 while the board lies flat at first, and 1 after."""
         return (self.t >= FLAT_S).astype(float)
 
 
@@ -56,7 +56,7 @@ class Leg:
 
 
 def along(legs: Sequence[Leg], step_s: float, rate: Callable[[Vector], Vector] = minimum_jerk_rate) -> Course:
-    """The course of legs, one after the other; `rate` is the derivative of the share of a turn (0 to 1) by time's."""
+    """Return the course of legs, one after the other; `rate`: of the share of a turn (0 to 1) by that of time."""
     seconds = FLAT_S + sum(leg.seconds + leg.hold_s for leg in legs)
     n = round(seconds / step_s)
     omega, moving = np.zeros((n, 3)), np.zeros(n)
@@ -71,7 +71,7 @@ def along(legs: Sequence[Leg], step_s: float, rate: Callable[[Vector], Vector] =
 
 
 def direction(rng: Rng) -> Vector:
-    """A unit vector (3,) in any direction."""
+    """Draw a unit vector (3,) in any direction."""
     v = rng.standard_normal(3)
     return np.asarray(v / np.linalg.norm(v))
 
@@ -85,7 +85,7 @@ def poses(
     hold_s: Span = (1.6, 2.8),
     back: bool = False,
 ) -> Course:
-    """Still orientations, the flat one among them, each as unlike those before as a person thinks of.
+    """Draw still orientations, the flat one among them, each as unlike those before as a person thinks of.
 
     back : it is put down at last as it lay at first.
     """
@@ -106,7 +106,7 @@ def poses(
 def on_a_chair(
     step_s: float, rng: Rng, count: int = 9, spin_rad: Span = (2.0, 7.0), spin_s: Span = (3.0, 5.0)
 ) -> Course:
-    """Still orientations, and after each the chair is turned, which gravity does not show."""
+    """Draw still orientations, and after each the chair is turned, which gravity does not show."""
     attitude, legs = rotation.exp(np.zeros(3)), []
     for _ in range(count - 1):
         turn = direction(rng) * rng.uniform(0.9, 2.5)
@@ -120,7 +120,7 @@ def on_a_chair(
 def continuous(
     step_s: float, rng: Rng, seconds: float = 45.0, rms_dps: float = 80.0, band_hz: Span = (0.08, 0.7)
 ) -> Course:
-    """Turned all the time about every axis: Gaussian rates within band_hz, rms_dps an axis."""
+    """Draw turns all the time about every axis: Gaussian rates within band_hz, rms_dps an axis."""
     n = round((FLAT_S + seconds) / step_s)
     moving = np.clip((step_s * np.arange(0.5, n) - FLAT_S) / FADE_S, 0.0, 1.0)
     moving *= moving * (3.0 - 2.0 * moving)
@@ -136,7 +136,7 @@ def spins(
     turn_s: Span = (4.0, 7.0),
     pause_s: float = 1.0,
 ) -> Course:
-    """A turn or more about each of these axes of the board (0, 1, 2), and about `oblique` others."""
+    """Draw a turn or more about each of these axes of the board (0, 1, 2), and about `oblique` others."""
     axes = [rng.choice([-1.0, 1.0]) * np.eye(3)[axis] for axis in about]
     axes += [direction(rng) for _ in range(oblique)]
     turns = [np.radians(rng.uniform(*turn_deg)) * axis + rng.uniform(-0.15, 0.15, 3) for axis in axes]
@@ -152,7 +152,7 @@ def arcs(
     pause_s: float = 0.0,
     ramp: float = 0.02,
 ) -> Course:
-    """Turned by a machine at constant rates, about axes with components of -1, 0 and 1.
+    """Draw turns of a machine at constant rates, about axes with components of -1, 0 and 1.
 
     ramp : the share of an arc that it takes to start, and to stop.
     """
@@ -168,12 +168,12 @@ def arcs(
 
 
 def trapezoid(share: Vector, ramp: float) -> Vector:
-    """A rate that rises within `ramp` of the time, stays, and falls; of mean 1 over 0..1."""
+    """Return a rate that rises within `ramp` of the time, stays, and falls; of mean 1 over 0..1."""
     return np.asarray(np.clip(np.minimum(share, 1.0 - share) / ramp, 0.0, 1.0) / (1.0 - ramp))
 
 
 def within(n: int, step_s: float, band_hz: Span, rng: Rng) -> Vector:
-    """(n, 3) Gaussian noise between two frequencies, of expected rms 1 an axis."""
+    """Draw (n, 3) Gaussian noise between two frequencies, of expected rms 1 an axis."""
     # lengths of few prime factors, a multiple of 1024 steps
     padded = -(-n // 1024) * 1024
     frequency = np.arange(padded // 2 + 1) / (padded * step_s)

@@ -25,7 +25,7 @@ TEMPERATURE_C = 25.0
 
 
 class Wanted(Enum):
-    """What a family's verdicts are to be, besides true."""
+    """The verdicts that a family is to have, besides true ones."""
 
     GOOD = "good"
     SHARP = "good, to 1 mm/s²"
@@ -75,7 +75,7 @@ class Simulated:
 
 
 def simulate(family: Family, seed: int) -> Simulated:
-    """The recording that a seed draws; other families draw other hands and sensors of the same seed."""
+    """Simulate the recording that a seed draws; other families draw other hands and sensors of the same seed."""
     rng = np.random.default_rng([seed, zlib.crc32(family.name.encode())])
     of_sensor, of_motion, of_noise, of_faults, of_digits, of_timing = rng.spawn(6)
     truth = family.chip.draw(of_sensor, GRAVITY_MPS2)
@@ -109,7 +109,7 @@ def simulate(family: Family, seed: int) -> Simulated:
 
 
 def _measured(family: Family, truth: SensorTruth, course: Course, of_motion: Rng, of_noise: Rng) -> Readings:
-    """What a sensor reads whose truth is D, b_a, K, b_omega and white noise."""
+    """Return what a sensor reads whose truth is D, b_a, K, b_omega and white noise."""
     sampling, omega = family.sampling, course.omega
     world = np.zeros_like(omega)
     for around in (family.hand.push, *family.around):
@@ -136,7 +136,7 @@ def _measured(family: Family, truth: SensorTruth, course: Course, of_motion: Rng
 
 
 def _sensor(family: Family) -> Sensor:
-    """What the recording says of its sensor."""
+    """Return what the recording says of its sensor."""
     chip = family.chip
     said = Sensor(chip=chip.name, rate_hz=family.sampling.rate_hz, message=chip.message)
     if not chip.bits:

@@ -1,4 +1,4 @@
-"""What a sensor does besides D, b_a, K and b_omega, or how these change while it is turned, in SI units.
+"""Errors of a sensor besides D, b_a, K and b_omega, and changes of these while it is turned, in SI units.
 
 Each is a function of the readings and a generator, and gives the readings so spoilt. Where D or b_a moves, what is
 compared as the truth is its mean over the recording after the flat segment.
@@ -22,7 +22,7 @@ MG_MPS2 = 1e-3 * STANDARD_GRAVITY_MPS2
 
 @dataclass(frozen=True)
 class Readings:
-    """What a sensor read.
+    """Readings of a sensor.
 
     t : (m,) s, true. moving : (m,) 0 to 1. force : (m, 3) m/s^2, the specific force. acc, gyr : (m, 3) m/s^2, rad/s.
     temperature_c : (m,). truth : the sensor. ranges : its full scales [m/s^2, rad/s].
@@ -38,12 +38,12 @@ class Readings:
     ranges: tuple[float, float]
 
     def zero_moved(self, by: Vector) -> Readings:
-        """The accelerometer's zero moves by (m, 3) m/s^2, and the true b_a by its mean after the flat segment."""
+        """Move the accelerometer's zero by (m, 3) m/s^2, and the true b_a by its mean after the flat segment."""
         mean = by[self.t >= FLAT_S].mean(axis=0)
         return replace(self, acc=self.acc + by, truth=replace(self.truth, b_a=self.truth.b_a + mean))
 
     def turning_share(self, share: float) -> float:
-        """The time [s] at that share of what follows the flat segment."""
+        """Return the time [s] at that share of what follows the flat segment."""
         return FLAT_S + share * (float(self.t[-1]) - FLAT_S)
 
 
@@ -51,25 +51,25 @@ Fault = Callable[[Readings, Rng], Readings]
 
 
 def nonlinear(readings: Readings, rng: Rng, share: float = 0.005) -> Readings:
-    """Each axis bends by up to `share` of full scale at full scale, as its square; the truth is the slope at zero."""
+    """Bend each axis by up to `share` of full scale at full scale, as its square; the truth is the slope at zero."""
     bend = share * rng.uniform(-1.0, 1.0, 3) / readings.ranges[0]
     return replace(readings, acc=readings.acc + bend * readings.acc**2)
 
 
 def gyro_nonlinear(readings: Readings, rng: Rng, share: float = 0.002) -> Readings:
-    """Each gyroscope axis bends by `share` of full scale at full scale, as its cube."""
+    """Bend each gyroscope axis by `share` of full scale at full scale, as its cube."""
     bend = share * rng.choice([-1.0, 1.0], 3) / readings.ranges[1] ** 2
     return replace(readings, gyr=readings.gyr + bend * readings.gyr**3)
 
 
 def sense_of_gravity(readings: Readings, rng: Rng, dps_per_g: float = 0.1) -> Readings:
-    """Each gyroscope axis reads `dps_per_g` too, of acceleration along some direction."""
+    """Add `dps_per_g` to each gyroscope axis, of acceleration along some direction."""
     G = np.radians(dps_per_g) * np.array([direction(rng) for _ in range(3)])
     return replace(readings, gyr=readings.gyr + readings.force @ G.T / STANDARD_GRAVITY_MPS2)
 
 
 def hysteresis(readings: Readings, rng: Rng, mps2: float = 0.02) -> Readings:
-    """The accelerometer follows with a play of mps2 to either side."""
+    """Have the accelerometer follow with a play of mps2 to either side."""
     acc = np.empty_like(readings.acc)
     for axis in range(3):
         at, followed = float(readings.acc[0, axis]), []
@@ -81,7 +81,7 @@ def hysteresis(readings: Readings, rng: Rng, mps2: float = 0.02) -> Readings:
 
 
 def flicker(readings: Readings, rng: Rng, accel_hz: float = 3.0, gyro_hz: float = 0.3) -> Readings:
-    """1/f noise beside the white: as strong as it at these corner frequencies [Hz]."""
+    """Add 1/f noise to the white: as strong as it at these corner frequencies [Hz]."""
     truth, step_s = readings.truth, float(np.median(np.diff(readings.t)))
     n = len(readings.t)
     frequency = np.fft.rfftfreq(n, step_s)
@@ -98,13 +98,13 @@ def flicker(readings: Readings, rng: Rng, accel_hz: float = 3.0, gyro_hz: float 
 
 
 def swapped(readings: Readings, rng: Rng, sign: float = 1.0) -> Readings:
-    """The accelerometer's x and y are swapped; with `sign` -1 turned by 90 deg, which leaves it right-handed."""
+    """Swap the accelerometer's x and y; with `sign` -1 turned by 90 deg, which leaves it right-handed."""
     P, truth = np.array([[0.0, sign, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), readings.truth
     return replace(readings, acc=readings.acc @ P.T, truth=replace(truth, D=P @ truth.D, b_a=P @ truth.b_a))
 
 
 def cross_clipped(readings: Readings, rng: Rng, mps2: float = 1.0) -> Readings:
-    """Where an axis is beyond its range, the others are off by mps2, and recover within 20 ms."""
+    """Push the other axes off by mps2 where one is beyond its range; they recover within 20 ms."""
     beyond = (np.abs(readings.acc) > readings.ranges[0]).any(axis=1).astype(float)
     step_s = float(np.median(np.diff(readings.t)))
     keep = np.exp(-step_s / 0.02)
@@ -113,7 +113,7 @@ def cross_clipped(readings: Readings, rng: Rng, mps2: float = 1.0) -> Readings:
 
 
 def hobby(readings: Readings, rng: Rng, smooth: float = 1.0, dead_dps: float = 0.0) -> Readings:
-    """What sketches do before they print: average the accelerometer over 1 / smooth samples, and take gyroscope rates
+    """Do as sketches do before they print: average the accelerometer over 1 / smooth samples, and take gyroscope rates
     below dead_dps, about the mean of the flat segment, for none.
     """
     acc, flat = readings.acc, readings.t < 0.3 * FLAT_S
@@ -124,13 +124,13 @@ def hobby(readings: Readings, rng: Rng, smooth: float = 1.0, dead_dps: float = 0
 
 
 def ripple(readings: Readings, rng: Rng, mps2: float = 0.3, hz: float = 1.7) -> Readings:
-    """The supply's ripple reaches the accelerometer: one line of mps2 at hz as it is aliased, from the start."""
+    """Add the supply's ripple to the accelerometer: one line of mps2 at hz as it is aliased, from the start."""
     wave = np.sin(2 * np.pi * hz * readings.t + rng.uniform(0, 2 * np.pi))
     return replace(readings, acc=readings.acc + mps2 * wave[:, None] * direction(rng))
 
 
 def gyro_moves(readings: Readings, rng: Rng, drift_dps: float = 0.0, step_dps: float = 0.0) -> Readings:
-    """The gyroscope's bias: it drifts by drift_dps in 90 s, and steps by step_dps midway."""
+    """Move the gyroscope's bias: it drifts by drift_dps in 90 s, and steps by step_dps midway."""
     drift = drift_dps / 90.0 * readings.t[:, None] * direction(rng)
     stepped = readings.t > readings.turning_share(rng.uniform(0.3, 0.7))
     step = step_dps * stepped[:, None] * direction(rng)
@@ -138,13 +138,13 @@ def gyro_moves(readings: Readings, rng: Rng, drift_dps: float = 0.0, step_dps: f
 
 
 def zero_step(readings: Readings, rng: Rng, mg: float = 10.0) -> Readings:
-    """The accelerometer's zero steps by `mg` in some direction, midway."""
+    """Step the accelerometer's zero by `mg` in some direction, midway."""
     after = readings.t > readings.turning_share(rng.uniform(0.3, 0.7))
     return readings.zero_moved(mg * MG_MPS2 * after[:, None] * direction(rng))
 
 
 def stress(readings: Readings, rng: Rng, mg: float = 3.0) -> Readings:
-    """How the board is held bends it: in each pose the accelerometer's zero is elsewhere, by `mg` rms an axis."""
+    """Bend the board by how it is held: in each pose the accelerometer's zero is elsewhere, by `mg` rms an axis."""
     pose = np.cumsum(np.diff((readings.moving > 0.5).astype(int), prepend=0) > 0)
     zeros = mg * MG_MPS2 * rng.standard_normal((pose[-1] + 1, 3))
     return readings.zero_moved(zeros[pose])
@@ -158,7 +158,7 @@ def warming(
     mg_per_c: float = 0.8,
     dps_per_c: float = 0.02,
 ) -> Readings:
-    """Warms by `by_c` with a time constant of tau_s; both biases follow, within what data sheets allow."""
+    """Warm by `by_c` with a time constant of tau_s; both biases follow, within what data sheets allow."""
     warmer = by_c * (1.0 - np.exp(-readings.t / tau_s))[:, None]
     moved = readings.zero_moved(mg_per_c * MG_MPS2 * rng.uniform(-1, 1, 3) * warmer)
     gyr = readings.gyr + np.radians(dps_per_c) * rng.uniform(-1, 1, 3) * warmer
@@ -166,7 +166,7 @@ def warming(
 
 
 def slip(readings: Readings, rng: Rng, deg: float = 3.0) -> Readings:
-    """The accelerometer slips on its mount by `deg` midway, and the gyroscope does not; the true D is the mean."""
+    """Slip the accelerometer on its mount by `deg` midway; the gyroscope does not; the true D is the mean."""
     after = readings.t > readings.turning_share(rng.uniform(0.3, 0.7))
     turn = np.cross(np.eye(3), np.radians(deg) * direction(rng))
     D, share = readings.truth.D, after[readings.t >= FLAT_S].mean()
@@ -175,7 +175,7 @@ def slip(readings: Readings, rng: Rng, deg: float = 3.0) -> Readings:
 
 
 def teleport(readings: Readings, rng: Rng, seconds: float = 8.0) -> Readings:
-    """A simulator is reset: for the last `seconds` the board is back where it lay, and no rate told of the way."""
+    """Reset a simulator: for the last `seconds` the board is back where it lay, and no rate told of the way."""
     n = int(np.searchsorted(readings.t, seconds))
     acc, gyr = readings.acc.copy(), readings.gyr.copy()
     acc[-n:], gyr[-n:] = acc[:n], gyr[:n]

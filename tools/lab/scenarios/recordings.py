@@ -81,7 +81,7 @@ MOTIONS = tuple(name for name in _SCENES if not name.startswith("check"))
 def paper_scenario(
     seed: int, *, rate_hz: float = 100.0, turn_s: float = 10.0, sensor: SensorTruth | None = None
 ) -> Simulated:
-    """The paper's section 4.3: 10 s flat, then one complete turn about each axis, turn_s each.
+    """Simulate the paper's section 4.3: 10 s flat, then one complete turn about each axis, turn_s each.
 
     sensor : drawn from the seed unless given; one given to many seeds makes section 4.4.
     """
@@ -104,7 +104,7 @@ def hand_scenario(
     sensor: SensorTruth | None = None,
     truth_hz: float = TRUTH_HZ,
 ) -> Simulated:
-    """An MPU-6050 that a hand moves after 10 s flat, for 40 s; for 15 s in the motions "check", "check as asked".
+    """Simulate an MPU-6050 that a hand moves after 10 s flat, for 40 s; for 15 s in the motions of a check.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def _measured(
     a: Vector,
     rng: np.random.Generator,
 ) -> Simulated:
-    """What the sensor reads, in steps [m/s^2, rad/s], of the rates omega and the specific force s + a, all (n, 3)."""
+    """Return what the sensor reads, in steps [m/s^2, rad/s], of rates omega and specific force s + a, all (n, 3)."""
     normal = np.hstack((rng.standard_normal(s.shape), np.zeros((len(s), 1)), rng.standard_normal(s.shape)))
     y = sensor.response(SiSetting(rate_hz)).values(s + a, omega, normal)
     (acc, acc_clipped), (gyr, gyr_clipped) = quantise(y[:, :3], steps[0]), quantise(y[:, 4:], steps[1])
@@ -172,13 +172,13 @@ def _measured(
 
 
 def _means(x: Vector, size: int) -> Vector:
-    """Means of consecutive size rows of x (n, 3)."""
+    """Return means of consecutive size rows of x (n, 3)."""
     means: Vector = x.reshape(-1, size, 3).mean(1)
     return means
 
 
 def _delayed(x: Vector, t: Vector, delay_s: float) -> Vector:
-    """x (n, 3) of the times t as it was delay_s before."""
+    """Return x (n, 3) of the times t as it was delay_s before."""
     if delay_s == 0.0:
         return x
     return np.stack([np.interp(t - delay_s, t, column) for column in x.T], axis=1)

@@ -1,4 +1,4 @@
-"""From a motion on a fine clock to samples: mount, filter, delay, clock, white noise."""
+"""Sampling of a motion on a fine clock: mount, filter, delay, clock, white noise."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mpucal.data import Vector
 
 @dataclass(frozen=True)
 class Sampling:
-    """How a motion is sampled.
+    """The way in which a motion is sampled.
 
     Attributes
     ----------
@@ -34,16 +34,16 @@ class Sampling:
 
     @property
     def per_sample(self) -> int:
-        """Fine steps in a sample."""
+        """Return the fine steps in a sample."""
         return max(2, math.ceil(self.fine_hz / self.rate_hz))
 
     @property
     def step_s(self) -> float:
-        """True length of a fine step."""
+        """Return the true length of a fine step [s]."""
         return 1.0 / (self.rate_hz * (1.0 + self.clock_error) * self.per_sample)
 
     def accelerometer(self, y: Vector, density: float | Vector, rng: np.random.Generator) -> Vector:
-        """Samples (m, 3) of y (n, 3), through its mount, late and noisy."""
+        """Return samples (m, 3) of y (n, 3), through its mount, late and noisy."""
         if self.mount_hz:
             y = self._mounted(y)
         late = round(self.delay_ms * 1e-3 / self.step_s)
@@ -52,7 +52,7 @@ class Sampling:
         return self.gyroscope(y, density, rng)
 
     def gyroscope(self, y: Vector, density: float | Vector, rng: np.random.Generator) -> Vector:
-        """Samples (m, 3) of y (n, 3), noisy by `density` [/sqrt(Hz)]."""
+        """Return samples (m, 3) of y (n, 3), noisy by `density` [/sqrt(Hz)]."""
         n = len(y) // self.per_sample
         y = y[: n * self.per_sample]
         if not self.lowpass_hz:
@@ -66,7 +66,7 @@ class Sampling:
         return np.asarray(sosfilt(sos, noisy, axis=0, zi=settled)[0][self.per_sample - 1 :: self.per_sample])
 
     def _mounted(self, y: Vector) -> Vector:
-        """Through w^2 / (s^2 + w s / Q + w^2), by the bilinear transform."""
+        """Filter by w^2 / (s^2 + w s / Q + w^2), by the bilinear transform."""
         k = 1.0 / np.tan(np.pi * self.mount_hz * self.step_s)
         a = np.array([k * k + k / self.mount_q + 1.0, 2.0 - 2.0 * k * k, k * k - k / self.mount_q + 1.0])
         sos = np.concatenate(([1.0, 2.0, 1.0], a))[None] / a[0]

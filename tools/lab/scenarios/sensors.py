@@ -17,7 +17,7 @@ GRAVITY_MPS2 = 9.82
 
 
 def paper_sensor(rng: np.random.Generator, rate_hz: float = 100.0) -> SensorTruth:
-    """A sensor of the paper's section 4.3: a gyroscope that is ideal but for its bias, an accelerometer far off.
+    """Draw a sensor of the paper's section 4.3: a gyroscope that is ideal but for its bias, an accelerometer far off.
 
     The paper draws the noise of a sample, which is then the same at any `rate_hz`.
     """
@@ -35,7 +35,7 @@ def paper_sensor(rng: np.random.Generator, rate_hz: float = 100.0) -> SensorTrut
 
 
 def hand_sensor(rng: np.random.Generator, perfect_gyro: bool = False) -> SensorTruth:
-    """An MPU-6050 as they are sold."""
+    """Draw an MPU-6050 as they are sold."""
     gain = rng.uniform(0.97, 1.03, 3)
     skew, misalignment = rng.uniform(-0.02, 0.02, 3), np.radians(rng.uniform(-2, 2, 3))
     b_a, b_omega = rng.uniform(-0.08, 0.08, 3) * STANDARD_GRAVITY_MPS2, np.radians(rng.uniform(-20, 20, 3))
@@ -82,7 +82,7 @@ class Chip:
     message: str | None = None
 
     def draw(self, rng: np.random.Generator, gravity: float) -> SensorTruth:
-        """One sensor, in the gyroscope's own frame."""
+        """Draw a sensor, in the gyroscope's own frame."""
         gains = np.diag(1.0 + rng.uniform(-self.gain, self.gain, 3))
         skew = non_orthogonality(*rng.uniform(-self.cross, self.cross, 3))
         turn = euler_rotation(np.radians(rng.uniform(-self.misaligned_deg, self.misaligned_deg, 3)))
@@ -101,17 +101,17 @@ class Chip:
 
     @property
     def ranges(self) -> tuple[float, float]:
-        """Full scales [m/s^2, rad/s]."""
+        """Return the full scales [m/s^2, rad/s]."""
         return self.accel_range_g * STANDARD_GRAVITY_MPS2, float(np.radians(self.gyro_range_dps))
 
     @property
     def step(self) -> Vector:
-        """(6,) of a count: the accelerometer's axes [m/s^2], then the gyroscope's [rad/s]."""
+        """Return the size (6,) of a count: the accelerometer's axes [m/s^2], then the gyroscope's [rad/s]."""
         accel, gyro = self.steps or (full / 2.0 ** (self.bits - 1) for full in self.ranges)
         return np.repeat([accel, gyro], 3)
 
     def counts(self, y: Vector) -> tuple[Counts, Mask]:
-        """y (n, 6) in counts, and which (n, 6) stand at the end of their range."""
+        """Return y (n, 6) in counts, and which (n, 6) stand at the end of their range."""
         end = 2 ** (self.bits - 1)
         counts = np.clip(np.rint(y / self.step), -end, end - 1).astype(np.int32)
         return counts, (counts == -end) | (counts == end - 1)

@@ -1,4 +1,4 @@
-"""What a simulated hand does to a board besides turning it, over a whole recording at once."""
+"""Shaking of a board by a simulated hand besides its turns, over a whole recording at once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PIVOT_HZ = (0.05, 0.4)
 def acceleration(
     habits: HandDisturbance, omega: Vector, moving: Vector, holding: Vector, step_s: float, rng: np.random.Generator
 ) -> Vector:
-    """The board's acceleration (n, 3) [m/s^2] in the body, turned by omega (n, 3) [rad/s] at steps of step_s.
+    """Return the board's acceleration (n, 3) [m/s^2] in the body, turned by omega (n, 3) [rad/s] at steps of step_s.
 
     moving, holding : (n,) how much the hand moves or holds a pose, 0 to 1.
     """
@@ -28,12 +28,12 @@ def acceleration(
 
 
 def tremor(habits: HandDisturbance, holding: Vector, step_s: float, rng: np.random.Generator) -> Vector:
-    """The rates (n, 3) [rad/s] of the tremor."""
+    """Return the rates (n, 3) [rad/s] of the tremor."""
     return habits.tremor_rad_s * holding[:, None] * band_noise(len(holding), step_s, TREMOR_HZ, rng)
 
 
 def _lever(habits: HandDisturbance, moving: Vector, step_s: float, rng: np.random.Generator) -> Vector:
-    """Where the sensor is from the pivot (n, 3) [m], in the body."""
+    """Return the sensor's place from the pivot (n, 3) [m], in the body."""
     along, length = direction(rng), rng.uniform(*habits.lever_m)
     # an rms of wobble * length over three axes
     rms = habits.wobble * length / np.sqrt(3.0)
@@ -42,7 +42,7 @@ def _lever(habits: HandDisturbance, moving: Vector, step_s: float, rng: np.rando
 
 
 def _jerks(habits: HandDisturbance, moving: Vector, step_s: float, rng: np.random.Generator) -> Vector:
-    """Half sines that begin while the hand moves."""
+    """Return half sines that begin while the hand moves."""
     n = len(moving)
     a = np.zeros((n, 3))
     for start in np.flatnonzero(rng.random(n) < habits.jerks_per_s * step_s * moving).tolist():
@@ -53,13 +53,13 @@ def _jerks(habits: HandDisturbance, moving: Vector, step_s: float, rng: np.rando
 
 
 def lever_acceleration(omega: Vector, r: Vector, step_s: float) -> Vector:
-    """The acceleration (n, 3) [m/s^2] in the body of a point r (n, 3) [m] of it, itself moving or not."""
+    """Return the acceleration (n, 3) [m/s^2] in the body of a point r (n, 3) [m] of it, itself moving or not."""
     alpha, v = np.gradient(omega, step_s, axis=0), np.gradient(r, step_s, axis=0)
     return np.asarray(point_acceleration(alpha, omega, r, v) + np.gradient(v, step_s, axis=0))
 
 
 def band_noise(n: int, step_s: float, band_hz: tuple[float, float], rng: np.random.Generator) -> Vector:
-    """(n, 3) Gaussian noise between two frequencies, of rms 1 an axis."""
+    """Draw (n, 3) Gaussian noise between two frequencies, of rms 1 an axis."""
     frequency = np.fft.rfftfreq(n, step_s)
     band = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
     spectrum = np.zeros((len(frequency), 3), complex)

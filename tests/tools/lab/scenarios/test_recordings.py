@@ -16,7 +16,7 @@ by_hand, as_in_the_paper = cache(hand_scenario), cache(paper_scenario)
 
 
 def residual(simulated):
-    """What the accelerometer read beyond D R(x) g + b_a: noise and the hand's acceleration."""
+    """Return what the accelerometer read beyond D R(x) g + b_a: noise and the hand's acceleration."""
     truth = simulated.truth
     return simulated.recording.acc - simulated.specific_force @ truth.D.T - truth.b_a
 
