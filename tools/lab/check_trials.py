@@ -5,9 +5,9 @@ python -m tools.lab check_trials --only nothing --seeds 2000     false alarms
 python -m tools.lab check_trials recordings/*.npz                halves of real recordings: nothing happened
 
 A pair is an MPU-6050 in a trembling hand: twelve poses make the calibration, a flat rest and the three orientations
-that are asked for, each missed by some degrees, the check; with `--any` any three. In addition to what happens to it, every
-sensor ages by five days, as `mpucal.recheck.drift` says of an unchanged one, and its rests and turns err by what
-`mpucal.recheck.observed` says that no mounting and no gyroscope is better than; `--perfect` leaves that out.
+that are asked for, each missed by some degrees, the check; with `--any` any three. Every sensor also ages by five days,
+as `mpucal.recheck.drift` says of an unchanged one, and its rests and turns err by what `mpucal.recheck.observed` says
+that no mounting and no gyroscope is better than; `--perfect` leaves that out.
 """
 
 from __future__ import annotations

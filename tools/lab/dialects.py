@@ -34,8 +34,24 @@ def walk() -> Walk:
     return Walk.from_arrays(t_ns * 1e-9, whole.acc, whole.gyr, name="walk")
 
 
+def to(name: str, put: Callable[[Path, Walk, Any], Any]) -> Write:
+    """Return what writes a file of that name."""
+
+    def write(folder: Path, w: Walk, ns: Any) -> Path:
+        put(folder / name, w, ns)
+        return folder / name
+
+    return write
+
+
+def own(path: Path, w: Walk, _ns: Any) -> None:
+    """Write it as mpucal does."""
+    with open_writer(path, Rows.of(w), "") as write:
+        write(w)
+
+
 def dialects() -> dict[str, tuple[str, Write, Hints]]:
-    """Name -> whose program writes it, how, and what has to be said to read it; the writers are those of the tests."""
+    """Return by name whose program writes it, how, and what has to be said to read it; the writers are the tests'."""
     tables, ros, logs, loggers, strangers = (
         run_path(str(ROOT / "tests" / "files" / f"test_{name}.py"))
         for name in ("tables", "ros", "logs", "loggers", "strangers")
@@ -43,86 +59,69 @@ def dialects() -> dict[str, tuple[str, Write, Hints]]:
     counts = Hints(rate_hz=100.0, accel_range_g=4.0, gyro_range_dps=500.0)
 
     def table(name: str, **how: Any) -> Write:
-        def write(folder: Path, w: Walk, ns: Any) -> Path:
-            tables["DIALECTS"][name](w, ns).to_csv(folder / "walk.csv", index=False, **how)
-            return folder / "walk.csv"
+        return to("walk.csv", lambda path, w, ns: tables["DIALECTS"][name](w, ns).to_csv(path, index=False, **how))
 
-        return write
-
-    def phone(name: str) -> Write:
-        return lambda folder, w, ns: tables[name](w, ns, folder) or folder
+    def phone(write: Callable[..., Any]) -> Write:
+        return lambda folder, w, ns: write(folder, w, ns) or folder
 
     def bag(kind: str) -> Write:
         return lambda folder, w, ns: ros["bag"](folder / ("walk.bag" if kind == "bag" else "walk"), w, ns, kind)
 
-    def ulog(folder: Path, w: Walk, ns: Any) -> Path:
+    def ulog(path: Path, w: Walk, ns: Any) -> None:
         t_us = (ns - ns[0]) // 1000 + 5_000_000
         sensors = [(f"sensor_{name}", 0, logs["imu"](t_us, of)) for name, of in (("accel", w.acc), ("gyro", w.gyr))]
-        path: Path = logs["ulog"](folder / "walk.ulg", *sensors)
-        return path
+        logs["ulog"](path, *sensors)
 
-    def parquet(folder: Path, w: Walk, ns: Any) -> Path:
-        logs["parquet_of"](w, timestamp=ns).to_parquet(folder / "walk.parquet")
-        return folder / "walk.parquet"
-
-    def raw(folder: Path, w: Walk, _ns: Any) -> Path:
+    def raw(path: Path, w: Walk, _ns: Any) -> None:
         lines = ["\t".join(["a/g:", *map(str, row)]) for row in tables["counts"](w).tolist()]
-        (folder / "walk.txt").write_text("\n".join([*lines, ""]))
-        return folder / "walk.txt"
+        path.write_text("\n".join([*lines, ""]))
 
-    def sketch(folder: Path, w: Walk, _ns: Any) -> Path:
-        np.savetxt(folder / "walk.csv", tables["counts"](w), "%d", ",", header="ax,ay,az,gx,gy,gz", comments="")
-        return folder / "walk.csv"
+    def sketch(path: Path, w: Walk, _ns: Any) -> None:
+        np.savetxt(path, tables["counts"](w), "%d", ",", header="ax,ay,az,gx,gy,gz", comments="")
 
-    def labelled(folder: Path, w: Walk, _ns: Any) -> Path:
-        lines = [loggers["LINES"][".txt"].format(*a, *g, t) for a, g, t in zip(w.acc, w.gyr, w.t, strict=True)]
-        (folder / "walk.txt").write_text("\n".join(lines))
-        return folder / "walk.txt"
+    def labelled(path: Path, w: Walk, _ns: Any) -> None:
+        line = loggers["LINES"][".txt"]
+        path.write_text("\n".join(line.format(*a, *g, t) for a, g, t in zip(w.acc, w.gyr, w.t, strict=True)))
 
-    def one_table(folder: Path, w: Walk, _ns: Any) -> Path:
-        loggers["sensor_loggers_one_table"](w, -1, in_g=True).to_csv(folder / "walk.csv", index=False)
-        return folder / "walk.csv"
-
-    def unnamed(folder: Path, w: Walk, ns: Any) -> Path:
-        loggers["pair"](folder, w, ns)
-        return folder
-
-    def form(name: str) -> Write:
-        def write(folder: Path, w: Walk, _ns: Any) -> Path:
-            (folder / name).write_text(strangers["FORMS"][name](w))
-            return folder / name
-
-        return write
-
-    def matrix(folder: Path, w: Walk, _ns: Any) -> Path:
-        strangers["as_matlabs_matrix"](w, folder / "walk.mat")
-        return folder / "walk.mat"
-
-    def own(folder: Path, w: Walk, _ns: Any) -> Path:
-        with open_writer(folder / "walk.mcap", Rows.of(w), "") as write:
-            write(w)
-        return folder / "walk.mcap"
+    def one_table(path: Path, w: Walk, _ns: Any) -> None:
+        loggers["sensor_loggers_one_table"](w, -1, in_g=True).to_csv(path, index=False)
 
     return {
         "ROS 2, .mcap": ("rosbags", bag("mcap"), NO_HINTS),
         "ROS 2, .db3": ("rosbags", bag("db3"), NO_HINTS),
         "ROS 1, .bag": ("rosbags", bag("bag"), NO_HINTS),
-        "what `mpucal apply` wrote": ("mpucal", own, NO_HINTS),
-        "PX4, .ulg": ("pyulog", ulog, NO_HINTS),
-        "Parquet": ("pandas, pyarrow", parquet, NO_HINTS),
+        "what `mpucal apply` wrote": ("mpucal", to("walk.mcap", own), NO_HINTS),
+        "PX4, .ulg": ("pyulog", to("walk.ulg", ulog), NO_HINTS),
+        "Parquet": (
+            "pandas, pyarrow",
+            to("walk.parquet", lambda path, w, ns: logs["parquet_of"](w, timestamp=ns).to_parquet(path)),
+            NO_HINTS,
+        ),
         **{name: ("pandas", table(name), NO_HINTS) for name in tables["DIALECTS"]},
         "AndroSensor, `;` and decimal commas": ("pandas", table("AndroSensor", sep=";", decimal=","), NO_HINTS),
-        "phyphox, a folder": ("pandas", phone("phyphox"), NO_HINTS),
-        "Sensor Logger, a folder": ("pandas", phone("sensor_logger"), NO_HINTS),
-        "Sensor Logger on iOS, one table": ("pandas", one_table, NO_HINTS),
-        "two tables without names": ("pandas", unnamed, NO_HINTS),
-        "lines that name each number": ("Python", labelled, NO_HINTS),
-        "MPU6050_raw": ("Python", raw, counts),
-        "a sketch's counts": ("NumPy", sketch, counts),
-        "a matrix of MATLAB without names": ("SciPy", matrix, NO_HINTS),
+        "phyphox, a folder": ("pandas", phone(lambda folder, w, ns: tables["phyphox"](w, ns, folder)), NO_HINTS),
+        "Sensor Logger, a folder": (
+            "pandas",
+            phone(lambda folder, w, ns: tables["sensor_logger"](w, ns, folder)),
+            NO_HINTS,
+        ),
+        "Sensor Logger on iOS, one table": ("pandas", to("walk.csv", one_table), NO_HINTS),
+        "two tables without names": ("pandas", phone(loggers["pair"]), NO_HINTS),
+        "lines that name each number": ("Python", to("walk.txt", labelled), NO_HINTS),
+        "MPU6050_raw": ("Python", to("walk.txt", raw), counts),
+        "a sketch's counts": ("NumPy", to("walk.csv", sketch), counts),
+        "a matrix of MATLAB without names": (
+            "SciPy",
+            to("walk.mat", lambda path, w, _: strangers["as_matlabs_matrix"](w, path)),
+            NO_HINTS,
+        ),
         **{
-            Path(name).stem: ("Python", form(name), Hints(rate_hz=100.0) if "board" in name else NO_HINTS)
-            for name in strangers["FORMS"]
+            Path(name).stem: (
+                "Python",
+                to(name, lambda path, w, _, form=form: path.write_text(form(w))),
+                Hints(rate_hz=100.0) if "board" in name else NO_HINTS,
+            )
+            for name, form in strangers["FORMS"].items()
         },
     }
 
