@@ -1,4 +1,4 @@
-"""Many recordings calibrated on dask.distributed: a table with a row for each, and a page about the fleet.
+"""Calibration of many recordings on dask.distributed: a table with a row for each, and a page about the fleet.
 
 import mpucal.batch
 table = mpucal.batch.calibrate_many(["a.mcap", "s3://bucket/b.mcap"])

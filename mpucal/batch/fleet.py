@@ -1,4 +1,4 @@
-"""What a fleet has in common: all rows' parameters in common units, by statistics that a few bad boards do not move."""
+"""Statistics of a fleet: parameters of all rows in common units, robust against a few bad boards."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from ..result.calibration import REFUSED
 from ..result.error_model import bias_mg, misalignment, scale_factor_error
 from .row import AXES
 
-# a value is an outlier where it lies so many robust standard deviations from the fleet's median
+# robust standard deviations from the fleet's median, beyond which a value is an outlier
 FAR = 5.0
 MAD_OF_NORMAL = 0.6745
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of each board that has one.
+    """Parameter of all boards.
 
     Attributes
     ----------
-    name, unit : in words. value : (n,) NaN where it is not known. limit : (n,) of the chip's data sheet, NaN without.
+    name, unit : as text. value : (n,) NaN if not known. limit : (n,) of the chip's data sheet, NaN without.
     """
 
     name: str
@@ -36,12 +36,12 @@ class Parameter:
 
     @property
     def known(self) -> Vector:
-        """(k,) the values that are."""
+        """Return the (k,) known values."""
         return np.asarray(self.value[np.isfinite(self.value)])
 
     @property
     def middle(self) -> tuple[float, float]:
-        """Median and robust standard deviation; NaN without values."""
+        """Return median and robust standard deviation; NaN without values."""
         if not len(self.known):
             return np.nan, np.nan
         median = float(np.median(self.known))
@@ -49,12 +49,12 @@ class Parameter:
 
     @property
     def beyond(self) -> int:
-        """How many exceed the data sheet's limit."""
+        """Return the number of values beyond the data sheet's limit."""
         with np.errstate(invalid="ignore"):
             return int(np.sum(np.abs(self.value) > self.limit))
 
     def outliers(self) -> Iterator[tuple[int, float]]:
-        """Row and distance, in robust standard deviations."""
+        """Yield (row, distance in robust standard deviations) of each outlier."""
         median, spread = self.middle
         if spread > 0.0:
             away = np.abs(self.value - median) / spread
@@ -63,9 +63,9 @@ class Parameter:
 
 
 def parameters(columns: Mapping[str, Sequence[Any]]) -> list[Parameter]:
-    """Scale factor error, bias and largest misalignment of the accelerometer, and the gyroscope's biases.
+    """Return scale factor error, bias and largest misalignment of the accelerometer, and the gyroscope's biases.
 
-    Of what was refused nothing is taken.
+    Refused calibrations are left out.
     """
     refused = np.array([verdict in (None, REFUSED) for verdict in columns["verdict"]], bool)
     D = _numbers(columns, [f"D_{i}{j}" for i in AXES for j in AXES]).reshape(-1, 3, 3)
@@ -95,8 +95,8 @@ def parameters(columns: Mapping[str, Sequence[Any]]) -> list[Parameter]:
     return made
 
 
-def twice(columns: Mapping[str, Sequence[Any]]) -> list[tuple[int, int]]:
-    """Pairs of rows of the same sensor, by its factory's trim: each with the next, of other files."""
+def repeated_sensors(columns: Mapping[str, Sequence[Any]]) -> list[tuple[int, int]]:
+    """Return pairs of successive rows of one sensor, by its factory trim, from different files."""
     seen: dict[str, list[int]] = {}
     for i, (sensor, verdict) in enumerate(zip(columns["sensor"], columns["verdict"], strict=True)):
         if sensor is not None and verdict not in (None, REFUSED):
@@ -106,7 +106,7 @@ def twice(columns: Mapping[str, Sequence[Any]]) -> list[tuple[int, int]]:
 
 
 def repeatability(columns: Mapping[str, Sequence[Any]], pairs: Sequence[tuple[int, int]]) -> list[tuple[str, Vector]]:
-    """Of D and of b_a, (pairs, elements) by how many standard deviations of their difference two rows differ."""
+    """Return for D and for b_a the differences of pairs (pairs, elements) in their standard deviations."""
     first, second = np.array(pairs, int).reshape(-1, 2).T
     found = []
     for name, places in (("D", [f"{i}{j}" for i in AXES for j in AXES]), ("b_a", list(AXES))):
@@ -121,5 +121,5 @@ def _family(who_am_i: int | None) -> Any:
 
 
 def _numbers(columns: Mapping[str, Sequence[Any]], names: Sequence[str]) -> Vector:
-    """(n, names)"""
+    """Return (n, names)."""
     return np.array([columns[name] for name in names], float).T

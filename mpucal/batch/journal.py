@@ -1,4 +1,4 @@
-"""What is done of a batch: a line of JSON for each row as it is finished, so that a killed batch goes on there."""
+"""Journal of a batch: a line of JSON for each finished row, so that a killed batch can be continued."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from ..disk.place import mode_of_old
 from ..errors import OutputError
 
 
-class Journal:
-    """The rows of a folder; of each path the latest, and in memory only where it stands in the file.
+class RowJournal:
+    """Rows of a batch in a file, the latest of each path; only their positions are in memory.
 
     Raises
     ------
@@ -21,7 +21,7 @@ class Journal:
 
     def __init__(self, file: Path, settings: str) -> None:
         self._settings = settings
-        # path -> where its line begins, and its file's digest
+        # path -> offset of its line, and digest of its file
         self._known: dict[str, tuple[int, str | None]] = {}
         try:
             mode_of_old(file)
@@ -38,18 +38,18 @@ class Journal:
         return len(self._known)
 
     def digest(self, path: str) -> str | None:
-        """Of the file whose row is there; None where there is none, or that could not be read."""
+        """Return the digest of the file of a row; None if there is no row, or the file could not be read."""
         return self._known.get(path, (0, None))[1]
 
     def add(self, row: dict[str, Any]) -> None:
-        """Keep a row, on the disk as far as this program can see to it."""
+        """Append a row and flush it."""
         self._file.seek(0, 2)
         self._known[row["path"]] = (self._file.tell(), row.get("digest"))
         self._file.write(json.dumps({"settings": self._settings, "row": row}).encode() + b"\n")
         self._file.flush()
 
     def rows(self, paths: Sequence[str]) -> Iterator[dict[str, Any]]:
-        """The rows of paths, in their order; those that are there."""
+        """Yield the existing rows of paths, in the order of paths."""
         for path in paths:
             if path in self._known:
                 self._file.seek(self._known[path][0])
@@ -66,7 +66,7 @@ class Journal:
                 if content["settings"] == self._settings:
                     self._known[content["row"]["path"]] = (begin, content["row"].get("digest"))
             except (ValueError, KeyError, TypeError):
-                # a line that a kill has cut
+                # the line was cut by a kill
                 continue
         self._file.seek(0, 2)
         if at and not line.endswith(b"\n"):

@@ -1,11 +1,11 @@
-"""The batch itself: recordings to dask's workers, a few hundred tasks at a time, and rows back as they come."""
+"""Run of a batch: recordings go to dask's workers, a few hundred tasks at a time, and rows come back."""
 
 from __future__ import annotations
 
 import logging
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -15,25 +15,31 @@ from typing import Any
 from ..data import STANDARD_GRAVITY_MPS2
 from ..disk.folder import Folder
 from ..errors import SourceError, UsageError
-from .journal import Journal
-from .row import Settings, rows_of
+from .journal import RowJournal
+from .row import Settings, make_rows
 
-# tasks that the scheduler knows of at once: more are no faster, and take memory
+# tasks of the scheduler at once: more are not faster, and take memory
 UNDER_WAY = 256
-# recordings of a task, which costs as much as ten milliseconds of calibrating: at most, and so that each worker has
-# so many tasks that none waits long for the last
-MOST_OF_A_TASK, TASKS_OF_A_WORKER = 8, 16
+# A task costs as much as ten milliseconds of calibration. Recordings per task, at most; tasks per worker, at least, so
+# that no worker waits long for the last one.
+MOST_PER_TASK, TASKS_PER_WORKER = 8, 16
 JOURNAL = "rows.jsonl"
 INSTALL = "pip install 'mpucal[batch]'"
 WAIT_S = 60
-# a worker that died is there again after seconds, and on a busy machine after minutes: until then dask must not give it
-# up, as by itself after 15 s, or nobody takes what is left
-COMES_BACK = {"distributed.deploy.lost-worker-timeout": "1 hour"}
+# A worker that died is restarted after seconds, on a busy machine after minutes. By default dask gives it up in 15 s,
+# which would leave its tasks undone.
+RESTART_CONFIG = {"distributed.deploy.lost-worker-timeout": "1 hour"}
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a batch is: rows done of so many, of which so many were there already or could not be read; s."""
+    """Progress of a batch.
+
+    Attributes
+    ----------
+    done, of : rows done, and all. kept, failed : of the rows done, those from an earlier run, and those with an error.
+    seconds : since the start.
+    """
 
     done: int
     of: int
@@ -43,7 +49,7 @@ class Progress:
 
     @property
     def left_s(self) -> float | None:
-        """How long it still takes at the pace so far."""
+        """Return the remaining time [s] at the pace so far; None if nothing is done yet."""
         made = self.done - self.kept
         return (self.of - self.done) * self.seconds / made if made else None
 
@@ -56,44 +62,45 @@ def calibrate_many(
     gravity: float = STANDARD_GRAVITY_MPS2,
     folder: str | Path | None = None,
 ) -> Any:
-    """Calibrate many recordings; a pyarrow.Table with a row for each, in their order.
+    """Calibrate many recordings; return a pyarrow.Table with a row for each, in their order.
 
     Parameters
     ----------
-    paths : files, folders of sessions, or URLs of fsspec, read where the worker is.
-    client : a distributed.Client; None: workers of this machine, one for each processor.
+    paths : files, folders of sessions, or URLs of fsspec, which the workers read.
+    client : a distributed.Client; None: one worker for each processor of this machine.
     model, gravity : see mpucal.calibrate.
-    folder : where what is done is kept, so that the next call goes on there.
+    folder : for the finished rows, so that the next call continues there.
 
     Raises
     ------
     SourceError : the scheduler was lost. OutputError : `folder` cannot be written, or another batch writes to it.
     UsageError : dask.distributed or pyarrow is not installed.
     """
-    from .table import table_of  # noqa: PLC0415
+    from .table import make_table  # noqa: PLC0415
 
     names, settings = [str(path) for path in paths], Settings(model, gravity)
-    with TemporaryDirectory() as temporary, local_client() if client is None else _as_is(client) as workers:
+    with TemporaryDirectory() as temporary, local_client() if client is None else nullcontext(client) as workers:
         place = Path(folder or temporary)
-        with Folder(place), closing(Journal(place / JOURNAL, settings.key)) as journal:
-            for _ in run(names, workers, journal, settings):
+        with Folder(place), closing(RowJournal(place / JOURNAL, settings.key)) as journal:
+            for _ in run_batch(names, workers, journal, settings):
                 pass
-            return table_of(journal.rows(names))
+            return make_table(journal.rows(names))
 
 
-def run(paths: Sequence[str], client: Any, journal: Journal, settings: Settings) -> Iterator[Progress]:
-    """Fill the journal; what it holds already of the same file is only compared by digest.
+def run_batch(paths: Sequence[str], client: Any, journal: RowJournal, settings: Settings) -> Iterator[Progress]:
+    """Fill the journal, and yield the progress after each row; a row of an unchanged file is kept.
 
     Raises
     ------
-    SourceError : the scheduler was lost; what is done stays in the journal.
+    SourceError : the scheduler was lost; finished rows stay in the journal.
     """
     from distributed import as_completed  # noqa: PLC0415
 
     begun, done, kept, failed = time.monotonic(), 0, 0, 0
     names = list(dict.fromkeys(paths))
-    size = len(names) // (TASKS_OF_A_WORKER * max(len(client.ncores()), 1))
-    todo, under_way = _batched(names, min(max(size, 1), MOST_OF_A_TASK)), {}
+    size = len(names) // (TASKS_PER_WORKER * max(len(client.ncores()), 1))
+    size = min(max(size, 1), MOST_PER_TASK)
+    todo, under_way = (names[first : first + size] for first in range(0, len(names), size)), {}
     suspects: list[str] = []
     alone = False
     results = as_completed(loop=client.loop, with_results=True, raise_errors=False)
@@ -101,7 +108,7 @@ def run(paths: Sequence[str], client: Any, journal: Journal, settings: Settings)
     def send(tasks: Iterable[Sequence[str]]) -> None:
         for task in tasks:
             known = [journal.digest(path) for path in task]
-            future = client.submit(rows_of, task, settings, known, pure=False)
+            future = client.submit(make_rows, task, settings, known, pure=False)
             under_way[future.key] = task
             results.add(future)
 
@@ -109,14 +116,14 @@ def run(paths: Sequence[str], client: Any, journal: Journal, settings: Settings)
     for future, result in results:
         task = under_way.pop(future.key)
         if future.status == "lost":
-            # its worker died before the result was fetched; the scheduler lives
+            # its worker died before the result was fetched, but the scheduler works
             send([task])
             continue
         if future.status == "cancelled":
-            raise SourceError("the scheduler was lost", "start it, and run the same again: what is done stays done")
+            raise SourceError("the scheduler was lost", "start it, and run the batch again: finished rows are kept")
         rows = result if future.status == "finished" else []
         if not rows and not alone:
-            # which of these, or of those that waited beside them, it was shows where each is alone
+            # one of these, or of those that waited with them, ended the worker: each is tried alone later
             suspects += task
         for row in rows or ([_died(task[0], result)] if alone else ()):
             if "batch" in row:
@@ -131,19 +138,14 @@ def run(paths: Sequence[str], client: Any, journal: Journal, settings: Settings)
             send([[suspects.pop(0)]])
 
 
-def _batched(names: Sequence[str], size: int) -> Iterator[Sequence[str]]:
-    """The names, so many at a time."""
-    return (names[first : first + size] for first in range(0, len(names), size))
-
-
 def _died(path: str, result: Any) -> dict[str, Any]:
     error = result[1] if isinstance(result, tuple) else result
-    return {"path": path, "batch": Path(path).parent.name, "error": f"its workers died or could not run it: {error}"}
+    return {"path": path, "batch": Path(path).parent.name, "error": f"the workers died or could not run it: {error}"}
 
 
 @contextmanager
 def local_client(workers: int | None = None, dashboard: bool = False) -> Iterator[Any]:
-    """Workers of this machine, processes of one thread each.
+    """Start workers on this machine, processes of one thread each.
 
     Raises
     ------
@@ -154,7 +156,7 @@ def local_client(workers: int | None = None, dashboard: bool = False) -> Iterato
 
     with (
         TemporaryDirectory(prefix="mpucal-") as scratch,
-        dask.config.set(COMES_BACK),
+        dask.config.set(RESTART_CONFIG),
         ExitStack() as stack,
     ):
         try:
@@ -164,21 +166,21 @@ def local_client(workers: int | None = None, dashboard: bool = False) -> Iterato
                 processes=True,
                 local_directory=scratch,
                 dashboard_address=":8787" if dashboard else ":0",
-                # its own lines would be of a worker that could not be started
+                # its messages would only be about a worker that could not be started
                 silence_logs="CRITICAL",
             )
             client = stack.enter_context(distributed.Client(stack.enter_context(cluster)))
         except (RuntimeError, OSError) as error:
             raise SourceError(
                 f"the workers were ended while they started ({error})",
-                "see to it that there is memory for them, or give fewer --workers, and run the same again",
+                "free memory for them, or give fewer --workers, and run the batch again",
             ) from error
         yield client
 
 
 @contextmanager
 def remote_client(scheduler: str) -> Iterator[Any]:
-    """The workers of a scheduler that runs already.
+    """Connect to the workers of a running scheduler.
 
     Raises
     ------
@@ -199,18 +201,13 @@ def remote_client(scheduler: str) -> Iterator[Any]:
         yield client
 
 
-@contextmanager
-def _as_is(client: Any) -> Iterator[Any]:
-    yield client
-
-
 def _distributed() -> Any:
     try:
         import distributed  # noqa: PLC0415
-        import pyarrow  # noqa: F401, PLC0415 - for the table, which comes last
+        import pyarrow  # noqa: F401, PLC0415 - the table at the end needs it
     except ImportError as error:
         raise UsageError(f"{error.name} is not installed", INSTALL) from error
-    # what died is told in one sentence, by whoever lost it
+    # run_batch reports lost workers in one sentence
     for name in ("distributed.client", "tornado.application"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     return distributed

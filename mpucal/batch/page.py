@@ -1,4 +1,4 @@
-"""The fleet's page: how its parameters are distributed, which boards are odd, and how well sensors repeat."""
+"""The page of a fleet: distributions of parameters, outliers, and repeatability of sensors."""
 
 from __future__ import annotations
 
@@ -12,13 +12,12 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from ..data import Vector
-from ..report.elements import escape, figure, paragraph, section, table
+from ..report.elements import document, escape, figure, paragraph, section, table
 from ..report.figure import BEFORE, Axes, X, Y, Z, legend, svg
-from ..report.style import CSS
-from .fleet import FAR, Parameter, parameters, repeatability, twice
+from .fleet import FAR, Parameter, parameters, repeatability, repeated_sensors
 
 PAGE = "fleet.html"
-# rows of the longest tables: the others are in results.csv
+# rows of a table on the page; results.csv has all
 MOST = 200
 BINS = 40
 _HEIGHT = 190.0
@@ -27,15 +26,15 @@ Columns = Mapping[str, Sequence[Any]]
 
 
 @dataclass(frozen=True)
-class Fleet:
-    """The page, and its first sentence."""
+class FleetPage:
+    """Page and its first sentence."""
 
     html: str
     sentence: str
 
 
-def page(results: Path) -> Fleet:
-    """The page of results.parquet."""
+def make_page(results: Path) -> FleetPage:
+    """Return the page of results.parquet."""
     columns: Columns = pq.read_table(results).to_pydict()
     found = parameters(columns)
     sentence = _sentence(columns)
@@ -51,20 +50,15 @@ def page(results: Path) -> Fleet:
         _errors(columns),
         _reports(columns),
     )
-    html = (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>Fleet of {len(columns['path'])}</title>\n<style>{CSS}</style>\n</head>\n<body>\n"
-        f"<h1>{len(columns['path'])} recordings</h1>\n{''.join(body)}</body>\n</html>\n"
-    )
-    return Fleet(html, sentence)
+    count = len(columns["path"])
+    return FleetPage(document(f"Fleet of {count}", f"{count} recordings", *body), sentence)
 
 
 def _sentence(columns: Columns) -> str:
     counts = Counter(columns["verdict"])
     unread = sum(error is not None for error in columns["error"])
-    told = [f"{counts[verdict]} {verdict}" for verdict in VERDICTS]
-    return f"Of {len(columns['path'])} recordings, {', '.join(told)}, {unread} could not be read."
+    verdicts = [f"{counts[verdict]} {verdict}" for verdict in VERDICTS]
+    return f"Of {len(columns['path'])} recordings, {', '.join(verdicts)}, {unread} could not be read."
 
 
 def _yield(columns: Columns) -> str:
@@ -101,7 +95,7 @@ def _distributions(found: Iterable[Parameter]) -> str:
     if not rows:
         return ""
     head = ("parameter", "5 %", "median", "95 %", "spread", "data sheet", "beyond it")
-    note = "Spread: standard deviation by the median absolute deviation. Refused calibrations are left out."
+    note = "Spread: standard deviation from the median absolute deviation. Refused calibrations are left out."
     pictures = [figure(_histograms(found, prefix), f"{prefix} of all boards") for prefix in ("scale factor", "bias")]
     return section("Parameters", table("parameters", note, head, rows), *pictures)
 
@@ -141,7 +135,7 @@ def _outliers(columns: Columns, found: Iterable[Parameter]) -> str:
 
 
 def _groups(title: str, what: str, names: Sequence[str | None], columns: Columns, found: Sequence[Parameter]) -> str:
-    """The medians of each group, of those that have a name."""
+    """Return the medians of each named group."""
     groups = sorted({name for name in names if name})
     if len(groups) < 2:
         return ""
@@ -162,7 +156,7 @@ def _median(values: Vector) -> str:
 
 
 def _temperature(columns: Columns, found: Iterable[Parameter]) -> str:
-    """How the biases of different boards go with their temperatures."""
+    """Return the slopes of the biases of different boards over their temperatures."""
     T = np.array(columns["temperature_c"], float)
     rows = []
     for each in found:
@@ -175,13 +169,13 @@ def _temperature(columns: Columns, found: Iterable[Parameter]) -> str:
     warm = T[np.isfinite(T)]
     if not len(warm):
         return ""
-    told = paragraph(f"Recorded at {warm.min():.1f} to {warm.max():.1f} °C, median {np.median(warm):.1f} °C.")
-    caption = "Bias against temperature over all boards, mg a degree ± 1 sigma"
-    return section("Temperature", told, table("temperature", caption, ("parameter", "slope"), rows) if rows else "")
+    range_c = paragraph(f"Recorded at {warm.min():.1f} to {warm.max():.1f} °C, median {np.median(warm):.1f} °C.")
+    caption = "Bias against temperature over all boards, mg per degree ± 1 sigma"
+    return section("Temperature", range_c, table("temperature", caption, ("parameter", "slope"), rows) if rows else "")
 
 
 def _repeats(columns: Columns) -> str:
-    pairs = twice(columns)
+    pairs = repeated_sensors(columns)
     if not pairs:
         return ""
     rows = []
@@ -191,10 +185,10 @@ def _repeats(columns: Columns) -> str:
             rows.append(
                 (name, str(len(known)), f"{np.sqrt(np.mean(known**2)):.2f}", f"{100 * np.mean(abs(known) > 2):.1f} %")
             )
-    told = f"{len(pairs)} pairs of recordings are of one sensor, by the factory's trim in its offset registers."
+    intro = f"{len(pairs)} pairs of recordings are of one sensor each, by the factory trim in its offset registers."
     head = ("elements of", "differences", "rms, in standard deviations", "beyond 2")
-    note = "Where nothing changed, the rms is 1, and 4.6 % lie beyond 2."
-    return section("Repeatability", paragraph(told), table("repeats", note, head, rows))
+    note = "If nothing changed, the rms is 1, and 4.6 % are beyond 2."
+    return section("Repeatability", paragraph(intro), table("repeats", note, head, rows))
 
 
 def _errors(columns: Columns) -> str:
@@ -213,6 +207,6 @@ def _reports(columns: Columns) -> str:
 
 
 def _links(columns: Columns) -> dict[str, str]:
-    """From each recording to its report."""
+    """Return recording -> its report."""
     pairs = zip(columns["path"], columns["report"], strict=True)
     return {path: f"reports/{report}" for path, report in pairs if report}

@@ -1,9 +1,10 @@
-"""The rows of a batch as a table of Arrow, a Parquet file and a CSV file, in the order of the paths."""
+"""The rows of a batch as a table of Arrow, a Parquet file and a CSV file."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Iterator
+from io import StringIO
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -15,26 +16,26 @@ from ..disk.whole import whole_file
 from ..errors import plain
 from .row import COLUMNS, TEXTS, WHOLE
 
-# rows that are in memory at once
+# rows in memory at once
 GROUP = 4096
 PARQUET, CSV = "results.parquet", "results.csv"
-# what formulas begin with in one spreadsheet or another
+# beginnings of formulas in various spreadsheets
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def schema() -> Any:
-    """Of the table: text, whole numbers and float64, null where unknown."""
+    """Return the schema of the table: text, whole numbers and float64, null if unknown."""
     kinds = {**dict.fromkeys(TEXTS, pa.string()), **dict.fromkeys(WHOLE, pa.int64())}
     return pa.schema([(name, kinds.get(name, pa.float64())) for name in COLUMNS])
 
 
-def table_of(rows: Iterable[dict[str, Any]]) -> Any:
-    """A pyarrow.Table of rows."""
+def make_table(rows: Iterable[dict[str, Any]]) -> Any:
+    """Return a pyarrow.Table of rows."""
     return pa.Table.from_pylist(list(rows), schema=schema())
 
 
-def write(folder: Path, rows: Iterator[dict[str, Any]]) -> tuple[Path, Path]:
-    """results.parquet and results.csv, a group of rows at a time.
+def write_tables(folder: Path, rows: Iterator[dict[str, Any]]) -> tuple[Path, Path]:
+    """Write results.parquet and results.csv, a group of rows at a time.
 
     Raises
     ------
@@ -44,28 +45,17 @@ def write(folder: Path, rows: Iterator[dict[str, Any]]) -> tuple[Path, Path]:
     with whole_file(parquet) as binary, whole_file(text) as plain, pq.ParquetWriter(binary, schema()) as writer:
         plain.write((",".join(COLUMNS) + "\n").encode())
         while group := list(islice(rows, GROUP)):
-            writer.write_table(table_of(group))
-            lines = _Lines()
+            writer.write_table(make_table(group))
+            lines = StringIO()
             csv.DictWriter(lines, COLUMNS, extrasaction="ignore", lineterminator="\n").writerows(
-                {key: cell(value) for key, value in row.items()} for row in group
+                {key: escape_cell(value) for key, value in row.items()} for row in group
             )
-            plain.write("".join(lines.text).encode())
+            plain.write(lines.getvalue().encode())
     return parquet, text
 
 
-def cell(value: Any) -> Any:
-    """A value as spreadsheets only show it: none takes a text for a formula, or turns its direction around."""
+def escape_cell(value: Any) -> Any:
+    """Return a value that a spreadsheet only shows: not a formula, and without characters that change its direction."""
     if not isinstance(value, str):
         return value
     return plain(f"'{value}" if value.startswith(FORMULA) else value)
-
-
-class _Lines:
-    """What csv writes to."""
-
-    def __init__(self) -> None:
-        self.text: list[str] = []
-
-    def write(self, text: str) -> int:
-        self.text.append(text)
-        return len(text)

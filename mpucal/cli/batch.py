@@ -10,9 +10,9 @@ from typing import Any
 
 import click
 
-from ..batch.journal import Journal
-from ..batch.many import JOURNAL, Progress, local_client, remote_client, run
-from ..batch.paths import found
+from ..batch.journal import RowJournal
+from ..batch.locations import expand
+from ..batch.many import JOURNAL, Progress, local_client, remote_client, run_batch
 from ..batch.row import Settings
 from ..disk.folder import Folder
 from ..disk.whole import write_atomically
@@ -62,7 +62,7 @@ def command(
     """
     if scheduler and workers:
         raise UsageError("--workers and --scheduler were given together", "give one of them")
-    paths = found(files)
+    paths = expand(files)
     settings = Settings(
         model,
         gravity,
@@ -74,12 +74,12 @@ def command(
     with (
         Folder(folder),
         Folder(folder / REPORTS) if reports else nullcontext(),
-        closing(Journal(folder / JOURNAL, settings.key)) as journal,
+        closing(RowJournal(folder / JOURNAL, settings.key)) as journal,
     ):
         with remote_client(scheduler) if scheduler else local_client(workers, dashboard) as client:
             if dashboard:
                 say(f"the dashboard is at {client.dashboard_link}")
-            _follow(run(paths, client, journal, settings))
+            _follow(run_batch(paths, client, journal, settings))
         _write_results(folder, paths, journal)
     return 0
 
@@ -110,12 +110,12 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
-def _write_results(folder: Path, paths: list[str], journal: Journal) -> None:
+def _write_results(folder: Path, paths: list[str], journal: RowJournal) -> None:
     # PyArrow is slow to load.
-    from ..batch.page import PAGE, page  # noqa: PLC0415
-    from ..batch.table import write  # noqa: PLC0415
+    from ..batch.page import PAGE, make_page  # noqa: PLC0415
+    from ..batch.table import write_tables  # noqa: PLC0415
 
-    parquet, text = write(folder, journal.rows(paths))
-    fleet = page(parquet)
+    parquet, text = write_tables(folder, journal.rows(paths))
+    fleet = make_page(parquet)
     write_atomically(folder / PAGE, fleet.html.encode())
     click.echo(f"{fleet.sentence}\n\nWritten to {folder}: {parquet.name}, {text.name}, {PAGE}")

@@ -17,6 +17,7 @@ from ..export.ros import ros_node
 from ..files.formats import is_of_session
 from ..result.calibration import GOOD, REFUSED, USABLE, Calibration
 from ..result.session_files import CAPTURE
+from . import sections
 from .elements import (
     as_float,
     code,
@@ -33,16 +34,6 @@ from .elements import (
     table,
 )
 from .pictures import gallery
-from .sections import (
-    accelerometer_section,
-    formula,
-    gyroscope_table,
-    is_regular,
-    matrices,
-    vehicle_section,
-    verification_section,
-    what_now,
-)
 from .track import Track
 from .units import estimated_error
 
@@ -61,8 +52,8 @@ def render(calibration: Calibration, recording: Recording | None = None) -> str:
     no_pictures = recording is not None and track is None
     body = (
         _verdict(calibration, recording),
-        first(what_now(calibration), accelerometer_section(calibration)),
-        verification_section(calibration),
+        first(sections.what_now(calibration), sections.accelerometer_section(calibration)),
+        sections.verification_section(calibration),
         section(
             "At rest, before and after",
             _magnitudes(track),
@@ -70,13 +61,13 @@ def render(calibration: Calibration, recording: Recording | None = None) -> str:
             pair(*_select(drawn, "sphere", "residuals")),
         ),
         section("Orientations and motion", pair(*_select(drawn, "coverage", "innovations"))),
-        vehicle_section(calibration),
-        details("The formula", formula(calibration)),
-        details("The gyroscope", gyroscope_table(calibration), *_select(drawn, "rates")),
+        sections.vehicle_section(calibration),
+        details("The formula", sections.formula(calibration)),
+        details("The gyroscope", sections.gyroscope_table(calibration), *_select(drawn, "rates")),
         details("Over time", *_select(drawn, "magnitude", "temperature")),
         details("How to apply it", _application(calibration)),
         details("Sensor and settings", _settings(calibration, recording)),
-        details("Parameters in calibration.json", matrices(calibration)),
+        details("Parameters in calibration.json", sections.matrices(calibration)),
         details("How to reproduce it", _reproduction(calibration, recording)),
         paragraph(f"Made by mpucal {__version__}.", note=True),
     )
@@ -114,7 +105,7 @@ def _verdict(calibration: Calibration, recording: Recording | None) -> str:
 
 def _track(calibration: Calibration, recording: Recording | None) -> Track | None:
     """Return the recording with its calibration; None without a recording, or if D cannot be inverted."""
-    return None if recording is None or not is_regular(calibration) else Track(recording, calibration)
+    return None if recording is None or not sections.is_regular(calibration) else Track(recording, calibration)
 
 
 def _magnitudes(track: Track | None) -> str:
@@ -134,7 +125,7 @@ def _select(drawn: Mapping[str, str], *names: str) -> list[str]:
 
 
 def _application(calibration: Calibration) -> str:
-    if not is_regular(calibration) or calibration.verdict == REFUSED:
+    if not sections.is_regular(calibration) or calibration.verdict == REFUSED:
         return ""
     return "".join(
         (

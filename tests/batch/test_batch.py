@@ -23,12 +23,12 @@ import pytest
 
 import mpucal.batch
 from mpucal.__main__ import run as call
-from mpucal.batch.journal import Journal
-from mpucal.batch.many import local_client, run
-from mpucal.batch.page import page
-from mpucal.batch.paths import found
-from mpucal.batch.row import COLUMNS, Settings, row_of
-from mpucal.batch.table import cell, table_of, write
+from mpucal.batch.journal import RowJournal
+from mpucal.batch.locations import expand
+from mpucal.batch.many import local_client, run_batch
+from mpucal.batch.page import make_page
+from mpucal.batch.row import COLUMNS, Settings, make_row
+from mpucal.batch.table import escape_cell, make_table, write_tables
 from mpucal.errors import SourceError
 from mpucal.result.calibration import Calibration
 
@@ -64,7 +64,7 @@ for child in children:
 
 @dataclass
 class Cluster:
-    """Where its scheduler is, and the processes of its workers."""
+    """Address of a scheduler, and process ids of its workers."""
 
     address: str
     workers: list[int]
@@ -108,7 +108,7 @@ def started(process):
 
 @pytest.fixture(scope="module")
 def cluster(started, tmp_path_factory):
-    """One that lives on."""
+    """Start a cluster for all tests."""
     with started(tmp_path_factory.mktemp("cluster")) as cluster:
         yield cluster
 
@@ -127,29 +127,29 @@ def captures(tmp_path):
 
 
 def test_a_worker_is_killed_and_then_the_scheduler(started, cluster, captures, tmp_path):
-    expected = table_of(row_of(path, SETTINGS) for path in captures)
+    expected = make_table(make_row(path, SETTINGS) for path in captures)
     errors = [error for error in expected["error"].to_pylist() if error]
     assert len(errors) >= 2
     assert not any("bug" in error for error in errors)
-    journal = Journal(tmp_path / "rows.jsonl", SETTINGS.key)
+    journal = RowJournal(tmp_path / "rows.jsonl", SETTINGS.key)
     with started(tmp_path / "first") as first, distributed.Client(first.address, set_as_default=False) as client:
         client.wait_for_workers(2, timeout=LONG_S)
-        for progress in run(captures, client, journal, SETTINGS):
+        for progress in run_batch(captures, client, journal, SETTINGS):
             if progress.done == 2:
                 os.kill(first.workers[0], signal.SIGKILL)
     assert (progress.done, progress.kept) == (len(captures), 0)
-    assert table_of(journal.rows(captures)).equals(expected)
+    assert make_table(journal.rows(captures)).equals(expected)
     journal.close()
     # another scheduler, and a line that a kill of the program has cut
     with (tmp_path / "rows.jsonl").open("ab") as file:
         file.write(b'{"settings": "')
-    journal = Journal(tmp_path / "rows.jsonl", SETTINGS.key)
+    journal = RowJournal(tmp_path / "rows.jsonl", SETTINGS.key)
     Path(captures[0]).write_bytes(Path(captures[1]).read_bytes())
     with distributed.Client(cluster.address, set_as_default=False) as client:
-        *_, progress = run(captures, client, journal, SETTINGS)
+        *_, progress = run_batch(captures, client, journal, SETTINGS)
     # what changed and what could not be read is done again
     assert progress.kept == len(captures) - 1 - errors.count(expected["error"][-1].as_py())
-    again = table_of(journal.rows(captures))
+    again = make_table(journal.rows(captures))
     assert again.slice(1).equals(expected.slice(1))
     assert again["digest"][0] == again["digest"][1]
     journal.close()
@@ -161,12 +161,12 @@ def test_the_one_that_workers_die_of_is_told_of_those_beside_it(started, tmp_pat
     """Several recordings make a task; each is tried alone after that."""
     paths = [f"/none/{i}.mcap" for i in range(100)]
     paths[40] = "/none/deadly.mcap"
-    journal = Journal(tmp_path / "rows.jsonl", SETTINGS.key)
+    journal = RowJournal(tmp_path / "rows.jsonl", SETTINGS.key)
     mortal = started(tmp_path / "three", 3, **{"distributed.scheduler.allowed-failures": 0})
     with mortal as three, distributed.Client(three.address, set_as_default=False) as client:
         client.wait_for_workers(3, timeout=LONG_S)
         client.run(_mortal)
-        *_, progress = run(paths, client, journal, SETTINGS)
+        *_, progress = run_batch(paths, client, journal, SETTINGS)
     assert (progress.done, progress.failed) == (100, 100)
     errors = [row["error"] for row in journal.rows(paths)]
     assert "workers died" in errors[40]
@@ -175,7 +175,7 @@ def test_the_one_that_workers_die_of_is_told_of_those_beside_it(started, tmp_pat
 
 
 def test_a_worker_that_comes_back_late_is_waited_for():
-    """Beyond the time that dask itself gives one, which here is none."""
+    """Wait longer than dask does by default, which is 0 s here."""
     with dask.config.set({"distributed.deploy.lost-worker-timeout": "0 s"}), local_client(1) as client:
         (first,) = client.run(os.getpid).values()
         os.kill(first, signal.SIGKILL)
@@ -186,7 +186,7 @@ def test_a_worker_that_comes_back_late_is_waited_for():
 
 
 def _mortal():
-    """A worker that dies of one path."""
+    """Have a worker die of one path."""
     from mpucal.batch import row
 
     digest_of = row.digest_of
@@ -222,21 +222,21 @@ def test_urls_are_read_where_the_worker_is(captures):
     there = fsspec.filesystem("memory")
     path = next(path for path in captures if "mpu6050" in path)
     there.pipe("/line/mpu6050.mcap", Path(path).read_bytes())
-    here, far = row_of(path, SETTINGS), row_of("memory://line/mpu6050.mcap", SETTINGS)
+    here, far = make_row(path, SETTINGS), make_row("memory://line/mpu6050.mcap", SETTINGS)
     assert far["batch"] == "line"
     assert {**far, "path": "", "batch": ""} == {**here, "path": "", "batch": ""}
-    assert "cannot fetch memory://line/none.mcap" in row_of("memory://line/none.mcap", SETTINGS)["error"]
+    assert "cannot fetch memory://line/none.mcap" in make_row("memory://line/none.mcap", SETTINGS)["error"]
 
 
 def test_a_url_that_nothing_can_read_says_what_is_lacking(monkeypatch):
     monkeypatch.setitem(sys.modules, "aiohttp", None)
     monkeypatch.delitem(sys.modules, "fsspec.implementations.http", raising=False)
     for url in ("http://127.0.0.1:9/a.mcap", "https://127.0.0.1:9/a.mcap"):
-        assert "pip install 'fsspec[http]'" in row_of(url, SETTINGS)["error"]
-    with pytest.raises(mpucal.MpucalError, match=r"cannot be looked into .* pip install 'fsspec\[http\]'"):
-        found(["http://127.0.0.1:9/*.mcap"])
+        assert "pip install 'fsspec[http]'" in make_row(url, SETTINGS)["error"]
+    with pytest.raises(mpucal.MpucalError, match=r"cannot list .* pip install 'fsspec\[http\]'"):
+        expand(["http://127.0.0.1:9/*.mcap"])
     signed = "https://bucket.example/a.mcap?signature=1*2"
-    assert found([signed]) == [signed]
+    assert expand([signed]) == [signed]
 
 
 def test_the_page_names_what_is_odd(tmp_path):
@@ -263,8 +263,8 @@ def test_the_page_names_what_is_odd(tmp_path):
             row |= {f"b_a_{axis}": b_a[k] + rng.normal(0.0, 0.01) for k, axis in enumerate("xyz")}
             row |= {f"b_a_std_{axis}": 0.01 for axis in "xyz"}
             rows.append(row)
-    parquet, _ = write(tmp_path, iter(rows))
-    html = page(parquet).html
+    parquet, _ = write_tables(tmp_path, iter(rows))
+    html = make_page(parquet).html
     outliers = html[html.index('id="outliers"') : html.index("By batch")]
     assert set(re.findall(r"b\d+-\d\.mcap", outliers)) == {"b77-0.mcap", "b77-1.mcap"}
     assert '<a href="reports/r77-1.html">b77-1.mcap</a>' in outliers
@@ -288,11 +288,11 @@ def test_workers_that_are_ended_while_they_start_are_told(monkeypatch):
     [("=1+1.mcap", "'=1+1.mcap"), ("@x", "'@x"), ("a=1", "a=1"), ("a\u202eb", "a\\u202eb"), (-1.5, -1.5), (None, None)],
 )
 def test_a_spreadsheet_only_shows_a_cell(value, shown):
-    assert cell(value) == shown
+    assert escape_cell(value) == shown
 
 
 def test_in_python(cluster, captures):
     with distributed.Client(cluster.address, set_as_default=False) as client:
         table = mpucal.batch.calibrate_many(captures[-3:], client, model="accel")
     assert table["path"].to_pylist() == captures[-3:]
-    assert table.equals(table_of(row_of(path, SETTINGS) for path in captures[-3:]))
+    assert table.equals(make_table(make_row(path, SETTINGS) for path in captures[-3:]))

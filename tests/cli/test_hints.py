@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mpucal as package
-from mpucal.batch.row import Settings, row_of
+from mpucal.batch.row import Settings, make_row
 from mpucal.cli.recording_options import read_hints_file
 from mpucal.errors import UsageError
 from mpucal.files.hints import Hints, parse_span
@@ -64,9 +64,9 @@ def test_a_batch_is_told_by_patterns(table, recording, tmp_path):
     assert settings.hints_of("b.csv") == Hints()
     assert settings.key != Settings("accel", 9.80665).key
     # as dask sends it to a worker
-    row = row_of(str(table), pickle.loads(pickle.dumps(settings)))
+    row = make_row(str(table), pickle.loads(pickle.dumps(settings)))
     assert row["samples"] == len(recording)
-    assert "its columns are a, b, c, d, e, f, g" in row_of(str(table), Settings("accel", 9.80665))["error"]
+    assert "its columns are a, b, c, d, e, f, g" in make_row(str(table), Settings("accel", 9.80665))["error"]
 
 
 @pytest.mark.parametrize("line", ["*.csv --units acc=feet", "*.csv --rate", "*.csv 'open", "*.csv more"])

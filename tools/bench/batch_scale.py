@@ -25,10 +25,10 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from mpucal.batch.journal import Journal
-from mpucal.batch.many import JOURNAL, local_client, run
-from mpucal.batch.row import Settings, row_of
-from mpucal.batch.table import write
+from mpucal.batch.journal import RowJournal
+from mpucal.batch.many import JOURNAL, local_client, run_batch
+from mpucal.batch.row import Settings, make_row
+from mpucal.batch.table import write_tables
 from mpucal.chip import registers as reg
 from mpucal.chip.access import Transaction
 from mpucal.files.mcap import CaptureWriter, read_capture
@@ -70,16 +70,16 @@ def cost(time: Used, rows: int) -> str:
     return f"{rows / time.wall_s:.2f} rows/s; {of}"
 
 
-def timed(paths: list[str], workers: int, journal: Journal, settings: Settings, until: int | None = None) -> Used:
+def timed(paths: list[str], workers: int, journal: RowJournal, settings: Settings, until: int | None = None) -> Used:
     """Run a batch on workers of its own; `until` : one is killed after half of so many rows, and all after them."""
     with local_client(workers) as client:
         client.wait_for_workers(workers)
         # what a worker imports with its first row
-        client.run(row_of, str(SESSIONS / "mpu6050.mcap"), settings)
+        client.run(make_row, str(SESSIONS / "mpu6050.mcap"), settings)
         processes = list(client.run(_process).values())
         children = psutil.Process().children(recursive=True)
         with used(lambda: sum(sum(one.cpu_times()[:2]) for one in children if one.is_running())) as time:
-            for progress in islice(run(paths, client, journal, settings), until):
+            for progress in islice(run_batch(paths, client, journal, settings), until):
                 if until is not None and progress.done == until // 2:
                     psutil.Process(processes[0]).kill()
     return time
@@ -92,7 +92,7 @@ def _process() -> int:
 def measured(folder: Path, paths: list[str], workers: int, settings: Settings, kill: bool) -> bytes:
     """Print the cost of a batch, and return its results.csv."""
     folder.mkdir()
-    journal = Journal(folder / JOURNAL, settings.key)
+    journal = RowJournal(folder / JOURNAL, settings.key)
     try:
         if kill:
             timed(paths, workers, journal, settings, until=2 * len(paths) // 3)
@@ -101,7 +101,7 @@ def measured(folder: Path, paths: list[str], workers: int, settings: Settings, k
         print(f"{workers} workers: {cost(timed(paths, workers, journal, settings), len(paths) - kept)}", flush=True)
         again = timed(paths, workers, journal, settings)
         print(f"  again, all there already: {cost(again, len(paths))}", flush=True)
-        return write(folder, journal.rows(paths))[1].read_bytes()
+        return write_tables(folder, journal.rows(paths))[1].read_bytes()
     finally:
         journal.close()
 
