@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from ..page.address import HERE, Address, address
+from ..page.address import LOOPBACK, Address, parse_address
 from ..sources.opened_source import OpenedSource
 from ..terminal.console import Console
 from ..terminal.flat import BOARD, BOARDS
@@ -28,9 +28,9 @@ def page_options(command: F) -> F:
         click.option(
             "--page",
             metavar="lan|HOST:PORT",
-            type=Parsed(address),
+            type=Parsed(parse_address),
             is_flag=False,
-            flag_value=HERE,
+            flag_value=LOOPBACK,
             help="Show it on a page in a browser, on this computer or (lan, HOST:PORT) in its network.",
         ),
         click.option("--board", type=click.Choice(BOARDS), help=f"Board to draw; default: {BOARD}."),

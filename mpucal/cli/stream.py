@@ -19,7 +19,7 @@ from ..disk.place import check_free
 from ..errors import EndOfCapture
 from ..files.csv import NS, CsvText
 from ..page.address import Address
-from ..page.live import live
+from ..page.live import live_page
 from ..recheck import days_since
 from ..recheck.watch import Contradiction, DriftMonitor
 from ..result.clock import now
@@ -73,10 +73,10 @@ def command(
     if page is not None:
         check_gyroscope(source.plan.config)
     text = CsvText(lambda text: sys.stdout.write(text.decode()))
-    live_page = live(page, source_title(options), board or (VEHICLE if options.get("mavlink") else BOARD))
+    on_page = live_page(page, source_title(options), board or (VEHICLE if options.get("mavlink") else BOARD))
     messages = _Messages(json_events)
     capture = source.measuring(file or Path(os.devnull), messages.say, now().isoformat())
-    with capture as measuring, live_page as screen, suppress(KeyboardInterrupt):
+    with capture as measuring, on_page as screen, suppress(KeyboardInterrupt):
         ready: Correction | None = None
         monitor: DriftMonitor | None = None
         for samples in _poll(measuring.source, seconds):

@@ -1,1 +1,1 @@
-"""The page: a session as a phone or laptop in the other hand shows it, served while the session lasts."""
+"""Page in a browser that shows a session on a phone or laptop, served while the session lasts."""

@@ -1,4 +1,4 @@
-"""A session's console with a page beside it: what is said goes to both, and the page's keys count as the terminal's."""
+"""Console that shows a session in the terminal and on a page, and accepts keys from both."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ ASK_EVERY_S = 0.1
 
 
 class ResultCallback(Protocol):
-    """ResultCallback the page the result, and which files hold it."""
+    """Function that shows a result, and its files, on the page."""
 
     def __call__(self, result: Result, paths: Sequence[Path]) -> None: ...  # noqa: D102
 
 
 class TeeConsole:
-    """A console, and a page beside it.
+    """Console that passes everything on to another console and to a page.
 
     Parameters
     ----------
-    paced : each output is said at its own time, counted from the first: for a source whose time runs ahead.
+    paced : show each output at its own time, counted from the first: for a source that runs faster than time.
     """
 
     def __init__(self, console: Console, feed: Feed, paced: bool) -> None:
@@ -41,29 +41,29 @@ class TeeConsole:
         self._ahead_s: float | None = None
 
     def hear(self, output: Output) -> None:
-        """Tell both."""
+        """Show an output on both."""
         if self._paced and not isinstance(output, Prompt | Decision | Command):
             self._wait_until(output.t_s)
         self._console.hear(output)
         self._feed.hear(output)
 
     def say(self, text: str) -> None:
-        """A line of talk, to both."""
+        """Show a message on both."""
         self._console.say(text)
         self._feed.say(text)
 
     def pressed(self) -> Sequence[Key]:
-        """What was pressed here or there since the last call."""
+        """Return the keys of both that were pressed since the last call."""
         return [*self._console.pressed(), *self._feed.pressed()]
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """The console's."""
+        """Listen to the terminal's keys."""
         with self._console.listening():
             yield
 
     def hung_up(self, stop: bool) -> None:
-        """The terminal went away; the page stays."""
+        """Stop showing the session in the terminal, which was closed; the page stays."""
         self._console.hung_up(stop)
 
     def _wait_until(self, t_s: float) -> None:
@@ -82,12 +82,12 @@ def on_page(
     as_json: bool = False,
     attended: bool = False,
 ) -> Iterator[tuple[Console, ResultCallback]]:
-    """The console with a page beside it, and what tells the page the result.
+    """Yield a console with a page beside it, and a function that shows the result there.
 
     Parameters
     ----------
     where : the page's address. about, keys : see Feed. paced : see TeeConsole.
-    as_json : the address is told as an event. attended : somebody at the terminal opens the page and ends it.
+    as_json : print the address as an event. attended : somebody at the terminal opens the page and closes it.
 
     Raises
     ------
@@ -95,13 +95,13 @@ def on_page(
     """
     feed = Feed(where, about, keys)
 
-    def tell(result: Result, paths: Sequence[Path]) -> None:
+    def show_result(result: Result, paths: Sequence[Path]) -> None:
         feed.show(**asdict(result))
         feed.offer(paths)
 
     try:
         _invite(feed, as_json, attended)
-        yield TeeConsole(console, feed, paced), tell
+        yield TeeConsole(console, feed, paced), show_result
         if attended and feed.visited:
             _wait("The page stays open; press Enter to end it.", lambda: False)
     except MpucalError as error:
@@ -112,7 +112,7 @@ def on_page(
 
 
 def _invite(feed: Feed, as_json: bool, attended: bool) -> None:
-    """Tell the address; whoever is at the terminal has the time to open it before the session's screen is shown."""
+    """Print the address; if somebody is at the terminal, wait until the page is open, or Enter is pressed."""
     if as_json:
         print(json.dumps({"event": "page", "address": feed.url}), file=sys.stderr, flush=True)
         return
@@ -124,7 +124,7 @@ def _invite(feed: Feed, as_json: bool, attended: bool) -> None:
 
 
 def _wait(what_for: str, enough: Callable[[], bool]) -> None:
-    """Until Enter is pressed, or it is enough."""
+    """Wait until Enter is pressed, or `enough` returns True."""
     print(f"  {what_for}", file=sys.stderr, flush=True)
     keys = Keys(sys.stdin)
     while keys.asked and not enough() and not keys.pressed():

@@ -1,4 +1,4 @@
-"""The session's end of the page: what it says goes to the page's process, which it never waits for."""
+"""Feed of the page: sends the session's state to the page's process without ever waiting for it."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ from ..terminal.view import View
 from .address import Address
 from .state import changes, state
 
-# a page is told no more often than this
+# Least time between two updates of the page.
 LEAST_INTERVAL_S = 0.03
 TOKEN_BYTES = 16
-# after the end, clients have so long to fetch the results
+# Time that clients have after the end to fetch the results.
 LINGER_S = 5.0
 
 
 class Feed:
-    """A page: its process, and a thread that tells that the latest view of the session.
+    """Process of a page, and a thread that sends it the latest view of the session.
 
-    What is heard only changes the view. Where the process or its clients are slow, views between are left out.
+    Outputs only change the view. If the process or its clients are slow, they skip the views between.
 
     Parameters
     ----------
-    about : what does not change: title, board. keys : whether the page may send keys.
+    about : constant values: title, board. keys : True if the page may send keys.
 
     Attributes
     ----------
-    url : where the page is, with its token. visited : somebody has followed the session on it.
+    url : address of the page, with its token. visited : True once a client has followed the session.
 
     Raises
     ------
-    OutputError : nobody can listen at `where`.
+    OutputError : the page cannot be served at `where`.
     """
 
     def __init__(self, where: Address, about: Mapping[str, Any], keys: bool = False) -> None:
@@ -53,20 +53,20 @@ class Feed:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
-            # what this program imports is imported from the same places
+            # The process imports from the same places as this program.
             env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-            # Ctrl-C is for the session, which ends this process too
+            # Ctrl-C reaches the session alone, which ends this process.
             process_group=0,
         )
         token = secrets.token_urlsafe(TOKEN_BYTES)
-        # not as an argument: those are for everybody on the computer to read
-        self._tell({"host": where.host, "port": where.port, "name": where.name, "token": token, "keys": keys})
-        said, _, rest = self._line().partition(" ")
-        if said != "port":
+        # The token is no argument of the process, because every user of the computer could read it there.
+        self._send({"host": where.host, "port": where.port, "name": where.name, "token": token, "keys": keys})
+        word, _, rest = self._read_line().partition(" ")
+        if word != "port":
             self.close()
             raise OutputError(
                 f"no page can be served at {where.host}:{where.port} ({rest or 'its process ended'})",
-                "choose another place with --page=HOST:PORT, or leave --page away",
+                "choose another address with --page=HOST:PORT, or leave --page out",
             )
         self.url = f"http://{where.name}:{rest}/{token}/"
         self.visited = False
@@ -77,7 +77,7 @@ class Feed:
         self._changed, self._closed = threading.Event(), threading.Event()
         self._changed.set()
         self._threads = [
-            threading.Thread(target=job, name="page", daemon=True) for job in (self._keep_telling, self._listen)
+            threading.Thread(target=job, name="page", daemon=True) for job in (self._send_changes, self._listen)
         ]
         for thread in self._threads:
             thread.start()
@@ -88,26 +88,26 @@ class Feed:
         self._changed.set()
 
     def say(self, text: str) -> None:
-        """A line of talk more."""
+        """Add a message to the view."""
         self._view = self._view.noted(text.strip())
         self._changed.set()
 
     def show(self, **values: Any) -> None:
-        """Show these besides, as they are: JSON's own types."""
+        """Show further values, which are sent as they are; in JSON's own types."""
         self._fixed = {**self._fixed, **values}
         self._changed.set()
 
     def offer(self, paths: Sequence[Path]) -> None:
-        """Let these files be fetched."""
+        """Offer files for download."""
         self._offered.append({path.name: str(path.resolve()) for path in paths})
         self.show(results=[{"name": path.name, "bytes": path.stat().st_size} for path in paths])
 
     def pressed(self) -> Sequence[Key]:
-        """The keys that came from the page since the last call."""
+        """Return the keys that came from the page since the last call."""
         return [self._pressed.popleft() for _ in range(len(self._pressed))]
 
     def end(self) -> None:
-        """Say the last, leave the clients a moment to fetch the results, and end the process."""
+        """Send the last changes, give the clients time to fetch the results, and end the process."""
         self.show(ended=True)
         self._closed.set()
         self._changed.set()
@@ -131,15 +131,15 @@ class Feed:
     def _stdin(self) -> Any:
         return self._process.stdin
 
-    def _tell(self, message: Mapping[str, Any]) -> None:
+    def _send(self, message: Mapping[str, Any]) -> None:
         with suppress(OSError, ValueError):
             self._stdin.write(json.dumps(message, allow_nan=False) + "\n")
             self._stdin.flush()
 
-    def _line(self) -> str:
+    def _read_line(self) -> str:
         return self._process.stdout.readline().strip() if self._process.stdout else ""
 
-    def _keep_telling(self) -> None:
+    def _send_changes(self) -> None:
         old: dict[str, Any] = {}
         while True:
             self._changed.wait()
@@ -147,19 +147,19 @@ class Feed:
             last = self._closed.is_set()
             new = {**state(self._view), **self._fixed}
             while self._offered:
-                self._tell({"results": self._offered.popleft()})
+                self._send({"results": self._offered.popleft()})
             if changed := changes(new, old):
-                self._tell({"show": changed})
+                self._send({"show": changed})
             old = new
             if last:
-                self._tell({"end": LINGER_S})
+                self._send({"end": LINGER_S})
                 return
             self._closed.wait(LEAST_INTERVAL_S)
 
     def _listen(self) -> None:
-        while line := self._line():
-            said, _, rest = line.partition(" ")
-            if said == "clients":
+        while line := self._read_line():
+            word, _, rest = line.partition(" ")
+            if word == "clients":
                 self.visited = True
-            elif said == "key":
+            elif word == "key":
                 self._pressed.append(Key(rest))

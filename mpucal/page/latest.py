@@ -1,4 +1,4 @@
-"""The latest of everything that the page shows, and what of it somebody has not seen yet."""
+"""Latest values of the page, and those that a client has not received yet."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 
-class Latest:
+class LatestValues:
     """Values by name, each with the version in which it changed.
 
-    Whoever is slow gets the latest values when it asks again and none that came between: nothing queues up.
+    A slow client gets the latest values when it asks again, and skips those between: there is no queue.
     """
 
     def __init__(self) -> None:
@@ -19,14 +19,14 @@ class Latest:
         self._changed = threading.Condition()
 
     def update(self, values: Mapping[str, Any]) -> None:
-        """Take these, and wake who waits."""
+        """Merge `values` and notify waiting clients."""
         with self._changed:
             self._version += 1
             self._values.update((name, (self._version, value)) for name, value in values.items())
             self._changed.notify_all()
 
     def since(self, version: int, wait_s: float) -> tuple[int, dict[str, Any]]:
-        """The version now, and what changed after `version` (0: everything); nothing did where `wait_s` passed."""
+        """Wait `wait_s` at most for changes after `version` (0: all values); return the new version and the changes."""
         with self._changed:
             self._changed.wait_for(lambda: self._version > version, wait_s)
             return self._version, {name: value for name, (of, value) in self._values.items() if of > version}

@@ -1,4 +1,4 @@
-"""The page of a stream: the board's attitude, and its calibrated values."""
+"""Page of `mpucal stream`: the board's attitude, and its calibrated values."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .address import Address, qr_code
 from .feed import Feed
 
 
-class Live:
-    """Shows samples on a page, four times a second.
+class LivePage:
+    """Page that shows samples four times a second.
 
     Parameters
     ----------
-    feed : of the page; None: there is none.
+    feed : of the page; None: show nothing.
     """
 
     def __init__(self, feed: Feed | None) -> None:
@@ -28,7 +28,7 @@ class Live:
         self._watch: MotionWatch | None = None
 
     def add(self, raw: Samples, calibrated: Samples, sensor: Sensor) -> None:
-        """The same samples as measured and as calibrated."""
+        """Show samples, as measured and as calibrated."""
         if self._feed is None:
             return
         self._watch = self._watch or MotionWatch(sensor)
@@ -39,27 +39,27 @@ class Live:
             self._feed.show(live={"acc": acc.tolist(), "magnitude": float(np.linalg.norm(acc)), "gyr": _known(gyr)})
 
     def say(self, text: str) -> None:
-        """A line of talk, which stays."""
+        """Show a message."""
         if self._feed is not None:
             self._feed.say(text)
 
 
 @contextmanager
-def live(where: Address | None, title: str, board: str) -> Iterator[Live]:
-    """What shows samples on a page at `where`, or nowhere if that is None.
+def live_page(where: Address | None, title: str, board: str) -> Iterator[LivePage]:
+    """Yield a page at `where`, which shows nothing if that is None.
 
     Raises
     ------
     OutputError : the page cannot be served there.
     """
     if where is None:
-        yield Live(None)
+        yield LivePage(None)
         return
     feed = Feed(where, {"title": title, "board": board})
     try:
         code = qr_code(feed.url) if sys.stderr.isatty() else ""
         print(f"{code}mpucal: page: {feed.url}", file=sys.stderr, flush=True)
-        yield Live(feed)
+        yield LivePage(feed)
     finally:
         feed.end()
 

@@ -1,8 +1,8 @@
-"""The process that serves the page, apart from the session: it is told lines of JSON, and tells lines of words.
+"""Process that serves the page; it reads lines of JSON, and answers lines of words.
 
-Its first line says where to listen. Each further one has `show` (what changed on the page), `results` (files by name)
-or `end` (for how many seconds clients may go on to fetch them). It answers `port N` or `error WHY` once, then
-`clients N` and `key NAME`. It ends with its stdin.
+The first line has the address to listen on. Each further one has `show` (changed values of the page), `results` (files
+by name) or `end` (seconds for which clients may still fetch them). The process answers `port N` or `error WHY` once,
+then `clients N` and `key NAME`. It ends when its stdin is closed.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from .server import Server
 
 
 def serve() -> None:
-    """What the process does."""
-    telling = threading.Lock()
+    """Serve the page until stdin is closed; the main function of the process."""
+    printing = threading.Lock()
 
-    def tell(*words: object) -> None:
-        with telling, suppress(BrokenPipeError):
+    def answer(*words: object) -> None:
+        with printing, suppress(BrokenPipeError):
             print(*words, flush=True)
 
     begin = json.loads(sys.stdin.readline())
@@ -32,21 +32,21 @@ def serve() -> None:
             begin["name"],
             begin["token"],
             begin["keys"],
-            lambda key: tell("key", key),
-            lambda clients: tell("clients", clients),
+            lambda key: answer("key", key),
+            lambda clients: answer("clients", clients),
         )
     except OSError as error:
-        tell("error", error.strerror or error)
+        answer("error", error.strerror or error)
         return
-    tell("port", server.server_port)
+    answer("port", server.server_port)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     linger_s = 0.0
     for line in sys.stdin:
-        told = json.loads(line)
-        server.results.update((name, Path(path)) for name, path in told.get("results", {}).items())
-        linger_s = told.get("end", linger_s)
+        message = json.loads(line)
+        server.results.update((name, Path(path)) for name, path in message.get("results", {}).items())
+        linger_s = message.get("end", linger_s)
         server.ending = linger_s > 0.0
-        server.latest.update(told.get("show", {}))
+        server.latest.update(message.get("show", {}))
     until_s = time.monotonic() + linger_s
     while server.clients and time.monotonic() < until_s:
         time.sleep(0.05)

@@ -1,8 +1,8 @@
-"""Which requests are let in, and what they may have: a pure function of the request.
+"""Filter of requests: a pure function from a request to what it may have, or the status that refuses it.
 
-A request is let in that names this server in its one Host header (so no other site's name can be made to lead here)
-and has the token in its path. It can only look: the page's own files, the session's events, and the results by their
-names. A key is pressed by POST, only where that was allowed and no other site sends it.
+A request is allowed if its only Host header names this server, which defeats DNS rebinding, and its path has the token.
+It may read the page's own files, the session's events, and the results by their names. A key is pressed by POST, if
+keys are allowed and the request does not come from another site.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ PAGE_FILES = {
 KEYS = ("enough", "redo", "abort")
 
 
-class What(Enum):
-    """What a request asks for."""
+class RequestKind(Enum):
+    """Kinds of resources."""
 
     PAGE = "a file of the page"
     EVENTS = "the session as it goes on"
@@ -33,34 +33,34 @@ class What(Enum):
 
 
 @dataclass(frozen=True)
-class Asked:
-    """A request that is let in: what it asks for, and which."""
+class AllowedRequest:
+    """Request that is allowed: the kind of its resource, and the resource's name."""
 
-    what: What
+    kind: RequestKind
     name: str = ""
 
 
 @dataclass(frozen=True)
-class Door:
-    """What a request must know.
+class RequestFilter:
+    """Filter that knows the secret of one page.
 
     Attributes
     ----------
-    host : HOST:PORT as the page's address has it. token : the first part of its path. keys : whether keys may be sent.
+    host : HOST:PORT of the page's address. token : first part of its path. keys : True if keys may be sent.
     """
 
     host: str
     token: str
     keys: bool = False
 
-    def asked(
+    def check(
         self, method: str, target: str, hosts: Sequence[str], origins: Sequence[str], results: Collection[str]
-    ) -> Asked | HTTPStatus:
-        """What the request asks for, or the status that refuses it.
+    ) -> AllowedRequest | HTTPStatus:
+        """Return the request if it is allowed, else the status that refuses it.
 
         Parameters
         ----------
-        method, target : of the request line. hosts, origins : all its headers of these names. results : by name.
+        method, target : of the request line. hosts, origins : all headers of these names. results : names of results.
         """
         if list(hosts) != [self.host]:
             return HTTPStatus.MISDIRECTED_REQUEST
@@ -73,18 +73,18 @@ class Door:
         if method != "GET":
             return HTTPStatus.METHOD_NOT_ALLOWED
         if name in PAGE_FILES:
-            return Asked(What.PAGE, name)
+            return AllowedRequest(RequestKind.PAGE, name)
         if name == "events":
-            return Asked(What.EVENTS)
+            return AllowedRequest(RequestKind.EVENTS)
         folder, _, result = name.partition("/")
         if folder == "results" and result in results:
-            return Asked(What.RESULT, result)
+            return AllowedRequest(RequestKind.RESULT, result)
         return HTTPStatus.NOT_FOUND
 
-    def _key(self, name: str, origins: Sequence[str]) -> Asked | HTTPStatus:
+    def _key(self, name: str, origins: Sequence[str]) -> AllowedRequest | HTTPStatus:
         folder, _, key = name.partition("/")
         if not self.keys or folder != "keys" or key not in KEYS:
             return HTTPStatus.METHOD_NOT_ALLOWED
         if any(origin != f"http://{self.host}" for origin in origins):
             return HTTPStatus.FORBIDDEN
-        return Asked(What.KEY, key)
+        return AllowedRequest(RequestKind.KEY, key)

@@ -1,4 +1,4 @@
-"""What a session or a check came to, as a page shows it."""
+"""Result of a session or a check, as the page shows it."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Result:
-    """What came of it.
+    """Result on the page.
 
     Attributes
     ----------
-    verdict : its word. said : what matters of it, in a sentence. reasons : against it, as calibration.json has them.
-    values : what was found, each with its name and three cells of x, y and z. summary : the rest, in words.
+    verdict : one word or two. said : the estimated error, in a sentence. reasons : as calibration.json has them.
+    values : name of each row of the table, and its cells for x, y and z. summary : further text.
     """
 
     verdict: str

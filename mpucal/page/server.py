@@ -1,9 +1,9 @@
-"""The page's server: GET and server-sent events, for a few clients at a time.
+"""HTTP server of the page: GET and server-sent events, for a few clients at a time.
 
-It is http.server of the standard library, behind a check of its own on each request's size and time. It costs no
-dependency and starts in a tenth of a second on a desk's computer; what a web framework adds (routes, forms, workers,
-speed) a page with one stream and five files does not use. Server-sent events rather than a WebSocket: they need no
-library on either side, the browser opens them again by itself, and they can only tell.
+It is http.server of the standard library, with limits on each request's size and time. It needs no dependency and
+starts in a tenth of a second on a desktop computer; a page with one stream and five files does not need the routes,
+forms, workers and speed of a web framework. Server-sent events are used rather than a WebSocket because they need no
+library on either side, the browser reopens them by itself, and they cannot carry anything to the server.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from shutil import copyfileobj
 from socketserver import TCPServer
 from typing import Any
 
-from .latest import Latest
-from .requests import PAGE_FILES, Asked, Door, What
+from .latest import LatestValues
+from .requests import PAGE_FILES, AllowedRequest, RequestFilter, RequestKind
 
 CLIENTS = 4
 CONNECTIONS = 24
-# a request's head: all of it, and until when
+# Limits of a request's head: its size, and the time for it to arrive.
 HEAD_BYTES, HEAD_S = 16384, 5.0
-# a client that takes nothing for so long is gone
+# A client that takes nothing for this time is disconnected.
 PATIENCE_S = 10.0
-# so much of what a client has not taken yet waits for it
+# Send buffer of a client.
 WAITING_BYTES = 32768
-# so often a page is told that the session is there, though nothing happens
+# Interval of the heartbeats, during the session and after its end.
 BEAT_S, LAST_BEAT_S = 2.0, 0.2
 HEADERS = {
     "Cache-Control": "no-store",
@@ -45,31 +45,31 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }
-# what the page itself needs, and nothing from elsewhere
+# The page loads its own files, and nothing from elsewhere.
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"
 )
-# the report has its style and pictures in it, and no script
+# The report contains its style and pictures, and no script.
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; sandbox"
 REPORT = "report.html"
 
 
 class Server(ThreadingHTTPServer):
-    """Serves one session's page.
+    """Server of one session's page.
 
     Parameters
     ----------
-    where : host and port to listen on; port 0: any that is free. name, token, keys : see Door.
-    pressed : told each key. counted : told how many clients follow the session, when that changes.
+    where : host and port to listen on; port 0: any free one. name, token, keys : see RequestFilter.
+    pressed : called with each key. counted : called with the number of clients that follow, when it changes.
 
     Attributes
     ----------
-    latest : what the page shows. results : path of each by its name. ending : no more will come.
+    latest : values of the page. results : path of each by name. ending : True once the session has ended.
 
     Raises
     ------
-    OSError : nobody can listen there.
+    OSError : the address cannot be listened on.
     """
 
     daemon_threads = True
@@ -86,8 +86,8 @@ class Server(ThreadingHTTPServer):
     ) -> None:
         self.address_family = socket.AF_INET6 if ":" in where[0] else socket.AF_INET
         super().__init__(where, Handler)
-        self.door = Door(f"{name}:{self.server_port}", token, keys)
-        self.latest = Latest()
+        self.filter = RequestFilter(f"{name}:{self.server_port}", token, keys)
+        self.latest = LatestValues()
         self.results: dict[str, Path] = {}
         self.ending = False
         self.pressed, self._counted = pressed, counted
@@ -96,35 +96,35 @@ class Server(ThreadingHTTPServer):
 
     @property
     def clients(self) -> int:
-        """How many follow the session."""
+        """Number of clients that follow the session."""
         return self._clients
 
-    def seat(self) -> bool:
-        """Take one client more, or not."""
+    def enter(self) -> bool:
+        """Count one client more; return False if there are too many."""
         return self._count(1)
 
     def leave(self) -> None:
-        """One client less."""
+        """Count one client less."""
         self._count(-1)
 
     def verify_request(self, request: Any, client_address: Any) -> bool:
-        """Whether there is a thread left for it."""
+        """Return True if there is a thread left for the request."""
         return self._free.acquire(blocking=False)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """One request, in a thread of its own."""
+        """Process one request in its thread, and free that."""
         try:
             super().process_request_thread(request, client_address)
         finally:
             self._free.release()
 
     def server_bind(self) -> None:
-        """Without asking a name server who this is."""
+        """Bind the socket without the reverse DNS lookup of HTTPServer."""
         TCPServer.server_bind(self)
         self.server_name, self.server_port = str(self.server_address[0]), self.server_address[1]
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A client that is gone is none; anything else is a bug."""
+        """Ignore clients that are gone; report anything else, which is a bug."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
 
@@ -138,7 +138,7 @@ class Server(ThreadingHTTPServer):
 
 
 class Handler(BaseHTTPRequestHandler):
-    """Answers one request, and closes the connection."""
+    """Handler of one request, after which the connection is closed."""
 
     server: Server
     protocol_version = "HTTP/1.1"
@@ -154,44 +154,44 @@ class Handler(BaseHTTPRequestHandler):
             self.handle_one_request()
 
     def do_GET(self) -> None:
-        """What is asked for, or why not."""
-        asked = self.server.door.asked(
+        """Answer the request, or refuse it."""
+        request = self.server.filter.check(
             self.command,
             self.path,
             self.headers.get_all("Host", []),
             self.headers.get_all("Origin", []),
             self.server.results,
         )
-        if not isinstance(asked, Asked):
-            self.send_error(asked)
-        elif asked.what is What.PAGE:
-            self._page(*PAGE_FILES[asked.name])
-        elif asked.what is What.EVENTS:
+        if not isinstance(request, AllowedRequest):
+            self.send_error(request)
+        elif request.kind is RequestKind.PAGE:
+            self._page(*PAGE_FILES[request.name])
+        elif request.kind is RequestKind.EVENTS:
             self._events()
-        elif asked.what is What.RESULT:
-            self._result(asked.name)
+        elif request.kind is RequestKind.RESULT:
+            self._result(request.name)
         else:
-            self.server.pressed(asked.name)
+            self.server.pressed(request.name)
             self._begin(HTTPStatus.NO_CONTENT)
 
     do_POST = do_HEAD = do_PUT = do_DELETE = do_OPTIONS = do_PATCH = do_GET
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """The status alone: nothing of the request comes back."""
+        """Send the status alone: nothing of the request is repeated."""
         with suppress(OSError):
             body = f"{HTTPStatus(code).phrase}\n".encode()
             self._begin(HTTPStatus(code), {"Content-Type": "text/plain", "Content-Length": str(len(body))})
             self.wfile.write(body)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """No log."""
+        """Log nothing."""
 
     def version_string(self) -> str:
-        """Of the server, for its header."""
+        """Return the server's name for its header."""
         return "mpucal"
 
     def _head(self) -> bytes | None:
-        """All of it; None where it does not come, or is too long."""
+        """Return the request's head; None if it does not arrive, or is too long."""
         head, until_s = b"", time.monotonic() + HEAD_S
         while b"\r\n\r\n" not in head:
             if len(head) >= HEAD_BYTES:
@@ -228,8 +228,8 @@ class Handler(BaseHTTPRequestHandler):
             copyfileobj(file, self.wfile)
 
     def _events(self) -> None:
-        """The latest of everything, then what changes; a client that is slow gets the latest again, and no queue."""
-        if not self.server.seat():
+        """Send all latest values, then their changes; a slow client skips changes, which are not queued."""
+        if not self.server.enter():
             self.send_error(HTTPStatus.SERVICE_UNAVAILABLE)
             return
         try:

@@ -1,4 +1,4 @@
-"""What the page shows, as JSON: the terminal's view of the session, with each event as `--json-events` has it."""
+"""State of the page as JSON: the terminal's view of the session, with each event as in `--json-events`."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ..terminal.words import groups
 CONNECTING = "Connecting"
 HOLD = "Hold still"
 TOLD = {Use.TAKEN: "Taken", Use.USEFUL: "Not that one, but useful", Use.SEEN: "Seen already"}
-# so many lines of talk are kept
+# Number of messages that are kept.
 NOTES = 30
 
 
 def state(view: View) -> dict[str, Any]:
-    """The view's values by name, not yet JSON; see `changes`."""
+    """Return the view's values by name, not yet as JSON; see `changes`."""
     return {
         "moment": view.moment,
         "headline": headline(view),
@@ -40,7 +40,7 @@ def state(view: View) -> dict[str, Any]:
 
 
 def known(knowledge: Knowledge) -> tuple[dict[str, Any], ...]:
-    """Each kind of parameter with its target, and its standard uncertainties of x, y and z in words as well."""
+    """Return each kind of parameter with its target and its standard uncertainties of x, y and z."""
     return tuple(
         {
             "name": group.name,
@@ -56,7 +56,7 @@ def known(knowledge: Knowledge) -> tuple[dict[str, Any], ...]:
 
 
 def headline(view: View) -> str:
-    """What to do this moment, without the numbers, which the page draws."""
+    """Return what to do at this moment, without the numbers, which the page draws."""
     match view.moment:
         case Moment.COUNTING if view.countdown is not None and view.countdown.elsewhere:
             return f"New: {HOLD.lower()}"
@@ -65,8 +65,8 @@ def headline(view: View) -> str:
         case Moment.TOLD if view.held is not None:
             return TOLD[view.held.use]
         case Moment.TURN if view.meter is not None:
-            way = view.meter.turn.rpartition(", ")[2]
-            return way[:1].upper() + way[1:]
+            words = view.meter.turn.rpartition(", ")[2]
+            return words[:1].upper() + words[1:]
         case Moment.STEP if view.prompt is not None:
             return HEADLINES[view.prompt.kind].capitalize()
         case Moment.POINT:
@@ -75,7 +75,7 @@ def headline(view: View) -> str:
 
 
 def changes(new: Mapping[str, Any], old: Mapping[str, Any]) -> dict[str, Any]:
-    """What is new, as JSON's own types."""
+    """Return the values that are new or changed, in JSON's own types."""
     return {name: _json(value) for name, value in new.items() if name not in old or value != old[name]}
 
 

@@ -1,4 +1,4 @@
-"""A page's server in this process, and a browser that opens the page."""
+"""Fixtures: a page's server in this process, and a tab of a browser."""
 
 import socket
 import sys
@@ -31,12 +31,12 @@ TOKEN = "c2VjcmV0LXRva2VuLTEyOA"
 
 
 class Watched(Server):
-    """A server whose errors are kept, and a client of it."""
+    """Server that keeps its errors, with the functions of a client."""
 
     def __init__(self, port=0, **more):
         self.errors, self.lines = [], []
         super().__init__(("127.0.0.1", port), "127.0.0.1", TOKEN, **more)
-        self.url = f"http://{self.door.host}/{TOKEN}/"
+        self.url = f"http://{self.filter.host}/{TOKEN}/"
         threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
 
     def process_request(self, request, client_address):
@@ -48,14 +48,16 @@ class Watched(Server):
             self.errors.append(sys.exception())
 
     def request(self, name, method="GET", *headers):
-        """A request that is let in."""
-        return "\r\n".join([f"{method} /{TOKEN}/{name} HTTP/1.1", f"Host: {self.door.host}", *headers, "", ""]).encode()
+        """Return a request that is allowed."""
+        return "\r\n".join(
+            [f"{method} /{TOKEN}/{name} HTTP/1.1", f"Host: {self.filter.host}", *headers, "", ""]
+        ).encode()
 
     def connect(self):
         return socket.create_connection(("127.0.0.1", self.server_port), 60.0)
 
     def answer(self, request):
-        """What comes back to these bytes, until the connection is closed."""
+        """Send these bytes; return the answer, up to the end of the connection."""
         answer = b""
         with closing(self.connect()) as line, suppress(ConnectionError):
             line.sendall(request)
@@ -65,7 +67,7 @@ class Watched(Server):
         return answer
 
     def follow(self):
-        """A connection that follows the session, and its first event or what refuses it."""
+        """Return a connection that follows the session, and its first event or refusal."""
         line, head = self.connect(), b""
         line.sendall(self.request("events"))
         while b"data:" not in head and b" 503 " not in head:
@@ -82,7 +84,7 @@ class Watched(Server):
 
 @pytest.fixture
 def serve():
-    """Begin to serve."""
+    """Return a function that starts a server."""
     servers = []
 
     def call(*words, **more):
@@ -97,7 +99,7 @@ def serve():
 
 @pytest.fixture(scope="session")
 def phases():
-    """What a session says in each, and the headline, the number and the look of the page then."""
+    """Return the outputs of each phase of a session, and the headline, number and look of the page then."""
     return PHASES
 
 
@@ -108,7 +110,7 @@ def server(serve):
 
 @pytest.fixture
 def tab(chromium):
-    """A tab in which nothing may go wrong: no script fails, and the policy stops nothing."""
+    """Return a tab; at its end no script may have failed, and the policy must have stopped nothing."""
     context = chromium.new_context(viewport={"width": 390, "height": 844})
     tab = context.new_page()
     wrong = []

@@ -1,4 +1,4 @@
-"""The session's end of the page: what reaches the process, and how both end."""
+"""The feed of a page: its messages reach the process, and both end together."""
 
 import json
 import os
@@ -27,7 +27,7 @@ def feed():
 
 
 def followed(url, until):
-    """What the page shows once `until` is true of it."""
+    """Return the values of the page once `until` is true of them."""
     shown = {}
     with closing(urllib.request.urlopen(f"{url}events", timeout=60.0)) as events:
         for line in events:

@@ -35,7 +35,7 @@ return canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).d
 
 
 class Firefox:
-    """One window of a phone's size, of a browser with a profile of its own.
+    """Browser with its own profile, and one window of a phone's size.
 
     Each message either way is its length, a colon and JSON: [0, number, command, parameters] and
     [1, number, error, result].
@@ -58,7 +58,7 @@ class Firefox:
         self.call("WebDriver:SetWindowRect", width=390, height=844)
 
     def _port(self, profile):
-        """Where it listens, once it does."""
+        """Return the port on which it listens, once it does."""
         until = time.monotonic() + 120.0
         while time.monotonic() < until and self.process.poll() is None:
             with suppress(OSError, ValueError):
@@ -71,7 +71,7 @@ class Firefox:
         return json.loads(self.answers.read(int(size)))
 
     def call(self, command, **parameters):
-        """What it answers to a command."""
+        """Send a command; return its result."""
         self.number += 1
         text = json.dumps([0, self.number, command, parameters]).encode()
         self.line.sendall(b"%d:%s" % (len(text), text))
@@ -80,11 +80,11 @@ class Firefox:
         return result
 
     def run(self, script):
-        """What a script of the page returns."""
+        """Run a script in the page; return its result."""
         return self.call("WebDriver:ExecuteScript", script=script, args=[])["value"]
 
     def wait(self, script, seconds=120.0):
-        """Until what a script returns is true."""
+        """Wait until a script returns something true."""
         until = time.monotonic() + seconds
         while not (found := self.run(script)):
             assert time.monotonic() < until, f"{script}: {self.text()}"
@@ -92,7 +92,7 @@ class Firefox:
         return found
 
     def text(self):
-        """What can be read."""
+        """Return the visible text of the page."""
         return self.run("return document.body.innerText")
 
     def close(self):

@@ -1,9 +1,9 @@
-"""Who is let in: only who names the host and knows the token, and only to what the page is made of."""
+"""Requests that are allowed: those with the right host and token, for the page's own resources."""
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mpucal.page.requests import KEYS, PAGE_FILES, Asked, Door
+from mpucal.page.requests import KEYS, PAGE_FILES, AllowedRequest, RequestFilter
 
 HOST, TOKEN = "127.0.0.1:8000", "c2VjcmV0LXRva2VuLTEyOA"
 RESULTS = {"report.html", "calibration.json"}
@@ -27,8 +27,8 @@ ORIGINS = st.lists(st.sampled_from([f"http://{HOST}", "http://evil.example", "nu
 
 @given(METHODS, TARGETS, HOSTS, ORIGINS, st.booleans())
 def test_only_who_knows_all_of_it_is_let_in(method, target, hosts, origins, keys):
-    asked = Door(HOST, TOKEN, keys).asked(method, target, hosts, origins, RESULTS)
+    request = RequestFilter(HOST, TOKEN, keys).check(method, target, hosts, origins, RESULTS)
     looks = method == "GET" and target in {f"/{TOKEN}/{name}" for name in LOOKS}
     presses = keys and method == "POST" and target in {f"/{TOKEN}/keys/{key}" for key in KEYS}
     own = all(origin == f"http://{HOST}" for origin in origins)
-    assert isinstance(asked, Asked) == (hosts == [HOST] and (looks or (presses and own)))
+    assert isinstance(request, AllowedRequest) == (hosts == [HOST] and (looks or (presses and own)))

@@ -31,7 +31,7 @@ def test_the_page_loads_nothing_from_elsewhere(server, name):
 @settings(max_examples=150)
 @given(st.data())
 def test_nobody_else_is_let_in_and_nothing_breaks(server, data):
-    token, host = server.door.token.encode(), server.door.host.encode()
+    token, host = server.filter.token.encode(), server.filter.host.encode()
     method = data.draw(st.sampled_from(METHODS)).encode("latin-1")
     near = st.sampled_from(
         [b"/", b"/" + token, b"/" + token[:-1] + b"/", b"/x" + token + b"/", b"/" + token + b"/../x"]
@@ -62,7 +62,7 @@ def test_keys_are_pressed_only_where_that_was_allowed(server, serve):
     assert b" 405 " in server.answer(server.request("keys/redo", "POST"))[:20]
     assert b" 403 " in other.answer(other.request("keys/redo", "POST", "Origin: http://evil.example"))[:20]
     assert b" 405 " in other.answer(other.request("keys/redo", "GET"))[:20] or pressed == []
-    assert b" 204 " in other.answer(other.request("keys/redo", "POST", f"Origin: http://{other.door.host}"))[:20]
+    assert b" 204 " in other.answer(other.request("keys/redo", "POST", f"Origin: http://{other.filter.host}"))[:20]
     assert pressed == ["redo"]
 
 

@@ -22,7 +22,7 @@ from mpucal.mavlink.parameters.client import ParameterClient
 from mpucal.mavlink.prearm import ArmingMonitor
 from mpucal.mavlink.stream_parameters import stream_parameter_names
 from mpucal.mavlink.transport import ReceivedBytes
-from mpucal.page.requests import Door
+from mpucal.page.requests import RequestFilter
 from mpucal.page.server import Handler
 from mpucal.sources.bridge import messages as wire
 from mpucal.sources.bridge.bus import BridgeBus
@@ -235,7 +235,7 @@ def vehicle_says() -> list[bytes]:
 def http(data: bytes) -> None:
     """What a browser asks for."""
     page = SimpleNamespace(
-        door=Door("h:1", "t", True),
+        filter=RequestFilter("h:1", "t", True),
         results={"report.html": Path(__file__)},
         pressed=lambda key: None,
         seat=lambda: False,

@@ -31,7 +31,7 @@ from mpucal.iio.devices import Devices
 from mpucal.mavlink.parameters.text import read_parameters_file
 from mpucal.mavlink.signing import read_key
 from mpucal.mavlink.url import parse_url
-from mpucal.page.address import address
+from mpucal.page.address import parse_address
 from mpucal.result.blob import Blob
 from mpucal.result.journal import Journal
 from mpucal.result.noise import Noise
@@ -73,7 +73,7 @@ TEXTS = (
     VehicleOptions.parse,
     parse_url,
     Devices.parse,
-    address,
+    parse_address,
     parse_columns,
     parse_units,
     parse_gravity,

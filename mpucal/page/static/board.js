@@ -17,7 +17,7 @@ function times([a, b, c, d], [e, f, g, h]) {
   return [a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g, a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e];
 }
 
-// the way from one attitude to another, at the share s of it
+// Returns the attitude between two, at the share s of the way (spherical interpolation).
 export function between(p, q, s) {
   let cosine = p.reduce((sum, v, i) => sum + v * q[i], 0);
   const sign = cosine < 0 ? -1 : 1;
@@ -27,7 +27,7 @@ export function between(p, q, s) {
   return p.map((v, i) => a * v + b * q[i]);
 }
 
-// the turn (axis times angle, in the room) from one attitude to another
+// Returns the turn from one attitude to another, as axis times angle in the room's axes.
 export function turn(from, to) {
   let [w, x, y, z] = times(to, [from[0], -from[1], -from[2], -from[3]]);
   if (w < 0) [w, x, y, z] = [-w, -x, -y, -z];
@@ -35,7 +35,7 @@ export function turn(from, to) {
   return sine < 1e-9 ? [0, 0, 0] : [x, y, z].map((v) => v * angle / sine);
 }
 
-// The eye: from the front, from above and a little from one side, or from where no board is seen edge-on.
+// The viewer's eye: in front, above and a little to one side; it moves so that no board is seen edge-on.
 const TURNS = [-28, 28, 0, -48, 48], TILTS = [32, 52, 16, 68], LEAST_FACE = 0.5, KEEPS_FACE = 0.38;
 
 export function eye({ turn, tilt }) {
@@ -47,7 +47,7 @@ export function eye({ turn, tilt }) {
   };
 }
 
-// how much of the face of the thinnest board is seen
+// Least visible share of the face of a board.
 const face = (view, attitudes) => Math.min(...attitudes.map((q) => Math.abs(dot(eye(view).toward, rotate(q, [0, 0, 1])))));
 
 export function viewOf(attitudes, kept) {
@@ -57,7 +57,7 @@ export function viewOf(attitudes, kept) {
     ?? views.reduce((best, view) => (face(view, attitudes) > face(best, attitudes) ? view : best));
 }
 
-// A model: a plate, boxes above and below it (lowest and highest corner, colour), and what is printed on both faces.
+// A model: a plate, boxes above and below it (lowest and highest corner, colour), and the print on both faces.
 const GOLD = [214, 170, 60], BLACK = [38, 40, 44], STEEL = [150, 156, 162], SAND = [190, 160, 120];
 const PINS = ["VCC", "GND", "SCL", "SDA", "XDA", "XCL", "AD0", "INT"];
 const pinX = (k) => 0.8 * (2 * k / 7 - 1);
@@ -91,7 +91,7 @@ function plainBoard() {
   };
 }
 
-// x to the nose, y to the right, z down: what is above it in flight lies at negative z
+// x to the nose, y to the right, z down: parts above the plate in flight have negative z.
 function vehicle() {
   const arms = [[0.8, 0.8], [0.8, -0.8], [-0.8, 0.8], [-0.8, -0.8]];
   return {
@@ -116,7 +116,7 @@ export class Picture {
     this.style = getComputedStyle(canvas);
   }
 
-  // the canvas in its size now; what is drawn is centred at 0, 0 with y up
+  // Fits the canvas to its present size; drawings are centred at 0, 0.
   begin(reach) {
     const { canvas } = this, ratio = Math.min(devicePixelRatio || 1, 3);
     const width = Math.round(canvas.clientWidth * ratio), height = Math.round(canvas.clientHeight * ratio);
@@ -138,13 +138,13 @@ export class Picture {
     this.eye = eye(view);
   }
 
-  // a point of the room, with some perspective
+  // Returns a point of the room on the canvas, with some perspective.
   seen(point) {
     const k = this.scale * DISTANCE / (DISTANCE - dot(this.eye.toward, point));
     return [k * dot(this.eye.across, point), -k * dot(this.eye.up, point)];
   }
 
-  // where a letter of that size is seen whole
+  // Returns the nearest place where a letter of this size is fully visible.
   inside(at, size) {
     const { width, height } = this.canvas, most = [width / 2 - 0.75 * size, height / 2 - 0.6 * size];
     return at.map((v, i) => Math.max(-most[i], Math.min(most[i], v)));
@@ -167,7 +167,7 @@ export class Picture {
     }
   }
 
-  // `around`: a rim in that colour, where words stand on anything
+  // `around`: colour of a rim, which keeps words legible on any background.
   text(text, at, colour, size, around = null) {
     this.pen.fillStyle = colour;
     this.pen.font = `800 ${size}px system-ui, sans-serif`;
@@ -213,7 +213,7 @@ function shadow(picture, model, room) {
 
 const SIDES = [[0, 1], [0, -1], [1, 1], [1, -1], [2, 1], [2, -1]];
 
-// each of them is convex, and none reaches behind another: the farthest first
+// The boxes are convex and do not overlap, so that drawing the farthest first is right.
 function boxes(picture, list, room) {
   const { toward, across, up } = picture.eye;
   const depth = (b) => dot(toward, room(b.low.map((v, i) => (v + b.high[i]) / 2)));
@@ -256,7 +256,7 @@ function print(picture, model, at, top) {
   }
 }
 
-// words that lie on the board, along one of its directions
+// Draws words that lie on the board, along one of its directions.
 function label(picture, at, text, where, along, upward, size) {
   const { pen } = picture, o = at(where), a = at(plus(where, along, 0.1)), b = at(plus(where, upward, 0.1));
   pen.save();
@@ -282,7 +282,7 @@ function rotors(picture, model, at) {
   for (const [x, y] of model.rotors ?? []) spot(picture, at, [x, y, -0.24], 0.45, "rgba(128, 140, 155, .28)", "rgba(128, 140, 155, .6)");
 }
 
-// the part of an axis that stands out of the board, and its letter; of z the half on the side that is seen
+// Draws the part of an axis outside the board, and its letter; of z the half on the visible side.
 function axis(picture, [name, direction, ink], at, model, sign) {
   const i = direction.indexOf(1), out = i === 2 ? (sign < 0) === Boolean(model.rotors) ? 0.35 : 0.15 : model.half[i];
   const along = (reach) => at(direction.map((v) => sign * v * reach)), from = along(out), [x, y] = along(out + (i === 2 ? 0.5 : 0.2));
@@ -308,7 +308,7 @@ function head(picture, from, to, colour, size) {
   picture.fill([[to[0] + u, to[1] + v], [to[0] - v * 0.8, to[1] + u * 0.8], [to[0] + v * 0.8, to[1] - u * 0.8]], colour, false);
 }
 
-// where the top goes: over the board, along the turn that is missing
+// Draws an arc over the board, along the missing turn of its top.
 function arc(picture, way) {
   const angle = Math.hypot(...way);
   if (angle < radians(12)) return;
@@ -323,8 +323,8 @@ function arc(picture, way) {
   head(picture, points[21], points[24], colour, 0.2);
 }
 
-// The ball of the directions that can point down, fixed to the board and seen from a little below: what points down
-// now is at its foot.
+// The sphere of directions that can point down, fixed to the board and seen from a little below: the direction that
+// points down now is at its foot.
 const BALL_VIEW = { turn: -20, tilt: -28 };
 
 export function drawBall(picture, attitude, taken, wanted) {

@@ -1,12 +1,12 @@
-// The page: the server tells what changed, and it is shown at once; the board moves on to its new attitude by itself.
+// The page: changes from the server are shown at once; the board moves to its new attitude by an animation.
 
 import { FLAT, TURNED_OVER, Picture, between, drawBall, drawBoard, turn, viewOf } from "./board.js";
 import * as sound from "./sound.js";
 
 const $ = (id) => document.getElementById(id);
-// the session tells the attitude four times a second
+// The attitude comes four times a second; the animation takes a little less.
 const MOVE_MS = 230;
-// so long without a word, the connection is lost; the server says something every two seconds
+// The server sends at least every two seconds: after this silence the connection counts as lost.
 const SILENCE_MS = 5000, REOPEN_MS = 1500, REPEAT_MS = 5000;
 const VERDICTS = {
   good: "The calibration is good.",
@@ -15,8 +15,8 @@ const VERDICTS = {
   "still good": "The calibration is still good.",
   drifted: "The sensor has drifted.",
   remounted: "The sensor was remounted.",
-  "another sensor": "It is another sensor.",
-  "cannot be told": "It cannot be told.",
+  "another sensor": "This is a different sensor.",
+  "cannot be told": "Not enough data to tell.",
 };
 const FINE = ["good", "usable", "still good"];
 const REPORT = "report.html";
@@ -53,7 +53,7 @@ function hear(changed) {
   heardAt = performance.now();
   if (!$("lost").hidden) $("lost").hidden = true;
   const old = state;
-  // what comes first is everything
+  // The first message holds all values.
   state = fresh ? changed : { ...state, ...changed };
   const begins = fresh;
   fresh = false;
@@ -110,7 +110,7 @@ function task() {
   if (look === "turn") $("way").setAttribute("transform", `rotate(${wayDegrees()})`);
 }
 
-// the form of the dial, how much of its ring is drawn, and its number
+// Returns the form of the dial, the drawn share of its ring, and its number.
 function dial() {
   const { moment, meter, countdown, held, progress } = state;
   switch (moment) {
@@ -134,7 +134,7 @@ function promptWords() {
   return prompt?.text ?? "";
 }
 
-// where the top goes, from "away from you" clockwise
+// Returns the direction in which the top turns, clockwise from "away from you".
 function wayDegrees() {
   const [x, y] = turn(state.meter.attitude, state.meter.wanted);
   return Math.atan2(y, -x) * 180 / Math.PI;
@@ -157,7 +157,7 @@ function element(name, words = "", kind = "") {
   return made;
 }
 
-// Standard uncertainties on a scale of factors: the bar begins at a thousand times the target, and is full at it.
+// Standard uncertainties on a logarithmic scale: a bar begins at a thousand times the target, and is full at the target.
 function known() {
   $("known").hidden = !state.known;
   $("known").replaceChildren(...(state.known ?? []).map((group) => {
@@ -259,7 +259,7 @@ const target = () => (state.meter?.wanted ? state.prompt?.down ?? state.knowledg
 
 function result() {
   $("result").hidden = !state.verdict;
-  // a reason's message ends with its remedy
+  // The message of a reason ends with its remedy, which is shown apart.
   $("reasons").replaceChildren(...(state.reasons ?? []).map(({ message, remedy }) => {
     const reason = element("li");
     reason.append(element("strong", sentence(message.replace(`; ${remedy}`, ""))), " ", sentence(remedy));
@@ -282,7 +282,7 @@ const sentence = (words) => `${capital(words)}.`;
 const reportFirst = (files) => [...files].sort((a, b) => (b.name === REPORT) - (a.name === REPORT));
 const size = (bytes) => (bytes > 1e6 ? `${(bytes / 1e6).toFixed(1)} MB` : `${Math.ceil(bytes / 1e3)} kB`);
 
-// A result is fetched at once where it is not large, so that it can be saved after the session's end as well.
+// Results that are not large are fetched at once, so that they can still be saved after the end of the session.
 function file({ name, bytes }) {
   const path = `results/${name}`, items = [];
   if (name === REPORT) items.push(link("Open the report", path, "first live", { target: "_blank", rel: "noopener" }));
@@ -312,7 +312,7 @@ async function end() {
   for (const gone of document.querySelectorAll("a.live")) gone.parentElement.remove();
 }
 
-// What is said: aloud where sound is on, and to a screen reader
+// Announcements: aloud if sound is on, and for screen readers
 
 let saidAt = 0;
 
@@ -344,7 +344,7 @@ function tellChanges(old, begins) {
   if (prompted && state.prompt && state.moment !== "turn") announce(state.prompt.text);
 }
 
-// What is pressed
+// Keys
 
 $("sound").addEventListener("click", () => {
   const on = sound.toggle();
@@ -362,7 +362,7 @@ for (const button of $("keys").children) {
       return;
     }
     button.textContent = words;
-    fetch(`keys/${key}`, { method: "POST" }).catch(() => lost("The key was not heard. Trying again …"));
+    fetch(`keys/${key}`, { method: "POST" }).catch(() => lost("The key did not arrive. Trying again …"));
   });
 }
 

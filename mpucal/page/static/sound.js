@@ -1,4 +1,4 @@
-// What is heard and felt: spoken prompts, tones and vibration, all of them off until a tap, as browsers require.
+// Speech, tones and vibration. They are off until a tap, as browsers require.
 
 // pitch [Hz], begin and length [s] of each note; vibration [ms]
 const TONES = {
@@ -42,7 +42,7 @@ export function tone(name) {
   navigator.vibrate?.(TONES[name].buzz);
 }
 
-// the latest is said at once: what was being said is out of date
+// Says the text at once; what was being said is out of date.
 export function say(text) {
   if (!audio || !self.speechSynthesis) return;
   const spoken = new SpeechSynthesisUtterance(text);
