@@ -1,4 +1,4 @@
-"""The noise of a sensor that lies still, from samples as they come, for minutes or days, in constant memory."""
+"""The noise of a sensor at rest, by its Allan variance, from a stream of samples in constant memory."""
 
 from __future__ import annotations
 
@@ -11,29 +11,30 @@ from ..chip.families import PARTS, Part
 from ..data import STANDARD_GRAVITY_MPS2, Recording, Samples, Sensor, Vector
 from ..errors import RecordingError
 from ..result.noise import ACCELEROMETER, COEFFICIENTS, GYROSCOPE, INSTABILITY, WHITE, Noise
-from .model import fitted
+from .model import fit_coefficients
 from .octaves import Octaves
 from .spectrum import Spectrum
-from .trace import Trace, steps, turned
+from .trace import Trace, find_steps, find_turn
 
 __all__ = ["NoiseMeter", "noise_of"]
 
 AXES = tuple(f"{sensor} {axis}" for sensor in (ACCELEROMETER, GYROSCOPE) for axis in "xyz")
 UNITS = ("m/s²",) * 3 + ("rad/s",) * 3
-# samples at a time
+# samples that are added at once
 RUN = 16384
 LEAST_SAMPLES = 256
+# degrees Celsius of a change that is reported; correlation of an axis with it that is reported
 WARMED_C, CORRELATED = 2.0, 0.7
-# of the white noise of a sample: a weaker tone hides in it
+# rms over the white noise of a sample: a weaker tone is hidden
 LEAST_TONE = 0.05
 
 
 class NoiseMeter:
-    """Gathers what comes; `result` may be asked for at any time.
+    """Accumulator of samples at rest; `result` can be called at any time.
 
     Parameters
     ----------
-    rate_hz : samples a second; None: by the times of the first of them.
+    rate_hz : sample rate; None: from the times of the first samples.
     """
 
     def __init__(self, sensor: Sensor, rate_hz: float | None = None) -> None:
@@ -44,11 +45,11 @@ class NoiseMeter:
 
     @property
     def seconds(self) -> float:
-        """How long it has been, without gaps."""
+        """Return the duration without gaps [s]."""
         return self._last_s - self._first_s - self._gaps_s
 
     def add(self, samples: Samples) -> None:
-        """Add what came; a sample after a gap begins anew."""
+        """Add samples; a gap interrupts the statistics."""
         if not len(samples):
             return
         if self._rate_hz is None and len(samples) > 1:
@@ -69,21 +70,23 @@ class NoiseMeter:
             self._last_s = float(samples.t[b - 1])
 
     def result(self, created: str = "") -> Noise:
-        """The noise so far.
+        """Return the noise so far.
 
         Raises
         ------
-        RecordingError : too little to say anything.
+        RecordingError : there are too few samples.
         """
         n = self._octaves.samples
         if n < LEAST_SAMPLES or self._trace is None or self.seconds <= 0.0:
-            raise RecordingError(f"{n} samples say nothing of noise", "let the board rest for minutes, or hours")
+            raise RecordingError(
+                f"{n} samples are too few to measure noise", "let the board rest for minutes, or hours"
+            )
         rate_hz = (n - 1) / self.seconds
         sizes, variances, _ = self._octaves.variances()
-        of = [fitted(sizes, variances[:, axis], n, 1.0 / rate_hz) for axis in range(6)]
+        fits = [fit_coefficients(sizes, variances[:, axis], n, 1.0 / rate_hz) for axis in range(6)]
         values, low, high = (
             {
-                name: np.array([math.nan if one is None else getattr(one, end)[i] for one in of])
+                name: np.array([math.nan if one is None else getattr(one, end)[i] for one in fits])
                 for i, name in enumerate(COEFFICIENTS)
             }
             for end in ("value", "low", "high")
@@ -108,9 +111,9 @@ class NoiseMeter:
         )
 
     def needed_s(self, wanted: float) -> float | None:
-        """How much longer until bias instability is known to a `wanted` share (1 sigma); None: not known yet.
+        """Return the time [s] until bias instability is known to a relative uncertainty `wanted`; None if unknown.
 
-        The deviation of a share falls with the root of time.
+        The uncertainty (1 sigma) decreases with the square root of time.
         """
         try:
             noise = self.result()
@@ -122,21 +125,21 @@ class NoiseMeter:
 
     def _suspicious(self, white: Vector, course: Vector, rate_hz: float) -> list[dict[str, str]]:
         seconds = self._trace.seconds if self._trace is not None else 0.0
-        turn = turned(course[:, :6]) if len(course) else None
+        turn = find_turn(course[:, :6]) if len(course) else None
         if turn is not None:
             block, angle = turn
-            said = f"the board was turned, gravity by {math.degrees(angle):.0f} deg, from {block * seconds:.0f} s on"
-            return [{"code": "moved", "message": f"{said}: these numbers are of the motion, not of the sensor"}]
+            what = f"the board was turned, gravity by {math.degrees(angle):.0f} deg, from {block * seconds:.0f} s on"
+            return [{"code": "moved", "message": f"{what}: these numbers are of the motion, not of the sensor"}]
         found = []
         for tone in self._spectrum.tones(rate_hz):
             if tone.rms > LEAST_TONE * white[tone.axis] * math.sqrt(rate_hz):
-                said = (
+                what = (
                     f"{AXES[tone.axis]}: a tone at {tone.frequency_hz:.2f} Hz of {tone.rms:.2g} {UNITS[tone.axis]} rms"
                 )
-                found.append({"code": "tone", "message": f"{said}, as of a fan or a pump"})
-        for block, axis, size in steps(course[:, :6]):
-            said = f"{AXES[axis]}: a step of {size:+.2g} {UNITS[axis]} after {block * seconds:.0f} s"
-            found.append({"code": "step", "message": f"{said}: the board was moved, or its bias jumped"})
+                found.append({"code": "tone", "message": f"{what}, as from a fan or a pump"})
+        for block, axis, size in find_steps(course[:, :6]):
+            what = f"{AXES[axis]}: a step of {size:+.2g} {UNITS[axis]} after {block * seconds:.0f} s"
+            found.append({"code": "step", "message": f"{what}: the board was moved, or its bias jumped"})
         T = course[:, 6]
         if np.isfinite(T).sum() > 8 and np.nanmax(T) - np.nanmin(T) > WARMED_C:
             found.append({"code": "temperature", "message": _warmed(course[np.isfinite(T)])})
@@ -144,11 +147,11 @@ class NoiseMeter:
 
 
 def noise_of(recording: Recording, created: str = "") -> Noise:
-    """The noise of a recording of a sensor that lies still.
+    """Return the noise in a recording of a sensor at rest.
 
     Raises
     ------
-    RecordingError : too few samples.
+    RecordingError : there are too few samples.
     """
     meter = NoiseMeter(recording.sensor, recording.rate_hz if len(recording) > 1 else None)
     for first in range(0, len(recording), RUN):
@@ -157,7 +160,7 @@ def noise_of(recording: Recording, created: str = "") -> Noise:
 
 
 def data_sheet(sensor: Sensor) -> dict[str, float]:
-    """Typical white noise of the kind of chip, two-sided; empty where it is not known."""
+    """Return the typical white noise of the chip by its data sheet, two-sided; empty if the chip is not known."""
     part: Part | None = next((part for part in PARTS.values() if part.chip == sensor.chip), None)
     if part is None:
         return {}
@@ -169,8 +172,9 @@ def data_sheet(sensor: Sensor) -> dict[str, float]:
 
 
 def _warmed(course: Vector) -> str:
+    """Return a sentence on the change of temperature and the axes that are correlated with it."""
     T = course[:, 6]
     r = np.asarray(np.corrcoef(course, rowvar=False))[6, :6]
     moved = [f"{AXES[i]} ({r[i]:+.2f})" for i in range(6) if abs(r[i]) > CORRELATED]
-    said = f"the temperature moved by {T.max() - T.min():.1f} °C"
-    return f"{said}, and with it {', '.join(moved)}" if moved else said
+    what = f"the temperature changed by {T.max() - T.min():.1f} °C"
+    return f"{what}, and with it {', '.join(moved)}" if moved else what

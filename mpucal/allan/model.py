@@ -1,16 +1,15 @@
-"""The noise behind an Allan variance: white noise, bias instability, random walk and quantisation, with intervals.
+"""Noise coefficients from an Allan variance: white noise, bias instability, random walk, quantisation, with intervals.
 
     AVAR(tau) = N^2 / tau + (2 ln 2 / pi) B^2 + K^2 tau / 3 + 3 Q^2 / tau^2
 
-(IEEE Std 952, annex C: N, B, K, Q), N in units/sqrt(Hz) of a two-sided density: a data sheet's, one-sided, is
-sqrt(2) N.
-The four squares are linear in it, and not negative: least squares, weighted by the covariance of the variances at all
-octaves, which follows from the noise itself:
+(IEEE Std 952, annex C: N, B, K, Q), with N in units/sqrt(Hz) of a two-sided density; a data sheet's one-sided density
+is sqrt(2) N. AVAR is linear in the four squares, which are not negative: non-negative least squares, weighted by the
+covariance of the variances at all octaves, which follows from the noise itself:
 
     Cov(AVAR_i, AVAR_j) = 2/n integral of S(f)^2 |H_i(f)|^2 |H_j(f)|^2 df
     |H_m|^2 = 2 sin^4(pi m f) / (m^2 sin^2(pi f))
 
-as of wavelet variances (Percival, Biometrika 1995; Guerrier et al., JASA 2013). Time is in samples until the end.
+as for wavelet variances (Percival, Biometrika 1995; Guerrier et al., JASA 2013). Time is in samples until the end.
 """
 
 from __future__ import annotations
@@ -24,19 +23,21 @@ from ..data import Vector
 
 NAMES = ("white_noise", "bias_instability", "random_walk", "quantisation")
 CONFIDENCE = 0.95
-# an octave with fewer differences that do not overlap says next to nothing
+# an octave with fewer non-overlapping differences has almost no information
 LEAST_CLUSTERS = 5.0
-# the low-pass filter of a sensor hides white noise from the shortest times: so many octaves may be left out
+# octaves that may be left out, since a sensor's low-pass filter removes white noise at the shortest times
 MOST_LEFT_OUT = 7
+# a more probable fit is accepted
 FITS = 1e-3
+# iterations of the weights; share of the diagonal that stays in them
 ROUNDS, LEAST_SHARE = 6, 1e-4
-# an interval's end is looked for between these times the square or its deviation, at so many places
+# the ends of an interval are searched from NEAR to FAR times the square or its deviation, at PLACES values
 NEAR, FAR, PLACES = 1e-3, 1e2, 40
 
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Of one axis: (4,) in the order of NAMES, with the ends of their 95 % intervals; from which tau [samples] on."""
+    """Coefficients of one axis (4,), as in NAMES, with 95 % intervals; `first` is the least tau used [samples]."""
 
     value: Vector
     low: Vector
@@ -44,13 +45,15 @@ class Coefficients:
     first: float
 
 
-def fitted(
+def fit_coefficients(
     sizes: Vector, variances: Vector, samples: int, step_s: float, confidence: float = CONFIDENCE
 ) -> Coefficients | None:
-    """The coefficients of (k,) Allan variances at (k,) sizes in samples; None where there are too few octaves.
+    """Return the coefficients of (k,) Allan variances at (k,) sizes in samples; None if there are too few octaves.
 
-    step_s : time of a sample [s]; the coefficients are in units a root of a Hz, units, units a root of a s, units s.
-    confidence : how often the intervals hold the truth.
+    Parameters
+    ----------
+    step_s : sample period [s]; the results are in units/sqrt(Hz), units, units/sqrt(s) and units s.
+    confidence : of the intervals.
     """
     used = (sizes <= samples / LEAST_CLUSTERS) & (variances > 0.0)
     sizes, variances = sizes[used], variances[used]
@@ -73,28 +76,28 @@ def fitted(
     return Coefficients(value, low, high, float(best.sizes[0]))
 
 
-def modelled(sizes: Vector) -> Vector:
-    """(k, 4) of the Allan variance at sizes (k,) by the squares of the coefficients, in samples."""
+def design_matrix(sizes: Vector) -> Vector:
+    """Return (k, 4): the Allan variance at sizes (k,) per square of each coefficient, in samples."""
     m = np.asarray(sizes, float)
     flicker = np.full(len(m), 2.0 * math.log(2.0) / math.pi)
     return np.stack([1.0 / m, flicker, m / 3.0 + 1.0 / (6.0 * m), 3.0 / m**2], axis=1)
 
 
 class _Fit:
-    """The squares (terms,) of the coefficients, and how often the model shows variances as unlikely as these."""
+    """Fit of the squares (terms,) of the coefficients, and the probability of variances as unlikely as these."""
 
     def __init__(self, sizes: Vector, variances: Vector, samples: int, terms: int) -> None:
         from scipy.optimize import nnls  # noqa: PLC0415 - slow to import
         from scipy.stats import chi2  # noqa: PLC0415
 
-        self.sizes, self._A = sizes, modelled(sizes)[:, :terms]
-        # as if every octave stood alone: where to begin, and a floor for noise of another kind than these
-        self._alone = np.diag(2.0 * variances**2 * sizes / samples)
+        self.sizes, self._A = sizes, design_matrix(sizes)[:, :terms]
+        # covariance of independent octaves: the start, and a floor for noise of other kinds
+        self._independent = np.diag(2.0 * variances**2 * sizes / samples)
         self._products = _products(sizes, samples)[:terms, :terms]
         self._scale = variances[0] / np.abs(self._A).max(0)
-        C = self._alone
+        C = self._independent
         for _ in range(ROUNDS):
-            root = np.linalg.cholesky(C + LEAST_SHARE * self._alone)
+            root = np.linalg.cholesky(C + LEAST_SHARE * self._independent)
             W, w = np.linalg.solve(root, self._A * self._scale), np.linalg.solve(root, variances)
             self.squares = self._scale * nnls(W, w)[0]
             C = np.einsum("a,b,abij->ij", self.squares, self.squares, self._products)
@@ -102,18 +105,18 @@ class _Fit:
         self.probability = float(chi2.sf(left @ left, max(len(sizes) - terms, 1)))
 
     def unbiased(self, i: int) -> float:
-        """Square i so that its root is right in the mean: a root bends, by an eighth of the square's relative variance.
+        """Return square i, corrected so that the mean of its root is unbiased.
 
-        Not by more where it is not told from zero.
+        The curvature of the root lowers its mean by an eighth of the square's relative variance, which is limited to 1.
         """
         square = float(self.squares[i])
         share = min(float(self._std(i, square)[0]) / square, 1.0) if square > 0.0 else 0.0
         return square * (1.0 + share**2 / 8.0) ** 2
 
     def interval(self, i: int, confidence: float) -> tuple[float, float]:
-        """The ends for square i: the truths that are as far from what was found as chance goes.
+        """Return the interval of square i: the true values that could just give this estimate by chance.
 
-        How far that is depends on the truth: the larger it is, the more it scatters.
+        The standard deviation depends on the true value, and grows with it.
         """
         from scipy.stats import norm  # noqa: PLC0415
 
@@ -125,17 +128,17 @@ class _Fit:
         return float(low), float(high)
 
     def _std(self, i: int, truth: float | Vector) -> Vector:
-        """(p,) of square i, were (p,) `truth` true and the other squares as found."""
+        """Return the standard deviations (p,) of square i for true values (p,), with the other squares as estimated."""
         squares = np.tile(self.squares, (np.size(truth), 1))
         squares[:, i] = truth
         A = self._A * self._scale
-        C = np.einsum("pa,pb,abij->pij", squares, squares, self._products) + LEAST_SHARE * self._alone
+        C = np.einsum("pa,pb,abij->pij", squares, squares, self._products) + LEAST_SHARE * self._independent
         information = A.T @ np.linalg.solve(C, np.broadcast_to(A, (len(C), *A.shape)))
         return np.asarray(self._scale[i] * np.sqrt(np.linalg.pinv(information, hermitian=True)[:, i, i]))
 
 
 def _products(sizes: Vector, samples: int) -> Vector:
-    """(4, 4, k, k): Cov(AVAR_i, AVAR_j) is the sum of these over a and b, times the squares of a and of b."""
+    """Return (4, 4, k, k): Cov(AVAR_i, AVAR_j) is its sum over a and b, times the squares a and b."""
     f = np.geomspace(0.003 / sizes[-1], 0.5, 160 * math.ceil(math.log2(200.0 * sizes[-1])))
     sine2 = np.sin(np.pi * f) ** 2
     S = np.stack([np.ones(len(f)), 1.0 / (2.0 * np.pi * f), 1.0 / (4.0 * sine2), 4.0 * sine2])

@@ -1,10 +1,10 @@
-"""Overlapping Allan variance over octaves of time, of samples as they come, in constant memory.
+"""Overlapping Allan variance over octaves of time, from a stream of samples in constant memory.
 
     AVAR(tau) = mean of (mean over the next tau - mean over this tau)^2 / 2
 
 (D. W. Allan, 1966; IEEE Std 952, annex C), at tau of 1, 2, 4, ... samples. Up to 16 samples every overlap is counted,
-as in allantools' oadev; beyond, means over blocks of a 16th of tau are moved by one block, which
-loses nothing that can be measured, and needs 32 numbers an octave.
+as in allantools' oadev; beyond, means over blocks of a 16th of tau are shifted by one block, which
+loses no measurable information, and needs 32 numbers per octave.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import numpy as np
 
 from ..data import Vector
 
-# blocks that make up tau
+# blocks per tau
 BLOCKS = 16
 _FIRST = (1, 2, 4, 8, 16)
 
 
 class _Level:
-    """Means over blocks of one length: their differences at each distance, and their means in pairs."""
+    """Level of blocks of one length: differences of their means at each distance, and means of pairs."""
 
     def __init__(self, axes: int, distances: tuple[int, ...]) -> None:
         self.distances = distances
@@ -27,12 +27,12 @@ class _Level:
         self.counts = np.zeros(len(distances))
         self._tail, self._odd = np.zeros((0, axes)), np.zeros((0, axes))
 
-    def forget(self) -> None:
-        """What comes next does not follow what was."""
+    def interrupt(self) -> None:
+        """Reset after a gap."""
         self._tail, self._odd = self._tail[:0], self._odd[:0]
 
     def add(self, blocks: Vector) -> Vector:
-        """Count (n, axes) more; returns the means of pairs."""
+        """Add block means (n, axes); return the means of pairs."""
         z = np.concatenate([self._tail, blocks])
         total = np.concatenate([np.zeros((1, z.shape[1])), np.cumsum(z, axis=0)])
         for i, n in enumerate(self.distances):
@@ -51,11 +51,11 @@ class _Level:
 
 
 class Octaves:
-    """The Allan variance so far of several axes.
+    """Allan variance of several axes so far.
 
     Attributes
     ----------
-    samples : how many were added.
+    samples : number of added samples.
     """
 
     def __init__(self, axes: int) -> None:
@@ -64,16 +64,16 @@ class Octaves:
         self.samples = 0
 
     def add(self, values: Vector, follows: bool = True) -> None:
-        """Add (n, axes) samples; `follows`: none is missing between them and those before."""
+        """Add (n, axes) samples; `follows` is False after a gap."""
         if not len(values):
             return
         if not self.samples:
-            # only differences count, and small numbers keep their digits
+            # without the mean, which does not matter, no digits are lost
             self._middle = values.mean(0)
         self.samples += len(values)
         if not follows:
             for level in self._levels:
-                level.forget()
+                level.interrupt()
         blocks, at = np.asarray(values - self._middle), 0
         while len(blocks):
             if at == len(self._levels):
@@ -82,7 +82,7 @@ class Octaves:
             at += 1
 
     def variances(self) -> tuple[Vector, Vector, Vector]:
-        """(k,) tau in samples, (k, axes) Allan variance, and (k,) how many differences, of those that were seen."""
+        """Return tau (k,) in samples, Allan variance (k, axes), and number of differences (k,)."""
         sizes = np.concatenate([np.array(level.distances) * 2**at for at, level in enumerate(self._levels)])
         sums = np.concatenate([level.sums for level in self._levels])
         counts = np.concatenate([level.counts for level in self._levels])

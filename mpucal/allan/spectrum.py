@@ -1,4 +1,4 @@
-"""Tones in noise that lasts: power spectral density averaged over segments (Welch, 1967), in constant memory."""
+"""Tones in noise, from a power spectral density averaged over segments (Welch, 1967), in constant memory."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ import numpy as np
 from ..data import Vector
 
 SEGMENT = 4096
-# so much a line stands above its neighbours, beyond chance
+# a line's least height above its neighbours, beyond the limit of chance, and the probability of that limit
 LEAST_SHARE, SURPRISE = 0.3, 1e-4
+# bins: half widths of the neighbourhoods and of a line; lines per axis
 NEIGHBOURS, LINE, AT_MOST = (8, 32), 2, 1
 
 
 @dataclass(frozen=True)
 class Tone:
-    """A line of a spectrum: axis number, frequency [Hz], rms in the samples' units."""
+    """Line of a spectrum: axis number, frequency [Hz], rms in the samples' units."""
 
     axis: int
     frequency_hz: float
@@ -24,7 +25,7 @@ class Tone:
 
 
 class Spectrum:
-    """The mean density of several axes so far."""
+    """Mean density of several axes so far."""
 
     def __init__(self, axes: int) -> None:
         self._window = np.hanning(SEGMENT)
@@ -33,7 +34,7 @@ class Spectrum:
         self._segments = 0
 
     def add(self, values: Vector, follows: bool = True) -> None:
-        """Add (n, axes) samples; `follows`: none is missing between them and those before."""
+        """Add (n, axes) samples; `follows` is False after a gap."""
         self._held = np.concatenate([self._held, values]) if follows else values
         while len(self._held) >= SEGMENT:
             part, self._held = self._held[:SEGMENT], self._held[SEGMENT:]
@@ -42,7 +43,7 @@ class Spectrum:
             self._segments += 1
 
     def tones(self, rate_hz: float) -> list[Tone]:
-        """The lines that no noise makes, the strongest of each axis first."""
+        """Return the significant lines, the strongest of each axis first."""
         from scipy.ndimage import median_filter  # noqa: PLC0415 - slow to import
         from scipy.stats import chi2  # noqa: PLC0415
 
@@ -50,14 +51,14 @@ class Spectrum:
             return []
         density = 2.0 * self._power / (self._segments * rate_hz * np.sum(self._window**2))
         freedom = 2 * self._segments
-        # both over the median, by which the neighbours are told
+        # relative to the median, as the floor is a median of the neighbours
         most = float(chi2.isf(SURPRISE / len(density), freedom) / chi2.median(freedom))
         found: list[Tone] = []
         for axis, of in enumerate(density.T):
-            # the near ones where the density is steep, as that of drift at low frequencies
+            # the narrow neighbourhood follows a steep density, such as drift at low frequencies
             floor = np.maximum(*(median_filter(of, 2 * many + 1, mode="reflect") for many in NEIGHBOURS)) + 1e-300
             above = of / floor
-            # the lowest bins are drift, and at the last the filter that folds has no neighbours
+            # the lowest bins are drift, and the highest lack neighbours
             above[: 2 * LINE] = above[-2 * LINE :] = 0.0
             lines: list[Tone] = []
             while len(lines) < AT_MOST and (at := int(above.argmax())) and above[at] > (1.0 + LEAST_SHARE) * most:

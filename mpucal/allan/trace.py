@@ -1,4 +1,4 @@
-"""The slow course of a long rest, in constant memory: means over blocks that double as it grows, steps, temperature."""
+"""The slow course of a long rest, in constant memory: means over blocks that double in length, and steps in them."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from ..data import Vector
 
 BLOCKS = 2048
 FIRST_S = 0.5
-# a step is seen between means of so many blocks, beyond so many of their robust standard deviations
+# blocks averaged on each side of a step, and robust standard deviations that it exceeds
 BESIDE, STEP_STD = 8, 10.0
 LEAST_BLOCKS = 64
-# neither a bias's drift nor noise turns gravity by so much, or a rate
+# more than drift or noise: a change of direction of gravity, and a rate
 TURNED_RAD, TURNED_RAD_S = math.radians(2.0), math.radians(3.0)
 
 
 class Trace:
-    """Means of columns over blocks of `seconds`; a merge in pairs makes room for more."""
+    """Means of columns over blocks of `seconds`; blocks are merged in pairs to limit their number."""
 
     def __init__(self, columns: int, rate_hz: float) -> None:
         self._size = max(round(FIRST_S * rate_hz), 1)
@@ -36,24 +36,24 @@ class Trace:
         self._means += list(self._held[:used].reshape(whole, self._size, -1).mean(1))
         self._held = self._held[used:]
         while len(self._means) >= BLOCKS:
-            # a block without a partner is half a new one: it is left out
+            # an odd last block is dropped
             pairs = np.array(self._means[: len(self._means) // 2 * 2]).reshape(-1, 2, self._held.shape[1])
             self._means = list(pairs.mean(1))
             self._size *= 2
 
     @property
     def seconds(self) -> float:
-        """Of a block."""
+        """Return the duration of a block [s]."""
         return self._size / self._rate_hz
 
     @property
     def means(self) -> Vector:
-        """(k, columns)."""
+        """Return the means (k, columns)."""
         return np.array(self._means).reshape(-1, self._held.shape[1])
 
 
-def steps(means: Vector) -> list[tuple[int, int, float]]:
-    """(block, column, size) of the largest step of each column of means (k, columns), where one is beyond chance."""
+def find_steps(means: Vector) -> list[tuple[int, int, float]]:
+    """Return (block, column, size) of the largest significant step of each column of means (k, columns)."""
     if len(means) < LEAST_BLOCKS:
         return []
     total = np.concatenate([np.zeros((1, means.shape[1])), np.cumsum(means - means[0], axis=0)])
@@ -68,8 +68,8 @@ def steps(means: Vector) -> list[tuple[int, int, float]]:
     return found
 
 
-def turned(means: Vector) -> tuple[int, float] | None:
-    """(block, rad) of means (k, 6) of accelerations and rates: when it was first turned, and how far gravity was."""
+def find_turn(means: Vector) -> tuple[int, float] | None:
+    """Return the first moving block of means (k, 6) and the largest turn of gravity [rad]; None if it lay still."""
     acc, rate = means[:, :3], np.linalg.norm(means[:, 3:6] - np.median(means[:, 3:6], axis=0), axis=1)
     away = np.arctan2(np.linalg.norm(np.cross(acc, acc[0]), axis=1), acc @ acc[0])
     moved = np.flatnonzero((away > TURNED_RAD) | (rate > TURNED_RAD_S))

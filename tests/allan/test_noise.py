@@ -8,7 +8,7 @@ import pytest
 
 import mpucal
 from mpucal.allan import NoiseMeter, noise_of
-from mpucal.allan.model import fitted, modelled
+from mpucal.allan.model import design_matrix, fit_coefficients
 from mpucal.allan.octaves import Octaves
 from mpucal.allan.spectrum import Spectrum
 from mpucal.data import Recording, Sensor
@@ -90,12 +90,12 @@ def test_the_coefficients_are_those_that_were_simulated(found):
 
 
 def test_what_is_simulated_walks_as_it_should_for_long():
-    """At an eighth of the time, too: a period of the simulation would be seen there."""
+    """Test at an eighth of the time, too, where a period of the simulation would show."""
     drawn = np.stack([noise(np.random.default_rng(seed), 1024, 1.0, 0.0, 0.0, 1.0) for seed in range(1500)], axis=1)
     octaves = Octaves(drawn.shape[1])
     octaves.add(drawn)
     sizes, variances, _ = octaves.variances()
-    ratio = variances[sizes == 128].mean() / modelled(np.array([128.0]))[0, 2]
+    ratio = variances[sizes == 128].mean() / design_matrix(np.array([128.0]))[0, 2]
     assert ratio == pytest.approx(1.0, abs=0.04)
 
 
@@ -106,7 +106,7 @@ def test_intervals_hold_the_truth_at_their_rate():
     octaves.add(np.stack([noise(np.random.default_rng(seed), n, 1.0, *truth) for seed in range(40)], axis=1))
     sizes, variances, _ = octaves.variances()
     for confidence in (0.68, 0.95):
-        of = [fitted(sizes, each, n, 1.0, confidence) for each in variances.T]
+        of = [fit_coefficients(sizes, each, n, 1.0, confidence) for each in variances.T]
         inside = np.mean([(one.low[:3] <= truth) & (truth <= one.high[:3]) for one in of])
         assert inside == pytest.approx(confidence, abs=2.5 * np.sqrt(confidence * (1.0 - confidence) / len(of)))
     values = np.mean([one.value[:3] for one in of], axis=0)
@@ -132,12 +132,12 @@ def test_what_is_suspicious(lying):
     assert set(said) == {"tone", "step", "temperature"}
     assert "accelerometer x: a tone at 11.69 Hz" in said["tone"]
     assert "gyroscope y: a step of +0.04" in said["step"]
-    assert "moved by 6.0 °C" in said["temperature"]
+    assert "changed by 6.0 °C" in said["temperature"]
     assert "gyroscope z" in said["temperature"]
 
 
 def test_a_short_rest_has_no_tones():
-    """Of one segment, white or with drift."""
+    """Use one segment, white or with drift."""
     rng = np.random.default_rng(5)
     for walk in (0.0, 1e-3):
         spectrum = Spectrum(50)
@@ -185,7 +185,7 @@ def test_it_is_read_as_it_was_written(found, tmp_path):
 
 
 def test_too_little_is_refused(lying):
-    with pytest.raises(mpucal.MpucalError, match="say nothing of noise"):
+    with pytest.raises(mpucal.MpucalError, match="are too few to measure noise"):
         mpucal.noise(lying.part(0, 100))
 
 

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from mpucal.allan.model import NAMES, fitted
+from mpucal.allan.model import NAMES, fit_coefficients
 from mpucal.allan.octaves import Octaves
 from mpucal.simulated.noise import noise
 
@@ -49,7 +49,7 @@ def of_seed(item: tuple[str, int], hours: float) -> list[Found]:
     for part in np.array_split(samples[:, None], max(n // 16384, 1)):
         octaves.add(part)
     sizes, variances, _ = octaves.variances()
-    found = [fitted(sizes, variances[:, 0], n, 1.0 / RATE_HZ, confidence) for confidence in CONFIDENCES]
+    found = [fit_coefficients(sizes, variances[:, 0], n, 1.0 / RATE_HZ, confidence) for confidence in CONFIDENCES]
     ends = [end[:3] for one in found if one is not None for end in (one.low, one.high)]
     value = np.full(3, np.nan) if found[0] is None else found[0].value[:3]
     by_truth = (np.array([value, *ends]) / np.array(AXES[axis])).T.tolist()
