@@ -13,7 +13,7 @@ from ..errors import OutputError
 from ..result.clock import stamp
 from ..sources.opening import open_source
 from ..terminal.console import console
-from ..terminal.hangup import outliving
+from ..terminal.hangup import logging_after_hangup
 from .arguments import output_option
 from .options import ABOVE_ZERO, check_source, fit_options, given_options, source_options
 from .running import open_runner
@@ -39,7 +39,7 @@ def command(file: Path | None, seconds: float | None, **options: Any) -> None:
         raise OutputError(f"{file} does not end with {suffix}, by which other commands know a capture", f"add {suffix}")
     check_free(file)
     person = console(quiet=False)
-    with outliving(lambda: file.with_suffix(".log"), partial(person.hung_up, stop=True)):
+    with logging_after_hangup(lambda: file.with_suffix(".log"), partial(person.hung_up, stop=True)):
         with open_runner(source, file, person) as runner:
             try:
                 samples = runner.record(seconds)

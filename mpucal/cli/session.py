@@ -27,7 +27,7 @@ from ..sources.resumed import open_resumed
 from ..sources.table import matching_kinds, source_title
 from ..terminal.console import Console, console
 from ..terminal.flat import BOARD, VEHICLE
-from ..terminal.hangup import outliving
+from ..terminal.hangup import logging_after_hangup
 from .arguments import PATH, json_option, output_option, yes_option
 from .destination import session_sink_options, write_back
 from .options import (
@@ -98,7 +98,7 @@ def command(
     hung_up = partial(terminal.hung_up, stop=page is None and not keep_going)
     with (
         SessionFolder(resume or folder, source.capture_name, again=resume is not None) as into,
-        outliving(lambda: into.path / LOG.name, hung_up),
+        logging_after_hangup(lambda: into.path / LOG.name, hung_up),
         on_page as (person, show_result),
     ):
         # A program that reads the events finds the sinks in calibration.json.

@@ -47,7 +47,7 @@ def known(knowledge: Knowledge) -> tuple[dict[str, Any], ...]:
             "target": f"{group.target:g} {group.unit}",
             "worst": group.worst,
             "axes": [
-                {"times": std / group.target, "said": group.said(axis), "reached": progress >= 1.0}
+                {"times": std / group.target, "said": group.text(axis), "reached": progress >= 1.0}
                 for axis, (std, progress) in enumerate(zip(group.std, group.progress, strict=True))
             ],
         }

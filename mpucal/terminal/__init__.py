@@ -1,1 +1,1 @@
-"""The terminal: what a session shows on it, as a screen, as lines or as JSON, and which keys are pressed."""
+"""Terminal: a session as a screen, as lines or as JSON, and the keys."""

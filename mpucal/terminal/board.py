@@ -1,4 +1,4 @@
-"""The picture of the board or the vehicle with its axes, in the attitude that a Meter carries."""
+"""Picture of the board or the vehicle with its axes, in the attitude of a Meter."""
 
 from __future__ import annotations
 
@@ -15,20 +15,19 @@ _AXES: tuple[tuple[str, Direction, str], ...] = (
     ("Y", (0.0, 1.0, 0.0), "bold green"),
     ("Z", (0.0, 0.0, 1.0), "bold blue"),
 )
-# where axes end and where their letters stand, seen from the middle
+# Distances from the middle to the ends of the axes, and to their letters.
 _TIPS, _LETTERS = (1.35, 1.1, 0.75), (1.62, 1.38, 1.05)
-# the eye looks from the front, from above and a little from the right
-_TURN_DEG, _TILT_DEG = -28.0, 30.0
-# ... or from where the plate is no thinner than this, as a share of its area
+# Turns and tilts of the view: first from the front, above and a little from the right, then others.
+_VIEWS_DEG = (-28.0, 28.0), (30.0, 52.0, 12.0, 70.0)
+# Least visible share of the plate's face; a view that shows less is too near to its edge.
 _LEAST_FACE = 0.35
-_VIEWS_DEG = (_TURN_DEG, 28.0), (_TILT_DEG, 52.0, 12.0, 70.0)
 _REACH = 1.75
-# rows from which the lines of a plate's edge do not run into each other
+# On fewer rows the lines of a plate's edge would merge.
 _LARGE = 14
 
 
 def picture(kind: str, attitude: Quaternion, columns: int, rows: int) -> Canvas:
-    """The board of a kind (`models.py`) with the given attitude."""
+    """Return the picture of a kind of board (`models.py`) in an attitude."""
     canvas, model = Canvas(columns, rows), MODELS[kind]
     board = matrix(attitude)
     across, up, eye = view_of(board)
@@ -49,7 +48,7 @@ def picture(kind: str, attitude: Quaternion, columns: int, rows: int) -> Canvas:
 
 
 def view_of(board: Matrix) -> Matrix:
-    """Unit vectors of the room that are seen across, up and toward the eye: the usual view, unless it shows an edge."""
+    """Return unit vectors of the room across, up and toward the eye: the first view that does not show an edge."""
     face = (board[0][2], board[1][2], board[2][2])
     views = [_view(turn, tilt) for tilt in _VIEWS_DEG[1] for turn in _VIEWS_DEG[0]]
     for view in views:

@@ -8,7 +8,7 @@ from rich.text import Text
 
 Point = tuple[float, float]
 
-# dots of one character cell, as braille numbers them: DOTS[row][column]
+# Bits of the dots of one character cell in Unicode's braille: _DOTS[row][column].
 COLUMNS, ROWS = 2, 4
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 _BRAILLE = 0x2800
@@ -19,7 +19,7 @@ _LEFT, _RIGHT = (sum(row[k] for row in _DOTS) for k in range(COLUMNS))
 class Canvas:
     """Dots and letters on `columns` x `rows` characters; a point is (x, y) in dots, y downwards.
 
-    A dot is about as high as it is wide, a character being twice as high.
+    Dots are about square, because a character is twice as high as wide.
     """
 
     def __init__(self, columns: int, rows: int) -> None:
@@ -29,30 +29,30 @@ class Canvas:
 
     @property
     def centre(self) -> Point:
-        """Its middle."""
+        """Middle of the canvas."""
         return (0.5 * (self.columns * COLUMNS - 1), 0.5 * (self.rows * ROWS - 1))
 
     def dot(self, point: Point) -> None:
-        """One dot; none outside."""
+        """Draw a dot, unless it is outside."""
         x, y = round(point[0]), round(point[1])
         if 0 <= x < self.columns * COLUMNS and 0 <= y < self.rows * ROWS:
             self._cells[y // ROWS][x // COLUMNS] |= _DOTS[y % ROWS][x % COLUMNS]
 
     def line(self, start: Point, end: Point) -> None:
-        """A straight line."""
+        """Draw a straight line."""
         steps = max(round(max(abs(end[0] - start[0]), abs(end[1] - start[1]))), 1)
         for k in range(steps + 1):
             share = k / steps
             self.dot((start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1])))
 
     def letter(self, point: Point, letter: str, style: str) -> None:
-        """A letter over the dots of its cell; none outside."""
+        """Draw a letter in place of the dots of its cell, unless it is outside."""
         column, row = round(point[0]) // COLUMNS, round(point[1]) // ROWS
         if 0 <= column < self.columns and 0 <= row < self.rows:
             self._letters[row, column] = (letter, style)
 
     def lines(self, style: str, unicode: bool) -> list[Text]:
-        """Its rows, the dots in `style`."""
+        """Return the rows, with the dots in `style`."""
         glyph = _braille if unicode else _ascii
         drawn = [[glyph(cell) for cell in cells] for cells in self._cells]
         for (row, column), (letter, _) in self._letters.items():
@@ -70,7 +70,7 @@ def _braille(dots: int) -> str:
 
 @cache
 def _ascii(dots: int) -> str:
-    """The character whose strokes lie where the dots are."""
+    """Return the character whose strokes lie where the dots are."""
     if not dots:
         return " "
     high = [k for k, mask in enumerate(_ROW_MASKS) if dots & mask]

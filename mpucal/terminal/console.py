@@ -1,4 +1,4 @@
-"""Chooses how a session talks on stderr: a screen, lines of text, or lines of JSON."""
+"""Console of a session on stderr: a screen, lines of text, or lines of JSON."""
 
 from __future__ import annotations
 
@@ -13,55 +13,54 @@ from .flat import BOARD
 from .keys import Keys
 from .lines import JsonLines, Lines
 
-# Jupyter sets it for its kernels
+# Jupyter sets this variable for its kernels.
 KERNEL = "JPY_PARENT_PID"
 
 
 class Console(Protocol):
-    """Says what the session says, and asks the keyboard where there is one."""
+    """Interface that shows a session, and returns keys."""
 
     def hear(self, output: Output) -> None:
-        """Be told."""
+        """Show an output."""
         ...
 
     def say(self, text: str) -> None:
-        """A line of talk."""
+        """Show a message."""
         ...
 
     def pressed(self) -> Sequence[Key]:
-        """What was pressed since the last call; never waits."""
+        """Return the keys that were pressed since the last call; never waits."""
         ...
 
     def listening(self) -> AbstractContextManager[None]:
-        """Meanwhile the person is shown the session and may press keys, Ctrl-C among them."""
+        """Show the session, and accept keys, Ctrl-C among them, within the context."""
         ...
 
     def hung_up(self, stop: bool) -> None:
-        """The terminal went away; `stop` the session for it."""
+        """Handle a terminal that was closed; with `stop`, as if Ctrl-C was pressed."""
         ...
 
 
 def console(
     quiet: bool, as_json: bool = False, beep: bool | None = None, title: str = "", board: str = BOARD
 ) -> Console:
-    """The console on stderr and stdin.
+    """Return the console that stderr and stdin allow.
 
     Parameters
     ----------
-    quiet : nobody is asked anything. as_json : one JSON object a line in place of words.
-    beep : ring at each change of prompt; None: where there is a screen. title : what is measured.
-    board : how it is drawn.
+    quiet : accept no keys. as_json : one JSON object a line instead of text.
+    beep : ring at each new prompt; None: only on a screen. title : name of the sensor. board : kind of picture.
     """
     term = os.environ.get("TERM", "dumb")
-    # what a cell of a notebook starts has a terminal that shows no screen and hears no keys
-    seen = KERNEL not in os.environ
-    drawn = seen and sys.stderr.isatty() and term not in ("", "dumb") and not as_json
-    keys = Keys(sys.stdin if seen and not quiet and sys.stdin.isatty() else None, single=drawn)
+    # A process that a notebook starts has a terminal which shows no screen and sends no keys.
+    interactive = KERNEL not in os.environ
+    on_screen = interactive and sys.stderr.isatty() and term not in ("", "dumb") and not as_json
+    keys = Keys(sys.stdin if interactive and not quiet and sys.stdin.isatty() else None, single=on_screen)
     if as_json:
         return JsonLines(sys.stderr, keys)
-    if not drawn:
+    if not on_screen:
         return Lines(sys.stderr, keys, bell=bool(beep))
-    from .glyphs import glyphs_of  # noqa: PLC0415 - draws with rich, which takes a while to load
+    from .glyphs import glyphs_of  # noqa: PLC0415 - rich takes a while to load
     from .screen import Screen  # noqa: PLC0415
 
     return Screen(sys.stderr, keys, glyphs_of(sys.stderr, term), bell=beep is not False, title=title, board=board)

@@ -1,4 +1,4 @@
-"""What the board looks like as it lies flat, in words: for whoever sees it to confirm by leaving it there."""
+"""Kinds of boards, and the description of each as it lies flat, which the operator confirms by leaving it there."""
 
 from __future__ import annotations
 
@@ -6,21 +6,20 @@ import math
 
 from ..session.events import Direction
 
-# the part of gravity along z, at least, of a board that lies
+# A board lies flat if at least this share of gravity is along its z axis.
 LIES = math.cos(math.radians(20.0))
-# by the picture that is drawn: what it is with its component side up and down, and where its front is then
+# Descriptions by kind of board, with -z down and with +z down. The z axis of a vehicle points down.
 _SIDES = {
-    "gy-521": ("the chip faces up, the pins are toward you", "the chip faces down, the pins are away from you"),
-    "plain": ("the chip faces up, +Y points away from you", "the chip faces down, +Y points toward you"),
-    # its z points down
-    "vehicle": ("it is upside down, its nose to the right", "it stands on its feet, its nose to the right"),
+    "gy-521": ("Chip up, pins toward you", "Chip down, pins away from you"),
+    "plain": ("Chip up, +Y away from you", "Chip down, +Y toward you"),
+    "vehicle": ("Upside down, nose to the right", "On its feet, nose to the right"),
 }
 BOARD, VEHICLE = "gy-521", "vehicle"
 BOARDS = tuple(_SIDES)
 
 
-def as_seen(down: Direction, board: str) -> str:
-    """What is to be confirmed where the unit vector `down` of the axes of a `board` points down."""
+def flat_description(down: Direction, board: str) -> str:
+    """Return the question to confirm for a `board` whose unit vector `down` points down."""
     if abs(down[2]) < LIES:
-        return "Now it is tilted."
-    return f"Is it so: {_SIDES[board][down[2] > 0.0]}? Leave it, and that says yes; if not, turn it."
+        return "The board is tilted now."
+    return f"{_SIDES[board][down[2] > 0.0]}? Then leave it. If not, turn it."

@@ -1,4 +1,4 @@
-"""The characters that a terminal can show: Unicode, or replacements in ASCII."""
+"""Characters that a terminal can show: Unicode, or replacements in ASCII."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TextIO
 
-# the Linux console's fonts have no braille, whatever its encoding
+# The fonts of the Linux console have no braille.
 _NO_BRAILLE = ("linux",)
 _IN_ASCII = str.maketrans({"²": "2", "±": "+-", "°": " deg ", "−": "-", "·": "-", "→": "->", "…": "..."})
 
 
 @dataclass(frozen=True)
 class Glyphs:
-    """Blocks, bars and lines; `replacements` for the texts of others."""
+    """Characters of pictures and bars, and `replacements` for those in texts."""
 
     unicode: bool
     block: str
@@ -30,7 +30,7 @@ ASCII = Glyphs(False, "#", "#", "-", "|", "->", _IN_ASCII)
 
 
 def glyphs_of(out: TextIO, term: str) -> Glyphs:
-    """What the terminal behind `out` can show; `term` is its TERM."""
+    """Return the characters for the terminal behind `out`; `term` is its TERM."""
     try:
         is_utf8 = codecs.lookup(out.encoding or "ascii").name == "utf-8"
     except LookupError:

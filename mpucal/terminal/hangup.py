@@ -1,4 +1,4 @@
-"""A terminal that goes away (SIGHUP): what is said from then on goes to a log."""
+"""Redirection of a session's output to a log when its terminal is closed (SIGHUP)."""
 
 from __future__ import annotations
 
@@ -15,39 +15,39 @@ _DESCRIPTORS = (0, 1, 2)
 
 
 @contextmanager
-def outliving(log: Callable[[], Path], told: Callable[[], None]) -> Iterator[None]:
-    """Within, SIGHUP ends nothing by itself; who ignores it already (nohup) goes on doing so.
+def logging_after_hangup(log: Callable[[], Path], hung_up: Callable[[], None]) -> Iterator[None]:
+    """Survive SIGHUP within the context; a process that ignores it already (nohup) continues to do so.
 
     Parameters
     ----------
-    log : where the words go that the terminal would have shown. told : is called then.
+    log : returns the file to which output is appended then. hung_up : called at SIGHUP.
     """
-    # Windows has none
+    # Windows has no SIGHUP.
     number = getattr(signal, "SIGHUP", None)
     if number is None or signal.getsignal(number) is signal.SIG_IGN:
         yield
         return
 
-    # a terminal that is gone is not seen to have been one
-    shown = [number for number in _DESCRIPTORS if os.isatty(number)]
+    # isatty is False after the terminal was closed, so it is asked now.
+    on_terminal = [number for number in _DESCRIPTORS if os.isatty(number)]
 
-    def gone(_number: int, _frame: FrameType | None) -> None:
-        # the shell and the kernel may both say so
+    def handle(_number: int, _frame: FrameType | None) -> None:
+        # The shell and the kernel may both send the signal.
         signal.signal(number, signal.SIG_IGN)
-        told()
-        _redirect(shown, log())
+        hung_up()
+        _redirect(on_terminal, log())
 
-    before = signal.signal(number, gone)
+    before = signal.signal(number, handle)
     try:
         yield
     finally:
-        if signal.getsignal(number) is gone:
+        if signal.getsignal(number) is handle:
             signal.signal(number, before)
 
 
-def _redirect(shown: Sequence[int], log: Path) -> None:
-    """What the terminal would have shown goes to the end of `log`; nobody types any more."""
-    if not shown:
+def _redirect(descriptors: Sequence[int], log: Path) -> None:
+    """Append output to `log` instead of the terminal; input has ended."""
+    if not descriptors:
         return
     try:
         end = os.open(log, os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0), 0o644)
@@ -55,7 +55,7 @@ def _redirect(shown: Sequence[int], log: Path) -> None:
         end = os.open(os.devnull, os.O_RDWR)
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.write(end, f"{now().isoformat()}: the terminal went away.\n".encode())
-    for number in shown:
+    for number in descriptors:
         os.dup2(end if number else nothing, number)
     os.close(end)
     os.close(nothing)

@@ -1,4 +1,4 @@
-"""Key presses: single keys or lines of them, Ctrl-C, and signals that end the program."""
+"""Key presses: single keys or lines, Ctrl-C, and signals that end the program."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ _WORDS = {
 }
 _ENDING = (signal.SIGINT, signal.SIGTERM)
 _AT_ONCE = 64
-# so long a Ctrl-C waits for who reads the sensor, who may hang on a device
+# A Ctrl-C that the reading loop has not taken after this time interrupts it: it may hang on a device.
 PATIENCE_S = 0.25
 
 
 class Keys:
-    """The keyboard, where there is one, and the signals.
+    """Keyboard, if there is one, and signals.
 
     Parameters
     ----------
-    keyboard : where the person types; None: nobody types.
-    single : each key counts by itself, and none is echoed; else a line counts when Enter ends it.
+    keyboard : file to read from; None: there is no keyboard.
+    single : read single keys without echo; else lines that end with Enter.
     """
 
     def __init__(self, keyboard: TextIO | None = None, single: bool = False) -> None:
@@ -41,17 +41,18 @@ class Keys:
 
     @property
     def asked(self) -> bool:
-        """Whether anybody can type."""
+        """True if there is a keyboard."""
         return self._keyboard is not None
 
     def pressed(self) -> Sequence[Key]:
-        """What was pressed since the last call; never waits."""
+        """Return the keys that were pressed since the last call; never waits."""
         keys = [Key.ABORT] if self._interrupted else []
-        self._heard()
+        self._clear_interrupt()
         while self._keyboard is not None and _waits(self._keyboard):
             try:
                 words = self._typed(self._keyboard)
-            except OSError:  # the terminal went away
+            except OSError:
+                # The terminal was closed.
                 words = None
             if words is None:
                 self._keyboard = None
@@ -61,24 +62,24 @@ class Keys:
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Meanwhile the first Ctrl-C is a key press; the second one, or nobody who takes the first, interrupts."""
+        """Take the first Ctrl-C as a key press; interrupt at the second one, or if nothing takes the first."""
         with ExitStack() as stack:
             if hasattr(signal, "SIGALRM"):
                 stack.callback(signal.signal, signal.SIGALRM, signal.signal(signal.SIGALRM, self._interrupt))
-            stack.callback(self._heard)
+            stack.callback(self._clear_interrupt)
             for number in _ENDING:
                 stack.callback(signal.signal, number, signal.signal(number, self._interrupt))
-            # a terminal may go away before anybody listens, as while a page is waited for
+            # The terminal may have been closed before this, as during the wait for a page.
             if self._single and self._keyboard is not None and self._keyboard.isatty():
-                stack.enter_context(_without_lines(self._keyboard))
+                stack.enter_context(_single_keys(self._keyboard))
             yield
 
     def abort(self) -> None:
-        """As Ctrl-C does the first time."""
+        """Act as at the first Ctrl-C."""
         self._interrupted = True
 
     def _typed(self, keyboard: TextIO) -> list[str] | None:
-        """The words or keys that are there; None where there will never be any more."""
+        """Return the words or keys that are there; None at the end of the input."""
         if (console := _windows()) is not None:
             return _words(console.getwch())
         if not self._single:
@@ -91,21 +92,21 @@ class Keys:
         if self._interrupted:
             raise KeyboardInterrupt
         self._interrupted = True
-        _alarm(PATIENCE_S)
+        _set_alarm(PATIENCE_S)
 
-    def _heard(self) -> None:
-        _alarm(0.0)
+    def _clear_interrupt(self) -> None:
+        _set_alarm(0.0)
         self._interrupted = False
 
 
-def _alarm(seconds: float) -> None:
-    """A signal after so long, on systems that have it; 0: none."""
+def _set_alarm(seconds: float) -> None:
+    """Arm SIGALRM for `seconds`, except on Windows; 0 disarms it."""
     if hasattr(signal, "setitimer"):
         signal.setitimer(signal.ITIMER_REAL, seconds)
 
 
 def _windows() -> Any:
-    """Windows' module for its console, which gives single keys and never lines; None elsewhere."""
+    """Return Windows' module for its console, which reads single keys and never lines; None elsewhere."""
     try:
         return import_module("msvcrt")
     except ImportError:
@@ -113,7 +114,7 @@ def _windows() -> Any:
 
 
 def _waits(keyboard: TextIO) -> bool:
-    """Whether a key or line is there."""
+    """Return True if a key or line can be read without waiting."""
     console = _windows()
     return bool(console.kbhit() if console is not None else select.select([keyboard], [], [], 0.0)[0])
 
@@ -123,23 +124,23 @@ def _words(keys: str) -> list[str]:
 
 
 @contextmanager
-def _without_lines(keyboard: TextIO) -> Iterator[None]:
-    """Keys come one by one and unseen; whatever happens, lines come again afterwards."""
+def _single_keys(keyboard: TextIO) -> Iterator[None]:
+    """Read single keys without echo within the context; restore the terminal afterwards."""
     if _windows() is not None:
         yield
         return
-    import termios  # noqa: PLC0415 - not everywhere is there a terminal
+    import termios  # noqa: PLC0415 - not on Windows
     import tty  # noqa: PLC0415
 
     handle = keyboard.fileno()
     before = termios.tcgetattr(handle)
-    # who is stopped by Ctrl-Z loses samples, and leaves a screen behind
+    # Ctrl-Z would lose samples, and leave the screen behind.
     stop = signal.signal(signal.SIGTSTP, signal.SIG_IGN)
     tty.setcbreak(handle)
     try:
         yield
     finally:
         signal.signal(signal.SIGTSTP, stop)
-        # what was typed for the session is not meant for the shell; a terminal that went away has neither
+        # Keys for the session must not reach the shell, so unread ones are flushed; a closed terminal raises an error.
         with suppress(termios.error):
             termios.tcsetattr(handle, termios.TCSAFLUSH, before)

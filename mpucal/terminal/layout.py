@@ -1,4 +1,4 @@
-"""The layout of a session's screen: a view in, lines of text out."""
+"""Layout of a session's screen: a view in, lines of text out."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import textwrap
 from rich.text import Text
 
 from ..session.events import PromptKind
-from . import board, globe, letters
+from . import board, letters, orientation_map
 from .bars import NARROWEST, caution_rows, keys, knowledge_rows, meter
 from .glyphs import Glyphs
 from .view import View
 
-# below these nothing is drawn but words
+# Smaller screens show text only.
 LEAST_COLUMNS, LEAST_ROWS = 60, 20
 LARGE_COLUMNS, LARGE_ROWS, AIRY_ROWS = 120, 40, 30
 _PROMPT_ROWS = 2
@@ -20,11 +20,11 @@ _BLANK = Text("")
 
 
 def lines(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
-    """Exactly `rows` lines of at most `columns` characters."""
+    """Return exactly `rows` lines of at most `columns` characters."""
     roomy = columns >= LEAST_COLUMNS and rows >= LEAST_ROWS
     air = [_BLANK] if rows >= AIRY_ROWS else []
     headline = _headline(view, columns, rows, glyphs)
-    # two lines of letters leave one row less
+    # A headline of two lines leaves one row less.
     prompt = _prompt(view, columns, _PROMPT_ROWS - (len(headline) == letters.TWO_ROWS))
     above = [_status(view, columns), *air, *headline, *prompt]
     below = [
@@ -37,7 +37,7 @@ def lines(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
     between = _pictures(view, columns, space, glyphs) if roomy and space > 4 else []
     between += [_BLANK] * max(space - len(between), 0)
     drawn = [*above, *between, *below]
-    # too low a screen loses its upper bars first, and never what is to be done
+    # A screen with too few rows loses its bars first, and never the headline and the prompt.
     if len(drawn) > rows:
         drawn = [*drawn[: max(rows - 2, 1)], *drawn[-2:]][:rows]
     return [_cut(line, columns, glyphs) for line in drawn]
@@ -50,7 +50,7 @@ def _status(view: View, columns: int) -> Text:
         facts.insert(0, f"{view.meter.rate_hz:.1f} Hz")
         if view.meter.temperature_c is not None:
             facts.insert(1, f"{view.meter.temperature_c:.1f} °C")
-    # the clock stays, whatever else is cut
+    # A narrow screen keeps the clock alone.
     right = "   ".join(facts) if columns >= LEAST_COLUMNS else facts[-1]
     space = max(columns - len(right) - 3, 1)
     return Text(f" {view.title[:space]:<{space}} {right} ", style="reverse")
@@ -76,13 +76,13 @@ def _headline_style(view: View) -> str:
 
 
 def _prompt(view: View, columns: int, rows: int) -> list[Text]:
-    said = view.prompt.text if view.prompt is not None else "Looking for the sensor."
-    wrapped = textwrap.wrap(said, max(columns - 2, NARROWEST), max_lines=rows, placeholder=" ...")
+    text = view.prompt.text if view.prompt is not None else "Looking for the sensor."
+    wrapped = textwrap.wrap(text, max(columns - 2, NARROWEST), max_lines=rows, placeholder=" ...")
     return [Text(f" {line}", style="bold") for line in [*wrapped, *[""] * (rows - len(wrapped))]]
 
 
 def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]:
-    """The board as it is and as it is wanted, and the map of where it has been."""
+    """Return the pictures of the board as it is and as it is wanted, and the map of its orientations."""
     height = rows - 1
     quarter = (columns - 4) // 4
     wide, round_ = min(quarter + 2, 4 * height), min(quarter - 2, 2 * height)
@@ -99,7 +99,7 @@ def _pictures(view: View, columns: int, rows: int, glyphs: Glyphs) -> list[Text]
     marks = _marks(view)
     if marks:
         for upper, name in ((False, "+Z up"), (True, "-Z up")):
-            canvas = globe.half(upper, marks, round_, height, glyphs.unicode)
+            canvas = orientation_map.draw_half(upper, marks, round_, height, glyphs.unicode)
             parts.append((name, canvas.lines("", glyphs.unicode), round_))
     rows_ = [Text(" ").join(Text(name[:wide].center(wide), style="dim") for name, _, wide in parts)]
     for k in range(height):

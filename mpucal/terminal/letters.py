@@ -4,7 +4,7 @@ from __future__ import annotations
 
 ROWS = 5
 WIDTH, GAP = 5, 1
-# two lines of letters of half the height, and a gap between them
+# Rows of two lines of letters of half the height, with a gap between them.
 TWO_ROWS = 6
 _HALVES = {"  ": " ", "# ": "▀", " #": "▄", "##": "█"}
 _UNKNOWN = " ### /#   #/  ## /     /  #  "
@@ -54,12 +54,12 @@ _LETTERS = {
 
 
 def width(text: str, scale: int = 1) -> int:
-    """How many columns `large` needs."""
+    """Return the number of columns that `large` needs."""
     return max(len(text) * (WIDTH + GAP) - GAP, 0) * scale
 
 
 def large(text: str, block: str, scale: int = 1) -> list[str]:
-    """ROWS * scale rows of `block` and spaces that show `text`."""
+    """Return ROWS * scale rows of `block` and spaces that show `text`."""
     letters = [_LETTERS.get(letter, _UNKNOWN).split("/") for letter in text.upper()]
     rows = []
     for k in range(ROWS):
@@ -70,12 +70,12 @@ def large(text: str, block: str, scale: int = 1) -> list[str]:
 
 
 def fit(columns: int) -> int:
-    """How many letters are no wider than `columns`."""
+    """Return the number of letters that fit in `columns`."""
     return (columns + GAP) // (WIDTH + GAP)
 
 
 def two_lines(first: str, second: str) -> list[str]:
-    """TWO_ROWS rows of half blocks that show two lines of text."""
+    """Return TWO_ROWS rows of half blocks that show two lines of text."""
     upper, lower = (large(text, "#") for text in (first, second))
     most = max(len(upper[0]), len(lower[0]))
     dots = [row.ljust(most) for row in (*upper, "", *lower, "")]

@@ -1,4 +1,4 @@
-"""A session as lines of text or of JSON, where there is no terminal to draw on."""
+"""Session as lines of text or of JSON, where there is no terminal to draw on."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .words import known, sentence
 
 PROGRESS_EVERY_S = 1.0
 KNOWLEDGE_EVERY_S = 5.0
-# the same warning is not repeated sooner
+# Least time between two cautions of one kind.
 CAUTION_EVERY_S = 5.0
 HEADINGS = {
     PromptKind.LAY_FLAT: "LAY FLAT",
@@ -24,28 +24,28 @@ HEADINGS = {
     PromptKind.AGAIN: "AGAIN?",
     PromptKind.REST: "REST",
 }
-HOW_TO_ANSWER = "(Enter: go on now; r and Enter: rotate again; q and Enter, or Ctrl-C: stop.)"
+KEYS = "(Enter: skip ahead; r and Enter: restart the turning; q and Enter, or Ctrl-C: stop.)"
 BELL = "\a"
 
 
 class Lines:
-    """Says a session in words, a line at a time.
+    """Console that prints lines of text.
 
     Parameters
     ----------
-    out : where the talk goes. keys : what is pressed. bell : rings at each change of prompt.
+    out : stream to print on. keys : source of key presses. bell : ring at each new prompt.
     """
 
     def __init__(self, out: TextIO, keys: Keys, bell: bool = False) -> None:
         self._out, self._keys, self._bell = out, keys, bell
         self._explained = not keys.asked
-        self._heard = True
+        self._open = True
         self._prompt: Prompt | None = None
         self._last = ""
         self._due_s: dict[str, float] = {}
 
     def hear(self, output: Output) -> None:
-        """Say it, where it is worth a line."""
+        """Print an output, unless it is repeated too soon."""
         match output:
             case Prompt():
                 self._say_prompt(output)
@@ -62,40 +62,40 @@ class Lines:
                 self.say(f"  {why}")
 
     def say(self, text: str) -> None:
-        """A line of talk; nobody may be left to hear it, and the session goes on all the same."""
-        if self._heard:
+        """Print a line; once the stream is closed, print nothing, so that the session goes on."""
+        if self._open:
             try:
                 print(text, file=self._out, flush=True)
             except OSError:
-                self._heard = False
+                self._open = False
 
     def pressed(self) -> Sequence[Key]:
-        """What was pressed since the last call."""
+        """Return the keys that were pressed since the last call."""
         return self._keys.pressed()
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Meanwhile the first Ctrl-C is a key press; the second one interrupts at once."""
+        """Take the first Ctrl-C as a key press within the context; see Keys."""
         with self._keys.listening():
             yield
 
     def hung_up(self, stop: bool) -> None:
-        """What follows is heard elsewhere; `stop`: as by Ctrl-C."""
-        self._heard = True
+        """Print on the log from now on; with `stop`, act as at Ctrl-C."""
+        self._open = True
         if stop:
             self._keys.abort()
 
     def _say_prompt(self, prompt: Prompt) -> None:
-        """A heading where something else is to be done; else the new words alone."""
+        """Print a heading and the prompt; the prompt alone if its kind is that of the last one."""
         bell = BELL if self._bell and prompt != self._prompt else ""
         goes_on = self._prompt is not None and self._prompt.kind is prompt.kind
         self._prompt = prompt
         if goes_on:
             self.say(f"{bell}  {prompt.text}")
             return
-        answer = "" if self._explained else f"\n  {HOW_TO_ANSWER}"
+        keys = "" if self._explained else f"\n  {KEYS}"
         self._explained = True
-        self.say(f"{bell}\n{HEADINGS[prompt.kind]}\n  {prompt.text}{answer}\n")
+        self.say(f"{bell}\n{HEADINGS[prompt.kind]}\n  {prompt.text}{keys}\n")
 
     def _is_due(self, name: str, t_s: float, every_s: float) -> bool:
         if t_s < self._due_s.get(name, -math.inf) - 1e-6:
@@ -105,14 +105,14 @@ class Lines:
 
 
 class JsonLines(Lines):
-    """Says every event as one line of JSON, for other front ends: its name in lower case, then its fields."""
+    """Console that prints each output as a line of JSON, for other front ends: its name in lower case, its fields."""
 
     def hear(self, output: Output) -> None:
-        """Say it."""
+        """Print an output."""
         self._event(type(output).__name__.lower(), asdict(output))
 
     def say(self, text: str) -> None:
-        """A line of talk as an event of its own."""
+        """Print a message as the event `note`."""
         self._event("note", {"text": text.strip()})
 
     def _event(self, name: str, fields: Mapping[str, Any]) -> None:
@@ -120,7 +120,7 @@ class JsonLines(Lines):
 
 
 def plain(value: Any) -> Any:
-    """JSON's own types: what is no finite number becomes null."""
+    """Return a value in JSON's own types; numbers that are not finite become None."""
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""What the terminal draws: breakouts and a vehicle, as strokes in their own axes (half a board's length is 1)."""
+"""Models of breakouts and a vehicle, as strokes in their own axes (half a board's length is 1)."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ Stroke = tuple[Direction, ...]
 
 @dataclass(frozen=True)
 class Model:
-    """Strokes, each from point to point.
+    """Model of a board, as strokes from point to point.
 
     Attributes
     ----------
-    up : the sign of z on the upper side. always, above, below : what is seen from anywhere, of the upper side, and of
-        the lower one. fine : where there is room for it.
+    up : sign of z on the upper side. always, above, below : strokes that are visible from everywhere, from above, and
+        from below. fine : strokes for large pictures.
     """
 
     up: float
@@ -30,7 +30,7 @@ class Model:
     fine: tuple[Stroke, ...]
 
     def strokes(self, front: bool, large: bool) -> Iterable[Stroke]:
-        """What is seen where the upper side faces the eye, or not."""
+        """Yield the visible strokes; front : the upper side faces the eye."""
         yield from self.always
         yield from self.above if front else self.below
         if large:
@@ -47,21 +47,21 @@ def _rectangle(x: float, y: float, z: float) -> Stroke:
 
 
 def _breakout(*fine: Stroke) -> Model:
-    """A plate with its chip on the component side."""
+    """Return a plate with its chip on the component side."""
     x, y, z = 1.0, 0.7, 0.09
     faces = _rectangle(x, y, z), _rectangle(x, y, -z)
     return Model(1.0, (), (faces[0], _rectangle(0.28, 0.28, z)), faces[1:], (*faces, *fine))
 
 
 def _pins() -> Iterable[Stroke]:
-    """A row of eight along the edge at -y, which is nearest to whoever laid it flat."""
+    """Yield a row of eight pins along the edge at -y, which is nearest to the operator of a board laid flat."""
     for k in range(8):
         x = 0.8 * (2 * k / 7 - 1.0)
         yield (x, -0.6, -0.09), (x, -0.6, -0.3)
 
 
 def _vehicle() -> Model:
-    """A multicopter: its body with the nose toward +x, four rotors above it, and two skids below (z points down)."""
+    """Return a multicopter: body with its nose toward +x, four rotors above, and two skids below (z points down)."""
     body = _around(((1.0, 0.0), (0.5, 0.25), (-0.6, 0.25), (-0.6, -0.25), (0.5, -0.25)), 0.0)
     nose = (0.5, 0.25, 0.0), (0.5, -0.25, 0.0)
     octagon = [math.radians(45.0 * k) for k in range(8)]

@@ -1,4 +1,4 @@
-"""Paints lines on the terminal's alternate screen; only rows that changed are sent."""
+"""Painter of lines on the terminal's alternate screen; it sends only rows that changed."""
 
 from __future__ import annotations
 
@@ -11,17 +11,14 @@ from rich.console import COLOR_SYSTEMS, Console
 from rich.segment import Segment
 from rich.text import Text
 
-# the second screen, so that the person's own is there again afterwards; and no cursor on it
+# The alternate screen leaves the terminal's contents as they were; its cursor is hidden.
 _SHOW, _GIVE_BACK = "\x1b[?1049h\x1b[?25l\x1b[2J", "\x1b[0m\x1b[?25h\x1b[?1049l"
 _ROW, _TO_THE_END = "\x1b[{};1H", "\x1b[0m\x1b[K"
 _USUAL = (80, 24)
 
 
 class Painter:
-    """Paints lines of text on `out`.
-
-    What colours there are, and whether NO_COLOR forbids them, rich finds out.
-    """
+    """Painter on the stream `out`; rich finds out about its colours and NO_COLOR."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
@@ -32,19 +29,19 @@ class Painter:
         self._shown = False
 
     def show(self) -> None:
-        """Begin."""
+        """Switch to the alternate screen."""
         self._shown = True
         self._send(_SHOW)
 
     def give_back(self) -> None:
-        """Put the terminal back as it was; once is enough."""
+        """Restore the terminal; further calls do nothing."""
         if self._shown:
             self._shown = False
             self._painted = []
             self._send(_GIVE_BACK)
 
     def size(self) -> tuple[int, int]:
-        """Columns and rows, which may change at any time."""
+        """Return columns and rows, which may change at any time."""
         try:
             columns, rows = os.get_terminal_size(self._out.fileno())
         except (OSError, ValueError):
@@ -52,7 +49,7 @@ class Painter:
         return columns or _USUAL[0], rows or _USUAL[1]
 
     def paint(self, lines: Sequence[Text], size: tuple[int, int], bell: bool = False) -> int:
-        """Show `lines` from the top; returns how many characters that took."""
+        """Show `lines` from the top; return the number of characters sent."""
         if size != self._size:
             self._size, self._painted = size, []
         painted = [self._encoded(line) for line in lines]
@@ -73,7 +70,7 @@ class Painter:
         system = self._console.color_system
         colours = COLOR_SYSTEMS[system] if system else None
         parts = []
-        # a text without spans renders without its own style
+        # Text.render applies the styles of spans, but not that of the text itself.
         base = self._console.get_style(line.style)
         for segment in Segment.apply_style(line.render(self._console), base):
             style = segment.style
@@ -86,7 +83,7 @@ class Painter:
         return "".join(parts)
 
     def _send(self, text: str) -> None:
-        # a terminal that is gone needs no painting, nor does the log in its place, and nobody is there to be told
+        # Escape sequences must not get into the log that replaces a closed terminal.
         if self._on_terminal and not self._out.isatty():
             return
         with suppress(OSError):

@@ -1,4 +1,4 @@
-"""A session on a terminal: one view that is kept up to date by a drawing thread of its own."""
+"""Session on a terminal: a drawing thread shows the latest view."""
 
 from __future__ import annotations
 
@@ -17,24 +17,25 @@ from .layout import lines
 from .painter import Painter
 from .view import View
 
-# as often as an eye follows, and a slow line can carry
+# Least time between two pictures: fast enough for the eye, and slow enough for a slow line.
 LEAST_INTERVAL_S = 0.16
-# so soon the drawing gives way to the reading loop, which must miss no FIFO for it; Python's own is ten times as long
-GIVE_WAY_S = 0.0005
-# a terminal that takes no output any more is not waited for longer
+# Interval after which the drawing thread gives way to the reading loop; Python's own is ten times as long, which could
+# cost a FIFO overflow.
+SWITCH_INTERVAL_S = 0.0005
+# Limit of the wait for a terminal that takes no output any more.
 LAST_WORD_S = 1.0
 
 
 class Screen:
-    """Shows a session while `listening`; before and afterwards it says lines.
+    """Console that draws a session while `listening`; before and afterwards it prints lines.
 
-    What is heard only changes the view, and a thread draws the latest one: a terminal that is slow or stopped
-    (Ctrl-S) costs the reading loop nothing.
+    Outputs only change the view, and a thread draws the latest one: a terminal that is slow or stopped (Ctrl-S) does
+    not delay the reading loop.
 
     Parameters
     ----------
-    out : a terminal. keys : what is pressed. glyphs : what `out` can show. bell : rings at each change of prompt.
-    title : what is measured. board : how it is drawn.
+    out : a terminal. keys : source of key presses. glyphs : characters for `out`. bell : ring at each new prompt.
+    title : name of the sensor. board : kind of picture.
     """
 
     def __init__(
@@ -43,7 +44,7 @@ class Screen:
         self._out, self._keys, self._glyphs, self._bell = out, keys, glyphs, bell
         self._view = View(f"mpucal: {title}" if title else "mpucal", board)
         self._ring = False
-        # a queue, as SIGHUP may come amid a put, which may be done again then; an event's lock may not
+        # Queues, because a signal handler may interrupt a put with another one; the lock of an Event would deadlock.
         self._changed: SimpleQueue[None] = SimpleQueue()
         self._closed: SimpleQueue[None] = SimpleQueue()
         self._open = False
@@ -60,7 +61,7 @@ class Screen:
         self._changed.put(None)
 
     def say(self, text: str) -> None:
-        """A line of talk, kept for the end while the screen is shown."""
+        """Print a message; while the screen is shown, keep it for the end."""
         if self._open:
             self._view = self._view.noted(text.strip())
             self._changed.put(None)
@@ -68,36 +69,36 @@ class Screen:
             print(text, file=self._out, flush=True)
 
     def pressed(self) -> Sequence[Key]:
-        """What was pressed since the last call."""
+        """Return the keys that were pressed since the last call."""
         return self._keys.pressed()
 
     def hung_up(self, stop: bool) -> None:
-        """Nothing is drawn any more; what was decided is told elsewhere in the end. `stop`: as by Ctrl-C."""
+        """Stop drawing; the messages go to the log in the end. With `stop`, act as at Ctrl-C."""
         self._close()
         if stop:
             self._keys.abort()
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Meanwhile the screen is shown; whatever happens, the terminal is as it was afterwards."""
+        """Show the screen within the context; restore the terminal afterwards."""
         self._drawing = threading.Thread(target=self._draw, name="screen", daemon=True)
-        gave_way_s = sys.getswitchinterval()
+        usual_s = sys.getswitchinterval()
         with self._keys.listening():
             try:
-                sys.setswitchinterval(GIVE_WAY_S)
+                sys.setswitchinterval(SWITCH_INTERVAL_S)
                 self._painter.show()
                 self._open = True
                 self._drawing.start()
                 yield
             finally:
                 self._close()
-                sys.setswitchinterval(gave_way_s)
+                sys.setswitchinterval(usual_s)
                 self._open = False
                 for note in self._view.notes:
                     self.say(f"  {note}")
 
     def _close(self) -> None:
-        """Draw no more, and give the terminal back; once is enough."""
+        """Stop drawing, and restore the terminal; further calls do nothing."""
         self._closed.put(None)
         self._changed.put(None)
         if self._drawing is not None and self._open:

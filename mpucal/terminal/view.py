@@ -1,4 +1,4 @@
-"""The state of a session's screen: outputs of the session in, one frozen value out."""
+"""State of a session's screen: outputs of the session in, one frozen value out."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from ..session.events import (
     Use,
     Verification,
 )
-from .flat import BOARD, as_seen
+from .flat import BOARD, flat_description
 
-# so long it is said what became of the last orientation
+# Time for which the headline shows the use of the last orientation.
 TOLD_S = 1.2
 TOLD = {Use.TAKEN: "TAKEN", Use.USEFUL: "NOT THAT ONE, BUT USEFUL", Use.SEEN: "SEEN ALREADY"}
-# nearer than this the board is held still, and turned no more
+# Angle from the wanted orientation below which the headline asks to hold still.
 NEAR_DEG = 15.0
-# a countdown that is not renewed for so long waits for nothing any more
+# A countdown that is not renewed for this time has ended.
 COUNTDOWN_HOLDS_S = 1.0
-# at its end the session looks at what is known now, and then says what became of the orientation
+# Time from the end of a countdown until the session has decided about the orientation.
 DECIDED_S = 2.0
-# the part of gravity that an axis must carry to be named: a tilt by 30 degrees towards a corner is named by both axes
+# Share of gravity along an axis from which it is named: of a tilt by 30 degrees towards a corner, both axes are.
 WORTH_NAMING = 0.3
 HEADLINES = {
     PromptKind.LAY_FLAT: "LAY FLAT",
@@ -46,7 +46,7 @@ CONNECTING = "WAIT"
 
 
 class Moment(StrEnum):
-    """What matters this moment: it takes the large letters."""
+    """Subject of the headline."""
 
     CONNECTING = "connecting"
     COUNTING = "counting"
@@ -59,12 +59,12 @@ class Moment(StrEnum):
 
 @dataclass(frozen=True)
 class View:
-    """The latest of everything; times are the session's [s], None where nothing came yet.
+    """Latest output of each kind; times are the session's [s], None before the first.
 
     Attributes
     ----------
-    board : how it is drawn. seen : the orientations that count, in the order in which they came. verified : since the
-        last prompt to turn. notes : decisions and other lines of talk, in order.
+    board : kind of picture. seen : orientations that count, in their order. verified : those since the last prompt to
+        turn. notes : decisions and other messages, in their order.
     """
 
     title: str = "mpucal"
@@ -83,7 +83,7 @@ class View:
     now_s: float | None = None
 
     def after(self, output: Output) -> View:
-        """The view once `output` has come."""
+        """Return the view after another output."""
         match output:
             case Prompt():
                 return self._prompted(output)
@@ -102,40 +102,39 @@ class View:
             case Caution():
                 view = replace(self, caution=output)
             case Seen():
-                # turned anew, they are counted anew
+                # When the turning starts again, the numbers do as well.
                 kept = tuple(s for s in self.seen if s.paused != output.paused or s.number < output.number)
                 view = replace(self, seen=(*kept, output))
             case Verification():
                 view = replace(self, verified=(*self.verified, output)).noted(output.text)
-            case _:  # what the session asks of others
+            case _:
+                # Commands are not shown.
                 return self
         return view._at(output.t_s)
 
     def noted(self, text: str) -> View:
-        """The view with a line of talk more."""
+        """Return the view with another message."""
         return replace(self, notes=(*self.notes, text))
 
     @property
     def elapsed_s(self) -> float:
-        """Since the first sample."""
+        """Time since the first sample [s]."""
         return 0.0 if self.begun_s is None or self.now_s is None else self.now_s - self.begun_s
 
     @property
     def waiting(self) -> Countdown | None:
-        """The countdown that runs: until the board moves or it is not renewed; at its end, until it is told of."""
+        """Countdown that runs, until the board moves or it is not renewed; after its end, until the decision."""
         if self.countdown is None or self.now_s is None:
             return None
         counts = self.countdown.remaining_s > 0.0
         moved = self.meter is not None and self.meter.t_s > self.countdown.t_s and not self.meter.still
-        if counts and moved:
-            return None
-        return (
-            self.countdown if self.now_s - self.countdown.t_s <= (COUNTDOWN_HOLDS_S if counts else DECIDED_S) else None
-        )
+        age_s = self.now_s - self.countdown.t_s
+        over = (counts and moved) or age_s > (COUNTDOWN_HOLDS_S if counts else DECIDED_S)
+        return None if over else self.countdown
 
     @property
     def wanted(self) -> Direction | None:
-        """What is to point down, where one orientation is wanted."""
+        """Unit vector that is to point down, if one orientation is wanted."""
         if self.prompt is None or self.prompt.kind not in (PromptKind.ROTATE, PromptKind.VERIFY):
             return None
         if self.prompt.down is not None or self.prompt.kind is PromptKind.VERIFY or self.knowledge is None:
@@ -144,28 +143,29 @@ class View:
 
     @property
     def confirming(self) -> str:
-        """What the person is to confirm as they lay the board flat, else nothing."""
+        """Question to confirm while the board is laid flat, else empty."""
         if self.prompt is None or self.prompt.kind is not PromptKind.LAY_FLAT or self.meter is None:
             return ""
-        return as_seen(self.meter.down, self.board)
+        return flat_description(self.meter.down, self.board)
 
     @property
     def moment(self) -> Moment:
-        """What matters now."""
+        """Subject of the headline."""
         return self._now[0]
 
     @property
     def headline(self) -> str:
-        """What to do this moment, in a word or two."""
+        """Instruction of this moment, in a few words."""
         return self._now[1]
 
     @property
     def _now(self) -> tuple[Moment, str]:
-        """A countdown, what became of an orientation, the step, or the way to the wanted orientation; and its words."""
         if self.prompt is None:
             return Moment.CONNECTING, CONNECTING
         waiting = self.waiting
-        if waiting is not None and self.prompt.kind is not PromptKind.REST and self._counts(waiting):
+        # Before the countdown begins, the headline says what to do for it.
+        counting = waiting is not None and waiting.remaining_s < waiting.of_s and not waiting.paused
+        if waiting is not None and counting and self.prompt.kind is not PromptKind.REST:
             word = "NEW: HOLD" if waiting.elsewhere else "HOLD"
             word = "STILL" if self.prompt.kind is PromptKind.LAY_FLAT else word
             return Moment.COUNTING, f"{word} {math.ceil(waiting.remaining_s) or ''}".rstrip()
@@ -177,15 +177,10 @@ class View:
             return Moment.POINT, f"{axes(self.wanted)} DOWN"
         if self.meter.missing_deg <= NEAR_DEG:
             return Moment.NEAR, "HOLD STILL"
-        return Moment.TURN, _way(self.meter.turn)
-
-    def _counts(self, waiting: Countdown) -> bool:
-        """Whether the countdown has begun; until then what it waits for is said."""
-        return waiting.remaining_s < waiting.of_s and not waiting.paused
+        return Moment.TURN, _turn_headline(self.meter.turn)
 
     def _prompted(self, prompt: Prompt) -> View:
-        goes_on = self.prompt is not None and self.prompt.kind is prompt.kind
-        if goes_on:
+        if self.prompt is not None and self.prompt.kind is prompt.kind:
             return replace(self, prompt=prompt)
         return replace(self, prompt=prompt, countdown=None, progress=None, caution=None, held=None, verified=())
 
@@ -193,15 +188,15 @@ class View:
         return replace(self, now_s=t_s, begun_s=t_s if self.begun_s is None else self.begun_s)
 
 
-def _way(turn: str) -> str:
-    """What is missing to the wanted orientation, in large letters: "ROLL LEFT 60"."""
-    degrees, _, way = turn.partition(" deg more, ")
-    for words, short in ((" it", ""), (" from you", ""), ("to the ", ""), ("toward", "to")):
-        way = way.replace(words, short)
-    return f"{way} {degrees}".upper()
+def _turn_headline(turn: str) -> str:
+    """Return a turn in few letters: "60 deg more, roll it to the left" becomes "ROLL LEFT 60"."""
+    degrees, _, words = turn.partition(" deg more, ")
+    for long, short in ((" it", ""), (" from you", ""), ("to the ", ""), ("toward", "to")):
+        words = words.replace(long, short)
+    return f"{words} {degrees}".upper()
 
 
 def axes(down: Direction) -> str:
-    """The axes that point down: "+X -Y"."""
+    """Return the names of the axes that point down: "+X -Y"."""
     named = [i for i in range(3) if abs(down[i]) >= WORTH_NAMING]
     return " ".join(f"{'+' if down[i] > 0 else '-'}{'XYZ'[i]}" for i in named)

@@ -1,4 +1,4 @@
-"""A session's outputs as a machine sends them, and the view they add up to."""
+"""Fixtures: a session's outputs, the views that they lead to, and a keyboard."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def view_of(outputs):
 
 @pytest.fixture
 def views():
-    """The views by where the session is."""
+    """Return the views by step of the session."""
     return {
         name: view_of(outputs)
         for name, outputs in (("laid", LAID), ("turned", TURNED), ("checked", CHECKED), ("ended", ENDED))
@@ -102,13 +102,13 @@ def views():
 
 @pytest.fixture
 def session():
-    """A whole session's outputs."""
+    """Return a whole session's outputs."""
     return ENDED
 
 
 @pytest.fixture
 def keyboard():
-    """What is typed, and where it is read."""
+    """Yield a file to type into, and the file that the program reads."""
     reader, writer = os.pipe()
     with os.fdopen(reader) as lines, os.fdopen(writer, "w") as typed:
         yield typed, lines

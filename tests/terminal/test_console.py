@@ -1,4 +1,4 @@
-"""Which kind of talk the streams allow; the kinds themselves are tested in tests/terminal."""
+"""Choice of the console by the streams and the environment."""
 
 import io
 import sys

@@ -73,7 +73,7 @@ def test_a_signal_that_nobody_takes_interrupts():
 
 @pytest.fixture
 def terminal():
-    """A terminal's two ends: what the person does, and what the program has."""
+    """Yield a terminal's two ends: the person's and the program's."""
     person, program = pty.openpty()
     with os.fdopen(program, "r+b", buffering=0) as raw, os.fdopen(person, "r+b", buffering=0) as there:
         yield there, raw

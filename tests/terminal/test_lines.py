@@ -89,7 +89,7 @@ def test_keys_are_explained_once_where_there_is_a_keyboard(keyboard):
         lines = Lines(out, Keys(lines_of))
         for kind in (PromptKind.LAY_FLAT, PromptKind.ROTATE):
             lines.hear(Prompt(kind, "Do it."))
-        assert out.getvalue().count("Enter: go on") == times
+        assert out.getvalue().count("Enter: skip ahead") == times
 
 
 def test_every_event_is_a_line_of_json(out, session):

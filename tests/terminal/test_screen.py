@@ -99,7 +99,7 @@ def test_the_bell_rings_when_something_else_is_to_be_done(out):
 
 
 def drawn(screen, out, words):
-    """Until the drawing thread has painted `words`."""
+    """Wait until the drawing thread has painted `words`."""
     painted = threading.Event()
     for _ in range(200):
         if words in out.getvalue():
@@ -120,7 +120,7 @@ def test_a_line_of_talk_is_kept_for_the_end(out):
 
 
 def test_a_terminal_that_takes_nothing_stops_nobody():
-    """Ctrl-S: the terminal's buffer is full, and hearing goes on all the same."""
+    """The session goes on although, after Ctrl-S, the terminal's buffer is full."""
     person, program = pty.openpty()
     os.set_blocking(person, False)
     with os.fdopen(program, "w") as out:

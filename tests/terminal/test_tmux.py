@@ -1,4 +1,4 @@
-"""The screen in a real terminal of both sizes: what a person sees, and what is left behind."""
+"""The screen in a real terminal of two sizes, and the terminal afterwards."""
 
 import itertools
 import os
@@ -16,7 +16,7 @@ BRAILLE = [chr(dots) for dots in range(0x2801, 0x2900)]
 
 
 class Tmux:
-    """One terminal of a given size, in a server of its own."""
+    """Terminal of a given size, in its own server."""
 
     def __init__(self, size, folder, environment):
         self._socket, self._folder = f"mpucal-{os.getpid()}-{next(_NUMBERS)}", folder
@@ -40,7 +40,7 @@ class Tmux:
         return self._tmux("display-message", "-p", "#{alternate_on} #{cursor_flag}").split() == ["1", "0"]
 
     def wait_for(self, *words, wide=0):
-        """The screen as soon as all of `words` are on it, and something beyond column `wide`."""
+        """Wait until all of `words` are on the screen, and something beyond column `wide`; return its text."""
         until = time.monotonic() + PATIENCE_S
         while time.monotonic() < until:
             text = self.text()

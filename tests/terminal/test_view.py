@@ -62,11 +62,11 @@ def test_the_way_is_short_in_large_letters(views, words, headline):
 @pytest.mark.parametrize(
     ("board", "down", "words"),
     [
-        ("gy-521", (0.0, 0.1, -0.99), "the chip faces up, the pins are toward you?"),
-        ("gy-521", (0.0, 0.0, 1.0), "the chip faces down, the pins are away from you?"),
-        ("plain", (0.0, 0.0, -1.0), "+Y points away from you?"),
-        ("vehicle", (0.0, 0.0, 1.0), "it stands on its feet"),
-        ("gy-521", (0.0, 0.7, -0.7), "it is tilted"),
+        ("gy-521", (0.0, 0.1, -0.99), "Chip up, pins toward you?"),
+        ("gy-521", (0.0, 0.0, 1.0), "Chip down, pins away from you?"),
+        ("plain", (0.0, 0.0, -1.0), "+Y away from you?"),
+        ("vehicle", (0.0, 0.0, 1.0), "On its feet"),
+        ("gy-521", (0.0, 0.7, -0.7), "The board is tilted"),
     ],
 )
 def test_a_person_confirms_what_they_see_by_leaving_it(views, board, down, words):

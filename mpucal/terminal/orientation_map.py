@@ -1,4 +1,4 @@
-"""The map of orientations: which directions of the board have pointed down, in equal-area projection."""
+"""Map of the directions that have pointed down, in equal-area projection."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ MARKS_ASCII = {"held": "o", "passed": ".", "wanted": "X", "now": "+"}
 _STYLES = {"held": "bold green", "passed": "green", "wanted": "bold yellow reverse", "now": "bold"}
 
 
-def half(upper: bool, marks: Iterable[tuple[str, Direction]], columns: int, rows: int, unicode: bool) -> Canvas:
-    """One half of the sphere of down directions, in equal areas, the board's x to the right and y upwards.
+def draw_half(upper: bool, marks: Iterable[tuple[str, Direction]], columns: int, rows: int, unicode: bool) -> Canvas:
+    """Return a map of one half of the sphere, with the board's x to the right and y upwards.
 
     Parameters
     ----------
-    upper : the half with z > 0 (the component side down). marks : what to draw ("held", "passed", "wanted", "now")
-        and where; later ones over earlier ones.
+    upper : the half with z > 0 (the component side down). marks : kind ("held", "passed", "wanted", "now") and
+        direction of each mark; later ones cover earlier ones.
     """
     canvas = Canvas(columns, rows)
     radius = min(canvas.centre) - 0.5
@@ -31,7 +31,7 @@ def half(upper: bool, marks: Iterable[tuple[str, Direction]], columns: int, rows
     glyphs = MARKS_UNICODE if unicode else MARKS_ASCII
     for name, (x, y, z) in marks:
         if (z > 0.0) == upper:
-            # Lambert's azimuthal projection of a half, its rim at 1
+            # Lambert's azimuthal equal-area projection, scaled so that the rim of the half is at 1.
             shrink = 1.0 / math.sqrt(1.0 + abs(z))
             canvas.letter(_at(canvas, 0.92 * radius, x * shrink, y * shrink), glyphs[name], _STYLES[name])
     return canvas
