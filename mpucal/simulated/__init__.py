@@ -1,1 +1,1 @@
-"""One simulated world: a sensor, a hand, a chip, a serial bridge and a vehicle."""
+"""Simulated world: a sensor, a hand, a chip, a serial bridge and a vehicle."""

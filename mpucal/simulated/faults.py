@@ -1,6 +1,6 @@
-"""The table of simulated faults: name, what happens, where; `sim:fault=`, its errors and the docs' tables follow it.
+"""Table of simulated faults, from which `sim:fault=`, its error messages and the tables of the documentation are made.
 
-A transfer fails as Linux would tell it: OSError with the errno of Documentation/i2c/fault-codes.rst.
+A transfer fails as on Linux: OSError with the errno of Documentation/i2c/fault-codes.rst.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .mishaps import Knock, Mishap, Slip, Warmth, ZeroStep
 
 
 class Where(StrEnum):
-    """What a fault befalls."""
+    """Parts of the simulated world that a fault affects."""
 
     CHIP = "chip"
     BUS = "bus"
@@ -34,20 +34,21 @@ OF_VEHICLE = (Where.VEHICLE, Where.LINK)
 
 @dataclass(frozen=True)
 class FaultKind:
-    """A row of the table; what is not given does not happen.
+    """A row of the table; a field that is not given has no effect.
 
     Attributes
     ----------
-    name : as in an option. where : what it befalls. what : what happens.
+    name : as in an option. where : the part that it affects. what : its description.
     timed : it begins at a time; otherwise it is there from the start.
-    seconds : how long it lasts. again_s : after which it happens again.
-    errno : with which every transfer fails meanwhile. takes_s : how long such a transfer takes.
-    flips : bytes arrive with bits flipped meanwhile. pause_s : how long the host does nothing.
-    strike : what happens to the chip at a time [ns] until another [ns], or to the vehicle.
-    share : of the packets, or of the bytes, that it befalls.
-    spoils : what a serial line makes of a byte, with a number from 1 to 255 to vary it.
-    mishap : what befalls the sensor.
-    pins : words of a sample, by number, that stay at this count. alters : what a read at a register gives instead.
+    seconds : its duration. again_s : time until it repeats.
+    errno : error of every transfer meanwhile. takes_s : duration of such a transfer.
+    flips : bits of the bytes that arrive are flipped meanwhile. pause_s : time for which the host does nothing.
+    strike : called with the chip, begin [ns] and end [ns], or with the vehicle.
+    share : of the packets or bytes that it affects.
+    spoils : makes bytes of a byte on a serial line and a number from 1 to 255, which varies the damage.
+    mishap : of the sensor.
+    pins : words of a sample, by number, and the count at which they stay. alters : makes another reply of a register
+        and its data.
     """
 
     name: str
@@ -69,18 +70,18 @@ class FaultKind:
 
 
 ACC, GYR, TEMPERATURE = (0, 1, 2), (4, 5, 6), (3,)
-# 12:00:07 on a Saturday, as a DS3231 tells it
+# 12:00:07 on a Saturday in the registers of a DS3231
 TIME = bytes([0x07, 0x00, 0x12, 0x07, 0x21, 0x11, 0x26])
 
 
 def _of_a_clock(register: int, data: bytes) -> bytes:
-    """What a DS3231 gives: its 19 registers, again and again."""
+    """Return the reply of a DS3231, which repeats its 19 registers."""
     held = TIME + bytes(12)
     return bytes(held[(register + i) % len(held)] for i in range(len(data)))
 
 
 def _without_fifo(register: int, data: bytes) -> bytes:
-    """Of FIFO_COUNT and of the FIFO, nothing."""
+    """Return zeros for FIFO_COUNT and the FIFO."""
     return bytes(len(data)) if FIFO_COUNT_H <= register <= FIFO_R_W else data
 
 
@@ -232,13 +233,13 @@ FAULTS = {kind.name: kind for kind in _ROWS}
 
 
 def fault_kinds(*where: Where) -> dict[str, FaultKind]:
-    """The rows of faults that befall any of these, by name."""
+    """Return the rows of faults that affect any of these parts, by name."""
     return {name: kind for name, kind in FAULTS.items() if kind.where in where}
 
 
 @dataclass(frozen=True)
 class Fault:
-    """A kind of fault, by its name in FAULTS, at `at_s` of its world's clock; 0 for one that is not timed."""
+    """A fault by its name in FAULTS, which begins at `at_s` of its world's clock; 0 if it is not timed."""
 
     name: str
     at_s: float = 0.0
@@ -248,7 +249,7 @@ class Fault:
 
     @classmethod
     def parse(cls, text: str, *where: Where) -> Self:
-        """Of NAME@SECONDS, or NAME of one that is not timed; KeyError or ValueError of anything else."""
+        """Parse NAME@SECONDS, or NAME of one that is not timed; raise KeyError or ValueError otherwise."""
         name, at, seconds = text.partition("@")
         if fault_kinds(*where)[name].timed != bool(at):
             raise ValueError(text)
@@ -259,33 +260,33 @@ class Fault:
 
     @property
     def kind(self) -> FaultKind:
-        """Its row."""
+        """Row of the table."""
         return FAULTS[self.name]
 
     @property
     def begin_ns(self) -> int:
-        """When it begins."""
+        """Time of its begin."""
         return round(self.at_s * 1e9)
 
     @property
     def end_ns(self) -> float:
-        """When it is over."""
+        """Time of its end."""
         return self.begin_ns + self.kind.seconds * 1e9
 
 
 class Schedule:
-    """The timed ones of `faults`, each when it begins, and again where it does that."""
+    """Schedule of the timed ones of `faults`, with their repetitions."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         timed = sorted((fault for fault in faults if fault.kind.timed), key=lambda fault: fault.at_s)
         self._waiting = [(fault.begin_ns, fault) for fault in timed]
 
     def next_ns(self) -> float:
-        """When the next one begins; infinite where none does."""
+        """Return the time of the next one, infinity if there is none."""
         return min((at_ns for at_ns, _ in self._waiting), default=math.inf)
 
     def due(self, now_ns: int) -> list[Fault]:
-        """Those that begin by `now_ns`, since the last call, in order."""
+        """Return the faults that begin by `now_ns`, since the last call, in order."""
         if not self._waiting:
             return []
         due = [(at_ns, fault) for at_ns, fault in self._waiting if at_ns <= now_ns]
@@ -297,7 +298,7 @@ class Schedule:
 
 
 def begin_mishaps(faults: Iterable[Fault]) -> list[Mishap]:
-    """What befalls the sensor in the hand, each begun at its time."""
+    """Return the mishaps of the sensor, each scheduled at its time."""
     begun = []
     for fault in faults:
         if fault.kind.mishap is not None:

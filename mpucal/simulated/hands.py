@@ -1,4 +1,4 @@
-"""The kinds of hands: those that follow the guidance, those that do as they like, and careless ones."""
+"""Kinds of hands: those that follow the guidance, those that ignore it, and careless ones."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .mishaps import Knock, Slip, Warmth
 
 
 class Guided(Hand):
-    """Goes where it is asked to and waits there; asked for nothing, varies faces, edges and corners."""
+    """Hand that turns to the requested orientation and waits there; without one it varies faces, edges and corners."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         super().__init__(rng)
@@ -26,15 +26,15 @@ class Guided(Hand):
         self._visited: list[Vector] = []
 
     def rotate(self, now: Stance) -> Leg:
-        """To the asked direction, or on to another of its own."""
+        """Turn to the requested orientation and wait, or alternate between own ones and pauses."""
         if self._down is None or not self._moved:
             return super().rotate(now)
         return self.pause(now, PAUSE_S)
 
     def aim(self, now: Stance) -> Vector:
-        """To the asked direction, else to the one least like those visited."""
+        """Return the turn to the requested orientation, or to the one farthest from those visited."""
         if self._down is not None:
-            return self.towards(now, self.missed(self._down), self._rng.uniform(-0.5, 0.5))
+            return self.turn_to(now, self.inaccurate(self._down), self._rng.uniform(-0.5, 0.5))
         down = -rotation.up_in_board(now.attitude)
         if not self._visited:
             self._visited.append(down)
@@ -44,39 +44,39 @@ class Guided(Hand):
         cost = nearest + self._rng.uniform(0.0, 0.2, len(nearest)) + np.where(reachable, 0.0, 10.0)
         place = self._places[int(np.argmin(cost))]
         self._visited.append(place)
-        return self._varied(now, self.missed(place))
+        return self._varied(now, self.inaccurate(place))
 
     def _varied(self, now: Stance, down: Vector) -> Vector:
-        """A turn to `down` with as much twist about the vertical as 50 to 130 deg leave room for."""
-        turn = self.towards(now, down)
+        """Return a turn to `down` with a random twist about the vertical, of 50 to 130 deg in all if possible."""
+        turn = self.turn_to(now, down)
         for twist in self._rng.uniform(-1.5, 1.5, 8):
-            twisted = self.towards(now, down, float(twist))
+            twisted = self.turn_to(now, down, float(twist))
             if TURN_RAD[0] <= np.linalg.norm(twisted) <= TURN_RAD[1]:
                 return twisted
         return turn
 
 
 class Placing(Guided):
-    """Sets the board down on something in each orientation, and lets go of it."""
+    """Hand that sets the board down in each orientation, and lets go of it."""
 
     HELD = ON_THE_TABLE
 
 
 class Wandering(Guided):
-    """Pauses as others do, but in any orientation, whatever it is asked for."""
+    """Hand that pauses in random orientations, whatever is requested."""
 
     def aim(self, now: Stance) -> Vector:
-        """Anywhere."""
+        """Return a turn by 50 to 130 deg about a random axis."""
         axis = self._rng.normal(size=3)
         return np.asarray(axis / np.linalg.norm(axis) * self._rng.uniform(*TURN_RAD))
 
     def rotate(self, now: Stance) -> Leg:
-        """Moves and pauses by turns."""
+        """Move and pause alternately."""
         return Hand.rotate(self, now)
 
 
 class Repeating(Guided):
-    """Verifies by what it has shown: goes back to poses of the turning, to the first two of them twice."""
+    """Hand that repeats earlier poses while verifying, the first two of them twice."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         super().__init__(rng)
@@ -85,13 +85,13 @@ class Repeating(Guided):
         self._arrived = True
 
     def rotate(self, now: Stance) -> Leg:
-        """Where it is asked to while turning; whatever it is asked for after that, from one old pose to the next."""
+        """Follow the requests while rotating; while verifying go from one old pose to the next."""
         down = -rotation.up_in_board(now.attitude)
         if self._wish == "verify":
             self._arrived = not self._arrived
             if self._arrived:
                 return self.pause(now, PAUSE_S)
-            return self.move(now, self.towards(now, self.missed(next(self._again, down))), self.HELD)
+            return self.move(now, self.turn_to(now, self.inaccurate(next(self._again, down))), self.HELD)
         leg = super().rotate(now)
         if not isinstance(leg, Move) and not any(np.array_equal(down, pose) for pose in self._shown):
             self._shown.append(down)
@@ -100,45 +100,45 @@ class Repeating(Guided):
 
 
 class OneAxis(Wandering):
-    """Turns the board about its x axis alone."""
+    """Hand that turns the board about its x axis only."""
 
     def aim(self, now: Stance) -> Vector:
-        """On, by as much as others turn."""
+        """Return a turn by 50 to 130 deg about x."""
         return np.array([self._rng.uniform(*TURN_RAD), 0.0, 0.0])
 
 
 class Hasty(Guided):
-    """Follows as others do, four times as fast."""
+    """Hand that follows the guidance four times as fast."""
 
     HASTE = 4.0
 
 
 class Slipping(Guided):
-    """Holds the board by its sensor, whose accelerometer slips on its mount."""
+    """Hand that holds the board by its sensor, whose accelerometer slips on its mount."""
 
     MISHAP = Slip
 
 
 class Knocking(Guided):
-    """Knocks the board against something."""
+    """Hand that knocks the board against something."""
 
     MISHAP = Knock
 
 
 class Warming(Guided):
-    """Stands in the sun."""
+    """Hand in the sun."""
 
     MISHAP = Warmth
 
 
 class Random(Hand):
-    """Turns the board all the time, about every axis at once, whatever direction it is asked for."""
+    """Hand that turns the board all the time about every axis, whatever is requested."""
 
     SINES = 6
     RATE_RMS_RAD_S = math.radians(80.0)
 
     def rotate(self, now: Stance) -> Leg:
-        """Six sines an axis at 0.08 to 0.7 Hz, 80 deg/s rms."""
+        """Return six sines an axis at 0.08 to 0.7 Hz, 80 deg/s rms."""
         if now.held == ON_THE_TABLE:
             return self.move(now, self._rng.uniform(-0.3, 0.3, 3), IN_THE_HAND)
         shape = (3, self.SINES)
@@ -152,20 +152,20 @@ class Random(Hand):
 
 
 class Motionless(Hand):
-    """Lays the board flat, and never moves it when told to rotate."""
+    """Hand that lays the board flat, and never moves it when told to rotate."""
 
     def rotate(self, now: Stance) -> Leg:
-        """Does not."""
+        """Hold the board still."""
         return self.pause(now, PAUSE_S)
 
 
 class Restless(Guided):
-    """Fidgets where others pause: the board never lies still."""
+    """Hand that fidgets instead of pausing: the board is never still."""
 
     FIDGET_RAD = math.radians(12.0)
 
     def pause(self, now: Stance, seconds: float) -> Leg:
-        """A small turn, in the hand."""
+        """Return a small turn, in the hand."""
         turn = self._rng.uniform(-self.FIDGET_RAD, self.FIDGET_RAD, 3)
         return Move(now.step, now.step + steps(self._rng.uniform(0.3, 0.7)), turn, (now.held, IN_THE_HAND))
 

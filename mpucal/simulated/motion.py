@@ -1,4 +1,4 @@
-"""The board's motion as a hand makes it while it is listened to: finely integrated, averaged over any span."""
+"""Motion of the board in a hand: integrated at 2 kHz as far as it is asked for, averaged over any span."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from .hand import REACTION_S, Hand, HandPrompt, Stance
 from .legs import STEP_HZ, STEP_S, Leg, steps
 from .mishaps import Mishap
 
-# Shorter than any reaction: a prompt never reaches what has been computed already.
+# Shorter than any reaction: a prompt never changes motion that has been computed.
 AHEAD_S = REACTION_S[0] / 2
 
 SINES = 12
-# times of one sample, and of its force that comes later
+# The number of times that one sample needs, with its force at other times
 FEW = 4
 
 
 class BandNoise:
-    """Band-limited noise as a sum of sines, three axes.
+    """Band-limited noise on three axes, as a sum of sines.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ class BandNoise:
         self._waves = np.concatenate((np.cos(angle), np.sin(angle)), axis=1)
 
     def at(self, first: int, n: int) -> Vector:
-        """(n, 3) at the steps from `first` on, no more than are settled ahead."""
+        """Return (n, 3) at the steps from `first` on, AHEAD_S at most."""
         angle = self._pulsation * (first * STEP_S) + self._phase
         return self._sum(np.sin(angle), np.cos(angle), n)
 
     def integral(self, first: int, n: int) -> Vector:
-        """(n, 3) the integral over time, without its mean, at the steps from `first` on."""
+        """Return (n, 3) the integral over time, without its mean, at the steps from `first` on."""
         angle = self._pulsation * (first * STEP_S) + self._phase
         return self._sum(-np.cos(angle) / self._pulsation, np.sin(angle) / self._pulsation, n)
 
@@ -63,37 +63,37 @@ class Jerk:
 
     @classmethod
     def draw(cls, rng: np.random.Generator, start_s: float) -> Self:
-        """In any direction."""
+        """Draw one in a random direction."""
         direction = rng.normal(size=3)
         peak = direction / np.linalg.norm(direction) * rng.uniform(*JERK_MPS2)
         return cls(start_s, rng.uniform(*JERK_S), peak)
 
     @property
     def end_s(self) -> float:
-        """When it is over."""
+        """Time of its end."""
         return self.start_s + self.seconds
 
     def at(self, t_s: Vector) -> Vector:
-        """(n, 3) m/s^2 at times (n,)."""
+        """Return (n, 3) m/s^2 at times (n,)."""
         share = np.clip((t_s - self.start_s) / self.seconds, 0.0, 1.0)
         return np.sin(np.pi * share)[:, None] * self.peak_mps2
 
 
 class Motion:
-    """Where the board is, what it feels and how it turns.
+    """Motion of the board: its attitude, specific force and rate.
 
-    Integrated at 2 kHz; the turn between two steps is the logarithm of the attitude's change, so that
+    It is integrated at 2 kHz; the turn between two steps is the logarithm of the attitude's change, so that
     rates integrate to the attitude.
 
     Parameters
     ----------
-    hand : decides on the legs. rng : the hand's tremor, lever and clumsiness. gravity : m/s^2.
-    mishaps : what befalls the sensor besides the hand's own. habits : how it shakes; of its acceleration's tremor this
+    hand : decides on the legs. rng : of the hand's tremor, lever and jerks. gravity : m/s^2.
+    mishaps : of the sensor, besides the hand's own. disturbance : its amplitudes; of the tremor's acceleration this
         person has half to all.
 
     Attributes
     ----------
-    mishaps : of both, those that do anything.
+    mishaps : of both, those that have an effect.
     """
 
     def __init__(
@@ -102,36 +102,36 @@ class Motion:
         rng: np.random.Generator,
         gravity: float,
         mishaps: Iterable[Mishap] = (),
-        habits: HandDisturbance = TYPICAL_TREMOR,
+        disturbance: HandDisturbance = TYPICAL_TREMOR,
     ) -> None:
         self._hand = hand
         self.mishaps = tuple(mishap for mishap in (hand.mishap, *mishaps) if type(mishap) is not Mishap)
-        self._gravity, self._habits = gravity, habits
+        self._gravity, self._disturbance = gravity, disturbance
         lever = rng.normal(size=3)
-        self._lever_m = lever / np.linalg.norm(lever) * rng.uniform(*habits.lever_m)
-        self._tremble = BandNoise(rng, TREMOR_HZ, habits.tremor_mps2 * rng.uniform(0.5, 1.0))
-        self._quiver = BandNoise(rng, TREMOR_HZ, habits.tremor_rad_s)
-        self._push = BandNoise(rng, SWAY_HZ, habits.sway_mps2)
-        self._fate = rng.spawn(1)[0]
+        self._lever_m = lever / np.linalg.norm(lever) * rng.uniform(*disturbance.lever_m)
+        self._tremor_force = BandNoise(rng, TREMOR_HZ, disturbance.tremor_mps2 * rng.uniform(0.5, 1.0))
+        self._tremor_rate = BandNoise(rng, TREMOR_HZ, disturbance.tremor_rad_s)
+        self._sway = BandNoise(rng, SWAY_HZ, disturbance.sway_mps2)
+        self._jerk_rng = rng.spawn(1)[0]
         self._stance = hand.first_stance()
         self._rate = np.zeros(3)
-        self._pulses: list[Jerk] = []
+        self._jerks: list[Jerk] = []
         self._first = 0
         self._sums = np.zeros((1, 6))
         self._attitudes = self._shaken(self._stance.attitude[None], 0, np.ones(1))
 
     def hear(self, prompt: HandPrompt, t_s: float) -> None:
-        """The hand hears `prompt` at `t_s`."""
+        """Pass a prompt to the hand at `t_s`."""
         self._hand.hear(prompt, t_s)
 
     def means(self, edges_s: Vector, force_late_s: float = 0.0) -> tuple[Vector, Vector]:
-        """Mean specific force (n, 3) [m/s^2] and rate (n, 3) [rad/s] between (n + 1,) increasing times [s].
+        """Return mean specific force (n, 3) [m/s^2] and rate (n, 3) [rad/s] between (n + 1,) increasing times [s].
 
-        What lies before the last edge is forgotten then.
+        The motion before the last edge is dropped then.
 
         Parameters
         ----------
-        force_late_s : the force is that of so much earlier than the rate; negative: the rate is.
+        force_late_s : delay of the force against the rate; negative: of the rate.
         """
         self._extend(float(edges_s[-1]))
         n = len(edges_s)
@@ -149,9 +149,9 @@ class Motion:
         return force, rate
 
     def _sums_at(self, t_s: Vector) -> tuple[Vector, int]:
-        """What was felt (n, 6) until times (n,) [s], and the step before the last of these."""
+        """Return the integrals of force and rate (n, 6) until times (n,) [s], and the step before the last of these."""
         if len(t_s) <= FEW:
-            # of one sample, plain numbers take half as long and give the same bits
+            # For one sample, plain numbers take half as long and give the same bits.
             each = [self._sum_at(each_s) for each_s in t_s.tolist()]
             return np.array([sums for sums, _ in each]), each[-1][1]
         place = np.maximum(t_s * STEP_HZ - self._first, 0.0)
@@ -160,18 +160,18 @@ class Motion:
         return np.asarray((1 - part) * self._sums[node] + part * self._sums[node + 1]), int(node[-1])
 
     def _sum_at(self, t_s: float) -> tuple[Vector, int]:
-        """Integral of force and rate (6,) from the start to `t_s`, and the step before that."""
+        """Return the integral of force and rate (6,) from the start to `t_s`, and the step before that."""
         place = max(t_s * STEP_HZ - self._first, 0.0)
         node = min(int(place), len(self._sums) - 2)
         part = place - node
         return (1 - part) * self._sums[node] + part * self._sums[node + 1], node
 
     def warmer_c(self, edges_s: Vector) -> Vector:
-        """(n,) by how much the chip is warmer than at first, between (n + 1,) times [s]."""
+        """Return (n,) degrees Celsius by which the chip is warmer than at first, between (n + 1,) times [s]."""
         return np.asarray(sum((mishap.warmer_c(edges_s[1:]) for mishap in self.mishaps), np.zeros(len(edges_s) - 1)))
 
     def attitude(self, t_s: float) -> Vector:
-        """The quaternion (4,) at `t_s`, which is not before what `means` was last asked for."""
+        """Return the quaternion (4,) at `t_s`, which is not before the last edge given to `means`."""
         self._extend(t_s)
         place = t_s * STEP_HZ - self._first
         node = min(int(place), len(self._attitudes) - 2)
@@ -183,8 +183,8 @@ class Motion:
             return
         sums, attitudes = [self._sums], [self._attitudes]
         while self._stance.step <= t_s * STEP_HZ:
-            felt, more = self._go_on()
-            sums.append(sums[-1][-1] + np.cumsum(felt, axis=0))
+            motion, more = self._next_steps()
+            sums.append(sums[-1][-1] + np.cumsum(motion, axis=0))
             attitudes.append(more)
         self._sums, self._attitudes = np.concatenate(sums), np.concatenate(attitudes)
 
@@ -193,8 +193,8 @@ class Motion:
         self._sums = self._sums[nodes:]
         self._attitudes = self._attitudes[nodes:]
 
-    def _go_on(self) -> tuple[Vector, Vector]:
-        """What is felt (n, 6) in the next quarter of a second, or less where a leg ends, and the attitudes (n, 4)."""
+    def _next_steps(self) -> tuple[Vector, Vector]:
+        """Return force and rate (n, 6) of the next AHEAD_S, or until a leg ends, and the attitudes (n, 4)."""
         leg = self._hand.leg(self._stance)
         first, last = self._stance.step, min(leg.last, self._stance.step + steps(AHEAD_S))
         nodes = np.arange(first, last + 1, dtype=float)
@@ -203,36 +203,36 @@ class Motion:
         attitudes = self._shaken(planned, first, grip)
         up = rotation.up_in_board(attitudes)
         force = self._gravity * (up[1:] + up[:-1]) / 2
-        force += self._swing(turns / STEP_S) + self._clumsiness(leg, nodes, grip)
+        force += self._lever_force(turns / STEP_S) + self._shaking(leg, nodes, grip)
         self._stance = Stance(last, planned[-1], float(grip[-1]))
         return np.hstack((force * STEP_S, rotation.between(attitudes))), attitudes[1:]
 
     def _shaken(self, planned: Vector, first: int, grip: Vector) -> Vector:
-        """The attitudes (n, 4) as the hand meant them, with its tremor in it."""
+        """Return the planned attitudes (n, 4) with the hand's tremor."""
         if not grip.any():
             return planned
-        return rotation.product(planned, rotation.exp(self._quiver.integral(first, len(grip)) * grip[:, None]))
+        return rotation.product(planned, rotation.exp(self._tremor_rate.integral(first, len(grip)) * grip[:, None]))
 
-    def _swing(self, rates: Vector) -> Vector:
-        """What a sensor on the lever r feels of (n, 3) rad/s: alpha x r + w x (w x r)."""
+    def _lever_force(self, rates: Vector) -> Vector:
+        """Return the acceleration (n, 3) on the lever r at (n, 3) rad/s: alpha x r + w x (w x r)."""
         if not (rates.any() or self._rate.any()):
             return np.zeros_like(rates)
         alpha = np.diff(rates, axis=0, prepend=self._rate[None]) / STEP_S
         self._rate = rates[-1]
         return point_acceleration(alpha, rates, self._lever_m)
 
-    def _clumsiness(self, leg: Leg, nodes: Vector, grip: Vector) -> Vector:
-        """The hand's own acceleration (n, 3) in each step: tremor, wandering, jerks."""
+    def _shaking(self, leg: Leg, nodes: Vector, grip: Vector) -> Vector:
+        """Return the hand's own acceleration (n, 3) in each step: tremor, sway, jerks."""
         first, t_s = int(nodes[0]), nodes[1:] * STEP_S
         effort = leg.effort(nodes)[1:, None]
         push = np.zeros((len(t_s), 3))
         if grip.any():
-            push += self._tremble.at(first, len(t_s)) * grip[1:, None]
+            push += self._tremor_force.at(first, len(t_s)) * grip[1:, None]
         if effort.any():
-            push += self._push.at(first, len(t_s)) * effort
-            for _ in range(self._fate.poisson(self._habits.jerks_per_s * len(t_s) * STEP_S)):
-                self._pulses.append(Jerk.draw(self._fate, float(self._fate.uniform(t_s[0], t_s[-1]))))
-        for pulse in self._pulses:
-            push += pulse.at(t_s)
-        self._pulses = [pulse for pulse in self._pulses if pulse.end_s > t_s[-1]]
+            push += self._sway.at(first, len(t_s)) * effort
+            for _ in range(self._jerk_rng.poisson(self._disturbance.jerks_per_s * len(t_s) * STEP_S)):
+                self._jerks.append(Jerk.draw(self._jerk_rng, float(self._jerk_rng.uniform(t_s[0], t_s[-1]))))
+        for jerk in self._jerks:
+            push += jerk.at(t_s)
+        self._jerks = [jerk for jerk in self._jerks if jerk.end_s > t_s[-1]]
         return push

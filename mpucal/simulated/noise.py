@@ -1,4 +1,4 @@
-"""Noise of known coefficients, as a sensor at rest makes it."""
+"""Noise of a sensor at rest, with known coefficients."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ from ..data import Vector
 
 
 def noise(rng: np.random.Generator, n: int, rate_hz: float, white: float, instability: float, walk: float) -> Vector:
-    """(n,) samples of white noise [units/sqrt(Hz), two-sided], bias instability [units], random walk [units/sqrt(s)].
+    """Return (n,) samples of white noise, bias instability and random walk.
 
     Bias instability is drawn in the frequency domain, by the density of IEEE Std 952, annex C, over twice the time so
-    that its ends do not meet. A random walk is a sum: what it does beyond that time belongs to its variance.
+    that its ends do not meet. The random walk is a cumulative sum of white noise.
+
+    Parameters
+    ----------
+    white : units/sqrt(Hz), two-sided. instability : units. walk : units/sqrt(s).
     """
     f = np.fft.rfftfreq(2 * n)[1:]
     drawn = rng.standard_normal((2, len(f))) * instability * np.sqrt(n / (2.0 * np.pi * f))

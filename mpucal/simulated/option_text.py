@@ -1,4 +1,4 @@
-"""The words of `sim:key=value,...`: what the simulated chip's and the simulated vehicle's options have in common."""
+"""Parsers of `sim:key=value,...`, shared by the options of the simulated chip and the simulated vehicle."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ import re
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
-from ..errors import UsageError, meant
+from ..errors import UsageError, did_you_mean
 from .faults import Fault, Where, fault_kinds
 
 FAULT = "fault"
-# how a value is read, and what it is to be
+# A function that parses a value, and a description of the values that it accepts.
 Parser = tuple[Callable[[str], Any], str]
 
 
 def parse_options(
     text: str, parsers: Mapping[str, Parser], seed: int | None, others: str | None = None
 ) -> dict[str, Any]:
-    """The values by key of `sim` or `sim:key=value,...`; those of faults given more than once add up.
+    """Return the values of `sim` or `sim:key=value,...` by key; faults that are given more than once add up.
 
     Parameters
     ----------
-    seed : given beside `text`. others : the key under which numbers named in capitals are gathered.
+    seed : of its own option. others : key under which numbers with a name in capitals are collected.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def parse_options(
         named = others is not None and key.isupper()
         if not equals or not (named or key in parsers):
             more = "" if others is None else ", or a parameter's name"
-            keys = f"its keys are {', '.join(parsers)}{more}{meant(key, parsers)}"
+            keys = f"its keys are {', '.join(parsers)}{more}{did_you_mean(key, parsers)}"
             raise UsageError(f"sim: does not know {word!r}", keys)
         made = _value(key, value, (number, "a number") if named else parsers[key])
         if named:
@@ -54,19 +54,19 @@ def _value(key: str, text: str, parser: Parser) -> Any:
     try:
         return parse(text)
     except (ValueError, KeyError):
-        nearly = meant(text.partition("@")[0], re.findall(r"[a-z]\w\w+", expected))
+        nearly = did_you_mean(text.partition("@")[0], re.findall(r"[a-z]\w\w+", expected))
         raise UsageError(f"sim: {key}={text} is not {expected}", f"correct it, or leave it out{nearly}") from None
 
 
 def number(text: str) -> float:
-    """A finite one; ValueError of anything else."""
+    """Parse a finite number; raise ValueError otherwise."""
     if not math.isfinite(value := float(text)):
         raise ValueError(text)
     return value
 
 
 def at_least(lowest: float) -> Parser:
-    """A number from `lowest` on."""
+    """Return the parser of a number from `lowest` on."""
 
     def parse(text: str) -> float:
         if (value := number(text)) < lowest:
@@ -77,7 +77,7 @@ def at_least(lowest: float) -> Parser:
 
 
 def whole(lowest: int, highest: int | None = None) -> Parser:
-    """A whole number within limits."""
+    """Return the parser of a whole number within limits."""
 
     def parse(text: str) -> int:
         if (value := int(text)) < lowest or (highest is not None and value > highest):
@@ -88,7 +88,7 @@ def whole(lowest: int, highest: int | None = None) -> Parser:
 
 
 def one_of(names: Collection[str]) -> Parser:
-    """One of the names that there are as it is read."""
+    """Return the parser of a name that is in `names` when the text is parsed."""
 
     def parse(text: str) -> str:
         if text not in names:
@@ -99,7 +99,7 @@ def one_of(names: Collection[str]) -> Parser:
 
 
 def faults(*where: Where) -> Parser:
-    """One or several faults that befall any of these."""
+    """Return the parser of one or several faults that affect any of these parts."""
     timed = ", ".join(name for name, kind in fault_kinds(*where).items() if kind.timed)
     others = ", ".join(name for name, kind in fault_kinds(*where).items() if not kind.timed)
     expected = f"NAME@SECONDS, or several with / between them, of {timed}"

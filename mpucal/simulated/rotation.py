@@ -1,4 +1,4 @@
-"""Unit quaternions (w, x, y, z), many at once, that take the board's axes to the world's."""
+"""Unit quaternions (w, x, y, z), arrays of them, from the board's axes to the world's."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SMALL_RAD = 1e-8
 
 
 def product(p: Vector, q: Vector) -> Vector:
-    """The quaternions p q of (..., 4) and (..., 4): first q, then p."""
+    """Return the quaternions p q of (..., 4) and (..., 4): first q, then p."""
     if p.ndim == 1:
         w, x, y, z = p.tolist()
         return np.asarray(q @ np.array([[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]]))
@@ -26,46 +26,46 @@ def product(p: Vector, q: Vector) -> Vector:
 
 
 def exp(turn_rad: Vector) -> Vector:
-    """The quaternions (..., 4) of rotation vectors (..., 3) [rad]."""
+    """Return the quaternions (..., 4) of rotation vectors (..., 3) [rad]."""
     half = 0.5 * np.asarray(turn_rad)
     angle = np.linalg.norm(half, axis=-1, keepdims=True)
     return np.concatenate((np.cos(angle), half * np.sinc(angle / np.pi)), axis=-1)
 
 
 def log(q: Vector) -> Vector:
-    """The shortest rotation vectors (..., 3) [rad] of quaternions (..., 4)."""
+    """Return the shortest rotation vectors (..., 3) [rad] of quaternions (..., 4)."""
     v = np.where(q[..., :1] < 0.0, -q[..., 1:], q[..., 1:])
     sine = np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-300)
     return np.asarray(2.0 * np.arctan2(sine, np.abs(q[..., :1])) / sine * v)
 
 
 def cross_rows(a: Vector, b: Vector) -> Vector:
-    """a x b of (n, 3) and (n, 3) or (3,); np.cross takes three times as long."""
+    """Return a x b of (n, 3) and (n, 3) or (3,), three times as fast as np.cross."""
     (a_x, a_y, a_z), (b_x, b_y, b_z) = a.T, b.T
     axes = (a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x)
     return np.stack(axes, axis=1)
 
 
 def board_from_world(q: Vector) -> Vector:
-    """R(x) of equation (3), (..., 3, 3), which takes the world's axes to the board's."""
+    """Return R(x) of equation (3), (..., 3, 3), from the world's axes to the board's."""
     V = cross(q[..., 1:])
     return np.asarray(np.eye(3) + 2.0 * (V @ V - q[..., 0, None, None] * V))
 
 
 def conjugate(q: Vector) -> Vector:
-    """The inverse of each of (..., 4)."""
+    """Return the inverse of each of (..., 4)."""
     return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0]))
 
 
 def between(q: Vector) -> Vector:
-    """The rotation vectors (n, 3) [rad] from each of (n + 1, 4) to the next, in the axes of the first."""
+    """Return the rotation vectors (n, 3) [rad] from each of (n + 1, 4) to the next, in the axes of the first."""
     return log(product(conjugate(q[:-1]), q[1:]))
 
 
 def running_product(start: Vector, steps: Vector) -> Vector:
-    """start, start s_0, start s_0 s_1, ...: (n + 1, 4) of (n, 4), each normalised.
+    """Return start, start s_0, start s_0 s_1, ...: (n + 1, 4) of (n, 4), each normalised.
 
-    Doubles the stride, so that a thousand steps are ten passes of NumPy.
+    The stride doubles, so that a thousand steps are ten passes of NumPy.
     """
     q = np.concatenate((start[None], steps))
     stride = 1
@@ -76,13 +76,13 @@ def running_product(start: Vector, steps: Vector) -> Vector:
 
 
 def up_in_board(q: Vector) -> Vector:
-    """Where the world's up points in the board's axes: (..., 3), the last row of R(q)."""
+    """Return the world's up in the board's axes: (..., 3), the last row of R(q)."""
     w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
     return np.stack((2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z), axis=-1)
 
 
 def shortest_turn(a: Vector, b: Vector) -> Vector:
-    """The rotation vector (3,) [rad] that takes unit vector a to unit vector b the short way."""
+    """Return the shortest rotation vector (3,) [rad] from unit vector a to unit vector b."""
     axis = np.cross(a, b)
     sine = float(np.linalg.norm(axis))
     if sine < SMALL_RAD:

@@ -1,4 +1,4 @@
-"""The true parameters of a simulated sensor, and what it makes of a motion: counts of a chip, or values in SI units."""
+"""True parameters of a simulated sensor, and its response to a motion: counts of a chip, or values in SI units."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ TEMPERATURE_NOISE_C = 0.02
 
 @dataclass(frozen=True)
 class Setting:
-    """How the chip is set to measure.
+    """Settings of the chip.
 
     Attributes
     ----------
     rate_hz : nominal sample rate. accel_range_g, gyro_range_dps : full scales.
-    accel_offset_g, gyro_offset_dps : (3,) what offset registers and self test add.
+    accel_offset_g, gyro_offset_dps : (3,) added by offset registers and self test.
     lsb_per_c, zero_c : temperature is counts / lsb_per_c + zero_c.
-    accel_lag_s : by how much its filters make the accelerometer later than the gyroscope.
+    accel_lag_s : delay of the accelerometer against the gyroscope by its filters.
     """
 
     rate_hz: float
@@ -41,18 +41,18 @@ class Setting:
 
     @property
     def mps2_per_lsb(self) -> float:
-        """m/s^2 of an accelerometer count, at the nominal scale."""
+        """Nominal m/s^2 of an accelerometer count."""
         return self.accel_range_g * STANDARD_GRAVITY_MPS2 / ACCEL_COUNTS
 
     @property
     def rad_s_per_lsb(self) -> float:
-        """rad/s of a gyroscope count, at the nominal scale (131 LSB/(deg/s) at 250 deg/s)."""
+        """Nominal rad/s of a gyroscope count (131 LSB/(deg/s) at 250 deg/s)."""
         return float(np.radians(self.gyro_range_dps / 250.0 / 131.0))
 
 
 @dataclass(frozen=True)
 class SiSetting:
-    """A setting whose counts are m/s^2, rad/s and degrees Celsius, of no limit; `rate_hz` as in Setting."""
+    """Setting whose counts are m/s^2, rad/s and degrees Celsius, without a full scale; see Setting."""
 
     rate_hz: float
     mps2_per_lsb: float = 1.0
@@ -65,23 +65,23 @@ class SiSetting:
 
 @dataclass(frozen=True)
 class SensorResponse:
-    """In counts: (f, w) times `matrix` (6, 7), plus `offset` (7,), plus noise of deviation `noise` (7,)."""
+    """Response in counts: (f, w) times `matrix` (6, 7) + `offset` (7,) + noise of standard deviation `noise` (7,)."""
 
     matrix: Vector
     offset: Vector
     noise: Vector
 
     def values(self, specific_force: Vector, omega: Vector, normal: Vector) -> Vector:
-        """(n, 7) before rounding, with `normal` (n, 7) of unit deviation for its noise; see `counts`."""
+        """Return (n, 7) before rounding, with noise from `normal` (n, 7) of unit variance; see `counts`."""
         exact = np.concatenate((specific_force, omega), axis=1) @ self.matrix + self.offset
         return np.asarray(exact + normal * self.noise)
 
     def counts(self, specific_force: Vector, omega: Vector, rng: np.random.Generator) -> Counts:
-        """What the chip reports of the mean motion over each sample.
+        """Return the chip's samples of the mean motion over each sample.
 
         Parameters
         ----------
-        specific_force : (n, 3) m/s^2. omega : (n, 3) rad/s. rng : where the noise comes from.
+        specific_force : (n, 3) m/s^2. omega : (n, 3) rad/s. rng : of the noise.
 
         Returns
         -------
@@ -99,10 +99,10 @@ class SensorTruth:
     ----------
     D, b_a : (3, 3), (3,) m/s^2: y = D s + b_a of specific force s (the paper's eq. 3).
     K, b_omega : (3, 3), (3,) rad/s: w = K (y - b_omega).
-    gravity : m/s^2, where the sensor is.
+    gravity : m/s^2 at the sensor.
     accel_noise_density, gyro_noise_density : m/s^2/sqrt(Hz), rad/s/sqrt(Hz), of all axes or of each (3,).
-    rate_error_ppm : how much faster than nominal the sample clock runs.
-    temperature_c : of the die. chip : its name. seed : what it was drawn from.
+    rate_error_ppm : of the sample clock, positive if it is fast.
+    temperature_c : of the die. chip : its name. seed : from which it was drawn.
     """
 
     D: Vector
@@ -119,7 +119,7 @@ class SensorTruth:
 
     @classmethod
     def draw(cls, seed: int, chip: str = "mpu6050", gravity: float = STANDARD_GRAVITY_MPS2) -> Self:
-        """A plausible sensor: uniform within the data sheets' tolerances.
+        """Draw a plausible sensor: uniform within the data sheets' tolerances.
 
         Gains +-3 %, cross-axis +-0.02 rad, misalignment +-2 deg, bias +-80 mg; gyro bias +-20 deg/s, its
         matrix +-3 % on and +-2 % off the diagonal; sample clock +-0.8 %.
@@ -147,7 +147,7 @@ class SensorTruth:
         )
 
     def response(self, setting: Setting | SiSetting) -> SensorResponse:
-        """What the sensor makes of a motion, so set.
+        """Return the sensor's response under a setting.
 
         A mean over one sample passes white noise up to half the sample rate.
         """
@@ -165,24 +165,24 @@ class SensorTruth:
         return SensorResponse(matrix, offset, noise)
 
     def document(self) -> dict[str, Any]:
-        """The truth in plain JSON types, in m/s^2, rad/s and the symmetric frame."""
+        """Return the truth in plain JSON types, in m/s^2, rad/s and the symmetric frame."""
         return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in self.__dict__.items()}
 
     def symmetric(self) -> tuple[Self, Vector]:
-        """The same sensor in the body frame in which K is symmetric, and Q, which turns the body to that frame."""
+        """Return this sensor in the body frame in which K is symmetric, and Q, the rotation to that frame."""
         D, K, Q = to_symmetric_frame(self.D, self.K)
         return replace(self, D=D, K=K), Q
 
 
 def to_symmetric_frame(D: Vector, K: NDArray[np.floating[Any]]) -> tuple[Vector, Vector, Vector]:
-    """D Q^T, the symmetric Q K, and Q: K = U S V^T, Q = V U^T."""
+    """Return D Q^T, the symmetric Q K, and Q, where K = U S V^T and Q = V U^T."""
     U, S, Vt = np.linalg.svd(K)
     Q, symmetric = Vt.T @ U.T, Vt.T @ np.diag(S) @ Vt
     return D @ Q.T, (symmetric + symmetric.T) / 2, Q
 
 
 def non_orthogonality(zeta: float, eta: float, rho: float) -> Vector:
-    """C_no of Kok and Schön (2014), section 4.3's skewed axes [rad]."""
+    """Return C_no of Kok and Schön (2014), section 4.3, of skewed axes [rad]."""
     return np.array(
         [
             [1.0, 0.0, 0.0],
@@ -193,18 +193,18 @@ def non_orthogonality(zeta: float, eta: float, rho: float) -> Vector:
 
 
 def euler_rotation(angles_rad: Vector) -> Vector:
-    """Rx Ry Rz of three angles [rad]."""
+    """Return Rx Ry Rz of three angles [rad]."""
     x, y, z = rotation(np.diag(angles_rad))
     return np.asarray(x @ y @ z)
 
 
 def density(std: Vector, rate_hz: float) -> Vector:
-    """The noise density that gives a deviation `std` a sample at `rate_hz`."""
+    """Return the noise density at which a sample at `rate_hz` has the standard deviation `std`."""
     return np.asarray(std / np.sqrt(rate_hz / 2.0))
 
 
 def quantise(y: Vector, step: float) -> tuple[Vector, Mask]:
-    """y (n, 3) as 16-bit counts of size step, and the samples (n,) with an axis at the end of its range."""
+    """Round y (n, 3) to 16-bit counts of size `step`; return it, and True (n,) where an axis is at full scale."""
     if step == 0.0:
         return y, np.zeros(len(y), bool)
     counts = np.clip(np.rint(y / step), -FULL_SCALE, FULL_SCALE - 1)

@@ -264,7 +264,7 @@ def test_a_px4_that_does_not_lie_level_is_not_asked_to_name_its_sensors(opened):
     to.source.start()
     assert [text for text in to.said if "did not lie level" in text]
     assert to.vehicle.firmware.store["CAL_ACC0_ID"] == 0
-    assert not np.any(to.vehicle.firmware.store.vector("CAL_ACC0_", "OFF"))
+    assert not np.any(to.vehicle.firmware.store.vector([f"CAL_ACC0_{axis}OFF" for axis in "XYZ"]))
 
 
 def test_autocal_is_set_back_where_the_answer_to_holding_it_is_lost(opened, monkeypatch):

@@ -1,6 +1,6 @@
-"""An emulated bridge: what the firmware does, byte for byte, with any bus as its I2C bus.
+"""Emulated bridge: the firmware's behaviour byte for byte, with any bus as its I2C bus.
 
-It stands in for a microcontroller in tests and trials. See firmware_protocol.md.
+It replaces a microcontroller in tests and trials. See firmware_protocol.md.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ __all__ = ["EmulatedBridge", "EmulatedLine", "Memory"]
 
 ADDRESSES = (0x68, 0x69)
 MOST_ADDRESS = 0x7F
-# magic, major and minor
+# Length of magic, major and minor
 VERSION_BYTES = 6
 NAME = b"emulated bridge"
 
 
 class EmulatedBridge:
-    """A bridge with a chip on it; whoever owns it carries its bytes and gives it time.
+    """Bridge with a chip on it; its owner carries its bytes and calls `work`.
 
     Parameters
     ----------
     chip : at `address`; None: nothing is connected. now_ns : its clock. memory : its EEPROM.
-    features : of those that a bridge may have. window : how many requests it takes at once.
+    features : optional ones that it has. window : number of requests that it accepts at once.
     """
 
     def __init__(
@@ -58,41 +58,41 @@ class EmulatedBridge:
         self._streamer: FrameStreamer | None = None
 
     def receive(self, data: bytes) -> None:
-        """Bytes came in."""
+        """Take bytes from the host."""
         self._inbox += [frame for frame in self._deframer.feed(data) if not frame.type & wire.REPLY_BIT]
 
     def work(self) -> bytes:
-        """Do what there is to do, and return what goes out; to be called once a millisecond."""
+        """Handle what came, and return the bytes to the host; to be called once a millisecond."""
         out = [self._handle(frame) for frame in self._inbox]
         self._inbox.clear()
         streamer = self._streamer
         if streamer is not None:
-            out += [_encoded(Frames.TYPE, streamer.seq, frames) for frames in streamer.look()]
+            out += [_encode(Frames.TYPE, streamer.seq, frames) for frames in streamer.poll()]
         return b"".join(out)
 
     def _handle(self, frame: Frame) -> bytes:
         kind = frame.type | wire.REPLY_BIT
-        return b"".join(_encoded(kind, frame.seq, reply) for reply in self._answer(frame))
+        return b"".join(_encode(kind, frame.seq, reply) for reply in self._answer(frame))
 
     def _answer(self, frame: Frame) -> Sequence[Reply]:
         kind = wire.REQUESTS.get(frame.type)
         if not self._greeted and kind is not wire.Hello:
-            return [self._said(Status.NO_HELLO)]
+            return [self._status(Status.NO_HELLO)]
         other = kind is wire.Hello and frame.payload[4:5] != bytes([wire.MAJOR]) and len(frame.payload) >= VERSION_BYTES
         try:
-            # of another major version only these are known to stay
+            # Another major version has at least these bytes.
             payload = frame.payload[:VERSION_BYTES] + b"\0" if other else frame.payload
             request = None if kind is None else kind.decode(payload)
         except wire.MessageError:
-            return [self._said(Status.BAD_PAYLOAD)]
+            return [self._status(Status.BAD_PAYLOAD)]
         try:
-            return self._done(request, frame.seq)
+            return self._dispatch(request, frame.seq)
         except NoAnswer:
-            return [self._said(Status.NO_ANSWER)]
+            return [self._status(Status.NO_ANSWER)]
         except BusError:
-            return [self._said(Status.BUS_FAILED)]
+            return [self._status(Status.BUS_FAILED)]
 
-    def _done(self, request: Message | None, seq: int) -> Sequence[Reply]:
+    def _dispatch(self, request: Message | None, seq: int) -> Sequence[Reply]:
         match request:
             case wire.Hello():
                 return [self._hello(request)]
@@ -109,23 +109,23 @@ class EmulatedBridge:
                 if isinstance(request, wire.BlobBegin) and reply.status == Status.OK:
                     self._stop()
                 return [reply]
-        return [self._said(Status.UNKNOWN_TYPE)]
+        return [self._status(Status.UNKNOWN_TYPE)]
 
     def _time(self) -> int:
         return self._now_ns() // US % WRAP_US
 
-    def _said(self, status: Status) -> Reply:
+    def _status(self, status: Status) -> Reply:
         return Reply(status, self._time())
 
     def _hello(self, request: wire.Hello) -> Reply:
         if request.magic != wire.MAGIC or (request.major == wire.MAJOR and request.address > MOST_ADDRESS):
-            return self._said(Status.BAD_PAYLOAD)
+            return self._status(Status.BAD_PAYLOAD)
         status = Status.OK if request.major == wire.MAJOR else Status.BAD_VERSION
         if status == Status.OK:
             asked = (request.address,) if request.address else ADDRESSES
             self._chosen = self._address if self._chip is not None and self._address in asked else 0
             self._greeted, self._streamer, self._drops = True, None, 0
-            self._blobs.give_up()
+            self._blobs.discard()
         room = MAX_LENGTH if wire.Feature.BLOB in self._features else 0
         identity = (wire.MAGIC, wire.MAJOR, wire.MINOR, self._chosen)
         occupied = wire.Feature.OCCUPIED if room and self._blobs.occupied else 0
@@ -140,13 +140,13 @@ class EmulatedBridge:
 
     def _read(self, request: wire.Read) -> Reply:
         if not 1 <= request.count <= wire.MAX_READ:
-            return self._said(Status.BAD_PAYLOAD)
+            return self._status(Status.BAD_PAYLOAD)
         began = self._time()
         return wire.ReadReply(Status.OK, began, self._bus().read(request.register, request.count).data)
 
     def _burst(self, request: wire.Burst) -> list[Reply]:
         if not 1 <= request.count <= wire.MAX_BURST:
-            return [self._said(Status.BAD_PAYLOAD)]
+            return [self._status(Status.BAD_PAYLOAD)]
         replies: list[Reply] = []
         for offset in range(0, request.count, wire.MAX_READ):
             began, count = self._time(), min(wire.MAX_READ, request.count - offset)
@@ -155,14 +155,14 @@ class EmulatedBridge:
 
     def _write(self, request: wire.Write) -> Reply:
         if not 1 <= len(request.data) <= wire.MAX_WRITE:
-            return self._said(Status.BAD_PAYLOAD)
+            return self._status(Status.BAD_PAYLOAD)
         began = self._time()
         self._bus().write(request.register, request.data)
         return wire.WriteReply(Status.OK, began)
 
     def _stream(self, request: wire.Stream, seq: int) -> Reply:
         if request.frame_bytes > wire.MAX_READ or (request.frame_bytes and not 1 <= request.batch <= wire.MAX_BATCH):
-            return self._said(Status.BAD_PAYLOAD)
+            return self._status(Status.BAD_PAYLOAD)
         self._stop()
         if request.frame_bytes:
             self._streamer = FrameStreamer(self._bus, seq, request, self._drops, self._now_ns)
@@ -173,5 +173,5 @@ class EmulatedBridge:
             self._drops, self._streamer = self._streamer.drops, None
 
 
-def _encoded(kind: int, seq: int, reply: Reply) -> bytes:
+def _encode(kind: int, seq: int, reply: Reply) -> bytes:
     return Frame(kind, seq, reply.payload()).encode()

@@ -1,4 +1,4 @@
-"""How an emulated bridge receives a blob, and tells what it stores."""
+"""Blob messages of an emulated bridge."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .storage import Memory, SlotStorage, crc_of, is_valid_blob
 
 
 class BlobHandler:
-    """The blob messages of firmware_protocol.md, on a memory."""
+    """Handler of the blob messages of firmware_protocol.md, on a memory."""
 
     def __init__(self, memory: Memory) -> None:
         self._storage = SlotStorage(memory)
@@ -18,15 +18,15 @@ class BlobHandler:
 
     @property
     def occupied(self) -> bool:
-        """Whether storing overwrites somebody else's bytes."""
+        """True if storing would overwrite bytes that are not a blob's."""
         return self._storage.occupied
 
-    def give_up(self) -> None:
-        """What was begun is not wanted any more."""
+    def discard(self) -> None:
+        """Drop a blob that was begun and not committed."""
         self._length = None
 
     def answer(self, request: Message, t_us: int) -> Reply:
-        """The reply to one of them."""
+        """Return the reply to one of them."""
         match request:
             case wire.BlobState():
                 return self._state(t_us)

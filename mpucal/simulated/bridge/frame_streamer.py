@@ -1,4 +1,4 @@
-"""What an emulated bridge pushes from the FIFO; see firmware_protocol.md, "FRAMES"."""
+"""Frames that an emulated bridge streams from the FIFO; see firmware_protocol.md, "FRAMES"."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ INDEX_WRAP = 2**16
 
 
 class FrameStreamer:
-    """One stream.
+    """A stream of FIFO frames.
 
     Parameters
     ----------
-    bus : gives that of the chip, or raises NoAnswer. seq, request : of the STREAM that starts it now.
-    drops : counted before. now_ns : the bridge's clock.
+    bus : returns the chip's bus, or raises NoAnswer. seq, request : of the STREAM that starts it now.
+    drops : number of earlier streams' drops. now_ns : the bridge's clock.
     """
 
     def __init__(
@@ -33,26 +33,26 @@ class FrameStreamer:
         self._now_ns = now_ns
         self._pushed_ns = now_ns()
 
-    def look(self) -> list[Frames]:
-        """What there is to push."""
+    def poll(self) -> list[Frames]:
+        """Return the messages that are due."""
         now_ns = self._now_ns()
         late = now_ns - self._pushed_ns >= BEAT_NS
         if self._status == Status.OK:
             try:
-                made = list(self._look(late))
+                made = list(self._read_fifo(late))
             except BusError as error:
-                made = [self._stand(Status.NO_ANSWER if isinstance(error, NoAnswer) else Status.BUS_FAILED, now_ns)]
+                made = [self._stop(Status.NO_ANSWER if isinstance(error, NoAnswer) else Status.BUS_FAILED, now_ns)]
         else:
             made = [self._frames(now_ns)] if late else []
         if made:
             self._pushed_ns = now_ns
         return made
 
-    def _look(self, late: bool) -> Iterator[Frames]:
+    def _read_fifo(self, late: bool) -> Iterator[Frames]:
         t_ns = self._now_ns()
         n = int.from_bytes(self._bus().read(reg.FIFO_COUNT_H, 2).data, "big") // self._frame_bytes
         if n > MAX_LOOK:
-            yield self._stand(Status.OVERFLOW, t_ns)
+            yield self._stop(Status.OVERFLOW, t_ns)
             return
         if n < self._batch and not late:
             return
@@ -63,7 +63,7 @@ class FrameStreamer:
             yield self._frames(t_ns, self._read(a_message), left)
         last = self._read(left)
         if self._bus().read(reg.INT_STATUS, 1).data[0] & reg.INT_FIFO_OFLOW:
-            yield self._stand(Status.OVERFLOW, t_ns)
+            yield self._stop(Status.OVERFLOW, t_ns)
         else:
             yield self._frames(t_ns, last)
 
@@ -75,7 +75,7 @@ class FrameStreamer:
         self._index = (self._index + len(data) // self._frame_bytes) % INDEX_WRAP
         return made
 
-    def _stand(self, status: Status, t_ns: int) -> Frames:
+    def _stop(self, status: Status, t_ns: int) -> Frames:
         self.drops += 1
         self._status = status
         return self._frames(t_ns)

@@ -1,4 +1,4 @@
-"""A serial line to an emulated bridge, as a port, in a time that runs only while the host waits."""
+"""Serial line to an emulated bridge, as a port, in a time that passes only while the host waits."""
 
 from __future__ import annotations
 
@@ -8,65 +8,54 @@ from typing import Protocol
 
 from ...sources.bridge.port import BAUDS, Chunk
 from ...sources.bridge.port_errors import port_gone
+from ..chip.clock import SimulatedClock
 
 STEP_NS = 500_000
 BITS_A_BYTE = 10
-# the host's clock and the bridge's begin at different times
+# The clocks of host and bridge have different origins.
 HOST_AHEAD_NS = 7_000_000_000
 
-Spoil = Callable[[bytes], bytes]
+Damage = Callable[[bytes], bytes]
 
 
 class LineEnd(Protocol):
-    """What is at the other end."""
+    """Device at the other end."""
 
     def receive(self, data: bytes) -> None:
-        """Bytes came in."""
+        """Take bytes from the host."""
         ...
 
     def work(self) -> bytes:
-        """Do what there is to do, and return what goes out."""
-        ...
-
-
-class SteppedClock(Protocol):
-    """A clock that can be moved on."""
-
-    def now(self) -> int:
-        """What it shows, ns."""
-        ...
-
-    def sleep_until(self, t_ns: int) -> None:
-        """Go on to `t_ns`."""
+        """Handle what came, and return the bytes to the host."""
         ...
 
 
 class EmulatedLine:
-    """A port whose other end is `device`; `clock` is the device's, too.
+    """Port whose other end is `device`; both have the same `clock`.
 
     Parameters
     ----------
-    latency_ns : how long an adapter holds back what the device sends. burst_ns : it hands over what came once in
-        so long, as USB does; 0: as it comes. step_ns : how often the device works.
+    latency_ns : delay of the bytes to the host by an adapter. burst_ns : interval at which they are delivered, as by
+        USB; 0: as they come. step_ns : interval of the device's `work`.
 
     Attributes
     ----------
-    device : may be replaced: that is a reset. to_host, to_device : what the line makes of bytes.
-    unplugged : the port is gone while this is set. written : what the host has sent.
+    device : may be replaced, which is a reset. to_host, to_device : functions that damage bytes on the line.
+    unplugged : the port is gone while this is True. written : bytes that the host has sent.
     """
 
     def __init__(
         self,
         device: LineEnd,
-        clock: SteppedClock,
+        clock: SimulatedClock,
         latency_ns: int = 1_000_000,
         burst_ns: int = 0,
         step_ns: int = STEP_NS,
     ) -> None:
         self.name, self.bauds = "the emulated line", BAUDS[:1]
         self.device = device
-        self.to_host: Spoil = _unchanged
-        self.to_device: Spoil = _unchanged
+        self.to_host: Damage = _unchanged
+        self.to_device: Damage = _unchanged
         self.unplugged = False
         self.written = bytearray()
         self._clock, self._latency_ns, self._burst_ns = clock, latency_ns, burst_ns or 1
@@ -75,7 +64,7 @@ class EmulatedLine:
         self._free_ns = 0
 
     def now_ns(self) -> int:
-        """The host's clock."""
+        """Return the time of the host's clock."""
         return self._clock.now() + HOST_AHEAD_NS
 
     def read(self, until_ns: int) -> Chunk | None:
@@ -95,7 +84,7 @@ class EmulatedLine:
         self.device.receive(self.to_device(data))
 
     def set_baud(self, baud: int) -> None:
-        """See Port; it runs at any."""
+        """See Port; every rate works."""
 
     def reopen(self, until_ns: int) -> None:
         """See Port."""
@@ -104,10 +93,10 @@ class EmulatedLine:
         self._check()
 
     def revive(self, until_ns: int) -> None:
-        """See Port; the device starts by itself."""
+        """See Port; the device needs no start."""
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: no device is open."""
 
     def _step(self) -> None:
         self._clock.sleep_until(self._clock.now() + self._step_ns)
@@ -116,8 +105,8 @@ class EmulatedLine:
             data = self.to_host(data)
             sent_ns = max(self._free_ns, self.now_ns()) + len(data) * BITS_A_BYTE * 1_000_000_000 // self.bauds[0]
             self._free_ns = sent_ns
-            heard_ns = -(-(sent_ns + self._latency_ns) // self._burst_ns) * self._burst_ns
-            self._coming.append(Chunk(data, heard_ns))
+            arrival_ns = -(-(sent_ns + self._latency_ns) // self._burst_ns) * self._burst_ns
+            self._coming.append(Chunk(data, arrival_ns))
 
     def _check(self) -> None:
         if self.unplugged:

@@ -1,4 +1,4 @@
-"""Bytes on an emulated line that suffer the serial faults of the table, each at its place."""
+"""Serial faults of the table at given bytes of an emulated line."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ LATE = "late"
 
 
 class LineFaults:
-    """What arrives of what is sent; to be given to EmulatedLine.
+    """Function that damages the bytes of an EmulatedLine.
 
     Parameters
     ----------
-    at : number of the byte on the line, name of the fault, and a number from 1 to 255 that varies it.
+    at : number of the byte on the line, name of the fault, and a number from 1 to 255 that varies the damage.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class LineFaults:
         self._held = b""
 
     def __call__(self, data: bytes) -> bytes:
-        """What arrives now; what is late comes with the next."""
+        """Return the bytes that arrive now; late ones arrive with the next."""
         out, late = bytearray(self._held), False
         self._held = b""
         for byte in data:

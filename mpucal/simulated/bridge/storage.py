@@ -1,4 +1,4 @@
-"""The two slots of an emulated bridge's memory; see firmware_protocol.md, "Storage"."""
+"""Two slots of an emulated bridge's memory; see firmware_protocol.md, "Storage"."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ WRAP = 2**32
 
 
 class Memory:
-    """Bytes that stay through power-off; they are written one after the other."""
+    """Non-volatile bytes, written one after the other."""
 
     def __init__(self) -> None:
         self.data = bytearray(b"\xff" * MEMORY_BYTES)
 
     def write(self, at: int, data: bytes) -> None:
-        """Write `data` at `at`."""
+        """Write `data` from address `at` on."""
         self.data[at : at + len(data)] = data
 
 
 @dataclass(frozen=True)
 class Stored:
-    """A valid slot."""
+    """Content of a valid slot."""
 
     slot: int
     generation: int
@@ -34,13 +34,13 @@ class Stored:
 
 
 class SlotStorage:
-    """One blob in a memory, old or new whenever the power goes."""
+    """Storage of one blob, which is the old or the new one whenever power is lost."""
 
     def __init__(self, memory: Memory) -> None:
         self._memory = memory
 
     def stored(self) -> Stored | None:
-        """The valid slot, the later one of two."""
+        """Return the valid slot, the later one of two; None if there is none."""
         slots = [slot for slot in (self._slot(0), self._slot(1)) if slot is not None]
         if len(slots) == 2 and (slots[1].generation - slots[0].generation) % WRAP < WRAP // 2:
             return slots[1]
@@ -48,25 +48,25 @@ class SlotStorage:
 
     @property
     def occupied(self) -> bool:
-        """Whether a slot holds what is neither a blob nor erased."""
+        """True if a slot holds bytes that are neither a blob nor erased."""
         slots = [bytes(self._memory.data[at : at + SLOT_BYTES]) for at in (0, SLOT_BYTES)]
         return any(not slot[HEADER.size :].startswith(MAGIC) and len(set(slot)) > 1 for slot in slots)
 
     def begin(self) -> None:
-        """Make the slot that is not in use free to be written."""
-        self._spoil(self._other())
+        """Invalidate the slot that is not in use."""
+        self._invalidate(self._other())
 
     def write(self, offset: int, data: bytes) -> None:
-        """Write `data` there."""
+        """Write `data` into the slot that is not in use."""
         self._memory.write(self._other() * SLOT_BYTES + HEADER.size + offset, data)
 
     def written(self, length: int) -> bytes:
-        """The first `length` bytes there."""
+        """Return the first `length` bytes of the slot that is not in use."""
         at = self._other() * SLOT_BYTES + HEADER.size
         return bytes(self._memory.data[at : at + length])
 
     def commit(self) -> int:
-        """Let what was written there be the blob; returns its generation."""
+        """Make the written slot the valid one; return its generation."""
         stored, slot = self.stored(), self._other()
         generation = (stored.generation + 1) % WRAP if stored else 1
         header = HEADER.pack(generation, generation ^ (WRAP - 1))
@@ -75,16 +75,16 @@ class SlotStorage:
         return generation
 
     def erase(self) -> None:
-        """Store none."""
+        """Invalidate both slots."""
         other = self._other()
-        self._spoil(other)
-        self._spoil(1 - other)
+        self._invalidate(other)
+        self._invalidate(1 - other)
 
     def _other(self) -> int:
         stored = self.stored()
         return 1 - stored.slot if stored else 0
 
-    def _spoil(self, slot: int) -> None:
+    def _invalidate(self, slot: int) -> None:
         at = slot * SLOT_BYTES
         (generation,) = struct.unpack_from("<I", self._memory.data, at)
         self._memory.write(at + 4, struct.pack("<I", generation))
@@ -100,7 +100,7 @@ class SlotStorage:
 
 
 def is_valid_blob(blob: bytes) -> bool:
-    """Whether a reader may accept it."""
+    """Return True if a reader accepts the blob."""
     try:
         Blob.decode(blob)
     except BlobError:
@@ -109,5 +109,5 @@ def is_valid_blob(blob: bytes) -> bool:
 
 
 def crc_of(blob: bytes) -> int:
-    """Its CRC-32, its last four bytes."""
+    """Return the CRC-32 in a blob's last four bytes."""
     return int.from_bytes(blob[-4:], "little")

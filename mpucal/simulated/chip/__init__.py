@@ -1,4 +1,4 @@
-"""A simulated MPU-6050 or MPU-6500 in a simulated hand, as a bus."""
+"""Simulated MPU-6050, MPU-6500 and relatives in a simulated hand, as a bus."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def open_simulated(
     clock: SimulatedClock | None = None,
     mishaps: Sequence[Mishap] = (),
 ) -> SimulatedBus:
-    """The simulated chip that `sim:key=value,...` describes.
+    """Return the simulated chip that `sim:key=value,...` describes.
 
     Parameters
     ----------
     text : `sim`, or with keys: chip, who_am_i, offsets, seed, hand, pace, fault, rate_error_ppm, D, b_a, K,
-        b_omega, noise, temperature_c, khz. gravity : m/s^2, where the board is. seed : beside the text.
-    mishaps : what befalls the sensor, besides the faults of the text.
-    clock : time in place of `pace`'s, where something else moves the bus.
+        b_omega, noise, temperature_c, khz. gravity : m/s^2 at the board. seed : of its own option.
+    mishaps : of the sensor, besides the faults of the text.
+    clock : in place of that of `pace`.
 
     Raises
     ------
@@ -71,27 +71,24 @@ def open_recorded(
     rate_error_ppm: float = 0.0,
     chip: str = "mpu6050",
 ) -> SimulatedBus:
-    """A simulated chip that serves the int16 counts (n, 3) of a recording, and then ends with EndOfCapture.
+    """Return a simulated chip that serves the int16 counts (n, 3) of a recording, then raises EndOfCapture.
 
-    Its sample clock is `rate_error_ppm` faster than `rate_hz`, to which the chip is to be set.
+    Its sample clock is `rate_error_ppm` faster than `rate_hz`, which the driver must set.
 
     Raises
     ------
-    RecordingError : counts that are no int16, or not as many of both.
+    RecordingError : counts that are not int16, or different numbers of them.
     """
     feed = RecordedFeed(acc_counts, gyr_counts, rate_hz, accel_range_g, gyro_range_dps)
-    return SimulatedBus(Chip(MODELS[chip], feed, rate_error_ppm, FactoryTrim()), FastClock())
+    return SimulatedBus(Chip(MODELS[chip], feed, rate_error_ppm), FastClock())
 
 
 def _truth(options: ChipOptions, gravity: float) -> SensorTruth:
-    """As drawn, but for what was asked for; brought to the frame in which K is symmetric."""
+    """Return the drawn sensor with the options' values, in the frame in which K is symmetric."""
     drawn = SensorTruth.draw(options.seed, options.chip, gravity)
-    asked: dict[str, Any] = {
-        key: getattr(options, key)
-        for key in ("D", "b_a", "K", "b_omega", "rate_error_ppm", "temperature_c")
-        if getattr(options, key) is not None
-    }
-    truth, _ = replace(drawn, **asked).symmetric()
+    values = {key: getattr(options, key) for key in ("D", "b_a", "K", "b_omega", "rate_error_ppm", "temperature_c")}
+    given: dict[str, Any] = {key: value for key, value in values.items() if value is not None}
+    truth, _ = replace(drawn, **given).symmetric()
     return replace(
         truth,
         accel_noise_density=truth.accel_noise_density * options.noise,

@@ -1,4 +1,4 @@
-"""The bus to a simulated chip, with the time its transfers take and the faults they meet."""
+"""Bus to a simulated chip, with the duration of its transfers and their faults."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ NAME, ADDRESS = "the simulated bus", 0x68
 
 
 class SimulatedBus:
-    """A Bus with a chip on it; its clock starts at 0.
+    """Bus with one chip; its clock starts at 0.
 
     Parameters
     ----------
-    chip : the only one on it. clock : its time.
-    motion, truth : what moves the chip's sensor and what is true of it; None for a recording's counts.
-    faults : what goes wrong with chip and bus. khz : how fast it moves bits.
+    chip, clock : of the bus.
+    motion, truth : of the chip's sensor; None for a recording's counts.
+    faults : of chip and bus. khz : bit rate.
     """
 
     def __init__(
@@ -41,33 +41,33 @@ class SimulatedBus:
 
     @property
     def real_time(self) -> bool:
-        """Whether its time passes by itself."""
+        """True if its time passes by itself."""
         return isinstance(self._clock, RealClock)
 
     def read(self, register: int, count: int) -> Reply:
-        """`count` bytes from `register` on, and when the read began.
+        """Read `count` bytes from `register` on; return them and the time at which the read began.
 
         Raises
         ------
-        EndOfCapture : the recording behind the chip has ended. BusError : a fault, as Linux would tell it.
+        EndOfCapture : the recording behind the chip has ended. BusError : a fault, as Linux reports it.
         """
-        t_ns = self._begun()
-        data = self._arriving(self._chip.read(register, count, t_ns))
+        t_ns = self._begin()
+        data = self._transmitted(self._chip.read(register, count, t_ns))
         if self._faults is not None:
-            data = self._faults.answered(register, data)
-        # two addresses and the register, start, repeated start and stop, then the data
+            data = self._faults.alter_reply(register, data)
+        # Two addresses and the register, start, repeated start and stop, then the data.
         self._clock.spend((27 + 3 + 9 * count) * self._bit_ns)
         return Reply(data, t_ns)
 
     def write(self, register: int, data: bytes) -> int:
-        """Write `data` from `register` on, and return when that began.
+        """Write `data` from `register` on; return the time at which the write began.
 
         Raises
         ------
-        BusError : a fault, as Linux would tell it.
+        BusError : a fault, as Linux reports it.
         """
-        t_ns = self._begun()
-        self._chip.write(register, self._arriving(data), t_ns)
+        t_ns = self._begin()
+        self._chip.write(register, self._transmitted(data), t_ns)
         self._clock.spend((18 + 2 + 9 * len(data)) * self._bit_ns)
         return t_ns
 
@@ -76,21 +76,21 @@ class SimulatedBus:
         self._clock.sleep_until(t_ns)
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: no device is open."""
 
     def hear(self, prompt: HandPrompt) -> None:
-        """The hand that holds the board hears `prompt` now; a recording hears nothing."""
+        """Pass a prompt to the hand; the bus of a recording ignores it."""
         if self._motion is not None:
             self._motion.hear(prompt, self._clock.now() * 1e-9)
 
     def truth_document(self) -> dict[str, Any] | None:
-        """What is true of the sensor, and what goes wrong with it, in plain JSON types; None for a recording."""
+        """Return the sensor's true parameters and its faults in plain JSON types, None for a recording."""
         if self._truth is None:
             return None
-        return self._truth.document() | ({} if self._faults is None else {"faults": self._faults.words()})
+        return self._truth.document() | ({} if self._faults is None else {"faults": self._faults.names()})
 
-    def _begun(self) -> int:
-        """When a transfer begins that may go on."""
+    def _begin(self) -> int:
+        """Return the time at which a transfer begins, unless a fault prevents it."""
         if self._faults is not None:
             try:
                 self._faults.before_transfer()
@@ -98,5 +98,5 @@ class SimulatedBus:
                 raise transfer_error(error, NAME, ADDRESS) from error
         return self._clock.now()
 
-    def _arriving(self, data: bytes) -> bytes:
-        return data if self._faults is None else self._faults.arriving(data)
+    def _transmitted(self, data: bytes) -> bytes:
+        return data if self._faults is None else self._faults.flip_bits(data)

@@ -1,4 +1,4 @@
-"""The simulated chip: registers, a sample clock of its own and a FIFO.
+"""Simulated chip: registers, a sample clock of its own and a FIFO.
 
 Source: RM-MPU-6000A r4.2, RM-MPU-9250A r1.4.
 """
@@ -17,25 +17,25 @@ from .feed import Feed
 from .fifo import Fifo
 from .models import Model
 
-# A write to one of these starts the sample clock anew,
+# A write that changes one of these restarts the sample clock,
 SAMPLING = frozenset((reg.SMPLRT_DIV, reg.CONFIG, reg.PWR_MGMT_1))
-# and to one of these where it changes the rate.
+# and a write to one of these if it changes the rate.
 PACING = frozenset((reg.PWR_MGMT_2, reg.ACCEL_CONFIG2))
 AFTER_SAMPLE = reg.ACCEL_XOUT_H + reg.FRAME_BYTES
 
 
 class Chip:
-    """A chip as its bus sees it; `t_ns` never goes back.
+    """Chip as its bus sees it; `t_ns` never decreases.
 
     Parameters
     ----------
-    model : which chip. feed : where its samples come from.
-    rate_error_ppm : how much faster than nominal its sample clock runs.
-    factory : what this piece brings along.
+    model, feed : kind of chip, and source of its samples.
+    rate_error_ppm : of the sample clock, positive if it is fast.
+    factory : settings of this piece.
     """
 
-    def __init__(self, model: Model, feed: Feed, rate_error_ppm: float, factory: FactoryTrim) -> None:
-        self._model, self._feed, self._factory = model, feed, factory
+    def __init__(self, model: Model, feed: Feed, rate_error_ppm: float, factory: FactoryTrim | None = None) -> None:
+        self._model, self._feed, self._factory = model, feed, factory or FactoryTrim()
         self._speed = 1 + rate_error_ppm * 1e-6
         self._writable = model.writable()
         self._fifo = Fifo(model.family.fifo_bytes)
@@ -44,12 +44,12 @@ class Chip:
         self._unread: Vector | None = None
         self._frozen_until_ns = 0
         self._frozen: Counts | None = None
-        self._stuck: list[tuple[int, int]] = []
-        self._pinned: list[tuple[tuple[int, ...], int]] = []
+        self._cleared: list[tuple[int, int]] = []
+        self._held: list[tuple[tuple[int, ...], int]] = []
         self.reset(0)
 
     def read(self, register: int, count: int, t_ns: int) -> bytes:
-        """`count` bytes from `register` on; FIFO_R_W does not auto-increment.
+        """Return `count` bytes from `register` on; FIFO_R_W does not auto-increment.
 
         Raises
         ------
@@ -64,10 +64,10 @@ class Chip:
                 more = bytes([self._read_byte(address)])
             data += more
             address = (address + len(more)) & 0x7F
-        return bytes(data) + self._popped(count - len(data))
+        return bytes(data) + self._pop_fifo(count - len(data))
 
     def write(self, register: int, data: bytes, t_ns: int) -> None:
-        """Write from `register` on; what no register keeps is ignored."""
+        """Write from `register` on; bytes for read-only registers are ignored."""
         self._advance(t_ns)
         self._collect()
         for i, value in enumerate(data):
@@ -75,7 +75,7 @@ class Chip:
                 self._write_byte(register + i, value, t_ns)
 
     def reset(self, t_ns: int) -> None:
-        """All registers as after power-on, and the FIFO empty."""
+        """Set all registers as after power-on, and empty the FIFO."""
         self._registers = self._model.reset_values(self._factory)
         self._fifo.size = self._model.family.fifo_bytes
         self._fifo.clear()
@@ -100,7 +100,7 @@ class Chip:
         elif address == reg.SIGNAL_PATH_RESET:
             value = 0
         elif address == reg.FIFO_EN:
-            value &= self._model.fifo_en_kept
+            value &= self._model.family.fifo_en_frame
         changed = self._registers[address] != value
         self._registers[address] = value
         self._setting = None
@@ -110,7 +110,7 @@ class Chip:
             self._start_clock(t_ns)
 
     def _user_control(self, value: int) -> int:
-        """Does what its self-clearing bits ask for, and returns the others."""
+        """Execute the self-clearing bits, and return the others."""
         running = value & reg.USER_CTRL_FIFO_EN and self._model.family.fifo_reset_needs_stop
         if value & reg.USER_CTRL_FIFO_RESET and not running:
             self._fifo.clear()
@@ -119,12 +119,12 @@ class Chip:
         return value & ~(reg.USER_CTRL_FIFO_RESET | reg.USER_CTRL_SIG_COND_RESET)
 
     def _resize_fifo(self, size: int) -> None:
-        """While it runs, what lies in it is lost: no register map says what happens."""
+        """Set the size; a FIFO that is running loses its content: no register map says what happens."""
         if size != self._fifo.size and self._registers[reg.USER_CTRL] & reg.USER_CTRL_FIFO_EN:
             self._fifo.clear()
         self._fifo.size = size
 
-    def _popped(self, count: int) -> bytes:
+    def _pop_fifo(self, count: int) -> bytes:
         if len(self._fifo) < count:
             self._collect()
         return self._fifo.pop(count)
@@ -136,31 +136,31 @@ class Chip:
         count = len(self._fifo).to_bytes(2, "big")
         self._registers[reg.FIFO_COUNT_H : reg.FIFO_COUNT_L + 1] = count
 
-    # What goes wrong with it.
+    # Faults.
 
     def change_speed(self, factor: float, t_ns: int) -> None:
-        """Its sample clock runs `factor` times as fast from now on."""
+        """Run the sample clock `factor` times as fast from now on."""
         self._advance(t_ns)
         self._collect()
         self._speed *= factor
         self._start_clock(t_ns)
 
     def freeze(self, until_ns: int) -> None:
-        """It measures the same again and again, until then."""
+        """Repeat the same sample until then."""
         self._collect()
         self._frozen_until_ns, self._frozen = until_ns, None
 
     def clear_bits(self, word: int, bits: int) -> None:
-        """These bits of a sample's word number `word` are 0 from now on."""
+        """Clear these bits of word number `word` of each sample from now on."""
         self._collect()
-        self._stuck.append((word, bits))
+        self._cleared.append((word, bits))
 
     def hold_words(self, words: tuple[int, ...], count: int) -> None:
-        """These words of a sample stay at `count`, whatever it measures."""
-        self._pinned.append((words, count))
+        """Keep these words of each sample at `count`."""
+        self._held.append((words, count))
 
     def lose_fifo_byte(self, t_ns: int) -> None:
-        """Its FIFO loses a byte."""
+        """Drop a byte of the FIFO."""
         self._advance(t_ns)
         self._collect()
         self._fifo.pop(1)
@@ -172,22 +172,22 @@ class Chip:
         self._rate_hz = self._rate()
 
     def _rate(self) -> float:
-        """Nominal samples a second."""
+        """Return the nominal sample rate [Hz]."""
         divider, dlpf = self._registers[reg.SMPLRT_DIV], self._registers[reg.CONFIG] & reg.CONFIG_DLPF_CFG
         if not self._model.family.has_accel_config2:
             return reg.sample_rate_hz(divider, dlpf)
         if self._in_standby() and self._registers[reg.ACCEL_CONFIG2] & reg.ACCEL_FCHOICE_B:
             return reg.ACCEL_ONLY_HZ
-        # RM-MPU-9250A, register 25: what comes from the filter at 8 kHz is not divided
+        # RM-MPU-9250A, register 25: the divider has no effect on the filter's 8 kHz.
         base_hz = reg.base_rate_hz(dlpf)
         return base_hz if base_hz > reg.MAX_RATE_HZ else reg.sample_rate_hz(divider, dlpf)
 
     def _in_standby(self) -> bool:
-        """Whether the gyroscope is."""
+        """Return True if the gyroscope is in standby."""
         return self._registers[reg.PWR_MGMT_2] & reg.STANDBY_GYRO == reg.STANDBY_GYRO
 
     def _advance(self, t_ns: int) -> None:
-        """Take the samples that are due."""
+        """Take the samples that are due; measure them if the FIFO gets full."""
         if self._registers[reg.PWR_MGMT_1] & reg.PWR_MGMT_1_SLEEP:
             return
         due = int((t_ns - self._start_ns) * 1e-9 / self._period_s)
@@ -196,7 +196,7 @@ class Chip:
         self._taken = due
         self._registers[reg.INT_STATUS] |= reg.INT_DATA_RDY
         if not (self._registers[reg.USER_CTRL] & reg.USER_CTRL_FIFO_EN and self._registers[reg.FIFO_EN]):
-            # what nobody can read is not measured: only the last sample where the FIFO is off
+            # With the FIFO off, only the last sample can be read, so only that one is measured.
             self._unread, self._collected = self._edges_s(due - 1), due
         elif len(self._fifo) + (due - self._collected) * reg.FRAME_BYTES > self._fifo.size:
             self._collect()
@@ -206,12 +206,12 @@ class Chip:
         return 1.0 / (self._rate_hz * self._speed)
 
     def _edges_s(self, first: int) -> Vector:
-        """When the samples from number `first` on began, and the last one ended."""
+        """Return the times at which the samples from number `first` on began, and the last one ended."""
         number = np.arange(first, self._taken + 1, dtype=np.float64)
         return np.asarray(self._start_ns * 1e-9 + self._period_s * number)
 
     def _collect(self) -> None:
-        """Measure what was taken for the FIFO: as late as nobody sees, which costs least of many samples at once."""
+        """Measure the samples taken for the FIFO: as late as possible, since many samples at once cost least."""
         if self._collected == self._taken:
             return
         counts = self._measure(self._edges_s(self._collected))
@@ -236,12 +236,12 @@ class Chip:
         return self._latest
 
     def _measure(self, edges_s: Vector) -> Counts:
-        counts = self._feed.samples(edges_s, self._how())
+        counts = self._feed.samples(edges_s, self._current_setting())
         if self._in_standby():
             counts[:, GYRO] = 0
-        for word, bits in self._stuck:
+        for word, bits in self._cleared:
             counts[:, word] &= ~bits
-        for words, count in self._pinned:
+        for words, count in self._held:
             counts[:, words] = count
         self._ended = len(counts) < len(edges_s) - 1
         if len(counts) and edges_s[0] * 1e9 < self._frozen_until_ns:
@@ -249,13 +249,13 @@ class Chip:
             return np.repeat(self._frozen, len(counts), axis=0)
         return counts
 
-    def _how(self) -> Setting:
+    def _current_setting(self) -> Setting:
         if self._setting is None:
             self._setting = _setting(self._registers, self._rate_hz, self._model, self._factory)
         return self._setting
 
 
-# FIFO_EN's bit of each of a sample's seven words, in register order
+# Bits of FIFO_EN for a sample's seven words, in register order
 WORD_BITS = {
     WordGroup.ACCEL: [(word, reg.FIFO_EN_ACCEL) for word in (0, 1, 2)],
     WordGroup.TEMPERATURE: [(3, reg.FIFO_EN_TEMP)],
@@ -265,7 +265,7 @@ GYRO = slice(4, 7)
 
 
 def _columns(sources: int, family: Family) -> list[int]:
-    """Which of a sample's seven words FIFO_EN asks for, in the frame's order."""
+    """Return the numbers of a sample's words that FIFO_EN selects, in the frame's order."""
     if family.fifo_en_with_temperature:
         sources |= reg.FIFO_EN_TEMP
         sources |= reg.FIFO_EN_XG | reg.FIFO_EN_YG if sources & reg.FIFO_EN_ZG else 0
@@ -273,17 +273,17 @@ def _columns(sources: int, family: Family) -> list[int]:
 
 
 def _setting(registers: bytearray, rate_hz: float, model: Model, factory: FactoryTrim) -> Setting:
-    """What the registers say about how to measure."""
+    """Return the settings in the registers."""
     accel, gyro = registers[reg.ACCEL_CONFIG], registers[reg.GYRO_CONFIG]
     ax, ay, az = (
-        ((_word(registers, address) & ~1) - (trim & ~1)) / model.offset_scale + more
-        for address, trim, more in zip(
-            model.family.accel_offset_h, factory.accel_trim, _tested(accel, factory.accel_self_test_g), strict=True
+        ((_word(registers, address) & ~1) - (trim & ~1)) / model.offset_scale + response
+        for address, trim, response in zip(
+            model.family.accel_offset_h, factory.accel_trim, _self_test(accel, factory.accel_self_test_g), strict=True
         )
     )
     gx, gy, gz = (
-        _word(registers, reg.XG_OFFSET_H + 2 * axis) / reg.GYRO_OFFSET_LSB_PER_DPS + more
-        for axis, more in enumerate(_tested(gyro, factory.gyro_self_test_dps))
+        _word(registers, reg.XG_OFFSET_H + 2 * axis) / reg.GYRO_OFFSET_LSB_PER_DPS + response
+        for axis, response in enumerate(_self_test(gyro, factory.gyro_self_test_dps))
     )
     afs_sel = accel >> reg.FULL_SCALE_SHIFT & reg.FULL_SCALE_CODES
     fs_sel = gyro >> model.family.gyro_range_shift & reg.FULL_SCALE_CODES
@@ -299,8 +299,8 @@ def _setting(registers: bytearray, rate_hz: float, model: Model, factory: Factor
     )
 
 
-def _tested(config: int, responses: Three) -> Three:
-    """What the self test adds to x, y, z, as bits 7, 6 and 5 ask for it."""
+def _self_test(config: int, responses: Three) -> Three:
+    """Return the self-test responses of x, y, z that bits 7, 6 and 5 switch on."""
     x, y, z = (response if config & 0x80 >> axis else 0.0 for axis, response in enumerate(responses))
     return x, y, z
 

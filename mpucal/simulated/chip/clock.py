@@ -1,4 +1,4 @@
-"""The simulated bus's time: as fast as it can be, or as slow as a person."""
+"""Clocks of the simulated bus: one that only waiting moves on, and one in real time."""
 
 from __future__ import annotations
 
@@ -10,54 +10,54 @@ class SimulatedClock(Protocol):
     """Time in ns since the bus was opened."""
 
     def now(self) -> int:
-        """What the clock shows."""
+        """Return the time."""
         ...
 
     def spend(self, ns: int) -> None:
-        """A transfer takes `ns`."""
+        """Spend `ns` on a transfer."""
         ...
 
     def sleep_until(self, t_ns: int) -> None:
-        """Wait until it shows `t_ns`."""
+        """Wait until `t_ns`."""
         ...
 
 
 class FastClock:
-    """Runs only while someone waits: returns at once, the same every time."""
+    """Clock that only waiting moves on: waits return at once, and each run is the same."""
 
     def __init__(self) -> None:
         self._now = 0
 
     def now(self) -> int:
-        """What the clock shows."""
+        """Return the time."""
         return self._now
 
     def spend(self, ns: int) -> None:
-        """Go on by `ns`."""
+        """Move on by `ns`."""
         self._now += ns
 
     def sleep_until(self, t_ns: int) -> None:
-        """Go on to `t_ns`."""
+        """Move on to `t_ns`."""
         self._now = max(self._now, t_ns)
 
 
 class RealClock:
-    """Shows the time that has passed, and sleeps."""
+    """Clock of the time since it was made, which sleeps."""
 
     def __init__(self) -> None:
         self._opened = time.monotonic_ns()
         self._busy_until = 0
 
     def now(self) -> int:
-        """What the clock shows; while a transfer lasts, its end."""
+        """Return the time; during a transfer, that of its end."""
         return max(self._busy_until, self._passed())
 
     def spend(self, ns: int) -> None:
-        """The bus is busy for `ns`."""
+        """Keep the bus busy for `ns`."""
         self._busy_until = self.now() + ns
 
     def sleep_until(self, t_ns: int) -> None:
-        """Sleep until it shows `t_ns`."""
+        """Sleep until `t_ns`."""
         time.sleep(max(0, t_ns - self._passed()) * 1e-9)
 
     def _passed(self) -> int:

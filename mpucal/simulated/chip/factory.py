@@ -1,7 +1,7 @@
-"""What the factory leaves in one piece of a chip: its trims, its self-test codes.
+"""Factory settings of one piece of a chip: its trims and self-test codes.
 
 Source: RM-MPU-6000A r4.2 registers 13 to 16; for the 6500, RM-MPU-9250A r1.4 registers 0 to 15, whose code c
-stands for 2620 * 1.01^(c - 1) counts at the smallest full scale (also in Linux' drivers/iio/imu/inv_mpu6050).
+means 2620 * 1.01^(c - 1) counts at the smallest full scale (also in Linux' drivers/iio/imu/inv_mpu6050).
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ Whole = NDArray[np.int64]
 Three = tuple[float, float, float]
 Codes = tuple[int, int, int]
 
-# A self test answers within this of what its code says; 14 % is what a data sheet allows.
+# A self-test response is within this share of the code's; data sheets allow 14 %.
 SELF_TEST_SPREAD = 0.05
 
 
 @dataclass(frozen=True)
 class FactoryTrim:
-    """One piece.
+    """Factory settings of one piece.
 
     Attributes
     ----------
-    accel_trim : the 16-bit words in the accelerometer's offset registers x, y, z after a reset.
-    accel_codes, gyro_codes : the self-test codes x, y, z; 0 where the factory wrote none.
-    accel_self_test_g, gyro_self_test_dps : what each axis shows more while its self test is on.
+    accel_trim : 16-bit words of the accelerometer's offset registers x, y, z after a reset.
+    accel_codes, gyro_codes : self-test codes x, y, z; 0: none.
+    accel_self_test_g, gyro_self_test_dps : added to each axis while its self test is on.
     """
 
     accel_trim: Codes = (0, 0, 0)
@@ -43,7 +43,7 @@ class FactoryTrim:
 
     @classmethod
     def draw(cls, rng: np.random.Generator, family: Family) -> Self:
-        """A plausible piece: trims within +-1.5 g at 2048 LSB/g, with any reserved bit 0."""
+        """Draw a plausible piece: trims within +-1.5 g at 2048 LSB/g, with any reserved bit 0."""
         trim = rng.integers(-3000, 3000, 3)
         of_test = rng.spawn(1)[0]
         low, high = ((10, 25), (8, 25)) if family.packed_self_test else ((85, 125), (130, 170))
@@ -59,7 +59,7 @@ class FactoryTrim:
         )
 
     def registers(self, family: Family) -> dict[int, int]:
-        """What it left, by register address."""
+        """Return the settings by register address."""
         values: dict[int, int] = {}
         for address, word in zip(family.accel_offset_h, self.accel_trim, strict=True):
             values |= dict(enumerate(word.to_bytes(2, "big", signed=True), address))
@@ -72,14 +72,14 @@ class FactoryTrim:
         )
 
     def _packed(self) -> list[int]:
-        """Bits 4:2 of an accelerometer's code above its gyroscope's code; bits 1:0 of all three in the fourth."""
+        """Return bits 4:2 of each accelerometer code above the gyroscope's; bits 1:0 of all three in the fourth."""
         bytes_ = [(a >> 2) << 5 | g for a, g in zip(self.accel_codes, self.gyro_codes, strict=True)]
         x, y, z = (a & 3 for a in self.accel_codes)
         return [*bytes_, x << 4 | y << 2 | z]
 
 
 def _responses(family: Family, accel_codes: Whole, gyro_codes: Whole) -> Vector:
-    """(2, 3) what the codes stand for: g, then deg/s."""
+    """Return (2, 3) the responses of the codes: g, then deg/s."""
     if family.packed_self_test:
         accel_g = 0.34 * (0.92 / 0.34) ** ((accel_codes - 1) / 30)
         return np.array([accel_g, 25 * 1.046 ** (gyro_codes - 1) * np.array([1, -1, 1])])

@@ -1,4 +1,4 @@
-"""The faults of a simulated chip and its bus, as the bus's clock goes on."""
+"""Faults of a simulated chip and its bus, by the bus's clock."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from .clock import SimulatedClock
 
 
 class FaultInjector:
-    """What goes wrong with one bus.
+    """Injector of the faults of one bus.
 
     Parameters
     ----------
-    faults : each at its time. chip, clock : what they happen to. rng : decides which bits flip.
+    faults : each with its time. chip, clock : that they affect. rng : of the bits that flip.
     """
 
     def __init__(self, faults: Sequence[Fault], chip: Chip, clock: SimulatedClock, rng: np.random.Generator) -> None:
@@ -32,7 +32,7 @@ class FaultInjector:
                 chip.hold_words(*fault.kind.pins)
 
     def before_transfer(self) -> None:
-        """What happens now, before a transfer.
+        """Inject the faults that are due before a transfer.
 
         Raises
         ------
@@ -41,28 +41,28 @@ class FaultInjector:
         while due := self._schedule.due(self._clock.now()):
             for fault in due:
                 self._strike(fault)
-        for kind in self._going_on(self._failing):
+        for kind in self._active(self._failing):
             if kind.errno is not None and (not kind.share or self._rng.random() < kind.share):
                 self._clock.spend(round(kind.takes_s * 1e9))
                 raise OSError(kind.errno, os.strerror(kind.errno))
 
-    def arriving(self, data: bytes) -> bytes:
-        """What arrives of `data`, in either direction."""
-        share = max((kind.share for kind in self._going_on(self._flipping)), default=0.0)
+    def flip_bits(self, data: bytes) -> bytes:
+        """Return `data`, sent in either direction, with the bits flipped that are flipped now."""
+        share = max((kind.share for kind in self._active(self._flipping)), default=0.0)
         if not share:
             return data
         hit = self._rng.random(len(data)) < share
         flipped = np.frombuffer(data, np.uint8) ^ np.where(hit, 1 << self._rng.integers(0, 8, len(data)), 0)
         return flipped.astype(np.uint8).tobytes()
 
-    def answered(self, register: int, data: bytes) -> bytes:
-        """What is read instead of `data` from `register` on."""
-        for altered in self._altering:
-            data = altered(register, data)
+    def alter_reply(self, register: int, data: bytes) -> bytes:
+        """Return the bytes that are read instead of `data` from `register` on."""
+        for alter in self._altering:
+            data = alter(register, data)
         return data
 
-    def words(self) -> list[str]:
-        """Each as in an option."""
+    def names(self) -> list[str]:
+        """Return each fault as in an option."""
         return [str(fault) for fault in self._faults]
 
     def _strike(self, fault: Fault) -> None:
@@ -72,8 +72,8 @@ class FaultInjector:
             end_ns = max(fault.end_ns, now_ns) if math.isfinite(fault.end_ns) else now_ns
             fault.kind.strike(self._chip, now_ns, round(end_ns))
 
-    def _going_on(self, faults: Sequence[Fault]) -> list[FaultKind]:
-        """Of which kind those of these are that go on now."""
+    def _active(self, faults: Sequence[Fault]) -> list[FaultKind]:
+        """Return the kinds of those of `faults` that last now."""
         if not faults:
             return []
         now_ns = self._clock.now()

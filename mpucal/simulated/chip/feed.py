@@ -1,4 +1,4 @@
-"""Where a simulated chip's samples come from: a sensor in motion, or a recording."""
+"""Feeds of a simulated chip: samples of a sensor in motion, or of a recording."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from ..sensor import FULL_SCALE, Counts, SensorResponse, SensorTruth, Setting
 
 RECORDED_C = 25.0
 TEMPERATURE = 3
-# until a driver has found out which chip it is, it may be set otherwise
+# A driver that has not identified the chip yet may set it otherwise.
 UNSET_S = 1.0
 
 
 class Feed(Protocol):
-    """Gives the next samples, at the chip's sample clock."""
+    """Source of the next samples, at the chip's sample clock."""
 
     def samples(self, edges_s: Vector, setting: Setting) -> Counts:
-        """(n, 7) int16 in register order between (n + 1,) times [s]; fewer where the feed has ended."""
+        """Return (n, 7) int16 in register order between (n + 1,) times [s]; fewer at the feed's end."""
         ...
 
 
 class SensorFeed:
-    """What a sensor of known truth measures of a motion."""
+    """Feed of a sensor of known truth in motion."""
 
     def __init__(self, truth: SensorTruth, motion: Motion, rng: np.random.Generator) -> None:
         self._truth, self._motion, self._rng = truth, motion, rng
         self._set: tuple[Setting, SensorResponse] | None = None
 
     def samples(self, edges_s: Vector, setting: Setting) -> Counts:
-        """The samples between (n + 1,) times [s]; it never ends."""
+        """Return the samples between (n + 1,) times [s]; the feed never ends."""
         if self._set is None or self._set[0] is not setting:
             self._set = setting, self._truth.response(setting)
         counts = self._set[1].counts(*self._motion.means(edges_s, setting.accel_lag_s), self._rng)
@@ -45,7 +45,7 @@ class SensorFeed:
 
 
 class RecordedFeed:
-    """The counts of a recording, served as they are, one a sample.
+    """Feed of a recording's counts, unchanged, one a sample.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class RecordedFeed:
 
     Raises
     ------
-    RecordingError : counts that are no int16, or not as many of both.
+    RecordingError : counts that are not int16, or different numbers of them.
     """
 
     def __init__(
@@ -76,16 +76,16 @@ class RecordedFeed:
         self._recorded = {"Hz": rate_hz, "g": accel_range_g, "deg/s": gyro_range_dps}
 
     def samples(self, edges_s: Vector, setting: Setting) -> Counts:
-        """The next samples, at 25 C; fewer than asked for at the end.
+        """Return the next samples, at 25 C; fewer than requested at the end.
 
-        A chip that is set otherwise than the recording lies flat meanwhile.
+        While the chip's settings differ from the recording's, the samples are those of a board that lies flat.
 
         Raises
         ------
-        UsageError : it stays set to another rate or range.
+        UsageError : the settings still differ after UNSET_S.
         """
         temperature = round((RECORDED_C - setting.zero_c) * setting.lsb_per_c)
-        if other := self._set_otherwise(setting):
+        if other := self._difference(setting):
             self._unset_s = float(edges_s[0]) if self._unset_s is None else self._unset_s
             if self._next or edges_s[-1] > self._unset_s + UNSET_S:
                 raise other
@@ -96,7 +96,7 @@ class RecordedFeed:
         self._next += len(acc)
         return np.hstack((acc, np.full((len(acc), 1), temperature, np.int16), gyr))
 
-    def _set_otherwise(self, setting: Setting) -> UsageError | None:
+    def _difference(self, setting: Setting) -> UsageError | None:
         chosen = {"Hz": setting.rate_hz, "g": setting.accel_range_g, "deg/s": setting.gyro_range_dps}
         for unit, recorded in self._recorded.items():
             if not np.isclose(chosen[unit], recorded, rtol=0.01):

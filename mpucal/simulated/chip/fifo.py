@@ -1,14 +1,14 @@
-"""The chip's FIFO: bytes in, bytes out, and what happens when it is full."""
+"""FIFO of the chip, with its overflow."""
 
 from __future__ import annotations
 
 
 class Fifo:
-    """A byte queue that overflows as the chip's does: by bytes, not by frames.
+    """Queue that overflows as the chip's does: by bytes, not by frames.
 
     Parameters
     ----------
-    size : bytes that fit.
+    size : in bytes.
     """
 
     def __init__(self, size: int) -> None:
@@ -20,7 +20,7 @@ class Fifo:
         return len(self._bytes)
 
     def push(self, data: bytes, stop_when_full: bool) -> bool:
-        """Append `data`; True where it did not fit, so that the oldest (or the newest) bytes are gone."""
+        """Append `data`; return True if it did not fit, so that the oldest (or the newest) bytes are lost."""
         self._bytes += data
         excess = len(self._bytes) - self.size
         if excess <= 0:
@@ -32,7 +32,7 @@ class Fifo:
         return True
 
     def pop(self, count: int) -> bytes:
-        """The `count` oldest bytes; once it is empty, the last byte again and again."""
+        """Return the `count` oldest bytes; an empty FIFO repeats the last byte."""
         data = bytes(self._bytes[:count])
         del self._bytes[:count]
         if data:
@@ -40,5 +40,5 @@ class Fifo:
         return data + bytes([self._last]) * (count - len(data))
 
     def clear(self) -> None:
-        """Forget all bytes."""
+        """Drop all bytes."""
         self._bytes.clear()

@@ -1,4 +1,4 @@
-"""The chips that can be simulated: rows of the table of chips, and how one of them deviates from its row."""
+"""Chips that can be simulated: families of the table of chips, and the deviations of single parts."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ AWAKE = 0x01
 
 @dataclass(frozen=True)
 class Model:
-    """One kind of chip; without deviations it is the first part of its family.
+    """Kind of chip; without deviations it is the first part of its family.
 
     Attributes
     ----------
     name : as in an option. family : its row.
-    who_am_i : another identity than the first part's.
+    who_am_i : identity, if not the first part's.
     accel_sensitivity : counts a g, relative to the nominal.
-    offset_lsb_per_g : another scale of its accelerometer offsets than the nominal.
-    offsets_kept : its accelerometer offsets can be written. fifo_grows : FIFO_SIZE does what its row says.
+    offset_lsb_per_g : scale of its accelerometer offsets, if not the nominal.
+    offsets_kept : its accelerometer offsets can be written. fifo_grows : FIFO_SIZE has the effect of its row.
     """
 
     name: str
@@ -35,33 +35,28 @@ class Model:
 
     @property
     def identity(self) -> int:
-        """Its answer to WHO_AM_I."""
+        """Value of WHO_AM_I."""
         return self.family.parts[0][0] if self.who_am_i is None else self.who_am_i
 
     @property
     def offset_scale(self) -> float:
-        """LSB/g of its accelerometer offsets."""
+        """LSB/g of the accelerometer offsets."""
         return self.offset_lsb_per_g or self.family.accel_offset_lsb_per_g
 
     def writable(self) -> frozenset[int]:
-        """The addresses that keep what is written to them."""
+        """Return the addresses that can be written."""
         offsets = {address + i for address in self.family.accel_offset_h for i in (0, 1) if self.offsets_kept}
         own = {reg.ACCEL_CONFIG2} if self.family.has_accel_config2 else set()
         return frozenset(WRITABLE | offsets | own)
 
     def fifo_bytes(self, accel_config2: int) -> int:
-        """Size of its FIFO while ACCEL_CONFIG2 holds this; each step of FIFO_SIZE doubles it."""
+        """Return the size of the FIFO by ACCEL_CONFIG2; each step of FIFO_SIZE doubles it."""
         steps = (accel_config2 & reg.FIFO_SIZE) >> reg.FIFO_SIZE_SHIFT
         widest = self.family.widest_fifo_bytes if self.fifo_grows else None
         return min(self.family.fifo_bytes << steps, widest or self.family.fifo_bytes)
 
-    @property
-    def fifo_en_kept(self) -> int:
-        """The bits of FIFO_EN that it keeps."""
-        return self.family.fifo_en_frame
-
     def reset_values(self, factory: FactoryTrim) -> bytearray:
-        """All 128 registers after a reset, with what the factory left in this piece."""
+        """Return all 128 registers after a reset, with the factory settings of this piece."""
         values = bytearray(128)
         values[reg.PWR_MGMT_1] = reg.PWR_MGMT_1_SLEEP if self.family.asleep else AWAKE
         values[reg.WHO_AM_I] = self.identity
@@ -87,7 +82,7 @@ WRITABLE = frozenset(
     )
 )
 
-# How the accelerometer's offset registers of a simulated chip answer, by the word of an option.
+# Behaviour of a simulated chip's accelerometer offset registers, by the name in an option.
 OFFSETS: dict[str, dict[str, Any]] = {
     "2048": {},
     "4096": {"offset_lsb_per_g": 4096.0},

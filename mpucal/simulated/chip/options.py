@@ -1,4 +1,4 @@
-"""What `sim:key=value,...` asks of the simulated chip and its hand."""
+"""Options `sim:key=value,...` of the simulated chip and its hand."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from .models import MODELS, OFFSETS
 
 @dataclass(frozen=True)
 class ChipOptions:
-    """A simulated chip and its hand, as asked for; None: as drawn from the seed.
+    """Options of a simulated chip and its hand; None: drawn from the seed.
 
     Attributes
     ----------
     chip, hand, pace : a name each. who_am_i : another identity than the chip's own.
-    offsets : what a count of its accelerometer offsets is, in LSB/g, or readonly.
-    seed : of the sensor, its noise and the hand. rate_error_ppm : how fast the sample clock runs.
+    offsets : scale of the accelerometer offsets in LSB/g, or readonly.
+    seed : of the sensor, its noise and the hand. rate_error_ppm : of the sample clock.
     D, K : (3, 3). b_a [m/s^2], b_omega [rad/s] : (3,).
-    fault : what goes wrong, and when. noise : times the data sheet's densities. temperature_c : of the die.
-    khz : how fast the bus is.
+    fault : faults with their times. noise : factor of the data sheet's densities. temperature_c : of the die.
+    khz : bit rate of the bus.
     """
 
     chip: str = "mpu6050"
@@ -48,11 +48,11 @@ class ChipOptions:
 
     @classmethod
     def parse(cls, text: str, seed: int | None = None) -> Self:
-        """Of `sim` or `sim:key=value,...`; vectors and matrices by row, as 0.1/0.2/0.3.
+        """Parse `sim` or `sim:key=value,...`; vectors and matrices are by row, as 0.1/0.2/0.3.
 
         Parameters
         ----------
-        seed : given beside `text`.
+        seed : of its own option.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The simulated chip behind a simulated driver of the kernel: what `--iio sim` opens."""
+"""Simulated chip behind a simulated kernel driver, which `--iio sim` opens."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ DEVICE = "iio:device0"
 
 
 def open_source(request: Request) -> OpenedIio:
-    """The chip that `sim:key=value,...` describes, in the gravity of the plan; see open_simulated."""
+    """Open the chip that `sim:key=value,...` describes, in the gravity of the plan; see open_simulated."""
     bus = open_simulated(request.value, request.plan.gravity, request.values.get("seed"))
     files: Any = SimulatedFiles(bus)
     return OpenedIio(

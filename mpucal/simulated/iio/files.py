@@ -1,6 +1,6 @@
-"""The files of a simulated IIO device: attributes as texts, and a buffer that the simulated chip fills.
+"""Files of a simulated IIO device: attributes as text, and a buffer that the simulated chip fills.
 
-mpucal's own driver plays the kernel's: it reads the chip, and its samples become frames as inv_mpu6050 has them.
+mpucal's own driver stands for the kernel's: its samples become frames like those of inv_mpu6050.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ IDENTITY = "1, 0, 0; 0, 1, 0; 0, 0, 1"
 
 
 class SimulatedFiles(Files):
-    """One device with both sensors, or two with one each.
+    """Files of one device with both sensors, or of two with one each.
 
     Parameters
     ----------
-    bus : to the chip. apart : two devices, the accelerometer's first. buffered : whether there are buffers.
+    bus : to the chip. apart : two devices, the accelerometer's first. buffered : the devices have buffers.
     """
 
     def __init__(self, bus: SimulatedBus, *, apart: bool = False, buffered: bool = True) -> None:
@@ -64,7 +64,7 @@ class SimulatedFiles(Files):
         if register == TRIGGERS:
             return Reply(b"hrtimer-0", self._now_ns)
         device, _, name = register.partition("/")
-        held = self._found(device, name)
+        held = self._device(device, name)
         if register.endswith("/"):
             return Reply("\n".join(sorted(held.texts)).encode(), self._now_ns)
         if not name:
@@ -74,7 +74,7 @@ class SimulatedFiles(Files):
             data, held.frames = bytes(held.frames[:take]), held.frames[take:]
             return Reply(data, self._now_ns)
         if name.endswith("_raw"):
-            return Reply(f"{self._polled(name.removesuffix('_raw'))}\n".encode(), self._now_ns)
+            return Reply(f"{self._read_channel(name.removesuffix('_raw'))}\n".encode(), self._now_ns)
         if name.endswith("_calibbias"):
             return Reply(f"{self._words()[AXES.index(name[-len('_calibbias') - 1])]}\n".encode(), self._now_ns)
         return Reply(f"{held.texts[name]}\n".encode(), self._now_ns)
@@ -82,7 +82,7 @@ class SimulatedFiles(Files):
     def write(self, register: str, data: bytes) -> int:
         """See Files."""
         device, _, name = register.partition("/")
-        held, text = self._found(device, name), data.decode()
+        held, text = self._device(device, name), data.decode()
         if held.running and name != "buffer/enable":
             raise attribute_error(_error(errno.EBUSY), device, name, text)
         if name.endswith("_calibbias"):
@@ -100,9 +100,9 @@ class SimulatedFiles(Files):
         return self._now_ns
 
     def sleep_until(self, t_ns: int) -> None:
-        """Wait, while the chip fills the buffers."""
+        """Wait while the chip fills the buffers."""
         while self._running and self._now_ns < t_ns:
-            self._pump()
+            self._fill_buffers()
         self._bus.sleep_until(t_ns)
         self._now_ns = max(self._now_ns, t_ns)
 
@@ -114,23 +114,22 @@ class SimulatedFiles(Files):
     def _running(self) -> bool:
         return any(device.running for device in self._devices.values())
 
-    def _found(self, device: str, name: str) -> _Device:
+    def _device(self, device: str, name: str) -> _Device:
         held = self._devices.get(device)
         if held is None or (name and name not in held.texts):
             raise attribute_error(_error(errno.ENOENT), device, name, None)
         return held
 
-    def _pump(self) -> Samples:
-        """What the chip measured since the last time, into the buffers."""
-        driver = self._started()
+    def _fill_buffers(self) -> None:
+        """Move the chip's new samples into the buffers."""
+        driver = self._start_driver()
         samples = driver.poll()
         self._now_ns = max(self._now_ns, driver.now_ns())
         for device in self._devices.values():
             device.fill(samples)
-        return samples
 
-    def _started(self) -> Driver:
-        """What plays the kernel's driver, with the attributes' settings."""
+    def _start_driver(self) -> Driver:
+        """Return the driver that stands for the kernel's, started with the attributes' settings."""
         if self._driver is None:
             first = next(iter(self._devices.values()))
             ranges = {kind: device.range(kind) for device in self._devices.values() for kind in device.kinds}
@@ -138,15 +137,15 @@ class SimulatedFiles(Files):
             self._driver = Driver(self._bus, config, "the simulated kernel")
             self._driver.start()
             if self._written is not None:
-                # mpucal's driver resets the chip, the kernel's does not
+                # mpucal's driver resets the chip; the kernel's does not.
                 self._write_words(self._written)
         return self._driver
 
-    def _polled(self, channel: str) -> int:
-        """The count of one channel now."""
+    def _read_channel(self, channel: str) -> int:
+        """Read the present count of one channel."""
         if self._running:
             raise attribute_error(_error(errno.EBUSY), "iio:device0", f"{channel}_raw", None)
-        self._started()
+        self._start_driver()
         reply = self._bus.read(REGISTERS[channel], 2)
         self._now_ns = max(self._now_ns, reply.t_ns)
         return int.from_bytes(reply.data, "big", signed=True)
@@ -159,14 +158,13 @@ class SimulatedFiles(Files):
 
 
 class _Device:
-    """The attributes of one device, and its buffer."""
+    """Attributes of one device, and its buffer."""
 
     def __init__(self, kinds: Sequence[str], part: Part, buffered: bool) -> None:
         self.kinds = kinds
-        # as inv_mpu6050 has it: thousandths of a degree
+        # inv_mpu6050 has thousandths of a degree.
         self._temp_scale, self._temp_offset = 1000 / part.family.lsb_per_c, part.family.zero_c * part.family.lsb_per_c
         self.frames = b""
-        self._last_ns = -1
         self.texts = {"name": part.chip.replace("-", "").lower(), "in_mount_matrix": IDENTITY}
         self.texts |= {"sampling_frequency": "50", "sampling_frequency_available": " ".join(map(str, RATES_HZ))}
         for kind in kinds:
@@ -195,11 +193,11 @@ class _Device:
 
     @property
     def running(self) -> bool:
-        """Whether the buffer is enabled."""
+        """True if the buffer is enabled."""
         return self.texts.get("buffer/enable") == "1"
 
     def range(self, kind: str) -> int:
-        """In g or deg/s."""
+        """Return the range in g or deg/s."""
         scale = float(self.texts[f"{kind}_scale"])
         return RANGES[kind][int(np.argmin(np.abs(np.array(SCALES[kind]) - scale)))]
 
@@ -207,21 +205,21 @@ class _Device:
         """Empty the buffer, which has just been enabled or disabled."""
         enabled = [e for e in self._elements.values() if self.texts.get(f"scan_elements/{e.name}_en") == "1"]
         self.layout = Layout(enabled)
-        self.frames, self._last_ns = b"", -1
+        self.frames = b""
 
     def columns(self, samples: Samples) -> dict[str, np.ndarray]:
-        """(n,) counts of each channel."""
-        warm = samples.temperature_c * 1000 / self._temp_scale - self._temp_offset
-        found = {TIMESTAMP: np.round(samples.t * 1e9).astype(np.int64), TEMP: np.round(warm)}
+        """Return (n,) counts of each channel."""
+        temperature = samples.temperature_c * 1000 / self._temp_scale - self._temp_offset
+        columns = {TIMESTAMP: np.round(samples.t * 1e9).astype(np.int64), TEMP: np.round(temperature)}
         for kind, values in ((ACCEL, samples.acc), (GYRO, samples.gyr)):
             if kind in self.kinds:
                 scale = SCALES[kind][RANGES[kind].index(self.range(kind))]
                 counts = np.round(values / scale)
-                found |= {f"{kind}_{axis}": counts[:, i] for i, axis in enumerate(AXES)}
-        return found
+                columns |= {f"{kind}_{axis}": counts[:, i] for i, axis in enumerate(AXES)}
+        return columns
 
     def fill(self, samples: Samples) -> None:
-        """Put samples into the buffer that runs; what it has no room for is lost."""
+        """Append samples to an enabled buffer; those beyond its length are lost."""
         if not self.running or len(samples) == 0:
             return
         columns = self.columns(samples)

@@ -1,4 +1,4 @@
-"""A simulated ArduPilot or PX4 vehicle in a simulated hand."""
+"""Simulated ArduPilot or PX4 vehicle in a simulated hand."""
 
 from __future__ import annotations
 

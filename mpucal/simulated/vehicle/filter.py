@@ -1,4 +1,4 @@
-"""The second-order low pass that ArduPilot puts on its IMUs."""
+"""Second-order low pass of ArduPilot's IMUs."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ class LowPass:
 
     Parameters
     ----------
-    cutoffs_hz : (k,) for values (..., k, 3); 0 passes everything. most : values that come at once.
+    cutoffs_hz : (k,) for values (..., k, 3); 0: no filter. most : number of values that come at once.
     """
 
     def __init__(self, cutoffs_hz: tuple[float, ...], rate_hz: float, most: int) -> None:
         made = [butterworth(cutoff, rate_hz) if cutoff > 0 else (PASSES, PASSES) for cutoff in cutoffs_hz]
-        # (3, k, 1) each
+        # Each is (3, k, 1).
         self._b, self._a = np.array(made).transpose(1, 2, 0)[..., None]
-        # what one value leaves in all that follow: (most + 1, k)
+        # Response (most + 1, k) of all following values to one value.
         left = [np.ones(len(made)), -self._a[1, :, 0]]
         while len(left) <= most:
             left.append(-self._a[1, :, 0] * left[-1] - self._a[2, :, 0] * left[-2])
@@ -35,11 +35,11 @@ class LowPass:
         self._states: Vector | None = None
 
     def __call__(self, values: Vector, again: int = 0) -> Vector:
-        """The filtered `values` (n, ..., k, 3); the first one has been there for ever.
+        """Return the filtered `values` (n, ..., k, 3); the filter starts in the steady state of the first one.
 
         Parameters
         ----------
-        again : how many of the last values come once more, with others in their places.
+        again : number of the last values that come once more, with others in their places.
         """
         n = len(values)
         if self._states is None:
@@ -52,9 +52,10 @@ class LowPass:
 
 
 def butterworth(cutoff_hz: float, rate_hz: float) -> tuple[Three, Three]:
-    """Numerator and denominator, as ArduPilot computes them (DigitalBiquadFilter); scipy.signal takes a second to load.
+    """Return numerator and denominator as ArduPilot computes them (DigitalBiquadFilter).
 
-    The bilinear transform of 1 / (s^2 + sqrt(2) s + 1), its frequency warped.
+    This is the bilinear transform of 1 / (s^2 + sqrt(2) s + 1) with a warped frequency; scipy.signal, which has it,
+    takes a second to load.
     """
     w = math.tan(math.pi * cutoff_hz / rate_hz)
     whole = 1.0 + math.sqrt(2.0) * w + w * w

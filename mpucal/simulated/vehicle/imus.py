@@ -1,4 +1,4 @@
-"""The vehicle's IMUs in one hand: what each measures in its own axes."""
+"""IMUs of a vehicle in one hand, with the measurements of each in its own axes."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from ..motion import Motion
 from ..sensor import SensorResponse, SensorTruth, Setting
 from .options import VehicleOptions
 
-# the hand's axes have z up, a vehicle's have z down
+# The hand's axes have z up, a vehicle's have z down.
 FROM_HAND = np.diag([1.0, -1.0, -1.0])
-# what autopilots set their IMUs to
+# Ranges to which autopilots set their IMUs
 ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 2000.0
 BLOCK = 40
-# autopilots take the gyroscope's bias at each start, but for what then warms up
+# Autopilots estimate the gyroscope's bias at each start; this share is left by warming.
 GYRO_BIAS_LEFT = 0.03
 GYRO_BIAS_ANEW_RAD_S = 5e-4
 
 
 class Imus:
-    """All IMUs of one vehicle: rigidly joined, each with its own errors.
+    """IMUs of one vehicle: rigidly joined, each with its own errors.
 
     Parameters
     ----------
-    rotation : R_b (3, 3), from their axes to the vehicle's. rate_hz : samples a second. gravity : m/s^2.
+    rotation : R_b (3, 3), from their axes to the vehicle's. rate_hz : of the samples. gravity : m/s^2.
     """
 
     def __init__(self, options: VehicleOptions, rotation: Vector, rate_hz: float, gravity: float) -> None:
@@ -45,22 +45,22 @@ class Imus:
 
     @property
     def temperature_c(self) -> float:
-        """Of their dies."""
+        """Temperature of the dies."""
         return self.truths[0].temperature_c + self._warmer_c
 
     def hear(self, prompt: HandPrompt, t_s: float) -> None:
-        """The hand hears `prompt`, whose `down` is in the vehicle's axes."""
+        """Pass a prompt to the hand, with `down` in the vehicle's axes."""
         down = prompt.down
         self._motion.hear(ReceivedPrompt(str(prompt.kind), None if down is None else to_hand_axes(down)), t_s)
 
     def restart(self) -> None:
-        """The autopilot takes the gyroscopes' biases anew, and leaves a little of each."""
+        """Estimate the gyroscopes' biases anew, as an autopilot does, which leaves a little of each."""
         for imu, true in enumerate(self.truths):
             left = self._rng.normal(0.0, GYRO_BIAS_ANEW_RAD_S, 3)
             self._responses[imu] = replace(true, b_omega=true.b_omega + left).response(self._setting)
 
     def next(self) -> Vector:
-        """The next samples: (BLOCK, imus, 2, 3), specific force [m/s^2] and rate [rad/s], in the sensors' axes."""
+        """Return the next samples (BLOCK, imus, 2, 3): specific force [m/s^2] and rate [rad/s] in the sensors' axes."""
         edges = (self._sample + np.arange(BLOCK + 1)) / self._rate_hz
         self._sample += BLOCK
         self._warmer_c = float(self._motion.warmer_c(edges)[-1])
@@ -68,7 +68,7 @@ class Imus:
         return np.stack([self._in_si(response, force, rate) for response in self._responses], axis=1)
 
     def truth(self, number: int, offset: Vector, scale: Vector) -> dict[str, Any]:
-        """What is true of IMU `number`'s stream, in the vehicle's axes, while `offset` and `scale` are its parameters.
+        """Return the truth of IMU `number`'s stream in the vehicle's axes, under the parameters `offset` and `scale`.
 
         The stream is R_b diag(scale) (raw - offset), and raw = D R_b^T s + b_a.
         """
@@ -89,12 +89,12 @@ class Imus:
 
 
 def to_hand_axes(down: Direction) -> Direction:
-    """The same direction in the hand's axes."""
+    """Return a direction of the vehicle's axes in the hand's axes."""
     x, y, z = down
     return x, -y, -z
 
 
 def _truth(seed: int, number: int, gravity: float) -> SensorTruth:
-    """IMU `number`'s errors; the chips on an autopilot are of the newer kind."""
+    """Draw the errors of IMU `number`; the chips on an autopilot are of the newer kind."""
     drawn = SensorTruth.draw(seed + 1000 * number, "mpu6500", gravity)
     return replace(drawn, b_omega=drawn.b_omega * GYRO_BIAS_LEFT, rate_error_ppm=0.0)

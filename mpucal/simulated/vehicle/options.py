@@ -1,4 +1,4 @@
-"""What `sim:key=value,...` asks of the simulated vehicle and its hand."""
+"""Options `sim:key=value,...` of the simulated vehicle and its hand."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ LAST_ORIENTATION = 40
 
 @dataclass(frozen=True)
 class VehicleOptions:
-    """A simulated vehicle and the hand that holds it, as asked for.
+    """Options of a simulated vehicle and the hand that holds it.
 
     Attributes
     ----------
-    firmware : ardupilot or px4. type : copter, plane or rover. imus : how many it has. system : its MAVLink id.
+    firmware : ardupilot or px4. type : copter, plane or rover. imus : their number. system : its MAVLink id.
     rotation : MAV_SENSOR_ORIENTATION of its board. highres : an ArduPilot of 4.6 or later, with HIGHRES_IMU.
-    seed : of its sensors, their noise and the hand. hand : which. pace : fast or real, of `--mavlink sim`.
-    rotate_at : s after which the hand begins to turn it though nobody prompts; None: it waits.
-    fault : what goes wrong, and when. refuse : the parameter that it will not set.
-    parameters : values that it holds at the start.
+    seed : of its sensors, their noise and the hand. hand : its kind. pace : fast or real, of `--mavlink sim`.
+    rotate_at : s after which the hand begins to turn it without a prompt; None: it waits for one.
+    fault : faults with their times. refuse : the parameter that it refuses to set.
+    parameters : values at the start.
     """
 
     firmware: str = "ardupilot"
@@ -48,11 +48,11 @@ class VehicleOptions:
 
     @classmethod
     def parse(cls, text: str, seed: int | None = None) -> Self:
-        """Of `sim` or `sim:key=value,...`; a key in capitals is a parameter.
+        """Parse `sim` or `sim:key=value,...`; a key in capitals is a parameter.
 
         Parameters
         ----------
-        seed : given beside `text`.
+        seed : of its own option.
 
         Raises
         ------
@@ -60,8 +60,8 @@ class VehicleOptions:
         """
         return cls(**parse_options(text, PARSERS, seed, "parameters"))
 
-    def suffers(self, name: str) -> bool:
-        """Whether this fault is among those asked for."""
+    def has_fault(self, name: str) -> bool:
+        """Return True if the options name this fault."""
         return any(fault.name == name for fault in self.fault)
 
 

@@ -1,4 +1,4 @@
-"""The simulated vehicle as a source: what `--mavlink sim` opens."""
+"""Simulated vehicle as a source, which `--mavlink sim` opens."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from .transport import SimulatedTransport
 
 
 def open_source(request: Request) -> OpenedVehicle:
-    """The vehicle that `sim:key=value,...` describes, in the gravity of the plan; see VehicleOptions.parse.
+    """Open the vehicle that `sim:key=value,...` describes, in the gravity of the plan; see VehicleOptions.parse.
 
-    Opened again by the same command, which hands on a dict `kept`, it holds the parameters that it held before.
+    A command that opens it again passes the same dict `kept`: the vehicle then has the parameters that it had before.
     """
     key = signing_key(request)
     vehicle = SimulatedVehicle(VehicleOptions.parse(request.value), request.plan.gravity, key)

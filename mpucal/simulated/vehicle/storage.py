@@ -1,18 +1,16 @@
-"""A simulated vehicle's card, as MAVLink FTP shows it."""
+"""Card of a simulated vehicle, behind MAVLink FTP."""
 
 from __future__ import annotations
 
-from ...mavlink.ftp import MOST_DATA, ErrorCode, Opcode, Payload
-
-SEQUENCE = 1 << 16
+from ...mavlink.ftp import MOST_DATA, SEQUENCE, ErrorCode, Opcode, Payload
 
 
 class Card:
-    """Files by path, one session at a time.
+    """Files by path, with one session at a time.
 
     Parameters
     ----------
-    folder : the only one in which files can be made; None: there is no card.
+    folder : the only one in which files can be created; None: there is no card.
     """
 
     def __init__(self, folder: str | None) -> None:
@@ -22,19 +20,16 @@ class Card:
         self._last: Payload | None = None
 
     def answer(self, asked: Payload) -> Payload:
-        """The reply; a request that comes again gets the same one."""
+        """Return the reply; a repeated request gets the same one."""
         sequence = (asked.sequence + 1) % SEQUENCE
         if self._last is not None and self._last.sequence == sequence:
             return self._last
-        given = self._do(asked)
-        if isinstance(given, ErrorCode):
-            reply = Payload(sequence, asked.session, Opcode.NAK, bytes([given]), asked.offset, None, asked.opcode)
-        else:
-            reply = Payload(sequence, asked.session, Opcode.ACK, given, asked.offset, None, asked.opcode)
-        self._last = reply
-        return reply
+        done = self._execute(asked)
+        opcode, data = (Opcode.NAK, bytes([done])) if isinstance(done, ErrorCode) else (Opcode.ACK, done)
+        self._last = Payload(sequence, asked.session, opcode, data, asked.offset, None, asked.opcode)
+        return self._last
 
-    def _do(self, asked: Payload) -> bytes | ErrorCode:
+    def _execute(self, asked: Payload) -> bytes | ErrorCode:
         path = asked.data.decode("ascii", "replace")
         if asked.opcode in (Opcode.RESET, Opcode.TERMINATE):
             self._open = None

@@ -1,16 +1,15 @@
-"""The parameters that a vehicle holds, in their order, with their types."""
+"""Parameters of a simulated vehicle, in their order, with their types."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from ...data import Vector
 from ...mavlink.parameters.encoding import REAL32, Number, Parameter, as_float32
 
-INT8, INT16, INT32 = 2, 4, 6
-AXES = ("X", "Y", "Z")
+INT8, INT16 = 2, 4
 
 
 class ParameterStore:
@@ -27,14 +26,14 @@ class ParameterStore:
         self._types: dict[str, int] = {}
 
     def add(self, name: str, value: Number, kind: int = REAL32) -> None:
-        """A parameter that the firmware has, with its default."""
+        """Add a parameter of the firmware, with its default."""
         self._types[name] = kind
         self[name] = value
 
-    def add_vector(self, stem: str, value: float, tail: str = "") -> None:
-        """Three of them: stem X tail, and so on."""
-        for axis in AXES:
-            self.add(f"{stem}{axis}{tail}", value)
+    def add_all(self, names: Iterable[str], value: float) -> None:
+        """Add several floats with one default."""
+        for name in names:
+            self.add(name, value)
 
     def __contains__(self, name: str) -> bool:
         return name in self._values
@@ -53,13 +52,18 @@ class ParameterStore:
         self._values[name] = as_float32(value) if self._types[name] == REAL32 else round(value)
 
     def type(self, name: str) -> int:
-        """MAV_PARAM_TYPE."""
+        """Return the MAV_PARAM_TYPE."""
         return self._types[name]
 
-    def vector(self, stem: str, tail: str = "") -> Vector:
-        """(3,) of stem X tail, and so on."""
-        return np.array([float(self._values[f"{stem}{axis}{tail}"]) for axis in AXES])
+    def vector(self, names: Sequence[str]) -> Vector:
+        """Return the values of several parameters."""
+        return np.array([float(self._values[name]) for name in names])
+
+    def set_vector(self, names: Sequence[str], values: Vector) -> None:
+        """Set several parameters."""
+        for name, value in zip(names, values.tolist(), strict=True):
+            self[name] = value
 
     def parameter(self, name: str) -> Parameter:
-        """As it is sent."""
+        """Return a parameter as it is sent."""
         return Parameter(name, self._values[name], self._types[name], list(self._values).index(name), len(self))

@@ -1,4 +1,4 @@
-"""The simulated vehicle as a link's transport, in this process: `--mavlink sim`."""
+"""Simulated vehicle as a link's transport, in this process: `--mavlink sim`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ REAL = "real"
 
 
 class SimulatedTransport:
-    """A vehicle that lives on only while it is listened to; see Transport."""
+    """Transport to a vehicle whose time passes only while it is received from; see Transport."""
 
     datagrams, outward = True, True
     name = ADDRESS
@@ -28,7 +28,7 @@ class SimulatedTransport:
 
     @property
     def real_time(self) -> bool:
-        """Whether its time passes by itself."""
+        """True if its time passes by itself."""
         return self._vehicle.options.pace == REAL
 
     def now_ns(self) -> int:
@@ -50,7 +50,7 @@ class SimulatedTransport:
         self._vehicle.receive(data)
 
     def restrict(self, address: str | None) -> None:
-        """See Transport: it is the only one."""
+        """See Transport."""
 
     def close(self) -> None:
         """See Transport."""

@@ -1,4 +1,4 @@
-"""A simulated vehicle on a line: hears packets, sends packets, as its time is moved on."""
+"""Simulated vehicle, which receives and sends packets as its time is moved on."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ...errors import UsageError
 from ...mavlink.dialect import Message, Parser, dialect
 from ...mavlink.ftp import Payload
 from ...mavlink.parameters.encoding import Parameter, from_wire, name_bytes, to_wire
+from ...mavlink.prearm import ARMED
 from ...mavlink.prompts import ReceivedPrompt, decode_prompt
 from ..faults import Schedule
 from .ardupilot import ArduPilot
@@ -34,24 +35,23 @@ SLOWER_WHILE_BUSY = 4
 SEQUENCE = 256
 # MAV_TYPE
 TYPES = {"plane": 1, "copter": 2, "rover": 10}
-ARMED = 128
 REBOOT_US = 2 * S_US
 SECOND_STATION_HZ = 4
 
 
 class Sent(NamedTuple):
-    """A packet, and when it went out [us of the vehicle's world]."""
+    """A packet, and when it was sent [us of the vehicle's world]."""
 
     t_us: int
     data: bytes
 
 
 class SimulatedVehicle:
-    """A vehicle that is switched on at 0 us, in a hand.
+    """Vehicle in a hand, switched on at 0 us.
 
     Parameters
     ----------
-    key : 32 bytes with which it signs, and wants to be answered; None: neither.
+    key : 32 bytes with which it signs and requires signatures, or None.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class SimulatedVehicle:
         self.firmware = FIRMWARES[options.firmware](options)
         for name, value in options.parameters.items():
             if name not in self.firmware.store:
-                raise UsageError(f"the simulated vehicle has no parameter {name}", "leave it out, or spell it anew")
+                raise UsageError(f"the simulated vehicle has no parameter {name}", "omit it, or correct its name")
             self.firmware.store[name] = value
         self.imus = Imus(options, self.firmware.rotation, S_US / self.firmware.tick_us, gravity)
         self._mav: Any = dialect().MAVLink(None, options.system, COMPONENT)
@@ -70,7 +70,7 @@ class SimulatedVehicle:
         self._parser = Parser(self._mav)
         self._now_us = 0
         self._silent_until_us: float = 0
-        self.card = Card(None if options.suffers("no_storage") else self.firmware.folder)
+        self.card = Card(None if options.has_fault("no_storage") else self.firmware.folder)
         self._schedule = Schedule(options.fault)
         self._out: deque[Sent] = deque()
         self._boot()
@@ -79,46 +79,46 @@ class SimulatedVehicle:
 
     @property
     def now_us(self) -> int:
-        """How far it has gone on."""
+        """Time of its world."""
         return self._now_us
 
     @property
     def silent(self) -> bool:
-        """Whether it sends and hears nothing now, as while it boots."""
+        """True while it neither sends nor receives, as during a boot."""
         return self._now_us < self._silent_until_us
 
     def receive(self, data: bytes, datagram: bool = True) -> None:
-        """Bytes arrive now: a datagram of whole packets, or a piece of a stream."""
+        """Receive a datagram of whole packets, or a piece of a stream."""
         if self.silent:
             return
         for packet in self._parser.datagram(data) if datagram else self._parser.stream(data):
-            # a prompt goes to the hand, not to the firmware
+            # A prompt goes to the hand, not to the firmware.
             kind = packet.message.get_type()
-            heard = kind == "STATUSTEXT" or self.firmware.hears(packet.message.get_srcSystem())
-            answer = self._HANDLERS.get(kind) if heard else None
+            accepted = kind == "STATUSTEXT" or self.firmware.accepts(packet.message.get_srcSystem())
+            answer = self._HANDLERS.get(kind) if accepted else None
             if answer is not None and getattr(packet.message, "target_system", 0) in (0, self.options.system):
                 answer(self, packet.message)
 
     def run_until(self, until_us: int) -> list[Sent]:
-        """Live until `until_us`; the packets that went out since the last call."""
+        """Move on to `until_us`; return the packets that were sent since the last call."""
         while self._now_us + self.firmware.tick_us <= until_us:
-            self._live(until_us)
-        return self._taken()
+            self._run_ticks(until_us)
+        return self._take_sent()
 
     def run_to_next(self, until_us: int) -> list[Sent]:
-        """Live until it may have sent something, and no longer than the first tick from `until_us` on; see `run_until`."""
+        """Move on until a packet may have been sent, at most to the first tick from `until_us` on; see `run_until`."""
         tick_us = self.firmware.tick_us
-        self._live(max(-(-until_us // tick_us), self._now_us // tick_us + 1) * tick_us)
-        return self._taken()
+        self._run_ticks(max(-(-until_us // tick_us), self._now_us // tick_us + 1) * tick_us)
+        return self._take_sent()
 
     def switch_on(self, store: ParameterStore) -> None:
-        """Start with the parameters in `store`, and keep them there."""
+        """Start with the parameters in `store`, and store changes there."""
         if store is not self.firmware.store:
             self.firmware.store = store
             self.firmware.start()
 
     def truth_document(self) -> dict[str, Any]:
-        """What is true of the streams while the parameters are as they are: of IMU 1, and of the others."""
+        """Return the truth of IMU 1's stream and, as `others`, of the other streams under the present parameters."""
         first, *others = (self.imus.truth(imu, *self.firmware.correction(imu)) for imu in range(self.options.imus))
         return {**first, "others": others}
 
@@ -131,13 +131,13 @@ class SimulatedVehicle:
         self._list: deque[str] = deque()
         self.firmware.start()
 
-    def _taken(self) -> list[Sent]:
+    def _take_sent(self) -> list[Sent]:
         sent = list(self._out)
         self._out.clear()
         return sent
 
-    def _live(self, until_us: int) -> None:
-        """Live through one tick or more, of which only the last may bring something, and none is after `until_us`."""
+    def _run_ticks(self, until_us: int) -> None:
+        """Run one tick or more, none after `until_us`; only the last of them may send something."""
         tick_us, ticks = self.firmware.tick_us, 1
         if not (self._out or self._list):
             due_us = min(max(self._streams.next_us(), self._silent_until_us), self._schedule.next_ns() / US)
@@ -252,29 +252,29 @@ class SimulatedVehicle:
         if prompt is not None:
             self.imus.hear(prompt, self._now_us / S_US)
 
-    # What goes wrong with it.
+    # Faults.
 
     def arm(self) -> None:
-        """Somebody arms it."""
+        """Arm it."""
         self.firmware.armed = True
 
     def reboot(self) -> None:
-        """It boots anew, silent meanwhile."""
+        """Boot again, silent meanwhile."""
         self._silent_until_us = self._now_us + REBOOT_US
         self.imus.restart()
         self._boot()
 
     def learn_offsets(self) -> None:
-        """It changes its own accelerometer offsets, and tells of it."""
+        """Change the vehicle's own accelerometer offsets, and send them."""
         for name in self.firmware.learn_offsets():
             self._send(self._value(self.firmware.store.parameter(name)))
 
     def fall_silent(self) -> None:
-        """It sends and hears nothing any more."""
+        """Stop sending and receiving for good."""
         self._silent_until_us = math.inf
 
     def obey_second_station(self) -> None:
-        """A ground station asks for everything at its default rate."""
+        """Set the rates that another ground station requests by default."""
         for message_id, interval_us in self.firmware.group(SECOND_STATION_HZ):
             self._streams.set(message_id, interval_us, self._now_us)
 
