@@ -46,12 +46,12 @@ def failing(number):
 # what the kernel says where somebody opens a bus, or asks for a chip on it, and what a person is told
 OPENING = {
     "no such bus": (errno.ENOENT, "there is no I2C bus /dev/i2c-1: "),
-    "no permission": (errno.EACCES, "no permission to use /dev/i2c-1: join the group that may"),
+    "no permission": (errno.EACCES, "no permission to use /dev/i2c-1: add yourself to its group"),
     "no adapter": (errno.ENXIO, "no adapter is behind /dev/i2c-1: plug it in"),
 }
 ASKING = {
     "nothing answers": (errno.EREMOTEIO, "nothing answers at 0x68 or 0x69 on /dev/i2c-1: check VCC, GND, SDA and SCL"),
-    "a wire held low": (errno.ETIMEDOUT, "the I2C bus does not come free (0x68 on /dev/i2c-1): a wire holds SDA"),
+    "a wire held low": (errno.ETIMEDOUT, "the I2C bus does not become free (0x68 on /dev/i2c-1): a wire holds SDA"),
     "a driver of the kernel": (errno.EBUSY, "a driver of the kernel holds the chip (0x68 on /dev/i2c-1): remove its"),
 }
 
@@ -88,13 +88,13 @@ def test_a_bus_that_fails_says_why_and_leaves_nothing(mpucal, tmp_path, monkeypa
         (["session", "--bus", "sim", "--gravity", "981"], "981 m/s² (9.76 to 9.84). In cm/s² it is --gravity 9.81."),
         (["session", "--bus", "sim", "--gravity", "1"], "In g it is --gravity 9.8066. To use"),
         (["calibrate", "walk.npz", "--gravity", "much"], "'much' is not a local gravity"),
-        (["session", "--bus", "sim", "--address", "0x68"], "--address was given beside --bus sim, which has none"),
+        (["session", "--bus", "sim", "--address", "0x68"], "--bus sim does not take --address"),
         (["session", "--bus", "sim", "--rate", "3"], "use 3.90625 Hz"),
         (["record", "--bus", "sim", "--seconds", "0"], "--seconds"),
         (["stream", "--bus", "sim", "--seconds", "nan"], "'nan' is not a finite number"),
         (["doctor", "--bus", "sim", "--seconds", "inf"], "'inf' is not a finite number"),
         (["record"], "no source was given"),
-        (["doctor", "--bus", ""], "no bus is named"),
+        (["doctor", "--bus", ""], "no bus was named"),
         (["sesion", "--bus", "sim"], "did you mean session?"),
         (["session", "--bus", "simm"], "did you mean sim?"),
         (["session", "--bus", "sim:hnd=guided"], "did you mean hand?"),

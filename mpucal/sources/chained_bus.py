@@ -1,4 +1,4 @@
-"""Several buses as one, one after the other: what was recorded, then perhaps the sensor itself."""
+"""Chain of buses that act as one: recorded parts of a session, then perhaps the sensor itself."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from ..chip.access import Bus, Files, Reply
 from ..chip.records import ABORT, KEY, RESUMED, Record, SessionEvent
 from .replay import ReplayBus
 
-# Between the end of one part and the begin of the next, where their clocks say nothing.
+# Time between two parts whose clocks do not tell it.
 PAUSE_NS = 1_000_000_000
 
 
 class ChainedBus:
-    """The parts of a session that was resumed; each ends with EndOfCapture, and `go_on` begins the next.
+    """Parts of a resumed session: each ends with EndOfCapture, and `go_on` begins the next.
 
     Parameters
     ----------
-    parts : in their order; only the last one may be something else than a replay.
+    parts : in order; only the last one may be another bus than a replay.
     """
 
     def __init__(self, parts: Sequence[Bus | Files]) -> None:
@@ -27,11 +27,11 @@ class ChainedBus:
 
     @property
     def replaying(self) -> bool:
-        """Whether the present part is a recorded one."""
+        """True if the present part is a recorded one."""
         return isinstance(self._part, ReplayBus)
 
     def go_on(self) -> bool:
-        """Begin the next part; False where this is the last."""
+        """Begin the next part; return False if there is none."""
         if self._at + 1 == len(self._parts):
             return False
         self._at += 1
@@ -50,16 +50,16 @@ class ChainedBus:
         self._part.sleep_until(t_ns)
 
     def close(self) -> None:
-        """Close all of them."""
+        """Close all parts."""
         for part in self._parts:
             part.close()
 
     def pending_events(self, name: str) -> list[SessionEvent]:
-        """See ReplayBus; none where nothing is replayed."""
+        """Return the events as ReplayBus does; none from another bus."""
         return self._part.pending_events(name) if isinstance(self._part, ReplayBus) else []
 
     def unread(self) -> int:
-        """How many recorded accesses of the last part nobody has asked for."""
+        """Return the number of unread accesses in the last part."""
         last = self._parts[-1]
         return last.unread() if isinstance(last, ReplayBus) else 0
 
@@ -69,45 +69,45 @@ class ChainedBus:
 
 
 class ShiftedClockBus:
-    """A bus whose clock goes on where an earlier one stopped.
+    """Bus whose clock continues an earlier one.
 
     Parameters
     ----------
-    bus : its first access happens a second after `last_ns`, unless its own clock shows more.
+    bus : its first access gets a time one second after `last_ns`, unless its own clock shows more.
     """
 
     def __init__(self, bus: Bus | Files, last_ns: int) -> None:
         self._bus, self._last_ns = bus, last_ns
-        self._later_ns: int | None = None
+        self._shift_ns: int | None = None
 
     def read(self, register: Any, count: int) -> Reply:
         """See Bus."""
         reply = self._bus.read(register, count)
-        return reply._replace(t_ns=self._shown(reply.t_ns))
+        return reply._replace(t_ns=self._shifted(reply.t_ns))
 
     def write(self, register: Any, data: bytes) -> int:
         """See Bus."""
-        return self._shown(self._bus.write(register, data))
+        return self._shifted(self._bus.write(register, data))
 
     def sleep_until(self, t_ns: int) -> None:
-        """See Bus; before the first access nobody knows for how long."""
-        if self._later_ns is not None:
-            self._bus.sleep_until(t_ns - self._later_ns)
+        """Sleep as Bus does; at once before the first access, when the shift is unknown."""
+        if self._shift_ns is not None:
+            self._bus.sleep_until(t_ns - self._shift_ns)
 
     def close(self) -> None:
         """See Bus."""
         self._bus.close()
 
-    def _shown(self, t_ns: int) -> int:
-        if self._later_ns is None:
-            self._later_ns = max(self._last_ns + PAUSE_NS - t_ns, 0)
-        return t_ns + self._later_ns
+    def _shifted(self, t_ns: int) -> int:
+        if self._shift_ns is None:
+            self._shift_ns = max(self._last_ns + PAUSE_NS - t_ns, 0)
+        return t_ns + self._shift_ns
 
 
 def split_at_resumes(captures: Iterable[Sequence[Record]], more: bool = False) -> list[list[Record]]:
-    """The records of one or several captures, cut where a session was resumed; `more`: another part will follow.
+    """Split the records of one or several captures where a session was resumed; `more`: another part will follow.
 
-    Of a part that somebody stopped and another follows, what came after is left out: nothing of it was measured.
+    If a part was stopped by its user and another follows, the records after that are left out, which hold no samples.
     """
     parts: list[list[Record]] = []
     for records in captures:

@@ -1,4 +1,4 @@
-"""A chip on a bus, open: its driver measures, and every access goes into an MCAP capture."""
+"""Open chip on a bus: its driver measures, and every access is recorded in an MCAP capture."""
 
 from __future__ import annotations
 
@@ -24,18 +24,17 @@ from .opened_source import ActiveSource, Say
 from .tap import Tap
 from .utc_recorder import UtcRecorder
 
-# of a capture's head: what to open to go on with the session
+# Key of a capture's head: the source, to resume the session.
 SOURCE = "source"
 
 
 @dataclass(frozen=True)
 class OpenedChip:
-    """A chip on a bus; see OpenedSource.
+    """Chip on a bus; see OpenedSource.
 
     Attributes
     ----------
-    bus : open. replay : the same bus where it is a replay.
-    words : what opens it again; see Request.words. real_time : see OpenedSource.
+    bus : open. replay : the same bus if it is a replay. words : options that open it again; see Request.words.
     """
 
     bus: Bus
@@ -49,7 +48,7 @@ class OpenedChip:
     real_time: bool = True
 
     def source_meta(self) -> dict[str, Any]:
-        """For the head of a capture."""
+        """Return the entries for the head of a capture."""
         return {SOURCE: dict(self.words)} if self.words else {}
 
     @property
@@ -59,16 +58,16 @@ class OpenedChip:
 
     @property
     def where(self) -> str:
-        """The very chip, in words."""
+        """Description of the chip's place, for messages."""
         return f"the chip on {next(iter(self.words.values()), 'its bus')}"
 
     def contents(self) -> dict[str, Any]:
-        """What its registers hold now, and where it is; nothing is set up or written."""
+        """Read the registers; nothing is set up or written."""
         with closing(self.bus):
             return {"where": self.where, **chip_contents(self.bus)}
 
     def driver(self, bus: Any, name: str, say: Say) -> Source:
-        """What measures, over `bus`; see Driver."""
+        """Make the driver that measures over `bus`."""
         return Driver(bus, self.plan.config, name, say)
 
     def talk(self, person: Operator) -> Operator:
@@ -90,7 +89,7 @@ class OpenedChip:
                 yield ActiveSource(driver, writer.event, self.replay.go_on, self._was_late)
         if self.replay is not None and self.replay.unread():
             raise CaptureError(
-                f"the replay ended with {self.replay.unread()} accesses of its capture unread",
+                f"the replay ended before the last {self.replay.unread()} accesses of its capture",
                 "replay it with the mpucal that recorded it, or use `mpucal calibrate`",
             )
 

@@ -1,4 +1,4 @@
-"""A chip is one process's: of two, each would empty the other's FIFO. By a lock that ends with the process."""
+"""Lock on a chip: two processes would empty each other's FIFO. The lock ends with its process."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from ..errors import BusError
 
 
 def lock_device(handle: int | None, chip: str, remedy: str = "end it", address: int = 0) -> None:
-    """Keep other sessions from `chip`, behind an open device.
+    """Lock `chip`, behind an open device, against other sessions.
 
-    The lock is on the byte of that address (fcntl(2)), so that two chips on one bus are two; a device that knows no
-    locks is anybody's.
+    The lock is on the byte at `address` (fcntl(2)), so that two chips on one bus have two locks. A device without
+    locks is not locked.
 
     Raises
     ------
-    BusError : another process has it.
+    BusError : another process has the lock.
     """
     try:
         import fcntl  # noqa: PLC0415 - not on Windows, which has no such bus

@@ -1,4 +1,4 @@
-"""Sensors that drivers of the Linux kernel hold: their attributes in sysfs and their buffers in /dev, without libiio.
+"""Sensors with a driver of the Linux kernel: their attributes in sysfs and their buffers in /dev, without libiio.
 
 Source: Linux Documentation/driver-api/iio and Documentation/ABI/testing/sysfs-bus-iio.
 """
@@ -6,15 +6,13 @@ Source: Linux Documentation/driver-api/iio and Documentation/ABI/testing/sysfs-b
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from ..chip.access import Files, Reply
-from ..errors import BusError, UsageError
+from ..chip.access import Reply
+from ..errors import BusError
 from ..files.mcap import Capture
 from ..iio import IIO_VERSION
 from ..iio.devices import Devices
@@ -22,6 +20,7 @@ from ..iio.driver import IioDriver
 from ..iio.setup import LIST_BYTES, TEXT_BYTES, TRIGGERS
 from ..session.plan import DRIVER
 from .chip import OpenedChip
+from .host_bus import HostBus, converting
 from .iio_errors import attribute_error, buffer_error
 from .kind import Request
 from .opened_source import Say
@@ -29,9 +28,9 @@ from .opened_source import Say
 SYSFS, DEVICES = Path("/sys/bus/iio/devices"), Path("/dev")
 RULES = Path("/etc/udev/rules.d")
 GROUPS = ("buffer", "scan_elements", "trigger")
-# what is written there is meant to stay
+# Attributes that keep what is written to them.
 STAYS = "_calibbias"
-# of a capture's head: which devices, and the trigger
+# Key of a capture's head: the devices and the trigger.
 OF_IIO = "iio"
 SHOWN = ("name", "in_", "sampling", "trigger/")
 NOWHERE = Devices("", "")
@@ -39,11 +38,11 @@ NOWHERE = Devices("", "")
 
 @dataclass(frozen=True)
 class OpenedIio(OpenedChip):
-    """One or two devices; see OpenedSource.
+    """Open IIO devices, one or two; see OpenedSource.
 
     Attributes
     ----------
-    devices : which ones. trigger : see IioDriver. rules : the folder of udev's rules; None: no udev knows them.
+    devices : their names. trigger : see IioDriver. rules : folder of udev's rules; None without udev.
     """
 
     devices: Devices = NOWHERE
@@ -51,16 +50,16 @@ class OpenedIio(OpenedChip):
     rules: Path | None = None
 
     def source_meta(self) -> dict[str, Any]:
-        """For the head of a capture."""
+        """Return the entries for the head of a capture."""
         return {**super().source_meta(), DRIVER: IIO_VERSION, OF_IIO: [*self.devices, self.trigger]}
 
     @property
     def where(self) -> str:
-        """The very devices, in words."""
+        """Names of the devices, for messages."""
         return " and ".join(self.devices.each)
 
     def contents(self) -> dict[str, Any]:
-        """What its attributes hold now; nothing is set up or written."""
+        """Read the attributes; nothing is set up or written."""
         files: Any = self.bus
         facts: dict[str, Any] = {"where": self.where}
         with closing(files):
@@ -73,30 +72,25 @@ class OpenedIio(OpenedChip):
         return facts
 
     def driver(self, bus: Any, name: str, say: Say) -> IioDriver:
-        """What measures, over `bus`."""
+        """Make the driver that measures over `bus`."""
         return IioDriver(bus, self.devices, self.plan.config, name, say, self.trigger)
 
 
 def iio_replay(replay: OpenedChip, capture: Capture) -> OpenedIio:
-    """A replay of what is no chip's; see OpenedIio.source_meta."""
+    """Convert the replay of a chip to one of IIO devices; see OpenedIio.source_meta."""
     accel, gyro, trigger = capture.meta[OF_IIO]
     held = {field.name: getattr(replay, field.name) for field in fields(OpenedChip)}
     return OpenedIio(**held, devices=Devices(accel, gyro), trigger=trigger)
 
 
 def open_source(request: Request) -> OpenedIio:
-    """The devices that --iio names.
+    """Open the devices that --iio names.
 
     Raises
     ------
-    UsageError : no names of devices. BusError : there are none such.
+    UsageError : no names of devices. BusError : there are no such devices.
     """
-    try:
-        devices = Devices.parse(request.value)
-    except ValueError as error:
-        raise UsageError(
-            f"--iio: {str(error).partition(': ')[0]}", str(error).partition(": ")[2].rstrip(".")
-        ) from error
+    devices = Devices.parse(request.value)
     files = IioFiles()
     for device in devices.each:
         files.check(device)
@@ -106,12 +100,12 @@ def open_source(request: Request) -> OpenedIio:
     )
 
 
-class IioFiles(Files):
-    """The files of IIO devices; the clock is the host's monotonic one.
+class IioFiles(HostBus):
+    """Files of IIO devices; see Files.
 
     Parameters
     ----------
-    sysfs : the folder of the devices' folders. dev : of their device files.
+    sysfs : folder of the devices' folders. dev : folder of their device files.
     """
 
     def __init__(self, sysfs: Path | None = None, dev: Path | None = None) -> None:
@@ -120,46 +114,42 @@ class IioFiles(Files):
         self._before: dict[str, bytes] = {}
 
     def check(self, device: str) -> None:
-        """BusError where there is no such device."""
+        """Raise BusError if there is no such device."""
         if not (self._sysfs / device).is_dir():
             there = [f"{path.name} ({_name(path)})" for path in sorted(self._sysfs.glob("iio:device*"))]
             remedy = (
-                f"there are {', '.join(there)}" if there else "load the driver of the sensor, which needs its overlay"
+                f"use one of {', '.join(there)}" if there else "load the driver of the sensor, which needs its overlay"
             )
             raise BusError(f"there is no {device}", remedy)
 
     def read(self, register: str, count: int) -> Reply:
-        """See Files; TRIGGERS: the names of all triggers."""
+        """Read a file as Files has it; TRIGGERS gives the names of all triggers."""
         device, _, name = register.partition("/")
         if register == TRIGGERS:
             names = [_name(path) for path in sorted(self._sysfs.glob("trigger*"))]
-            return Reply("\n".join(names).encode(), time.monotonic_ns())
+            return Reply("\n".join(names).encode(), self.now_ns())
         if register.endswith("/"):
-            return Reply("\n".join(self._names(device)).encode(), time.monotonic_ns())
+            return Reply("\n".join(self._names(device)).encode(), self.now_ns())
         if not name:
             return self._buffer(device, count)
-        begun_ns = time.monotonic_ns()
-        with self._told(device, name):
+        begun_ns = self.now_ns()
+        with converting(lambda error: attribute_error(error, device, name, None)):
             data = (self._sysfs / register).read_bytes()[:count]
-        # a driver asks the chip for a count meanwhile
-        return Reply(data, (begun_ns + time.monotonic_ns()) // 2)
+        # The driver reads the count from the chip in between.
+        return Reply(data, (begun_ns + self.now_ns()) // 2)
 
     def write(self, register: str, data: bytes) -> int:
         """See Files."""
         device, _, name = register.partition("/")
-        t_ns = time.monotonic_ns()
-        with self._told(device, name, data.decode()):
+        t_ns = self.now_ns()
+        with converting(lambda error: attribute_error(error, device, name, data.decode())):
             if not name.endswith(STAYS) and register not in self._before:
                 self._before[register] = (self._sysfs / register).read_bytes().strip()
             self._put(register, data)
         return t_ns
 
-    def sleep_until(self, t_ns: int) -> None:
-        """Sleep until the monotonic clock shows `t_ns`."""
-        time.sleep(max(0, t_ns - time.monotonic_ns()) * 1e-9)
-
     def close(self) -> None:
-        """Let go of the buffers, and put back what an error or Ctrl-C left: no driver ends a buffer by itself."""
+        """Close the buffers, and restore attributes after an error or Ctrl-C: no driver stops a buffer by itself."""
         for fd in self._open.values():
             os.close(fd)
         self._open = {}
@@ -170,7 +160,7 @@ class IioFiles(Files):
                     self._put(register, text)
 
     def _put(self, register: str, data: bytes) -> None:
-        # one write without a buffer: the driver refuses it there and then
+        # One unbuffered write gets the driver's refusal at once.
         fd = os.open(self._sysfs / register, os.O_WRONLY | os.O_TRUNC)
         try:
             os.write(fd, data)
@@ -178,7 +168,7 @@ class IioFiles(Files):
             os.close(fd)
 
     def _buffer(self, device: str, count: int) -> Reply:
-        t_ns = time.monotonic_ns()
+        t_ns = self.now_ns()
         try:
             if device not in self._open:
                 self._open[device] = os.open(self._dev / device, os.O_RDONLY | os.O_NONBLOCK)
@@ -189,21 +179,14 @@ class IioFiles(Files):
             raise buffer_error(error, device) from error
 
     def _names(self, device: str) -> list[str]:
-        """Of all attributes, those of its groups with the group's name before them."""
+        """List all attributes, those of the groups with the group's name in front."""
         folder = self._sysfs / device
-        with self._told(device, ""):
+        with converting(lambda error: attribute_error(error, device, "", None)):
             names = [path.name for path in folder.iterdir() if path.is_file()]
             groups = [folder / group for group in GROUPS if (folder / group).is_dir()]
             return sorted(
                 [*names, *(f"{g.name}/{path.name}" for g in groups for path in g.iterdir() if path.is_file())]
             )
-
-    @contextmanager
-    def _told(self, device: str, name: str, text: str | None = None) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise attribute_error(error, device, name, text) from error
 
 
 def _name(folder: Path) -> str:

@@ -1,4 +1,4 @@
-"""What the program asks of a kind of source: how it is named, what belongs to it, and what opens it."""
+"""Description of a kind of source: its name, its options and its opener."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ..session.plan import Plan
 
-# of the board, beside the options of its source
+# Key of the board's name, besides the options of its source.
 NAME = "name"
 
 
 @dataclass(frozen=True)
 class Option:
-    """One option of the command line.
+    """Option of the command line.
 
     Attributes
     ----------
-    name : accel_range, of --accel-range. metavar : what the help shows for its value.
-    parse : the value of its text; ValueError with a sentence where that is none. choices : the texts it can be.
-    bare : its text where it is given without one; None: it needs one.
+    name : accel_range for --accel-range. metavar : shown for its value in the help.
+    parse : converts its text to a value, or raises ValueError with a sentence. choices : possible texts.
+    bare : text of the option without a value; None: it needs one.
     """
 
     name: str
@@ -35,12 +35,12 @@ class Option:
 
     @property
     def flag(self) -> str:
-        """As a person writes it."""
+        """Spelling on the command line."""
         return f"--{self.name.replace('_', '-')}"
 
 
 class Delivery(Enum):
-    """What comes out of a source."""
+    """Kind of data that a source delivers."""
 
     REGISTERS = "a chip's registers"
     SAMPLES = "samples"
@@ -49,24 +49,24 @@ class Delivery(Enum):
 
 @dataclass(frozen=True)
 class SourceKind:
-    """A kind of source: one row of the table.
+    """Kind of source: one row of the table.
 
     Attributes
     ----------
-    what : of which kind it is, in words. option : names it on the command line; several kinds may share one.
-    forms : what the option's value looks like, for the help.
+    what : description. option : selects it on the command line; several kinds may share one.
+    forms : forms of the option's value, for the help.
     opener : "module:attribute" of a function from a Request to an OpenedSource; imported when it is called.
-    delivers : a session on registers can go on after an interruption. What opens another than a capture has besides
-        `contents() -> dict`: what the sensor holds now, in JSON's own types, `where` among them.
-    options : belong to it, and name the source beside `option`. settings : how its sensor can be set.
-    word : it is meant where the option's value is this, or begins with it and a colon.
-    beside : it is meant where this one of its `options` is given.
-    instead : which commands read it that take no source.
-    title : of a session on it; {} is the option's value.
-    store : "module:attribute" of a context manager from the options' values to a memory that keeps a calibration, as
-        mpucal.sources.bridge has it; empty where there is none.
-    doctor : "module:attribute" of what examines it, from an OpenedSource and seconds to findings; empty: nothing does.
-    host : the same of what examines this computer's side of it before it is opened, from the option's value.
+    delivers : a session on registers can be resumed. Every kind except a capture also has `contents() -> dict`, the
+        present content of the sensor in JSON's types, with the key `where`.
+    options : options that identify the source besides `option`. settings : options that configure its sensor.
+    word : selects this kind if the option's value is this word, or begins with it and a colon.
+    beside : selects this kind if this one of its `options` is given.
+    instead : commands that read it and take no source.
+    title : title of a session on it; {} is the option's value.
+    store : "module:attribute" of a context manager from the options' values to a memory for a calibration, as in
+        mpucal.sources.bridge; empty: there is none.
+    doctor : "module:attribute" of its examination, from an OpenedSource and seconds to findings; empty: none.
+    host : "module:attribute" of the examination of this computer before it is opened, from the option's value.
     """
 
     what: str
@@ -86,18 +86,18 @@ class SourceKind:
 
     @property
     def flag(self) -> str:
-        """As a person writes it: `--bus sim`."""
+        """Spelling on the command line: `--bus sim`."""
         beside = next((option.flag for option in self.options if option.name == self.beside), "")
         return " ".join(filter(None, (self.option.flag, self.word, beside)))
 
     @property
     def commands(self) -> tuple[str, ...]:
-        """Which take it."""
+        """Commands that take it."""
         live = () if self.delivers is Delivery.CAPTURE else ("stream", "write", "show")
         return ("session", "record", "check", "noise", *live, *(("doctor",) if self.doctor else ()))
 
     def matches(self, values: Mapping[str, Any]) -> bool:
-        """Whether the options' values name a source of this kind."""
+        """Return True if the options' values name a source of this kind."""
         value = values.get(self.option.name)
         if value is None or (self.beside and values.get(self.beside) is None):
             return False
@@ -106,12 +106,12 @@ class SourceKind:
 
 @dataclass(frozen=True)
 class Request:
-    """A source that is to be opened.
+    """Request to open a source.
 
     Attributes
     ----------
-    values : of all options, by name. plan : what to do with it.
-    given : the options that the person wrote, by name, as they were written; empty where no person did.
+    values : of all options, by name. plan : of the session.
+    given : options on the command line as they were written, by name; empty without a command line.
     """
 
     kind: SourceKind
@@ -121,12 +121,12 @@ class Request:
 
     @property
     def value(self) -> Any:
-        """Of the option that names the source."""
+        """Value of the option that selects the source."""
         return self.values[self.kind.option.name]
 
     @property
     def words(self) -> dict[str, Any]:
-        """What opens the same source again, in JSON's own types, and what the board is called, if anything."""
+        """Options that open the same source again, in JSON's types, and the board's name if it has one."""
         names = (self.kind.option.name, *(option.name for option in self.kind.options))
-        called = {NAME: self.values[NAME]} if self.values.get(NAME) else {}
-        return {**{name: self.values.get(name) for name in names}, **called}
+        board = {NAME: self.values[NAME]} if self.values.get(NAME) else {}
+        return {name: self.values.get(name) for name in names} | board

@@ -1,4 +1,4 @@
-"""What every open source has, whatever its kind."""
+"""Interface of an open source of any kind."""
 
 from __future__ import annotations
 
@@ -14,36 +14,31 @@ from ..session.ports import Note, Operator, Source
 Say = Callable[[str], None]
 
 
-def never_on() -> bool:
-    """A source in one part does not go on after its end."""
-    return False
-
-
 class ActiveSource(NamedTuple):
-    """A source that is being recorded.
+    """Source that is being recorded.
 
     Attributes
     ----------
-    note : keeps session events beside it. go_on : begins its next part.
-    late : whether to wait for an answer that is late now, or is not; see Runner.
+    note : records session events with it. go_on : begins its next part; False if there is none.
+    late : decides to wait for an answer that is late now, or is not; see Runner.
     """
 
     source: Source
     note: Note
-    go_on: Callable[[], bool] = never_on
+    go_on: Callable[[], bool] = lambda: False
     late: Callable[[bool], bool] = bool
 
 
 class OpenedSource(Protocol):
-    """A source, open, and what comes with its kind.
+    """Open source, with the properties of its kind.
 
     Attributes
     ----------
-    plan : what to do with it. listeners : hear the prompts besides the person.
-    truth : of a simulated sensor. recovered : how much of a damaged capture it holds.
-    capture_name : of the file that its kind is recorded into.
-    real_time : its time passes by itself, and waits for nobody.
-    resumable : what is recorded of it can be gone on with.
+    plan : of the session. listeners : receive the prompts besides the operator.
+    truth : true parameters of a simulated sensor. recovered : description of a damaged capture's readable part.
+    capture_name : name of its capture's file.
+    real_time : True if its time passes by itself, False if it waits for the program.
+    resumable : True if a session on it can be resumed from its capture.
     """
 
     @property
@@ -68,18 +63,18 @@ class OpenedSource(Protocol):
     def resumable(self) -> bool: ...  # noqa: D102
 
     def talk(self, person: Operator) -> Operator:
-        """Who presses the keys: the person, or the person in the capture."""
+        """Return the operator who presses the keys: the given one, or the one in the capture."""
         ...
 
     def measuring(self, capture: Path, say: Say, recorded: str) -> AbstractContextManager[ActiveSource]:
-        """The source, recorded into `capture`; whatever happens, both are closed.
+        """Record the source into `capture` during a `with` block; both are closed at its end.
 
         Parameters
         ----------
-        say : tells the person a sentence. recorded : the time of day, for the capture's head.
+        say : shows a sentence to the operator. recorded : time of day for the capture's head.
 
         Raises
         ------
-        CaptureError : a replay came to its end before its capture did.
+        CaptureError : a replay ended before its capture did.
         """
         ...

@@ -1,4 +1,4 @@
-"""From the values of the options to an open source: which kind is meant, whether they fit together, what to do."""
+"""Opening of a source from the options' values: its kind, checks that options fit together, and the plan."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from pkgutil import resolve_name
 from typing import Any
 
 from ..chip.config import Config, RateOnlyConfig
-from ..errors import CaptureError, UsageError, meant
+from ..errors import CaptureError, UsageError, did_you_mean
 from ..session.plan import Plan
 from .kind import Delivery, Option, Request, SourceKind
 from .opened_source import OpenedSource
 from .table import DLPF, SOURCES, kinds_for, matching_kinds, unique
 
-# what a person may choose of a plan; a capture holds it
+# Options of the plan, which a capture fixes.
 OF_THE_PLAN = ("gravity", "gravity_anyway", "model", "target", "tilt_only")
 OUTPUT_FOLDER = "folder"
 
 
 def check_source(values: Mapping[str, Any], given: Mapping[str, str], command: str) -> SourceKind:
-    """The one source that is named, with nothing beside it that belongs to another.
+    """Return the kind of the selected source, after checks that there is one and that the options belong to it.
 
     Parameters
     ----------
-    values : of all options, by name. given : the options that a person wrote, by name, as they were written.
+    values : of all options, by name. given : options on the command line as they were written, by name.
 
     Raises
     ------
-    UsageError : none, several, one that the command does not take, or options that do not fit it.
+    UsageError : no source, several, one that the command does not take, or options that do not belong to it.
     """
     kinds = matching_kinds(values)
     if len(kinds) != 1:
@@ -39,66 +39,63 @@ def check_source(values: Mapping[str, Any], given: Mapping[str, str], command: s
         remedy = "; ".join(filter(None, (one_of(kinds_for(command)), kind.instead)))
         raise UsageError(f"{kind.flag} was given, and `mpucal {command}` does not take it", remedy)
     word = str(values[kind.option.name]).partition(":")[0]
-    if nearly := meant(word, [other.word for other in SOURCES if other.option is kind.option and other.word]):
-        raise UsageError(f"{kind.option.flag} {word} names no source", f"{kind.forms}{nearly}")
+    if nearly := did_you_mean(word, [other.word for other in SOURCES if other.option is kind.option and other.word]):
+        raise UsageError(f"{kind.option.flag} {word} is not a known source", f"{kind.forms}{nearly}")
     if kind.delivers is not Delivery.CAPTURE:
-        for option in _beside(SOURCES):
-            if option.name in given and option not in _beside([kind]):
-                what = f"{given[option.name]} was given beside {kind.flag}, which has none"
-                raise UsageError(what, "leave it out")
+        for option in _dependent_options(SOURCES):
+            if option.name in given and option not in _dependent_options([kind]):
+                raise UsageError(f"{kind.flag} does not take {given[option.name]}", "remove it")
     return kind
 
 
 def check_resume_options(given: Mapping[str, str]) -> None:
-    """Beside --resume neither a source nor what its capture fixes.
+    """Refuse a source, or an option that the capture fixes, together with --resume.
 
     Raises
     ------
-    UsageError : it was given.
+    UsageError : one was given.
     """
     for name in (*(kind.option.name for kind in SOURCES), *_fixed_by_capture(), OUTPUT_FOLDER):
         if name in given:
-            what = f"{given[name]} was given beside --resume, and a session goes on as it began, in its folder"
-            raise UsageError(what, "leave it out")
+            raise UsageError(
+                f"--resume does not take {given[name]}: a session keeps its settings and folder", "remove it"
+            )
 
 
 def refuse_fixed_options(request: Request) -> None:
-    """Beside a capture, nothing that it fixes.
+    """Refuse an option that a capture fixes, together with that capture.
 
     Raises
     ------
-    UsageError : it was given.
+    UsageError : one was given.
     """
     for name in _fixed_by_capture():
         if name in request.given:
             raise UsageError(
-                f"{request.given[name]} was given beside {request.kind.flag}, and the capture fixes it",
-                "leave it out, or use `mpucal calibrate` to fit the capture differently",
+                f"{request.kind.flag} does not take {request.given[name]}, which the capture fixes",
+                "remove it, or use `mpucal calibrate` to fit the capture with other options",
             )
 
 
 def open_source(
     values: Mapping[str, Any], given: Mapping[str, str] | None = None, until_end: bool = False
 ) -> OpenedSource:
-    """The source that the options' values name; see check_source.
+    """Open the source that the options' values select; see check_source.
 
     Raises
     ------
-    UsageError : values that name no such source. SourceError : it cannot be opened.
+    UsageError : impossible values. SourceError : the source cannot be opened.
     """
     kind = matching_kinds(values)[0]
-    opened: OpenedSource = resolve_name(kind.opener)(
-        Request(kind, values, _plan(values, until_end, _of_a_chip(kind)), given or {})
-    )
-    return opened
+    return _open(Request(kind, values, _plan(values, until_end, kind), given or {}))
 
 
 def contents(values: Mapping[str, Any]) -> dict[str, Any]:
-    """What the sensor that the options' values name holds now, in JSON's own types; nothing is set up or written.
+    """Read the present content of the selected sensor, in JSON's types; nothing is set up or written.
 
     Raises
     ------
-    UsageError : values that name no such source. SourceError : it cannot be opened, or does not answer.
+    UsageError : impossible values. SourceError : the sensor cannot be opened, or does not answer.
     """
     source: Any = open_source(values)
     facts: dict[str, Any] = source.contents()
@@ -106,51 +103,51 @@ def contents(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def reopen_source(words: Mapping[str, Any], plan: Plan) -> OpenedSource:
-    """The source of a session that goes on, by the words in its capture's head; see Request.words.
+    """Open the source of a resumed session by the options in its capture's head; see Request.words.
 
     Raises
     ------
-    CaptureError : no such kind of source is known. SourceError : it cannot be opened.
+    CaptureError : an unknown kind of source. SourceError : it cannot be opened.
     """
     kinds = matching_kinds(words)
     if not kinds:
         raise CaptureError(
-            f"its capture was made of a source that this mpucal does not know ({', '.join(words)})",
+            f"its capture comes from a source that this mpucal does not know ({', '.join(words)})",
             "use the mpucal that recorded it, or `mpucal calibrate` on the folder",
         )
-    opened: OpenedSource = resolve_name(kinds[0].opener)(Request(kinds[0], words, plan))
+    return _open(Request(kinds[0], words, plan))
+
+
+def _open(request: Request) -> OpenedSource:
+    opened: OpenedSource = resolve_name(request.kind.opener)(request)
     return opened
 
 
 def one_of(kinds: Iterable[SourceKind]) -> str:
-    """What to do where none or the wrong one was given."""
+    """Return the remedy for a missing or wrong source."""
     *others, last = (f"{option.flag} {option.metavar}" for option in unique(kind.option for kind in kinds))
     return f"give exactly one of {', '.join(others)} and {last}" if others else f"give {last}"
 
 
-def _beside(kinds: Iterable[SourceKind]) -> list[Option]:
-    """The options that belong to some kinds of source, besides the ones that name these."""
+def _dependent_options(kinds: Iterable[SourceKind]) -> list[Option]:
+    """List the options that belong to kinds of source, without those that select them."""
     return unique(option for kind in kinds for option in (*kind.options, *kind.settings))
 
 
 def _fixed_by_capture() -> tuple[str, ...]:
-    return (*(option.name for option in _beside(SOURCES)), *OF_THE_PLAN)
+    return (*(option.name for option in _dependent_options(SOURCES)), *OF_THE_PLAN)
 
 
-def _of_a_chip(kind: SourceKind) -> bool:
-    """Whether more than its rate can be set."""
-    return DLPF in kind.settings or kind.delivers is Delivery.CAPTURE
-
-
-def _plan(values: Mapping[str, Any], until_end: bool, of_a_chip: bool) -> Plan:
-    """What the options' values ask for; what they leave out is as usual.
+def _plan(values: Mapping[str, Any], until_end: bool, kind: SourceKind) -> Plan:
+    """Build the plan from the options' values, with defaults.
 
     Raises
     ------
-    UsageError : values that a chip does not have, or that contradict each other.
+    UsageError : values that no chip has, or that contradict each other.
     """
     usual = Plan(Config())
-    config = (Config if of_a_chip else RateOnlyConfig)(
+    configures_chip = DLPF in kind.settings or kind.delivers is Delivery.CAPTURE
+    config = (Config if configures_chip else RateOnlyConfig)(
         int(values.get("accel_range", usual.config.accel_range_g)),
         int(values.get("gyro_range", usual.config.gyro_range_dps)),
         values.get("rate", usual.config.rate_hz),
@@ -159,8 +156,8 @@ def _plan(values: Mapping[str, Any], until_end: bool, of_a_chip: bool) -> Plan:
     model = values.get("model", usual.model)
     if values.get("tilt_only"):
         if model not in ("auto", "tilt"):
-            what = f"--model {model} was given beside --tilt-only, and tilts alone do not determine it"
-            raise UsageError(what, "leave it out: tilts are fitted by the model tilt")
+            what = f"--tilt-only does not take --model {model}, which tilts alone do not determine"
+            raise UsageError(what, "remove it: tilts are fitted by the model tilt")
         model = "tilt"
     aim = {name: values[name] for name in ("target", "tilt_only", "attended", "gravity_anyway") if name in values}
     return Plan(config, values.get("gravity", usual.gravity), model, until_end, **aim)

@@ -1,4 +1,4 @@
-"""When a read happened: between the host's clock before and after it, within which a process may be put to sleep."""
+"""Timer of reads: a read happens between two times of the host's clock, and the process may be suspended in between."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Callable
 from ..chip.access import Reply
 from ..chip.registers import ACCEL_XOUT_H, FIFO_COUNT_H
 
-# what is read for its time, and may be read again: nothing is taken away from the chip
-AGAIN = (FIFO_COUNT_H, ACCEL_XOUT_H)
+# These are read for their time, and may be read again: a read takes nothing away from the chip.
+REPEATABLE = (FIFO_COUNT_H, ACCEL_XOUT_H)
 TRIES = 3
-# longer than the shortest of its like: two samples at 1 kHz, and more than a transfer varies by
+# Excess over the shortest read: two samples at 1 kHz, and more than a transfer varies by.
 LATE_NS = 2_000_000
 
 
 class ReadTimer:
-    """Reads with the time just before each; one that was held up is repeated, and of all tries the shortest counts.
+    """Makes reads with the time just before each; a delayed one is repeated, and the shortest of the tries counts.
 
-    Its time is early by no more than it took longer than the shortest read of as many bytes.
+    Its time is early by no more than its excess over the shortest read of as many bytes.
     """
 
     def __init__(self, now_ns: Callable[[], int]) -> None:
@@ -25,15 +25,15 @@ class ReadTimer:
         self._shortest_ns: dict[tuple[int, int], int] = {}
 
     def read(self, register: int, count: int, transfer: Callable[[], bytes]) -> Reply:
-        """What `transfer` gives, which reads `count` bytes from `register` on."""
-        found = []
-        for _ in range(TRIES if register in AGAIN else 1):
+        """Make the read `transfer` of `count` bytes from `register` on."""
+        tries = []
+        for _ in range(TRIES if register in REPEATABLE else 1):
             t_ns = self._now_ns()
             data = transfer()
             took_ns = self._now_ns() - t_ns
-            found.append((took_ns, Reply(data, t_ns)))
+            tries.append((took_ns, Reply(data, t_ns)))
             shortest_ns = min(took_ns, self._shortest_ns.get((register, count), took_ns))
             self._shortest_ns[register, count] = shortest_ns
             if took_ns - shortest_ns <= LATE_NS:
                 break
-        return min(found, key=lambda each: each[0])[1]
+        return min(tries, key=lambda each: each[0])[1]

@@ -1,4 +1,4 @@
-"""A bus that answers from the records of a capture, and from nothing else."""
+"""Bus that answers from the records of a capture alone."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ _RAISES["LinkLost"] = LinkError
 
 
 class ReplayBus:
-    """Gives the recorded replies to the recorded accesses, in their order.
+    """Bus that answers the recorded accesses, in their order, with the recorded replies.
 
-    Raises EndOfCapture after the last one, CaptureError on an access that is not the recorded one,
-    and the recorded error where the recorded access failed.
+    It raises EndOfCapture after the last one, CaptureError on another access than the recorded one, and the recorded
+    error of an access that failed.
 
     Parameters
     ----------
-    records : as recorded. name : what to call the capture in a message.
+    records : as recorded. name : of the capture, for messages.
     """
 
     def __init__(self, records: Iterable[Record], name: str = "the capture") -> None:
         self._name = name
         self._accesses: list[Transaction] = []
-        # the events that lie before each access, and those after the last
+        # Events before each access, and after the last.
         self._events: list[list[SessionEvent]] = [[]]
         for record in records:
             if isinstance(record, SessionEvent):
@@ -40,40 +40,39 @@ class ReplayBus:
 
     def read(self, register: Any, count: int) -> Reply:
         """See Bus."""
-        recorded = self._recorded(Transaction("read", register, count, b"", 0))
+        recorded = self._next_recorded(Transaction("read", register, count, b"", 0))
         return Reply(recorded.data, recorded.t_ns, recorded.host_ns)
 
     def write(self, register: Any, data: bytes) -> int:
         """See Bus."""
-        return self._recorded(Transaction("write", register, len(data), data, 0)).t_ns
+        return self._next_recorded(Transaction("write", register, len(data), data, 0)).t_ns
 
     def sleep_until(self, t_ns: int) -> None:
         """Return at once: the replies carry their times."""
 
     def close(self) -> None:
-        """Nothing to let go of; `unread` tells whether the capture was used up."""
+        """Do nothing; `unread` shows if the whole capture was used."""
 
     def pending_events(self, name: str) -> list[SessionEvent]:
-        """The events of that name recorded before the next access, each once.
+        """Return the events of that name recorded before the next access, each once.
 
-        Asked where the recording session asked its keyboard, what was recorded between two accesses
-        comes between the same two.
+        A replay that calls it where the session read its keyboard gets each event between the same two accesses.
         """
         pending = [event for event in self._pending if event.name == name]
         self._pending = [event for event in self._pending if event.name != name]
         return pending
 
     def unread(self) -> int:
-        """How many recorded accesses nobody has asked for."""
+        """Return the number of unread accesses."""
         return len(self._accesses) - self._next
 
-    def _recorded(self, asked: Transaction) -> Transaction:
+    def _next_recorded(self, asked: Transaction) -> Transaction:
         if self._next == len(self._accesses):
             raise EndOfCapture(f"{self._name} ends before {_words(asked)}")
         recorded = self._accesses[self._next]
         if _words(asked) != _words(recorded):
             raise CaptureError(
-                f"the program asked for {_words(asked)}, but access {self._next} of {self._name} is {_words(recorded)}",
+                f"the program makes {_words(asked)}, but access {self._next} of {self._name} is {_words(recorded)}",
                 "replay it with the mpucal and options that recorded it, or calibrate it without replaying",
             )
         self._next += 1
@@ -84,7 +83,7 @@ class ReplayBus:
 
 
 def _words(access: Transaction) -> str:
-    """An access as words; two accesses are the same where these are."""
+    """Describe an access; equal descriptions mean equal accesses."""
     if access.op == "read":
         return f"a read of {access.count} bytes from {_place(access)}"
     return f"a write of {access.data.hex(' ') or 'nothing'} to {_place(access)}"

@@ -1,4 +1,4 @@
-"""A capture as a source: the accesses of a bus (.mcap) or the packets of a vehicle (.tlog), run again."""
+"""Replay of a capture as a source: the accesses of a bus (.mcap) or the packets of a vehicle (.tlog)."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ TLOG = ".tlog"
 
 
 def open_source(request: Request) -> OpenedSource:
-    """A capture, or all those in the folder of a session that was resumed.
+    """Open a capture, or all captures in the folder of a resumed session.
 
     Raises
     ------
-    UsageError : options that the capture fixes. CaptureError : no capture, or one of another driver.
+    UsageError : options that the capture fixes. CaptureError : not a capture, or one of another driver.
     RecordingError : a .tlog without an IMU.
     """
     file: Path = request.value
     if file.suffix.lower() != TLOG:
         refuse_fixed_options(request)
         return _open_mcap(file)
-    # pymavlink is slow to load, and of no use to a chip on a bus
+    # pymavlink loads slowly, and a chip on a bus does not need it.
     from .vehicle import OpenedVehicle, open_tlog  # noqa: PLC0415
 
     source = open_tlog(file, replace(request.plan, until_end=True), request.values.get("system"))
     if isinstance(source, OpenedVehicle):
-        # one of another ground station fixes nothing
+        # A .tlog of another ground station fixes no options.
         refuse_fixed_options(request)
     return source
 

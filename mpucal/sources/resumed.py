@@ -1,4 +1,4 @@
-"""A session that goes on after an interruption: its captures are run again, then the sensor is measured."""
+"""Session that is resumed after an interruption: its captures are replayed, then the sensor is measured."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from .utc_recorder import UtcRecorder
 
 @dataclass(frozen=True)
 class ResumedChip:
-    """What was recorded of a session, and the sensor to go on with; see OpenedSource.
+    """Recorded parts of a session and the sensor to continue with; see OpenedSource.
 
     Attributes
     ----------
-    bus : the recorded parts, then the sensor, which alone is recorded again. live : how the sensor was opened.
+    bus : the recorded parts, then the sensor, whose accesses alone are recorded. live : the open sensor.
     """
 
     bus: ChainedBus
@@ -58,12 +58,12 @@ class ResumedChip:
 
     @property
     def listeners(self) -> Sequence[Callable[[Prompt], None]]:
-        """See OpenedSource; what was said before is not said again."""
-        return [self._now(listener) for listener in self.live.listeners]
+        """Listeners that do not receive the earlier prompts again."""
+        return [self._only_new(listener) for listener in self.live.listeners]
 
     def talk(self, person: Operator) -> Operator:
         """See OpenedSource."""
-        return _Later(person, self.bus)
+        return _ResumedOperator(person, self.bus)
 
     @contextmanager
     def measuring(self, capture: Path, say: Say, recorded: str) -> Iterator[ActiveSource]:
@@ -77,12 +77,12 @@ class ResumedChip:
     def _late(self, late: bool) -> bool:
         return bool(self.bus.pending_events(LATE)) if self.bus.replaying else late
 
-    def _now(self, listener: Callable[[Prompt], None]) -> Callable[[Prompt], None]:
+    def _only_new(self, listener: Callable[[Prompt], None]) -> Callable[[Prompt], None]:
         return lambda prompt: None if self.bus.replaying else listener(prompt)
 
 
 class _Recorder:
-    """Keeps what happens now, and not what was recorded before."""
+    """Recorder of new accesses and events, without the replayed ones."""
 
     def __init__(self, writer: CaptureWriter, dated: UtcRecorder, bus: ChainedBus) -> None:
         self._writer, self._dated, self._bus = writer, dated, bus
@@ -98,47 +98,47 @@ class _Recorder:
             self._writer.event(name, t_ns, data)
 
 
-class _Later:
-    """The person, who heard and pressed before what is in the captures."""
+class _ResumedOperator:
+    """Operator whose earlier prompts and keys are in the captures."""
 
     def __init__(self, person: Operator, bus: ChainedBus) -> None:
         self._person, self._bus = person, bus
 
     def hear(self, output: Output) -> None:
-        """Be told, if it is new."""
+        """Show an output if it is new."""
         if not self._bus.replaying:
             self._person.hear(output)
 
     def pressed(self) -> Sequence[Key]:
-        """As recorded; then as pressed now."""
+        """Return the recorded keys; after the replay, the pressed ones."""
         if self._bus.replaying:
             return [Key(event.data[KEY]) for event in self._bus.pending_events(KEY)]
         return self._person.pressed()
 
 
 def open_resumed(folder: Path) -> ResumedChip:
-    """The session in `folder`, to go on with the source that its first capture names.
+    """Open the session in `folder` and the source that its first capture names.
 
     Raises
     ------
-    UsageError : there is no session, or its source cannot be opened again. CaptureError : a damaged head.
+    UsageError : no session, or its source cannot be opened again. CaptureError : a damaged head.
     """
     files = captures_in(folder)
     if (folder / CAPTURE_OF_VEHICLE.name).exists():
-        remedy = f"`mpucal calibrate {folder}` takes what there is of it; or start again"
-        raise UsageError(f"the session in {folder} is a vehicle's, which cannot be resumed", remedy)
+        remedy = f"use `mpucal calibrate {folder}` for the recorded part; or start again"
+        raise UsageError(f"the session in {folder} is one with a vehicle, which cannot be resumed", remedy)
     if not files:
-        raise UsageError(f"{folder} holds no session that could be resumed", "give the folder of an interrupted one")
+        raise UsageError(f"{folder} does not hold a session", "give the folder of an interrupted session")
     captures = [read_capture(file) for file in files]
     plan = Plan.of_capture(captures[0].meta, captures[0].name)
     source = captures[0].meta.get(SOURCE)
     if not source:
-        raise UsageError(
-            f"the capture in {folder} does not name a source to go on with", "use `mpucal calibrate` on the folder"
-        )
+        raise UsageError(f"the capture in {folder} does not name its source", "use `mpucal calibrate` on the folder")
     live = reopen_source(source, plan)
     if not isinstance(live, OpenedChip):
-        raise UsageError(f"a session on {folder}'s source cannot go on", "use `mpucal calibrate` on the folder")
+        raise UsageError(
+            f"a session on the source of {folder} cannot be resumed", "use `mpucal calibrate` on the folder"
+        )
     records = split_at_resumes((capture.records for capture in captures), more=True)
     last_ns = max((record.t_ns for part in records for record in part), default=0)
     replays = [ReplayBus(part, folder.name) for part in records]

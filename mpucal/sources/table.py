@@ -1,7 +1,7 @@
-"""The table of sources: one row for each kind, from which options, help, error messages and documentation are made.
+"""Table of sources: one row for each kind, from which options, help, error messages and documentation are made.
 
-A new source is a module that opens it and a row here. The module, and the library behind it, are imported when a
-source of that kind is opened.
+A new source is a module that opens it and a row here. The module and its library are imported when a source of that
+kind is opened.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from .kind import Delivery, Option, SourceKind
 
 
 def bus_name(text: str) -> str:
-    """A bus as text; the number of an adapter becomes its path, and a kind's word is taken in any case."""
+    """Convert the name of a bus: the number of an adapter to its path, and a kind's word to lower case."""
     if not text:
-        raise ValueError("no bus is named: give /dev/i2c-N, or sim.")
+        raise ValueError("no bus was named: give /dev/i2c-N, or sim.")
     word, colon, rest = text.partition(":")
     if word.lower() in {kind.word for kind in SOURCES if kind.option is BUS}:
         return word.lower() + colon + rest
@@ -25,13 +25,13 @@ def bus_name(text: str) -> str:
 
 
 def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
-    """What parses a whole number from `least` to `most`, decimal or 0x hexadecimal."""
+    """Return a parser of whole numbers from `least` to `most`, decimal or 0x hexadecimal."""
 
     def parse(text: str) -> int:
         try:
             number = int(text, 0)
         except ValueError:
-            raise ValueError(f"{text!r} is no whole number.") from None
+            raise ValueError(f"{text!r} is not a whole number.") from None
         if number < least or (most is not None and number > most):
             allowed = f"{least} or more" if most is None else f"{least} to {most}"
             raise ValueError(f"{text} is not {allowed}.")
@@ -41,18 +41,18 @@ def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
 
 
 def number(text: str) -> float:
-    """A number as text."""
+    """Parse a number."""
     try:
         return float(text)
     except ValueError:
-        raise ValueError(f"{text!r} is no number.") from None
+        raise ValueError(f"{text!r} is not a number.") from None
 
 
 def pins(text: str) -> tuple[int | str, ...]:
-    """SDA,SCL as numbers or names of pins; empty where none are named."""
+    """Parse SDA,SCL as numbers or names of pins; empty without pins."""
     named = tuple(int(pin) if pin.isdecimal() else pin for pin in text.split(",") if pin)
     if len(named) not in (0, 2):
-        raise ValueError(f"{text!r} are not two pins, SDA,SCL.")
+        raise ValueError(f"{text!r} is not two pins, SDA,SCL.")
     return named
 
 
@@ -64,20 +64,20 @@ MAVLINK = Option("mavlink", metavar="URL")
 REPLAY = Option("replay", metavar="FILE", parse=Path)
 
 ADDRESS = Option("address", "I2C address; by default 0x68, then 0x69.", "ADDRESS", whole_number(0, 0x7F))
-TRIGGER = Option("trigger", "Trigger of the buffer, by default its own; none polls instead.", "NAME")
+TRIGGER = Option("trigger", "Trigger of the buffer; by default its own; none: poll instead.", "NAME")
 MICROPYTHON = Option(
     "micropython",
-    "The board runs MicroPython: let it run the bridge from its memory, with the chip on its own I2C pins or on these.",
+    "Run the bridge on a board with MicroPython; the chip is on the board's I2C pins, or on these.",
     "SDA,SCL",
     pins,
     bare="",
 )
-SEED = Option("seed", "Which simulated sensor and hand.", "N", whole_number(0))
-SYSTEM = Option("system", "Which vehicle, if several.", "N", whole_number(1, 255))
+SEED = Option("seed", "Number of the simulated sensor and hand.", "N", whole_number(0))
+SYSTEM = Option("system", "Number of the vehicle, if there are several.", "N", whole_number(1, 255))
 SOURCE_SYSTEM = Option("source_system", "MAVLink id of mpucal itself; by default 254.", "N", whole_number(1, 255))
 PREPARE = Option(
     "prepare",
-    "Of a PX4 that lies level: have it name its accelerometers where it names none, and learn no offsets meanwhile.",
+    "PX4 only, vehicle level: assign missing accelerometer IDs and pause offset learning.",
     "yes|no",
     choices=("yes", "no"),
     bare="yes",
@@ -88,14 +88,14 @@ SIGNING_KEY = Option(
 
 RATE = Option(
     "rate",
-    "Samples a second, to 1000; 4000 records or streams an MPU-6500's accelerometer alone.",
+    "Samples a second, up to 1000; 4000: only the accelerometer of an MPU-6500, to record or stream.",
     "HZ",
     number,
     default=200.0,
 )
 DLPF = Option(
     "dlpf",
-    "Low-pass filter: 1 (184 Hz) to 6 (5 Hz); 0 (260 Hz) of an MPU-6050 only.",
+    "Low-pass filter: 1 (184 Hz) to 6 (5 Hz); 0 (260 Hz) for an MPU-6050 only.",
     "CODE",
     whole_number(DLPF_CODES[0], DLPF_CODES[-1]),
     default=3,
@@ -173,7 +173,7 @@ SOURCES = [
         doctor="mpucal.doctor.sources:examine_chip_alone",
     ),
     SourceKind(
-        what="a sensor that a driver of the Linux kernel holds",
+        what="a sensor with a Linux kernel (IIO) driver",
         option=IIO,
         forms="iio:deviceN, or accel=iio:deviceN,gyro=iio:deviceM",
         opener="mpucal.sources.iio:open_source",
@@ -183,10 +183,10 @@ SOURCES = [
         doctor="mpucal.doctor.iio:examine_iio",
     ),
     SourceKind(
-        what="the same, simulated",
+        what="a simulated sensor with a kernel driver",
         option=IIO,
         word="sim",
-        forms="sim[:key=value,...] for the simulated chip behind a simulated driver",
+        forms="sim[:key=value,...] for the simulated chip with a simulated driver",
         opener="mpucal.simulated.iio:open_source",
         delivers=Delivery.SAMPLES,
         options=(TRIGGER, SEED),
@@ -215,9 +215,9 @@ SOURCES = [
         title="simulated vehicle",
     ),
     SourceKind(
-        what="a capture that is run again",
+        what="the replay of a capture",
         option=REPLAY,
-        forms="a capture to run again: .mcap, .tlog, or the folder of a session",
+        forms="a capture to replay: .mcap, .tlog, or the folder of a session",
         opener="mpucal.sources.replayed:open_source",
         delivers=Delivery.CAPTURE,
         instead="`mpucal calibrate`, `mpucal apply` and `mpucal show` read a capture",
@@ -227,26 +227,26 @@ SOURCES = [
 
 
 def kinds_for(command: str) -> list[SourceKind]:
-    """The kinds of source that a command takes."""
+    """Return the kinds of source that a command takes."""
     return [kind for kind in SOURCES if command in kind.commands]
 
 
 def matching_kinds(values: Mapping[str, Any]) -> list[SourceKind]:
-    """The kinds that the options' values name: one for each of their options that has a value."""
-    meant: dict[Option, SourceKind] = {}
-    # what asks for a word or another option is meant rather than what does not
+    """Return the kinds that the options' values select: one for each of their options that has a value."""
+    selected: dict[Option, SourceKind] = {}
+    # A kind that needs a word or another option has priority over one that does not.
     for kind in sorted(SOURCES, key=lambda kind: bool(kind.word) + bool(kind.beside)):
         if kind.matches(values):
-            meant[kind.option] = kind
-    return [meant[option] for option in unique(kind.option for kind in SOURCES) if option in meant]
+            selected[kind.option] = kind
+    return [selected[option] for option in unique(kind.option for kind in SOURCES) if option in selected]
 
 
 def source_title(values: Mapping[str, Any]) -> str:
-    """The source as a person would name it; empty where the options' values name none."""
+    """Return the title of the selected source; empty without one."""
     kinds = matching_kinds(values)
     return kinds[0].title.format(values[kinds[0].option.name]) if kinds else ""
 
 
 def unique(options: Iterable[Option]) -> list[Option]:
-    """Each option once, in their order."""
+    """Remove duplicates, in order."""
     return list(dict.fromkeys(options))

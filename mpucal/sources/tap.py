@@ -1,18 +1,21 @@
-"""A bus that passes every access on to another bus, and records it."""
+"""Bus that passes every access on to another bus, and records it."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Literal, TypeVar
 
 from ..chip.access import Bus, Failure, Files, Reply, Transaction
 from ..chip.records import Recorder
 from ..errors import BusError
 
+T = TypeVar("T")
+
 
 class Tap:
-    """Passes every access on to `bus` and tells `recorder`, failed accesses too.
+    """Passes every access on to `bus` and records it in `recorder`, failed accesses included.
 
-    A failed access has no time of its own: it is recorded with the latest time that is known.
+    A failed access has no time: it is recorded with the last known time.
     """
 
     def __init__(self, bus: Bus | Files, recorder: Recorder) -> None:
@@ -22,24 +25,14 @@ class Tap:
 
     def read(self, register: Any, count: int) -> Reply:
         """See Bus."""
-        try:
-            reply = self._bus.read(register, count)
-        except BusError as error:
-            self._recorder.transaction(Transaction("read", register, count, b"", self._latest_ns, _failure(error)))
-            raise
+        reply = self._tried("read", register, count, b"", lambda: self._bus.read(register, count))
         self._latest_ns = max(self._latest_ns, reply.t_ns)
         self._recorder.transaction(Transaction("read", register, count, reply.data, reply.t_ns, host_ns=reply.host_ns))
         return reply
 
     def write(self, register: Any, data: bytes) -> int:
         """See Bus."""
-        try:
-            t_ns = self._bus.write(register, data)
-        except BusError as error:
-            self._recorder.transaction(
-                Transaction("write", register, len(data), data, self._latest_ns, _failure(error))
-            )
-            raise
+        t_ns = self._tried("write", register, len(data), data, lambda: self._bus.write(register, data))
         self._latest_ns = max(self._latest_ns, t_ns)
         self._recorder.transaction(Transaction("write", register, len(data), data, t_ns))
         return t_ns
@@ -53,6 +46,13 @@ class Tap:
         """Close the bus; the recorder stays open."""
         self._bus.close()
 
-
-def _failure(error: BusError) -> Failure:
-    return Failure(type(error).__name__, error.what, error.remedy)
+    def _tried(
+        self, op: Literal["read", "write"], register: Any, count: int, data: bytes, access: Callable[[], T]
+    ) -> T:
+        """Make an access, and record a failure."""
+        try:
+            return access()
+        except BusError as error:
+            failure = Failure(type(error).__name__, error.what, error.remedy)
+            self._recorder.transaction(Transaction(op, register, count, data, self._latest_ns, failure))
+            raise

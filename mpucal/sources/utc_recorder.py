@@ -1,4 +1,4 @@
-"""The time of day in a capture, so that its samples can be merged with what others recorded meanwhile."""
+"""Recorder that adds the time of day to a capture, so that its samples can be merged with other recordings."""
 
 from __future__ import annotations
 
@@ -15,22 +15,23 @@ class _Capture(Recorder, Protocol):
 
 
 class UtcRecorder:
-    """Keeps the time of day before the first access that succeeded, then every access.
+    """Records the time of day before the first successful access, then every access.
 
     Parameters
     ----------
-    capture : where to. pending : of a replay, the session events of a name since the last access: it keeps its date.
+    capture : receives the records. pending : for a replay, which keeps its recorded time: returns the session events of
+        a name since the last access.
     """
 
     def __init__(self, capture: _Capture, pending: Callable[[str], Sequence[SessionEvent]] | None = None) -> None:
-        self._capture, self._pending, self._is_dated = capture, pending, False
+        self._capture, self._pending, self._has_time = capture, pending, False
 
     def transaction(self, transaction: Transaction) -> None:
         """See Recorder."""
         if self._pending is not None:
             for event in self._pending(UTC):
                 self._capture.event(UTC, event.t_ns, event.data)
-        elif not self._is_dated and transaction.error is None:
-            self._is_dated = True
+        elif not self._has_time and transaction.error is None:
+            self._has_time = True
             self._capture.event(UTC, transaction.t_ns, {UTC: time.time_ns()})
         self._capture.transaction(transaction)

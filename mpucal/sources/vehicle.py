@@ -1,4 +1,4 @@
-"""A vehicle over MAVLink, or its .tlog, open: every packet goes into a .tlog."""
+"""Open vehicle over MAVLink, or its .tlog: every packet is recorded in a .tlog."""
 
 from __future__ import annotations
 
@@ -35,21 +35,21 @@ from .opened_source import ActiveSource, Say
 
 SESSION, END = "session", "end"
 MPUCAL, RECORDED, SOURCE, PLAN, SYSTEM, PREPARE = "mpucal", "recorded", "source", "plan", "system", "prepare"
-# counts up with every change of what the source sends and believes
+# Counts up with every change of what the source sends and accepts.
 SOURCE_VERSION = 4
 NOTE_IDS = 65535
 
 
 class OpenedVehicle:
-    """A transport to a vehicle; see OpenedSource.
+    """Vehicle behind a transport; see OpenedSource.
 
     Parameters
     ----------
-    transport : open. plan : what to do; of its `config` the rate matters. system : whom to lock to.
-    key : to sign with, or None. listeners : hear the prompts, besides the vehicle.
-    own_system : under which MAVLink id we speak. writes : whether the result will be written to it.
-    prepare : whether a PX4 is to be made ready; see Preparation.
-    truth : tells what is true of a simulated vehicle's streams now. replay : the same transport where it is a replay.
+    transport : open. plan : of the session; only the rate of its `config` applies. system : number of the vehicle.
+    key : signing key, or None. listeners : receive the prompts besides the vehicle.
+    own_system : MAVLink id of mpucal. writes : True if the result will be written to the vehicle.
+    prepare : True to prepare a PX4; see Preparation.
+    truth : returns the true parameters of a simulated vehicle's streams. replay : the same transport if it is a replay.
     real_time : see OpenedSource.
 
     Attributes
@@ -92,7 +92,7 @@ class OpenedVehicle:
 
     @property
     def truth(self) -> Mapping[str, Any] | None:
-        """Of the streams under the parameters that it holds by now: those to which a recording is composed."""
+        """True parameters of the streams, under the vehicle's present parameters."""
         return None if self._truth is None else self._truth()
 
     def talk(self, person: Operator) -> Operator:
@@ -104,7 +104,7 @@ class OpenedVehicle:
         """See OpenedSource."""
         with closing(self._transport), TlogWriter(capture) as writer:
             link = self.link = Link(self._transport, writer.packet, self._key, self._own_system)
-            notes = _Noting(link)
+            notes = _NoteRecorder(link)
             plan = {SOURCE: SOURCE_VERSION, PLAN: asdict(self.plan), SYSTEM: self._system, PREPARE: self._prepare}
             notes.keep(SESSION, 0, {MPUCAL: __version__, RECORDED: recorded, **plan})
             rate_hz = self.plan.config.rate_hz
@@ -114,26 +114,26 @@ class OpenedVehicle:
             finally:
                 with suppress(EndOfCapture):
                     source.stop()
-                # until when nothing more came: a replay ends its last poll there
+                # Nothing came after this time, so that a replay ends its last poll here.
                 notes.keep(END, 0, {})
 
     @contextmanager
     def connected(self, say: Say) -> Iterator[Link]:
-        """A link that is locked to the vehicle, and recorded nowhere.
+        """Lock a link to the vehicle, without recording it.
 
         Raises
         ------
         UsageError : a .tlog, or several vehicles. NoAnswer, LinkError : see Link.
         """
         if self._replay is not None:
-            raise UsageError("a .tlog has no vehicle to write to", "give the vehicle's --mavlink URL")
+            raise UsageError("a .tlog is not a vehicle that can be written to", "give the vehicle's --mavlink URL")
         with closing(self._transport):
             link = self.link = Link(self._transport, lambda _t_ns, _packet: None, self._key, self._own_system)
             lock_to_vehicle(link, self._system, say)
             yield link
 
     def contents(self) -> dict[str, Any]:
-        """What its accelerometer parameters are now, and which vehicle it is; nothing is written."""
+        """Read the vehicle's identity and its accelerometer parameters; nothing is written."""
         with self.connected(lambda _sentence: None) as link:
             firmware = link.vehicle.family
             return {
@@ -143,9 +143,9 @@ class OpenedVehicle:
             }
 
     def _prompt(self, prompt: Prompt) -> None:
-        """Tell the vehicle, whose log then says what was done to it."""
+        """Send the prompt to the vehicle, so that its log contains it."""
         if self.link is not None:
-            # a vehicle that is gone is no reason to keep a prompt from the person
+            # The operator gets the prompt even if the vehicle is gone.
             with suppress(LinkError):
                 self.link.send(encode_prompt(prompt))
 
@@ -160,7 +160,7 @@ class OpenedVehicle:
 
 @dataclass(frozen=True)
 class OpenedLog:
-    """A .tlog of another ground station; see OpenedSource."""
+    """Open .tlog of another ground station; see OpenedSource."""
 
     tlog: Tlog
     measured: Recording
@@ -182,33 +182,33 @@ class OpenedLog:
 
     @contextmanager
     def measuring(self, capture: Path, _say: Say, _recorded: str) -> Iterator[ActiveSource]:
-        """See OpenedSource; the capture is a copy."""
+        """Copy the log as the capture; see OpenedSource."""
         with TlogWriter(capture) as writer:
             for record in self.tlog.records:
                 writer.packet(record.t_ns, record.data)
             yield ActiveSource(RecordedSource(self.measured), lambda _name, _t_ns, _data: None)
 
 
-class _Noting:
-    """Keeps session events among a link's packets."""
+class _NoteRecorder:
+    """Recorder of session events among a link's packets."""
 
     def __init__(self, link: Link) -> None:
         self._link = link
         self._notes = 0
 
     def keep(self, name: str, _t_ns: int, data: Mapping[str, Any]) -> None:
-        """Keep an event; its time is the link's."""
+        """Record an event at the link's time."""
         for message in encode_note(Note(name, data), 1 + self._notes % NOTE_IDS):
             self._link.note(message)
         self._notes += 1
 
 
 def open_source(request: Request) -> OpenedVehicle:
-    """The vehicle at a URL.
+    """Open the vehicle at a URL.
 
     Raises
     ------
-    UsageError : words that are no URL, or no key. LinkError : it cannot be opened.
+    UsageError : not a URL, or not a key. LinkError : the link cannot be opened.
     """
     key = signing_key(request)
     transport = open_transport(parse_url(request.value))
@@ -216,7 +216,7 @@ def open_source(request: Request) -> OpenedVehicle:
 
 
 class LinkIdentity(TypedDict):
-    """Under which system id we speak, whether the result will be written to the vehicle, and what is prepared."""
+    """MAVLink id of mpucal, and its intention to write the result and to prepare the vehicle."""
 
     own_system: int
     writes: bool
@@ -224,7 +224,7 @@ class LinkIdentity(TypedDict):
 
 
 def link_identity(request: Request) -> LinkIdentity:
-    """What the options say of us."""
+    """Return the LinkIdentity that the options select."""
     own = request.values.get("source_system")
     return {
         "own_system": OWN_SYSTEM if own is None else int(own),
@@ -234,26 +234,26 @@ def link_identity(request: Request) -> LinkIdentity:
 
 
 def signing_key(request: Request) -> bytes | None:
-    """To sign with, where one is named.
+    """Read the signing key if one is named.
 
     Raises
     ------
-    UsageError : it cannot be read.
+    UsageError : the key cannot be read.
     """
     path = request.values.get("signing_key")
     return None if path is None else read_key(path)
 
 
 def open_tlog(file: Path, asked: Plan, system: int | None) -> OpenedVehicle | OpenedLog:
-    """A .tlog to be run again: one of mpucal's sessions as it was, any other until its end.
+    """Open a .tlog for a replay: a session of mpucal as it was, any other log until its end.
 
     Parameters
     ----------
-    asked : the plan for one of another ground station.
+    asked : plan for the log of another ground station.
 
     Raises
     ------
-    CaptureError : it cannot be read, or another version of mpucal made it. RecordingError : it holds no IMU.
+    CaptureError : it cannot be read, or another version of mpucal recorded it. RecordingError : it has no IMU.
     """
     tlog = read_tlog(file)
     replay = TlogReplay(tlog)
@@ -272,5 +272,5 @@ def open_tlog(file: Path, asked: Plan, system: int | None) -> OpenedVehicle | Op
         return OpenedVehicle(replay, made, head.data[SYSTEM], replay=replay, recovered=tlog.recovered, prepare=prepare)
     except (KeyError, TypeError, ValueError) as error:
         raise CaptureError(
-            f"the head of {tlog.name} does not say how it was made ({error})", "use `mpucal calibrate` on it"
+            f"the head of {tlog.name} does not describe its session ({error})", "use `mpucal calibrate` on it"
         ) from error

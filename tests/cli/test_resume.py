@@ -81,9 +81,9 @@ def test_goes_on_where_it_was_with_the_same_bits_as_unbroken(mpucal, stopped_at,
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--resume", "nowhere"], "nowhere holds no session that could be resumed"),
-        (["--resume", "x", "--bus", "sim"], "--bus was given beside --resume"),
-        (["--resume", "x", "-o", "y"], "-o was given beside --resume"),
+        (["--resume", "nowhere"], "nowhere does not hold a session"),
+        (["--resume", "x", "--bus", "sim"], "--resume does not take --bus"),
+        (["--resume", "x", "-o", "y"], "--resume does not take -o"),
     ],
     ids=["no session", "another source", "another folder"],
 )
@@ -97,7 +97,7 @@ def test_a_vehicle_cannot_be_resumed(mpucal, tmp_path):
     (tmp_path / "capture.tlog").touch()
     result = mpucal("session", "--resume", str(tmp_path))
     assert result.code == 2
-    assert "is a vehicle's, which cannot be resumed" in result.err
+    assert "is one with a vehicle, which cannot be resumed" in result.err
 
 
 def test_a_capture_without_a_source_cannot_be_resumed(mpucal, write_capture, tmp_path):
@@ -107,7 +107,7 @@ def test_a_capture_without_a_source_cannot_be_resumed(mpucal, write_capture, tmp
     write_capture(tmp_path / "old" / "capture.mcap", meta, [])
     result = mpucal("session", "--resume", "old")
     assert result.code == 2
-    assert "does not name a source to go on with" in result.err
+    assert "does not name its source" in result.err
 
 
 @pytest.mark.slow

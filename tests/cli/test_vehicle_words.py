@@ -32,9 +32,9 @@ def test_a_recording_of_a_vehicle_is_shown(recorded):
     ("words", "what"),
     [
         (["--bus", "sim", "--mavlink", "sim"], "--bus and --mavlink were given together"),
-        (["--bus", "sim", "--system", 1], "--system was given beside --bus"),
-        (["--mavlink", "sim", "--address", 0x68], "--address was given beside --mavlink"),
-        (["--mavlink", "sim", "--accel-range", 8], "--accel-range was given beside --mavlink"),
+        (["--bus", "sim", "--system", 1], "--bus sim does not take --system"),
+        (["--mavlink", "sim", "--address", 0x68], "--mavlink sim does not take --address"),
+        (["--mavlink", "sim", "--accel-range", 8], "--mavlink sim does not take --accel-range"),
         (["--mavlink", "nonsense"], "cannot be understood"),
         (["--mavlink", "sim", "--signing-key", "/no/such/key"], "cannot be read"),
     ],
@@ -49,7 +49,7 @@ def test_what_does_not_fit_is_refused(words, what, tmp_path):
 def test_a_capture_of_mpucal_fixes_its_options(recorded, tmp_path):
     result = run("session", "--replay", recorded, "--gravity", 9.8, "-o", tmp_path / "out", "--yes")
     assert isinstance(result.exception, UsageError)
-    assert "the capture fixes it" in str(result.exception)
+    assert "which the capture fixes" in str(result.exception)
 
 
 def test_a_rate_is_asked_of_a_vehicle_whatever_a_chip_has(tmp_path):

@@ -49,7 +49,7 @@ def test_a_chip_under_another_name_is_recognised_and_a_correction_in_it_noticed(
     [
         ({"address": 0x50}, "on the bus", "0x50, an EEPROM"),
         ({"bound": [0x68]}, "on the bus", "held by a kernel driver"),
-        ({"fails": errno.ETIMEDOUT}, "bus", "does not come free"),
+        ({"fails": errno.ETIMEDOUT}, "bus", "does not become free"),
     ],
     ids=["nobody", "bound", "stuck"],
 )

@@ -147,7 +147,7 @@ def test_no_permission_is_one_sentence(device):
     result = mocked.installed("session", "--bus", NODE, "-o", "x")
     assert result.code == 3
     assert result.err.strip() == (
-        f"mpucal: no permission to use {NODE}: join the group that may: `sudo usermod -aG i2c $USER`,"
+        f"mpucal: no permission to use {NODE}: add yourself to its group: `sudo usermod -aG i2c $USER`,"
         " then log in again."
     )
 

@@ -53,7 +53,7 @@ def test_a_bus_that_is_held_is_not_asked_for_every_address(told):
     adapter = Adapter(lambda _address: errno.ETIMEDOUT)
     finding = told(adapter)
     assert finding.mark is Mark.BAD
-    assert "does not come free" in finding.what
+    assert "does not become free" in finding.what
     assert "holds SDA or SCL low" in finding.remedy
     assert len(adapter.asked) < 5
 

@@ -24,7 +24,7 @@ def recorded(guest, step):
 def test_a_chip_that_the_kernel_holds_is_pointed_to_by_its_other_name(guest):
     said = guest.said["held"]["code"]
     assert "a driver of the kernel holds the chip" in said
-    assert f"give --iio {guest.said['bound']['device']} in place of --bus" in said
+    assert f"use --iio {guest.said['bound']['device']} instead of --bus" in said
 
 
 def test_the_doctor_finds_the_driver_in_order(guest):

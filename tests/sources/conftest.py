@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from smbus2 import smbus2
 
-import mpucal.sources.i2c
+import mpucal.sources.host_bus
 from mpucal.simulated.chip import SimulatedBus
 from mpucal.simulated.chip.chip import Chip
 from mpucal.simulated.chip.clock import FastClock
@@ -146,7 +146,7 @@ def adapter(monkeypatch, tmp_path, still_chip):
         kernel.path.touch()
         monkeypatch.setattr(smbus2, "ioctl", kernel.ioctl)
         time = SimpleNamespace(monotonic_ns=clock.now, sleep=lambda s: clock.sleep_until(clock.now() + round(s * 1e9)))
-        monkeypatch.setattr(mpucal.sources.i2c, "time", time)
+        monkeypatch.setattr(mpucal.sources.host_bus, "time", time)
         return kernel
 
     return make

@@ -61,7 +61,7 @@ def test_a_kernel_driver_is_noticed_by_a_plain_read_first(adapter):
     [
         (errno.EREMOTEIO, NoAnswer, "nothing answers at 0x68"),
         (errno.ENXIO, NoAnswer, "nothing answers at 0x68"),
-        (errno.ETIMEDOUT, BusHeld, "does not come free .*holds SDA or SCL low"),
+        (errno.ETIMEDOUT, BusHeld, "does not become free .*holds SDA or SCL low"),
         (errno.EIO, BusError, "broke off .*shorten the wires"),
         (errno.EAGAIN, BusError, "another master"),
         (errno.EBUSY, BusError, "driver of the kernel"),
@@ -102,10 +102,10 @@ def test_where_a_stub_has_no_chip_nothing_answers(adapter):
 
 def test_no_such_bus_names_those_there_are(tmp_path, monkeypatch):
     monkeypatch.setattr(mpucal.sources.i2c_errors, "DEVICES", tmp_path)
-    with pytest.raises(BusError, match=r"there is no I2C bus .*i2c-7: enable I2C"):
+    with pytest.raises(BusError, match=r"there is not an I2C bus .*i2c-7: enable I2C"):
         I2cBus(str(tmp_path / "i2c-7"))
     (tmp_path / "i2c-1").touch()
-    with pytest.raises(BusError, match=r"there is no I2C bus .*i2c-7: take one of .*i2c-1"):
+    with pytest.raises(BusError, match=r"there is no I2C bus .*i2c-7: use one of .*i2c-1"):
         I2cBus(str(tmp_path / "i2c-7"))
 
 
@@ -147,7 +147,7 @@ def test_another_file_is_no_bus_and_is_closed_again(tmp_path):
     other.write_text("no bus")
     handles = len(os.listdir("/proc/self/fd"))  # noqa: PTH208
     for path in (other, tmp_path):
-        with pytest.raises(BusError, match="is no I2C bus"):
+        with pytest.raises(BusError, match="is not an I2C bus"):
             I2cBus(str(path))
     assert len(os.listdir("/proc/self/fd")) == handles  # noqa: PTH208
 
@@ -155,7 +155,7 @@ def test_another_file_is_no_bus_and_is_closed_again(tmp_path):
 def test_an_adapter_of_single_bytes_is_refused(adapter):
     kernel = adapter()
     kernel.functions = int(smbus2.I2cFunc.SMBUS_BYTE_DATA)
-    with pytest.raises(BusError, match="moves single bytes only"):
+    with pytest.raises(BusError, match="transfers single bytes only"):
         I2cBus(str(kernel.path))
 
 
@@ -177,14 +177,14 @@ def test_a_block_that_is_not_acknowledged_after_another_is_no_transfer_that_took
     kernel = adapter()
     kernel.functions = int(smbus2.I2cFunc.SMBUS_BYTE_DATA | smbus2.I2cFunc.SMBUS_I2C_BLOCK)
     bus = I2cBus(str(kernel.path))
-    whole = bus._part
+    whole = bus._read_part
 
     def fails_after_one(register, count):
         if count < 40:
             raise OSError(errno.EREMOTEIO, "Remote I/O error")
         return whole(register, count)
 
-    monkeypatch.setattr(bus, "_part", fails_after_one)
+    monkeypatch.setattr(bus, "_read_part", fails_after_one)
     with pytest.raises(BusError) as caught:
         bus.read(reg.FIFO_R_W, 64)
     assert not isinstance(caught.value, NoAnswer)
@@ -227,7 +227,7 @@ def test_an_adapter_that_moves_nothing_is_a_sentence(adapter, op):
     kernel = adapter()
     bus = I2cBus(str(kernel.path))
     kernel.failures[smbus2.I2C_RDWR] = errno.EOPNOTSUPP
-    with pytest.raises(BusError, match="cannot move this transfer"):
+    with pytest.raises(BusError, match="does not support this transfer"):
         bus.read(reg.FIFO_R_W, 14) if op == "read" else bus.write(reg.USER_CTRL, b"\0")
 
 

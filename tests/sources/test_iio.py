@@ -241,7 +241,7 @@ def test_an_accelerometer_alone_asks_for_the_other_device():
         (errno.EACCES, "no permission to write x of iio:device0: run it as root"),
         (errno.EBUSY, "another program reads the buffer of iio:device0"),
         (errno.ENODEV, "iio:device0 is gone"),
-        (errno.EINVAL, "does not take '7' for x"),
+        (errno.EINVAL, "does not accept '7' for x"),
         (errno.ETIMEDOUT, "cannot write x"),
     ],
 )
@@ -255,7 +255,7 @@ def test_each_error_number_of_a_buffer(number):
 
 
 def test_a_device_that_is_not_there_names_those_that_are(tree):
-    with pytest.raises(BusError, match=r"there is no iio:device3: there are iio:device0 \(mpu6050\)"):
+    with pytest.raises(BusError, match=r"there is no iio:device3: use one of iio:device0 \(mpu6050\)"):
         open_source({"iio": "3"})
 
 
@@ -266,7 +266,7 @@ def test_devices_by_their_names(text):
 
 
 def test_what_is_no_device_is_wrong_usage():
-    with pytest.raises(UsageError, match="is no device: give iio:deviceN"):
+    with pytest.raises(UsageError, match="is not a device: give iio:deviceN"):
         open_source({"iio": "mpu"})
 
 
@@ -274,5 +274,5 @@ def test_a_chip_that_the_kernel_holds_is_pointed_to_by_its_other_name(tmp_path, 
     monkeypatch.setattr(i2c_errors, "HELD", tmp_path)
     (tmp_path / "1-0068" / "iio:device2").mkdir(parents=True)
     error = OSError(errno.EBUSY, "busy")
-    assert "give --iio iio:device2 in place of --bus; or" in str(i2c_errors.transfer_error(error, "/dev/i2c-1", 0x68))
+    assert "use --iio iio:device2 instead of --bus; or" in str(i2c_errors.transfer_error(error, "/dev/i2c-1", 0x68))
     assert "--iio" not in str(i2c_errors.transfer_error(error, "/dev/i2c-1", 0x69))

@@ -20,7 +20,7 @@ from mpucal.errors import BusError, UsageError
 from mpucal.session.events import Prompt, PromptKind
 from mpucal.simulated.chip import open_simulated
 from mpucal.simulated.chip.clock import FastClock
-from mpucal.sources import spi
+from mpucal.sources import host_bus, spi
 from mpucal.sources.chip import OpenedChip
 from mpucal.sources.spi import SpiBus
 
@@ -70,7 +70,7 @@ def opened(monkeypatch):
         stopped = SimpleNamespace(
             monotonic_ns=clock.now, sleep=lambda s: clock.sleep_until(clock.now() + round(s * 1e9))
         )
-        monkeypatch.setattr(spi, "time", stopped)
+        monkeypatch.setattr(host_bus, "time", stopped)
         bus = SpiBus("/dev/spidev0.0")
         return bus, library.SpiDev.made
 
@@ -104,7 +104,7 @@ def test_a_clock_that_wires_bear_is_not_passed(opened):
     bus.read(reg.FIFO_R_W, 28)
     assert bus._device.path == "/dev/spidev0.0"
     assert [hz for _, hz in bus._device.messages] == [1_000_000, 4_000_000]
-    with pytest.raises(UsageError, match=r"quick is no clock .*give /dev/spidev0\.0:HZ"):
+    with pytest.raises(UsageError, match=r"quick is not a clock .*give /dev/spidev0\.0:HZ"):
         SpiBus("/dev/spidev0.0:quick")
 
 
@@ -169,8 +169,8 @@ def test_the_doctor_examines_it(opened):
     ("number", "says"),
     [
         (errno.ENOENT, "there is no SPI device /dev/spidev0.0: enable SPI"),
-        (errno.EACCES, "no permission to use /dev/spidev0.0: join the group"),
-        (errno.ENOTTY, "is no SPI device"),
+        (errno.EACCES, "no permission to use /dev/spidev0.0: add yourself"),
+        (errno.ENOTTY, "is not an SPI device"),
         (errno.ENODEV, "is gone"),
         (errno.EIO, "a transfer with /dev/spidev0.0 failed"),
     ],

@@ -1,6 +1,6 @@
-"""The serial bridge as a program for MicroPython; see firmware_protocol.md. mpucal pastes it, and it runs from RAM.
+"""Serial bridge for MicroPython; see firmware_protocol.md. mpucal pastes this program, which runs from RAM.
 
-The last line of what is pasted calls `main`. Nothing here is used on the host but by tests, which run it there too.
+The last line that is pasted calls `main`. On the host only tests run it.
 """
 
 import binascii
@@ -18,15 +18,15 @@ ADDRESSES = (0x68, 0x69)
 INT_STATUS, FIFO_COUNT, FIFO_R_W = 0x3A, 0x72, 0x74
 MAX_READ, MAX_WRITE, MAX_BURST, MAX_BATCH, MAX_LOOK, MAX_ENCODED, MAX_BLOB = 56, 32, 4096, 32, 73, 71, 256
 BEAT_US = 100_000
-# the clock of a board is narrower than the protocol's
+# A board's clock has fewer bits than the protocol's.
 TICKS = 2**30 - 1
-# as Linux and as lwIP number ETIMEDOUT
+# ETIMEDOUT of Linux and of lwIP.
 TIMED_OUT = (110, 116)
 SLOTS = ("mpucal_blob0.bin", "mpucal_blob1.bin")
 
 
 def crc_table():
-    """CRC-16/CCITT-FALSE of each byte."""
+    """Yield the CRC-16/CCITT-FALSE of each byte."""
     for byte in range(256):
         crc = byte << 8
         for _ in range(8):
@@ -39,7 +39,7 @@ TABLE = tuple(crc_table())
 
 
 def crc16(data):
-    """Of `data`."""
+    """Return the CRC-16 of `data`."""
     crc = 0xFFFF
     for byte in data:
         crc = crc << 8 & 0xFF00 ^ TABLE[crc >> 8 ^ byte]
@@ -47,14 +47,14 @@ def crc16(data):
 
 
 def framed(kind, seq, payload):
-    """A message as bytes on the line."""
+    """Encode a message to the bytes on the line."""
     content = bytes((kind, seq)) + payload
     content += struct.pack("<H", crc16(content))
     return b"".join(bytes((len(piece) + 1,)) + piece for piece in content.split(b"\0")) + b"\0"
 
 
 def unframed(encoded):
-    """The content without its CRC; None: it is no frame."""
+    """Decode a frame to its content without the CRC; None if it is not a frame."""
     pieces, at = [], 0
     while at < len(encoded):
         end = at + encoded[at]
@@ -68,8 +68,8 @@ def unframed(encoded):
     return content[:-2]
 
 
-def acceptable(blob):
-    """Whether a reader may accept `blob`."""
+def is_valid(blob):
+    """Return True if `blob` is valid for a reader."""
     if len(blob) < 188 or blob[:5] != b"MPUC\1" or struct.unpack("<H", blob[6:8])[0] != len(blob):
         return False
     if binascii.crc32(blob[:-4]) != struct.unpack("<I", blob[-4:])[0]:
@@ -87,18 +87,18 @@ def acceptable(blob):
 
 
 class Failed(Exception):
-    """A request that cannot be done; its argument is the status."""
+    """Error of a request that cannot be done; its argument is the status."""
 
 
 class Chip:
-    """The chip on one of `buses`, which MicroPython's machine.I2C are."""
+    """Chip on one of `buses`, which are machine.I2C of MicroPython."""
 
     def __init__(self, buses):
         self.buses = buses
         self.i2c, self.address = None, 0
 
     def find(self, addresses):
-        """Use what answers at one of `addresses`."""
+        """Find the chip: the first of `addresses` that answers on a bus."""
         self.i2c, self.address = None, 0
         for i2c in self.buses:
             for address in addresses:
@@ -110,24 +110,24 @@ class Chip:
                 return
 
     def read(self, register, count):
-        """`count` bytes from `register` on."""
-        return self.moved(lambda: self.i2c.readfrom_mem(self.address, register, count))
+        """Read `count` bytes from `register` on."""
+        return self.transfer(lambda: self.i2c.readfrom_mem(self.address, register, count))
 
     def write(self, register, data):
-        """`data` from `register` on."""
-        self.moved(lambda: self.i2c.writeto_mem(self.address, register, data))
+        """Write `data` from `register` on."""
+        self.transfer(lambda: self.i2c.writeto_mem(self.address, register, data))
 
-    def moved(self, transfer):
-        """What `transfer` gives."""
+    def transfer(self, access):
+        """Make an access, and convert its error to a status."""
         if not self.address:
             raise Failed(NO_ANSWER)
         try:
-            return transfer()
+            return access()
         except OSError as error:
-            raise Failed(self.why(error))
+            raise Failed(self.status_of(error))
 
-    def why(self, error):
-        """The status of a transfer that failed: boards give one that was not acknowledged different numbers."""
+    def status_of(self, error):
+        """Return the status of a failed transfer: a missing acknowledge has another number on each board."""
         if error.args[0] in TIMED_OUT:
             return BUS_FAILED
         try:
@@ -137,15 +137,15 @@ class Chip:
         return BUS_FAILED
 
 
-class Keeper:
-    """The blob, in two files: header and blob of a slot in each."""
+class BlobFiles:
+    """Two files for the blob: each is a slot with a header and a blob."""
 
     def __init__(self, folder):
         self.paths = [folder + name for name in SLOTS]
         self.begun = None
 
     def slot(self, number):
-        """Its generation and blob; None: it is not valid."""
+        """Read a slot's generation and blob; None if it is not valid."""
         try:
             with open(self.paths[number], "rb") as file:
                 data = file.read()
@@ -155,10 +155,10 @@ class Keeper:
             return None
         generation, check = struct.unpack("<II", data[:8])
         blob = data[8:]
-        return (generation, blob) if generation ^ check == 0xFFFFFFFF and acceptable(blob) else None
+        return (generation, blob) if generation ^ check == 0xFFFFFFFF and is_valid(blob) else None
 
     def stored(self):
-        """Number, generation and blob of the slot that counts; the number that is free, 0 and None where none does."""
+        """Return number, generation and blob of the valid slot; 1, 0 and None without one."""
         first, second = self.slot(0), self.slot(1)
         if first and second:
             number = 1 if (second[0] - first[0]) & 0xFFFFFFFF < 0x80000000 else 0
@@ -168,14 +168,14 @@ class Keeper:
         return (number, found[0], found[1]) if found else (1, 0, None)
 
     def remove(self, number):
-        """A slot, if it is there."""
+        """Remove a slot if it is there."""
         try:
             os.remove(self.paths[number])
         except OSError:
             pass
 
     def commit(self):
-        """Store what was begun; returns its generation."""
+        """Store the received blob, and return its generation."""
         used, generation, _ = self.stored()
         generation = generation + 1 & 0xFFFFFFFF or 1
         blob, free, self.begun = bytes(self.begun), 1 - used, None
@@ -190,13 +190,13 @@ class Keeper:
 
 
 class Bridge:
-    """The bridge; `ticks_us` is its clock, of 30 bits or more, asked once in nine minutes at least.
+    """Bridge; `ticks_us` is its clock of 30 bits or more, which must be read once in nine minutes.
 
-    `left` : the host has said LEAVE.
+    `left` : True after the host has sent LEAVE.
     """
 
     def __init__(self, buses, ticks_us, folder=""):
-        self.chip, self.keeper = Chip(buses), Keeper(folder)
+        self.chip, self.files = Chip(buses), BlobFiles(folder)
         self.ticks_us, self.ticks, self.now_us = ticks_us, ticks_us(), 0
         self.piece, self.inbox = bytearray(), []
         self.greeted = self.left = False
@@ -217,7 +217,7 @@ class Bridge:
         }
 
     def receive(self, data):
-        """Bytes came in."""
+        """Take received bytes."""
         for byte in data:
             if byte:
                 if len(self.piece) <= MAX_ENCODED:
@@ -229,35 +229,35 @@ class Bridge:
             self.piece = bytearray()
 
     def work(self):
-        """Do what there is to do; returns what goes out."""
+        """Answer the requests and read the FIFO; return the bytes to send."""
         out = b""
         while self.inbox:
             content = self.inbox.pop(0)
             for payload in self.answer(content[0], content[1], content[2:]):
                 out += framed(content[0] | 0x80, content[1], payload)
-        return out + self.look() if self.frame_bytes else out
+        return out + self.push() if self.frame_bytes else out
 
     def clock(self):
-        """What it shows, us."""
+        """Return the time, us."""
         ticks = self.ticks_us()
         self.now_us = self.now_us + (ticks - self.ticks & TICKS) & 0xFFFFFFFF
         self.ticks = ticks
         return self.now_us
 
-    def said(self, status, tail=b""):
-        """A reply's payload."""
+    def reply(self, status, tail=b""):
+        """Make the payload of a reply, as a list of one."""
         return [struct.pack("<BI", status, self.clock()) + tail]
 
     def answer(self, kind, seq, payload):
-        """The payloads of the replies to a request."""
+        """Carry out a request, and return the payloads of its replies."""
         if not self.greeted and kind != 1:
-            return self.said(NO_HELLO)
+            return self.reply(NO_HELLO)
         if kind not in self.requests:
-            return self.said(UNKNOWN_TYPE)
+            return self.reply(UNKNOWN_TYPE)
         form, act = self.requests[kind]
         size = struct.calcsize(form)
         if len(payload) < size:
-            return self.said(BAD_PAYLOAD)
+            return self.reply(BAD_PAYLOAD)
         values = struct.unpack(form, payload[:size])
         if kind in (1, 4, 19):
             values += (payload[size:],)
@@ -266,33 +266,33 @@ class Bridge:
         try:
             return act(*values)
         except Failed as error:
-            return self.said(error.args[0])
+            return self.reply(error.args[0])
 
     def hello(self, magic, major, _minor, rest):
-        """Who is there."""
+        """Answer HELLO with the bridge's description."""
         if magic != b"MPUB" or (major == 1 and not b"" < rest[:1] < b"\x80"):
-            return self.said(BAD_PAYLOAD)
+            return self.reply(BAD_PAYLOAD)
         if major == 1:
             address = rest[0]
-            self.greeted, self.frame_bytes, self.drops, self.keeper.begun = True, 0, 0, None
+            self.greeted, self.frame_bytes, self.drops, self.files.begun = True, 0, 0, None
             self.chip.find((address,) if address else ADDRESSES)
         here = struct.pack("<BBBBBH", 1, 0, self.chip.address, STREAM | BLOB | LEAVE, 2, MAX_BLOB)
-        return self.said(OK if major == 1 else BAD_VERSION, b"MPUB" + here + NAME)
+        return self.reply(OK if major == 1 else BAD_VERSION, b"MPUB" + here + NAME)
 
     def leave(self):
-        """End the program."""
+        """Note that the program is to end."""
         self.left, self.frame_bytes = True, 0
-        return self.said(OK)
+        return self.reply(OK)
 
     def read(self, register, count):
-        """Registers."""
+        """Read registers."""
         if not 1 <= count <= MAX_READ:
             raise Failed(BAD_PAYLOAD)
         began = struct.pack("<BI", OK, self.clock())
         return [began + self.chip.read(register, count)]
 
     def burst(self, register, count):
-        """One register, often."""
+        """Read a register that does not auto-increment, in several replies."""
         if not 1 <= count <= MAX_BURST:
             raise Failed(BAD_PAYLOAD)
         made = []
@@ -301,11 +301,11 @@ class Bridge:
             try:
                 made.append(began + self.chip.read(register, min(MAX_READ, count - at)))
             except Failed as error:
-                return made + self.said(error.args[0])
+                return made + self.reply(error.args[0])
         return made
 
     def write(self, register, data):
-        """Registers."""
+        """Write registers."""
         if not 1 <= len(data) <= MAX_WRITE:
             raise Failed(BAD_PAYLOAD)
         began = struct.pack("<BI", OK, self.clock())
@@ -313,35 +313,35 @@ class Bridge:
         return [began]
 
     def stream(self, frame_bytes, batch, seq):
-        """Push what the FIFO collects."""
+        """Start or stop pushing the FIFO's content."""
         if frame_bytes > MAX_READ or (frame_bytes and not 1 <= batch <= MAX_BATCH):
             raise Failed(BAD_PAYLOAD)
         self.frame_bytes, self.batch, self.seq = frame_bytes, batch, seq
         self.index = self.status = 0
         self.pushed_us = self.clock()
-        return self.said(OK)
+        return self.reply(OK)
 
-    def look(self):
-        """What there is to push."""
+    def push(self):
+        """Return the frames to push, if any are due."""
         now = self.clock()
         late = (now - self.pushed_us & 0xFFFFFFFF) >= BEAT_US
         if self.status:
             made = [self.frames(now)] if late else []
         else:
             try:
-                made = self.looked(now, late)
+                made = self.drain(now, late)
             except Failed as error:
-                made = [self.stand(error.args[0], now)]
+                made = [self.stop(error.args[0], now)]
         if made:
             self.pushed_us = now
         return b"".join(made)
 
-    def looked(self, now, late):
-        """One look at a FIFO that runs."""
+    def drain(self, now, late):
+        """Read a running FIFO if it has enough frames, or the last message is old."""
         size = self.frame_bytes
         left = struct.unpack(">H", self.chip.read(FIFO_COUNT, 2))[0] // size
         if left > MAX_LOOK:
-            return [self.stand(OVERFLOW, now)]
+            return [self.stop(OVERFLOW, now)]
         if left < self.batch and not late:
             return []
         made = []
@@ -353,86 +353,86 @@ class Bridge:
                 break
             made.append(self.frames(now, data, left))
         if self.chip.read(INT_STATUS, 1)[0] & 0x10:
-            return made + [self.stand(OVERFLOW, now)]
+            return made + [self.stop(OVERFLOW, now)]
         return made + [self.frames(now, data)]
 
-    def stand(self, status, now):
-        """Something was lost."""
+    def stop(self, status, now):
+        """Count a loss, and report why the stream stands still."""
         self.drops = self.drops + 1 & 0xFFFF
         self.status = status
         return self.frames(now)
 
     def frames(self, now, data=b"", left=0):
-        """One message of a look."""
+        """Make a FRAMES message of a look."""
         payload = struct.pack("<BIHHB", self.status, now, self.index, self.drops, left) + data
         self.index = self.index + len(data) // self.frame_bytes & 0xFFFF
         return framed(0xC0, self.seq, payload)
 
     def blob_state(self):
-        """Which is stored."""
-        _, generation, blob = self.keeper.stored()
+        """Describe the stored blob."""
+        _, generation, blob = self.files.stored()
         if blob is None:
-            return self.said(NO_BLOB, bytes(10))
-        return self.said(OK, struct.pack("<IH", generation, len(blob)) + blob[-4:])
+            return self.reply(NO_BLOB, bytes(10))
+        return self.reply(OK, struct.pack("<IH", generation, len(blob)) + blob[-4:])
 
     def blob_read(self, offset, count):
-        """Some of it."""
+        """Read a part of the stored blob."""
         if not 1 <= count <= MAX_READ:
             raise Failed(BAD_PAYLOAD)
-        blob = self.keeper.stored()[2]
+        blob = self.files.stored()[2]
         if blob is None:
             raise Failed(NO_BLOB)
         if offset + count > len(blob):
             raise Failed(BAD_OFFSET)
-        return self.said(OK, blob[offset : offset + count])
+        return self.reply(OK, blob[offset : offset + count])
 
     def blob_begin(self, length):
-        """Another comes."""
+        """Prepare for a blob of `length` bytes."""
         if length > MAX_BLOB:
             raise Failed(NO_ROOM)
         self.frame_bytes, self.length = 0, length
-        self.keeper.remove(1 - self.keeper.stored()[0])
-        self.keeper.begun = bytearray()
-        return self.said(OK)
+        self.files.remove(1 - self.files.stored()[0])
+        self.files.begun = bytearray()
+        return self.reply(OK)
 
     def blob_data(self, offset, data):
-        """Some of it."""
+        """Receive a part of the blob."""
         if not 1 <= len(data) <= MAX_WRITE:
             raise Failed(BAD_PAYLOAD)
-        begun = self.keeper.begun
+        begun = self.files.begun
         if begun is None:
             raise Failed(NOT_BEGUN)
         if offset > len(begun) or offset + len(data) > self.length:
             raise Failed(BAD_OFFSET)
-        self.keeper.begun = begun[:offset] + data + begun[offset + len(data) :]
-        return self.said(OK)
+        self.files.begun = begun[:offset] + data + begun[offset + len(data) :]
+        return self.reply(OK)
 
     def blob_commit(self, length, crc):
-        """Store it."""
-        _, generation, blob = self.keeper.stored()
-        begun = self.keeper.begun
+        """Check and store the received blob."""
+        _, generation, blob = self.files.stored()
+        begun = self.files.begun
         if begun is None:
             if blob is None or (len(blob), blob[-4:]) != (length, struct.pack("<I", crc)):
                 raise Failed(NOT_BEGUN)
         elif len(begun) != self.length or length != self.length:
             raise Failed(BAD_OFFSET)
-        elif not acceptable(bytes(begun)) or begun[-4:] != struct.pack("<I", crc):
+        elif not is_valid(bytes(begun)) or begun[-4:] != struct.pack("<I", crc):
             raise Failed(BAD_BLOB)
         else:
-            generation = self.keeper.commit()
-        return self.said(OK, struct.pack("<I", generation))
+            generation = self.files.commit()
+        return self.reply(OK, struct.pack("<I", generation))
 
     def blob_erase(self):
-        """Store none."""
-        used = self.keeper.stored()[0]
-        self.keeper.begun = None
-        self.keeper.remove(1 - used)
-        self.keeper.remove(used)
-        return self.said(OK if self.keeper.stored()[2] is None else STORAGE_FAILED)
+        """Erase the stored blob."""
+        used = self.files.stored()[0]
+        self.files.begun = None
+        self.files.remove(1 - used)
+        self.files.remove(used)
+        return self.reply(OK if self.files.stored()[2] is None else STORAGE_FAILED)
 
 
 def buses(machine, pins):
-    """The I2C buses at `pins`, (SDA, SCL), or at the board's own; where its hardware has none there, made of pins."""
+    """Open the I2C buses at `pins` (SDA, SCL), or the board's own; a software bus if the hardware has none there."""
     how = {"freq": 400_000, "timeout": 25_000}
     if pins:
         how["sda"], how["scl"] = (machine.Pin(pin) for pin in pins)
@@ -457,10 +457,10 @@ def main(pins):
     waiting = select.poll()
     waiting.register(sys.stdin, select.POLLIN)
     bridge = Bridge(buses(machine, pins), time.ticks_us)
-    # a frame holds any byte, Ctrl-C too
+    # A frame may hold the byte of Ctrl-C.
     micropython.kbd_intr(-1)
     try:
-        # an empty frame: the bridge runs
+        # An empty frame shows that the bridge runs.
         sys.stdout.buffer.write(b"\0")
         while not bridge.left:
             while waiting.poll(0):

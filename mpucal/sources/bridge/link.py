@@ -59,7 +59,7 @@ class LinkLost(LinkError):  # noqa: N818 - reads as the sentence it is
 
 
 class Link:
-    """One bridge on one port.
+    """Link to the bridge on a port.
 
     Parameters
     ----------

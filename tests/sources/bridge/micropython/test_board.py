@@ -142,14 +142,14 @@ def test_its_clock_is_as_wide_as_the_protocols(pasted):
 def test_a_write_that_power_cuts_leaves_the_old_blob(pasted, tmp_path):
     bridge = pasted(None, lambda: 0)
     for blob in (BLOB, BLOB):
-        bridge.keeper.begun = bytearray(blob)
-        bridge.keeper.commit()
-    used, generation, _ = bridge.keeper.stored()
+        bridge.files.begun = bytearray(blob)
+        bridge.files.commit()
+    used, generation, _ = bridge.files.stored()
     assert generation == 2
-    whole = Path(bridge.keeper.paths[used]).read_bytes()
+    whole = Path(bridge.files.paths[used]).read_bytes()
     for cut in range(len(whole)):
-        Path(bridge.keeper.paths[used]).write_bytes(whole[:cut])
-        assert bridge.keeper.stored() == (1 - used, 1, BLOB)
+        Path(bridge.files.paths[used]).write_bytes(whole[:cut])
+        assert bridge.files.stored() == (1 - used, 1, BLOB)
 
 
 def session(bus, chip, folder):

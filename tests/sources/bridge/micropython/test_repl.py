@@ -83,4 +83,4 @@ def test_a_board_that_cannot_run_it_says_why(repl):
 
 def test_pins_are_two(capsys):
     assert run(["show", "--serial", "/dev/ttyACM0", "--micropython=4"]) == 2
-    assert "'4' are not two pins, SDA,SCL." in capsys.readouterr().err
+    assert "'4' is not two pins, SDA,SCL." in capsys.readouterr().err

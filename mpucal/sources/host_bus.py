@@ -1,0 +1,64 @@
+"""Common parts of the buses of this computer: the monotonic clock, the search for the chip, and system errors."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+from ..chip.families import PARTS
+from ..chip.registers import FIFO_R_W
+from ..errors import BusError, NoAnswer
+from .i2c_errors import no_answer_error
+
+# AD0 low, AD0 high
+ADDRESSES = (0x68, 0x69)
+
+
+class HostBus:
+    """Base of a bus whose clock is the monotonic clock of the host."""
+
+    def now_ns(self) -> int:
+        """Return the time of the clock."""
+        return time.monotonic_ns()
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Sleep until the clock shows `t_ns`."""
+        time.sleep(max(0, t_ns - time.monotonic_ns()) * 1e-9)
+
+
+def register_after(register: int, count: int) -> int:
+    """Return the register of the byte `count` bytes after the first; FIFO_R_W does not auto-increment."""
+    return register if register == FIFO_R_W else register + count
+
+
+def find_chip(path: str, addresses: Sequence[int], who_am_i: Callable[[int], int]) -> int:
+    """Return the first address at which a known part answers `who_am_i`, else the first at which anything answers.
+
+    Raises
+    ------
+    BusError : the first failure of a transfer if nothing answers. NoAnswer : nothing acknowledges.
+    """
+    failures: list[BusError] = []
+    others: list[int] = []
+    for address in addresses:
+        try:
+            if who_am_i(address) in PARTS:
+                return address
+            others.append(address)
+        except NoAnswer:
+            continue
+        except BusError as error:
+            failures.append(error)
+    if others:
+        return others[0]
+    raise next(iter(failures), no_answer_error(path, addresses))
+
+
+@contextmanager
+def converting(convert: Callable[[OSError], BusError]) -> Iterator[None]:
+    """Convert an OSError of the `with` block to the BusError of `convert`."""
+    try:
+        yield
+    except OSError as error:
+        raise convert(error) from error
