@@ -15,7 +15,8 @@ from .intervals import TELLS_BIAS_S, Intervals, gravity_turns, statistics
 
 TURNING_RAD_S = 0.005  # slower, gravity wanders by a hand that settles and by noise
 TREMOR_S = 0.05  # correlation time of a hand's tremor
-RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # (rad/s)^2 a second
+RANDOM_WALKS = 10.0 ** np.arange(-13.0, -3.0, 0.5)  # (rad/s)^2 a second; the first is none
+DRIFTS_99 = 11.3  # scipy.stats.chi2.ppf(0.99, 3): twice what the log likelihood gains by walks of chance, on three axes
 
 
 def without_drift(recording: Recording, flat: Flat, runs: Intervals) -> Recording:
@@ -56,4 +57,5 @@ def _smoothed(t: Vector, mean: Vector, variance: Vector) -> Vector:
         m[i], P[i] = m_before[i] + gain * e, (1.0 - gain) * P_before[i]
     for i in range(k - 2, -1, -1):
         m[i] += P[i] / P_before[i + 1] * (m[i + 1] - m_before[i + 1])
-    return np.asarray(m[:, np.arange(3), cost.argmin(1)])
+    likeliest = cost.argmin(1) if np.sum(cost[:, 0] - cost.min(1)) > DRIFTS_99 else 0
+    return np.asarray(m[:, np.arange(3), likeliest])
